@@ -1,0 +1,32 @@
+//! What EtherCAT looks like on the wire: a codec without state, policy, allocation, clock or I/O.
+//!
+//! * [`frame`]: Ethernet, VLAN and UDP encapsulation, the EtherCAT header, reading and building frames;
+//! * [`datagram`], [`command`]: one EtherCAT command and its header;
+//! * [`source_address`]: the two encodings of ring and standby marks in the source MAC address;
+//! * [`register`]: the register table of a SubDevice controller and typed views of its registers;
+//! * [`al`]: states of the EtherCAT state machine and AL status codes;
+//! * [`sii`]: SubDevice information (EEPROM), reader and writer;
+//! * [`mailbox`]: the mailbox header and the SDO services of CoE;
+//! * [`time`], [`address`]: newtypes.
+//!
+//! # Panic contract
+//!
+//! Decoding any bytes never panics: what does not fit is an error that says what was expected and what came.
+//! Unknown codes from the wire are kept, so that decode and encode are inverse.
+#![no_std]
+#![forbid(unsafe_code)]
+
+#[cfg(test)]
+extern crate std;
+
+pub mod address;
+pub mod al;
+mod bytes;
+pub mod command;
+pub mod datagram;
+pub mod frame;
+pub mod mailbox;
+pub mod register;
+pub mod sii;
+pub mod source_address;
+pub mod time;
