@@ -1,0 +1,151 @@
+//! Allowed arrows between crates.
+//!
+//! In go the manifests `crates/*/Cargo.toml`, out comes a finding for every dependency that [`ROOMS`] does not list.
+//! Normal, build and development dependencies count alike: a test must not know what its crate must not know.
+
+use toml::{Table, Value};
+
+use crate::Finding;
+use crate::tree::{File, Tree};
+
+/// What one crate may depend on.
+struct Room {
+    /// Directory below `crates/`.
+    directory: &'static str,
+    /// Crates of this repository.
+    internal: Internal,
+    /// Crates from the registry outside of tests.
+    external: External,
+}
+
+enum Internal {
+    Only(&'static [&'static str]),
+    Any,
+}
+
+enum External {
+    Only(&'static [&'static str]),
+    Any,
+}
+
+/// The map of `docs/ARCHITECTURE.md`; a new crate gets a line here and there.
+const ROOMS: &[Room] = &[
+    Room { directory: "wire", internal: Internal::Only(&[]), external: External::Only(&[]) },
+    Room { directory: "engine", internal: Internal::Only(&["ringcat-wire"]), external: External::Only(&[]) },
+    Room {
+        directory: "sim",
+        internal: Internal::Only(&["ringcat-wire"]),
+        external: External::Only(&["serde", "toml"]),
+    },
+    Room {
+        directory: "ringcat",
+        internal: Internal::Only(&["ringcat-engine", "ringcat-sim", "ringcat-wire"]),
+        external: External::Any,
+    },
+    Room { directory: "scenarios", internal: Internal::Any, external: External::Any },
+    Room { directory: "tidy", internal: Internal::Only(&[]), external: External::Only(&["toml"]) },
+];
+
+/// Tables of a manifest that list dependencies; the first two end up in the product.
+const TABLES: [&str; 3] = ["dependencies", "build-dependencies", "dev-dependencies"];
+
+/// Dependencies that are not allowed, and crates that have no line in the table.
+pub fn forbidden_arrows(tree: &Tree) -> Vec<Finding> {
+    let mut findings = Vec::new();
+    for (directory, file) in manifests(tree) {
+        match (ROOMS.iter().find(|room| room.directory == directory), file.text.parse::<Table>()) {
+            (None, _) => findings.push(Finding::new(&file.path, 0, "no room in crates/tidy/src/crates.rs: add it")),
+            (_, Err(error)) => findings.push(Finding::new(&file.path, 0, format!("cannot be read: {error}"))),
+            (Some(room), Ok(manifest)) => check(room, &file.path, &manifest, &internal_names(tree), &mut findings),
+        }
+    }
+    findings
+}
+
+fn manifests(tree: &Tree) -> impl Iterator<Item = (&str, &File)> {
+    tree.files.iter().filter_map(|file| {
+        let directory = file.path.strip_prefix("crates/")?.strip_suffix("/Cargo.toml")?;
+        (!directory.contains('/')).then_some((directory, file))
+    })
+}
+
+fn internal_names(tree: &Tree) -> Vec<String> {
+    let name = |file: &File| {
+        let manifest = file.text.parse::<Table>().ok()?;
+        Some(manifest.get("package")?.get("name")?.as_str()?.to_owned())
+    };
+    manifests(tree).filter_map(|(_, file)| name(file)).collect()
+}
+
+fn check(room: &Room, path: &str, manifest: &Table, internal: &[String], findings: &mut Vec<Finding>) {
+    for (table, name) in dependencies(manifest) {
+        let allowed = if internal.contains(&name) {
+            match room.internal {
+                Internal::Only(names) => names.contains(&name.as_str()),
+                Internal::Any => true,
+            }
+        } else {
+            match room.external {
+                External::Only(names) => table == "dev-dependencies" || names.contains(&name.as_str()),
+                External::Any => true,
+            }
+        };
+        if !allowed {
+            findings.push(Finding::new(path, 0, format!("must not depend on {name} ([{table}])")));
+        }
+    }
+}
+
+/// Table and name of every dependency, those of single targets and renamed ones too.
+fn dependencies(manifest: &Table) -> Vec<(&'static str, String)> {
+    let targets = manifest.get("target").and_then(Value::as_table);
+    let per_target = targets.into_iter().flat_map(|t| t.values()).filter_map(Value::as_table);
+    let mut found = Vec::new();
+    for section in std::iter::once(manifest).chain(per_target) {
+        for table in TABLES {
+            for (key, value) in section.get(table).and_then(Value::as_table).into_iter().flatten() {
+                let name = value.get("package").and_then(Value::as_str).unwrap_or(key);
+                found.push((table, name.to_owned()));
+            }
+        }
+    }
+    found
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn findings(sim: &str) -> Vec<String> {
+        let engine = "[package]\nname = \"ringcat-engine\"\n";
+        let wire = "[package]\nname = \"ringcat-wire\"\n";
+        let files = [("engine", engine), ("sim", sim), ("wire", wire)];
+        let files = files.iter().map(|(name, text)| File::new(&format!("crates/{name}/Cargo.toml"), text)).collect();
+        forbidden_arrows(&Tree { files }).iter().map(ToString::to_string).collect()
+    }
+
+    #[test]
+    fn the_simulator_may_know_the_codec_and_not_the_engine() {
+        assert!(findings("[dependencies]\nringcat-wire.workspace = true\ntoml = \"1\"\n").is_empty());
+        let engine = "crates/sim/Cargo.toml: must not depend on ringcat-engine ([dev-dependencies])";
+        assert_eq!(findings("[dev-dependencies]\nringcat-engine.workspace = true\n"), [engine]);
+    }
+
+    #[test]
+    fn renamed_and_target_dependencies_are_seen() {
+        let renamed = "[target.'cfg(unix)'.dependencies]\nother = { package = \"ringcat-engine\", path = \"x\" }\n";
+        assert_eq!(findings(renamed).len(), 1);
+    }
+
+    #[test]
+    fn crates_from_the_registry_are_free_in_tests_only() {
+        assert!(findings("[dev-dependencies]\nproptest = \"1\"\n").is_empty());
+        assert_eq!(findings("[dependencies]\nrand = \"1\"\n").len(), 1);
+    }
+
+    #[test]
+    fn a_crate_without_a_room_is_found() {
+        let tree = Tree { files: vec![File::new("crates/new/Cargo.toml", "")] };
+        assert_eq!(forbidden_arrows(&tree).len(), 1);
+    }
+}

@@ -1,0 +1,48 @@
+//! Checks of the source tree that the compiler does not make; `tests/tree.rs` runs them over this repository.
+//!
+//! In goes the text of the tree ([`tree::Tree`]), out come [`Finding`]s, each with the place and what to do about it.
+//! One module per rule:
+//!
+//! * [`files`]: length of files, forbidden names, the opening comment, marks of unfinished work;
+//! * [`crates`]: allowed arrows between crates;
+//! * [`modules`]: allowed arrows between the modules of the engine;
+//! * [`safety`]: where `unsafe` may be written;
+//! * [`features`]: every row of `docs/FEATURES.md` names tests that exist.
+//!
+//! [`tokens`] is the little Rust lexer under them, so that words in comments and strings are not taken for code.
+#![forbid(unsafe_code)]
+
+pub mod crates;
+pub mod features;
+pub mod files;
+pub mod modules;
+pub mod safety;
+pub mod tokens;
+pub mod tree;
+
+use std::fmt;
+
+/// Something that breaks a rule, or is about to.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Finding {
+    /// File, relative to the root of the repository, with `/` between its parts.
+    pub file: String,
+    /// Line, counted from 1; 0 is the whole file.
+    pub line: usize,
+    /// What is wrong and what to do.
+    pub text: String,
+}
+
+impl Finding {
+    /// A finding at a line of a file.
+    pub fn new(file: &str, line: usize, text: impl Into<String>) -> Finding {
+        Finding { file: file.to_owned(), line, text: text.into() }
+    }
+}
+
+impl fmt::Display for Finding {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Finding { file, line, text } = self;
+        if *line == 0 { write!(f, "{file}: {text}") } else { write!(f, "{file}:{line}: {text}") }
+    }
+}

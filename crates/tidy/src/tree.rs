@@ -1,0 +1,91 @@
+//! The files that are checked: everything below `crates/`, `ci/` and `docs/`, read once.
+//!
+//! In goes the root of the repository, out come paths and texts, sorted. Build output is left out.
+
+use std::fs;
+use std::io;
+use std::path::{Path, PathBuf};
+
+/// One file of text.
+#[derive(Clone, Debug)]
+pub struct File {
+    /// Relative to the root, with `/` between its parts.
+    pub path: String,
+    /// What is in it.
+    pub text: String,
+}
+
+impl File {
+    /// A file that exists only here.
+    pub fn new(path: &str, text: &str) -> File {
+        File { path: path.to_owned(), text: text.to_owned() }
+    }
+
+    /// Whether it is Rust source.
+    pub fn is_rust(&self) -> bool {
+        self.path.ends_with(".rs")
+    }
+}
+
+/// All files that the checks look at.
+#[derive(Clone, Debug, Default)]
+pub struct Tree {
+    /// Sorted by path.
+    pub files: Vec<File>,
+}
+
+/// Directories of the repository that are read.
+const ROOTS: [&str; 3] = ["crates", "ci", "docs"];
+
+/// Kinds of files that are read.
+const EXTENSIONS: [&str; 3] = ["rs", "toml", "md"];
+
+impl Tree {
+    /// Reads the repository that this crate lies in.
+    pub fn of_this_repository() -> io::Result<Tree> {
+        Tree::read(&Path::new(env!("CARGO_MANIFEST_DIR")).join("../.."))
+    }
+
+    /// Reads the repository at `root`.
+    pub fn read(root: &Path) -> io::Result<Tree> {
+        let mut files = Vec::new();
+        for directory in ROOTS {
+            let path = root.join(directory);
+            if path.is_dir() {
+                collect(root, &path, &mut files)?;
+            }
+        }
+        files.sort_by(|a, b| a.path.cmp(&b.path));
+        Ok(Tree { files })
+    }
+
+    /// The file with this path.
+    pub fn file(&self, path: &str) -> Option<&File> {
+        self.files.iter().find(|file| file.path == path)
+    }
+
+    /// All Rust sources.
+    pub fn rust(&self) -> impl Iterator<Item = &File> {
+        self.files.iter().filter(|file| file.is_rust())
+    }
+}
+
+fn collect(root: &Path, directory: &Path, files: &mut Vec<File>) -> io::Result<()> {
+    for entry in fs::read_dir(directory)? {
+        let path = entry?.path();
+        let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
+        if path.is_dir() {
+            if !name.starts_with("target") && !name.starts_with('.') {
+                collect(root, &path, files)?;
+            }
+        } else if path.extension().is_some_and(|e| EXTENSIONS.iter().any(|known| e == *known)) {
+            files.push(File { path: relative(root, &path), text: fs::read_to_string(&path)? });
+        }
+    }
+    Ok(())
+}
+
+fn relative(root: &Path, path: &Path) -> String {
+    let path: PathBuf = path.strip_prefix(root).unwrap_or(path).to_path_buf();
+    path.components().map(|c| c.as_os_str().to_string_lossy().into_owned()).collect::<Vec<_>>().join("/")
+}

@@ -1,0 +1,68 @@
+//! The rules, applied to this repository.
+
+use tidy::tree::Tree;
+use tidy::{Finding, crates, features, files, modules, safety};
+
+fn tree() -> Tree {
+    Tree::of_this_repository().expect("the repository can be read")
+}
+
+fn none(findings: Vec<Finding>) {
+    let lines: Vec<String> = findings.iter().map(ToString::to_string).collect();
+    assert!(lines.is_empty(), "\n{}\n", lines.join("\n"));
+}
+
+#[test]
+fn the_tree_is_found() {
+    let tree = tree();
+    assert!(tree.file("crates/wire/src/lib.rs").is_some() && tree.file("docs/FEATURES.md").is_some());
+}
+
+#[test]
+fn no_source_is_too_long() {
+    let tree = tree();
+    for finding in files::nearly_too_long(&tree) {
+        println!("warning: {finding}");
+    }
+    none(files::too_long(&tree));
+}
+
+#[test]
+fn every_name_says_what_is_inside() {
+    none(files::empty_names(&tree()));
+}
+
+#[test]
+fn every_source_opens_with_its_purpose() {
+    none(files::without_opening_comment(&tree()));
+}
+
+#[test]
+fn nothing_is_unfinished() {
+    none(files::unfinished(&tree()));
+}
+
+#[test]
+fn crates_depend_on_each_other_as_the_map_says() {
+    none(crates::forbidden_arrows(&tree()));
+}
+
+#[test]
+fn modules_of_the_engine_name_each_other_as_the_map_says() {
+    none(modules::forbidden_arrows_in_engine(&tree()));
+}
+
+#[test]
+fn unsafe_code_is_where_it_may_be() {
+    none(safety::misplaced(&tree()));
+}
+
+#[test]
+fn pure_crates_forbid_unsafe_code() {
+    none(safety::not_forbidden(&tree()));
+}
+
+#[test]
+fn every_feature_has_a_test() {
+    none(features::rows_without_test(&tree()));
+}
