@@ -1,1 +1,1 @@
-//! TODO
+//! Ring and standby marks in the source MAC address (facts 9.7).
