@@ -1,0 +1,71 @@
+//! What a controller is made of: the parts that differ between types and devices.
+//!
+//! In: nothing. Out: [`ControllerConfig`] for [`super::Controller::new`], by default like an ET1100 with two ports.
+
+use core::time::Duration;
+
+use ringcat_wire::register::{Features, PortKind};
+
+/// Most FMMUs and SyncManagers of a controller (facts 3.1).
+pub const MAX_UNITS: u8 = 16;
+
+/// Hardware of a controller and its EEPROM.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ControllerConfig {
+    /// TYPE (0x0000).
+    pub type_code: u8,
+    /// REVISION (0x0001).
+    pub revision: u8,
+    /// BUILD (0x0002).
+    pub build: u16,
+    /// FMMU_COUNT (0x0004), at most [`MAX_UNITS`].
+    pub fmmu_count: u8,
+    /// SYNC_MANAGER_COUNT (0x0005), at most [`MAX_UNITS`].
+    pub sync_manager_count: u8,
+    /// RAM_SIZE (0x0006): KiB of process RAM from 0x1000, at most 60.
+    pub ram_kib: u8,
+    /// PORT_DESCRIPTOR (0x0007): what stands at port 0..3.
+    pub ports: [PortKind; 4],
+    /// FEATURES (0x0008).
+    pub features: Features,
+    /// PRODUCT_ID (0x0E00).
+    pub product_id: u64,
+    /// EEPROM image; without one the device information is never loaded.
+    pub sii: Vec<u8>,
+    /// How long one read or write command of the SII interface takes.
+    pub sii_busy: Duration,
+    /// How long loading the configuration from the EEPROM takes after power-on, reset and reload.
+    pub sii_load_time: Duration,
+    /// One read command yields 8 bytes (otherwise 4).
+    pub eight_byte_reads: bool,
+    /// How much the local clock runs ahead of virtual time, in parts per billion.
+    pub clock_drift_ppb: i64,
+    /// The local clock when power comes.
+    pub clock_start: u64,
+    /// The controller has DC_LATCH_MODE (0x0936) and, while it is 0, does not latch the receive time of frames that come
+    /// in at another port than 0 before the processing unit has seen them (facts 3.12, 7.5).
+    pub receive_time_latch_mode: bool,
+}
+
+impl Default for ControllerConfig {
+    fn default() -> ControllerConfig {
+        ControllerConfig {
+            type_code: 0x11,
+            revision: 0,
+            build: 2,
+            fmmu_count: 8,
+            sync_manager_count: 8,
+            ram_kib: 8,
+            ports: [PortKind::Mii, PortKind::Mii, PortKind::NotImplemented, PortKind::NotImplemented],
+            features: Features::from_bits(0x00FC),
+            product_id: 0,
+            sii: Vec::new(),
+            sii_busy: Duration::from_micros(500),
+            sii_load_time: Duration::from_millis(1),
+            eight_byte_reads: true,
+            clock_drift_ppb: 0,
+            clock_start: 0,
+            receive_time_latch_mode: false,
+        }
+    }
+}

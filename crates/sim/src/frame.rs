@@ -1,0 +1,297 @@
+//! A frame on its way through the segment (facts 1.1, 1.2, 1.3).
+//!
+//! In: the bytes that a host sends. Out: [`SimFrame`], which carries the offsets of its datagrams so that no controller
+//! parses it again, and the state of its frame check sequence. What happens to it is the controllers' and the network's.
+
+use ringcat_wire::datagram::{HEADER_LEN, OVERHEAD, WKC_LEN};
+use ringcat_wire::frame::{
+    BYTE_TIME_NS, ETHERCAT_HEADER_LEN, ETHERNET_HEADER_LEN, ETHERTYPE, ETHERTYPE_IPV4, ETHERTYPE_VLAN, MIN_FRAME,
+    UDP_PORT, wire_time_ns,
+};
+
+/// Bytes of preamble, delimiter and FCS, which take time on the wire beside the frame's own bytes.
+const PREAMBLE_AND_FCS: u64 = 12;
+/// Bytes of an IPv4 header of five words and a UDP header.
+const UDP_HEADERS_LEN: usize = 28;
+const LENGTH_MASK: u16 = 0x07FF;
+const MORE: u8 = 0x80;
+
+/// One of the four ports of a controller. The order of travel (0-3-1-2) is the controller's matter.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub enum Port {
+    /// Port 0, behind which the processing unit sits.
+    A = 0,
+    /// Port 1.
+    B = 1,
+    /// Port 2.
+    C = 2,
+    /// Port 3.
+    D = 3,
+}
+
+impl Port {
+    /// All ports by number.
+    pub const ALL: [Port; 4] = [Port::A, Port::B, Port::C, Port::D];
+
+    /// The port's number, 0..=3.
+    pub const fn index(self) -> usize {
+        self as usize
+    }
+
+    /// From a port's number.
+    pub const fn from_index(index: usize) -> Option<Port> {
+        if index < 4 { Some(Self::ALL[index]) } else { None }
+    }
+}
+
+/// State of a frame's check sequence (facts 2.5).
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+pub enum Fcs {
+    /// The frame is as it was sent.
+    #[default]
+    Good,
+    /// Damaged, and no controller has seen it yet.
+    Bad,
+    /// Damaged; a controller has counted it and marked it for the following ones.
+    Marked,
+}
+
+/// What a controller takes a frame for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum FrameKind {
+    /// EtherCAT with datagrams (type 1), plain, behind a VLAN tag or in UDP.
+    Datagrams,
+    /// EtherCAT of another type: never processed, passed on.
+    OtherEthercat,
+    /// Another protocol.
+    Foreign,
+}
+
+/// Where a datagram lies in the frame's bytes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub struct DatagramPlace {
+    /// Offset of the ten-byte header.
+    pub header: u16,
+    /// Bytes of data; the working counter follows them.
+    pub length: u16,
+}
+
+/// A frame that travels.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct SimFrame {
+    /// The frame without FCS.
+    pub bytes: Vec<u8>,
+    /// The datagrams, in order; those before the first that leaves the frame. Empty unless `kind` is `Datagrams`.
+    pub datagrams: Vec<DatagramPlace>,
+    /// What it is to a controller.
+    pub kind: FrameKind,
+    /// Shorter than an Ethernet frame may be, or a datagram leaves the frame: an error to every processing unit.
+    pub malformed: bool,
+    /// State of the check sequence.
+    pub fcs: Fcs,
+    /// Unique number: for logs, and to tell the frame when it comes back to a controller.
+    pub id: u64,
+}
+
+impl SimFrame {
+    /// Takes the bytes of a frame and finds its datagrams. Any bytes will do.
+    pub fn new(id: u64, bytes: Vec<u8>) -> SimFrame {
+        let mut frame = SimFrame {
+            bytes,
+            datagrams: Vec::new(),
+            kind: FrameKind::Foreign,
+            malformed: false,
+            fcs: Fcs::Good,
+            id,
+        };
+        frame.parse();
+        frame
+    }
+
+    /// Becomes another frame with these bytes, keeping the buffers: for pools.
+    pub fn refill(&mut self, id: u64, bytes: &[u8]) {
+        self.id = id;
+        self.fcs = Fcs::Good;
+        self.bytes.clear();
+        self.bytes.extend_from_slice(bytes);
+        self.parse();
+    }
+
+    /// Becomes a copy of another frame, keeping the buffers: for pools.
+    pub fn copy_from(&mut self, other: &SimFrame) {
+        self.bytes.clear();
+        self.bytes.extend_from_slice(&other.bytes);
+        self.datagrams.clear();
+        self.datagrams.extend_from_slice(&other.datagrams);
+        (self.kind, self.malformed, self.fcs, self.id) = (other.kind, other.malformed, other.fcs, other.id);
+    }
+
+    /// Keeps the first `len` bytes only, as a cable leaves them that is cut while the frame passes.
+    pub fn truncate(&mut self, len: usize) {
+        if len < self.bytes.len() {
+            self.bytes.truncate(len);
+            self.fcs = Fcs::Bad;
+            self.parse();
+        }
+    }
+
+    /// Whether a controller sees datagrams to process.
+    pub const fn is_ethercat(&self) -> bool {
+        matches!(self.kind, FrameKind::Datagrams)
+    }
+
+    /// Time from the first bit of the preamble to the last bit of the FCS at 100 Mbit/s.
+    pub const fn first_to_last_bit_ns(&self) -> u64 {
+        (self.bytes.len() as u64 + PREAMBLE_AND_FCS) * BYTE_TIME_NS
+    }
+
+    /// Time for which the frame occupies a link at 100 Mbit/s, gap included.
+    pub const fn occupies_ns(&self) -> u64 {
+        wire_time_ns(self.bytes.len())
+    }
+
+    /// Finds kind and datagrams anew. Controllers walk the lengths of the datagrams, not the one in the EtherCAT header
+    /// (facts 1.1).
+    fn parse(&mut self) {
+        self.datagrams.clear();
+        let (kind, payload) = classify(&self.bytes);
+        self.kind = kind;
+        self.malformed = self.bytes.len() < MIN_FRAME;
+        if kind != FrameKind::Datagrams {
+            return;
+        }
+        let mut at = payload;
+        loop {
+            let Some(field) = self.bytes.get(at + 6..at + 8) else {
+                self.malformed = true;
+                return;
+            };
+            let length = u16::from_le_bytes([field[0], field[1]]) & LENGTH_MASK;
+            let more = field[1] & MORE != 0;
+            let end = at + OVERHEAD + usize::from(length);
+            match u16::try_from(at) {
+                Ok(header) if end <= self.bytes.len() => self.datagrams.push(DatagramPlace { header, length }),
+                _ => {
+                    self.malformed = true;
+                    return;
+                }
+            }
+            if !more {
+                return;
+            }
+            at = end;
+        }
+    }
+}
+
+impl DatagramPlace {
+    /// Offset of the data.
+    pub const fn data(&self) -> usize {
+        self.header as usize + HEADER_LEN
+    }
+
+    /// Offset of the working counter.
+    pub const fn wkc(&self) -> usize {
+        self.data() + self.length as usize
+    }
+
+    /// Offset behind the working counter.
+    pub const fn end(&self) -> usize {
+        self.wkc() + WKC_LEN
+    }
+}
+
+/// Offset of the UDP checksum in an EtherCAT frame over UDP, which a processing unit clears (facts 1.3).
+pub(crate) const UDP_CHECKSUM: usize = ETHERNET_HEADER_LEN + UDP_HEADERS_LEN - 2;
+
+/// Whether the frame's EtherCAT part is wrapped in UDP.
+pub(crate) fn is_udp(bytes: &[u8]) -> bool {
+    bytes.get(12..14).is_some_and(|ethertype| ethertype == ETHERTYPE_IPV4.to_be_bytes())
+}
+
+/// The kind of a frame and the offset of what follows the EtherCAT header.
+fn classify(bytes: &[u8]) -> (FrameKind, usize) {
+    let word = |at: usize| bytes.get(at..at + 2).map(|b| u16::from_be_bytes([b[0], b[1]]));
+    let start = match word(12) {
+        Some(ETHERTYPE) => ETHERNET_HEADER_LEN,
+        Some(ETHERTYPE_VLAN) if word(16) == Some(ETHERTYPE) => ETHERNET_HEADER_LEN + 4,
+        Some(ETHERTYPE_IPV4)
+            if bytes.get(14) == Some(&0x45) && bytes.get(23) == Some(&17) && word(36) == Some(UDP_PORT) =>
+        {
+            ETHERNET_HEADER_LEN + UDP_HEADERS_LEN
+        }
+        _ => return (FrameKind::Foreign, 0),
+    };
+    match bytes.get(start + 1).map(|high| high >> 4) {
+        Some(1) => (FrameKind::Datagrams, start + ETHERCAT_HEADER_LEN),
+        Some(_) => (FrameKind::OtherEthercat, start + ETHERCAT_HEADER_LEN),
+        None => (FrameKind::Foreign, 0),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+    use ringcat_wire::address::RegisterAddress;
+    use ringcat_wire::command::Command;
+    use ringcat_wire::datagram::Target;
+    use ringcat_wire::frame::{FrameBuilder, MacAddress};
+
+    fn two_datagrams() -> Vec<u8> {
+        let mut buffer = vec![0; 1514];
+        let mut builder =
+            FrameBuilder::ethernet(&mut buffer, MacAddress::BROADCAST, MacAddress([2, 0, 0, 0, 0, 1])).unwrap();
+        builder.datagram(Command::Brd, 1, Target::Broadcast(RegisterAddress(0x0130)), 2).unwrap();
+        builder.datagram(Command::Nop, 1, Target::None, 5).unwrap();
+        let len = builder.finish();
+        buffer.truncate(len);
+        buffer
+    }
+
+    #[test]
+    fn datagrams_are_found_once() {
+        let frame = SimFrame::new(7, two_datagrams());
+        assert!(frame.is_ethercat() && !frame.malformed);
+        let places = [DatagramPlace { header: 16, length: 2 }, DatagramPlace { header: 30, length: 5 }];
+        assert_eq!(frame.datagrams, places);
+        assert_eq!((places[1].data(), places[1].wkc(), places[1].end()), (40, 45, 47));
+    }
+
+    #[test]
+    fn a_cut_frame_keeps_the_datagrams_that_are_whole() {
+        let mut frame = SimFrame::new(7, two_datagrams());
+        frame.truncate(44);
+        assert_eq!((frame.datagrams.len(), frame.malformed, frame.fcs), (1, true, Fcs::Bad));
+    }
+
+    #[test]
+    fn network_variables_and_other_protocols_are_told_apart() {
+        let mut bytes = two_datagrams();
+        bytes[15] = 0x40;
+        assert_eq!(SimFrame::new(0, bytes.clone()).kind, FrameKind::OtherEthercat);
+        bytes[12] = 0x08;
+        assert_eq!(SimFrame::new(0, bytes).kind, FrameKind::Foreign);
+    }
+
+    #[test]
+    fn a_shortest_frame_takes_5760_ns_and_occupies_6720_ns() {
+        let frame = SimFrame::new(0, two_datagrams());
+        assert_eq!((frame.first_to_last_bit_ns(), frame.occupies_ns()), (5_760, 6_720));
+    }
+
+    proptest! {
+        #[test]
+        fn any_bytes_become_a_frame_whose_places_lie_inside(bytes in prop::collection::vec(any::<u8>(), 0..200)) {
+            let mut ethercat = bytes.clone();
+            if ethercat.len() > 16 {
+                ethercat[12..14].copy_from_slice(&[0x88, 0xA4]);
+                ethercat[15] = 0x10;
+            }
+            for bytes in [bytes, ethercat] {
+                let frame = SimFrame::new(0, bytes);
+                prop_assert!(frame.datagrams.iter().all(|place| place.end() <= frame.bytes.len()));
+            }
+        }
+    }
+}

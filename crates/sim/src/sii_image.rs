@@ -1,0 +1,1 @@
+//! SII images.
