@@ -1,0 +1,164 @@
+//! Category SYNCM: eight bytes per sync manager (facts 4.4).
+
+/// What a sync manager is meant for.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+pub enum SyncManagerKind {
+    /// 0: nothing, or not said.
+    #[default]
+    Unused,
+    /// 1: mailbox from MainDevice to SubDevice.
+    MailboxOut,
+    /// 2: mailbox from SubDevice to MainDevice.
+    MailboxIn,
+    /// 3: process data from MainDevice to SubDevice.
+    Outputs,
+    /// 4: process data from SubDevice to MainDevice.
+    Inputs,
+    /// Any other.
+    Other(u8),
+}
+
+impl SyncManagerKind {
+    /// From the type byte.
+    pub const fn from_code(code: u8) -> SyncManagerKind {
+        match code {
+            0 => SyncManagerKind::Unused,
+            1 => SyncManagerKind::MailboxOut,
+            2 => SyncManagerKind::MailboxIn,
+            3 => SyncManagerKind::Outputs,
+            4 => SyncManagerKind::Inputs,
+            code => SyncManagerKind::Other(code),
+        }
+    }
+
+    /// The type byte.
+    pub const fn code(self) -> u8 {
+        match self {
+            SyncManagerKind::Unused => 0,
+            SyncManagerKind::MailboxOut => 1,
+            SyncManagerKind::MailboxIn => 2,
+            SyncManagerKind::Outputs => 3,
+            SyncManagerKind::Inputs => 4,
+            SyncManagerKind::Other(code) => code,
+        }
+    }
+}
+
+/// How a sync manager is to be set up.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+pub struct SiiSyncManager {
+    /// Physical start address.
+    pub start: u16,
+    /// Default length in bytes.
+    pub length: u16,
+    /// Control byte, as register 0x0804 takes it.
+    pub control: u8,
+    /// Status byte, without meaning.
+    pub status: u8,
+    /// Enable byte; see the constants.
+    pub enable: u8,
+    /// What it is meant for.
+    pub kind: SyncManagerKind,
+}
+
+impl SiiSyncManager {
+    /// Bytes of one entry.
+    pub const LEN: usize = 8;
+    /// Bit of [`SiiSyncManager::enable`]: to be activated.
+    pub const ENABLE: u8 = 1 << 0;
+    /// Bit of [`SiiSyncManager::enable`]: the content is fixed.
+    pub const FIXED_CONTENT: u8 = 1 << 1;
+    /// Bit of [`SiiSyncManager::enable`]: virtual, no hardware behind it.
+    pub const VIRTUAL: u8 = 1 << 2;
+    /// Bit of [`SiiSyncManager::enable`]: to be activated in OP only.
+    pub const OP_ONLY: u8 = 1 << 3;
+
+    /// Decodes one entry; every pattern has a meaning.
+    pub const fn decode(b: &[u8; Self::LEN]) -> SiiSyncManager {
+        SiiSyncManager {
+            start: u16::from_le_bytes([b[0], b[1]]),
+            length: u16::from_le_bytes([b[2], b[3]]),
+            control: b[4],
+            status: b[5],
+            enable: b[6],
+            kind: SyncManagerKind::from_code(b[7]),
+        }
+    }
+
+    /// Encodes one entry.
+    pub const fn encode(&self) -> [u8; Self::LEN] {
+        let start = self.start.to_le_bytes();
+        let length = self.length.to_le_bytes();
+        [start[0], start[1], length[0], length[1], self.control, self.status, self.enable, self.kind.code()]
+    }
+
+    /// Whether it is to be activated.
+    pub const fn is_enabled(&self) -> bool {
+        self.enable & Self::ENABLE != 0
+    }
+}
+
+/// Iterator over the entries of a category, SM 0 first. Bytes that make no whole entry are left out.
+#[derive(Clone, Debug)]
+pub struct SiiSyncManagers<'a> {
+    data: &'a [u8],
+}
+
+impl<'a> SiiSyncManagers<'a> {
+    /// Reads the data of a category.
+    pub const fn new(data: &'a [u8]) -> SiiSyncManagers<'a> {
+        SiiSyncManagers { data }
+    }
+}
+
+impl Iterator for SiiSyncManagers<'_> {
+    type Item = SiiSyncManager;
+
+    fn next(&mut self) -> Option<SiiSyncManager> {
+        let (entry, rest) = self.data.split_first_chunk()?;
+        self.data = rest;
+        Some(SiiSyncManager::decode(entry))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+    use std::vec::Vec;
+
+    #[test]
+    fn a_write_mailbox_and_an_input_have_these_bytes() {
+        let data = [
+            0x00, 0x10, 0x80, 0x00, 0x26, 0x00, 0x01, 0x01, // SM 0
+            0x00, 0x11, 0x02, 0x00, 0x20, 0x00, 0x0B, 0x04, // SM 1
+            0xFF, 0xFF, // no whole entry
+        ];
+        let mailbox = SiiSyncManager {
+            start: 0x1000,
+            length: 128,
+            control: 0x26,
+            status: 0,
+            enable: SiiSyncManager::ENABLE,
+            kind: SyncManagerKind::MailboxOut,
+        };
+        let inputs = SiiSyncManager {
+            start: 0x1100,
+            length: 2,
+            control: 0x20,
+            status: 0,
+            enable: SiiSyncManager::ENABLE | SiiSyncManager::FIXED_CONTENT | SiiSyncManager::OP_ONLY,
+            kind: SyncManagerKind::Inputs,
+        };
+        assert_eq!(SiiSyncManagers::new(&data).collect::<Vec<_>>(), [mailbox, inputs]);
+        assert_eq!([mailbox.encode(), inputs.encode()].as_flattened(), &data[..16]);
+        assert!(mailbox.is_enabled());
+    }
+
+    proptest! {
+        #[test]
+        fn any_eight_bytes_round_trip(bytes in any::<[u8; SiiSyncManager::LEN]>()) {
+            prop_assert_eq!(SiiSyncManager::decode(&bytes).encode(), bytes);
+        }
+    }
+}
