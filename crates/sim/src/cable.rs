@@ -1,0 +1,256 @@
+//! Cables and what happens to a frame on the way through one (issue 2, part 3; facts 11.4).
+//!
+//! A cable is two [`Leg`]s, one for each direction. A leg knows where it leads, how long a bit takes, since when it
+//! carries a signal, and which faults wait for the frames that come along. What is decided here is the fate of a frame
+//! whose last bit is due at the far end; who sends and who receives is the network's business.
+
+use core::fmt;
+use core::time::Duration;
+
+use crate::frame::Port;
+use crate::time::SimTime;
+
+/// Number of a device: its place in the segment file, from 0.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct DeviceIndex(pub usize);
+
+/// Number of a cable in the order in which the cables were given, from 0.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct CableId(pub usize);
+
+/// One of the two network interfaces of the MainDevice.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub enum HostLink {
+    /// MAIN.
+    Main = 0,
+    /// RED, the other end of a ring.
+    Redundant = 1,
+}
+
+impl HostLink {
+    /// Both links.
+    pub const ALL: [HostLink; 2] = [HostLink::Main, HostLink::Redundant];
+}
+
+impl fmt::Display for HostLink {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            HostLink::Main => "main",
+            HostLink::Redundant => "redundant",
+        })
+    }
+}
+
+/// Where a cable can be plugged in.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Endpoint {
+    /// A port of a device.
+    Device(DeviceIndex, Port),
+    /// An interface of the MainDevice.
+    Host(HostLink),
+}
+
+/// A cable as it is given: both ends and how long a bit takes from one to the other (5 ns per metre, facts 1.3).
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct CableSpec {
+    /// One end.
+    pub a: Endpoint,
+    /// The other end.
+    pub b: Endpoint,
+    /// Propagation delay.
+    pub delay: Duration,
+}
+
+/// One of the two directions of a cable.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Direction {
+    /// From end `a` to end `b`.
+    AToB = 0,
+    /// From end `b` to end `a`.
+    BToA = 1,
+}
+
+impl Direction {
+    /// Both directions.
+    pub const ALL: [Direction; 2] = [Direction::AToB, Direction::BToA];
+}
+
+/// One direction of a cable, as a number: twice the cable's number, plus the direction.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct LegId(pub(crate) u32);
+
+impl LegId {
+    pub(crate) fn new(cable: CableId, direction: Direction) -> LegId {
+        LegId((cable.0 as u32) << 1 | direction as u32)
+    }
+
+    pub(crate) fn index(self) -> usize {
+        self.0 as usize
+    }
+
+    pub(crate) fn cable(self) -> CableId {
+        CableId(self.index() >> 1)
+    }
+
+    /// The same cable, the other direction.
+    pub(crate) fn reverse(self) -> LegId {
+        LegId(self.0 ^ 1)
+    }
+}
+
+/// What becomes of a frame whose last bit is due at the end of a leg.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Fate {
+    /// It arrives whole.
+    Arrives,
+    /// The signal went while the frame was arriving: only its beginning came through.
+    Truncated {
+        /// Time for which the receiver saw the frame.
+        seen: Duration,
+    },
+    /// Nothing of it arrives.
+    Lost,
+}
+
+/// Faults that wait for frames on a leg.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(crate) struct LegFaults {
+    /// Frames still to be dropped.
+    pub(crate) drop: u32,
+    /// Frames still to be doubled.
+    pub(crate) duplicate: u32,
+    /// Frames still to be corrupted.
+    pub(crate) corrupt: u32,
+    /// Frames still to be delayed.
+    pub(crate) delay: u32,
+    /// By how much they are delayed.
+    pub(crate) delay_by: Duration,
+    /// Every frame is lost although both ends have link.
+    pub(crate) blocked: bool,
+}
+
+impl LegFaults {
+    /// Takes one from a counter of frames; `false` when it is used up.
+    pub(crate) fn take(counter: &mut u32) -> bool {
+        let hit = *counter > 0;
+        *counter -= u32::from(hit);
+        hit
+    }
+}
+
+/// One direction of a cable.
+#[derive(Clone, Debug)]
+pub(crate) struct Leg {
+    /// Where it leads.
+    pub(crate) to: Endpoint,
+    /// Propagation delay.
+    pub(crate) delay_ns: u64,
+    /// Whether the receiving end knows that there is a signal (detection takes time).
+    pub(crate) detected: bool,
+    /// Since when it knows.
+    pub(crate) detected_at: SimTime,
+    /// Whether any fault is set: spares the frames on healthy cables the look at each.
+    pub(crate) faulty: bool,
+    /// The faults.
+    pub(crate) faults: LegFaults,
+    signal: bool,
+    up_since: SimTime,
+    last_up: Option<(SimTime, SimTime)>,
+}
+
+impl Leg {
+    /// A leg that has carried a signal for long.
+    pub(crate) fn new(to: Endpoint, delay_ns: u64) -> Leg {
+        Leg {
+            to,
+            delay_ns,
+            detected: true,
+            detected_at: SimTime::ZERO,
+            faulty: false,
+            faults: LegFaults::default(),
+            signal: true,
+            up_since: SimTime::ZERO,
+            last_up: None,
+        }
+    }
+
+    /// Whether the leg carries a signal.
+    pub(crate) fn signal(&self) -> bool {
+        self.signal
+    }
+
+    /// The signal comes or goes.
+    pub(crate) fn set_signal(&mut self, up: bool, now: SimTime) {
+        if up && !self.signal {
+            self.up_since = now;
+        } else if !up && self.signal {
+            self.last_up = Some((self.up_since, now));
+        }
+        self.signal = up;
+    }
+
+    /// Sets the faults.
+    pub(crate) fn set_faults(&mut self, change: impl FnOnce(&mut LegFaults)) {
+        change(&mut self.faults);
+        self.refresh_faulty();
+    }
+
+    /// Looks whether any fault is left.
+    pub(crate) fn refresh_faulty(&mut self) {
+        let LegFaults { drop, duplicate, corrupt, delay, delay_by: _, blocked } = self.faults;
+        self.faulty = blocked || drop > 0 || duplicate > 0 || corrupt > 0 || delay > 0;
+    }
+
+    /// Fate of a frame that took `wire_ns` from first to last bit and whose last bit is due at the far end at `at`: the
+    /// leg must have carried a signal from the first bit's entry to the last bit's exit.
+    pub(crate) fn fate(&self, at: SimTime, wire_ns: u64) -> Fate {
+        let first_out = at.back_ns(wire_ns);
+        let first_in = first_out.back_ns(self.delay_ns);
+        if self.signal && self.up_since <= first_in {
+            return Fate::Arrives;
+        }
+        match self.last_up {
+            Some((up, down)) if up <= first_in && down > first_out => {
+                Fate::Truncated { seen: down - first_out }
+            }
+            _ => Fate::Lost,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const WIRE: u64 = 5_760;
+
+    fn leg() -> Leg {
+        Leg::new(Endpoint::Host(HostLink::Main), 500)
+    }
+
+    #[test]
+    fn a_frame_that_enters_before_the_cut_and_leaves_after_it_is_lost() {
+        let mut leg = leg();
+        leg.set_signal(false, SimTime(100_000));
+        assert_eq!(leg.fate(SimTime(100_000 + 5_760), WIRE), Fate::Lost);
+        assert_eq!(leg.fate(SimTime(100_000 + 5_759), WIRE), Fate::Truncated { seen: Duration::from_nanos(1) });
+        assert_eq!(leg.fate(SimTime(100_001), WIRE), Fate::Truncated { seen: Duration::from_nanos(5_759) });
+    }
+
+    #[test]
+    fn a_frame_that_enters_a_dead_cable_is_lost_even_if_it_heals_meanwhile() {
+        let mut leg = leg();
+        leg.set_signal(false, SimTime(100_000));
+        leg.set_signal(true, SimTime(200_000));
+        assert_eq!(leg.fate(SimTime(200_000 + 6_259), WIRE), Fate::Lost);
+        assert_eq!(leg.fate(SimTime(200_000 + 6_260), WIRE), Fate::Arrives);
+    }
+
+    #[test]
+    fn a_cut_and_heal_within_one_frame_still_truncates_it() {
+        let mut leg = leg();
+        leg.set_signal(false, SimTime(100_000));
+        leg.set_signal(true, SimTime(100_010));
+        assert_eq!(leg.fate(SimTime(104_000), WIRE), Fate::Truncated { seen: Duration::from_nanos(1_760) });
+    }
+}

@@ -1,0 +1,96 @@
+//! The two network interfaces of the MainDevice: they send at 100 Mbit/s, one frame after the other, and keep what
+//! arrives until it is fetched (facts 1.3).
+
+use core::time::Duration;
+use std::collections::VecDeque;
+
+use crate::cable::LegId;
+use crate::frame::SimFrame;
+use crate::time::SimTime;
+
+/// A frame that came back to the MainDevice.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Received {
+    /// When its last bit arrived.
+    pub at: SimTime,
+    /// The frame without check sequence.
+    pub bytes: Vec<u8>,
+}
+
+/// One interface.
+#[derive(Debug)]
+pub(crate) struct HostInterface {
+    /// The direction of the cable that leads away from it, if a cable is plugged in.
+    pub(crate) out: Option<LegId>,
+    /// Frames that wait to be fetched.
+    pub(crate) received: VecDeque<Received>,
+    free_at: SimTime,
+    ends: VecDeque<SimTime>,
+    transmit_limit: usize,
+    receive_limit: usize,
+}
+
+impl HostInterface {
+    pub(crate) fn new(out: Option<LegId>, transmit_limit: usize, receive_limit: usize) -> HostInterface {
+        HostInterface {
+            out,
+            received: VecDeque::with_capacity(receive_limit),
+            free_at: SimTime(0),
+            ends: VecDeque::with_capacity(transmit_limit),
+            transmit_limit,
+            receive_limit,
+        }
+    }
+
+    /// Queues a frame behind those that are being sent. Returns when its last bit leaves, or `None` when the queue is
+    /// full.
+    pub(crate) fn transmit(&mut self, now: SimTime, frame: &SimFrame) -> Option<SimTime> {
+        while self.ends.front().is_some_and(|end| *end <= now) {
+            self.ends.pop_front();
+        }
+        if self.ends.len() >= self.transmit_limit {
+            return None;
+        }
+        let start = self.free_at.max(now);
+        self.free_at = start + Duration::from_nanos(frame.occupies_ns());
+        let end = start + Duration::from_nanos(frame.first_to_last_bit_ns());
+        self.ends.push_back(end);
+        Some(end)
+    }
+
+    /// Keeps a frame, or gives it back when there is no room.
+    pub(crate) fn deliver(&mut self, frame: Received) -> Result<(), Received> {
+        if self.received.len() >= self.receive_limit {
+            return Err(frame);
+        }
+        self.received.push_back(frame);
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn frame(len: usize) -> SimFrame {
+        SimFrame::new(0, vec![0; len])
+    }
+
+    #[test]
+    fn back_to_back_frames_are_one_wire_time_apart() {
+        // facts 1.3: 60 bytes, 8 of preamble, 4 of FCS, 12 of gap: 84 byte times of 80 ns.
+        let mut host = HostInterface::new(None, 8, 8);
+        assert_eq!(host.transmit(SimTime(1_000), &frame(60)), Some(SimTime(1_000 + 72 * 80)));
+        assert_eq!(host.transmit(SimTime(1_000), &frame(60)), Some(SimTime(1_000 + 84 * 80 + 72 * 80)));
+        assert_eq!(host.transmit(SimTime(1_000_000), &frame(1514)), Some(SimTime(1_000_000 + 1_526 * 80)));
+    }
+
+    #[test]
+    fn a_full_transmit_queue_refuses_until_a_frame_has_left() {
+        let mut host = HostInterface::new(None, 2, 8);
+        assert_eq!(host.transmit(SimTime(0), &frame(60)), Some(SimTime(5_760)));
+        assert!(host.transmit(SimTime(0), &frame(60)).is_some());
+        assert_eq!(host.transmit(SimTime(0), &frame(60)), None);
+        assert!(host.transmit(SimTime(5_760), &frame(60)).is_some());
+    }
+}

@@ -1,0 +1,197 @@
+//! Signals on cables, their detection at both ends, and the power of devices.
+
+use core::time::Duration;
+
+use super::{Event, Network, Node};
+use crate::cable::{CableId, DeviceIndex, Direction, Endpoint, LegId};
+use crate::device::Device;
+use crate::frame::Port;
+use crate::time::SimTime;
+
+/// The order in which a frame travels through a controller (facts 2.1), as the successor of each port.
+const NEXT_PORT: [usize; 4] = [3, 2, 0, 1];
+
+impl Node {
+    pub(super) fn new(device: Device, out: [Option<LegId>; 4]) -> Node {
+        Node {
+            device,
+            out,
+            loop_changed_at: [SimTime::ZERO; 4],
+            last_loop_change: SimTime::ZERO,
+            wake_at: SimTime::NEVER,
+        }
+    }
+
+    /// A port notices that its link came or went.
+    fn link_changed(&mut self, port: Port, up: bool, now: SimTime) {
+        let before = self.device.controller.loop_closed(port);
+        self.device.controller.link_changed(port, up, now);
+        if self.device.controller.loop_closed(port) != before {
+            self.loop_changed_at[port.index()] = now;
+            self.last_loop_change = now;
+        }
+    }
+
+    /// Whether a port opened or closed while a frame passed from one port to another, first bit at `first_bit`.
+    pub(super) fn interrupted(&self, from: Port, to: Port, first_bit: SimTime) -> bool {
+        if self.last_loop_change <= first_bit {
+            return false;
+        }
+        let mut at = from.index();
+        loop {
+            at = NEXT_PORT[at];
+            if self.loop_changed_at[at] > first_bit {
+                return true;
+            }
+            if at == to.index() {
+                return false;
+            }
+        }
+    }
+}
+
+impl Network {
+    /// Power on everywhere, links up.
+    pub(super) fn start(&mut self) {
+        for index in 0..self.nodes.len() {
+            let node = &mut self.nodes[index];
+            node.device.power_on(SimTime::ZERO);
+            for port in Port::ALL {
+                if node.out[port.index()].is_some() {
+                    node.device.controller.link_changed(port, true, SimTime::ZERO);
+                }
+            }
+            self.settle(index);
+        }
+    }
+
+    /// Lets a device react to what has happened to it, and sees to it that it is woken in time.
+    pub(super) fn settle(&mut self, index: usize) {
+        let node = &mut self.nodes[index];
+        if node.device.needs_run() {
+            node.device.run(self.now);
+        }
+        if let Some(deadline) = node.device.next_deadline() {
+            self.wake_at(index, deadline);
+        }
+    }
+
+    /// Wakes a device at a time, or earlier if that is arranged already.
+    pub(super) fn wake_at(&mut self, index: usize, at: SimTime) {
+        let node = &mut self.nodes[index];
+        if at < node.wake_at {
+            node.wake_at = at;
+            self.queue.push(at, Event::Wake { device: index as u32 });
+        }
+    }
+
+    /// The time has come that was arranged. Deadlines move away under way (a watchdog that was triggered), so the
+    /// device is asked anew.
+    pub(super) fn wake(&mut self, index: usize) {
+        let node = &mut self.nodes[index];
+        if node.wake_at > self.now {
+            return;
+        }
+        node.wake_at = SimTime::NEVER;
+        node.device.run(self.now);
+        if let Some(deadline) = node.device.next_deadline() {
+            // A deadline that the run did not meet must not stop time.
+            self.wake_at(index, deadline.max(self.now + Duration::from_nanos(1)));
+        }
+    }
+
+    /// Cuts a cable.
+    ///
+    /// # Panics
+    /// When there is no cable with this number.
+    pub fn cut(&mut self, cable: CableId) {
+        self.cables[cable.0].cut = true;
+        self.refresh_signal(cable);
+    }
+
+    /// Makes a cable whole again.
+    ///
+    /// # Panics
+    /// When there is no cable with this number.
+    pub fn heal(&mut self, cable: CableId) {
+        self.cables[cable.0].cut = false;
+        self.refresh_signal(cable);
+    }
+
+    /// Takes the power from a device. Its ports are dead at once; its neighbours notice.
+    ///
+    /// # Panics
+    /// When there is no device with this number.
+    pub fn power_off(&mut self, device: DeviceIndex) {
+        let node = &mut self.nodes[device.0];
+        if !node.device.controller.is_powered() {
+            return;
+        }
+        node.device.power_off(self.now);
+        for out in node.out.into_iter().flatten() {
+            self.legs[out.reverse().index()].detected = false;
+            self.refresh_signal(out.cable());
+        }
+    }
+
+    /// Gives a device its power back. Its links come up after their detection delay.
+    ///
+    /// # Panics
+    /// When there is no device with this number.
+    pub fn power_on(&mut self, device: DeviceIndex) {
+        let node = &mut self.nodes[device.0];
+        if node.device.controller.is_powered() {
+            return;
+        }
+        node.device.power_on(self.now);
+        node.loop_changed_at = [self.now; 4];
+        node.last_loop_change = self.now;
+        for out in node.out.into_iter().flatten() {
+            self.refresh_signal(out.cable());
+        }
+        self.settle(device.0);
+    }
+
+    fn has_power(&self, endpoint: Endpoint) -> bool {
+        match endpoint {
+            Endpoint::Device(device, _) => self.nodes[device.0].device.controller.is_powered(),
+            Endpoint::Host(_) => true,
+        }
+    }
+
+    /// Finds out whether a cable carries a signal; if that changed, its ends notice later.
+    fn refresh_signal(&mut self, id: CableId) {
+        let cable = &self.cables[id.0];
+        let up = !cable.cut && self.has_power(cable.spec.a) && self.has_power(cable.spec.b);
+        if up == self.leg_mut(id, Direction::AToB).signal() {
+            return;
+        }
+        let cable = &mut self.cables[id.0];
+        cable.epoch += 1;
+        let epoch = cable.epoch;
+        let delay = if up { self.options.link_up_delay } else { self.options.link_down_delay };
+        for direction in Direction::ALL {
+            let now = self.now;
+            self.leg_mut(id, direction).set_signal(up, now);
+            self.queue.push(now + delay, Event::Detection { leg: LegId::new(id, direction), epoch });
+        }
+    }
+
+    /// The end of a leg notices whether there is a signal.
+    pub(super) fn detect(&mut self, id: LegId, epoch: u32) {
+        if self.cables[id.cable().0].epoch != epoch {
+            return;
+        }
+        let leg = &mut self.legs[id.index()];
+        let up = leg.signal();
+        if leg.detected == up {
+            return;
+        }
+        leg.detected = up;
+        leg.detected_at = self.now;
+        if let Endpoint::Device(device, port) = leg.to {
+            self.nodes[device.0].link_changed(port, up, self.now);
+            self.settle(device.0);
+        }
+    }
+}

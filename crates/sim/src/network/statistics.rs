@@ -1,0 +1,97 @@
+//! Counters of a segment: what the MainDevice's links carried and why frames did not come back.
+
+use crate::cable::HostLink;
+
+/// Why a frame went no further.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum LossCause {
+    /// It was sent on an interface without carrier or without cable.
+    NoCarrier,
+    /// It was longer than an interface sends.
+    Oversized,
+    /// The transmit queue of the interface was full.
+    TransmitQueueFull,
+    /// The cable was cut, or an end of it had no power, while the frame was on it.
+    DeadCable,
+    /// A device sent it out of a port that was forced open and has no cable.
+    OpenPort,
+    /// It reached a port or interface that had not detected the link yet.
+    NoLink,
+    /// A port on its way opened or closed while it passed (facts 2.2: a running frame may be cut).
+    LoopChanged,
+    /// The direction was blocked by a fault.
+    Blocked,
+    /// It was dropped by a fault.
+    Dropped,
+    /// A controller destroyed it: closed port, circulating frame or forwarding rule (facts 2.2, 2.4, 2.6).
+    Destroyed,
+    /// It came back with a wrong check sequence.
+    BadCheckSequence,
+    /// Nobody fetched the received frames, and their queue was full.
+    ReceiveQueueFull,
+}
+
+impl LossCause {
+    /// All causes.
+    pub const ALL: [LossCause; 12] = [
+        LossCause::NoCarrier,
+        LossCause::Oversized,
+        LossCause::TransmitQueueFull,
+        LossCause::DeadCable,
+        LossCause::OpenPort,
+        LossCause::NoLink,
+        LossCause::LoopChanged,
+        LossCause::Blocked,
+        LossCause::Dropped,
+        LossCause::Destroyed,
+        LossCause::BadCheckSequence,
+        LossCause::ReceiveQueueFull,
+    ];
+}
+
+/// What one interface of the MainDevice carried. Bytes are those of the frames without check sequence.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct LinkStatistics {
+    /// Frames that went onto the wire.
+    pub frames_sent: u64,
+    /// Their bytes.
+    pub bytes_sent: u64,
+    /// Frames received whole.
+    pub frames_received: u64,
+    /// Their bytes.
+    pub bytes_received: u64,
+}
+
+/// Counters of a whole segment since it was made.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Statistics {
+    pub(crate) links: [LinkStatistics; 2],
+    pub(crate) lost: [u64; LossCause::ALL.len()],
+    pub(crate) hops: u64,
+}
+
+impl Statistics {
+    /// What an interface of the MainDevice carried.
+    pub fn link(&self, link: HostLink) -> LinkStatistics {
+        self.links[link as usize]
+    }
+
+    /// Frames lost for one reason.
+    pub fn lost(&self, cause: LossCause) -> u64 {
+        self.lost[cause as usize]
+    }
+
+    /// Frames lost for any reason.
+    pub fn lost_in_all(&self) -> u64 {
+        self.lost.iter().sum()
+    }
+
+    /// Passages of frames through devices.
+    pub fn hops(&self) -> u64 {
+        self.hops
+    }
+
+    pub(crate) fn lose(&mut self, cause: LossCause) {
+        self.lost[cause as usize] += 1;
+    }
+}

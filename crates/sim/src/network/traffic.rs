@@ -1,0 +1,149 @@
+//! Frames under way: from an interface of the MainDevice through cables and devices back to one.
+
+use core::time::Duration;
+
+use ringcat_wire::frame::MAX_FRAME_VLAN;
+
+use super::statistics::LossCause;
+use super::{Event, Network, Slot};
+use crate::cable::{Endpoint, Fate, HostLink, LegFaults, LegId};
+use crate::controller::Passage;
+use crate::frame::{Fcs, Port};
+use crate::host::{Received, bytes_within};
+use crate::time::SimTime;
+
+impl Network {
+    /// Puts a frame into the transmit queue of an interface.
+    pub(super) fn transmit(&mut self, link: HostLink, bytes: &[u8]) {
+        if bytes.len() > MAX_FRAME_VLAN {
+            return self.statistics.lose(LossCause::Oversized);
+        }
+        let Some(out) = self.hosts[link as usize].out.filter(|_| self.carrier(link)) else {
+            return self.statistics.lose(LossCause::NoCarrier);
+        };
+        let slot = self.frames.put(bytes);
+        let Some(last_bit) = self.hosts[link as usize].transmit(self.now, self.frames.frame(slot)) else {
+            return self.lose(slot, LossCause::TransmitQueueFull);
+        };
+        let counters = &mut self.statistics.links[link as usize];
+        counters.frames_sent += 1;
+        counters.bytes_sent += bytes.len() as u64;
+        let at = last_bit + Duration::from_nanos(self.legs[out.index()].delay_ns);
+        self.queue.push(at, Event::Arrival { slot, leg: out, meddled: false });
+    }
+
+    /// The last bit of a frame is due at the end of a leg. Returns its next arrival.
+    pub(super) fn arrive(&mut self, slot: Slot, id: LegId, meddled: bool) -> Option<(SimTime, Event)> {
+        if self.legs[id.index()].faulty && !meddled {
+            return self.meddle(slot, id);
+        }
+        let wire_ns = self.frames.frame(slot).first_to_last_bit_ns();
+        let leg = &self.legs[id.index()];
+        let (to, detected) = (leg.to, leg.detected && leg.detected_at <= self.now.back_ns(wire_ns));
+        match leg.fate(self.now, wire_ns) {
+            Fate::Arrives => {}
+            Fate::Truncated { seen } if bytes_within(seen) > 0 => {
+                let frame = self.frames.frame_mut(slot);
+                frame.truncate(usize::try_from(bytes_within(seen)).unwrap_or(usize::MAX));
+                frame.fcs = Fcs::Bad;
+            }
+            Fate::Truncated { .. } | Fate::Lost => return self.lose_hop(slot, LossCause::DeadCable),
+        }
+        if !detected {
+            return self.lose_hop(slot, LossCause::NoLink);
+        }
+        match to {
+            Endpoint::Device(device, port) => self.hop(slot, device.0, port),
+            Endpoint::Host(link) => {
+                self.deliver(slot, link);
+                None
+            }
+        }
+    }
+
+    /// A frame passes a device.
+    fn hop(&mut self, slot: Slot, index: usize, from: Port) -> Option<(SimTime, Event)> {
+        self.statistics.hops += 1;
+        let frame = self.frames.frame_mut(slot);
+        let first_bit = self.now.back_ns(frame.first_to_last_bit_ns());
+        let node = &mut self.nodes[index];
+        let passage = node.device.controller.receive(frame, from, self.now);
+        self.settle(index);
+        let Passage::Leaves { port, processed } = passage else {
+            return self.lose_hop(slot, LossCause::Destroyed);
+        };
+        let node = &self.nodes[index];
+        if node.interrupted(from, port, first_bit) {
+            return self.lose_hop(slot, LossCause::LoopChanged);
+        }
+        let Some(leg) = node.out[port.index()] else {
+            return self.lose_hop(slot, LossCause::OpenPort);
+        };
+        let delay = if processed { self.options.processing_delay } else { self.options.forwarding_delay };
+        let at = self.now + delay + Duration::from_nanos(self.legs[leg.index()].delay_ns);
+        Some((at, Event::Arrival { slot, leg, meddled: false }))
+    }
+
+    /// A frame reaches an interface of the MainDevice.
+    fn deliver(&mut self, slot: Slot, link: HostLink) {
+        if self.frames.frame(slot).fcs != Fcs::Good {
+            return self.lose(slot, LossCause::BadCheckSequence);
+        }
+        let bytes = self.frames.remove_bytes(slot);
+        let length = bytes.len() as u64;
+        if let Err(refused) = self.hosts[link as usize].deliver(Received { at: self.now, bytes }) {
+            self.frames.give_back(refused.bytes);
+            return self.statistics.lose(LossCause::ReceiveQueueFull);
+        }
+        let counters = &mut self.statistics.links[link as usize];
+        counters.frames_received += 1;
+        counters.bytes_received += length;
+    }
+
+    /// The faults of a leg have their turn with a frame that is due at its end.
+    fn meddle(&mut self, slot: Slot, id: LegId) -> Option<(SimTime, Event)> {
+        let leg = &mut self.legs[id.index()];
+        if leg.faults.blocked {
+            return self.lose_hop(slot, LossCause::Blocked);
+        }
+        let dropped = LegFaults::take(&mut leg.faults.drop);
+        let corrupted = !dropped && LegFaults::take(&mut leg.faults.corrupt);
+        let doubled = !dropped && LegFaults::take(&mut leg.faults.duplicate);
+        let late = if !dropped && LegFaults::take(&mut leg.faults.delay) { leg.faults.delay_by } else { Duration::ZERO };
+        leg.refresh_faulty();
+        if dropped {
+            return self.lose_hop(slot, LossCause::Dropped);
+        }
+        if corrupted {
+            self.corrupt(slot);
+        }
+        let at = self.now + late;
+        if doubled {
+            let copy = self.frames.put_copy(slot);
+            let behind = at + Duration::from_nanos(self.frames.frame(slot).occupies_ns());
+            self.queue.push(behind, Event::Arrival { slot: copy, leg: id, meddled: true });
+        }
+        Some((at, Event::Arrival { slot, leg: id, meddled: true }))
+    }
+
+    /// Turns over one bit of a frame.
+    fn corrupt(&mut self, slot: Slot) {
+        let frame = self.frames.frame_mut(slot);
+        let bit = self.random.below(frame.bytes.len() * 8);
+        if let Some(byte) = frame.bytes.get_mut(bit / 8) {
+            *byte ^= 1 << (bit % 8);
+        }
+        frame.reparse();
+        frame.fcs = Fcs::Bad;
+    }
+
+    fn lose(&mut self, slot: Slot, cause: LossCause) {
+        self.statistics.lose(cause);
+        self.frames.remove(slot);
+    }
+
+    fn lose_hop(&mut self, slot: Slot, cause: LossCause) -> Option<(SimTime, Event)> {
+        self.lose(slot, cause);
+        None
+    }
+}
