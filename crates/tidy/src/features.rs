@@ -1,7 +1,7 @@
 //! `docs/FEATURES.md` is honest: every row of its table names tests that exist.
 //!
 //! In goes a tree, out come findings. A row is `| capability | state | tests |`; each test is its function's name in
-//! backticks, with as much of its path before it as is needed to tell it from others.
+//! backticks; a path before it helps the reader where several have one name.
 
 use std::collections::BTreeSet;
 
