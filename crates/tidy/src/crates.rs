@@ -1,6 +1,6 @@
 //! Allowed arrows between crates.
 //!
-//! In go the manifests `crates/*/Cargo.toml`, out comes a finding for every dependency that [`ROOMS`] does not list.
+//! In go the manifests `crates/*/Cargo.toml`, out comes a finding for every dependency that `ROOMS` does not list.
 //! Normal, build and development dependencies count alike: a test must not know what its crate must not know.
 
 use toml::{Table, Value};

@@ -7,7 +7,8 @@
 //! * [`crates`]: allowed arrows between crates;
 //! * [`modules`]: allowed arrows between the modules of the engine;
 //! * [`safety`]: where `unsafe` may be written;
-//! * [`features`]: every row of `docs/FEATURES.md` names tests that exist.
+//! * [`features`]: every row of `docs/FEATURES.md` names tests that exist;
+//! * [`paths`]: the places that `docs/ARCHITECTURE.md` names exist.
 //!
 //! [`tokens`] is the little Rust lexer under them, so that words in comments and strings are not taken for code.
 #![forbid(unsafe_code)]
@@ -16,6 +17,7 @@ pub mod crates;
 pub mod features;
 pub mod files;
 pub mod modules;
+pub mod paths;
 pub mod safety;
 pub mod tokens;
 pub mod tree;

@@ -1,7 +1,7 @@
 //! The rules, applied to this repository.
 
 use tidy::tree::Tree;
-use tidy::{Finding, crates, features, files, modules, safety};
+use tidy::{Finding, crates, features, files, modules, paths, safety};
 
 fn tree() -> Tree {
     Tree::of_this_repository().expect("the repository can be read")
@@ -65,4 +65,9 @@ fn pure_crates_forbid_unsafe_code() {
 #[test]
 fn every_feature_has_a_test() {
     none(features::rows_without_test(&tree()));
+}
+
+#[test]
+fn the_map_leads_somewhere() {
+    none(paths::leading_nowhere(&tree()));
 }
