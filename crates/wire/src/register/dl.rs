@@ -44,7 +44,7 @@ impl Field for [LoopControl; 4] {
 
 bit_register! {
     /// Register DL_CONTROL (0x0100).
-    DlControl(u32, reset 0x0007_0001) {
+    DlControl(u32, reset 0x0007_0001, reserved kept) {
         /// Destroy frames that are not EtherCAT and mark the source address of those that are (facts 2.6).
         forwarding_rule: bool = 0, 1;
         /// The loop settings hold for about one second.
@@ -99,7 +99,7 @@ impl Field for [PortStatus; 4] {
 
 bit_register! {
     /// Register DL_STATUS (0x0110).
-    DlStatus(u16, reset 0) {
+    DlStatus(u16, reset 0, reserved kept) {
         /// The PDI is operational: the EEPROM is loaded.
         pdi_operational: bool = 0, 1;
         /// The PDI watchdog has not expired.

@@ -57,7 +57,7 @@ bit_register! {
 
 bit_register! {
     /// Register FEATURES (0x0008).
-    Features(u16, reset 0) {
+    Features(u16, reset 0, reserved kept) {
         /// FMMUs map whole bytes only (0: bit by bit).
         fmmu_byte_oriented: bool = 0, 1;
         /// Unused register access.

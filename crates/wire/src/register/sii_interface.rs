@@ -41,7 +41,7 @@ impl Field for SiiCommand {
 
 bit_register! {
     /// Register SII_CONFIGURATION (0x0500).
-    SiiConfiguration(u8, reset 0) {
+    SiiConfiguration(u8, reset 0, reserved kept) {
         /// The EEPROM is offered to the PDI.
         offer_pdi: bool = 0, 1;
         /// Takes the EEPROM away from the PDI.
@@ -51,7 +51,7 @@ bit_register! {
 
 bit_register! {
     /// Register SII_PDI_ACCESS (0x0501).
-    SiiPdiAccess(u8, reset 0) {
+    SiiPdiAccess(u8, reset 0, reserved kept) {
         /// The PDI has the EEPROM.
         pdi_access: bool = 0, 1;
     }
@@ -59,7 +59,7 @@ bit_register! {
 
 bit_register! {
     /// Register SII_CONTROL (0x0502).
-    SiiControl(u16, reset 0) {
+    SiiControl(u16, reset 0, reserved kept) {
         /// Allows the write command of the same frame.
         write_enable: bool = 0, 1;
         /// The PDI emulates the EEPROM.

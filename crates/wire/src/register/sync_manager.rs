@@ -80,7 +80,7 @@ bit_register! {
 
 bit_register! {
     /// Status byte of a SyncManager (+5), read only.
-    SyncManagerStatus(u8, reset 0) {
+    SyncManagerStatus(u8, reset 0, reserved kept) {
         /// The buffer was written completely.
         write_event: bool = 0, 1;
         /// The buffer was read completely.
@@ -98,7 +98,7 @@ bit_register! {
 
 bit_register! {
     /// Activate byte of a SyncManager (+6).
-    SyncManagerActivate(u8, reset 0) {
+    SyncManagerActivate(u8, reset 0, reserved kept) {
         /// Switched on.
         enable: bool = 0, 1;
         /// Toggled by the MainDevice to have the last mail again.
@@ -112,7 +112,7 @@ bit_register! {
 
 bit_register! {
     /// PDI control byte of a SyncManager (+7), written by the PDI.
-    SyncManagerPdiControl(u8, reset 0) {
+    SyncManagerPdiControl(u8, reset 0, reserved kept) {
         /// The PDI has switched the SyncManager off.
         deactivate: bool = 0, 1;
         /// Follows the repeat request when the mail is back.

@@ -49,17 +49,20 @@ pub(super) const fn low_bits(width: u32) -> u32 {
     u32::MAX >> (32 - width)
 }
 
-/// Declares a register of named bit fields, `field: Type = lowest bit, width;`. All other bits are kept in `reserved`.
+/// Declares a register of named bit fields, `field: Type = lowest bit, width;`. Registers with bits that have no name
+/// say `reserved kept` and get a field for them.
 macro_rules! bit_register {
-    ($(#[$doc:meta])* $name:ident($bits:ty, reset $reset:literal) {
+    ($(#[$doc:meta])* $name:ident($bits:ty, reset $reset:literal $(, $reserved:ident kept)?) {
         $($(#[$field_doc:meta])* $field:ident: $type:ty = $shift:literal, $width:literal;)*
     }) => {
         $(#[$doc])*
         #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
         pub struct $name {
             $($(#[$field_doc])* pub $field: $type,)*
-            /// All other bits, in place.
-            pub reserved: $bits,
+            $(
+                /// All other bits, in place.
+                pub $reserved: $bits,
+            )?
         }
 
         impl $name {
@@ -67,8 +70,8 @@ macro_rules! bit_register {
             pub const LEN: usize = <$bits>::BITS as usize / 8;
             /// Value after a reset.
             pub const RESET: $bits = $reset;
-
-            const NAMED: $bits = {
+            /// Mask of the bits that have a name.
+            pub const NAMED: $bits = {
                 let mut named = 0u32;
                 $(named |= $crate::register::view::low_bits($width) << $shift;)*
                 named as $bits
@@ -79,16 +82,18 @@ macro_rules! bit_register {
                 use $crate::register::view::{Field, low_bits};
                 $name {
                     $($field: <$type as Field>::from_field(u32::from(bits) >> $shift & low_bits($width)),)*
-                    reserved: bits & !Self::NAMED,
+                    $($reserved: bits & !Self::NAMED,)?
                 }
             }
 
             /// The register's value. Numbers that are too large for their field lose their upper bits.
             pub fn bits(self) -> $bits {
                 use $crate::register::view::{Field, low_bits};
-                let mut bits = 0u32;
-                $(bits |= (Field::to_field(self.$field) & low_bits($width)) << $shift;)*
-                bits as $bits | self.reserved & !Self::NAMED
+                let mut named = 0u32;
+                $(named |= (Field::to_field(self.$field) & low_bits($width)) << $shift;)*
+                let bits = named as $bits;
+                $(let bits = bits | self.$reserved & !Self::NAMED;)?
+                bits
             }
 
             /// From the register's bytes.
