@@ -156,12 +156,7 @@ impl SiiHeader {
     pub fn decode(bytes: &[u8; Self::LEN]) -> SiiHeader {
         let word = |at: usize| u16::from_le_bytes([bytes[2 * at], bytes[2 * at + 1]]);
         let double = |at: usize| u32::from(word(at)) | u32::from(word(at + 1)) << 16;
-        let mailbox = |at: usize| MailboxLayout {
-            receive_offset: word(at),
-            receive_size: word(at + 1),
-            send_offset: word(at + 2),
-            send_size: word(at + 3),
-        };
+        let mailbox = |at: usize| MailboxLayout::decode(&core::array::from_fn(|n| bytes[2 * at + n]));
         SiiHeader {
             pdi_control: word(0x00),
             pdi_configuration: word(0x01),
@@ -208,18 +203,14 @@ impl SiiHeader {
             put(0x10 + n, delay);
         }
         put(0x13, self.reserved_13);
-        for (start, mailbox) in [(0x14, &self.bootstrap_mailbox), (0x18, &self.standard_mailbox)] {
-            put(start, mailbox.receive_offset);
-            put(start + 1, mailbox.receive_size);
-            put(start + 2, mailbox.send_offset);
-            put(start + 3, mailbox.send_size);
-        }
         put(0x1C, self.protocols.0);
         for (n, word) in self.reserved_1d.into_iter().enumerate() {
             put(0x1D + n, word);
         }
         put(0x3E, self.size_kbit_minus_1);
         put(0x3F, self.version);
+        out[0x28..0x30].copy_from_slice(&self.bootstrap_mailbox.encode());
+        out[0x30..0x38].copy_from_slice(&self.standard_mailbox.encode());
         out
     }
 

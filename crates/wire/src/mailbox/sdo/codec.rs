@@ -121,7 +121,7 @@ impl Encoder<'_> {
     }
 
     /// The first message of a normal transfer; `None` also where there is more data than the total says.
-    pub fn normal(mut self, specifier: u8, flags: u8, object: (u16, u8), total: u32, data: &[u8]) -> Option<usize> {
+    pub fn normal(self, specifier: u8, flags: u8, object: (u16, u8), total: u32, data: &[u8]) -> Option<usize> {
         if u32::try_from(data.len()).ok()? > total {
             return None;
         }
