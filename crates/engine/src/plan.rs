@@ -1,0 +1,195 @@
+//! Declaration and scan result to register values: what has to be written to a SubDevice on its way to OP
+//! (facts 3.10, 3.11, 5.2).
+//!
+//! In go a [`SubDeviceConfig`] and the [`SubDeviceInfo`] to which it belongs; out comes a [`SubDevicePlan`]: mailbox
+//! and process data SyncManagers, the layout of each process data area, watchdog registers, SDO downloads for PDO
+//! assignment and mapping. Logical addresses are given later, when domains are laid out: [`fmmu`]. Writing all this,
+//! in which order and in which state, is the matter of the procedures.
+
+mod areas;
+mod check;
+mod error;
+mod sdos;
+
+use alloc::vec::Vec;
+
+use ringcat_wire::address::{LogicalAddress, RegisterAddress, StationAddress};
+use ringcat_wire::register::{Fmmu, SyncManager, SyncManagerControl, map};
+use ringcat_wire::sii::{MailboxLayout, SyncManagerKind};
+
+use crate::config::{SdoDownload, SubDeviceConfig};
+use crate::info::{Direction, SubDeviceInfo};
+
+pub use error::{PlanError, PlanProblem, PlanWarning};
+
+/// Control byte of the mailbox that the MainDevice writes, where the SII gives none (facts 3.11).
+const MAILBOX_OUT_CONTROL: u8 = 0x26;
+/// Control byte of the mailbox that the MainDevice reads, where the SII gives none (facts 3.11).
+const MAILBOX_IN_CONTROL: u8 = 0x22;
+
+/// A SyncManager to be written.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct SmPlan {
+    /// Its number.
+    pub index: u8,
+    /// Its registers.
+    pub register: SyncManager,
+}
+
+/// An entry of a PDO and where it lies.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct MappedEntry {
+    /// Index of the object; 0 is a gap.
+    pub index: u16,
+    /// Subindex of the object.
+    pub sub_index: u8,
+    /// First bit, counted from the start of the area.
+    pub bit_offset: u32,
+    /// Bits.
+    pub bit_length: u8,
+}
+
+/// A PDO in an area.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct MappedPdo {
+    /// Index of the PDO mapping object.
+    pub index: u16,
+    /// Its entries in order, gaps included.
+    pub entries: Vec<MappedEntry>,
+}
+
+/// The process data of one SyncManager.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct AreaPlan {
+    /// The SyncManager.
+    pub sync_manager: u8,
+    /// Its direction.
+    pub direction: Direction,
+    /// First physical byte.
+    pub physical: u16,
+    /// Bytes; 0 where the SyncManager is switched off and needs no FMMU.
+    pub length: u16,
+    /// Registers of the SyncManager.
+    pub register: SyncManager,
+    /// To be enabled on the way to OP only, not for SAFEOP (facts 4.4).
+    pub op_only: bool,
+    /// Its PDOs; none where the SII names a length only.
+    pub pdos: Vec<MappedPdo>,
+}
+
+/// What has to be written to a SubDevice.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct SubDevicePlan {
+    /// Its station address.
+    pub station: StationAddress,
+    /// Mailbox SyncManagers for PREOP: first the one that the MainDevice writes. None or two.
+    pub mailbox: Vec<SmPlan>,
+    /// Mailbox SyncManagers for BOOT. None or two.
+    pub bootstrap: Vec<SmPlan>,
+    /// Process data areas by SyncManager number. Each of them gets an FMMU unless its length is 0.
+    pub process_data: Vec<AreaPlan>,
+    /// SyncManagers of the controller to be switched off before SAFEOP: neither mailbox nor process data.
+    pub unused: Vec<u8>,
+    /// SDO downloads of the application.
+    pub sdos: Vec<SdoDownload>,
+    /// SDO downloads that make PDO assignment and mapping what they are planned to be; they come after `sdos`.
+    pub assign_sdos: Vec<SdoDownload>,
+    /// LRW reaches the SubDevice.
+    pub lrw_supported: bool,
+    /// Watchdog registers to be written before SAFEOP.
+    pub watchdog: Vec<(RegisterAddress, Vec<u8>)>,
+    /// What the application asked for and the SubDevice may not follow.
+    pub warnings: Vec<PlanWarning>,
+}
+
+impl SubDevicePlan {
+    /// Areas that need an FMMU, with its number: in the order of the SyncManagers.
+    pub fn mapped_areas(&self) -> impl Iterator<Item = (u8, &AreaPlan)> {
+        (0..).zip(self.process_data.iter().filter(|area| area.length > 0))
+    }
+}
+
+/// Plans one SubDevice. The error names SubDevice, SyncManager, PDO or object, what was expected and what came.
+pub fn plan(config: &SubDeviceConfig, info: &SubDeviceInfo) -> Result<SubDevicePlan, PlanError> {
+    plan_inner(config, info).map_err(|problem| PlanError { position: info.position, station: info.station, problem })
+}
+
+fn plan_inner(config: &SubDeviceConfig, info: &SubDeviceInfo) -> Result<SubDevicePlan, PlanProblem> {
+    let mailbox = info.mailbox.filter(|_| mailbox_wanted(info)).map_or(Vec::new(), |layout| mailbox_pair(info, &layout));
+    let bootstrap = info.bootstrap.map_or(Vec::new(), |layout| mailbox_pair(info, &layout));
+    let process_data = areas::areas(config, info, &mailbox)?;
+    check::check(info, &mailbox, &process_data)?;
+    let mut warnings = Vec::new();
+    let assign_sdos = sdos::assign_sdos(config, info, &process_data, &mut warnings)?;
+    if !config.sdos.is_empty() && (mailbox.is_empty() || !info.protocols.coe()) {
+        return Err(PlanProblem::NoCoe { index: config.sdos[0].index, sub_index: config.sdos[0].sub_index });
+    }
+    let used = |index: &u8| {
+        mailbox.iter().any(|sm| sm.index == *index) || process_data.iter().any(|area| area.sync_manager == *index)
+    };
+    Ok(SubDevicePlan {
+        station: info.station,
+        unused: (0..info.controller.sync_manager_count).filter(|index| !used(index)).collect(),
+        mailbox,
+        bootstrap,
+        process_data,
+        sdos: config.sdos.clone(),
+        assign_sdos,
+        lrw_supported: info.lrw_supported(),
+        watchdog: watchdog(config),
+        warnings,
+    })
+}
+
+/// The registers of an FMMU that maps a whole area, byte by byte, to a logical address.
+pub fn fmmu(area: &AreaPlan, logical: LogicalAddress) -> Fmmu {
+    Fmmu {
+        logical_start: logical,
+        length: area.length,
+        logical_start_bit: 0,
+        logical_stop_bit: 7,
+        physical_start: area.physical,
+        physical_start_bit: 0,
+        read: area.direction == Direction::Inputs,
+        write: area.direction == Direction::Outputs,
+        active: area.length > 0,
+        ..Fmmu::default()
+    }
+}
+
+/// SM 0 and 1 belong to the mailbox unless the SII gives one of them to process data.
+fn mailbox_wanted(info: &SubDeviceInfo) -> bool {
+    !info.sync_managers.iter().take(2).any(|sm| matches!(sm.kind, SyncManagerKind::Outputs | SyncManagerKind::Inputs))
+}
+
+fn mailbox_pair(info: &SubDeviceInfo, layout: &MailboxLayout) -> Vec<SmPlan> {
+    let control = |index: usize, kind, default| {
+        info.sync_managers.get(index).filter(|sm| sm.kind == kind && sm.control != 0).map_or(default, |sm| sm.control)
+    };
+    let out = control(0, SyncManagerKind::MailboxOut, MAILBOX_OUT_CONTROL);
+    let inward = control(1, SyncManagerKind::MailboxIn, MAILBOX_IN_CONTROL);
+    Vec::from([
+        SmPlan { index: 0, register: sync_manager(layout.receive_offset, layout.receive_size, out) },
+        SmPlan { index: 1, register: sync_manager(layout.send_offset, layout.send_size, inward) },
+    ])
+}
+
+fn sync_manager(start: u16, length: u16, control: u8) -> SyncManager {
+    let mut register =
+        SyncManager { start, length, control: SyncManagerControl::from_bits(control), ..SyncManager::default() };
+    register.activate.enable = length > 0;
+    register
+}
+
+fn watchdog(config: &SubDeviceConfig) -> Vec<(RegisterAddress, Vec<u8>)> {
+    [
+        (map::WATCHDOG_DIVIDER, config.watchdog_divider),
+        (map::WATCHDOG_TIME_PROCESS_DATA, config.watchdog_intervals),
+    ]
+    .into_iter()
+    .filter_map(|(address, value)| Some((address, value?.to_le_bytes().to_vec())))
+    .collect()
+}
+
+#[cfg(test)]
+mod tests;

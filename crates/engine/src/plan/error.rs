@@ -1,0 +1,227 @@
+//! Why a SubDevice cannot be set up as declared. Most of it is a wrong declaration, some of it a wrong SII.
+
+use core::fmt;
+
+use ringcat_wire::address::{Position, StationAddress};
+
+use crate::info::Direction;
+
+/// A problem and the SubDevice that has it.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct PlanError {
+    /// Position of the SubDevice.
+    pub position: Position,
+    /// Its station address.
+    pub station: StationAddress,
+    /// What is wrong.
+    pub problem: PlanProblem,
+}
+
+/// What is wrong.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum PlanProblem {
+    /// A SyncManager that the controller does not have.
+    NoSuchSyncManager {
+        /// Its number.
+        sync_manager: u8,
+        /// SyncManagers of the controller.
+        available: u8,
+    },
+    /// Process data for a SyncManager whose place the SII does not give.
+    UnknownSyncManager {
+        /// Its number.
+        sync_manager: u8,
+        /// SyncManagers that the SII describes.
+        described: usize,
+    },
+    /// Process data for a SyncManager that belongs to the mailbox.
+    MailboxSyncManager {
+        /// Its number.
+        sync_manager: u8,
+    },
+    /// Two declarations for one SyncManager differ in its direction.
+    Directions {
+        /// Its number.
+        sync_manager: u8,
+        /// Direction of the declaration of the SyncManager.
+        expected: Direction,
+        /// Direction of its PDO assignment.
+        got: Direction,
+    },
+    /// A PDO without declared entries that the SII does not describe.
+    UnknownPdo {
+        /// The SyncManager to which it is assigned.
+        sync_manager: u8,
+        /// Its index.
+        pdo: u16,
+    },
+    /// A PDO that is assigned to a SyncManager of the other direction.
+    PdoDirection {
+        /// The SyncManager.
+        sync_manager: u8,
+        /// Index of the PDO.
+        pdo: u16,
+        /// Direction of the SyncManager.
+        expected: Direction,
+        /// Direction of the PDO in the SII.
+        got: Direction,
+    },
+    /// A PDO that is assigned twice.
+    PdoTwice {
+        /// Index of the PDO.
+        pdo: u16,
+        /// The SyncManager of the first assignment.
+        first: u8,
+        /// The SyncManager of the second assignment.
+        second: u8,
+    },
+    /// More PDOs in an assignment, or entries in a PDO, than their object can hold.
+    TooMany {
+        /// Object: 0x1C10 + n for the assignment of SM n, or the PDO.
+        object: u16,
+        /// Entries that it can hold.
+        expected: usize,
+        /// Entries asked for.
+        got: usize,
+    },
+    /// More process data than a SyncManager can hold.
+    TooLong {
+        /// The SyncManager.
+        sync_manager: u8,
+        /// Bits asked for.
+        bits: u64,
+    },
+    /// An area that does not lie in the memory of the controller.
+    OutsideMemory {
+        /// The SyncManager.
+        sync_manager: u8,
+        /// First byte.
+        start: u16,
+        /// Bytes including all buffers.
+        bytes: u32,
+        /// First byte behind the memory.
+        memory_end: u32,
+    },
+    /// Two areas share bytes; one with three buffers takes three times its length.
+    Overlap {
+        /// The SyncManager of the first area.
+        first: u8,
+        /// Bytes of the first area, all buffers included: start and first byte behind.
+        first_bytes: (u16, u32),
+        /// The SyncManager of the second area.
+        second: u8,
+        /// Bytes of the second area.
+        second_bytes: (u16, u32),
+    },
+    /// More areas than the controller has FMMUs.
+    TooFewFmmus {
+        /// FMMUs needed.
+        expected: usize,
+        /// FMMUs of the controller.
+        got: u8,
+    },
+    /// Other process data is asked for than the SII describes, and there is no CoE to tell the SubDevice.
+    FixedProcessData {
+        /// The SyncManager.
+        sync_manager: u8,
+        /// Bits that the SII describes.
+        expected: u64,
+        /// Bits asked for.
+        got: u64,
+    },
+    /// An SDO download for a SubDevice without CoE.
+    NoCoe {
+        /// Index of the object.
+        index: u16,
+        /// Subindex of the object.
+        sub_index: u8,
+    },
+}
+
+/// What the application asked for and the SubDevice may not follow. The plan takes it as asked for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum PlanWarning {
+    /// Another PDO assignment than the SII describes, but the SII says that it cannot be changed. It is not written.
+    FixedAssignment {
+        /// The SyncManager.
+        sync_manager: u8,
+    },
+    /// Another mapping than the SII describes, but the SII says that it cannot be changed. It is not written.
+    FixedMapping {
+        /// Index of the PDO.
+        pdo: u16,
+    },
+}
+
+impl fmt::Display for PlanError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "SubDevice {} ({}): {}", self.position, self.station, self.problem)
+    }
+}
+
+impl core::error::Error for PlanError {}
+
+impl fmt::Display for PlanProblem {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            PlanProblem::NoSuchSyncManager { sync_manager, available } => {
+                write!(f, "SM {sync_manager} is declared, the controller has {available} SyncManagers")
+            }
+            PlanProblem::UnknownSyncManager { sync_manager, described } => {
+                write!(f, "SM {sync_manager} has process data, the SII describes {described} SyncManagers only")
+            }
+            PlanProblem::MailboxSyncManager { sync_manager } => {
+                write!(f, "SM {sync_manager} has process data, but it belongs to the mailbox")
+            }
+            PlanProblem::Directions { sync_manager, expected, got } => {
+                write!(f, "SM {sync_manager} is declared for {expected}, its PDO assignment for {got}")
+            }
+            PlanProblem::UnknownPdo { sync_manager, pdo } => {
+                write!(f, "SM {sync_manager}: PDO {pdo:#06x} has no declared entries and is not in the SII")
+            }
+            PlanProblem::PdoDirection { sync_manager, pdo, expected, got } => {
+                write!(f, "SM {sync_manager} is for {expected}, PDO {pdo:#06x} for {got}")
+            }
+            PlanProblem::PdoTwice { pdo, first, second } => {
+                write!(f, "PDO {pdo:#06x} is assigned to SM {first} and again to SM {second}")
+            }
+            PlanProblem::TooMany { object, expected, got } => {
+                write!(f, "object {object:#06x} holds at most {expected} entries, got {got}")
+            }
+            PlanProblem::TooLong { sync_manager, bits } => {
+                write!(f, "SM {sync_manager}: {bits} bits of process data, expected at most 524280")
+            }
+            PlanProblem::OutsideMemory { sync_manager, start, bytes, memory_end } => {
+                write!(f, "SM {sync_manager}: {bytes} bytes (all buffers) at {start:#06x} leave the memory, ")?;
+                write!(f, "which ends at {memory_end:#06x}")
+            }
+            PlanProblem::Overlap { first, first_bytes, second, second_bytes } => {
+                write!(f, "SM {first} ({:#06x}..{:#06x}) and ", first_bytes.0, first_bytes.1)?;
+                write!(f, "SM {second} ({:#06x}..{:#06x}) overlap", second_bytes.0, second_bytes.1)
+            }
+            PlanProblem::TooFewFmmus { expected, got } => {
+                write!(f, "{expected} FMMUs are needed, the controller has {got}")
+            }
+            PlanProblem::FixedProcessData { sync_manager, expected, got } => {
+                write!(f, "SM {sync_manager}: the SII describes {expected} bits, {got} are declared, ")?;
+                f.write_str("and without CoE it cannot be changed")
+            }
+            PlanProblem::NoCoe { index, sub_index } => {
+                write!(f, "object {index:#06x}:{sub_index:02x} is to be written, but there is no CoE")
+            }
+        }
+    }
+}
+
+impl fmt::Display for PlanWarning {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            PlanWarning::FixedAssignment { sync_manager } => {
+                write!(f, "SM {sync_manager}: another PDO assignment is declared, the SII says it cannot be changed")
+            }
+            PlanWarning::FixedMapping { pdo } => {
+                write!(f, "PDO {pdo:#06x}: another mapping is declared, the SII says it cannot be changed")
+            }
+        }
+    }
+}
