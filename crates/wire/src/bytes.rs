@@ -1,10 +1,5 @@
 //! Little-endian fields at an offset of a byte slice. Reading past the end yields `None`.
 
-/// Reads one byte.
-pub(crate) fn u8_at(bytes: &[u8], at: usize) -> Option<u8> {
-    bytes.get(at).copied()
-}
-
 /// Reads a little-endian `u16`.
 pub(crate) fn u16_at(bytes: &[u8], at: usize) -> Option<u16> {
     Some(u16::from_le_bytes(bytes.get(at..at.checked_add(2)?)?.try_into().ok()?))

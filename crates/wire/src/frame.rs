@@ -138,11 +138,6 @@ pub enum FrameError {
         /// Bytes left for it.
         got: usize,
     },
-    /// Announced bytes remain behind the last datagram.
-    Trailing {
-        /// How many.
-        bytes: usize,
-    },
 }
 
 impl fmt::Display for FrameError {
@@ -161,7 +156,6 @@ impl fmt::Display for FrameError {
             FrameError::Datagram { offset, expected, got } => {
                 write!(f, "datagram at byte {offset} needs {expected} bytes, {got} are left")
             }
-            FrameError::Trailing { bytes } => write!(f, "{bytes} announced bytes behind the last datagram"),
         }
     }
 }
@@ -183,6 +177,9 @@ pub struct Frame<'a> {
     pub ethercat_type: EthercatType,
     /// The EtherCAT part without header and padding.
     pub payload: &'a [u8],
+    /// What the EtherCAT header announces behind the last datagram. Controllers go by the datagrams (facts 1.1), and
+    /// some MainDevices count the padding in.
+    pub surplus: &'a [u8],
     /// What follows the EtherCAT part, normally zeros.
     pub padding: &'a [u8],
 }
@@ -200,22 +197,25 @@ impl<'a> Frame<'a> {
             return Err(FrameError::Length { announced, got: rest.len() });
         }
         let (payload, padding) = rest.split_at(announced);
-        let frame = Frame {
+        let mut frame = Frame {
             destination: MacAddress(bytes[..6].try_into().unwrap_or_default()),
             source: MacAddress(bytes[6..12].try_into().unwrap_or_default()),
             encapsulation,
             reserved: header & 0x0800 != 0,
             ethercat_type: EthercatType::from_code((header >> 12) as u8),
             payload,
+            surplus: &[],
             padding,
         };
         if frame.ethercat_type == EthercatType::Datagrams {
-            frame.check_datagrams(start + ETHERCAT_HEADER_LEN)?;
+            let used = frame.check_datagrams(start + ETHERCAT_HEADER_LEN)?;
+            (frame.payload, frame.surplus) = payload.split_at(used);
         }
         Ok(frame)
     }
 
-    fn check_datagrams(&self, start: usize) -> Result<(), FrameError> {
+    /// Returns the bytes of all datagrams.
+    fn check_datagrams(&self, start: usize) -> Result<usize, FrameError> {
         let mut at = 0;
         loop {
             let left = self.payload.len() - at;
@@ -226,8 +226,7 @@ impl<'a> Frame<'a> {
             }
             at += expected;
             if length & MORE == 0 {
-                let bytes = self.payload.len() - at;
-                return if bytes == 0 { Ok(()) } else { Err(FrameError::Trailing { bytes }) };
+                return Ok(at);
             }
         }
     }
@@ -248,13 +247,14 @@ impl<'a> Frame<'a> {
     /// Writes the frame into `out` byte by byte as it was parsed and returns its length; `None` where it does not fit.
     pub fn encode(&self, out: &mut [u8]) -> Option<usize> {
         let start = self.encapsulation.header_len();
-        let length = start + ETHERCAT_HEADER_LEN + self.payload.len() + self.padding.len();
+        let announced = self.payload.len() + self.surplus.len();
+        let length = start + ETHERCAT_HEADER_LEN + announced + self.padding.len();
         let out = out.get_mut(..length)?;
         write_headers(out, self.destination, self.source, &self.encapsulation)?;
-        let header = (self.payload.len() as u16 & 0x07FF)
-            | u16::from(self.reserved) << 11
-            | u16::from(self.ethercat_type.code()) << 12;
-        let (head, padding) = out[start..].split_at_mut(ETHERCAT_HEADER_LEN + self.payload.len());
+        let header =
+            (announced as u16 & 0x07FF) | u16::from(self.reserved) << 11 | u16::from(self.ethercat_type.code()) << 12;
+        let (head, rest) = out[start..].split_at_mut(ETHERCAT_HEADER_LEN + self.payload.len());
+        let (surplus, padding) = rest.split_at_mut(self.surplus.len());
         head[..2].copy_from_slice(&header.to_le_bytes());
         let mut at = ETHERCAT_HEADER_LEN;
         match self.ethercat_type {
@@ -269,6 +269,7 @@ impl<'a> Frame<'a> {
                 }
             }
         }
+        surplus.copy_from_slice(self.surplus);
         padding.copy_from_slice(self.padding);
         Some(length)
     }

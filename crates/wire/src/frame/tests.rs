@@ -97,8 +97,7 @@ fn errors_say_what_was_expected_and_what_came() {
     );
     buffer[22] = 3;
     assert_eq!(Frame::parse(&buffer[..length]), Err(FrameError::Datagram { offset: 16, expected: 15, got: 14 }));
-    buffer[22] = 1;
-    assert_eq!(Frame::parse(&buffer[..length]), Err(FrameError::Trailing { bytes: 1 }));
+    buffer[22] = 2;
     buffer[12] = 0x86;
     buffer[13] = 0xDD;
     assert_eq!(Frame::parse(&buffer[..length]), Err(FrameError::NotEthercat { ethertype: 0x86DD }));
@@ -106,6 +105,19 @@ fn errors_say_what_was_expected_and_what_came() {
     buffer[13] = 0xA4;
     buffer[14] = 45;
     assert_eq!(Frame::parse(&buffer[..length]), Err(FrameError::Length { announced: 45, got: 44 }));
+}
+
+#[test]
+fn padding_that_the_header_counts_in_is_surplus_and_kept() {
+    let (mut buffer, length) = brd_al_status();
+    buffer[14] = 44;
+    buffer[40] = 7;
+    let frame = Frame::parse(&buffer[..length]).unwrap();
+    assert_eq!((frame.payload.len(), frame.surplus.len(), frame.padding.len()), (14, 30, 0));
+    assert_eq!(frame.datagrams().count(), 1);
+    let mut again = [0; MIN_FRAME];
+    assert_eq!(frame.encode(&mut again), Some(length));
+    assert_eq!(again, buffer);
 }
 
 #[test]

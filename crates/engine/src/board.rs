@@ -1,0 +1,172 @@
+//! What the two halves of the engine tell each other without a queue: the latest value of a few words.
+//!
+//! The exchange posts what its supervision datagram saw and the state of the ring; the supervisor posts which SubDevices
+//! take part in process data. Readers look at the latest value, so nothing is lost when they are slow.
+
+use alloc::vec::Vec;
+use core::sync::atomic::{AtomicU32, AtomicU64, Ordering};
+
+use ringcat_wire::address::Wkc;
+
+use crate::ring::RingState;
+
+/// What one supervision datagram brought back: a BRD of AL status.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Supervision {
+    /// SubDevices that the main copy met.
+    pub main: Wkc,
+    /// SubDevices that the redundant copy met.
+    pub redundant: Wkc,
+    /// OR of all AL status words.
+    pub al_status: u16,
+    /// OR of all ECAT event requests (register 0x0210 under its mask).
+    pub irq: u16,
+}
+
+impl Supervision {
+    /// SubDevices that answered on either copy.
+    pub const fn total(&self) -> Wkc {
+        self.main.plus(self.redundant)
+    }
+
+    const fn pack(self) -> u64 {
+        self.main.0 as u64 | (self.redundant.0 as u64) << 16 | (self.al_status as u64) << 32 | (self.irq as u64) << 48
+    }
+
+    const fn unpack(word: u64) -> Supervision {
+        Supervision {
+            main: Wkc(word as u16),
+            redundant: Wkc((word >> 16) as u16),
+            al_status: (word >> 32) as u16,
+            irq: (word >> 48) as u16,
+        }
+    }
+}
+
+/// State of the ring as the exchange last posted it.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct RingWord {
+    /// The state.
+    pub state: RingState,
+    /// How often it changed, so that a quick double change is seen too.
+    pub changes: u32,
+}
+
+/// The shared words.
+#[derive(Debug)]
+pub struct Board {
+    supervision: AtomicU64,
+    /// Counts supervision results; 0 = none yet.
+    supervision_count: AtomicU32,
+    ring: AtomicU64,
+    cycles: AtomicU64,
+    /// One bit per SubDevice: takes part in process data.
+    taking_part: Vec<AtomicU64>,
+    taking_part_changes: AtomicU32,
+}
+
+impl Board {
+    /// A board for this many SubDevices; none takes part.
+    pub fn new(subdevices: usize) -> Board {
+        Board {
+            supervision: AtomicU64::new(0),
+            supervision_count: AtomicU32::new(0),
+            ring: AtomicU64::new(0),
+            cycles: AtomicU64::new(0),
+            taking_part: (0..subdevices.div_ceil(64)).map(|_| AtomicU64::new(0)).collect(),
+            taking_part_changes: AtomicU32::new(0),
+        }
+    }
+
+    pub(crate) fn post_supervision(&self, supervision: Supervision) {
+        self.supervision.store(supervision.pack(), Ordering::Relaxed);
+        // Single writer: a plain store of the next number is enough, and cheaper than a read-modify-write.
+        let count = self.supervision_count.load(Ordering::Relaxed);
+        self.supervision_count.store(count.wrapping_add(1).max(1), Ordering::Release);
+    }
+
+    /// The latest supervision result and its number; `None` before the first.
+    pub fn supervision(&self) -> Option<(u32, Supervision)> {
+        let count = self.supervision_count.load(Ordering::Acquire);
+        (count != 0).then(|| (count, Supervision::unpack(self.supervision.load(Ordering::Relaxed))))
+    }
+
+    pub(crate) fn post_ring(&self, state: RingState) {
+        let changes = ((self.ring.load(Ordering::Relaxed) >> 32) as u32).wrapping_add(1);
+        let code = match state {
+            RingState::Unknown => 0,
+            RingState::Closed => 1,
+            RingState::Open => 2,
+        };
+        self.ring.store(code | u64::from(changes) << 32, Ordering::Release);
+    }
+
+    /// The state of the ring as the exchange sees it.
+    pub fn ring(&self) -> RingWord {
+        let word = self.ring.load(Ordering::Acquire);
+        let state = match word as u32 {
+            1 => RingState::Closed,
+            2 => RingState::Open,
+            _ => RingState::Unknown,
+        };
+        RingWord { state, changes: (word >> 32) as u32 }
+    }
+
+    pub(crate) fn post_cycle(&self) {
+        let cycles = self.cycles.load(Ordering::Relaxed);
+        self.cycles.store(cycles + 1, Ordering::Release);
+    }
+
+    /// Cycles that the exchange has sent: 0 until the application runs it.
+    pub fn cycles(&self) -> u64 {
+        self.cycles.load(Ordering::Acquire)
+    }
+
+    /// Says whether a SubDevice takes part in process data. Indices beyond the board are ignored.
+    pub fn set_taking_part(&self, subdevice: usize, takes_part: bool) {
+        let Some(word) = self.taking_part.get(subdevice / 64) else { return };
+        let bit = 1 << (subdevice % 64);
+        let before =
+            if takes_part { word.fetch_or(bit, Ordering::Relaxed) } else { word.fetch_and(!bit, Ordering::Relaxed) };
+        if (before & bit != 0) != takes_part {
+            self.taking_part_changes.fetch_add(1, Ordering::Release);
+        }
+    }
+
+    /// Whether a SubDevice takes part in process data.
+    pub fn takes_part(&self, subdevice: usize) -> bool {
+        self.taking_part
+            .get(subdevice / 64)
+            .is_some_and(|word| word.load(Ordering::Relaxed) & (1 << (subdevice % 64)) != 0)
+    }
+
+    /// Changes to who takes part since the beginning.
+    pub(crate) fn taking_part_changes(&self) -> u32 {
+        self.taking_part_changes.load(Ordering::Acquire)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_latest_supervision_result_is_read_with_its_number() {
+        let board = Board::new(1);
+        assert_eq!(board.supervision(), None);
+        let first = Supervision { main: Wkc(3), redundant: Wkc(1), al_status: 0x18, irq: 4 };
+        board.post_supervision(first);
+        board.post_supervision(Supervision { irq: 0x8004, ..first });
+        assert_eq!(board.supervision(), Some((2, Supervision { irq: 0x8004, ..first })));
+    }
+
+    #[test]
+    fn only_real_changes_of_taking_part_are_counted() {
+        let board = Board::new(70);
+        board.set_taking_part(69, true);
+        board.set_taking_part(69, true);
+        board.set_taking_part(1000, true);
+        assert_eq!(board.taking_part_changes(), 1);
+        assert!(board.takes_part(69) && !board.takes_part(68) && !board.takes_part(1000));
+    }
+}

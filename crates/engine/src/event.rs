@@ -1,0 +1,298 @@
+//! What happened: the events of both halves.
+
+use alloc::collections::VecDeque;
+use alloc::string::String;
+
+use ringcat_wire::address::{Position, StationAddress};
+use ringcat_wire::al::{AlState, AlStatus, AlStatusCode};
+use ringcat_wire::sii::Identity;
+
+use crate::exchange::{DomainState, DomainStatus};
+use crate::queue::WORDS;
+use crate::time::Instant;
+
+/// Events kept until the application fetches them; beyond, the oldest is dropped and counted.
+const KEPT: usize = 4096;
+
+/// An event with the time at which the engine saw it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct TimedEvent {
+    /// The `now` of the call in which it was seen.
+    pub at: Instant,
+    /// What happened.
+    pub event: Event,
+}
+
+/// What can happen. SubDevices that were declared are named by their index in the declaration, others by position.
+#[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
+pub enum Event {
+    /// A scan counted the SubDevices on each link.
+    Counted {
+        /// Met by the main copy.
+        main: u16,
+        /// Met by the redundant copy.
+        redundant: u16,
+    },
+    /// SubDevices whose information a scan has read so far.
+    ScanProgress {
+        /// Done.
+        done: usize,
+        /// Of.
+        total: usize,
+    },
+    /// A scan ended.
+    ScanFinished {
+        /// SubDevices found.
+        subdevices: usize,
+    },
+    /// Something that keeps a scan from being complete.
+    ScanFailed {
+        /// What and where.
+        reason: String,
+    },
+    /// Something odd in a SubDevice's SII that was worked around.
+    SiiOddity {
+        /// Where.
+        position: Position,
+        /// What.
+        what: String,
+    },
+    /// Port 0 of a SubDevice is not connected though frames reach it: the frame is looped there and may pass no second
+    /// such place (facts 2.4).
+    UnconnectedPort0 {
+        /// Where.
+        position: Position,
+    },
+    /// A SubDevice is entered at a port other than 0: its cables are swapped (facts LC-01).
+    LineCrossed {
+        /// Where; `None` where only the ring shows that there is one (facts LC-02).
+        position: Option<Position>,
+        /// The port of entry, where known.
+        entry_port: Option<u8>,
+    },
+    /// Two SubDevices have one alias.
+    DuplicateAlias {
+        /// The alias.
+        alias: u16,
+        /// First SubDevice that has it.
+        first: Position,
+        /// Second one.
+        second: Position,
+    },
+    /// The ring opened (RED_LINEBRK of the seeds).
+    RingOpened {
+        /// SubDevices on the main link.
+        main: u16,
+        /// SubDevices on the redundant link.
+        redundant: u16,
+    },
+    /// The place of the break, from the topology.
+    BreakLocated {
+        /// Last SubDevice before the break, `None` for the main link itself.
+        after: Option<usize>,
+        /// First SubDevice behind it, `None` for the redundant link itself.
+        before: Option<usize>,
+    },
+    /// The ring closed again (RED_LINEFIXED).
+    RingClosed {
+        /// SubDevices on the main link.
+        main: u16,
+        /// SubDevices on the redundant link.
+        redundant: u16,
+    },
+    /// A SubDevice reached a state.
+    StateReached {
+        /// Index in the declaration.
+        subdevice: usize,
+        /// The state.
+        state: AlState,
+    },
+    /// A SubDevice refused a state or fell out of one.
+    StateError {
+        /// Index in the declaration.
+        subdevice: usize,
+        /// What was asked for; `None` where it fell by itself.
+        requested: Option<AlState>,
+        /// What AL status says.
+        status: AlStatus,
+        /// Why.
+        code: AlStatusCode,
+    },
+    /// A SubDevice no longer answers.
+    Lost {
+        /// Index in the declaration.
+        subdevice: usize,
+    },
+    /// A SubDevice that was lost answers again.
+    Returned {
+        /// Index in the declaration.
+        subdevice: usize,
+    },
+    /// The configuration of a SubDevice failed; it is tried again.
+    ConfigurationFailed {
+        /// Index in the declaration.
+        subdevice: usize,
+        /// What and why.
+        reason: String,
+    },
+    /// A SubDevice that was not declared answers.
+    Unexpected {
+        /// Where.
+        position: Position,
+        /// Who.
+        identity: Identity,
+    },
+    /// A declared SubDevice is not there.
+    Missing {
+        /// Index in the declaration.
+        subdevice: usize,
+        /// Whether the declaration allows that.
+        optional: bool,
+    },
+    /// A station address was given to a SubDevice.
+    Addressed {
+        /// Index in the declaration.
+        subdevice: usize,
+        /// The address.
+        station: StationAddress,
+    },
+    /// The judgement of a domain changed.
+    Domain {
+        /// Number of the domain.
+        domain: usize,
+        /// The new judgement.
+        status: DomainStatus,
+    },
+    /// A domain was due while its frames were still out.
+    Skipped {
+        /// Number of the domain.
+        domain: usize,
+    },
+}
+
+/// Events of one half, oldest first.
+#[derive(Debug, Default)]
+pub struct EventLog {
+    events: VecDeque<TimedEvent>,
+    dropped: u64,
+}
+
+impl EventLog {
+    /// Appends an event.
+    pub fn push(&mut self, at: Instant, event: Event) {
+        if self.events.len() >= KEPT {
+            self.events.pop_front();
+            self.dropped += 1;
+        }
+        self.events.push_back(TimedEvent { at, event });
+    }
+
+    /// Takes the oldest.
+    pub fn pop(&mut self) -> Option<TimedEvent> {
+        self.events.pop_front()
+    }
+
+    /// Events that were dropped because nobody fetched them.
+    pub fn dropped(&self) -> u64 {
+        self.dropped
+    }
+}
+
+/// Events of the exchange, which travel as words.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum CyclicEvent {
+    /// The judgement of a domain changed.
+    Domain {
+        /// Number of the domain.
+        domain: u16,
+        /// The new judgement.
+        status: DomainStatus,
+    },
+    /// A domain was due while its frames were still out.
+    Skipped {
+        /// Number of the domain.
+        domain: u16,
+    },
+}
+
+const KIND_DOMAIN: u64 = 1;
+const KIND_SKIPPED: u64 = 2;
+
+impl CyclicEvent {
+    /// As two words: kind 8 bits, state 8, domain 16, then the working counters.
+    pub const fn pack(self) -> [u64; WORDS] {
+        match self {
+            CyclicEvent::Domain { domain, status } => {
+                let state = match status.state {
+                    DomainState::Zero => 0,
+                    DomainState::Incomplete => 1,
+                    DomainState::Complete => 2,
+                };
+                [
+                    KIND_DOMAIN | state << 8 | (domain as u64) << 16 | (status.skipped << 32),
+                    status.wkc as u64 | (status.expected as u64) << 32,
+                ]
+            }
+            CyclicEvent::Skipped { domain } => [KIND_SKIPPED | (domain as u64) << 16, 0],
+        }
+    }
+
+    /// Back from words; `None` for words that [`CyclicEvent::pack`] does not make.
+    pub const fn unpack(words: [u64; WORDS]) -> Option<CyclicEvent> {
+        let domain = (words[0] >> 16) as u16;
+        match words[0] & 0xFF {
+            KIND_DOMAIN => {
+                let state = match (words[0] >> 8) & 0xFF {
+                    0 => DomainState::Zero,
+                    1 => DomainState::Incomplete,
+                    2 => DomainState::Complete,
+                    _ => return None,
+                };
+                let status = DomainStatus {
+                    wkc: words[1] as u32,
+                    expected: (words[1] >> 32) as u32,
+                    state,
+                    pending: false,
+                    skipped: words[0] >> 32,
+                };
+                Some(CyclicEvent::Domain { domain, status })
+            }
+            KIND_SKIPPED => Some(CyclicEvent::Skipped { domain }),
+            _ => None,
+        }
+    }
+
+    /// As an event for the application.
+    pub fn event(self) -> Event {
+        match self {
+            CyclicEvent::Domain { domain, status } => Event::Domain { domain: domain.into(), status },
+            CyclicEvent::Skipped { domain } => Event::Skipped { domain: domain.into() },
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn cyclic_events_survive_the_words() {
+        let status =
+            DomainStatus { wkc: 3, expected: 70_000, state: DomainState::Incomplete, pending: false, skipped: 9 };
+        for event in [CyclicEvent::Domain { domain: 7, status }, CyclicEvent::Skipped { domain: 65_535 }] {
+            assert_eq!(CyclicEvent::unpack(event.pack()), Some(event));
+        }
+        assert_eq!(CyclicEvent::unpack([0xFF, 0]), None);
+    }
+
+    #[test]
+    fn the_log_keeps_the_newest() {
+        let mut log = EventLog::default();
+        for n in 0..KEPT + 3 {
+            log.push(Instant(n as u64), Event::Skipped { domain: n });
+        }
+        assert_eq!(log.dropped(), 3);
+        assert_eq!(log.pop().unwrap().event, Event::Skipped { domain: 3 });
+    }
+}

@@ -1,0 +1,312 @@
+//! The cyclic half: process data and one supervision datagram.
+//!
+//! A cycle of the application is: [`Exchange::receive`] for every frame that came in, [`Exchange::process`] for each
+//! domain, work on the images, [`Exchange::queue`] for each domain that is due, [`Exchange::send`]. None of them
+//! allocates, locks or waits; the work is bounded by what was planned at activation.
+//!
+//! A frame is delivered when its working counters are as expected, or all its copies are in, or at its deadline. Inputs
+//! are delivered per SubDevice: see [`domain`].
+
+pub mod counters;
+pub mod domain;
+pub mod entry;
+mod flight;
+pub mod foreign;
+pub mod layout;
+
+use alloc::sync::Arc;
+use alloc::vec::Vec;
+use core::time::Duration;
+
+pub use counters::CyclicCounters;
+pub use domain::{Domain, DomainState, DomainStatus, Freshness};
+pub use entry::Entry;
+pub use foreign::ForeignFrame;
+pub use layout::{DomainId, DomainSpec, Layout};
+
+use crate::board::Board;
+use crate::event::CyclicEvent;
+use crate::link::{Link, LinkSet};
+use crate::queue::Producer;
+use crate::ring::{Class, Classified, Identity, RingMonitor, RingState, Sequence};
+use crate::time::Instant;
+use flight::{CyclicFrame, Step};
+use foreign::ForeignFrames;
+
+/// No frame has this id.
+const NO_FRAME: u16 = u16::MAX;
+
+/// What became of a frame that was handed to [`Exchange::receive`].
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Received {
+    /// A copy of a frame that is in flight.
+    Taken,
+    /// A frame of ours whose answer was given up, or a copy that was there already.
+    Late,
+    /// A frame of ours with other datagrams than were sent.
+    Corrupt,
+    /// A frame of the acyclic half.
+    Acyclic,
+    /// A frame of another MainDevice; kept for [`Exchange::pop_foreign`].
+    Foreign,
+    /// No EtherCAT frame.
+    Other,
+}
+
+/// The cyclic half of the MainDevice.
+#[derive(Debug)]
+pub struct Exchange {
+    identity: Identity,
+    links: LinkSet,
+    board: Arc<Board>,
+    events: Producer,
+    sequence: Sequence,
+    by_id: [u16; 256],
+    frames: Vec<CyclicFrame>,
+    domains: Vec<Domain>,
+    to_send: Vec<u16>,
+    monitor: RingMonitor,
+    counters: CyclicCounters,
+    foreign: ForeignFrames,
+    taking_part_changes: u32,
+    cycle: u64,
+}
+
+impl Exchange {
+    /// Builds the images and frames of a layout. This is the last time that memory is allocated.
+    pub fn new(identity: Identity, links: LinkSet, layout: &Layout, board: Arc<Board>, events: Producer) -> Exchange {
+        let mut frames = Vec::new();
+        let mut domains = Vec::new();
+        for (index, planned) in layout.domains.iter().enumerate() {
+            let first = frames.len();
+            frames.extend(planned.frames.iter().map(|frame| CyclicFrame::new(&identity, index, frame)));
+            domains.push(Domain::new(planned, first..frames.len()));
+        }
+        Exchange {
+            identity,
+            links,
+            board,
+            events,
+            sequence: Sequence::default(),
+            by_id: [NO_FRAME; 256],
+            to_send: Vec::with_capacity(frames.len()),
+            frames,
+            domains,
+            monitor: RingMonitor::default(),
+            counters: CyclicCounters::default(),
+            foreign: ForeignFrames::new(),
+            taking_part_changes: 0,
+            cycle: 0,
+        }
+    }
+
+    /// Takes in a frame that arrived on a link. Any bytes are allowed.
+    pub fn receive(&mut self, arrived_on: Link, bytes: &[u8], _now: Instant) -> Received {
+        let copy = match self.identity.classify(bytes) {
+            Classified::Ours(copy) if copy.class == Class::Cyclic => copy,
+            Classified::Ours(_) => return Received::Acyclic,
+            Classified::Foreign => {
+                self.counters.foreign += 1;
+                self.foreign.keep(arrived_on, bytes);
+                return Received::Foreign;
+            }
+            Classified::Other => {
+                self.counters.other += 1;
+                return Received::Other;
+            }
+        };
+        let index = self.by_id[usize::from(copy.sequence.frame_id())];
+        let Some(frame) = self.frames.get_mut(usize::from(index)) else {
+            self.counters.late += 1;
+            return Received::Late;
+        };
+        let Some(domain) = self.domains.get_mut(frame.domain()) else { return Received::Other };
+        match frame.receive(copy, arrived_on, bytes, self.links.mask(), domain.image_mut(), self.cycle) {
+            Step::Waiting => Received::Taken,
+            Step::Finished => {
+                self.counters.received += 1;
+                self.close(index);
+                Received::Taken
+            }
+            Step::Late => {
+                self.counters.late += 1;
+                Received::Late
+            }
+            Step::Corrupt => {
+                self.counters.corrupt += 1;
+                Received::Corrupt
+            }
+        }
+    }
+
+    /// A flight is over: what it proves about the ring and what its supervision datagram saw go on the board.
+    fn close(&mut self, index: u16) {
+        let Some(frame) = self.frames.get_mut(usize::from(index)) else { return };
+        if let Some(state) = self.monitor.observe(frame.arrivals()) {
+            self.board.post_ring(state);
+        }
+        if let Some(supervision) = frame.supervision() {
+            self.board.post_supervision(supervision);
+        }
+        frame.close();
+    }
+
+    /// Judges a domain: gives up its overdue frames and sums its working counters.
+    pub fn process(&mut self, id: DomainId, now: Instant) -> DomainStatus {
+        self.follow_board();
+        let Some(domain) = self.domains.get_mut(id.0) else { return DomainStatus::default() };
+        let (mut wkc, mut pending) = (0, false);
+        for index in domain.frames() {
+            let frame = &mut self.frames[index];
+            if frame.is_waiting() {
+                if frame.overdue(now) {
+                    if frame.give_up(domain.image_mut(), self.cycle) {
+                        self.counters.lost += 1;
+                    } else {
+                        self.counters.half += 1;
+                    }
+                } else {
+                    pending = true;
+                }
+            }
+            wkc += frame.wkc();
+        }
+        if pending || !domain.was_queued() {
+            return domain.status(pending);
+        }
+        let before = domain.status(false).state;
+        let status = domain.judge(wkc, self.cycle);
+        if status.state != DomainState::Complete {
+            self.counters.incomplete += 1;
+        }
+        if status.state != before {
+            let event = CyclicEvent::Domain { domain: id.0 as u16, status };
+            self.events.push(event.pack());
+        }
+        status
+    }
+
+    /// Puts a domain's outputs into its frames, to go out with the next [`Exchange::send`]. A domain whose frames are
+    /// still out is skipped, counted and reported; false then.
+    pub fn queue(&mut self, id: DomainId, now: Instant) -> bool {
+        let Some(domain) = self.domains.get_mut(id.0) else { return false };
+        let frames = domain.frames();
+        if self.frames[frames.clone()].iter().any(|frame| frame.is_waiting() && !frame.overdue(now)) {
+            self.counters.skipped += 1;
+            domain.count_skip();
+            self.events.push(CyclicEvent::Skipped { domain: id.0 as u16 }.pack());
+            return false;
+        }
+        domain.note_queued();
+        for index in frames {
+            if self.frames[index].is_open() {
+                self.counters.copies_lost += 1;
+                self.close(index as u16);
+            }
+            self.frames[index].load(self.domains[id.0].image());
+            if self.to_send.len() < self.to_send.capacity() {
+                self.to_send.push(index as u16);
+            }
+        }
+        true
+    }
+
+    /// Sends what was queued, every frame on all links, and ends the cycle.
+    pub fn send(&mut self, now: Instant, transmit: &mut impl FnMut(Link, &[u8])) {
+        for position in 0..self.to_send.len() {
+            let index = self.to_send[position];
+            let Some(frame) = self.frames.get_mut(usize::from(index)) else { continue };
+            self.sequence = self.sequence.next();
+            self.by_id[usize::from(self.sequence.frame_id())] = index;
+            let timeout = self.domains[frame.domain()].timeout();
+            let bytes = frame.depart(&self.identity, self.sequence, now + timeout);
+            self.counters.sent += 1;
+            self.counters.bytes += bytes.len() as u64;
+            transmit(Link::Main, bytes);
+            if self.links == LinkSet::Ring {
+                Identity::mark_redundant(bytes, true);
+                transmit(Link::Redundant, bytes);
+                Identity::mark_redundant(bytes, false);
+            }
+        }
+        self.to_send.clear();
+        self.cycle += 1;
+        self.board.post_cycle();
+    }
+
+    /// Takes over who takes part in process data where the supervisor changed it.
+    fn follow_board(&mut self) {
+        let changes = self.board.taking_part_changes();
+        if changes == self.taking_part_changes {
+            return;
+        }
+        self.taking_part_changes = changes;
+        for frame in &mut self.frames {
+            frame.recount(|subdevice| self.board.takes_part(subdevice));
+        }
+        for domain in &mut self.domains {
+            let frames = &self.frames[domain.frames()];
+            domain.follow(self.cycle, |subdevice| self.board.takes_part(subdevice), frames);
+        }
+    }
+
+    /// Number of domains.
+    pub fn domain_count(&self) -> usize {
+        self.domains.len()
+    }
+
+    /// A domain's image: its SubDevices' outputs and inputs. Its address does not change.
+    pub fn image(&self, id: DomainId) -> &[u8] {
+        self.domains.get(id.0).map_or(&[], Domain::image)
+    }
+
+    /// A domain's image, to write outputs. What is written into inputs is overwritten by the next delivery.
+    pub fn image_mut(&mut self, id: DomainId) -> &mut [u8] {
+        self.domains.get_mut(id.0).map_or(&mut [], Domain::image_mut)
+    }
+
+    /// The last judgement of a domain.
+    pub fn status(&self, id: DomainId) -> DomainStatus {
+        let Some(domain) = self.domains.get(id.0) else { return DomainStatus::default() };
+        let pending = self.frames[domain.frames()].iter().any(CyclicFrame::is_waiting);
+        domain.status(pending)
+    }
+
+    /// How old a SubDevice's inputs in a domain are.
+    pub fn freshness(&self, id: DomainId, subdevice: usize) -> Freshness {
+        let Some(domain) = self.domains.get(id.0) else { return Freshness::Never };
+        domain.freshness(subdevice, &self.frames[domain.frames()])
+    }
+
+    /// Overrides how long a domain's frames are waited for; the default is three quarters of its period.
+    pub fn set_timeout(&mut self, id: DomainId, timeout: Duration) {
+        if let Some(domain) = self.domains.get_mut(id.0) {
+            domain.set_timeout(timeout);
+        }
+    }
+
+    /// Reads an entry's value from its image, zero-extended.
+    pub fn read(&self, entry: &Entry) -> u64 {
+        entry.read(self.image(entry.domain))
+    }
+
+    /// Writes an entry's value into its image, truncated to the entry's bits.
+    pub fn write(&mut self, entry: &Entry, value: u64) {
+        entry.write(self.image_mut(entry.domain), value);
+    }
+
+    /// State of the ring as the cyclic frames show it.
+    pub fn ring(&self) -> RingState {
+        self.monitor.state()
+    }
+
+    /// Counters since activation.
+    pub fn counters(&self) -> &CyclicCounters {
+        &self.counters
+    }
+
+    /// Takes the oldest kept frame of another MainDevice (facts MR-10).
+    pub fn pop_foreign(&mut self) -> Option<ForeignFrame<'_>> {
+        self.foreign.pop()
+    }
+}

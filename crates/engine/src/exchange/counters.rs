@@ -1,0 +1,30 @@
+//! What the cyclic half counts.
+
+/// Counters of the cyclic half since activation. A frame is counted once, whatever number of copies it has.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct CyclicCounters {
+    /// Frames sent.
+    pub sent: u64,
+    /// Bytes sent, one copy of each frame, without FCS.
+    pub bytes: u64,
+    /// Frames whose copies all came back.
+    pub received: u64,
+    /// Frames of which no copy came back in time.
+    pub lost: u64,
+    /// Frames of which one copy of two came back in time, and not complete.
+    pub half: u64,
+    /// Frames that were complete without their second copy, which did not come before the next cycle.
+    pub copies_lost: u64,
+    /// Copies that came too late or twice.
+    pub late: u64,
+    /// Frames of ours that came back with other datagrams than were sent.
+    pub corrupt: u64,
+    /// Frames of other MainDevices.
+    pub foreign: u64,
+    /// Frames that are not EtherCAT.
+    pub other: u64,
+    /// Domains that were due while their frames were still out.
+    pub skipped: u64,
+    /// Judgements that were not complete, summed over domains.
+    pub incomplete: u64,
+}

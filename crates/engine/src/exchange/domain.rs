@@ -1,0 +1,187 @@
+//! A domain: image, judgement of its working counters, freshness of its SubDevices.
+//!
+//! When all SubDevices answered, all inputs are new. When just those answered that are known to take part, theirs are
+//! new and those of the missing ones keep their last value. While it is not known who is missing, nothing is new.
+
+use alloc::boxed::Box;
+use alloc::vec;
+use alloc::vec::Vec;
+use core::ops::Range;
+use core::time::Duration;
+
+use super::flight::CyclicFrame;
+use super::layout::PlannedDomain;
+
+/// Judgement of a domain's working counters.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+pub enum DomainState {
+    /// No SubDevice answered.
+    #[default]
+    Zero,
+    /// Some answered, or one was met twice.
+    Incomplete,
+    /// All answered.
+    Complete,
+}
+
+/// A domain after [`super::Exchange::process`].
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct DomainStatus {
+    /// Sum of the working counters of all datagrams and both copies, as really sent (LRW, or LWR and LRD).
+    pub wkc: u32,
+    /// The sum with all SubDevices.
+    pub expected: u32,
+    /// The judgement.
+    pub state: DomainState,
+    /// Frames are still out and not overdue: the other fields are those of the last judgement.
+    pub pending: bool,
+    /// How often the domain was due while its frames were still out.
+    pub skipped: u64,
+}
+
+/// How old a SubDevice's inputs are.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Freshness {
+    /// They never came.
+    Never,
+    /// They came with the last judgement of the domain.
+    Fresh,
+    /// They are this many cycles older than the last judgement.
+    Stale {
+        /// Cycles of the exchange.
+        cycles: u64,
+    },
+}
+
+/// What is kept per SubDevice.
+#[derive(Debug)]
+struct Member {
+    subdevice: usize,
+    takes_part: bool,
+    /// Cycle, plus one, before which deliveries to those taking part did not include this one.
+    part_since: u64,
+    /// Cycle, plus one, of the last delivery before it last stopped taking part.
+    delivered_before: u64,
+}
+
+/// A domain of the exchange.
+#[derive(Debug)]
+pub struct Domain {
+    image: Box<[u8]>,
+    frames: Range<usize>,
+    expected: u32,
+    timeout: Duration,
+    members: Vec<Member>,
+    status: DomainStatus,
+    queued: bool,
+    /// Cycle, plus one, of the last judgement.
+    judged: u64,
+}
+
+impl Domain {
+    pub(crate) fn new(planned: &PlannedDomain, frames: Range<usize>) -> Domain {
+        let contributions =
+            planned.frames.iter().flat_map(|frame| &frame.datagrams).flat_map(|datagram| &datagram.contributions);
+        let expected = contributions.map(|(_, wkc)| u32::from(wkc.0)).sum();
+        let mut subdevices: Vec<usize> = planned.areas.iter().map(|placed| placed.area.subdevice).collect();
+        subdevices.sort_unstable();
+        subdevices.dedup();
+        let member = |subdevice| Member { subdevice, takes_part: false, part_since: u64::MAX, delivered_before: 0 };
+        Domain {
+            image: vec![0; planned.image_len as usize].into_boxed_slice(),
+            frames,
+            expected,
+            timeout: planned.period * 3 / 4,
+            members: subdevices.into_iter().map(member).collect(),
+            status: DomainStatus { expected, ..DomainStatus::default() },
+            queued: false,
+            judged: 0,
+        }
+    }
+
+    pub(crate) fn image(&self) -> &[u8] {
+        &self.image
+    }
+
+    pub(crate) fn image_mut(&mut self) -> &mut [u8] {
+        &mut self.image
+    }
+
+    pub(crate) fn frames(&self) -> Range<usize> {
+        self.frames.clone()
+    }
+
+    pub(crate) fn timeout(&self) -> Duration {
+        self.timeout
+    }
+
+    pub(crate) fn set_timeout(&mut self, timeout: Duration) {
+        self.timeout = timeout;
+    }
+
+    pub(crate) fn was_queued(&self) -> bool {
+        self.queued
+    }
+
+    pub(crate) fn note_queued(&mut self) {
+        self.queued = true;
+    }
+
+    pub(crate) fn count_skip(&mut self) {
+        self.status.skipped += 1;
+    }
+
+    pub(crate) fn status(&self, pending: bool) -> DomainStatus {
+        DomainStatus { pending, ..self.status }
+    }
+
+    /// Judges the sum of all working counters of the flights since the last judgement.
+    pub(crate) fn judge(&mut self, wkc: u32, cycle: u64) -> DomainStatus {
+        let state = match wkc {
+            0 if self.expected > 0 => DomainState::Zero,
+            wkc if wkc == self.expected => DomainState::Complete,
+            _ => DomainState::Incomplete,
+        };
+        self.status = DomainStatus { wkc, expected: self.expected, state, ..self.status };
+        self.queued = false;
+        self.judged = cycle + 1;
+        self.status
+    }
+
+    /// Takes over who takes part.
+    pub(crate) fn follow(&mut self, cycle: u64, takes_part: impl Fn(usize) -> bool, frames: &[CyclicFrame]) {
+        for member in &mut self.members {
+            let now = takes_part(member.subdevice);
+            if now == member.takes_part {
+                continue;
+            }
+            if now {
+                member.part_since = cycle + 1;
+            } else {
+                member.delivered_before = member.delivered(frames);
+                member.part_since = u64::MAX;
+            }
+            member.takes_part = now;
+        }
+    }
+
+    pub(crate) fn freshness(&self, subdevice: usize, frames: &[CyclicFrame]) -> Freshness {
+        let Ok(at) = self.members.binary_search_by_key(&subdevice, |member| member.subdevice) else {
+            return Freshness::Never;
+        };
+        match self.members[at].delivered(frames) {
+            0 => Freshness::Never,
+            delivered if delivered >= self.judged => Freshness::Fresh,
+            delivered => Freshness::Stale { cycles: self.judged - delivered },
+        }
+    }
+}
+
+impl Member {
+    /// Cycle, plus one, of the last delivery of this SubDevice's inputs.
+    fn delivered(&self, frames: &[CyclicFrame]) -> u64 {
+        let Some((all, part)) = frames.iter().find_map(|frame| frame.delivered(self.subdevice)) else { return 0 };
+        let part = if part >= self.part_since { part } else { 0 };
+        all.max(part).max(self.delivered_before)
+    }
+}

@@ -1,0 +1,330 @@
+//! From who exchanges what to logical addresses, images and frames.
+//!
+//! A domain is cut into chunks of whole areas that fit one frame, so that no SyncManager is spread over datagrams (facts
+//! 3.11: an access must cover start and end). A chunk is one LRW, or an LWR and an LRD, over
+//! `[outputs of the chunk][inputs of the chunk]`; image and logical addresses follow the same order. Areas are aligned to
+//! bytes (facts 3.10: bitwise FMMUs work in few places).
+
+use alloc::vec::Vec;
+use core::fmt;
+use core::time::Duration;
+
+use ringcat_wire::address::{LogicalAddress, Wkc};
+use ringcat_wire::command::Command;
+use ringcat_wire::datagram::{MAX_DATA, OVERHEAD};
+
+use crate::link::LinkSet;
+
+/// Number of a domain, in the order of declaration.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct DomainId(pub usize);
+
+/// Which way process data flows.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Flow {
+    /// MainDevice to SubDevice.
+    Outputs,
+    /// SubDevice to MainDevice.
+    Inputs,
+}
+
+/// One SyncManager's process data that takes part in a domain.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct AreaSpec {
+    /// Index of the SubDevice among those that were declared.
+    pub subdevice: usize,
+    /// SyncManager number.
+    pub sync_manager: u8,
+    /// Direction.
+    pub flow: Flow,
+    /// Bytes.
+    pub length: u16,
+}
+
+/// What a domain exchanges.
+#[derive(Clone, Debug)]
+pub struct DomainSpec {
+    /// How often the application exchanges it.
+    pub period: Duration,
+    /// Whether every SubDevice of the domain knows LRW (facts 3.1, features bit 9).
+    pub lrw: bool,
+    /// Areas in the order in which they lie in the image; those of a SubDevice stand together.
+    pub areas: Vec<AreaSpec>,
+}
+
+/// Where an area came to lie.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct PlacedArea {
+    /// The area.
+    pub area: AreaSpec,
+    /// First byte in the domain's image.
+    pub image_offset: u32,
+    /// Logical address of that byte.
+    pub logical: LogicalAddress,
+}
+
+/// A datagram of a cyclic frame.
+#[derive(Clone, Debug)]
+pub struct PlannedDatagram {
+    /// LRW, LWR, LRD, or BRD for supervision.
+    pub command: Command,
+    /// Logical address.
+    pub logical: LogicalAddress,
+    /// First byte in the image of what the datagram covers.
+    pub image_offset: u32,
+    /// Bytes of outputs, at the beginning of the data.
+    pub outputs: u16,
+    /// Bytes of inputs, behind the outputs.
+    pub inputs: u16,
+    /// Working counter that each SubDevice adds.
+    pub contributions: Vec<(usize, Wkc)>,
+    /// Input areas, to deliver them one by one.
+    pub input_areas: Vec<PlacedArea>,
+}
+
+/// A frame of a domain.
+#[derive(Clone, Debug, Default)]
+pub struct PlannedFrame {
+    /// Process data datagrams.
+    pub datagrams: Vec<PlannedDatagram>,
+    /// Whether the supervision datagram rides in this frame.
+    pub supervision: bool,
+}
+
+/// A domain that was laid out.
+#[derive(Clone, Debug)]
+pub struct PlannedDomain {
+    /// From the specification.
+    pub period: Duration,
+    /// Bytes of the image.
+    pub image_len: u32,
+    /// All areas with their places.
+    pub areas: Vec<PlacedArea>,
+    /// The frames.
+    pub frames: Vec<PlannedFrame>,
+}
+
+/// Everything the exchange sends.
+#[derive(Clone, Debug, Default)]
+pub struct Layout {
+    /// By [`DomainId`].
+    pub domains: Vec<PlannedDomain>,
+}
+
+/// Why domains cannot be laid out.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum LayoutError {
+    /// An area is longer than a datagram can carry.
+    AreaTooLong {
+        /// Index of the SubDevice.
+        subdevice: usize,
+        /// SyncManager.
+        sync_manager: u8,
+        /// Its bytes.
+        length: u16,
+    },
+    /// Logical addresses or images beyond 2 GiB.
+    TooLarge,
+    /// More frames than may be in flight at once.
+    TooManyFrames {
+        /// Frames that would be needed.
+        frames: usize,
+    },
+}
+
+impl fmt::Display for LayoutError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            LayoutError::AreaTooLong { subdevice, sync_manager, length } => write!(
+                f,
+                "SubDevice {subdevice}, SyncManager {sync_manager}: {length} bytes of process data, a datagram carries \
+                 at most {MAX_DATA}"
+            ),
+            LayoutError::TooLarge => f.write_str("process data of all domains exceeds 2 GiB"),
+            LayoutError::TooManyFrames { frames } => write!(
+                f,
+                "process data needs {frames} frames at once, at most {} may be in flight",
+                crate::ring::MAX_IN_FLIGHT
+            ),
+        }
+    }
+}
+
+impl core::error::Error for LayoutError {}
+
+/// Data of the supervision datagram: AL status.
+pub(crate) const SUPERVISION_LEN: usize = 2;
+
+impl Layout {
+    /// Lays out domains. Two links forbid LRW (facts 9.2.2). `supervision` adds the supervision datagram to the domain
+    /// with the shortest period.
+    pub fn new(specs: &[DomainSpec], links: LinkSet, supervision: bool) -> Result<Layout, LayoutError> {
+        let mut layout = Layout::default();
+        let mut logical = 0u32;
+        for spec in specs {
+            let lrw = spec.lrw && links == LinkSet::Single;
+            let domain = lay_out(spec, lrw, LogicalAddress(logical))?;
+            // Domains start at multiples of four bytes: easier to read in a capture.
+            let end = logical.checked_add(domain.image_len).filter(|end| *end < 1 << 31);
+            logical = end.ok_or(LayoutError::TooLarge)?.next_multiple_of(4);
+            layout.domains.push(domain);
+        }
+        if supervision {
+            layout.add_supervision();
+        }
+        let frames = layout.domains.iter().map(|domain| domain.frames.len()).sum();
+        if frames > crate::ring::MAX_IN_FLIGHT {
+            return Err(LayoutError::TooManyFrames { frames });
+        }
+        Ok(layout)
+    }
+
+    fn add_supervision(&mut self) {
+        let Some(domain) = self.domains.iter_mut().min_by_key(|domain| domain.period) else { return };
+        let room = |frame: &PlannedFrame| frame.used() + OVERHEAD + SUPERVISION_LEN <= MAX_DATA + OVERHEAD;
+        match domain.frames.iter_mut().find(|frame| room(frame)) {
+            Some(frame) => frame.supervision = true,
+            None => domain.frames.push(PlannedFrame { datagrams: Vec::new(), supervision: true }),
+        }
+    }
+
+    /// Where an area of a SubDevice lies, with its domain.
+    pub fn area(&self, subdevice: usize, sync_manager: u8) -> Option<(DomainId, PlacedArea)> {
+        self.domains.iter().enumerate().find_map(|(id, domain)| {
+            let found =
+                domain.areas.iter().find(|a| a.area.subdevice == subdevice && a.area.sync_manager == sync_manager);
+            found.map(|area| (DomainId(id), *area))
+        })
+    }
+}
+
+impl PlannedFrame {
+    /// Bytes of all datagrams with their overhead.
+    fn used(&self) -> usize {
+        let data = |d: &PlannedDatagram| OVERHEAD + usize::from(d.outputs) + usize::from(d.inputs);
+        self.datagrams.iter().map(data).sum::<usize>()
+    }
+}
+
+/// Areas that travel in one frame.
+#[derive(Default)]
+struct Chunk {
+    outputs: Vec<AreaSpec>,
+    inputs: Vec<AreaSpec>,
+    bytes: usize,
+}
+
+impl Chunk {
+    fn fits(&self, bytes: usize, lrw: bool) -> bool {
+        // LWR + LRD have one more overhead than a single datagram.
+        let limit = if lrw { MAX_DATA } else { MAX_DATA - OVERHEAD };
+        self.bytes == 0 || self.bytes + bytes <= limit
+    }
+
+    fn add(&mut self, area: AreaSpec) {
+        self.bytes += usize::from(area.length);
+        match area.flow {
+            Flow::Outputs => self.outputs.push(area),
+            Flow::Inputs => self.inputs.push(area),
+        }
+    }
+}
+
+fn lay_out(spec: &DomainSpec, lrw: bool, base: LogicalAddress) -> Result<PlannedDomain, LayoutError> {
+    let mut domain = PlannedDomain { period: spec.period, image_len: 0, areas: Vec::new(), frames: Vec::new() };
+    for chunk in chunks(spec, lrw)? {
+        domain.place(&chunk, lrw, base)?;
+    }
+    Ok(domain)
+}
+
+fn chunks(spec: &DomainSpec, lrw: bool) -> Result<Vec<Chunk>, LayoutError> {
+    let mut chunks = Vec::new();
+    let mut chunk = Chunk::default();
+    let used = spec.areas.iter().filter(|area| area.length > 0);
+    let areas: Vec<AreaSpec> = used.copied().collect();
+    for group in areas.chunk_by(|a, b| a.subdevice == b.subdevice) {
+        if let Some(long) = group.iter().find(|area| usize::from(area.length) > MAX_DATA) {
+            let AreaSpec { subdevice, sync_manager, length, .. } = *long;
+            return Err(LayoutError::AreaTooLong { subdevice, sync_manager, length });
+        }
+        // A SubDevice's areas stay together where they can: fewer working counters to look at.
+        let total = group.iter().map(|area| usize::from(area.length)).sum();
+        if !chunk.fits(total, lrw) {
+            chunks.push(core::mem::take(&mut chunk));
+        }
+        for area in group {
+            if !chunk.fits(usize::from(area.length), lrw) {
+                chunks.push(core::mem::take(&mut chunk));
+            }
+            chunk.add(*area);
+        }
+    }
+    if chunk.bytes > 0 {
+        chunks.push(chunk);
+    }
+    Ok(chunks)
+}
+
+impl PlannedDomain {
+    fn place(&mut self, chunk: &Chunk, lrw: bool, base: LogicalAddress) -> Result<(), LayoutError> {
+        let start = self.image_len;
+        let mut placed = Vec::new();
+        for area in chunk.outputs.iter().chain(&chunk.inputs) {
+            let logical = LogicalAddress(base.0.checked_add(self.image_len).ok_or(LayoutError::TooLarge)?);
+            placed.push(PlacedArea { area: *area, image_offset: self.image_len, logical });
+            self.image_len += u32::from(area.length);
+        }
+        let (outputs, inputs) = placed.split_at(chunk.outputs.len());
+        let bytes = |areas: &[PlacedArea]| areas.iter().map(|a| a.area.length).sum::<u16>();
+        let (out_len, in_len) = (bytes(outputs), bytes(inputs));
+        let datagram = |command, image_offset: u32, out_len, in_len, reads: &[PlacedArea], writes: &[PlacedArea]| {
+            PlannedDatagram {
+                command,
+                logical: LogicalAddress(base.0 + image_offset),
+                image_offset,
+                outputs: out_len,
+                inputs: in_len,
+                contributions: contributions(command, reads, writes),
+                input_areas: reads.to_vec(),
+            }
+        };
+        let mut frame = PlannedFrame::default();
+        if lrw && out_len > 0 && in_len > 0 {
+            frame.datagrams.push(datagram(Command::Lrw, start, out_len, in_len, inputs, outputs));
+        } else {
+            if out_len > 0 {
+                frame.datagrams.push(datagram(Command::Lwr, start, out_len, 0, &[], outputs));
+            }
+            if in_len > 0 {
+                frame.datagrams.push(datagram(Command::Lrd, start + u32::from(out_len), 0, in_len, inputs, &[]));
+            }
+        }
+        self.areas.extend(placed);
+        self.frames.push(frame);
+        Ok(())
+    }
+}
+
+/// What each SubDevice adds to the working counter (facts 1.4): once per datagram and direction.
+fn contributions(command: Command, reads: &[PlacedArea], writes: &[PlacedArea]) -> Vec<(usize, Wkc)> {
+    let write = if command == Command::Lrw { 2 } else { 1 };
+    let mut contributions: Vec<(usize, Wkc)> = Vec::new();
+    let subdevices = |areas: &[PlacedArea]| {
+        let mut subdevices: Vec<usize> = areas.iter().map(|a| a.area.subdevice).collect();
+        subdevices.sort_unstable();
+        subdevices.dedup();
+        subdevices
+    };
+    contributions.extend(subdevices(writes).into_iter().map(|subdevice| (subdevice, Wkc(write))));
+    for subdevice in subdevices(reads) {
+        match contributions.binary_search_by_key(&subdevice, |c| c.0) {
+            Ok(at) => contributions[at].1 = contributions[at].1.plus(Wkc(1)),
+            Err(at) => contributions.insert(at, (subdevice, Wkc(1))),
+        }
+    }
+    contributions
+}
+
+#[cfg(test)]
+mod tests;

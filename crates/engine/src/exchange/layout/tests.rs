@@ -1,0 +1,91 @@
+//! Layouts of literal and random domains.
+
+use std::vec;
+
+use proptest::prelude::*;
+
+use super::*;
+
+fn area(subdevice: usize, sync_manager: u8, flow: Flow, length: u16) -> AreaSpec {
+    AreaSpec { subdevice, sync_manager, flow, length }
+}
+
+fn spec(areas: Vec<AreaSpec>) -> DomainSpec {
+    DomainSpec { period: Duration::from_millis(1), lrw: true, areas }
+}
+
+#[test]
+fn one_link_uses_lrw_and_two_links_use_lwr_and_lrd() {
+    let areas = vec![area(0, 2, Flow::Outputs, 4), area(0, 3, Flow::Inputs, 6), area(1, 0, Flow::Outputs, 1)];
+    let single = Layout::new(&[spec(areas.clone())], LinkSet::Single, false).unwrap();
+    let frame = &single.domains[0].frames[0];
+    assert_eq!(frame.datagrams.len(), 1);
+    assert_eq!(frame.datagrams[0].command, Command::Lrw);
+    assert_eq!((frame.datagrams[0].outputs, frame.datagrams[0].inputs), (5, 6));
+    // facts 1.4: LRW read +1, write +2.
+    assert_eq!(frame.datagrams[0].contributions, vec![(0, Wkc(3)), (1, Wkc(2))]);
+
+    let ring = Layout::new(&[spec(areas)], LinkSet::Ring, false).unwrap();
+    let commands: Vec<_> = ring.domains[0].frames[0].datagrams.iter().map(|d| (d.command, d.logical.0)).collect();
+    assert_eq!(commands, vec![(Command::Lwr, 0), (Command::Lrd, 5)]);
+    assert_eq!(ring.domains[0].frames[0].datagrams[1].contributions, vec![(0, Wkc(1))]);
+}
+
+#[test]
+fn two_areas_of_one_subdevice_count_once_per_direction() {
+    let areas = vec![area(0, 3, Flow::Inputs, 2), area(0, 4, Flow::Inputs, 2)];
+    let layout = Layout::new(&[spec(areas)], LinkSet::Single, false).unwrap();
+    assert_eq!(layout.domains[0].frames[0].datagrams[0].contributions, vec![(0, Wkc(1))]);
+}
+
+#[test]
+fn a_domain_larger_than_a_frame_is_cut_between_areas() {
+    let areas = (0..4).map(|n| area(n, 3, Flow::Inputs, 700)).collect();
+    let layout = Layout::new(&[spec(areas)], LinkSet::Single, true).unwrap();
+    let lengths: Vec<_> = layout.domains[0].frames.iter().map(|f| f.datagrams[0].inputs).collect();
+    assert_eq!(lengths, vec![1400, 1400]);
+    assert_eq!(layout.area(3, 3).unwrap().1.logical, LogicalAddress(2100));
+}
+
+#[test]
+fn an_area_beyond_a_datagram_is_refused_with_its_name() {
+    let error = Layout::new(&[spec(vec![area(7, 3, Flow::Inputs, 1487)])], LinkSet::Single, false).unwrap_err();
+    assert_eq!(error, LayoutError::AreaTooLong { subdevice: 7, sync_manager: 3, length: 1487 });
+    let full = Layout::new(&[spec(vec![area(7, 3, Flow::Inputs, 1486)])], LinkSet::Single, true).unwrap();
+    // No room for supervision beside it: a frame of its own.
+    assert_eq!(full.domains[0].frames.len(), 2);
+    assert!(full.domains[0].frames[1].supervision);
+}
+
+proptest! {
+    #[test]
+    fn areas_are_disjoint_and_frames_fit(
+        lengths in proptest::collection::vec((0u16..1000, 0u16..1000), 1..40), ring: bool, lrw: bool,
+    ) {
+        let mut areas = Vec::new();
+        for (n, (out, inp)) in lengths.iter().enumerate() {
+            areas.push(area(n, 2, Flow::Outputs, *out));
+            areas.push(area(n, 3, Flow::Inputs, *inp));
+        }
+        let links = if ring { LinkSet::Ring } else { LinkSet::Single };
+        let layout = Layout::new(&[DomainSpec { lrw, ..spec(areas) }], links, true).unwrap();
+        let domain = &layout.domains[0];
+        let mut end = 0;
+        for placed in &domain.areas {
+            prop_assert_eq!(placed.image_offset, end);
+            prop_assert_eq!(placed.logical.0, end);
+            end += u32::from(placed.area.length);
+        }
+        prop_assert_eq!(end, domain.image_len);
+        let total: u32 = lengths.iter().map(|(o, i)| u32::from(*o) + u32::from(*i)).sum();
+        prop_assert_eq!(end, total);
+        for frame in &domain.frames {
+            let supervision = if frame.supervision { OVERHEAD + SUPERVISION_LEN } else { 0 };
+            prop_assert!(frame.used() + supervision <= MAX_DATA + OVERHEAD);
+            if ring {
+                prop_assert!(frame.datagrams.iter().all(|d| d.command != Command::Lrw));
+            }
+        }
+        prop_assert_eq!(domain.frames.iter().filter(|f| f.supervision).count(), 1);
+    }
+}

@@ -1,0 +1,221 @@
+//! Marks that a MainDevice puts on its frames, and how it finds them again.
+//!
+//! The source address carries the identity of the MainDevice, the bit of the link the copy was sent on, and the lower 8
+//! bits of the frame's sequence number (facts 9.7.1, 9.7.2). The Idx of every datagram carries the class bit and 7
+//! further bits, so that a frame that was delayed by more than 256 others is never taken for a new one.
+
+use ringcat_wire::datagram;
+use ringcat_wire::frame::{ETHERCAT_HEADER_LEN, ETHERNET_HEADER_LEN, ETHERTYPE, MacAddress};
+use ringcat_wire::source_address::{MacCodec, SourceMarks};
+
+use crate::link::Link;
+
+/// Offset of the source address in a frame.
+const SOURCE_AT: usize = 6;
+/// Offset of the first datagram.
+pub(crate) const DATAGRAMS_AT: usize = ETHERNET_HEADER_LEN + ETHERCAT_HEADER_LEN;
+/// Offset of the first datagram's Idx.
+const FIRST_INDEX_AT: usize = DATAGRAMS_AT + 1;
+/// Bit of the source address that tells the copies apart (facts SM-01).
+const REDUNDANT_BIT: u8 = 0x08;
+/// Bit of Idx that tells the classes apart.
+const CLASS_BIT: u8 = 0x80;
+
+/// Which half of the engine a frame belongs to.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Class {
+    /// Sent by the exchange.
+    Cyclic,
+    /// Sent by the supervisor.
+    Acyclic,
+}
+
+/// Sequence number of a frame within its class, 15 bits.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Sequence(u16);
+
+impl Sequence {
+    /// The number after this one.
+    #[must_use]
+    pub const fn next(self) -> Sequence {
+        Sequence((self.0 + 1) & 0x7FFF)
+    }
+
+    /// The lower 8 bits, RedFrameId of the seeds.
+    pub const fn frame_id(self) -> u8 {
+        self.0 as u8
+    }
+
+    /// The Idx of a datagram of this frame.
+    pub const fn index(self, class: Class) -> u8 {
+        let high = (self.0 >> 8) as u8 & 0x7F;
+        match class {
+            Class::Cyclic => high,
+            Class::Acyclic => high | CLASS_BIT,
+        }
+    }
+
+    /// From frame id and Idx.
+    pub const fn from_wire(frame_id: u8, index: u8) -> Sequence {
+        Sequence(frame_id as u16 | ((index & !CLASS_BIT) as u16) << 8)
+    }
+}
+
+/// A copy of a frame of ours.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct FrameCopy {
+    /// Which half sent it.
+    pub class: Class,
+    /// Which frame it is.
+    pub sequence: Sequence,
+    /// The link it was sent on.
+    pub sent_on: Link,
+}
+
+/// What a received frame is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Classified {
+    /// A copy of one of our frames.
+    Ours(FrameCopy),
+    /// An EtherCAT frame of another MainDevice (facts MR-10).
+    Foreign,
+    /// No EtherCAT frame with datagrams.
+    Other,
+}
+
+/// Who we are on the wire.
+#[derive(Clone, Copy, Debug)]
+pub struct Identity {
+    codec: MacCodec,
+    main: MacAddress,
+    redundant: Option<MacAddress>,
+    id_at: usize,
+}
+
+impl Identity {
+    /// The addresses of the interfaces; both copies of a frame carry those of the main one (facts SM-07).
+    pub fn new(codec: MacCodec, main: MacAddress, redundant: Option<MacAddress>) -> Identity {
+        let id_at = SOURCE_AT
+            + match codec {
+                MacCodec::FlagsFirst => 1,
+                MacCodec::IdLast => 5,
+            };
+        Identity { codec, main, redundant, id_at }
+    }
+
+    /// The source address of the main copy of frame zero, to put into a frame that is being built.
+    pub fn source(&self) -> MacAddress {
+        self.marked(Sequence::default(), 0)
+    }
+
+    fn marked(&self, sequence: Sequence, retry: u8) -> MacAddress {
+        self.codec.encode(self.main, &SourceMarks { frame_id: sequence.frame_id(), retry, ..SourceMarks::default() })
+    }
+
+    /// Writes the source address of the main copy into a built frame. `retry` counts resends (facts SM-04).
+    pub(crate) fn stamp(&self, frame: &mut [u8], sequence: Sequence, retry: u8) {
+        frame[SOURCE_AT..SOURCE_AT + 6].copy_from_slice(&self.marked(sequence, retry).0);
+    }
+
+    /// Changes only the frame id of a frame that [`Identity::stamp`] or [`Identity::source`] marked before.
+    pub(crate) fn restamp(&self, frame: &mut [u8], sequence: Sequence) {
+        frame[self.id_at] = sequence.frame_id();
+    }
+
+    /// Makes a frame the copy for the redundant link, or the main copy again.
+    pub(crate) fn mark_redundant(frame: &mut [u8], redundant: bool) {
+        if redundant {
+            frame[SOURCE_AT] |= REDUNDANT_BIT;
+        } else {
+            frame[SOURCE_AT] &= !REDUNDANT_BIT;
+        }
+    }
+
+    fn is_own(&self, source: MacAddress) -> bool {
+        self.codec.same_main_device(source, self.main)
+            || self.redundant.is_some_and(|redundant| self.codec.same_main_device(source, redundant))
+    }
+
+    /// Tells what a received frame is. Any bytes are allowed; only plain Ethernet frames can be ours.
+    pub fn classify(&self, bytes: &[u8]) -> Classified {
+        let Some(head) = bytes.first_chunk::<{ DATAGRAMS_AT + datagram::OVERHEAD }>() else {
+            return Classified::Other;
+        };
+        if head[12..14] != ETHERTYPE.to_be_bytes() || head[15] >> 4 != 1 {
+            return Classified::Other;
+        }
+        let source = MacAddress([head[6], head[7], head[8], head[9], head[10], head[11]]);
+        if !self.is_own(source) {
+            return Classified::Foreign;
+        }
+        let index = head[FIRST_INDEX_AT];
+        Classified::Ours(FrameCopy {
+            class: if index & CLASS_BIT == 0 { Class::Cyclic } else { Class::Acyclic },
+            sequence: Sequence::from_wire(head[self.id_at], index),
+            sent_on: if head[SOURCE_AT] & REDUNDANT_BIT == 0 { Link::Main } else { Link::Redundant },
+        })
+    }
+}
+
+/// The half that a received frame is for, without knowing who we are: the class bit of its first datagram. Foreign
+/// frames go by the same bit. `None` where there is no first datagram.
+pub fn class_of(bytes: &[u8]) -> Option<Class> {
+    let index = *bytes.get(FIRST_INDEX_AT)?;
+    Some(if index & CLASS_BIT == 0 { Class::Cyclic } else { Class::Acyclic })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const NIC: MacAddress = MacAddress([0x00, 0x30, 0x64, 0x11, 0x22, 0x33]);
+
+    fn identity() -> Identity {
+        Identity::new(MacCodec::FlagsFirst, NIC, Some(MacAddress([0, 0x30, 0x64, 0x11, 0x22, 0x34])))
+    }
+
+    fn frame(sequence: Sequence, class: Class) -> [u8; 60] {
+        let mut bytes = [0; 60];
+        bytes[12] = 0x88;
+        bytes[13] = 0xA4;
+        bytes[15] = 0x10;
+        bytes[FIRST_INDEX_AT] = sequence.index(class);
+        identity().stamp(&mut bytes, sequence, 0);
+        bytes
+    }
+
+    #[test]
+    fn both_copies_of_a_frame_are_recognised_after_controllers_marked_them() {
+        let mut sequence = Sequence::default();
+        for _ in 0..70_000 {
+            let mut bytes = frame(sequence, Class::Acyclic);
+            bytes[6] |= 0x02;
+            let copy = FrameCopy { class: Class::Acyclic, sequence, sent_on: Link::Main };
+            assert_eq!(identity().classify(&bytes), Classified::Ours(copy));
+            Identity::mark_redundant(&mut bytes, true);
+            let copy = FrameCopy { sent_on: Link::Redundant, ..copy };
+            assert_eq!(identity().classify(&bytes), Classified::Ours(copy));
+            sequence = sequence.next();
+        }
+    }
+
+    #[test]
+    fn a_frame_that_is_256_frames_old_has_another_sequence_number() {
+        let old = Sequence::default();
+        let new = (0..256).fold(old, |sequence, _| sequence.next());
+        assert_eq!(old.frame_id(), new.frame_id());
+        let bytes = frame(old, Class::Cyclic);
+        let Classified::Ours(copy) = identity().classify(&bytes) else { panic!("not ours") };
+        assert_ne!(copy.sequence, new);
+    }
+
+    #[test]
+    fn frames_of_others_are_foreign_and_short_ones_are_nothing() {
+        let mut bytes = frame(Sequence::default(), Class::Cyclic);
+        bytes[11] ^= 0x40;
+        assert_eq!(identity().classify(&bytes), Classified::Foreign);
+        assert_eq!(identity().classify(&bytes[..20]), Classified::Other);
+        bytes[12] = 0x08;
+        assert_eq!(identity().classify(&bytes), Classified::Other);
+    }
+}

@@ -1,0 +1,102 @@
+//! What becomes of two copies of a datagram (facts 9.3). Decided by command and by which copy was worked on, never by
+//! comparing data. Working counters are always added.
+
+use ringcat_wire::address::Wkc;
+use ringcat_wire::command::Command;
+
+use crate::link::Link;
+
+/// How the data of two copies becomes one.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum MergeRule {
+    /// Nothing was read: the data is what was sent.
+    AsSent,
+    /// Broadcast and logical reads, sent as zeros: each bit belongs to one SubDevice, or is an OR of all.
+    Or,
+    /// One SubDevice answers: the copy whose working counter is not zero.
+    Answered,
+    /// The copy that was sent on this link, because the addressed SubDevice is visible there (ARMW, FRMW: every other
+    /// SubDevice counts too, so the working counter cannot tell).
+    SentOn(Link),
+}
+
+impl MergeRule {
+    /// The rule for a command; `visible` is the link on which an addressed SubDevice is reached, for ARMW and FRMW.
+    pub const fn of(command: Command, visible: Link) -> MergeRule {
+        match command {
+            Command::Nop | Command::Apwr | Command::Fpwr | Command::Bwr | Command::Lwr | Command::Reserved(_) => {
+                MergeRule::AsSent
+            }
+            Command::Brd | Command::Brw | Command::Lrd | Command::Lrw => MergeRule::Or,
+            Command::Aprd | Command::Fprd | Command::Aprw | Command::Fprw => MergeRule::Answered,
+            Command::Armw | Command::Frmw => MergeRule::SentOn(visible),
+        }
+    }
+
+    /// Merges the second copy into the first. Both have the same length.
+    pub(crate) fn merge(self, first: &mut [u8], first_wkc: Wkc, second: &[u8], second_wkc: Wkc, second_sent_on: Link) {
+        match self {
+            MergeRule::AsSent => {}
+            MergeRule::Or => or_into(first, second),
+            MergeRule::Answered => {
+                if first_wkc.0 == 0 && second_wkc.0 != 0 {
+                    first.copy_from_slice(second);
+                }
+            }
+            MergeRule::SentOn(link) => {
+                if link == second_sent_on {
+                    first.copy_from_slice(second);
+                }
+            }
+        }
+    }
+}
+
+/// ORs `source` into `target`, as far as the shorter of them goes.
+pub(crate) fn or_into(target: &mut [u8], source: &[u8]) {
+    for (to, from) in target.iter_mut().zip(source) {
+        *to |= from;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn merged(command: Command, main: (&[u8; 2], u16), redundant: (&[u8; 2], u16)) -> [u8; 2] {
+        let rule = MergeRule::of(command, Link::Redundant);
+        let mut forward = *main.0;
+        rule.merge(&mut forward, Wkc(main.1), redundant.0, Wkc(redundant.1), Link::Redundant);
+        let mut backward = *redundant.0;
+        rule.merge(&mut backward, Wkc(redundant.1), main.0, Wkc(main.1), Link::Main);
+        assert_eq!(forward, backward, "{command}: the order of arrival must not matter");
+        forward
+    }
+
+    #[test]
+    fn reads_by_one_subdevice_come_from_the_copy_it_answered() {
+        for command in [Command::Aprd, Command::Fprd, Command::Fprw, Command::Aprw] {
+            assert_eq!(merged(command, (&[0, 0], 0), (&[1, 2], 1)), [1, 2]);
+            assert_eq!(merged(command, (&[1, 2], 1), (&[0, 0], 0)), [1, 2]);
+        }
+    }
+
+    #[test]
+    fn broadcast_and_logical_reads_are_ored() {
+        for command in [Command::Brd, Command::Lrd] {
+            assert_eq!(merged(command, (&[1, 0x20], 3), (&[4, 2], 1)), [5, 0x22]);
+        }
+    }
+
+    #[test]
+    fn a_distributed_time_comes_from_the_side_of_the_reference() {
+        assert_eq!(merged(Command::Frmw, (&[9, 9], 5), (&[1, 2], 7)), [1, 2]);
+    }
+
+    #[test]
+    fn writes_stay_as_sent() {
+        for command in [Command::Fpwr, Command::Lwr, Command::Bwr, Command::Apwr, Command::Nop] {
+            assert_eq!(merged(command, (&[7, 7], 1), (&[7, 7], 0)), [7, 7]);
+        }
+    }
+}

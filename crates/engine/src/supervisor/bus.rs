@@ -1,0 +1,359 @@
+//! What procedures do: ask the bus for datagrams, wait, start other procedures, report events.
+
+use alloc::boxed::Box;
+use alloc::rc::Rc;
+use alloc::vec;
+use alloc::vec::Vec;
+use core::cell::{Cell, RefCell};
+use core::fmt;
+use core::future::{Future, poll_fn};
+use core::pin::{Pin, pin};
+use core::task::{Context, Poll};
+use core::time::Duration;
+
+use ringcat_wire::address::{Position, RegisterAddress, StationAddress, Wkc};
+use ringcat_wire::command::Command;
+use ringcat_wire::datagram::Target;
+
+use super::core::Core;
+use super::executor::TaskId;
+use super::transfer::{Request, Stage, TransferId};
+use crate::board::Board;
+use crate::event::Event;
+use crate::link::LinkSet;
+use crate::ring::RingState;
+use crate::time::Instant;
+
+/// What a datagram brought back, merged from all copies.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Reply {
+    /// The data; for writes, what was sent.
+    pub data: Vec<u8>,
+    /// Working counter of the copy sent on the main link.
+    pub main: Wkc,
+    /// Working counter of the copy sent on the redundant link.
+    pub redundant: Wkc,
+    /// OR of the ECAT event requests.
+    pub irq: u16,
+}
+
+impl Reply {
+    /// Sum of the working counters (facts CR-05).
+    pub const fn wkc(&self) -> Wkc {
+        self.main.plus(self.redundant)
+    }
+}
+
+/// Why a datagram brought nothing back.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum BusError {
+    /// Its frame was lost, also when it was sent again.
+    Lost {
+        /// Whom it addressed.
+        target: Target,
+        /// How often it was sent again.
+        retries: u8,
+    },
+    /// Not the expected number of SubDevices answered.
+    Wkc {
+        /// Whom it addressed.
+        target: Target,
+        /// Expected.
+        expected: Wkc,
+        /// Came.
+        got: Wkc,
+    },
+}
+
+impl fmt::Display for BusError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        fn target(f: &mut fmt::Formatter<'_>, target: Target) -> fmt::Result {
+            match target {
+                Target::None => f.write_str("nobody"),
+                Target::Position(position, register) => write!(f, "position {position}, register {register}"),
+                Target::Station(station, register) => write!(f, "station {station}, register {register}"),
+                Target::Broadcast(register) => write!(f, "all SubDevices, register {register}"),
+                Target::Logical(address) => write!(f, "logical address {address}"),
+            }
+        }
+        match self {
+            BusError::Lost { target: whom, retries } => {
+                target(f, *whom)?;
+                write!(f, ": the frame was lost, {} times", u16::from(*retries) + 1)
+            }
+            BusError::Wkc { target: whom, expected, got } => {
+                target(f, *whom)?;
+                write!(f, ": expected working counter {expected}, got {got}")
+            }
+        }
+    }
+}
+
+impl core::error::Error for BusError {}
+
+/// A time limit ran out.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Elapsed;
+
+/// The handle of a procedure to the bus.
+#[derive(Clone)]
+pub struct Bus {
+    core: Rc<RefCell<Core>>,
+}
+
+impl Bus {
+    pub(super) fn new(core: Rc<RefCell<Core>>) -> Bus {
+        Bus { core }
+    }
+
+    /// The time of the call that lets the procedure run.
+    pub fn now(&self) -> Instant {
+        self.core.borrow().now
+    }
+
+    /// The links the MainDevice has.
+    pub fn links(&self) -> LinkSet {
+        self.core.borrow().links
+    }
+
+    /// State of the ring: as the exchange sees it once it runs, before that as acyclic frames show it.
+    pub fn ring(&self) -> RingState {
+        let core = self.core.borrow();
+        match core.board.as_ref().map(|board| board.ring().state) {
+            None | Some(RingState::Unknown) => core.monitor.state(),
+            Some(state) => state,
+        }
+    }
+
+    /// What the exchange posts, once there is one.
+    pub fn board(&self) -> Option<alloc::sync::Arc<Board>> {
+        self.core.borrow().board.clone()
+    }
+
+    /// Reports an event.
+    pub fn report(&self, event: Event) {
+        let core = &mut *self.core.borrow_mut();
+        core.events.push(core.now, event);
+    }
+
+    /// Sends a datagram as often as needed and returns what came back, whatever its working counter. `expected` is the
+    /// working counter at which a second copy need not be waited for.
+    pub fn transfer(
+        &self,
+        command: Command,
+        target: Target,
+        data: Vec<u8>,
+        expected: Option<Wkc>,
+    ) -> impl Future<Output = Result<Reply, BusError>> {
+        self.submit(Request { command, target, data, expected, resend: true })
+    }
+
+    /// Like [`Bus::transfer`], but sent once: for accesses that must not happen twice.
+    pub fn transfer_once(
+        &self,
+        command: Command,
+        target: Target,
+        data: Vec<u8>,
+    ) -> impl Future<Output = Result<Reply, BusError>> {
+        self.submit(Request { command, target, data, expected: Some(Wkc(1)), resend: false })
+    }
+
+    fn submit(&self, request: Request) -> TransferFuture {
+        TransferFuture { core: self.core.clone(), request: Some(request), id: None }
+    }
+
+    /// Reads registers of all SubDevices, ORed.
+    pub async fn brd(&self, register: RegisterAddress, length: usize) -> Result<Reply, BusError> {
+        self.transfer(Command::Brd, Target::Broadcast(register), vec![0; length], None).await
+    }
+
+    /// Writes registers of all SubDevices.
+    pub async fn bwr(&self, register: RegisterAddress, data: &[u8]) -> Result<Reply, BusError> {
+        self.transfer(Command::Bwr, Target::Broadcast(register), data.to_vec(), None).await
+    }
+
+    /// Reads registers of the SubDevice at a position, which must answer.
+    pub async fn aprd(
+        &self,
+        position: Position,
+        register: RegisterAddress,
+        length: usize,
+    ) -> Result<Vec<u8>, BusError> {
+        self.one(Command::Aprd, Target::Position(position, register), vec![0; length]).await
+    }
+
+    /// Writes registers of the SubDevice at a position, which must answer.
+    pub async fn apwr(&self, position: Position, register: RegisterAddress, data: &[u8]) -> Result<(), BusError> {
+        self.one(Command::Apwr, Target::Position(position, register), data.to_vec()).await.map(drop)
+    }
+
+    /// Reads registers of a SubDevice, which must answer.
+    pub async fn fprd(
+        &self,
+        station: StationAddress,
+        register: RegisterAddress,
+        length: usize,
+    ) -> Result<Vec<u8>, BusError> {
+        self.one(Command::Fprd, Target::Station(station, register), vec![0; length]).await
+    }
+
+    /// Reads `N` bytes of registers of a SubDevice, which must answer.
+    pub async fn fprd_array<const N: usize>(
+        &self,
+        station: StationAddress,
+        register: RegisterAddress,
+    ) -> Result<[u8; N], BusError> {
+        let data = self.fprd(station, register, N).await?;
+        let mut array = [0; N];
+        array.copy_from_slice(&data[..N]);
+        Ok(array)
+    }
+
+    /// Writes registers of a SubDevice, which must answer.
+    pub async fn fpwr(&self, station: StationAddress, register: RegisterAddress, data: &[u8]) -> Result<(), BusError> {
+        self.one(Command::Fpwr, Target::Station(station, register), data.to_vec()).await.map(drop)
+    }
+
+    async fn one(&self, command: Command, target: Target, data: Vec<u8>) -> Result<Vec<u8>, BusError> {
+        let expected = Wkc(1);
+        let reply = self.transfer(command, target, data, Some(expected)).await?;
+        if reply.wkc() == expected { Ok(reply.data) } else { Err(BusError::Wkc { target, expected, got: reply.wkc() }) }
+    }
+
+    /// Waits.
+    pub async fn sleep(&self, duration: Duration) {
+        let until = self.now() + duration;
+        self.sleep_until(until).await;
+    }
+
+    /// Waits until a point of time.
+    pub async fn sleep_until(&self, until: Instant) {
+        let mut armed = false;
+        poll_fn(|_| {
+            let core = &mut *self.core.borrow_mut();
+            if core.now >= until {
+                return Poll::Ready(());
+            }
+            if !armed {
+                core.wake_at(until);
+                armed = true;
+            }
+            Poll::Pending
+        })
+        .await;
+    }
+
+    /// Lets a future run at most for a time; then it is dropped, and what it asked of the bus is abandoned.
+    pub async fn within<F: Future>(&self, limit: Duration, future: F) -> Result<F::Output, Elapsed> {
+        let mut future = pin!(future);
+        let until = self.now() + limit;
+        let mut armed = false;
+        poll_fn(|context| {
+            if let Poll::Ready(output) = future.as_mut().poll(context) {
+                return Poll::Ready(Ok(output));
+            }
+            let core = &mut *self.core.borrow_mut();
+            if core.now >= until {
+                return Poll::Ready(Err(Elapsed));
+            }
+            if !armed {
+                core.wake_at(until);
+                armed = true;
+            }
+            Poll::Pending
+        })
+        .await
+    }
+
+    /// Starts a procedure that goes on by itself.
+    pub fn spawn(&self, procedure: impl Future<Output = ()> + 'static) {
+        self.core.borrow_mut().spawn(Box::pin(procedure));
+    }
+
+    /// A group of procedures that can be waited for together.
+    pub fn group(&self) -> Group {
+        Group { bus: self.clone(), state: Rc::default() }
+    }
+}
+
+#[derive(Default)]
+struct GroupState {
+    running: Cell<usize>,
+    waiter: Cell<Option<TaskId>>,
+}
+
+/// Procedures that were started together. Waiting costs one wake when the last of them ends.
+pub struct Group {
+    bus: Bus,
+    state: Rc<GroupState>,
+}
+
+impl Group {
+    /// Starts a procedure of the group.
+    pub fn spawn(&self, procedure: impl Future<Output = ()> + 'static) {
+        self.state.running.set(self.state.running.get() + 1);
+        let state = self.state.clone();
+        let core = self.bus.core.clone();
+        self.bus.spawn(async move {
+            procedure.await;
+            state.running.set(state.running.get() - 1);
+            if state.running.get() == 0
+                && let Some(task) = state.waiter.take()
+            {
+                core.borrow_mut().wake(task);
+            }
+        });
+    }
+
+    /// Waits for all of them.
+    pub async fn done(&self) {
+        poll_fn(|_| {
+            if self.state.running.get() == 0 {
+                return Poll::Ready(());
+            }
+            self.state.waiter.set(Some(self.bus.core.borrow().current));
+            Poll::Pending
+        })
+        .await;
+    }
+}
+
+/// Waits for the reply to a datagram. Dropped before, the reply is thrown away when it comes.
+struct TransferFuture {
+    core: Rc<RefCell<Core>>,
+    request: Option<Request>,
+    id: Option<TransferId>,
+}
+
+impl Future for TransferFuture {
+    type Output = Result<Reply, BusError>;
+
+    fn poll(mut self: Pin<&mut Self>, _: &mut Context<'_>) -> Poll<Self::Output> {
+        let this = &mut *self;
+        let core = &mut *this.core.borrow_mut();
+        if let Some(request) = this.request.take() {
+            this.id = Some(core.request(request));
+            return Poll::Pending;
+        }
+        let Some(id) = this.id else { return Poll::Pending };
+        let Some(transfer) = core.transfers.find(id) else { return Poll::Pending };
+        if !matches!(transfer.stage, Stage::Done(_)) {
+            // The future may have moved to another task since it was first polled.
+            transfer.task = core.current;
+            return Poll::Pending;
+        }
+        this.id = None;
+        match core.transfers.remove(id).map(|transfer| transfer.stage) {
+            Some(Stage::Done(result)) => Poll::Ready(result),
+            _ => Poll::Pending,
+        }
+    }
+}
+
+impl Drop for TransferFuture {
+    fn drop(&mut self) {
+        if let Some(id) = self.id {
+            self.core.borrow_mut().abandon(id);
+        }
+    }
+}

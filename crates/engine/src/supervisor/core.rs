@@ -1,0 +1,116 @@
+//! What the executor, the procedures and the frames share.
+
+use alloc::collections::{BinaryHeap, VecDeque};
+use alloc::sync::Arc;
+use core::cmp::Reverse;
+
+use super::executor::{Task, TaskId};
+use super::flights::{AcyclicCounters, Flights};
+use super::transfer::{Request, Stage, Transfer, TransferId, Transfers};
+use crate::board::Board;
+use crate::event::EventLog;
+use crate::link::LinkSet;
+use crate::ring::{Identity, RingMonitor};
+use crate::time::Instant;
+
+pub(crate) struct Core {
+    pub(crate) now: Instant,
+    pub(crate) identity: Identity,
+    pub(crate) links: LinkSet,
+    pub(crate) board: Option<Arc<Board>>,
+    pub(crate) monitor: RingMonitor,
+    pub(crate) counters: AcyclicCounters,
+    pub(crate) events: EventLog,
+    pub(crate) transfers: Transfers,
+    pub(crate) outbox: VecDeque<TransferId>,
+    pub(crate) flights: Flights,
+    /// SubDevices that the main copy of the last broadcast met: positions from here on live behind the redundant link.
+    pub(crate) main_count: u16,
+    pub(crate) current: TaskId,
+    pub(crate) spawned: VecDeque<Task>,
+    ready: VecDeque<TaskId>,
+    timers: BinaryHeap<Reverse<(Instant, TaskId)>>,
+}
+
+impl Core {
+    pub(crate) fn new(identity: Identity, links: LinkSet, now: Instant) -> Core {
+        Core {
+            now,
+            identity,
+            links,
+            board: None,
+            monitor: RingMonitor::default(),
+            counters: AcyclicCounters::default(),
+            events: EventLog::default(),
+            transfers: Transfers::default(),
+            outbox: VecDeque::new(),
+            flights: Flights::new(),
+            main_count: 0,
+            current: TaskId(0),
+            spawned: VecDeque::new(),
+            ready: VecDeque::new(),
+            timers: BinaryHeap::new(),
+        }
+    }
+
+    pub(crate) fn spawn(&mut self, task: Task) {
+        self.spawned.push_back(task);
+    }
+
+    pub(crate) fn wake(&mut self, task: TaskId) {
+        self.ready.push_back(task);
+    }
+
+    pub(crate) fn next_ready(&mut self) -> Option<TaskId> {
+        self.ready.pop_front()
+    }
+
+    /// Wakes the current task at a point of time.
+    pub(crate) fn wake_at(&mut self, at: Instant) {
+        self.timers.push(Reverse((at, self.current)));
+    }
+
+    pub(crate) fn fire_timers(&mut self) {
+        while let Some(&Reverse((at, task))) = self.timers.peek() {
+            if at > self.now {
+                return;
+            }
+            self.timers.pop();
+            self.wake(task);
+        }
+    }
+
+    pub(crate) fn next_deadline(&self) -> Option<Instant> {
+        if !self.ready.is_empty() || !self.spawned.is_empty() {
+            return Some(self.now);
+        }
+        let timer = self.timers.peek().map(|Reverse((at, _))| *at);
+        match (timer, self.flights.next_deadline()) {
+            (Some(a), Some(b)) => Some(a.min(b)),
+            (a, b) => a.or(b),
+        }
+    }
+
+    pub(crate) fn wants_to_send(&self) -> bool {
+        !self.outbox.is_empty()
+    }
+
+    /// Queues a datagram for the current task.
+    pub(crate) fn request(&mut self, request: Request) -> TransferId {
+        let transfer = Transfer { request, stage: Stage::Queued, task: self.current, retries: 0, abandoned: false };
+        let id = self.transfers.insert(transfer);
+        self.outbox.push_back(id);
+        id
+    }
+
+    /// The procedure no longer waits for a transfer.
+    pub(crate) fn abandon(&mut self, id: TransferId) {
+        let Some(transfer) = self.transfers.find(id) else { return };
+        match transfer.stage {
+            Stage::Done(_) => {
+                self.transfers.remove(id);
+            }
+            Stage::Queued | Stage::InFlight => transfer.abandoned = true,
+        }
+    }
+}

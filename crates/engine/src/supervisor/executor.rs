@@ -1,0 +1,61 @@
+//! A single-threaded executor for procedures.
+//!
+//! Procedures wait for nothing but transfers, timers and groups of this engine, and each of these knows the task that
+//! waits: completions carry a task id and wake just that task, so no waker and no synchronisation is needed.
+
+use alloc::boxed::Box;
+use alloc::rc::Rc;
+use alloc::vec::Vec;
+use core::cell::RefCell;
+use core::future::Future;
+use core::pin::Pin;
+use core::task::{Context, Poll, Waker};
+
+use super::core::Core;
+
+/// A procedure under way.
+pub(crate) type Task = Pin<Box<dyn Future<Output = ()>>>;
+
+/// Place of a task in the table. Places are re-used: waking a place whose task has ended polls another task once more
+/// than needed, which every future here tolerates.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub(crate) struct TaskId(pub u32);
+
+pub(crate) struct Executor {
+    core: Rc<RefCell<Core>>,
+    tasks: Vec<Option<Task>>,
+    free: Vec<u32>,
+}
+
+impl Executor {
+    pub(crate) fn new(core: Rc<RefCell<Core>>) -> Executor {
+        Executor { core, tasks: Vec::new(), free: Vec::new() }
+    }
+
+    /// Polls tasks that were woken, and new ones, until all wait.
+    pub(crate) fn run(&mut self) {
+        let mut context = Context::from_waker(Waker::noop());
+        loop {
+            self.adopt();
+            let Some(id) = self.core.borrow_mut().next_ready() else { return };
+            let Some(mut task) = self.tasks.get_mut(id.0 as usize).and_then(Option::take) else { continue };
+            self.core.borrow_mut().current = id;
+            match task.as_mut().poll(&mut context) {
+                Poll::Pending => self.tasks[id.0 as usize] = Some(task),
+                Poll::Ready(()) => self.free.push(id.0),
+            }
+        }
+    }
+
+    fn adopt(&mut self) {
+        loop {
+            let Some(task) = self.core.borrow_mut().spawned.pop_front() else { return };
+            let index = self.free.pop().unwrap_or_else(|| {
+                self.tasks.push(None);
+                (self.tasks.len() - 1) as u32
+            });
+            self.tasks[index as usize] = Some(task);
+            self.core.borrow_mut().wake(TaskId(index));
+        }
+    }
+}

@@ -1,0 +1,419 @@
+//! Acyclic frames: packing requests, sending on all links, pairing and merging the copies, answering or giving up.
+
+use alloc::boxed::Box;
+use alloc::vec;
+use alloc::vec::Vec;
+use core::time::Duration;
+
+use ringcat_wire::address::Wkc;
+use ringcat_wire::command::Command;
+use ringcat_wire::datagram::{CIRCULATING, HEADER_LEN, OVERHEAD, WKC_LEN};
+use ringcat_wire::frame::{FrameBuilder, MAX_FRAME, MacAddress};
+
+use super::Received;
+use super::bus::{BusError, Reply};
+use super::core::Core;
+use super::transfer::{Stage, TransferId};
+use crate::link::{Link, LinkSet};
+use crate::ring::identity::DATAGRAMS_AT;
+use crate::ring::{Arrivals, Class, FrameCopy, Identity, MAX_IN_FLIGHT, MergeRule, Sequence};
+use crate::time::Instant;
+
+/// Frames in flight at once: enough to fill the wire over the round trip of a thousand SubDevices (2 ms at 123 us a
+/// frame), few enough that a full transmit queue is no reason to give a frame up.
+const WINDOW: usize = 32;
+/// After this time a frame is given up. Far beyond any round trip with [`WINDOW`] frames queued before it.
+const FRAME_TIMEOUT: Duration = Duration::from_millis(20);
+/// A lost datagram is sent again so often; the retry index in the source address has three bits (facts SM-04).
+pub(super) const MAX_RETRIES: u8 = 7;
+/// Flights are found by the lower bits of their sequence number.
+const SLOTS: usize = 128;
+
+const _: () = assert!(WINDOW <= MAX_IN_FLIGHT && MAX_IN_FLIGHT <= SLOTS);
+
+/// Counters of the acyclic half.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct AcyclicCounters {
+    /// Frames sent.
+    pub sent: u64,
+    /// Bytes sent, one copy of each frame, without FCS.
+    pub bytes: u64,
+    /// Frames answered.
+    pub received: u64,
+    /// Frames of which no copy came back in time.
+    pub lost: u64,
+    /// Frames of which one copy of two came back in time.
+    pub half: u64,
+    /// Copies that came too late or twice.
+    pub late: u64,
+    /// Frames of ours that came back with other datagrams than were sent.
+    pub corrupt: u64,
+    /// Datagrams sent.
+    pub datagrams: u64,
+    /// Datagrams that were sent again because their frame was lost.
+    pub resent: u64,
+    /// Datagrams that were given up because their frame was lost.
+    pub timed_out: u64,
+}
+
+/// A datagram in a frame.
+#[derive(Debug)]
+struct Place {
+    transfer: TransferId,
+    header_at: usize,
+    length: usize,
+    command: Command,
+    expected: Option<Wkc>,
+    wkc: [Wkc; 2],
+}
+
+#[derive(Debug)]
+struct Flight {
+    sequence: Sequence,
+    places: Vec<Place>,
+    /// The first copy, with later ones merged in; before the first, what was sent.
+    bytes: Vec<u8>,
+    arrivals: Arrivals,
+    deadline: Instant,
+    /// Answered already; kept so that the second copy is recognised.
+    answered: bool,
+}
+
+pub(crate) struct Flights {
+    slots: Vec<Option<Flight>>,
+    in_flight: usize,
+    sequence: Sequence,
+    /// Flights that ended, for their memory.
+    spare: Vec<Flight>,
+    /// The redundant copy of the frame that is being sent.
+    redundant: Box<[u8]>,
+}
+
+impl Flights {
+    pub(crate) fn new() -> Flights {
+        Flights {
+            slots: (0..SLOTS).map(|_| None).collect(),
+            in_flight: 0,
+            sequence: Sequence::default(),
+            spare: Vec::new(),
+            redundant: vec![0; MAX_FRAME].into_boxed_slice(),
+        }
+    }
+
+    pub(crate) fn next_deadline(&self) -> Option<Instant> {
+        if self.in_flight == 0 {
+            return None;
+        }
+        self.slots.iter().flatten().map(|flight| flight.deadline).min()
+    }
+
+    fn slot(sequence: Sequence) -> usize {
+        usize::from(sequence.frame_id()) % SLOTS
+    }
+
+    fn has_room(&self) -> bool {
+        self.in_flight < WINDOW && self.slots[Self::slot(self.sequence.next())].is_none()
+    }
+
+    fn fresh(&mut self, sequence: Sequence) -> Flight {
+        let mut flight = self.spare.pop().unwrap_or_else(|| Flight {
+            sequence,
+            places: Vec::new(),
+            bytes: Vec::with_capacity(MAX_FRAME),
+            arrivals: Arrivals::default(),
+            deadline: Instant::NEVER,
+            answered: false,
+        });
+        flight.sequence = sequence;
+        flight.places.clear();
+        flight.bytes.clear();
+        flight.arrivals = Arrivals::default();
+        flight.answered = false;
+        flight
+    }
+}
+
+impl Core {
+    /// Packs what waits in the outbox into frames and sends them, within the budget and the window.
+    pub(super) fn transmit(&mut self, budget: usize, transmit: &mut impl FnMut(Link, &[u8])) -> usize {
+        let mut used = 0;
+        while !self.outbox.is_empty() && self.flights.has_room() && used < budget {
+            let limit = (budget - used).min(MAX_FRAME);
+            let Some(flight) = self.pack(limit) else { break };
+            used += flight.bytes.len();
+            self.counters.sent += 1;
+            self.counters.bytes += flight.bytes.len() as u64;
+            self.counters.datagrams += flight.places.len() as u64;
+            transmit(Link::Main, &flight.bytes);
+            if self.links == LinkSet::Ring {
+                let copy = &mut self.flights.redundant[..flight.bytes.len()];
+                copy.copy_from_slice(&flight.bytes);
+                Identity::mark_redundant(copy, true);
+                adjust_auto_increment(copy, &flight.places, self.main_count);
+                transmit(Link::Redundant, copy);
+            }
+            let slot = Flights::slot(flight.sequence);
+            self.flights.slots[slot] = Some(flight);
+            self.flights.in_flight += 1;
+        }
+        used
+    }
+
+    /// Builds one frame of at most `limit` bytes from the front of the outbox; at least one datagram goes in.
+    fn pack(&mut self, limit: usize) -> Option<Flight> {
+        let sequence = self.flights.sequence.next();
+        let mut flight = self.flights.fresh(sequence);
+        flight.bytes.resize(MAX_FRAME, 0);
+        let mut retry = 0;
+        let length = {
+            let source = self.identity.source();
+            let mut builder = FrameBuilder::ethernet(&mut flight.bytes, MacAddress::ETHERCAT_GROUP, source)?;
+            let mut total = DATAGRAMS_AT;
+            while let Some(&id) = self.outbox.front() {
+                let Some(transfer) = self.transfers.find(id) else {
+                    self.outbox.pop_front();
+                    continue;
+                };
+                if transfer.abandoned {
+                    self.outbox.pop_front();
+                    self.transfers.remove(id);
+                    continue;
+                }
+                let request = &transfer.request;
+                let bytes = OVERHEAD + request.data.len();
+                if !flight.places.is_empty() && total + bytes > limit {
+                    break;
+                }
+                let index = sequence.index(Class::Acyclic);
+                let Some(data_at) = builder.datagram(request.command, index, request.target, request.data.len()) else {
+                    break;
+                };
+                if let Some(data) = builder.data_mut(data_at, request.data.len()) {
+                    data.copy_from_slice(&request.data);
+                }
+                total += bytes;
+                retry = retry.max(transfer.retries);
+                flight.places.push(Place {
+                    transfer: id,
+                    header_at: data_at - HEADER_LEN,
+                    length: request.data.len(),
+                    command: request.command,
+                    expected: request.expected,
+                    wkc: [Wkc(0); 2],
+                });
+                transfer.stage = Stage::InFlight;
+                self.outbox.pop_front();
+            }
+            builder.finish()
+        };
+        flight.bytes.truncate(length);
+        self.identity.stamp(&mut flight.bytes, sequence, retry);
+        if flight.places.is_empty() {
+            self.flights.spare.push(flight);
+            return None;
+        }
+        self.flights.sequence = sequence;
+        flight.deadline = self.now + FRAME_TIMEOUT;
+        Some(flight)
+    }
+
+    /// Takes in a copy of an acyclic frame.
+    pub(super) fn receive(&mut self, copy: FrameCopy, arrived_on: Link, bytes: &[u8]) -> Received {
+        let slot = Flights::slot(copy.sequence);
+        let Some(flight) = self.flights.slots[slot].as_mut().filter(|flight| flight.sequence == copy.sequence) else {
+            self.counters.late += 1;
+            return Received::Late;
+        };
+        if !flight.is_what_was_sent(bytes) {
+            self.counters.corrupt += 1;
+            return Received::Corrupt;
+        }
+        let first = flight.arrivals.arrived == 0;
+        if !flight.arrivals.note(copy.sent_on, arrived_on) {
+            self.counters.late += 1;
+            return Received::Late;
+        }
+        flight.take(copy.sent_on, bytes, first);
+        let all = self.links.mask();
+        let finished = flight.arrivals.arrived & all == all;
+        if finished || flight.satisfied() {
+            self.answer(slot, finished);
+        }
+        if finished {
+            self.end(slot);
+        }
+        Received::Taken
+    }
+
+    /// Hands the replies of a flight to its procedures. `all_in`: no further copy can come.
+    fn answer(&mut self, slot: usize, all_in: bool) {
+        let Some(flight) = self.flights.slots[slot].as_mut() else { return };
+        if flight.answered {
+            return;
+        }
+        flight.answered = true;
+        self.counters.received += 1;
+        let flight = self.flights.slots[slot].take();
+        if let Some(flight) = flight {
+            if all_in {
+                self.learn_main_count(&flight);
+            }
+            for place in &flight.places {
+                let reply = place.reply(&flight.bytes);
+                self.finish(place.transfer, Ok(reply));
+            }
+            self.flights.slots[slot] = Some(flight);
+        }
+    }
+
+    /// A broadcast shows how many SubDevices the main copy meets (facts CR-09).
+    fn learn_main_count(&mut self, flight: &Flight) {
+        let broadcast = flight.places.iter().rfind(|place| matches!(place.command, Command::Brd | Command::Bwr));
+        if let Some(place) = broadcast {
+            self.main_count = place.wkc[Link::Main.index()].0;
+        }
+    }
+
+    fn end(&mut self, slot: usize) {
+        let Some(flight) = self.flights.slots[slot].take() else { return };
+        self.flights.in_flight -= 1;
+        self.monitor.observe(flight.arrivals);
+        self.flights.spare.push(flight);
+    }
+
+    fn finish(&mut self, id: TransferId, result: Result<Reply, BusError>) {
+        let Some(transfer) = self.transfers.find(id) else { return };
+        if transfer.abandoned {
+            self.transfers.remove(id);
+            return;
+        }
+        transfer.stage = Stage::Done(result);
+        let task = transfer.task;
+        self.wake(task);
+    }
+
+    /// Gives up flights whose deadline is over.
+    pub(super) fn expire_flights(&mut self) {
+        if self.flights.in_flight == 0 {
+            return;
+        }
+        for slot in 0..SLOTS {
+            let overdue = |flight: &Flight| flight.deadline <= self.now;
+            if self.flights.slots[slot].as_ref().is_some_and(overdue) {
+                self.expire(slot);
+            }
+        }
+    }
+
+    /// Datagrams that one copy answered as expected are done; the others count as lost: the copy that is missing may
+    /// have been the one that reached the SubDevice.
+    fn expire(&mut self, slot: usize) {
+        let Some(flight) = self.flights.slots[slot].take() else { return };
+        self.flights.in_flight -= 1;
+        self.monitor.observe(flight.arrivals);
+        if !flight.answered {
+            if flight.arrivals.arrived == 0 {
+                self.counters.lost += 1;
+            } else {
+                self.counters.half += 1;
+            }
+            for place in &flight.places {
+                if place.satisfied() {
+                    let reply = place.reply(&flight.bytes);
+                    self.finish(place.transfer, Ok(reply));
+                } else {
+                    self.lost(place.transfer);
+                }
+            }
+        }
+        self.flights.spare.push(flight);
+    }
+
+    fn lost(&mut self, id: TransferId) {
+        let Some(transfer) = self.transfers.find(id) else { return };
+        if transfer.request.resend && transfer.retries < MAX_RETRIES && !transfer.abandoned {
+            transfer.retries += 1;
+            transfer.stage = Stage::Queued;
+            self.counters.resent += 1;
+            self.outbox.push_back(id);
+            return;
+        }
+        let error = BusError::Lost { target: transfer.request.target, retries: transfer.retries };
+        self.counters.timed_out += 1;
+        self.finish(id, Err(error));
+    }
+}
+
+/// In an open ring the SubDevice at position `p` behind the break is the one at `p - main_count` on the redundant link;
+/// in a closed one nobody is addressed twice (facts CR-09).
+fn adjust_auto_increment(frame: &mut [u8], places: &[Place], main_count: u16) {
+    for place in places {
+        if !matches!(place.command, Command::Aprd | Command::Apwr | Command::Aprw | Command::Armw) {
+            continue;
+        }
+        let at = place.header_at + 2;
+        let adp = u16::from_le_bytes([frame[at], frame[at + 1]]).wrapping_add(main_count);
+        frame[at..at + 2].copy_from_slice(&adp.to_le_bytes());
+    }
+}
+
+impl Flight {
+    /// Everything controllers never change is as sent (facts 1.5): command, Idx, length, M bit of every datagram.
+    fn is_what_was_sent(&self, bytes: &[u8]) -> bool {
+        if bytes.len() < self.bytes.len() {
+            return false;
+        }
+        self.places.iter().all(|place| {
+            let at = place.header_at;
+            let (sent, got) = (&self.bytes[at..at + 8], &bytes[at..at + 8]);
+            let circulating = (CIRCULATING >> 8) as u8;
+            sent[..2] == got[..2] && sent[6] == got[6] && (sent[7] ^ got[7]) & !circulating == 0
+        })
+    }
+
+    /// Takes in a copy that was found to be ours.
+    fn take(&mut self, sent_on: Link, bytes: &[u8], first: bool) {
+        for place in &mut self.places {
+            let data_at = place.header_at + HEADER_LEN;
+            let data = data_at..data_at + place.length;
+            let wkc = Wkc(u16::from_le_bytes([bytes[data.end], bytes[data.end + 1]]));
+            let before = place.total();
+            place.wkc[sent_on.index()] = wkc;
+            // OR of the event requests (facts 9.3); both copies have them behind the length.
+            let irq = place.header_at + 8;
+            if first {
+                self.bytes[data.clone()].copy_from_slice(&bytes[data]);
+                self.bytes[irq..irq + WKC_LEN].copy_from_slice(&bytes[irq..irq + WKC_LEN]);
+            } else {
+                let rule = MergeRule::of(place.command, Link::Main);
+                rule.merge(&mut self.bytes[data.clone()], before, &bytes[data], wkc, sent_on);
+                self.bytes[irq] |= bytes[irq];
+                self.bytes[irq + 1] |= bytes[irq + 1];
+            }
+        }
+    }
+
+    fn satisfied(&self) -> bool {
+        self.places.iter().all(Place::satisfied)
+    }
+}
+
+impl Place {
+    fn total(&self) -> Wkc {
+        self.wkc[0].plus(self.wkc[1])
+    }
+
+    fn satisfied(&self) -> bool {
+        self.expected.is_some_and(|expected| self.total() == expected)
+    }
+
+    fn reply(&self, bytes: &[u8]) -> Reply {
+        let data_at = self.header_at + HEADER_LEN;
+        Reply {
+            data: bytes[data_at..data_at + self.length].to_vec(),
+            main: self.wkc[0],
+            redundant: self.wkc[1],
+            irq: u16::from_le_bytes([bytes[data_at - 2], bytes[data_at - 1]]),
+        }
+    }
+}

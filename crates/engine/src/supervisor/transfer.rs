@@ -1,0 +1,88 @@
+//! Datagrams that procedures asked for, from the request to the reply.
+
+use alloc::vec::Vec;
+
+use ringcat_wire::address::Wkc;
+use ringcat_wire::command::Command;
+use ringcat_wire::datagram::Target;
+
+use super::bus::{BusError, Reply};
+use super::executor::TaskId;
+
+/// What is asked of the bus.
+#[derive(Clone, Debug)]
+pub(crate) struct Request {
+    pub command: Command,
+    pub target: Target,
+    /// Data to send; zeros for reads.
+    pub data: Vec<u8>,
+    /// The working counter at which waiting for a second copy is pointless.
+    pub expected: Option<Wkc>,
+    /// Whether a lost datagram may be sent again: false where reading or writing twice is not the same as once.
+    pub resend: bool,
+}
+
+/// How far a transfer is.
+#[derive(Debug)]
+pub(crate) enum Stage {
+    /// Waits to be packed into a frame.
+    Queued,
+    /// Is in a frame that is out.
+    InFlight,
+    /// The procedure may fetch it.
+    Done(Result<Reply, BusError>),
+}
+
+#[derive(Debug)]
+pub(crate) struct Transfer {
+    pub request: Request,
+    pub stage: Stage,
+    pub task: TaskId,
+    pub retries: u8,
+    /// The procedure no longer waits: freed as soon as it is not in a frame.
+    pub abandoned: bool,
+}
+
+/// A transfer in the table; the generation tells re-used places apart.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct TransferId {
+    index: u32,
+    generation: u32,
+}
+
+/// All transfers that exist.
+#[derive(Debug, Default)]
+pub(crate) struct Transfers {
+    entries: Vec<(u32, Option<Transfer>)>,
+    free: Vec<u32>,
+}
+
+impl Transfers {
+    pub(crate) fn insert(&mut self, transfer: Transfer) -> TransferId {
+        let index = self.free.pop().unwrap_or_else(|| {
+            self.entries.push((0, None));
+            (self.entries.len() - 1) as u32
+        });
+        let entry = &mut self.entries[index as usize];
+        entry.0 = entry.0.wrapping_add(1);
+        entry.1 = Some(transfer);
+        TransferId { index, generation: entry.0 }
+    }
+
+    pub(crate) fn find(&mut self, id: TransferId) -> Option<&mut Transfer> {
+        let (generation, transfer) = self.entries.get_mut(id.index as usize)?;
+        if *generation == id.generation { transfer.as_mut() } else { None }
+    }
+
+    pub(crate) fn remove(&mut self, id: TransferId) -> Option<Transfer> {
+        let (generation, transfer) = self.entries.get_mut(id.index as usize)?;
+        if *generation != id.generation {
+            return None;
+        }
+        let removed = transfer.take();
+        if removed.is_some() {
+            self.free.push(id.index);
+        }
+        removed
+    }
+}
