@@ -1,0 +1,9 @@
+//! The network of the simulator, driven through its public API: what way frames take, when they arrive, what faults do
+//! to them (facts 2, 9.4, 11.3; issue 2, part 3).
+
+mod determinism;
+mod faults;
+mod random_walks;
+mod timing;
+mod vectors;
+mod wiring;

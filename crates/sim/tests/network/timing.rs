@@ -1,0 +1,213 @@
+//! When frames arrive, when links are noticed, and what a cut catches under way (facts 1.3, 2.2, 11.4).
+
+use core::time::Duration;
+
+use ringcat_sim::cable::HostLink::{Main, Redundant};
+use ringcat_sim::cable::{DeviceIndex, HostLink};
+use ringcat_sim::network::statistics::LossCause;
+use ringcat_sim::network::{Network, NetworkOptions};
+use ringcat_sim::time::SimTime;
+use ringcat_wire::command::Command;
+use ringcat_wire::datagram::Target;
+use ringcat_wire::register::map;
+
+use crate::wiring::{SETTLE, command, cut, endpoint, ring, segment, segment_with, shortest, travel};
+
+/// A shortest frame takes this long from its first to its last bit: 72 byte times.
+const WIRE_NS: u64 = 5_760;
+
+fn ns(time: u64) -> Duration {
+    Duration::from_nanos(time)
+}
+
+fn options() -> NetworkOptions {
+    NetworkOptions { processing_delay: ns(400), forwarding_delay: ns(200), ..NetworkOptions::default() }
+}
+
+/// Times of the frames received on a link, counted from `since`.
+fn arrivals(network: &mut Network, link: HostLink, since: SimTime) -> Vec<u64> {
+    std::iter::from_fn(|| network.receive(link)).map(|received| (received.at - since).as_nanos() as u64).collect()
+}
+
+#[test]
+fn a_frame_needs_its_wire_time_the_hops_and_the_cables() {
+    let mut network = segment_with("main-1.0 1.1-2.0", options());
+    let start = network.now();
+    network.send(Main, &shortest());
+    // To 1; processed and on to 2; processed and back to 1; forwarded and home.
+    let expected = WIRE_NS + 100 + (400 + 100) + (400 + 100) + (200 + 100);
+    network.advance(start + ns(expected - 1));
+    assert_eq!(network.receive(Main), None);
+    assert_eq!(network.next_event(), Some(start + ns(expected)));
+    network.advance(start + ns(expected));
+    assert_eq!(arrivals(&mut network, Main, start), [expected]);
+}
+
+#[test]
+fn frames_sent_at_once_leave_one_behind_the_other() {
+    let mut network = segment(&ring(3));
+    let start = network.now();
+    let long = command(Command::Nop, Target::None, &[0; 1486]);
+    assert_eq!(long.len(), 1_514);
+    for frame in [&shortest(), &long, &shortest()] {
+        network.send(Main, frame);
+    }
+    network.advance_by(SETTLE);
+    let times = arrivals(&mut network, Redundant, start);
+    // facts 1.3: 60 + 24 byte times to the next frame, 1514 + 12 of the long one, 12 of gap, 72 of the last.
+    assert_eq!(times[1] - times[0], (84 + 1_526 - 72) * 80);
+    assert_eq!(times[2] - times[1], (12 + 72) * 80);
+}
+
+#[test]
+fn the_two_interfaces_send_at_the_same_time() {
+    let mut network = segment(&ring(3));
+    let start = network.now();
+    network.send(Main, &shortest());
+    network.send(Redundant, &shortest());
+    network.advance_by(SETTLE);
+    assert_eq!(arrivals(&mut network, Redundant, start), arrivals(&mut network, Main, start));
+}
+
+#[test]
+fn a_full_transmit_queue_loses_frames() {
+    let mut network = segment_with(&ring(1), NetworkOptions { transmit_queue: 3, ..NetworkOptions::default() });
+    for _ in 0..5 {
+        network.send(Main, &shortest());
+    }
+    assert_eq!(network.statistics().lost(LossCause::TransmitQueueFull), 2);
+    assert_eq!(network.statistics().link(Main).frames_sent, 3);
+    assert_eq!(network.statistics().link(Main).bytes_sent, 180);
+}
+
+#[test]
+fn frames_that_nobody_fetches_fill_a_bounded_queue() {
+    let mut network = segment_with(&ring(1), NetworkOptions { receive_queue: 2, ..NetworkOptions::default() });
+    for _ in 0..3 {
+        network.send(Main, &shortest());
+    }
+    network.advance_by(SETTLE);
+    assert_eq!(network.statistics().lost(LossCause::ReceiveQueueFull), 1);
+    assert_eq!(network.statistics().link(Redundant).frames_received, 2);
+}
+
+#[test]
+fn both_ends_notice_a_cut_and_a_heal_after_their_delays() {
+    let options =
+        NetworkOptions { link_down_delay: ns(20_000), link_up_delay: ns(70_000), ..NetworkOptions::default() };
+    let mut network = segment_with(&ring(2), options);
+    let cable = network.host_cable(Main).unwrap();
+    let port = endpoint("1.0");
+    assert_eq!(network.cable_at(port), Some(cable));
+    let port_0_closed =
+        |network: &Network| network.device(DeviceIndex(0)).controller.loop_closed(ringcat_sim::frame::Port::A);
+    let start = network.now();
+    network.cut(cable);
+    network.advance(start + ns(19_999));
+    assert!(network.carrier(Main) && !port_0_closed(&network));
+    network.advance(start + ns(20_000));
+    assert!(!network.carrier(Main) && port_0_closed(&network));
+    assert!(network.carrier(Redundant));
+    let start = network.now();
+    network.heal(cable);
+    network.advance(start + ns(69_999));
+    assert!(!network.carrier(Main) && port_0_closed(&network));
+    network.advance(start + ns(70_000));
+    assert!(network.carrier(Main) && !port_0_closed(&network));
+}
+
+#[test]
+fn a_flap_shorter_than_the_detection_is_not_noticed() {
+    let mut network = segment(&ring(2));
+    let cable = network.cable_at(endpoint("1.1")).unwrap();
+    network.cut(cable);
+    network.advance_by(ns(5_000));
+    network.heal(cable);
+    network.advance_by(SETTLE);
+    let lost_links = |device| network.device(DeviceIndex(device)).controller.register(map::LOST_LINK_COUNTER, 4).to_vec();
+    assert_eq!((lost_links(0), lost_links(1)), (vec![0; 4], vec![0; 4]));
+    assert!(travel(&mut network, Main).is_some());
+}
+
+#[test]
+fn until_a_cut_is_noticed_frames_are_lost_and_then_they_turn_round() {
+    let mut network = segment_with(&ring(3), NetworkOptions::default().with_detection_delay(ns(1_000_000)));
+    let cable = network.cable_at(endpoint("1.1")).unwrap();
+    let start = network.now();
+    network.cut(cable);
+    for step in 0..20 {
+        network.advance(start + ns(step * 100_000));
+        network.send(Main, &shortest());
+        network.send(Redundant, &shortest());
+    }
+    network.advance_by(SETTLE);
+    // Steps 0 to 9 are before the detection; the frame of step 10 leaves at it and reaches the port after it.
+    assert_eq!(arrivals(&mut network, Main, start).len(), 10);
+    assert_eq!(arrivals(&mut network, Redundant, start).len(), 10);
+    assert_eq!(network.statistics().lost(LossCause::DeadCable), 20);
+}
+
+/// Sends a shortest frame through a ring of 4 and cuts the cable from 1 to 2 after `cut_ns`.
+fn cut_under_way(cut_ns: u64) -> Network {
+    let mut network = segment_with(&ring(4), options());
+    let cable = network.cable_at(endpoint("1.1")).unwrap();
+    network.send(Main, &shortest());
+    network.advance_by(ns(cut_ns));
+    network.cut(cable);
+    network.advance_by(ns(100_000));
+    network
+}
+
+fn invalid_and_forwarded(network: &Network, device: usize) -> (u8, u8) {
+    let controller = &network.device(DeviceIndex(device)).controller;
+    (controller.register(map::RX_ERROR_COUNTER, 1)[0], controller.register(map::FORWARDED_RX_ERROR_COUNTER, 1)[0])
+}
+
+#[test]
+fn a_cut_before_the_frame_enters_the_cable_leaves_no_trace_behind_it() {
+    // The first bit enters the cable from 1 to 2 at 100 (cable) + 400 (device 1) = 500 ns.
+    let network = cut_under_way(499);
+    assert_eq!(invalid_and_forwarded(&network, 1), (0, 0));
+    assert_eq!(network.statistics().lost(LossCause::DeadCable), 1);
+}
+
+#[test]
+fn a_cut_while_the_frame_is_in_the_cable_leaves_a_damaged_rest() {
+    let mut network = cut_under_way(3_000);
+    assert_eq!(network.receive(Redundant), None);
+    assert_eq!(network.statistics().lost(LossCause::BadCheckSequence), 1);
+    // facts 2.5: the first controller counts it as invalid, the others as forwarded.
+    let counters: Vec<_> = (0..4).map(|device| invalid_and_forwarded(&network, device)).collect();
+    assert_eq!(counters, [(0, 0), (1, 0), (0, 1), (0, 1)]);
+}
+
+#[test]
+fn a_cut_behind_the_frame_does_not_touch_it() {
+    // The last bit leaves the cable at 500 + 100 + 5760 ns.
+    let mut network = cut_under_way(500 + 100 + WIRE_NS);
+    assert_eq!(network.statistics().lost_in_all(), 0);
+    assert_eq!(network.receive(Redundant).unwrap().bytes[6], 0x02);
+}
+
+#[test]
+fn a_port_that_opens_cuts_the_frame_that_runs_through_it() {
+    let mut network = segment(&ring(2));
+    let cable = cut(&mut network, "1.1");
+    let start = network.now();
+    network.heal(cable);
+    network.advance(start + ns(10_000 - 3_000));
+    network.send(Main, &shortest());
+    network.send(Redundant, &shortest());
+    network.advance_by(SETTLE);
+    assert_eq!(network.statistics().lost(LossCause::LoopChanged), 2);
+    assert_eq!(travel(&mut network, Main).unwrap().met, [1, 2]);
+}
+
+#[test]
+fn an_interface_without_carrier_sends_nothing() {
+    let mut network = segment("main-1.0");
+    network.send(Redundant, &shortest());
+    assert_eq!(network.statistics().lost(LossCause::NoCarrier), 1);
+    assert_eq!(network.statistics().link(Redundant).frames_sent, 0);
+    assert!(!network.carrier(Redundant));
+}
