@@ -1,1 +1,460 @@
-//! The application behind a controller's PDI.
+//! The application behind a SubDevice controller: everything that the PDI side does (facts 3.4, 5, 6).
+//!
+//! In: AL events and virtual time, through [`Application::run`], and faults. Out: AL status, answers in the mailbox,
+//! inputs and latched outputs. The parts: [`state_machine`] says what a request means, [`settings`] whether the
+//! configuration suits, [`process_data`] moves data, [`mailbox`], [`coe`] and [`dictionary`] answer SDOs,
+//! [`behaviours`] and [`servo`] make inputs. Here they are put together.
+
+pub mod behaviours;
+pub mod coe;
+pub mod dictionary;
+pub mod mailbox;
+pub mod process_data;
+pub mod servo;
+pub mod settings;
+pub mod state_machine;
+
+use core::time::Duration;
+
+use ringcat_wire::al::{AlState, AlStatus, AlStatusCode};
+use ringcat_wire::mailbox::{ErrorReply, Protocol};
+use ringcat_wire::register::map;
+use ringcat_wire::sii::MailboxLayout;
+
+use crate::controller::Controller;
+use crate::description::DeviceDescription;
+use crate::time::SimTime;
+use coe::{Answer, Objects};
+use dictionary::Dictionary;
+use mailbox::Mailbox;
+use process_data::ProcessData;
+use settings::Layout;
+use state_machine::{Pending, Reaction, StateMachine};
+
+pub use behaviours::{Behaviour, InputFunction, InputSource};
+
+/// AL_EVENT bits (facts 3.5).
+const EVENT_AL_CONTROL: u32 = 1 << 0;
+const EVENT_SYNC_MANAGER: u32 = 1 << 4;
+const EVENT_WATCHDOG: u32 = 1 << 6;
+
+/// A transition that is refused on purpose.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+struct Refusal {
+    to: AlState,
+    code: AlStatusCode,
+    times: u32,
+}
+
+/// State of the application of one device.
+#[derive(Clone, Debug)]
+pub struct Application {
+    machine: StateMachine,
+    dictionary: Dictionary,
+    process_data: ProcessData,
+    mailbox: Option<Mailbox>,
+    layout: Layout,
+    refusals: Vec<Refusal>,
+    hanging: bool,
+    interest: u32,
+    polled: bool,
+    /// AL state that was seen last on a device whose controller runs the state machine alone.
+    emulated_state: AlState,
+    last_run: SimTime,
+}
+
+impl Application {
+    /// The application of a device before power comes.
+    pub fn new(description: &DeviceDescription) -> Application {
+        let mut application = Application {
+            machine: StateMachine::default(),
+            dictionary: Dictionary::new(description),
+            process_data: ProcessData::new(&description.behaviour),
+            mailbox: None,
+            layout: Layout::default(),
+            refusals: Vec::new(),
+            hanging: false,
+            interest: 0,
+            polled: false,
+            emulated_state: AlState::Init,
+            last_run: SimTime::ZERO,
+        };
+        application.watch(description);
+        application
+    }
+
+    /// Starts anew: power came, or the controller was reset. Faults and the source of the inputs stay.
+    pub fn restart(&mut self, description: &DeviceDescription, now: SimTime) {
+        self.machine = StateMachine::default();
+        self.dictionary = Dictionary::new(description);
+        self.process_data.stop(now);
+        self.mailbox = None;
+        self.layout = Layout::default();
+        self.emulated_state = AlState::Init;
+        self.last_run = now;
+        self.watch(description);
+    }
+
+    /// The next `times` requests for `to` are refused with `code`.
+    pub fn refuse(&mut self, to: AlState, code: AlStatusCode, times: u32) {
+        self.refusals.push(Refusal { to, code, times });
+    }
+
+    /// A hanging application reacts to nothing.
+    pub fn hang(&mut self, hanging: bool) {
+        self.hanging = hanging;
+    }
+
+    /// It hangs.
+    pub const fn is_hanging(&self) -> bool {
+        self.hanging
+    }
+
+    /// The process data.
+    pub const fn process_data(&self) -> &ProcessData {
+        &self.process_data
+    }
+
+    /// The object dictionary.
+    pub const fn dictionary(&self) -> &Dictionary {
+        &self.dictionary
+    }
+
+    /// Inputs come from this source from now on.
+    pub fn set_source(&mut self, source: InputSource, controller: &mut Controller) {
+        self.process_data.set_source(source, controller, self.last_run);
+    }
+
+    /// Changes an object from inside the device.
+    pub fn set_object(&mut self, index: u16, sub_index: u8, value: &[u8]) {
+        self.dictionary.set(index, sub_index, value);
+    }
+
+    /// Whether [`Application::run`] has something to do now.
+    pub fn needs_run(&self, events: u32) -> bool {
+        !self.hanging && (self.polled || events & self.interest != 0)
+    }
+
+    /// When [`Application::run`] has something to do without any frame.
+    pub fn next_deadline(&self) -> Option<SimTime> {
+        if self.hanging {
+            return None;
+        }
+        let due = |pending: Pending| if self.is_waiting(pending) { pending.give_up } else { pending.at };
+        let transition = self.machine.pending().map(due);
+        let answer = self.mailbox.as_ref().and_then(Mailbox::next_deadline);
+        match (transition, answer) {
+            (Some(transition), Some(answer)) => Some(transition.min(answer)),
+            (transition, answer) => transition.or(answer),
+        }
+    }
+
+    /// The transition could be done but something else is missing.
+    fn is_waiting(&self, pending: Pending) -> bool {
+        pending.at <= self.last_run
+    }
+
+    /// Reacts to what happened at the controller.
+    pub fn run(&mut self, description: &DeviceDescription, controller: &mut Controller, now: SimTime) {
+        if self.hanging || !controller.pdi_operational() {
+            return;
+        }
+        self.last_run = now;
+        if description.emulation {
+            self.run_emulated(description, controller, now);
+        } else {
+            self.run_checked(description, controller, now);
+        }
+        self.watch(description);
+    }
+
+    fn run_checked(&mut self, description: &DeviceDescription, controller: &mut Controller, now: SimTime) {
+        let events = controller.al_event();
+        if self.machine.pending().is_none() {
+            if events & EVENT_SYNC_MANAGER != 0 {
+                self.sync_managers_changed(description, controller, now);
+            }
+            if events & EVENT_AL_CONTROL != 0 {
+                self.requested(description, controller, now);
+            }
+        }
+        let operating = self.machine.state() == AlState::Op && self.machine.pending().is_none();
+        self.process_data.exchange(controller, events, operating, now);
+        self.check_watchdog(controller, events, now);
+        self.run_mailbox(description, controller, events, now);
+        if let Some(pending) = self.machine.pending()
+            && pending.at <= now
+        {
+            self.finish(pending, description, controller, now);
+        }
+    }
+
+    /// AL control was written.
+    fn requested(&mut self, description: &DeviceDescription, controller: &mut Controller, now: SimTime) {
+        let control = controller.al_control(now);
+        let boot = bootstrap(description).is_some();
+        let mut reaction = self.machine.request(control, boot, description.identification);
+        if let Reaction::Begin(to) = reaction {
+            reaction = match self.prepare(to, description, controller, now) {
+                Ok(()) => Reaction::Begin(to),
+                Err(code) => self.machine.refuse(code),
+            };
+        }
+        match reaction {
+            Reaction::Ignore => {}
+            Reaction::Report => self.report(controller, now),
+            Reaction::Begin(to) => {
+                let from = self.machine.state();
+                if from == AlState::Op {
+                    self.process_data.make_safe(controller, now);
+                }
+                let takes = state_machine::duration(&description.transitions, from, to);
+                let patience = if to == AlState::Op { description.outputs_timeout } else { Duration::ZERO };
+                self.report(controller, now);
+                self.machine.begin(to, now, takes, patience);
+            }
+        }
+    }
+
+    /// The checks before a transition.
+    fn prepare(
+        &mut self,
+        to: AlState,
+        description: &DeviceDescription,
+        controller: &mut Controller,
+        now: SimTime,
+    ) -> Result<(), AlStatusCode> {
+        if let Some(code) = self.take_refusal(to) {
+            return Err(code);
+        }
+        let from = self.machine.state();
+        match (from, to) {
+            (AlState::Init, AlState::PreOp) => match standard(description) {
+                Some(layout) => self.check_mailbox(
+                    &layout,
+                    AlStatusCode::INVALID_MAILBOX_CONFIGURATION_PREOP,
+                    description,
+                    controller,
+                    now,
+                ),
+                None => Ok(()),
+            },
+            (AlState::Init, AlState::Boot) => {
+                let layout = bootstrap(description).ok_or(AlStatusCode::BOOT_NOT_SUPPORTED)?;
+                let wrong = AlStatusCode::INVALID_MAILBOX_CONFIGURATION_BOOT;
+                self.check_mailbox(&layout, wrong, description, controller, now)
+            }
+            (AlState::PreOp, AlState::SafeOp) => {
+                let actual = settings::sync_managers(controller, now);
+                let ram_kib = controller.config().ram_kib;
+                let layout = settings::process_data(description, &self.dictionary, &actual, ram_kib)?;
+                settings::timing(description, &layout, controller, now)?;
+                self.layout = layout;
+                Ok(())
+            }
+            _ => Ok(()),
+        }
+    }
+
+    fn check_mailbox(
+        &mut self,
+        layout: &MailboxLayout,
+        wrong: AlStatusCode,
+        description: &DeviceDescription,
+        controller: &mut Controller,
+        now: SimTime,
+    ) -> Result<(), AlStatusCode> {
+        let actual = settings::sync_managers(controller, now);
+        if !settings::mailbox_matches(description, layout, &actual) {
+            return Err(wrong);
+        }
+        let numbers = settings::mailbox_numbers(description);
+        self.mailbox = Some(Mailbox::open(*layout, numbers, controller, now));
+        Ok(())
+    }
+
+    fn take_refusal(&mut self, to: AlState) -> Option<AlStatusCode> {
+        let place = self.refusals.iter().position(|refusal| refusal.to == to && refusal.times > 0)?;
+        let refusal = &mut self.refusals[place];
+        let code = refusal.code;
+        refusal.times -= 1;
+        if refusal.times == 0 {
+            self.refusals.remove(place);
+        }
+        Some(code)
+    }
+
+    /// A transition is due.
+    fn finish(
+        &mut self,
+        pending: Pending,
+        description: &DeviceDescription,
+        controller: &mut Controller,
+        now: SimTime,
+    ) {
+        if pending.to == AlState::Op && !self.process_data.outputs_seen() {
+            if now >= pending.give_up {
+                self.machine.refuse(AlStatusCode::NO_VALID_OUTPUTS);
+                self.report(controller, now);
+            } else if controller.al_event() & EVENT_AL_CONTROL != 0 {
+                self.machine.abandon();
+                self.requested(description, controller, now);
+            }
+            return;
+        }
+        let from = self.machine.complete();
+        match (from, pending.to) {
+            (_, AlState::Init) => {
+                self.process_data.stop(now);
+                self.mailbox = None;
+            }
+            (AlState::SafeOp | AlState::Op, AlState::PreOp) => self.process_data.stop(now),
+            (AlState::PreOp, AlState::SafeOp) => {
+                self.process_data.start(self.layout.clone(), &self.dictionary, controller, now);
+            }
+            (_, AlState::Op) => self.process_data.operate(controller, now),
+            _ => {}
+        }
+        self.report(controller, now);
+        if controller.al_event() & EVENT_SYNC_MANAGER != 0 {
+            self.sync_managers_changed(description, controller, now);
+        }
+        if controller.al_event() & EVENT_AL_CONTROL != 0 {
+            self.requested(description, controller, now);
+        }
+        self.check_watchdog(controller, EVENT_WATCHDOG, now);
+    }
+
+    /// A SyncManager was switched on or off, or the last answer is asked for again (facts 5.2, 6.2).
+    fn sync_managers_changed(&mut self, description: &DeviceDescription, controller: &mut Controller, now: SimTime) {
+        let actual = settings::sync_managers(controller, now);
+        let state = self.machine.state();
+        if let Some(mailbox) = &mut self.mailbox {
+            if !settings::mailbox_matches(description, mailbox.layout(), &actual) {
+                let code = if state == AlState::Boot {
+                    AlStatusCode::INVALID_MAILBOX_CONFIGURATION_BOOT
+                } else {
+                    AlStatusCode::INVALID_MAILBOX_CONFIGURATION_PREOP
+                };
+                self.mailbox = None;
+                self.process_data.stop(now);
+                self.machine.fail(AlState::Init, code);
+                self.report(controller, now);
+                return;
+            }
+            mailbox.check_repeat(controller, now);
+        }
+        if !matches!(state, AlState::SafeOp | AlState::Op) {
+            return;
+        }
+        let ram_kib = controller.config().ram_kib;
+        if let Err(code) = settings::process_data(description, &self.dictionary, &actual, ram_kib) {
+            self.process_data.stop(now);
+            self.machine.fail(AlState::PreOp, code);
+            self.report(controller, now);
+        }
+    }
+
+    fn check_watchdog(&mut self, controller: &mut Controller, events: u32, now: SimTime) {
+        if events & EVENT_WATCHDOG == 0 {
+            return;
+        }
+        // Reading the status clears the event.
+        settings::read_u16(controller, map::WATCHDOG_STATUS, now);
+        let expired = !controller.process_data_watchdog_ok();
+        let operating = self.machine.state() == AlState::Op && self.machine.pending().is_none();
+        if expired && operating && self.process_data.is_watched() {
+            self.process_data.make_safe(controller, now);
+            self.machine.fail(AlState::SafeOp, AlStatusCode::SYNC_MANAGER_WATCHDOG);
+            self.report(controller, now);
+        }
+    }
+
+    fn run_mailbox(
+        &mut self,
+        description: &DeviceDescription,
+        controller: &mut Controller,
+        events: u32,
+        now: SimTime,
+    ) {
+        let (Some(mailbox), Some(declared)) = (&mut self.mailbox, description.mailbox) else {
+            return;
+        };
+        if let Some(message) = mailbox.take(controller, events, now) {
+            let state = self.machine.state();
+            let mut objects = Objects {
+                dictionary: &mut self.dictionary,
+                process_data: &self.process_data,
+                state,
+                complete_access: declared.coe_details.complete_access(),
+            };
+            mailbox.serve(&message, now + declared.response_time, |protocol, payload, room| match protocol {
+                Protocol::Coe if declared.has_coe() && state != AlState::Boot => {
+                    coe::serve(payload, room, &mut objects)
+                }
+                // Errors are never answered, or two ends would answer each other for ever.
+                Protocol::Error => Answer::Silence,
+                _ => Answer::Error(ErrorReply::UNSUPPORTED_PROTOCOL),
+            });
+        }
+        mailbox.send(controller, now);
+    }
+
+    /// The controller copies AL control by itself; only the process data follows.
+    fn run_emulated(&mut self, description: &DeviceDescription, controller: &mut Controller, now: SimTime) {
+        let events = controller.al_event();
+        let bytes = controller.register(map::AL_STATUS, AlStatus::LEN);
+        let status = bytes.first_chunk().map_or(AlStatus::new(AlState::Init), AlStatus::decode);
+        let state = status.al_state().unwrap_or(AlState::Init);
+        if state != self.emulated_state || events & EVENT_SYNC_MANAGER != 0 {
+            let actual = settings::sync_managers(controller, now);
+            let active = matches!(state, AlState::SafeOp | AlState::Op);
+            let layout = if active { settings::unchecked(description, &actual) } else { Layout::default() };
+            if *self.process_data.layout() != layout {
+                self.process_data.start(layout, &self.dictionary, controller, now);
+            }
+        }
+        let operating = state == AlState::Op && controller.process_data_watchdog_ok();
+        if !operating && self.process_data.outputs().iter().any(|byte| *byte != 0) {
+            self.process_data.make_safe(controller, now);
+        }
+        self.process_data.exchange(controller, events, operating, now);
+        self.emulated_state = state;
+    }
+
+    fn report(&mut self, controller: &mut Controller, now: SimTime) {
+        controller.set_al_status(self.machine.status(), self.machine.code(), now);
+    }
+
+    /// Which events matter from now on.
+    fn watch(&mut self, description: &DeviceDescription) {
+        if description.emulation {
+            self.polled = !description.pdos.is_empty();
+            self.interest = 0;
+            return;
+        }
+        let mut interest = self.process_data.events();
+        match self.machine.pending() {
+            None => interest |= EVENT_AL_CONTROL | EVENT_SYNC_MANAGER | EVENT_WATCHDOG,
+            Some(pending) if self.is_waiting(pending) => interest |= EVENT_AL_CONTROL,
+            Some(_) => {}
+        }
+        if let Some(mailbox) = &self.mailbox {
+            interest |= mailbox.events();
+        }
+        self.interest = interest;
+        self.polled = self.process_data.is_polled();
+    }
+}
+
+fn standard(description: &DeviceDescription) -> Option<MailboxLayout> {
+    description.mailbox.map(|mailbox| mailbox.standard).filter(|layout| layout.receive_size != 0)
+}
+
+fn bootstrap(description: &DeviceDescription) -> Option<MailboxLayout> {
+    let mailbox = description.mailbox.filter(|mailbox| mailbox.protocols.foe())?;
+    Some(mailbox.bootstrap).filter(|layout| layout.receive_size != 0)
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,1 +1,168 @@
-//! A SubDevice.
+//! A SubDevice: a controller and the application behind it.
+//!
+//! In: a [`DeviceDescription`] or a real SII image; frames through [`Device::controller`], the passing of virtual time,
+//! faults. Out: the device's reactions, its inputs and outputs for inspection. Cables and frames between devices are
+//! the network's matter.
+
+use ringcat_wire::al::{AlState, AlStatus, AlStatusCode};
+use ringcat_wire::register::{Features, map};
+
+use crate::application::{Application, InputSource};
+use crate::controller::{Controller, ControllerConfig};
+use crate::description::DeviceDescription;
+use crate::sii_image::{self, DescriptionError};
+use crate::time::SimTime;
+
+/// Features without distributed clocks: bit-wise FMMUs, enhanced link detection, separate FCS errors.
+const FEATURES_PLAIN: u16 = 0x00E0;
+/// Feature bits of a clock with 32 and with 64 bits.
+const FEATURES_DC_32: u16 = 0x0004;
+const FEATURES_DC_64: u16 = 0x000C;
+
+/// A SubDevice with power supply, controller and application.
+#[derive(Clone, Debug)]
+pub struct Device {
+    /// The controller: ports, registers, EEPROM.
+    pub controller: Controller,
+    /// What stands behind it.
+    pub application: Application,
+    /// What it is made from. Changes to it have no effect on registers and EEPROM.
+    pub description: DeviceDescription,
+    starts: u32,
+}
+
+impl Device {
+    /// A device without power.
+    pub fn new(description: DeviceDescription) -> Device {
+        let controller = Controller::new(controller_config(&description));
+        let starts = controller.starts();
+        Device { application: Application::new(&description), controller, description, starts }
+    }
+
+    /// A device that answers like the one whose SII image this is.
+    pub fn from_sii(image: Vec<u8>, name: &str) -> Result<Device, DescriptionError> {
+        Ok(Device::new(DeviceDescription::from_sii(image, name)?))
+    }
+
+    /// Name in the segment.
+    pub fn name(&self) -> &str {
+        &self.description.name
+    }
+
+    /// Power comes.
+    pub fn power_on(&mut self, now: SimTime) {
+        self.controller.power_on(now);
+        self.follow_restart(now);
+    }
+
+    /// Power goes.
+    pub fn power_off(&mut self, now: SimTime) {
+        self.controller.power_off(now);
+        self.application.restart(&self.description, now);
+    }
+
+    /// The application hangs, or goes on.
+    pub fn hang(&mut self, hanging: bool, now: SimTime) {
+        self.application.hang(hanging);
+        self.controller.set_pdi_alive(!hanging, now);
+    }
+
+    /// The next `times` requests for `to` are refused with `code`.
+    pub fn refuse_transition(&mut self, to: AlState, code: AlStatusCode, times: u32) {
+        self.application.refuse(to, code, times);
+    }
+
+    /// Lets controller and application react to frames and to the time.
+    pub fn run(&mut self, now: SimTime) {
+        if !self.controller.is_powered() {
+            return;
+        }
+        self.controller.tick(now);
+        self.follow_restart(now);
+        self.application.run(&self.description, &mut self.controller, now);
+    }
+
+    /// The application starts anew with the controller.
+    fn follow_restart(&mut self, now: SimTime) {
+        let starts = self.controller.starts();
+        if starts != self.starts {
+            self.starts = starts;
+            self.application.restart(&self.description, now);
+        }
+    }
+
+    /// Whether [`Device::run`] has something to do now, after a frame.
+    pub fn needs_run(&self) -> bool {
+        self.controller.starts() != self.starts || self.application.needs_run(self.controller.al_event())
+    }
+
+    /// When [`Device::run`] has something to do without any frame.
+    pub fn next_deadline(&self) -> Option<SimTime> {
+        if !self.controller.is_powered() {
+            return None;
+        }
+        match (self.controller.next_deadline(), self.application.next_deadline()) {
+            (Some(controller), Some(application)) => Some(controller.min(application)),
+            (controller, application) => controller.or(application),
+        }
+    }
+
+    /// AL status as EtherCAT reads it.
+    pub fn al_status(&self) -> AlStatus {
+        let bytes = self.controller.register(map::AL_STATUS, AlStatus::LEN);
+        bytes.first_chunk().map_or(AlStatus::new(AlState::Init), AlStatus::decode)
+    }
+
+    /// AL status code as EtherCAT reads it.
+    pub fn al_status_code(&self) -> AlStatusCode {
+        let bytes = self.controller.register(map::AL_STATUS_CODE, AlStatusCode::LEN);
+        bytes.first_chunk().map_or(AlStatusCode::NO_ERROR, AlStatusCode::decode)
+    }
+
+    /// Valid outputs: zero in the safe state, empty below SAFEOP.
+    pub fn outputs(&self) -> &[u8] {
+        self.application.process_data().outputs()
+    }
+
+    /// Inputs as EtherCAT reads them, empty below SAFEOP.
+    pub fn inputs(&self) -> &[u8] {
+        self.application.process_data().inputs()
+    }
+
+    /// How often outputs were taken over in OP. Where a SyncManager raises no event only changes are counted.
+    pub const fn outputs_latched(&self) -> u64 {
+        self.application.process_data().latched()
+    }
+
+    /// Inputs are these bytes from now on. A drive makes its own and ignores them.
+    pub fn set_inputs(&mut self, bytes: &[u8]) {
+        self.set_input_source(InputSource::Constant(bytes.into()));
+    }
+
+    /// Inputs come from this source from now on. A drive makes its own and ignores it.
+    pub fn set_input_source(&mut self, source: InputSource) {
+        self.application.set_source(source, &mut self.controller);
+    }
+}
+
+/// The controller that a description asks for.
+fn controller_config(description: &DeviceDescription) -> ControllerConfig {
+    let clock = match &description.dc {
+        None => 0,
+        Some(dc) if dc.wide => FEATURES_DC_64,
+        Some(_) => FEATURES_DC_32,
+    };
+    ControllerConfig {
+        ports: description.ports,
+        features: Features::from_bits(FEATURES_PLAIN | clock),
+        sii: sii_image::build(description),
+        sii_busy: description.sii_busy,
+        eight_byte_reads: description.eight_byte_sii,
+        clock_drift_ppb: description.clock_drift_ppb,
+        clock_start: description.clock_start_ns,
+        ..ControllerConfig::default()
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,1 +1,227 @@
-//! SII images.
+//! SII image from a device description, and description from a real SII image (facts 4).
+//!
+//! In and out: [`DeviceDescription`] and the bytes of an EEPROM. A real image is kept byte for byte; the description
+//! made from it says what the device behind it must do. Where an image is silent, as about the mapping of a device whose
+//! PDOs are only in its dictionary, what is missing is filled in so that SyncManagers and dictionary agree.
+
+mod reader;
+
+use core::fmt;
+
+use ringcat_wire::register::PortKind;
+use ringcat_wire::sii::{
+    DcMode, General, GeneralFlags, MailboxProtocols, PdoDescription as SiiPdo, PdoDirection, PdoEntry, SiiError,
+    SiiHeader, SiiSyncManager, SiiWriteError, SiiWriter,
+};
+
+use crate::description::{DeviceDescription, PdoDescription};
+
+/// Bytes per KBit, the unit of the size word.
+const BYTES_PER_KBIT: usize = 128;
+/// Largest EEPROM that the size word can name.
+const MAX_IMAGE_BYTES: usize = 0x1_0000 * BYTES_PER_KBIT;
+/// Most characters of a string that are written.
+const MAX_STRING: usize = 255;
+
+/// Why an SII image makes no device.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum DescriptionError {
+    /// The image itself is broken.
+    Sii(SiiError),
+    /// More SyncManagers than a controller has.
+    SyncManagers {
+        /// SyncManagers of the image.
+        got: usize,
+        /// SyncManagers of the controller.
+        expected: usize,
+    },
+}
+
+impl fmt::Display for DescriptionError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            DescriptionError::Sii(error) => error.fmt(f),
+            DescriptionError::SyncManagers { got, expected } => {
+                write!(f, "SII declares {got} SyncManagers, expected at most {expected}")
+            }
+        }
+    }
+}
+
+impl std::error::Error for DescriptionError {}
+
+/// The EEPROM content of a device: the real image where there is one. The image grows beyond the declared size where
+/// the content needs it; strings beyond 255 and entries beyond what the format holds are left out.
+pub fn build(description: &DeviceDescription) -> Vec<u8> {
+    if let Some(image) = &description.sii_image {
+        return image.clone();
+    }
+    let mut size = description.sii_size_bytes.next_multiple_of(BYTES_PER_KBIT).clamp(BYTES_PER_KBIT, MAX_IMAGE_BYTES);
+    loop {
+        let mut image = vec![0; size];
+        match write(description, &mut image) {
+            Ok(_) => return image,
+            Err(SiiWriteError::Full { expected, .. }) if size < MAX_IMAGE_BYTES => {
+                size = expected.max(size + 1).next_multiple_of(BYTES_PER_KBIT).min(MAX_IMAGE_BYTES);
+            }
+            // What cannot be written at all ends the chain of categories before it.
+            Err(_) => return image,
+        }
+    }
+}
+
+/// Bytes of an image that mean something: up to the end marker.
+pub fn used_bytes(description: &DeviceDescription) -> usize {
+    let mut image = vec![0; build(description).len()];
+    write(description, &mut image).unwrap_or(image.len())
+}
+
+/// Strings of an image with their numbers.
+#[derive(Default)]
+struct StringTable<'a>(Vec<&'a str>);
+
+impl<'a> StringTable<'a> {
+    /// The number of a string, 0 for none.
+    fn number(&mut self, string: &'a str) -> u8 {
+        let end = (0..=string.len().min(MAX_STRING)).rev().find(|end| string.is_char_boundary(*end)).unwrap_or(0);
+        let string = &string[..end];
+        if string.is_empty() {
+            return 0;
+        }
+        let place = self.0.iter().position(|known| *known == string).unwrap_or_else(|| {
+            if self.0.len() < usize::from(u8::MAX) {
+                self.0.push(string);
+            }
+            self.0.len() - 1
+        });
+        u8::try_from(place + 1).unwrap_or(0)
+    }
+}
+
+fn write(description: &DeviceDescription, image: &mut [u8]) -> Result<usize, SiiWriteError> {
+    let mut strings = StringTable::default();
+    let general = general(description, &mut strings);
+    let inputs = PdoTable::new(description, PdoDirection::Tx, &mut strings);
+    let outputs = PdoTable::new(description, PdoDirection::Rx, &mut strings);
+    let mut writer = SiiWriter::new(image, &header(description, image.len()))?;
+    writer.strings(&strings.0)?;
+    writer.general(&general)?;
+    if !description.fmmus.is_empty() {
+        writer.fmmus(&description.fmmus)?;
+    }
+    let managers: Vec<SiiSyncManager> = description
+        .sync_managers
+        .iter()
+        .map(|entry| SiiSyncManager {
+            start: entry.start,
+            length: entry.length,
+            control: entry.control,
+            status: 0,
+            enable: entry.enable,
+            kind: entry.kind,
+        })
+        .collect();
+    if !managers.is_empty() {
+        writer.sync_managers(&managers)?;
+    }
+    for (direction, table) in [(PdoDirection::Tx, inputs), (PdoDirection::Rx, outputs)] {
+        if !table.heads.is_empty() {
+            writer.pdos(direction, &table.rows())?;
+        }
+    }
+    let modes: &[DcMode] = description.dc.as_ref().map_or(&[], |dc| &dc.modes);
+    if !modes.is_empty() {
+        writer.dc_modes(modes)?;
+    }
+    writer.finish()
+}
+
+fn header(description: &DeviceDescription, size_bytes: usize) -> SiiHeader {
+    let kbit = u16::try_from(size_bytes / BYTES_PER_KBIT - 1).unwrap_or(u16::MAX);
+    let mailbox = description.mailbox;
+    SiiHeader {
+        pdi_control: u16::from_le_bytes([description.pdi_type, u8::from(description.emulation)]),
+        alias: description.alias,
+        identity: description.identity,
+        bootstrap_mailbox: mailbox.map(|mailbox| mailbox.bootstrap).unwrap_or_default(),
+        standard_mailbox: mailbox.map(|mailbox| mailbox.standard).unwrap_or_default(),
+        protocols: mailbox.map_or(MailboxProtocols(0), |mailbox| mailbox.protocols),
+        size_kbit_minus_1: kbit,
+        ..SiiHeader::default()
+    }
+}
+
+fn general<'a>(description: &'a DeviceDescription, strings: &mut StringTable<'a>) -> General {
+    let group = strings.number(&description.group);
+    let order = strings.number(&description.order_code);
+    let mut flags = 0;
+    if description.mailbox.is_some() {
+        flags |= GeneralFlags::MAILBOX_DATA_LINK_LAYER;
+    }
+    if description.identification.is_some() {
+        flags |= GeneralFlags::IDENTIFICATION_AL_STATUS_CODE;
+    }
+    General {
+        group,
+        order,
+        name: strings.number(&description.name),
+        coe: description.mailbox.map(|mailbox| mailbox.coe_details).unwrap_or_default(),
+        flags: GeneralFlags(flags),
+        ebus_current_ma: description.ebus_current_ma,
+        group_again: group,
+        physical_ports: physical_ports(&description.ports),
+        ..General::default()
+    }
+}
+
+/// A nibble per port (facts 4.3).
+fn physical_ports(ports: &[PortKind; 4]) -> u16 {
+    ports.iter().rev().fold(0, |bits, port| {
+        bits << 4
+            | match port {
+                PortKind::NotImplemented | PortKind::NotConfigured => 0,
+                PortKind::Mii => 1,
+                PortKind::Ebus => 3,
+            }
+    })
+}
+
+/// The PDOs of one direction with their entries, as the writer takes them.
+struct PdoTable<'a> {
+    heads: Vec<(&'a PdoDescription, u8)>,
+    entries: Vec<Vec<PdoEntry>>,
+}
+
+impl<'a> PdoTable<'a> {
+    fn new(description: &'a DeviceDescription, direction: PdoDirection, strings: &mut StringTable<'a>) -> PdoTable<'a> {
+        let mut table = PdoTable { heads: Vec::new(), entries: Vec::new() };
+        for pdo in description.pdos.iter().filter(|pdo| pdo.direction == direction) {
+            table.heads.push((pdo, strings.number(&pdo.name)));
+            let entries = pdo.entries.iter().take(usize::from(u8::MAX)).map(|entry| PdoEntry {
+                index: entry.index,
+                sub_index: entry.sub_index,
+                name: strings.number(&entry.name),
+                data_type: entry.data_type,
+                bit_length: entry.bit_length,
+                flags: 0,
+            });
+            table.entries.push(entries.collect());
+        }
+        table
+    }
+
+    fn rows(&self) -> Vec<SiiPdo<'_>> {
+        let rows = self.heads.iter().zip(&self.entries).map(|((pdo, name), entries)| SiiPdo {
+            index: pdo.index,
+            sync_manager: pdo.sync_manager,
+            synchronisation: 0,
+            name: *name,
+            flags: pdo.flags,
+            entries,
+        });
+        rows.collect()
+    }
+}
+
+#[cfg(test)]
+mod tests;

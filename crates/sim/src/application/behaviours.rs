@@ -1,0 +1,86 @@
+//! Where the inputs of a device come from: a constant, its own outputs, a function of time and outputs, a drive.
+//!
+//! In: virtual time and the valid outputs (zero in the safe state). Out: the bytes of the inputs. Nothing here
+//! reads a clock or draws a number, so two runs with the same frames give the same inputs (facts 11.4).
+
+use core::fmt;
+
+use crate::time::SimTime;
+
+/// Computes inputs from the time and the outputs that are valid now.
+pub type InputFunction = fn(SimTime, outputs: &[u8], inputs: &mut [u8]);
+
+/// Where inputs come from. What is longer than the inputs is cut, what is shorter leaves zeros.
+#[derive(Clone)]
+pub enum InputSource {
+    /// The same bytes until somebody sets others.
+    Constant(Vec<u8>),
+    /// The device's own valid outputs.
+    Outputs,
+    /// A function, called anew after each exchange of process data.
+    Function(InputFunction),
+}
+
+impl InputSource {
+    /// The value changes without new outputs.
+    pub const fn varies_with_time(&self) -> bool {
+        matches!(self, InputSource::Function(_))
+    }
+
+    /// Fills `inputs`.
+    pub fn fill(&self, now: SimTime, outputs: &[u8], inputs: &mut [u8]) {
+        match self {
+            InputSource::Constant(bytes) => copy(bytes, inputs),
+            InputSource::Outputs => copy(outputs, inputs),
+            InputSource::Function(function) => function(now, outputs, inputs),
+        }
+    }
+}
+
+impl fmt::Debug for InputSource {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            InputSource::Constant(bytes) => f.debug_tuple("Constant").field(bytes).finish(),
+            InputSource::Outputs => f.write_str("Outputs"),
+            InputSource::Function(_) => f.write_str("Function"),
+        }
+    }
+}
+
+/// What the application does with process data.
+#[derive(Clone, Debug)]
+pub enum Behaviour {
+    /// Outputs are kept for inspection, inputs come from a source.
+    Terminal(InputSource),
+    /// A CiA 402 drive (see [`Servo`](super::servo::Servo)).
+    Servo,
+}
+
+impl Default for Behaviour {
+    fn default() -> Self {
+        Behaviour::Terminal(InputSource::Constant(Vec::new()))
+    }
+}
+
+fn copy(from: &[u8], to: &mut [u8]) {
+    let length = from.len().min(to.len());
+    to[..length].copy_from_slice(&from[..length]);
+    to[length..].fill(0);
+}
+
+/// A sawtooth on each 16-bit channel: one digit per microsecond, each channel a quarter of the range ahead of the
+/// one before. Used by the analogue input terminals.
+pub fn sawtooth_16(now: SimTime, _outputs: &[u8], inputs: &mut [u8]) {
+    for (channel, bytes) in (0u64..).zip(inputs.chunks_exact_mut(2)) {
+        let value = (now.0 / 1000).wrapping_add(channel * 0x4000);
+        bytes.copy_from_slice(&value.to_le_bytes()[..2]);
+    }
+}
+
+/// A bit pattern that counts up once per 10 ms. For digital inputs that shall move by themselves.
+pub fn counter_10_ms(now: SimTime, _outputs: &[u8], inputs: &mut [u8]) {
+    let count = (now.0 / 10_000_000).to_le_bytes();
+    for (byte, value) in inputs.iter_mut().zip(count) {
+        *byte = value;
+    }
+}

@@ -1,0 +1,309 @@
+//! The object dictionary of a simulated SubDevice (facts 6.3).
+//!
+//! In: the device's description, from which the standard objects, the PDO mappings (0x16xx, 0x1Axx), the PDO
+//! assignments (0x1C10 + SyncManager) and the mapped objects follow; reads and writes by index and sub index.
+//! Out: bytes or an abort code. The SDO services around it are in [`coe`](super::coe), what the process data looks
+//! like with a given assignment in [`process_data`](super::process_data).
+
+mod objects;
+
+use ringcat_wire::al::AlState;
+use ringcat_wire::mailbox::sdo::AbortCode;
+use ringcat_wire::sii::PdoDirection;
+
+use crate::description::DeviceDescription;
+
+/// Index of the PDO assignment of SyncManager 0; that of SyncManager n is n further on.
+pub const ASSIGNMENT_BASE: u16 = 0x1C10;
+/// Entries that a configurable mapping may have.
+const MAX_MAPPED_ENTRIES: usize = 32;
+
+/// When an entry may be written.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Access {
+    /// Never.
+    ReadOnly,
+    /// In each state with a mailbox.
+    ReadWrite,
+    /// In PREOP.
+    ReadWritePreOp,
+}
+
+/// One sub index of an object.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Entry {
+    /// Sub index.
+    pub sub_index: u8,
+    /// Data type code of CoE.
+    pub data_type: u8,
+    /// When it may be written.
+    pub access: Access,
+    /// The value, little-endian. Its length is fixed except for strings.
+    pub value: Vec<u8>,
+}
+
+impl Entry {
+    /// An entry.
+    pub fn new(sub_index: u8, data_type: u8, access: Access, value: &[u8]) -> Entry {
+        Entry { sub_index, data_type, access, value: value.into() }
+    }
+}
+
+/// What rules apply beyond the access of the entries.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum ObjectRole {
+    /// None.
+    Plain,
+    /// A list of PDOs of this direction: sub index 0 must be 0 while the others are written.
+    Assignment(PdoDirection),
+    /// A list of mapped entries of this direction, same rule.
+    Mapping(PdoDirection),
+}
+
+/// One object.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Object {
+    /// Index.
+    pub index: u16,
+    /// Name for people.
+    pub name: String,
+    /// Extra rules.
+    pub role: ObjectRole,
+    /// Its entries, sub indices ascending.
+    pub entries: Vec<Entry>,
+}
+
+impl Object {
+    /// An object with one value at sub index 0.
+    pub fn variable(index: u16, name: &str, data_type: u8, access: Access, value: &[u8]) -> Object {
+        let entries = vec![Entry::new(0, data_type, access, value)];
+        Object { index, name: name.into(), role: ObjectRole::Plain, entries }
+    }
+
+    fn entry(&self, sub_index: u8) -> Option<&Entry> {
+        self.entries.iter().find(|entry| entry.sub_index == sub_index)
+    }
+
+    fn entry_mut(&mut self, sub_index: u8) -> Option<&mut Entry> {
+        self.entries.iter_mut().find(|entry| entry.sub_index == sub_index)
+    }
+
+    /// Value of sub index 0 of a list.
+    fn count(&self) -> usize {
+        self.entry(0).and_then(|entry| entry.value.first()).map_or(0, |count| usize::from(*count))
+    }
+
+    /// The valid entries of a list.
+    fn listed(&self) -> impl Iterator<Item = &Entry> {
+        self.entries.iter().filter(|entry| entry.sub_index != 0).take(self.count())
+    }
+}
+
+/// One mapped entry of a PDO.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct MappedEntry {
+    /// Object index, 0 for a gap.
+    pub index: u16,
+    /// Sub index.
+    pub sub_index: u8,
+    /// Length in bits.
+    pub bit_length: u8,
+}
+
+impl MappedEntry {
+    fn decode(bytes: &[u8]) -> Option<MappedEntry> {
+        let [bit_length, sub_index, low, high] = bytes.first_chunk().copied()?;
+        Some(MappedEntry { index: u16::from_le_bytes([low, high]), sub_index, bit_length })
+    }
+
+    fn encode(self) -> [u8; 4] {
+        let [low, high] = self.index.to_le_bytes();
+        [self.bit_length, self.sub_index, low, high]
+    }
+}
+
+/// All objects of a device, indices ascending.
+#[derive(Clone, Debug, Default)]
+pub struct Dictionary {
+    objects: Vec<Object>,
+}
+
+impl Dictionary {
+    /// The dictionary that follows from a description; it has PDO lists even where no CoE makes them visible.
+    pub fn new(description: &DeviceDescription) -> Dictionary {
+        Dictionary { objects: objects::build(description) }
+    }
+
+    /// Looks an object up.
+    pub fn object(&self, index: u16) -> Option<&Object> {
+        self.objects.binary_search_by_key(&index, |object| object.index).ok().map(|place| &self.objects[place])
+    }
+
+    fn object_mut(&mut self, index: u16) -> Option<&mut Object> {
+        let place = self.objects.binary_search_by_key(&index, |object| object.index).ok()?;
+        self.objects.get_mut(place)
+    }
+
+    /// The value of one entry.
+    pub fn read(&self, index: u16, sub_index: u8) -> Result<&[u8], AbortCode> {
+        let object = self.object(index).ok_or(AbortCode::OBJECT_DOES_NOT_EXIST)?;
+        let entry = object.entry(sub_index).ok_or(AbortCode::SUB_INDEX_DOES_NOT_EXIST)?;
+        Ok(&entry.value)
+    }
+
+    /// All entries from sub index 0 (padded to 16 bits) or 1 on, packed (facts 6.3, complete access).
+    pub fn read_complete(&self, index: u16, from: u8) -> Result<Vec<u8>, AbortCode> {
+        let object = self.object(index).ok_or(AbortCode::OBJECT_DOES_NOT_EXIST)?;
+        let mut bytes = Vec::new();
+        if from == 0 {
+            bytes.push(object.entry(0).and_then(|entry| entry.value.first().copied()).unwrap_or(0));
+            bytes.push(0);
+        }
+        for entry in object.listed() {
+            bytes.extend_from_slice(&entry.value);
+        }
+        Ok(bytes)
+    }
+
+    /// Writes one entry by SDO, in `state`.
+    pub fn write(&mut self, index: u16, sub_index: u8, data: &[u8], state: AlState) -> Result<(), AbortCode> {
+        self.check_write(index, sub_index, data, state)?;
+        let object = self.object_mut(index).ok_or(AbortCode::OBJECT_DOES_NOT_EXIST)?;
+        let entry = object.entry_mut(sub_index).ok_or(AbortCode::SUB_INDEX_DOES_NOT_EXIST)?;
+        entry.value.clear();
+        entry.value.extend_from_slice(data);
+        Ok(())
+    }
+
+    /// Writes a whole list by SDO: entries first, then their number, all or nothing.
+    pub fn write_complete(&mut self, index: u16, from: u8, data: &[u8], state: AlState) -> Result<(), AbortCode> {
+        let before = self.object(index).ok_or(AbortCode::OBJECT_DOES_NOT_EXIST)?.clone();
+        let result = self.write_parts(&before, from, data, state);
+        if result.is_err()
+            && let Some(object) = self.object_mut(index)
+        {
+            *object = before;
+        }
+        result
+    }
+
+    fn write_parts(&mut self, object: &Object, from: u8, data: &[u8], state: AlState) -> Result<(), AbortCode> {
+        let list = !matches!(object.role, ObjectRole::Plain);
+        let mut rest = data;
+        let mut count = None;
+        if from == 0 {
+            let (head, tail) = rest.split_at_checked(2).ok_or(AbortCode::LENGTH_TOO_SHORT)?;
+            count = Some(head[0]);
+            rest = tail;
+        }
+        if list {
+            self.write(object.index, 0, &[0], state)?;
+        }
+        let mut written = 0u8;
+        for entry in object.entries.iter().filter(|entry| entry.sub_index != 0) {
+            if rest.is_empty() {
+                break;
+            }
+            let (value, tail) = rest.split_at_checked(entry.value.len()).ok_or(AbortCode::LENGTH_TOO_SHORT)?;
+            // The unused tail of a list may be sent as zeros.
+            if !list || count.is_none_or(|count| written < count) {
+                self.write(object.index, entry.sub_index, value, state)?;
+            }
+            written += 1;
+            rest = tail;
+        }
+        if !rest.is_empty() {
+            return Err(AbortCode::LENGTH_TOO_LONG);
+        }
+        match (list, count) {
+            (true, _) => self.write(object.index, 0, &[count.unwrap_or(written)], state),
+            (false, _) => Ok(()),
+        }
+    }
+
+    fn check_write(&self, index: u16, sub_index: u8, data: &[u8], state: AlState) -> Result<(), AbortCode> {
+        let object = self.object(index).ok_or(AbortCode::OBJECT_DOES_NOT_EXIST)?;
+        let entry = object.entry(sub_index).ok_or(AbortCode::SUB_INDEX_DOES_NOT_EXIST)?;
+        match entry.access {
+            Access::ReadOnly => return Err(AbortCode::READ_ONLY),
+            Access::ReadWritePreOp if state != AlState::PreOp => return Err(AbortCode::CANNOT_BE_STORED_DEVICE_STATE),
+            Access::ReadWritePreOp | Access::ReadWrite => {}
+        }
+        if data.len() > entry.value.len() {
+            return Err(AbortCode::LENGTH_TOO_LONG);
+        }
+        if data.len() < entry.value.len() {
+            return Err(AbortCode::LENGTH_TOO_SHORT);
+        }
+        match object.role {
+            ObjectRole::Plain => Ok(()),
+            ObjectRole::Assignment(_) | ObjectRole::Mapping(_) => self.check_list(object, sub_index, data),
+        }
+    }
+
+    fn check_list(&self, object: &Object, sub_index: u8, data: &[u8]) -> Result<(), AbortCode> {
+        if sub_index == 0 {
+            let count = usize::from(data[0]);
+            if count >= object.entries.len() {
+                return Err(AbortCode::VALUE_TOO_HIGH);
+            }
+            let filled =
+                object.entries.iter().skip(1).take(count).all(|entry| entry.value.iter().any(|byte| *byte != 0));
+            return if filled { Ok(()) } else { Err(AbortCode::VALUE_RANGE) };
+        }
+        if object.count() != 0 {
+            return Err(AbortCode::SUB_INDEX_0_FIRST);
+        }
+        match object.role {
+            ObjectRole::Assignment(direction) => {
+                let pdo = data.first_chunk().map_or(0, |bytes| u16::from_le_bytes(*bytes));
+                let known = self.object(pdo).is_some_and(|pdo| pdo.role == ObjectRole::Mapping(direction));
+                if known { Ok(()) } else { Err(AbortCode::VALUE_RANGE) }
+            }
+            ObjectRole::Mapping(_) => self.check_mapped(data),
+            ObjectRole::Plain => Ok(()),
+        }
+    }
+
+    fn check_mapped(&self, data: &[u8]) -> Result<(), AbortCode> {
+        let mapped = MappedEntry::decode(data).ok_or(AbortCode::LENGTH_TOO_SHORT)?;
+        if mapped.bit_length == 0 {
+            return Err(AbortCode::CANNOT_BE_MAPPED);
+        }
+        if mapped.index == 0 {
+            return Ok(());
+        }
+        let value = self.read(mapped.index, mapped.sub_index)?;
+        let fits = usize::from(mapped.bit_length).div_ceil(8) == value.len();
+        if mapped.index >= 0x2000 && fits { Ok(()) } else { Err(AbortCode::CANNOT_BE_MAPPED) }
+    }
+
+    /// Sets a value from inside the device; a value of another length is cut or filled with zeros.
+    pub fn set(&mut self, index: u16, sub_index: u8, data: &[u8]) {
+        if let Some(entry) = self.object_mut(index).and_then(|object| object.entry_mut(sub_index)) {
+            for (place, byte) in entry.value.iter_mut().enumerate() {
+                *byte = data.get(place).copied().unwrap_or(0);
+            }
+        }
+    }
+
+    /// PDO indices that are assigned to a SyncManager now.
+    pub fn assigned(&self, sync_manager: u8) -> impl Iterator<Item = u16> {
+        let object = self.object(ASSIGNMENT_BASE + u16::from(sync_manager));
+        let entries = object.into_iter().flat_map(Object::listed);
+        entries.filter_map(|entry| entry.value.first_chunk().map(|bytes| u16::from_le_bytes(*bytes)))
+    }
+
+    /// What a PDO maps now.
+    pub fn mapped(&self, pdo: u16) -> impl Iterator<Item = MappedEntry> {
+        self.object(pdo).into_iter().flat_map(Object::listed).filter_map(|entry| MappedEntry::decode(&entry.value))
+    }
+
+    /// Sum of the PDOs assigned to a SyncManager, in bits.
+    pub fn assigned_bits(&self, sync_manager: u8) -> u32 {
+        self.assigned(sync_manager).flat_map(|pdo| self.mapped(pdo)).map(|entry| u32::from(entry.bit_length)).sum()
+    }
+}
+
+#[cfg(test)]
+mod tests;

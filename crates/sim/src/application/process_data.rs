@@ -1,0 +1,335 @@
+//! Process data of a simulated SubDevice: outputs taken from the SyncManagers, inputs put into them.
+//!
+//! In: the areas that were found right ([`Layout`]), AL events, virtual time. Out: the outputs that are valid (zero in
+//! the safe state) and inputs in the buffers. Whether outputs may be used is the state machine's matter.
+
+use ringcat_wire::address::RegisterAddress;
+
+use super::behaviours::{Behaviour, InputSource};
+use super::dictionary::{Dictionary, MappedEntry};
+use super::servo::Servo;
+use super::settings::{Area, Layout};
+use crate::controller::Controller;
+use crate::time::SimTime;
+
+/// Bit of SyncManager 0 in AL_EVENT (facts 3.5).
+const SYNC_MANAGER_EVENT_SHIFT: u32 = 8;
+
+/// The bit of a SyncManager in AL_EVENT.
+pub const fn event_bit(sync_manager: u8) -> u32 {
+    1 << (SYNC_MANAGER_EVENT_SHIFT + sync_manager as u32)
+}
+
+/// A mapped entry and where it is in the image of its direction.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct PlacedEntry {
+    /// The entry.
+    pub entry: MappedEntry,
+    /// Its first bit.
+    pub bit_offset: usize,
+}
+
+/// The entries of one direction.
+#[derive(Clone, Debug, Default)]
+pub struct Mapping(Vec<PlacedEntry>);
+
+impl Mapping {
+    fn new(areas: &[Area], dictionary: &Dictionary) -> Mapping {
+        let mut placed = Vec::new();
+        let mut area_start = 0;
+        for area in areas {
+            let mut bit_offset = area_start * 8;
+            for entry in dictionary.assigned(area.sync_manager).flat_map(|pdo| dictionary.mapped(pdo)) {
+                placed.push(PlacedEntry { entry, bit_offset });
+                bit_offset += usize::from(entry.bit_length);
+            }
+            area_start += usize::from(area.length);
+        }
+        Mapping(placed)
+    }
+
+    /// Finds an object.
+    pub fn find(&self, index: u16, sub_index: u8) -> Option<PlacedEntry> {
+        self.0.iter().copied().find(|placed| placed.entry.index == index && placed.entry.sub_index == sub_index)
+    }
+
+    /// The value of an object of up to 64 bits in an image.
+    pub fn value(&self, index: u16, sub_index: u8, image: &[u8]) -> Option<u64> {
+        let placed = self.find(index, sub_index)?;
+        (placed.entry.bit_length <= 64).then(|| {
+            (0..usize::from(placed.entry.bit_length)).fold(0, |value, bit| {
+                let place = placed.bit_offset + bit;
+                let set = image.get(place / 8).is_some_and(|byte| byte >> (place % 8) & 1 != 0);
+                value | u64::from(set) << bit
+            })
+        })
+    }
+
+    /// Sets the value of an object of up to 64 bits in an image; nothing happens where it is not mapped.
+    pub fn set_value(&self, index: u16, sub_index: u8, value: u64, image: &mut [u8]) {
+        let Some(placed) = self.find(index, sub_index) else {
+            return;
+        };
+        for bit in 0..usize::from(placed.entry.bit_length).min(64) {
+            let place = placed.bit_offset + bit;
+            if let Some(byte) = image.get_mut(place / 8) {
+                *byte = *byte & !(1 << (place % 8)) | ((value >> bit & 1) as u8) << (place % 8);
+            }
+        }
+    }
+}
+
+/// What makes inputs.
+#[derive(Clone, Debug)]
+enum Source {
+    Terminal(InputSource),
+    Servo(Servo),
+}
+
+/// Images, areas and what happened to them.
+#[derive(Clone, Debug)]
+pub struct ProcessData {
+    layout: Layout,
+    output_mapping: Mapping,
+    input_mapping: Mapping,
+    received: Vec<u8>,
+    outputs: Vec<u8>,
+    inputs: Vec<u8>,
+    source: Source,
+    latched: u64,
+    seen: bool,
+}
+
+impl ProcessData {
+    /// Nothing mapped yet.
+    pub fn new(behaviour: &Behaviour) -> ProcessData {
+        let source = match behaviour {
+            Behaviour::Terminal(source) => Source::Terminal(source.clone()),
+            Behaviour::Servo => Source::Servo(Servo::default()),
+        };
+        ProcessData {
+            layout: Layout::default(),
+            output_mapping: Mapping::default(),
+            input_mapping: Mapping::default(),
+            received: Vec::new(),
+            outputs: Vec::new(),
+            inputs: Vec::new(),
+            source,
+            latched: 0,
+            seen: false,
+        }
+    }
+
+    /// Valid outputs, zero in the safe state, empty below SAFEOP.
+    pub fn outputs(&self) -> &[u8] {
+        &self.outputs
+    }
+
+    /// Inputs as last written to the SyncManagers, empty below SAFEOP.
+    pub fn inputs(&self) -> &[u8] {
+        &self.inputs
+    }
+
+    /// How often outputs were taken over in OP.
+    pub const fn latched(&self) -> u64 {
+        self.latched
+    }
+
+    /// Outputs have come since SAFEOP was entered, or there are none to wait for.
+    pub fn outputs_seen(&self) -> bool {
+        self.seen || !self.layout.outputs.iter().any(|area| area.event)
+    }
+
+    /// A missing frame of outputs trips the watchdog.
+    pub fn is_watched(&self) -> bool {
+        self.layout.outputs.iter().any(|area| area.watchdog)
+    }
+
+    /// The areas in use.
+    pub const fn layout(&self) -> &Layout {
+        &self.layout
+    }
+
+    /// The drive, where the device is one.
+    pub const fn servo(&self) -> Option<&Servo> {
+        match &self.source {
+            Source::Servo(servo) => Some(servo),
+            Source::Terminal(_) => None,
+        }
+    }
+
+    /// Value of a mapped object as it is in the process data now.
+    pub fn value(&self, index: u16, sub_index: u8) -> Option<u64> {
+        let output = || self.output_mapping.value(index, sub_index, &self.outputs);
+        self.input_mapping.value(index, sub_index, &self.inputs).or_else(output)
+    }
+
+    /// The object is part of the outputs.
+    pub fn is_output(&self, index: u16, sub_index: u8) -> bool {
+        self.output_mapping.find(index, sub_index).is_some()
+    }
+
+    /// AL events that call for an exchange.
+    pub fn events(&self) -> u32 {
+        let outputs = self.layout.outputs.iter().filter(|area| area.event);
+        let inputs = self.layout.inputs.iter().filter(|area| area.event && self.varies());
+        outputs.chain(inputs).fold(0, |mask, area| mask | event_bit(area.sync_manager))
+    }
+
+    /// Some SyncManager raises no event although its content matters: it has to be looked at after each frame.
+    pub fn is_polled(&self) -> bool {
+        let silent = |areas: &[Area]| areas.iter().any(|area| !area.event);
+        silent(&self.layout.outputs) || self.varies() && silent(&self.layout.inputs)
+    }
+
+    fn varies(&self) -> bool {
+        match &self.source {
+            Source::Terminal(source) => source.varies_with_time(),
+            Source::Servo(_) => true,
+        }
+    }
+
+    /// The process data becomes active, outputs still in the safe state.
+    pub fn start(&mut self, layout: Layout, dictionary: &Dictionary, controller: &mut Controller, now: SimTime) {
+        let total = |areas: &[Area]| areas.iter().map(|area| usize::from(area.length)).sum::<usize>();
+        self.output_mapping = Mapping::new(&layout.outputs, dictionary);
+        self.input_mapping = Mapping::new(&layout.inputs, dictionary);
+        self.received = vec![0; total(&layout.outputs)];
+        self.outputs = vec![0; total(&layout.outputs)];
+        self.inputs = vec![0; total(&layout.inputs)];
+        self.layout = layout;
+        self.seen = false;
+        self.refresh(controller, now);
+    }
+
+    /// The process data ends.
+    pub fn stop(&mut self, now: SimTime) {
+        self.outputs.fill(0);
+        self.release_drive(now);
+        self.layout = Layout::default();
+        self.output_mapping = Mapping::default();
+        self.input_mapping = Mapping::default();
+        self.received.clear();
+        self.outputs.clear();
+        self.inputs.clear();
+        self.seen = false;
+    }
+
+    /// Outputs go to the safe state.
+    pub fn make_safe(&mut self, controller: &mut Controller, now: SimTime) {
+        self.outputs.fill(0);
+        self.received.fill(0);
+        self.seen = false;
+        self.release_drive(now);
+        self.refresh(controller, now);
+    }
+
+    fn release_drive(&mut self, now: SimTime) {
+        match &mut self.source {
+            Source::Servo(servo) => servo.release(now),
+            Source::Terminal(_) => {}
+        }
+    }
+
+    /// What was received last becomes valid: OP begins.
+    pub fn operate(&mut self, controller: &mut Controller, now: SimTime) {
+        if self.outputs.is_empty() {
+            return;
+        }
+        self.latch(now);
+        self.refresh(controller, now);
+    }
+
+    /// Takes new outputs and makes new inputs, after AL `events`.
+    pub fn exchange(&mut self, controller: &mut Controller, events: u32, operating: bool, now: SimTime) {
+        let fresh = self.receive(controller, events, now);
+        if fresh && operating {
+            self.latch(now);
+        }
+        let read = self.layout.inputs.iter().any(|area| !area.event || events & event_bit(area.sync_manager) != 0);
+        let due = match &self.source {
+            Source::Terminal(InputSource::Constant(_)) => false,
+            Source::Terminal(InputSource::Outputs) => fresh && operating,
+            Source::Terminal(InputSource::Function(_)) | Source::Servo(_) => fresh || read,
+        };
+        if due {
+            self.refresh(controller, now);
+        }
+    }
+
+    fn receive(&mut self, controller: &mut Controller, events: u32, now: SimTime) -> bool {
+        let mut fresh = false;
+        let mut rest = self.received.as_mut_slice();
+        for area in &self.layout.outputs {
+            let (image, tail) = rest.split_at_mut(usize::from(area.length).min(rest.len()));
+            rest = tail;
+            let address = RegisterAddress(area.start);
+            if area.event {
+                if events & event_bit(area.sync_manager) != 0 {
+                    fresh |= controller.pdi_read(address, image, now);
+                }
+            } else {
+                let before = image.to_vec();
+                fresh |= controller.pdi_read(address, image, now) && image != before.as_slice();
+            }
+        }
+        self.seen |= fresh;
+        fresh
+    }
+
+    fn latch(&mut self, now: SimTime) {
+        self.outputs.copy_from_slice(&self.received);
+        self.latched += 1;
+        match &mut self.source {
+            Source::Servo(servo) => servo.command(now, &self.output_mapping, &self.outputs),
+            Source::Terminal(_) => {}
+        }
+    }
+
+    /// Makes inputs and writes them into the SyncManagers.
+    fn refresh(&mut self, controller: &mut Controller, now: SimTime) {
+        match &mut self.source {
+            Source::Terminal(source) => source.fill(now, &self.outputs, &mut self.inputs),
+            Source::Servo(servo) => servo.report(now, &self.input_mapping, &mut self.inputs),
+        }
+        let mut rest = self.inputs.as_slice();
+        for area in &self.layout.inputs {
+            let (image, tail) = rest.split_at(usize::from(area.length).min(rest.len()));
+            rest = tail;
+            controller.pdi_write(RegisterAddress(area.start), image, now);
+        }
+    }
+
+    /// Inputs are these bytes from now on. A drive makes its own and ignores them.
+    pub fn set_inputs(&mut self, bytes: &[u8], controller: &mut Controller, now: SimTime) {
+        self.set_source(InputSource::Constant(bytes.into()), controller, now);
+    }
+
+    /// Inputs come from this source from now on. A drive makes its own and ignores it.
+    pub fn set_source(&mut self, new: InputSource, controller: &mut Controller, now: SimTime) {
+        match &mut self.source {
+            Source::Terminal(source) => *source = new,
+            Source::Servo(_) => return,
+        }
+        self.refresh(controller, now);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn values_are_placed_bit_by_bit() {
+        let entry = |index, bit_length| MappedEntry { index, sub_index: 1, bit_length };
+        let placed = |index, bit_length, bit_offset| PlacedEntry { entry: entry(index, bit_length), bit_offset };
+        let mapping = Mapping(vec![placed(0x6000, 3, 2), placed(0x6010, 16, 5)]);
+        let mut image = [0xFF; 3];
+        mapping.set_value(0x6000, 1, 0b010, &mut image);
+        mapping.set_value(0x6010, 1, 0x1234, &mut image);
+        assert_eq!((mapping.value(0x6000, 1, &image), mapping.value(0x6010, 1, &image)), (Some(2), Some(0x1234)));
+        assert_eq!(image[0] & 0x03, 0x03);
+        assert_eq!(image[2] & 0xE0, 0xE0);
+        assert_eq!(mapping.value(0x6010, 2, &image), None);
+    }
+}

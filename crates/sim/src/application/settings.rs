@@ -1,0 +1,234 @@
+//! Does the configuration that the MainDevice wrote suit the device? The checks of facts 5.2, codes of facts 5.5.
+//!
+//! In: SyncManager, watchdog and clock registers through the PDI, the description, the dictionary (whose PDO
+//! assignment decides the lengths). Out: the process data areas, or the AL status code of the refusal.
+
+use ringcat_wire::address::RegisterAddress;
+use ringcat_wire::al::AlStatusCode;
+use ringcat_wire::register::{SyncManager, SyncManagerControl, SyncManagerDirection, SyncManagerMode, map};
+use ringcat_wire::sii::{MailboxLayout, SyncManagerKind};
+
+use super::dictionary::Dictionary;
+use crate::controller::Controller;
+use crate::description::DeviceDescription;
+use crate::time::SimTime;
+
+/// SyncManagers an application looks at; no controller has more (facts 3.1).
+pub const MAX_SYNC_MANAGERS: u8 = 16;
+/// First address of the process RAM; below it nothing is buffered.
+const RAM_START: u32 = 0x1000;
+
+/// A part of the process data behind one SyncManager.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Area {
+    /// Number of the SyncManager.
+    pub sync_manager: u8,
+    /// Physical start address.
+    pub start: u16,
+    /// Bytes.
+    pub length: u16,
+    /// Raises an AL event.
+    pub event: bool,
+    /// Retriggers the process data watchdog.
+    pub watchdog: bool,
+}
+
+/// Where outputs and inputs are.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Layout {
+    /// Areas that EtherCAT writes.
+    pub outputs: Vec<Area>,
+    /// Areas that EtherCAT reads.
+    pub inputs: Vec<Area>,
+}
+
+/// Reads all SyncManagers through the PDI, which also clears the event of a changed activation.
+pub fn sync_managers(controller: &mut Controller, now: SimTime) -> Vec<SyncManager> {
+    let mut found = Vec::new();
+    for number in 0..controller.config().sync_manager_count.min(MAX_SYNC_MANAGERS) {
+        let mut bytes = [0; SyncManager::LEN];
+        controller.pdi_read(map::sync_manager(number), &mut bytes, now);
+        found.push(SyncManager::decode(&bytes));
+    }
+    found
+}
+
+/// The mailbox SyncManagers are as the layout (standard or bootstrap) says.
+pub fn mailbox_matches(description: &DeviceDescription, layout: &MailboxLayout, actual: &[SyncManager]) -> bool {
+    let (out, back) = mailbox_numbers(description);
+    let place = |number: u8| actual.get(usize::from(number));
+    let matches = |number, start, length, direction| {
+        place(number).is_some_and(|manager: &SyncManager| {
+            manager.activate.enable
+                && manager.start == start
+                && manager.length == length
+                && manager.control.mode == SyncManagerMode::Mailbox
+                && manager.control.direction == direction
+        })
+    };
+    matches(out, layout.receive_offset, layout.receive_size, SyncManagerDirection::Write)
+        && matches(back, layout.send_offset, layout.send_size, SyncManagerDirection::Read)
+}
+
+/// Numbers of the mailbox SyncManagers: to the device, from the device.
+pub fn mailbox_numbers(description: &DeviceDescription) -> (u8, u8) {
+    let out = description.sync_manager_of(SyncManagerKind::MailboxOut).unwrap_or(0);
+    let back = description.sync_manager_of(SyncManagerKind::MailboxIn).unwrap_or(1);
+    (out, back)
+}
+
+/// Checks the SyncManagers of the process data and says where the process data is.
+pub fn process_data(
+    description: &DeviceDescription,
+    dictionary: &Dictionary,
+    actual: &[SyncManager],
+    ram_kib: u8,
+) -> Result<Layout, AlStatusCode> {
+    let mut layout = Layout::default();
+    for (number, entry) in (0u8..).zip(&description.sync_managers) {
+        let (areas, direction, wrong, wrong_mapping) = match entry.kind {
+            SyncManagerKind::Outputs => (
+                &mut layout.outputs,
+                SyncManagerDirection::Write,
+                AlStatusCode::INVALID_OUTPUT_CONFIGURATION,
+                AlStatusCode::INVALID_OUTPUT_MAPPING,
+            ),
+            SyncManagerKind::Inputs => (
+                &mut layout.inputs,
+                SyncManagerDirection::Read,
+                AlStatusCode::INVALID_INPUT_CONFIGURATION,
+                AlStatusCode::INVALID_INPUT_MAPPING,
+            ),
+            SyncManagerKind::Unused
+            | SyncManagerKind::MailboxOut
+            | SyncManagerKind::MailboxIn
+            | SyncManagerKind::Other(_) => continue,
+        };
+        if assigned_twice(dictionary, number) {
+            return Err(wrong_mapping);
+        }
+        let manager = actual.get(usize::from(number)).copied().unwrap_or_default();
+        let running = manager.activate.enable && manager.length != 0;
+        let expected = expected_length(description, dictionary, number);
+        if expected == 0 && !running {
+            continue;
+        }
+        if !running || manager.start != entry.start || u32::from(manager.length) != expected {
+            return Err(wrong);
+        }
+        let mode = SyncManagerControl::from_bits(entry.control).mode;
+        if manager.control.mode != mode || manager.control.direction != direction {
+            return Err(AlStatusCode::INVALID_SYNC_MANAGER_TYPES);
+        }
+        areas.push(area(number, &manager));
+    }
+    if overlap(actual, ram_kib) {
+        return Err(AlStatusCode::INVALID_SYNC_MANAGER_CONFIGURATION);
+    }
+    Ok(layout)
+}
+
+/// Where the process data is on a device that checks nothing: whatever the SyncManagers say.
+pub fn unchecked(description: &DeviceDescription, actual: &[SyncManager]) -> Layout {
+    let mut layout = Layout::default();
+    for (number, (entry, manager)) in (0u8..).zip(description.sync_managers.iter().zip(actual)) {
+        if !manager.activate.enable || manager.length == 0 {
+            continue;
+        }
+        match entry.kind {
+            SyncManagerKind::Outputs => layout.outputs.push(area(number, manager)),
+            SyncManagerKind::Inputs => layout.inputs.push(area(number, manager)),
+            SyncManagerKind::Unused
+            | SyncManagerKind::MailboxOut
+            | SyncManagerKind::MailboxIn
+            | SyncManagerKind::Other(_) => {}
+        }
+    }
+    layout
+}
+
+fn area(number: u8, manager: &SyncManager) -> Area {
+    Area {
+        sync_manager: number,
+        start: manager.start,
+        length: manager.length,
+        event: manager.control.pdi_event,
+        watchdog: manager.control.watchdog,
+    }
+}
+
+/// Bytes that a SyncManager must have: the assigned PDOs decide; without CoE and PDOs its SII entry does.
+fn expected_length(description: &DeviceDescription, dictionary: &Dictionary, number: u8) -> u32 {
+    let bits = dictionary.assigned_bits(number);
+    if bits == 0 && !description.has_coe() {
+        return u32::from(description.default_length(number));
+    }
+    bits.div_ceil(8)
+}
+
+fn assigned_twice(dictionary: &Dictionary, number: u8) -> bool {
+    let assigned: Vec<u16> = dictionary.assigned(number).collect();
+    assigned.iter().enumerate().any(|(place, pdo)| assigned[..place].contains(pdo))
+}
+
+/// Two SyncManagers share a byte, or one leaves the memory. Three-buffer mode uses three times the length.
+fn overlap(actual: &[SyncManager], ram_kib: u8) -> bool {
+    let memory_end = RAM_START + u32::from(ram_kib) * 1024;
+    let ranges: Vec<(u32, u32)> = actual
+        .iter()
+        .filter(|manager| manager.activate.enable && manager.length != 0)
+        .map(|manager| {
+            let start = u32::from(manager.start);
+            let buffered = manager.control.mode == SyncManagerMode::Buffered;
+            let buffers = if buffered && manager.length > 1 && start >= RAM_START { 3 } else { 1 };
+            (start, start + u32::from(manager.length) * buffers)
+        })
+        .collect();
+    let outside = ranges.iter().any(|(_, end)| *end > memory_end);
+    let shared = ranges.iter().enumerate().any(|(place, (start, end))| {
+        ranges[..place].iter().any(|(other_start, other_end)| start < other_end && other_start < end)
+    });
+    outside || shared
+}
+
+/// Checks watchdog and clock settings (0x001F, 0x0030, 0x0035).
+pub fn timing(
+    description: &DeviceDescription,
+    layout: &Layout,
+    controller: &mut Controller,
+    now: SimTime,
+) -> Result<(), AlStatusCode> {
+    if description.watchdog_required && !layout.outputs.is_empty() {
+        let time = read_u16(controller, map::WATCHDOG_TIME_PROCESS_DATA, now);
+        if time == 0 || layout.outputs.iter().all(|area| !area.watchdog) {
+            return Err(AlStatusCode::INVALID_WATCHDOG_CONFIGURATION);
+        }
+    }
+    let Some(dc) = &description.dc else {
+        return Ok(());
+    };
+    let mut activation = [0];
+    controller.pdi_read(map::DC_ACTIVATION, &mut activation, now);
+    // Cyclic unit and the two SYNC signals.
+    let signals = activation[0] & 0x07;
+    if signals == 0 {
+        return Ok(());
+    }
+    if !dc.modes.iter().any(|mode| mode.assign_activate.to_le_bytes()[1] & 0x07 == signals) {
+        return Err(AlStatusCode::INVALID_DC_SYNC_CONFIGURATION);
+    }
+    let mut cycle = [0; 4];
+    controller.pdi_read(map::DC_SYNC0_CYCLE, &mut cycle, now);
+    let cycle_ns = u32::from_le_bytes(cycle);
+    if cycle_ns == 0 || cycle_ns < dc.minimum_cycle_ns {
+        return Err(AlStatusCode::DC_INVALID_SYNC_CYCLE_TIME);
+    }
+    Ok(())
+}
+
+/// A 16-bit register through the PDI.
+pub fn read_u16(controller: &mut Controller, address: RegisterAddress, now: SimTime) -> u16 {
+    let mut bytes = [0; 2];
+    controller.pdi_read(address, &mut bytes, now);
+    u16::from_le_bytes(bytes)
+}

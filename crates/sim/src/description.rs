@@ -1,0 +1,266 @@
+//! What a simulated SubDevice is: identity, ports, SyncManagers, PDOs, mailbox, clocks, timing and behaviour.
+//!
+//! In: values written by the [`catalogue`](crate::catalogue), by an application, or read from a real SII image
+//! ([`DeviceDescription::from_sii`](crate::sii_image)). Out: the SII image, the object dictionary and the settings
+//! of the controller follow from it, so that they cannot contradict each other (facts 4, 5.2, 6.3).
+
+use core::time::Duration;
+
+use ringcat_wire::register::PortKind;
+use ringcat_wire::sii::{
+    CoeDetails, DcMode, FmmuUsage, Identity, MailboxLayout, MailboxProtocols, PdoDirection, SyncManagerKind,
+};
+
+use crate::application::Behaviour;
+use crate::application::dictionary::Object;
+
+/// Data type codes of CoE that the models use (facts 6.3).
+pub mod data_type {
+    /// One bit.
+    pub const BOOL: u8 = 0x01;
+    /// Signed 8 bits.
+    pub const I8: u8 = 0x02;
+    /// Signed 16 bits.
+    pub const I16: u8 = 0x03;
+    /// Signed 32 bits.
+    pub const I32: u8 = 0x04;
+    /// Unsigned 8 bits.
+    pub const U8: u8 = 0x05;
+    /// Unsigned 16 bits.
+    pub const U16: u8 = 0x06;
+    /// Unsigned 32 bits.
+    pub const U32: u8 = 0x07;
+    /// Characters without an end mark.
+    pub const VISIBLE_STRING: u8 = 0x09;
+}
+
+/// One SyncManager as the SII declares it (facts 4.4).
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct SyncManagerDescription {
+    /// Physical start address.
+    pub start: u16,
+    /// Length in bytes with the default PDO assignment.
+    pub length: u16,
+    /// Control byte of register 0x0804 + 8n.
+    pub control: u8,
+    /// Enable byte of the SII entry, bit 0 is copied to the activate register by a MainDevice.
+    pub enable: u8,
+    /// What the SyncManager is for.
+    pub kind: SyncManagerKind,
+}
+
+/// One process data object (facts 4.5).
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct PdoDescription {
+    /// `Tx` = inputs of the MainDevice, `Rx` = outputs.
+    pub direction: PdoDirection,
+    /// Object index of the mapping, 0x16xx or 0x1Axx.
+    pub index: u16,
+    /// Name for people.
+    pub name: String,
+    /// SyncManager it is assigned to by default.
+    pub sync_manager: Option<u8>,
+    /// Flags of the SII entry, kept as they are.
+    pub flags: u16,
+    /// What it carries, in order.
+    pub entries: Vec<PdoEntryDescription>,
+}
+
+impl PdoDescription {
+    /// Sum of the entries in bits.
+    pub fn bit_length(&self) -> u32 {
+        self.entries.iter().map(|entry| u32::from(entry.bit_length)).sum()
+    }
+}
+
+/// One entry of a PDO; index 0 is a gap (facts 4.5).
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct PdoEntryDescription {
+    /// Object index, 0 for a gap.
+    pub index: u16,
+    /// Sub index.
+    pub sub_index: u8,
+    /// Name for people.
+    pub name: String,
+    /// Data type code, see [`data_type`].
+    pub data_type: u8,
+    /// Length in bits.
+    pub bit_length: u8,
+}
+
+/// The mailbox of a SubDevice (facts 4.1, 4.3).
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct MailboxDescription {
+    /// Places and sizes in PREOP and above.
+    pub standard: MailboxLayout,
+    /// Places and sizes in BOOT; all zero where BOOT is not supported.
+    pub bootstrap: MailboxLayout,
+    /// Protocols as the SII declares them.
+    pub protocols: MailboxProtocols,
+    /// What CoE can do, as the general category says.
+    pub coe_details: CoeDetails,
+    /// Time from a request to its answer.
+    pub response_time: Duration,
+}
+
+impl MailboxDescription {
+    /// The device answers SDO requests.
+    pub fn has_coe(&self) -> bool {
+        self.protocols.coe() || self.coe_details.sdo()
+    }
+}
+
+/// Distributed clock of a SubDevice (facts 3.12, 4.6).
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct DcDescription {
+    /// 64-bit registers; 32-bit otherwise.
+    pub wide: bool,
+    /// Operation modes of the SII; an activation that no mode names is refused with 0x0030.
+    pub modes: Vec<DcMode>,
+    /// Smallest SYNC0 cycle that is accepted, 0x0035 below.
+    pub minimum_cycle_ns: u32,
+}
+
+/// How long the application takes to reach each state (facts 5.4 has what a MainDevice waits).
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct TransitionTimes {
+    /// INIT from anywhere.
+    pub to_init: Duration,
+    /// PREOP or BOOT from INIT.
+    pub to_preop: Duration,
+    /// SAFEOP from PREOP.
+    pub to_safeop: Duration,
+    /// OP from SAFEOP; the wait for valid outputs comes on top.
+    pub to_op: Duration,
+    /// SAFEOP from OP, PREOP from SAFEOP or OP.
+    pub back: Duration,
+}
+
+impl TransitionTimes {
+    /// The same time for each transition.
+    pub const fn all(time: Duration) -> TransitionTimes {
+        TransitionTimes { to_init: time, to_preop: time, to_safeop: time, to_op: time, back: time }
+    }
+}
+
+impl Default for TransitionTimes {
+    fn default() -> Self {
+        TransitionTimes::all(Duration::from_millis(1))
+    }
+}
+
+/// A SubDevice, complete.
+#[derive(Clone, Debug)]
+pub struct DeviceDescription {
+    /// Name of this device in the segment.
+    pub name: String,
+    /// Order code, string of the SII.
+    pub order_code: String,
+    /// Group, string of the SII.
+    pub group: String,
+    /// Vendor, product, revision, serial number.
+    pub identity: Identity,
+    /// Configured station alias.
+    pub alias: u16,
+    /// Value of the identification switch; `None` = the request is not supported (facts 5.3).
+    pub identification: Option<u16>,
+    /// Kind of each port.
+    pub ports: [PortKind; 4],
+    /// Usage of the FMMUs, also their number in the SII.
+    pub fmmus: Vec<FmmuUsage>,
+    /// SyncManagers in order.
+    pub sync_managers: Vec<SyncManagerDescription>,
+    /// Process data objects, inputs and outputs.
+    pub pdos: Vec<PdoDescription>,
+    /// Objects beside those that follow from the rest; they replace such with the same index.
+    pub objects: Vec<Object>,
+    /// Mailbox, if there is one.
+    pub mailbox: Option<MailboxDescription>,
+    /// Distributed clock, if there is one.
+    pub dc: Option<DcDescription>,
+    /// PDI type of register 0x0140.
+    pub pdi_type: u8,
+    /// AL control is copied to AL status by the controller; no application checks anything (facts 3.4).
+    pub emulation: bool,
+    /// Process data is refused without a running watchdog (0x001F).
+    pub watchdog_required: bool,
+    /// How long the application waits for outputs between SAFEOP and OP before it refuses with 0x0019.
+    pub outputs_timeout: Duration,
+    /// Current drawn from the E-bus; negative = feeds.
+    pub ebus_current_ma: i16,
+    /// Durations of the state transitions.
+    pub transitions: TransitionTimes,
+    /// Size of the EEPROM; grows where the content needs more.
+    pub sii_size_bytes: usize,
+    /// Time the EEPROM takes for each command.
+    pub sii_busy: Duration,
+    /// The controller reads eight bytes of SII at a time.
+    pub eight_byte_sii: bool,
+    /// Error of the local clock.
+    pub clock_drift_ppb: i64,
+    /// Local clock at power-on.
+    pub clock_start_ns: u64,
+    /// Where the inputs come from.
+    pub behaviour: Behaviour,
+    /// A real image that is used as it is instead of one made from this description.
+    pub sii_image: Option<Vec<u8>>,
+}
+
+impl DeviceDescription {
+    /// A device without process data, mailbox and clock: two MII ports, state machine in an application.
+    pub fn plain(name: &str, identity: Identity) -> DeviceDescription {
+        DeviceDescription {
+            name: name.into(),
+            order_code: name.into(),
+            group: String::from("RingCAT"),
+            identity,
+            alias: 0,
+            identification: None,
+            ports: [PortKind::Mii, PortKind::Mii, PortKind::NotImplemented, PortKind::NotImplemented],
+            fmmus: Vec::new(),
+            sync_managers: Vec::new(),
+            pdos: Vec::new(),
+            objects: Vec::new(),
+            mailbox: None,
+            dc: None,
+            pdi_type: 0x05,
+            emulation: false,
+            watchdog_required: false,
+            outputs_timeout: Duration::from_secs(1),
+            ebus_current_ma: 0,
+            transitions: TransitionTimes::default(),
+            sii_size_bytes: 512,
+            sii_busy: Duration::from_micros(500),
+            eight_byte_sii: true,
+            clock_drift_ppb: 0,
+            clock_start_ns: 0,
+            behaviour: Behaviour::default(),
+            sii_image: None,
+        }
+    }
+
+    /// PDOs that are assigned to SyncManager `number` by default, in order.
+    pub fn default_assignment(&self, number: u8) -> impl Iterator<Item = &PdoDescription> {
+        self.pdos.iter().filter(move |pdo| pdo.sync_manager == Some(number))
+    }
+
+    /// Length that SyncManager `number` must have with the default assignment: the PDOs decide where there are any,
+    /// the entry of the SyncManager otherwise.
+    pub fn default_length(&self, number: u8) -> u16 {
+        let bits: u32 = self.default_assignment(number).map(PdoDescription::bit_length).sum();
+        if bits > 0 {
+            return u16::try_from(bits.div_ceil(8)).unwrap_or(u16::MAX);
+        }
+        self.sync_managers.get(usize::from(number)).map_or(0, |entry| entry.length)
+    }
+
+    /// Number of the first SyncManager of a kind.
+    pub fn sync_manager_of(&self, kind: SyncManagerKind) -> Option<u8> {
+        self.sync_managers.iter().position(|entry| entry.kind == kind).and_then(|place| u8::try_from(place).ok())
+    }
+
+    /// The device answers SDO requests.
+    pub fn has_coe(&self) -> bool {
+        self.mailbox.is_some_and(|mailbox| mailbox.has_coe())
+    }
+}
