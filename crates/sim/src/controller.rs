@@ -1,14 +1,46 @@
 //! One SubDevice controller (ESC), register by register (facts 2, 3, 4.7, 11.4).
+//!
+//! In: frames at ports, link changes, accesses of the application, virtual time. Out: frames at ports, events for the
+//! application, deadlines. The network carries frames between controllers; the application behind the PDI makes a device
+//! of it. Not modelled: the control loop and SYNC units of distributed clocks, MII management.
+//!
+//! A frame is handled when its last bit has come in. It makes its whole way inside at once: along 0-(EPU)-3-1-2 to the
+//! next open port. What happens by itself (watchdogs, busy EEPROM, temporary loops) is brought up to date at the next
+//! access, so that idle controllers cost nothing.
 
+mod access;
+mod clock;
 mod config;
+mod counters;
+mod events;
+mod fmmu;
+mod memory;
+mod pass;
+mod pdi;
+mod ports;
+mod processing;
+mod registers;
+mod reset;
+mod sii;
+mod sync_manager;
+mod watchdog;
 
 pub use config::{ControllerConfig, MAX_UNITS};
 
 use ringcat_wire::address::RegisterAddress;
-use ringcat_wire::al::{AlControl, AlStatus, AlStatusCode};
+use ringcat_wire::register::{LoopControl, map};
 
-use crate::frame::{Port, SimFrame};
+use crate::frame::{Fcs, Port, SimFrame};
 use crate::time::SimTime;
+use clock::Clock;
+use events::EVENT_PROCESS_DATA_WATCHDOG;
+use fmmu::Fmmus;
+use memory::Memory;
+use pass::Pass;
+use ports::Ports;
+use sii::SiiInterface;
+use sync_manager::SyncManagers;
+use watchdog::Watchdog;
 
 /// What becomes of a frame that a controller received.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -28,81 +60,190 @@ pub enum Passage {
 #[derive(Clone, Debug)]
 pub struct Controller {
     config: ControllerConfig,
+    powered: bool,
+    starts: u32,
+    memory: Memory,
+    ports: Ports,
+    fmmus: Fmmus,
+    sync_managers: SyncManagers,
+    process_data_watchdog: Watchdog,
+    pdi_watchdog: Watchdog,
+    sii: SiiInterface,
+    clock: Clock,
+    pass: Pass,
+    /// Loop settings as last written, and those that return when temporary ones end.
+    lasting_loops: [LoopControl; 4],
+    temporary_loops: Option<(SimTime, [LoopControl; 4])>,
+    /// STATION_ADDRESS and the alias bit, at hand for every datagram.
+    station: u16,
+    alias_enabled: bool,
+    /// ECAT events that are not masked.
+    irq: u16,
+    /// When something happens by itself next.
+    deadline: SimTime,
 }
 
-#[allow(unused_variables, missing_docs)]
 impl Controller {
+    /// A controller without power and without links.
     pub fn new(config: ControllerConfig) -> Controller {
-        Controller { config }
+        Controller {
+            powered: false,
+            starts: 0,
+            memory: Memory::new(&config),
+            ports: Ports::new(config.ports),
+            fmmus: Fmmus::default(),
+            sync_managers: SyncManagers::new(config.sync_manager_count.min(MAX_UNITS)),
+            process_data_watchdog: Watchdog::new(),
+            pdi_watchdog: Watchdog::new(),
+            sii: SiiInterface::new(),
+            clock: Clock::new(config.clock_start, config.clock_drift_ppb),
+            pass: Pass::new(),
+            lasting_loops: [LoopControl::Auto; 4],
+            temporary_loops: None,
+            station: 0,
+            alias_enabled: false,
+            irq: 0,
+            deadline: SimTime::NEVER,
+            config,
+        }
     }
-    pub fn power_on(&mut self, now: SimTime) {}
-    pub fn power_off(&mut self, now: SimTime) {}
-    pub fn is_powered(&self) -> bool {
-        false
-    }
-    /// Counts resets (0x0040, 0x0041) and power-ons: a change means the application starts anew.
-    pub fn starts(&self) -> u32 {
-        0
-    }
-    pub fn link_changed(&mut self, port: Port, up: bool, now: SimTime) {}
-    pub fn receive(&mut self, frame: &mut SimFrame, port: Port, now: SimTime) -> Passage {
-        Passage::Destroyed
-    }
-    pub fn loop_closed(&self, port: Port) -> bool {
-        true
-    }
-    /// Reads for the PDI: false where any byte is blocked (SM direction, mailbox empty, no complete buffer, watchdog).
-    pub fn pdi_read(&mut self, address: RegisterAddress, out: &mut [u8], now: SimTime) -> bool {
-        false
-    }
-    pub fn pdi_write(&mut self, address: RegisterAddress, data: &[u8], now: SimTime) -> bool {
-        false
-    }
-    /// AL_EVENT (0x0220) without the mask.
-    pub fn al_event(&self) -> u32 {
-        0
-    }
-    /// PDI reads AL control: clears event bit 0.
-    pub fn al_control(&mut self, now: SimTime) -> AlControl {
-        AlControl::from_bits(0)
-    }
-    pub fn set_al_status(&mut self, status: AlStatus, code: AlStatusCode, now: SimTime) {}
-    /// The PDI watchdog only runs while the application is not alive (hangs); default alive.
-    pub fn set_pdi_alive(&mut self, alive: bool, now: SimTime) {}
-    pub fn sii_image(&self) -> &[u8] {
-        &self.config.sii
-    }
-    pub fn sii_image_mut(&mut self) -> &mut Vec<u8> {
-        &mut self.config.sii
-    }
-    /// Next instant at which something the application or network must react to happens by itself.
-    pub fn next_deadline(&self) -> Option<SimTime> {
-        None
-    }
-    pub fn tick(&mut self, now: SimTime) {}
-    pub fn local_time(&self, now: SimTime) -> u64 {
-        0
-    }
-    pub fn system_time(&self, now: SimTime) -> u64 {
-        0
-    }
-    /// Raw view of registers and RAM; empty where the range leaves the memory.
-    pub fn register(&self, address: RegisterAddress, len: usize) -> &[u8] {
-        &[]
-    }
-    /// DIGITAL_OUTPUTS (0x0F00); `None` while the process data watchdog keeps them from the terminals.
-    pub fn digital_outputs(&self) -> Option<[u8; 4]> {
-        None
-    }
-    /// SII loaded: PDI and process RAM are open.
-    pub fn pdi_operational(&self) -> bool {
-        false
-    }
-    /// Process data watchdog: false when expired.
-    pub fn process_data_watchdog_ok(&self) -> bool {
-        true
-    }
+
+    /// What the controller is made of.
     pub fn config(&self) -> &ControllerConfig {
         &self.config
     }
+
+    /// Tells what the port's link detection found. Without power nothing is detected.
+    pub fn link_changed(&mut self, port: Port, up: bool, now: SimTime) {
+        if !self.powered {
+            return;
+        }
+        self.catch_up(now);
+        if self.ports.set_link(port, up) {
+            self.memory.count(map::LOST_LINK_COUNTER.offset(port.index() as u16));
+        }
+        self.refresh_dl_status();
+    }
+
+    /// Takes a frame whose last bit came in at `port` at `now` all the way to the port by which it leaves.
+    pub fn receive(&mut self, frame: &mut SimFrame, port: Port, now: SimTime) -> Passage {
+        if !self.powered || !self.ports.link(port) {
+            return Passage::Destroyed;
+        }
+        self.catch_up(now);
+        let good = frame.fcs == Fcs::Good;
+        self.count_damage(frame, port);
+        let returns = self.ports.closed_by(port, frame.id);
+        if !self.ports.passes(port) && !returns {
+            if good && self.ports.reopen(port) {
+                self.refresh_dl_status();
+            }
+            return Passage::Destroyed;
+        }
+        let first_bit = now.back_ns(frame.first_to_last_bit_ns());
+        if self.clock.arrived(port, frame.id, first_bit) && good {
+            self.store_receive_time(port, first_bit);
+        }
+        self.travel(frame, port, returns, first_bit, now)
+    }
+
+    /// Along 0-(EPU)-3-1-2 from `entry` to the next open port; a frame that came in through a port that it has closed
+    /// itself leaves through it too.
+    fn travel(
+        &mut self,
+        frame: &mut SimFrame,
+        entry: Port,
+        returns: bool,
+        first_bit: SimTime,
+        now: SimTime,
+    ) -> Passage {
+        let open = Port::ALL.map(|port| self.ports.passes(port) || (returns && port == entry));
+        let mut processed = false;
+        let mut at = entry;
+        loop {
+            if at == Port::A {
+                if processed || !self.process(frame, first_bit, now) {
+                    return Passage::Destroyed;
+                }
+                processed = true;
+            }
+            at = ports::next(at);
+            if open[at.index()] {
+                return Passage::Leaves { port: at, processed };
+            }
+        }
+    }
+
+    /// Whether the loop of a port is closed, as DL status shows it.
+    pub fn loop_closed(&self, port: Port) -> bool {
+        self.ports.loop_closed(port)
+    }
+
+    /// When something happens by itself to which the application has to react: a watchdog expires, the EEPROM is loaded
+    /// or has finished a command of the PDI.
+    pub fn next_deadline(&self) -> Option<SimTime> {
+        let sii = self.sii.is_loading() || self.sii_owned_by_pdi();
+        let sii = if sii { self.sii.deadline() } else { SimTime::NEVER };
+        let next = sii.min(self.process_data_watchdog.deadline()).min(self.pdi_watchdog.deadline());
+        (self.powered && next != SimTime::NEVER).then_some(next)
+    }
+
+    /// Brings everything that happens by itself up to date.
+    pub fn tick(&mut self, now: SimTime) {
+        if !self.powered {
+            return;
+        }
+        if now >= self.sii.deadline() {
+            self.finish_sii_task();
+        }
+        if self.process_data_watchdog.expire(now) {
+            self.memory.count(map::WATCHDOG_COUNTER_PROCESS_DATA);
+            self.set_al_event(EVENT_PROCESS_DATA_WATCHDOG);
+            self.refresh_watchdog_status();
+        }
+        if self.pdi_watchdog.expire(now) {
+            self.memory.count(map::WATCHDOG_COUNTER_PDI);
+            self.refresh_dl_status();
+        }
+        if self.temporary_loops.is_some_and(|(until, _)| now >= until) {
+            self.end_temporary_loops();
+        }
+        self.schedule();
+    }
+
+    /// Brings up to date what is due.
+    fn catch_up(&mut self, now: SimTime) {
+        if now >= self.deadline {
+            self.tick(now);
+        }
+    }
+
+    /// Finds out when something happens by itself next.
+    fn schedule(&mut self) {
+        let loops = self.temporary_loops.map_or(SimTime::NEVER, |(until, _)| until);
+        self.deadline = (self.sii.deadline())
+            .min(self.process_data_watchdog.deadline())
+            .min(self.pdi_watchdog.deadline())
+            .min(loops);
+    }
+
+    /// The local clock in nanoseconds (facts 3.12).
+    pub fn local_time(&self, now: SimTime) -> u64 {
+        self.clock.local(now)
+    }
+
+    /// Local clock plus DC_SYSTEM_TIME_OFFSET; 32 bits where the clock has no more.
+    pub fn system_time(&self, now: SimTime) -> u64 {
+        let time = self.clock.local(now).wrapping_add(self.memory.u64(map::DC_SYSTEM_TIME_OFFSET));
+        if self.config.features.dc_64bit { time } else { u64::from(time as u32) }
+    }
+
+    /// Registers and RAM as they are, without the effects of reading; what is brought up to date when read may be old.
+    /// Empty where the range leaves the address space.
+    pub fn register(&self, address: RegisterAddress, len: usize) -> &[u8] {
+        self.memory.span(address.0.into(), len)
+    }
 }
+
+#[cfg(test)]
+mod tests;

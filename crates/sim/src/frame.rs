@@ -96,14 +96,8 @@ pub struct SimFrame {
 impl SimFrame {
     /// Takes the bytes of a frame and finds its datagrams. Any bytes will do.
     pub fn new(id: u64, bytes: Vec<u8>) -> SimFrame {
-        let mut frame = SimFrame {
-            bytes,
-            datagrams: Vec::new(),
-            kind: FrameKind::Foreign,
-            malformed: false,
-            fcs: Fcs::Good,
-            id,
-        };
+        let mut frame =
+            SimFrame { bytes, datagrams: Vec::new(), kind: FrameKind::Foreign, malformed: false, fcs: Fcs::Good, id };
         frame.parse();
         frame
     }

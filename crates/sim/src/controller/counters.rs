@@ -1,0 +1,50 @@
+//! Error and lost-link counters (facts 2.5).
+//!
+//! In: damaged frames and writes. Out: counters that stay at 0xFF and are cleared in groups by any write of EtherCAT.
+
+use core::ops::Range;
+
+use ringcat_wire::address::RegisterAddress;
+use ringcat_wire::register::map;
+
+use super::Controller;
+use crate::frame::{Fcs, Port, SimFrame};
+
+/// Counters that are cleared together.
+const GROUPS: [Range<u16>; 5] = [
+    map::RX_ERROR_COUNTER.0..map::EPU_ERROR_COUNTER.0,
+    map::EPU_ERROR_COUNTER.0..map::PDI_ERROR_COUNTER.0,
+    map::PDI_ERROR_COUNTER.0..map::PDI_ERROR_CODE.0 + 1,
+    map::LOST_LINK_COUNTER.0..map::LOST_LINK_COUNTER.0 + 4,
+    map::WATCHDOG_COUNTER_PROCESS_DATA.0..map::WATCHDOG_COUNTER_PDI.0 + 1,
+];
+
+/// Whether the address is a counter, which takes no value.
+pub(super) fn is_counter(address: u32) -> bool {
+    GROUPS.iter().any(|group| (u32::from(group.start)..u32::from(group.end)).contains(&address))
+}
+
+impl Controller {
+    /// Counts a damaged frame at a port, and marks it for the controllers behind: only the first one sees an invalid
+    /// frame, the others a forwarded error.
+    pub(super) fn count_damage(&mut self, frame: &mut SimFrame, port: Port) {
+        let p = port.index() as u16;
+        match frame.fcs {
+            Fcs::Good => {}
+            Fcs::Bad => {
+                self.memory.count(map::RX_ERROR_COUNTER.offset(2 * p));
+                frame.fcs = Fcs::Marked;
+            }
+            Fcs::Marked => self.memory.count(map::FORWARDED_RX_ERROR_COUNTER.offset(p)),
+        }
+    }
+
+    /// Clears the groups that a write to `address..end` touches.
+    pub(super) fn clear_counters(&mut self, address: u32, end: u32) {
+        for group in GROUPS {
+            if address < group.end.into() && u32::from(group.start) < end {
+                group.for_each(|counter| self.memory.set_u8(RegisterAddress(counter), 0));
+            }
+        }
+    }
+}

@@ -1,0 +1,89 @@
+//! ECAT and AL events, and the registers that mirror states: DL status and SyncManager status (facts 2.3, 3.5).
+//!
+//! In: what happened. Out: registers 0x0110, 0x0210, 0x0220, 0x0805 + 8n, and the bits that the processing unit puts
+//! into the IRQ field of datagrams.
+
+use ringcat_wire::register::{DlStatus, map};
+
+use super::Controller;
+
+/// ECAT event: DL status changed; cleared by reading it.
+pub(super) const EVENT_DL_STATUS: u16 = 1 << 2;
+/// ECAT event: AL status written; cleared by reading it.
+pub(super) const EVENT_AL_STATUS: u16 = 1 << 3;
+/// First of the eight ECAT events that mirror SyncManagers.
+const EVENT_SYNC_MANAGER_ECAT: u32 = 4;
+/// SyncManagers with an ECAT event.
+const MIRRORED: usize = 8;
+
+/// AL event: AL control written; cleared by the PDI reading it.
+pub(super) const EVENT_AL_CONTROL: u32 = 1 << 0;
+/// AL event: a SyncManager's activation changed; cleared by the PDI reading an activate register.
+pub(super) const EVENT_SYNC_MANAGER_ACTIVATION: u32 = 1 << 4;
+/// AL event: the process data watchdog expired; cleared by the PDI reading the watchdog status.
+pub(super) const EVENT_PROCESS_DATA_WATCHDOG: u32 = 1 << 6;
+/// First of the sixteen AL events of SyncManagers.
+const EVENT_SYNC_MANAGER_PDI: u32 = 8;
+
+/// Bits of ESC_CONFIGURATION that switch enhanced link detection on (facts 2.8).
+const ENHANCED_LINK_DETECTION: u8 = 0xF2;
+
+impl Controller {
+    pub(super) fn set_ecat_event(&mut self, bits: u16) {
+        self.memory.set_u16(map::ECAT_EVENT, self.memory.u16(map::ECAT_EVENT) | bits);
+        self.refresh_irq();
+    }
+
+    pub(super) fn clear_ecat_event(&mut self, bits: u16) {
+        self.memory.set_u16(map::ECAT_EVENT, self.memory.u16(map::ECAT_EVENT) & !bits);
+        self.refresh_irq();
+    }
+
+    /// The bits for datagrams: pending and not masked (facts 1.2).
+    pub(super) fn refresh_irq(&mut self) {
+        self.irq = self.memory.u16(map::ECAT_EVENT) & self.memory.u16(map::ECAT_EVENT_MASK);
+    }
+
+    pub(super) fn set_al_event(&mut self, bits: u32) {
+        self.memory.set_u32(map::AL_EVENT, self.memory.u32(map::AL_EVENT) | bits);
+    }
+
+    pub(super) fn clear_al_event(&mut self, bits: u32) {
+        self.memory.set_u32(map::AL_EVENT, self.memory.u32(map::AL_EVENT) & !bits);
+    }
+
+    /// Brings DL_STATUS up to date and raises the event where it changed.
+    pub(super) fn refresh_dl_status(&mut self) {
+        let loaded = self.memory.process_ram_open;
+        let configuration = self.memory.u8(map::ESC_CONFIGURATION);
+        let status = DlStatus {
+            pdi_operational: loaded,
+            pdi_watchdog_ok: loaded && !self.pdi_watchdog.expired(),
+            // Active by default until the EEPROM is loaded (facts 2.8).
+            enhanced_link_detection: !loaded || configuration & ENHANCED_LINK_DETECTION != 0,
+            ports: self.ports.status(),
+            reserved: 0,
+        };
+        if status.bits() != self.memory.u16(map::DL_STATUS) {
+            self.memory.set_u16(map::DL_STATUS, status.bits());
+            self.set_ecat_event(EVENT_DL_STATUS);
+        }
+    }
+
+    /// Brings the status byte and the events of SyncManager `n` up to date.
+    pub(super) fn refresh_sync_manager(&mut self, n: usize) {
+        let status = map::sync_manager(n as u8).offset(ringcat_wire::register::SyncManager::STATUS);
+        self.memory.set_u8(status, self.sync_managers.status(n).bits());
+        let (ecat, pdi) = self.sync_managers.events(n);
+        let bit = 1 << (EVENT_SYNC_MANAGER_PDI + n as u32);
+        if pdi {
+            self.set_al_event(bit)
+        } else {
+            self.clear_al_event(bit)
+        }
+        if n < MIRRORED {
+            let bit = 1 << (EVENT_SYNC_MANAGER_ECAT + n as u32);
+            if ecat { self.set_ecat_event(bit) } else { self.clear_ecat_event(bit) }
+        }
+    }
+}

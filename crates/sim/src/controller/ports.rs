@@ -1,0 +1,113 @@
+//! The four ports: links, loops, the order of travel, DL status (facts 2.1, 2.2, 2.3).
+//!
+//! In: link changes and loop modes. Out: which ports are open and the content of DL_STATUS. When a change raises an event
+//! or a counter is [`super::Controller`]'s matter.
+
+use ringcat_wire::register::{LoopControl, PortKind, PortStatus};
+
+use crate::frame::Port;
+
+/// Port behind each port in the order of travel 0-3-1-2.
+const NEXT: [Port; 4] = [Port::D, Port::C, Port::A, Port::B];
+
+/// The port behind `port` in the order of travel.
+pub(super) const fn next(port: Port) -> Port {
+    NEXT[port.index()]
+}
+
+/// Links and loops.
+#[derive(Clone, Debug)]
+pub(super) struct Ports {
+    usable: [bool; 4],
+    link: [bool; 4],
+    open: [bool; 4],
+    modes: [LoopControl; 4],
+    /// The frame that closed loops by writing DL_CONTROL, and the loops: it may still come back through them.
+    closing: Option<(u64, [bool; 4])>,
+}
+
+impl Ports {
+    pub fn new(kinds: [PortKind; 4]) -> Ports {
+        Ports {
+            usable: kinds.map(|kind| kind != PortKind::NotImplemented),
+            link: [false; 4],
+            open: [false; 4],
+            modes: [LoopControl::Auto; 4],
+            closing: None,
+        }
+    }
+
+    /// Takes all links away.
+    pub fn unplug(&mut self) {
+        self.link = [false; 4];
+    }
+
+    pub fn link(&self, port: Port) -> bool {
+        self.link[port.index()]
+    }
+
+    /// Takes over a link state. Returns whether a lost link counts: it was open in mode Auto (facts 2.5).
+    pub fn set_link(&mut self, port: Port, up: bool) -> bool {
+        let p = port.index();
+        let lost = self.link[p] && !up && self.open[p] && self.modes[p] == LoopControl::Auto;
+        self.link[p] = up && self.usable[p];
+        self.settle(p, false);
+        lost
+    }
+
+    /// Takes over loop modes that were written, as by the frame `frame`.
+    pub fn set_modes(&mut self, modes: [LoopControl; 4], frame: Option<u64>) {
+        let before = self.open;
+        self.modes = modes;
+        (0..4).for_each(|p| self.settle(p, true));
+        let closed = core::array::from_fn(|p| before[p] && !self.open[p]);
+        self.closing = frame.map(|frame| (frame, closed));
+    }
+
+    /// Opens a port that has auto-closed and on which a valid frame came in (facts 2.2). Returns whether it did.
+    pub fn reopen(&mut self, port: Port) -> bool {
+        let p = port.index();
+        let opens = !self.open[p] && self.link[p] && self.modes[p] == LoopControl::AutoClose;
+        self.open[p] |= opens;
+        opens
+    }
+
+    fn settle(&mut self, p: usize, rewritten: bool) {
+        self.open[p] = self.usable[p]
+            && match self.modes[p] {
+                LoopControl::Auto => self.link[p],
+                LoopControl::AutoClose => self.link[p] && (self.open[p] || rewritten),
+                LoopControl::Open => true,
+                LoopControl::Closed => false,
+            };
+    }
+
+    /// Whether the loop is closed, as DL status shows it.
+    pub fn loop_closed(&self, port: Port) -> bool {
+        !self.open[port.index()]
+    }
+
+    /// Whether frames pass the port. Port 0 is the way back in when all loops are closed (facts 2.2).
+    pub fn passes(&self, port: Port) -> bool {
+        self.open[port.index()] || (port == Port::A && self.open == [false; 4])
+    }
+
+    /// Whether a frame passes the port although its loop is closed: it is the frame that closed it, on its way back.
+    pub fn closed_by(&self, port: Port, frame: u64) -> bool {
+        self.closing.is_some_and(|(id, closed)| id == frame && closed[port.index()])
+    }
+
+    /// Whether the circulating-frame rule holds: port 0 is closed, but not by force (facts 2.4).
+    pub fn breaks_circulation(&self) -> bool {
+        matches!(self.modes[0], LoopControl::Auto | LoopControl::AutoClose) && !self.passes(Port::A)
+    }
+
+    /// The ports as DL status shows them.
+    pub fn status(&self) -> [PortStatus; 4] {
+        core::array::from_fn(|p| PortStatus {
+            link: self.link[p],
+            loop_closed: !self.open[p],
+            communication: self.link[p],
+        })
+    }
+}

@@ -1,0 +1,405 @@
+//! SyncManagers: three buffers or a mailbox in front of a piece of RAM (facts 3.11).
+//!
+//! In: the register bytes of each SyncManager and accesses to its area. Out: whether an access is granted and to which
+//! bytes, and after complete accesses the status byte and events. An access by EtherCAT is complete only when its frame had
+//! a good FCS, so [`SyncManagers::finish_frame`] decides; the PDI's accesses are complete at once.
+//!
+//! Not configured areas are free. The area of a SyncManager that is switched off, by either side, is locked. The second
+//! and third buffer are not addressable. Areas of one byte, and areas in register space, have a single buffer.
+
+use ringcat_wire::register::{SyncManager, SyncManagerDirection, SyncManagerMode, SyncManagerStatus};
+
+use super::memory::{PROCESS_RAM, Side};
+
+/// Number of the last buffer while none has been written.
+const NO_BUFFER: u8 = 3;
+const BUFFERS: u32 = 3;
+
+/// How the area is buffered.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+enum Buffering {
+    #[default]
+    Three,
+    Mailbox,
+    Single,
+    /// A reserved mode or direction: nothing gets through.
+    Invalid,
+}
+
+/// Whose turn an access is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Role {
+    Writer,
+    Reader,
+}
+
+/// What the SyncManagers say about an access that starts at an address.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Claim {
+    /// Up to this address no SyncManager is concerned.
+    Free(u32),
+    /// Up to this address nothing is accessible.
+    Locked(u32),
+    /// Up to this address, the area of this SyncManager.
+    Area(usize, u32),
+}
+
+/// An access that is allowed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Grant {
+    /// Where the bytes lie: in one of the buffers.
+    pub address: u32,
+    /// The access begins at the first byte of the area.
+    pub opened: bool,
+    /// The access ends with the last byte of an area that was begun at its first.
+    pub completed: bool,
+}
+
+/// What an access completed.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(super) struct Completion {
+    /// A complete write that triggers the process data watchdog.
+    pub triggers_watchdog: bool,
+}
+
+#[derive(Clone, Copy, Debug, Default)]
+struct Unit {
+    start: u32,
+    length: u32,
+    buffering: Buffering,
+    ecat_writes: bool,
+    enabled: bool,
+    ecat_event: bool,
+    pdi_event: bool,
+    watchdog: bool,
+    activate: u8,
+    write_buffer: u8,
+    read_buffer: u8,
+    last_buffer: u8,
+    full: bool,
+    write_event: bool,
+    read_event: bool,
+    writer_open: bool,
+    reader_open: bool,
+    /// EtherCAT began reading or writing in this frame.
+    frame_opened: bool,
+    /// EtherCAT accessed the last byte in this frame.
+    frame_completed: bool,
+}
+
+/// All SyncManagers of a controller.
+#[derive(Clone, Debug)]
+pub(super) struct SyncManagers {
+    units: Vec<Unit>,
+    /// SyncManagers with a length, bit by bit: the only ones that concern an access.
+    configured: u16,
+}
+
+impl SyncManagers {
+    pub fn new(count: u8) -> SyncManagers {
+        SyncManagers { units: vec![Unit::after_reset(); usize::from(count)], configured: 0 }
+    }
+
+    pub fn reset(&mut self) {
+        self.units.fill(Unit::after_reset());
+        self.configured = 0;
+    }
+
+    pub fn count(&self) -> usize {
+        self.units.len()
+    }
+
+    /// Takes over the registers of SyncManager `n`. Whatever changes its area or switches it resets its buffers.
+    /// Returns whether the activate byte has changed.
+    pub fn configure(&mut self, n: usize, registers: &SyncManager) -> bool {
+        let Some(unit) = self.units.get_mut(n) else { return false };
+        let old = *unit;
+        let new = Unit::from_registers(registers);
+        *unit = new;
+        if old.layout() == new.layout() {
+            let Unit { ecat_event, pdi_event, watchdog, activate, .. } = new;
+            *unit = Unit { ecat_event, pdi_event, watchdog, activate, ..old };
+        }
+        self.configured = self.configured & !(1 << n) | u16::from(new.length != 0) << n;
+        old.activate != new.activate
+    }
+
+    /// Whether the start and length registers are writable.
+    pub fn enabled(&self, n: usize) -> bool {
+        self.units.get(n).is_some_and(|unit| unit.enabled)
+    }
+
+    /// Who is responsible for `address`.
+    pub fn claim(&self, address: u32, end: u32) -> Claim {
+        let mut free_until = end;
+        let mut hidden_until = None;
+        let mut left = self.configured;
+        while left != 0 {
+            let n = left.trailing_zeros() as usize;
+            left &= left - 1;
+            let unit = &self.units[n];
+            let area_end = unit.start + unit.length;
+            if address < unit.start {
+                free_until = free_until.min(unit.start);
+            } else if address < area_end {
+                let until = area_end.min(end);
+                return if unit.enabled { Claim::Area(n, until) } else { Claim::Locked(until) };
+            } else if unit.hides(address) {
+                hidden_until = Some(unit.start + BUFFERS * unit.length);
+            }
+        }
+        match hidden_until {
+            Some(hidden) => Claim::Locked(hidden.min(free_until)),
+            None => Claim::Free(free_until),
+        }
+    }
+
+    /// Asks for an access to `start..end` inside the area of SyncManager `n`; `None` where it is not allowed.
+    pub fn access(&mut self, n: usize, side: Side, write: bool, start: u32, end: u32) -> Option<Grant> {
+        self.units[n].access(side, write, start, end)
+    }
+
+    /// Whether the PDI is kept from reading while the process data watchdog is expired.
+    pub fn guarded(&self, n: usize) -> bool {
+        let unit = &self.units[n];
+        unit.watchdog && unit.ecat_writes && unit.buffering != Buffering::Mailbox
+    }
+
+    /// Ends what EtherCAT did to SyncManager `n` in this frame; with a bad FCS nothing was done.
+    pub fn finish_frame(&mut self, n: usize, good: bool) -> Completion {
+        let unit = &mut self.units[n];
+        let role = if unit.ecat_writes { Role::Writer } else { Role::Reader };
+        let (opened, completed) = (unit.frame_opened, unit.frame_completed);
+        (unit.frame_opened, unit.frame_completed) = (false, false);
+        if !good {
+            unit.close(role);
+            return Completion::default();
+        }
+        unit.finish(role, opened, completed)
+    }
+
+    /// Ends what the PDI did to SyncManager `n` with a read or write.
+    pub fn finish_pdi(&mut self, n: usize, write: bool, grant: Grant) -> Completion {
+        let role = if write { Role::Writer } else { Role::Reader };
+        self.units[n].finish(role, grant.opened, grant.completed)
+    }
+
+    /// The status byte (+5).
+    pub fn status(&self, n: usize) -> SyncManagerStatus {
+        self.units[n].status()
+    }
+
+    /// The bits for the ECAT event and the AL event.
+    pub fn events(&self, n: usize) -> (bool, bool) {
+        let unit = &self.units[n];
+        let (ecat, pdi) = match unit.ecat_writes {
+            true => (unit.read_event, unit.write_event),
+            false => (unit.write_event, unit.read_event),
+        };
+        (ecat && unit.ecat_event, pdi && unit.pdi_event)
+    }
+}
+
+impl Unit {
+    fn after_reset() -> Unit {
+        Unit { last_buffer: NO_BUFFER, ..Unit::default() }
+    }
+
+    fn from_registers(registers: &SyncManager) -> Unit {
+        let (start, length) = (u32::from(registers.start), u32::from(registers.length));
+        let mut unit = Unit {
+            start,
+            length,
+            enabled: registers.activate.enable && !registers.pdi_control.deactivate && length != 0,
+            ecat_event: registers.control.ecat_event,
+            pdi_event: registers.control.pdi_event,
+            watchdog: registers.control.watchdog,
+            activate: registers.activate.bits(),
+            ..Unit::after_reset()
+        };
+        unit.ecat_writes = registers.control.direction == SyncManagerDirection::Write;
+        unit.buffering = match (registers.control.mode, registers.control.direction) {
+            (SyncManagerMode::Reserved(_), _) | (_, SyncManagerDirection::Reserved(_)) => Buffering::Invalid,
+            (SyncManagerMode::Mailbox, _) => Buffering::Mailbox,
+            (SyncManagerMode::Buffered, _) if length == 1 || start < PROCESS_RAM => Buffering::Single,
+            (SyncManagerMode::Buffered, _) => Buffering::Three,
+        };
+        unit
+    }
+
+    /// What makes the buffers what they are.
+    fn layout(&self) -> (u32, u32, bool, bool, Buffering) {
+        (self.start, self.length, self.enabled, self.ecat_writes, self.buffering)
+    }
+
+    /// Whether `address`, behind the area, is in the second or third buffer.
+    fn hides(&self, address: u32) -> bool {
+        self.enabled && self.buffering == Buffering::Three && address < self.start + BUFFERS * self.length
+    }
+
+    fn role(&self, side: Side, write: bool) -> Option<Role> {
+        let writer = self.ecat_writes == (side == Side::Ecat);
+        match (write, writer) {
+            (true, true) => Some(Role::Writer),
+            (false, false) => Some(Role::Reader),
+            // A single buffer can be read back.
+            (false, true) if self.buffering == Buffering::Single => Some(Role::Reader),
+            _ => None,
+        }
+    }
+
+    fn access(&mut self, side: Side, write: bool, start: u32, end: u32) -> Option<Grant> {
+        let role = self.role(side, write)?;
+        let reads_back = role == Role::Reader && self.ecat_writes == (side == Side::Ecat);
+        if self.buffering == Buffering::Invalid {
+            return None;
+        }
+        let direct = Grant { address: start, opened: false, completed: false };
+        if reads_back {
+            return Some(direct);
+        }
+        let opened = start == self.start;
+        if opened {
+            self.open(role)?;
+        }
+        let open = match role {
+            Role::Writer => self.writer_open,
+            Role::Reader => self.reader_open,
+        };
+        if !open {
+            return (self.buffering == Buffering::Single).then_some(direct);
+        }
+        let completed = end == self.start + self.length;
+        if side == Side::Ecat {
+            self.frame_opened |= opened;
+            self.frame_completed |= completed;
+        }
+        let buffer = match (self.buffering, role) {
+            (Buffering::Three, Role::Writer) => self.write_buffer,
+            (Buffering::Three, Role::Reader) => self.read_buffer,
+            _ => 0,
+        };
+        Some(Grant { address: start + u32::from(buffer) * self.length, opened, completed })
+    }
+
+    /// Access to the first byte.
+    fn open(&mut self, role: Role) -> Option<()> {
+        match (self.buffering, role) {
+            (Buffering::Mailbox, Role::Writer) if self.full || self.frame_completed => return None,
+            (Buffering::Mailbox, Role::Reader) if !self.full || self.frame_completed => return None,
+            (Buffering::Three, Role::Reader) => {
+                if self.last_buffer == NO_BUFFER {
+                    return None;
+                }
+                self.read_buffer = self.last_buffer;
+            }
+            _ => {}
+        }
+        match role {
+            Role::Writer => self.writer_open = true,
+            Role::Reader => self.reader_open = true,
+        }
+        Some(())
+    }
+
+    fn close(&mut self, role: Role) {
+        match role {
+            Role::Writer => self.writer_open = false,
+            Role::Reader => self.reader_open = false,
+        }
+    }
+
+    /// Takes over that an access began or ended.
+    fn finish(&mut self, role: Role, opened: bool, completed: bool) -> Completion {
+        if opened {
+            match role {
+                Role::Writer => self.read_event = false,
+                Role::Reader => self.write_event = false,
+            }
+        }
+        if !completed {
+            return Completion::default();
+        }
+        self.close(role);
+        match role {
+            Role::Writer => {
+                self.write_event = true;
+                self.full = self.buffering == Buffering::Mailbox;
+                self.last_buffer = self.write_buffer;
+                if self.buffering == Buffering::Three {
+                    self.write_buffer = self.spare_buffer();
+                }
+                Completion { triggers_watchdog: self.watchdog }
+            }
+            Role::Reader => {
+                self.read_event = true;
+                self.full = false;
+                Completion::default()
+            }
+        }
+    }
+
+    /// A buffer that holds neither the last complete value nor one that is being read.
+    fn spare_buffer(&self) -> u8 {
+        let taken = |b: u8| b == self.last_buffer || (self.reader_open && b == self.read_buffer);
+        (0..NO_BUFFER).find(|&b| !taken(b)).unwrap_or(0)
+    }
+
+    fn status(&self) -> SyncManagerStatus {
+        let mailbox = self.buffering == Buffering::Mailbox;
+        SyncManagerStatus {
+            write_event: self.write_event,
+            read_event: self.read_event,
+            mailbox_full: self.full,
+            last_buffer: if mailbox { 0 } else { self.last_buffer },
+            read_buffer_open: self.reader_open,
+            write_buffer_open: self.writer_open,
+            reserved: 0,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn managers(control: u8, length: u16) -> SyncManagers {
+        let mut managers = SyncManagers::new(8);
+        let l = length.to_le_bytes();
+        managers.configure(0, &SyncManager::decode(&[0x00, 0x10, l[0], l[1], control, 0, 1, 0]));
+        managers
+    }
+
+    #[test]
+    fn the_writer_never_meets_the_buffer_that_is_being_read() {
+        let mut managers = managers(0x24, 4);
+        let mut last = None;
+        for round in 0..10 {
+            let at = managers.access(0, Side::Ecat, true, 0x1000, 0x1004).unwrap().address;
+            assert_ne!(Some(at), last, "round {round}");
+            managers.finish_frame(0, true);
+            if round % 3 == 0 {
+                // A reader opens the newest buffer and dawdles.
+                let grant = managers.access(0, Side::Pdi, false, 0x1000, 0x1001).unwrap();
+                assert!(grant.opened && !grant.completed);
+                assert_eq!(grant.address, at);
+                managers.finish_pdi(0, false, grant);
+                last = Some(at);
+            }
+        }
+    }
+
+    #[test]
+    fn the_second_and_third_buffer_are_not_addressable() {
+        let managers = managers(0x24, 4);
+        assert_eq!(managers.claim(0x0F80, 0x2000), Claim::Free(0x1000));
+        assert_eq!(managers.claim(0x1001, 0x2000), Claim::Area(0, 0x1004));
+        assert_eq!(managers.claim(0x1004, 0x2000), Claim::Locked(0x100C));
+        assert_eq!(managers.claim(0x100C, 0x2000), Claim::Free(0x2000));
+    }
+
+    #[test]
+    fn after_a_reset_no_buffer_was_written() {
+        assert_eq!(SyncManagers::new(1).status(0).bits(), 0x30);
+    }
+}
