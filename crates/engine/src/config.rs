@@ -233,7 +233,8 @@ impl SubDeviceConfig {
 
     /// The SubDevice that a scan found: at its position, of its vendor and product, everything else from its SII.
     pub fn from_info(info: &SubDeviceInfo) -> SubDeviceConfig {
-        SubDeviceConfig::at_position(info.position.0).expect_product(info.identity.vendor_id, info.identity.product_code)
+        SubDeviceConfig::at_position(info.position.0)
+            .expect_product(info.identity.vendor_id, info.identity.product_code)
     }
 
     /// Expects a vendor and a product.

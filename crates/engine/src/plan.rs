@@ -115,7 +115,8 @@ pub fn plan(config: &SubDeviceConfig, info: &SubDeviceInfo) -> Result<SubDeviceP
 }
 
 fn plan_inner(config: &SubDeviceConfig, info: &SubDeviceInfo) -> Result<SubDevicePlan, PlanProblem> {
-    let mailbox = info.mailbox.filter(|_| mailbox_wanted(info)).map_or(Vec::new(), |layout| mailbox_pair(info, &layout));
+    let mailbox =
+        info.mailbox.filter(|_| mailbox_wanted(info)).map_or(Vec::new(), |layout| mailbox_pair(info, &layout));
     let bootstrap = info.bootstrap.map_or(Vec::new(), |layout| mailbox_pair(info, &layout));
     let process_data = areas::areas(config, info, &mailbox)?;
     check::check(info, &mailbox, &process_data)?;
@@ -182,13 +183,10 @@ fn sync_manager(start: u16, length: u16, control: u8) -> SyncManager {
 }
 
 fn watchdog(config: &SubDeviceConfig) -> Vec<(RegisterAddress, Vec<u8>)> {
-    [
-        (map::WATCHDOG_DIVIDER, config.watchdog_divider),
-        (map::WATCHDOG_TIME_PROCESS_DATA, config.watchdog_intervals),
-    ]
-    .into_iter()
-    .filter_map(|(address, value)| Some((address, value?.to_le_bytes().to_vec())))
-    .collect()
+    [(map::WATCHDOG_DIVIDER, config.watchdog_divider), (map::WATCHDOG_TIME_PROCESS_DATA, config.watchdog_intervals)]
+        .into_iter()
+        .filter_map(|(address, value)| Some((address, value?.to_le_bytes().to_vec())))
+        .collect()
 }
 
 #[cfg(test)]

@@ -118,6 +118,20 @@ pub enum Finding {
     },
 }
 
+impl Finding {
+    /// Position of the SubDevice.
+    pub fn node(&self) -> usize {
+        match *self {
+            Finding::UnconnectedPort0 { node }
+            | Finding::CrossedLine { node, .. }
+            | Finding::ForcedOpen { node, .. }
+            | Finding::ClosedWithLink { node, .. }
+            | Finding::LinkWithoutCommunication { node, .. }
+            | Finding::Inconsistent { node } => node,
+        }
+    }
+}
+
 impl fmt::Display for Finding {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {

@@ -1,0 +1,282 @@
+//! Follows the walk of a frame through the segment and hangs each SubDevice where the walk must have met it.
+//!
+//! A SubDevice entered at port 0 is met before what hangs on its ports 3, 1, 2. One that is entered elsewhere is met
+//! only when the frame is about to leave it through port 0 or has come back there (facts 2.1): what hangs on its ports
+//! before that was met earlier and is taken over ([`Walk::take_over`]).
+
+use alloc::vec;
+use alloc::vec::Vec;
+
+use ringcat_wire::register::PortKind;
+
+use super::{Finding, Node, NodeStatus, PortOf, Topology};
+
+/// Order in which a frame passes the ports (facts 2.1). The processing unit is behind port 0.
+pub(super) const TRAVEL: [u8; 4] = [0, 3, 1, 2];
+
+/// Where the next SubDevice may hang: a port of another one, or (`None`) the link.
+pub(super) type Slot = Option<PortOf>;
+
+/// A SubDevice that was hung somewhere.
+struct Placed {
+    node: usize,
+    slot: Slot,
+    /// Open slots when it was hung: once there are no more than these, all behind it has been met.
+    level: usize,
+}
+
+/// The walk so far.
+pub(super) struct Walk<'s> {
+    status: &'s [NodeStatus],
+    pub(super) nodes: Vec<Node>,
+    /// Slots that the frame will still come to, the next one last.
+    pub(super) slots: Vec<Slot>,
+    placed: Vec<Placed>,
+    /// Where in `placed` each SubDevice is.
+    placed_at: Vec<usize>,
+    /// Ports that are open but lead to no SubDevice.
+    pub(super) open_ports: Vec<PortOf>,
+    pub(super) findings: Vec<Finding>,
+}
+
+/// See [`Topology::build`].
+pub(super) fn build(status: &[NodeStatus], main_count: usize) -> Topology {
+    let mut walk = Walk::new(status);
+    walk.slots.push(None);
+    (0..main_count).for_each(|node| walk.place(node));
+    let rest = main_count..status.len();
+    let head = rest.clone().find(|node| !walk.is_open(*node, 0));
+    let redundant_head = match head {
+        Some(head) => {
+            walk.close();
+            walk.stub(rest, head);
+            Some(head)
+        }
+        None => {
+            // A closed ring: the frame of the main link left through the next slot; what comes behind it, frames of
+            // the redundant link meet.
+            if !rest.is_empty() {
+                walk.leave();
+            }
+            rest.for_each(|node| walk.place(node));
+            None
+        }
+    };
+    walk.close();
+    for node in 0..status.len() {
+        walk.report_ports(node, Some(node) == redundant_head);
+    }
+    let Walk { nodes, open_ports, mut findings, .. } = walk;
+    findings.sort_by_key(Finding::node);
+    Topology { nodes, main_count, redundant_head, open_ports, findings }
+}
+
+impl<'s> Walk<'s> {
+    fn new(status: &'s [NodeStatus]) -> Walk<'s> {
+        Walk {
+            status,
+            nodes: vec![Node::default(); status.len()],
+            slots: Vec::new(),
+            placed: Vec::new(),
+            placed_at: vec![usize::MAX; status.len()],
+            open_ports: Vec::new(),
+            findings: Vec::new(),
+        }
+    }
+
+    /// Whether frames pass a port.
+    pub(super) fn is_open(&self, node: usize, port: u8) -> bool {
+        let state = self.status[node].dl_status.ports[usize::from(port)];
+        self.exists(node, port) && state.communication && !state.loop_closed
+    }
+
+    /// Whether the controller has the port. One that claims to have none is not believed.
+    fn exists(&self, node: usize, port: u8) -> bool {
+        let kinds = &self.status[node].ports;
+        kinds[usize::from(port)] != PortKind::NotImplemented || *kinds == [PortKind::NotImplemented; 4]
+    }
+
+    /// Open ports among those that a frame passes after it came in at `entry`, in its order.
+    pub(super) fn open_after(&self, node: usize, entry: u8) -> impl DoubleEndedIterator<Item = u8> + use<'_, 's> {
+        let at = TRAVEL.iter().position(|port| *port == entry).unwrap_or(0);
+        (1..4).map(move |step| TRAVEL[(at + step) % 4]).filter(move |port| self.is_open(node, *port))
+    }
+
+    /// The open port at which the frame came in first by its receive times (LC-05); `None` where they do not say.
+    pub(super) fn earliest(&self, node: usize) -> Option<u8> {
+        let times = self.status[node].receive_times?;
+        let open = || (0..4).filter(|port| self.is_open(node, *port));
+        let first = open().reduce(|a, b| if before(&times, b, a) { b } else { a })?;
+        open().all(|port| port == first || before(&times, first, port)).then_some(first)
+    }
+
+    /// Time from the frame's first to its last passage, in nanoseconds.
+    fn span(&self, node: usize) -> Option<u32> {
+        let times = self.status[node].receive_times?;
+        let first = times[usize::from(self.earliest(node)?)];
+        (0..4).filter(|port| self.is_open(node, *port)).map(|port| times[usize::from(port)].wrapping_sub(first)).max()
+    }
+
+    /// Hangs the SubDevice that the frame met next.
+    pub(super) fn place(&mut self, node: usize) {
+        let entry = self.entry(node);
+        if entry != 0 && self.is_open(node, 0) && self.take_over(node, entry) {
+            return;
+        }
+        let entry = if self.is_open(node, 0) { 0 } else { entry };
+        if let Some(slot) = self.slots.pop() {
+            if entry != 0 {
+                self.findings.push(Finding::CrossedLine { node, entry_port: entry });
+            }
+            self.hang(node, slot, entry);
+            self.expect_children(node, entry);
+            return;
+        }
+        // Nowhere to hang it: only a SubDevice that was passed before it was met can come here.
+        let swapped = (1..4).rev().find(|port| self.is_open(node, *port));
+        if !swapped.is_some_and(|entry| self.is_open(node, 0) && self.take_over(node, entry)) {
+            self.findings.push(Finding::Inconsistent { node });
+            self.hang(node, None, entry);
+            self.expect_children(node, entry);
+        }
+    }
+
+    /// The port at which frames come in, by receive times or else by what is open.
+    fn entry(&self, node: usize) -> u8 {
+        let by_ports = || {
+            if self.is_open(node, 0) {
+                return 0;
+            }
+            // With the last one on the way nothing was met before the SubDevice itself.
+            TRAVEL.into_iter().rev().find(|port| self.is_open(node, *port)).unwrap_or(0)
+        };
+        self.earliest(node).unwrap_or_else(by_ports)
+    }
+
+    /// Hangs a SubDevice that is entered at another port than 0 above those that the frame met on its way through it.
+    /// False where there are none: then it is not so.
+    fn take_over(&mut self, node: usize, entry: u8) -> bool {
+        let passed: Vec<u8> = self.passed_before(node, entry);
+        let mut taken = Vec::new();
+        for port in passed.iter().rev() {
+            match self.last_complete(self.span(node)) {
+                Some(at) => taken.push((*port, self.unhang(at))),
+                None => break,
+            }
+        }
+        let slot = match (taken.is_empty(), self.slots.pop()) {
+            (false, Some(slot)) => slot,
+            (_, popped) => {
+                self.slots.extend(popped);
+                return false;
+            }
+        };
+        self.findings.push(Finding::CrossedLine { node, entry_port: entry });
+        self.hang(node, slot, entry);
+        for port in passed.iter().take(passed.len() - taken.len()) {
+            self.open_ports.push(PortOf { node, port: *port });
+        }
+        for (port, child) in taken {
+            self.connect(PortOf { node, port }, child);
+        }
+        self.expect_children(node, entry);
+        true
+    }
+
+    /// Open ports that a frame coming in at `entry` passes before it meets the processing unit.
+    fn passed_before(&self, node: usize, entry: u8) -> Vec<u8> {
+        if entry == 0 {
+            return Vec::new();
+        }
+        let at = TRAVEL.iter().position(|port| *port == entry).unwrap_or(0);
+        let to_unit = (at + 1..=4).map(|step| TRAVEL[step % 4]);
+        to_unit.filter(|port| self.is_open(node, *port)).collect()
+    }
+
+    /// The smallest tree behind which nothing is missing, or, with the time that the frame spent behind the SubDevice
+    /// that is to take it over, the largest that fits.
+    fn last_complete(&self, span: Option<u32>) -> Option<usize> {
+        let complete = |at: usize| self.placed.get(at).filter(|placed| self.slots.len() <= placed.level);
+        let mut at = self.placed.len().checked_sub(1)?;
+        complete(at)?;
+        while let Some(PortOf { node, .. }) = self.placed[at].slot {
+            let parent = self.placed_at[node];
+            let fits = match (self.span(node), span) {
+                (Some(inner), Some(outer)) => inner < outer,
+                _ => false,
+            };
+            if !fits || complete(parent).is_none() {
+                break;
+            }
+            at = parent;
+        }
+        Some(at)
+    }
+
+    /// Takes a tree off its slot, which is free again.
+    fn unhang(&mut self, at: usize) -> usize {
+        let Placed { node, slot, .. } = self.placed[at];
+        self.placed.truncate(at);
+        if let Some(PortOf { node, port }) = slot {
+            self.nodes[node].children[usize::from(port)] = None;
+        }
+        self.slots.push(slot);
+        node
+    }
+
+    /// Hangs a SubDevice into a slot that was popped.
+    pub(super) fn hang(&mut self, node: usize, slot: Slot, entry_port: u8) {
+        self.nodes[node].entry_port = entry_port;
+        if let Some(parent) = slot {
+            self.connect(parent, node);
+        }
+        self.placed_at[node] = self.placed.len();
+        self.placed.push(Placed { node, slot, level: self.slots.len() });
+    }
+
+    pub(super) fn connect(&mut self, parent: PortOf, child: usize) {
+        self.nodes[child].parent = Some((parent.node, parent.port));
+        self.nodes[parent.node].children[usize::from(parent.port)] = Some(child);
+    }
+
+    /// Slots for what hangs on the ports that the frame passes after it met the SubDevice.
+    fn expect_children(&mut self, node: usize, entry: u8) {
+        let passed = self.passed_before(node, entry);
+        let after: Vec<u8> = self.open_after(node, entry).filter(|port| !passed.contains(port)).collect();
+        self.slots.extend(after.into_iter().rev().map(|port| Some(PortOf { node, port })));
+    }
+
+    /// The frame left through the next slot.
+    fn leave(&mut self) {
+        self.open_ports.extend(self.slots.pop().flatten());
+    }
+
+    /// The walk is over: slots that it still expected lead to no SubDevice.
+    pub(super) fn close(&mut self) {
+        while !self.slots.is_empty() {
+            self.leave();
+        }
+    }
+
+    fn report_ports(&mut self, node: usize, at_break: bool) {
+        for port in 0..4u8 {
+            let state = self.status[node].dl_status.ports[usize::from(port)];
+            if !self.exists(node, port) {
+                continue;
+            }
+            let finding = match (state.link, state.communication, state.loop_closed) {
+                (_, false, false) => Finding::ForcedOpen { node, port },
+                (_, true, true) => Finding::ClosedWithLink { node, port },
+                (true, false, true) => Finding::LinkWithoutCommunication { node, port },
+                (false, false, true) if port == 0 && !at_break => Finding::UnconnectedPort0 { node },
+                (false, false, true) | (_, true, false) => continue,
+            };
+            self.findings.push(finding);
+        }
+    }
+}
+
+/// Whether the time of port `a` is earlier than that of port `b`; the clock may have wrapped between them.
+fn before(times: &[u32; 4], a: u8, b: u8) -> bool {
+    (times[usize::from(a)].wrapping_sub(times[usize::from(b)]) as i32) < 0
+}
