@@ -210,9 +210,7 @@ impl Leg {
             return Fate::Arrives;
         }
         match self.last_up {
-            Some((up, down)) if up <= first_in && down > first_out => {
-                Fate::Truncated { seen: down - first_out }
-            }
+            Some((up, down)) if up <= first_in && down > first_out => Fate::Truncated { seen: down - first_out },
             _ => Fate::Lost,
         }
     }

@@ -1,1 +1,309 @@
-//! The network.
+//! A segment in virtual time: devices, the cables between them and the two interfaces of the MainDevice (issue 2,
+//! part 3; facts 2, 9.1, 11.3, 11.4).
+//!
+//! In: frames of the MainDevice ([`Network::send`]), the time up to which things shall happen ([`Network::advance`]),
+//! and faults. Out: the frames that come back, with the time of their last bit ([`Network::receive`]), and the devices
+//! themselves for whoever wants to look inside. There is no other clock and no other chance than the seed: the same
+//! calls give the same run, bit for bit.
+//!
+//! # Model
+//!
+//! An event is the arrival of a frame's *last* bit at an end of a cable. Controllers cut through, so the next arrival
+//! is this one, plus the delay of the hop, plus that of the cable; when the first bit passed follows from the frame's
+//! length at 100 Mbit/s. A frame is lost if the cable, from the first bit's entry to the last bit's exit, was dead at
+//! any moment; where the receiver saw its beginning it travels on as a damaged frame (facts 2.5). Both ends of a cable
+//! notice a lost or a new signal after a detection delay; until then frames sent there are lost. A frame on whose way
+//! through a device a port opens or closes is lost (facts 2.2).
+
+pub mod builder;
+mod cabling;
+mod faults;
+mod pool;
+mod random;
+mod signals;
+pub mod statistics;
+mod traffic;
+
+use core::time::Duration;
+
+use crate::cable::{CableId, CableSpec, DeviceIndex, Direction, Endpoint, HostLink, Leg, LegId};
+use crate::device::Device;
+use crate::fault::Fault;
+use crate::host::{HostInterface, Received};
+use crate::queue::EventQueue;
+use crate::segment::{Segment, SegmentError};
+use crate::time::SimTime;
+use pool::{FramePool, Slot};
+pub(crate) use random::Random;
+use statistics::Statistics;
+
+/// Properties of a segment that belong to no single device.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct NetworkOptions {
+    /// Where random choices start from (the bit that a fault corrupts).
+    pub seed: u64,
+    /// From the loss of a signal to the moment the ends notice. Default 10 us (fast detection as DS1 demands it,
+    /// facts 2.8); plain PHYs take hundreds of milliseconds.
+    pub link_down_delay: Duration,
+    /// From the return of a signal to the moment the ends notice. Default 10 us.
+    pub link_up_delay: Duration,
+    /// Delay of a passage through a device with its processing unit. Default 300 ns.
+    pub processing_delay: Duration,
+    /// Delay of a passage through a device without its processing unit. Default 300 ns.
+    pub forwarding_delay: Duration,
+    /// Frames that an interface of the MainDevice queues for sending. Default 256.
+    pub transmit_queue: usize,
+    /// Frames that an interface of the MainDevice keeps until they are fetched. Default 256.
+    pub receive_queue: usize,
+}
+
+impl Default for NetworkOptions {
+    fn default() -> Self {
+        NetworkOptions {
+            seed: 0,
+            link_down_delay: Duration::from_micros(10),
+            link_up_delay: Duration::from_micros(10),
+            processing_delay: Duration::from_nanos(300),
+            forwarding_delay: Duration::from_nanos(300),
+            transmit_queue: 256,
+            receive_queue: 256,
+        }
+    }
+}
+
+impl NetworkOptions {
+    /// The same delay for every passage through a device.
+    #[must_use]
+    pub const fn with_hop_delay(mut self, delay: Duration) -> NetworkOptions {
+        self.processing_delay = delay;
+        self.forwarding_delay = delay;
+        self
+    }
+
+    /// The same delay for noticing that a link goes and that it comes.
+    #[must_use]
+    pub const fn with_detection_delay(mut self, delay: Duration) -> NetworkOptions {
+        self.link_down_delay = delay;
+        self.link_up_delay = delay;
+        self
+    }
+}
+
+/// Something that is due.
+#[derive(Clone, Copy, Debug)]
+enum Event {
+    /// The last bit of a frame reaches the end of a leg. `meddled`: the faults of the leg have had their turn.
+    Arrival { slot: Slot, leg: LegId, meddled: bool },
+    /// The end of a leg notices whether there is a signal, unless it has changed again since.
+    Detection { leg: LegId, epoch: u32 },
+    /// A device has something to do by itself.
+    Wake { device: u32 },
+    /// A scheduled fault.
+    Fault { number: u32 },
+}
+
+/// A device with its place in the segment.
+#[derive(Debug)]
+struct Node {
+    device: Device,
+    /// The direction of the cable that leads away from each port.
+    out: [Option<LegId>; 4],
+    /// When each port last opened or closed because its link came or went.
+    loop_changed_at: [SimTime; 4],
+    /// The latest of these: spares most frames the look at each.
+    last_loop_change: SimTime,
+    /// The earliest event that will wake the device.
+    wake_at: SimTime,
+}
+
+/// A cable.
+#[derive(Debug)]
+struct Cable {
+    spec: CableSpec,
+    cut: bool,
+    /// Counts changes of the signal, so that a detection knows whether it is out of date.
+    epoch: u32,
+}
+
+/// A segment.
+#[derive(Debug)]
+pub struct Network {
+    now: SimTime,
+    options: NetworkOptions,
+    queue: EventQueue<Event>,
+    nodes: Vec<Node>,
+    cables: Vec<Cable>,
+    legs: Vec<Leg>,
+    hosts: [HostInterface; 2],
+    frames: FramePool,
+    scheduled: Vec<Option<Fault>>,
+    random: Random,
+    statistics: Statistics,
+}
+
+impl Network {
+    /// A segment of these devices and cables. It begins at time zero with the power just switched on and all links up.
+    ///
+    /// # Errors
+    /// A cable that ends at a device or port that does not exist, or where another cable is plugged in.
+    pub fn new(
+        devices: Vec<Device>,
+        cables: Vec<CableSpec>,
+        options: NetworkOptions,
+    ) -> Result<Network, SegmentError> {
+        let out = cabling::plug(&devices, &cables)?;
+        let legs = cables.iter().flat_map(|cable| {
+            let delay_ns = u64::try_from(cable.delay.as_nanos()).unwrap_or(u64::MAX);
+            [Leg::new(cable.b, delay_ns), Leg::new(cable.a, delay_ns)]
+        });
+        let host = |link: HostLink| {
+            HostInterface::new(out.hosts[link as usize], options.transmit_queue, options.receive_queue)
+        };
+        let mut network = Network {
+            now: SimTime::ZERO,
+            queue: EventQueue::with_capacity(devices.len() + options.transmit_queue),
+            hosts: HostLink::ALL.map(host),
+            legs: legs.collect(),
+            cables: cables.into_iter().map(|spec| Cable { spec, cut: false, epoch: 0 }).collect(),
+            nodes: devices.into_iter().zip(out.devices).map(|(device, out)| Node::new(device, out)).collect(),
+            frames: FramePool::default(),
+            scheduled: Vec::new(),
+            random: Random::new(options.seed),
+            statistics: Statistics::default(),
+            options,
+        };
+        network.start();
+        Ok(network)
+    }
+
+    /// A segment as a file describes it.
+    ///
+    /// # Errors
+    /// As [`Network::new`].
+    pub fn from_description(segment: Segment) -> Result<Network, SegmentError> {
+        let devices = segment.devices.into_iter().map(Device::new).collect();
+        Network::new(devices, segment.cables, segment.options)
+    }
+
+    /// The time up to which everything has happened.
+    pub fn now(&self) -> SimTime {
+        self.now
+    }
+
+    /// When the next thing happens, if anything does.
+    pub fn next_event(&self) -> Option<SimTime> {
+        self.queue.next_at()
+    }
+
+    /// Lets everything happen that is due up to and including `to`.
+    pub fn advance(&mut self, to: SimTime) {
+        let mut due = self.queue.pop_until(to);
+        while let Some((at, event)) = due {
+            self.now = at;
+            due = match self.handle(event) {
+                Some((at, event)) => self.queue.push_pop(at, event, to),
+                None => self.queue.pop_until(to),
+            };
+        }
+        self.now = self.now.max(to);
+    }
+
+    /// Lets the time pass.
+    pub fn advance_by(&mut self, time: Duration) {
+        self.advance(self.now + time);
+    }
+
+    /// What happens, and what follows from it at once if it is the next hop of a frame.
+    fn handle(&mut self, event: Event) -> Option<(SimTime, Event)> {
+        match event {
+            Event::Arrival { slot, leg, meddled } => return self.arrive(slot, leg, meddled),
+            Event::Detection { leg, epoch } => self.detect(leg, epoch),
+            Event::Wake { device } => self.wake(device as usize),
+            Event::Fault { number } => self.strike(number as usize),
+        }
+        None
+    }
+
+    /// Sends a frame (without check sequence) on an interface. It leaves behind those that are queued there. On an
+    /// interface without carrier it is lost.
+    pub fn send(&mut self, link: HostLink, bytes: &[u8]) {
+        self.transmit(link, bytes);
+    }
+
+    /// The next frame that arrived on an interface with a good check sequence.
+    pub fn receive(&mut self, link: HostLink) -> Option<Received> {
+        self.hosts[link as usize].received.pop_front()
+    }
+
+    /// Gives the buffer of a received frame back, so that sending does not need a new one.
+    pub fn give_back(&mut self, bytes: Vec<u8>) {
+        self.frames.give_back(bytes);
+    }
+
+    /// Whether the interface has link, as far as it has noticed.
+    pub fn carrier(&self, link: HostLink) -> bool {
+        self.hosts[link as usize].out.is_some_and(|out| self.legs[out.reverse().index()].detected)
+    }
+
+    /// A device.
+    ///
+    /// # Panics
+    /// When there is no device with this number.
+    pub fn device(&self, device: DeviceIndex) -> &Device {
+        &self.nodes[device.0].device
+    }
+
+    /// A device, to be changed from outside at the present time; it looks at what has changed before time goes on.
+    ///
+    /// # Panics
+    /// When there is no device with this number.
+    pub fn device_mut(&mut self, device: DeviceIndex) -> &mut Device {
+        self.wake_at(device.0, self.now);
+        &mut self.nodes[device.0].device
+    }
+
+    /// All devices in the order of their numbers.
+    pub fn devices(&self) -> impl ExactSizeIterator<Item = &Device> {
+        self.nodes.iter().map(|node| &node.device)
+    }
+
+    /// All cables in the order of their numbers.
+    pub fn cables(&self) -> impl ExactSizeIterator<Item = &CableSpec> {
+        self.cables.iter().map(|cable| &cable.spec)
+    }
+
+    /// The cable that is plugged in there.
+    pub fn cable_at(&self, endpoint: Endpoint) -> Option<CableId> {
+        let out = match endpoint {
+            Endpoint::Device(device, port) => self.nodes.get(device.0)?.out[port.index()],
+            Endpoint::Host(link) => self.hosts[link as usize].out,
+        };
+        out.map(LegId::cable)
+    }
+
+    /// The first cable that joins two devices.
+    pub fn cable_between(&self, one: DeviceIndex, other: DeviceIndex) -> Option<CableId> {
+        let is = |endpoint: Endpoint, wanted| matches!(endpoint, Endpoint::Device(device, _) if device == wanted);
+        let joins = |spec: &CableSpec| is(spec.a, one) && is(spec.b, other) || is(spec.a, other) && is(spec.b, one);
+        self.cables().position(joins).map(CableId)
+    }
+
+    /// The cable of an interface of the MainDevice.
+    pub fn host_cable(&self, link: HostLink) -> Option<CableId> {
+        self.cable_at(Endpoint::Host(link))
+    }
+
+    /// Counters since the beginning.
+    pub fn statistics(&self) -> &Statistics {
+        &self.statistics
+    }
+
+    /// The options it was made with.
+    pub fn options(&self) -> &NetworkOptions {
+        &self.options
+    }
+
+    fn leg_mut(&mut self, cable: CableId, direction: Direction) -> &mut Leg {
+        &mut self.legs[LegId::new(cable, direction).index()]
+    }
+}

@@ -1,1 +1,68 @@
-//! Segments from files.
+//! Segments from files (issue 2, part 3). The format is described in `docs/segments.md`.
+//!
+//! In: TOML text and the directory in which SII images are looked for. Out: [`Segment`], a description of all devices,
+//! cables and options from which [`Network::from_description`](crate::network::Network::from_description) makes a
+//! segment. An error names file, line and device.
+
+mod devices;
+mod error;
+mod format;
+mod topology;
+
+use std::path::Path;
+
+use crate::cable::CableSpec;
+use crate::description::DeviceDescription;
+use crate::network::NetworkOptions;
+
+pub use error::SegmentError;
+
+/// A segment as a file describes it.
+///
+/// Cable `n` is the one that attaches device `n`; behind these come the one that closes the ring, if there is one, and
+/// those that the file lists. (Devices that the file attaches by listed cables only shift the numbers.)
+#[derive(Clone, Debug)]
+pub struct Segment {
+    /// Name of the segment.
+    pub name: String,
+    /// Options of the network.
+    pub options: NetworkOptions,
+    /// The devices in the order of the file.
+    pub devices: Vec<DeviceDescription>,
+    /// The cables.
+    pub cables: Vec<CableSpec>,
+}
+
+impl Segment {
+    /// Reads a segment file. SII images are looked for relative to it.
+    ///
+    /// # Errors
+    /// A file that cannot be read, and what [`Segment::from_toml`] refuses.
+    pub fn load(path: &Path) -> Result<Segment, SegmentError> {
+        let text = std::fs::read_to_string(path)
+            .map_err(|error| SegmentError::new(format!("cannot be read: {error}")).in_file(path))?;
+        let base_dir = path.parent().unwrap_or(Path::new("."));
+        Segment::from_toml(&text, base_dir).map_err(|error| error.in_file(path))
+    }
+
+    /// Reads the text of a segment file. SII images are looked for relative to `base_dir`.
+    ///
+    /// # Errors
+    /// Text that is not TOML, unknown or missing keys, values out of range, unknown device types, SII images that
+    /// cannot be read, names used twice, and cables that end nowhere or where another is plugged in.
+    pub fn from_toml(text: &str, base_dir: &Path) -> Result<Segment, SegmentError> {
+        let file = format::File::parse(text)?;
+        let options = file.options(text)?;
+        let plan = devices::describe(&file, text, base_dir, options.seed)?;
+        let cables = topology::plug(&file, text, &plan)?;
+        Ok(Segment {
+            name: file.segment.name.clone().unwrap_or_else(|| String::from("segment")),
+            options,
+            devices: plan.into_iter().map(|device| device.description).collect(),
+            cables,
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -144,8 +144,6 @@ impl Network {
             return;
         }
         node.device.power_on(self.now);
-        node.loop_changed_at = [self.now; 4];
-        node.last_loop_change = self.now;
         for out in node.out.into_iter().flatten() {
             self.refresh_signal(out.cable());
         }

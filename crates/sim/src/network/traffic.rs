@@ -2,15 +2,18 @@
 
 use core::time::Duration;
 
-use ringcat_wire::frame::MAX_FRAME_VLAN;
+use ringcat_wire::frame::{BYTE_TIME_NS, MAX_FRAME_VLAN};
 
 use super::statistics::LossCause;
 use super::{Event, Network, Slot};
 use crate::cable::{Endpoint, Fate, HostLink, LegFaults, LegId};
 use crate::controller::Passage;
-use crate::frame::{Fcs, Port};
-use crate::host::{Received, bytes_within};
+use crate::frame::{Fcs, Port, SimFrame};
+use crate::host::Received;
 use crate::time::SimTime;
+
+/// Bytes of preamble and delimiter before a frame.
+const PREAMBLE: u64 = 8;
 
 impl Network {
     /// Puts a frame into the transmit queue of an interface.
@@ -44,7 +47,7 @@ impl Network {
             Fate::Arrives => {}
             Fate::Truncated { seen } if bytes_within(seen) > 0 => {
                 let frame = self.frames.frame_mut(slot);
-                frame.truncate(usize::try_from(bytes_within(seen)).unwrap_or(usize::MAX));
+                frame.truncate(bytes_within(seen));
                 frame.fcs = Fcs::Bad;
             }
             Fate::Truncated { .. } | Fate::Lost => return self.lose_hop(slot, LossCause::DeadCable),
@@ -129,12 +132,14 @@ impl Network {
     /// Turns over one bit of a frame.
     fn corrupt(&mut self, slot: Slot) {
         let frame = self.frames.frame_mut(slot);
-        let bit = self.random.below(frame.bytes.len() * 8);
-        if let Some(byte) = frame.bytes.get_mut(bit / 8) {
+        let mut bytes = core::mem::take(&mut frame.bytes);
+        let bit = self.random.below(bytes.len() * 8);
+        if let Some(byte) = bytes.get_mut(bit / 8) {
             *byte ^= 1 << (bit % 8);
         }
-        frame.reparse();
-        frame.fcs = Fcs::Bad;
+        // The bit may be one of a datagram's length: the datagrams have to be found anew.
+        let fcs = if frame.fcs == Fcs::Good { Fcs::Bad } else { frame.fcs };
+        *frame = SimFrame { fcs, ..SimFrame::new(frame.id, bytes) };
     }
 
     fn lose(&mut self, slot: Slot, cause: LossCause) {
@@ -146,4 +151,9 @@ impl Network {
         self.lose(slot, cause);
         None
     }
+}
+
+/// Bytes of a frame that have arrived this long after the first bit of the preamble.
+fn bytes_within(time: Duration) -> usize {
+    usize::try_from((time.as_nanos() as u64 / BYTE_TIME_NS).saturating_sub(PREAMBLE)).unwrap_or(usize::MAX)
 }

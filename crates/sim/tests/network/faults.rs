@@ -77,7 +77,8 @@ fn a_corrupted_write_changes_no_register() {
     network.apply(Fault::Corrupt { cable, direction: Some(Direction::AToB), count: 1 });
     network.send(Main, &write);
     network.advance_by(SETTLE);
-    let address = |network: &Network| network.device(DeviceIndex(0)).controller.register(map::STATION_ADDRESS, 2).to_vec();
+    let address =
+        |network: &Network| network.device(DeviceIndex(0)).controller.register(map::STATION_ADDRESS, 2).to_vec();
     assert_eq!(address(&network), [0, 0]);
     network.send(Main, &write);
     network.advance_by(SETTLE);

@@ -124,7 +124,8 @@ fn a_flap_shorter_than_the_detection_is_not_noticed() {
     network.advance_by(ns(5_000));
     network.heal(cable);
     network.advance_by(SETTLE);
-    let lost_links = |device| network.device(DeviceIndex(device)).controller.register(map::LOST_LINK_COUNTER, 4).to_vec();
+    let lost_links =
+        |device| network.device(DeviceIndex(device)).controller.register(map::LOST_LINK_COUNTER, 4).to_vec();
     assert_eq!((lost_links(0), lost_links(1)), (vec![0; 4], vec![0; 4]));
     assert!(travel(&mut network, Main).is_some());
 }

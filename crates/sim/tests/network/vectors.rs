@@ -116,7 +116,6 @@ fn junction(start: u8, back: u8) -> String {
 #[test]
 fn a_local_ring_from_an_earlier_to_a_later_port_is_always_served() {
     for (start, back) in [(3, 1), (3, 2), (1, 2)] {
-
         let cables = junction(start, back);
         let all = [1, 2, 3, 4, 5];
         let main = |cuts: &[&str]| copies(&cables, cuts)[0].clone();

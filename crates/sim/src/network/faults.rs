@@ -1,0 +1,101 @@
+//! Faults: at once, or at a time.
+
+use super::{Event, Network};
+use crate::cable::{CableId, DeviceIndex, Direction, LegFaults};
+use crate::fault::Fault;
+use crate::time::SimTime;
+
+impl Network {
+    /// Brings about a fault at a time, or at once where that has passed.
+    ///
+    /// # Panics
+    /// When the device or cable does not exist.
+    pub fn schedule(&mut self, at: SimTime, fault: Fault) {
+        self.check(&fault);
+        let free = self.scheduled.iter().position(Option::is_none).unwrap_or(self.scheduled.len());
+        if free == self.scheduled.len() {
+            self.scheduled.push(None);
+        }
+        self.scheduled[free] = Some(fault);
+        self.queue.push(at.max(self.now), Event::Fault { number: free as u32 });
+    }
+
+    /// Brings about a fault now.
+    ///
+    /// # Panics
+    /// When the device or cable does not exist.
+    pub fn apply(&mut self, fault: Fault) {
+        self.check(&fault);
+        match fault {
+            Fault::Cut(cable) => self.cut(cable),
+            Fault::Heal(cable) => self.heal(cable),
+            Fault::Drop { cable, direction, count } => self.set_faults(cable, direction, |faults| faults.drop = count),
+            Fault::Duplicate { cable, direction, count } => {
+                self.set_faults(cable, direction, |faults| faults.duplicate = count);
+            }
+            Fault::Corrupt { cable, direction, count } => {
+                self.set_faults(cable, direction, |faults| faults.corrupt = count);
+            }
+            Fault::Delay { cable, direction, count, by } => self.set_faults(cable, direction, |faults| {
+                faults.delay = count;
+                faults.delay_by = by;
+            }),
+            Fault::OneWay { cable, direction, blocked } => {
+                self.set_faults(cable, Some(direction), |faults| faults.blocked = blocked);
+            }
+            Fault::PowerOff(device) => self.power_off(device),
+            Fault::PowerOn(device) => self.power_on(device),
+            Fault::Hang(device, hanging) => {
+                let now = self.now;
+                self.device_mut(device).hang(hanging, now);
+            }
+            Fault::CorruptSii { device, offset, mask } => {
+                if let Some(byte) = self.device_mut(device).controller.sii_image_mut().get_mut(offset) {
+                    *byte ^= mask;
+                }
+            }
+            Fault::RefuseTransition { device, to, code, times } => {
+                self.device_mut(device).refuse_transition(to, code, times);
+            }
+        }
+    }
+
+    /// A scheduled fault is due.
+    pub(super) fn strike(&mut self, number: usize) {
+        if let Some(fault) = self.scheduled.get_mut(number).and_then(Option::take) {
+            self.apply(fault);
+        }
+    }
+
+    fn set_faults(&mut self, cable: CableId, direction: Option<Direction>, change: impl Fn(&mut LegFaults)) {
+        for candidate in Direction::ALL {
+            if direction.is_none_or(|wanted| wanted == candidate) {
+                self.leg_mut(cable, candidate).set_faults(&change);
+            }
+        }
+    }
+
+    /// A fault on something that does not exist is a mistake of the test, which must not pass unseen.
+    fn check(&self, fault: &Fault) {
+        match *fault {
+            Fault::Cut(cable)
+            | Fault::Heal(cable)
+            | Fault::Drop { cable, .. }
+            | Fault::Duplicate { cable, .. }
+            | Fault::Corrupt { cable, .. }
+            | Fault::Delay { cable, .. }
+            | Fault::OneWay { cable, .. } => {
+                assert!(cable.0 < self.cables.len(), "no cable {} among {}", cable.0, self.cables.len());
+            }
+            Fault::PowerOff(device)
+            | Fault::PowerOn(device)
+            | Fault::Hang(device, _)
+            | Fault::CorruptSii { device, .. }
+            | Fault::RefuseTransition { device, .. } => self.check_device(device),
+        }
+    }
+
+    fn check_device(&self, device: DeviceIndex) {
+        assert!(device.0 < self.nodes.len(), "no device {} among {}", device.0, self.nodes.len());
+    }
+}

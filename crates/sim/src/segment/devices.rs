@@ -1,0 +1,172 @@
+//! From the tables of a file to descriptions of devices.
+
+use core::time::Duration;
+use std::path::Path;
+
+use ringcat_wire::sii;
+
+use super::SegmentError;
+use super::format::{DeviceEntry, File, duration, line};
+use crate::catalogue;
+use crate::description::{DeviceDescription, TransitionTimes};
+use crate::network::Random;
+
+/// Most devices of a segment: station addresses are 16 bits wide.
+const MAX_DEVICES: usize = 65_535;
+/// Names that mean something else where a cable is plugged in.
+pub(super) const RESERVED: [&str; 3] = ["main", "redundant", "none"];
+/// Checksum word that switches the check off (facts 4.1).
+const CHECKSUM_OFF: u16 = 0x88A4;
+
+/// A device, and which table of the file it comes from.
+pub(super) struct PlannedDevice {
+    pub(super) description: DeviceDescription,
+    /// Number of the table.
+    pub(super) entry: usize,
+    /// It is the first one of its table.
+    pub(super) first: bool,
+}
+
+/// All devices of the file.
+pub(super) fn describe(
+    file: &File,
+    text: &str,
+    base_dir: &Path,
+    seed: u64,
+) -> Result<Vec<PlannedDevice>, SegmentError> {
+    let mut plan: Vec<PlannedDevice> = Vec::new();
+    let mut random = Random::new(seed);
+    for (number, spanned) in file.device.iter().enumerate() {
+        let entry = spanned.get_ref();
+        let here = line(text, &spanned.span());
+        let name = name(entry, number);
+        let error = |message: String, at: usize| SegmentError::new(message).about(&name).at_line(at);
+        let template = template(entry, &name, base_dir).map_err(|(message, span)| {
+            let at = span.map_or(here, |span| line(text, &span));
+            error(message, at)
+        })?;
+        let count = entry.count.as_ref().map_or(1, |count| *count.get_ref());
+        if count == 0 || plan.len().saturating_add(count) > MAX_DEVICES {
+            let at = entry.count.as_ref().map_or(here, |count| line(text, &count.span()));
+            return Err(error(format!("count: expected 1 to {MAX_DEVICES} devices in all, got {count}"), at));
+        }
+        for copy in 0..count {
+            let mut description = template.clone();
+            description.name = if count > 1 { format!("{name}-{}", copy + 1) } else { name.clone() };
+            check_name(&description.name, &plan).map_err(|message| {
+                error(message, entry.name.as_ref().map_or(here, |name| line(text, &name.span())))
+            })?;
+            // Clocks that were switched on at different times (facts 11.3).
+            let start = random.next() >> 16;
+            description.clock_start_ns = entry.clock_start_ns.unwrap_or(start);
+            plan.push(PlannedDevice { description, entry: number, first: copy == 0 });
+        }
+    }
+    Ok(plan)
+}
+
+/// Name of a device that may have none.
+fn name(entry: &DeviceEntry, number: usize) -> String {
+    let stem = entry.kind.as_ref().or(entry.sii.as_ref()).map_or("device", |kind| kind.get_ref());
+    let stem = Path::new(stem).file_stem().and_then(|stem| stem.to_str()).unwrap_or("device");
+    let given = entry.name.as_ref().map(|name| name.get_ref().clone());
+    given.unwrap_or_else(|| format!("{}-{}", stem.replace('.', "-"), number + 1))
+}
+
+fn check_name(name: &str, plan: &[PlannedDevice]) -> Result<(), String> {
+    if name.is_empty() || name.contains('.') || RESERVED.contains(&name) {
+        return Err(format!("name: expected one without a dot that is not one of {}, got \"{name}\"", RESERVED.join(", ")));
+    }
+    if let Some(place) = plan.iter().position(|device| device.description.name == name) {
+        return Err(format!("name: \"{name}\" is that of device {place} already"));
+    }
+    Ok(())
+}
+
+type Place = Option<core::ops::Range<usize>>;
+
+/// The device of one table.
+fn template(entry: &DeviceEntry, name: &str, base_dir: &Path) -> Result<DeviceDescription, (String, Place)> {
+    let mut description = match (&entry.kind, &entry.sii) {
+        (Some(kind), None) => {
+            let known = || catalogue::names().collect::<Vec<_>>().join(", ");
+            catalogue::by_name(kind.get_ref()).ok_or_else(|| {
+                let message = format!("type: expected one of {}, got \"{}\"", known(), kind.get_ref());
+                (message, Some(kind.span()))
+            })?
+        }
+        (None, Some(file)) => {
+            let path = base_dir.join(file.get_ref());
+            let place = || Some(file.span());
+            let image = std::fs::read(&path)
+                .map_err(|error| (format!("sii: {} cannot be read: {error}", path.display()), place()))?;
+            DeviceDescription::from_sii(image, name)
+                .map_err(|error| (format!("sii: {}: {error}", path.display()), place()))?
+        }
+        (Some(_), Some(file)) => return Err(("expected either type or sii, got both".into(), Some(file.span()))),
+        (None, None) => return Err(("expected type or sii, got neither".into(), None)),
+    };
+    settings(entry, &mut description)?;
+    Ok(description)
+}
+
+/// The other keys of a table.
+fn settings(entry: &DeviceEntry, description: &mut DeviceDescription) -> Result<(), (String, Place)> {
+    let time = |value: &Option<toml::Spanned<f64>>, key: &str, unit: f64| -> Result<Option<Duration>, (String, Place)> {
+        let Some(value) = value else {
+            return Ok(None);
+        };
+        duration(value, key, unit).map(Some).map_err(|error| (error.message, Some(value.span())))
+    };
+    if let Some(alias) = entry.alias {
+        description.alias = alias;
+        patch(description, 8, &alias.to_le_bytes());
+    }
+    if let Some(serial) = entry.serial {
+        description.identity.serial = serial;
+        patch(description, 28, &serial.to_le_bytes());
+    }
+    if let Some(drift) = &entry.drift_ppm {
+        let ppb = *drift.get_ref() * 1e3;
+        if !(-1e9..=1e9).contains(&ppb) {
+            let message = format!("drift_ppm: expected -1000000 to 1000000, got {}", drift.get_ref());
+            return Err((message, Some(drift.span())));
+        }
+        description.clock_drift_ppb = ppb.round() as i64;
+    }
+    if let Some(eight) = entry.eight_byte_sii {
+        description.eight_byte_sii = eight;
+    }
+    if let Some(busy) = time(&entry.sii_busy_us, "sii_busy_us", 1e-6)? {
+        description.sii_busy = busy;
+    }
+    if let Some(all) = time(&entry.transition_ms, "transition_ms", 1e-3)? {
+        description.transitions = TransitionTimes::all(all);
+    }
+    let times = &mut description.transitions;
+    for (value, key, target) in [
+        (&entry.to_init_ms, "to_init_ms", &mut times.to_init),
+        (&entry.to_preop_ms, "to_preop_ms", &mut times.to_preop),
+        (&entry.to_safeop_ms, "to_safeop_ms", &mut times.to_safeop),
+        (&entry.to_op_ms, "to_op_ms", &mut times.to_op),
+    ] {
+        *target = time(value, key, 1e-3)?.unwrap_or(*target);
+    }
+    Ok(())
+}
+
+/// Puts bytes into the fixed part of a real image and makes its checksum right again (facts 4.1).
+fn patch(description: &mut DeviceDescription, at: usize, bytes: &[u8]) {
+    let Some(image) = &mut description.sii_image else {
+        return;
+    };
+    if let Some(place) = image.get_mut(at..at + bytes.len()) {
+        place.copy_from_slice(bytes);
+    }
+    if let Some((first, rest)) = image.split_first_chunk_mut::<14>()
+        && let Some(word) = rest.first_chunk_mut::<2>()
+        && u16::from_le_bytes(*word) != CHECKSUM_OFF
+    {
+        *word = u16::from(sii::checksum(first)).to_le_bytes();
+    }
+}

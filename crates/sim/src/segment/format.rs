@@ -1,0 +1,146 @@
+//! The keys of a segment file, as they are written.
+
+use core::ops::Range;
+use core::time::Duration;
+
+use serde::Deserialize;
+use toml::{Spanned, Table, Value};
+
+use super::SegmentError;
+use crate::network::NetworkOptions;
+
+/// A whole file.
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct File {
+    #[serde(default)]
+    pub(super) segment: Options,
+    #[serde(default)]
+    pub(super) device: Vec<Spanned<DeviceEntry>>,
+    #[serde(default)]
+    pub(super) cable: Vec<Spanned<CableEntry>>,
+}
+
+/// Table `[segment]`.
+#[derive(Debug, Default, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct Options {
+    pub(super) name: Option<String>,
+    pub(super) seed: Option<u64>,
+    pub(super) ring: Option<Spanned<Value>>,
+    pub(super) cable_ns: Option<u64>,
+    link_down_delay_us: Option<Spanned<f64>>,
+    link_up_delay_us: Option<Spanned<f64>>,
+    hop_ns: Option<u64>,
+    processing_ns: Option<u64>,
+    forwarding_ns: Option<u64>,
+}
+
+/// One table of `[[device]]`.
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct DeviceEntry {
+    pub(super) name: Option<Spanned<String>>,
+    #[serde(rename = "type")]
+    pub(super) kind: Option<Spanned<String>>,
+    pub(super) sii: Option<Spanned<String>>,
+    pub(super) count: Option<Spanned<usize>>,
+    pub(super) alias: Option<u16>,
+    pub(super) serial: Option<u32>,
+    pub(super) drift_ppm: Option<Spanned<f64>>,
+    pub(super) clock_start_ns: Option<u64>,
+    pub(super) eight_byte_sii: Option<bool>,
+    pub(super) sii_busy_us: Option<Spanned<f64>>,
+    pub(super) transition_ms: Option<Spanned<f64>>,
+    pub(super) to_init_ms: Option<Spanned<f64>>,
+    pub(super) to_preop_ms: Option<Spanned<f64>>,
+    pub(super) to_safeop_ms: Option<Spanned<f64>>,
+    pub(super) to_op_ms: Option<Spanned<f64>>,
+    pub(super) attach: Option<Spanned<String>>,
+    pub(super) port: Option<Spanned<usize>>,
+    pub(super) cable_ns: Option<u64>,
+}
+
+/// One table of `[[cable]]`.
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct CableEntry {
+    pub(super) from: Spanned<String>,
+    pub(super) to: Spanned<String>,
+    pub(super) delay_ns: Option<u64>,
+}
+
+impl File {
+    /// Reads the keys.
+    pub(super) fn parse(text: &str) -> Result<File, SegmentError> {
+        toml::from_str(text).map_err(|error| {
+            let message = SegmentError::new(error.message().replace('\n', ", "));
+            match error.span() {
+                Some(span) => {
+                    let at = message.at_line(line(text, &span));
+                    match device_around(text, span.start) {
+                        Some(device) => at.about(device),
+                        None => at,
+                    }
+                }
+                None => message,
+            }
+        })
+    }
+
+    /// Options of the network.
+    pub(super) fn options(&self, text: &str) -> Result<NetworkOptions, SegmentError> {
+        let given = &self.segment;
+        let mut options = NetworkOptions { seed: given.seed.unwrap_or(0), ..NetworkOptions::default() };
+        for (value, key, target) in [
+            (&given.link_down_delay_us, "link_down_delay_us", &mut options.link_down_delay),
+            (&given.link_up_delay_us, "link_up_delay_us", &mut options.link_up_delay),
+        ] {
+            if let Some(value) = value {
+                *target = duration(value, key, 1e-6).map_err(|error| error.at_line(line(text, &value.span())))?;
+            }
+        }
+        if let Some(hop) = given.hop_ns {
+            options = options.with_hop_delay(Duration::from_nanos(hop));
+        }
+        if let Some(processing) = given.processing_ns {
+            options.processing_delay = Duration::from_nanos(processing);
+        }
+        if let Some(forwarding) = given.forwarding_ns {
+            options.forwarding_delay = Duration::from_nanos(forwarding);
+        }
+        Ok(options)
+    }
+}
+
+/// A time that is written as a number of units of so many seconds.
+pub(super) fn duration(value: &Spanned<f64>, key: &str, unit: f64) -> Result<Duration, SegmentError> {
+    let given = *value.get_ref();
+    Duration::try_from_secs_f64(given * unit)
+        .map_err(|_| SegmentError::new(format!("{key}: expected a time, not negative, got {given}")))
+}
+
+/// Number of the line, from 1, in which a span begins.
+pub(super) fn line(text: &str, span: &Range<usize>) -> usize {
+    let before = &text.as_bytes()[..span.start.min(text.len())];
+    1 + before.iter().filter(|byte| **byte == b'\n').count()
+}
+
+/// What to call the device whose table is around an offset of the text, though the file as a whole makes no sense.
+fn device_around(text: &str, offset: usize) -> Option<String> {
+    let offset = (0..=offset.min(text.len())).rev().find(|offset| text.is_char_boundary(*offset))?;
+    // The error may lie in the header itself.
+    let line_end = text[offset..].find('\n').map_or(text.len(), |end| offset + end);
+    let start = text[..line_end].rfind("[[device]]")?;
+    let rest = &text[start..];
+    let end = rest[2..].find("\n[").map_or(rest.len(), |end| end + 2);
+    if start + end < offset {
+        return None;
+    }
+    let number = text[..start].matches("[[device]]").count() + 1;
+    let named = rest[..end].parse::<Table>().ok().and_then(|table| {
+        let entry = table.get("device")?.as_array()?.first()?.as_table()?.clone();
+        Some(entry.get("name").or(entry.get("type"))?.as_str()?.to_owned())
+    });
+    Some(named.unwrap_or_else(|| format!("number {number}")))
+}

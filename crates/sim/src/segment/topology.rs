@@ -1,0 +1,172 @@
+//! From the tables of a file to cables.
+
+use core::ops::Range;
+use core::time::Duration;
+
+use ringcat_wire::register::PortKind;
+use toml::Value;
+
+use super::SegmentError;
+use super::devices::PlannedDevice;
+use super::format::{DeviceEntry, File, line};
+use crate::cable::{CableSpec, DeviceIndex, Endpoint, HostLink};
+use crate::frame::Port;
+use crate::network::builder::DEFAULT_CABLE_DELAY;
+
+/// Ports that lead further, in the order in which a device's next free one is looked for: OUT of a two-port device
+/// first, then in the order in which frames travel.
+const FURTHER: [Port; 3] = [Port::B, Port::D, Port::C];
+
+/// Cables on the table, and what they are plugged into.
+struct Plan<'a> {
+    text: &'a str,
+    devices: &'a [PlannedDevice],
+    cables: Vec<CableSpec>,
+}
+
+/// All cables of the file.
+pub(super) fn plug(file: &File, text: &str, devices: &[PlannedDevice]) -> Result<Vec<CableSpec>, SegmentError> {
+    let delay = |given: Option<u64>| {
+        given.or(file.segment.cable_ns).map_or(DEFAULT_CABLE_DELAY, Duration::from_nanos)
+    };
+    // Listed cables first: what is attached without a port looks for a free one.
+    let mut plan = Plan { text, devices, cables: Vec::new() };
+    for cable in &file.cable {
+        let cable = cable.get_ref();
+        let [from, to] = [&cable.from, &cable.to].map(|end| plan.endpoint(end.get_ref(), &end.span()));
+        plan.join(from?, to?, delay(cable.delay_ns), &cable.from.span())?;
+    }
+    let listed = plan.cables.len();
+    for index in 0..devices.len() {
+        let spanned = &file.device[devices[index].entry];
+        plan.attach(index, spanned.get_ref(), &spanned.span(), delay(spanned.get_ref().cable_ns))?;
+    }
+    if let Some(ring) = &file.segment.ring {
+        plan.close(ring.get_ref(), &ring.span(), delay(None))?;
+    }
+    plan.cables.rotate_left(listed);
+    Ok(plan.cables)
+}
+
+impl Plan<'_> {
+    fn error(&self, message: impl Into<String>, span: &Range<usize>) -> SegmentError {
+        SegmentError::new(message).at_line(line(self.text, span))
+    }
+
+    fn name(&self, device: DeviceIndex) -> &str {
+        &self.devices[device.0].description.name
+    }
+
+    /// Attaches a device to the one before it, or to where its table says.
+    fn attach(
+        &mut self,
+        index: usize,
+        entry: &DeviceEntry,
+        span: &Range<usize>,
+        delay: Duration,
+    ) -> Result<(), SegmentError> {
+        let about = |error: SegmentError| error.about(&self.devices[index].description.name);
+        let own = entry.port.as_ref().map_or(0, |port| *port.get_ref());
+        let Some(own) = Port::from_index(own) else {
+            let span = entry.port.as_ref().map_or(span.clone(), |port| port.span());
+            return Err(about(self.error(format!("port: expected 0 to 3, got {own}"), &span)));
+        };
+        let given = entry.attach.as_ref().filter(|_| self.devices[index].first);
+        let place = given.map_or(span.clone(), |attach| attach.span());
+        let to = match (given.map(|attach| attach.get_ref().as_str()), index.checked_sub(1)) {
+            (Some("none"), _) => return Ok(()),
+            (Some(text), _) => self.endpoint(text, &place),
+            (None, Some(previous)) => self.next_free(DeviceIndex(previous), &place),
+            (None, None) => Ok(Endpoint::Host(HostLink::Main)),
+        };
+        let to = to.map_err(about)?;
+        self.join(to, Endpoint::Device(DeviceIndex(index), own), delay, &place)
+    }
+
+    /// Closes the ring.
+    fn close(&mut self, ring: &Value, span: &Range<usize>, delay: Duration) -> Result<(), SegmentError> {
+        let end = match (ring, self.devices.len().checked_sub(1)) {
+            (Value::Boolean(false), _) => return Ok(()),
+            (Value::Boolean(true), Some(last)) => self.next_free(DeviceIndex(last), span)?,
+            (Value::Boolean(true), None) => return Err(self.error("ring: there is no device", span)),
+            (Value::String(text), _) => self.endpoint(text, span)?,
+            (other, _) => {
+                let message = format!("ring: expected true, false or \"device.port\", got {other}");
+                return Err(self.error(message, span));
+            }
+        };
+        self.join(end, Endpoint::Host(HostLink::Redundant), delay, span)
+    }
+
+    /// "main", "redundant", "device.port", or "device" for its next free port.
+    fn endpoint(&self, text: &str, span: &Range<usize>) -> Result<Endpoint, SegmentError> {
+        match text {
+            "main" => return Ok(Endpoint::Host(HostLink::Main)),
+            "redundant" => return Ok(Endpoint::Host(HostLink::Redundant)),
+            _ => {}
+        }
+        let (name, port) = text.rsplit_once('.').map_or((text, None), |(name, port)| (name, Some(port)));
+        let Some(index) = self.devices.iter().position(|device| device.description.name == name) else {
+            return Err(self.error(format!("expected \"main\", \"redundant\" or a device, got \"{name}\""), span));
+        };
+        let Some(port) = port else {
+            return self.next_free(DeviceIndex(index), span);
+        };
+        match port.parse().ok().and_then(Port::from_index) {
+            Some(port) => Ok(Endpoint::Device(DeviceIndex(index), port)),
+            None => Err(self.error(format!("port of \"{name}\": expected 0 to 3, got \"{port}\""), span)),
+        }
+    }
+
+    fn next_free(&self, device: DeviceIndex, span: &Range<usize>) -> Result<Endpoint, SegmentError> {
+        let ports = &self.devices[device.0].description.ports;
+        let free = FURTHER.into_iter().map(|port| (port, Endpoint::Device(device, port))).find(|(port, endpoint)| {
+            ports[port.index()] != PortKind::NotImplemented && self.taken(*endpoint).is_none()
+        });
+        let message = || format!("device \"{}\" has no free port that leads further", self.name(device));
+        free.map(|(_, endpoint)| endpoint).ok_or_else(|| self.error(message(), span))
+    }
+
+    /// What an endpoint is joined to already.
+    fn taken(&self, endpoint: Endpoint) -> Option<Endpoint> {
+        self.cables.iter().find_map(|cable| match endpoint {
+            _ if cable.a == endpoint => Some(cable.b),
+            _ if cable.b == endpoint => Some(cable.a),
+            _ => None,
+        })
+    }
+
+    fn describe(&self, endpoint: Endpoint) -> String {
+        match endpoint {
+            Endpoint::Host(link) => format!("the {link} link"),
+            Endpoint::Device(device, port) => format!("port {} of \"{}\"", port.index(), self.name(device)),
+        }
+    }
+
+    fn join(&mut self, a: Endpoint, b: Endpoint, delay: Duration, span: &Range<usize>) -> Result<(), SegmentError> {
+        if a == b {
+            return Err(self.error(format!("{} cannot be joined to itself", self.describe(a)), span));
+        }
+        for end in [a, b] {
+            if let Some(other) = self.taken(end) {
+                let message = format!("{} is joined to {} already", self.describe(end), self.describe(other));
+                return Err(self.blame(self.error(message, span), end));
+            }
+            if let Endpoint::Device(device, port) = end
+                && self.devices[device.0].description.ports[port.index()] == PortKind::NotImplemented
+            {
+                let message = format!("{} does not exist", self.describe(end));
+                return Err(self.blame(self.error(message, span), end));
+            }
+        }
+        self.cables.push(CableSpec { a, b, delay });
+        Ok(())
+    }
+
+    fn blame(&self, error: SegmentError, end: Endpoint) -> SegmentError {
+        match end {
+            Endpoint::Device(device, _) => error.about(self.name(device)),
+            Endpoint::Host(_) => error,
+        }
+    }
+}
