@@ -30,7 +30,7 @@ unsafe impl GlobalAlloc for Bump {
         if layout.align() > ALIGN {
             return ptr::null_mut();
         }
-        let place = |used: usize| Some(used.checked_next_multiple_of(layout.align())?.checked_add(layout.size())?);
+        let place = |used: usize| used.checked_next_multiple_of(layout.align())?.checked_add(layout.size());
         let fits = |used: usize| place(used).filter(|end| *end <= SIZE);
         match self.used.fetch_update(Ordering::Relaxed, Ordering::Relaxed, fits) {
             Ok(used) => self.block.0.get().cast::<u8>().wrapping_add(used.next_multiple_of(layout.align())),

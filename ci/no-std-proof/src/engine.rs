@@ -28,7 +28,7 @@ const INPUT: u8 = 0x5A;
 /// Whether a procedure gets its answer and a cycle is complete.
 pub fn works() -> Option<()> {
     let identity = black_box(Identity::new(MacCodec::FlagsFirst, MacAddress([2, 0, 0, 0, 0, 1]), None));
-    procedure_works(identity.clone())?;
+    procedure_works(identity)?;
     cycle_works(identity)
 }
 
