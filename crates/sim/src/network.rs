@@ -146,11 +146,7 @@ impl Network {
     ///
     /// # Errors
     /// A cable that ends at a device or port that does not exist, or where another cable is plugged in.
-    pub fn new(
-        devices: Vec<Device>,
-        cables: Vec<CableSpec>,
-        options: NetworkOptions,
-    ) -> Result<Network, SegmentError> {
+    pub fn new(devices: Vec<Device>, cables: Vec<CableSpec>, options: NetworkOptions) -> Result<Network, SegmentError> {
         let out = cabling::plug(&devices, &cables)?;
         let legs = cables.iter().flat_map(|cable| {
             let delay_ns = u64::try_from(cable.delay.as_nanos()).unwrap_or(u64::MAX);

@@ -112,7 +112,8 @@ impl Network {
         let dropped = LegFaults::take(&mut leg.faults.drop);
         let corrupted = !dropped && LegFaults::take(&mut leg.faults.corrupt);
         let doubled = !dropped && LegFaults::take(&mut leg.faults.duplicate);
-        let late = if !dropped && LegFaults::take(&mut leg.faults.delay) { leg.faults.delay_by } else { Duration::ZERO };
+        let late =
+            if !dropped && LegFaults::take(&mut leg.faults.delay) { leg.faults.delay_by } else { Duration::ZERO };
         leg.refresh_faulty();
         if dropped {
             return self.lose_hop(slot, LossCause::Dropped);

@@ -53,9 +53,8 @@ pub(super) fn describe(
         for copy in 0..count {
             let mut description = template.clone();
             description.name = if count > 1 { format!("{name}-{}", copy + 1) } else { name.clone() };
-            check_name(&description.name, &plan).map_err(|message| {
-                error(message, entry.name.as_ref().map_or(here, |name| line(text, &name.span())))
-            })?;
+            check_name(&description.name, &plan)
+                .map_err(|message| error(message, entry.name.as_ref().map_or(here, |name| line(text, &name.span()))))?;
             // Clocks that were switched on at different times (facts 11.3).
             let start = random.next() >> 16;
             description.clock_start_ns = entry.clock_start_ns.unwrap_or(start);
@@ -75,7 +74,10 @@ fn name(entry: &DeviceEntry, number: usize) -> String {
 
 fn check_name(name: &str, plan: &[PlannedDevice]) -> Result<(), String> {
     if name.is_empty() || name.contains('.') || RESERVED.contains(&name) {
-        return Err(format!("name: expected one without a dot that is not one of {}, got \"{name}\"", RESERVED.join(", ")));
+        return Err(format!(
+            "name: expected one without a dot that is not one of {}, got \"{name}\"",
+            RESERVED.join(", ")
+        ));
     }
     if let Some(place) = plan.iter().position(|device| device.description.name == name) {
         return Err(format!("name: \"{name}\" is that of device {place} already"));
@@ -112,12 +114,13 @@ fn template(entry: &DeviceEntry, name: &str, base_dir: &Path) -> Result<DeviceDe
 
 /// The other keys of a table.
 fn settings(entry: &DeviceEntry, description: &mut DeviceDescription) -> Result<(), (String, Place)> {
-    let time = |value: &Option<toml::Spanned<f64>>, key: &str, unit: f64| -> Result<Option<Duration>, (String, Place)> {
-        let Some(value) = value else {
-            return Ok(None);
+    let time =
+        |value: &Option<toml::Spanned<f64>>, key: &str, unit: f64| -> Result<Option<Duration>, (String, Place)> {
+            let Some(value) = value else {
+                return Ok(None);
+            };
+            duration(value, key, unit).map(Some).map_err(|error| (error.message, Some(value.span())))
         };
-        duration(value, key, unit).map(Some).map_err(|error| (error.message, Some(value.span())))
-    };
     if let Some(alias) = entry.alias {
         description.alias = alias;
         patch(description, 8, &alias.to_le_bytes());

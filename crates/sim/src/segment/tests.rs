@@ -20,3 +20,248 @@ fn at(device: usize, port: Port) -> Endpoint {
 fn ends(segment: &Segment) -> Vec<(Endpoint, Endpoint)> {
     segment.cables.iter().map(|cable| (cable.a, cable.b)).collect()
 }
+
+#[test]
+fn devices_are_attached_one_behind_the_other_and_the_last_closes_the_ring() {
+    let segment = read(
+        r#"
+        [segment]
+        name = "small"
+        seed = 3
+        ring = true
+        hop_ns = 1_000
+        forwarding_ns = 500
+        link_down_delay_us = 2.5
+        cable_ns = 7
+
+        [[device]]
+        type = "coupler"
+
+        [[device]]
+        type = "digital-output-8"
+        name = "lamps"
+        count = 2
+        cable_ns = 9
+        "#,
+    )
+    .unwrap();
+    let names: Vec<&str> = segment.devices.iter().map(|device| device.name.as_str()).collect();
+    assert_eq!((segment.name.as_str(), names), ("small", vec!["coupler-1", "lamps-1", "lamps-2"]));
+    let main = Endpoint::Host(HostLink::Main);
+    let redundant = Endpoint::Host(HostLink::Redundant);
+    let expected = [
+        (main, at(0, Port::A)),
+        (at(0, Port::B), at(1, Port::A)),
+        (at(1, Port::B), at(2, Port::A)),
+        (at(2, Port::B), redundant),
+    ];
+    assert_eq!(ends(&segment), expected);
+    let delays: Vec<u128> = segment.cables.iter().map(|cable| cable.delay.as_nanos()).collect();
+    assert_eq!(delays, [7, 9, 9, 7]);
+    let options = &segment.options;
+    assert_eq!((options.seed, options.link_down_delay.as_nanos()), (3, 2_500));
+    assert_eq!((options.processing_delay.as_nanos(), options.forwarding_delay.as_nanos()), (1_000, 500));
+    assert!(Network::from_description(segment).is_ok());
+}
+
+#[test]
+fn branches_crossed_devices_and_listed_cables_are_plugged_in() {
+    let segment = read(
+        r#"
+        segment = { ring = "last.1" }
+
+        [[device]]
+        type = "junction"
+        name = "j"
+        [[device]]
+        type = "coupler"
+        name = "branch"
+        attach = "j.3"
+        [[device]]
+        type = "servo"
+        name = "crossed"
+        attach = "j"
+        port = 1
+        [[device]]
+        type = "servo"
+        name = "last"
+        attach = "none"
+        [[cable]]
+        from = "last.0"
+        to = "crossed.0"
+        delay_ns = 1_000
+        "#,
+    )
+    .unwrap();
+    let expected = [
+        (Endpoint::Host(HostLink::Main), at(0, Port::A)),
+        (at(0, Port::D), at(1, Port::A)),
+        (at(0, Port::B), at(2, Port::B)),
+        (at(3, Port::B), Endpoint::Host(HostLink::Redundant)),
+        (at(3, Port::A), at(2, Port::A)),
+    ];
+    assert_eq!(ends(&segment), expected);
+    assert_eq!(segment.cables[4].delay.as_nanos(), 1_000);
+}
+
+#[test]
+fn the_settings_of_a_device_reach_its_description() {
+    let text = r#"
+        [[device]]
+        type = "digital-input-8"
+        alias = 0x1234
+        serial = 77
+        drift_ppm = -12.5
+        clock_start_ns = 5
+        eight_byte_sii = false
+        sii_busy_us = 0.5
+        transition_ms = 5
+        to_op_ms = 7.5
+        "#;
+    let device = read(text).unwrap().devices.remove(0);
+    assert_eq!((device.alias, device.identity.serial, device.clock_drift_ppb), (0x1234, 77, -12_500));
+    assert_eq!((device.clock_start_ns, device.eight_byte_sii, device.sii_busy.as_nanos()), (5, false, 500));
+    let times = device.transitions;
+    assert_eq!(
+        (times.to_init.as_micros(), times.to_safeop.as_micros(), times.to_op.as_micros()),
+        (5_000, 5_000, 7_500)
+    );
+}
+
+#[test]
+fn clocks_start_where_the_seed_says() {
+    let starts = |seed: u64| {
+        let text = format!("segment = {{ seed = {seed} }}\n[[device]]\ntype = \"servo\"\ncount = 3");
+        read(&text).unwrap().devices.iter().map(|device| device.clock_start_ns).collect::<Vec<_>>()
+    };
+    assert_eq!(starts(1), starts(1));
+    assert_ne!(starts(1), starts(2));
+    assert_ne!(starts(1)[0], starts(1)[1]);
+}
+
+#[test]
+fn a_real_image_with_another_alias_keeps_a_valid_checksum() {
+    let directory = std::env::temp_dir().join(format!("ringcat-segment-{}", std::process::id()));
+    std::fs::create_dir_all(&directory).unwrap();
+    let mut terminal = crate::catalogue::by_name("digital-input-8").unwrap();
+    terminal.name = String::from("x");
+    std::fs::write(directory.join("di.bin"), crate::sii_image::build(&terminal)).unwrap();
+    let text = "[[device]]\nsii = \"di.bin\"\nalias = 300\nserial = 9\n";
+    let mut segment = Segment::from_toml(text, &directory).unwrap();
+    std::fs::remove_dir_all(&directory).unwrap();
+    let device = segment.devices.remove(0);
+    let again = DeviceDescription::from_sii(device.sii_image.unwrap(), "again").unwrap();
+    assert_eq!((device.name.as_str(), again.alias, again.identity.serial), ("di-1", 300, 9));
+}
+
+#[test]
+fn errors_name_line_and_device() {
+    let known = crate::catalogue::names().collect::<Vec<_>>().join(", ");
+    let coupler = "[[device]]\ntype = \"coupler\"\nname = \"head\"\n";
+    for (text, expected) in [
+        ("[segment]\nspeed = 3", "line 2: unknown field `speed`".to_owned()),
+        ("[[device]]\nname = \"x\"\ntyp = \"servo\"", "line 3: device \"x\": unknown field `typ`".to_owned()),
+        ("[[device]]\ntype = \"servo\"\n[[device]]\nalias = 70000", "line 4: device \"number 2\": invalid value".to_owned()),
+        ("[[device]]\nname = \"x\"\ntype = \"servvo\"", format!("line 3: device \"x\": type: expected one of {known}, got \"servvo\"")),
+        ("\n[[device]]\nname = \"x\"", "line 2: device \"x\": expected type or sii, got neither".to_owned()),
+        ("[[device]]\ntype = \"servo\"\nsii = \"a.bin\"", "line 3: device \"servo-1\": expected either type or sii, got both".to_owned()),
+        ("[[device]]\nsii = \"a.bin\"", "line 2: device \"a-1\": sii: nowhere/a.bin cannot be read".to_owned()),
+        ("[[device]]\ntype = \"servo\"\ncount = 0", "line 3: device \"servo-1\": count: expected 1 to 65535 devices in all, got 0".to_owned()),
+        ("[[device]]\ntype = \"servo\"\nname = \"a.b\"", "line 3: device \"a.b\": name: expected one without a dot that is not one of main, redundant, none, got \"a.b\"".to_owned()),
+        ("[[device]]\ntype = \"servo\"\nto_op_ms = -1", "line 3: device \"servo-1\": to_op_ms: expected a time, not negative, got -1".to_owned()),
+        ("[[device]]\ntype = \"servo\"\ndrift_ppm = inf", "line 3: device \"servo-1\": drift_ppm: expected -1000000 to 1000000, got inf".to_owned()),
+        ("[segment]\nlink_up_delay_us = nan", "line 2: link_up_delay_us: expected a time, not negative, got NaN".to_owned()),
+        ("[segment]\nring = true", "line 2: ring: there is no device".to_owned()),
+        ("[segment]\nring = 7\n[[device]]\ntype = \"servo\"", "line 2: ring: expected true, false or \"device.port\", got 7".to_owned()),
+    ] {
+        let got = refused(text);
+        assert!(got.starts_with(&expected), "{text}\nexpected {expected}\ngot      {got}");
+    }
+    for (text, expected) in [
+        (
+            "[[device]]\ntype = \"servo\"\nname = \"head\"",
+            "line 6: device \"head\": name: \"head\" is that of device 0 already",
+        ),
+        (
+            "[[device]]\ntype = \"servo\"\nname = \"s\"\nattach = \"tail\"",
+            "line 7: device \"s\": expected \"main\", \"redundant\" or a device, got \"tail\"",
+        ),
+        (
+            "[[device]]\ntype = \"servo\"\nname = \"s\"\nattach = \"head.7\"",
+            "line 7: device \"s\": port of \"head\": expected 0 to 3, got \"7\"",
+        ),
+        (
+            "[[device]]\ntype = \"servo\"\nname = \"s\"\nattach = \"head.0\"",
+            "line 7: device \"head\": port 0 of \"head\" is joined to the main link already",
+        ),
+        (
+            "[[device]]\ntype = \"servo\"\nname = \"s\"\nport = 3",
+            "line 4: device \"s\": port 3 of \"s\" does not exist",
+        ),
+        ("[[device]]\ntype = \"servo\"\nname = \"s\"\nport = 4", "line 7: device \"s\": port: expected 0 to 3, got 4"),
+        (
+            "[[cable]]\nfrom = \"head.1\"\nto = \"head.1\"",
+            "line 5: device \"head\": port 1 of \"head\" cannot be joined to itself",
+        ),
+        (
+            "[[device]]\ntype = \"servo\"\nname = \"s\"\nattach = \"s.1\"\nport = 1",
+            "line 7: device \"s\": port 1 of \"s\" cannot be joined to itself",
+        ),
+    ] {
+        let got = refused(&format!("{coupler}{text}"));
+        assert_eq!(got, expected, "{text}");
+    }
+}
+
+#[test]
+fn a_file_that_is_missing_is_named() {
+    let error = Segment::load(Path::new("nowhere/none.toml")).unwrap_err();
+    assert_eq!(error.file, Some(PathBuf::from("nowhere/none.toml")));
+    assert!(error.to_string().starts_with("nowhere/none.toml: cannot be read"));
+}
+
+#[test]
+fn the_example_segments_of_this_crate_can_be_made() {
+    let directory = Path::new(env!("CARGO_MANIFEST_DIR")).join("segments");
+    let mut files: Vec<PathBuf> = std::fs::read_dir(directory).unwrap().map(|entry| entry.unwrap().path()).collect();
+    files.sort();
+    assert!(files.len() >= 3);
+    for file in files {
+        let segment = Segment::load(&file).unwrap_or_else(|error| panic!("{error}"));
+        assert!(Network::from_description(segment).is_ok(), "{}", file.display());
+    }
+}
+
+mod any_text {
+    use super::*;
+    use proptest::prelude::*;
+
+    const LINES: [&str; 16] = [
+        "[segment]",
+        "[[device]]",
+        "[[cable]]",
+        "ring = true",
+        "type = \"coupler\"",
+        "type = \"digital-input-8\"",
+        "sii = \"a.bin\"",
+        "name = \"a\"",
+        "attach = \"a.1\"",
+        "attach = \"none\"",
+        "from = \"a.1\"",
+        "to = \"a.2\"",
+        "count = 3",
+        "port = 1",
+        "alias = -1",
+        "name = \"\u{e4}\"",
+    ];
+
+    proptest! {
+        #[test]
+        fn never_panics(lines in prop::collection::vec(prop::sample::select(&LINES[..]), 0..14), noise in ".{0,20}") {
+            if let Ok(segment) = read(&lines.join("\n")) {
+                prop_assert!(Network::from_description(segment).is_ok());
+            }
+            let _ = read(&format!("{}\n{noise}", lines.join("\n")));
+        }
+    }
+}

@@ -26,9 +26,7 @@ struct Plan<'a> {
 
 /// All cables of the file.
 pub(super) fn plug(file: &File, text: &str, devices: &[PlannedDevice]) -> Result<Vec<CableSpec>, SegmentError> {
-    let delay = |given: Option<u64>| {
-        given.or(file.segment.cable_ns).map_or(DEFAULT_CABLE_DELAY, Duration::from_nanos)
-    };
+    let delay = |given: Option<u64>| given.or(file.segment.cable_ns).map_or(DEFAULT_CABLE_DELAY, Duration::from_nanos);
     // Listed cables first: what is attached without a port looks for a free one.
     let mut plan = Plan { text, devices, cables: Vec::new() };
     for cable in &file.cable {
@@ -145,7 +143,8 @@ impl Plan<'_> {
 
     fn join(&mut self, a: Endpoint, b: Endpoint, delay: Duration, span: &Range<usize>) -> Result<(), SegmentError> {
         if a == b {
-            return Err(self.error(format!("{} cannot be joined to itself", self.describe(a)), span));
+            let message = format!("{} cannot be joined to itself", self.describe(a));
+            return Err(self.blame(self.error(message, span), a));
         }
         for end in [a, b] {
             if let Some(other) = self.taken(end) {
