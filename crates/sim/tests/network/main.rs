@@ -5,6 +5,7 @@ mod determinism;
 mod examples;
 mod faults;
 mod random_walks;
+mod real_images;
 mod timing;
 mod vectors;
 mod wiring;
