@@ -71,6 +71,13 @@ pub enum Event {
         /// The port of entry, where known.
         entry_port: Option<u8>,
     },
+    /// Something else that is odd about a SubDevice's ports.
+    CablingOddity {
+        /// Where.
+        position: Position,
+        /// What.
+        what: String,
+    },
     /// Two SubDevices have one alias.
     DuplicateAlias {
         /// The alias.
@@ -90,9 +97,9 @@ pub enum Event {
     /// The place of the break, from the topology.
     BreakLocated {
         /// Last SubDevice before the break, `None` for the main link itself.
-        after: Option<usize>,
+        after: Option<Position>,
         /// First SubDevice behind it, `None` for the redundant link itself.
-        before: Option<usize>,
+        before: Option<Position>,
     },
     /// The ring closed again (RED_LINEFIXED).
     RingClosed {

@@ -14,38 +14,12 @@ use alloc::vec::Vec;
 use ringcat_wire::address::{Position, StationAddress};
 use ringcat_wire::register::{DlStatus, Features, Information, PortKind};
 use ringcat_wire::sii::{
-    CategoryKind, CoeDetails, DcMode, FmmuUsage, GeneralFlags, Identity, MailboxLayout, MailboxProtocols, PdoDirection,
-    SiiHeader, SiiSyncManager,
+    CategoryKind, CoeDetails, DcMode, FmmuUsage, GeneralFlags, Identity, MailboxLayout, MailboxProtocols, SiiHeader,
+    SiiSyncManager,
 };
 
+pub use crate::direction::Direction;
 pub use warning::{InfoWarning, SiiProblem};
-
-/// Which way process data goes, seen from the MainDevice.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub enum Direction {
-    /// From the MainDevice to the SubDevice.
-    Outputs,
-    /// From the SubDevice to the MainDevice.
-    Inputs,
-}
-
-impl core::fmt::Display for Direction {
-    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
-        f.write_str(match self {
-            Direction::Outputs => "outputs",
-            Direction::Inputs => "inputs",
-        })
-    }
-}
-
-impl From<PdoDirection> for Direction {
-    fn from(direction: PdoDirection) -> Direction {
-        match direction {
-            PdoDirection::Rx => Direction::Outputs,
-            PdoDirection::Tx => Direction::Inputs,
-        }
-    }
-}
 
 /// What the controller of a SubDevice is and can do.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -152,6 +126,8 @@ pub struct SubDeviceInfo {
     pub identity: Identity,
     /// The controller.
     pub controller: ControllerInfo,
+    /// The controller copies AL control into AL status by itself: no application, and no acknowledge bit (facts 3.4).
+    pub device_emulation: bool,
     /// Register DL_STATUS at the time of the scan.
     pub dl_status: DlStatus,
     /// Receive times of port 0..3 in nanoseconds of the local clock.

@@ -1,1 +1,35 @@
-//! Engine.
+//! The EtherCAT MainDevice as a pure machine: frames, time and requests go in; frames, deadlines and events come out.
+//!
+//! No socket, thread, clock or log sink is in here; `now` is always an argument. So the same code runs on a network
+//! interface in a real-time thread and in a test with a thousand SubDevices in virtual time.
+//!
+//! Two halves share nothing but the wire, a few atomics ([`board`]) and a bounded queue ([`queue`]):
+//!
+//! * [`exchange`]: the cyclic half. Process data and one supervision datagram. After activation it neither allocates nor
+//!   locks nor waits, and its work per call is bounded.
+//! * [`supervisor`]: everything else, as async [`procedures`] over an executor with injected time: scan, configuration,
+//!   state changes, mailbox, recovery.
+//!
+//! Both send through [`ring`], which marks frames, pairs the copies that travel both ways, and merges them.
+#![no_std]
+#![forbid(unsafe_code)]
+
+extern crate alloc;
+#[cfg(test)]
+extern crate std;
+
+pub mod board;
+pub mod config;
+pub mod direction;
+pub mod event;
+pub mod exchange;
+pub mod info;
+pub mod link;
+pub mod main_device;
+pub mod plan;
+pub mod procedures;
+pub mod queue;
+pub mod ring;
+pub mod supervisor;
+pub mod time;
+pub mod topology;

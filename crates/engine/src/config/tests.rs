@@ -1,1 +1,136 @@
+use core::time::Duration;
+use std::string::ToString;
+use std::vec;
+use std::vec::Vec;
 
+use ringcat_wire::address::Position;
+use ringcat_wire::al::AlState;
+use ringcat_wire::sii::Identity;
+
+use super::*;
+
+fn infos(products: &[u32]) -> Vec<SubDeviceInfo> {
+    let info = |(position, product_code): (u16, &u32)| SubDeviceInfo {
+        position: Position(position),
+        identity: Identity { vendor_id: 2, product_code: *product_code, revision: 3, serial: 4 },
+        ..SubDeviceInfo::default()
+    };
+    (0..).zip(products).map(info).collect()
+}
+
+fn config(position: u16, product: u32) -> SubDeviceConfig {
+    SubDeviceConfig::at_position(position).expect_product(2, product)
+}
+
+fn found(config: usize, info: usize) -> Resolution {
+    Resolution::Found { config, info }
+}
+
+#[test]
+fn each_declaration_finds_its_position_in_any_order() {
+    let configs = [config(1, 11), config(0, 10), SubDeviceConfig::at_position(2)];
+    assert_eq!(resolve(&configs, &infos(&[10, 11, 12])), [found(0, 1), found(1, 0), found(2, 2)]);
+}
+
+#[test]
+fn a_wrong_product_is_named_with_position_expected_and_got() {
+    let resolutions = resolve(&[config(0, 10)], &infos(&[11]));
+    let [Resolution::Failed { config: 0, error }, Resolution::Extra { info: 0 }] = resolutions[..] else {
+        panic!("{resolutions:?}")
+    };
+    assert_eq!(error.to_string(), "SubDevice 0: expected product code 0x0000000a, got 0x0000000b");
+}
+
+#[test]
+fn revision_and_serial_count_where_declared() {
+    let right = config(0, 10).expect_revision(3).expect_serial(4);
+    assert_eq!(resolve(&[right], &infos(&[10])), [found(0, 0)]);
+    let wrong = config(0, 10).expect_revision(9);
+    let error = ConfigError::Mismatch { position: Position(0), field: IdentityField::Revision, expected: 9, got: 3 };
+    assert_eq!(resolve(&[wrong], &infos(&[10]))[0], Resolution::Failed { config: 0, error });
+}
+
+#[test]
+fn a_missing_subdevice_is_an_error_and_an_undeclared_one_is_extra() {
+    let missing = ConfigError::Missing { address: ConfigAddress::Position(1), present: 1 };
+    let configs = [config(0, 10), config(1, 11)];
+    assert_eq!(resolve(&configs, &infos(&[10])), [found(0, 0), Resolution::Failed { config: 1, error: missing }]);
+    assert_eq!(resolve(&configs[..1], &infos(&[10, 11])), [found(0, 0), Resolution::Extra { info: 1 }]);
+    assert_eq!(missing.to_string(), "no SubDevice at position 1; 1 are present");
+}
+
+#[test]
+fn an_absent_optional_subdevice_moves_those_behind_it_forward() {
+    let configs = [config(0, 10), config(1, 11).optional(), config(2, 12)];
+    assert_eq!(resolve(&configs, &infos(&[10, 12])), [found(0, 0), Resolution::Absent { config: 1 }, found(2, 1)]);
+    assert_eq!(resolve(&configs, &infos(&[10, 11, 12])), [found(0, 0), found(1, 1), found(2, 2)]);
+}
+
+#[test]
+fn a_mandatory_subdevice_goes_before_an_optional_one_of_the_same_product() {
+    let configs = [config(0, 10).optional(), config(1, 10)];
+    assert_eq!(resolve(&configs, &infos(&[10])), [Resolution::Absent { config: 0 }, found(1, 0)]);
+}
+
+#[test]
+fn an_alias_counts_from_its_bearer_and_alias_0_from_the_start() {
+    let mut infos = infos(&[10, 11, 12]);
+    infos[1].alias = 5;
+    let configs = [SubDeviceConfig::at_alias(5, 0), SubDeviceConfig::at_alias(5, 1), SubDeviceConfig::at_alias(0, 0)];
+    assert_eq!(resolve(&configs, &infos), [found(0, 1), found(1, 2), found(2, 0)]);
+    let beyond = ConfigAddress::Alias { alias: 5, offset: 2 };
+    let resolutions = resolve(&[SubDeviceConfig::at_alias(5, 2)], &infos);
+    let error = ConfigError::Missing { address: beyond, present: 3 };
+    assert_eq!(resolutions[0], Resolution::Failed { config: 0, error });
+}
+
+#[test]
+fn two_subdevices_with_one_alias_are_ambiguous_and_named() {
+    let mut infos = infos(&[10, 11, 12, 13]);
+    (infos[0].alias, infos[2].alias, infos[3].alias) = (7, 7, 8);
+    let error = ConfigError::AmbiguousAlias { alias: 7, first: Position(0), second: Position(2) };
+    let failed = Resolution::Failed { config: 0, error };
+    assert_eq!(resolve(&[SubDeviceConfig::at_alias(7, 1)], &infos)[0], failed);
+    let duplicate = DuplicateAlias { alias: 7, first: Position(0), second: Position(2) };
+    assert_eq!(duplicate_aliases(&infos), [duplicate]);
+    assert_eq!(duplicate.to_string(), "SubDevice 0 and SubDevice 2 have the same alias 7");
+}
+
+#[test]
+fn two_declarations_for_one_subdevice_are_an_error() {
+    let error = ConfigError::DeclaredTwice { position: Position(0), first: 0 };
+    let resolutions = resolve(&[config(0, 10), SubDeviceConfig::at_alias(0, 0)], &infos(&[10]));
+    assert_eq!(resolutions, [found(0, 0), Resolution::Failed { config: 1, error }]);
+}
+
+#[test]
+fn a_later_declaration_of_a_sync_manager_replaces_the_earlier() {
+    let config = SubDeviceConfig::default()
+        .sync_manager(2, Direction::Inputs, Watchdog::Off)
+        .sync_manager(2, Direction::Outputs, Watchdog::On)
+        .assign(2, Direction::Inputs, vec![])
+        .assign(2, Direction::Outputs, vec![PdoMapping::from_sii(0x1600)]);
+    let declared = SyncManagerOverride { index: 2, direction: Direction::Outputs, watchdog: Watchdog::On };
+    assert_eq!(config.sync_managers, [declared]);
+    let pdos = config.pdos.unwrap();
+    assert_eq!((pdos.len(), pdos[0].pdos[0].index), (1, 0x1600));
+}
+
+#[test]
+fn default_time_limits_are_those_of_facts_5_4() {
+    let timeouts = Timeouts::default();
+    let limit = |from, to| timeouts.transition(from, to);
+    assert_eq!(limit(AlState::Init, AlState::PreOp), Duration::from_secs(3));
+    assert_eq!(limit(AlState::Init, AlState::Boot), Duration::from_secs(3));
+    assert_eq!(limit(AlState::PreOp, AlState::SafeOp), Duration::from_secs(10));
+    assert_eq!(limit(AlState::SafeOp, AlState::Op), Duration::from_secs(10));
+    assert_eq!(limit(AlState::Op, AlState::Init), Duration::from_secs(5));
+    assert_eq!(limit(AlState::Op, AlState::SafeOp), Duration::from_millis(200));
+}
+
+#[test]
+fn a_declaration_from_a_scan_finds_its_subdevice_again() {
+    let infos = infos(&[10, 11]);
+    let configs: Vec<_> = infos.iter().map(SubDeviceConfig::from_info).collect();
+    assert_eq!(resolve(&configs, &infos), [found(0, 0), found(1, 1)]);
+}

@@ -13,20 +13,12 @@ use ringcat_wire::address::{LogicalAddress, Wkc};
 use ringcat_wire::command::Command;
 use ringcat_wire::datagram::{MAX_DATA, OVERHEAD};
 
+use crate::direction::Direction;
 use crate::link::LinkSet;
 
 /// Number of a domain, in the order of declaration.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct DomainId(pub usize);
-
-/// Which way process data flows.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub enum Flow {
-    /// MainDevice to SubDevice.
-    Outputs,
-    /// SubDevice to MainDevice.
-    Inputs,
-}
 
 /// One SyncManager's process data that takes part in a domain.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -36,7 +28,7 @@ pub struct AreaSpec {
     /// SyncManager number.
     pub sync_manager: u8,
     /// Direction.
-    pub flow: Flow,
+    pub direction: Direction,
     /// Bytes.
     pub length: u16,
 }
@@ -223,9 +215,9 @@ impl Chunk {
 
     fn add(&mut self, area: AreaSpec) {
         self.bytes += usize::from(area.length);
-        match area.flow {
-            Flow::Outputs => self.outputs.push(area),
-            Flow::Inputs => self.inputs.push(area),
+        match area.direction {
+            Direction::Outputs => self.outputs.push(area),
+            Direction::Inputs => self.inputs.push(area),
         }
     }
 }

@@ -3,6 +3,7 @@
 use alloc::string::String;
 use alloc::vec::Vec;
 
+use ringcat_wire::register::EscConfiguration;
 use ringcat_wire::sii::{
     CategoryKind, DcMode, DcModes, FmmuUsages, General, MailboxLayout, Pdo, PdoDirection, PdoEntry, Pdos, SiiHeader,
     SiiSyncManager, SiiSyncManagers, Strings, SyncManagerKind,
@@ -40,12 +41,15 @@ impl<'a> Parts<'_, 'a> {
 /// See [`SubDeviceInfo::from_parts`].
 pub(super) fn collect(readout: Readout, header: &SiiHeader, parts: &[(CategoryKind, &[u8])]) -> SubDeviceInfo {
     let parts = Parts { parts };
+    // The high byte of the first word is what the controller loads into ESC_CONFIGURATION.
+    let esc_configuration = (header.pdi_control >> 8) as u8;
     let mut info = SubDeviceInfo {
         position: readout.position,
         station: readout.station,
         alias: readout.alias,
         identity: header.identity,
         controller: readout.information.into(),
+        device_emulation: EscConfiguration::from_bits(esc_configuration).device_emulation,
         dl_status: readout.dl_status,
         receive_times: readout.receive_times,
         ..SubDeviceInfo::default()

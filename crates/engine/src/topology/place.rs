@@ -28,6 +28,7 @@ struct Placed {
 /// The walk so far.
 pub(super) struct Walk<'s> {
     status: &'s [NodeStatus],
+    trust_times: bool,
     pub(super) nodes: Vec<Node>,
     /// Slots that the frame will still come to, the next one last.
     pub(super) slots: Vec<Slot>,
@@ -41,21 +42,25 @@ pub(super) struct Walk<'s> {
 
 /// See [`Topology::build`].
 pub(super) fn build(status: &[NodeStatus], main_count: usize) -> Topology {
-    let mut walk = Walk::new(status);
-    walk.slots.push(None);
-    (0..main_count).for_each(|node| walk.place(node));
+    // In a closed ring frames come in from both sides, and the earlier one need not be that which the processing unit
+    // meets: receive times say nothing about crossed lines (LC-02). A closed ring leaves a slot over.
+    let mut walk = Walk::along_main(status, main_count, false);
+    if walk.slots.is_empty() {
+        walk = Walk::along_main(status, main_count, true);
+    }
     let rest = main_count..status.len();
     let head = rest.clone().find(|node| !walk.is_open(*node, 0));
     let redundant_head = match head {
         Some(head) => {
             walk.close();
+            walk.trust_times = true;
             walk.stub(rest, head);
             Some(head)
         }
         None => {
             // A closed ring: the frame of the main link left through the next slot; what comes behind it, frames of
-            // the redundant link meet.
-            if !rest.is_empty() {
+            // the redundant link meet. Where the main link met nobody, the other one is all there is.
+            if !rest.is_empty() && walk.slots.last() != Some(&None) {
                 walk.leave();
             }
             rest.for_each(|node| walk.place(node));
@@ -72,16 +77,20 @@ pub(super) fn build(status: &[NodeStatus], main_count: usize) -> Topology {
 }
 
 impl<'s> Walk<'s> {
-    fn new(status: &'s [NodeStatus]) -> Walk<'s> {
-        Walk {
+    /// Hangs those that the frames of the main link met.
+    fn along_main(status: &'s [NodeStatus], main_count: usize, trust_times: bool) -> Walk<'s> {
+        let mut walk = Walk {
             status,
+            trust_times,
             nodes: vec![Node::default(); status.len()],
-            slots: Vec::new(),
+            slots: vec![None],
             placed: Vec::new(),
             placed_at: vec![usize::MAX; status.len()],
             open_ports: Vec::new(),
             findings: Vec::new(),
-        }
+        };
+        (0..main_count).for_each(|node| walk.place(node));
+        walk
     }
 
     /// Whether frames pass a port.
@@ -104,7 +113,7 @@ impl<'s> Walk<'s> {
 
     /// The open port at which the frame came in first by its receive times (LC-05); `None` where they do not say.
     pub(super) fn earliest(&self, node: usize) -> Option<u8> {
-        let times = self.status[node].receive_times?;
+        let times = self.status[node].receive_times.filter(|_| self.trust_times)?;
         let open = || (0..4).filter(|port| self.is_open(node, *port));
         let first = open().reduce(|a, b| if before(&times, b, a) { b } else { a })?;
         open().all(|port| port == first || before(&times, first, port)).then_some(first)

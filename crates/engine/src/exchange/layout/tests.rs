@@ -6,8 +6,8 @@ use proptest::prelude::*;
 
 use super::*;
 
-fn area(subdevice: usize, sync_manager: u8, flow: Flow, length: u16) -> AreaSpec {
-    AreaSpec { subdevice, sync_manager, flow, length }
+fn area(subdevice: usize, sync_manager: u8, direction: Direction, length: u16) -> AreaSpec {
+    AreaSpec { subdevice, sync_manager, direction, length }
 }
 
 fn spec(areas: Vec<AreaSpec>) -> DomainSpec {
@@ -16,7 +16,8 @@ fn spec(areas: Vec<AreaSpec>) -> DomainSpec {
 
 #[test]
 fn one_link_uses_lrw_and_two_links_use_lwr_and_lrd() {
-    let areas = vec![area(0, 2, Flow::Outputs, 4), area(0, 3, Flow::Inputs, 6), area(1, 0, Flow::Outputs, 1)];
+    let areas =
+        vec![area(0, 2, Direction::Outputs, 4), area(0, 3, Direction::Inputs, 6), area(1, 0, Direction::Outputs, 1)];
     let single = Layout::new(&[spec(areas.clone())], LinkSet::Single, false).unwrap();
     let frame = &single.domains[0].frames[0];
     assert_eq!(frame.datagrams.len(), 1);
@@ -33,14 +34,14 @@ fn one_link_uses_lrw_and_two_links_use_lwr_and_lrd() {
 
 #[test]
 fn two_areas_of_one_subdevice_count_once_per_direction() {
-    let areas = vec![area(0, 3, Flow::Inputs, 2), area(0, 4, Flow::Inputs, 2)];
+    let areas = vec![area(0, 3, Direction::Inputs, 2), area(0, 4, Direction::Inputs, 2)];
     let layout = Layout::new(&[spec(areas)], LinkSet::Single, false).unwrap();
     assert_eq!(layout.domains[0].frames[0].datagrams[0].contributions, vec![(0, Wkc(1))]);
 }
 
 #[test]
 fn a_domain_larger_than_a_frame_is_cut_between_areas() {
-    let areas = (0..4).map(|n| area(n, 3, Flow::Inputs, 700)).collect();
+    let areas = (0..4).map(|n| area(n, 3, Direction::Inputs, 700)).collect();
     let layout = Layout::new(&[spec(areas)], LinkSet::Single, true).unwrap();
     let lengths: Vec<_> = layout.domains[0].frames.iter().map(|f| f.datagrams[0].inputs).collect();
     assert_eq!(lengths, vec![1400, 1400]);
@@ -49,9 +50,9 @@ fn a_domain_larger_than_a_frame_is_cut_between_areas() {
 
 #[test]
 fn an_area_beyond_a_datagram_is_refused_with_its_name() {
-    let error = Layout::new(&[spec(vec![area(7, 3, Flow::Inputs, 1487)])], LinkSet::Single, false).unwrap_err();
+    let error = Layout::new(&[spec(vec![area(7, 3, Direction::Inputs, 1487)])], LinkSet::Single, false).unwrap_err();
     assert_eq!(error, LayoutError::AreaTooLong { subdevice: 7, sync_manager: 3, length: 1487 });
-    let full = Layout::new(&[spec(vec![area(7, 3, Flow::Inputs, 1486)])], LinkSet::Single, true).unwrap();
+    let full = Layout::new(&[spec(vec![area(7, 3, Direction::Inputs, 1486)])], LinkSet::Single, true).unwrap();
     // No room for supervision beside it: a frame of its own.
     assert_eq!(full.domains[0].frames.len(), 2);
     assert!(full.domains[0].frames[1].supervision);
@@ -64,8 +65,8 @@ proptest! {
     ) {
         let mut areas = Vec::new();
         for (n, (out, inp)) in lengths.iter().enumerate() {
-            areas.push(area(n, 2, Flow::Outputs, *out));
-            areas.push(area(n, 3, Flow::Inputs, *inp));
+            areas.push(area(n, 2, Direction::Outputs, *out));
+            areas.push(area(n, 3, Direction::Inputs, *inp));
         }
         let links = if ring { LinkSet::Ring } else { LinkSet::Single };
         let layout = Layout::new(&[DomainSpec { lrw, ..spec(areas) }], links, true).unwrap();

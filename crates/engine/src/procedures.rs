@@ -1,0 +1,14 @@
+//! Procedures: async functions, each the whole story of a job, one file per job.
+//!
+//! They see the bus through [`crate::supervisor::Bus`] and time through nothing else.
+
+pub mod al_state;
+pub mod configure;
+pub mod fleet;
+pub mod inspect;
+pub mod mailbox;
+pub mod recover;
+pub mod scan;
+pub mod sdo;
+pub mod sii;
+pub mod supervise;

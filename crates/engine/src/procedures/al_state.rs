@@ -1,0 +1,124 @@
+//! Requesting a state of a SubDevice and waiting for it (facts 5.3).
+
+use core::fmt;
+use core::time::Duration;
+
+use ringcat_wire::address::StationAddress;
+use ringcat_wire::al::{AlControl, AlState, AlStatus, AlStatusCode};
+use ringcat_wire::register::map;
+
+use crate::supervisor::{Bus, BusError};
+
+/// First pause between two looks at AL status; later ones grow by a half, so that a change that takes milliseconds is
+/// seen soon and one that takes seconds costs few datagrams.
+const FIRST_PAUSE: Duration = Duration::from_micros(500);
+/// Longest pause.
+const LONGEST_PAUSE: Duration = Duration::from_millis(10);
+/// How long a SubDevice may take to clear its error bit after the acknowledgement.
+const ACKNOWLEDGE_LIMIT: Duration = Duration::from_millis(500);
+
+/// Why a SubDevice is not in the requested state.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum StateError {
+    /// The bus failed.
+    Bus(BusError),
+    /// The SubDevice refused.
+    Refused {
+        /// What was asked for.
+        requested: AlState,
+        /// What AL status says.
+        status: AlStatus,
+        /// Why.
+        code: AlStatusCode,
+    },
+    /// The SubDevice did not get there in time.
+    Timeout {
+        /// What was asked for.
+        requested: AlState,
+        /// What AL status said last.
+        status: AlStatus,
+        /// How long was waited.
+        limit: Duration,
+    },
+}
+
+impl fmt::Display for StateError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            StateError::Bus(error) => error.fmt(f),
+            StateError::Refused { requested, status, code } => {
+                write!(f, "refused {requested}: AL status {status}, code {code}")
+            }
+            StateError::Timeout { requested, status, limit } => {
+                write!(f, "expected {requested} within {} ms, AL status is {status}", limit.as_millis())
+            }
+        }
+    }
+}
+
+impl core::error::Error for StateError {}
+
+impl From<BusError> for StateError {
+    fn from(error: BusError) -> StateError {
+        StateError::Bus(error)
+    }
+}
+
+/// AL status and AL status code, in one datagram.
+pub async fn read_status(bus: &Bus, station: StationAddress) -> Result<(AlStatus, AlStatusCode), BusError> {
+    let bytes: [u8; 6] = bus.fprd_array(station, map::AL_STATUS).await?;
+    Ok(split_status(&bytes))
+}
+
+/// AL status (0x0130) and AL status code (0x0134) from the six bytes that hold both.
+pub(super) fn split_status(bytes: &[u8; 6]) -> (AlStatus, AlStatusCode) {
+    let [a, b, _, _, c, d] = *bytes;
+    (AlStatus::decode(&[a, b]), AlStatusCode::decode(&[c, d]))
+}
+
+/// Clears an error by acknowledging it in the present state. Devices that copy AL control into AL status must not be
+/// acknowledged: for them the acknowledge bit is the error bit, and writing the bare state clears it.
+pub async fn acknowledge(bus: &Bus, station: StationAddress, emulated: bool) -> Result<AlStatus, StateError> {
+    let (status, _) = read_status(bus, station).await?;
+    let state = status.al_state().unwrap_or(AlState::Init);
+    let control = if emulated { AlControl::new(state) } else { AlControl::with_acknowledge(state) };
+    bus.fpwr(station, map::AL_CONTROL, &control.encode()).await?;
+    let limit = bus.now() + ACKNOWLEDGE_LIMIT;
+    let mut pause = FIRST_PAUSE;
+    loop {
+        let (status, _) = read_status(bus, station).await?;
+        if !status.error || bus.now() >= limit {
+            return Ok(status);
+        }
+        bus.sleep(pause).await;
+        pause = (pause * 3 / 2).min(LONGEST_PAUSE);
+    }
+}
+
+/// Requests a state and waits for it. A refusal is read with its code, and acknowledged.
+pub async fn request(
+    bus: &Bus,
+    station: StationAddress,
+    state: AlState,
+    emulated: bool,
+    limit: Duration,
+) -> Result<(), StateError> {
+    bus.fpwr(station, map::AL_CONTROL, &AlControl::new(state).encode()).await?;
+    let until = bus.now() + limit;
+    let mut pause = FIRST_PAUSE;
+    loop {
+        let (status, code) = read_status(bus, station).await?;
+        if status.error {
+            acknowledge(bus, station, emulated).await?;
+            return Err(StateError::Refused { requested: state, status, code });
+        }
+        if status.al_state() == Some(state) {
+            return Ok(());
+        }
+        if bus.now() >= until {
+            return Err(StateError::Timeout { requested: state, status, limit });
+        }
+        bus.sleep(pause).await;
+        pause = (pause * 3 / 2).min(LONGEST_PAUSE);
+    }
+}

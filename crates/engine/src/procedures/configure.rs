@@ -1,0 +1,196 @@
+//! Bringing one SubDevice from INIT to its target state with its whole configuration (facts 5.2, order of IgH).
+
+use alloc::rc::Rc;
+use alloc::vec;
+use core::fmt;
+use core::time::Duration;
+
+use ringcat_wire::address::StationAddress;
+use ringcat_wire::al::AlState;
+use ringcat_wire::register::{Fmmu, SyncManager, map};
+
+use super::al_state::{self, StateError};
+use super::fleet::{Setup, SharedFleet};
+use super::mailbox::Mailbox;
+use super::sdo::{self, SdoAddress, SdoError};
+use super::sii;
+use crate::config::{SdoDownload, Timeouts};
+use crate::supervisor::{Bus, BusError};
+
+/// Cycles of the exchange that must have gone by before OP is requested, so that valid outputs are there (facts 5.2).
+const CYCLES_BEFORE_OP: u64 = 2;
+/// Pause between two looks at the cycle counter.
+const CYCLE_PAUSE: Duration = Duration::from_micros(500);
+
+/// Why a SubDevice is not configured.
+#[derive(Clone, Debug, PartialEq)]
+pub enum ConfigureError {
+    /// The bus failed.
+    Bus(BusError),
+    /// A state was not reached.
+    State(StateError),
+    /// An SDO failed.
+    Sdo(SdoError),
+    /// It never was there, so nothing is known to write.
+    NoSetup,
+}
+
+impl fmt::Display for ConfigureError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            ConfigureError::Bus(error) => error.fmt(f),
+            ConfigureError::State(error) => error.fmt(f),
+            ConfigureError::Sdo(error) => error.fmt(f),
+            ConfigureError::NoSetup => f.write_str("nothing is known about this SubDevice yet"),
+        }
+    }
+}
+
+impl core::error::Error for ConfigureError {}
+
+impl From<BusError> for ConfigureError {
+    fn from(error: BusError) -> ConfigureError {
+        ConfigureError::Bus(error)
+    }
+}
+
+impl From<StateError> for ConfigureError {
+    fn from(error: StateError) -> ConfigureError {
+        match error {
+            StateError::Bus(error) => ConfigureError::Bus(error),
+            error => ConfigureError::State(error),
+        }
+    }
+}
+
+impl From<SdoError> for ConfigureError {
+    fn from(error: SdoError) -> ConfigureError {
+        ConfigureError::Sdo(error)
+    }
+}
+
+/// What a SubDevice is like when its configuration begins.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Start {
+    /// A scan has just put it into INIT and cleared its registers.
+    Cleared,
+    /// Anything.
+    Unknown,
+}
+
+/// One SubDevice's bring-up.
+pub(super) struct BringUp<'a> {
+    pub bus: &'a Bus,
+    pub fleet: &'a SharedFleet,
+    pub index: usize,
+    pub station: StationAddress,
+    pub setup: Rc<Setup>,
+    pub timeouts: Timeouts,
+    pub target: AlState,
+}
+
+impl BringUp<'_> {
+    /// The whole way. Process data counts on the SubDevice from the moment its FMMUs are written.
+    pub(super) async fn run(&self, start: Start) -> Result<(), ConfigureError> {
+        self.fleet.board.set_taking_part(self.index, false);
+        if start == Start::Unknown {
+            self.back_to_init().await?;
+        }
+        if self.target == AlState::Init {
+            return Ok(());
+        }
+        self.preop().await?;
+        if self.target == AlState::PreOp {
+            return Ok(());
+        }
+        self.safeop().await?;
+        if self.target == AlState::Op {
+            self.op().await?;
+        }
+        Ok(())
+    }
+
+    async fn request(&self, from: AlState, to: AlState) -> Result<(), ConfigureError> {
+        let limit = self.timeouts.transition(from, to);
+        Ok(al_state::request(self.bus, self.station, to, self.setup.emulated, limit).await?)
+    }
+
+    async fn back_to_init(&self) -> Result<(), ConfigureError> {
+        let (status, _) = al_state::read_status(self.bus, self.station).await?;
+        if status.error {
+            al_state::acknowledge(self.bus, self.station, self.setup.emulated).await?;
+        }
+        self.request(AlState::Op, AlState::Init).await?;
+        let fmmus = vec![0; Fmmu::LEN * usize::from(self.setup.fmmu_count)];
+        self.bus.fpwr(self.station, map::FMMU_BASE, &fmmus).await?;
+        let sync_managers = vec![0; SyncManager::LEN * usize::from(self.setup.sync_manager_count)];
+        self.bus.fpwr(self.station, map::SYNC_MANAGER_BASE, &sync_managers).await?;
+        Ok(())
+    }
+
+    async fn write_sync_manager(&self, index: u8, register: &SyncManager) -> Result<(), BusError> {
+        self.bus.fpwr(self.station, map::sync_manager(index), &register.encode()).await
+    }
+
+    /// Mailbox, EEPROM to the PDI for the time of the transition, PREOP.
+    async fn preop(&self) -> Result<(), ConfigureError> {
+        for sync_manager in &self.setup.plan.mailbox {
+            self.write_sync_manager(sync_manager.index, &sync_manager.register).await?;
+        }
+        let has_application = !self.setup.plan.mailbox.is_empty();
+        if has_application {
+            sii::assign(self.bus, self.station, true).await?;
+        }
+        self.request(AlState::Init, AlState::PreOp).await?;
+        if has_application {
+            sii::assign(self.bus, self.station, false).await?;
+        }
+        Ok(())
+    }
+
+    /// SDOs, watchdog, process data SyncManagers, FMMUs, SAFEOP.
+    async fn safeop(&self) -> Result<(), ConfigureError> {
+        let plan = &self.setup.plan;
+        self.download_all().await?;
+        for (register, data) in &plan.watchdog {
+            self.bus.fpwr(self.station, *register, data).await?;
+        }
+        for area in &plan.process_data {
+            let mut register = area.register;
+            register.activate.enable &= !area.op_only;
+            self.write_sync_manager(area.sync_manager, &register).await?;
+        }
+        for (number, fmmu) in &self.setup.fmmus {
+            self.bus.fpwr(self.station, map::fmmu(*number), &fmmu.encode()).await?;
+        }
+        self.fleet.board.set_taking_part(self.index, true);
+        self.request(AlState::PreOp, AlState::SafeOp).await
+    }
+
+    /// Waits until outputs flow, then OP.
+    async fn op(&self) -> Result<(), ConfigureError> {
+        for area in self.setup.plan.process_data.iter().filter(|area| area.op_only) {
+            self.write_sync_manager(area.sync_manager, &area.register).await?;
+        }
+        let cycles = self.fleet.board.cycles() + CYCLES_BEFORE_OP;
+        while self.fleet.board.cycles() < cycles {
+            self.bus.sleep(CYCLE_PAUSE).await;
+        }
+        self.request(AlState::SafeOp, AlState::Op).await
+    }
+
+    async fn download_all(&self) -> Result<(), ConfigureError> {
+        let plan = &self.setup.plan;
+        let layout = self.fleet.access().members.get(self.index).and_then(|m| m.info.as_ref()?.mailbox);
+        let Some(layout) = layout.filter(|_| !(plan.sdos.is_empty() && plan.assign_sdos.is_empty())) else {
+            return Ok(());
+        };
+        let mut mailbox = Mailbox::new(self.station, layout);
+        let limits = (self.timeouts.mailbox_request, self.timeouts.sdo);
+        for SdoDownload { index, sub_index, complete_access, data } in plan.sdos.iter().chain(&plan.assign_sdos) {
+            let object = SdoAddress { index: *index, sub_index: *sub_index, complete_access: *complete_access };
+            sdo::download(self.bus, &mut mailbox, object, data, limits, |_| ()).await?;
+        }
+        Ok(())
+    }
+}

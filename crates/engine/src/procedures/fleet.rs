@@ -1,0 +1,183 @@
+//! What the procedures know about the declared SubDevices, shared by all of them.
+
+use alloc::rc::Rc;
+use alloc::sync::Arc;
+use alloc::vec::Vec;
+use core::cell::{RefCell, RefMut};
+
+use ringcat_wire::address::StationAddress;
+use ringcat_wire::al::AlState;
+use ringcat_wire::register::Fmmu;
+
+use super::sii::SiiCache;
+use crate::board::Board;
+use crate::config::SubDeviceConfig;
+use crate::exchange::Layout;
+use crate::info::{Direction, SubDeviceInfo};
+use crate::plan::{self, AreaPlan, PlanError, SubDevicePlan};
+use crate::topology::Topology;
+
+/// How far a SubDevice is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Phase {
+    /// It does not answer.
+    Absent,
+    /// It is being configured, or waits for the next attempt.
+    Configuring,
+    /// It is in its target state.
+    Settled(AlState),
+}
+
+/// A SubDevice that the application declared.
+#[derive(Debug)]
+pub struct Member {
+    /// The declaration.
+    pub config: SubDeviceConfig,
+    /// Who it is; `None` while it has never been seen.
+    pub info: Option<SubDeviceInfo>,
+    /// Its station address.
+    pub station: StationAddress,
+    /// How far it is.
+    pub phase: Phase,
+    /// Its configuration, shared with the procedure that applies it.
+    pub setup: Option<Rc<Setup>>,
+}
+
+/// What has to be written to one SubDevice, complete with logical addresses.
+#[derive(Debug)]
+pub struct Setup {
+    /// Registers and SDOs.
+    pub plan: SubDevicePlan,
+    /// FMMU number and registers.
+    pub fmmus: Vec<(u8, Fmmu)>,
+    /// FMMUs that the controller has.
+    pub fmmu_count: u8,
+    /// SyncManagers that the controller has.
+    pub sync_manager_count: u8,
+    /// AL control is copied into AL status by hardware.
+    pub emulated: bool,
+}
+
+/// An area whose size on the SubDevice differs from that in the layout.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum SetupError {
+    /// The declaration does not fit the SubDevice.
+    Plan(PlanError),
+    /// The process image has no place, or another one, for what the SubDevice has.
+    Area {
+        /// The SyncManager.
+        sync_manager: u8,
+        /// Bytes in the process image.
+        expected: u16,
+        /// Bytes of the SubDevice.
+        got: u16,
+    },
+}
+
+impl core::fmt::Display for SetupError {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        match self {
+            SetupError::Plan(error) => error.fmt(f),
+            SetupError::Area { sync_manager, expected, got } => write!(
+                f,
+                "SyncManager {sync_manager}: the process image has {expected} bytes for it, the SubDevice {got}"
+            ),
+        }
+    }
+}
+
+impl core::error::Error for SetupError {}
+
+impl Setup {
+    /// Plans a SubDevice and gives its areas the logical addresses of the layout. Areas that no domain holds are
+    /// configured without an FMMU.
+    pub fn new(
+        index: usize,
+        config: &SubDeviceConfig,
+        info: &SubDeviceInfo,
+        layout: &Layout,
+    ) -> Result<Setup, SetupError> {
+        let plan = plan::plan(config, info).map_err(SetupError::Plan)?;
+        let mut fmmus = Vec::new();
+        for (number, area) in plan.mapped_areas() {
+            let Some((_, placed)) = layout.area(index, area.sync_manager) else { continue };
+            if placed.area.length != area.length {
+                let (expected, got) = (placed.area.length, area.length);
+                return Err(SetupError::Area { sync_manager: area.sync_manager, expected, got });
+            }
+            fmmus.push((number, plan::fmmu(area, placed.logical)));
+        }
+        Ok(Setup {
+            plan,
+            fmmus,
+            fmmu_count: info.controller.fmmu_count,
+            sync_manager_count: info.controller.sync_manager_count,
+            emulated: info.device_emulation,
+        })
+    }
+}
+
+/// Bytes of the process data areas that a declaration fixes by itself, for a SubDevice that is not there yet.
+pub fn declared_areas(config: &SubDeviceConfig) -> Option<Vec<(u8, Direction, u16)>> {
+    let mut areas = Vec::new();
+    for assignment in config.pdos.as_ref()? {
+        let mut bits = 0;
+        for pdo in &assignment.pdos {
+            bits += pdo.entries.as_ref()?.iter().map(|entry| u32::from(entry.bit_length)).sum::<u32>();
+        }
+        areas.push((assignment.sync_manager, assignment.direction, u16::try_from(bits.div_ceil(8)).ok()?));
+    }
+    Some(areas)
+}
+
+/// Bytes of the process data areas of a plan.
+pub fn planned_areas(plan: &SubDevicePlan) -> Vec<(u8, Direction, u16)> {
+    plan.process_data.iter().map(|area: &AreaPlan| (area.sync_manager, area.direction, area.length)).collect()
+}
+
+/// Everything that procedures share after activation.
+#[derive(Debug)]
+pub struct Fleet {
+    /// The declared SubDevices.
+    pub members: Vec<Member>,
+    /// Station addresses given to SubDevices that nobody declared.
+    pub strangers: Vec<StationAddress>,
+    /// Where process data lies.
+    pub layout: Layout,
+    /// Connections as the scan found them.
+    pub topology: Topology,
+    /// SII contents read before.
+    pub cache: SiiCache,
+}
+
+/// Shared by all procedures of one MainDevice.
+#[derive(Clone, Debug)]
+pub struct SharedFleet {
+    fleet: Rc<RefCell<Fleet>>,
+    /// Who takes part in process data.
+    pub board: Arc<Board>,
+}
+
+impl SharedFleet {
+    /// Shares a fleet.
+    pub fn new(fleet: Fleet, board: Arc<Board>) -> SharedFleet {
+        SharedFleet { fleet: Rc::new(RefCell::new(fleet)), board }
+    }
+
+    /// Access between two points at which a procedure waits.
+    pub fn access(&self) -> RefMut<'_, Fleet> {
+        self.fleet.borrow_mut()
+    }
+
+    /// Notes how far a SubDevice is.
+    pub fn set_phase(&self, index: usize, phase: Phase) {
+        if let Some(member) = self.access().members.get_mut(index) {
+            member.phase = phase;
+        }
+    }
+
+    /// How far a SubDevice is.
+    pub fn phase(&self, index: usize) -> Phase {
+        self.access().members.get(index).map_or(Phase::Absent, |member| member.phase)
+    }
+}

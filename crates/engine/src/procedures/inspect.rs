@@ -1,0 +1,85 @@
+//! Looking at all declared SubDevices: who answers, in which state, with which ports; and where a ring is broken.
+
+use alloc::rc::Rc;
+use alloc::vec;
+use alloc::vec::Vec;
+use core::cell::RefCell;
+
+use ringcat_wire::address::Position;
+use ringcat_wire::al::{AlStatus, AlStatusCode};
+use ringcat_wire::register::{DlStatus, map};
+
+use super::al_state::split_status;
+use super::fleet::SharedFleet;
+use crate::supervisor::{Bus, BusError};
+use crate::topology::Topology;
+
+/// What a SubDevice said.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(super) enum Look {
+    /// Its frames were lost: nothing is known.
+    #[default]
+    Unknown,
+    /// Frames came back, it did not answer.
+    Silent,
+    /// It answered.
+    Answer { status: AlStatus, code: AlStatusCode, dl_status: DlStatus },
+}
+
+/// Looks at all members at once.
+pub(super) async fn look_at_all(bus: &Bus, fleet: &SharedFleet) -> Vec<Look> {
+    let stations: Vec<_> = fleet.access().members.iter().map(|member| member.station).collect();
+    let looks = Rc::new(RefCell::new(vec![Look::Unknown; stations.len()]));
+    let group = bus.group();
+    for (index, station) in stations.into_iter().enumerate() {
+        let (bus, looks) = (bus.clone(), looks.clone());
+        group.spawn(async move {
+            let look = match look_at(&bus, station).await {
+                Ok(look) => look,
+                Err(BusError::Wkc { .. }) => Look::Silent,
+                Err(BusError::Lost { .. }) => Look::Unknown,
+            };
+            looks.borrow_mut()[index] = look;
+        });
+    }
+    group.done().await;
+    looks.take()
+}
+
+async fn look_at(bus: &Bus, station: ringcat_wire::address::StationAddress) -> Result<Look, BusError> {
+    let bytes: [u8; 6] = bus.fprd_array(station, map::AL_STATUS).await?;
+    let (status, code) = split_status(&bytes);
+    let dl_status = DlStatus::decode(&bus.fprd_array(station, map::DL_STATUS).await?);
+    Ok(Look::Answer { status, code, dl_status })
+}
+
+/// Neighbours of a break: the last SubDevice before it and the first behind it, in the order of the scan. `None` on a
+/// side is the link itself.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Break {
+    pub after: Option<Position>,
+    pub before: Option<Position>,
+}
+
+/// The place where a connection of the scan no longer has communication. `dl_status` by position.
+pub(super) fn locate_break(topology: &Topology, dl_status: &[Option<DlStatus>]) -> Option<Break> {
+    let down = |node: usize, port: u8| {
+        let status = dl_status.get(node).copied().flatten()?;
+        Some(!status.ports[usize::from(port & 3)].communication)
+    };
+    let position = |node: usize| Some(Position(u16::try_from(node).unwrap_or(u16::MAX)));
+    if down(0, topology.nodes.first()?.entry_port) == Some(true) {
+        return Some(Break { after: None, before: position(0) });
+    }
+    for node in 0..topology.nodes.len() {
+        let Some(connection) = topology.connection_to(node) else { continue };
+        let near = down(connection.near.node, connection.near.port);
+        let far = down(connection.far.node, connection.far.port);
+        // One end is enough: the other may have no power.
+        if near == Some(true) || far == Some(true) {
+            return Some(Break { after: position(connection.near.node), before: position(node) });
+        }
+    }
+    let lost = topology.open_ports.iter().find(|at| down(at.node, at.port) == Some(true))?;
+    Some(Break { after: position(lost.node), before: None })
+}
