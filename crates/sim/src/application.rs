@@ -121,8 +121,9 @@ impl Application {
     }
 
     /// Inputs come from this source from now on.
-    pub fn set_source(&mut self, source: InputSource, controller: &mut Controller) {
+    pub fn set_source(&mut self, source: InputSource, description: &DeviceDescription, controller: &mut Controller) {
         self.process_data.set_source(source, controller, self.last_run);
+        self.watch(description);
     }
 
     /// Changes an object from inside the device.
@@ -285,13 +286,7 @@ impl Application {
     }
 
     /// A transition is due.
-    fn finish(
-        &mut self,
-        pending: Pending,
-        description: &DeviceDescription,
-        controller: &mut Controller,
-        now: SimTime,
-    ) {
+    fn finish(&mut self, pending: Pending, description: &DeviceDescription, controller: &mut Controller, now: SimTime) {
         if pending.to == AlState::Op && !self.process_data.outputs_seen() {
             if now >= pending.give_up {
                 self.machine.refuse(AlStatusCode::NO_VALID_OUTPUTS);
@@ -370,13 +365,7 @@ impl Application {
         }
     }
 
-    fn run_mailbox(
-        &mut self,
-        description: &DeviceDescription,
-        controller: &mut Controller,
-        events: u32,
-        now: SimTime,
-    ) {
+    fn run_mailbox(&mut self, description: &DeviceDescription, controller: &mut Controller, events: u32, now: SimTime) {
         let (Some(mailbox), Some(declared)) = (&mut self.mailbox, description.mailbox) else {
             return;
         };

@@ -1,1 +1,48 @@
-//! Devices out of the box.
+//! Devices out of the box, by name.
+//!
+//! In: a name as segment files use it. Out: a [`DeviceDescription`] to be changed at will before a device is made of it.
+//! Vendor and product numbers are the simulator's own; SyncManager settings are like those of real terminals (facts
+//! 3.11). Terminals are in [`terminals`], drive, block and junctions in [`machines`].
+
+mod machines;
+mod parts;
+mod terminals;
+
+use crate::description::DeviceDescription;
+
+/// Vendor number of the simulated devices; no vendor has it.
+pub const VENDOR_ID: u32 = 0x0000_0C47;
+
+/// Makes a description.
+type Maker = fn(&str) -> DeviceDescription;
+
+/// All devices, in the order in which people are shown them.
+const DEVICES: &[(&str, Maker)] = &[
+    ("coupler", machines::coupler),
+    ("junction", machines::junction),
+    ("digital-input-4", |name| terminals::digital_input(name, 4)),
+    ("digital-input-8", |name| terminals::digital_input(name, 8)),
+    ("digital-input-16", |name| terminals::digital_input(name, 16)),
+    ("digital-output-4", |name| terminals::digital_output(name, 4)),
+    ("digital-output-8", |name| terminals::digital_output(name, 8)),
+    ("digital-output-16", |name| terminals::digital_output(name, 16)),
+    ("emulated-input-8", |name| terminals::emulated(terminals::digital_input(name, 8))),
+    ("emulated-output-8", |name| terminals::emulated(terminals::digital_output(name, 8))),
+    ("analog-input-4", |name| terminals::analog_input(name, 4)),
+    ("analog-output-4", |name| terminals::analog_output(name, 4)),
+    ("servo", machines::servo),
+    ("block", machines::block),
+];
+
+/// The device with this name.
+pub fn by_name(name: &str) -> Option<DeviceDescription> {
+    DEVICES.iter().find(|(known, _)| *known == name).map(|(known, make)| make(known))
+}
+
+/// The names [`by_name`] knows.
+pub fn names() -> impl ExactSizeIterator<Item = &'static str> {
+    DEVICES.iter().map(|(name, _)| *name)
+}
+
+#[cfg(test)]
+mod tests;

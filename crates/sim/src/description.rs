@@ -32,6 +32,8 @@ pub mod data_type {
     pub const U32: u8 = 0x07;
     /// Characters without an end mark.
     pub const VISIBLE_STRING: u8 = 0x09;
+    /// Any bytes.
+    pub const OCTET_STRING: u8 = 0x0A;
 }
 
 /// One SyncManager as the SII declares it (facts 4.4).

@@ -141,7 +141,7 @@ impl Device {
 
     /// Inputs come from this source from now on. A drive makes its own and ignores it.
     pub fn set_input_source(&mut self, source: InputSource) {
-        self.application.set_source(source, &mut self.controller);
+        self.application.set_source(source, &self.description, &mut self.controller);
     }
 }
 

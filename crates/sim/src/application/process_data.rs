@@ -300,11 +300,6 @@ impl ProcessData {
         }
     }
 
-    /// Inputs are these bytes from now on. A drive makes its own and ignores them.
-    pub fn set_inputs(&mut self, bytes: &[u8], controller: &mut Controller, now: SimTime) {
-        self.set_source(InputSource::Constant(bytes.into()), controller, now);
-    }
-
     /// Inputs come from this source from now on. A drive makes its own and ignores it.
     pub fn set_source(&mut self, new: InputSource, controller: &mut Controller, now: SimTime) {
         match &mut self.source {

@@ -1,1 +1,100 @@
+use proptest::prelude::*;
+use ringcat_wire::sii::{Identity, PhysicalPort, Sii, SyncManagerKind};
 
+use super::*;
+use crate::catalogue;
+use crate::description::{DeviceDescription, PdoEntryDescription};
+
+#[test]
+fn the_image_of_a_coupler_has_these_bytes_in_front() {
+    let mut description = catalogue::by_name("coupler").unwrap();
+    description.alias = 0x1234;
+    let image = build(&description);
+    // PDI none, device emulation, alias; the checksum is that of facts 4.1.
+    assert_eq!(image[..10], [0x00, 0x01, 0, 0, 0, 0, 0, 0, 0x34, 0x12]);
+    assert_eq!(image[14], ringcat_wire::sii::checksum(image.first_chunk().unwrap()));
+    assert_eq!(image[0x7C..0x80], [0x01, 0x00, 0x01, 0x00], "2 KBit, version 1");
+    let ports = Sii::parse(&image).unwrap().general().unwrap().ports();
+    assert_eq!(ports, [PhysicalPort::Mii, PhysicalPort::Ebus, PhysicalPort::Mii, PhysicalPort::Unused]);
+}
+
+#[test]
+fn a_real_image_is_kept_byte_for_byte() {
+    let image = build(&catalogue::by_name("servo").unwrap());
+    let description = DeviceDescription::from_sii(image.clone(), "copy").unwrap();
+    assert_eq!(build(&description), image);
+}
+
+#[test]
+fn a_broken_checksum_is_refused_with_a_reason() {
+    let mut image = build(&catalogue::by_name("servo").unwrap());
+    image[14] ^= 0xFF;
+    let error = DeviceDescription::from_sii(image, "broken").unwrap_err();
+    assert!(error.to_string().starts_with("SII checksum: expected"), "{error}");
+}
+
+#[test]
+fn more_sync_managers_than_the_controller_has_are_refused() {
+    let mut description = catalogue::by_name("digital-output-8").unwrap();
+    description.sync_managers = vec![description.sync_managers[0]; 9];
+    let error = DeviceDescription::from_sii(build(&description), "many").unwrap_err();
+    assert_eq!(error.to_string(), "SII declares 9 SyncManagers, expected at most 8");
+}
+
+#[test]
+fn content_that_needs_more_room_makes_the_image_grow() {
+    let mut description = catalogue::by_name("digital-output-16").unwrap();
+    description.sii_size_bytes = 128;
+    let image = build(&description);
+    assert_eq!(image.len(), 768);
+    assert_eq!(Sii::parse(&image).unwrap().header().size_bytes(), 768);
+}
+
+#[test]
+fn strings_that_are_too_long_are_cut_at_a_character() {
+    let mut description = DeviceDescription::plain(&"ä".repeat(200), Identity::default());
+    description.group = "x".repeat(300);
+    let image = build(&description);
+    let again = DeviceDescription::from_sii(image, "cut").unwrap();
+    assert_eq!(again.group.len(), 255);
+    assert_eq!(again.order_code, "ä".repeat(127));
+}
+
+#[test]
+fn pdos_stand_for_those_that_a_coe_device_keeps_in_its_dictionary() {
+    let mut description = catalogue::by_name("servo").unwrap();
+    description.pdos.clear();
+    let again = DeviceDescription::from_sii(build(&description), "silent").unwrap();
+    let number = again.sync_manager_of(SyncManagerKind::Outputs).unwrap();
+    assert_eq!(again.default_length(number), 12);
+    assert_eq!(again.default_assignment(number).count(), 1);
+}
+
+proptest! {
+    #[test]
+    fn any_pdo_comes_back(entries in prop::collection::vec((any::<u16>(), any::<u8>(), any::<u8>(), 1u8..), 0..40)) {
+        let mut description = catalogue::by_name("digital-output-8").unwrap();
+        description.pdos.truncate(1);
+        let entries = entries.into_iter().map(|(index, sub_index, data_type, bit_length)| PdoEntryDescription {
+            index, sub_index, name: format!("{}", index % 50), data_type, bit_length,
+        });
+        description.pdos[0].entries = entries.collect();
+        let again = DeviceDescription::from_sii(build(&description), "again").unwrap();
+        prop_assert_eq!(again.pdos, description.pdos);
+    }
+
+    #[test]
+    fn any_image_makes_a_device_or_an_error(mut image in prop::collection::vec(any::<u8>(), 128..700), small in any::<bool>()) {
+        if small {
+            // Make the chain of categories plausible more often.
+            for place in (0x80..image.len().saturating_sub(1)).step_by(20) {
+                image[place] = [10, 30, 40, 41, 50, 51, 60][place % 7];
+                image[place + 1] = 0;
+            }
+        }
+        image[14..16].copy_from_slice(&0x88A4u16.to_le_bytes());
+        if let Ok(device) = crate::device::Device::from_sii(image.clone(), "any") {
+            prop_assert_eq!(device.controller.sii_image(), &image[..]);
+        }
+    }
+}
