@@ -74,6 +74,8 @@ pub struct Controller {
     /// Loop settings as last written, and those that return when temporary ones end.
     lasting_loops: [LoopControl; 4],
     temporary_loops: Option<(SimTime, [LoopControl; 4])>,
+    /// The frame that brought the last letter of the reset sequence.
+    reset_frame: Option<u64>,
     /// STATION_ADDRESS and the alias bit, at hand for every datagram.
     station: u16,
     alias_enabled: bool,
@@ -100,6 +102,7 @@ impl Controller {
             pass: Pass::new(),
             lasting_loops: [LoopControl::Auto; 4],
             temporary_loops: None,
+            reset_frame: None,
             station: 0,
             alias_enabled: false,
             irq: 0,

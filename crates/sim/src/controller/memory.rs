@@ -226,13 +226,15 @@ impl Memory {
         if address < u32::from(region.start) {
             return Run { end: region.start.into(), exists: false, writable: false };
         }
+        let exists = self.has(region.needs);
         let mut run = Run {
             end: region.end.into(),
-            exists: self.has(region.needs),
-            writable: match side {
-                Side::Ecat => region.ecat_writes,
-                Side::Pdi => region.pdi_writes,
-            },
+            exists,
+            writable: exists
+                && match side {
+                    Side::Ecat => region.ecat_writes,
+                    Side::Pdi => region.pdi_writes,
+                },
         };
         match region.needs {
             Needs::Fmmu => run.limit(address, self.fmmus_end),

@@ -39,7 +39,7 @@ impl Ports {
 
     /// Takes all links away.
     pub fn unplug(&mut self) {
-        self.link = [false; 4];
+        (self.link, self.open) = ([false; 4], [false; 4]);
     }
 
     pub fn link(&self, port: Port) -> bool {

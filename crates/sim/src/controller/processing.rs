@@ -129,8 +129,9 @@ impl Controller {
         match command {
             Command::Aprw | Command::Fprw | Command::Brw => self.read_write(command, ado, data),
             Command::Apwr | Command::Fpwr | Command::Bwr => {
-                self.pass.latches |= command != Command::Apwr && self.latches(at, data);
-                u16::from(self.write(Side::Ecat, at, data, 0xFF) > 0)
+                let written = self.write(Side::Ecat, at, data, 0xFF) > 0;
+                self.pass.latches |= written && command != Command::Apwr && self.latches(at, data);
+                u16::from(written)
             }
             _ if multiple && !matches => u16::from(self.write(Side::Ecat, at, data, 0xFF) > 0),
             _ => u16::from(self.read(Side::Ecat, at, data, command == Command::Brd) > 0),

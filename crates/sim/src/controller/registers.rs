@@ -50,7 +50,7 @@ impl Controller {
         }
         let first = bytes.first().map_or(0, |&(value, _)| value);
         match at >> 8 {
-            0x00 => self.addressing_written(touched, first, now),
+            0x00 => self.addressing_written(touched, first, now, frame),
             0x01 => self.layers_written(touched, al_control_pending, now, frame),
             0x02 => self.refresh_irq(),
             0x03 => self.clear_counters(touched.at, touched.end),
@@ -88,13 +88,13 @@ impl Controller {
         }
     }
 
-    fn addressing_written(&mut self, touched: Touched, value: u8, now: SimTime) {
+    fn addressing_written(&mut self, touched: Touched, value: u8, now: SimTime, frame: Option<u64>) {
         if touched.is(map::STATION_ADDRESS, 2) {
             self.station = self.memory.u16(map::STATION_ADDRESS);
         }
         for register in [map::ESC_RESET_ECAT, map::ESC_RESET_PDI] {
             if touched.is(register, 1) {
-                self.reset_written(register, value, now);
+                self.reset_written(register, value, now, frame);
             }
         }
     }
@@ -105,7 +105,8 @@ impl Controller {
             if touched.is(DL_CONTROL_LOOPS, 1) {
                 self.loops_written(now, frame);
             } else if self.memory.u8(map::DL_CONTROL) & TEMPORARY == 0 {
-                self.keep_temporary_loops();
+                // The bit was taken back: the settings become lasting.
+                self.temporary_loops = None;
             }
         }
         if touched.is(map::AL_CONTROL, 1) && !al_control_pending {
@@ -137,11 +138,6 @@ impl Controller {
         self.lasting_loops = control.loops;
         self.ports.set_modes(control.loops, frame);
         self.refresh_dl_status();
-    }
-
-    /// Temporary settings become lasting: the bit was taken back.
-    fn keep_temporary_loops(&mut self) {
-        self.temporary_loops = None;
     }
 
     /// The loop settings from before the temporary ones return.

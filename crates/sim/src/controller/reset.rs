@@ -44,8 +44,12 @@ impl Controller {
         self.starts
     }
 
-    /// A letter of the reset sequence.
-    pub(super) fn reset_written(&mut self, register: RegisterAddress, letter: u8, now: SimTime) {
+    /// A letter of the reset sequence. A frame can bring one only.
+    pub(super) fn reset_written(&mut self, register: RegisterAddress, letter: u8, now: SimTime, frame: Option<u64>) {
+        if frame.is_some() && frame == self.reset_frame {
+            return;
+        }
+        self.reset_frame = frame;
         let progress = self.memory.u8(register);
         let expected = SEQUENCE.get(usize::from(progress)) == Some(&letter);
         match (expected, progress) {
@@ -64,7 +68,9 @@ impl Controller {
         self.fmmus.clear();
         self.pass.clear();
         self.clock.restart(now);
+        self.lasting_loops = [LoopControl::Auto; 4];
         self.temporary_loops = None;
+        self.reset_frame = None;
         (self.station, self.alias_enabled, self.irq) = (0, false, 0);
         self.process_data_watchdog.rest();
         self.pdi_watchdog.rest();

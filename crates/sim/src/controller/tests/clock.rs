@@ -1,0 +1,124 @@
+//! Distributed clocks: latches and times (facts 3.12, 7.1).
+
+use super::*;
+
+const FIRST_BIT: u64 = 5_760;
+
+fn receive_times(bench: &Bench) -> [u32; 4] {
+    let bytes: [u8; 16] = bench.register(0x0900);
+    core::array::from_fn(|p| u32::from_le_bytes(bytes[4 * p..4 * p + 4].try_into().unwrap()))
+}
+
+fn latch(bench: &mut Bench, command: Command) -> SimFrame {
+    bench.frame(&[(command, 0, 0x0900, &[0; 4])])
+}
+
+/// Local time at the first bit of a shortest frame whose last bit comes in now.
+fn local_first_bit(bench: &Bench) -> u64 {
+    bench.controller.local_time(SimTime(bench.now.0 - FIRST_BIT))
+}
+
+#[test]
+fn a_write_to_0x0900_latches_every_port_the_frame_comes_in_at_facts_3_12() {
+    let mut bench = Bench::with(ControllerConfig { clock_start: 0xFFFF_F000, clock_drift_ppb: 20_000, ..config() });
+    bench.link(Port::B, true);
+    let mut frame = latch(&mut bench, Command::Bwr);
+    bench.receive(&mut frame, Port::A);
+    let at_unit = local_first_bit(&bench);
+    assert_eq!(receive_times(&bench), [at_unit as u32, 0, 0, 0]);
+    bench.receive(&mut frame, Port::B);
+    assert_eq!(receive_times(&bench), [at_unit as u32, local_first_bit(&bench) as u32, 0, 0]);
+    assert_eq!(bench.register(0x0918), at_unit.to_le_bytes());
+    assert!(at_unit > u64::from(u32::MAX));
+    // Other frames change nothing.
+    let times = receive_times(&bench);
+    bench.write(0x0F80, &[1]);
+    assert_eq!(receive_times(&bench), times);
+}
+
+#[test]
+fn only_bwr_and_fpwr_latch_though_others_count_facts_3_12() {
+    let mut bench = Bench::new();
+    for command in [Command::Apwr, Command::Brw, Command::Aprw, Command::Armw, Command::Frmw, Command::Fprw] {
+        let mut frame = latch(&mut bench, command);
+        bench.receive(&mut frame, Port::A);
+        assert_ne!(returned(&frame, 0).1, 0, "{command}");
+        assert_eq!(receive_times(&bench), [0; 4], "{command}");
+    }
+    assert_eq!(bench.one((Command::Bwr, 0, 0x0901, &[0])).1, 1);
+    assert_eq!(receive_times(&bench), [0; 4]);
+    bench.one((Command::Fpwr, 0, 0x0900, &[0]));
+    assert_ne!(receive_times(&bench)[0], 0);
+}
+
+#[test]
+fn a_damaged_frame_latches_nothing_facts_2_5() {
+    let mut bench = Bench::new();
+    bench.damaged(&[(Command::Bwr, 0, 0x0900, &[0; 4])]);
+    assert_eq!(receive_times(&bench), [0; 4]);
+}
+
+#[test]
+fn a_frame_entering_at_port_1_is_latched_where_it_came_in_facts_7_1() {
+    for (latch_mode, expected) in [(false, true), (true, false)] {
+        let mut bench = Bench::with(ControllerConfig { receive_time_latch_mode: latch_mode, ..config() });
+        bench.link(Port::A, false);
+        bench.link(Port::B, true);
+        let mut frame = latch(&mut bench, Command::Bwr);
+        bench.receive(&mut frame, Port::B);
+        assert_eq!(receive_times(&bench)[1] != 0, expected);
+        assert_eq!(bench.register(0x0918), local_first_bit(&bench).to_le_bytes());
+        let mut write = bench.frame(&[(Command::Bwr, 0, 0x0936, &[1])]);
+        bench.receive(&mut write, Port::B);
+        let mut frame = latch(&mut bench, Command::Bwr);
+        bench.receive(&mut frame, Port::B);
+        assert_eq!(receive_times(&bench)[1], local_first_bit(&bench) as u32);
+    }
+}
+
+#[test]
+fn system_time_is_local_time_plus_offset_at_the_start_of_the_frame_facts_3_12() {
+    let mut bench = Bench::with(ControllerConfig { clock_drift_ppb: -50_000, ..config() });
+    bench.write(0x0920, &0x0011_2233_4455_6677u64.to_le_bytes());
+    let (data, wkc) = bench.read(0x0910, 8);
+    let expected = local_first_bit(&bench) + 0x0011_2233_4455_6677;
+    assert_eq!((data, wkc), (expected.to_le_bytes().to_vec(), 1));
+    assert_eq!(bench.controller.system_time(SimTime(bench.now.0 - FIRST_BIT)), expected);
+    // The PDI reads it when it reads it.
+    let now = bench.controller.system_time(bench.now);
+    assert_eq!(bench.pdi_read(0x0910, 8), Some(now.to_le_bytes().to_vec()));
+}
+
+#[test]
+fn a_negative_offset_is_one_in_twos_complement_facts_3_12() {
+    let mut bench = Bench::new();
+    let local = bench.controller.local_time(bench.now);
+    bench.write(0x0920, &(-1_000i64).to_le_bytes());
+    assert_eq!(bench.controller.system_time(bench.now) - local, 10_000 - 1_000);
+}
+
+#[test]
+fn a_write_to_system_time_counts_and_is_not_stored_facts_3_12() {
+    let mut bench = Bench::new();
+    assert_eq!(bench.one((Command::Frmw, 0x7777, 0x0910, &[9; 8])).1, 1);
+    assert_eq!(u64::from_le_bytes(bench.read(0x0910, 8).0.try_into().unwrap()), local_first_bit(&bench));
+}
+
+#[test]
+fn a_32_bit_clock_answers_four_bytes_and_one_without_clock_none_facts_3_12() {
+    let mut config = config();
+    config.features.dc_64bit = false;
+    let mut bench = Bench::with(ControllerConfig { clock_start: 0x1_0000_0000, ..config.clone() });
+    let (data, wkc) = bench.one((Command::Aprd, 0, 0x0910, &[0xEE; 8]));
+    assert_eq!((&data[4..], wkc), (&[0xEE; 4][..], 1));
+    assert_eq!(data[..4], (local_first_bit(&bench) as u32).to_le_bytes());
+    config.features.dc = false;
+    let mut bench = Bench::with(config);
+    assert_eq!((bench.read(0x0910, 8).1, bench.one((Command::Bwr, 0, 0x0900, &[0; 4])).1), (0, 0));
+}
+
+#[test]
+fn reset_values_of_the_control_loop_facts_3_12() {
+    let mut bench = Bench::new();
+    assert_eq!(bench.read(0x0930, 6).0, [0x00, 0x10, 0x00, 0x00, 0x04, 0x0C]);
+}

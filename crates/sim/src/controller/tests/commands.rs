@@ -1,0 +1,169 @@
+//! Commands and working counters (facts 1.4), side effects and a bad FCS (facts 2.5).
+
+use super::*;
+
+#[test]
+fn auto_increment_meets_zero_only_and_counts_up_facts_1_4() {
+    let mut bench = Bench::new();
+    let mut frame = bench.frame(&[(Command::Aprd, 0, 0x0000, &[0xEE]), (Command::Aprd, 0xFFFF, 0x0000, &[0xEE])]);
+    bench.receive(&mut frame, Port::A);
+    assert_eq!((returned(&frame, 0), returned(&frame, 1)), ((vec![0x11], 1), (vec![0xEE], 0)));
+    let adp = |n: usize| {
+        let header = usize::from(frame.datagrams[n].header);
+        u16::from_le_bytes([frame.bytes[header + 2], frame.bytes[header + 3]])
+    };
+    assert_eq!((adp(0), adp(1)), (1, 0));
+}
+
+#[test]
+fn broadcasts_count_up_and_combine_by_or_facts_1_4() {
+    let mut bench = Bench::new();
+    let mut frame = bench.frame(&[(Command::Brd, 7, 0x0000, &[0x40])]);
+    bench.receive(&mut frame, Port::A);
+    assert_eq!(returned(&frame, 0), (vec![0x51], 1));
+    assert_eq!(&frame.bytes[16..20], &[0x07, 0x5A, 0x08, 0x00]);
+    assert_eq!(bench.one((Command::Bwr, 3, 0x0010, &[0x01, 0x10])).1, 1);
+    assert_eq!(bench.register(0x0010), [0x01, 0x10]);
+}
+
+#[test]
+fn brw_writes_what_came_in_and_returns_the_or_with_the_old_value_facts_1_4() {
+    let mut bench = Bench::new();
+    bench.write(0x0F80, &[0x0F]);
+    assert_eq!(bench.one((Command::Brw, 0, 0x0F80, &[0x30])), (vec![0x3F], 3));
+    assert_eq!(bench.register(0x0F80), [0x30]);
+}
+
+#[test]
+fn station_address_and_enabled_alias_match_facts_2_7() {
+    let mut bench = Bench::new();
+    bench.write(0x0010, &[0x01, 0x10]);
+    assert_eq!(bench.one((Command::Fprd, 0x1001, 0x0004, &[0])), (vec![8], 1));
+    assert_eq!(bench.one((Command::Fprd, 0x1234, 0x0004, &[0])).1, 0);
+    bench.write(0x0103, &[0x01]);
+    for command in [Command::Fprd, Command::Fpwr, Command::Fprw, Command::Frmw] {
+        let expected = if command == Command::Fprw { 3 } else { 1 };
+        assert_eq!(bench.one((command, 0x1234, 0x0F80, &[0])).1, expected, "{command}");
+    }
+}
+
+#[test]
+fn address_0_is_a_station_address_like_others_facts_2_7() {
+    let mut bench = Bench::new();
+    assert_eq!(bench.one((Command::Fprd, 0, 0x0000, &[0])), (vec![0x11], 1));
+}
+
+#[test]
+fn read_write_takes_the_old_value_and_counts_3_facts_1_4() {
+    let mut bench = Bench::new();
+    bench.write(0x0F90, &[1, 2]);
+    assert_eq!(bench.one((Command::Aprw, 0, 0x0F90, &[3, 4])), (vec![1, 2], 3));
+    assert_eq!(bench.one((Command::Fprw, 0, 0x0F90, &[5, 6])), (vec![3, 4], 3));
+    // Read-only registers count the read alone, write-only ones the write alone.
+    assert_eq!(bench.one((Command::Aprw, 0, 0x0000, &[0x55])), (vec![0x11], 1));
+}
+
+#[test]
+fn the_physical_offset_moves_the_write_of_read_write_commands_facts_1_4() {
+    let mut bench = Bench::new();
+    bench.write(0x0108, &[0x10, 0x00]);
+    bench.one((Command::Fprw, 0, 0x0F90, &[5]));
+    assert_eq!((bench.register(0x0F90), bench.register(0x0FA0)), ([0], [5]));
+    bench.write(0x0F90, &[9]);
+    assert_eq!(bench.register(0x0F90), [9]);
+}
+
+#[test]
+fn multiple_writes_read_at_the_addressed_and_write_at_the_others_facts_1_4() {
+    let mut bench = Bench::new();
+    bench.write(0x0010, &[0x01, 0x10]);
+    bench.write(0x0F80, &[7]);
+    assert_eq!(bench.one((Command::Armw, 0, 0x0F80, &[1])), (vec![7], 1));
+    assert_eq!(bench.one((Command::Armw, 0xFFF0, 0x0F80, &[2])), (vec![2], 1));
+    assert_eq!(bench.one((Command::Frmw, 0x1001, 0x0F80, &[3])), (vec![2], 1));
+    assert_eq!(bench.one((Command::Frmw, 0x1002, 0x0F80, &[4])), (vec![4], 1));
+    assert_eq!(bench.register(0x0F80), [4]);
+}
+
+#[test]
+fn nop_and_reserved_commands_change_nothing_facts_1_4() {
+    let mut bench = Bench::new();
+    for command in [Command::Nop, Command::Reserved(15), Command::Reserved(255)] {
+        assert_eq!(bench.one((command, 0, 0x0000, &[0xEE])), (vec![0xEE], 0));
+    }
+}
+
+#[test]
+fn bytes_that_are_not_there_change_nothing_but_the_others_count_facts_1_4() {
+    let mut bench = Bench::new();
+    // 0x000A..0x000F do not exist.
+    assert_eq!(bench.one((Command::Aprd, 0, 0x0009, &[0xEE, 0xEE])), (vec![0x00, 0xEE], 1));
+    assert_eq!(bench.one((Command::Aprd, 0, 0x000A, &[0xEE, 0xEE])), (vec![0xEE, 0xEE], 0));
+    // AL status cannot be written, the station address before the alias can.
+    assert_eq!(bench.write(0x0130, &[4, 0]), 0);
+    assert_eq!(bench.write(0x0010, &[1, 0, 0xAA, 0xAA]), 1);
+    assert_eq!(bench.register(0x0010), [1, 0, 0x34, 0x12]);
+    // The RAM of 8 KiB ends at 0x2FFF, the address space at 0xFFFF.
+    assert_eq!(bench.one((Command::Aprd, 0, 0x2FFF, &[0xEE, 0xEE])), (vec![0x00, 0xEE], 1));
+    assert_eq!(bench.one((Command::Aprd, 0, 0xFFFF, &[0xEE, 0xEE])), (vec![0xEE, 0xEE], 0));
+}
+
+#[test]
+fn lrw_and_brw_do_nothing_where_the_features_say_so_facts_1_4() {
+    let mut config = config();
+    (config.features.brw_unsupported, config.features.lrw_unsupported) = (true, true);
+    let mut bench = Bench::with(config);
+    assert_eq!(bench.one((Command::Aprw, 0, 0x0F80, &[1])), (vec![1], 0));
+    bench.write(0x0600, &[0, 0, 1, 0, 1, 0, 0, 7, 0x80, 0x0F, 0, 3, 1]);
+    assert_eq!(bench.one((Command::Lrw, 0, 1, &[1])), (vec![1], 0));
+    assert_eq!(bench.one((Command::Lwr, 0, 1, &[1])).1, 1);
+}
+
+#[test]
+fn the_working_counter_wraps_facts_1_4() {
+    let mut bench = Bench::new();
+    let mut frame = bench.frame(&[(Command::Brd, 0, 0, &[0])]);
+    let wkc = frame.datagrams[0].wkc();
+    frame.bytes[wkc..wkc + 2].fill(0xFF);
+    bench.receive(&mut frame, Port::A);
+    assert_eq!(returned(&frame, 0).1, 0);
+}
+
+#[test]
+fn registers_take_over_at_the_end_of_the_frame_facts_2_5() {
+    let mut bench = Bench::new();
+    bench.write(0x0010, &[5, 0]);
+    let answers = bench.exchange(&[(Command::Bwr, 0, 0x0010, &[6, 0]), (Command::Brd, 0, 0x0010, &[0, 0])]);
+    assert_eq!(answers[1], (vec![5, 0], 1));
+    assert_eq!(bench.register(0x0010), [6, 0]);
+}
+
+#[test]
+fn a_bad_fcs_has_no_side_effects_on_registers_but_on_ram_facts_2_5() {
+    let mut bench = Bench::new();
+    let answers = bench.damaged(&[
+        (Command::Bwr, 0, 0x0010, &[5, 0]),
+        (Command::Bwr, 0, 0x0F80, &[1]),
+        (Command::Bwr, 0, 0x1000, &[2]),
+    ]);
+    assert!(answers.iter().all(|answer| answer.1 == 1));
+    assert_eq!((bench.register(0x0010), bench.register(0x0F80), bench.register(0x1000)), ([0, 0], [1], [2]));
+    // The read of DL status has to leave its event.
+    assert_eq!(bench.register(0x0210), [0x04, 0x00]);
+    bench.damaged(&[(Command::Brd, 0, 0x0110, &[0, 0])]);
+    assert_eq!(bench.register(0x0210), [0x04, 0x00]);
+    bench.read(0x0110, 2);
+    assert_eq!(bench.register(0x0210), [0x00, 0x00]);
+}
+
+#[test]
+fn a_frame_whose_last_datagram_leaves_it_is_an_epu_error_without_effects_facts_2_5() {
+    let mut bench = Bench::new();
+    let mut frame = bench.frame(&[(Command::Bwr, 0, 0x0010, &[5, 0]), (Command::Nop, 0, 0, &[0; 30])]);
+    let header = usize::from(frame.datagrams[1].header);
+    frame.bytes[header + 6] = 0xFF;
+    let mut frame = SimFrame::new(frame.id, frame.bytes);
+    assert!(frame.malformed);
+    assert_ne!(bench.receive(&mut frame, Port::A), Passage::Destroyed);
+    assert_eq!((bench.register(0x030C), bench.register(0x0010)), ([1], [0, 0]));
+}
