@@ -1,6 +1,6 @@
 //! Cables and what happens to a frame on the way through one (issue 2, part 3; facts 11.4).
 //!
-//! A cable is two [`Leg`]s, one for each direction. A leg knows where it leads, how long a bit takes, since when it
+//! A cable is two legs, one for each direction. A leg knows where it leads, how long a bit takes, since when it
 //! carries a signal, and which faults wait for the frames that come along. What is decided here is the fate of a frame
 //! whose last bit is due at the far end; who sends and who receives is the network's business.
 

@@ -2,7 +2,7 @@
 //!
 //! * [`controller`]: one SubDevice controller: ports, processing unit, FMMUs, SyncManagers, SII interface, clock;
 //! * [`device`], [`application`], [`description`], [`sii_image`], [`catalogue`]: what stands behind a controller;
-//! * [`network`], [`cable`], [`queue`], [`host`], [`fault`]: cables, events, hosts and what goes wrong with them;
+//! * [`network`], [`cable`], [`host`], [`fault`]: cables, events, hosts and what goes wrong with them;
 //! * [`segment`]: segments from files;
 //! * [`time`], [`frame`]: virtual time and the frames that travel.
 //!
@@ -19,7 +19,7 @@ pub mod fault;
 pub mod frame;
 pub mod host;
 pub mod network;
-pub mod queue;
+mod queue;
 pub mod segment;
 pub mod sii_image;
 pub mod time;

@@ -35,8 +35,8 @@ pub(super) fn plug(file: &File, text: &str, devices: &[PlannedDevice]) -> Result
         plan.join(from?, to?, delay(cable.delay_ns), &cable.from.span())?;
     }
     let listed = plan.cables.len();
-    for index in 0..devices.len() {
-        let spanned = &file.device[devices[index].entry];
+    for (index, device) in devices.iter().enumerate() {
+        let spanned = &file.device[device.entry];
         plan.attach(index, spanned.get_ref(), &spanned.span(), delay(spanned.get_ref().cable_ns))?;
     }
     if let Some(ring) = &file.segment.ring {
