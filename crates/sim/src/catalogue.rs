@@ -2,7 +2,7 @@
 //!
 //! In: a name as segment files use it. Out: a [`DeviceDescription`] to be changed at will before a device is made of it.
 //! Vendor and product numbers are the simulator's own; SyncManager settings are like those of real terminals (facts
-//! 3.11). Terminals are in [`terminals`], drive, block and junctions in [`machines`].
+//! 3.11). Terminals are in `terminals`, drive, block and junctions in `machines`.
 
 mod machines;
 mod parts;
