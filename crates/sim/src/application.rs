@@ -3,7 +3,7 @@
 //! In: AL events and virtual time, through [`Application::run`], and faults. Out: AL status, answers in the mailbox,
 //! inputs and latched outputs. The parts: [`state_machine`] says what a request means, [`settings`] whether the
 //! configuration suits, [`process_data`] moves data, [`mailbox`], [`coe`] and [`dictionary`] answer SDOs,
-//! [`behaviours`] and [`servo`] make inputs. Here they are put together.
+//! [`behaviours`] and [`servo`] make inputs, `transitions` leads from state to state. Here they are put together.
 
 pub mod behaviours;
 pub mod coe;
@@ -13,13 +13,11 @@ pub mod process_data;
 pub mod servo;
 pub mod settings;
 pub mod state_machine;
-
-use core::time::Duration;
+mod transitions;
 
 use ringcat_wire::al::{AlState, AlStatus, AlStatusCode};
 use ringcat_wire::mailbox::{ErrorReply, Protocol};
 use ringcat_wire::register::map;
-use ringcat_wire::sii::MailboxLayout;
 
 use crate::controller::Controller;
 use crate::description::DeviceDescription;
@@ -29,7 +27,7 @@ use dictionary::Dictionary;
 use mailbox::Mailbox;
 use process_data::ProcessData;
 use settings::Layout;
-use state_machine::{Pending, Reaction, StateMachine};
+use state_machine::{Pending, StateMachine};
 
 pub use behaviours::{Behaviour, InputFunction, InputSource};
 
@@ -190,136 +188,6 @@ impl Application {
         }
     }
 
-    /// AL control was written.
-    fn requested(&mut self, description: &DeviceDescription, controller: &mut Controller, now: SimTime) {
-        let control = controller.al_control(now);
-        let boot = bootstrap(description).is_some();
-        let mut reaction = self.machine.request(control, boot, description.identification);
-        if let Reaction::Begin(to) = reaction {
-            reaction = match self.prepare(to, description, controller, now) {
-                Ok(()) => Reaction::Begin(to),
-                Err(code) => self.machine.refuse(code),
-            };
-        }
-        match reaction {
-            Reaction::Ignore => {}
-            Reaction::Report => self.report(controller, now),
-            Reaction::Begin(to) => {
-                let from = self.machine.state();
-                if from == AlState::Op {
-                    self.process_data.make_safe(controller, now);
-                }
-                let takes = state_machine::duration(&description.transitions, from, to);
-                let patience = if to == AlState::Op { description.outputs_timeout } else { Duration::ZERO };
-                self.report(controller, now);
-                self.machine.begin(to, now, takes, patience);
-            }
-        }
-    }
-
-    /// The checks before a transition.
-    fn prepare(
-        &mut self,
-        to: AlState,
-        description: &DeviceDescription,
-        controller: &mut Controller,
-        now: SimTime,
-    ) -> Result<(), AlStatusCode> {
-        if let Some(code) = self.take_refusal(to) {
-            return Err(code);
-        }
-        let from = self.machine.state();
-        match (from, to) {
-            (AlState::Init, AlState::PreOp) => match standard(description) {
-                Some(layout) => self.check_mailbox(
-                    &layout,
-                    AlStatusCode::INVALID_MAILBOX_CONFIGURATION_PREOP,
-                    description,
-                    controller,
-                    now,
-                ),
-                None => Ok(()),
-            },
-            (AlState::Init, AlState::Boot) => {
-                let layout = bootstrap(description).ok_or(AlStatusCode::BOOT_NOT_SUPPORTED)?;
-                let wrong = AlStatusCode::INVALID_MAILBOX_CONFIGURATION_BOOT;
-                self.check_mailbox(&layout, wrong, description, controller, now)
-            }
-            (AlState::PreOp, AlState::SafeOp) => {
-                let actual = settings::sync_managers(controller, now);
-                let ram_kib = controller.config().ram_kib;
-                let layout = settings::process_data(description, &self.dictionary, &actual, ram_kib)?;
-                settings::timing(description, &layout, controller, now)?;
-                self.layout = layout;
-                Ok(())
-            }
-            _ => Ok(()),
-        }
-    }
-
-    fn check_mailbox(
-        &mut self,
-        layout: &MailboxLayout,
-        wrong: AlStatusCode,
-        description: &DeviceDescription,
-        controller: &mut Controller,
-        now: SimTime,
-    ) -> Result<(), AlStatusCode> {
-        let actual = settings::sync_managers(controller, now);
-        if !settings::mailbox_matches(description, layout, &actual) {
-            return Err(wrong);
-        }
-        let numbers = settings::mailbox_numbers(description);
-        self.mailbox = Some(Mailbox::open(*layout, numbers, controller, now));
-        Ok(())
-    }
-
-    fn take_refusal(&mut self, to: AlState) -> Option<AlStatusCode> {
-        let place = self.refusals.iter().position(|refusal| refusal.to == to && refusal.times > 0)?;
-        let refusal = &mut self.refusals[place];
-        let code = refusal.code;
-        refusal.times -= 1;
-        if refusal.times == 0 {
-            self.refusals.remove(place);
-        }
-        Some(code)
-    }
-
-    /// A transition is due.
-    fn finish(&mut self, pending: Pending, description: &DeviceDescription, controller: &mut Controller, now: SimTime) {
-        if pending.to == AlState::Op && !self.process_data.outputs_seen() {
-            if now >= pending.give_up {
-                self.machine.refuse(AlStatusCode::NO_VALID_OUTPUTS);
-                self.report(controller, now);
-            } else if controller.al_event() & EVENT_AL_CONTROL != 0 {
-                self.machine.abandon();
-                self.requested(description, controller, now);
-            }
-            return;
-        }
-        let from = self.machine.complete();
-        match (from, pending.to) {
-            (_, AlState::Init) => {
-                self.process_data.stop(now);
-                self.mailbox = None;
-            }
-            (AlState::SafeOp | AlState::Op, AlState::PreOp) => self.process_data.stop(now),
-            (AlState::PreOp, AlState::SafeOp) => {
-                self.process_data.start(self.layout.clone(), &self.dictionary, controller, now);
-            }
-            (_, AlState::Op) => self.process_data.operate(controller, now),
-            _ => {}
-        }
-        self.report(controller, now);
-        if controller.al_event() & EVENT_SYNC_MANAGER != 0 {
-            self.sync_managers_changed(description, controller, now);
-        }
-        if controller.al_event() & EVENT_AL_CONTROL != 0 {
-            self.requested(description, controller, now);
-        }
-        self.check_watchdog(controller, EVENT_WATCHDOG, now);
-    }
-
     /// A SyncManager was switched on or off, or the last answer is asked for again (facts 5.2, 6.2).
     fn sync_managers_changed(&mut self, description: &DeviceDescription, controller: &mut Controller, now: SimTime) {
         let actual = settings::sync_managers(controller, now);
@@ -369,6 +237,8 @@ impl Application {
         let (Some(mailbox), Some(declared)) = (&mut self.mailbox, description.mailbox) else {
             return;
         };
+        // An answer that leaves makes room for the message that waits.
+        mailbox.send(controller, now);
         if let Some(message) = mailbox.take(controller, events, now) {
             let state = self.machine.state();
             let mut objects = Objects {
@@ -435,15 +305,3 @@ impl Application {
         self.polled = self.process_data.is_polled();
     }
 }
-
-fn standard(description: &DeviceDescription) -> Option<MailboxLayout> {
-    description.mailbox.map(|mailbox| mailbox.standard).filter(|layout| layout.receive_size != 0)
-}
-
-fn bootstrap(description: &DeviceDescription) -> Option<MailboxLayout> {
-    let mailbox = description.mailbox.filter(|mailbox| mailbox.protocols.foe())?;
-    Some(mailbox.bootstrap).filter(|layout| layout.receive_size != 0)
-}
-
-#[cfg(test)]
-mod tests;

@@ -67,7 +67,7 @@ impl Device {
         self.controller.set_pdi_alive(!hanging, now);
     }
 
-    /// The next `times` requests for `to` are refused with `code`.
+    /// The next `times` requests for `to` are refused with `code`; no effect where the controller emulates the device.
     pub fn refuse_transition(&mut self, to: AlState, code: AlStatusCode, times: u32) {
         self.application.refuse(to, code, times);
     }

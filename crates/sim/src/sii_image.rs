@@ -10,8 +10,8 @@ use core::fmt;
 
 use ringcat_wire::register::PortKind;
 use ringcat_wire::sii::{
-    DcMode, General, GeneralFlags, MailboxProtocols, PdoDescription as SiiPdo, PdoDirection, PdoEntry, SiiError,
-    SiiHeader, SiiSyncManager, SiiWriteError, SiiWriter,
+    CHECKSUM_DISABLED, DcMode, General, GeneralFlags, MailboxProtocols, PdoDescription as SiiPdo, PdoDirection,
+    PdoEntry, SiiError, SiiHeader, SiiSyncManager, SiiWriteError, SiiWriter,
 };
 
 use crate::description::{DeviceDescription, PdoDescription};
@@ -50,11 +50,12 @@ impl fmt::Display for DescriptionError {
 
 impl std::error::Error for DescriptionError {}
 
-/// The EEPROM content of a device: the real image where there is one. The image grows beyond the declared size where
-/// the content needs it; strings beyond 255 and entries beyond what the format holds are left out.
+/// The EEPROM content of a device: the real image where there is one, with the alias and the serial number of the
+/// description. An image made from the description grows beyond the declared size where the content needs it; strings
+/// beyond 255 and entries beyond what the format holds are left out.
 pub fn build(description: &DeviceDescription) -> Vec<u8> {
     if let Some(image) = &description.sii_image {
-        return image.clone();
+        return personalise(image.clone(), description);
     }
     let mut size = description.sii_size_bytes.next_multiple_of(BYTES_PER_KBIT).clamp(BYTES_PER_KBIT, MAX_IMAGE_BYTES);
     loop {
@@ -68,6 +69,21 @@ pub fn build(description: &DeviceDescription) -> Vec<u8> {
             Err(_) => return image,
         }
     }
+}
+
+/// Writes alias and serial number into a real image; the same ones leave it as it is.
+fn personalise(mut image: Vec<u8>, description: &DeviceDescription) -> Vec<u8> {
+    if let Some(bytes) = image.first_chunk_mut::<{ SiiHeader::LEN }>() {
+        let mut header = SiiHeader::decode(bytes);
+        let serial = description.identity.serial;
+        if (header.alias, header.identity.serial) != (description.alias, serial) {
+            header.alias = description.alias;
+            header.identity.serial = serial;
+            let unchecked = header.checksum == CHECKSUM_DISABLED;
+            *bytes = if unchecked { header.encode() } else { header.with_checksum().encode() };
+        }
+    }
+    image
 }
 
 /// Bytes of an image that mean something: up to the end marker.

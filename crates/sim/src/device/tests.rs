@@ -4,4 +4,5 @@ mod bench;
 mod images;
 mod mailbox;
 mod process_data;
+mod robustness;
 mod state_machine;

@@ -26,6 +26,18 @@ fn a_real_image_is_kept_byte_for_byte() {
 }
 
 #[test]
+fn a_real_image_gets_the_alias_and_serial_number_of_its_description() {
+    let image = build(&catalogue::by_name("servo").unwrap());
+    let mut description = DeviceDescription::from_sii(image.clone(), "copy").unwrap();
+    description.alias = 0x0042;
+    description.identity.serial = 7;
+    let changed = build(&description);
+    let again = DeviceDescription::from_sii(changed.clone(), "again").unwrap();
+    assert_eq!((again.alias, again.identity.serial), (0x0042, 7));
+    assert_eq!(changed[32..], image[32..]);
+}
+
+#[test]
 fn a_broken_checksum_is_refused_with_a_reason() {
     let mut image = build(&catalogue::by_name("servo").unwrap());
     image[14] ^= 0xFF;

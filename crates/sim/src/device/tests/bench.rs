@@ -49,6 +49,13 @@ impl Bench {
         assert!(self.device.controller.pdi_operational());
     }
 
+    /// Power goes and comes again.
+    pub fn power_cycle(&mut self) {
+        self.device.power_off(self.now);
+        self.now += Duration::from_millis(100);
+        self.power_on();
+    }
+
     /// A device that has gone up to `state` with the right settings.
     pub fn up_to(description: DeviceDescription, state: AlState) -> Bench {
         let mut bench = Bench::new(description);
@@ -181,6 +188,17 @@ impl Bench {
         self.write(address.offset(SyncManager::ACTIVATE), &[0]);
         self.write(address, &manager.encode()[..5]);
         self.write(address.offset(SyncManager::ACTIVATE), &manager.activate.encode());
+    }
+
+    /// Writes all SyncManagers right, wherever they can be written.
+    pub fn try_set_all(&mut self) {
+        for number in (0u8..).take(self.device.description.sync_managers.len()) {
+            let manager = self.right(number);
+            let address = map::sync_manager(number);
+            self.try_write(address.offset(SyncManager::ACTIVATE), &[0]);
+            self.try_write(address, &manager.encode()[..5]);
+            self.try_write(address.offset(SyncManager::ACTIVATE), &manager.activate.encode());
+        }
     }
 
     fn set_kinds(&mut self, kinds: [SyncManagerKind; 2]) {

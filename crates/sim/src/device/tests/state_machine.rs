@@ -343,8 +343,7 @@ fn power_off_and_on_begins_in_init() {
     let mut bench = up_to("servo", AlState::Op);
     bench.device.power_off(bench.now);
     assert_eq!((bench.device.next_deadline(), bench.device.needs_run()), (None, false));
-    bench.now += Duration::from_millis(100);
-    bench.power_on();
+    bench.power_cycle();
     assert_eq!(bench.status(), ok(AlState::Init));
     bench.climb(AlState::Op);
 }

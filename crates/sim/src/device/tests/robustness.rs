@@ -1,0 +1,76 @@
+//! Whatever a MainDevice writes, a device neither panics nor leaves its states.
+
+use core::time::Duration;
+
+use proptest::prelude::*;
+use ringcat_wire::address::RegisterAddress;
+use ringcat_wire::al::AlState;
+
+use super::bench::Bench;
+use crate::catalogue;
+
+/// Something a MainDevice might do, sensible or not.
+#[derive(Clone, Debug)]
+enum Act {
+    Write(u16, Vec<u8>),
+    Read(u16, usize),
+    Pass(u64),
+    Right,
+    Hang(bool),
+}
+
+fn act() -> impl Strategy<Value = Act> {
+    let bytes = prop::collection::vec(any::<u8>(), 1..40);
+    let control = prop::sample::select(vec![0x01u8, 0x02, 0x03, 0x04, 0x08, 0x11, 0x12, 0x14, 0x18, 0x22, 0x07]);
+    prop_oneof![
+        4 => control.prop_map(|value| Act::Write(0x0120, vec![value, 0])),
+        2 => (0x0800u16..0x0828, bytes.clone()).prop_map(|(address, data)| Act::Write(address, data)),
+        2 => bytes.clone().prop_map(|mut data| {
+            // A message with a plausible header of protocol CoE that fills the mailbox.
+            data.resize(128, 0);
+            data[..2].copy_from_slice(&[10, 0]);
+            data[5] = data[5] & 0x70 | 0x03;
+            data[7] = 0x20;
+            Act::Write(0x1000, data)
+        }),
+        1 => (0x1000u16..0x1300, bytes).prop_map(|(address, data)| Act::Write(address, data)),
+        2 => Just(Act::Read(0x1080, 128)),
+        1 => (0u16..0x1300, 1usize..200).prop_map(|(address, length)| Act::Read(address, length)),
+        2 => (0u64..4_000).prop_map(Act::Pass),
+        2 => Just(Act::Right),
+        1 => any::<bool>().prop_map(Act::Hang),
+    ]
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(64))]
+    #[test]
+    fn any_sequence_of_writes_leaves_a_device_in_a_state(
+        name in prop::sample::select(catalogue::names().collect::<Vec<_>>()),
+        acts in prop::collection::vec(act(), 0..60),
+    ) {
+        let mut bench = Bench::named(name);
+        let emulated = bench.device.description.emulation;
+        for act in acts {
+            match act {
+                Act::Write(address, data) => {
+                    bench.try_write(RegisterAddress(address), &data);
+                }
+                Act::Read(address, length) => {
+                    bench.try_read(RegisterAddress(address), length);
+                }
+                Act::Pass(us) => bench.pass(Duration::from_micros(us)),
+                Act::Right => {
+                    bench.try_set_all();
+                }
+                Act::Hang(hanging) => bench.device.hang(hanging, bench.now),
+            }
+            if !emulated {
+                prop_assert!(bench.device.al_status().al_state().is_some());
+            }
+        }
+        bench.device.hang(false, bench.now);
+        bench.power_cycle();
+        bench.climb(AlState::Op);
+    }
+}
