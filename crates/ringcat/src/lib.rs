@@ -1,1 +1,54 @@
-//! RingCAT.
+//! RingCAT: an EtherCAT MainDevice for Linux.
+//!
+//! An application requests a [`MainDevice`] on a set of [`Links`], scans, declares what it expects, activates, and then
+//! runs cycles:
+//!
+//! ```
+//! use std::time::Duration;
+//! use ringcat::simulated::SimulatedSegment;
+//! use ringcat::{Declaration, MainDevice, Options, automatic};
+//!
+//! # fn main() -> Result<(), ringcat::Error> {
+//! let segment = SimulatedSegment::from_toml("[segment]\nring = true\n[[device]]\ntype = \"digital-output-8\"\n")?;
+//! let mut main_device = MainDevice::request(segment, &Options::default());
+//! let found = main_device.scan()?;
+//! let declaration: Declaration = automatic(&found.subdevices, Duration::from_millis(1));
+//! let mut application = main_device.activate(declaration)?;
+//! let output = application.entry(0, 0x7000, 1);
+//! while !application.all_settled() {
+//!     application.cycle(|data| {
+//!         if let Some(output) = output {
+//!             data.write(&output, 1);
+//!         }
+//!     });
+//! }
+//! # Ok(())
+//! # }
+//! ```
+//!
+//! Frames, time and waiting come from the [`Links`]; everything that EtherCAT is lives in [`ringcat_engine`].
+
+pub mod application;
+mod error;
+pub mod links;
+pub mod main_device;
+pub mod memory;
+pub mod simulated;
+
+pub use application::{Application, ProcessData};
+pub use error::Error;
+pub use links::Links;
+pub use main_device::{MainDevice, Options, automatic};
+
+pub use ringcat_engine::config::{
+    ConfigAddress, PdoAssignment, PdoEntry, PdoMapping, SdoDownload, SubDeviceConfig, Timeouts, Watchdog,
+};
+pub use ringcat_engine::event::{Event, TimedEvent};
+pub use ringcat_engine::exchange::{CyclicCounters, DomainId, DomainState, DomainStatus, Entry, Freshness};
+pub use ringcat_engine::info::{Direction, SubDeviceInfo};
+pub use ringcat_engine::link::Link;
+pub use ringcat_engine::main_device::{ActivateError, Declaration, DomainConfig, DomainMember, SubDeviceState};
+pub use ringcat_engine::procedures::scan::{Scan, ScanError};
+pub use ringcat_engine::ring::RingState;
+pub use ringcat_engine::supervisor::AcyclicCounters;
+pub use ringcat_engine::time::Instant;

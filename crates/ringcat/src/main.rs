@@ -1,1 +1,3 @@
+//! The `ringcat` program.
+
 fn main() {}

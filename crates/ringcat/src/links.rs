@@ -1,0 +1,26 @@
+//! What a MainDevice sends and receives through, and where its time comes from.
+
+use ringcat_engine::link::Link;
+use ringcat_engine::time::Instant;
+use ringcat_wire::frame::MacAddress;
+
+/// One or two network interfaces with a clock.
+///
+/// The runtime is single-threaded: it calls these in turn. [`Links::send`] and [`Links::receive`] are called in the
+/// cyclic path and neither allocate nor wait.
+pub trait Links {
+    /// Host time.
+    fn now(&self) -> Instant;
+
+    /// Addresses of the main interface and, if there is one, of the redundant interface.
+    fn addresses(&self) -> (MacAddress, Option<MacAddress>);
+
+    /// Sends a frame, without FCS. A link that is down swallows it.
+    fn send(&mut self, link: Link, frame: &[u8]);
+
+    /// Hands the oldest frame that has arrived to `take`; false where there is none.
+    fn receive(&mut self, take: &mut dyn FnMut(Link, &[u8])) -> bool;
+
+    /// Waits until a frame has arrived or the time has come.
+    fn wait(&mut self, until: Instant);
+}

@@ -1,0 +1,126 @@
+//! A MainDevice on its links before it is active.
+
+use std::time::Duration;
+
+use ringcat_engine::config::SubDeviceConfig;
+use ringcat_engine::event::TimedEvent;
+use ringcat_engine::info::SubDeviceInfo;
+use ringcat_engine::main_device::{
+    Declaration, DomainConfig, DomainMember, MainDevice as Engine, Options as Engineering,
+};
+use ringcat_engine::procedures::scan::Scan;
+use ringcat_engine::time::Instant;
+
+use crate::application::Application;
+use crate::error::Error;
+use crate::links::Links;
+
+/// How a MainDevice works. The addresses come from the links.
+#[derive(Clone, Debug)]
+pub struct Options {
+    /// Whether SII contents are kept and used for SubDevices with the same first 64 words.
+    pub sii_cache: bool,
+    /// Whether a supervision datagram rides with the process data. Without it nothing is noticed by itself.
+    pub supervision: bool,
+    /// For so long the number of SubDevices must not change at the beginning of a scan.
+    pub settle: Duration,
+    /// So long a scan waits for the first SubDevice.
+    pub patience: Duration,
+}
+
+impl Default for Options {
+    fn default() -> Options {
+        Options {
+            sii_cache: true,
+            supervision: true,
+            settle: Duration::from_millis(5),
+            patience: Duration::from_secs(5),
+        }
+    }
+}
+
+/// A MainDevice that has links and sends nothing by itself yet.
+#[derive(Debug)]
+pub struct MainDevice<L> {
+    links: L,
+    engine: Engine,
+}
+
+impl<L: Links> MainDevice<L> {
+    /// A MainDevice on these links.
+    pub fn request(links: L, options: &Options) -> MainDevice<L> {
+        let (main, redundant) = links.addresses();
+        let options = Engineering {
+            sii_cache: options.sii_cache,
+            supervision: options.supervision,
+            settle: options.settle,
+            patience: options.patience,
+            ..Engineering::new(main, redundant)
+        };
+        let engine = Engine::new(options, links.now());
+        MainDevice { links, engine }
+    }
+
+    /// Scans the segment; all SubDevices are in INIT afterwards.
+    ///
+    /// # Errors
+    /// No answer, no SubDevices, a count that does not settle, or an SII that cannot be read.
+    pub fn scan(&mut self) -> Result<Scan, Error> {
+        self.scan_with(|_| ())
+    }
+
+    /// Like [`MainDevice::scan`], and hands out each event as it comes.
+    ///
+    /// # Errors
+    /// As [`MainDevice::scan`].
+    pub fn scan_with(&mut self, mut on_event: impl FnMut(&TimedEvent)) -> Result<Scan, Error> {
+        self.engine.start_scan()?;
+        loop {
+            self.step(Instant::NEVER);
+            while let Some(event) = self.engine.pop_event(self.links.now()) {
+                on_event(&event);
+            }
+            if let Some(result) = self.engine.scan_result() {
+                return Ok(result?);
+            }
+        }
+    }
+
+    /// Receives, lets procedures go on, sends, and waits for the next thing to happen, at most until `until`.
+    fn step(&mut self, until: Instant) {
+        let MainDevice { links, engine } = self;
+        let now = links.now();
+        while links.receive(&mut |link, frame| {
+            engine.receive(link, frame, now);
+        }) {}
+        engine.poll(now);
+        engine.transmit(now, usize::MAX, &mut |link, frame| links.send(link, frame));
+        if let Some(wake) = engine.next_deadline() {
+            links.wait(wake.min(until));
+        }
+    }
+
+    /// Lays out process data, starts the configuration of all SubDevices, and hands out the running application.
+    ///
+    /// # Errors
+    /// A declaration that does not fit what was scanned, or process data that does not fit frames.
+    pub fn activate(mut self, declaration: Declaration) -> Result<Application<L>, Error> {
+        let periods: Vec<Duration> = declaration.domains.iter().map(|domain| domain.period).collect();
+        let active = self.engine.activate(declaration)?;
+        Ok(Application::new(self.links, self.engine, active, &periods))
+    }
+
+    /// The links.
+    pub fn links_mut(&mut self) -> &mut L {
+        &mut self.links
+    }
+}
+
+/// Everything that was scanned, as its SII says, in one domain.
+pub fn automatic(subdevices: &[SubDeviceInfo], period: Duration) -> Declaration {
+    let members = (0..subdevices.len()).map(|subdevice| DomainMember { subdevice, sync_managers: None });
+    Declaration {
+        domains: vec![DomainConfig { period, members: members.collect() }],
+        subdevices: subdevices.iter().map(SubDeviceConfig::from_info).collect(),
+    }
+}

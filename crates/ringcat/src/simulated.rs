@@ -1,0 +1,129 @@
+//! Links that end in a simulated segment in the same thread.
+//!
+//! In virtual time waiting costs nothing. Paced, the simulator is held back to the pace of the wall clock: a stall of
+//! the machine then stalls both sides alike and is not mistaken for a lost frame.
+
+use std::time::{Duration, Instant as WallClock};
+
+use ringcat_engine::link::Link;
+use ringcat_engine::time::Instant;
+use ringcat_sim::cable::HostLink;
+use ringcat_sim::host::Received;
+use ringcat_sim::network::Network;
+use ringcat_sim::segment::{Segment, SegmentError};
+use ringcat_sim::time::SimTime;
+use ringcat_wire::frame::MacAddress;
+
+use crate::links::Links;
+
+/// Address of the main interface: locally administered would set the bit that controllers set, so a plain one.
+const MAIN: MacAddress = MacAddress([0x00, 0x00, 0x5E, 0x00, 0x53, 0x01]);
+/// Address of the redundant interface.
+const REDUNDANT: MacAddress = MacAddress([0x00, 0x00, 0x5E, 0x00, 0x53, 0x02]);
+/// Being ahead of the wall clock by less than this is not worth a sleep.
+const SLEEP_THRESHOLD: Duration = Duration::from_micros(100);
+
+/// A simulated segment as links.
+#[derive(Debug)]
+pub struct SimulatedSegment {
+    network: Network,
+    ring: bool,
+    arrived: Option<(Link, Received)>,
+    pace: Option<(WallClock, SimTime)>,
+    stalled: Duration,
+}
+
+impl SimulatedSegment {
+    /// Links into a network; two of them where something is plugged into its redundant host interface.
+    pub fn new(network: Network) -> SimulatedSegment {
+        let ring = network.host_cable(HostLink::Redundant).is_some();
+        SimulatedSegment { network, ring, arrived: None, pace: None, stalled: Duration::ZERO }
+    }
+
+    /// A segment from the text of a segment file; SII images are looked for in the working directory.
+    pub fn from_toml(text: &str) -> Result<SimulatedSegment, SegmentError> {
+        let segment = Segment::from_toml(text, std::path::Path::new("."))?;
+        Ok(SimulatedSegment::new(Network::from_description(segment)?))
+    }
+
+    /// From now on virtual time does not run ahead of the wall clock.
+    pub fn pace(&mut self) {
+        self.pace = Some((WallClock::now(), self.network.now()));
+        self.stalled = Duration::ZERO;
+    }
+
+    /// How far virtual time fell behind the wall clock at most since [`SimulatedSegment::pace`].
+    pub fn stalled(&self) -> Duration {
+        self.stalled
+    }
+
+    /// The segment behind the links.
+    pub fn network(&self) -> &Network {
+        &self.network
+    }
+
+    /// The segment behind the links, to bring about faults.
+    pub fn network_mut(&mut self) -> &mut Network {
+        &mut self.network
+    }
+
+    fn fetch(&mut self) -> bool {
+        if self.arrived.is_none() {
+            let main = self.network.receive(HostLink::Main).map(|received| (Link::Main, received));
+            let next =
+                main.or_else(|| self.network.receive(HostLink::Redundant).map(|received| (Link::Redundant, received)));
+            self.arrived = next;
+        }
+        self.arrived.is_some()
+    }
+
+    /// Holds virtual time back to the wall clock.
+    fn keep_pace(&mut self) {
+        let Some((wall, virtual_time)) = self.pace else { return };
+        let ahead = self.network.now() - virtual_time;
+        let elapsed = wall.elapsed();
+        if ahead > elapsed + SLEEP_THRESHOLD {
+            std::thread::sleep(ahead - elapsed);
+        } else if elapsed > ahead {
+            self.stalled = self.stalled.max(elapsed - ahead);
+        }
+    }
+}
+
+const fn host_link(link: Link) -> HostLink {
+    match link {
+        Link::Main => HostLink::Main,
+        Link::Redundant => HostLink::Redundant,
+    }
+}
+
+impl Links for SimulatedSegment {
+    fn now(&self) -> Instant {
+        Instant(self.network.now().0)
+    }
+
+    fn addresses(&self) -> (MacAddress, Option<MacAddress>) {
+        (MAIN, self.ring.then_some(REDUNDANT))
+    }
+
+    fn send(&mut self, link: Link, frame: &[u8]) {
+        self.network.send(host_link(link), frame);
+    }
+
+    fn receive(&mut self, take: &mut dyn FnMut(Link, &[u8])) -> bool {
+        self.fetch();
+        let Some((link, received)) = self.arrived.take() else { return false };
+        take(link, &received.bytes);
+        self.network.give_back(received.bytes);
+        true
+    }
+
+    fn wait(&mut self, until: Instant) {
+        let until = SimTime(until.0);
+        while !self.fetch() && self.network.now() < until {
+            let next = self.network.next_event().map_or(until, |next| next.min(until));
+            self.network.advance(next);
+        }
+        self.keep_pace();
+    }
+}
