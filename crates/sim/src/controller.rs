@@ -79,6 +79,8 @@ pub struct Controller {
     /// STATION_ADDRESS and the alias bit, at hand for every datagram.
     station: u16,
     alias_enabled: bool,
+    /// Bit 0 of DL_CONTROL, at hand for every frame.
+    forwarding_rule: bool,
     /// ECAT events that are not masked.
     irq: u16,
     /// When something happens by itself next.
@@ -105,6 +107,7 @@ impl Controller {
             reset_frame: None,
             station: 0,
             alias_enabled: false,
+            forwarding_rule: true,
             irq: 0,
             deadline: SimTime::NEVER,
             config,

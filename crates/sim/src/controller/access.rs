@@ -12,6 +12,7 @@ use super::Controller;
 use super::events::{EVENT_AL_CONTROL, EVENT_PROCESS_DATA_WATCHDOG, EVENT_SYNC_MANAGER_ACTIVATION};
 use super::fmmu::Piece;
 use super::memory::{Side, USER_RAM};
+use super::pass::Pass;
 use super::sync_manager::Claim;
 
 /// End of the 64 KiB address space.
@@ -81,7 +82,7 @@ impl Controller {
                 self.pass.write(address, bytes, mask);
             }
             Side::Pdi => {
-                let mut pass = mem::replace(&mut self.pass, super::pass::Pass::new());
+                let mut pass = mem::replace(&mut self.pass, Pass::new());
                 pass.clear();
                 pass.write(address, bytes, mask);
                 self.apply(Side::Pdi, address, &pass.bytes, pass.start, None);

@@ -35,8 +35,11 @@ impl Controller {
     }
 
     pub(super) fn clear_ecat_event(&mut self, bits: u16) {
-        self.memory.set_u16(map::ECAT_EVENT, self.memory.u16(map::ECAT_EVENT) & !bits);
-        self.refresh_irq();
+        let pending = self.memory.u16(map::ECAT_EVENT);
+        if pending & bits != 0 {
+            self.memory.set_u16(map::ECAT_EVENT, pending & !bits);
+            self.refresh_irq();
+        }
     }
 
     /// The bits for datagrams: pending and not masked (facts 1.2).

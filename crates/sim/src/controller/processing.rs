@@ -12,8 +12,10 @@ use ringcat_wire::datagram::CIRCULATING;
 use ringcat_wire::register::map;
 
 use super::Controller;
+use super::events::{EVENT_AL_STATUS, EVENT_DL_STATUS};
 use super::fmmu::Direction;
 use super::memory::Side;
+use super::pass::Pass;
 use crate::frame::{DatagramPlace, Fcs, FrameKind, SimFrame, UDP_CHECKSUM, is_udp};
 use crate::time::SimTime;
 
@@ -28,7 +30,7 @@ const CIRCULATING_HIGH: u8 = (CIRCULATING >> 8) as u8;
 impl Controller {
     /// Processes a frame. Returns whether it goes on.
     pub(super) fn process(&mut self, frame: &mut SimFrame, first_bit: SimTime, now: SimTime) -> bool {
-        let rule = self.memory.u8(map::DL_CONTROL) & 1 != 0;
+        let rule = self.forwarding_rule;
         if frame.malformed {
             self.memory.count(map::EPU_ERROR_COUNTER);
         }
@@ -207,8 +209,7 @@ impl Controller {
 
     /// The end of a frame: what it asked for takes effect, or is forgotten.
     fn finish_frame(&mut self, good: bool, now: SimTime) {
-        let mut pass = mem::replace(&mut self.pass, super::pass::Pass::new());
-        let mut left = pass.sync_managers;
+        let mut left = self.pass.sync_managers;
         while left != 0 {
             let n = left.trailing_zeros() as usize;
             left &= left - 1;
@@ -218,26 +219,35 @@ impl Controller {
             self.refresh_sync_manager(n);
         }
         if good {
-            if pass.read_dl_status {
-                self.clear_ecat_event(super::events::EVENT_DL_STATUS);
+            if self.pass.read_dl_status {
+                self.clear_ecat_event(EVENT_DL_STATUS);
             }
-            if pass.read_al_status {
-                self.clear_ecat_event(super::events::EVENT_AL_STATUS);
+            if self.pass.read_al_status {
+                self.clear_ecat_event(EVENT_AL_STATUS);
             }
-            if pass.latches {
-                self.latch_receive_times(pass.frame, pass.start);
+            if self.pass.latches {
+                self.latch_receive_times(self.pass.frame, self.pass.start);
             }
-            let mut at = 0;
-            for &(address, len) in &pass.writes {
-                let bytes = &pass.bytes[at..at + usize::from(len)];
-                self.apply(Side::Ecat, address.into(), bytes, now, Some(pass.frame));
-                at += usize::from(len);
+            if !self.pass.writes.is_empty() {
+                self.apply_writes(now);
             }
-            self.run_sii_command(Side::Ecat, now);
-            self.schedule();
+        }
+        self.pass.clear();
+    }
+
+    /// Carries out the frame's register writes in the order of its datagrams, then the SII command among them.
+    fn apply_writes(&mut self, now: SimTime) {
+        let mut pass = mem::replace(&mut self.pass, Pass::new());
+        let mut at = 0;
+        for &(address, len) in &pass.writes {
+            let bytes = &pass.bytes[at..at + usize::from(len)];
+            self.apply(Side::Ecat, address.into(), bytes, now, Some(pass.frame));
+            at += usize::from(len);
         }
         pass.clear();
         self.pass = pass;
+        self.run_sii_command(Side::Ecat, now);
+        self.schedule();
     }
 }
 

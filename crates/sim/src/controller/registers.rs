@@ -101,7 +101,8 @@ impl Controller {
 
     fn layers_written(&mut self, touched: Touched, al_control_pending: bool, now: SimTime, frame: Option<u64>) {
         if touched.is(map::DL_CONTROL, 4) {
-            self.alias_enabled = DlControl::decode(&self.memory.array(map::DL_CONTROL)).alias_enable;
+            let control = DlControl::decode(&self.memory.array(map::DL_CONTROL));
+            (self.alias_enabled, self.forwarding_rule) = (control.alias_enable, control.forwarding_rule);
             if touched.is(DL_CONTROL_LOOPS, 1) {
                 self.loops_written(now, frame);
             } else if self.memory.u8(map::DL_CONTROL) & TEMPORARY == 0 {

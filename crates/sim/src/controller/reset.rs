@@ -71,7 +71,7 @@ impl Controller {
         self.lasting_loops = [LoopControl::Auto; 4];
         self.temporary_loops = None;
         self.reset_frame = None;
-        (self.station, self.alias_enabled, self.irq) = (0, false, 0);
+        (self.station, self.alias_enabled, self.forwarding_rule, self.irq) = (0, false, true, 0);
         self.process_data_watchdog.rest();
         self.pdi_watchdog.rest();
         self.store_reset_values();

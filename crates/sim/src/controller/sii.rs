@@ -38,11 +38,13 @@ pub(super) struct SiiInterface {
     until: SimTime,
     /// A command that was written in this frame.
     command: Option<SiiCommand>,
+    /// Bit 0 of SII_CONTROL, at hand for every frame.
+    write_enabled: bool,
 }
 
 impl SiiInterface {
     pub const fn new() -> SiiInterface {
-        SiiInterface { task: Task::Idle, until: SimTime::NEVER, command: None }
+        SiiInterface { task: Task::Idle, until: SimTime::NEVER, command: None, write_enabled: false }
     }
 
     /// When the running command ends.
@@ -94,10 +96,15 @@ impl Controller {
 
     /// Write enable holds for one frame (facts 3.8).
     pub(super) fn clear_sii_write_enable(&mut self) {
-        let low = self.memory.u8(map::SII_CONTROL);
-        if low & 1 != 0 {
-            self.memory.set_u8(map::SII_CONTROL, low & !1);
+        if self.sii.write_enabled {
+            self.set_sii_write_enable(false);
         }
+    }
+
+    fn set_sii_write_enable(&mut self, enabled: bool) {
+        self.sii.write_enabled = enabled;
+        let low = self.memory.u8(map::SII_CONTROL);
+        self.memory.set_u8(map::SII_CONTROL, low & !1 | u8::from(enabled));
     }
 
     /// Takes over a write to 0x0500..0x0503; address and data are plain registers.
@@ -110,10 +117,7 @@ impl Controller {
             match address {
                 CONFIGURATION => self.sii_configuration_written(value),
                 PDI_ACCESS => self.sii_pdi_access_written(value),
-                CONTROL => {
-                    let low = self.memory.u8(map::SII_CONTROL);
-                    self.memory.set_u8(map::SII_CONTROL, low & !1 | value & 1);
-                }
+                CONTROL => self.set_sii_write_enable(value & 1 != 0),
                 COMMAND => self.sii.command = Some(SiiControl::from_bits(u16::from(value) << 8).command),
                 _ => {}
             }
@@ -164,8 +168,9 @@ impl Controller {
 
     /// Starts loading the configuration.
     pub(super) fn start_loading(&mut self, first: bool, now: SimTime) {
-        self.sii.command = None;
+        (self.sii.command, self.sii.write_enabled) = (None, false);
         self.set_sii_control(SiiControl {
+            write_enable: false,
             eight_byte_reads: self.config.eight_byte_reads,
             two_address_bytes: self.config.sii.len() > ONE_ADDRESS_BYTE,
             ..self.sii_control()
