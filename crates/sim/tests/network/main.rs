@@ -2,6 +2,7 @@
 //! to them (facts 2, 9.4, 11.3; issue 2, part 3).
 
 mod any_frames;
+mod clocks;
 mod determinism;
 mod examples;
 mod faults;
