@@ -3,8 +3,6 @@
 use core::time::Duration;
 use std::path::Path;
 
-use ringcat_wire::sii;
-
 use super::SegmentError;
 use super::format::{DeviceEntry, File, duration, line};
 use crate::catalogue;
@@ -15,8 +13,6 @@ use crate::network::Random;
 const MAX_DEVICES: usize = 65_535;
 /// Names that mean something else where a cable is plugged in.
 pub(super) const RESERVED: [&str; 3] = ["main", "redundant", "none"];
-/// Checksum word that switches the check off (facts 4.1).
-const CHECKSUM_OFF: u16 = 0x88A4;
 
 /// A device, and which table of the file it comes from.
 pub(super) struct PlannedDevice {
@@ -123,11 +119,9 @@ fn settings(entry: &DeviceEntry, description: &mut DeviceDescription) -> Result<
         };
     if let Some(alias) = entry.alias {
         description.alias = alias;
-        patch(description, 8, &alias.to_le_bytes());
     }
     if let Some(serial) = entry.serial {
         description.identity.serial = serial;
-        patch(description, 28, &serial.to_le_bytes());
     }
     if let Some(drift) = &entry.drift_ppm {
         let ppb = *drift.get_ref() * 1e3;
@@ -156,20 +150,4 @@ fn settings(entry: &DeviceEntry, description: &mut DeviceDescription) -> Result<
         *target = time(value, key, 1e-3)?.unwrap_or(*target);
     }
     Ok(())
-}
-
-/// Puts bytes into the fixed part of a real image and makes its checksum right again (facts 4.1).
-fn patch(description: &mut DeviceDescription, at: usize, bytes: &[u8]) {
-    let Some(image) = &mut description.sii_image else {
-        return;
-    };
-    if let Some(place) = image.get_mut(at..at + bytes.len()) {
-        place.copy_from_slice(bytes);
-    }
-    if let Some((first, rest)) = image.split_first_chunk_mut::<14>()
-        && let Some(word) = rest.first_chunk_mut::<2>()
-        && u16::from_le_bytes(*word) != CHECKSUM_OFF
-    {
-        *word = u16::from(sii::checksum(first)).to_le_bytes();
-    }
 }

@@ -150,7 +150,7 @@ fn a_real_image_with_another_alias_keeps_a_valid_checksum() {
     let mut segment = Segment::from_toml(text, &directory).unwrap();
     std::fs::remove_dir_all(&directory).unwrap();
     let device = segment.devices.remove(0);
-    let again = DeviceDescription::from_sii(device.sii_image.unwrap(), "again").unwrap();
+    let again = DeviceDescription::from_sii(crate::sii_image::build(&device), "again").unwrap();
     assert_eq!((device.name.as_str(), again.alias, again.identity.serial), ("di-1", 300, 9));
 }
 
