@@ -127,10 +127,10 @@ impl Mailbox {
             if self.is_repeated(&message.header) {
                 continue;
             }
-            if message.header.protocol == Protocol::Error {
-                if let Some(bytes) = message.payload.first_chunk() {
-                    return Err(MailboxError::Error(ErrorReply::decode(bytes)));
-                }
+            if message.header.protocol == Protocol::Error
+                && let Some(bytes) = message.payload.first_chunk()
+            {
+                return Err(MailboxError::Error(ErrorReply::decode(bytes)));
             }
             match accept(&message) {
                 Some(answer) => return Ok(answer),

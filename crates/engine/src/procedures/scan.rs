@@ -17,7 +17,7 @@ use ringcat_wire::register::{DcReceiveTimes, DlStatus, EcatEvent, Fmmu, Informat
 use super::sii::{SiiCache, SiiReadError, SiiReader, claim_all};
 use crate::config::duplicate_aliases;
 use crate::event::Event;
-use crate::info::{Readout, SubDeviceInfo};
+use crate::info::{InfoWarning, Readout, SiiProblem, SubDeviceInfo};
 use crate::link::LinkSet;
 use crate::ring::RingState;
 use crate::supervisor::{Bus, BusError};
@@ -285,7 +285,11 @@ pub(super) async fn read_one(
     let contents = reader.read().await.map_err(|error| ScanError::Sii { position, error })?;
     let readout = Readout { position, station, alias, information, dl_status, receive_times };
     let categories = contents.categories.iter().map(|(kind, data)| (*kind, data.as_slice()));
-    Ok(SubDeviceInfo::from_parts(readout, &contents.header, categories))
+    let mut info = SubDeviceInfo::from_parts(readout, &contents.header, categories);
+    if !contents.complete {
+        info.warnings.push(InfoWarning { category: None, offset: 0, problem: SiiProblem::NoEndMarker });
+    }
+    Ok(info)
 }
 
 fn report_findings(bus: &Bus, scan: &Scan) {

@@ -167,7 +167,7 @@ impl SiiReader {
         if !self.cache.enabled {
             return self.read_categories(&header).await.map(|(_, contents)| contents);
         }
-        if let Some(contents) = self.from_cache(&header).await? {
+        if let Some(contents) = self.known(&header).await? {
             return Ok(contents);
         }
         self.claim(&header);
@@ -191,7 +191,7 @@ impl SiiReader {
 
     /// Contents of a SubDevice with the same first words, if the category headers are the same too. While another
     /// SubDevice's are being read, waits for them.
-    async fn from_cache(&mut self, header: &[u8; SiiHeader::LEN]) -> Result<Option<SiiContents>, SiiReadError> {
+    async fn known(&mut self, header: &[u8; SiiHeader::LEN]) -> Result<Option<SiiContents>, SiiReadError> {
         loop {
             let found = {
                 let entries = self.cache.entries.borrow();
@@ -241,7 +241,7 @@ impl SiiReader {
         let mut chain = Vec::new();
         // An EEPROM that says nothing about its size is followed as far as any goes.
         let size = (contents.header.size_bytes() / 2) as u32;
-        let end = size.max(HEADER_WORDS + 2).min(MAX_WORDS);
+        let end = size.clamp(HEADER_WORDS + 2, MAX_WORDS);
         let mut word = HEADER_WORDS;
         while word + 2 <= end && chain.len() < MAX_CATEGORIES {
             let category = self.category_header(word).await?;

@@ -85,7 +85,8 @@ mod tests {
     #[test]
     fn the_table_of_facts_9_2_1() {
         use Link::{Main, Redundant};
-        let table: [(&[(Link, Link)], Option<RingState>); 7] = [
+        type Copies = &'static [(Link, Link)];
+        let table: [(Copies, Option<RingState>); 7] = [
             (&[(Redundant, Main), (Main, Redundant)], Some(RingState::Closed)),
             (&[(Main, Main), (Redundant, Redundant)], Some(RingState::Open)),
             (&[(Main, Main)], Some(RingState::Open)),
