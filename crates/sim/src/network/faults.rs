@@ -9,7 +9,7 @@ impl Network {
     /// Brings about a fault at a time, or at once where that has passed.
     ///
     /// # Panics
-    /// When the device or cable does not exist.
+    /// When the device, the cable or the byte of the EEPROM does not exist.
     pub fn schedule(&mut self, at: SimTime, fault: Fault) {
         self.check(&fault);
         let free = self.scheduled.iter().position(Option::is_none).unwrap_or(self.scheduled.len());
@@ -23,7 +23,7 @@ impl Network {
     /// Brings about a fault now.
     ///
     /// # Panics
-    /// When the device or cable does not exist.
+    /// When the device, the cable or the byte of the EEPROM does not exist.
     pub fn apply(&mut self, fault: Fault) {
         self.check(&fault);
         match fault {
@@ -90,8 +90,12 @@ impl Network {
             Fault::PowerOff(device)
             | Fault::PowerOn(device)
             | Fault::Hang(device, _)
-            | Fault::CorruptSii { device, .. }
             | Fault::RefuseTransition { device, .. } => self.check_device(device),
+            Fault::CorruptSii { device, offset, .. } => {
+                self.check_device(device);
+                let size = self.nodes[device.0].device.controller.sii_image().len();
+                assert!(offset < size, "no byte {offset} among {size} of the EEPROM of device {}", device.0);
+            }
         }
     }
 
