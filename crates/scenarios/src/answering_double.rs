@@ -1,0 +1,127 @@
+//! A segment that does nothing but answer cyclic frames: a stand-in where only the MainDevice's cost is of interest.
+//!
+//! In: the frames that a MainDevice put on its in-memory links. Out: the same frames, with the working counters that
+//! SubDevices would have written and the bit that controllers set in the source address (facts 2.6), on the link where
+//! the cabling brings them back (facts 9.2.1). Inputs stay as they were sent.
+
+use ringcat::memory::FrameRing;
+use ringcat_engine::exchange::Layout;
+use ringcat_engine::exchange::layout::PlannedFrame;
+use ringcat_engine::link::Link;
+use ringcat_wire::datagram::{HEADER_LEN, Target, WKC_LEN};
+use ringcat_wire::frame::{ETHERCAT_HEADER_LEN, ETHERNET_HEADER_LEN};
+use ringcat_wire::register::map;
+use ringcat_wire::source_address::PROCESSED;
+
+/// Offset of the first datagram in a frame.
+const DATAGRAMS_AT: usize = ETHERNET_HEADER_LEN + ETHERCAT_HEADER_LEN;
+/// Offset of the first datagram's address, by which frames are told apart.
+const KEY_AT: usize = DATAGRAMS_AT + 2;
+/// Offset of the source address.
+const SOURCE_AT: usize = 6;
+/// Bytes of AL status, which the supervision datagram reads.
+const AL_STATUS_LEN: usize = 2;
+
+/// How the SubDevices hang on the links.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Cabling {
+    /// On the main link alone.
+    Line,
+    /// A closed ring: the main copy meets all SubDevices and arrives on the redundant link, the redundant copy meets
+    /// none and arrives on the main link.
+    ClosedRing,
+    /// A ring that is cut: copies return where they were sent. The main copy meets those before the break, the
+    /// redundant copy the others.
+    CutRing {
+        /// Number of SubDevices before the break.
+        before: usize,
+    },
+}
+
+impl Cabling {
+    /// The copy that meets a SubDevice.
+    fn met_on(self, subdevice: usize) -> Link {
+        match self {
+            Cabling::CutRing { before } if subdevice >= before => Link::Redundant,
+            Cabling::Line | Cabling::ClosedRing | Cabling::CutRing { .. } => Link::Main,
+        }
+    }
+
+    fn arrives_on(self, sent_on: Link) -> Link {
+        match (self, sent_on) {
+            (Cabling::ClosedRing, Link::Main) => Link::Redundant,
+            (Cabling::ClosedRing, Link::Redundant) => Link::Main,
+            (Cabling::Line | Cabling::CutRing { .. }, link) => link,
+        }
+    }
+}
+
+/// A working counter to be written.
+#[derive(Clone, Copy, Debug)]
+struct Patch {
+    at: usize,
+    /// By the link on which the copy was sent.
+    wkc: [u16; 2],
+}
+
+#[derive(Debug)]
+struct Answer {
+    key: [u8; 4],
+    patches: Vec<Patch>,
+}
+
+/// The double.
+#[derive(Debug)]
+pub struct AnsweringDouble {
+    answers: Vec<Answer>,
+    cabling: Cabling,
+}
+
+impl AnsweringDouble {
+    /// A double that answers the frames of a layout for this many SubDevices.
+    pub fn new(layout: &Layout, subdevices: usize, cabling: Cabling) -> AnsweringDouble {
+        let frames = layout.domains.iter().flat_map(|domain| &domain.frames);
+        AnsweringDouble { answers: frames.map(|frame| Answer::new(frame, subdevices, cabling)).collect(), cabling }
+    }
+
+    /// Answers all frames that were sent; frames that are not of the layout vanish.
+    // One copy of this in a program: what it costs is measured apart and subtracted.
+    #[inline(never)]
+    pub fn answer(&self, sent: &mut FrameRing, arriving: &mut FrameRing) {
+        while let Some((link, frame)) = sent.pop() {
+            let Some(key) = frame.get(KEY_AT..KEY_AT + 4) else { continue };
+            let Some(answer) = self.answers.iter().find(|answer| answer.key == *key) else { continue };
+            frame[SOURCE_AT] |= PROCESSED;
+            for patch in &answer.patches {
+                frame[patch.at..patch.at + WKC_LEN].copy_from_slice(&patch.wkc[link.index()].to_le_bytes());
+            }
+            arriving.push(self.cabling.arrives_on(link), frame);
+        }
+    }
+}
+
+impl Answer {
+    fn new(frame: &PlannedFrame, subdevices: usize, cabling: Cabling) -> Answer {
+        let supervision = Target::Broadcast(map::AL_STATUS);
+        let first = frame.datagrams.first().map_or(supervision, |datagram| Target::Logical(datagram.logical));
+        let mut patches = Vec::new();
+        let mut at = DATAGRAMS_AT;
+        for datagram in &frame.datagrams {
+            at += HEADER_LEN + usize::from(datagram.outputs) + usize::from(datagram.inputs);
+            let mut wkc = [0; 2];
+            for (subdevice, contribution) in &datagram.contributions {
+                wkc[cabling.met_on(*subdevice).index()] += contribution.0;
+            }
+            patches.push(Patch { at, wkc });
+            at += WKC_LEN;
+        }
+        if frame.supervision {
+            let mut wkc = [0; 2];
+            for subdevice in 0..subdevices {
+                wkc[cabling.met_on(subdevice).index()] += 1;
+            }
+            patches.push(Patch { at: at + HEADER_LEN + AL_STATUS_LEN, wkc });
+        }
+        Answer { key: first.raw().to_le_bytes(), patches }
+    }
+}

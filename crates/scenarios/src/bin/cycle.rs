@@ -1,0 +1,199 @@
+//! Instructions per process-data cycle (issue 2, "What it must reach"), counted by callgrind.
+//!
+//! A cycle is what the application's thread does: receive all frames, judge, copy between image and application, queue,
+//! send on the in-memory links. The other end is a double that only writes working counters and the source bit. Cost is
+//! the slope between two run lengths, so that start-up does not count; the double's own slope, measured by running it
+//! alone on the same frames, is subtracted. Between the two lengths no function that allocates or locks may be called.
+//!
+//! Run without arguments it prints the table; `run CASE exchange|double CYCLES` is the work that callgrind watches.
+
+use std::io;
+use std::process::ExitCode;
+use std::thread;
+
+use scenarios::answering_double::Cabling;
+use scenarios::callgrind::{Profile, is_installed, profile_self};
+use scenarios::cyclic_load::{CyclicLoad, LoadSpec};
+use scenarios::figures::{Figures, verdict};
+
+const SHORT: u64 = 1_000;
+const LONG: u64 = 3_000;
+/// Most instructions of a cycle with one SubDevice on one link.
+const BAR: f64 = 900.0;
+/// Most that two links may cost, as a multiple of one link.
+const RING_BAR: f64 = 1.7;
+/// Most that 50 SubDevices may cost, as a multiple of one with as many bytes.
+const FIFTY_BAR: f64 = 1.3;
+
+struct Case {
+    name: &'static str,
+    spec: LoadSpec,
+}
+
+const fn case(name: &'static str, subdevices: usize, bytes: u16, lrw: bool, cabling: Cabling) -> Case {
+    Case { name, spec: LoadSpec { subdevices, bytes, domains: 1, lrw, supervision: true, cabling } }
+}
+
+const fn unsupervised(mut case: Case, name: &'static str) -> Case {
+    case.name = name;
+    case.spec.supervision = false;
+    case
+}
+
+const BEFORE: Cabling = Cabling::CutRing { before: 1 };
+const BEHIND: Cabling = Cabling::CutRing { before: 0 };
+
+const LRW: Case = case("lrw", 1, 2, true, Cabling::Line);
+const SPLIT: Case = case("lwr+lrd", 1, 2, false, Cabling::Line);
+const CLOSED: Case = case("closed", 1, 2, false, Cabling::ClosedRing);
+const CUT_BEHIND: Case = case("cut-main", 1, 2, false, BEFORE);
+const CUT_BEFORE: Case = case("cut-redundant", 1, 2, false, BEHIND);
+const CASES: [Case; 14] = [
+    unsupervised(LRW, "lrw-unsupervised"),
+    unsupervised(SPLIT, "lwr+lrd-unsupervised"),
+    unsupervised(CLOSED, "closed-unsupervised"),
+    unsupervised(CUT_BEHIND, "cut-main-unsupervised"),
+    unsupervised(CUT_BEFORE, "cut-redundant-unsupervised"),
+    LRW,
+    SPLIT,
+    CLOSED,
+    CUT_BEHIND,
+    CUT_BEFORE,
+    case("one-of-100", 1, 100, true, Cabling::Line),
+    case("fifty-of-2", 50, 2, true, Cabling::Line),
+    case("one-of-100-cut", 1, 100, false, BEHIND),
+    case("fifty-of-2-cut", 50, 2, false, Cabling::CutRing { before: 25 }),
+];
+
+fn main() -> ExitCode {
+    let arguments: Vec<String> = std::env::args().skip(1).collect();
+    let result = match arguments.iter().map(String::as_str).collect::<Vec<_>>()[..] {
+        [] if !is_installed() => {
+            println!("skipped: instructions per cycle, for valgrind is not installed");
+            Ok(true)
+        }
+        [] => measure_all().map(|measured| print(&measured)),
+        ["run", name, part, cycles] => run(name, part, cycles).map(|()| true),
+        _ => Err(io::Error::other("usage: cycle [run CASE exchange|double CYCLES]")),
+    };
+    match result {
+        Ok(met) => verdict(met),
+        Err(error) => {
+            eprintln!("cycle: {error}");
+            ExitCode::FAILURE
+        }
+    }
+}
+
+/// The work that callgrind watches.
+fn run(name: &str, part: &str, cycles: &str) -> io::Result<()> {
+    let case = CASES.iter().find(|case| case.name == name).ok_or(io::Error::other("no such case"))?;
+    let cycles: u64 = cycles.parse().map_err(io::Error::other)?;
+    let mut load = CyclicLoad::new(&case.spec).map_err(io::Error::other)?;
+    let incomplete = load.exchange_once().state;
+    match part {
+        "exchange" => {
+            for _ in 0..cycles {
+                load.answer();
+                load.exchange_once();
+            }
+            let counters = load.exchange.counters();
+            let disturbed = counters.lost + counters.late + counters.corrupt + counters.skipped + counters.copies_lost;
+            if disturbed != 0 || counters.incomplete != 0 || counters.received != cycles {
+                return Err(io::Error::other(format!("first {incomplete:?}, then {counters:?}")));
+            }
+        }
+        "double" => {
+            for _ in 0..cycles / 2 {
+                load.answer();
+                load.answer_back();
+            }
+        }
+        _ => return Err(io::Error::other("no such part")),
+    }
+    Ok(())
+}
+
+/// Slopes of one case.
+struct Measured {
+    exchange: f64,
+    double: f64,
+    /// Calls of functions that allocate or lock, within the cycles and in the whole run.
+    forbidden: (u64, u64),
+}
+
+impl Measured {
+    fn net(&self) -> f64 {
+        self.exchange - self.double
+    }
+}
+
+fn measure_all() -> io::Result<Vec<Measured>> {
+    // Two at a time: valgrind uses one processor each.
+    let (left, right) = CASES.split_at(CASES.len() / 2);
+    let measure_half = |cases: &'static [Case]| cases.iter().map(measure).collect::<io::Result<Vec<_>>>();
+    let (left, right) = thread::scope(|scope| {
+        let right = scope.spawn(move || measure_half(right));
+        (measure_half(left), right.join())
+    });
+    let right = right.map_err(|_| io::Error::other("a measurement panicked"))?;
+    Ok(left?.into_iter().chain(right?).collect())
+}
+
+fn measure(case: &Case) -> io::Result<Measured> {
+    let profile = |part: &str, cycles: u64| {
+        profile_self(&["run".to_owned(), case.name.to_owned(), part.to_owned(), cycles.to_string()])
+    };
+    let (short, long) = (profile("exchange", SHORT)?, profile("exchange", LONG)?);
+    let (double_short, double_long) = (profile("double", SHORT)?, profile("double", LONG)?);
+    let calls = |profile: &Profile| profile.calls_of(allocates_or_locks);
+    Ok(Measured {
+        exchange: slope(&short, &long),
+        double: slope(&double_short, &double_long),
+        forbidden: (calls(&long).abs_diff(calls(&short)), calls(&long)),
+    })
+}
+
+fn slope(short: &Profile, long: &Profile) -> f64 {
+    (long.instructions as f64 - short.instructions as f64) / (LONG - SHORT) as f64
+}
+
+/// Functions that allocate, lock or enter the kernel. Rust's own paths begin with `alloc::` also where nothing is
+/// allocated, so names are taken for what they call in the end.
+fn allocates_or_locks(name: &str) -> bool {
+    const PARTS: [&str; 13] = [
+        "malloc", "calloc", "realloc", "memalign", "__rust_alloc", "__rust_dealloc", "_int_free", "mutex", "rwlock",
+        "futex", "pthread", "lll_lock", "syscall",
+    ];
+    let lower = name.to_ascii_lowercase();
+    lower.starts_with("free") || lower.starts_with("cfree") || PARTS.iter().any(|part| lower.contains(part))
+}
+
+fn print(measured: &[Measured]) -> bool {
+    let find = |name: &str| {
+        let at = CASES.iter().position(|case| case.name == name).unwrap_or_default();
+        &measured[at]
+    };
+    let mut figures = Figures::new("instructions per process-data cycle, the double's subtracted");
+    let one_link = find("lwr+lrd").net().max(find("lrw").net());
+    for (case, measured) in CASES.iter().zip(measured) {
+        let name = format!("{:<28} (with double {:>6.1}, double {:>5.1})", case.name, measured.exchange, measured.double);
+        if case.spec.cabling == Cabling::Line && case.spec.subdevices == 1 {
+            figures.at_most(&name, measured.net(), BAR, "instructions");
+        } else {
+            figures.show(&name, format!("{:.2} instructions", measured.net()));
+        }
+    }
+    for name in ["closed", "cut-main", "cut-redundant"] {
+        figures.at_most(&format!("two links, {name}, against one link"), find(name).net() / one_link, RING_BAR, "x");
+    }
+    let fifty = find("fifty-of-2").net() / find("one-of-100").net();
+    figures.at_most("50 SubDevices of 2 + 2 bytes against one of 100 + 100", fifty, FIFTY_BAR, "x");
+    let fifty = find("fifty-of-2-cut").net() / find("one-of-100-cut").net();
+    figures.at_most("the same, two links, cut in the middle", fifty, FIFTY_BAR, "x");
+    let forbidden = measured.iter().map(|measured| measured.forbidden.0).sum::<u64>();
+    let outside = measured.iter().map(|measured| measured.forbidden.1).sum::<u64>();
+    let name = format!("calls that allocate or lock, in the cycles ({outside} at start-up)");
+    figures.at_most(&name, forbidden as f64, 0.0, "calls");
+    figures.print()
+}

@@ -1,0 +1,141 @@
+//! An exchange that runs against the answering double: what the benches and tests of the cyclic path measure.
+//!
+//! In: number of SubDevices, their process data, the cabling. Out: whole cycles, one call each: receive, judge, work a
+//! little on the image, queue, send on the in-memory links.
+
+use std::hint::black_box;
+use std::sync::Arc;
+use std::time::Duration;
+
+use ringcat::links::Links;
+use ringcat::memory::MemoryLinks;
+use ringcat_engine::board::Board;
+use ringcat_engine::direction::Direction;
+use ringcat_engine::exchange::layout::{AreaSpec, LayoutError};
+use ringcat_engine::exchange::{DomainId, DomainSpec, DomainStatus, Exchange, Layout};
+use ringcat_engine::link::LinkSet;
+use ringcat_engine::queue::{Consumer, queue};
+use ringcat_engine::ring::Identity;
+use ringcat_engine::time::Instant;
+use ringcat_wire::frame::MacAddress;
+use ringcat_wire::source_address::MacCodec;
+
+use crate::answering_double::{AnsweringDouble, Cabling};
+
+/// Time between two cycles.
+pub const PERIOD: Duration = Duration::from_millis(1);
+/// Frames that fit into each queue of the links.
+const LINK_QUEUE: usize = 64;
+/// Events that fit between the halves.
+const EVENTS: usize = 64;
+const MAIN: MacAddress = MacAddress([0x00, 0x00, 0x5E, 0x00, 0x53, 0x01]);
+const REDUNDANT: MacAddress = MacAddress([0x00, 0x00, 0x5E, 0x00, 0x53, 0x02]);
+
+/// What is exchanged, and how.
+#[derive(Clone, Copy, Debug)]
+pub struct LoadSpec {
+    /// Number of SubDevices.
+    pub subdevices: usize,
+    /// Bytes of outputs, and of inputs, of each of them.
+    pub bytes: u16,
+    /// Number of domains; each holds part of the SubDevices.
+    pub domains: usize,
+    /// Whether the SubDevices know LRW.
+    pub lrw: bool,
+    /// Whether the supervision datagram rides along.
+    pub supervision: bool,
+    /// Links and where the copies go.
+    pub cabling: Cabling,
+}
+
+/// The exchange with everything around it.
+#[derive(Debug)]
+pub struct CyclicLoad {
+    /// The exchange.
+    pub exchange: Exchange,
+    /// The links between it and the double.
+    pub links: MemoryLinks,
+    /// Words shared with the half that is not there.
+    pub board: Arc<Board>,
+    /// What the exchange reports.
+    pub events: Consumer,
+    /// The double.
+    pub double: AnsweringDouble,
+    /// Time of the cycle.
+    pub now: Instant,
+}
+
+impl CyclicLoad {
+    /// An exchange whose SubDevices all take part.
+    ///
+    /// # Errors
+    /// Process data that cannot be laid out.
+    pub fn new(spec: &LoadSpec) -> Result<CyclicLoad, LayoutError> {
+        let (links, redundant) = match spec.cabling {
+            Cabling::Line => (LinkSet::Single, None),
+            Cabling::ClosedRing | Cabling::CutRing { .. } => (LinkSet::Ring, Some(REDUNDANT)),
+        };
+        let layout = Layout::new(&domains(spec), links, spec.supervision)?;
+        let board = Arc::new(Board::new(spec.subdevices));
+        for subdevice in 0..spec.subdevices {
+            board.set_taking_part(subdevice, true);
+        }
+        let (producer, events) = queue(EVENTS);
+        let identity = Identity::new(MacCodec::FlagsFirst, MAIN, redundant);
+        Ok(CyclicLoad {
+            exchange: Exchange::new(identity, links, &layout, board.clone(), producer),
+            links: MemoryLinks::new(MAIN, redundant, LINK_QUEUE),
+            board,
+            events,
+            double: AnsweringDouble::new(&layout, spec.subdevices, spec.cabling),
+            now: Instant::default(),
+        })
+    }
+
+    /// The MainDevice's part of a cycle: everything that came in is received and judged, the application copies two
+    /// bytes, everything is sent. Returns the last domain's status.
+    #[inline(never)]
+    pub fn exchange_once(&mut self) -> DomainStatus {
+        let CyclicLoad { exchange, links, now, .. } = self;
+        *now += PERIOD;
+        links.set_now(*now);
+        let mut status = DomainStatus::default();
+        while links.receive(&mut |link, frame| {
+            exchange.receive(link, frame, *now);
+        }) {}
+        for domain in (0..exchange.domain_count()).map(DomainId) {
+            status = exchange.process(domain, *now);
+            let image = exchange.image_mut(domain);
+            // Outputs lie in front, inputs behind: the application answers to an input.
+            if let [first, second, .., last] = image {
+                *first = first.wrapping_add(1);
+                *second = *last;
+            }
+            exchange.queue(domain, *now);
+        }
+        exchange.send(*now, &mut |link, frame| links.send(link, frame));
+        black_box(status)
+    }
+
+    /// The segment's part of a cycle.
+    pub fn answer(&mut self) {
+        self.double.answer(&mut self.links.sent, &mut self.links.arriving);
+    }
+
+    /// The same work for the double in the other direction: with this, it can be run alone.
+    pub fn answer_back(&mut self) {
+        self.double.answer(&mut self.links.arriving, &mut self.links.sent);
+    }
+}
+
+fn domains(spec: &LoadSpec) -> Vec<DomainSpec> {
+    let mut domains = vec![DomainSpec { period: PERIOD, lrw: spec.lrw, areas: Vec::new() }; spec.domains.max(1)];
+    let count = domains.len();
+    for subdevice in 0..spec.subdevices {
+        let area = |sync_manager, direction| AreaSpec { subdevice, sync_manager, direction, length: spec.bytes };
+        let areas = &mut domains[subdevice * count / spec.subdevices].areas;
+        areas.push(area(2, Direction::Outputs));
+        areas.push(area(3, Direction::Inputs));
+    }
+    domains
+}

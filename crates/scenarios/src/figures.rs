@@ -1,0 +1,57 @@
+//! Figures with their bars: a table that people read, and a verdict for CI.
+
+use std::fmt::Display;
+use std::process::ExitCode;
+
+/// A table under a heading.
+#[derive(Debug)]
+pub struct Figures {
+    rows: Vec<[String; 4]>,
+    missed: bool,
+}
+
+impl Figures {
+    /// A table without rows; the heading is printed at once.
+    pub fn new(heading: &str) -> Figures {
+        println!("\n== {heading}");
+        Figures { rows: Vec::new(), missed: false }
+    }
+
+    /// A figure without a bar.
+    pub fn show(&mut self, name: &str, value: impl Display) {
+        self.row(name, value.to_string(), String::new(), "");
+    }
+
+    /// A figure that must not exceed its bar.
+    pub fn at_most(&mut self, name: &str, value: f64, bar: f64, unit: &str) {
+        let met = value <= bar;
+        self.missed |= !met;
+        let verdict = if met { "ok" } else { "MISSED" };
+        self.row(name, format!("{} {unit}", short(value)), format!("<= {} {unit}", short(bar)), verdict);
+    }
+
+    fn row(&mut self, name: &str, value: String, bar: String, verdict: &str) {
+        self.rows.push([name.to_owned(), value, bar, verdict.to_owned()]);
+    }
+
+    /// Prints the table. True where every bar was met.
+    pub fn print(&self) -> bool {
+        let width = |column: usize| self.rows.iter().map(|row| row[column].chars().count()).max().unwrap_or(0);
+        let [first, second, third] = [0, 1, 2].map(width);
+        for [name, value, bar, verdict] in &self.rows {
+            let line = format!("  {name:<first$}  {value:>second$}  {bar:<third$}  {verdict}");
+            println!("{}", line.trim_end());
+        }
+        !self.missed
+    }
+}
+
+/// Success, or failure where a bar was missed.
+pub fn verdict(met: bool) -> ExitCode {
+    if met { ExitCode::SUCCESS } else { ExitCode::FAILURE }
+}
+
+/// As many digits as a reader needs.
+fn short(value: f64) -> String {
+    if value.fract() == 0.0 || value.abs() >= 1000.0 { format!("{value:.0}") } else { format!("{value:.2}") }
+}

@@ -1,0 +1,77 @@
+//! Segments that scenarios run on, from the simulator's catalogue.
+
+use std::time::Duration;
+
+use ringcat_sim::catalogue;
+use ringcat_sim::description::DeviceDescription;
+use ringcat_sim::device::Device;
+use ringcat_sim::network::builder::SegmentBuilder;
+use ringcat_sim::network::{Network, NetworkOptions};
+
+/// Sixteen SubDevices of all kinds, as in the demonstration.
+pub const SIXTEEN: [&str; 16] = [
+    "coupler",
+    "digital-input-8",
+    "digital-output-8",
+    "analog-input-4",
+    "servo",
+    "digital-input-16",
+    "digital-output-16",
+    "analog-output-4",
+    "emulated-input-8",
+    "emulated-output-8",
+    "junction",
+    "digital-input-4",
+    "digital-output-4",
+    "block",
+    "analog-input-4",
+    "servo",
+];
+
+/// A device of the catalogue.
+///
+/// # Panics
+/// When the catalogue has no such device.
+pub fn describe(kind: &str, name: &str) -> DeviceDescription {
+    let mut description = catalogue::by_name(kind).unwrap_or_else(|| panic!("no device \"{kind}\" in the catalogue"));
+    description.name = name.into();
+    description
+}
+
+/// Descriptions of these kinds, numbered. Clocks start at different times, as those of real devices do.
+pub fn descriptions(kinds: &[&str]) -> Vec<DeviceDescription> {
+    let numbered = kinds.iter().enumerate();
+    numbered
+        .map(|(number, kind)| {
+            let mut description = describe(kind, &format!("{kind}-{number}"));
+            description.clock_start_ns = 0x1234_5678_9ABC * (number as u64 + 1);
+            description
+        })
+        .collect()
+}
+
+/// Devices from descriptions.
+pub fn devices(descriptions: Vec<DeviceDescription>) -> Vec<Device> {
+    descriptions.into_iter().map(Device::new).collect()
+}
+
+/// A closed ring: cable 0 from the main link, cable `n` between devices `n - 1` and `n`, the last to the redundant link.
+///
+/// # Panics
+/// When the segment cannot be built.
+pub fn ring(descriptions: Vec<DeviceDescription>, options: NetworkOptions) -> Network {
+    SegmentBuilder::ring(devices(descriptions)).options(options).build().expect("a ring can be built")
+}
+
+/// A line on the main link.
+///
+/// # Panics
+/// When the segment cannot be built.
+pub fn line(descriptions: Vec<DeviceDescription>, options: NetworkOptions) -> Network {
+    SegmentBuilder::line(devices(descriptions)).options(options).build().expect("a line can be built")
+}
+
+/// The ring of [`SIXTEEN`] with a detection delay.
+pub fn ring_of_16(detection: Duration) -> Network {
+    ring(descriptions(&SIXTEEN), NetworkOptions::default().with_detection_delay(detection))
+}

@@ -1,0 +1,152 @@
+//! The links between engine and segment, with a tap: everything that passes is hashed, frames can be slipped in, and
+//! virtual time has a limit, so that an engine that hangs fails its test instead of stopping it.
+
+use ringcat::simulated::SimulatedSegment;
+use ringcat::{Instant, Link, Links};
+use ringcat_engine::ring::identity::{Class, class_of};
+use ringcat_sim::network::Network;
+use ringcat_wire::frame::MacAddress;
+
+/// Waits in a row in which no time passes; far beyond what an engine needs between two events.
+const IDLE_WAITS: u64 = 200_000;
+const FNV_OFFSET: u64 = 0xCBF2_9CE4_8422_2325;
+const FNV_PRIME: u64 = 0x0000_0100_0000_01B3;
+
+/// A running hash (FNV-1a).
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Fingerprint(pub u64);
+
+impl Default for Fingerprint {
+    fn default() -> Self {
+        Fingerprint(FNV_OFFSET)
+    }
+}
+
+impl Fingerprint {
+    /// Takes bytes in.
+    pub fn take(&mut self, bytes: &[u8]) {
+        for byte in bytes {
+            self.0 = (self.0 ^ u64::from(*byte)).wrapping_mul(FNV_PRIME);
+        }
+    }
+}
+
+/// Links into a simulated segment, tapped.
+#[derive(Debug)]
+pub struct Tap {
+    segment: SimulatedSegment,
+    fingerprint: Fingerprint,
+    injected: Vec<(Link, Vec<u8>)>,
+    limit: Instant,
+    idle_waits: u64,
+    /// When the exchange last began to send.
+    cyclic_sent: Instant,
+    /// Longest time from there to a frame of the exchange that came back before it sent again, in nanoseconds.
+    flight_ns: u64,
+}
+
+impl Tap {
+    /// Taps the links of a network.
+    pub fn new(network: Network) -> Tap {
+        Tap {
+            segment: SimulatedSegment::new(network),
+            fingerprint: Fingerprint::default(),
+            injected: Vec::new(),
+            limit: Instant::NEVER,
+            idle_waits: 0,
+            cyclic_sent: Instant::default(),
+            flight_ns: 0,
+        }
+    }
+
+    /// The segment.
+    pub fn network(&self) -> &Network {
+        self.segment.network()
+    }
+
+    /// The segment, to bring about faults.
+    pub fn network_mut(&mut self) -> &mut Network {
+        self.segment.network_mut()
+    }
+
+    /// A frame that the engine will find on a link next.
+    pub fn inject(&mut self, link: Link, bytes: &[u8]) {
+        self.injected.push((link, bytes.to_vec()));
+    }
+
+    /// From now on reaching this time is a failure.
+    pub fn set_limit(&mut self, limit: Instant) {
+        self.limit = limit;
+    }
+
+    /// Hash of all frames with link, direction and time.
+    pub fn fingerprint(&self) -> Fingerprint {
+        self.fingerprint
+    }
+
+    /// Longest time from the beginning of a cycle to the return of one of its frames, since [`Tap::measure_flights`].
+    pub fn flight_ns(&self) -> u64 {
+        self.flight_ns
+    }
+
+    /// Measures flights anew.
+    pub fn measure_flights(&mut self) {
+        self.flight_ns = 0;
+    }
+
+    fn note(&mut self, outward: bool, link: Link, bytes: &[u8]) {
+        let now = self.segment.now();
+        self.fingerprint.take(&now.0.to_le_bytes());
+        self.fingerprint.take(&[u8::from(outward), link.index() as u8]);
+        self.fingerprint.take(bytes);
+        if class_of(bytes) != Some(Class::Cyclic) {
+            return;
+        }
+        if outward {
+            self.cyclic_sent = now;
+        } else {
+            self.flight_ns = self.flight_ns.max(now.since(self.cyclic_sent).as_nanos() as u64);
+        }
+    }
+}
+
+impl Links for Tap {
+    fn now(&self) -> Instant {
+        self.segment.now()
+    }
+
+    fn addresses(&self) -> (MacAddress, Option<MacAddress>) {
+        self.segment.addresses()
+    }
+
+    fn send(&mut self, link: Link, frame: &[u8]) {
+        self.note(true, link, frame);
+        self.segment.send(link, frame);
+    }
+
+    fn receive(&mut self, take: &mut dyn FnMut(Link, &[u8])) -> bool {
+        if !self.injected.is_empty() {
+            let (link, bytes) = self.injected.remove(0);
+            self.note(false, link, &bytes);
+            take(link, &bytes);
+            return true;
+        }
+        let mut received = None;
+        let any = self.segment.receive(&mut |link, frame| received = Some((link, frame.to_vec())));
+        if let Some((link, frame)) = received {
+            self.note(false, link, &frame);
+            take(link, &frame);
+        }
+        any
+    }
+
+    fn wait(&mut self, until: Instant) {
+        let before = self.segment.now();
+        let until = until.min(self.limit);
+        self.segment.wait(until);
+        let now = self.segment.now();
+        assert!(now < self.limit, "virtual time reached its limit of {} ms", self.limit.0 / 1_000_000);
+        self.idle_waits = if now > before { 0 } else { self.idle_waits + 1 };
+        assert!(self.idle_waits < IDLE_WAITS, "the engine waits without letting time pass, at {} ns", now.0);
+    }
+}
