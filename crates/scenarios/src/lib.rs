@@ -1,9 +1,16 @@
 //! Engine and simulated segment put together in virtual time: [`world`] with its verbs, what it runs on ([`segments`],
 //! [`tap`], [`dice`]) and, apart from the scenarios, what is checked ([`check`]). The scenarios are in `tests/`, one file
 //! per theme.
+//!
+//! Benches (`src/bin/`) run on [`cyclic_load`] and [`answering_double`], count with [`callgrind`] and print
+//! [`figures`].
 
+pub mod answering_double;
+pub mod callgrind;
 pub mod check;
+pub mod cyclic_load;
 pub mod dice;
+pub mod figures;
 pub mod segments;
 pub mod tap;
 pub mod world;
