@@ -12,6 +12,7 @@ use core::fmt;
 use core::future::Future;
 use core::time::Duration;
 
+use ringcat_wire::address::StationAddress;
 use ringcat_wire::al::AlState;
 use ringcat_wire::frame::MacAddress;
 use ringcat_wire::source_address::MacCodec;
@@ -261,6 +262,12 @@ impl MainDevice {
     pub fn states(&self) -> Vec<SubDeviceState> {
         let Some(fleet) = &self.fleet else { return Vec::new() };
         fleet.access().members.iter().map(|member| member.phase.into()).collect()
+    }
+
+    /// Station addresses of the declared SubDevices.
+    pub fn stations(&self) -> Vec<StationAddress> {
+        let Some(fleet) = &self.fleet else { return Vec::new() };
+        fleet.access().members.iter().map(|member| member.station).collect()
     }
 
     /// Whether every declared SubDevice is in its target state.

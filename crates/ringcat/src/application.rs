@@ -178,8 +178,18 @@ impl<L: Links> Application<L> {
     }
 
     /// The cyclic half, for what is not offered here.
+    pub fn exchange(&self) -> &Exchange {
+        &self.exchange
+    }
+
+    /// The cyclic half, for what is not offered here.
     pub fn exchange_mut(&mut self) -> &mut Exchange {
         &mut self.exchange
+    }
+
+    /// The acyclic half, for what is not offered here.
+    pub fn engine(&self) -> &Engine {
+        &self.engine
     }
 
     /// The acyclic half, for what is not offered here.

@@ -1,0 +1,207 @@
+//! What is checked, apart from the scenarios: what each cycle delivered, whether images agree with what the simulated
+//! devices had and latched, and how many events a change may cause.
+
+use std::ops::Range;
+
+use ringcat::{Direction, DomainId, DomainState, DomainStatus, Event, Freshness, Instant, TimedEvent};
+use ringcat_engine::exchange::Exchange;
+use ringcat_engine::main_device::Directory;
+use ringcat_sim::cable::DeviceIndex;
+use ringcat_sim::device::Device;
+use ringcat_sim::network::Network;
+use ringcat_wire::al::AlState;
+
+/// What a domain delivered in one cycle.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Delivery {
+    /// Nothing was judged: it was not due, or not out.
+    None,
+    /// Its frames were still out.
+    Pending,
+    /// Everybody answered.
+    Complete,
+    /// All inputs but those of SubDevices that are not there or below SAFEOP are fresh.
+    WithoutAbsent,
+    /// Somebody's data is missing who could have answered, or somebody was met twice.
+    Incomplete,
+    /// Nobody answered.
+    Zero,
+}
+
+impl Delivery {
+    /// Whether a SubDevice that could answer was missed.
+    pub const fn is_incomplete(self) -> bool {
+        matches!(self, Delivery::Incomplete | Delivery::Zero)
+    }
+}
+
+/// One cycle of a domain.
+#[derive(Clone, Copy, Debug)]
+pub struct Judged {
+    /// The domain.
+    pub domain: DomainId,
+    /// When the cycle began that judged it.
+    pub at: Instant,
+    /// What the engine says.
+    pub status: DomainStatus,
+    /// What came of it.
+    pub delivery: Delivery,
+}
+
+/// What was true when a domain's frames left.
+#[derive(Debug)]
+struct Flight {
+    /// The domain's image, for its outputs.
+    image: Vec<u8>,
+    /// Inputs of all devices.
+    inputs: Vec<Vec<u8>>,
+}
+
+/// A part of a domain's image and of a device's process data.
+#[derive(Debug)]
+struct Area {
+    subdevice: usize,
+    device: DeviceIndex,
+    domain: DomainId,
+    direction: Direction,
+    in_image: Range<usize>,
+    in_device: Range<usize>,
+}
+
+/// Compares images with devices, cycle by cycle: fresh inputs are what the device had when the frame left, outputs of a
+/// complete cycle are what the device latched.
+#[derive(Debug)]
+pub struct Mirror {
+    areas: Vec<Area>,
+    flights: Vec<Option<Flight>>,
+    compared: u64,
+    /// Differences are failures.
+    pub strict: bool,
+}
+
+impl Mirror {
+    /// A mirror for declared SubDevices, `devices` being theirs.
+    pub fn new(directory: &Directory, devices: &[Option<DeviceIndex>], domains: usize) -> Mirror {
+        let mut areas = Vec::new();
+        for (subdevice, device) in devices.iter().enumerate() {
+            let Some(device) = *device else { continue };
+            let (mut outputs, mut inputs) = (0, 0);
+            for entries in directory.areas(subdevice) {
+                let start = entries.placed.image_offset as usize;
+                let length = usize::from(entries.placed.area.length);
+                let at = match entries.direction {
+                    Direction::Outputs => &mut outputs,
+                    Direction::Inputs => &mut inputs,
+                };
+                areas.push(Area {
+                    subdevice,
+                    device,
+                    domain: entries.domain,
+                    direction: entries.direction,
+                    in_image: start..start + length,
+                    in_device: *at..*at + length,
+                });
+                *at += length;
+            }
+        }
+        Mirror { areas, flights: (0..domains).map(|_| None).collect(), compared: 0, strict: true }
+    }
+
+    /// Bytes compared so far.
+    pub fn compared(&self) -> u64 {
+        self.compared
+    }
+
+    /// What a domain delivered whose frames left before and were judged now. Compares where it can.
+    ///
+    /// # Panics
+    /// When image and device differ.
+    pub fn judge(&mut self, status: DomainStatus, domain: DomainId, exchange: &Exchange, network: &Network) -> Delivery {
+        if status.pending {
+            return Delivery::Pending;
+        }
+        let Some(flight) = self.flights.get_mut(domain.0).and_then(Option::take) else { return Delivery::None };
+        let delivery = self.delivery(status, domain, exchange, network);
+        let image = exchange.image(domain);
+        for area in self.areas.iter().filter(|area| area.domain == domain) {
+            let device = network.device(area.device);
+            let (got, expected) = match area.direction {
+                Direction::Inputs if exchange.freshness(domain, area.subdevice) == Freshness::Fresh => {
+                    let inputs = &flight.inputs[area.device.0];
+                    (image.get(area.in_image.clone()), inputs.get(area.in_device.clone()))
+                }
+                Direction::Outputs if !delivery.is_incomplete() && operates(device) => {
+                    (device.outputs().get(area.in_device.clone()), flight.image.get(area.in_image.clone()))
+                }
+                Direction::Inputs | Direction::Outputs => continue,
+            };
+            let (Some(got), Some(expected)) = (got, expected) else { continue };
+            self.compared += got.len() as u64;
+            if self.strict {
+                assert_eq!(got, expected, "{:?} of {} in domain {}", area.direction, device.name(), domain.0);
+            }
+        }
+        delivery
+    }
+
+    fn delivery(&self, status: DomainStatus, domain: DomainId, exchange: &Exchange, network: &Network) -> Delivery {
+        match status.state {
+            DomainState::Complete => return Delivery::Complete,
+            DomainState::Zero => return Delivery::Zero,
+            DomainState::Incomplete if status.wkc > status.expected => return Delivery::Incomplete,
+            DomainState::Incomplete => {}
+        }
+        let mut here = self.areas.iter().filter(|area| area.domain == domain);
+        let all_fresh = here.all(|area| {
+            let absent = !exchanges(network.device(area.device));
+            absent
+                || area.direction == Direction::Outputs
+                || exchange.freshness(domain, area.subdevice) == Freshness::Fresh
+        });
+        if all_fresh { Delivery::WithoutAbsent } else { Delivery::Incomplete }
+    }
+
+    /// A domain's frames leave now.
+    pub fn depart(&mut self, domain: DomainId, exchange: &Exchange, network: &Network) {
+        let image = exchange.image(domain).to_vec();
+        let inputs = network.devices().map(|device| device.inputs().to_vec()).collect();
+        if let Some(flight) = self.flights.get_mut(domain.0) {
+            *flight = Some(Flight { image, inputs });
+        }
+    }
+}
+
+/// It exchanges process data.
+pub fn exchanges(device: &Device) -> bool {
+    device.controller.is_powered() && matches!(device.al_status().al_state(), Some(AlState::SafeOp | AlState::Op))
+}
+
+/// It is in OP and its application works.
+pub fn operates(device: &Device) -> bool {
+    let status = device.al_status();
+    exchanges(device) && status.al_state() == Some(AlState::Op) && !status.error && !device.application.is_hanging()
+}
+
+/// Events about the ring, in order.
+pub fn ring_events(events: &[TimedEvent]) -> Vec<&Event> {
+    let of_ring =
+        |event: &&Event| matches!(event, Event::RingOpened { .. } | Event::BreakLocated { .. } | Event::RingClosed { .. });
+    events.iter().map(|timed| &timed.event).filter(of_ring).collect()
+}
+
+/// Events that say that something is wrong with a SubDevice or its configuration.
+pub fn troubles(events: &[TimedEvent]) -> Vec<&Event> {
+    let of_subdevice = |event: &&Event| {
+        matches!(
+            event,
+            Event::StateError { .. }
+                | Event::Lost { .. }
+                | Event::Returned { .. }
+                | Event::ConfigurationFailed { .. }
+                | Event::Unexpected { .. }
+                | Event::Missing { .. }
+                | Event::ScanFailed { .. }
+        )
+    };
+    events.iter().map(|timed| &timed.event).filter(of_subdevice).collect()
+}

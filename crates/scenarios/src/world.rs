@@ -1,0 +1,441 @@
+//! A MainDevice and a simulated segment in virtual time, with verbs for what can happen to them.
+//!
+//! Every cycle writes new outputs, takes all events, compares images with devices ([`Mirror`]) and notes who left OP. A
+//! failing test prints the seed and everything that happened.
+
+use std::fmt::Display;
+use std::ops::Range;
+use std::time::Duration;
+
+use ringcat::{
+    Application, Declaration, Direction, DomainId, Error, Event, Instant, Links, MainDevice, Options, ProcessData, Scan,
+    TimedEvent, automatic,
+};
+use ringcat_engine::main_device::Directory;
+use ringcat_sim::cable::{CableId, DeviceIndex};
+use ringcat_sim::fault::Fault;
+use ringcat_sim::network::Network;
+use ringcat_sim::time::SimTime;
+use ringcat_wire::al::{AlState, AlStatus, AlStatusCode};
+use ringcat_wire::register::map;
+
+use crate::check::{Delivery, Judged, Mirror};
+use crate::tap::{Fingerprint, Tap};
+
+/// Cycle time of scenarios that do not say otherwise.
+pub const CYCLE: Duration = Duration::from_millis(1);
+/// Virtual time that a scan may take.
+const SCAN_LIMIT: Duration = Duration::from_secs(20);
+
+/// A device changed its AL status, as seen at the beginning of a cycle.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Step {
+    /// When it was seen.
+    pub at: Instant,
+    /// Who.
+    pub device: DeviceIndex,
+    /// AL status before.
+    pub from: AlStatus,
+    /// AL status since.
+    pub to: AlStatus,
+    /// AL status code since.
+    pub code: AlStatusCode,
+}
+
+impl Step {
+    /// It was in OP and is no longer.
+    pub fn leaves_op(&self) -> bool {
+        self.from.al_state() == Some(AlState::Op) && self.to != AlStatus::new(AlState::Op)
+    }
+}
+
+/// A point in the history of a world.
+#[derive(Clone, Copy, Debug)]
+pub struct Mark {
+    events: usize,
+    judged: usize,
+    steps: usize,
+}
+
+/// Engine, segment and time.
+#[derive(Debug)]
+pub struct World {
+    seed: u64,
+    application: Application<Tap>,
+    /// What the scan found.
+    pub scan: Scan,
+    devices: Vec<Option<DeviceIndex>>,
+    mirror: Mirror,
+    journal: Journal,
+    /// Bytes of outputs, by domain.
+    outputs: Vec<Vec<Range<usize>>>,
+    domains: usize,
+    cycles: u64,
+}
+
+/// What happened, in order.
+#[derive(Debug, Default)]
+struct Journal {
+    lines: Vec<(Instant, String)>,
+    events: Vec<TimedEvent>,
+    judged: Vec<Judged>,
+    steps: Vec<Step>,
+    status: Vec<AlStatus>,
+}
+
+impl World {
+    /// Scans, declares everything that was found in one domain at [`CYCLE`], activates.
+    ///
+    /// # Panics
+    /// When scan or activation fail.
+    pub fn new(seed: u64, network: Network) -> World {
+        World::with(seed, network, &Options::default(), |scan| automatic(&scan.subdevices, CYCLE))
+            .unwrap_or_else(|error| panic!("seed {seed}: {error}"))
+    }
+
+    /// As [`World::new`], and runs until all devices are in OP and the process data is complete.
+    ///
+    /// # Panics
+    /// When that does not come about in 5 s.
+    pub fn in_op(seed: u64, network: Network) -> World {
+        let mut world = World::new(seed, network);
+        world.settle();
+        world
+    }
+
+    /// Scans, declares, activates.
+    ///
+    /// # Errors
+    /// As [`MainDevice::scan`] and [`MainDevice::activate`].
+    pub fn with(
+        seed: u64,
+        network: Network,
+        options: &Options,
+        declare: impl FnOnce(&Scan) -> Declaration,
+    ) -> Result<World, Error> {
+        let mut tap = Tap::new(network);
+        tap.set_limit(tap.now() + SCAN_LIMIT);
+        let mut main_device = MainDevice::request(tap, options);
+        let mut journal = Journal::default();
+        let scan = main_device.scan_with(|event| journal.event(event.clone()))?;
+        main_device.links_mut().set_limit(Instant::NEVER);
+        let declaration = declare(&scan);
+        let (domains, declared) = (declaration.domains.len(), declaration.subdevices.len());
+        let application = main_device.activate(declaration)?;
+        let network = application.links().network();
+        let devices: Vec<Option<DeviceIndex>> = Vec::new();
+        let mirror = Mirror::new(application.directory(), &devices, domains);
+        journal.status = network.devices().map(|device| device.al_status()).collect();
+        let outputs = output_ranges(application.directory(), domains, declared);
+        let mut world = World { seed, application, scan, devices, mirror, journal, outputs, domains, cycles: 0 };
+        world.recognise();
+        Ok(world)
+    }
+
+    /// Finds out which device each declared SubDevice is, by its station address, and looks at them from now on.
+    pub fn recognise(&mut self) {
+        let network = self.application.links().network();
+        let station = |device: &ringcat_sim::device::Device| {
+            let bytes = device.controller.register(map::STATION_ADDRESS, 2);
+            u16::from_le_bytes([bytes[0], bytes[1]])
+        };
+        let by_station: Vec<u16> = network.devices().map(station).collect();
+        let found = self.application.engine().stations();
+        let of = |wanted: &ringcat_wire::address::StationAddress| {
+            by_station.iter().position(|station| *station == wanted.0).map(DeviceIndex)
+        };
+        self.devices = found.iter().map(of).collect();
+        let strict = self.mirror.strict;
+        self.mirror = Mirror::new(self.application.directory(), &self.devices, self.domains);
+        self.mirror.strict = strict;
+    }
+
+    /// Runs until all declared SubDevices are settled and all domains complete.
+    ///
+    /// # Panics
+    /// When that does not come about in 5 s.
+    pub fn settle(&mut self) {
+        self.until(Duration::from_secs(5), "everything settled and complete", |world| {
+            let last = world.journal.judged.iter().rev().take(world.domains);
+            world.application.all_settled()
+                && world.journal.judged.len() >= world.domains
+                && last.clone().all(|judged| judged.delivery == Delivery::Complete)
+        });
+    }
+
+    /// One cycle.
+    pub fn cycle(&mut self) {
+        self.cycle_with(|_| ());
+    }
+
+    /// One cycle, with `work` behind the pattern that is written to all outputs.
+    pub fn cycle_with<R>(&mut self, work: impl FnOnce(&mut ProcessData<'_>) -> R) -> R {
+        let number = self.cycles;
+        let mut due = Vec::new();
+        let result = self.application.cycle(|data| {
+            for (domain, outputs) in self.outputs.iter().enumerate() {
+                let domain = DomainId(domain);
+                if data.is_due(domain) {
+                    due.push((domain, data.status(domain)));
+                    write_pattern(data.image_mut(domain), outputs, number);
+                }
+            }
+            work(data)
+        });
+        self.cycles += 1;
+        let at = self.application.now();
+        let network = self.application.links().network();
+        for (domain, status) in due {
+            let exchange = self.application.exchange();
+            let delivery = self.mirror.judge(status, domain, exchange, network);
+            if delivery != Delivery::None {
+                self.journal.judge(Judged { domain, at, status, delivery });
+            }
+            if exchange.status(domain).skipped == status.skipped {
+                self.mirror.depart(domain, exchange, network);
+            }
+        }
+        self.journal.watch(at, network);
+        while let Some(event) = self.application.pop_event() {
+            self.journal.event(event);
+        }
+        result
+    }
+
+    /// Some cycles.
+    pub fn run_cycles(&mut self, cycles: u64) {
+        (0..cycles).for_each(|_| self.cycle());
+    }
+
+    /// Cycles until a condition holds.
+    ///
+    /// # Panics
+    /// When it does not hold within a time.
+    pub fn until(&mut self, limit: Duration, what: &str, condition: impl Fn(&World) -> bool) {
+        let end = self.application.now() + limit;
+        while !condition(self) {
+            assert!(self.application.now() < end, "not within {} ms: {what}", limit.as_millis());
+            self.cycle();
+        }
+    }
+
+    /// Lets time pass without a cycle, as an application does that is stopped. The acyclic half stands still too.
+    pub fn stall(&mut self, time: Duration) {
+        self.say(format!("the application stands still for {} ms", time.as_millis()));
+        let network = self.application.links_mut().network_mut();
+        network.advance_by(time);
+    }
+
+    /// Brings about a fault now.
+    pub fn fault(&mut self, fault: Fault) {
+        self.say(format!("{fault:?}"));
+        self.network_mut().apply(fault);
+    }
+
+    /// Brings about a fault in a while.
+    pub fn fault_in(&mut self, delay: Duration, fault: Fault) {
+        self.say(format!("in {} us: {fault:?}", delay.as_micros()));
+        let at = self.network().now() + delay;
+        self.network_mut().schedule(at, fault);
+    }
+
+    /// Cuts a cable.
+    pub fn cut(&mut self, cable: CableId) {
+        self.fault(Fault::Cut(cable));
+    }
+
+    /// Makes a cable whole again.
+    pub fn heal(&mut self, cable: CableId) {
+        self.fault(Fault::Heal(cable));
+    }
+
+    /// Takes a device's power.
+    pub fn power_off(&mut self, device: DeviceIndex) {
+        self.fault(Fault::PowerOff(device));
+    }
+
+    /// Gives a device its power back.
+    pub fn power_on(&mut self, device: DeviceIndex) {
+        self.fault(Fault::PowerOn(device));
+    }
+
+    /// Lets a device's application hang or go on.
+    pub fn hang(&mut self, device: DeviceIndex, hanging: bool) {
+        self.fault(Fault::Hang(device, hanging));
+    }
+
+    /// Corrupts the next frames on a cable, in both directions.
+    pub fn corrupt(&mut self, cable: CableId, count: u32) {
+        self.fault(Fault::Corrupt { cable, direction: None, count });
+    }
+
+    /// Drops the next frames on a cable, in both directions.
+    pub fn drop(&mut self, cable: CableId, count: u32) {
+        self.fault(Fault::Drop { cable, direction: None, count });
+    }
+
+    /// Puts a line into the log.
+    pub fn say(&mut self, what: impl Display) {
+        let at = self.application.now();
+        self.journal.lines.push((at, format!("> {what}")));
+    }
+
+    /// The application.
+    pub fn application(&self) -> &Application<Tap> {
+        &self.application
+    }
+
+    /// The application.
+    pub fn application_mut(&mut self) -> &mut Application<Tap> {
+        &mut self.application
+    }
+
+    /// The segment.
+    pub fn network(&self) -> &Network {
+        self.application.links().network()
+    }
+
+    /// The segment.
+    pub fn network_mut(&mut self) -> &mut Network {
+        self.application.links_mut().network_mut()
+    }
+
+    /// The device that a declared SubDevice is, if it was there at the last look.
+    pub fn device_of(&self, subdevice: usize) -> Option<DeviceIndex> {
+        self.devices.get(subdevice).copied().flatten()
+    }
+
+    /// Compares images with devices or not.
+    pub fn set_strict(&mut self, strict: bool) {
+        self.mirror.strict = strict;
+    }
+
+    /// Bytes of process data that were compared with what devices had or latched.
+    pub fn compared(&self) -> u64 {
+        self.mirror.compared()
+    }
+
+    /// Time of the simulation.
+    pub fn now(&self) -> SimTime {
+        self.network().now()
+    }
+
+    /// Here and now in the history.
+    pub fn mark(&self) -> Mark {
+        let Journal { events, judged, steps, .. } = &self.journal;
+        Mark { events: events.len(), judged: judged.len(), steps: steps.len() }
+    }
+
+    /// The beginning of the history.
+    pub fn beginning(&self) -> Mark {
+        Mark { events: 0, judged: 0, steps: 0 }
+    }
+
+    /// Events since a point.
+    pub fn events(&self, since: Mark) -> &[TimedEvent] {
+        &self.journal.events[since.events..]
+    }
+
+    /// Whether an event came since a point.
+    pub fn saw(&self, since: Mark, wanted: impl Fn(&Event) -> bool) -> bool {
+        self.events(since).iter().any(|timed| wanted(&timed.event))
+    }
+
+    /// Judgements of domains since a point.
+    pub fn judged(&self, since: Mark) -> &[Judged] {
+        &self.journal.judged[since.judged..]
+    }
+
+    /// Judgements since a point in which somebody was missed who could have answered.
+    pub fn incomplete(&self, since: Mark) -> usize {
+        self.judged(since).iter().filter(|judged| judged.delivery.is_incomplete()).count()
+    }
+
+    /// Devices that left OP since a point.
+    pub fn left_op(&self, since: Mark) -> Vec<DeviceIndex> {
+        self.journal.steps[since.steps..].iter().filter(|step| step.leaves_op()).map(|step| step.device).collect()
+    }
+
+    /// Changes of AL status since a point.
+    pub fn steps(&self, since: Mark) -> &[Step] {
+        &self.journal.steps[since.steps..]
+    }
+
+    /// Whether all devices are in OP, as they say themselves.
+    pub fn all_in_op(&self) -> bool {
+        self.network().devices().all(|device| device.al_status() == AlStatus::new(AlState::Op))
+    }
+
+    /// Hash of all frames and events so far.
+    pub fn fingerprint(&self) -> Fingerprint {
+        let mut fingerprint = self.application.links().fingerprint();
+        for event in &self.journal.events {
+            fingerprint.take(format!("{event:?}").as_bytes());
+        }
+        fingerprint
+    }
+
+    /// The log as text.
+    pub fn log(&self) -> String {
+        let line = |(at, what): &(Instant, String)| format!("{:>12.3} us  {what}\n", at.0 as f64 / 1e3);
+        self.journal.lines.iter().map(line).collect()
+    }
+}
+
+impl Drop for World {
+    fn drop(&mut self) {
+        if std::thread::panicking() {
+            println!("seed {}, at {}; what happened:\n{}", self.seed, self.now(), self.log());
+        }
+    }
+}
+
+impl Journal {
+    fn event(&mut self, event: TimedEvent) {
+        self.lines.push((event.at, format!("{:?}", event.event)));
+        self.events.push(event);
+    }
+
+    /// Notes a judgement; the log has only those that differ from the one before.
+    fn judge(&mut self, judged: Judged) {
+        let before = self.judged.iter().rev().find(|before| before.domain == judged.domain);
+        if before.is_none_or(|before| before.delivery != judged.delivery || before.status.wkc != judged.status.wkc) {
+            let Judged { domain, at, status, delivery } = &judged;
+            let line = format!("  domain {}: {delivery:?}, {} of {}", domain.0, status.wkc, status.expected);
+            self.lines.push((*at, line));
+        }
+        self.judged.push(judged);
+    }
+
+    /// Notes what the devices say about their state.
+    fn watch(&mut self, at: Instant, network: &Network) {
+        for (number, device) in network.devices().enumerate() {
+            let to = device.al_status();
+            let from = std::mem::replace(&mut self.status[number], to);
+            if from != to {
+                let code = device.al_status_code();
+                self.lines.push((at, format!("  device {number} ({}): {from} to {to}, {code}", device.name())));
+                self.steps.push(Step { at, device: DeviceIndex(number), from, to, code });
+            }
+        }
+    }
+}
+
+/// Where outputs lie in each domain's image.
+fn output_ranges(directory: &Directory, domains: usize, declared: usize) -> Vec<Vec<Range<usize>>> {
+    let mut ranges = vec![Vec::new(); domains];
+    for area in (0..declared).flat_map(|subdevice| directory.areas(subdevice)) {
+        if area.direction == Direction::Outputs {
+            let start = area.placed.image_offset as usize;
+            ranges[area.domain.0].push(start..start + usize::from(area.placed.area.length));
+        }
+    }
+    ranges
+}
+
+/// New outputs in every cycle, different from byte to byte.
+fn write_pattern(image: &mut [u8], outputs: &[Range<usize>], number: u64) {
+    for at in outputs.iter().cloned().flatten() {
+        image[at] = (number as u8).wrapping_mul(31).wrapping_add((at as u8).wrapping_mul(7));
+    }
+}
