@@ -1,11 +1,8 @@
 //! Looking at all declared SubDevices: who answers, in which state, with which ports; and where a ring is broken.
 
-use alloc::rc::Rc;
-use alloc::vec;
 use alloc::vec::Vec;
-use core::cell::RefCell;
 
-use ringcat_wire::address::Position;
+use ringcat_wire::address::{Position, StationAddress};
 use ringcat_wire::al::{AlStatus, AlStatusCode};
 use ringcat_wire::register::{DlStatus, map};
 
@@ -29,24 +26,17 @@ pub(super) enum Look {
 /// Looks at all members at once.
 pub(super) async fn look_at_all(bus: &Bus, fleet: &SharedFleet) -> Vec<Look> {
     let stations: Vec<_> = fleet.access().members.iter().map(|member| member.station).collect();
-    let looks = Rc::new(RefCell::new(vec![Look::Unknown; stations.len()]));
-    let group = bus.group();
-    for (index, station) in stations.into_iter().enumerate() {
-        let (bus, looks) = (bus.clone(), looks.clone());
-        group.spawn(async move {
-            let look = match look_at(&bus, station).await {
-                Ok(look) => look,
-                Err(BusError::Wkc { .. }) => Look::Silent,
-                Err(BusError::Lost { .. }) => Look::Unknown,
-            };
-            looks.borrow_mut()[index] = look;
-        });
-    }
-    group.done().await;
-    looks.take()
+    let looks = bus.gather(stations, |bus, station| async move {
+        match look_at(&bus, station).await {
+            Ok(look) => look,
+            Err(BusError::Wkc { .. }) => Look::Silent,
+            Err(BusError::Lost { .. }) => Look::Unknown,
+        }
+    });
+    looks.await
 }
 
-async fn look_at(bus: &Bus, station: ringcat_wire::address::StationAddress) -> Result<Look, BusError> {
+async fn look_at(bus: &Bus, station: StationAddress) -> Result<Look, BusError> {
     let bytes: [u8; 6] = bus.fprd_array(station, map::AL_STATUS).await?;
     let (status, code) = split_status(&bytes);
     let dl_status = DlStatus::decode(&bus.fprd_array(station, map::DL_STATUS).await?);

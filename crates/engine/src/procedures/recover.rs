@@ -120,11 +120,11 @@ struct Stranger {
 /// Finds SubDevices without a known station address among `count` positions, tells which members they are, and starts
 /// their configuration.
 pub(super) async fn identify(bus: &Bus, fleet: &SharedFleet, main_count: u16, count: u16) -> Result<(), ScanError> {
-    let mut owners = Vec::new();
-    for position in (0..count).map(Position) {
+    let read = bus.gather((0..count).map(Position), |bus, position| async move {
         let bytes = bus.aprd(position, map::STATION_ADDRESS, 2).await?;
-        owners.push(StationAddress(u16::from_le_bytes([bytes[0], bytes[1]])));
-    }
+        Ok::<_, BusError>(StationAddress(u16::from_le_bytes([bytes[0], bytes[1]])))
+    });
+    let owners = read.await.into_iter().collect::<Result<Vec<_>, _>>()?;
     let known: Vec<Option<usize>> = {
         let access = fleet.access();
         let member = |station: &StationAddress| access.members.iter().position(|m| m.station == *station);

@@ -4,9 +4,8 @@
 
 use alloc::rc::Rc;
 use alloc::string::ToString;
-use alloc::vec;
 use alloc::vec::Vec;
-use core::cell::RefCell;
+use core::cell::Cell;
 use core::fmt;
 use core::time::Duration;
 
@@ -213,21 +212,10 @@ async fn to_init(bus: &Bus, count: u16) -> Result<(), BusError> {
 }
 
 async fn assign_addresses(bus: &Bus, count: u16) -> Result<(), BusError> {
-    let group = bus.group();
-    let failed = Rc::new(RefCell::new(None));
-    for position in (0..count).map(Position) {
-        let bus = bus.clone();
-        let failed = failed.clone();
-        group.spawn(async move {
-            let station = station_at(position);
-            if let Err(error) = bus.apwr(position, map::STATION_ADDRESS, &station.0.to_le_bytes()).await {
-                failed.borrow_mut().get_or_insert(error);
-            }
-        });
-    }
-    group.done().await;
-    let failed = failed.borrow_mut().take();
-    failed.map_or(Ok(()), Err)
+    let written = bus.gather((0..count).map(Position), |bus, position| async move {
+        bus.apwr(position, map::STATION_ADDRESS, &station_at(position).0.to_le_bytes()).await
+    });
+    written.await.into_iter().collect()
 }
 
 /// The station address that a scan gives to a position.
@@ -237,32 +225,19 @@ pub const fn station_at(position: Position) -> StationAddress {
 
 async fn read_all(bus: &Bus, count: u16, cache: &SiiCache) -> Result<Vec<SubDeviceInfo>, ScanError> {
     let total = usize::from(count);
-    let found: Rc<RefCell<Vec<Option<SubDeviceInfo>>>> = Rc::new(RefCell::new(vec![None; total]));
-    let failed = Rc::new(RefCell::new(None));
-    let done = Rc::new(core::cell::Cell::new(0));
-    let group = bus.group();
-    for position in (0..count).map(Position) {
-        let (bus, found, failed, done, cache) =
-            (bus.clone(), found.clone(), failed.clone(), done.clone(), cache.clone());
-        group.spawn(async move {
-            match read_one(&bus, position, station_at(position), &cache).await {
-                Ok(info) => found.borrow_mut()[usize::from(position.0)] = Some(info),
-                Err(error) => {
-                    failed.borrow_mut().get_or_insert(error);
-                }
-            }
+    let done = Rc::new(Cell::new(0));
+    let read = bus.gather((0..count).map(Position), |bus, position| {
+        let (done, cache) = (done.clone(), cache.clone());
+        async move {
+            let result = read_one(&bus, position, station_at(position), &cache).await;
             done.set(done.get() + 1);
             if done.get() % PROGRESS_STEP == 0 || done.get() == total {
                 bus.report(Event::ScanProgress { done: done.get(), total });
             }
-        });
-    }
-    group.done().await;
-    if let Some(error) = failed.borrow_mut().take() {
-        return Err(error);
-    }
-    let found = found.borrow_mut().drain(..).flatten().collect();
-    Ok(found)
+            result
+        }
+    });
+    read.await.into_iter().collect()
 }
 
 /// Reads what one SubDevice is: controller, ports, alias, receive times, SII.

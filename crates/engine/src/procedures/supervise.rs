@@ -82,14 +82,17 @@ impl Watch {
         let Ok(counted) = self.bus.brd(map::AL_STATUS, AlStatus::LEN).await else { return };
         let (main, redundant) = (counted.main.0, counted.redundant.0);
         let looks = look_at_all(&self.bus, &self.fleet).await;
-        let answering = self.judge(&looks);
-        if looks.contains(&Look::Silent) && self.silent.iter().any(|looks| (1..SILENT_LOOKS).contains(looks)) {
+        let strangers = self.fleet.access().strangers.len();
+        let answered = looks.iter().filter(|look| matches!(look, Look::Answer { .. })).count();
+        // When the count and the answers agree, a silent SubDevice is certainly not there.
+        let needed = if usize::from(counted.wkc().0) == answered + strangers { 1 } else { SILENT_LOOKS };
+        let answering = self.judge(&looks, needed);
+        if looks.contains(&Look::Silent) && needed > 1 {
             // Certainty soon, and then again only when something changes.
             self.bus.sleep(SECOND_LOOK_PAUSE).await;
             self.next_routine = self.bus.now();
         }
         self.report_ring(main, redundant, &looks);
-        let strangers = self.fleet.access().strangers.len();
         if usize::from(counted.wkc().0) > answering + strangers {
             self.find_strangers(main, counted.wkc().0).await;
         }
@@ -99,8 +102,8 @@ impl Watch {
         }
     }
 
-    /// Acts on what each SubDevice said; returns how many answered.
-    fn judge(&mut self, looks: &[Look]) -> usize {
+    /// Acts on what each SubDevice said; returns how many answered. So many silent looks make one lost.
+    fn judge(&mut self, looks: &[Look], needed: u8) -> usize {
         let mut answering = 0;
         for (index, look) in looks.iter().enumerate() {
             let phase = self.fleet.phase(index);
@@ -110,7 +113,7 @@ impl Watch {
                 (Look::Silent, Phase::Configuring | Phase::Settled(_)) => {
                     self.silent[index] = (self.silent[index] + 1).min(SILENT_LOOKS);
                     // One that is being configured is lost by its own procedure.
-                    if self.silent[index] >= SILENT_LOOKS && phase != Phase::Configuring {
+                    if self.silent[index] >= needed && phase != Phase::Configuring {
                         lose(&self.bus, &self.fleet, index);
                     }
                 }

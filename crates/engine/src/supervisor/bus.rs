@@ -270,6 +270,27 @@ impl Bus {
         self.core.borrow_mut().spawn(Box::pin(procedure));
     }
 
+    /// Runs a procedure for each item, all at once, and returns what they return in the order of the items.
+    pub async fn gather<I, T, F>(&self, items: impl IntoIterator<Item = I>, procedure: impl Fn(Bus, I) -> F) -> Vec<T>
+    where
+        T: 'static,
+        F: Future<Output = T> + 'static,
+    {
+        let group = self.group();
+        let results: Rc<RefCell<Vec<Option<T>>>> = Rc::default();
+        for (index, item) in items.into_iter().enumerate() {
+            results.borrow_mut().push(None);
+            let one = procedure(self.clone(), item);
+            let results = results.clone();
+            group.spawn(async move {
+                let result = one.await;
+                results.borrow_mut()[index] = Some(result);
+            });
+        }
+        group.done().await;
+        results.take().into_iter().flatten().collect()
+    }
+
     /// A group of procedures that can be waited for together.
     pub fn group(&self) -> Group {
         Group { bus: self.clone(), state: Rc::default() }
