@@ -358,6 +358,8 @@ pub struct Active {
 #[derive(Clone, Debug, Default)]
 pub struct Directory {
     subdevices: Vec<Vec<AreaEntries>>,
+    /// What each SubDevice adds to the working counters of all domains.
+    contributions: Vec<u32>,
 }
 
 /// An area with the entries in it.
@@ -376,7 +378,19 @@ pub struct AreaEntries {
 impl Directory {
     fn new(plans: &[Areas], layout: &Layout) -> Directory {
         let subdevices = plans.iter().enumerate().map(|(index, areas)| areas.directory(index, layout)).collect();
-        Directory { subdevices }
+        let mut contributions = alloc::vec![0; plans.len()];
+        let frames = layout.domains.iter().flat_map(|domain| &domain.frames);
+        for (subdevice, wkc) in frames.flat_map(|f| &f.datagrams).flat_map(|datagram| &datagram.contributions) {
+            if let Some(sum) = contributions.get_mut(*subdevice) {
+                *sum += u32::from(wkc.0);
+            }
+        }
+        Directory { subdevices, contributions }
+    }
+
+    /// What a SubDevice adds to the working counters of its domains when it takes part.
+    pub fn contribution(&self, subdevice: usize) -> u32 {
+        self.contributions.get(subdevice).copied().unwrap_or(0)
     }
 
     /// All areas of a SubDevice.

@@ -70,7 +70,7 @@ impl<L: Links> Application<L> {
         self.wait_for_cycle();
         let now = self.links.now();
         for (number, rate) in self.rates.iter_mut().enumerate() {
-            if self.cycle % rate.divider == 0 {
+            if self.cycle.is_multiple_of(rate.divider) {
                 rate.status = self.exchange.process(DomainId(number), now);
             }
         }
@@ -82,7 +82,7 @@ impl<L: Links> Application<L> {
             now,
         });
         for (number, rate) in self.rates.iter().enumerate() {
-            if self.cycle % rate.divider == 0 {
+            if self.cycle.is_multiple_of(rate.divider) {
                 self.exchange.queue(DomainId(number), now);
             }
         }

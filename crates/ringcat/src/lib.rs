@@ -34,6 +34,7 @@ pub mod links;
 pub mod main_device;
 pub mod memory;
 pub mod simulated;
+pub mod text;
 
 pub use application::{Application, ProcessData};
 pub use error::Error;

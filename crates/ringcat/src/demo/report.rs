@@ -1,0 +1,211 @@
+//! What the demonstration prints.
+
+use std::io::{IsTerminal, Write, stdout};
+use std::time::Duration;
+
+use ringcat::simulated::SimulatedSegment;
+use ringcat::text::{Names, describe};
+use ringcat::{Application, Direction, Event, Instant, Scan, SubDeviceInfo, SubDeviceState, TimedEvent};
+
+use super::plan::{Incident, Plan};
+use super::watch::{Account, Watch};
+
+/// Writes lines with the time before them.
+#[derive(Debug)]
+pub struct Reporter {
+    terminal: bool,
+    /// A progress line is on the screen and has not been ended.
+    line_open: bool,
+    reached_op: Option<Instant>,
+}
+
+/// Bytes of process data in one direction as the SII says.
+fn sii_bytes(info: &SubDeviceInfo, direction: Direction) -> u32 {
+    let assigned = |pdo: &&ringcat_engine::info::PdoInfo| pdo.direction == direction && pdo.sync_manager.is_some();
+    info.pdos.iter().filter(assigned).map(|pdo| pdo.bit_length()).sum::<u32>().div_ceil(8)
+}
+
+impl Reporter {
+    /// A reporter on the standard output.
+    pub fn new() -> Reporter {
+        Reporter { terminal: stdout().is_terminal(), line_open: false, reached_op: None }
+    }
+
+    /// A line without a time.
+    pub fn say(&mut self, text: &str) {
+        self.end_line();
+        println!("{text}");
+    }
+
+    fn end_line(&mut self) {
+        if self.line_open {
+            println!();
+            self.line_open = false;
+        }
+    }
+
+    fn timed(&mut self, at: Instant, mark: &str, text: &str) {
+        self.end_line();
+        println!("{:>10.3} ms {mark} {text}", at.0 as f64 / 1e6);
+    }
+
+    /// An event of the scan; progress stays on one line of a terminal.
+    pub fn scan_event(&mut self, event: &TimedEvent) {
+        let text = describe(&event.event, &Names::default());
+        if matches!(event.event, Event::ScanProgress { .. }) && self.terminal {
+            print!("\r{:>10.3} ms   {text}", event.at.0 as f64 / 1e6);
+            // A progress line that cannot be flushed is no reason to stop.
+            let _ = stdout().flush();
+            self.line_open = true;
+        } else {
+            self.timed(event.at, " ", &text);
+        }
+    }
+
+    /// Any other event.
+    pub fn event(&mut self, event: &TimedEvent, names: &Names) {
+        self.timed(event.at, " ", &describe(&event.event, names));
+    }
+
+    /// Something the demonstration does.
+    pub fn incident(&mut self, at: Instant, text: &str) {
+        self.timed(at, ">", text);
+    }
+
+    /// All SubDevices are in OP.
+    pub fn reached_op(&mut self, at: Instant, cycle: Duration) {
+        self.reached_op = Some(at);
+        self.timed(at, ">", &format!("all SubDevices are in OP; cycle {} us", cycle.as_micros()));
+    }
+
+    /// The SubDevices that were found.
+    pub fn table(&mut self, scan: &Scan) {
+        self.say("");
+        self.say("pos  station  alias  vendor      product     out   in  connected to       name");
+        for info in &scan.subdevices {
+            let position = usize::from(info.position.0);
+            let parent = match scan.topology.connection_to(position) {
+                Some(connection) => format!("{} port {}", connection.near.node, connection.near.port),
+                None if position == 0 => "MAIN".to_owned(),
+                None => "REDUNDANT".to_owned(),
+            };
+            self.say(&format!(
+                "{:>3}  {}  {:>5}  {:#010x}  {:#010x} {:>4} {:>4}  {parent:<17}  {}",
+                position,
+                info.station,
+                info.alias,
+                info.identity.vendor_id,
+                info.identity.product_code,
+                sii_bytes(info, Direction::Outputs),
+                sii_bytes(info, Direction::Inputs),
+                info.name
+            ));
+        }
+        self.say("");
+    }
+
+    /// Where every SubDevice is.
+    pub fn states(&mut self, application: &Application<SimulatedSegment>, names: &Names) {
+        for (subdevice, state) in application.states().iter().enumerate() {
+            let state = match state {
+                SubDeviceState::Absent => "does not answer".to_owned(),
+                SubDeviceState::Configuring => "is being configured".to_owned(),
+                SubDeviceState::Settled(state) => state.to_string(),
+            };
+            let name = names.0.get(subdevice).map_or("", String::as_str);
+            self.say(&format!("  SubDevice {subdevice} \"{name}\": {state}"));
+        }
+    }
+
+    /// The closing summary; true where everything held.
+    pub fn summary(
+        &mut self,
+        application: &Application<SimulatedSegment>,
+        watch: &Watch,
+        plan: &Plan,
+        names: &Names,
+    ) -> bool {
+        self.say("\nsummary");
+        self.totals(application);
+        if let Some(remark) = plan.remark {
+            self.say(&format!("  {remark}"));
+        }
+        self.say("\n  cycles  incomplete  allowed  held back  lacking only the switched-off one  after");
+        for account in &watch.accounts {
+            self.say(&format!(
+                "  {:>6}  {:>10}  {:>7}  {:>9}  {:>33}  {}",
+                account.cycles,
+                account.incomplete,
+                account.incident.edges(plan.cables_of_device),
+                account.held_back,
+                account.without_one,
+                account.incident.describe(names)
+            ));
+        }
+        self.say("");
+        self.verdicts(application, watch, plan)
+    }
+
+    fn totals(&mut self, application: &Application<SimulatedSegment>) {
+        let cyclic = application.cyclic_counters();
+        let acyclic = application.acyclic_counters();
+        if let Some(at) = self.reached_op {
+            self.say(&format!("  power-on to OP of all SubDevices: {:.3} ms", at.0 as f64 / 1e6));
+        }
+        self.say(&format!(
+            "  process data: {} frames, {} bytes on each link, {} lost, {} late",
+            cyclic.sent, cyclic.bytes, cyclic.lost, cyclic.late
+        ));
+        self.say(&format!(
+            "  everything else: {} frames with {} datagrams, {} bytes on each link, {} datagrams sent again",
+            acyclic.sent, acyclic.datagrams, acyclic.bytes, acyclic.resent
+        ));
+        let stalled = application.links().stalled();
+        if stalled > Duration::ZERO {
+            self.say(&format!(
+                "  this machine was at most {:.3} ms late; the simulator waited, so nothing was lost by that",
+                stalled.as_secs_f64() * 1e3
+            ));
+        }
+    }
+
+    fn verdicts(&mut self, application: &Application<SimulatedSegment>, watch: &Watch, plan: &Plan) -> bool {
+        let cycled = watch.accounts.iter().any(|account| matches!(account.incident, Incident::PowerOff { .. }));
+        let within = |account: &Account| account.incomplete <= account.incident.edges(plan.cables_of_device);
+        let mut all = true;
+        let mut verdict = |reporter: &mut Reporter, held: bool, text: String| {
+            all &= held;
+            reporter.say(&format!("  {} {text}", if held { "ok    " } else { "FAILED" }));
+        };
+        let left: Vec<String> =
+            watch.left_op.iter().map(|(subdevice, status)| format!("{subdevice} ({status})")).collect();
+        let text = if left.is_empty() {
+            "nobody left OP but the one that lost its power".to_owned()
+        } else {
+            format!("left OP: SubDevices {}", left.join(", "))
+        };
+        verdict(self, left.is_empty(), text);
+        if cycled {
+            let back = watch.without_power.is_none() && application.all_settled();
+            verdict(self, back, "the one that lost its power is back in OP".to_owned());
+        }
+        let held = watch.accounts.iter().all(within);
+        verdict(self, held, "at most one incomplete cycle per edge of a cable".to_owned());
+        let text = format!(
+            "outputs and inputs agree with the simulated devices: {} comparisons, {} failed",
+            watch.compared, watch.disagreements
+        );
+        verdict(self, watch.compared > 0 && watch.disagreements == 0, text);
+        for text in &watch.described {
+            self.say(&format!("         {text}"));
+        }
+        for drive in &watch.drives {
+            let text = format!(
+                "drive {} was enabled for {} cycles, is at {}, and was at most {} increments behind its target",
+                drive.subdevice, drive.enabled_cycles, drive.position, drive.lag
+            );
+            verdict(self, drive.follows(), text);
+        }
+        all
+    }
+}

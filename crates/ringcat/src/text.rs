@@ -1,0 +1,92 @@
+//! Events in words, for programs that show them to people.
+
+use std::fmt;
+
+use ringcat_engine::event::Event;
+use ringcat_engine::exchange::DomainState;
+use ringcat_wire::address::Position;
+
+/// Names of declared SubDevices, by their index in the declaration.
+#[derive(Clone, Debug, Default)]
+pub struct Names(pub Vec<String>);
+
+impl Names {
+    fn of(&self, subdevice: usize) -> impl fmt::Display {
+        match self.0.get(subdevice) {
+            Some(name) => format!("SubDevice {subdevice} \"{name}\""),
+            None => format!("SubDevice {subdevice}"),
+        }
+    }
+
+    fn at(&self, position: Position) -> impl fmt::Display {
+        match self.0.get(usize::from(position.0)) {
+            Some(name) => format!("position {position} \"{name}\""),
+            None => format!("position {position}"),
+        }
+    }
+
+    /// Neighbour of a break: a SubDevice, or the link itself.
+    fn end(&self, position: Option<Position>, link: &str) -> String {
+        position.map_or_else(|| format!("the {link} interface"), |position| self.at(position).to_string())
+    }
+}
+
+/// An event in one line.
+pub fn describe(event: &Event, names: &Names) -> String {
+    match event {
+        Event::Counted { main, redundant } => format!("SubDevices answering: {main} on MAIN, {redundant} on REDUNDANT"),
+        Event::ScanProgress { done, total } => format!("scanning: {done} of {total} SubDevices read"),
+        Event::ScanFinished { subdevices } => format!("scan finished: {subdevices} SubDevices"),
+        Event::ScanFailed { reason } => format!("scan failed: {reason}"),
+        Event::SiiOddity { position, what } => format!("{}: SII: {what}", names.at(*position)),
+        Event::CablingOddity { position, what } => format!("{}: {what}", names.at(*position)),
+        Event::UnconnectedPort0 { position } => format!("{}: port 0 is not connected", names.at(*position)),
+        Event::LineCrossed { position: Some(position), entry_port: Some(port) } => {
+            format!("{}: line crossed, frames enter at port {port}", names.at(*position))
+        }
+        Event::LineCrossed { .. } => "line crossed: the redundant copy is processed in a closed ring".to_owned(),
+        Event::DuplicateAlias { alias, first, second } => {
+            format!("alias {alias} is used twice: {} and {}", names.at(*first), names.at(*second))
+        }
+        Event::RingOpened { main, redundant } => {
+            format!("ring open: {main} SubDevices on MAIN, {redundant} on REDUNDANT")
+        }
+        Event::BreakLocated { after, before } => {
+            format!("break between {} and {}", names.end(*after, "MAIN"), names.end(*before, "REDUNDANT"))
+        }
+        Event::RingClosed { main, .. } => format!("ring closed: {main} SubDevices on MAIN"),
+        Event::StateReached { subdevice, state } => format!("{}: {state}", names.of(*subdevice)),
+        Event::StateError { subdevice, requested: Some(state), status, code } => {
+            format!("{}: refused {state}: {status}, {code}", names.of(*subdevice))
+        }
+        Event::StateError { subdevice, requested: None, status, code } => {
+            format!("{}: is in {status}: {code}", names.of(*subdevice))
+        }
+        Event::Lost { subdevice } => format!("{}: no longer answers", names.of(*subdevice)),
+        Event::Returned { subdevice } => format!("{}: answers again", names.of(*subdevice)),
+        Event::ConfigurationFailed { subdevice, reason } => {
+            format!("{}: configuration failed: {reason}", names.of(*subdevice))
+        }
+        Event::Unexpected { position, identity } => format!(
+            "{}: not declared: vendor {:#010x}, product {:#010x}",
+            names.at(*position),
+            identity.vendor_id,
+            identity.product_code
+        ),
+        Event::Missing { subdevice, optional } => {
+            let what = if *optional { "optional, not there" } else { "missing" };
+            format!("{}: {what}", names.of(*subdevice))
+        }
+        Event::Addressed { subdevice, station } => format!("{}: station address {station}", names.of(*subdevice)),
+        Event::Domain { domain, status } => {
+            let state = match status.state {
+                DomainState::Zero => "nobody answers",
+                DomainState::Incomplete => "incomplete",
+                DomainState::Complete => "complete",
+            };
+            format!("domain {domain}: {state}, working counter {} of {}", status.wkc, status.expected)
+        }
+        Event::Skipped { domain } => format!("domain {domain}: skipped, its frames are still out"),
+        other => format!("{other:?}"),
+    }
+}

@@ -1,0 +1,60 @@
+//! The `ringcat` program as a user calls it.
+
+use std::path::PathBuf;
+use std::process::{Command, Output};
+
+fn ringcat(arguments: &[&str]) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_ringcat")).args(arguments).output().expect("the program starts")
+}
+
+fn text(bytes: &[u8]) -> String {
+    String::from_utf8_lossy(bytes).into_owned()
+}
+
+fn segment(name: &str) -> String {
+    format!("{}/../sim/segments/{name}.toml", env!("CARGO_MANIFEST_DIR"))
+}
+
+#[test]
+fn the_demonstration_on_the_embedded_ring_holds() {
+    let output = ringcat(&["demo", "--fast"]);
+    let said = text(&output.stdout);
+    assert!(output.status.success(), "{said}");
+    assert_eq!(said.matches("FAILED").count(), 0, "{said}");
+    for part in ["19 of 19 SubDevices read", "cutting the cable", "ring open", "ring closed", "answers again"] {
+        assert!(said.contains(part), "{part} is missing in:\n{said}");
+    }
+}
+
+#[test]
+fn the_demonstration_holds_on_every_example_segment() {
+    for name in ["demo", "tree", "junction-ring"] {
+        let output = ringcat(&["demo", "--fast", "--segment", &segment(name)]);
+        assert!(output.status.success(), "{name}: {}{}", text(&output.stdout), text(&output.stderr));
+    }
+}
+
+#[test]
+fn two_runs_of_the_demonstration_print_the_same() {
+    let run = || text(&ringcat(&["demo", "--fast"]).stdout);
+    assert_eq!(run(), run());
+}
+
+#[test]
+fn a_wrong_segment_file_is_named_with_its_line() {
+    let path: PathBuf = std::env::temp_dir().join(format!("ringcat-wrong-{}.toml", std::process::id()));
+    std::fs::write(&path, "[segment]\nring = true\n\n[[device]]\ntype = \"digital-otput-8\"\n").expect("writable");
+    let output = ringcat(&["demo", "--segment", &path.display().to_string()]);
+    let said = text(&output.stderr);
+    assert_eq!(output.status.code(), Some(2));
+    assert!(said.contains(&format!("{}:5:", path.display())), "{said}");
+    assert!(said.contains("digital-otput-8"), "{said}");
+    std::fs::remove_file(&path).expect("it was just written");
+}
+
+#[test]
+fn a_missing_segment_file_is_named() {
+    let output = ringcat(&["demo", "--segment", "/nowhere/plant.toml"]);
+    assert_eq!(output.status.code(), Some(2));
+    assert!(text(&output.stderr).contains("/nowhere/plant.toml"));
+}
