@@ -125,7 +125,7 @@ impl Exchange {
             Step::Waiting => Received::Taken,
             Step::Finished => {
                 self.counters.received += 1;
-                self.close(index);
+                close(frame, &mut self.monitor, &self.board);
                 Received::Taken
             }
             Step::Late => {
@@ -139,49 +139,29 @@ impl Exchange {
         }
     }
 
-    /// A flight is over: what it proves about the ring and what its supervision datagram saw go on the board.
-    fn close(&mut self, index: u16) {
-        let Some(frame) = self.frames.get_mut(usize::from(index)) else { return };
-        if let Some(state) = self.monitor.observe(frame.arrivals()) {
-            self.board.post_ring(state);
-        }
-        if let Some(supervision) = frame.supervision() {
-            self.board.post_supervision(supervision);
-        }
-        frame.close();
-    }
-
     /// Judges a domain: gives up its overdue frames and sums its working counters.
     pub fn process(&mut self, id: DomainId, now: Instant) -> DomainStatus {
-        self.follow_board();
+        if self.board.taking_part_changes() != self.taking_part_changes {
+            self.follow_board();
+        }
         let Some(domain) = self.domains.get_mut(id.0) else { return DomainStatus::default() };
-        let (mut wkc, mut pending) = (0, false);
-        for index in domain.frames() {
-            let frame = &mut self.frames[index];
-            if frame.is_waiting() {
-                if frame.overdue(now) {
-                    if frame.give_up(domain.image_mut(), self.cycle) {
-                        self.counters.lost += 1;
-                    } else {
-                        self.counters.half += 1;
-                    }
-                } else {
-                    pending = true;
-                }
-            }
+        let frames = &mut self.frames[domain.frames()];
+        let (mut wkc, mut waiting) = (0, false);
+        for frame in &*frames {
+            waiting |= frame.is_waiting();
             wkc += frame.wkc();
         }
+        let pending = waiting && give_up_overdue(frames, domain.image_mut(), now, self.cycle, &mut self.counters);
         if pending || !domain.was_queued() {
             return domain.status(pending);
         }
-        let before = domain.status(false).state;
+        let before = domain.state();
         let status = domain.judge(wkc, self.cycle);
         if status.state != DomainState::Complete {
             self.counters.incomplete += 1;
         }
         if status.state != before {
-            let event = CyclicEvent::Domain { domain: id.0 as u16, status };
-            self.events.push(event.pack());
+            self.events.push(CyclicEvent::Domain { domain: id.0 as u16, status }.pack());
         }
         status
     }
@@ -190,22 +170,23 @@ impl Exchange {
     /// still out is skipped, counted and reported; false then.
     pub fn queue(&mut self, id: DomainId, now: Instant) -> bool {
         let Some(domain) = self.domains.get_mut(id.0) else { return false };
-        let frames = domain.frames();
-        if self.frames[frames.clone()].iter().any(|frame| frame.is_waiting() && !frame.overdue(now)) {
+        let range = domain.frames();
+        let frames = &mut self.frames[range.clone()];
+        if frames.iter().any(|frame| frame.is_waiting() && !frame.overdue(now)) {
             self.counters.skipped += 1;
             domain.count_skip();
             self.events.push(CyclicEvent::Skipped { domain: id.0 as u16 }.pack());
             return false;
         }
         domain.note_queued();
-        for index in frames {
-            if self.frames[index].is_open() {
+        for (frame, index) in frames.iter_mut().zip(range.start as u16..) {
+            if frame.is_open() {
                 self.counters.copies_lost += 1;
-                self.close(index as u16);
+                close(frame, &mut self.monitor, &self.board);
             }
-            self.frames[index].load(self.domains[id.0].image());
+            frame.load(domain.image());
             if self.to_send.len() < self.to_send.capacity() {
-                self.to_send.push(index as u16);
+                self.to_send.push(index);
             }
         }
         true
@@ -218,8 +199,8 @@ impl Exchange {
             let Some(frame) = self.frames.get_mut(usize::from(index)) else { continue };
             self.sequence = self.sequence.next();
             self.by_id[usize::from(self.sequence.frame_id())] = index;
-            let timeout = self.domains[frame.domain()].timeout();
-            let bytes = frame.depart(&self.identity, self.sequence, now + timeout);
+            let timeout_ns = self.domains[frame.domain()].timeout_ns();
+            let bytes = frame.depart(&self.identity, self.sequence, Instant(now.0.saturating_add(timeout_ns)));
             self.counters.sent += 1;
             self.counters.bytes += bytes.len() as u64;
             transmit(Link::Main, bytes);
@@ -234,13 +215,10 @@ impl Exchange {
         self.board.post_cycle();
     }
 
-    /// Takes over who takes part in process data where the supervisor changed it.
+    /// Takes over who takes part in process data, which the supervisor has changed.
+    #[cold]
     fn follow_board(&mut self) {
-        let changes = self.board.taking_part_changes();
-        if changes == self.taking_part_changes {
-            return;
-        }
-        self.taking_part_changes = changes;
+        self.taking_part_changes = self.board.taking_part_changes();
         for frame in &mut self.frames {
             frame.recount(|subdevice| self.board.takes_part(subdevice));
         }
@@ -309,4 +287,37 @@ impl Exchange {
     pub fn pop_foreign(&mut self) -> Option<ForeignFrame<'_>> {
         self.foreign.pop()
     }
+}
+
+/// Gives up those frames that are overdue. True where others are still waited for.
+#[cold]
+fn give_up_overdue(
+    frames: &mut [CyclicFrame],
+    image: &mut [u8],
+    now: Instant,
+    cycle: u64,
+    counters: &mut CyclicCounters,
+) -> bool {
+    let mut pending = false;
+    for frame in frames.iter_mut().filter(|frame| frame.is_waiting()) {
+        if !frame.overdue(now) {
+            pending = true;
+        } else if frame.give_up(image, cycle) {
+            counters.lost += 1;
+        } else {
+            counters.half += 1;
+        }
+    }
+    pending
+}
+
+/// A flight is over: what it proves about the ring and what its supervision datagram saw go on the board.
+fn close(frame: &mut CyclicFrame, monitor: &mut RingMonitor, board: &Board) {
+    if let Some(state) = monitor.observe(frame.arrivals()) {
+        board.post_ring(state);
+    }
+    if let Some(supervision) = frame.supervision() {
+        board.post_supervision(supervision);
+    }
+    frame.close();
 }

@@ -70,7 +70,7 @@ pub struct Domain {
     image: Box<[u8]>,
     frames: Range<usize>,
     expected: u32,
-    timeout: Duration,
+    timeout_ns: u64,
     members: Vec<Member>,
     status: DomainStatus,
     queued: bool,
@@ -91,7 +91,7 @@ impl Domain {
             image: vec![0; planned.image_len as usize].into_boxed_slice(),
             frames,
             expected,
-            timeout: planned.period * 3 / 4,
+            timeout_ns: whole_ns(planned.period * 3 / 4),
             members: subdevices.into_iter().map(member).collect(),
             status: DomainStatus { expected, ..DomainStatus::default() },
             queued: false,
@@ -111,12 +111,12 @@ impl Domain {
         self.frames.clone()
     }
 
-    pub(crate) fn timeout(&self) -> Duration {
-        self.timeout
+    pub(crate) fn timeout_ns(&self) -> u64 {
+        self.timeout_ns
     }
 
     pub(crate) fn set_timeout(&mut self, timeout: Duration) {
-        self.timeout = timeout;
+        self.timeout_ns = whole_ns(timeout);
     }
 
     pub(crate) fn was_queued(&self) -> bool {
@@ -129,6 +129,11 @@ impl Domain {
 
     pub(crate) fn count_skip(&mut self) {
         self.status.skipped += 1;
+    }
+
+    /// The last judgement.
+    pub(crate) fn state(&self) -> DomainState {
+        self.status.state
     }
 
     pub(crate) fn status(&self, pending: bool) -> DomainStatus {
@@ -184,4 +189,9 @@ impl Member {
         let part = if part >= self.part_since { part } else { 0 };
         all.max(part).max(self.delivered_before)
     }
+}
+
+/// A duration in the unit of the hot path, as long as it gets.
+fn whole_ns(duration: Duration) -> u64 {
+    u64::try_from(duration.as_nanos()).unwrap_or(u64::MAX)
 }

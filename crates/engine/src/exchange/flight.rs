@@ -9,11 +9,11 @@ use alloc::vec::Vec;
 
 use ringcat_wire::address::Wkc;
 use ringcat_wire::command::Command;
-use ringcat_wire::datagram::{CIRCULATING, HEADER_LEN, Target};
+use ringcat_wire::datagram::{CIRCULATING, HEADER_LEN, OVERHEAD, Target};
 use ringcat_wire::frame::{FrameBuilder, MAX_FRAME, MacAddress};
 use ringcat_wire::register::map;
 
-use super::layout::{PlannedDatagram, PlannedFrame, SUPERVISION_LEN};
+use super::layout::{PlacedArea, PlannedDatagram, PlannedFrame, SUPERVISION_LEN};
 use crate::board::Supervision;
 use crate::link::Link;
 use crate::ring::merge::or_into;
@@ -33,47 +33,51 @@ pub(crate) enum Step {
     Corrupt,
 }
 
-/// Input bytes of one SubDevice within a datagram.
-#[derive(Debug)]
-struct Segment {
-    subdevice: usize,
-    data_at: usize,
+/// Bytes that are copied between frame and image.
+#[derive(Clone, Copy, Debug)]
+struct Span {
+    frame_at: usize,
     image_at: usize,
     length: usize,
 }
 
-/// What a datagram is for.
+/// Inputs of one SubDevice within a datagram.
 #[derive(Debug)]
-enum Purpose {
-    ProcessData {
-        /// Outputs: offset in the image, bytes.
-        outputs: (usize, usize),
-        /// Inputs: offset in the image, bytes.
-        inputs: (usize, usize),
-        contributions: Box<[(usize, Wkc)]>,
-        segments: Box<[Segment]>,
-        /// Cycle of the last delivery of all inputs, plus one.
-        delivered_all: u64,
-        /// Cycle of the last delivery of those that took part, plus one.
-        delivered_part: u64,
-    },
-    Supervision,
+struct Segment {
+    subdevice: usize,
+    takes_part: bool,
+    span: Span,
 }
 
-/// A datagram of the frame.
+/// A process data datagram.
 #[derive(Debug)]
 struct Place {
-    header_at: usize,
-    length: usize,
-    purpose: Purpose,
+    wkc_at: usize,
+    /// Sum over the copies received so far.
+    wkc: Wkc,
     /// Working counter with all SubDevices.
     expected: Wkc,
     /// Working counter with those that take part now.
     expected_part: Wkc,
-    /// Sum over the copies received so far.
-    wkc: Wkc,
-    takes_part: Box<[bool]>,
+    outputs: Span,
+    inputs: Span,
+    contributions: Box<[(usize, Wkc)]>,
+    segments: Box<[Segment]>,
+    /// Cycle of the last delivery of all inputs, plus one.
+    delivered_all: u64,
+    /// Cycle of the last delivery of those that took part, plus one.
+    delivered_part: u64,
 }
+
+/// A datagram's first eight bytes, as far as no controller changes them (facts 1.5): command, Idx, length, M bit.
+#[derive(Debug)]
+struct Header {
+    at: usize,
+    sent: u64,
+}
+
+/// Address and C bit are left out of [`Header`].
+const HEADER_MASK: u64 = 0x0000_0000_0000_FFFF | !(CIRCULATING as u64) << 48;
 
 /// How far a flight is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -89,34 +93,43 @@ enum Stage {
 #[derive(Debug)]
 pub(crate) struct CyclicFrame {
     domain: usize,
+    stage: Stage,
+    sequence: Sequence,
+    /// Idx of all datagrams.
+    index: u8,
+    arrivals: Arrivals,
+    deadline: Instant,
+    /// Sum of the working counters of process data over the copies received so far.
+    wkc: u32,
+    seen: Supervision,
+    /// Offset of the supervision datagram's header.
+    supervision_at: Option<usize>,
+    headers: Box<[Header]>,
+    places: Box<[Place]>,
     tx: Box<[u8]>,
     /// First copy of a flight that was not complete by itself.
     merged: Box<[u8]>,
-    places: Box<[Place]>,
-    sequence: Sequence,
-    stage: Stage,
-    arrivals: Arrivals,
-    deadline: Instant,
-    seen: Supervision,
 }
 
 impl CyclicFrame {
     pub(crate) fn new(identity: &Identity, domain: usize, planned: &PlannedFrame) -> CyclicFrame {
         let mut buffer = vec![0; MAX_FRAME];
-        let mut places = Vec::new();
+        let (mut places, mut headers_at, mut supervision_at) = (Vec::new(), Vec::new(), None);
         let mut length = 0;
         if let Some(mut builder) = FrameBuilder::ethernet(&mut buffer, MacAddress::ETHERCAT_GROUP, identity.source()) {
             for datagram in &planned.datagrams {
                 let bytes = usize::from(datagram.outputs) + usize::from(datagram.inputs);
                 let target = Target::Logical(datagram.logical);
                 if let Some(data_at) = builder.datagram(datagram.command, 0, target, bytes) {
-                    places.push(Place::process_data(datagram, data_at - HEADER_LEN));
+                    headers_at.push(data_at - HEADER_LEN);
+                    places.push(Place::new(datagram, data_at));
                 }
             }
             if planned.supervision {
                 let target = Target::Broadcast(map::AL_STATUS);
                 if let Some(data_at) = builder.datagram(Command::Brd, 0, target, SUPERVISION_LEN) {
-                    places.push(Place::supervision(data_at - HEADER_LEN));
+                    headers_at.push(data_at - HEADER_LEN);
+                    supervision_at = Some(data_at - HEADER_LEN);
                 }
             }
             length = builder.finish();
@@ -124,14 +137,18 @@ impl CyclicFrame {
         buffer.truncate(length);
         CyclicFrame {
             domain,
-            merged: vec![0; length].into_boxed_slice(),
-            tx: buffer.into_boxed_slice(),
-            places: places.into_boxed_slice(),
-            sequence: Sequence::default(),
             stage: Stage::Idle,
+            sequence: Sequence::default(),
+            index: 0,
             arrivals: Arrivals::default(),
             deadline: Instant::NEVER,
+            wkc: 0,
             seen: Supervision::default(),
+            supervision_at,
+            headers: headers_at.into_iter().map(|at| Header { at, sent: header_at(&buffer, at) }).collect(),
+            places: places.into_boxed_slice(),
+            merged: vec![0; length].into_boxed_slice(),
+            tx: buffer.into_boxed_slice(),
         }
     }
 
@@ -161,43 +178,45 @@ impl CyclicFrame {
 
     /// Sum of the working counters of process data.
     pub(crate) fn wkc(&self) -> u32 {
-        let data = self.places.iter().filter(|place| matches!(place.purpose, Purpose::ProcessData { .. }));
-        data.map(|place| u32::from(place.wkc.0)).sum()
+        self.wkc
     }
 
     /// What the supervision datagram of this flight saw, if it has one and anything came back.
     pub(crate) fn supervision(&self) -> Option<Supervision> {
-        let last = self.places.last()?;
-        (matches!(last.purpose, Purpose::Supervision) && self.arrivals.arrived != 0).then_some(self.seen)
+        (self.supervision_at.is_some() && self.arrivals.arrived != 0).then_some(self.seen)
     }
 
-    /// Copies the outputs in.
+    /// Copies the outputs in and forgets the flight before.
     pub(crate) fn load(&mut self, image: &[u8]) {
-        for place in &self.places {
-            let Purpose::ProcessData { outputs: (image_at, length), .. } = place.purpose else { continue };
-            let data_at = place.header_at + HEADER_LEN;
-            if let (Some(to), Some(from)) =
-                (self.tx.get_mut(data_at..data_at + length), image.get(image_at..image_at + length))
-            {
-                to.copy_from_slice(from);
-            }
+        for place in &mut self.places {
+            place.outputs.load(image, &mut self.tx);
+            place.wkc = Wkc(0);
         }
+        self.wkc = 0;
+        self.arrivals = Arrivals::default();
+        self.seen = Supervision::default();
     }
 
-    /// Starts a flight; returns the bytes of the main copy.
+    /// Starts a flight of what was loaded; returns the bytes of the main copy.
     pub(crate) fn depart(&mut self, identity: &Identity, sequence: Sequence, deadline: Instant) -> &mut [u8] {
         let index = sequence.index(Class::Cyclic);
-        for place in &mut self.places {
-            self.tx[place.header_at + 1] = index;
-            place.wkc = Wkc(0);
+        if self.index != index {
+            self.write_index(index);
         }
         identity.restamp(&mut self.tx, sequence);
         self.sequence = sequence;
         self.stage = Stage::Waiting;
-        self.arrivals = Arrivals::default();
         self.deadline = deadline;
-        self.seen = Supervision::default();
         &mut self.tx
+    }
+
+    /// Changes the Idx of all datagrams, which is due once in 256 frames.
+    fn write_index(&mut self, index: u8) {
+        for header in &mut self.headers {
+            self.tx[header.at + 1] = index;
+            header.sent = header_at(&self.tx, header.at);
+        }
+        self.index = index;
     }
 
     /// Takes in a copy. Delivers into the image as soon as the flight is complete.
@@ -219,56 +238,48 @@ impl CyclicFrame {
         if !self.arrivals.note(copy.sent_on, arrived_on) {
             return Step::Late;
         }
-        let first = self.arrivals.arrived.count_ones() == 1;
+        let first = self.arrivals.arrived == copy.sent_on.bit();
         let finished = self.arrivals.arrived & all_links == all_links;
         let complete = self.count(copy.sent_on, bytes);
         if self.stage == Stage::Waiting {
-            if first && (complete || finished) {
-                self.deliver(image, cycle, Source::Received(bytes));
-            } else if first {
+            if first && !(complete || finished) {
                 self.merged.copy_from_slice(&bytes[..self.tx.len()]);
+                return Step::Waiting;
+            }
+            if first {
+                deliver(&mut self.places, bytes, image, cycle);
             } else {
                 self.merge(bytes);
-                self.deliver(image, cycle, Source::Merged);
+                deliver(&mut self.places, &self.merged, image, cycle);
             }
-            if complete || finished {
-                self.stage = Stage::Delivered;
-            }
+            self.stage = Stage::Delivered;
         }
         if finished { Step::Finished } else { Step::Waiting }
     }
 
-    /// Everything controllers never change is as sent (facts 1.5): command, Idx, length, M bit of every datagram.
     fn is_what_was_sent(&self, bytes: &[u8]) -> bool {
-        if bytes.len() < self.tx.len() {
-            return false;
-        }
-        self.places.iter().all(|place| {
-            let at = place.header_at;
-            let (sent, got) = (&self.tx[at..at + 8], &bytes[at..at + 8]);
-            let circulating = (CIRCULATING >> 8) as u8;
-            sent[0] == got[0] && sent[1] == got[1] && sent[6] == got[6] && sent[7] == got[7] & !circulating
-        })
+        bytes.len() >= self.tx.len() && self.headers.iter().all(|header| header_at(bytes, header.at) == header.sent)
     }
 
     /// Adds the working counters of a copy; true where every process data datagram has just what it should.
     fn count(&mut self, sent_on: Link, bytes: &[u8]) -> bool {
         let mut complete = true;
         for place in &mut self.places {
-            let data_at = place.header_at + HEADER_LEN;
-            let at = data_at + place.length;
-            let wkc = Wkc(u16::from_le_bytes([bytes[at], bytes[at + 1]]));
-            place.wkc = place.wkc.plus(wkc);
-            match place.purpose {
-                Purpose::ProcessData { .. } => complete &= place.wkc == place.expected,
-                Purpose::Supervision => {
-                    self.seen.al_status |= u16::from_le_bytes([bytes[data_at], bytes[data_at + 1]]);
-                    self.seen.irq |= u16::from_le_bytes([bytes[data_at - 2], bytes[data_at - 1]]);
-                    match sent_on {
-                        Link::Main => self.seen.main = wkc,
-                        Link::Redundant => self.seen.redundant = wkc,
-                    }
-                }
+            let wkc = u16_at(bytes, place.wkc_at);
+            place.wkc = place.wkc.plus(Wkc(wkc));
+            self.wkc += u32::from(wkc);
+            complete &= place.wkc == place.expected;
+        }
+        if let Some(at) = self.supervision_at
+            && let Some(datagram) = bytes[at..].first_chunk::<{ OVERHEAD + SUPERVISION_LEN }>()
+        {
+            let [.., irq_low, irq_high, al_low, al_high, wkc_low, wkc_high] = *datagram;
+            self.seen.irq |= u16::from_le_bytes([irq_low, irq_high]);
+            self.seen.al_status |= u16::from_le_bytes([al_low, al_high]);
+            let wkc = Wkc(u16::from_le_bytes([wkc_low, wkc_high]));
+            match sent_on {
+                Link::Main => self.seen.main = wkc,
+                Link::Redundant => self.seen.redundant = wkc,
             }
         }
         complete
@@ -277,41 +288,27 @@ impl CyclicFrame {
     /// ORs the inputs of the second copy into the first (facts 9.3: sent as zeros, every bit belongs to one SubDevice).
     fn merge(&mut self, bytes: &[u8]) {
         for place in &self.places {
-            let Purpose::ProcessData { outputs: (_, outputs), inputs: (_, inputs), .. } = place.purpose else {
-                continue;
-            };
-            let at = place.header_at + HEADER_LEN + outputs;
-            or_into(&mut self.merged[at..at + inputs], &bytes[at..at + inputs]);
+            let inputs = place.inputs.frame_at..place.inputs.frame_at + place.inputs.length;
+            or_into(&mut self.merged[inputs.clone()], &bytes[inputs]);
         }
     }
 
     /// The deadline is over: delivers what is there. True where nothing at all came back.
     pub(crate) fn give_up(&mut self, image: &mut [u8], cycle: u64) -> bool {
         if self.arrivals.arrived != 0 {
-            self.deliver(image, cycle, Source::Merged);
+            deliver(&mut self.places, &self.merged, image, cycle);
         }
         self.stage = Stage::Delivered;
         self.arrivals.arrived == 0
     }
 
-    fn deliver(&mut self, image: &mut [u8], cycle: u64, source: Source<'_>) {
-        let bytes = match source {
-            Source::Received(bytes) => bytes,
-            Source::Merged => &self.merged,
-        };
-        for place in &mut self.places {
-            place.deliver(bytes, image, cycle);
-        }
-    }
-
     /// Counts anew what those that take part add.
     pub(crate) fn recount(&mut self, takes_part: impl Fn(usize) -> bool) {
         for place in &mut self.places {
-            let Purpose::ProcessData { contributions, segments, .. } = &place.purpose else { continue };
-            let part = contributions.iter().filter(|(subdevice, _)| takes_part(*subdevice));
+            let part = place.contributions.iter().filter(|(subdevice, _)| takes_part(*subdevice));
             place.expected_part = part.fold(Wkc(0), |sum, (_, wkc)| sum.plus(*wkc));
-            for (flag, segment) in place.takes_part.iter_mut().zip(segments) {
-                *flag = takes_part(segment.subdevice);
+            for segment in &mut place.segments {
+                segment.takes_part = takes_part(segment.subdevice);
             }
         }
     }
@@ -319,96 +316,84 @@ impl CyclicFrame {
     /// Cycles (plus one) in which all inputs that include this SubDevice's, and those of the ones taking part, were
     /// last delivered; `None` where the SubDevice has no inputs in this frame.
     pub(crate) fn delivered(&self, subdevice: usize) -> Option<(u64, u64)> {
-        self.places.iter().find_map(|place| {
-            let Purpose::ProcessData { segments, delivered_all, delivered_part, .. } = &place.purpose else {
-                return None;
-            };
-            let here = segments.iter().any(|segment| segment.subdevice == subdevice);
-            here.then_some((*delivered_all, *delivered_part))
-        })
+        let here = |place: &&Place| place.segments.iter().any(|segment| segment.subdevice == subdevice);
+        self.places.iter().find(here).map(|place| (place.delivered_all, place.delivered_part))
     }
-}
-
-enum Source<'a> {
-    Received(&'a [u8]),
-    Merged,
 }
 
 impl Place {
-    fn process_data(datagram: &PlannedDatagram, header_at: usize) -> Place {
-        let outputs = usize::from(datagram.outputs);
-        let inputs = usize::from(datagram.inputs);
-        let image_at = datagram.image_offset as usize;
-        let data_at = header_at + HEADER_LEN;
-        let segments: Box<[Segment]> = datagram
-            .input_areas
-            .iter()
-            .map(|placed| Segment {
-                subdevice: placed.area.subdevice,
-                data_at: data_at + placed.image_offset as usize - image_at,
-                image_at: placed.image_offset as usize,
-                length: usize::from(placed.area.length),
-            })
-            .collect();
-        let contributions: Box<[(usize, Wkc)]> = datagram.contributions.iter().copied().collect();
+    fn new(datagram: &PlannedDatagram, data_at: usize) -> Place {
+        let (outputs, inputs) = (usize::from(datagram.outputs), usize::from(datagram.inputs));
+        let start = datagram.image_offset as usize;
+        let span = |image_at: usize, length| Span { frame_at: data_at + image_at - start, image_at, length };
+        let segment = |placed: &PlacedArea| Segment {
+            subdevice: placed.area.subdevice,
+            takes_part: false,
+            span: span(placed.image_offset as usize, usize::from(placed.area.length)),
+        };
         Place {
-            header_at,
-            length: outputs + inputs,
-            expected: contributions.iter().fold(Wkc(0), |sum, (_, wkc)| sum.plus(*wkc)),
-            expected_part: Wkc(0),
+            wkc_at: data_at + outputs + inputs,
             wkc: Wkc(0),
-            takes_part: vec![false; segments.len()].into_boxed_slice(),
-            purpose: Purpose::ProcessData {
-                outputs: (image_at, outputs),
-                inputs: (image_at + outputs, inputs),
-                contributions,
-                segments,
-                delivered_all: 0,
-                delivered_part: 0,
-            },
-        }
-    }
-
-    fn supervision(header_at: usize) -> Place {
-        Place {
-            header_at,
-            length: SUPERVISION_LEN,
-            purpose: Purpose::Supervision,
-            expected: Wkc(0),
+            expected: datagram.contributions.iter().fold(Wkc(0), |sum, (_, wkc)| sum.plus(*wkc)),
             expected_part: Wkc(0),
-            wkc: Wkc(0),
-            takes_part: Box::default(),
+            outputs: span(start, outputs),
+            inputs: span(start + outputs, inputs),
+            contributions: datagram.contributions.iter().copied().collect(),
+            segments: datagram.input_areas.iter().map(segment).collect(),
+            delivered_all: 0,
+            delivered_part: 0,
         }
     }
 
     /// All inputs where everybody answered; those of the ones that take part where just they answered; else nothing,
     /// because it is not known whose bytes are zeros.
     fn deliver(&mut self, bytes: &[u8], image: &mut [u8], cycle: u64) {
-        let Purpose::ProcessData { outputs, inputs, segments, delivered_all, delivered_part, .. } = &mut self.purpose
-        else {
-            return;
-        };
-        let (image_at, length) = *inputs;
-        if length == 0 {
+        if self.inputs.length == 0 {
             return;
         }
         if self.wkc == self.expected {
-            let at = self.header_at + HEADER_LEN + outputs.1;
-            copy(image, image_at, bytes, at, length);
-            *delivered_all = cycle + 1;
+            self.inputs.deliver(bytes, image);
+            self.delivered_all = cycle + 1;
         } else if self.wkc == self.expected_part && self.wkc.0 > 0 {
-            for (segment, takes_part) in segments.iter().zip(&self.takes_part) {
-                if *takes_part {
-                    copy(image, segment.image_at, bytes, segment.data_at, segment.length);
-                }
+            for segment in self.segments.iter().filter(|segment| segment.takes_part) {
+                segment.span.deliver(bytes, image);
             }
-            *delivered_part = cycle + 1;
+            self.delivered_part = cycle + 1;
         }
     }
 }
 
-fn copy(image: &mut [u8], image_at: usize, bytes: &[u8], at: usize, length: usize) {
-    if let (Some(to), Some(from)) = (image.get_mut(image_at..image_at + length), bytes.get(at..at + length)) {
+impl Span {
+    fn load(&self, image: &[u8], frame: &mut [u8]) {
+        copy(image, self.image_at, frame, self.frame_at, self.length);
+    }
+
+    fn deliver(&self, frame: &[u8], image: &mut [u8]) {
+        copy(frame, self.frame_at, image, self.image_at, self.length);
+    }
+}
+
+fn deliver(places: &mut [Place], bytes: &[u8], image: &mut [u8], cycle: u64) {
+    for place in places {
+        place.deliver(bytes, image, cycle);
+    }
+}
+
+fn copy(from: &[u8], from_at: usize, to: &mut [u8], to_at: usize, length: usize) {
+    if length > 0
+        && let Some(to) = to.get_mut(to_at..to_at + length)
+        && let Some(from) = from.get(from_at..from_at + length)
+    {
         to.copy_from_slice(from);
     }
+}
+
+/// What [`Header`] keeps of the datagram there; of bytes beyond the end, zero.
+fn header_at(bytes: &[u8], at: usize) -> u64 {
+    bytes.get(at..).and_then(<[u8]>::first_chunk).map_or(0, |head| u64::from_le_bytes(*head)) & HEADER_MASK
+}
+
+/// Two bytes; beyond the end, zero.
+fn u16_at(bytes: &[u8], at: usize) -> u16 {
+    bytes.get(at..).and_then(<[u8]>::first_chunk).map_or(0, |bytes| u16::from_le_bytes(*bytes))
 }

@@ -12,6 +12,10 @@ use crate::link::Link;
 
 /// Offset of the source address in a frame.
 const SOURCE_AT: usize = 6;
+/// Offset of the EtherType, which follows the source address.
+const ETHERTYPE_AT: usize = SOURCE_AT + 6;
+/// Offset of the byte whose upper half is the type of the EtherCAT part.
+const KIND_AT: usize = ETHERNET_HEADER_LEN + 1;
 /// Offset of the first datagram.
 pub(crate) const DATAGRAMS_AT: usize = ETHERNET_HEADER_LEN + ETHERCAT_HEADER_LEN;
 /// Offset of the first datagram's Idx.
@@ -88,19 +92,29 @@ pub enum Classified {
 pub struct Identity {
     codec: MacCodec,
     main: MacAddress,
-    redundant: Option<MacAddress>,
     id_at: usize,
+    /// The frame id's place in the eight bytes from the source address on, in bits.
+    id_shift: u32,
+    /// Bits of the eight bytes from the source address on that tell our frames: identity and EtherType.
+    own_mask: u64,
+    /// These bits with the identity of the main and of the redundant interface.
+    own: [u64; 2],
 }
 
 impl Identity {
     /// The addresses of the interfaces; both copies of a frame carry those of the main one (facts SM-07).
     pub fn new(codec: MacCodec, main: MacAddress, redundant: Option<MacAddress>) -> Identity {
-        let id_at = SOURCE_AT
-            + match codec {
-                MacCodec::FlagsFirst => 1,
-                MacCodec::IdLast => 5,
-            };
-        Identity { codec, main, redundant, id_at }
+        let (id_at, mask) = match codec {
+            MacCodec::FlagsFirst => (SOURCE_AT + 1, [0, 0, 0, 0xFF, 0xFF, 0xFF, 0xFF, 0xFF]),
+            MacCodec::IdLast => (SOURCE_AT + 5, [0, 0, 0xFF, 0xFF, 0xFF, 0, 0xFF, 0xFF]),
+        };
+        let own_mask = u64::from_le_bytes(mask);
+        let own = [main, redundant.unwrap_or(main)].map(|address| {
+            let [a, b, c, d, e, f] = address.0;
+            let [high, low] = ETHERTYPE.to_be_bytes();
+            u64::from_le_bytes([a, b, c, d, e, f, high, low]) & own_mask
+        });
+        Identity { codec, main, id_at, id_shift: 8 * (id_at - SOURCE_AT) as u32, own_mask, own }
     }
 
     /// The source address of the main copy of frame zero, to put into a frame that is being built.
@@ -131,28 +145,28 @@ impl Identity {
         }
     }
 
-    fn is_own(&self, source: MacAddress) -> bool {
-        self.codec.same_main_device(source, self.main)
-            || self.redundant.is_some_and(|redundant| self.codec.same_main_device(source, redundant))
-    }
-
     /// Tells what a received frame is. Any bytes are allowed; only plain Ethernet frames can be ours.
     pub fn classify(&self, bytes: &[u8]) -> Classified {
         let Some(head) = bytes.first_chunk::<{ DATAGRAMS_AT + datagram::OVERHEAD }>() else {
             return Classified::Other;
         };
-        if head[12..14] != ETHERTYPE.to_be_bytes() || head[15] >> 4 != 1 {
+        // Slices of a constant length: the compiler loads eight bytes at once.
+        let mut word = [0; 8];
+        word.copy_from_slice(&head[SOURCE_AT..SOURCE_AT + 8]);
+        let word = u64::from_le_bytes(word);
+        if head[KIND_AT] >> 4 != 1 {
             return Classified::Other;
         }
-        let source = MacAddress([head[6], head[7], head[8], head[9], head[10], head[11]]);
-        if !self.is_own(source) {
-            return Classified::Foreign;
+        let own = word & self.own_mask;
+        if own != self.own[0] && own != self.own[1] {
+            let ethercat = head[ETHERTYPE_AT..ETHERTYPE_AT + 2] == ETHERTYPE.to_be_bytes();
+            return if ethercat { Classified::Foreign } else { Classified::Other };
         }
         let index = head[FIRST_INDEX_AT];
         Classified::Ours(FrameCopy {
             class: if index & CLASS_BIT == 0 { Class::Cyclic } else { Class::Acyclic },
-            sequence: Sequence::from_wire(head[self.id_at], index),
-            sent_on: if head[SOURCE_AT] & REDUNDANT_BIT == 0 { Link::Main } else { Link::Redundant },
+            sequence: Sequence::from_wire((word >> self.id_shift) as u8, index),
+            sent_on: if word as u8 & REDUNDANT_BIT == 0 { Link::Main } else { Link::Redundant },
         })
     }
 }
