@@ -8,6 +8,7 @@ pub mod bus;
 mod core;
 mod executor;
 mod flights;
+mod silence;
 mod transfer;
 
 use ::core::cell::RefCell;

@@ -116,7 +116,13 @@ impl Mirror {
     ///
     /// # Panics
     /// When image and device differ.
-    pub fn judge(&mut self, status: DomainStatus, domain: DomainId, exchange: &Exchange, network: &Network) -> Delivery {
+    pub fn judge(
+        &mut self,
+        status: DomainStatus,
+        domain: DomainId,
+        exchange: &Exchange,
+        network: &Network,
+    ) -> Delivery {
         if status.pending {
             return Delivery::Pending;
         }
@@ -184,8 +190,9 @@ pub fn operates(device: &Device) -> bool {
 
 /// Events about the ring, in order.
 pub fn ring_events(events: &[TimedEvent]) -> Vec<&Event> {
-    let of_ring =
-        |event: &&Event| matches!(event, Event::RingOpened { .. } | Event::BreakLocated { .. } | Event::RingClosed { .. });
+    let of_ring = |event: &&Event| {
+        matches!(event, Event::RingOpened { .. } | Event::BreakLocated { .. } | Event::RingClosed { .. })
+    };
     events.iter().map(|timed| &timed.event).filter(of_ring).collect()
 }
 

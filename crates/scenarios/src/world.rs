@@ -8,8 +8,8 @@ use std::ops::Range;
 use std::time::Duration;
 
 use ringcat::{
-    Application, Declaration, Direction, DomainId, Error, Event, Instant, Links, MainDevice, Options, ProcessData, Scan,
-    TimedEvent, automatic,
+    Application, Declaration, Direction, DomainId, Error, Event, Instant, Links, MainDevice, Options, ProcessData,
+    Scan, TimedEvent, automatic,
 };
 use ringcat_engine::main_device::Directory;
 use ringcat_sim::cable::{CableId, DeviceIndex};

@@ -2,9 +2,13 @@
 //!
 //! The exchange posts one word per cycle: how many SubDevices answered on each link, the OR of their AL status, the OR
 //! of their event requests. As long as it does not change, nothing is asked of the bus but one look per second.
+//!
+//! Changes of the ring are reported from these words alone, by a procedure of their own: a look waits for lost frames.
 
+use alloc::rc::Rc;
 use alloc::vec;
 use alloc::vec::Vec;
+use core::cell::Cell;
 use core::time::Duration;
 
 use ringcat_wire::al::AlStatus;
@@ -12,7 +16,7 @@ use ringcat_wire::register::{DlStatus, map};
 
 use super::configure::Start;
 use super::fleet::{Phase, SharedFleet};
-use super::inspect::{Look, locate_break, look_at_all};
+use super::inspect::{Break, Look, locate_break, look_at_all};
 use super::recover::{identify, lose, start};
 use super::scan::ScanError;
 use crate::board::{RingWord, Supervision};
@@ -29,17 +33,29 @@ const ROUTINE: Duration = Duration::from_secs(1);
 const SILENT_LOOKS: u8 = 2;
 /// Pause before a silent SubDevice is looked at again.
 const SECOND_LOOK_PAUSE: Duration = Duration::from_millis(2);
+/// Supervision results until the counts of both links must be the same twice in a row: at the edge of a cut one copy
+/// may meet fewer SubDevices than live on its side.
+const SETTLING_RESULTS: u32 = 20;
+/// Looks for the place of a break: its neighbours may notice the lost link later than frames do.
+const BREAK_LOOKS: u8 = 20;
+/// Pause between two of them.
+const BREAK_LOOK_PAUSE: Duration = Duration::from_millis(10);
 
 /// Runs for ever.
 pub(crate) async fn supervise(bus: Bus, fleet: SharedFleet) {
     let silent = vec![0; fleet.access().members.len()];
+    let reported = Rc::new(Cell::new(RingState::Unknown));
+    bus.spawn(report_ring(bus.clone(), fleet.clone(), reported.clone()));
     let mut watch = Watch {
         bus,
         fleet,
         silent,
         seen: Supervision::default(),
         ring: RingWord::default(),
-        reported: RingState::Unknown,
+        reported,
+        seen_reported: RingState::Unknown,
+        place: None,
+        break_looks: 0,
         next_routine: Instant::default(),
     };
     loop {
@@ -59,8 +75,44 @@ struct Watch {
     seen: Supervision,
     ring: RingWord,
     /// The state of the ring that was reported last.
-    reported: RingState,
+    reported: Rc<Cell<RingState>>,
+    /// The same, as of the last check.
+    seen_reported: RingState,
+    /// The break that was reported last.
+    place: Option<Break>,
+    /// Looks for it that are left.
+    break_looks: u8,
     next_routine: Instant,
+}
+
+/// Reports each change of the ring once, with the counts of both links.
+async fn report_ring(bus: Bus, fleet: SharedFleet, reported: Rc<Cell<RingState>>) {
+    let (mut last, mut results) = (None, 0);
+    loop {
+        bus.sleep(PAUSE).await;
+        let state = fleet.board.ring().state;
+        let Some((number, supervision)) = fleet.board.supervision() else { continue };
+        if state == reported.get() {
+            last = None;
+            continue;
+        }
+        let counts = (supervision.main.0, supervision.redundant.0);
+        match last {
+            None => results = 0,
+            Some((before, _)) if before == number => continue,
+            Some((_, before)) if before == counts || results >= SETTLING_RESULTS => {
+                let was_open = reported.replace(state) == RingState::Open;
+                let (main, redundant) = counts;
+                match state {
+                    RingState::Open => bus.report(Event::RingOpened { main, redundant }),
+                    RingState::Closed if was_open => bus.report(Event::RingClosed { main, redundant }),
+                    RingState::Closed | RingState::Unknown => {}
+                }
+            }
+            Some(_) => results += 1,
+        }
+        last = Some((number, counts));
+    }
 }
 
 impl Watch {
@@ -68,19 +120,27 @@ impl Watch {
         let ring = self.fleet.board.ring();
         let now = self.bus.now();
         let supervision = self.fleet.board.supervision().map(|(_, supervision)| supervision);
-        let changed = supervision.is_some_and(|supervision| supervision != self.seen) || ring != self.ring;
+        let reported = self.reported.get();
+        let changed = supervision.is_some_and(|supervision| supervision != self.seen)
+            || ring != self.ring
+            || reported != self.seen_reported;
         if !changed && now < self.next_routine {
             return false;
         }
         self.seen = supervision.unwrap_or(self.seen);
         self.ring = ring;
+        if reported != self.seen_reported {
+            self.seen_reported = reported;
+            self.place = None;
+            self.break_looks = BREAK_LOOKS;
+        }
         self.next_routine = now + ROUTINE;
         true
     }
 
     async fn check(&mut self) {
         let Ok(counted) = self.bus.brd(map::AL_STATUS, AlStatus::LEN).await else { return };
-        let (main, redundant) = (counted.main.0, counted.redundant.0);
+        let main = counted.main.0;
         let looks = look_at_all(&self.bus, &self.fleet).await;
         let strangers = self.fleet.access().strangers.len();
         let answered = looks.iter().filter(|look| matches!(look, Look::Answer { .. })).count();
@@ -92,7 +152,7 @@ impl Watch {
             self.bus.sleep(SECOND_LOOK_PAUSE).await;
             self.next_routine = self.bus.now();
         }
-        self.report_ring(main, redundant, &looks);
+        self.report_break(&looks);
         if usize::from(counted.wkc().0) > answering + strangers {
             self.find_strangers(main, counted.wkc().0).await;
         }
@@ -145,27 +205,25 @@ impl Watch {
         answering
     }
 
-    /// One event per change, with the place of the break where the topology shows it.
-    fn report_ring(&mut self, main: u16, redundant: u16, looks: &[Look]) {
-        let state = self.fleet.board.ring().state;
-        if state == self.reported {
+    /// One event per break, when its neighbours have noticed it.
+    fn report_break(&mut self, looks: &[Look]) {
+        if self.seen_reported != RingState::Open {
             return;
         }
-        let was_open = self.reported == RingState::Open;
-        self.reported = state;
-        match state {
-            RingState::Open => {
-                self.bus.report(Event::RingOpened { main, redundant });
-                if let Some(place) = self.break_place(looks) {
-                    self.bus.report(Event::BreakLocated { after: place.after, before: place.before });
-                }
+        match self.break_place(looks) {
+            Some(place) if self.place != Some(place) => {
+                self.place = Some(place);
+                self.bus.report(Event::BreakLocated { after: place.after, before: place.before });
             }
-            RingState::Closed if was_open => self.bus.report(Event::RingClosed { main, redundant }),
-            RingState::Closed | RingState::Unknown => {}
+            None if self.place.is_none() && self.break_looks > 0 => {
+                self.break_looks -= 1;
+                self.next_routine = self.bus.now() + BREAK_LOOK_PAUSE;
+            }
+            Some(_) | None => {}
         }
     }
 
-    fn break_place(&self, looks: &[Look]) -> Option<super::inspect::Break> {
+    fn break_place(&self, looks: &[Look]) -> Option<Break> {
         let access = self.fleet.access();
         let mut by_position = vec![None; access.topology.nodes.len()];
         for (member, look) in access.members.iter().zip(looks) {

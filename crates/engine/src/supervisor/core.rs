@@ -6,6 +6,7 @@ use core::cmp::Reverse;
 
 use super::executor::{Task, TaskId};
 use super::flights::{AcyclicCounters, Flights};
+use super::silence::Silence;
 use super::transfer::{Request, Stage, Transfer, TransferId, Transfers};
 use crate::board::Board;
 use crate::event::EventLog;
@@ -24,6 +25,7 @@ pub(crate) struct Core {
     pub(crate) transfers: Transfers,
     pub(crate) outbox: VecDeque<TransferId>,
     pub(crate) flights: Flights,
+    pub(crate) silence: Silence,
     /// SubDevices that the main copy of the last broadcast met: positions from here on live behind the redundant link.
     pub(crate) main_count: u16,
     pub(crate) current: TaskId,
@@ -45,6 +47,7 @@ impl Core {
             transfers: Transfers::default(),
             outbox: VecDeque::new(),
             flights: Flights::new(),
+            silence: Silence::default(),
             main_count: 0,
             current: TaskId(0),
             spawned: VecDeque::new(),

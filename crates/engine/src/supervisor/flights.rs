@@ -144,8 +144,10 @@ impl Core {
             self.counters.sent += 1;
             self.counters.bytes += flight.bytes.len() as u64;
             self.counters.datagrams += flight.places.len() as u64;
+            self.silence.sent(Link::Main, self.now);
             transmit(Link::Main, &flight.bytes);
             if self.links == LinkSet::Ring {
+                self.silence.sent(Link::Redundant, self.now);
                 let copy = &mut self.flights.redundant[..flight.bytes.len()];
                 copy.copy_from_slice(&flight.bytes);
                 Identity::mark_redundant(copy, true);
@@ -219,6 +221,7 @@ impl Core {
 
     /// Takes in a copy of an acyclic frame.
     pub(super) fn receive(&mut self, copy: FrameCopy, arrived_on: Link, bytes: &[u8]) -> Received {
+        self.silence.came_back(copy.sent_on);
         let slot = Flights::slot(copy.sequence);
         let Some(flight) = self.flights.slots[slot].as_mut().filter(|flight| flight.sequence == copy.sequence) else {
             self.counters.late += 1;
@@ -234,10 +237,10 @@ impl Core {
             return Received::Late;
         }
         flight.take(copy.sent_on, bytes, first);
-        let all = self.links.mask();
-        let finished = flight.arrivals.arrived & all == all;
-        if finished || flight.satisfied() {
-            self.answer(slot, finished);
+        let finished = flight.has_all(self.links);
+        let nothing_to_wait_for = finished || flight.has_all_but(self.silence.mask(self.now), self.links);
+        if nothing_to_wait_for || flight.satisfied() {
+            self.answer(slot, nothing_to_wait_for);
         }
         if finished {
             self.end(slot);
@@ -245,7 +248,7 @@ impl Core {
         Received::Taken
     }
 
-    /// Hands the replies of a flight to its procedures. `all_in`: no further copy can come.
+    /// Hands the replies of a flight to its procedures. `all_in`: no further copy is waited for.
     fn answer(&mut self, slot: usize, all_in: bool) {
         let Some(flight) = self.flights.slots[slot].as_mut() else { return };
         if flight.answered {
@@ -317,8 +320,9 @@ impl Core {
             } else {
                 self.counters.half += 1;
             }
+            let nothing_to_wait_for = flight.has_all_but(self.silence.mask(self.now), self.links);
             for place in &flight.places {
-                if place.satisfied() {
+                if nothing_to_wait_for || place.satisfied() {
                     let reply = place.reply(&flight.bytes);
                     self.finish(place.transfer, Ok(reply));
                 } else {
@@ -395,6 +399,17 @@ impl Flight {
 
     fn satisfied(&self) -> bool {
         self.places.iter().all(Place::satisfied)
+    }
+
+    /// All copies are in.
+    fn has_all(&self, links: LinkSet) -> bool {
+        self.arrivals.arrived & links.mask() == links.mask()
+    }
+
+    /// A copy came back on its own link, so that it met all whom it can meet, and those that are missing were sent on
+    /// links that are silent.
+    fn has_all_but(&self, silent: u8, links: LinkSet) -> bool {
+        self.arrivals.returned != 0 && (self.arrivals.arrived | silent) & links.mask() == links.mask()
     }
 }
 

@@ -1,0 +1,55 @@
+//! Whether a link is silent: nothing of what is sent on it comes back.
+//!
+//! A reply that needs both copies would wait for the one on a dead link (a cut host cable) until its deadline, again and
+//! again. A link that has been silent for long while the other one proves the ring open is not waited for. Sending on it
+//! goes on, so that it is noticed when copies come back.
+
+use core::time::Duration;
+
+use crate::link::Link;
+use crate::time::Instant;
+
+/// Silence after which a link is not waited for: several frame timeouts, so that a burst of losses is not mistaken.
+const SILENCE: Duration = Duration::from_millis(30);
+
+/// Since when the copies sent on each link have not come back.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Silence {
+    since: [Option<Instant>; 2],
+}
+
+impl Silence {
+    /// A copy is sent.
+    pub(crate) fn sent(&mut self, link: Link, now: Instant) {
+        self.since[link.index()].get_or_insert(now);
+    }
+
+    /// A copy that was sent on a link came back, on time or late.
+    pub(crate) fn came_back(&mut self, link: Link) {
+        self.since[link.index()] = None;
+    }
+
+    /// Bits of the links that are silent.
+    pub(crate) fn mask(&self, now: Instant) -> u8 {
+        let silent = |link: &&Link| self.since[link.index()].is_some_and(|since| now.since(since) >= SILENCE);
+        Link::ALL.iter().filter(silent).fold(0, |mask, link| mask | link.bit())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn silence_begins_with_the_first_copy_that_is_not_answered_and_ends_with_any_that_is() {
+        let mut silence = Silence::default();
+        let at = |ms| Instant(ms * 1_000_000);
+        assert_eq!(silence.mask(at(1000)), 0, "nothing was sent");
+        silence.sent(Link::Main, at(1000));
+        silence.sent(Link::Main, at(1020));
+        assert_eq!(silence.mask(at(1029)), 0);
+        assert_eq!(silence.mask(at(1030)), Link::Main.bit());
+        silence.came_back(Link::Main);
+        assert_eq!(silence.mask(at(1030)), 0);
+    }
+}
