@@ -43,7 +43,7 @@ mod tests {
     #[test]
     fn silence_begins_with_the_first_copy_that_is_not_answered_and_ends_with_any_that_is() {
         let mut silence = Silence::default();
-        let at = |ms| Instant(ms * 1_000_000);
+        let at = |ms: u64| Instant(ms * 1_000_000);
         assert_eq!(silence.mask(at(1000)), 0, "nothing was sent");
         silence.sent(Link::Main, at(1000));
         silence.sent(Link::Main, at(1020));
