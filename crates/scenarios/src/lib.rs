@@ -2,12 +2,13 @@
 //! [`tap`], [`dice`]) and, apart from the scenarios, what is checked ([`check`]). The scenarios are in `tests/`, one file
 //! per theme.
 //!
-//! Benches (`src/bin/`) run on [`cyclic_load`] and [`answering_double`], count with [`callgrind`] and print
-//! [`figures`].
+//! Benches (`src/bin/`) run on [`cyclic_load`] and [`answering_double`], count with [`callgrind`] and
+//! [`counting_allocator`] and print [`figures`].
 
 pub mod answering_double;
 pub mod callgrind;
 pub mod check;
+pub mod counting_allocator;
 pub mod cyclic_load;
 pub mod dice;
 pub mod figures;

@@ -1,0 +1,144 @@
+//! After activation the cyclic path takes and gives back no memory, whatever comes from the wire (issue 2).
+
+use std::time::Duration;
+
+use ringcat_engine::exchange::{CyclicCounters, DomainId, Freshness, Received};
+use ringcat_engine::link::Link;
+use scenarios::answering_double::Cabling;
+use scenarios::counting_allocator::{CountingAllocator, Counts, counts};
+use scenarios::cyclic_load::{CyclicLoad, LoadSpec, PERIOD};
+
+#[global_allocator]
+static ALLOCATOR: CountingAllocator = CountingAllocator;
+
+/// More than the 256 frames after which Idx changes.
+const CYCLES: u64 = 1_000;
+const SUBDEVICES: usize = 60;
+
+/// Three domains, two frames each.
+fn load(cabling: Cabling) -> CyclicLoad {
+    let lrw = cabling == Cabling::Line;
+    let spec = LoadSpec { subdevices: SUBDEVICES, bytes: 60, domains: 3, lrw, supervision: true, cabling };
+    CyclicLoad::new(&spec).expect("fits")
+}
+
+const CABLINGS: [Cabling; 3] = [Cabling::Line, Cabling::ClosedRing, Cabling::CutRing { before: 7 }];
+
+/// Allocations and deallocations in `work`.
+fn counted(work: impl FnOnce()) -> (u64, u64) {
+    let before: Counts = counts();
+    work();
+    let after = counts();
+    (after.allocations - before.allocations, after.deallocations - before.deallocations)
+}
+
+#[test]
+fn the_counter_sees_an_allocation() {
+    assert_eq!(counted(|| drop(std::hint::black_box(vec![1u8; 100]))), (1, 1));
+}
+
+#[test]
+fn undisturbed_cycles_take_no_memory() {
+    for cabling in CABLINGS {
+        let mut load = load(cabling);
+        let used = counted(|| {
+            for _ in 0..CYCLES {
+                load.exchange_once();
+                load.answer();
+            }
+        });
+        assert_eq!(used, (0, 0), "{cabling:?}");
+        let counters = load.exchange.counters();
+        assert_eq!((counters.sent, counters.received), (CYCLES * 6, (CYCLES - 1) * 6), "{cabling:?}");
+        assert_eq!(counters.incomplete, 0, "{cabling:?}");
+    }
+}
+
+#[test]
+fn disturbed_cycles_take_no_memory() {
+    for cabling in CABLINGS {
+        let mut load = load(cabling);
+        let used = counted(|| {
+            for cycle in 0..CYCLES {
+                load.exchange_once();
+                disturb(&mut load, cycle);
+            }
+        });
+        assert_eq!(used, (0, 0), "{cabling:?}");
+        let CyclicCounters { lost, late, corrupt, foreign, other, skipped, incomplete, half, copies_lost, .. } =
+            *load.exchange.counters();
+        let everywhere = [lost, late, corrupt, foreign, other, skipped, incomplete];
+        assert!(everywhere.iter().all(|count| *count > 0), "{cabling:?}: {:?}", load.exchange.counters());
+        // Of one link there is no half.
+        let halves = [half, copies_lost];
+        assert!(cabling == Cabling::Line || halves.iter().any(|count| *count > 0), "{cabling:?}: {halves:?}");
+    }
+}
+
+/// Answers, but not quite, in a way of its own for each of ten cycles.
+fn disturb(load: &mut CyclicLoad, cycle: u64) {
+    let CyclicLoad { exchange, links, board, double, now, .. } = load;
+    match cycle % 10 {
+        // Everything is lost.
+        0 => while links.sent.pop().is_some() {},
+        // One copy, or frame, is lost.
+        1 => {
+            links.sent.pop();
+            double.answer(&mut links.sent, &mut links.arriving);
+        }
+        // The first comes three times.
+        2 => {
+            double.answer(&mut links.sent, &mut links.arriving);
+            let mut first = [0; 1514];
+            let (link, length) = copy_first(links, &mut first);
+            for _ in 0..3 {
+                exchange.receive(link, &first[..length], *now);
+            }
+        }
+        // Somebody's working counter, Idx, sender, or protocol is wrong.
+        3..=6 => {
+            double.answer(&mut links.sent, &mut links.arriving);
+            let mut first = [0; 1514];
+            let (link, length) = copy_first(links, &mut first);
+            let at = [length - 1, 17, 11, 12][cycle as usize % 10 - 3];
+            first[at] ^= 0x41;
+            exchange.receive(link, &first[..length], *now);
+            if cycle % 20 > 10 {
+                exchange.pop_foreign();
+            }
+        }
+        // A datagram is not what was sent.
+        7 => {
+            double.answer(&mut links.sent, &mut links.arriving);
+            let mut first = [0; 1514];
+            let (link, length) = copy_first(links, &mut first);
+            first[16] ^= 0x01;
+            assert_eq!(exchange.receive(link, &first[..length], *now), Received::Corrupt);
+        }
+        // The application is early: its domains are skipped.
+        8 => {
+            let early = *now + Duration::from_micros(1);
+            for domain in (0..3).map(DomainId) {
+                assert!(exchange.process(domain, early).pending);
+                assert!(!exchange.queue(domain, early));
+            }
+            exchange.send(early, &mut |_, _| panic!("nothing was queued"));
+            double.answer(&mut links.sent, &mut links.arriving);
+        }
+        // A SubDevice stops taking part, or takes part again; frames come after the next cycle has begun.
+        _ => {
+            let subdevice = cycle as usize % SUBDEVICES;
+            board.set_taking_part(subdevice, !board.takes_part(subdevice));
+            exchange.process(DomainId(0), *now + PERIOD);
+            assert_ne!(exchange.freshness(DomainId(0), 0), Freshness::Never);
+            double.answer(&mut links.sent, &mut links.arriving);
+        }
+    }
+}
+
+/// Takes the first frame that arrives and copies it.
+fn copy_first(links: &mut ringcat::memory::MemoryLinks, first: &mut [u8; 1514]) -> (Link, usize) {
+    let (link, frame) = links.arriving.pop().expect("there is one");
+    first[..frame.len()].copy_from_slice(frame);
+    (link, frame.len())
+}
