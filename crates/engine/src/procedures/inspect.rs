@@ -30,7 +30,7 @@ pub(super) async fn look_at_all(bus: &Bus, fleet: &SharedFleet) -> Vec<Look> {
         match look_at(&bus, station).await {
             Ok(look) => look,
             Err(BusError::Wkc { .. }) => Look::Silent,
-            Err(BusError::Lost { .. }) => Look::Unknown,
+            Err(BusError::Lost { .. } | BusError::TooLong { .. }) => Look::Unknown,
         }
     });
     looks.await

@@ -13,7 +13,7 @@ use core::time::Duration;
 
 use ringcat_wire::address::{Position, RegisterAddress, StationAddress, Wkc};
 use ringcat_wire::command::Command;
-use ringcat_wire::datagram::Target;
+use ringcat_wire::datagram::{MAX_DATA, Target};
 
 use super::core::Core;
 use super::executor::TaskId;
@@ -54,6 +54,13 @@ pub enum BusError {
         /// How often it was sent again.
         retries: u8,
     },
+    /// It is longer than a frame can carry.
+    TooLong {
+        /// Whom it addresses.
+        target: Target,
+        /// Bytes of data.
+        length: usize,
+    },
     /// Not the expected number of SubDevices answered.
     Wkc {
         /// Whom it addressed.
@@ -80,6 +87,10 @@ impl fmt::Display for BusError {
             BusError::Lost { target: whom, retries } => {
                 target(f, *whom)?;
                 write!(f, ": the frame was lost, {} times", u16::from(*retries) + 1)
+            }
+            BusError::TooLong { target: whom, length } => {
+                target(f, *whom)?;
+                write!(f, ": {length} bytes, a datagram carries at most {MAX_DATA}")
             }
             BusError::Wkc { target: whom, expected, got } => {
                 target(f, *whom)?;

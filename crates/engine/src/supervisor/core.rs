@@ -4,6 +4,9 @@ use alloc::collections::{BinaryHeap, VecDeque};
 use alloc::sync::Arc;
 use core::cmp::Reverse;
 
+use ringcat_wire::datagram::MAX_DATA;
+
+use super::bus::BusError;
 use super::executor::{Task, TaskId};
 use super::flights::{AcyclicCounters, Flights};
 use super::silence::Silence;
@@ -28,6 +31,8 @@ pub(crate) struct Core {
     pub(crate) silence: Silence,
     /// SubDevices that the main copy of the last broadcast met: positions from here on live behind the redundant link.
     pub(crate) main_count: u16,
+    /// Since when the first datagram of the outbox has been too long for the send window.
+    pub(crate) blocked_since: Option<Instant>,
     pub(crate) current: TaskId,
     pub(crate) spawned: VecDeque<Task>,
     ready: VecDeque<TaskId>,
@@ -49,6 +54,7 @@ impl Core {
             flights: Flights::new(),
             silence: Silence::default(),
             main_count: 0,
+            blocked_since: None,
             current: TaskId(0),
             spawned: VecDeque::new(),
             ready: VecDeque::new(),
@@ -98,11 +104,18 @@ impl Core {
         !self.outbox.is_empty()
     }
 
-    /// Queues a datagram for the current task.
+    /// Queues a datagram for the current task. One that no frame can carry fails at once.
     pub(crate) fn request(&mut self, request: Request) -> TransferId {
-        let transfer = Transfer { request, stage: Stage::Queued, task: self.current, retries: 0, abandoned: false };
-        let id = self.transfers.insert(transfer);
-        self.outbox.push_back(id);
+        let length = request.data.len();
+        let fits = length <= MAX_DATA;
+        let stage =
+            if fits { Stage::Queued } else { Stage::Done(Err(BusError::TooLong { target: request.target, length })) };
+        let id = self.transfers.insert(Transfer { request, stage, task: self.current, retries: 0, abandoned: false });
+        if fits {
+            self.outbox.push_back(id);
+        } else {
+            self.wake(self.current);
+        }
         id
     }
 

@@ -26,6 +26,8 @@ const WINDOW: usize = 32;
 const FRAME_TIMEOUT: Duration = Duration::from_millis(20);
 /// A lost datagram is sent again so often; the retry index in the source address has three bits (facts SM-04).
 pub(super) const MAX_RETRIES: u8 = 7;
+/// A datagram that fits no send window goes out after this time all the same, and delays a cycle once.
+const STARVED: Duration = Duration::from_millis(10);
 /// Flights are found by the lower bits of their sequence number.
 const SLOTS: usize = 128;
 
@@ -140,6 +142,7 @@ impl Core {
         while !self.outbox.is_empty() && self.flights.has_room() && used < budget {
             let limit = (budget - used).min(MAX_FRAME);
             let Some(flight) = self.pack(limit) else { break };
+            self.blocked_since = None;
             used += flight.bytes.len();
             self.counters.sent += 1;
             self.counters.bytes += flight.bytes.len() as u64;
@@ -161,12 +164,20 @@ impl Core {
         used
     }
 
-    /// Builds one frame of at most `limit` bytes from the front of the outbox; at least one datagram goes in.
+    /// Whether a first datagram that is too long for the window has waited for so long that it goes out all the same:
+    /// it may be too long for every window.
+    fn is_starved(&mut self) -> bool {
+        let since = *self.blocked_since.get_or_insert(self.now);
+        self.now.since(since) >= STARVED
+    }
+
+    /// Builds one frame of at most `limit` bytes from the front of the outbox; `None` where nothing fits.
     fn pack(&mut self, limit: usize) -> Option<Flight> {
         let sequence = self.flights.sequence.next();
         let mut flight = self.flights.fresh(sequence);
         flight.bytes.resize(MAX_FRAME, 0);
         let mut retry = 0;
+        let starved = self.is_starved();
         let length = {
             let source = self.identity.source();
             let mut builder = FrameBuilder::ethernet(&mut flight.bytes, MacAddress::ETHERCAT_GROUP, source)?;
@@ -183,7 +194,7 @@ impl Core {
                 }
                 let request = &transfer.request;
                 let bytes = OVERHEAD + request.data.len();
-                if !flight.places.is_empty() && total + bytes > limit {
+                if total + bytes > limit && (!flight.places.is_empty() || !starved) {
                     break;
                 }
                 let index = sequence.index(Class::Acyclic);

@@ -1,1 +1,387 @@
-//! Supervisor tests.
+//! The acyclic half against hand-made answers: packing, pairing, resending, giving up, timers.
+
+use ::core::cell::{Cell, RefCell};
+use ::core::time::Duration;
+use alloc::rc::Rc;
+use alloc::vec;
+use alloc::vec::Vec;
+
+use proptest::prelude::*;
+use ringcat_wire::address::{Position, RegisterAddress, StationAddress, Wkc};
+use ringcat_wire::command::Command;
+use ringcat_wire::datagram::HEADER_LEN;
+use ringcat_wire::frame::{Frame, MacAddress};
+use ringcat_wire::register::map;
+use ringcat_wire::source_address::MacCodec;
+
+use super::*;
+
+const MAIN: MacAddress = MacAddress([0, 0, 0x5E, 0, 0x53, 1]);
+const REDUNDANT: MacAddress = MacAddress([0, 0, 0x5E, 0, 0x53, 2]);
+const STATION: StationAddress = StationAddress(0x1001);
+
+struct Bench {
+    supervisor: Supervisor,
+    now: Instant,
+    sent: Vec<(Link, Vec<u8>)>,
+}
+
+impl Bench {
+    fn new(links: LinkSet) -> Bench {
+        let identity = Identity::new(MacCodec::FlagsFirst, MAIN, Some(REDUNDANT));
+        Bench { supervisor: Supervisor::new(identity, links, Instant(0)), now: Instant(0), sent: Vec::new() }
+    }
+
+    /// Polls and sends; the frames sent are in `sent`.
+    fn step(&mut self) {
+        self.supervisor.poll(self.now);
+        let sent = &mut self.sent;
+        sent.clear();
+        self.supervisor.transmit(self.now, usize::MAX, &mut |link, frame| sent.push((link, frame.to_vec())));
+    }
+
+    fn pass(&mut self, time: Duration) {
+        self.now += time;
+    }
+
+    fn start<T: 'static>(&mut self, procedure: impl Future<Output = T> + 'static) -> Rc<RefCell<Option<T>>> {
+        let result = Rc::new(RefCell::new(None));
+        let slot = result.clone();
+        self.supervisor.spawn(async move {
+            let value = procedure.await;
+            *slot.borrow_mut() = Some(value);
+        });
+        result
+    }
+}
+
+/// A copy that came back with this working counter in every datagram, and this data in the reads.
+fn answered(frame: &[u8], wkc: u16, fill: u8) -> Vec<u8> {
+    let mut frame = frame.to_vec();
+    let places: Vec<(usize, usize, bool)> = {
+        let parsed = Frame::parse(&frame).unwrap();
+        let mut at = parsed.payload_offset();
+        let place = |d: ringcat_wire::datagram::Datagram<'_>| {
+            let data = at + HEADER_LEN;
+            at = data + d.data.len() + 2;
+            (data, d.data.len(), d.header.command.reads())
+        };
+        parsed.datagrams().map(place).collect()
+    };
+    for (data, length, reads) in places {
+        if reads && wkc > 0 {
+            frame[data..data + length].fill(fill);
+        }
+        frame[data + length..data + length + 2].copy_from_slice(&wkc.to_le_bytes());
+    }
+    frame[6] |= 0x02;
+    frame
+}
+
+#[test]
+fn requests_of_many_procedures_share_a_frame() {
+    let mut bench = Bench::new(LinkSet::Single);
+    for station in 0..50 {
+        let bus = bench.supervisor.bus();
+        bench.start(async move { bus.fprd(StationAddress(station), map::AL_STATUS, 2).await });
+    }
+    bench.step();
+    assert_eq!(bench.sent.len(), 1);
+    assert_eq!(Frame::parse(&bench.sent[0].1).unwrap().datagrams().count(), 50);
+}
+
+#[test]
+fn a_reply_reaches_the_procedure_that_waits_for_it() {
+    let mut bench = Bench::new(LinkSet::Single);
+    let bus = bench.supervisor.bus();
+    let result = bench.start(async move { bus.fprd(STATION, map::AL_STATUS, 2).await });
+    bench.step();
+    let answer = answered(&bench.sent[0].1, 1, 0x08);
+    assert_eq!(bench.supervisor.receive(Link::Main, &answer, bench.now), Received::Taken);
+    assert_eq!(bench.supervisor.receive(Link::Main, &answer, bench.now), Received::Late);
+    bench.step();
+    assert_eq!(*result.borrow(), Some(Ok(vec![0x08, 0x08])));
+}
+
+#[test]
+fn nobody_answering_is_an_error_that_names_register_and_counter() {
+    let mut bench = Bench::new(LinkSet::Single);
+    let bus = bench.supervisor.bus();
+    let result = bench.start(async move { bus.fprd(STATION, map::AL_STATUS, 2).await });
+    bench.step();
+    let answer = answered(&bench.sent[0].1, 0, 0);
+    bench.supervisor.receive(Link::Main, &answer, bench.now);
+    bench.step();
+    let error = result.borrow().clone().unwrap().unwrap_err();
+    assert_eq!(
+        alloc::string::ToString::to_string(&error),
+        "station 0x1001, register 0x0130: expected working counter 1, got 0"
+    );
+}
+
+#[test]
+fn a_lost_frame_is_sent_again_with_the_retry_index_and_given_up_in_the_end() {
+    let mut bench = Bench::new(LinkSet::Single);
+    let bus = bench.supervisor.bus();
+    let result = bench.start(async move { bus.fprd(STATION, map::AL_STATUS, 2).await });
+    for retry in 0..=7 {
+        bench.step();
+        assert_eq!(bench.sent.len(), 1, "try {retry}");
+        // facts SM-04: bits 6:4 of the first byte of the source address.
+        assert_eq!(bench.sent[0].1[6], retry << 4);
+        bench.pass(Duration::from_millis(20));
+    }
+    bench.step();
+    assert!(bench.sent.is_empty());
+    let error = result.borrow().clone().unwrap().unwrap_err();
+    assert!(matches!(error, BusError::Lost { retries: 7, .. }), "{error}");
+    let counters = bench.supervisor.counters();
+    assert_eq!((counters.lost, counters.resent, counters.timed_out), (8, 7, 1));
+}
+
+#[test]
+fn what_must_not_happen_twice_is_not_sent_again() {
+    let mut bench = Bench::new(LinkSet::Single);
+    let bus = bench.supervisor.bus();
+    let target = ringcat_wire::datagram::Target::Station(STATION, RegisterAddress(0x1000));
+    let result = bench.start(async move { bus.transfer_once(Command::Fprd, target, vec![0; 4]).await });
+    bench.step();
+    bench.pass(Duration::from_millis(20));
+    bench.step();
+    assert!(bench.sent.is_empty());
+    assert!(matches!(*result.borrow(), Some(Err(BusError::Lost { retries: 0, .. }))));
+}
+
+#[test]
+fn an_answer_that_comes_after_the_retry_is_late() {
+    let mut bench = Bench::new(LinkSet::Single);
+    let bus = bench.supervisor.bus();
+    let result = bench.start(async move { bus.fprd(STATION, map::AL_STATUS, 2).await });
+    bench.step();
+    let first = answered(&bench.sent[0].1, 1, 0xAA);
+    bench.pass(Duration::from_millis(20));
+    bench.step();
+    assert_eq!(bench.supervisor.receive(Link::Main, &first, bench.now), Received::Late);
+    let second = answered(&bench.sent[0].1, 1, 0x55);
+    bench.supervisor.receive(Link::Main, &second, bench.now);
+    bench.step();
+    assert_eq!(*result.borrow(), Some(Ok(vec![0x55, 0x55])));
+}
+
+#[test]
+fn both_copies_leave_with_one_id_and_the_redundant_bit_on_one() {
+    // facts CR-01, CR-24, SM-02.
+    let mut bench = Bench::new(LinkSet::Ring);
+    let bus = bench.supervisor.bus();
+    bench.start(async move { bus.brd(map::TYPE, 1).await });
+    bench.step();
+    let (main, redundant) = (&bench.sent[0], &bench.sent[1]);
+    assert_eq!((main.0, redundant.0), (Link::Main, Link::Redundant));
+    assert_eq!(redundant.1[6], main.1[6] | 0x08);
+    assert_eq!(main.1[7..], redundant.1[7..]);
+}
+
+#[test]
+fn in_an_open_ring_counts_are_added_and_reads_are_ored() {
+    let mut bench = Bench::new(LinkSet::Ring);
+    let bus = bench.supervisor.bus();
+    let result = bench.start(async move { bus.brd(map::AL_STATUS, 2).await });
+    bench.step();
+    let main = answered(&bench.sent[0].1, 3, 0x04);
+    let redundant = answered(&bench.sent[1].1, 5, 0x08);
+    bench.supervisor.receive(Link::Redundant, &redundant, bench.now);
+    bench.step();
+    assert!(result.borrow().is_none(), "one copy of a broadcast is not enough");
+    bench.supervisor.receive(Link::Main, &main, bench.now);
+    bench.step();
+    let reply = result.borrow().clone().unwrap().unwrap();
+    assert_eq!((reply.main, reply.redundant, reply.wkc()), (Wkc(3), Wkc(5), Wkc(8)));
+    assert_eq!(reply.data, vec![0x0C, 0x0C]);
+    assert_eq!(bench.supervisor.ring(), RingState::Open);
+}
+
+#[test]
+fn positions_behind_the_break_are_shifted_on_the_redundant_copy() {
+    // facts CR-09: three on the main link, so position 4 is position 1 on the redundant one: ADP -4 + 3 = -1.
+    let mut bench = Bench::new(LinkSet::Ring);
+    let bus = bench.supervisor.bus();
+    bench.start(async move {
+        bus.brd(map::TYPE, 1).await.unwrap();
+        bus.aprd(Position(4), map::STATION_ADDRESS, 2).await
+    });
+    bench.step();
+    let copies = bench.sent.clone();
+    for (link, frame) in copies {
+        let count = if link == Link::Main { 3 } else { 5 };
+        bench.supervisor.receive(link, &answered(&frame, count, 0), bench.now);
+    }
+    bench.step();
+    let adp = |frame: &[u8]| Frame::parse(frame).unwrap().datagrams().next().unwrap().header.adp();
+    assert_eq!(adp(&bench.sent[0].1), 0u16.wrapping_sub(4));
+    assert_eq!(adp(&bench.sent[1].1), 0u16.wrapping_sub(1));
+}
+
+#[test]
+fn one_copy_is_enough_where_the_counter_is_as_expected() {
+    // facts CR-06.
+    let mut bench = Bench::new(LinkSet::Ring);
+    let bus = bench.supervisor.bus();
+    let result = bench.start(async move { bus.fprd(STATION, map::AL_STATUS, 2).await });
+    bench.step();
+    let main = answered(&bench.sent[0].1, 1, 0x08);
+    bench.supervisor.receive(Link::Redundant, &main, bench.now);
+    bench.step();
+    assert_eq!(*result.borrow(), Some(Ok(vec![0x08, 0x08])));
+    assert_eq!(bench.supervisor.ring(), RingState::Unknown, "a missing copy proves nothing");
+}
+
+#[test]
+fn a_copy_nobody_answered_is_no_answer_while_the_other_is_missing() {
+    let mut bench = Bench::new(LinkSet::Ring);
+    let bus = bench.supervisor.bus();
+    let result = bench.start(async move { bus.fprd(STATION, map::AL_STATUS, 2).await });
+    bench.step();
+    let redundant = answered(&bench.sent[1].1, 0, 0);
+    bench.supervisor.receive(Link::Main, &redundant, bench.now);
+    bench.pass(Duration::from_millis(20));
+    bench.step();
+    assert!(result.borrow().is_none());
+    assert_eq!(bench.sent.len(), 2, "sent again on both links");
+}
+
+#[test]
+fn a_frame_with_other_datagrams_than_sent_is_corrupt() {
+    let mut bench = Bench::new(LinkSet::Single);
+    let bus = bench.supervisor.bus();
+    bench.start(async move { bus.fprd(STATION, map::AL_STATUS, 2).await });
+    bench.step();
+    let mut answer = answered(&bench.sent[0].1, 1, 0x08);
+    answer[22] = 1; // length of the datagram
+    assert_eq!(bench.supervisor.receive(Link::Main, &answer, bench.now), Received::Corrupt);
+    assert_eq!(bench.supervisor.receive(Link::Main, &answer[..30], bench.now), Received::Corrupt);
+}
+
+#[test]
+fn an_abandoned_request_is_forgotten_and_its_answer_harms_nobody() {
+    let mut bench = Bench::new(LinkSet::Single);
+    let bus = bench.supervisor.bus();
+    let result = bench.start(async move {
+        let slow = bus.fprd(STATION, map::AL_STATUS, 2);
+        let gave_up = bus.within(Duration::from_millis(1), slow).await.is_err();
+        (gave_up, bus.fprd(STATION, map::DL_STATUS, 2).await)
+    });
+    bench.step();
+    let first = answered(&bench.sent[0].1, 1, 0xAA);
+    bench.pass(Duration::from_millis(1));
+    bench.step();
+    let second = answered(&bench.sent[0].1, 1, 0x55);
+    bench.supervisor.receive(Link::Main, &first, bench.now);
+    bench.supervisor.receive(Link::Main, &second, bench.now);
+    bench.step();
+    assert_eq!(*result.borrow(), Some((true, Ok(vec![0x55, 0x55]))));
+}
+
+#[test]
+fn a_request_abandoned_before_it_was_sent_is_never_sent() {
+    let mut bench = Bench::new(LinkSet::Single);
+    let bus = bench.supervisor.bus();
+    bench.start(async move {
+        let never = bus.fprd(STATION, map::AL_STATUS, 2);
+        bus.within(Duration::ZERO, never).await.is_err()
+    });
+    bench.step();
+    assert!(bench.sent.is_empty());
+}
+
+#[test]
+fn the_byte_budget_and_the_window_are_kept() {
+    let mut bench = Bench::new(LinkSet::Single);
+    let bus = bench.supervisor.bus();
+    bench.supervisor.spawn(async move {
+        let read = |bus: Bus, n| async move { bus.fprd(StationAddress(n), map::PROCESS_RAM, 1000).await };
+        bus.gather(0..200u16, read).await;
+    });
+    bench.supervisor.poll(bench.now);
+    let mut sizes = Vec::new();
+    bench.supervisor.transmit(bench.now, 2500, &mut |_, frame| sizes.push(frame.len()));
+    assert_eq!(sizes, vec![1028, 1028]);
+    bench.supervisor.transmit(bench.now, usize::MAX, &mut |_, frame| sizes.push(frame.len()));
+    assert_eq!(sizes.len(), 32);
+}
+
+#[test]
+fn a_datagram_too_long_for_every_window_goes_out_after_ten_milliseconds() {
+    let mut bench = Bench::new(LinkSet::Single);
+    let bus = bench.supervisor.bus();
+    bench.start(async move { bus.fprd(STATION, map::PROCESS_RAM, 1000).await });
+    bench.supervisor.poll(bench.now);
+    let mut sent = 0;
+    for _ in 0..10 {
+        bench.supervisor.transmit(bench.now, 500, &mut |_, _| sent += 1);
+        assert_eq!(sent, 0);
+        bench.pass(Duration::from_millis(1));
+    }
+    bench.supervisor.transmit(bench.now, 500, &mut |_, _| sent += 1);
+    assert_eq!(sent, 1);
+}
+
+#[test]
+fn what_no_frame_can_carry_fails_at_once() {
+    let mut bench = Bench::new(LinkSet::Single);
+    let bus = bench.supervisor.bus();
+    let result = bench.start(async move { bus.fprd(STATION, map::PROCESS_RAM, 1487).await });
+    bench.step();
+    bench.step();
+    assert!(bench.sent.is_empty());
+    assert!(matches!(*result.borrow(), Some(Err(BusError::TooLong { length: 1487, .. }))));
+}
+
+#[test]
+fn timers_fire_in_order_and_groups_wake_once() {
+    let mut bench = Bench::new(LinkSet::Single);
+    let bus = bench.supervisor.bus();
+    let woken = Rc::new(Cell::new(0));
+    let counter = woken.clone();
+    let result = bench.start(async move {
+        let order = bus.gather([3u64, 1, 2], |bus, ms| async move {
+            bus.sleep(Duration::from_millis(ms)).await;
+            (ms, bus.now().0 / 1_000_000)
+        });
+        let order = order.await;
+        counter.set(counter.get() + 1);
+        order
+    });
+    assert_eq!(bench.supervisor.next_deadline(), Some(Instant(0)));
+    bench.step();
+    for ms in 1..=3 {
+        assert_eq!(bench.supervisor.next_deadline(), Some(Instant(ms * 1_000_000)));
+        bench.pass(Duration::from_millis(1));
+        bench.step();
+    }
+    assert_eq!(*result.borrow(), Some(vec![(3, 3), (1, 1), (2, 2)]));
+    assert_eq!(woken.get(), 1);
+    assert_eq!(bench.supervisor.next_deadline(), None);
+}
+
+proptest! {
+    #[test]
+    fn any_bytes_may_arrive(frames in proptest::collection::vec((any::<bool>(), proptest::collection::vec(any::<u8>(), 0..120)), 0..20), mangle in any::<[u8; 8]>()) {
+        let mut bench = Bench::new(LinkSet::Ring);
+        let bus = bench.supervisor.bus();
+        bench.start(async move { bus.fprd(STATION, map::AL_STATUS, 2).await });
+        bench.step();
+        for (main, bytes) in frames {
+            let link = if main { Link::Main } else { Link::Redundant };
+            bench.supervisor.receive(link, &bytes, bench.now);
+            // A frame of ours with random bytes changed.
+            let mut own = bench.sent[0].1.clone();
+            for (at, value) in bytes.iter().zip(mangle) {
+                let at = usize::from(*at) % own.len();
+                own[at] = value;
+            }
+            bench.supervisor.receive(link, &own, bench.now);
+        }
+        bench.pass(Duration::from_millis(20));
+        bench.step();
+    }
+}
