@@ -7,7 +7,7 @@ use ringcat_wire::address::{Position, StationAddress};
 use ringcat_wire::al::{AlState, AlStatus, AlStatusCode};
 use ringcat_wire::sii::Identity;
 
-use crate::exchange::{DomainState, DomainStatus};
+use crate::domain::{DomainState, DomainStatus};
 use crate::queue::WORDS;
 use crate::time::Instant;
 

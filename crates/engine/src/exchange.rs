@@ -12,20 +12,20 @@ pub mod domain;
 pub mod entry;
 mod flight;
 pub mod foreign;
-pub mod layout;
 
 use alloc::sync::Arc;
 use alloc::vec::Vec;
 use core::time::Duration;
 
 pub use counters::CyclicCounters;
-pub use domain::{Domain, DomainState, DomainStatus, Freshness};
+pub use domain::Domain;
 pub use entry::Entry;
 pub use foreign::ForeignFrame;
-pub use layout::{DomainId, DomainSpec, Layout};
 
 use crate::board::Board;
+use crate::domain::{DomainId, DomainState, DomainStatus, Freshness};
 use crate::event::CyclicEvent;
+use crate::layout::Layout;
 use crate::link::{Link, LinkSet};
 use crate::queue::Producer;
 use crate::ring::{Class, Classified, Identity, RingMonitor, RingState, Sequence};

@@ -19,10 +19,11 @@ use ringcat_wire::source_address::MacCodec;
 
 use crate::board::Board;
 use crate::config::{ConfigError, Resolution, SubDeviceConfig, resolve};
+use crate::domain::DomainId;
 use crate::event::{CyclicEvent, Event, TimedEvent};
-use crate::exchange::layout::{AreaSpec, DomainId, DomainSpec, Layout, LayoutError, PlacedArea};
 use crate::exchange::{Entry, Exchange};
 use crate::info::{Direction, SubDeviceInfo};
+use crate::layout::{AreaSpec, DomainSpec, Layout, LayoutError, PlacedArea};
 use crate::link::{Link, LinkSet};
 use crate::plan::{SubDevicePlan, plan};
 use crate::procedures::configure::Start;

@@ -5,8 +5,9 @@
 
 use std::time::Duration;
 
+use ringcat_engine::domain::{DomainId, DomainStatus, Freshness};
 use ringcat_engine::event::TimedEvent;
-use ringcat_engine::exchange::{CyclicCounters, DomainId, DomainStatus, Entry, Exchange, Freshness};
+use ringcat_engine::exchange::{CyclicCounters, Entry, Exchange};
 use ringcat_engine::link::Link;
 use ringcat_engine::main_device::{Active, Directory, MainDevice as Engine, SubDeviceState};
 use ringcat_engine::ring::RingState;

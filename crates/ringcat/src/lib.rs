@@ -44,8 +44,9 @@ pub use main_device::{MainDevice, Options, automatic};
 pub use ringcat_engine::config::{
     ConfigAddress, PdoAssignment, PdoEntry, PdoMapping, SdoDownload, SubDeviceConfig, Timeouts, Watchdog,
 };
+pub use ringcat_engine::domain::{DomainId, DomainState, DomainStatus, Freshness};
 pub use ringcat_engine::event::{Event, TimedEvent};
-pub use ringcat_engine::exchange::{CyclicCounters, DomainId, DomainState, DomainStatus, Entry, Freshness};
+pub use ringcat_engine::exchange::{CyclicCounters, Entry};
 pub use ringcat_engine::info::{Direction, SubDeviceInfo};
 pub use ringcat_engine::link::Link;
 pub use ringcat_engine::main_device::{ActivateError, Declaration, DomainConfig, DomainMember, SubDeviceState};

@@ -2,8 +2,8 @@
 
 use std::fmt;
 
+use ringcat_engine::domain::DomainState;
 use ringcat_engine::event::Event;
-use ringcat_engine::exchange::DomainState;
 use ringcat_wire::address::Position;
 
 /// Names of declared SubDevices, by their index in the declaration.

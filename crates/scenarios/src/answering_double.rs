@@ -5,8 +5,7 @@
 //! the cabling brings them back (facts 9.2.1). Inputs stay as they were sent.
 
 use ringcat::memory::FrameRing;
-use ringcat_engine::exchange::Layout;
-use ringcat_engine::exchange::layout::PlannedFrame;
+use ringcat_engine::layout::{Layout, PlannedFrame};
 use ringcat_engine::link::Link;
 use ringcat_wire::datagram::{HEADER_LEN, Target, WKC_LEN};
 use ringcat_wire::frame::{ETHERCAT_HEADER_LEN, ETHERNET_HEADER_LEN};

@@ -21,29 +21,32 @@ pub const ENGINE: &[(&str, &[&str])] = &[
     ("time", &[]),
     ("link", &[]),
     ("queue", &[]),
+    ("direction", &[]),
+    ("domain", &[]),
     // frames
     ("ring", &["time", "link"]),
     ("board", &["time", "link", "ring"]),
     // knowledge of the bus
-    ("info", &[]),
+    ("info", &["direction"]),
     ("topology", &["info", "link"]),
     ("config", &["info"]),
     ("plan", &["info", "topology", "config"]),
+    ("layout", &["link", "ring", "direction", "domain"]),
     // what happened
-    ("event", &["time", "link", "queue", "ring", "info", "topology"]),
+    ("event", &["time", "link", "queue", "ring", "domain", "info", "topology"]),
     // cyclic half
-    ("exchange", &["time", "link", "queue", "ring", "board", "event"]),
+    ("exchange", &["time", "link", "queue", "domain", "ring", "board", "layout", "event"]),
     // acyclic half
     ("supervisor", &["time", "link", "queue", "ring", "board", "event"]),
-    ("procedures", &["time", "link", "queue", "ring", "board", "info", "topology", "config", "plan", "event",
+    ("procedures", &["time", "link", "queue", "ring", "board", "info", "topology", "config", "plan", "layout", "event",
         "supervisor"]),
     // both together
-    ("main_device", &["time", "link", "queue", "ring", "board", "info", "topology", "config", "plan", "event",
-        "exchange", "supervisor", "procedures"]),
+    ("main_device", &["time", "link", "queue", "domain", "ring", "board", "info", "topology", "config", "plan", "layout",
+        "event", "exchange", "supervisor", "procedures"]),
 ];
 
 /// Arrows against the order of [`ENGINE`], each with its reason: values without behaviour, nothing else.
-const UPWARDS: &[(&str, &str, &str)] = &[("event", "exchange", "the state of a domain is part of an event")];
+const UPWARDS: &[(&str, &str, &str)] = &[];
 
 /// Where the engine's sources are.
 const ENGINE_SOURCES: &str = "crates/engine/src/";

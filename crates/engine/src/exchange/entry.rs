@@ -1,6 +1,6 @@
 //! A PDO entry's place in a domain image, and typed access to it.
 
-use super::layout::DomainId;
+use crate::domain::DomainId;
 
 /// Where a PDO entry lives. Bits are counted from bit 0 of byte 0 of the image, least significant first.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -13,8 +13,8 @@ use ringcat_wire::datagram::{CIRCULATING, HEADER_LEN, OVERHEAD, Target};
 use ringcat_wire::frame::{FrameBuilder, MAX_FRAME, MacAddress};
 use ringcat_wire::register::map;
 
-use super::layout::{PlacedArea, PlannedDatagram, PlannedFrame, SUPERVISION_LEN};
 use crate::board::Supervision;
+use crate::layout::{PlacedArea, PlannedDatagram, PlannedFrame, SUPERVISION_LEN};
 use crate::link::Link;
 use crate::ring::merge::or_into;
 use crate::ring::{Arrivals, Class, FrameCopy, Identity, Sequence};

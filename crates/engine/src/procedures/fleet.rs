@@ -12,8 +12,8 @@ use ringcat_wire::register::Fmmu;
 use super::sii::SiiCache;
 use crate::board::Board;
 use crate::config::SubDeviceConfig;
-use crate::exchange::Layout;
 use crate::info::{Direction, SubDeviceInfo};
+use crate::layout::Layout;
 use crate::plan::{self, AreaPlan, PlanError, SubDevicePlan};
 use crate::topology::Topology;
 

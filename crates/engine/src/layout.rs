@@ -14,11 +14,8 @@ use ringcat_wire::command::Command;
 use ringcat_wire::datagram::{MAX_DATA, OVERHEAD};
 
 use crate::direction::Direction;
+use crate::domain::DomainId;
 use crate::link::LinkSet;
-
-/// Number of a domain, in the order of declaration.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
-pub struct DomainId(pub usize);
 
 /// One SyncManager's process data that takes part in a domain.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -1,0 +1,46 @@
+//! Process data domains: their numbers, and how they are judged.
+
+/// Number of a domain, in the order of declaration.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct DomainId(pub usize);
+
+/// Judgement of a domain's working counters.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+pub enum DomainState {
+    /// No SubDevice answered.
+    #[default]
+    Zero,
+    /// Some answered, or one was met twice.
+    Incomplete,
+    /// All answered.
+    Complete,
+}
+
+/// A domain after it was judged.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct DomainStatus {
+    /// Sum of the working counters of all datagrams and both copies, as really sent (LRW, or LWR and LRD).
+    pub wkc: u32,
+    /// The sum with all SubDevices.
+    pub expected: u32,
+    /// The judgement.
+    pub state: DomainState,
+    /// Frames are still out and not overdue: the other fields are those of the last judgement.
+    pub pending: bool,
+    /// How often the domain was due while its frames were still out.
+    pub skipped: u64,
+}
+
+/// How old a SubDevice's inputs are.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Freshness {
+    /// They never came.
+    Never,
+    /// They came with the last judgement of the domain.
+    Fresh,
+    /// They are this many cycles older than the last judgement.
+    Stale {
+        /// Cycles of the exchange.
+        cycles: u64,
+    },
+}
