@@ -14,4 +14,5 @@ pub mod dice;
 pub mod figures;
 pub mod segments;
 pub mod tap;
+pub mod terminals;
 pub mod world;

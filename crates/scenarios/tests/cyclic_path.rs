@@ -2,7 +2,8 @@
 
 use std::time::Duration;
 
-use ringcat_engine::exchange::{CyclicCounters, DomainId, Freshness, Received};
+use ringcat_engine::domain::{DomainId, Freshness};
+use ringcat_engine::exchange::{CyclicCounters, Received};
 use ringcat_engine::link::Link;
 use scenarios::answering_double::Cabling;
 use scenarios::counting_allocator::{CountingAllocator, Counts, counts};
