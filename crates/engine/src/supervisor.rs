@@ -5,30 +5,30 @@
 //! Procedures see time only through the `now` of these calls.
 
 pub mod bus;
-mod core;
 mod executor;
 mod flights;
+mod shared;
 mod silence;
 mod transfer;
 
-use ::core::cell::RefCell;
-use ::core::future::Future;
 use alloc::rc::Rc;
 use alloc::sync::Arc;
+use core::cell::RefCell;
+use core::future::Future;
 
 pub use bus::{Bus, BusError, Elapsed, Group, Reply};
 pub use flights::AcyclicCounters;
 
-use self::core::Core;
 use crate::board::Board;
 use crate::event::TimedEvent;
 use crate::link::{Link, LinkSet};
 use crate::ring::{Class, Classified, Identity, RingState};
 use crate::time::Instant;
+use shared::Shared;
 
 /// The acyclic half of the MainDevice.
 pub struct Supervisor {
-    core: Rc<RefCell<Core>>,
+    shared: Rc<RefCell<Shared>>,
     executor: executor::Executor,
 }
 
@@ -52,31 +52,31 @@ pub enum Received {
 impl Supervisor {
     /// A supervisor without procedures.
     pub fn new(identity: Identity, links: LinkSet, now: Instant) -> Supervisor {
-        let core = Rc::new(RefCell::new(Core::new(identity, links, now)));
-        Supervisor { executor: executor::Executor::new(core.clone()), core }
+        let shared = Rc::new(RefCell::new(Shared::new(identity, links, now)));
+        Supervisor { executor: executor::Executor::new(shared.clone()), shared }
     }
 
     /// The handle that procedures work with.
     pub fn bus(&self) -> Bus {
-        Bus::new(self.core.clone())
+        Bus::new(self.shared.clone())
     }
 
     /// Starts a procedure.
     pub fn spawn(&mut self, procedure: impl Future<Output = ()> + 'static) {
-        self.core.borrow_mut().spawn(alloc::boxed::Box::pin(procedure));
+        self.shared.borrow_mut().spawn(alloc::boxed::Box::pin(procedure));
     }
 
     /// Hands over what the exchange posts; from now on its view of the ring counts.
     pub fn attach(&mut self, board: Arc<Board>) {
-        self.core.borrow_mut().board = Some(board);
+        self.shared.borrow_mut().board = Some(board);
     }
 
     /// Takes in a frame that arrived on a link. Any bytes are allowed.
     pub fn receive(&mut self, arrived_on: Link, bytes: &[u8], now: Instant) -> Received {
-        let core = &mut *self.core.borrow_mut();
-        core.now = now;
-        match core.identity.classify(bytes) {
-            Classified::Ours(copy) if copy.class == Class::Acyclic => core.receive(copy, arrived_on, bytes),
+        let shared = &mut *self.shared.borrow_mut();
+        shared.now = now;
+        match shared.identity.classify(bytes) {
+            Classified::Ours(copy) if copy.class == Class::Acyclic => shared.receive(copy, arrived_on, bytes),
             Classified::Ours(_) => Received::Cyclic,
             Classified::Foreign => Received::Foreign,
             Classified::Other => Received::Other,
@@ -86,10 +86,10 @@ impl Supervisor {
     /// Gives up overdue frames, fires timers, and lets procedures go on until all of them wait.
     pub fn poll(&mut self, now: Instant) {
         {
-            let core = &mut *self.core.borrow_mut();
-            core.now = now;
-            core.expire_flights();
-            core.fire_timers();
+            let shared = &mut *self.shared.borrow_mut();
+            shared.now = now;
+            shared.expire_flights();
+            shared.fire_timers();
         }
         self.executor.run();
     }
@@ -97,39 +97,39 @@ impl Supervisor {
     /// Sends what procedures asked for, at most about `budget` bytes (without overhead on the wire), every frame on all
     /// links. Returns the bytes sent per link.
     pub fn transmit(&mut self, now: Instant, budget: usize, transmit: &mut impl FnMut(Link, &[u8])) -> usize {
-        let core = &mut *self.core.borrow_mut();
-        core.now = now;
-        core.transmit(budget, transmit)
+        let shared = &mut *self.shared.borrow_mut();
+        shared.now = now;
+        shared.transmit(budget, transmit)
     }
 
     /// When [`Supervisor::poll`] has something to do at the latest, frames received meanwhile aside.
     pub fn next_deadline(&self) -> Option<Instant> {
-        self.core.borrow().next_deadline()
+        self.shared.borrow().next_deadline()
     }
 
     /// Whether procedures have asked for datagrams that were not sent yet.
     pub fn wants_to_send(&self) -> bool {
-        self.core.borrow().wants_to_send()
+        self.shared.borrow().wants_to_send()
     }
 
     /// Takes the oldest event.
     pub fn pop_event(&mut self) -> Option<TimedEvent> {
-        self.core.borrow_mut().events.pop()
+        self.shared.borrow_mut().events.pop()
     }
 
     /// The state of the ring as the acyclic frames show it.
     pub fn ring(&self) -> RingState {
-        self.core.borrow().monitor.state()
+        self.shared.borrow().monitor.state()
     }
 
     /// Counters since the beginning.
     pub fn counters(&self) -> AcyclicCounters {
-        self.core.borrow().counters
+        self.shared.borrow().counters
     }
 }
 
-impl ::core::fmt::Debug for Supervisor {
-    fn fmt(&self, f: &mut ::core::fmt::Formatter<'_>) -> ::core::fmt::Result {
+impl core::fmt::Debug for Supervisor {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
         f.debug_struct("Supervisor").field("counters", &self.counters()).finish_non_exhaustive()
     }
 }

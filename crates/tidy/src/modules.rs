@@ -45,9 +45,6 @@ pub const ENGINE: &[(&str, &[&str])] = &[
         "event", "exchange", "supervisor", "procedures"]),
 ];
 
-/// Arrows against the order of [`ENGINE`], each with its reason: values without behaviour, nothing else.
-const UPWARDS: &[(&str, &str, &str)] = &[];
-
 /// Where the engine's sources are.
 const ENGINE_SOURCES: &str = "crates/engine/src/";
 
@@ -70,8 +67,7 @@ fn forbidden_arrows(tree: &Tree, sources: &str, table: &[(&str, &[&str])]) -> Ve
         };
         for arrow in arrows(file, &module) {
             let to = exports.get(&arrow.to).unwrap_or(&arrow.to);
-            let upwards = UPWARDS.iter().any(|(lower, upper, _)| lower == from && upper == to);
-            if to != from && !upwards && !allowed.contains(&to.as_str()) {
+            if to != from && !allowed.contains(&to.as_str()) {
                 let text = format!("`{from}` must not name `{to}` ({TABLE})");
                 findings.push(Finding::new(&file.path, arrow.line, text));
             }

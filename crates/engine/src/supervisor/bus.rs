@@ -15,8 +15,8 @@ use ringcat_wire::address::{Position, RegisterAddress, StationAddress, Wkc};
 use ringcat_wire::command::Command;
 use ringcat_wire::datagram::{MAX_DATA, Target};
 
-use super::core::Core;
 use super::executor::TaskId;
+use super::shared::Shared;
 use super::transfer::{Request, Stage, TransferId};
 use crate::board::Board;
 use crate::event::Event;
@@ -109,42 +109,42 @@ pub struct Elapsed;
 /// The handle of a procedure to the bus.
 #[derive(Clone)]
 pub struct Bus {
-    core: Rc<RefCell<Core>>,
+    shared: Rc<RefCell<Shared>>,
 }
 
 impl Bus {
-    pub(super) fn new(core: Rc<RefCell<Core>>) -> Bus {
-        Bus { core }
+    pub(super) fn new(shared: Rc<RefCell<Shared>>) -> Bus {
+        Bus { shared }
     }
 
     /// The time of the call that lets the procedure run.
     pub fn now(&self) -> Instant {
-        self.core.borrow().now
+        self.shared.borrow().now
     }
 
     /// The links the MainDevice has.
     pub fn links(&self) -> LinkSet {
-        self.core.borrow().links
+        self.shared.borrow().links
     }
 
     /// State of the ring: as the exchange sees it once it runs, before that as acyclic frames show it.
     pub fn ring(&self) -> RingState {
-        let core = self.core.borrow();
-        match core.board.as_ref().map(|board| board.ring().state) {
-            None | Some(RingState::Unknown) => core.monitor.state(),
+        let shared = self.shared.borrow();
+        match shared.board.as_ref().map(|board| board.ring().state) {
+            None | Some(RingState::Unknown) => shared.monitor.state(),
             Some(state) => state,
         }
     }
 
     /// What the exchange posts, once there is one.
     pub fn board(&self) -> Option<alloc::sync::Arc<Board>> {
-        self.core.borrow().board.clone()
+        self.shared.borrow().board.clone()
     }
 
     /// Reports an event.
     pub fn report(&self, event: Event) {
-        let core = &mut *self.core.borrow_mut();
-        core.events.push(core.now, event);
+        let shared = &mut *self.shared.borrow_mut();
+        shared.events.push(shared.now, event);
     }
 
     /// Sends a datagram as often as needed and returns what came back, whatever its working counter. `expected` is the
@@ -170,7 +170,7 @@ impl Bus {
     }
 
     fn submit(&self, request: Request) -> TransferFuture {
-        TransferFuture { core: self.core.clone(), request: Some(request), id: None }
+        TransferFuture { shared: self.shared.clone(), request: Some(request), id: None }
     }
 
     /// Reads registers of all SubDevices, ORed.
@@ -241,12 +241,12 @@ impl Bus {
     pub async fn sleep_until(&self, until: Instant) {
         let mut armed = false;
         poll_fn(|_| {
-            let core = &mut *self.core.borrow_mut();
-            if core.now >= until {
+            let shared = &mut *self.shared.borrow_mut();
+            if shared.now >= until {
                 return Poll::Ready(());
             }
             if !armed {
-                core.wake_at(until);
+                shared.wake_at(until);
                 armed = true;
             }
             Poll::Pending
@@ -263,12 +263,12 @@ impl Bus {
             if let Poll::Ready(output) = future.as_mut().poll(context) {
                 return Poll::Ready(Ok(output));
             }
-            let core = &mut *self.core.borrow_mut();
-            if core.now >= until {
+            let shared = &mut *self.shared.borrow_mut();
+            if shared.now >= until {
                 return Poll::Ready(Err(Elapsed));
             }
             if !armed {
-                core.wake_at(until);
+                shared.wake_at(until);
                 armed = true;
             }
             Poll::Pending
@@ -278,7 +278,7 @@ impl Bus {
 
     /// Starts a procedure that goes on by itself.
     pub fn spawn(&self, procedure: impl Future<Output = ()> + 'static) {
-        self.core.borrow_mut().spawn(Box::pin(procedure));
+        self.shared.borrow_mut().spawn(Box::pin(procedure));
     }
 
     /// Runs a procedure for each item, all at once, and returns what they return in the order of the items.
@@ -325,14 +325,14 @@ impl Group {
     pub fn spawn(&self, procedure: impl Future<Output = ()> + 'static) {
         self.state.running.set(self.state.running.get() + 1);
         let state = self.state.clone();
-        let core = self.bus.core.clone();
+        let shared = self.bus.shared.clone();
         self.bus.spawn(async move {
             procedure.await;
             state.running.set(state.running.get() - 1);
             if state.running.get() == 0
                 && let Some(task) = state.waiter.take()
             {
-                core.borrow_mut().wake(task);
+                shared.borrow_mut().wake(task);
             }
         });
     }
@@ -343,7 +343,7 @@ impl Group {
             if self.state.running.get() == 0 {
                 return Poll::Ready(());
             }
-            self.state.waiter.set(Some(self.bus.core.borrow().current));
+            self.state.waiter.set(Some(self.bus.shared.borrow().current));
             Poll::Pending
         })
         .await;
@@ -352,7 +352,7 @@ impl Group {
 
 /// Waits for the reply to a datagram. Dropped before, the reply is thrown away when it comes.
 struct TransferFuture {
-    core: Rc<RefCell<Core>>,
+    shared: Rc<RefCell<Shared>>,
     request: Option<Request>,
     id: Option<TransferId>,
 }
@@ -362,20 +362,20 @@ impl Future for TransferFuture {
 
     fn poll(mut self: Pin<&mut Self>, _: &mut Context<'_>) -> Poll<Self::Output> {
         let this = &mut *self;
-        let core = &mut *this.core.borrow_mut();
+        let shared = &mut *this.shared.borrow_mut();
         if let Some(request) = this.request.take() {
-            this.id = Some(core.request(request));
+            this.id = Some(shared.request(request));
             return Poll::Pending;
         }
         let Some(id) = this.id else { return Poll::Pending };
-        let Some(transfer) = core.transfers.find(id) else { return Poll::Pending };
+        let Some(transfer) = shared.transfers.find(id) else { return Poll::Pending };
         if !matches!(transfer.stage, Stage::Done(_)) {
             // The future may have moved to another task since it was first polled.
-            transfer.task = core.current;
+            transfer.task = shared.current;
             return Poll::Pending;
         }
         this.id = None;
-        match core.transfers.remove(id).map(|transfer| transfer.stage) {
+        match shared.transfers.remove(id).map(|transfer| transfer.stage) {
             Some(Stage::Done(result)) => Poll::Ready(result),
             _ => Poll::Pending,
         }
@@ -385,7 +385,7 @@ impl Future for TransferFuture {
 impl Drop for TransferFuture {
     fn drop(&mut self) {
         if let Some(id) = self.id {
-            self.core.borrow_mut().abandon(id);
+            self.shared.borrow_mut().abandon(id);
         }
     }
 }

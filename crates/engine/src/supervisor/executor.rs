@@ -11,7 +11,7 @@ use core::future::Future;
 use core::pin::Pin;
 use core::task::{Context, Poll, Waker};
 
-use super::core::Core;
+use super::shared::Shared;
 
 /// A procedure under way.
 pub(crate) type Task = Pin<Box<dyn Future<Output = ()>>>;
@@ -22,14 +22,14 @@ pub(crate) type Task = Pin<Box<dyn Future<Output = ()>>>;
 pub(crate) struct TaskId(pub u32);
 
 pub(crate) struct Executor {
-    core: Rc<RefCell<Core>>,
+    shared: Rc<RefCell<Shared>>,
     tasks: Vec<Option<Task>>,
     free: Vec<u32>,
 }
 
 impl Executor {
-    pub(crate) fn new(core: Rc<RefCell<Core>>) -> Executor {
-        Executor { core, tasks: Vec::new(), free: Vec::new() }
+    pub(crate) fn new(shared: Rc<RefCell<Shared>>) -> Executor {
+        Executor { shared, tasks: Vec::new(), free: Vec::new() }
     }
 
     /// Polls tasks that were woken, and new ones, until all wait.
@@ -37,9 +37,9 @@ impl Executor {
         let mut context = Context::from_waker(Waker::noop());
         loop {
             self.adopt();
-            let Some(id) = self.core.borrow_mut().next_ready() else { return };
+            let Some(id) = self.shared.borrow_mut().next_ready() else { return };
             let Some(mut task) = self.tasks.get_mut(id.0 as usize).and_then(Option::take) else { continue };
-            self.core.borrow_mut().current = id;
+            self.shared.borrow_mut().current = id;
             match task.as_mut().poll(&mut context) {
                 Poll::Pending => self.tasks[id.0 as usize] = Some(task),
                 Poll::Ready(()) => self.free.push(id.0),
@@ -49,13 +49,13 @@ impl Executor {
 
     fn adopt(&mut self) {
         loop {
-            let Some(task) = self.core.borrow_mut().spawned.pop_front() else { return };
+            let Some(task) = self.shared.borrow_mut().spawned.pop_front() else { return };
             let index = self.free.pop().unwrap_or_else(|| {
                 self.tasks.push(None);
                 (self.tasks.len() - 1) as u32
             });
             self.tasks[index as usize] = Some(task);
-            self.core.borrow_mut().wake(TaskId(index));
+            self.shared.borrow_mut().wake(TaskId(index));
         }
     }
 }

@@ -12,7 +12,7 @@ use ringcat_wire::frame::{FrameBuilder, MAX_FRAME, MacAddress};
 
 use super::Received;
 use super::bus::{BusError, Reply};
-use super::core::Core;
+use super::shared::Shared;
 use super::transfer::{Stage, TransferId};
 use crate::link::{Link, LinkSet};
 use crate::ring::identity::DATAGRAMS_AT;
@@ -135,7 +135,7 @@ impl Flights {
     }
 }
 
-impl Core {
+impl Shared {
     /// Packs what waits in the outbox into frames and sends them, within the budget and the window.
     pub(super) fn transmit(&mut self, budget: usize, transmit: &mut impl FnMut(Link, &[u8])) -> usize {
         let mut used = 0;

@@ -1,10 +1,10 @@
 //! The acyclic half against hand-made answers: packing, pairing, resending, giving up, timers.
 
-use ::core::cell::{Cell, RefCell};
-use ::core::time::Duration;
 use alloc::rc::Rc;
 use alloc::vec;
 use alloc::vec::Vec;
+use core::cell::{Cell, RefCell};
+use core::time::Duration;
 
 use proptest::prelude::*;
 use ringcat_wire::address::{Position, RegisterAddress, StationAddress, Wkc};

@@ -17,7 +17,7 @@ use crate::link::LinkSet;
 use crate::ring::{Identity, RingMonitor};
 use crate::time::Instant;
 
-pub(crate) struct Core {
+pub(crate) struct Shared {
     pub(crate) now: Instant,
     pub(crate) identity: Identity,
     pub(crate) links: LinkSet,
@@ -39,9 +39,9 @@ pub(crate) struct Core {
     timers: BinaryHeap<Reverse<(Instant, TaskId)>>,
 }
 
-impl Core {
-    pub(crate) fn new(identity: Identity, links: LinkSet, now: Instant) -> Core {
-        Core {
+impl Shared {
+    pub(crate) fn new(identity: Identity, links: LinkSet, now: Instant) -> Shared {
+        Shared {
             now,
             identity,
             links,
