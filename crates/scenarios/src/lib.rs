@@ -9,6 +9,7 @@ pub mod answering_double;
 pub mod callgrind;
 pub mod check;
 pub mod counting_allocator;
+pub mod cpu_time;
 pub mod cyclic_load;
 pub mod dice;
 pub mod figures;

@@ -1,5 +1,5 @@
 //! Segments of many plain terminals, as the figures of issue 2 ask for: SII of 512 bytes that are all in use, 500 us per
-//! EEPROM command, 5 ms per state change, 1 us per hop.
+//! EEPROM command, 5 ms per state change, a time of choice per hop.
 
 use std::time::Duration;
 
@@ -17,7 +17,7 @@ pub const SII_BYTES: usize = 512;
 pub const SII_BUSY: Duration = Duration::from_micros(500);
 /// Time of a state change.
 pub const STATE_CHANGE: Duration = Duration::from_millis(5);
-/// From one device to the next.
+/// From one device to the next, as the bars have it.
 pub const HOP: Duration = Duration::from_micros(1);
 
 /// How the terminals are connected.
@@ -33,14 +33,14 @@ pub enum Links {
 ///
 /// # Panics
 /// When the segment cannot be built.
-pub fn segment(count: usize, eight_byte_sii: bool, links: Links) -> Network {
+pub fn segment(count: usize, eight_byte_sii: bool, links: Links, hop: Duration) -> Network {
     let kinds = ["digital-output-8", "digital-input-8"].map(|kind| terminal(kind, eight_byte_sii));
     let devices = (0..count).map(|at| Device::new(kinds[at % kinds.len()].clone())).collect();
     let builder = match links {
         Links::One => SegmentBuilder::line(devices),
         Links::Two => SegmentBuilder::ring(devices),
     };
-    let options = NetworkOptions::default().with_hop_delay(HOP);
+    let options = NetworkOptions::default().with_hop_delay(hop);
     builder.cable_delay(Duration::ZERO).options(options).build().expect("terminals make a segment")
 }
 

@@ -24,7 +24,7 @@ use ringcat_wire::al::AlState;
 use ringcat_wire::datagram::OVERHEAD;
 use ringcat_wire::frame::{ETHERCAT_HEADER_LEN, ETHERNET_HEADER_LEN, MAX_FRAME, MIN_FRAME};
 use scenarios::figures::{Figures, verdict};
-use scenarios::terminals::{Links, segment, sii_bytes_used};
+use scenarios::terminals::{HOP, Links, segment, sii_bytes_used};
 
 /// Beyond this virtual time a start has failed.
 const LIMIT: Duration = Duration::from_secs(20);
@@ -93,7 +93,7 @@ const fn period(count: usize) -> Duration {
 }
 
 fn start(count: usize, eight_byte_reads: bool, cache: bool) -> Result<Start, Error> {
-    let network = segment(count, eight_byte_reads, Links::One);
+    let network = segment(count, eight_byte_reads, Links::One, HOP);
     let floor = floor(&network, if eight_byte_reads { 8 } else { 4 });
     let options = Options { sii_cache: cache, ..Options::default() };
     let mut main_device = MainDevice::request(SimulatedSegment::new(network), &options);

@@ -1,0 +1,99 @@
+//! A thousand SubDevices: CPU per simulated second and memory of the MainDevice (issue 2, "What it must reach").
+//!
+//! Terminals as in [`scenarios::terminals`] form a closed ring on two links. With 1,000 of them and 1 us per hop the round
+//! trip exceeds a millisecond, so that cycles take 4 ms; with 0.3 us it does not. CPU is what the kernel charges this
+//! process, engine and simulator together, while all are in OP; the best of several stretches counts, for neighbours on
+//! the machine only add to it. Memory is what the allocator handed out since the segment was made: the MainDevice, and
+//! the few frames and queues that the simulator needed since.
+
+use std::process::ExitCode;
+use std::time::Duration;
+
+use ringcat::simulated::SimulatedSegment;
+use ringcat::{Application, Error, MainDevice, Options, automatic};
+use ringcat_engine::ring::RingState;
+use scenarios::counting_allocator::{CountingAllocator, counts, restart_peak};
+use scenarios::cpu_time::process_cpu_time;
+use scenarios::figures::{Figures, verdict};
+use scenarios::terminals::{Links, segment};
+
+#[global_allocator]
+static ALLOCATOR: CountingAllocator = CountingAllocator;
+
+/// Most CPU seconds per simulated second with 1,000 SubDevices.
+const CPU_BAR: f64 = 1.0;
+/// Most MiB of a MainDevice with 1,000 SubDevices.
+const MEMORY_BAR: f64 = 64.0;
+/// SubDevices, cycle in ms, delay of a hop in ns.
+const RINGS: [(usize, u64, u64); 3] = [(100, 1, 1_000), (1_000, 4, 1_000), (1_000, 1, 300)];
+/// Simulated time of a stretch.
+const STRETCH: Duration = Duration::from_secs(2);
+const STRETCHES: usize = 3;
+const MIB: f64 = (1 << 20) as f64;
+
+fn main() -> ExitCode {
+    match measure() {
+        Ok(met) => verdict(met),
+        Err(error) => {
+            eprintln!("scale: {error}");
+            ExitCode::FAILURE
+        }
+    }
+}
+
+fn measure() -> Result<bool, Error> {
+    let mut met = true;
+    for (count, period_ms, hop_ns) in RINGS {
+        let (period, hop) = (Duration::from_millis(period_ms), Duration::from_nanos(hop_ns));
+        let mut figures = Figures::new(&format!("{count} SubDevices, closed ring, {period:?} cycle, {hop:?} per hop"));
+        let network = segment(count, true, Links::Two, hop);
+        let before = counts();
+        restart_peak();
+        let mut application = start(network, period)?;
+        let after = counts();
+        let cpu = cpu_per_second(&mut application, &mut figures);
+        let (held, peak) = ((after.bytes - before.bytes) as f64 / MIB, (after.peak - before.bytes) as f64 / MIB);
+        if count == 1_000 {
+            figures.at_most("CPU per simulated second, best stretch", cpu, CPU_BAR, "s");
+            figures.at_most("memory in OP", held, MEMORY_BAR, "MiB");
+            figures.at_most("most memory on the way there", peak, MEMORY_BAR, "MiB");
+        } else {
+            figures.show("CPU per simulated second, best stretch", format!("{cpu:.3} s"));
+            figures.show("memory in OP", format!("{held:.2} MiB"));
+            figures.show("most memory on the way there", format!("{peak:.2} MiB"));
+        }
+        met &= figures.print();
+    }
+    Ok(met)
+}
+
+/// A MainDevice on the segment with everything in OP.
+fn start(network: ringcat_sim::network::Network, period: Duration) -> Result<Application<SimulatedSegment>, Error> {
+    let mut main_device = MainDevice::request(SimulatedSegment::new(network), &Options::default());
+    let found = main_device.scan()?;
+    let declaration = automatic(&found.subdevices, period);
+    drop(found);
+    let mut application = main_device.activate(declaration)?;
+    while !application.all_settled() {
+        application.cycle(|_| ());
+    }
+    Ok(application)
+}
+
+fn cpu_per_second(application: &mut Application<SimulatedSegment>, figures: &mut Figures) -> f64 {
+    let mut best = f64::INFINITY;
+    let (cycles, hops) = (application.cyclic_counters().sent, application.links().network().statistics().hops());
+    for _ in 0..STRETCHES {
+        let (begin, cpu) = (application.now(), process_cpu_time());
+        while application.now().since(begin) < STRETCH {
+            application.cycle(|_| ());
+        }
+        let simulated = application.now().since(begin).as_secs_f64();
+        best = best.min((process_cpu_time() - cpu).as_secs_f64() / simulated);
+    }
+    let counters = application.cyclic_counters();
+    assert_eq!((application.ring(), counters.lost), (RingState::Closed, 0), "{counters:?}");
+    let hops = application.links().network().statistics().hops() - hops;
+    figures.show("frames of process data, hops", format!("{}, {hops}", counters.sent - cycles));
+    best
+}
