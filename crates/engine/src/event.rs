@@ -2,15 +2,19 @@
 
 use alloc::collections::VecDeque;
 use alloc::string::String;
+use alloc::vec::Vec;
 
-use ringcat_wire::address::{Position, StationAddress};
+use ringcat_wire::address::Position;
 use ringcat_wire::al::{AlState, AlStatus, AlStatusCode};
 use ringcat_wire::sii::Identity;
 
 use crate::domain::{DomainState, DomainStatus};
+use crate::link::Link;
 use crate::queue::WORDS;
 use crate::time::Instant;
 
+/// Frames of other MainDevices among them: a collision must be seen, not archived.
+const FOREIGN_KEPT: usize = 8;
 /// Events kept until the application fetches them; beyond, the oldest is dropped and counted.
 const KEPT: usize = 4096;
 
@@ -157,12 +161,12 @@ pub enum Event {
         /// Whether the declaration allows that.
         optional: bool,
     },
-    /// A station address was given to a SubDevice.
-    Addressed {
-        /// Index in the declaration.
-        subdevice: usize,
-        /// The address.
-        station: StationAddress,
+    /// A frame of another MainDevice arrived (facts MR-10). The first few are kept, all are counted.
+    ForeignFrame {
+        /// Where it arrived.
+        arrived_on: Link,
+        /// Its bytes without FCS.
+        bytes: Vec<u8>,
     },
     /// The judgement of a domain changed.
     Domain {
@@ -182,14 +186,22 @@ pub enum Event {
 #[derive(Debug, Default)]
 pub struct EventLog {
     events: VecDeque<TimedEvent>,
+    foreign: usize,
     dropped: u64,
 }
 
 impl EventLog {
     /// Appends an event.
     pub fn push(&mut self, at: Instant, event: Event) {
+        if matches!(event, Event::ForeignFrame { .. }) {
+            if self.foreign >= FOREIGN_KEPT {
+                self.dropped += 1;
+                return;
+            }
+            self.foreign += 1;
+        }
         if self.events.len() >= KEPT {
-            self.events.pop_front();
+            self.pop();
             self.dropped += 1;
         }
         self.events.push_back(TimedEvent { at, event });
@@ -197,7 +209,11 @@ impl EventLog {
 
     /// Takes the oldest.
     pub fn pop(&mut self) -> Option<TimedEvent> {
-        self.events.pop_front()
+        let event = self.events.pop_front()?;
+        if matches!(event.event, Event::ForeignFrame { .. }) {
+            self.foreign -= 1;
+        }
+        Some(event)
     }
 
     /// Events that were dropped because nobody fetched them.
@@ -291,6 +307,20 @@ mod tests {
             assert_eq!(CyclicEvent::unpack(event.pack()), Some(event));
         }
         assert_eq!(CyclicEvent::unpack([0xFF, 0]), None);
+    }
+
+    #[test]
+    fn a_flood_of_foreign_frames_leaves_room_for_other_events() {
+        let mut log = EventLog::default();
+        for n in 0..100 {
+            log.push(Instant(n), Event::ForeignFrame { arrived_on: Link::Main, bytes: alloc::vec![0; 60] });
+        }
+        log.push(Instant(100), Event::Skipped { domain: 0 });
+        assert_eq!(log.dropped(), 100 - FOREIGN_KEPT as u64);
+        let kept: Vec<_> = core::iter::from_fn(|| log.pop()).collect();
+        assert_eq!(kept.len(), FOREIGN_KEPT + 1);
+        log.push(Instant(101), Event::ForeignFrame { arrived_on: Link::Main, bytes: alloc::vec![0; 60] });
+        assert!(log.pop().is_some());
     }
 
     #[test]

@@ -20,7 +20,7 @@ pub use bus::{Bus, BusError, Elapsed, Group, Reply};
 pub use flights::AcyclicCounters;
 
 use crate::board::Board;
-use crate::event::TimedEvent;
+use crate::event::{Event, TimedEvent};
 use crate::link::{Link, LinkSet};
 use crate::ring::{Class, Classified, Identity, RingState};
 use crate::time::Instant;
@@ -78,7 +78,11 @@ impl Supervisor {
         match shared.identity.classify(bytes) {
             Classified::Ours(copy) if copy.class == Class::Acyclic => shared.receive(copy, arrived_on, bytes),
             Classified::Ours(_) => Received::Cyclic,
-            Classified::Foreign => Received::Foreign,
+            Classified::Foreign => {
+                shared.counters.foreign += 1;
+                shared.events.push(now, Event::ForeignFrame { arrived_on, bytes: bytes.to_vec() });
+                Received::Foreign
+            }
             Classified::Other => Received::Other,
         }
     }

@@ -6,7 +6,7 @@
 use std::time::Duration;
 
 use ringcat_engine::domain::{DomainId, DomainStatus, Freshness};
-use ringcat_engine::event::TimedEvent;
+use ringcat_engine::event::{Event, TimedEvent};
 use ringcat_engine::exchange::{CyclicCounters, Entry, Exchange};
 use ringcat_engine::link::Link;
 use ringcat_engine::main_device::{Active, Directory, MainDevice as Engine, SubDeviceState};
@@ -155,7 +155,12 @@ impl<L: Links> Application<L> {
 
     /// Takes the oldest event.
     pub fn pop_event(&mut self) -> Option<TimedEvent> {
-        self.engine.pop_event(self.links.now())
+        let now = self.links.now();
+        if let Some(foreign) = self.exchange.pop_foreign() {
+            let event = Event::ForeignFrame { arrived_on: foreign.arrived_on, bytes: foreign.bytes.to_vec() };
+            return Some(TimedEvent { at: now, event });
+        }
+        self.engine.pop_event(now)
     }
 
     /// State of the ring.

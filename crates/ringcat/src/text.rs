@@ -77,7 +77,10 @@ pub fn describe(event: &Event, names: &Names) -> String {
             let what = if *optional { "optional, not there" } else { "missing" };
             format!("{}: {what}", names.of(*subdevice))
         }
-        Event::Addressed { subdevice, station } => format!("{}: station address {station}", names.of(*subdevice)),
+        Event::ForeignFrame { arrived_on, bytes } => {
+            let source = bytes.get(6..12).map_or_else(String::new, |b| format!(" from {:02x?}", b));
+            format!("another MainDevice sends: {} bytes on {arrived_on}{source}", bytes.len())
+        }
         Event::Domain { domain, status } => {
             let state = match status.state {
                 DomainState::Zero => "nobody answers",

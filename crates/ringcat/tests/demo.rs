@@ -35,6 +35,29 @@ fn the_demonstration_holds_on_every_example_segment() {
 }
 
 #[test]
+fn the_demonstration_holds_on_devices_made_of_real_images() {
+    let data = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../../../shared/data/sii");
+    if !data.is_dir() {
+        println!("skipped: {} is not here", data.display());
+        return;
+    }
+    let mut text_of_segment = String::from("[segment]\nring = true\n");
+    for image in
+        ["beckhoff_ek1100_qitech", "beckhoff_el1008_qitech", "beckhoff_el2809_qitech", "beckhoff_el4002_qitech"]
+    {
+        text_of_segment += &format!("[[device]]\nsii = \"{image}.bin\"\n");
+    }
+    let path = std::env::temp_dir().join(format!("ringcat-real-{}.toml", std::process::id()));
+    std::fs::write(&path, text_of_segment.replace("sii = \"", &format!("sii = \"{}/", data.display())))
+        .expect("writable");
+    let output = ringcat(&["demo", "--fast", "--segment", &path.display().to_string()]);
+    std::fs::remove_file(&path).expect("it was just written");
+    let said = text(&output.stdout);
+    assert!(output.status.success(), "{said}{}", text(&output.stderr));
+    assert!(said.contains("EL2809"), "{said}");
+}
+
+#[test]
 fn two_runs_of_the_demonstration_print_the_same() {
     let run = || text(&ringcat(&["demo", "--fast"]).stdout);
     assert_eq!(run(), run());

@@ -44,6 +44,36 @@ impl Entry {
         ((self.read(image) << unused) as i64) >> unused
     }
 
+    /// Whether any bit of the entry is set.
+    pub fn read_bool(&self, image: &[u8]) -> bool {
+        self.read(image) != 0
+    }
+
+    /// Reads a REAL32; the entry has 32 bits.
+    pub fn read_f32(&self, image: &[u8]) -> f32 {
+        f32::from_bits(self.read(image) as u32)
+    }
+
+    /// Reads a REAL64; the entry has 64 bits.
+    pub fn read_f64(&self, image: &[u8]) -> f64 {
+        f64::from_bits(self.read(image))
+    }
+
+    /// Writes a REAL32; the entry has 32 bits.
+    pub fn write_f32(&self, image: &mut [u8], value: f32) {
+        self.write(image, u64::from(value.to_bits()));
+    }
+
+    /// Writes a REAL64; the entry has 64 bits.
+    pub fn write_f64(&self, image: &mut [u8], value: f64) {
+        self.write(image, value.to_bits());
+    }
+
+    /// Writes a signed value; bits beyond the entry's width are cut off.
+    pub fn write_signed(&self, image: &mut [u8], value: i64) {
+        self.write(image, value as u64);
+    }
+
     /// Writes the lower bits of `value`; the other bits of the image stay. Outside the image nothing is written.
     pub fn write(&self, image: &mut [u8], value: u64) {
         let (start, span) = self.span();
@@ -88,6 +118,19 @@ mod tests {
     fn signed_values_are_extended() {
         assert_eq!(entry(0, 16).read_signed(&[0xFE, 0xFF]), -2);
         assert_eq!(entry(0, 12).read_signed(&[0xFF, 0x07]), 0x7FF);
+    }
+
+    #[test]
+    fn floats_and_negative_numbers_come_back() {
+        let mut image = [0; 12];
+        entry(8, 32).write_f32(&mut image, -1.5);
+        assert_eq!(image[1..5], [0x00, 0x00, 0xC0, 0xBF]);
+        assert_eq!(entry(8, 32).read_f32(&image), -1.5);
+        entry(32, 64).write_f64(&mut image, 0.1);
+        assert_eq!(entry(32, 64).read_f64(&image), 0.1);
+        entry(3, 12).write_signed(&mut image, -2);
+        assert_eq!(entry(3, 12).read_signed(&image), -2);
+        assert!(entry(4, 1).read_bool(&image) && !entry(3, 1).read_bool(&image));
     }
 
     #[test]

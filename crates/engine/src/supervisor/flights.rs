@@ -50,6 +50,8 @@ pub struct AcyclicCounters {
     pub late: u64,
     /// Frames of ours that came back with other datagrams than were sent.
     pub corrupt: u64,
+    /// Frames of other MainDevices.
+    pub foreign: u64,
     /// Datagrams sent.
     pub datagrams: u64,
     /// Datagrams that were sent again because their frame was lost.
