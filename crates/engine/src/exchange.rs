@@ -321,3 +321,6 @@ fn close(frame: &mut CyclicFrame, monitor: &mut RingMonitor, board: &Board) {
     }
     frame.close();
 }
+
+#[cfg(test)]
+mod tests;

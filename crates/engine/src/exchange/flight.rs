@@ -45,7 +45,6 @@ struct Span {
 #[derive(Debug)]
 struct Segment {
     subdevice: usize,
-    takes_part: bool,
     span: Span,
 }
 
@@ -63,6 +62,8 @@ struct Place {
     inputs: Span,
     contributions: Box<[(usize, Wkc)]>,
     segments: Box<[Segment]>,
+    /// Segments of those that take part, neighbours joined. Room for all of them is there from the beginning.
+    part: Vec<Span>,
     /// Cycle of the last delivery of all inputs, plus one.
     delivered_all: u64,
     /// Cycle of the last delivery of those that took part, plus one.
@@ -307,8 +308,12 @@ impl CyclicFrame {
         for place in &mut self.places {
             let part = place.contributions.iter().filter(|(subdevice, _)| takes_part(*subdevice));
             place.expected_part = part.fold(Wkc(0), |sum, (_, wkc)| sum.plus(*wkc));
-            for segment in &mut place.segments {
-                segment.takes_part = takes_part(segment.subdevice);
+            place.part.clear();
+            for segment in place.segments.iter().filter(|segment| takes_part(segment.subdevice)) {
+                match place.part.last_mut() {
+                    Some(run) if run.reaches(&segment.span) => run.length += segment.span.length,
+                    _ => place.part.push(segment.span),
+                }
             }
         }
     }
@@ -328,7 +333,6 @@ impl Place {
         let span = |image_at: usize, length| Span { frame_at: data_at + image_at - start, image_at, length };
         let segment = |placed: &PlacedArea| Segment {
             subdevice: placed.area.subdevice,
-            takes_part: false,
             span: span(placed.image_offset as usize, usize::from(placed.area.length)),
         };
         Place {
@@ -339,6 +343,7 @@ impl Place {
             outputs: span(start, outputs),
             inputs: span(start + outputs, inputs),
             contributions: datagram.contributions.iter().copied().collect(),
+            part: Vec::with_capacity(datagram.input_areas.len()),
             segments: datagram.input_areas.iter().map(segment).collect(),
             delivered_all: 0,
             delivered_part: 0,
@@ -355,8 +360,8 @@ impl Place {
             self.inputs.deliver(bytes, image);
             self.delivered_all = cycle + 1;
         } else if self.wkc == self.expected_part && self.wkc.0 > 0 {
-            for segment in self.segments.iter().filter(|segment| segment.takes_part) {
-                segment.span.deliver(bytes, image);
+            for run in &self.part {
+                run.deliver(bytes, image);
             }
             self.delivered_part = cycle + 1;
         }
@@ -364,6 +369,11 @@ impl Place {
 }
 
 impl Span {
+    /// Whether another one begins where this one ends.
+    fn reaches(&self, next: &Span) -> bool {
+        self.frame_at + self.length == next.frame_at && self.image_at + self.length == next.image_at
+    }
+
     fn load(&self, image: &[u8], frame: &mut [u8]) {
         copy(image, self.image_at, frame, self.frame_at, self.length);
     }

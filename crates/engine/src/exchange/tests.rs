@@ -1,0 +1,275 @@
+//! Flights of a domain of three SubDevices with one byte out and one byte in each, on a ring.
+
+use std::vec;
+
+use ringcat_wire::frame::MacAddress;
+use ringcat_wire::source_address::MacCodec;
+
+use super::*;
+use crate::board::Supervision;
+use crate::direction::Direction;
+use crate::layout::{AreaSpec, DomainSpec};
+use crate::queue::{Consumer, queue};
+use ringcat_wire::address::Wkc;
+
+const DOMAIN: DomainId = DomainId(0);
+const PERIOD: Duration = Duration::from_millis(1);
+/// Places in the frame: LWR with three bytes, LRD with three bytes, BRD with two.
+const OUTPUTS_AT: usize = 26;
+const LWR_WKC_AT: usize = 29;
+const INPUTS_AT: usize = 41;
+const LRD_WKC_AT: usize = 44;
+const AL_STATUS_AT: usize = 56;
+const BRD_WKC_AT: usize = 58;
+/// Inputs in the image lie behind the outputs.
+const IMAGE_INPUTS: core::ops::Range<usize> = 3..6;
+
+struct Ring {
+    exchange: Exchange,
+    board: Arc<Board>,
+    events: Consumer,
+    now: Instant,
+}
+
+impl Ring {
+    fn new() -> Ring {
+        let area = |subdevice, direction| AreaSpec { subdevice, sync_manager: direction as u8, direction, length: 1 };
+        let areas = (0..3).flat_map(|s| [area(s, Direction::Outputs), area(s, Direction::Inputs)]).collect();
+        let spec = DomainSpec { period: PERIOD, lrw: true, areas };
+        let layout = Layout::new(&[spec], LinkSet::Ring, true).unwrap();
+        let board = Arc::new(Board::new(3));
+        (0..3).for_each(|subdevice| board.set_taking_part(subdevice, true));
+        let (producer, events) = queue(16);
+        let (main, redundant) = (MacAddress([0, 1, 2, 3, 4, 5]), MacAddress([0, 1, 2, 3, 4, 6]));
+        let identity = Identity::new(MacCodec::FlagsFirst, main, Some(redundant));
+        let exchange = Exchange::new(identity, LinkSet::Ring, &layout, board.clone(), producer);
+        Ring { exchange, board, events, now: Instant(0) }
+    }
+
+    /// Queues and sends; returns the copies, which must be alike but for the mark of the redundant one.
+    fn send(&mut self) -> [Vec<u8>; 2] {
+        assert!(self.exchange.queue(DOMAIN, self.now));
+        let mut copies = [vec![], vec![]];
+        self.exchange.send(self.now, &mut |link, bytes| copies[link.index()] = bytes.to_vec());
+        let mut unmarked = copies[1].clone();
+        assert_eq!(unmarked[6], 0x08);
+        unmarked[6] = 0;
+        assert_eq!((copies[0].len(), &unmarked), (60, &copies[0]));
+        copies
+    }
+
+    fn receive(&mut self, arrived_on: Link, bytes: &[u8]) -> Received {
+        self.exchange.receive(arrived_on, bytes, self.now)
+    }
+
+    /// Lets the cycle pass and judges.
+    fn judge(&mut self) -> DomainStatus {
+        self.now += PERIOD;
+        self.exchange.process(DOMAIN, self.now)
+    }
+
+    fn inputs(&self) -> &[u8] {
+        &self.exchange.image(DOMAIN)[IMAGE_INPUTS]
+    }
+
+    fn freshness(&self) -> [Freshness; 3] {
+        [0, 1, 2].map(|subdevice| self.exchange.freshness(DOMAIN, subdevice))
+    }
+}
+
+/// What these SubDevices make of a frame; their inputs are `base` plus their number.
+fn meet(frame: &mut [u8], subdevices: &[usize], base: u8) {
+    frame[6] |= 0x02;
+    for subdevice in subdevices {
+        frame[INPUTS_AT + subdevice] |= base + *subdevice as u8;
+        for at in [LWR_WKC_AT, LRD_WKC_AT, BRD_WKC_AT] {
+            frame[at] += 1;
+        }
+        frame[AL_STATUS_AT] |= 0x08;
+    }
+}
+
+#[test]
+fn in_a_closed_ring_the_complete_copy_is_delivered_without_waiting_for_the_other() {
+    let mut ring = Ring::new();
+    ring.exchange.image_mut(DOMAIN)[..3].copy_from_slice(&[7, 8, 9]);
+    let [mut main, redundant] = ring.send();
+    assert_eq!(main[OUTPUTS_AT..OUTPUTS_AT + 3], [7, 8, 9]);
+    meet(&mut main, &[0, 1, 2], 0x40);
+    assert_eq!(ring.receive(Link::Redundant, &main), Received::Taken);
+    assert_eq!(ring.inputs(), [0x40, 0x41, 0x42]);
+    assert_eq!(ring.receive(Link::Main, &redundant), Received::Taken);
+    let status = ring.judge();
+    assert_eq!((status.wkc, status.expected, status.state), (6, 6, DomainState::Complete));
+    assert_eq!(ring.exchange.ring(), RingState::Closed);
+    assert_eq!(ring.freshness(), [Freshness::Fresh; 3]);
+    let seen = Supervision { main: Wkc(3), redundant: Wkc(0), al_status: 8, irq: 0 };
+    assert_eq!(ring.board.supervision(), Some((1, seen)));
+    assert!(ring.events.pop().is_some() && ring.events.pop().is_none(), "one change of state");
+}
+
+#[test]
+fn a_zero_copy_that_comes_first_does_not_hide_the_complete_one() {
+    let mut ring = Ring::new();
+    let [mut main, redundant] = ring.send();
+    meet(&mut main, &[0, 1, 2], 0x40);
+    ring.receive(Link::Main, &redundant);
+    assert_eq!(ring.inputs(), [0; 3]);
+    ring.receive(Link::Redundant, &main);
+    assert_eq!(ring.inputs(), [0x40, 0x41, 0x42]);
+    assert_eq!(ring.judge().state, DomainState::Complete);
+}
+
+#[test]
+fn in_a_cut_ring_both_copies_make_one_answer() {
+    for before in 0..=3 {
+        let mut ring = Ring::new();
+        let [mut main, mut redundant] = ring.send();
+        let (near, far) = [0, 1, 2].split_at(before);
+        meet(&mut main, near, 0x40);
+        meet(&mut redundant, far, 0x40);
+        ring.receive(Link::Main, &main);
+        ring.receive(Link::Redundant, &redundant);
+        let status = ring.judge();
+        assert_eq!((ring.inputs(), status.state), (&[0x40, 0x41, 0x42][..], DomainState::Complete), "cut at {before}");
+        assert_eq!((status.wkc, ring.exchange.ring()), (6, RingState::Open));
+        let (_, seen) = ring.board.supervision().unwrap();
+        assert_eq!((seen.main, seen.redundant), (Wkc(before as u16), Wkc(3 - before as u16)));
+    }
+}
+
+#[test]
+fn while_it_is_not_known_who_is_missing_no_inputs_are_new() {
+    let mut ring = Ring::new();
+    for (who, base) in [(&[0, 1, 2][..], 0x10), (&[0, 2][..], 0x20)] {
+        let [mut main, redundant] = ring.send();
+        meet(&mut main, who, base);
+        ring.receive(Link::Redundant, &main);
+        ring.receive(Link::Main, &redundant);
+        ring.judge();
+    }
+    assert_eq!((ring.inputs(), ring.exchange.status(DOMAIN).state), (&[0x10, 0x11, 0x12][..], DomainState::Incomplete));
+    assert_eq!(ring.freshness(), [Freshness::Stale { cycles: 1 }; 3]);
+}
+
+#[test]
+fn inputs_of_those_that_take_part_are_new_and_the_missing_one_keeps_its_last() {
+    for missing in 0..3 {
+        let mut ring = Ring::new();
+        let there: Vec<usize> = (0..3).filter(|subdevice| *subdevice != missing).collect();
+        for (who, base) in [(&[0, 1, 2][..], 0x10), (&there, 0x20)] {
+            let [mut main, redundant] = ring.send();
+            meet(&mut main, who, base);
+            ring.board.set_taking_part(missing, who.len() == 3);
+            ring.exchange.process(DOMAIN, ring.now);
+            ring.receive(Link::Redundant, &main);
+            ring.receive(Link::Main, &redundant);
+            ring.judge();
+        }
+        let mut inputs = [0x20, 0x21, 0x22];
+        inputs[missing] -= 0x10;
+        assert_eq!(ring.inputs(), inputs);
+        let mut freshness = [Freshness::Fresh; 3];
+        freshness[missing] = Freshness::Stale { cycles: 1 };
+        assert_eq!(ring.freshness(), freshness);
+    }
+}
+
+#[test]
+fn one_lost_copy_of_a_closed_ring_costs_nothing_and_both_lost_cost_a_cycle() {
+    let mut ring = Ring::new();
+    let [mut main, _] = ring.send();
+    meet(&mut main, &[0, 1, 2], 0x10);
+    ring.receive(Link::Redundant, &main);
+    assert_eq!(ring.judge().state, DomainState::Complete);
+    ring.send();
+    assert_eq!(ring.exchange.counters().copies_lost, 1);
+    assert_eq!(ring.judge().state, DomainState::Zero);
+    assert_eq!((ring.exchange.counters().lost, ring.inputs()), (1, &[0x10, 0x11, 0x12][..]));
+}
+
+#[test]
+fn one_copy_that_is_not_complete_is_given_up_at_the_deadline() {
+    let mut ring = Ring::new();
+    let [mut main, _] = ring.send();
+    meet(&mut main, &[0], 0x10);
+    ring.receive(Link::Main, &main);
+    let early = ring.exchange.process(DOMAIN, ring.now + PERIOD / 2);
+    assert!(early.pending && !ring.exchange.queue(DOMAIN, ring.now + PERIOD / 2));
+    let status = ring.judge();
+    assert_eq!((status.wkc, status.state, status.skipped), (2, DomainState::Incomplete, 1));
+    assert_eq!((ring.exchange.counters().half, ring.inputs()), (1, &[0; 3][..]));
+}
+
+#[test]
+fn a_copy_that_met_a_subdevice_twice_is_incomplete_though_it_was_delivered() {
+    let mut ring = Ring::new();
+    let [mut main, mut redundant] = ring.send();
+    meet(&mut main, &[0, 1, 2], 0x10);
+    meet(&mut redundant, &[2], 0x10);
+    ring.receive(Link::Redundant, &main);
+    ring.receive(Link::Main, &redundant);
+    let status = ring.judge();
+    assert_eq!((status.wkc, status.state), (8, DomainState::Incomplete));
+}
+
+#[test]
+fn late_double_and_corrupt_copies_change_nothing() {
+    let mut ring = Ring::new();
+    let [mut old, _] = ring.send();
+    ring.judge();
+    let [mut main, redundant] = ring.send();
+    meet(&mut old, &[0, 1, 2], 0x70);
+    assert_eq!(ring.receive(Link::Redundant, &old), Received::Late);
+    // Command, Idx behind the first, length, M bit.
+    for (at, bit) in [(16, 1), (32, 1), (37, 1), (22, 1), (23, 0x80), (52, 4)] {
+        let mut wrong = main.clone();
+        meet(&mut wrong, &[0, 1, 2], 0x70);
+        wrong[at] ^= bit;
+        assert_eq!(ring.receive(Link::Redundant, &wrong), Received::Corrupt, "byte {at}");
+    }
+    assert_eq!(ring.receive(Link::Redundant, &main[..59]), Received::Corrupt);
+    // The C bit is the controllers' to set.
+    main[23] |= 0x40;
+    meet(&mut main, &[0, 1, 2], 0x10);
+    assert_eq!(ring.receive(Link::Redundant, &main), Received::Taken);
+    assert_eq!(ring.receive(Link::Redundant, &main), Received::Late);
+    assert_eq!(ring.receive(Link::Main, &redundant), Received::Taken);
+    assert_eq!(ring.judge().wkc, 6);
+    assert_eq!(ring.inputs(), [0x10, 0x11, 0x12]);
+    let counters = ring.exchange.counters();
+    assert_eq!((counters.late, counters.corrupt), (2, 7));
+}
+
+#[test]
+fn frames_of_more_than_256_flights_are_told_apart() {
+    let mut ring = Ring::new();
+    let [first, _] = ring.send();
+    for _ in 0..256 {
+        ring.judge();
+        let [mut main, redundant] = ring.send();
+        meet(&mut main, &[0, 1, 2], 0x10);
+        assert_eq!(ring.receive(Link::Redundant, &main), Received::Taken);
+        assert_eq!(ring.receive(Link::Main, &redundant), Received::Taken);
+    }
+    let [now, _] = ring.send();
+    assert_eq!(first[7].wrapping_add(1), now[7]);
+    assert!([17, 32, 47].iter().all(|at| (first[*at], now[*at]) == (0, 1)), "every Idx");
+    let mut same_id = first.clone();
+    same_id[7] = now[7];
+    meet(&mut same_id, &[0, 1, 2], 0x70);
+    assert_eq!(ring.receive(Link::Redundant, &same_id), Received::Late);
+}
+
+#[test]
+fn what_was_queued_and_never_sent_was_not_answered() {
+    let mut ring = Ring::new();
+    let [mut main, redundant] = ring.send();
+    meet(&mut main, &[0, 1, 2], 0x10);
+    ring.receive(Link::Redundant, &main);
+    ring.receive(Link::Main, &redundant);
+    assert_eq!(ring.judge().state, DomainState::Complete);
+    assert!(ring.exchange.queue(DOMAIN, ring.now));
+    let status = ring.judge();
+    assert_eq!((status.wkc, status.state), (0, DomainState::Zero));
+}
