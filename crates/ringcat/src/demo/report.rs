@@ -7,6 +7,8 @@ use ringcat::simulated::SimulatedSegment;
 use ringcat::text::{Names, describe};
 use ringcat::{Application, Direction, Event, Instant, Scan, SubDeviceInfo, SubDeviceState, TimedEvent};
 
+use ringcat_wire::sii::{SiiSyncManager, SyncManagerKind};
+
 use super::plan::{Incident, Plan};
 use super::watch::{Account, Watch};
 
@@ -19,10 +21,19 @@ pub struct Reporter {
     reached_op: Option<Instant>,
 }
 
-/// Bytes of process data in one direction as the SII says.
+/// Bytes of process data in one direction as the SII says: of the assigned PDOs, or of the SyncManagers where it
+/// describes no PDOs.
 fn sii_bytes(info: &SubDeviceInfo, direction: Direction) -> u32 {
-    let assigned = |pdo: &&ringcat_engine::info::PdoInfo| pdo.direction == direction && pdo.sync_manager.is_some();
-    info.pdos.iter().filter(assigned).map(|pdo| pdo.bit_length()).sum::<u32>().div_ceil(8)
+    let kind = match direction {
+        Direction::Outputs => SyncManagerKind::Outputs,
+        Direction::Inputs => SyncManagerKind::Inputs,
+    };
+    let bytes = |(number, sync_manager): (u8, &SiiSyncManager)| {
+        let bits: Vec<u32> = info.assigned_pdos(number).map(|pdo| pdo.bit_length()).collect();
+        if bits.is_empty() { u32::from(sync_manager.length) } else { bits.iter().sum::<u32>().div_ceil(8) }
+    };
+    let of_kind = (0..).zip(&info.sync_managers).filter(|(_, sync_manager)| sync_manager.kind == kind);
+    of_kind.map(bytes).sum()
 }
 
 impl Reporter {
