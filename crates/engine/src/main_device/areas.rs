@@ -1,0 +1,103 @@
+//! Where the process data of the declared SubDevices lies, and which PDO entries it has.
+
+use alloc::vec;
+use alloc::vec::Vec;
+
+use crate::domain::DomainId;
+use crate::exchange::Entry;
+use crate::info::Direction;
+use crate::layout::{Layout, PlacedArea};
+use crate::plan::SubDevicePlan;
+use crate::procedures::fleet::planned_areas;
+
+/// Where the PDO entries of all declared SubDevices lie in the domains' images.
+#[derive(Clone, Debug, Default)]
+pub struct Directory {
+    subdevices: Vec<Vec<AreaEntries>>,
+    /// What each SubDevice adds to the working counters of all domains.
+    contributions: Vec<u32>,
+}
+
+/// An area with the entries in it.
+#[derive(Clone, Debug)]
+pub struct AreaEntries {
+    /// The domain.
+    pub domain: DomainId,
+    /// Place in the image.
+    pub placed: PlacedArea,
+    /// Direction.
+    pub direction: Direction,
+    /// Index, subindex, place; gaps are left out.
+    pub entries: Vec<(u16, u8, Entry)>,
+}
+
+impl Directory {
+    pub(super) fn new(plans: &[Areas], layout: &Layout) -> Directory {
+        let subdevices = plans.iter().enumerate().map(|(index, areas)| areas.directory(index, layout)).collect();
+        let mut contributions = vec![0; plans.len()];
+        let frames = layout.domains.iter().flat_map(|domain| &domain.frames);
+        for (subdevice, wkc) in frames.flat_map(|f| &f.datagrams).flat_map(|datagram| &datagram.contributions) {
+            if let Some(sum) = contributions.get_mut(*subdevice) {
+                *sum += u32::from(wkc.0);
+            }
+        }
+        Directory { subdevices, contributions }
+    }
+
+    /// What a SubDevice adds to the working counters of its domains when it takes part.
+    pub fn contribution(&self, subdevice: usize) -> u32 {
+        self.contributions.get(subdevice).copied().unwrap_or(0)
+    }
+
+    /// All areas of a SubDevice.
+    pub fn areas(&self, subdevice: usize) -> &[AreaEntries] {
+        self.subdevices.get(subdevice).map_or(&[], Vec::as_slice)
+    }
+
+    /// The place of a PDO entry; the first one where it is mapped more than once.
+    pub fn entry(&self, subdevice: usize, index: u16, sub_index: u8) -> Option<Entry> {
+        let entries = self.areas(subdevice).iter().flat_map(|area| &area.entries);
+        entries.into_iter().find(|(i, s, _)| (*i, *s) == (index, sub_index)).map(|(_, _, entry)| *entry)
+    }
+}
+
+/// Process data of a declared SubDevice: planned from what it is, or from the declaration while it is not there.
+pub(super) enum Areas {
+    Planned(SubDevicePlan),
+    Declared(Vec<(u8, Direction, u16)>),
+}
+
+impl Areas {
+    pub(super) fn list(&self) -> Vec<(u8, Direction, u16)> {
+        match self {
+            Areas::Planned(plan) => planned_areas(plan),
+            Areas::Declared(areas) => areas.clone(),
+        }
+    }
+
+    pub(super) fn lrw(&self) -> bool {
+        match self {
+            Areas::Planned(plan) => plan.lrw_supported,
+            Areas::Declared(_) => false,
+        }
+    }
+
+    pub(super) fn directory(&self, index: usize, layout: &Layout) -> Vec<AreaEntries> {
+        let mut found = Vec::new();
+        for (sync_manager, direction, _) in self.list() {
+            let Some((domain, placed)) = layout.area(index, sync_manager) else { continue };
+            let mut entries = Vec::new();
+            if let Areas::Planned(plan) = self {
+                let area = plan.process_data.iter().find(|area| area.sync_manager == sync_manager);
+                let mapped = area.into_iter().flat_map(|area| &area.pdos).flat_map(|pdo| &pdo.entries);
+                entries.extend(mapped.filter(|entry| entry.index != 0).map(|entry| {
+                    let bit_offset = placed.image_offset * 8 + entry.bit_offset;
+                    let place = Entry { domain, bit_offset, bit_length: entry.bit_length.into() };
+                    (entry.index, entry.sub_index, place)
+                }));
+            }
+            found.push(AreaEntries { domain, placed, direction, entries });
+        }
+        found
+    }
+}

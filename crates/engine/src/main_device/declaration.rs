@@ -1,0 +1,177 @@
+//! What the application declares, held against what the scan found, and turned into domains and members.
+
+use alloc::rc::Rc;
+use alloc::vec;
+use alloc::vec::Vec;
+use core::fmt;
+use core::time::Duration;
+
+use ringcat_wire::address::Position;
+
+use super::areas::Areas;
+use crate::config::{ConfigError, Resolution, SubDeviceConfig, resolve};
+use crate::event::Event;
+use crate::info::SubDeviceInfo;
+use crate::layout::{AreaSpec, DomainSpec, Layout, LayoutError};
+use crate::plan::plan;
+use crate::procedures::fleet::{Member, Phase, Setup, SetupError, declared_areas};
+use crate::procedures::scan::{Scan, station_at};
+use crate::supervisor::Bus;
+
+/// A domain as the application declares it.
+#[derive(Clone, Debug)]
+pub struct DomainConfig {
+    /// How often the application will exchange it.
+    pub period: Duration,
+    /// What belongs to it.
+    pub members: Vec<DomainMember>,
+}
+
+/// A SubDevice's part in a domain.
+#[derive(Clone, Debug)]
+pub struct DomainMember {
+    /// Index of the SubDevice in the declaration.
+    pub subdevice: usize,
+    /// SyncManagers whose process data belongs to the domain; `None` for all.
+    pub sync_managers: Option<Vec<u8>>,
+}
+
+/// What the application declares.
+#[derive(Clone, Debug, Default)]
+pub struct Declaration {
+    /// The SubDevices that are expected.
+    pub subdevices: Vec<SubDeviceConfig>,
+    /// The domains.
+    pub domains: Vec<DomainConfig>,
+}
+
+/// Why a declaration cannot be activated.
+#[derive(Clone, Debug, PartialEq)]
+pub enum ActivateError {
+    /// There is no scan result.
+    NoScan,
+    /// The MainDevice is active.
+    Active,
+    /// A declared SubDevice is not there, or another one is.
+    Config {
+        /// Index in the declaration.
+        subdevice: usize,
+        /// What is wrong.
+        error: ConfigError,
+    },
+    /// A SubDevice cannot be configured as declared.
+    Setup {
+        /// Index in the declaration.
+        subdevice: usize,
+        /// What is wrong.
+        error: SetupError,
+    },
+    /// Process data does not fit.
+    Layout(LayoutError),
+    /// A domain names a SubDevice that was not declared.
+    UnknownMember {
+        /// Number of the domain.
+        domain: usize,
+        /// Index that was given.
+        subdevice: usize,
+    },
+}
+
+impl fmt::Display for ActivateError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            ActivateError::NoScan => f.write_str("no scan result: scan before activating"),
+            ActivateError::Active => f.write_str("the MainDevice is active already"),
+            ActivateError::Config { subdevice, error } => write!(f, "declaration {subdevice}: {error}"),
+            ActivateError::Setup { subdevice, error } => write!(f, "declaration {subdevice}: {error}"),
+            ActivateError::Layout(error) => error.fmt(f),
+            ActivateError::UnknownMember { domain, subdevice } => {
+                write!(f, "domain {domain} names declaration {subdevice}, which does not exist")
+            }
+        }
+    }
+}
+
+impl core::error::Error for ActivateError {}
+
+/// Who is whom: by declaration, the SubDevice that was found.
+pub(super) fn match_declaration(
+    bus: &Bus,
+    declaration: &Declaration,
+    scan: &Scan,
+) -> Result<Vec<Option<SubDeviceInfo>>, ActivateError> {
+    let mut found = vec![None; declaration.subdevices.len()];
+    for resolution in resolve(&declaration.subdevices, &scan.subdevices) {
+        match resolution {
+            Resolution::Found { config, info } => found[config] = Some(scan.subdevices[info].clone()),
+            Resolution::Absent { config } => bus.report(Event::Missing { subdevice: config, optional: true }),
+            Resolution::Failed { config, error } => {
+                return Err(ActivateError::Config { subdevice: config, error });
+            }
+            Resolution::Extra { info } => {
+                let info = &scan.subdevices[info];
+                bus.report(Event::Unexpected { position: info.position, identity: info.identity });
+            }
+        }
+    }
+    Ok(found)
+}
+
+pub(super) fn plan_all(
+    declaration: &Declaration,
+    found: &[Option<SubDeviceInfo>],
+) -> Result<Vec<Areas>, ActivateError> {
+    let pairs = declaration.subdevices.iter().zip(found).enumerate();
+    pairs
+        .map(|(subdevice, (config, info))| match info {
+            Some(info) => plan(config, info)
+                .map(Areas::Planned)
+                .map_err(|error| ActivateError::Setup { subdevice, error: SetupError::Plan(error) }),
+            None => Ok(Areas::Declared(declared_areas(config).unwrap_or_default())),
+        })
+        .collect()
+}
+
+pub(super) fn domain_specs(declaration: &Declaration, plans: &[Areas]) -> Result<Vec<DomainSpec>, ActivateError> {
+    let mut specs = Vec::new();
+    for (domain, config) in declaration.domains.iter().enumerate() {
+        let mut spec = DomainSpec { period: config.period, lrw: true, areas: Vec::new() };
+        for member in &config.members {
+            let subdevice = member.subdevice;
+            let Some(areas) = plans.get(subdevice) else {
+                return Err(ActivateError::UnknownMember { domain, subdevice });
+            };
+            spec.lrw &= areas.lrw();
+            for (sync_manager, direction, length) in areas.list() {
+                if member.sync_managers.as_ref().is_none_or(|wanted| wanted.contains(&sync_manager)) {
+                    spec.areas.push(AreaSpec { subdevice, sync_manager, direction, length });
+                }
+            }
+        }
+        specs.push(spec);
+    }
+    Ok(specs)
+}
+
+pub(super) fn members(
+    declaration: Declaration,
+    found: Vec<Option<SubDeviceInfo>>,
+    layout: &Layout,
+) -> Result<Vec<Member>, ActivateError> {
+    let count = found.len();
+    let mut members = Vec::with_capacity(count);
+    for (index, (config, info)) in declaration.subdevices.into_iter().zip(found).enumerate() {
+        let setup = match &info {
+            Some(info) => Some(Rc::new(
+                Setup::new(index, &config, info, layout)
+                    .map_err(|error| ActivateError::Setup { subdevice: index, error })?,
+            )),
+            None => None,
+        };
+        // One that is not there yet gets an address behind those of the scan.
+        let absent = station_at(Position((0x4000 + index) as u16));
+        let station = info.as_ref().map_or(absent, |info| info.station);
+        members.push(Member { config, info, station, phase: Phase::Absent, setup });
+    }
+    Ok(members)
+}
