@@ -40,28 +40,28 @@ const fn unsupervised(mut case: Case, name: &'static str) -> Case {
     case
 }
 
-const BEFORE: Cabling = Cabling::CutRing { before: 1 };
-const BEHIND: Cabling = Cabling::CutRing { before: 0 };
+const ON_MAIN: Cabling = Cabling::CutRing { before: 1 };
+const ON_REDUNDANT: Cabling = Cabling::CutRing { before: 0 };
 
 const LRW: Case = case("lrw", 1, 2, true, Cabling::Line);
 const SPLIT: Case = case("lwr+lrd", 1, 2, false, Cabling::Line);
 const CLOSED: Case = case("closed", 1, 2, false, Cabling::ClosedRing);
-const CUT_BEHIND: Case = case("cut-main", 1, 2, false, BEFORE);
-const CUT_BEFORE: Case = case("cut-redundant", 1, 2, false, BEHIND);
+const CUT_MAIN: Case = case("cut-main", 1, 2, false, ON_MAIN);
+const CUT_REDUNDANT: Case = case("cut-redundant", 1, 2, false, ON_REDUNDANT);
 const CASES: [Case; 14] = [
     unsupervised(LRW, "lrw-unsupervised"),
     unsupervised(SPLIT, "lwr+lrd-unsupervised"),
     unsupervised(CLOSED, "closed-unsupervised"),
-    unsupervised(CUT_BEHIND, "cut-main-unsupervised"),
-    unsupervised(CUT_BEFORE, "cut-redundant-unsupervised"),
+    unsupervised(CUT_MAIN, "cut-main-unsupervised"),
+    unsupervised(CUT_REDUNDANT, "cut-redundant-unsupervised"),
     LRW,
     SPLIT,
     CLOSED,
-    CUT_BEHIND,
-    CUT_BEFORE,
+    CUT_MAIN,
+    CUT_REDUNDANT,
     case("one-of-100", 1, 100, true, Cabling::Line),
     case("fifty-of-2", 50, 2, true, Cabling::Line),
-    case("one-of-100-cut", 1, 100, false, BEHIND),
+    case("one-of-100-cut", 1, 100, false, ON_REDUNDANT),
     case("fifty-of-2-cut", 50, 2, false, Cabling::CutRing { before: 25 }),
 ];
 
@@ -173,6 +173,12 @@ fn print(measured: &[Measured]) -> bool {
         &measured[at]
     };
     let mut figures = Figures::new("instructions per process-data cycle, the double's subtracted");
+    println!(
+        "  lrw, lwr+lrd: one SubDevice with 2 + 2 bytes on one link. closed, cut-main, cut-redundant: two links, the ring"
+    );
+    println!(
+        "  closed, or cut so that the main or the redundant copy meets it. n-of-b: n SubDevices with b + b bytes each."
+    );
     // LRW is what one link uses where it can: the smaller figure of the two, so the stricter measure.
     let one_link = find("lrw").net();
     for (case, measured) in CASES.iter().zip(measured) {
