@@ -121,7 +121,8 @@ impl Domain {
                 continue;
             }
             if now {
-                member.part_since = cycle + 1;
+                // A partial delivery of this very cycle came before the change.
+                member.part_since = cycle + 2;
             } else {
                 member.delivered_before = member.delivered(frames);
                 member.part_since = u64::MAX;
