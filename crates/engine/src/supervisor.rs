@@ -7,6 +7,7 @@
 pub mod bus;
 mod executor;
 mod flights;
+mod round_trip;
 mod shared;
 mod silence;
 mod transfer;

@@ -22,8 +22,6 @@ use crate::time::Instant;
 /// Frames in flight at once: enough to fill the wire over the round trip of a thousand SubDevices (2 ms at 123 us a
 /// frame), few enough that a full transmit queue is no reason to give a frame up.
 const WINDOW: usize = 32;
-/// After this time a frame is given up. Far beyond any round trip with [`WINDOW`] frames queued before it.
-const FRAME_TIMEOUT: Duration = Duration::from_millis(20);
 /// A lost datagram is sent again so often; the retry index in the source address has three bits (facts SM-04).
 pub(super) const MAX_RETRIES: u8 = 7;
 /// A datagram that fits no send window goes out after this time all the same, and delays a cycle once.
@@ -69,6 +67,8 @@ struct Place {
     command: Command,
     expected: Option<Wkc>,
     wkc: [Wkc; 2],
+    /// Its procedure has the reply.
+    answered: bool,
 }
 
 #[derive(Debug)]
@@ -78,6 +78,7 @@ struct Flight {
     /// The first copy, with later ones merged in; before the first, what was sent.
     bytes: Vec<u8>,
     arrivals: Arrivals,
+    sent_at: Instant,
     deadline: Instant,
     /// Answered already; kept so that the second copy is recognised.
     answered: bool,
@@ -125,6 +126,7 @@ impl Flights {
             places: Vec::new(),
             bytes: Vec::with_capacity(MAX_FRAME),
             arrivals: Arrivals::default(),
+            sent_at: Instant::NEVER,
             deadline: Instant::NEVER,
             answered: false,
         });
@@ -215,6 +217,7 @@ impl Shared {
                     command: request.command,
                     expected: request.expected,
                     wkc: [Wkc(0); 2],
+                    answered: false,
                 });
                 transfer.stage = Stage::InFlight;
                 self.outbox.pop_front();
@@ -228,7 +231,8 @@ impl Shared {
             return None;
         }
         self.flights.sequence = sequence;
-        flight.deadline = self.now + FRAME_TIMEOUT;
+        flight.sent_at = self.now;
+        flight.deadline = self.now + self.round_trip.wait(retry);
         Some(flight)
     }
 
@@ -237,6 +241,7 @@ impl Shared {
         self.silence.came_back(copy.sent_on);
         let slot = Flights::slot(copy.sequence);
         let Some(flight) = self.flights.slots[slot].as_mut().filter(|flight| flight.sequence == copy.sequence) else {
+            self.round_trip.was_late();
             self.counters.late += 1;
             return Received::Late;
         };
@@ -249,37 +254,43 @@ impl Shared {
             self.counters.late += 1;
             return Received::Late;
         }
+        self.round_trip.took(self.now.since(flight.sent_at));
         flight.take(copy.sent_on, bytes, first);
         let finished = flight.has_all(self.links);
-        let nothing_to_wait_for = finished || flight.has_all_but(self.silence.mask(self.now), self.links);
-        if nothing_to_wait_for || flight.satisfied() {
-            self.answer(slot, nothing_to_wait_for);
-        }
+        let enough = finished || flight.has_all_but(self.silence.mask(self.now), self.links);
+        self.answer(slot, enough);
         if finished {
             self.end(slot);
         }
         Received::Taken
     }
 
-    /// Hands the replies of a flight to its procedures. `all_in`: no further copy is waited for.
-    fn answer(&mut self, slot: usize, all_in: bool) {
-        let Some(flight) = self.flights.slots[slot].as_mut() else { return };
-        if flight.answered {
-            return;
+    /// Hands replies to procedures: those with the expected working counter at once, all when no further copy is
+    /// waited for. What was met while the ring changed is lost.
+    fn answer(&mut self, slot: usize, enough: bool) {
+        let Some(mut flight) = self.flights.slots[slot].take() else { return };
+        let straddled = flight.straddled_a_change();
+        if enough && !straddled {
+            self.learn_main_count(&flight);
         }
-        flight.answered = true;
-        self.counters.received += 1;
-        let flight = self.flights.slots[slot].take();
-        if let Some(flight) = flight {
-            if all_in {
-                self.learn_main_count(&flight);
+        for place in flight.places.iter_mut().filter(|place| !place.answered) {
+            let satisfied = place.satisfied();
+            if !satisfied && !enough {
+                continue;
             }
-            for place in &flight.places {
+            place.answered = true;
+            if satisfied || !straddled {
                 let reply = place.reply(&flight.bytes);
                 self.finish(place.transfer, Ok(reply));
+            } else {
+                self.lost(place.transfer);
             }
-            self.flights.slots[slot] = Some(flight);
         }
+        if !flight.answered && flight.places.iter().all(|place| place.answered) {
+            flight.answered = true;
+            self.counters.received += 1;
+        }
+        self.flights.slots[slot] = Some(flight);
     }
 
     /// A broadcast shows how many SubDevices the main copy meets (facts CR-09).
@@ -333,9 +344,9 @@ impl Shared {
             } else {
                 self.counters.half += 1;
             }
-            let nothing_to_wait_for = flight.has_all_but(self.silence.mask(self.now), self.links);
-            for place in &flight.places {
-                if nothing_to_wait_for || place.satisfied() {
+            let enough = flight.has_all_but(self.silence.mask(self.now), self.links);
+            for place in flight.places.iter().filter(|place| !place.answered) {
+                if enough {
                     let reply = place.reply(&flight.bytes);
                     self.finish(place.transfer, Ok(reply));
                 } else {
@@ -410,13 +421,15 @@ impl Flight {
         }
     }
 
-    fn satisfied(&self) -> bool {
-        self.places.iter().all(Place::satisfied)
-    }
-
     /// All copies are in.
     fn has_all(&self, links: LinkSet) -> bool {
         self.arrivals.arrived & links.mask() == links.mask()
+    }
+
+    /// One copy crossed the ring and one returned: it opened or closed meanwhile, and SubDevices were met twice or not
+    /// at all.
+    fn straddled_a_change(&self) -> bool {
+        self.arrivals.arrived == LinkSet::Ring.mask() && self.arrivals.returned.count_ones() == 1
     }
 
     /// A copy came back on its own link, so that it met all whom it can meet, and those that are missing were sent on

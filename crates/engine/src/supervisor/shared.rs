@@ -9,6 +9,7 @@ use ringcat_wire::datagram::MAX_DATA;
 use super::bus::BusError;
 use super::executor::{Task, TaskId};
 use super::flights::{AcyclicCounters, Flights};
+use super::round_trip::RoundTrip;
 use super::silence::Silence;
 use super::transfer::{Request, Stage, Transfer, TransferId, Transfers};
 use crate::board::Board;
@@ -29,6 +30,7 @@ pub(crate) struct Shared {
     pub(crate) outbox: VecDeque<TransferId>,
     pub(crate) flights: Flights,
     pub(crate) silence: Silence,
+    pub(crate) round_trip: RoundTrip,
     /// SubDevices that the main copy of the last broadcast met: positions from here on live behind the redundant link.
     pub(crate) main_count: u16,
     /// Since when the first datagram of the outbox has been too long for the send window.
@@ -53,6 +55,7 @@ impl Shared {
             outbox: VecDeque::new(),
             flights: Flights::new(),
             silence: Silence::default(),
+            round_trip: RoundTrip::default(),
             main_count: 0,
             blocked_since: None,
             current: TaskId(0),
