@@ -163,7 +163,7 @@ impl MainDevice {
             Some(Err(_)) | None => return Err(ActivateError::NoScan),
         };
         let bus = self.supervisor.bus();
-        let found = match_declaration(&bus, &declaration, &scan)?;
+        let (found, strangers) = match_declaration(&bus, &declaration, &scan)?;
         let plans = plan_all(&declaration, &found)?;
         let specs = domain_specs(&declaration, &plans)?;
         let layout =
@@ -173,8 +173,7 @@ impl MainDevice {
         let board = Arc::new(Board::new(members.len()));
         let (producer, consumer) = queue(CYCLIC_EVENTS);
         let exchange = Exchange::new(self.identity, self.options.links(), &layout, board.clone(), producer);
-        let fleet =
-            Fleet { members, strangers: Vec::new(), layout, topology: scan.topology, cache: self.cache.clone() };
+        let fleet = Fleet { members, strangers, layout, topology: scan.topology, cache: self.cache.clone() };
         let fleet = SharedFleet::new(fleet, board.clone());
         self.supervisor.attach(board);
         start_all(&bus, &fleet, Start::Cleared);

@@ -11,4 +11,5 @@ pub mod recover;
 pub mod scan;
 pub mod sdo;
 pub mod sii;
+pub mod strangers;
 pub mod supervise;

@@ -14,8 +14,9 @@ use crate::event::Event;
 use crate::info::SubDeviceInfo;
 use crate::layout::{AreaSpec, DomainSpec, Layout, LayoutError};
 use crate::plan::plan;
-use crate::procedures::fleet::{Member, Phase, Setup, SetupError, declared_areas};
+use crate::procedures::fleet::{Member, Setup, SetupError, declared_areas};
 use crate::procedures::scan::{Scan, station_at};
+use crate::procedures::strangers::Stranger;
 use crate::supervisor::Bus;
 
 /// A domain as the application declares it.
@@ -94,27 +95,33 @@ impl fmt::Display for ActivateError {
 
 impl core::error::Error for ActivateError {}
 
-/// Who is whom: by declaration, the SubDevice that was found.
-pub(super) fn match_declaration(
-    bus: &Bus,
-    declaration: &Declaration,
-    scan: &Scan,
-) -> Result<Vec<Option<SubDeviceInfo>>, ActivateError> {
+/// By declaration the SubDevice that was found, and those that nobody declared.
+type Matched = (Vec<Option<SubDeviceInfo>>, Vec<Stranger>);
+
+/// Who is whom.
+pub(super) fn match_declaration(bus: &Bus, declaration: &Declaration, scan: &Scan) -> Result<Matched, ActivateError> {
     let mut found = vec![None; declaration.subdevices.len()];
+    let mut owners = vec![None; scan.subdevices.len()];
+    let mut extra = Vec::new();
     for resolution in resolve(&declaration.subdevices, &scan.subdevices) {
         match resolution {
-            Resolution::Found { config, info } => found[config] = Some(scan.subdevices[info].clone()),
+            Resolution::Found { config, info } => {
+                owners[info] = Some(config);
+                found[config] = Some(scan.subdevices[info].clone());
+            }
             Resolution::Absent { config } => bus.report(Event::Missing { subdevice: config, optional: true }),
             Resolution::Failed { config, error } => {
                 return Err(ActivateError::Config { subdevice: config, error });
             }
-            Resolution::Extra { info } => {
-                let info = &scan.subdevices[info];
-                bus.report(Event::Unexpected { position: info.position, identity: info.identity });
-            }
+            Resolution::Extra { info } => extra.push(info),
         }
     }
-    Ok(found)
+    let strangers = extra.into_iter().map(|at| {
+        let info = scan.subdevices[at].clone();
+        bus.report(Event::Unexpected { position: info.position, identity: info.identity });
+        Stranger::new(info, &owners, scan.main_count, true)
+    });
+    Ok((found, strangers.collect()))
 }
 
 pub(super) fn plan_all(
@@ -171,7 +178,7 @@ pub(super) fn members(
         // One that is not there yet gets an address behind those of the scan.
         let absent = station_at(Position((0x4000 + index) as u16));
         let station = info.as_ref().map_or(absent, |info| info.station);
-        members.push(Member { config, info, station, phase: Phase::Absent, setup });
+        members.push(Member::new(config, info, station, setup));
     }
     Ok(members)
 }

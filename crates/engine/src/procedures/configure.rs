@@ -93,6 +93,7 @@ impl BringUp<'_> {
     /// The whole way. Process data counts on the SubDevice from the moment its FMMUs are written.
     pub(super) async fn run(&self, start: Start) -> Result<(), ConfigureError> {
         self.fleet.board.set_taking_part(self.index, false);
+        self.fleet.set_configured(self.index, false);
         if start == Start::Unknown {
             self.back_to_init().await?;
         }
@@ -148,7 +149,9 @@ impl BringUp<'_> {
         Ok(())
     }
 
-    /// SDOs, watchdog, process data SyncManagers, FMMUs, SAFEOP.
+    /// SDOs, watchdog, process data SyncManagers, SAFEOP, FMMUs. The FMMUs come last and all at once: before SAFEOP a
+    /// SubDevice takes outputs and gives no inputs, so that nobody could tell from a working counter whose inputs are
+    /// missing, and the others' would count as stale for as long as it takes.
     async fn safeop(&self) -> Result<(), ConfigureError> {
         let plan = &self.setup.plan;
         self.download_all().await?;
@@ -160,11 +163,19 @@ impl BringUp<'_> {
             register.activate.enable &= !area.op_only;
             self.write_sync_manager(area.sync_manager, &register).await?;
         }
+        self.request(AlState::PreOp, AlState::SafeOp).await?;
+        let count = self.setup.fmmus.iter().map(|(number, _)| usize::from(*number) + 1).max().unwrap_or(0);
+        let mut fmmus = vec![0; Fmmu::LEN * count];
         for (number, fmmu) in &self.setup.fmmus {
-            self.bus.fpwr(self.station, map::fmmu(*number), &fmmu.encode()).await?;
+            let at = Fmmu::LEN * usize::from(*number);
+            fmmus[at..at + Fmmu::LEN].copy_from_slice(&fmmu.encode());
+        }
+        if count > 0 {
+            self.bus.fpwr(self.station, map::FMMU_BASE, &fmmus).await?;
         }
         self.fleet.board.set_taking_part(self.index, true);
-        self.request(AlState::PreOp, AlState::SafeOp).await
+        self.fleet.set_configured(self.index, true);
+        Ok(())
     }
 
     /// Waits until outputs flow, then OP.

@@ -10,6 +10,7 @@ use ringcat_wire::al::AlState;
 use ringcat_wire::register::Fmmu;
 
 use super::sii::SiiCache;
+use super::strangers::Stranger;
 use crate::board::Board;
 use crate::config::SubDeviceConfig;
 use crate::info::{Direction, SubDeviceInfo};
@@ -39,8 +40,27 @@ pub struct Member {
     pub station: StationAddress,
     /// How far it is.
     pub phase: Phase,
+    /// Number of the attempt to configure it that is under way; one that is out of date ends.
+    pub attempt: u32,
+    /// Its registers hold its configuration, FMMUs included, until it loses power or is sent back to INIT.
+    pub configured: bool,
+    /// Its place in the topology of the scan.
+    pub node: Option<usize>,
     /// Its configuration, shared with the procedure that applies it.
     pub setup: Option<Rc<Setup>>,
+}
+
+impl Member {
+    /// A member of which nothing is known but what the scan found.
+    pub fn new(
+        config: SubDeviceConfig,
+        info: Option<SubDeviceInfo>,
+        station: StationAddress,
+        setup: Option<Rc<Setup>>,
+    ) -> Member {
+        let node = info.as_ref().map(|info| usize::from(info.position.0));
+        Member { config, info, station, phase: Phase::Absent, attempt: 0, configured: false, node, setup }
+    }
 }
 
 /// What has to be written to one SubDevice, complete with logical addresses.
@@ -140,8 +160,8 @@ pub fn planned_areas(plan: &SubDevicePlan) -> Vec<(u8, Direction, u16)> {
 pub struct Fleet {
     /// The declared SubDevices.
     pub members: Vec<Member>,
-    /// Station addresses given to SubDevices that nobody declared.
-    pub strangers: Vec<StationAddress>,
+    /// SubDevices that nobody declared, or that are not known to be declared yet.
+    pub strangers: Vec<Stranger>,
     /// Where process data lies.
     pub layout: Layout,
     /// Connections as the scan found them.
@@ -174,6 +194,31 @@ impl SharedFleet {
         if let Some(member) = self.access().members.get_mut(index) {
             member.phase = phase;
         }
+    }
+
+    /// Notes whether a SubDevice's registers hold its configuration.
+    pub fn set_configured(&self, index: usize, configured: bool) {
+        if let Some(member) = self.access().members.get_mut(index) {
+            member.configured = configured;
+        }
+    }
+
+    /// Whether a SubDevice's registers hold its configuration.
+    pub fn is_configured(&self, index: usize) -> bool {
+        self.access().members.get(index).is_some_and(|member| member.configured)
+    }
+
+    /// Number of the attempt under way.
+    pub fn attempt(&self, index: usize) -> u32 {
+        self.access().members.get(index).map_or(0, |member| member.attempt)
+    }
+
+    /// Begins another attempt, or ends the one that is under way; returns the new number.
+    pub fn next_attempt(&self, index: usize) -> u32 {
+        self.access().members.get_mut(index).map_or(0, |member| {
+            member.attempt = member.attempt.wrapping_add(1);
+            member.attempt
+        })
     }
 
     /// How far a SubDevice is.

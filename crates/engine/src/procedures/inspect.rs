@@ -1,6 +1,10 @@
 //! Looking at all declared SubDevices: who answers, in which state, with which ports; and where a ring is broken.
 
+use alloc::rc::Rc;
+use alloc::vec;
 use alloc::vec::Vec;
+use core::cell::RefCell;
+use core::time::Duration;
 
 use ringcat_wire::address::{Position, StationAddress};
 use ringcat_wire::al::{AlStatus, AlStatusCode};
@@ -10,6 +14,9 @@ use super::al_state::split_status;
 use super::fleet::SharedFleet;
 use crate::supervisor::{Bus, BusError};
 use crate::topology::Topology;
+
+/// Between two reports of what looks have brought so far: most answers are there by then.
+const STEP: Duration = Duration::from_micros(300);
 
 /// What a SubDevice said.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -23,20 +30,40 @@ pub(super) enum Look {
     Answer { status: AlStatus, code: AlStatusCode, dl_status: DlStatus },
 }
 
-/// Looks at all members at once.
-pub(super) async fn look_at_all(bus: &Bus, fleet: &SharedFleet) -> Vec<Look> {
-    let stations: Vec<_> = fleet.access().members.iter().map(|member| member.station).collect();
-    let looks = bus.gather(stations, |bus, station| async move {
-        match look_at(&bus, station).await {
-            Ok(look) => look,
-            Err(BusError::Wkc { .. }) => Look::Silent,
-            Err(BusError::Lost { .. } | BusError::TooLong { .. }) => Look::Unknown,
-        }
-    });
-    looks.await
+/// Looks at all members at once. What there is after each step is shown to `so_far`, because looks at SubDevices that
+/// are not there take longer.
+pub(super) async fn look_at_all(bus: &Bus, fleet: &SharedFleet, mut so_far: impl FnMut(&[Look])) -> Vec<Look> {
+    let stations: Vec<StationAddress> = fleet.access().members.iter().map(|member| member.station).collect();
+    let looks = Rc::new(RefCell::new(vec![Look::Unknown; stations.len()]));
+    let group = bus.group();
+    for (index, station) in stations.into_iter().enumerate() {
+        let (bus, looks) = (bus.clone(), looks.clone());
+        group.spawn(async move {
+            let look = look_at(&bus, station).await;
+            looks.borrow_mut()[index] = look;
+        });
+    }
+    while bus.within(STEP, group.done()).await.is_err() {
+        so_far(&looks.borrow());
+    }
+    looks.take()
 }
 
-async fn look_at(bus: &Bus, station: StationAddress) -> Result<Look, BusError> {
+/// Looks at all that are nobody's.
+pub(super) async fn look_at_strangers(bus: &Bus, fleet: &SharedFleet) -> Vec<Look> {
+    let stations: Vec<StationAddress> = fleet.access().strangers.iter().map(|s| s.info.station).collect();
+    bus.gather(stations, |bus, station| async move { look_at(&bus, station).await }).await
+}
+
+async fn look_at(bus: &Bus, station: StationAddress) -> Look {
+    match read_both(bus, station).await {
+        Ok(look) => look,
+        Err(BusError::Wkc { .. }) => Look::Silent,
+        Err(BusError::Lost { .. } | BusError::TooLong { .. }) => Look::Unknown,
+    }
+}
+
+async fn read_both(bus: &Bus, station: StationAddress) -> Result<Look, BusError> {
     let bytes: [u8; 6] = bus.fprd_array(station, map::AL_STATUS).await?;
     let (status, code) = split_status(&bytes);
     let dl_status = DlStatus::decode(&bus.fprd_array(station, map::DL_STATUS).await?);

@@ -1,35 +1,34 @@
 //! Bringing SubDevices back: from an error, from power-off, or for the first time. The others go on meanwhile.
 
-use alloc::rc::Rc;
-use alloc::string::{String, ToString};
+use alloc::string::ToString;
 use alloc::vec::Vec;
+use core::future::{Future, poll_fn};
+use core::pin::pin;
+use core::task::Poll;
 use core::time::Duration;
 
-use ringcat_wire::address::{Position, StationAddress};
 use ringcat_wire::al::AlState;
-use ringcat_wire::register::map;
 
 use super::al_state;
 use super::configure::{BringUp, ConfigureError, Start};
-use super::fleet::{Phase, Setup, SharedFleet};
-use super::scan::{ScanError, read_one};
-use super::sii::claim_all;
-use crate::config::ConfigAddress;
+use super::fleet::{Phase, SharedFleet};
 use crate::event::Event;
-use crate::info::SubDeviceInfo;
 use crate::supervisor::{Bus, BusError};
 
 /// Pause before the first new attempt to configure a SubDevice; it doubles with every failure.
 const FIRST_PAUSE: Duration = Duration::from_millis(100);
 /// Longest pause between attempts.
 const LONGEST_PAUSE: Duration = Duration::from_secs(5);
-/// Station addresses for SubDevices that nobody declared, counted down from here.
-const STRANGER_STATIONS: u16 = 0xFFFE;
+/// Looks at a SubDevice that did not answer once, before it is lost: at the edge of a cut a frame may have met nobody.
+const LOOKS: usize = 3;
+/// Pause between two of them, and before a configuration that the bus disturbed is tried again for the first time.
+const LOOK_PAUSE: Duration = Duration::from_millis(3);
 
 /// Brings a SubDevice to its target state, again and again until it works or it no longer answers.
 pub(super) async fn keep_up(bus: Bus, fleet: SharedFleet, index: usize, start: Start) {
     let mut start = start;
     let mut pause = FIRST_PAUSE;
+    let mut disturbed = false;
     loop {
         match attempt(&bus, &fleet, index, start).await {
             Ok(state) => {
@@ -37,10 +36,19 @@ pub(super) async fn keep_up(bus: Bus, fleet: SharedFleet, index: usize, start: S
                 bus.report(Event::StateReached { subdevice: index, state });
                 return;
             }
-            Err(ConfigureError::Bus(BusError::Wkc { .. })) => {
-                // It does not answer: whoever supervises finds out more.
-                lose(&bus, &fleet, index);
-                return;
+            Err(error) if is_of_bus(&error) => {
+                if !is_there(&bus, &fleet, index).await {
+                    // Whoever supervises finds out more.
+                    lose(&bus, &fleet, index);
+                    return;
+                }
+                start = Start::Unknown;
+                // Once may be the edge of a cut, which is no matter of this SubDevice.
+                if !core::mem::replace(&mut disturbed, true) {
+                    bus.sleep(LOOK_PAUSE).await;
+                    continue;
+                }
+                bus.report(failure(index, &error));
             }
             Err(error) => bus.report(failure(index, &error)),
         }
@@ -50,8 +58,32 @@ pub(super) async fn keep_up(bus: Bus, fleet: SharedFleet, index: usize, start: S
     }
 }
 
-/// A SubDevice no longer answers.
+/// The frames are to blame, not what the SubDevice said.
+fn is_of_bus(error: &ConfigureError) -> bool {
+    use super::mailbox::MailboxError;
+    use super::sdo::SdoFailure;
+    match error {
+        ConfigureError::Bus(_) => true,
+        ConfigureError::Sdo(error) => matches!(error.cause, SdoFailure::Mailbox(MailboxError::Bus(_))),
+        ConfigureError::State(_) | ConfigureError::NoSetup => false,
+    }
+}
+
+/// Whether a SubDevice answers. While frames get lost nothing is known, and it counts as there.
+async fn is_there(bus: &Bus, fleet: &SharedFleet, index: usize) -> bool {
+    let Some(station) = fleet.access().members.get(index).map(|member| member.station) else { return false };
+    for _ in 0..LOOKS {
+        match al_state::read_status(bus, station).await {
+            Err(BusError::Wkc { .. }) => bus.sleep(LOOK_PAUSE).await,
+            Ok(_) | Err(_) => return true,
+        }
+    }
+    false
+}
+
+/// A SubDevice no longer answers. What was under way for it ends.
 pub(super) fn lose(bus: &Bus, fleet: &SharedFleet, index: usize) {
+    fleet.next_attempt(index);
     if fleet.phase(index) != Phase::Absent {
         fleet.set_phase(index, Phase::Absent);
         bus.report(Event::Lost { subdevice: index });
@@ -98,9 +130,10 @@ async fn quick(bring_up: &BringUp<'_>) -> Result<bool, ConfigureError> {
         fleet.board.set_taking_part(*index, *target == AlState::SafeOp || *target == AlState::Op);
         return Ok(true);
     }
-    if status.al_state() != Some(AlState::SafeOp) || *target != AlState::Op || !fleet.board.takes_part(*index) {
+    if status.al_state() != Some(AlState::SafeOp) || *target != AlState::Op || !fleet.is_configured(*index) {
         return Ok(false);
     }
+    fleet.board.set_taking_part(*index, true);
     if status.error {
         bus.report(Event::StateError { subdevice: *index, requested: None, status, code });
         al_state::acknowledge(bus, *station, setup.emulated).await?;
@@ -109,90 +142,26 @@ async fn quick(bring_up: &BringUp<'_>) -> Result<bool, ConfigureError> {
     Ok(al_state::request(bus, *station, AlState::Op, setup.emulated, limit).await.is_ok())
 }
 
-/// A SubDevice that answers but is nobody's: found at a position with an address that is not of a member.
-struct Stranger {
-    position: Position,
-    /// Index of the nearest member before it, and behind it, in the order of positions.
-    between: (Option<usize>, Option<usize>),
-    info: SubDeviceInfo,
-}
-
-/// Finds SubDevices without a known station address among `count` positions, tells which members they are, and starts
-/// their configuration.
-pub(super) async fn identify(bus: &Bus, fleet: &SharedFleet, main_count: u16, count: u16) -> Result<(), ScanError> {
-    let read = bus.gather((0..count).map(Position), |bus, position| async move {
-        let bytes = bus.aprd(position, map::STATION_ADDRESS, 2).await?;
-        Ok::<_, BusError>(StationAddress(u16::from_le_bytes([bytes[0], bytes[1]])))
-    });
-    let owners = read.await.into_iter().collect::<Result<Vec<_>, _>>()?;
-    let known: Vec<Option<usize>> = {
-        let access = fleet.access();
-        let member = |station: &StationAddress| access.members.iter().position(|m| m.station == *station);
-        owners.iter().map(member).collect()
-    };
-    for (at, station) in owners.iter().enumerate() {
-        if known[at].is_some() || fleet.access().strangers.contains(station) {
-            continue;
-        }
-        let position = Position(at as u16);
-        let temporary = next_stranger_station(fleet);
-        bus.apwr(position, map::STATION_ADDRESS, &temporary.0.to_le_bytes()).await?;
-        claim_all(bus).await?;
-        let cache = fleet.access().cache.clone();
-        let info = read_one(bus, position, temporary, &cache).await?;
-        let between =
-            (known[..at].iter().rev().copied().flatten().next(), known[at + 1..].iter().copied().flatten().next());
-        let from_main = position.0 < main_count;
-        admit(bus, fleet, Stranger { position, between, info }, temporary, from_main).await?;
-    }
-    Ok(())
-}
-
-fn next_stranger_station(fleet: &SharedFleet) -> StationAddress {
-    let access = fleet.access();
-    let taken = |station: &u16| access.strangers.contains(&StationAddress(*station));
-    StationAddress((1..=STRANGER_STATIONS).rev().find(|station| !taken(station)).unwrap_or(STRANGER_STATIONS))
-}
-
-/// Gives a stranger the address of the absent member that it is, or notes it as unexpected.
-async fn admit(
-    bus: &Bus,
-    fleet: &SharedFleet,
-    stranger: Stranger,
-    temporary: StationAddress,
-    from_main: bool,
-) -> Result<(), BusError> {
-    let Some(index) = member_for(fleet, &stranger, from_main) else {
-        fleet.access().strangers.push(temporary);
-        bus.report(Event::Unexpected { position: stranger.position, identity: stranger.info.identity });
-        return Ok(());
-    };
-    let station = fleet.access().members[index].station;
-    bus.fpwr(temporary, map::STATION_ADDRESS, &station.0.to_le_bytes()).await?;
-    match adopt(fleet, index, SubDeviceInfo { station, ..stranger.info }) {
-        Ok(()) => {
-            bus.report(Event::Returned { subdevice: index });
-            start(bus, fleet, index, Start::Unknown);
-        }
-        Err(reason) => bus.report(Event::ConfigurationFailed { subdevice: index, reason }),
-    }
-    Ok(())
-}
-
-fn adopt(fleet: &SharedFleet, index: usize, info: SubDeviceInfo) -> Result<(), String> {
-    let mut access = fleet.access();
-    let setup = Setup::new(index, &access.members[index].config, &info, &access.layout);
-    let setup = setup.map_err(|error| error.to_string())?;
-    let member = &mut access.members[index];
-    member.setup = Some(Rc::new(setup));
-    member.info = Some(info);
-    Ok(())
-}
-
 /// Starts the configuration of a SubDevice that answers.
 pub(super) fn start(bus: &Bus, fleet: &SharedFleet, index: usize, from: Start) {
     fleet.set_phase(index, Phase::Configuring);
-    bus.spawn(keep_up(bus.clone(), fleet.clone(), index, from));
+    let attempt = fleet.next_attempt(index);
+    let (own_bus, own_fleet) = (bus.clone(), fleet.clone());
+    bus.spawn(async move {
+        while_current(&own_fleet, index, attempt, keep_up(own_bus.clone(), own_fleet.clone(), index, from)).await;
+    });
+}
+
+/// Lets a procedure for a SubDevice run until another one begins or the SubDevice is lost.
+async fn while_current(fleet: &SharedFleet, index: usize, attempt: u32, procedure: impl Future<Output = ()>) {
+    let mut procedure = pin!(procedure);
+    poll_fn(|context| {
+        if fleet.attempt(index) != attempt {
+            return Poll::Ready(());
+        }
+        procedure.as_mut().poll(context)
+    })
+    .await;
 }
 
 /// Starts the configuration of all SubDevices that were found.
@@ -205,36 +174,4 @@ pub(crate) fn start_all(bus: &Bus, fleet: &SharedFleet, from: Start) {
     for index in found {
         start(bus, fleet, index, from);
     }
-}
-
-/// The absent member that a stranger is. One with the same serial number wins; else, coming from the main link, the
-/// first that fits between its neighbours, and coming from the redundant link the last: a SubDevice can only answer
-/// through its neighbours.
-fn member_for(fleet: &SharedFleet, stranger: &Stranger, from_main: bool) -> Option<usize> {
-    let access = fleet.access();
-    let identity = &stranger.info.identity;
-    let fits = |index: &usize| {
-        let member = &access.members[*index];
-        let same_product = member.info.as_ref().is_none_or(|info| {
-            (info.identity.vendor_id, info.identity.product_code) == (identity.vendor_id, identity.product_code)
-        });
-        let same_alias = match member.config.address {
-            ConfigAddress::Alias { alias, offset: 0 } if alias != 0 => alias == stranger.info.alias,
-            _ => true,
-        };
-        member.phase == Phase::Absent
-            && same_product
-            && same_alias
-            && member.config.expected.mismatch(identity).is_none()
-    };
-    let before = stranger.between.0.map_or(0, |index| index + 1);
-    let behind = stranger.between.1.unwrap_or(access.members.len()).max(before);
-    let candidates: Vec<usize> = (before..behind).filter(fits).collect();
-    let same_serial = |index: &&usize| {
-        let info = access.members[**index].info.as_ref();
-        identity.serial != 0 && info.is_some_and(|info| info.identity.serial == identity.serial)
-    };
-    let by_serial = candidates.iter().find(same_serial);
-    let by_place = if from_main { candidates.first() } else { candidates.last() };
-    by_serial.or(by_place).copied()
 }

@@ -178,7 +178,7 @@ async fn count(bus: &Bus, options: &ScanOptions) -> Result<(Wkc, Wkc), ScanError
 /// The same starting point for all: loops automatic, aliases off, event mask, no FMMU, no SyncManager, no clock
 /// activity, EEPROM to EtherCAT, error counters clear.
 async fn level(bus: &Bus) -> Result<(), BusError> {
-    let mask = EcatEvent { dl_status: true, ..EcatEvent::default() };
+    let mask = event_mask();
     bus.bwr(map::DL_CONTROL.offset(1), &[0]).await?;
     bus.bwr(map::DL_CONTROL.offset(3), &[0]).await?;
     bus.bwr(map::AL_CONTROL, &AlControl::with_acknowledge(AlState::Init).encode()).await?;
@@ -188,6 +188,11 @@ async fn level(bus: &Bus) -> Result<(), BusError> {
     bus.bwr(map::SYNC_MANAGER_BASE, &[0; SyncManager::LEN * MAX_CHANNELS]).await?;
     bus.bwr(map::DC_ACTIVATION, &[0]).await?;
     claim_all(bus).await
+}
+
+/// ECAT events that SubDevices tell in every datagram: a port changed.
+pub(super) fn event_mask() -> EcatEvent {
+    EcatEvent { dl_status: true, ..EcatEvent::default() }
 }
 
 /// Waits until all are in INIT. Devices that copy AL control into AL status show the acknowledge bit as an error: they

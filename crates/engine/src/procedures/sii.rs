@@ -355,10 +355,19 @@ impl SiiReader {
     }
 }
 
+/// Written to `SII_CONFIGURATION`: takes the EEPROM from the PDI.
+const FORCE: [u8; 1] = [0x02];
+/// Written to `SII_CONFIGURATION`: the EEPROM is EtherCAT's.
+const ETHERCAT: [u8; 1] = [0x00];
+
+/// Takes the EEPROM of one SubDevice away from its PDI.
+pub(super) async fn claim(bus: &Bus, station: StationAddress) -> Result<(), BusError> {
+    bus.fpwr(station, map::SII_CONFIGURATION, &FORCE).await?;
+    bus.fpwr(station, map::SII_CONFIGURATION, &ETHERCAT).await
+}
+
 /// Takes the EEPROMs of all SubDevices away from their PDI (facts 5.6).
 pub(super) async fn claim_all(bus: &Bus) -> Result<(), BusError> {
-    const FORCE: [u8; 1] = [0x02];
-    const ETHERCAT: [u8; 1] = [0x00];
     bus.bwr(map::SII_CONFIGURATION, &FORCE).await?;
     bus.bwr(map::SII_CONFIGURATION, &ETHERCAT).await?;
     Ok(())

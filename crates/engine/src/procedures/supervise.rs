@@ -11,14 +11,15 @@ use alloc::vec::Vec;
 use core::cell::Cell;
 use core::time::Duration;
 
-use ringcat_wire::al::AlStatus;
+use ringcat_wire::al::{AlStatus, AlStatusCode};
 use ringcat_wire::register::{DlStatus, map};
 
 use super::configure::Start;
 use super::fleet::{Phase, SharedFleet};
-use super::inspect::{Break, Look, locate_break, look_at_all};
-use super::recover::{identify, lose, start};
+use super::inspect::{Break, Look, locate_break, look_at_all, look_at_strangers};
+use super::recover::{lose, start};
 use super::scan::ScanError;
+use super::strangers;
 use crate::board::{RingWord, Supervision};
 use crate::event::Event;
 use crate::ring::RingState;
@@ -26,7 +27,7 @@ use crate::supervisor::{Bus, BusError};
 use crate::time::Instant;
 
 /// Pause between two looks at the board.
-const PAUSE: Duration = Duration::from_millis(1);
+const PAUSE: Duration = Duration::from_micros(500);
 /// All SubDevices are looked at so often even if nothing changed: an OR can hide one state behind others.
 const ROUTINE: Duration = Duration::from_secs(1);
 /// A SubDevice is lost when it was silent in so many looks in a row: at the edge of a cut a copy may have met nobody.
@@ -41,15 +42,19 @@ const BREAK_LOOKS: u8 = 20;
 /// Pause between two of them.
 const BREAK_LOOK_PAUSE: Duration = Duration::from_millis(10);
 
+/// Pause between two searches for SubDevices that answer and are not known.
+const STRANGER_PAUSE: Duration = Duration::from_millis(10);
+
 /// Runs for ever.
 pub(crate) async fn supervise(bus: Bus, fleet: SharedFleet) {
-    let silent = vec![0; fleet.access().members.len()];
+    let members = fleet.access().members.len();
     let reported = Rc::new(Cell::new(RingState::Unknown));
     bus.spawn(report_ring(bus.clone(), fleet.clone(), reported.clone()));
     let mut watch = Watch {
         bus,
         fleet,
-        silent,
+        silent: vec![0; members],
+        suspended: vec![false; members],
         seen: Supervision::default(),
         ring: RingWord::default(),
         reported,
@@ -71,6 +76,8 @@ struct Watch {
     fleet: SharedFleet,
     /// Silent looks in a row, by member.
     silent: Vec<u8>,
+    /// Process data does not wait for it though it is not lost, by member.
+    suspended: Vec<bool>,
     /// The supervision result that the last check was about.
     seen: Supervision,
     ring: RingWord,
@@ -139,70 +146,79 @@ impl Watch {
     }
 
     async fn check(&mut self) {
-        let Ok(counted) = self.bus.brd(map::AL_STATUS, AlStatus::LEN).await else { return };
-        let main = counted.main.0;
-        let looks = look_at_all(&self.bus, &self.fleet).await;
-        let strangers = self.fleet.access().strangers.len();
-        let answered = looks.iter().filter(|look| matches!(look, Look::Answer { .. })).count();
+        let strangers = look_at_strangers(&self.bus, &self.fleet).await;
+        let (fleet, suspended) = (&self.fleet, &mut self.suspended);
+        let looks = look_at_all(&self.bus, fleet, |so_far| suspend(fleet, suspended, so_far, &strangers)).await;
+        let Some((_, seen)) = self.fleet.board.supervision() else { return };
+        let (count, answering) = (usize::from(seen.total().0), answers(&looks) + answers(&strangers));
         // When the count and the answers agree, a silent SubDevice is certainly not there.
-        let needed = if usize::from(counted.wkc().0) == answered + strangers { 1 } else { SILENT_LOOKS };
-        let answering = self.judge(&looks, needed);
-        if looks.contains(&Look::Silent) && needed > 1 {
+        let needed = if count == answering { 1 } else { SILENT_LOOKS };
+        let certain = self.judge(&looks, needed);
+        if needed == 1 {
+            self.forget_strangers(&strangers);
+        }
+        if !certain {
             // Certainty soon, and then again only when something changes.
-            self.bus.sleep(SECOND_LOOK_PAUSE).await;
-            self.next_routine = self.bus.now();
+            self.again_in(SECOND_LOOK_PAUSE);
         }
         self.report_break(&looks);
-        if usize::from(counted.wkc().0) > answering + strangers {
-            self.find_strangers(main, counted.wkc().0).await;
+        if count > answering && !looks.contains(&Look::Unknown) {
+            self.find_strangers().await;
         }
-        // Clears the request of those that nobody looked at.
-        if self.bus.brd(map::DL_STATUS, DlStatus::LEN).await.is_err() {
-            self.next_routine = self.bus.now();
-        }
+        strangers::admit_all(&self.bus, &self.fleet, certain).await;
     }
 
-    /// Acts on what each SubDevice said; returns how many answered. So many silent looks make one lost.
-    fn judge(&mut self, looks: &[Look], needed: u8) -> usize {
-        let mut answering = 0;
+    fn again_in(&mut self, pause: Duration) {
+        self.next_routine = self.next_routine.min(self.bus.now() + pause);
+    }
+
+    /// Acts on what each SubDevice said; so many silent looks make one lost. True where it is known of all whether they
+    /// are there.
+    fn judge(&mut self, looks: &[Look], needed: u8) -> bool {
+        let mut certain = true;
         for (index, look) in looks.iter().enumerate() {
-            let phase = self.fleet.phase(index);
-            match (look, phase) {
-                (Look::Unknown, _) => {}
+            match (look, self.fleet.phase(index)) {
+                (Look::Unknown, _) => certain = false,
                 (Look::Silent, Phase::Absent) => self.silent[index] = SILENT_LOOKS,
                 (Look::Silent, Phase::Configuring | Phase::Settled(_)) => {
                     self.silent[index] = (self.silent[index] + 1).min(SILENT_LOOKS);
-                    // One that is being configured is lost by its own procedure.
-                    if self.silent[index] >= needed && phase != Phase::Configuring {
+                    if self.silent[index] >= needed {
                         lose(&self.bus, &self.fleet, index);
+                    } else {
+                        certain = false;
                     }
                 }
-                (Look::Answer { .. }, Phase::Absent) => {
-                    answering += 1;
+                (Look::Answer { status, code, .. }, phase) => {
                     self.silent[index] = 0;
-                    self.bus.report(Event::Returned { subdevice: index });
-                    start(&self.bus, &self.fleet, index, Start::Unknown);
-                }
-                (Look::Answer { status, code, .. }, Phase::Settled(state)) => {
-                    answering += 1;
-                    self.silent[index] = 0;
-                    if status.error || status.al_state() != Some(state) {
-                        self.bus.report(Event::StateError {
-                            subdevice: index,
-                            requested: None,
-                            status: *status,
-                            code: *code,
-                        });
-                        start(&self.bus, &self.fleet, index, Start::Unknown);
-                    }
-                }
-                (Look::Answer { .. }, Phase::Configuring) => {
-                    answering += 1;
-                    self.silent[index] = 0;
+                    self.heard(index, phase, *status, *code);
                 }
             }
         }
-        answering
+        certain
+    }
+
+    /// A SubDevice answered.
+    fn heard(&mut self, index: usize, phase: Phase, status: AlStatus, code: AlStatusCode) {
+        let event = match phase {
+            Phase::Configuring => return,
+            Phase::Settled(state) if !status.error && status.al_state() == Some(state) => {
+                if core::mem::take(&mut self.suspended[index]) {
+                    self.fleet.board.set_taking_part(index, true);
+                }
+                return;
+            }
+            Phase::Settled(_) => Event::StateError { subdevice: index, requested: None, status, code },
+            Phase::Absent => Event::Returned { subdevice: index },
+        };
+        self.bus.report(event);
+        self.suspended[index] = false;
+        start(&self.bus, &self.fleet, index, Start::Unknown);
+    }
+
+    /// Strangers that no longer answer are gone.
+    fn forget_strangers(&self, looks: &[Look]) {
+        let mut looks = looks.iter();
+        self.fleet.access().strangers.retain(|_| looks.next() != Some(&Look::Silent));
     }
 
     /// One event per break, when its neighbours have noticed it.
@@ -217,7 +233,7 @@ impl Watch {
             }
             None if self.place.is_none() && self.break_looks > 0 => {
                 self.break_looks -= 1;
-                self.next_routine = self.bus.now() + BREAK_LOOK_PAUSE;
+                self.again_in(BREAK_LOOK_PAUSE);
             }
             Some(_) | None => {}
         }
@@ -227,16 +243,16 @@ impl Watch {
         let access = self.fleet.access();
         let mut by_position = vec![None; access.topology.nodes.len()];
         for (member, look) in access.members.iter().zip(looks) {
-            let (Some(info), Look::Answer { dl_status, .. }) = (&member.info, look) else { continue };
-            if let Some(slot) = by_position.get_mut(usize::from(info.position.0)) {
+            let (Some(node), Look::Answer { dl_status, .. }) = (member.node, look) else { continue };
+            if let Some(slot) = by_position.get_mut(node) {
                 *slot = Some(*dl_status);
             }
         }
         locate_break(&access.topology, &by_position)
     }
 
-    async fn find_strangers(&mut self, main: u16, count: u16) {
-        match identify(&self.bus, &self.fleet, main, count).await {
+    async fn find_strangers(&mut self) {
+        match strangers::find(&self.bus, &self.fleet).await {
             // The segment changed under our hands: again when it is quiet.
             Ok(()) | Err(ScanError::Bus(BusError::Wkc { .. } | BusError::Lost { .. })) => {}
             Err(error) => {
@@ -244,6 +260,30 @@ impl Watch {
                 self.bus.report(Event::ScanFailed { reason });
             }
         }
-        self.next_routine = self.bus.now() + Duration::from_millis(10);
+        // Clears the requests of those that nobody looks at.
+        if self.bus.brd(map::DL_STATUS, DlStatus::LEN).await.is_err() {
+            self.again_in(PAUSE);
+        }
+        self.again_in(STRANGER_PAUSE);
+    }
+}
+
+fn answers(looks: &[Look]) -> usize {
+    looks.iter().filter(|look| matches!(look, Look::Answer { .. })).count()
+}
+
+/// As soon as all that the cyclic datagram counts have answered, process data no longer waits for the others: whether
+/// they are lost is seen later, whose inputs are new is seen now.
+fn suspend(fleet: &SharedFleet, suspended: &mut [bool], looks: &[Look], strangers: &[Look]) {
+    let count = fleet.board.supervision().map(|(_, seen)| usize::from(seen.total().0));
+    if count != Some(answers(looks) + answers(strangers)) {
+        return;
+    }
+    let silent = looks.iter().enumerate().filter(|(_, look)| !matches!(look, Look::Answer { .. }));
+    for (index, _) in silent {
+        if matches!(fleet.phase(index), Phase::Settled(_)) && fleet.board.takes_part(index) {
+            fleet.board.set_taking_part(index, false);
+            suspended[index] = true;
+        }
     }
 }
