@@ -9,7 +9,7 @@ use ringcat_engine::main_device::Directory;
 use ringcat_sim::cable::DeviceIndex;
 use ringcat_sim::device::Device;
 use ringcat_sim::network::Network;
-use ringcat_wire::al::AlState;
+use ringcat_wire::al::{AlState, AlStatus};
 
 /// What a domain delivered in one cycle.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -20,7 +20,7 @@ pub enum Delivery {
     Pending,
     /// Everybody answered.
     Complete,
-    /// All inputs but those of SubDevices that are not there or below SAFEOP are fresh.
+    /// All inputs but those of SubDevices that are not there or not in OP are fresh.
     WithoutAbsent,
     /// Somebody's data is missing who could have answered, or somebody was met twice.
     Incomplete,
@@ -55,6 +55,8 @@ struct Flight {
     image: Vec<u8>,
     /// Inputs of all devices.
     inputs: Vec<Vec<u8>>,
+    /// Who was in OP.
+    operating: Vec<bool>,
 }
 
 /// A part of a domain's image and of a device's process data.
@@ -136,7 +138,9 @@ impl Mirror {
                     let inputs = &flight.inputs[area.device.0];
                     (image.get(area.in_image.clone()), inputs.get(area.in_device.clone()))
                 }
-                Direction::Outputs if !delivery.is_incomplete() && operates(device) => {
+                Direction::Outputs
+                    if !delivery.is_incomplete() && flight.operating[area.device.0] && operates(device) =>
+                {
                     (device.outputs().get(area.in_device.clone()), flight.image.get(area.in_image.clone()))
                 }
                 Direction::Inputs | Direction::Outputs => continue,
@@ -159,7 +163,8 @@ impl Mirror {
         }
         let mut here = self.areas.iter().filter(|area| area.domain == domain);
         let all_fresh = here.all(|area| {
-            let absent = !exchanges(network.device(area.device));
+            let device = network.device(area.device);
+            let absent = !device.controller.is_powered() || device.al_status().al_state() != Some(AlState::Op);
             absent
                 || area.direction == Direction::Outputs
                 || exchange.freshness(domain, area.subdevice) == Freshness::Fresh
@@ -171,21 +176,17 @@ impl Mirror {
     pub fn depart(&mut self, domain: DomainId, exchange: &Exchange, network: &Network) {
         let image = exchange.image(domain).to_vec();
         let inputs = network.devices().map(|device| device.inputs().to_vec()).collect();
+        let operating = network.devices().map(operates).collect();
         if let Some(flight) = self.flights.get_mut(domain.0) {
-            *flight = Some(Flight { image, inputs });
+            *flight = Some(Flight { image, inputs, operating });
         }
     }
 }
 
-/// It exchanges process data.
-pub fn exchanges(device: &Device) -> bool {
-    device.controller.is_powered() && matches!(device.al_status().al_state(), Some(AlState::SafeOp | AlState::Op))
-}
-
 /// It is in OP and its application works.
 pub fn operates(device: &Device) -> bool {
-    let status = device.al_status();
-    exchanges(device) && status.al_state() == Some(AlState::Op) && !status.error && !device.application.is_hanging()
+    let in_op = device.al_status() == AlStatus::new(AlState::Op);
+    device.controller.is_powered() && in_op && !device.application.is_hanging()
 }
 
 /// Events about the ring, in order.
