@@ -195,6 +195,7 @@ impl Network {
     pub fn advance(&mut self, to: SimTime) {
         let mut due = self.queue.pop_until(to);
         while let Some((at, event)) = due {
+            debug_assert!(at >= self.now, "time goes back from {} to {at}", self.now);
             self.now = at;
             due = match self.handle(event) {
                 Some((at, event)) => self.queue.push_pop(at, event, to),

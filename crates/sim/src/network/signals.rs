@@ -76,8 +76,10 @@ impl Network {
         }
     }
 
-    /// Wakes a device at a time, or earlier if that is arranged already.
+    /// Wakes a device at a time, or earlier if that is arranged already. A deadline can have passed when it is set: a
+    /// watchdog time that was shortened, an application that hung meanwhile.
     pub(super) fn wake_at(&mut self, index: usize, at: SimTime) {
+        let at = at.max(self.now);
         let node = &mut self.nodes[index];
         if at < node.wake_at {
             node.wake_at = at;

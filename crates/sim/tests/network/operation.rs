@@ -106,6 +106,19 @@ fn next_event_tells_when_the_watchdog_strikes() {
 }
 
 #[test]
+fn a_shorter_watchdog_time_that_has_passed_already_strikes_now_and_not_in_the_past() {
+    let mut network = operational();
+    assert_eq!(cycle(&mut network, 0xFF), Some(1));
+    network.advance_by(50 * MILLISECOND);
+    // 5 units of 100 us: over for long when the frame comes.
+    let time = Target::Position(Position(1), map::WATCHDOG_TIME_PROCESS_DATA);
+    network.send(Main, &command(Command::Apwr, time, &[5, 0]));
+    // Time that goes back is a failed assertion of the network.
+    network.advance_by(MILLISECOND);
+    assert_eq!(al_status(&network), (0x14, 0x001B));
+}
+
+#[test]
 fn a_cut_ring_keeps_the_terminal_in_op() {
     let mut network = operational();
     let cable = network.cable_between(DeviceIndex(0), TERMINAL).unwrap();
