@@ -97,6 +97,28 @@ pub(super) fn locate_break(topology: &Topology, dl_status: &[Option<DlStatus>]) 
             return Some(Break { after: position(connection.near.node), before: position(node) });
         }
     }
-    let lost = topology.open_ports.iter().find(|at| down(at.node, at.port) == Some(true))?;
-    Some(Break { after: position(lost.node), before: None })
+    match topology.open_ports.iter().find(|at| down(at.node, at.port) == Some(true)) {
+        Some(lost) => Some(Break { after: position(lost.node), before: None }),
+        None => seam(topology, dl_status),
+    }
+}
+
+/// A connection that the scan did not see, because the ring was broken there already.
+fn seam(topology: &Topology, dl_status: &[Option<DlStatus>]) -> Option<Break> {
+    let position = |node: usize| Position(u16::try_from(node).unwrap_or(u16::MAX));
+    let last = topology.main_count.checked_sub(1);
+    let communicates = |node: usize, port: u8| {
+        let status = dl_status.get(node).copied().flatten()?;
+        Some(status.ports[usize::from(port & 3)].communication)
+    };
+    if let Some(head) = topology.redundant_head {
+        let broken = communicates(head, topology.nodes.get(head)?.entry_port) == Some(false);
+        return broken.then(|| Break { after: last.map(position), before: Some(position(head)) });
+    }
+    // Only then was nothing seen of the redundant link.
+    let last = last.filter(|_| topology.open_ports.is_empty())?;
+    let node = topology.nodes.get(last)?;
+    let known = |port: u8| port == node.entry_port || node.children[usize::from(port)].is_some();
+    let broken = (0..4).filter(|port| !known(*port)).all(|port| communicates(last, port) == Some(false));
+    broken.then(|| Break { after: Some(position(last)), before: None })
 }

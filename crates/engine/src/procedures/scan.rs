@@ -32,6 +32,8 @@ const MAX_CHANNELS: usize = 16;
 const COUNT_PAUSE: Duration = Duration::from_millis(1);
 /// How long SubDevices may take to get to INIT before they are addressed one by one.
 const INIT_LIMIT: Duration = Duration::from_millis(100);
+/// A scan is begun so often: a cable may be cut or plugged in while it runs.
+const ATTEMPTS: u8 = 3;
 /// Every so many SubDevices, progress is reported.
 const PROGRESS_STEP: usize = 50;
 
@@ -71,6 +73,13 @@ pub enum ScanError {
         /// The last two counts.
         counts: [u16; 2],
     },
+    /// The segment changed while it was scanned, again and again.
+    Changed {
+        /// SubDevices on the main and on the redundant link at the beginning.
+        before: (u16, u16),
+        /// And at the end.
+        after: (u16, u16),
+    },
     /// More SubDevices than station addresses.
     TooMany {
         /// SubDevices counted.
@@ -97,6 +106,12 @@ impl fmt::Display for ScanError {
             ScanError::Unsettled { counts: [a, b] } => {
                 write!(f, "the number of SubDevices does not settle: {a}, then {b}")
             }
+            ScanError::Changed { before, after } => write!(
+                f,
+                "the segment changes while it is scanned: {} SubDevices on the main and {} on the redundant link, then \
+                 {} and {}",
+                before.0, before.1, after.0, after.1
+            ),
             ScanError::TooMany { count } => write!(f, "{count} SubDevices, at most {MAX_SUBDEVICES} are possible"),
             ScanError::Bus(error) => error.fmt(f),
             ScanError::Sii { position, error } => write!(f, "SubDevice at position {position}: {error}"),
@@ -112,8 +127,23 @@ impl From<BusError> for ScanError {
     }
 }
 
-/// Scans the segment. Every SubDevice is in INIT afterwards.
+/// Scans the segment. Every SubDevice is in INIT afterwards. A scan that the segment disturbed by changing is begun
+/// again.
 pub async fn scan(bus: &Bus, options: &ScanOptions) -> Result<Scan, ScanError> {
+    let mut attempts = 1;
+    loop {
+        match attempt(bus, options).await {
+            Err(ScanError::Bus(_) | ScanError::Changed { .. } | ScanError::Sii { error: SiiReadError::Bus(_), .. })
+                if attempts < ATTEMPTS =>
+            {
+                attempts += 1;
+            }
+            result => return result,
+        }
+    }
+}
+
+async fn attempt(bus: &Bus, options: &ScanOptions) -> Result<Scan, ScanError> {
     let (main, redundant) = count(bus, options).await?;
     bus.report(Event::Counted { main: main.0, redundant: redundant.0 });
     let total = u32::from(main.0) + u32::from(redundant.0);
@@ -126,6 +156,10 @@ pub async fn scan(bus: &Bus, options: &ScanOptions) -> Result<Scan, ScanError> {
     assign_addresses(bus, count).await?;
     bus.bwr(map::DC_RECEIVE_TIME, &[0; 4]).await?;
     let subdevices = read_all(bus, count, &options.cache).await?;
+    let counted = bus.brd(map::TYPE, 1).await?;
+    if (counted.main, counted.redundant) != (main, redundant) {
+        return Err(ScanError::Changed { before: (main.0, redundant.0), after: (counted.main.0, counted.redundant.0) });
+    }
     let statuses: Vec<NodeStatus> = subdevices.iter().map(node_status).collect();
     let topology = Topology::build(&statuses, usize::from(main.0));
     let scan =
