@@ -36,7 +36,7 @@ impl Delivery {
 }
 
 /// One cycle of a domain.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 pub struct Judged {
     /// The domain.
     pub domain: DomainId,
@@ -46,6 +46,8 @@ pub struct Judged {
     pub status: DomainStatus,
     /// What came of it.
     pub delivery: Delivery,
+    /// SubDevices whose inputs are not fresh.
+    pub stale: Vec<usize>,
 }
 
 /// What was true when a domain's frames left.
@@ -152,6 +154,13 @@ impl Mirror {
             }
         }
         delivery
+    }
+
+    /// Whose inputs are not fresh.
+    pub fn stale(&self, domain: DomainId, exchange: &Exchange) -> Vec<usize> {
+        let inputs = self.areas.iter().filter(|area| area.domain == domain && area.direction == Direction::Inputs);
+        let stale = inputs.filter(|area| exchange.freshness(domain, area.subdevice) != Freshness::Fresh);
+        stale.map(|area| area.subdevice).collect()
     }
 
     fn delivery(&self, status: DomainStatus, domain: DomainId, exchange: &Exchange, network: &Network) -> Delivery {

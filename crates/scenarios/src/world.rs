@@ -189,7 +189,8 @@ impl World {
             let exchange = self.application.exchange();
             let delivery = self.mirror.judge(status, domain, exchange, network);
             if delivery != Delivery::None {
-                self.journal.judge(Judged { domain, at, status, delivery });
+                let stale = self.mirror.stale(domain, exchange);
+                self.journal.judge(Judged { domain, at, status, delivery, stale });
             }
             if exchange.status(domain).skipped == status.skipped {
                 self.mirror.depart(domain, exchange, network);
@@ -400,7 +401,7 @@ impl Journal {
     fn judge(&mut self, judged: Judged) {
         let before = self.judged.iter().rev().find(|before| before.domain == judged.domain);
         if before.is_none_or(|before| before.delivery != judged.delivery || before.status.wkc != judged.status.wkc) {
-            let Judged { domain, at, status, delivery } = &judged;
+            let Judged { domain, at, status, delivery, .. } = &judged;
             let line = format!("  domain {}: {delivery:?}, {} of {}", domain.0, status.wkc, status.expected);
             self.lines.push((*at, line));
         }

@@ -20,7 +20,7 @@ fn with_own_settings(scan: &Scan) -> Declaration {
     let mut declaration = automatic(&scan.subdevices, CYCLE);
     for (config, info) in declaration.subdevices.iter_mut().zip(&scan.subdevices) {
         let declared = config.clone();
-        *config = match info.name.as_str() {
+        *config = match info.order_code.as_str() {
             "servo" => declared.sdo(0x6065, 0, 4711u32.to_le_bytes()),
             "analog-input-4" => declared.sdo(0x8000, 1, 77u16.to_le_bytes()).sdo(0x8000, 3, *b"sixteen bytes!!!"),
             "digital-output-8" => declared.watchdog(None, Some(500)).sync_manager(0, Direction::Outputs, Watchdog::On),
