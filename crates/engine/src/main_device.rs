@@ -33,6 +33,7 @@ use crate::procedures::fleet::{Fleet, Phase, SharedFleet};
 use crate::procedures::recover::start_all;
 use crate::procedures::scan::{Scan, ScanError, ScanOptions, scan};
 use crate::procedures::sii::SiiCache;
+use crate::procedures::stop::{StopError, stop};
 use crate::procedures::supervise::supervise;
 use crate::queue::{Consumer, queue};
 use crate::ring::Identity;
@@ -92,6 +93,7 @@ pub enum SubDeviceState {
     Settled(AlState),
 }
 
+type StopSlot = Rc<RefCell<Option<Result<(), StopError>>>>;
 type ScanSlot = Rc<RefCell<Option<Result<Scan, ScanError>>>>;
 
 /// The MainDevice without its cyclic half.
@@ -102,6 +104,7 @@ pub struct MainDevice {
     identity: Identity,
     cache: SiiCache,
     scan: ScanSlot,
+    stopped: StopSlot,
     fleet: Option<SharedFleet>,
     cyclic_events: Option<Consumer>,
 }
@@ -115,6 +118,7 @@ impl MainDevice {
             identity,
             cache: SiiCache::new(options.sii_cache),
             scan: ScanSlot::default(),
+            stopped: StopSlot::default(),
             fleet: None,
             cyclic_events: None,
             options,
@@ -183,6 +187,25 @@ impl MainDevice {
         self.fleet = Some(fleet);
         self.cyclic_events = Some(consumer);
         Ok(Active { exchange, directory })
+    }
+
+    /// Ends supervision and all other procedures, and takes all SubDevices down to a state. The exchange must not send
+    /// any more. Afterwards a new scan may start.
+    pub fn start_stop(&mut self, state: AlState, limit: Duration, now: Instant) {
+        self.supervisor = Supervisor::new(self.identity, self.options.links(), now);
+        self.fleet = None;
+        self.cyclic_events = None;
+        *self.stopped.borrow_mut() = None;
+        let (bus, slot) = (self.supervisor.bus(), self.stopped.clone());
+        self.supervisor.spawn(async move {
+            let result = stop(&bus, state, limit).await;
+            *slot.borrow_mut() = Some(result);
+        });
+    }
+
+    /// The result of [`MainDevice::start_stop`], once it has ended.
+    pub fn stop_result(&self) -> Option<Result<(), StopError>> {
+        *self.stopped.borrow()
     }
 
     /// How far each declared SubDevice is.

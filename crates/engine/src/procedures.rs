@@ -11,5 +11,6 @@ pub mod recover;
 pub mod scan;
 pub mod sdo;
 pub mod sii;
+pub mod stop;
 pub mod strangers;
 pub mod supervise;

@@ -2,27 +2,53 @@
 //!
 //! [`Application::cycle`] waits for the next cycle, judges the domains that are due, lets the application work on them,
 //! and sends. While it waits, the acyclic half gets the wire, in windows that keep off the cyclic frames.
+//!
+//! Cycles have a fixed grid in time. One that begins late is counted ([`Pace`]); those that a stall of the machine has
+//! passed over altogether are left out, so that frames are not sent in bursts to catch up.
 
 use std::time::Duration;
 
 use ringcat_engine::domain::{DomainId, DomainStatus, Freshness};
 use ringcat_engine::event::{Event, TimedEvent};
 use ringcat_engine::exchange::{CyclicCounters, Entry, Exchange};
+use ringcat_engine::info::Direction;
 use ringcat_engine::link::Link;
 use ringcat_engine::main_device::{Active, Directory, MainDevice as Engine, SubDeviceState};
 use ringcat_engine::ring::RingState;
 use ringcat_engine::ring::identity::{Class, class_of};
 use ringcat_engine::supervisor::AcyclicCounters;
 use ringcat_engine::time::Instant;
+use ringcat_wire::al::AlState;
 use ringcat_wire::frame::{BYTE_TIME_NS, MAX_FRAME, WIRE_OVERHEAD, wire_time_ns};
 
+use crate::error::Error;
 use crate::links::Links;
+use crate::main_device::MainDevice;
 
 /// Before a cycle begins, the wire is left to itself for so long: an acyclic frame that is under way then has passed
 /// the interface.
 const GUARD: Duration = Duration::from_nanos(wire_time_ns(MAX_FRAME) / 4);
+/// A cycle is late when it begins this part of its period after its time.
+const LATE_FRACTION: u32 = 10;
+/// Cycles with zeroed outputs before an orderly stop.
+const LAST_CYCLES: u32 = 3;
 /// Period of an application without domains.
 const IDLE_PERIOD: Duration = Duration::from_millis(1);
+
+/// How well the cycles keep to their grid in time. None of it is the wire's fault.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Pace {
+    /// Cycles that ran.
+    pub cycles: u64,
+    /// Cycles that began later than a tenth of the period after their time.
+    pub late: u64,
+    /// Cycles that were left out because their time and that of the next had passed.
+    pub skipped: u64,
+    /// How late the last cycle began.
+    pub last_delay: Duration,
+    /// How late the latest cycle began.
+    pub longest_delay: Duration,
+}
 
 #[derive(Debug)]
 struct Rate {
@@ -42,6 +68,7 @@ pub struct Application<L> {
     period: Duration,
     next_cycle: Instant,
     cycle: u64,
+    pace: Pace,
     /// When what was sent so far will have left the interfaces.
     wire_free: Instant,
 }
@@ -63,6 +90,7 @@ impl<L: Links> Application<L> {
             rates: periods.iter().map(rate).collect(),
             period,
             cycle: 0,
+            pace: Pace::default(),
         }
     }
 
@@ -70,6 +98,7 @@ impl<L: Links> Application<L> {
     pub fn cycle<R>(&mut self, work: impl FnOnce(&mut ProcessData<'_>) -> R) -> R {
         self.wait_for_cycle();
         let now = self.links.now();
+        self.keep_pace(now);
         for (number, rate) in self.rates.iter_mut().enumerate() {
             if self.cycle.is_multiple_of(rate.divider) {
                 rate.status = self.exchange.process(DomainId(number), now);
@@ -92,6 +121,20 @@ impl<L: Links> Application<L> {
         self.cycle += 1;
         self.next_cycle += self.period;
         result
+    }
+
+    /// Notes how late the cycle is, and leaves out those whose time has passed meanwhile.
+    fn keep_pace(&mut self, now: Instant) {
+        let delay = now.since(self.next_cycle);
+        self.pace.cycles += 1;
+        self.pace.last_delay = delay;
+        self.pace.longest_delay = self.pace.longest_delay.max(delay);
+        self.pace.late += u64::from(delay > self.period / LATE_FRACTION);
+        let passed_over = (delay.as_nanos() / self.period.as_nanos()) as u64;
+        if passed_over > 0 {
+            self.pace.skipped += passed_over;
+            self.next_cycle += Duration::from_nanos(passed_over.saturating_mul(self.period.as_nanos() as u64));
+        }
     }
 
     /// Receives and lets the acyclic half work until the cycle begins.
@@ -131,6 +174,30 @@ impl<L: Links> Application<L> {
         let free = self.wire_free.max(now) + GUARD;
         let bytes = self.next_cycle.since(free).as_nanos() / u128::from(BYTE_TIME_NS);
         usize::try_from(bytes).unwrap_or(usize::MAX).saturating_sub(WIRE_OVERHEAD)
+    }
+
+    /// An orderly stop: a few more cycles, with all outputs zero where `outputs` says so, then all SubDevices are taken
+    /// down to a state. Hands back the MainDevice, which may scan again.
+    ///
+    /// # Errors
+    /// SubDevices that do not get to the state in time, or a bus that fails.
+    pub fn stop(mut self, outputs: LastOutputs, state: AlState, limit: Duration) -> Result<MainDevice<L>, Error> {
+        for _ in 0..LAST_CYCLES {
+            self.cycle(|data| {
+                if outputs == LastOutputs::Zero {
+                    data.zero_outputs();
+                }
+            });
+        }
+        self.engine.start_stop(state, limit, self.links.now());
+        let mut main_device = MainDevice::from_parts(self.links, self.engine);
+        main_device.finish_stop()?;
+        Ok(main_device)
+    }
+
+    /// How well the cycles keep to their grid.
+    pub fn pace(&self) -> Pace {
+        self.pace
     }
 
     /// Where a PDO entry of a declared SubDevice lies.
@@ -223,6 +290,15 @@ fn send(links: &mut impl Links, wire_free: &mut Instant, now: Instant, link: Lin
     links.send(link, frame);
 }
 
+/// What outputs show at an orderly stop.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum LastOutputs {
+    /// Zero.
+    Zero,
+    /// What the application wrote last.
+    Held,
+}
+
 /// What an application works on within a cycle.
 #[derive(Debug)]
 pub struct ProcessData<'a> {
@@ -277,6 +353,17 @@ impl ProcessData<'_> {
     /// A domain's whole image, to write outputs.
     pub fn image_mut(&mut self, domain: DomainId) -> &mut [u8] {
         self.exchange.image_mut(domain)
+    }
+
+    /// Sets all outputs of all domains to zero.
+    pub fn zero_outputs(&mut self) {
+        for subdevice in 0..self.directory.subdevice_count() {
+            for area in self.directory.areas(subdevice).iter().filter(|area| area.direction == Direction::Outputs) {
+                let start = area.placed.image_offset as usize;
+                let end = start + usize::from(area.placed.area.length);
+                self.exchange.image_mut(area.domain)[start..end].fill(0);
+            }
+        }
     }
 
     /// How old a SubDevice's inputs are.

@@ -1,9 +1,10 @@
-//! What can go wrong before cycles run.
+//! What can go wrong before and after the cycles.
 
 use core::fmt;
 
 use ringcat_engine::main_device::ActivateError;
 use ringcat_engine::procedures::scan::ScanError;
+use ringcat_engine::procedures::stop::StopError;
 use ringcat_sim::segment::SegmentError;
 
 /// An error of the public API.
@@ -13,6 +14,8 @@ pub enum Error {
     Scan(ScanError),
     /// The declaration cannot be activated.
     Activate(ActivateError),
+    /// The segment could not be stopped in order.
+    Stop(StopError),
     /// The simulated segment cannot be built.
     Segment(SegmentError),
 }
@@ -22,6 +25,7 @@ impl fmt::Display for Error {
         match self {
             Error::Scan(error) => write!(f, "scan: {error}"),
             Error::Activate(error) => write!(f, "activation: {error}"),
+            Error::Stop(error) => write!(f, "stop: {error}"),
             Error::Segment(error) => error.fmt(f),
         }
     }
@@ -38,6 +42,12 @@ impl From<ScanError> for Error {
 impl From<ActivateError> for Error {
     fn from(error: ActivateError) -> Error {
         Error::Activate(error)
+    }
+}
+
+impl From<StopError> for Error {
+    fn from(error: StopError) -> Error {
+        Error::Stop(error)
     }
 }
 

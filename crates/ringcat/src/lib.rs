@@ -36,7 +36,7 @@ pub mod memory;
 pub mod simulated;
 pub mod text;
 
-pub use application::{Application, ProcessData};
+pub use application::{Application, LastOutputs, Pace, ProcessData};
 pub use error::Error;
 pub use links::Links;
 pub use main_device::{MainDevice, Options, automatic};
@@ -51,6 +51,7 @@ pub use ringcat_engine::info::{Direction, SubDeviceInfo};
 pub use ringcat_engine::link::Link;
 pub use ringcat_engine::main_device::{ActivateError, Declaration, DomainConfig, DomainMember, SubDeviceState};
 pub use ringcat_engine::procedures::scan::{Scan, ScanError};
+pub use ringcat_engine::procedures::stop::StopError;
 pub use ringcat_engine::ring::RingState;
 pub use ringcat_engine::supervisor::AcyclicCounters;
 pub use ringcat_engine::time::Instant;

@@ -110,6 +110,20 @@ impl<L: Links> MainDevice<L> {
         Ok(Application::new(self.links, self.engine, active, &periods))
     }
 
+    pub(crate) fn from_parts(links: L, engine: Engine) -> MainDevice<L> {
+        MainDevice { links, engine }
+    }
+
+    /// Waits for the end of a stop that the engine has begun.
+    pub(crate) fn finish_stop(&mut self) -> Result<(), Error> {
+        loop {
+            self.step(Instant::NEVER);
+            if let Some(result) = self.engine.stop_result() {
+                return Ok(result?);
+            }
+        }
+    }
+
     /// The links.
     pub fn links_mut(&mut self) -> &mut L {
         &mut self.links

@@ -44,6 +44,11 @@ impl Directory {
         Directory { subdevices, contributions }
     }
 
+    /// Number of declared SubDevices.
+    pub fn subdevice_count(&self) -> usize {
+        self.subdevices.len()
+    }
+
     /// What a SubDevice adds to the working counters of its domains when it takes part.
     pub fn contribution(&self, subdevice: usize) -> u32 {
         self.contributions.get(subdevice).copied().unwrap_or(0)
