@@ -273,7 +273,9 @@ impl Application {
                 self.process_data.start(layout, &self.dictionary, controller, now);
             }
         }
-        let operating = state == AlState::Op && controller.process_data_watchdog_ok();
+        // Outputs that no SyncManager watches stay valid whatever the watchdog says.
+        let alive = controller.process_data_watchdog_ok() || !self.process_data.is_watched();
+        let operating = state == AlState::Op && alive;
         if !operating && self.process_data.outputs().iter().any(|byte| *byte != 0) {
             self.process_data.make_safe(controller, now);
         }
