@@ -22,6 +22,7 @@ use super::scan::ScanError;
 use super::strangers;
 use crate::board::{RingWord, Supervision};
 use crate::event::Event;
+use crate::link::LinkSet;
 use crate::ring::RingState;
 use crate::supervisor::{Bus, BusError};
 use crate::time::Instant;
@@ -49,7 +50,10 @@ const STRANGER_PAUSE: Duration = Duration::from_millis(10);
 pub(crate) async fn supervise(bus: Bus, fleet: SharedFleet) {
     let members = fleet.access().members.len();
     let reported = Rc::new(Cell::new(RingState::Unknown));
-    bus.spawn(report_ring(bus.clone(), fleet.clone(), reported.clone()));
+    // One link is a ring of one, which is no news.
+    if bus.links() == LinkSet::Ring {
+        bus.spawn(report_ring(bus.clone(), fleet.clone(), reported.clone()));
+    }
     let mut watch = Watch {
         bus,
         fleet,
