@@ -8,7 +8,7 @@ use ringcat_sim::cable::DeviceIndex;
 use ringcat_sim::network::{Network, NetworkOptions};
 use ringcat_wire::al::{AlState, AlStatus};
 use ringcat_wire::register::map;
-use scenarios::check::{Delivery, troubles};
+use scenarios::check::{Delivery, ring_events, troubles};
 use scenarios::segments::{SIXTEEN, descriptions, line, ring_of_16};
 use scenarios::world::{CYCLE, Mark, World};
 
@@ -121,6 +121,7 @@ fn the_last_subdevice_of_a_line_comes_back_while_the_others_stay_in_op() {
     let mut world = world(4, line(descriptions(&kinds), NetworkOptions::default()));
     let incomplete = power_cycle(&mut world, DeviceIndex(3), 60, 100);
     println!("last of a line off and on: {incomplete} incomplete cycles");
+    assert_eq!(ring_events(world.events(world.beginning())), Vec::<&Event>::new(), "a line is no broken ring");
     assert!(incomplete <= EDGES, "{incomplete}");
 }
 
