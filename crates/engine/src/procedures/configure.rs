@@ -74,8 +74,10 @@ impl From<SdoError> for ConfigureError {
 pub enum Start {
     /// A scan has just put it into INIT and cleared its registers.
     Cleared,
-    /// Anything.
+    /// Anything; what it still has may be used.
     Unknown,
+    /// Anything, and what it has is of no use.
+    Doubtful,
 }
 
 /// One SubDevice's bring-up.
@@ -94,7 +96,7 @@ impl BringUp<'_> {
     pub(super) async fn run(&self, start: Start) -> Result<(), ConfigureError> {
         self.fleet.board.set_taking_part(self.index, false);
         self.fleet.set_configured(self.index, false);
-        if start == Start::Unknown {
+        if start != Start::Cleared {
             self.back_to_init().await?;
         }
         if self.target == AlState::Init {

@@ -30,7 +30,10 @@ pub(super) async fn keep_up(bus: Bus, fleet: SharedFleet, index: usize, start: S
     let mut pause = FIRST_PAUSE;
     let mut disturbed = false;
     loop {
-        match attempt(&bus, &fleet, index, start).await {
+        let result = attempt(&bus, &fleet, index, start).await;
+        // A short way that did not lead there is followed by the whole one, and that by the short one.
+        start = if start == Start::Unknown { Start::Doubtful } else { Start::Unknown };
+        match result {
             Ok(state) => {
                 fleet.set_phase(index, Phase::Settled(state));
                 bus.report(Event::StateReached { subdevice: index, state });
@@ -42,7 +45,6 @@ pub(super) async fn keep_up(bus: Bus, fleet: SharedFleet, index: usize, start: S
                     lose(&bus, &fleet, index);
                     return;
                 }
-                start = Start::Unknown;
                 // Once may be the edge of a cut, which is no matter of this SubDevice.
                 if !core::mem::replace(&mut disturbed, true) {
                     bus.sleep(LOOK_PAUSE).await;
@@ -52,7 +54,6 @@ pub(super) async fn keep_up(bus: Bus, fleet: SharedFleet, index: usize, start: S
             }
             Err(error) => bus.report(failure(index, &error)),
         }
-        start = Start::Unknown;
         bus.sleep(pause).await;
         pause = (pause * 2).min(LONGEST_PAUSE);
     }
@@ -139,7 +140,8 @@ async fn quick(bring_up: &BringUp<'_>) -> Result<bool, ConfigureError> {
         al_state::acknowledge(bus, *station, setup.emulated).await?;
     }
     let limit = timeouts.transition(AlState::SafeOp, AlState::Op);
-    Ok(al_state::request(bus, *station, AlState::Op, setup.emulated, limit).await.is_ok())
+    al_state::request(bus, *station, AlState::Op, setup.emulated, limit).await?;
+    Ok(true)
 }
 
 /// Starts the configuration of a SubDevice that answers.
