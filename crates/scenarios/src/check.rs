@@ -10,6 +10,7 @@ use ringcat_sim::cable::DeviceIndex;
 use ringcat_sim::device::Device;
 use ringcat_sim::network::Network;
 use ringcat_wire::al::{AlState, AlStatus};
+use ringcat_wire::register::map;
 
 /// What a domain delivered in one cycle.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -141,7 +142,7 @@ impl Mirror {
                     (image.get(area.in_image.clone()), inputs.get(area.in_device.clone()))
                 }
                 Direction::Outputs
-                    if !delivery.is_incomplete() && flight.operating[area.device.0] && operates(device) =>
+                    if !delivery.is_incomplete() && flight.operating[area.device.0] && uses_outputs(device) =>
                 {
                     (device.outputs().get(area.in_device.clone()), flight.image.get(area.in_image.clone()))
                 }
@@ -181,21 +182,30 @@ impl Mirror {
         if all_fresh { Delivery::WithoutAbsent } else { Delivery::Incomplete }
     }
 
+    /// Devices changed by something else than frames, while the frames have not left yet.
+    pub fn look_again(&mut self, network: &Network) {
+        for flight in self.flights.iter_mut().flatten() {
+            flight.inputs = network.devices().map(|device| device.inputs().to_vec()).collect();
+        }
+    }
+
     /// A domain's frames leave now.
     pub fn depart(&mut self, domain: DomainId, exchange: &Exchange, network: &Network) {
         let image = exchange.image(domain).to_vec();
         let inputs = network.devices().map(|device| device.inputs().to_vec()).collect();
-        let operating = network.devices().map(operates).collect();
+        let operating = network.devices().map(uses_outputs).collect();
         if let Some(flight) = self.flights.get_mut(domain.0) {
             *flight = Some(Flight { image, inputs, operating });
         }
     }
 }
 
-/// It is in OP and its application works.
-pub fn operates(device: &Device) -> bool {
+/// It uses outputs: it is in OP and its application works. One without an application stays in OP when its watchdog
+/// expires.
+pub fn uses_outputs(device: &Device) -> bool {
     let in_op = device.al_status() == AlStatus::new(AlState::Op);
-    device.controller.is_powered() && in_op && !device.application.is_hanging()
+    let alive = !device.description.emulation || device.controller.register(map::WATCHDOG_STATUS, 2)[0] & 1 != 0;
+    device.controller.is_powered() && in_op && alive && !device.application.is_hanging()
 }
 
 /// Events about the ring, in order.

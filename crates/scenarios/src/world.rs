@@ -230,7 +230,10 @@ impl World {
     /// Brings about a fault now.
     pub fn fault(&mut self, fault: Fault) {
         self.say(format!("{fault:?}"));
-        self.network_mut().apply(fault);
+        let network = self.network_mut();
+        network.apply(fault);
+        network.advance(network.now());
+        self.mirror.look_again(self.application.links().network());
     }
 
     /// Brings about a fault in a while.

@@ -1,0 +1,225 @@
+//! What goes wrong with a SubDevice, its application or the whole segment, and how it is said and mended.
+
+use std::time::Duration;
+
+use ringcat::{Declaration, Error, Event, Options, Scan, ScanError, SubDeviceState, Timeouts, automatic};
+use ringcat_sim::cable::{CableId, DeviceIndex, Endpoint, HostLink};
+use ringcat_sim::fault::Fault;
+use ringcat_sim::network::builder::SegmentBuilder;
+use ringcat_sim::network::{Network, NetworkOptions};
+use ringcat_sim::time::SimTime;
+use ringcat_wire::al::{AlState, AlStatus, AlStatusCode};
+use scenarios::check::{Delivery, ring_events, troubles};
+use scenarios::segments::{SIXTEEN, descriptions, line, ring, ring_of_16};
+use scenarios::world::{CYCLE, World};
+
+const FAST: Duration = Duration::from_micros(10);
+const LIMIT: Duration = Duration::from_secs(5);
+
+fn all_well(world: &World) -> bool {
+    world.all_in_op() && world.application().all_settled()
+}
+
+#[test]
+fn an_application_that_stands_still_for_longer_than_the_watchdog_finds_all_back_in_op() {
+    for network in [ring_of_16(FAST), line(descriptions(&SIXTEEN), NetworkOptions::default())] {
+        let mut world = World::in_op(1, network);
+        world.run_cycles(50);
+        let mark = world.mark();
+        world.stall(Duration::from_millis(150));
+        world.cycle();
+        let watched: Vec<usize> = world.left_op(mark).iter().map(|device| device.0).collect();
+        let (outputs, drives) = ([2, 6, 7, 12, 13], [4, 15]);
+        assert!(outputs.iter().chain(&drives).all(|device| watched.contains(device)), "{watched:?} fell");
+        for step in world.steps(mark) {
+            assert_eq!(
+                (step.to, step.code),
+                (AlStatus::with_error(AlState::SafeOp), AlStatusCode::SYNC_MANAGER_WATCHDOG)
+            );
+        }
+        world.until(LIMIT, "all back in OP", all_well);
+        world.run_cycles(20);
+        for subdevice in watched {
+            let fell = |event: &Event| {
+                matches!(event, Event::StateError { subdevice: who, requested: None, code, .. }
+                    if *who == subdevice && *code == AlStatusCode::SYNC_MANAGER_WATCHDOG)
+            };
+            assert!(world.saw(mark, fell), "{subdevice} is named with its code");
+        }
+        assert_eq!(world.judged(mark).last().map(|judged| judged.delivery), Some(Delivery::Complete));
+        assert_eq!(ring_events(world.events(mark)), Vec::<&Event>::new());
+    }
+}
+
+#[test]
+fn an_application_of_a_subdevice_that_hangs_in_op_costs_nobody_else_anything() {
+    let mut world = World::in_op(2, ring_of_16(FAST));
+    let mark = world.mark();
+    world.hang(DeviceIndex(4), true);
+    world.run_cycles(300);
+    world.hang(DeviceIndex(4), false);
+    world.run_cycles(50);
+    world.until(LIMIT, "all in OP", all_well);
+    let left: Vec<usize> = world.left_op(mark).iter().map(|device| device.0).collect();
+    assert!(left.iter().all(|device| *device == 4), "{left:?}");
+    assert_eq!(world.incomplete(mark), 0);
+}
+
+/// Everything as found, with short time limits.
+fn impatient(scan: &Scan) -> Declaration {
+    let short = Duration::from_millis(40);
+    let timeouts = Timeouts { preop: short, safeop_op: short, back_to_init: short, sdo: short, ..Timeouts::default() };
+    let mut declaration = automatic(&scan.subdevices, CYCLE);
+    for config in &mut declaration.subdevices {
+        *config = config.clone().timeouts(timeouts);
+    }
+    declaration
+}
+
+#[test]
+fn an_application_that_hangs_while_it_is_configured_is_named_and_configured_later() {
+    for after in [0, 1, 2, 3] {
+        let mut world = World::with(after, ring_of_16(FAST), &Options::default(), impatient).expect("activation");
+        world.run_cycles(after);
+        world.hang(DeviceIndex(3), true);
+        world.run_cycles(100);
+        assert!(matches!(world.application().states()[3], SubDeviceState::Configuring));
+        world.hang(DeviceIndex(3), false);
+        world.until(LIMIT, "all in OP", all_well);
+        let named = |event: &Event| matches!(event, Event::ConfigurationFailed { subdevice: 3, reason } if reason.contains("within 40 ms"));
+        assert!(world.saw(world.beginning(), named));
+        assert_eq!(world.left_op(world.beginning()), []);
+    }
+}
+
+#[test]
+fn a_refused_transition_is_named_with_its_code_and_tried_again() {
+    for to in [AlState::PreOp, AlState::SafeOp, AlState::Op] {
+        for (device, times) in [(2, 1), (4, 2), (13, 3)] {
+            let mut network = ring_of_16(FAST);
+            let code = AlStatusCode(0x8000 + device as u16);
+            network.apply(Fault::RefuseTransition { device: DeviceIndex(device), to, code, times });
+            let mut world = World::new(3, network);
+            world.until(LIMIT, "all in OP", all_well);
+            let refused = world.events(world.beginning()).iter().filter(|timed| {
+                matches!(timed.event, Event::StateError { subdevice, requested, code: got, .. }
+                    if subdevice == device && requested == Some(to) && got == code)
+            });
+            assert_eq!(refused.count(), times as usize, "device {device} refuses {to}");
+            assert_eq!(troubles(world.events(world.beginning())).len(), times as usize);
+            assert!(world.left_op(world.beginning()).is_empty());
+        }
+    }
+}
+
+#[test]
+fn a_subdevice_that_refuses_for_long_holds_up_nobody() {
+    let mut network = ring_of_16(FAST);
+    let code = AlStatusCode::INVALID_INPUT_MAPPING;
+    network.apply(Fault::RefuseTransition { device: DeviceIndex(3), to: AlState::SafeOp, code, times: 1_000 });
+    let mut world = World::new(4, network);
+    world.run_cycles(3_000);
+    let states = world.application().states();
+    assert_eq!(states.iter().filter(|state| **state == SubDeviceState::Settled(AlState::Op)).count(), 15);
+    // The pause between attempts grows, so that nobody is flooded with events.
+    let errors = troubles(world.events(world.beginning())).len();
+    assert!((3..12).contains(&errors), "{errors} events");
+    let last = world.judged(world.beginning()).last().expect("cycles went by");
+    assert_eq!((last.delivery, last.stale.as_slice()), (Delivery::WithoutAbsent, [3].as_slice()));
+}
+
+#[test]
+fn a_corrupt_sii_is_told_with_what_was_expected_and_what_came() {
+    // Byte 8 is that of the vendor in word 8, byte 14 the checksum (facts 4.1).
+    let mut network = ring_of_16(FAST);
+    network.apply(Fault::CorruptSii { device: DeviceIndex(2), offset: 14, mask: 0x40 });
+    network.apply(Fault::CorruptSii { device: DeviceIndex(5), offset: 16, mask: 0x80 });
+    let declare = |scan: &Scan| {
+        let mut declaration = automatic(&scan.subdevices, CYCLE);
+        declaration.subdevices[5] = declaration.subdevices[5].clone().expect_product(0x0C47, 0x03F0_0010);
+        declaration
+    };
+    let failed = World::with(5, network, &Options::default(), declare).expect_err("the vendor is another one");
+    let text = failed.to_string();
+    assert!(text.contains("expected vendor id 0x00000c47, got 0x00000cc7"), "{text}");
+}
+
+#[test]
+fn a_subdevice_with_a_wrong_checksum_in_its_sii_is_told_and_holds_up_nobody() {
+    let mut network = ring_of_16(FAST);
+    network.apply(Fault::CorruptSii { device: DeviceIndex(2), offset: 14, mask: 0x40 });
+    let mut world = World::with(6, network, &Options::default(), impatient).expect("activation");
+    world.run_cycles(200);
+    let start = world.beginning();
+    let told = |event: &Event| matches!(event, Event::SiiOddity { position, what } if position.0 == 2 && what.contains("checksum: expected"));
+    assert!(world.saw(start, told));
+    // The controller does not load such an EEPROM, and without it the application does not run (facts 4.7).
+    let named = |event: &Event| matches!(event, Event::ConfigurationFailed { subdevice: 2, reason } if reason.contains("expected PREOP"));
+    assert!(world.saw(start, named));
+    let op = AlStatus::new(AlState::Op);
+    assert!(world.network().devices().enumerate().all(|(number, device)| number == 2 || device.al_status() == op));
+}
+
+fn impatiently() -> Options {
+    Options { patience: Duration::from_millis(300), ..Options::default() }
+}
+
+fn scan_error(network: Network) -> ScanError {
+    match World::with(7, network, &impatiently(), |scan| automatic(&scan.subdevices, CYCLE)) {
+        Err(Error::Scan(error)) => error,
+        Err(other) => panic!("{other}"),
+        Ok(_) => panic!("there is nothing to scan"),
+    }
+}
+
+#[test]
+fn links_that_are_joined_without_any_subdevice_are_told_from_links_that_lead_nowhere() {
+    let (main, redundant) = (Endpoint::Host(HostLink::Main), Endpoint::Host(HostLink::Redundant));
+    let joined = SegmentBuilder::new().cable(main, redundant).build().expect("two links");
+    let error = scan_error(joined);
+    assert_eq!(error, ScanError::NoSubDevices);
+    assert_eq!(error.to_string(), "frames return, but no SubDevice processes them");
+    let nothing = SegmentBuilder::new().build().expect("nothing");
+    assert_eq!(scan_error(nothing), ScanError::NoAnswer);
+    let mut cut = ring(descriptions(&SIXTEEN), NetworkOptions::default());
+    cut.cut(CableId(0));
+    cut.cut(CableId(16));
+    let error = scan_error(cut);
+    assert_eq!(error, ScanError::NoAnswer);
+    assert!(error.to_string().contains("is the cable plugged"), "{error}");
+}
+
+#[test]
+fn a_count_that_does_not_settle_is_an_error_with_the_counts() {
+    for network in [ring_of_16(FAST), line(descriptions(&SIXTEEN), NetworkOptions::default())] {
+        let mut network = network;
+        for tick in 0..200 {
+            let device = DeviceIndex(9);
+            let fault = if tick % 2 == 0 { Fault::PowerOff(device) } else { Fault::PowerOn(device) };
+            network.schedule(SimTime::from_micros(1_000 + 3_500 * tick), fault);
+        }
+        let error = scan_error(network);
+        assert!(matches!(error, ScanError::Unsettled { .. }), "{error:?}");
+        assert!(error.to_string().starts_with("the number of SubDevices does not settle: "), "{error}");
+    }
+}
+
+#[test]
+fn a_whole_segment_that_loses_power_comes_back_by_itself() {
+    for ring in [true, false] {
+        let network = if ring { ring_of_16(FAST) } else { line(descriptions(&SIXTEEN), NetworkOptions::default()) };
+        let mut world = World::in_op(8, network);
+        for device in 0..SIXTEEN.len() {
+            world.power_off(DeviceIndex(device));
+        }
+        world.run_cycles(300);
+        for device in 0..SIXTEEN.len() {
+            world.power_on(DeviceIndex(device));
+        }
+        world.until(LIMIT, "all in OP", all_well);
+        world.run_cycles(20);
+        let last = world.judged(world.beginning()).last().map(|judged| judged.delivery);
+        assert_eq!(last, Some(Delivery::Complete));
+        assert!(!world.saw(world.beginning(), |event| matches!(event, Event::Unexpected { .. })));
+    }
+}
