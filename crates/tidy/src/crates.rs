@@ -37,9 +37,10 @@ const ROOMS: &[Room] = &[
         internal: Internal::Only(&["ringcat-wire"]),
         external: External::Only(&["serde", "toml"]),
     },
+    Room { directory: "link", internal: Internal::Only(&[]), external: External::Only(&["libc"]) },
     Room {
         directory: "ringcat",
-        internal: Internal::Only(&["ringcat-engine", "ringcat-sim", "ringcat-wire"]),
+        internal: Internal::Only(&["ringcat-engine", "ringcat-link", "ringcat-sim", "ringcat-wire"]),
         external: External::Any,
     },
     Room { directory: "scenarios", internal: Internal::Any, external: External::Any },

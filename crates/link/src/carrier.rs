@@ -1,0 +1,150 @@
+//! Whether cables are plugged in, polled in a thread of its own.
+//!
+//! In go the names of interfaces and a period; the states are read from anywhere without a system call. The question
+//! (`ETHTOOL_GLINK`) waits for a lock of the kernel, so it has no place in the cyclic thread; the kernel's own
+//! notification is not used, it is late or missing on some devices.
+
+use std::os::fd::{AsRawFd, OwnedFd};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU32, Ordering};
+use std::thread::{self, JoinHandle};
+use std::time::Duration;
+
+use crate::error::LinkError;
+use crate::{interface, kernel, realtime};
+
+/// State of a carrier and how often it has changed, shared with the watching thread.
+///
+/// Cheap to clone; reading is one atomic load.
+#[derive(Clone, Debug)]
+pub struct Carrier {
+    /// Twice the number of changes, plus 1 while there is a carrier.
+    word: Arc<AtomicU32>,
+}
+
+impl Carrier {
+    fn new(up: bool) -> Carrier {
+        Carrier { word: Arc::new(AtomicU32::new(u32::from(up))) }
+    }
+
+    /// Whether there is a carrier.
+    #[inline]
+    pub fn is_up(&self) -> bool {
+        self.word.load(Ordering::Acquire) & 1 != 0
+    }
+
+    /// How often that has changed since the watch began, modulo 2^31. Changes shorter than the period go unseen.
+    #[inline]
+    pub fn changes(&self) -> u32 {
+        self.word.load(Ordering::Acquire) >> 1
+    }
+
+    fn set(&self, up: bool) {
+        if self.is_up() != up {
+            // Flips the state and counts: only the watching thread writes.
+            let word = self.word.load(Ordering::Relaxed);
+            self.word.store(((word >> 1).wrapping_add(1) << 1) | u32::from(up), Ordering::Release);
+        }
+    }
+}
+
+/// Polls the carriers of some interfaces until it is dropped.
+#[derive(Debug)]
+pub struct CarrierWatch {
+    carriers: Vec<Carrier>,
+    stop: Option<Arc<()>>,
+    thread: Option<JoinHandle<()>>,
+}
+
+impl CarrierWatch {
+    /// A period that sees a cut cable soon and costs next to nothing.
+    pub const PERIOD: Duration = Duration::from_millis(5);
+
+    /// Starts to watch. The first states are known when this returns. An interface that vanishes has no carrier.
+    pub fn start(interfaces: &[&str], period: Duration) -> Result<CarrierWatch, LinkError> {
+        let failed = |what| move |errno| LinkError::from_errno(&interfaces.join(" and "), what, errno);
+        if let Some(missing) = interfaces.iter().find(|name| kernel::index_of(name).is_none()) {
+            return Err(LinkError::NoInterface { name: missing.to_string(), present: interface::names() });
+        }
+        let questions = kernel::question_socket().map_err(failed("opening a socket to ask for the carrier"))?;
+        let watched: Vec<(String, Carrier)> =
+            interfaces.iter().map(|name| (name.to_string(), Carrier::new(has_carrier(&questions, name)))).collect();
+        let carriers = watched.iter().map(|(_, carrier)| carrier.clone()).collect();
+        let stop = Arc::new(());
+        let running = Arc::downgrade(&stop);
+        let poll = move || {
+            realtime::leave();
+            while running.strong_count() > 0 {
+                thread::park_timeout(period);
+                for (name, carrier) in &watched {
+                    carrier.set(has_carrier(&questions, name));
+                }
+            }
+        };
+        let thread = thread::Builder::new()
+            .name("carrier-watch".to_owned())
+            .spawn(poll)
+            .map_err(|error| failed("starting a thread")(error.raw_os_error().unwrap_or(0)))?;
+        Ok(CarrierWatch { carriers, stop: Some(stop), thread: Some(thread) })
+    }
+
+    /// The carrier of the interface at this place of those that [`CarrierWatch::start`] was given.
+    ///
+    /// # Panics
+    /// Where there is no such place.
+    pub fn carrier(&self, place: usize) -> &Carrier {
+        &self.carriers[place]
+    }
+}
+
+impl Drop for CarrierWatch {
+    fn drop(&mut self) {
+        self.stop = None;
+        if let Some(thread) = self.thread.take() {
+            thread.thread().unpark();
+            // A panic over there has been printed; there is nothing to add.
+            let _ = thread.join();
+        }
+    }
+}
+
+fn has_carrier(questions: &OwnedFd, name: &str) -> bool {
+    kernel::link_up(questions.as_raw_fd(), name).unwrap_or_else(|_| running(questions, name))
+}
+
+/// What the kernel's own flags say, for drivers that do not answer `ETHTOOL_GLINK`.
+fn running(questions: &OwnedFd, name: &str) -> bool {
+    kernel::ask(questions.as_raw_fd(), name, libc::SIOCGIFFLAGS as _).is_ok_and(|answer| {
+        // SAFETY: the kernel has answered with flags.
+        let flags = libc::c_int::from(unsafe { answer.ifr_ifru.ifru_flags });
+        flags & libc::IFF_UP != 0 && flags & libc::IFF_RUNNING != 0
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_missing_interface_is_named() {
+        let error = CarrierWatch::start(&["lo", "no-such"], CarrierWatch::PERIOD).expect_err("no such interface");
+        assert!(matches!(&error, LinkError::NoInterface { name, present } if name == "no-such" && !present.is_empty()));
+    }
+
+    #[test]
+    fn changes_are_counted_once_each() {
+        let carrier = Carrier::new(true);
+        for up in [true, false, false, true] {
+            carrier.set(up);
+            assert_eq!(carrier.is_up(), up);
+        }
+        assert_eq!(carrier.changes(), 2);
+    }
+
+    #[test]
+    fn a_watch_ends_when_it_is_dropped_however_long_its_period() {
+        let watch = CarrierWatch::start(&["lo"], Duration::from_secs(3600)).expect("a watch");
+        assert_eq!(Some(watch.carrier(0).is_up()), interface::carrier("lo"));
+        drop(watch);
+    }
+}

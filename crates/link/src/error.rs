@@ -1,0 +1,120 @@
+//! Why an interface cannot be used, in words that say what to do.
+
+use std::error::Error;
+use std::fmt;
+use std::io;
+
+/// Why a link cannot be opened.
+#[derive(Clone, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum LinkError {
+    /// There is no interface of this name.
+    NoInterface {
+        /// The name that was asked for.
+        name: String,
+        /// Interfaces that are there.
+        present: Vec<String>,
+    },
+    /// This process may not open packet sockets.
+    Permission {
+        /// The interface that was to be opened.
+        name: String,
+    },
+    /// The interface carries something else than Ethernet, or is the loopback.
+    NotEthernet {
+        /// The interface.
+        name: String,
+    },
+    /// A system call failed in a way that is not one of the above.
+    Os {
+        /// The interface.
+        name: String,
+        /// What was tried.
+        what: &'static str,
+        /// The kernel's answer.
+        errno: i32,
+    },
+}
+
+impl LinkError {
+    /// What the kernel's answer to `what` on this interface means.
+    pub(crate) fn from_errno(name: &str, what: &'static str, errno: i32) -> LinkError {
+        let name = name.to_owned();
+        match errno {
+            libc::EPERM | libc::EACCES => LinkError::Permission { name },
+            errno => LinkError::Os { name, what, errno },
+        }
+    }
+}
+
+impl fmt::Display for LinkError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            LinkError::NoInterface { name, present } if present.is_empty() => {
+                write!(f, "there is no network interface {name:?}, nor any other; `ip link` shows what there is")
+            }
+            LinkError::NoInterface { name, present } => {
+                write!(f, "there is no network interface {name:?}; there are: {}", present.join(", "))
+            }
+            LinkError::Permission { name } => write!(
+                f,
+                "not permitted to send and receive raw frames on {name}; run as root or permit it once with\n  \
+                 sudo setcap cap_net_raw,cap_net_admin,cap_ipc_lock,cap_sys_nice=ep $(which ringcat)"
+            ),
+            LinkError::NotEthernet { name } => {
+                write!(f, "{name} is not an Ethernet interface; take the one that the first SubDevice is plugged into")
+            }
+            LinkError::Os { name, what, errno } => {
+                write!(f, "{name}: {what}: {}; {}", io::Error::from_raw_os_error(*errno), advice(*errno))
+            }
+        }
+    }
+}
+
+impl Error for LinkError {}
+
+fn advice(errno: i32) -> &'static str {
+    match errno {
+        libc::ENOMEM | libc::ENOBUFS => "the kernel is short of memory: free some, or ask for a smaller receive ring",
+        libc::EMFILE | libc::ENFILE => "too many files are open: raise the limit (ulimit -n) or close some",
+        libc::ENODEV | libc::ENXIO | libc::ENETDOWN => "the interface went away meanwhile: see `ip link` and try again",
+        libc::EAFNOSUPPORT | libc::ENOPROTOOPT | libc::EPROTONOSUPPORT => {
+            "this kernel lacks packet sockets with rings (CONFIG_PACKET): use another kernel"
+        }
+        _ => "unexpected: please report it with the output of `uname -r` and `ethtool -i` of the interface",
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_missing_interface_is_told_with_those_that_are_there() {
+        let present = vec!["lo".to_owned(), "eth0".to_owned()];
+        let text = LinkError::NoInterface { name: "eth9".to_owned(), present }.to_string();
+        assert_eq!(text, "there is no network interface \"eth9\"; there are: lo, eth0");
+    }
+
+    #[test]
+    fn a_missing_permission_is_told_with_the_line_that_grants_it() {
+        for errno in [libc::EPERM, libc::EACCES] {
+            let text = LinkError::from_errno("eth0", "socket", errno).to_string();
+            let line = "sudo setcap cap_net_raw,cap_net_admin,cap_ipc_lock,cap_sys_nice=ep $(which ringcat)";
+            assert!(text.contains("eth0") && text.ends_with(line), "{text}");
+        }
+    }
+
+    #[test]
+    fn other_failures_tell_interface_action_and_advice() {
+        let text = LinkError::from_errno("eth0", "mapping the receive ring", libc::ENOMEM).to_string();
+        assert!(text.starts_with("eth0: mapping the receive ring: "), "{text}");
+        assert!(text.ends_with("smaller receive ring"), "{text}");
+        assert!(LinkError::from_errno("eth0", "bind", libc::EIO).to_string().contains("uname -r"));
+    }
+
+    #[test]
+    fn an_interface_without_ethernet_is_told_so() {
+        assert!(LinkError::NotEthernet { name: "lo".to_owned() }.to_string().starts_with("lo is not an Ethernet"));
+    }
+}

@@ -1,0 +1,287 @@
+//! Who else uses an interface that EtherCAT wants for itself.
+//!
+//! In goes a name, out come [`UseWarning`]s whose text says what to do. Each is a warning: a machine may be set up so
+//! on purpose, and a test bench often is.
+
+use std::collections::HashSet;
+use std::ffi::CStr;
+use std::fmt;
+use std::fs;
+use std::net::{IpAddr, Ipv4Addr, Ipv6Addr};
+
+use super::netlink;
+use crate::filter::ETHERCAT;
+
+/// A use of the interface beside ours.
+#[derive(Clone, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum UseWarning {
+    /// The host speaks IP on it.
+    Address {
+        /// The interface.
+        interface: String,
+        /// One of its addresses.
+        address: IpAddr,
+    },
+    /// It is a member of a bridge or bond, which takes or sends frames of its own.
+    Member {
+        /// The interface.
+        interface: String,
+        /// The bridge or bond.
+        controller: String,
+        /// "bridge", "bond", ...
+        kind: String,
+    },
+    /// Another socket receives EtherCAT frames on it: another MainDevice, or another of this program.
+    Socket {
+        /// The interface.
+        interface: String,
+        /// Process and its name, where this user may know.
+        owner: Option<(u32, String)>,
+    },
+    /// The modules of a MainDevice inside the kernel are loaded.
+    KernelModule {
+        /// The module.
+        module: String,
+    },
+    /// Its MTU is too small for a whole EtherCAT frame.
+    SmallMtu {
+        /// The interface.
+        interface: String,
+        /// What it is.
+        mtu: u32,
+    },
+}
+
+impl fmt::Display for UseWarning {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            UseWarning::Address { interface, address: IpAddr::V6(address) } if address.is_unicast_link_local() => {
+                write!(
+                    f,
+                    "IPv6 is enabled on {interface} ({address}), so the host sends frames of its own into the segment; \
+                 sudo sysctl net.ipv6.conf.{interface}.disable_ipv6=1"
+                )
+            }
+            UseWarning::Address { interface, address } => write!(
+                f,
+                "{interface} has the IP address {address}, so other programs send into the segment; take an interface \
+                 for EtherCAT alone, or: sudo ip address flush dev {interface}"
+            ),
+            UseWarning::Member { interface, controller, kind } => write!(
+                f,
+                "{interface} is a member of the {kind} {controller}, which sends and takes frames of its own; \
+                 sudo ip link set {interface} nomaster"
+            ),
+            UseWarning::Socket { interface, owner: Some((process, name)) } => write!(
+                f,
+                "process {process} ({name}) receives EtherCAT frames on {interface} already; stop it if it is another \
+                 MainDevice: two that do not know of each other disturb the segment"
+            ),
+            UseWarning::Socket { interface, owner: None } => write!(
+                f,
+                "another program receives EtherCAT frames on {interface} already (sudo ss -0p shows which); stop it if \
+                 it is another MainDevice: two that do not know of each other disturb the segment"
+            ),
+            UseWarning::KernelModule { module } => write!(
+                f,
+                "the kernel module {module} of another EtherCAT MainDevice is loaded and may use the interface; stop \
+                 that MainDevice: sudo systemctl stop ethercat"
+            ),
+            UseWarning::SmallMtu { interface, mtu } => write!(
+                f,
+                "the MTU of {interface} is {mtu}, too small for whole EtherCAT frames; \
+                 sudo ip link set {interface} mtu 1500"
+            ),
+        }
+    }
+}
+
+/// Who else uses this interface. Nothing about an interface that is not there.
+pub fn exclusive_use(name: &str) -> Vec<UseWarning> {
+    let Some(interface) = super::list().into_iter().find(|interface| interface.name == name) else {
+        return Vec::new();
+    };
+    let mut warnings: Vec<UseWarning> = addresses(name)
+        .into_iter()
+        .map(|address| UseWarning::Address { interface: name.to_owned(), address })
+        .collect();
+    warnings.extend(member(name, interface.index));
+    warnings.extend(sockets(name, interface.index));
+    warnings.extend(kernel_modules(&read("/proc/modules")).map(|module| UseWarning::KernelModule { module }));
+    if interface.mtu < 1500 {
+        warnings.push(UseWarning::SmallMtu { interface: name.to_owned(), mtu: interface.mtu });
+    }
+    warnings
+}
+
+fn read(path: &str) -> String {
+    fs::read_to_string(path).unwrap_or_default()
+}
+
+fn addresses(name: &str) -> Vec<IpAddr> {
+    let mut found = Vec::new();
+    let mut list: *mut libc::ifaddrs = std::ptr::null_mut();
+    // SAFETY: the pointer is to a live place for the list.
+    if unsafe { libc::getifaddrs(&mut list) } != 0 {
+        return found;
+    }
+    let mut at = list;
+    while !at.is_null() {
+        // SAFETY: an entry of the list that getifaddrs returned and nobody has freed yet.
+        let entry = unsafe { &*at };
+        // SAFETY: names in the list are strings with their end.
+        if unsafe { CStr::from_ptr(entry.ifa_name) }.to_bytes() == name.as_bytes() {
+            found.extend(address(entry.ifa_addr));
+        }
+        at = entry.ifa_next;
+    }
+    // SAFETY: the list is freed once, after its last use.
+    unsafe { libc::freeifaddrs(list) };
+    found
+}
+
+fn address(address: *const libc::sockaddr) -> Option<IpAddr> {
+    if address.is_null() {
+        return None;
+    }
+    // SAFETY: getifaddrs gives addresses of the size that their family says, aligned for any of them.
+    unsafe {
+        match libc::c_int::from((*address).sa_family) {
+            libc::AF_INET => {
+                let v4 = &*address.cast::<libc::sockaddr_in>();
+                Some(IpAddr::V4(Ipv4Addr::from(u32::from_be(v4.sin_addr.s_addr))))
+            }
+            libc::AF_INET6 => {
+                let v6 = &*address.cast::<libc::sockaddr_in6>();
+                Some(IpAddr::V6(Ipv6Addr::from(v6.sin6_addr.s6_addr)))
+            }
+            _ => None,
+        }
+    }
+}
+
+fn member(name: &str, index: u32) -> Option<UseWarning> {
+    let controller = netlink::membership(index)?.controller?;
+    let kind = netlink::membership(controller).map(|m| m.kind).filter(|kind| !kind.is_empty());
+    let controller_name = super::list().into_iter().find(|i| i.index == controller).map(|i| i.name);
+    Some(UseWarning::Member {
+        interface: name.to_owned(),
+        controller: controller_name.unwrap_or_else(|| format!("with index {controller}")),
+        kind: kind.unwrap_or_else(|| "interface".to_owned()),
+    })
+}
+
+/// Packet sockets for EtherCAT on this interface that are not of this process, one warning per process.
+fn sockets(name: &str, index: u32) -> Vec<UseWarning> {
+    let inodes = bound_inodes(&read("/proc/thread-self/net/packet"), index);
+    if inodes.is_empty() {
+        return Vec::new();
+    }
+    let own: HashSet<u64> = socket_inodes("self").collect();
+    let mut owners: Vec<Option<(u32, String)>> = Vec::new();
+    for inode in inodes.into_iter().filter(|inode| !own.contains(inode)) {
+        let owner = owner(inode);
+        if !owners.contains(&owner) {
+            owners.push(owner);
+        }
+    }
+    owners.into_iter().map(|owner| UseWarning::Socket { interface: name.to_owned(), owner }).collect()
+}
+
+/// Inodes of the sockets in the kernel's table that are bound to EtherCAT and this interface.
+fn bound_inodes(table: &str, index: u32) -> Vec<u64> {
+    let inode = |line: &str| {
+        let columns: Vec<&str> = line.split_whitespace().collect();
+        let protocol = u16::from_str_radix(columns.get(3)?, 16).ok()?;
+        let interface: u32 = columns.get(4)?.parse().ok()?;
+        let inode = columns.get(8)?.parse().ok()?;
+        (protocol == ETHERCAT && interface == index).then_some(inode)
+    };
+    table.lines().skip(1).filter_map(inode).collect()
+}
+
+/// The process that has this socket open, as far as this user may look.
+fn owner(inode: u64) -> Option<(u32, String)> {
+    for entry in fs::read_dir("/proc").ok()?.flatten() {
+        let name = entry.file_name().to_string_lossy().into_owned();
+        let Ok(process) = name.parse() else { continue };
+        if socket_inodes(&name).any(|of_process| of_process == inode) {
+            return Some((process, read(&format!("/proc/{name}/comm")).trim_end().to_owned()));
+        }
+    }
+    None
+}
+
+/// Inodes of the sockets that a process has open.
+fn socket_inodes(process: &str) -> impl Iterator<Item = u64> + use<> {
+    let entries = fs::read_dir(format!("/proc/{process}/fd")).into_iter().flatten().flatten();
+    entries.filter_map(|entry| {
+        let target = fs::read_link(entry.path()).ok()?;
+        target.to_str()?.strip_prefix("socket:[")?.strip_suffix(']')?.parse().ok()
+    })
+}
+
+/// Modules of EtherCAT MainDevices among the loaded ones.
+fn kernel_modules(table: &str) -> impl Iterator<Item = String> + use<'_> {
+    let name = |line: &'_ str| line.split_whitespace().next().map(str::to_owned);
+    table.lines().filter_map(name).filter(|name| name == "ec_master")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn sockets_for_ethercat_on_the_interface_are_found_in_the_kernels_table() {
+        let table = "sk               RefCnt Type Proto  Iface R Rmem   User   Inode\n\
+                     0000000000000000 3      3    88a4   4     1 0      0      111\n\
+                     0000000000000000 3      3    88a4   5     1 0      0      222\n\
+                     0000000000000000 3      3    0003   4     1 0      0      333\n\
+                     0000000000000000 3      3    88a4   4     1 0      0      444\n\
+                     short line\n";
+        assert_eq!(bound_inodes(table, 4), [111, 444]);
+        assert!(bound_inodes("", 4).is_empty());
+    }
+
+    #[test]
+    fn a_maindevice_inside_the_kernel_is_found_by_its_module() {
+        let table = "ec_generic 16384 0 - Live 0x0\nec_master 512000 1 ec_generic, Live 0x0\nveth 4096 0 - Live 0x0\n";
+        assert_eq!(kernel_modules(table).collect::<Vec<_>>(), ["ec_master"]);
+    }
+
+    #[test]
+    fn the_loopback_has_an_address_unless_it_is_down() {
+        let lo = crate::interface::list().into_iter().find(|i| i.name == "lo").expect("an interface lo");
+        let expected = UseWarning::Address { interface: "lo".to_owned(), address: Ipv4Addr::LOCALHOST.into() };
+        assert_eq!(exclusive_use("lo").contains(&expected), lo.up);
+        assert!(exclusive_use("no-such").is_empty());
+    }
+
+    #[test]
+    fn each_warning_says_what_to_do() {
+        let interface = "eth1".to_owned();
+        let address = |address: &str| UseWarning::Address {
+            interface: interface.clone(),
+            address: address.parse().expect("an address"),
+        };
+        let member = |kind: &str| UseWarning::Member {
+            interface: interface.clone(),
+            controller: "br0".to_owned(),
+            kind: kind.to_owned(),
+        };
+        let socket = |owner| UseWarning::Socket { interface: interface.clone(), owner };
+        let cases = [
+            (address("192.168.1.2"), "sudo ip address flush dev eth1"),
+            (address("fe80::1"), "sudo sysctl net.ipv6.conf.eth1.disable_ipv6=1"),
+            (member("bridge"), "sudo ip link set eth1 nomaster"),
+            (socket(None), "sudo ss -0p"),
+            (socket(Some((77, "other".to_owned()))), "process 77 (other)"),
+            (UseWarning::KernelModule { module: "ec_master".to_owned() }, "sudo systemctl stop ethercat"),
+            (UseWarning::SmallMtu { interface: interface.clone(), mtu: 576 }, "sudo ip link set eth1 mtu 1500"),
+        ];
+        for (warning, advice) in cases {
+            assert!(warning.to_string().contains(advice), "{warning}");
+        }
+    }
+}

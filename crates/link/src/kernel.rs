@@ -1,0 +1,165 @@
+//! What the kernel's headers say and the `libc` crate does not, and the plain system calls under the other modules.
+//!
+//! Constants and layouts are those of `linux/if_packet.h` and `linux/ethtool.h`.
+
+use std::ffi::CString;
+use std::io;
+use std::mem::{size_of, zeroed};
+use std::os::fd::{AsRawFd, FromRawFd, OwnedFd, RawFd};
+
+pub const PACKET_ADD_MEMBERSHIP: libc::c_int = 1;
+pub const PACKET_RX_RING: libc::c_int = 5;
+pub const PACKET_STATISTICS: libc::c_int = 6;
+pub const PACKET_VERSION: libc::c_int = 10;
+pub const PACKET_IGNORE_OUTGOING: libc::c_int = 23;
+pub const TPACKET_V2: libc::c_int = 1;
+pub const PACKET_MR_MULTICAST: libc::c_ushort = 0;
+pub const PACKET_MR_PROMISC: libc::c_ushort = 1;
+pub const PACKET_OUTGOING: u8 = 4;
+pub const TP_STATUS_KERNEL: u32 = 0;
+pub const TP_STATUS_USER: u32 = 1;
+pub const TP_STATUS_VLAN_VALID: u32 = 1 << 4;
+pub const TP_STATUS_VLAN_TPID_VALID: u32 = 1 << 6;
+const ETHTOOL_GLINK: u32 = 0x0a;
+
+/// How a receive ring is laid out.
+#[repr(C)]
+pub struct RingRequest {
+    pub block_size: libc::c_uint,
+    pub block_count: libc::c_uint,
+    pub frame_size: libc::c_uint,
+    pub frame_count: libc::c_uint,
+}
+
+/// What stands in front of each frame in the ring (`tpacket2_hdr`).
+#[repr(C)]
+pub struct FrameHeader {
+    pub status: u32,
+    pub length: u32,
+    pub captured_length: u32,
+    pub mac_offset: u16,
+    pub network_offset: u16,
+    pub seconds: u32,
+    pub nanoseconds: u32,
+    pub vlan_tci: u16,
+    pub vlan_tpid: u16,
+    pub padding: [u8; 4],
+}
+
+/// Which frames an interface is to let through (`packet_mreq`).
+#[repr(C)]
+pub struct Membership {
+    pub interface: libc::c_int,
+    pub kind: libc::c_ushort,
+    pub address_length: libc::c_ushort,
+    pub address: [u8; 8],
+}
+
+/// Counters of a packet socket, cleared by reading (`tpacket_stats`).
+#[repr(C)]
+#[derive(Default)]
+pub struct Statistics {
+    pub packets: libc::c_uint,
+    pub drops: libc::c_uint,
+}
+
+#[repr(C)]
+struct EthtoolValue {
+    command: u32,
+    data: u32,
+}
+
+/// The kernel's last answer to this thread.
+pub fn errno() -> i32 {
+    io::Error::last_os_error().raw_os_error().unwrap_or(0)
+}
+
+/// A socket, closed on exec.
+pub fn socket(domain: libc::c_int, kind: libc::c_int, protocol: libc::c_int) -> Result<OwnedFd, i32> {
+    // SAFETY: no pointers are passed.
+    let fd = unsafe { libc::socket(domain, kind | libc::SOCK_CLOEXEC, protocol) };
+    if fd < 0 {
+        return Err(errno());
+    }
+    // SAFETY: the descriptor was just made and nobody else owns it.
+    Ok(unsafe { OwnedFd::from_raw_fd(fd) })
+}
+
+/// Sets a socket option. `T` has to be what the option wants.
+pub fn set_option<T>(fd: RawFd, level: libc::c_int, option: libc::c_int, value: &T) -> Result<(), i32> {
+    let pointer = std::ptr::from_ref(value).cast();
+    // SAFETY: pointer and length describe a live value that the kernel only reads.
+    let result = unsafe { libc::setsockopt(fd, level, option, pointer, size_of::<T>() as libc::socklen_t) };
+    if result == 0 { Ok(()) } else { Err(errno()) }
+}
+
+/// Reads a socket option into `value`, which stays as it is where the kernel refuses.
+pub fn option<T: Copy + Plain>(fd: RawFd, level: libc::c_int, option: libc::c_int, mut value: T) -> T {
+    let mut length = size_of::<T>() as libc::socklen_t;
+    // SAFETY: pointer and length describe a live value for which any bytes are valid (`Plain`).
+    unsafe { libc::getsockopt(fd, level, option, std::ptr::from_mut(&mut value).cast(), &mut length) };
+    value
+}
+
+/// Types for which any bytes are a value.
+///
+/// # Safety
+/// Only for integers and structs of them.
+pub unsafe trait Plain {}
+// SAFETY: an integer.
+unsafe impl Plain for libc::c_int {}
+// SAFETY: two integers.
+unsafe impl Plain for Statistics {}
+
+impl Clone for Statistics {
+    fn clone(&self) -> Self {
+        *self
+    }
+}
+impl Copy for Statistics {}
+
+/// Asks for something of an interface by name (`SIOCGIF...`); a name that cannot be one is answered with `ENODEV`.
+pub fn ask(fd: RawFd, name: &str, request: libc::c_ulong) -> Result<libc::ifreq, i32> {
+    let mut ifreq = named(name)?;
+    // SAFETY: the pointer is to a live ifreq, which all requests passed here read and fill.
+    if unsafe { libc::ioctl(fd, request as _, &mut ifreq) } < 0 { Err(errno()) } else { Ok(ifreq) }
+}
+
+/// Whether the interface has a carrier (`ETHTOOL_GLINK`); an interface that is down has none.
+pub fn link_up(fd: RawFd, name: &str) -> Result<bool, i32> {
+    let mut value = EthtoolValue { command: ETHTOOL_GLINK, data: 0 };
+    let mut ifreq = named(name)?;
+    ifreq.ifr_ifru.ifru_data = std::ptr::from_mut(&mut value).cast();
+    // SAFETY: the ifreq and the value it points to live across the call; the kernel writes one integer of the value.
+    if unsafe { libc::ioctl(fd, libc::SIOCETHTOOL as _, &mut ifreq) } < 0 { Err(errno()) } else { Ok(value.data != 0) }
+}
+
+fn named(name: &str) -> Result<libc::ifreq, i32> {
+    // SAFETY: all bytes zero is a valid ifreq.
+    let mut ifreq: libc::ifreq = unsafe { zeroed() };
+    if name.is_empty() || name.len() >= ifreq.ifr_name.len() || name.contains('\0') {
+        return Err(libc::ENODEV);
+    }
+    for (to, from) in ifreq.ifr_name.iter_mut().zip(name.bytes()) {
+        *to = from as libc::c_char;
+    }
+    Ok(ifreq)
+}
+
+/// The index of an interface, if there is one of this name.
+pub fn index_of(name: &str) -> Option<u32> {
+    let name = CString::new(name).ok()?;
+    // SAFETY: the pointer is to a live string with its end.
+    let index = unsafe { libc::if_nametoindex(name.as_ptr()) };
+    (index != 0).then_some(index)
+}
+
+/// A socket to ask the kernel about interfaces with; anybody may open it.
+pub fn question_socket() -> Result<OwnedFd, i32> {
+    socket(libc::AF_INET, libc::SOCK_DGRAM, 0)
+}
+
+/// Takes a pending error off a socket.
+pub fn clear_error(fd: &impl AsRawFd) {
+    option::<libc::c_int>(fd.as_raw_fd(), libc::SOL_SOCKET, libc::SO_ERROR, 0);
+}

@@ -1,0 +1,31 @@
+//! Everything of RingCAT that talks to the Linux kernel about network interfaces and time.
+//!
+//! * [`packet_socket`]: frames in and out of an interface: `AF_PACKET` with a memory-mapped receive ring;
+//! * [`filter`]: which frames the kernel puts into that ring;
+//! * [`waiting`]: sleeping or spinning until a frame or a moment comes;
+//! * [`interface`], [`carrier`]: what interfaces there are, who else uses them, whether a cable is plugged in;
+//! * [`monotonic`], [`realtime`]: the host's clock, scheduling, memory locking, processor latency;
+//! * [`pcapng`]: captures that Wireshark reads.
+//!
+//! Frames go in and out as bytes without FCS. Of EtherCAT only the EtherType and the class bit of the first datagram's
+//! Idx are known here. `docs/links.md` tells how another back end is written and what the kernel wants to be granted.
+//! `unsafe` is allowed in this crate, each block says why it is sound.
+#![deny(unsafe_op_in_unsafe_fn)]
+
+pub mod carrier;
+mod error;
+pub mod filter;
+pub mod interface;
+mod kernel;
+pub mod monotonic;
+pub mod packet_socket;
+pub mod pcapng;
+pub mod realtime;
+mod ring;
+pub mod waiting;
+
+pub use carrier::{Carrier, CarrierWatch};
+pub use error::LinkError;
+pub use filter::ClassFilter;
+pub use packet_socket::{LinkCounters, PacketOptions, PacketSocket};
+pub use waiting::{ReceiveMode, wait};

@@ -1,0 +1,213 @@
+//! Frames in and out of a network interface: `AF_PACKET` with a memory-mapped receive ring.
+//!
+//! In go the name of an interface and [`PacketOptions`]; frames are sent with one system call each and received from
+//! the ring with none. One socket serves one thread; a MainDevice opens two per interface, one for each of its classes
+//! of frames ([`ClassFilter`]). Only EtherType 0x88A4 is received, never what this host sent itself.
+
+use std::cell::Cell;
+use std::mem::{size_of, zeroed};
+use std::os::fd::{AsRawFd, OwnedFd, RawFd};
+
+use crate::error::LinkError;
+use crate::filter::{self, ClassFilter};
+use crate::interface;
+use crate::kernel::{self, Membership, Statistics};
+use crate::ring::{self, Ring, Taken};
+use crate::waiting::ReceiveMode;
+
+/// The group that EtherCAT frames may be sent to instead of broadcast.
+pub const GROUP_ADDRESS: [u8; 6] = [0x01, 0x01, 0x05, 0x01, 0x00, 0x00];
+
+/// How a socket is opened.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct PacketOptions {
+    /// Which frames it receives.
+    pub filter: ClassFilter,
+    /// How its owner means to wait; see [`PacketSocket::mode`].
+    pub receive: ReceiveMode,
+    /// Slots of the receive ring: at least two, at most 16,384; 2 KiB each. Frames that find it full are lost.
+    pub ring_frames: u32,
+    /// Whether the interface takes all frames. Without, it takes broadcast, its own address and [`GROUP_ADDRESS`].
+    pub promiscuous: bool,
+}
+
+impl Default for PacketOptions {
+    /// All EtherCAT frames, 256 slots, promiscuous.
+    fn default() -> Self {
+        PacketOptions { filter: ClassFilter::All, receive: ReceiveMode::default(), ring_frames: 256, promiscuous: true }
+    }
+}
+
+/// What a socket has seen.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct LinkCounters {
+    /// Frames that the kernel took for sending.
+    pub sent: u64,
+    /// Frames handed out.
+    pub received: u64,
+    /// Frames not sent because the interface was down or gone.
+    pub down: u64,
+    /// Frames not sent because the kernel's queue was full.
+    pub busy: u64,
+    /// Frames not sent for another reason, such as a length beyond the MTU.
+    pub refused: u64,
+    /// Frames received and lost because the ring was full.
+    pub overrun: u64,
+    /// Frames received that are longer than a slot of the ring.
+    pub truncated: u64,
+}
+
+/// A packet socket with its ring.
+#[derive(Debug)]
+pub struct PacketSocket {
+    // Before the descriptor, so that it is unmapped first.
+    ring: Ring,
+    fd: OwnedFd,
+    interface: String,
+    mac: [u8; 6],
+    mode: ReceiveMode,
+    counters: LinkCounters,
+    overrun: Cell<u64>,
+}
+
+impl PacketSocket {
+    /// Opens a socket on an interface, which may be down and come up later.
+    pub fn open(interface: &str, options: &PacketOptions) -> Result<PacketSocket, LinkError> {
+        let (index, mac) = ethernet(interface)?;
+        let failed = |what| move |errno| LinkError::from_errno(interface, what, errno);
+        // Protocol 0 receives nothing until the filter is in place and the interface chosen.
+        let fd = kernel::socket(libc::AF_PACKET, libc::SOCK_RAW, 0).map_err(failed("opening a packet socket"))?;
+        let raw = fd.as_raw_fd();
+        let set = |option, value: libc::c_int| kernel::set_option(raw, libc::SOL_PACKET, option, &value);
+        set(kernel::PACKET_VERSION, kernel::TPACKET_V2).map_err(failed("choosing the ring's version"))?;
+        // Before Linux 4.20 the ring leaves them out, at more cost.
+        let _ = set(kernel::PACKET_IGNORE_OUTGOING, 1);
+        attach_filter(raw, options.filter).map_err(failed("attaching the filter"))?;
+        let layout = ring::layout(options.ring_frames);
+        kernel::set_option(raw, libc::SOL_PACKET, kernel::PACKET_RX_RING, &layout)
+            .map_err(failed("making the receive ring"))?;
+        let ring = Ring::map(raw, &layout).map_err(failed("mapping the receive ring"))?;
+        bind(raw, index).map_err(failed("binding to the interface"))?;
+        join(raw, index, options.promiscuous).map_err(failed("joining the EtherCAT group"))?;
+        // An interface that is down leaves an error behind that the first send would return.
+        kernel::clear_error(&fd);
+        let (interface, mode) = (interface.to_owned(), options.receive);
+        Ok(PacketSocket { ring, fd, interface, mac, mode, counters: LinkCounters::default(), overrun: Cell::new(0) })
+    }
+
+    /// Address of the interface.
+    pub fn mac(&self) -> [u8; 6] {
+        self.mac
+    }
+
+    /// Name of the interface.
+    pub fn interface(&self) -> &str {
+        &self.interface
+    }
+
+    /// How its owner means to wait, to be passed to [`crate::wait`].
+    pub fn mode(&self) -> ReceiveMode {
+        self.mode
+    }
+
+    /// Sends a frame, without FCS: one system call. False where the interface is down or gone or the queue is full;
+    /// the next frame is tried all the same, so an interface that comes back is used at once.
+    pub fn send(&mut self, frame: &[u8]) -> bool {
+        let mut result = self.send_once(frame);
+        if result == Err(libc::ENETDOWN) {
+            // It may be an error kept from when the interface went down, while it is up again by now.
+            kernel::clear_error(&self.fd);
+            result = self.send_once(frame);
+        }
+        match result {
+            Ok(()) => self.counters.sent += 1,
+            Err(libc::ENETDOWN | libc::ENXIO | libc::ENODEV) => self.counters.down += 1,
+            Err(libc::ENOBUFS | libc::EAGAIN | libc::ENOMEM) => self.counters.busy += 1,
+            Err(_) => self.counters.refused += 1,
+        }
+        result.is_ok()
+    }
+
+    fn send_once(&self, frame: &[u8]) -> Result<(), i32> {
+        // SAFETY: pointer and length describe the live frame, which the kernel only reads.
+        let sent = unsafe { libc::send(self.fd(), frame.as_ptr().cast(), frame.len(), libc::MSG_DONTWAIT) };
+        if sent < 0 { Err(kernel::errno()) } else { Ok(()) }
+    }
+
+    /// Hands the oldest frame that has arrived to `take`, with its VLAN tag if it came with one; false where there is
+    /// none. No system call.
+    #[inline]
+    pub fn receive(&mut self, take: &mut dyn FnMut(&[u8])) -> bool {
+        loop {
+            match self.ring.take(take) {
+                Taken::Frame => {
+                    self.counters.received += 1;
+                    return true;
+                }
+                Taken::Nothing => return false,
+                Taken::Truncated => self.counters.truncated += 1,
+                Taken::Outgoing => {}
+            }
+        }
+    }
+
+    /// Whether a frame waits in the ring. No system call.
+    #[inline]
+    pub fn has_frame(&self) -> bool {
+        self.ring.has_frame()
+    }
+
+    /// What this socket has seen. One system call.
+    pub fn counters(&self) -> LinkCounters {
+        let since = kernel::option(self.fd(), libc::SOL_PACKET, kernel::PACKET_STATISTICS, Statistics::default()).drops;
+        self.overrun.set(self.overrun.get() + u64::from(since));
+        LinkCounters { overrun: self.overrun.get(), ..self.counters }
+    }
+
+    /// The descriptor, readable while frames wait.
+    pub fn fd(&self) -> RawFd {
+        self.fd.as_raw_fd()
+    }
+}
+
+/// Index and address of an Ethernet interface.
+fn ethernet(name: &str) -> Result<(libc::c_int, [u8; 6]), LinkError> {
+    let missing = || LinkError::NoInterface { name: name.to_owned(), present: interface::names() };
+    let index = kernel::index_of(name).ok_or_else(missing)?;
+    let questions = kernel::question_socket().map_err(|errno| LinkError::from_errno(name, "asking for it", errno))?;
+    let answer = kernel::ask(questions.as_raw_fd(), name, libc::SIOCGIFHWADDR as _).map_err(|_| missing())?;
+    // SAFETY: the kernel has answered with a hardware address.
+    let address = unsafe { answer.ifr_ifru.ifru_hwaddr };
+    if address.sa_family != libc::ARPHRD_ETHER {
+        return Err(LinkError::NotEthernet { name: name.to_owned() });
+    }
+    Ok((index as libc::c_int, std::array::from_fn(|i| address.sa_data[i] as u8)))
+}
+
+fn attach_filter(fd: RawFd, class: ClassFilter) -> Result<(), i32> {
+    let mut program = filter::program(class);
+    let attached = libc::sock_fprog { len: program.len() as libc::c_ushort, filter: program.as_mut_ptr() };
+    kernel::set_option(fd, libc::SOL_SOCKET, libc::SO_ATTACH_FILTER, &attached)
+}
+
+fn bind(fd: RawFd, index: libc::c_int) -> Result<(), i32> {
+    // SAFETY: all bytes zero is a valid sockaddr_ll.
+    let mut address: libc::sockaddr_ll = unsafe { zeroed() };
+    address.sll_family = libc::AF_PACKET as libc::c_ushort;
+    address.sll_protocol = filter::ETHERCAT.to_be();
+    address.sll_ifindex = index;
+    let length = size_of::<libc::sockaddr_ll>() as libc::socklen_t;
+    // SAFETY: pointer and length describe a live address.
+    if unsafe { libc::bind(fd, std::ptr::from_ref(&address).cast(), length) } < 0 {
+        return Err(kernel::errno());
+    }
+    Ok(())
+}
+
+fn join(fd: RawFd, interface: libc::c_int, promiscuous: bool) -> Result<(), i32> {
+    let mut address = [0; 8];
+    address[..6].copy_from_slice(&GROUP_ADDRESS);
+    let kind = if promiscuous { kernel::PACKET_MR_PROMISC } else { kernel::PACKET_MR_MULTICAST };
+    let membership = Membership { interface, kind, address_length: 6, address };
+    kernel::set_option(fd, libc::SOL_PACKET, kernel::PACKET_ADD_MEMBERSHIP, &membership)
+}

@@ -1,0 +1,141 @@
+//! Captures that Wireshark reads, from several interfaces in one file (pcapng, draft-ietf-opsawg-pcapng).
+//!
+//! In go frames with interface, direction and time, out come bytes: one section header, one description per interface
+//! with its name and nanosecond time stamps, one enhanced packet block per frame. Little-endian throughout.
+
+use std::io::{self, Write};
+
+const SECTION_HEADER: u32 = 0x0A0D_0D0A;
+const INTERFACE_DESCRIPTION: u32 = 1;
+const ENHANCED_PACKET: u32 = 6;
+const BYTE_ORDER_MAGIC: u32 = 0x1A2B_3C4D;
+const LINK_TYPE_ETHERNET: u16 = 1;
+
+const OPTION_END: u16 = 0;
+const SECTION_APPLICATION: u16 = 4;
+const INTERFACE_NAME: u16 = 2;
+const INTERFACE_TEXT: u16 = 3;
+const INTERFACE_RESOLUTION: u16 = 9;
+const PACKET_FLAGS: u16 = 2;
+
+/// Time stamps count 10^-9 s.
+const NANOSECONDS: u8 = 9;
+
+/// Which way a frame went, seen from this host.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Direction {
+    /// Received.
+    In,
+    /// Sent.
+    Out,
+}
+
+impl Direction {
+    fn flags(self) -> u32 {
+        match self {
+            Direction::In => 1,
+            Direction::Out => 2,
+        }
+    }
+}
+
+/// Writes one capture. Each call writes whole blocks and goes straight to `W`: wrap a file in a `BufWriter`.
+#[derive(Debug)]
+pub struct Writer<W: Write> {
+    out: W,
+    interfaces: usize,
+    block: Vec<u8>,
+}
+
+impl<W: Write> Writer<W> {
+    /// Begins a capture of interfaces with these names and descriptions.
+    pub fn new(out: W, interfaces: &[(&str, &str)]) -> io::Result<Writer<W>> {
+        let mut writer = Writer { out, interfaces: interfaces.len(), block: Vec::with_capacity(2048) };
+        writer.begin(SECTION_HEADER);
+        writer.put(&BYTE_ORDER_MAGIC.to_le_bytes());
+        writer.put(&[1, 0, 0, 0]);
+        // The section's length is not known in advance.
+        writer.put(&u64::MAX.to_le_bytes());
+        writer.option(SECTION_APPLICATION, b"RingCAT");
+        writer.option(OPTION_END, &[]);
+        writer.end()?;
+        for (name, description) in interfaces {
+            writer.begin(INTERFACE_DESCRIPTION);
+            writer.put(&LINK_TYPE_ETHERNET.to_le_bytes());
+            writer.put(&[0; 2]);
+            // No limit to the captured length.
+            writer.put(&[0; 4]);
+            writer.option(INTERFACE_NAME, name.as_bytes());
+            if !description.is_empty() {
+                writer.option(INTERFACE_TEXT, description.as_bytes());
+            }
+            writer.option(INTERFACE_RESOLUTION, &[NANOSECONDS]);
+            writer.option(OPTION_END, &[]);
+            writer.end()?;
+        }
+        Ok(writer)
+    }
+
+    /// Adds a frame of the interface at this place of those that [`Writer::new`] was given, with the time since 1970.
+    pub fn frame(&mut self, interface: usize, direction: Direction, unix_time_ns: u64, frame: &[u8]) -> io::Result<()> {
+        let length = u32::try_from(frame.len()).map_err(|_| io::Error::from(io::ErrorKind::InvalidInput))?;
+        if interface >= self.interfaces {
+            return Err(io::Error::new(io::ErrorKind::InvalidInput, "the capture has no such interface"));
+        }
+        self.begin(ENHANCED_PACKET);
+        self.put(&(interface as u32).to_le_bytes());
+        self.put(&((unix_time_ns >> 32) as u32).to_le_bytes());
+        self.put(&(unix_time_ns as u32).to_le_bytes());
+        self.put(&length.to_le_bytes());
+        self.put(&length.to_le_bytes());
+        self.put(frame);
+        self.pad();
+        self.option(PACKET_FLAGS, &direction.flags().to_le_bytes());
+        self.option(OPTION_END, &[]);
+        self.end()
+    }
+
+    /// Hands what is buffered below on to where it belongs.
+    pub fn flush(&mut self) -> io::Result<()> {
+        self.out.flush()
+    }
+
+    /// What was written to.
+    pub fn into_inner(self) -> W {
+        self.out
+    }
+
+    fn begin(&mut self, kind: u32) {
+        self.block.clear();
+        self.put(&kind.to_le_bytes());
+        // The length, filled in at the end.
+        self.put(&[0; 4]);
+    }
+
+    fn put(&mut self, bytes: &[u8]) {
+        self.block.extend_from_slice(bytes);
+    }
+
+    fn pad(&mut self) {
+        self.block.resize(self.block.len().next_multiple_of(4), 0);
+    }
+
+    /// Texts beyond what an option can hold are cut.
+    fn option(&mut self, code: u16, value: &[u8]) {
+        let length = value.len().min(usize::from(u16::MAX));
+        self.put(&code.to_le_bytes());
+        self.put(&(length as u16).to_le_bytes());
+        self.put(&value[..length]);
+        self.pad();
+    }
+
+    fn end(&mut self) -> io::Result<()> {
+        let length = (self.block.len() as u32 + 4).to_le_bytes();
+        self.block[4..8].copy_from_slice(&length);
+        self.put(&length);
+        self.out.write_all(&self.block)
+    }
+}
+
+#[cfg(test)]
+mod tests;

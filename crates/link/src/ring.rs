@@ -1,0 +1,206 @@
+//! The receive ring that the kernel writes frames into (TPACKET_V2).
+//!
+//! In go nothing but the kernel's writes, out come the frames in the order of their arrival, each handed out in place.
+//! A slot belongs to the kernel or to us, as its status word says; nothing else is shared.
+
+use std::io;
+use std::mem::size_of;
+use std::ptr::NonNull;
+use std::sync::atomic::{AtomicU32, Ordering};
+
+use crate::filter::VLAN;
+use crate::kernel::{
+    FrameHeader, PACKET_OUTGOING, RingRequest, TP_STATUS_KERNEL, TP_STATUS_USER, TP_STATUS_VLAN_TPID_VALID,
+    TP_STATUS_VLAN_VALID,
+};
+
+/// Bytes of a slot: header, address of the sender, gap, and a frame of up to 1,982 bytes.
+const SLOT: usize = 2048;
+/// Where `sll_pkttype` of the `sockaddr_ll` behind the header is.
+const PACKET_TYPE: usize = size_of::<FrameHeader>() + 10;
+/// What stands before the frame: header and `sockaddr_ll`.
+const HEAD: usize = size_of::<FrameHeader>() + size_of::<libc::sockaddr_ll>();
+/// More slots than this are a mistake: 32 MiB.
+const MAX_SLOTS: u32 = 16_384;
+
+/// What became of the slot at the head of the ring.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Taken {
+    /// Its frame was handed out.
+    Frame,
+    /// Its frame was one that this host sent.
+    Outgoing,
+    /// Its frame is longer than a slot.
+    Truncated,
+    /// There is no frame.
+    Nothing,
+}
+
+/// The mapped ring.
+#[derive(Debug)]
+pub struct Ring {
+    base: NonNull<u8>,
+    slots: usize,
+    head: usize,
+}
+
+// SAFETY: the mapping belongs to this value alone; nothing about it is bound to a thread.
+unsafe impl Send for Ring {}
+
+/// The layout for at least `frames` slots.
+pub fn layout(frames: u32) -> RingRequest {
+    // SAFETY: no pointers are passed.
+    let page = unsafe { libc::sysconf(libc::_SC_PAGESIZE) };
+    // A block is one page, so that its memory is always found; slots do not cross pages.
+    let page = usize::try_from(page).unwrap_or(0).max(SLOT);
+    let per_block = (page / SLOT) as u32;
+    let blocks = frames.clamp(per_block, MAX_SLOTS).div_ceil(per_block);
+    RingRequest {
+        block_size: page as libc::c_uint,
+        block_count: blocks,
+        frame_size: SLOT as libc::c_uint,
+        frame_count: blocks * per_block,
+    }
+}
+
+impl Ring {
+    /// Maps the ring of a socket that was made with this layout.
+    pub fn map(fd: libc::c_int, layout: &RingRequest) -> Result<Ring, i32> {
+        let slots = layout.frame_count as usize;
+        let (access, flags) = (libc::PROT_READ | libc::PROT_WRITE, libc::MAP_SHARED | libc::MAP_POPULATE);
+        // SAFETY: the kernel chooses the place; nothing that exists is mapped over.
+        let base = unsafe { libc::mmap(std::ptr::null_mut(), slots * SLOT, access, flags, fd, 0) };
+        if base == libc::MAP_FAILED {
+            return Err(io::Error::last_os_error().raw_os_error().unwrap_or(0));
+        }
+        NonNull::new(base.cast()).map(|base| Ring { base, slots, head: 0 }).ok_or(libc::ENOMEM)
+    }
+
+    /// Whether a frame waits.
+    #[inline]
+    pub fn has_frame(&self) -> bool {
+        self.status().load(Ordering::Acquire) & TP_STATUS_USER != 0
+    }
+
+    /// Hands the oldest frame to `take` and gives its slot back to the kernel.
+    #[inline]
+    pub fn take(&mut self, take: &mut dyn FnMut(&[u8])) -> Taken {
+        let status = self.status().load(Ordering::Acquire);
+        if status & TP_STATUS_USER == 0 {
+            return Taken::Nothing;
+        }
+        // SAFETY: the status says that the slot is ours until it is given back, which needs `&mut self` again; the
+        // slot lies within the mapping, and bytes have no invalid values.
+        let slot = unsafe { std::slice::from_raw_parts_mut(self.slot().as_ptr(), SLOT) };
+        let taken = hand_out(status, slot, take);
+        self.status().store(TP_STATUS_KERNEL, Ordering::Release);
+        self.head = if self.head + 1 == self.slots { 0 } else { self.head + 1 };
+        taken
+    }
+
+    fn slot(&self) -> NonNull<u8> {
+        // SAFETY: the head is below the number of slots that are mapped.
+        unsafe { self.base.add(self.head * SLOT) }
+    }
+
+    fn status(&self) -> &AtomicU32 {
+        // SAFETY: the status is the first word of the aligned slot and lives as long as the mapping. Our own slice over
+        // the slot in `take` is not used any more when this is called after it.
+        unsafe { AtomicU32::from_ptr(self.slot().as_ptr().cast()) }
+    }
+}
+
+impl Drop for Ring {
+    fn drop(&mut self) {
+        // SAFETY: this is the mapping made in `map`; no reference into it outlives `self`.
+        unsafe { libc::munmap(self.base.as_ptr().cast(), self.slots * SLOT) };
+    }
+}
+
+/// Hands out the frame of a slot that is ours, with its VLAN tag put back if the kernel took it off.
+fn hand_out(status: u32, slot: &mut [u8], take: &mut dyn FnMut(&[u8])) -> Taken {
+    let u16_at = |at: usize| u16::from_ne_bytes([slot[at], slot[at + 1]]);
+    let u32_at = |at: usize| u32::from_ne_bytes([slot[at], slot[at + 1], slot[at + 2], slot[at + 3]]);
+    let (length, captured, start) = (u32_at(4), u32_at(8) as usize, usize::from(u16_at(12)));
+    let (tci, tpid) = (u16_at(24), u16_at(26));
+    if slot[PACKET_TYPE] == PACKET_OUTGOING {
+        return Taken::Outgoing;
+    }
+    if captured != length as usize || start < HEAD + 4 || start + captured > slot.len() || captured < 14 {
+        return Taken::Truncated;
+    }
+    if status & TP_STATUS_VLAN_VALID == 0 {
+        take(&slot[start..start + captured]);
+        return Taken::Frame;
+    }
+    // The addresses move into the gap before them, the tag goes behind them.
+    let tpid = if status & TP_STATUS_VLAN_TPID_VALID == 0 { VLAN } else { tpid };
+    slot.copy_within(start..start + 12, start - 4);
+    slot[start + 8..start + 10].copy_from_slice(&tpid.to_be_bytes());
+    slot[start + 10..start + 12].copy_from_slice(&tci.to_be_bytes());
+    take(&slot[start - 4..start + captured]);
+    Taken::Frame
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn slot(frame: &[u8], tci: u16, packet_type: u8) -> Vec<u8> {
+        let mut slot = vec![0; SLOT];
+        slot[4..8].copy_from_slice(&(frame.len() as u32).to_ne_bytes());
+        slot[8..12].copy_from_slice(&(frame.len() as u32).to_ne_bytes());
+        slot[12..14].copy_from_slice(&66u16.to_ne_bytes());
+        slot[24..26].copy_from_slice(&tci.to_ne_bytes());
+        slot[PACKET_TYPE] = packet_type;
+        slot[66..66 + frame.len()].copy_from_slice(frame);
+        slot
+    }
+
+    fn handed(status: u32, mut slot: Vec<u8>) -> (Taken, Vec<u8>) {
+        let mut frame = Vec::new();
+        let taken = hand_out(status, &mut slot, &mut |bytes| frame.extend_from_slice(bytes));
+        (taken, frame)
+    }
+
+    const FRAME: [u8; 18] = [1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 0x88, 0xa4, 0x02, 0x10, 0x07, 0x01];
+
+    #[test]
+    fn a_frame_is_handed_out_as_it_came() {
+        assert_eq!(handed(TP_STATUS_USER, slot(&FRAME, 0, 0)), (Taken::Frame, FRAME.to_vec()));
+    }
+
+    #[test]
+    fn a_tag_that_the_kernel_took_off_is_put_back() {
+        let mut expected = FRAME.to_vec();
+        expected.splice(12..12, [0x81, 0x00, 0xe0, 0x05]);
+        let status = TP_STATUS_USER | TP_STATUS_VLAN_VALID;
+        assert_eq!(handed(status, slot(&FRAME, 0xe005, 0)), (Taken::Frame, expected));
+    }
+
+    #[test]
+    fn frames_that_this_host_sent_are_left_out() {
+        assert_eq!(handed(TP_STATUS_USER, slot(&FRAME, 0, PACKET_OUTGOING)), (Taken::Outgoing, Vec::new()));
+    }
+
+    #[test]
+    fn a_frame_that_does_not_fit_a_slot_or_is_none_is_not_handed_out() {
+        let mut long = slot(&FRAME, 0, 0);
+        long[4..8].copy_from_slice(&9000u32.to_ne_bytes());
+        assert_eq!(handed(TP_STATUS_USER, long).0, Taken::Truncated);
+        let mut far = slot(&FRAME, 0, 0);
+        far[12..14].copy_from_slice(&u16::MAX.to_ne_bytes());
+        assert_eq!(handed(TP_STATUS_USER, far).0, Taken::Truncated);
+        assert_eq!(handed(TP_STATUS_USER, slot(&FRAME[..10], 0, 0)).0, Taken::Truncated);
+    }
+
+    #[test]
+    fn a_ring_has_at_least_the_slots_asked_for_and_a_bound() {
+        for frames in [0, 1, 3, 64, 65] {
+            let layout = layout(frames);
+            assert!(layout.frame_count >= frames.max(2));
+            assert_eq!(layout.block_size * layout.block_count, layout.frame_size * layout.frame_count);
+        }
+        assert_eq!(layout(u32::MAX).frame_count, MAX_SLOTS);
+    }
+}
