@@ -89,7 +89,7 @@ static REGIONS: [Region; 69] = [
     ecat(map::AL_CONTROL, 2),
     pdi(map::AL_STATUS, 2),
     pdi(map::AL_STATUS_CODE, 2),
-    pdi(map::RUN_LED, 2),
+    both(map::RUN_LED, 2),
     fixed(map::PDI_CONTROL, 2),
     fixed(map::PDI_INFORMATION, 2),
     fixed(map::PDI_CONFIGURATION, 4),

@@ -2,6 +2,7 @@
 
 use super::*;
 use ringcat_wire::al::{AlState, AlStatus, AlStatusCode};
+use ringcat_wire::register::RegisterGroup;
 
 #[test]
 fn information_registers_show_the_configuration_facts_3_1() {
@@ -9,6 +10,17 @@ fn information_registers_show_the_configuration_facts_3_1() {
     assert_eq!(bench.read(0x0000, 10).0, [0x11, 0, 2, 0, 8, 8, 8, 0xFF, 0xFC, 0x00]);
     assert_eq!(bench.read(0x0100, 4).0, [0x01, 0x00, 0x07, 0x00]);
     assert_eq!((bench.read(0x0120, 2).0, bench.read(0x0130, 2).0), (vec![1, 0], vec![1, 0]));
+}
+
+#[test]
+fn ethercat_may_write_what_the_register_table_says_facts_3() {
+    for info in ringcat_wire::register::table().iter().filter(|info| info.group != RegisterGroup::Mii) {
+        let config = ControllerConfig { receive_time_latch_mode: true, ..config() };
+        let mut bench = Bench::with(config);
+        let data = vec![0; usize::from(info.size).min(64)];
+        let wkc = bench.write(info.address.0, &data);
+        assert_eq!(wkc == 1, info.ecat.writes(), "{} {}", info.name, info.address);
+    }
 }
 
 #[test]
