@@ -168,8 +168,9 @@ fn header(description: &DeviceDescription, size_bytes: usize) -> SiiHeader {
 }
 
 fn general<'a>(description: &'a DeviceDescription, strings: &mut StringTable<'a>) -> General {
-    let group = strings.number(&description.group);
+    // String 1 is the order code, as in real images: some MainDevices take it for the name without asking this category.
     let order = strings.number(&description.order_code);
+    let group = strings.number(&description.group);
     let mut flags = 0;
     if description.mailbox.is_some() {
         flags |= GeneralFlags::MAILBOX_DATA_LINK_LAYER;

@@ -19,6 +19,15 @@ fn the_image_of_a_coupler_has_these_bytes_in_front() {
 }
 
 #[test]
+fn the_first_string_is_the_order_code() {
+    let image = build(&catalogue::by_name("servo").unwrap());
+    let sii = Sii::parse(&image).unwrap();
+    let general = sii.general().unwrap();
+    assert_eq!((general.order, sii.strings().string(1)), (1, Some("servo".as_bytes())));
+    assert_eq!(sii.strings().string(general.group), Some("Drives".as_bytes()));
+}
+
+#[test]
 fn a_real_image_is_kept_byte_for_byte() {
     let image = build(&catalogue::by_name("servo").unwrap());
     let description = DeviceDescription::from_sii(image.clone(), "copy").unwrap();
