@@ -146,6 +146,7 @@ fn settings(entry: &DeviceEntry, description: &mut DeviceDescription) -> Result<
         (&entry.to_preop_ms, "to_preop_ms", &mut times.to_preop),
         (&entry.to_safeop_ms, "to_safeop_ms", &mut times.to_safeop),
         (&entry.to_op_ms, "to_op_ms", &mut times.to_op),
+        (&entry.back_ms, "back_ms", &mut times.back),
     ] {
         *target = time(value, key, 1e-3)?.unwrap_or(*target);
     }

@@ -56,6 +56,7 @@ pub(super) struct DeviceEntry {
     pub(super) to_preop_ms: Option<Spanned<f64>>,
     pub(super) to_safeop_ms: Option<Spanned<f64>>,
     pub(super) to_op_ms: Option<Spanned<f64>>,
+    pub(super) back_ms: Option<Spanned<f64>>,
     pub(super) attach: Option<Spanned<String>>,
     pub(super) port: Option<Spanned<usize>>,
     pub(super) cable_ns: Option<u64>,

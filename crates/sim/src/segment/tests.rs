@@ -117,14 +117,15 @@ fn the_settings_of_a_device_reach_its_description() {
         sii_busy_us = 0.5
         transition_ms = 5
         to_op_ms = 7.5
+        back_ms = 0.25
         "#;
     let device = read(text).unwrap().devices.remove(0);
     assert_eq!((device.alias, device.identity.serial, device.clock_drift_ppb), (0x1234, 77, -12_500));
     assert_eq!((device.clock_start_ns, device.eight_byte_sii, device.sii_busy.as_nanos()), (5, false, 500));
     let times = device.transitions;
     assert_eq!(
-        (times.to_init.as_micros(), times.to_safeop.as_micros(), times.to_op.as_micros()),
-        (5_000, 5_000, 7_500)
+        [times.to_init, times.to_safeop, times.to_op, times.back].map(|time| time.as_micros()),
+        [5_000, 5_000, 7_500, 250]
     );
 }
 
