@@ -64,11 +64,15 @@ impl Controller {
         true
     }
 
-    /// Sets the C bit in every datagram; `false` where one had it already (facts 2.4).
+    /// Sets the C bit in every datagram; `false` where one had it already or there is none to set (facts 2.4).
     fn mark_circulating(&mut self, frame: &mut SimFrame) -> bool {
         let SimFrame { bytes, datagrams, .. } = frame;
         let field = |place: &DatagramPlace| usize::from(place.header) + LENGTH_HIGH;
         let circulates = |place| bytes.get(field(place)).is_some_and(|high| high & CIRCULATING_HIGH != 0);
+        if datagrams.is_empty() {
+            // What is left of a cut frame; it is counted already.
+            return false;
+        }
         if datagrams.iter().any(circulates) {
             self.memory.count(map::EPU_ERROR_COUNTER);
             return false;

@@ -264,3 +264,17 @@ fn without_power_frames_end_and_links_are_gone() {
     assert_eq!(pass(&mut bench, Port::A), Passage::Destroyed);
     assert_eq!(bench.register::<2>(0x0110)[0] & 0xF0, 0);
 }
+
+#[test]
+fn a_remnant_that_can_carry_no_c_bit_ends_where_port_0_has_closed_facts_2_4() {
+    // A cable was cut while the frame passed; in a loop of controllers the remnant would travel for ever.
+    let mut bench = with_links(&[Port::B, Port::D]);
+    let mut frame = bench.frame(&[(Command::Brd, 0, 0, &[0])]);
+    frame.truncate(20);
+    assert_eq!(bench.receive(&mut frame, Port::B), Passage::Destroyed);
+    assert_eq!(bench.register(0x030C), [1]);
+    let mut bench = with_links(&[Port::A, Port::B]);
+    let mut frame = bench.frame(&[(Command::Brd, 0, 0, &[0])]);
+    frame.truncate(20);
+    assert_eq!(bench.receive(&mut frame, Port::A), leaves(Port::B, true));
+}
