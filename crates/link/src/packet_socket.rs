@@ -29,12 +29,22 @@ pub struct PacketOptions {
     pub ring_frames: u32,
     /// Whether the interface takes all frames. Without, it takes broadcast, its own address and [`GROUP_ADDRESS`].
     pub promiscuous: bool,
+    /// Whether frames that came with a VLAN tag are handed out with it. Without, they come as if they had had none: the
+    /// kernel takes the tag off and forgets it before it looks for sockets of one EtherType. With, the socket sees all
+    /// frames before that, and each EtherCAT frame counts as dropped in the statistics of the interface.
+    pub keep_vlan_tags: bool,
 }
 
 impl Default for PacketOptions {
-    /// All EtherCAT frames, 256 slots, promiscuous.
+    /// All EtherCAT frames, asleep while there are none, 256 slots, promiscuous, VLAN tags left out.
     fn default() -> Self {
-        PacketOptions { filter: ClassFilter::All, receive: ReceiveMode::default(), ring_frames: 256, promiscuous: true }
+        PacketOptions {
+            filter: ClassFilter::All,
+            receive: ReceiveMode::default(),
+            ring_frames: 256,
+            promiscuous: true,
+            keep_vlan_tags: false,
+        }
     }
 }
 
@@ -87,7 +97,8 @@ impl PacketSocket {
         kernel::set_option(raw, libc::SOL_PACKET, kernel::PACKET_RX_RING, &layout)
             .map_err(failed("making the receive ring"))?;
         let ring = Ring::map(raw, &layout).map_err(failed("mapping the receive ring"))?;
-        bind(raw, index).map_err(failed("binding to the interface"))?;
+        let protocol = if options.keep_vlan_tags { libc::ETH_P_ALL as u16 } else { filter::ETHERCAT };
+        bind(raw, index, protocol).map_err(failed("binding to the interface"))?;
         join(raw, index, options.promiscuous).map_err(failed("joining the EtherCAT group"))?;
         // An interface that is down leaves an error behind that the first send would return.
         kernel::clear_error(&fd);
@@ -134,8 +145,7 @@ impl PacketSocket {
         if sent < 0 { Err(kernel::errno()) } else { Ok(()) }
     }
 
-    /// Hands the oldest frame that has arrived to `take`, with its VLAN tag if it came with one; false where there is
-    /// none. No system call.
+    /// Hands the oldest frame that has arrived to `take`, false where there is none. No system call.
     #[inline]
     pub fn receive(&mut self, take: &mut dyn FnMut(&[u8])) -> bool {
         loop {
@@ -190,11 +200,11 @@ fn attach_filter(fd: RawFd, class: ClassFilter) -> Result<(), i32> {
     kernel::set_option(fd, libc::SOL_SOCKET, libc::SO_ATTACH_FILTER, &attached)
 }
 
-fn bind(fd: RawFd, index: libc::c_int) -> Result<(), i32> {
+fn bind(fd: RawFd, index: libc::c_int, protocol: u16) -> Result<(), i32> {
     // SAFETY: all bytes zero is a valid sockaddr_ll.
     let mut address: libc::sockaddr_ll = unsafe { zeroed() };
     address.sll_family = libc::AF_PACKET as libc::c_ushort;
-    address.sll_protocol = filter::ETHERCAT.to_be();
+    address.sll_protocol = protocol.to_be();
     address.sll_ifindex = index;
     let length = size_of::<libc::sockaddr_ll>() as libc::socklen_t;
     // SAFETY: pointer and length describe a live address.
