@@ -63,6 +63,8 @@ pub struct Board {
     /// One bit per SubDevice: takes part in process data.
     taking_part: Vec<AtomicU64>,
     taking_part_changes: AtomicU32,
+    /// SubDevices that may be missing without a domain being incomplete.
+    optional: Vec<bool>,
 }
 
 impl Board {
@@ -75,7 +77,20 @@ impl Board {
             cycles: AtomicU64::new(0),
             taking_part: (0..subdevices.div_ceil(64)).map(|_| AtomicU64::new(0)).collect(),
             taking_part_changes: AtomicU32::new(0),
+            optional: Vec::new(),
         }
+    }
+
+    /// Says which SubDevices may be missing without a domain being incomplete.
+    #[must_use]
+    pub fn with_optional(mut self, optional: Vec<bool>) -> Board {
+        self.optional = optional;
+        self
+    }
+
+    /// Whether a SubDevice may be missing without a domain being incomplete.
+    pub fn is_optional(&self, subdevice: usize) -> bool {
+        self.optional.get(subdevice).copied().unwrap_or(false)
     }
 
     pub(crate) fn post_supervision(&self, supervision: Supervision) {

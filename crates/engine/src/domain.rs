@@ -23,7 +23,7 @@ pub struct DomainStatus {
     pub wkc: u32,
     /// The sum with all SubDevices.
     pub expected: u32,
-    /// The judgement.
+    /// The judgement: every datagram by its own working counter; SubDevices declared optional may be missing.
     pub state: DomainState,
     /// Frames are still out and not overdue: the other fields are those of the last judgement.
     pub pending: bool,

@@ -147,6 +147,13 @@ pub enum Event {
         /// What and why.
         reason: String,
     },
+    /// Something in a declaration that the SubDevice may not follow.
+    PlanOddity {
+        /// Index in the declaration.
+        subdevice: usize,
+        /// What.
+        what: String,
+    },
     /// A SubDevice that was not declared answers.
     Unexpected {
         /// Where.

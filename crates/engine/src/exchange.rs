@@ -146,9 +146,10 @@ impl Exchange {
         }
         let Some(domain) = self.domains.get_mut(id.0) else { return DomainStatus::default() };
         let frames = &mut self.frames[domain.frames()];
-        let (mut wkc, mut waiting) = (0, false);
+        let (mut wkc, mut waiting, mut complete) = (0, false, true);
         for frame in &*frames {
             waiting |= frame.is_waiting();
+            complete &= frame.is_complete();
             wkc += frame.wkc();
         }
         let pending = waiting && give_up_overdue(frames, domain.image_mut(), now, self.cycle, &mut self.counters);
@@ -156,7 +157,7 @@ impl Exchange {
             return domain.status(pending);
         }
         let before = domain.state();
-        let status = domain.judge(wkc, self.cycle);
+        let status = domain.judge(wkc, complete, self.cycle);
         if status.state != DomainState::Complete {
             self.counters.incomplete += 1;
         }
@@ -220,7 +221,7 @@ impl Exchange {
     fn follow_board(&mut self) {
         self.taking_part_changes = self.board.taking_part_changes();
         for frame in &mut self.frames {
-            frame.recount(|subdevice| self.board.takes_part(subdevice));
+            frame.recount(|s| self.board.takes_part(s), |s| self.board.is_optional(s));
         }
         for domain in &mut self.domains {
             let frames = &self.frames[domain.frames()];

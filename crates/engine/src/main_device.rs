@@ -10,7 +10,7 @@ mod declaration;
 use alloc::rc::Rc;
 use alloc::sync::Arc;
 use alloc::vec::Vec;
-use core::cell::RefCell;
+use core::cell::{Cell, RefCell};
 use core::future::Future;
 use core::time::Duration;
 
@@ -39,7 +39,7 @@ use crate::queue::{Consumer, queue};
 use crate::ring::Identity;
 use crate::supervisor::{AcyclicCounters, Bus, Received, Supervisor};
 use crate::time::Instant;
-use declaration::{domain_specs, match_declaration, members, plan_all};
+use declaration::{check, domain_specs, match_declaration, members, plan_all, report_oddities, with_domain};
 
 /// Messages of the exchange that may wait until somebody fetches events.
 const CYCLIC_EVENTS: usize = 1024;
@@ -104,6 +104,7 @@ pub struct MainDevice {
     identity: Identity,
     cache: SiiCache,
     scan: ScanSlot,
+    scanning: Rc<Cell<bool>>,
     stopped: StopSlot,
     fleet: Option<SharedFleet>,
     cyclic_events: Option<Consumer>,
@@ -118,6 +119,7 @@ impl MainDevice {
             identity,
             cache: SiiCache::new(options.sii_cache),
             scan: ScanSlot::default(),
+            scanning: Rc::default(),
             stopped: StopSlot::default(),
             fleet: None,
             cyclic_events: None,
@@ -130,8 +132,11 @@ impl MainDevice {
         if self.fleet.is_some() {
             return Err(ActivateError::Active);
         }
+        if self.scanning.replace(true) {
+            return Err(ActivateError::Scanning);
+        }
         *self.scan.borrow_mut() = None;
-        let (bus, slot) = (self.supervisor.bus(), self.scan.clone());
+        let (bus, slot, scanning) = (self.supervisor.bus(), self.scan.clone(), self.scanning.clone());
         let options =
             ScanOptions { settle: self.options.settle, patience: self.options.patience, cache: self.cache.clone() };
         self.supervisor.spawn(async move {
@@ -140,6 +145,7 @@ impl MainDevice {
                 bus.report(Event::ScanFailed { reason: alloc::string::ToString::to_string(error) });
             }
             *slot.borrow_mut() = Some(result);
+            scanning.set(false);
         });
         Ok(())
     }
@@ -166,7 +172,9 @@ impl MainDevice {
             Some(Ok(scan)) => scan.clone(),
             Some(Err(_)) | None => return Err(ActivateError::NoScan),
         };
+        check(&declaration)?;
         let bus = self.supervisor.bus();
+        let declaration = with_domain(declaration);
         let (found, strangers) = match_declaration(&bus, &declaration, &scan)?;
         let plans = plan_all(&declaration, &found)?;
         let specs = domain_specs(&declaration, &plans)?;
@@ -174,7 +182,9 @@ impl MainDevice {
             Layout::new(&specs, self.options.links(), self.options.supervision).map_err(ActivateError::Layout)?;
         let members = members(declaration, found, &layout)?;
         let directory = Directory::new(&plans, &layout);
-        let board = Arc::new(Board::new(members.len()));
+        report_oddities(&bus, &members);
+        let optional = members.iter().map(|member| member.config.optional).collect();
+        let board = Arc::new(Board::new(members.len()).with_optional(optional));
         let (producer, consumer) = queue(CYCLIC_EVENTS);
         let exchange = Exchange::new(self.identity, self.options.links(), &layout, board.clone(), producer);
         let fleet = Fleet { members, strangers, layout, topology: scan.topology, cache: self.cache.clone() };
@@ -186,13 +196,15 @@ impl MainDevice {
         }
         self.fleet = Some(fleet);
         self.cyclic_events = Some(consumer);
-        Ok(Active { exchange, directory })
+        let periods = specs.iter().map(|spec| spec.period).collect();
+        Ok(Active { exchange, directory, periods })
     }
 
     /// Ends supervision and all other procedures, and takes all SubDevices down to a state. The exchange must not send
     /// any more. Afterwards a new scan may start.
     pub fn start_stop(&mut self, state: AlState, limit: Duration, now: Instant) {
         self.supervisor = Supervisor::new(self.identity, self.options.links(), now);
+        self.scanning.set(false);
         self.fleet = None;
         self.cyclic_events = None;
         *self.stopped.borrow_mut() = None;
@@ -206,6 +218,11 @@ impl MainDevice {
     /// The result of [`MainDevice::start_stop`], once it has ended.
     pub fn stop_result(&self) -> Option<Result<(), StopError>> {
         *self.stopped.borrow()
+    }
+
+    /// Events that nobody fetched in time and that were dropped, of both halves.
+    pub fn events_dropped(&self) -> u64 {
+        self.supervisor.events_dropped() + self.cyclic_events.as_ref().map_or(0, Consumer::dropped)
     }
 
     /// How far each declared SubDevice is.
@@ -302,4 +319,6 @@ pub struct Active {
     pub exchange: Exchange,
     /// Where PDO entries lie.
     pub directory: Directory,
+    /// Periods of the domains. There is at least one domain, if only for supervision.
+    pub periods: Vec<Duration>,
 }

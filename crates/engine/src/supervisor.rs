@@ -122,6 +122,11 @@ impl Supervisor {
         self.shared.borrow_mut().events.pop()
     }
 
+    /// Events that were dropped because nobody fetched them.
+    pub fn events_dropped(&self) -> u64 {
+        self.shared.borrow().events.dropped()
+    }
+
     /// The state of the ring as the acyclic frames show it.
     pub fn ring(&self) -> RingState {
         self.shared.borrow().monitor.state()

@@ -103,11 +103,13 @@ impl<L: Links> MainDevice<L> {
     /// Lays out process data, starts the configuration of all SubDevices, and hands out the running application.
     ///
     /// # Errors
-    /// A declaration that does not fit what was scanned, or process data that does not fit frames.
-    pub fn activate(mut self, declaration: Declaration) -> Result<Application<L>, Error> {
-        let periods: Vec<Duration> = declaration.domains.iter().map(|domain| domain.period).collect();
-        let active = self.engine.activate(declaration)?;
-        Ok(Application::new(self.links, self.engine, active, &periods))
+    /// A declaration that does not fit what was scanned, or process data that does not fit frames. The MainDevice comes
+    /// back with the error, for another try.
+    pub fn activate(mut self, declaration: Declaration) -> Result<Application<L>, Box<Refused<L>>> {
+        match self.engine.activate(declaration) {
+            Ok(active) => Ok(Application::new(self.links, self.engine, active)),
+            Err(error) => Err(Box::new(Refused { error: error.into(), main_device: self })),
+        }
     }
 
     pub(crate) fn from_parts(links: L, engine: Engine) -> MainDevice<L> {
@@ -127,6 +129,21 @@ impl<L: Links> MainDevice<L> {
     /// The links.
     pub fn links_mut(&mut self) -> &mut L {
         &mut self.links
+    }
+}
+
+/// A declaration that was not activated.
+#[derive(Debug)]
+pub struct Refused<L> {
+    /// Why.
+    pub error: Error,
+    /// The MainDevice as it was.
+    pub main_device: MainDevice<L>,
+}
+
+impl<L> From<Box<Refused<L>>> for Error {
+    fn from(refused: Box<Refused<L>>) -> Error {
+        refused.error
     }
 }
 

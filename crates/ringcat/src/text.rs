@@ -62,6 +62,7 @@ pub fn describe(event: &Event, names: &Names) -> String {
         Event::StateError { subdevice, requested: None, status, code } => {
             format!("{}: is in {status}: {code}", names.of(*subdevice))
         }
+        Event::PlanOddity { subdevice, what } => format!("{}: {what}", names.of(*subdevice)),
         Event::Lost { subdevice } => format!("{}: no longer answers", names.of(*subdevice)),
         Event::Returned { subdevice } => format!("{}: answers again", names.of(*subdevice)),
         Event::ConfigurationFailed { subdevice, reason } => {

@@ -100,12 +100,13 @@ impl Domain {
         DomainStatus { pending, ..self.status }
     }
 
-    /// Judges the sum of all working counters of the flights since the last judgement.
-    pub(crate) fn judge(&mut self, wkc: u32, cycle: u64) -> DomainStatus {
-        let state = match wkc {
-            0 if self.expected > 0 => DomainState::Zero,
-            wkc if wkc == self.expected => DomainState::Complete,
-            _ => DomainState::Incomplete,
+    /// Judges the flights since the last judgement: the sum of their working counters, and whether each datagram had
+    /// just what it should.
+    pub(crate) fn judge(&mut self, wkc: u32, complete: bool, cycle: u64) -> DomainStatus {
+        let state = match (wkc, complete) {
+            (0, _) if self.expected > 0 => DomainState::Zero,
+            (_, true) => DomainState::Complete,
+            (_, false) => DomainState::Incomplete,
         };
         self.status = DomainStatus { wkc, expected: self.expected, state, ..self.status };
         self.queued = false;

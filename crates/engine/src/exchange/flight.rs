@@ -58,6 +58,8 @@ struct Place {
     expected: Wkc,
     /// Working counter with those that take part now.
     expected_part: Wkc,
+    /// All others are optional: their part is enough.
+    part_suffices: bool,
     outputs: Span,
     inputs: Span,
     contributions: Box<[(usize, Wkc)]>,
@@ -102,6 +104,8 @@ pub(crate) struct CyclicFrame {
     deadline: Instant,
     /// Sum of the working counters of process data over the copies received so far.
     wkc: u32,
+    /// Every process data datagram has just what it should.
+    complete: bool,
     seen: Supervision,
     /// Offset of the supervision datagram's header.
     supervision_at: Option<usize>,
@@ -144,6 +148,7 @@ impl CyclicFrame {
             arrivals: Arrivals::default(),
             deadline: Instant::NEVER,
             wkc: 0,
+            complete: false,
             seen: Supervision::default(),
             supervision_at,
             headers: headers_at.into_iter().map(|at| Header { at, sent: header_at(&buffer, at) }).collect(),
@@ -182,6 +187,12 @@ impl CyclicFrame {
         self.wkc
     }
 
+    /// Whether every process data datagram of the flight has just the working counter it should have: a sum over
+    /// datagrams could hide one that is short behind one that is over.
+    pub(crate) fn is_complete(&self) -> bool {
+        self.complete
+    }
+
     /// What the supervision datagram of this flight saw, if it has one and anything came back.
     pub(crate) fn supervision(&self) -> Option<Supervision> {
         (self.supervision_at.is_some() && self.arrivals.arrived != 0).then_some(self.seen)
@@ -194,6 +205,7 @@ impl CyclicFrame {
             place.wkc = Wkc(0);
         }
         self.wkc = 0;
+        self.complete = self.places.is_empty();
         self.arrivals = Arrivals::default();
         self.seen = Supervision::default();
     }
@@ -269,8 +281,9 @@ impl CyclicFrame {
             let wkc = u16_at(bytes, place.wkc_at);
             place.wkc = place.wkc.plus(Wkc(wkc));
             self.wkc += u32::from(wkc);
-            complete &= place.wkc == place.expected;
+            complete &= place.wkc == place.expected || (place.part_suffices && place.wkc == place.expected_part);
         }
+        self.complete = complete;
         if let Some(at) = self.supervision_at
             && let Some(datagram) = bytes[at..].first_chunk::<{ OVERHEAD + SUPERVISION_LEN }>()
         {
@@ -303,11 +316,12 @@ impl CyclicFrame {
         self.arrivals.arrived == 0
     }
 
-    /// Counts anew what those that take part add.
-    pub(crate) fn recount(&mut self, takes_part: impl Fn(usize) -> bool) {
+    /// Counts anew what those that take part add. Those that are optional may be missing.
+    pub(crate) fn recount(&mut self, takes_part: impl Fn(usize) -> bool, optional: impl Fn(usize) -> bool) {
         for place in &mut self.places {
             let part = place.contributions.iter().filter(|(subdevice, _)| takes_part(*subdevice));
             place.expected_part = part.fold(Wkc(0), |sum, (_, wkc)| sum.plus(*wkc));
+            place.part_suffices = place.contributions.iter().all(|(s, _)| takes_part(*s) || optional(*s));
             place.part.clear();
             for segment in place.segments.iter().filter(|segment| takes_part(segment.subdevice)) {
                 match place.part.last_mut() {
@@ -340,6 +354,7 @@ impl Place {
             wkc: Wkc(0),
             expected: datagram.contributions.iter().fold(Wkc(0), |sum, (_, wkc)| sum.plus(*wkc)),
             expected_part: Wkc(0),
+            part_suffices: false,
             outputs: span(start, outputs),
             inputs: span(start + outputs, inputs),
             contributions: datagram.contributions.iter().copied().collect(),

@@ -33,11 +33,15 @@ struct Ring {
 
 impl Ring {
     fn new() -> Ring {
+        Ring::with_optional(vec![])
+    }
+
+    fn with_optional(optional: Vec<bool>) -> Ring {
         let area = |subdevice, direction| AreaSpec { subdevice, sync_manager: direction as u8, direction, length: 1 };
         let areas = (0..3).flat_map(|s| [area(s, Direction::Outputs), area(s, Direction::Inputs)]).collect();
         let spec = DomainSpec { period: PERIOD, lrw: true, areas };
         let layout = Layout::new(&[spec], LinkSet::Ring, true).unwrap();
-        let board = Arc::new(Board::new(3));
+        let board = Arc::new(Board::new(3).with_optional(optional));
         (0..3).for_each(|subdevice| board.set_taking_part(subdevice, true));
         let (producer, events) = queue(16);
         let (main, redundant) = (MacAddress([0, 1, 2, 3, 4, 5]), MacAddress([0, 1, 2, 3, 4, 6]));
@@ -272,4 +276,36 @@ fn what_was_queued_and_never_sent_was_not_answered() {
     assert!(ring.exchange.queue(DOMAIN, ring.now));
     let status = ring.judge();
     assert_eq!((status.wkc, status.state), (0, DomainState::Zero));
+}
+
+#[test]
+fn a_datagram_that_is_short_does_not_hide_behind_one_that_is_over() {
+    let mut ring = Ring::new();
+    let [mut main, redundant] = ring.send();
+    meet(&mut main, &[0, 1, 2], 0x40);
+    main[LWR_WKC_AT] += 1;
+    main[LRD_WKC_AT] -= 1;
+    ring.receive(Link::Redundant, &main);
+    ring.receive(Link::Main, &redundant);
+    let status = ring.judge();
+    assert_eq!((status.wkc, status.expected, status.state), (6, 6, DomainState::Incomplete));
+    assert_eq!(ring.freshness(), [Freshness::Never; 3]);
+}
+
+#[test]
+fn without_its_optional_subdevice_a_domain_is_complete_and_without_another_it_is_not() {
+    for (missing, state) in [(1, DomainState::Complete), (2, DomainState::Incomplete)] {
+        let mut ring = Ring::with_optional(vec![false, true, false]);
+        ring.board.set_taking_part(missing, false);
+        let judged = [0, 1].map(|_| {
+            let [mut main, redundant] = ring.send();
+            let present: Vec<usize> = (0..3).filter(|subdevice| *subdevice != missing).collect();
+            meet(&mut main, &present, 0x40);
+            ring.receive(Link::Redundant, &main);
+            ring.receive(Link::Main, &redundant);
+            ring.judge().state
+        });
+        assert_eq!(judged[1], state, "without {missing}");
+        assert_eq!(ring.freshness()[0], Freshness::Fresh);
+    }
 }

@@ -3,11 +3,12 @@
 use alloc::vec;
 use alloc::vec::Vec;
 
+use crate::config::{PdoEntry, SubDeviceConfig};
 use crate::domain::DomainId;
 use crate::exchange::Entry;
 use crate::info::Direction;
 use crate::layout::{Layout, PlacedArea};
-use crate::plan::SubDevicePlan;
+use crate::plan::{MappedEntry, SubDevicePlan};
 use crate::procedures::fleet::planned_areas;
 
 /// Where the PDO entries of all declared SubDevices lie in the domains' images.
@@ -68,22 +69,23 @@ impl Directory {
 
 /// Process data of a declared SubDevice: planned from what it is, or from the declaration while it is not there.
 pub(super) enum Areas {
-    Planned(SubDevicePlan),
-    Declared(Vec<(u8, Direction, u16)>),
+    /// Planned; `None` where its target state exchanges nothing.
+    Planned(Option<SubDevicePlan>),
+    Declared(Vec<(u8, Direction, u16)>, SubDeviceConfig),
 }
 
 impl Areas {
     pub(super) fn list(&self) -> Vec<(u8, Direction, u16)> {
         match self {
-            Areas::Planned(plan) => planned_areas(plan),
-            Areas::Declared(areas) => areas.clone(),
+            Areas::Planned(plan) => plan.as_ref().map(planned_areas).unwrap_or_default(),
+            Areas::Declared(areas, _) => areas.clone(),
         }
     }
 
     pub(super) fn lrw(&self) -> bool {
         match self {
-            Areas::Planned(plan) => plan.lrw_supported,
-            Areas::Declared(_) => false,
+            Areas::Planned(plan) => plan.as_ref().is_none_or(|plan| plan.lrw_supported),
+            Areas::Declared(..) => false,
         }
     }
 
@@ -91,18 +93,35 @@ impl Areas {
         let mut found = Vec::new();
         for (sync_manager, direction, _) in self.list() {
             let Some((domain, placed)) = layout.area(index, sync_manager) else { continue };
-            let mut entries = Vec::new();
-            if let Areas::Planned(plan) = self {
-                let area = plan.process_data.iter().find(|area| area.sync_manager == sync_manager);
-                let mapped = area.into_iter().flat_map(|area| &area.pdos).flat_map(|pdo| &pdo.entries);
-                entries.extend(mapped.filter(|entry| entry.index != 0).map(|entry| {
-                    let bit_offset = placed.image_offset * 8 + entry.bit_offset;
-                    let place = Entry { domain, bit_offset, bit_length: entry.bit_length.into() };
-                    (entry.index, entry.sub_index, place)
-                }));
-            }
-            found.push(AreaEntries { domain, placed, direction, entries });
+            let entries = self.mapped(sync_manager).into_iter().filter(|entry| entry.index != 0).map(|entry| {
+                let bit_offset = placed.image_offset * 8 + entry.bit_offset;
+                let place = Entry { domain, bit_offset, bit_length: entry.bit_length.into() };
+                (entry.index, entry.sub_index, place)
+            });
+            found.push(AreaEntries { domain, placed, direction, entries: entries.collect() });
         }
         found
+    }
+
+    /// Entries of an area in order, gaps included.
+    fn mapped(&self, sync_manager: u8) -> Vec<MappedEntry> {
+        match self {
+            Areas::Planned(plan) => {
+                let areas = plan.iter().flat_map(|plan| &plan.process_data);
+                let pdos = areas.filter(|area| area.sync_manager == sync_manager).flat_map(|area| &area.pdos);
+                pdos.flat_map(|pdo| &pdo.entries).copied().collect()
+            }
+            Areas::Declared(_, config) => {
+                let assignments = config.pdos.iter().flatten().filter(|a| a.sync_manager == sync_manager);
+                let entries = assignments.flat_map(|a| &a.pdos).flat_map(|pdo| pdo.entries.iter().flatten());
+                let place = |bit_offset: &mut u32, entry: &PdoEntry| {
+                    let PdoEntry { index, sub_index, bit_length } = *entry;
+                    let mapped = MappedEntry { index, sub_index, bit_offset: *bit_offset, bit_length };
+                    *bit_offset += u32::from(bit_length);
+                    Some(mapped)
+                };
+                entries.scan(0, place).collect()
+            }
+        }
     }
 }

@@ -1,12 +1,15 @@
 //! What the application declares, held against what the scan found, and turned into domains and members.
 
+use alloc::borrow::ToOwned;
 use alloc::rc::Rc;
+use alloc::string::ToString;
 use alloc::vec;
 use alloc::vec::Vec;
 use core::fmt;
 use core::time::Duration;
 
 use ringcat_wire::address::Position;
+use ringcat_wire::al::AlState;
 
 use super::areas::Areas;
 use crate::config::{ConfigError, Resolution, SubDeviceConfig, resolve};
@@ -67,6 +70,33 @@ pub enum ActivateError {
         /// What is wrong.
         error: SetupError,
     },
+    /// A scan is running.
+    Scanning,
+    /// A SubDevice is to stay in a state that process data and mailbox do not lead to.
+    Target {
+        /// Index in the declaration.
+        subdevice: usize,
+        /// The state that was declared.
+        target: AlState,
+    },
+    /// Process data of a SubDevice was put into two domains.
+    TwoDomains {
+        /// Index in the declaration.
+        subdevice: usize,
+        /// The SyncManager.
+        sync_manager: u8,
+        /// The domains.
+        domains: [usize; 2],
+    },
+    /// The period of a domain is zero, or no multiple of the shortest one.
+    Period {
+        /// Number of the domain.
+        domain: usize,
+        /// Its period.
+        period: Duration,
+        /// The shortest period.
+        shortest: Duration,
+    },
     /// Process data does not fit.
     Layout(LayoutError),
     /// A domain names a SubDevice that was not declared.
@@ -85,6 +115,20 @@ impl fmt::Display for ActivateError {
             ActivateError::Active => f.write_str("the MainDevice is active already"),
             ActivateError::Config { subdevice, error } => write!(f, "declaration {subdevice}: {error}"),
             ActivateError::Setup { subdevice, error } => write!(f, "declaration {subdevice}: {error}"),
+            ActivateError::Scanning => f.write_str("a scan is running"),
+            ActivateError::Target { subdevice, target } => {
+                write!(f, "declaration {subdevice}: expected target INIT, PREOP, SAFEOP or OP, got {target}")
+            }
+            ActivateError::TwoDomains { subdevice, sync_manager, domains: [a, b] } => write!(
+                f,
+                "declaration {subdevice}: process data of SyncManager {sync_manager} is in domain {a} and in domain {b}"
+            ),
+            ActivateError::Period { domain, period, shortest } => write!(
+                f,
+                "domain {domain}: expected a period that is a multiple of {} us and not zero, got {} us",
+                shortest.as_micros(),
+                period.as_micros()
+            ),
             ActivateError::Layout(error) => error.fmt(f),
             ActivateError::UnknownMember { domain, subdevice } => {
                 write!(f, "domain {domain} names declaration {subdevice}, which does not exist")
@@ -132,15 +176,36 @@ pub(super) fn plan_all(
     pairs
         .map(|(subdevice, (config, info))| match info {
             Some(info) => plan(config, info)
-                .map(Areas::Planned)
+                .map(|plan| Areas::Planned(exchanges(config.target).then_some(plan)))
                 .map_err(|error| ActivateError::Setup { subdevice, error: SetupError::Plan(error) }),
-            None => Ok(Areas::Declared(declared_areas(config).unwrap_or_default())),
+            None => Ok(Areas::Declared(declared_areas(config).unwrap_or_default(), config.clone())),
         })
         .collect()
 }
 
+/// Whether process data flows in a state.
+const fn exchanges(target: AlState) -> bool {
+    matches!(target, AlState::SafeOp | AlState::Op)
+}
+
+/// What needs no SubDevice to be found wrong.
+pub(super) fn check(declaration: &Declaration) -> Result<(), ActivateError> {
+    let boot = declaration.subdevices.iter().position(|config| config.target == AlState::Boot);
+    if let Some(subdevice) = boot {
+        return Err(ActivateError::Target { subdevice, target: AlState::Boot });
+    }
+    let shortest = declaration.domains.iter().map(|domain| domain.period).min().unwrap_or_default();
+    for (domain, config) in declaration.domains.iter().enumerate() {
+        let period = config.period;
+        if period.is_zero() || period.as_nanos() % shortest.as_nanos() != 0 {
+            return Err(ActivateError::Period { domain, period, shortest });
+        }
+    }
+    Ok(())
+}
+
 pub(super) fn domain_specs(declaration: &Declaration, plans: &[Areas]) -> Result<Vec<DomainSpec>, ActivateError> {
-    let mut specs = Vec::new();
+    let mut specs: Vec<DomainSpec> = Vec::new();
     for (domain, config) in declaration.domains.iter().enumerate() {
         let mut spec = DomainSpec { period: config.period, lrw: true, areas: Vec::new() };
         for member in &config.members {
@@ -151,6 +216,13 @@ pub(super) fn domain_specs(declaration: &Declaration, plans: &[Areas]) -> Result
             spec.lrw &= areas.lrw();
             for (sync_manager, direction, length) in areas.list() {
                 if member.sync_managers.as_ref().is_none_or(|wanted| wanted.contains(&sync_manager)) {
+                    let same = |a: &AreaSpec| a.subdevice == subdevice && a.sync_manager == sync_manager;
+                    let earlier = specs.iter().position(|spec| spec.areas.iter().any(same));
+                    let earlier = earlier.or_else(|| spec.areas.iter().any(same).then_some(domain));
+                    if let Some(other) = earlier {
+                        let domains = [other, domain];
+                        return Err(ActivateError::TwoDomains { subdevice, sync_manager, domains });
+                    }
                     spec.areas.push(AreaSpec { subdevice, sync_manager, direction, length });
                 }
             }
@@ -158,6 +230,31 @@ pub(super) fn domain_specs(declaration: &Declaration, plans: &[Areas]) -> Result
         specs.push(spec);
     }
     Ok(specs)
+}
+
+/// Period of the domain that only carries the supervision datagram.
+const SUPERVISION_PERIOD: Duration = Duration::from_millis(10);
+
+/// An application without domains still has one for the supervision datagram.
+pub(super) fn with_domain(mut declaration: Declaration) -> Declaration {
+    if declaration.domains.is_empty() {
+        declaration.domains.push(DomainConfig { period: SUPERVISION_PERIOD, members: Vec::new() });
+    }
+    declaration
+}
+
+/// What SubDevices may not follow, and optional ones for which the process image has no place.
+pub(super) fn report_oddities(bus: &Bus, members: &[Member]) {
+    for (subdevice, member) in members.iter().enumerate() {
+        let warnings = member.setup.iter().flat_map(|setup| &setup.plan.warnings);
+        for warning in warnings {
+            bus.report(Event::PlanOddity { subdevice, what: warning.to_string() });
+        }
+        if member.setup.is_none() && declared_areas(&member.config).is_none() {
+            let what = "not there, and its PDOs are not declared: when it comes, it has no place in the process image";
+            bus.report(Event::PlanOddity { subdevice, what: what.to_owned() });
+        }
+    }
 }
 
 pub(super) fn members(
