@@ -187,7 +187,8 @@ impl MainDevice {
         let board = Arc::new(Board::new(members.len()).with_optional(optional));
         let (producer, consumer) = queue(CYCLIC_EVENTS);
         let exchange = Exchange::new(self.identity, self.options.links(), &layout, board.clone(), producer);
-        let fleet = Fleet { members, strangers, layout, topology: scan.topology, cache: self.cache.clone() };
+        let fleet =
+            Fleet { members, strangers, next_temporary: 0, layout, topology: scan.topology, cache: self.cache.clone() };
         let fleet = SharedFleet::new(fleet, board.clone());
         self.supervisor.attach(board);
         start_all(&bus, &fleet, Start::Cleared);

@@ -162,6 +162,8 @@ pub struct Fleet {
     pub members: Vec<Member>,
     /// SubDevices that nobody declared, or that are not known to be declared yet.
     pub strangers: Vec<Stranger>,
+    /// Number of the next temporary station address.
+    pub next_temporary: u16,
     /// Where process data lies.
     pub layout: Layout,
     /// Connections as the scan found them.

@@ -4,6 +4,7 @@
 use alloc::rc::Rc;
 use alloc::string::ToString;
 use alloc::vec::Vec;
+use core::ops::RangeInclusive;
 
 use ringcat_wire::address::{Position, StationAddress};
 use ringcat_wire::register::map;
@@ -18,8 +19,9 @@ use crate::event::Event;
 use crate::info::SubDeviceInfo;
 use crate::supervisor::{Bus, BusError};
 
-/// Temporary station addresses are counted down from here.
-const TEMPORARY: u16 = 0xFFFE;
+/// Temporary station addresses, taken in turn: one that was given to a SubDevice that vanished before anything was read
+/// from it must not be given to another one soon.
+const TEMPORARY: RangeInclusive<u16> = 0xC000..=0xFFFE;
 
 /// A SubDevice that answers but is nobody's yet.
 #[derive(Clone, Debug)]
@@ -60,7 +62,7 @@ pub(super) async fn find(bus: &Bus, fleet: &SharedFleet) -> Result<(), ScanError
             continue;
         }
         let position = Position(at as u16);
-        let temporary = next_temporary(fleet);
+        let temporary = next_temporary(fleet, &owners);
         bus.apwr(position, map::STATION_ADDRESS, &temporary.0.to_le_bytes()).await?;
         level(bus, temporary).await?;
         let cache = fleet.access().cache.clone();
@@ -91,9 +93,20 @@ fn is_stranger(fleet: &SharedFleet, station: StationAddress) -> bool {
     fleet.access().strangers.iter().any(|stranger| stranger.info.station == station)
 }
 
-fn next_temporary(fleet: &SharedFleet) -> StationAddress {
-    let free = |station: &u16| !is_stranger(fleet, StationAddress(*station));
-    StationAddress((1..=TEMPORARY).rev().find(free).unwrap_or(TEMPORARY))
+/// A temporary address that none of those present has.
+fn next_temporary(fleet: &SharedFleet, present: &[StationAddress]) -> StationAddress {
+    let count = TEMPORARY.end() - TEMPORARY.start() + 1;
+    let mut address = StationAddress(*TEMPORARY.start());
+    for _ in 0..count {
+        let mut access = fleet.access();
+        address = StationAddress(TEMPORARY.start() + access.next_temporary % count);
+        access.next_temporary = access.next_temporary.wrapping_add(1);
+        let taken = access.strangers.iter().any(|stranger| stranger.info.station == address);
+        if !taken && !present.contains(&address) {
+            break;
+        }
+    }
+    address
 }
 
 /// The same starting point as after a scan, for one SubDevice; the rest comes with its configuration.
@@ -104,12 +117,12 @@ async fn level(bus: &Bus, station: StationAddress) -> Result<(), BusError> {
     claim(bus, station).await
 }
 
-/// Tells strangers which absent members they are and starts their configuration. `certain`: nobody's fate is open, so
-/// that one that is no absent member is nobody.
-pub(super) async fn admit_all(bus: &Bus, fleet: &SharedFleet, certain: bool) {
+/// Tells strangers which absent members they are and starts their configuration. To be called when it is known of all
+/// members whether they are there: one that is absent, but not known to be, may be the one that a stranger is.
+pub(super) async fn admit_all(bus: &Bus, fleet: &SharedFleet) {
     let mut at = 0;
     while let Some(stranger) = { fleet.access().strangers.get(at).cloned() } {
-        if admit(bus, fleet, &stranger, certain).await {
+        if admit(bus, fleet, &stranger).await {
             fleet.access().strangers.retain(|other| other.info.station != stranger.info.station);
         } else {
             at += 1;
@@ -118,10 +131,10 @@ pub(super) async fn admit_all(bus: &Bus, fleet: &SharedFleet, certain: bool) {
 }
 
 /// Admits one stranger; true where it is one no longer.
-async fn admit(bus: &Bus, fleet: &SharedFleet, stranger: &Stranger, certain: bool) -> bool {
+async fn admit(bus: &Bus, fleet: &SharedFleet, stranger: &Stranger) -> bool {
     let temporary = stranger.info.station;
     let Some(index) = member_for(fleet, stranger) else {
-        if certain && note_reported(fleet, temporary) {
+        if note_reported(fleet, temporary) {
             let SubDeviceInfo { position, identity, .. } = stranger.info;
             bus.report(Event::Unexpected { position, identity });
         }

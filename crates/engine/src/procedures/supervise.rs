@@ -169,7 +169,9 @@ impl Watch {
         if count > answering && !looks.contains(&Look::Unknown) {
             self.find_strangers().await;
         }
-        strangers::admit_all(&self.bus, &self.fleet, certain).await;
+        if certain {
+            strangers::admit_all(&self.bus, &self.fleet).await;
+        }
     }
 
     fn again_in(&mut self, pause: Duration) {
