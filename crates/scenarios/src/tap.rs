@@ -31,6 +31,19 @@ impl Fingerprint {
     }
 }
 
+/// Offset of the frame id in the source address, and of the first datagram's Idx, which carries its upper bits.
+const FRAME_ID_AT: usize = 7;
+const INDEX_AT: usize = 17;
+/// Bit of the first byte of the source address that marks the redundant copy.
+const REDUNDANT_BIT: u8 = 0x08;
+
+/// Which frame of the exchange it is, and a bit for each link whose copy came back.
+#[derive(Clone, Copy, Debug)]
+struct Out {
+    frame: (u8, u8),
+    back: u8,
+}
+
 /// Links into a simulated segment, tapped.
 #[derive(Debug)]
 pub struct Tap {
@@ -41,6 +54,10 @@ pub struct Tap {
     idle: u64,
     /// When the exchange last began to send.
     cyclic_sent: Instant,
+    /// Frames of the exchange that it sent last.
+    out: Vec<Out>,
+    /// Copies that came back when newer frames had been sent, or twice.
+    outdated: u64,
     /// Longest time from there to a frame of the exchange that came back before it sent again, in nanoseconds.
     flight_ns: u64,
 }
@@ -55,6 +72,8 @@ impl Tap {
             limit: Instant::NEVER,
             idle: 0,
             cyclic_sent: Instant::default(),
+            out: Vec::new(),
+            outdated: 0,
             flight_ns: 0,
         }
     }
@@ -89,6 +108,12 @@ impl Tap {
         self.flight_ns
     }
 
+    /// Copies of frames of the exchange that came back when newer ones had been sent, or twice: those that nobody may
+    /// take for new.
+    pub fn outdated(&self) -> u64 {
+        self.outdated
+    }
+
     /// Measures flights anew.
     pub fn measure_flights(&mut self) {
         self.flight_ns = 0;
@@ -108,10 +133,22 @@ impl Tap {
         if class_of(bytes) != Some(Class::Cyclic) {
             return;
         }
+        let frame = (bytes[FRAME_ID_AT], bytes[INDEX_AT]);
         if outward {
+            if now > self.cyclic_sent {
+                self.out.clear();
+            }
             self.cyclic_sent = now;
+            if link == Link::Main {
+                self.out.push(Out { frame, back: 0 });
+            }
         } else {
             self.flight_ns = self.flight_ns.max(now.since(self.cyclic_sent).as_nanos() as u64);
+            let copy = if bytes[6] & REDUNDANT_BIT == 0 { 1 } else { 2 };
+            match self.out.iter_mut().find(|out| out.frame == frame) {
+                Some(out) if out.back & copy == 0 => out.back |= copy,
+                Some(_) | None => self.outdated += 1,
+            }
         }
     }
 }

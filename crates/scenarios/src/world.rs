@@ -13,6 +13,7 @@ use ringcat::{
 };
 use ringcat_engine::main_device::Directory;
 use ringcat_sim::cable::{CableId, DeviceIndex};
+use ringcat_sim::device::Device;
 use ringcat_sim::fault::Fault;
 use ringcat_sim::network::Network;
 use ringcat_sim::time::SimTime;
@@ -135,10 +136,6 @@ impl World {
     /// Finds out which device each declared SubDevice is, by its station address, and looks at them from now on.
     pub fn recognise(&mut self) {
         let network = self.application.links().network();
-        let station = |device: &ringcat_sim::device::Device| {
-            let bytes = device.controller.register(map::STATION_ADDRESS, 2);
-            u16::from_le_bytes([bytes[0], bytes[1]])
-        };
         let by_station: Vec<u16> = network.devices().map(station).collect();
         let found = self.application.engine().stations();
         let of = |wanted: &ringcat_wire::address::StationAddress| {
@@ -379,6 +376,22 @@ impl World {
         fingerprint
     }
 
+    /// How things stand: what the devices say of themselves, what the engine thinks of them.
+    pub fn condition(&self) -> String {
+        let mut text = String::new();
+        for (number, device) in self.network().devices().enumerate() {
+            let (name, station, power) = (device.name(), station(device), device.controller.is_powered());
+            let status = device.al_status();
+            text += &format!("device {number} ({name}): station {station:#06x}, power {power}, {status}\n");
+        }
+        let engine = self.application.engine();
+        for (number, (state, station)) in engine.states().into_iter().zip(engine.stations()).enumerate() {
+            text += &format!("declared {number}: station {station}, {state:?}\n");
+        }
+        let last = self.journal.judged.last().map(|judged| (judged.delivery, judged.status, &judged.stale));
+        text + &format!("ring {:?}, last cycle {last:?}\n", self.application.ring())
+    }
+
     /// The log as text.
     pub fn log(&self) -> String {
         let line = |(at, what): &(Instant, String)| format!("{:>12.3} us  {what}\n", at.0 as f64 / 1e3);
@@ -389,7 +402,7 @@ impl World {
 impl Drop for World {
     fn drop(&mut self) {
         if std::thread::panicking() {
-            println!("seed {}, at {}; what happened:\n{}", self.seed, self.now(), self.log());
+            println!("seed {}, at {}; what happened:\n{}\n{}", self.seed, self.now(), self.log(), self.condition());
         }
     }
 }
@@ -423,6 +436,11 @@ impl Journal {
             }
         }
     }
+}
+
+fn station(device: &Device) -> u16 {
+    let bytes = device.controller.register(map::STATION_ADDRESS, 2);
+    u16::from_le_bytes([bytes[0], bytes[1]])
 }
 
 /// Where outputs lie in each domain's image.
