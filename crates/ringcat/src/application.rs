@@ -10,7 +10,7 @@ use std::time::Duration;
 
 use ringcat_engine::domain::{DomainId, DomainStatus, Freshness};
 use ringcat_engine::event::{Event, TimedEvent};
-use ringcat_engine::exchange::{CyclicCounters, Entry, Exchange};
+use ringcat_engine::exchange::{CyclicCounters, Entry, Exchange, Received};
 use ringcat_engine::info::Direction;
 use ringcat_engine::link::Link;
 use ringcat_engine::main_device::{Active, Directory, MainDevice as Engine, SubDeviceState};
@@ -22,6 +22,7 @@ use ringcat_wire::al::AlState;
 use ringcat_wire::frame::{BYTE_TIME_NS, MAX_FRAME, WIRE_OVERHEAD, wire_time_ns};
 
 use crate::error::Error;
+use crate::histogram::Histogram;
 use crate::links::Links;
 use crate::main_device::MainDevice;
 
@@ -69,12 +70,16 @@ pub struct Application<L> {
     next_cycle: Instant,
     cycle: u64,
     pace: Pace,
+    /// When process data was sent last.
+    sent_at: Instant,
+    round_trips: Histogram,
     /// When what was sent so far will have left the interfaces.
     wire_free: Instant,
 }
 
 impl<L: Links> Application<L> {
-    pub(crate) fn new(links: L, engine: Engine, active: Active, periods: &[Duration]) -> Application<L> {
+    pub(crate) fn new(links: L, engine: Engine, active: Active) -> Application<L> {
+        let periods = active.periods;
         let period = periods.iter().copied().min().unwrap_or(IDLE_PERIOD).max(Duration::from_micros(1));
         let rate = |domain: &Duration| Rate {
             divider: (domain.as_nanos() / period.as_nanos()).max(1) as u64,
@@ -91,6 +96,8 @@ impl<L: Links> Application<L> {
             period,
             cycle: 0,
             pace: Pace::default(),
+            sent_at: Instant::NEVER,
+            round_trips: Histogram::default(),
         }
     }
 
@@ -116,8 +123,12 @@ impl<L: Links> Application<L> {
                 self.exchange.queue(DomainId(number), now);
             }
         }
-        let Application { links, exchange, wire_free, .. } = self;
+        let Application { links, exchange, wire_free, sent_at, .. } = self;
+        let before = exchange.counters().sent;
         exchange.send(now, &mut |link, frame| send(links, wire_free, now, link, frame));
+        if exchange.counters().sent != before {
+            *sent_at = now;
+        }
         self.cycle += 1;
         self.next_cycle += self.period;
         result
@@ -157,14 +168,16 @@ impl<L: Links> Application<L> {
     }
 
     fn receive(&mut self) {
-        let Application { links, engine, exchange, .. } = self;
+        let Application { links, engine, exchange, round_trips, sent_at, .. } = self;
         let now = links.now();
         while links.receive(&mut |link, frame| match class_of(frame) {
             Some(Class::Acyclic) => {
                 engine.receive(link, frame, now);
             }
             Some(Class::Cyclic) | None => {
-                exchange.receive(link, frame, now);
+                if exchange.receive(link, frame, now) == Received::Taken {
+                    round_trips.record(now.since(*sent_at));
+                }
             }
         }) {}
     }
@@ -198,6 +211,17 @@ impl<L: Links> Application<L> {
     /// How well the cycles keep to their grid.
     pub fn pace(&self) -> Pace {
         self.pace
+    }
+
+    /// Times from the sending of a cycle's frames to the arrival of their copies. (A copy that arrives after other frames
+    /// were sent counts from those.)
+    pub fn round_trips(&self) -> &Histogram {
+        &self.round_trips
+    }
+
+    /// Forgets the round trips so far.
+    pub fn reset_round_trips(&mut self) {
+        self.round_trips = Histogram::default();
     }
 
     /// Where a PDO entry of a declared SubDevice lies.

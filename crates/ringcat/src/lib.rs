@@ -30,16 +30,18 @@
 
 pub mod application;
 mod error;
+pub mod histogram;
 pub mod links;
 pub mod main_device;
 pub mod memory;
+pub mod packet;
 pub mod simulated;
 pub mod text;
 
 pub use application::{Application, LastOutputs, Pace, ProcessData};
 pub use error::Error;
 pub use links::Links;
-pub use main_device::{MainDevice, Options, automatic};
+pub use main_device::{MainDevice, Options, Refused, automatic};
 
 pub use ringcat_engine::config::{
     ConfigAddress, PdoAssignment, PdoEntry, PdoMapping, SdoDownload, SubDeviceConfig, Timeouts, Watchdog,

@@ -85,6 +85,17 @@ fn what_is_wrong_is_named_and_the_main_device_is_there_for_another_try() -> Resu
 }
 
 #[test]
+fn outputs_that_come_slower_than_their_watchdog_are_named() -> Result<(), Error> {
+    let (main_device, mut declaration) = scanned("[[device]]\ntype = \"servo\"\n");
+    declaration.domains[0].period = Duration::from_millis(150);
+    let mut application = main_device.activate(declaration)?;
+    let events = run(&mut application, 1);
+    let text = "its outputs come every 150 ms, its watchdog expires after 100 ms".to_owned();
+    assert!(events.contains(&Event::PlanOddity { subdevice: 0, what: text }), "{events:?}");
+    Ok(())
+}
+
+#[test]
 fn without_a_domain_subdevices_are_still_supervised() -> Result<(), Error> {
     let (main_device, declaration) = scanned(SEGMENT);
     let subdevices = declaration.subdevices.into_iter().map(|config| config.target(AlState::PreOp)).collect();

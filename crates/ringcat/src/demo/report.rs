@@ -5,12 +5,11 @@ use std::time::Duration;
 
 use ringcat::simulated::SimulatedSegment;
 use ringcat::text::{Names, describe};
-use ringcat::{Application, Direction, Event, Instant, Scan, SubDeviceInfo, SubDeviceState, TimedEvent};
-
-use ringcat_wire::sii::{SiiSyncManager, SyncManagerKind};
+use ringcat::{Application, Event, Instant, Scan, SubDeviceState, TimedEvent};
 
 use super::plan::{Incident, Plan};
 use super::watch::{Account, Watch};
+use crate::table;
 
 /// Writes lines with the time before them.
 #[derive(Debug)]
@@ -19,21 +18,6 @@ pub struct Reporter {
     /// A progress line is on the screen and has not been ended.
     line_open: bool,
     reached_op: Option<Instant>,
-}
-
-/// Bytes of process data in one direction as the SII says: of the assigned PDOs, or of the SyncManagers where it
-/// describes no PDOs.
-fn sii_bytes(info: &SubDeviceInfo, direction: Direction) -> u32 {
-    let kind = match direction {
-        Direction::Outputs => SyncManagerKind::Outputs,
-        Direction::Inputs => SyncManagerKind::Inputs,
-    };
-    let bytes = |(number, sync_manager): (u8, &SiiSyncManager)| {
-        let bits: Vec<u32> = info.assigned_pdos(number).map(|pdo| pdo.bit_length()).collect();
-        if bits.is_empty() { u32::from(sync_manager.length) } else { bits.iter().sum::<u32>().div_ceil(8) }
-    };
-    let of_kind = (0..).zip(&info.sync_managers).filter(|(_, sync_manager)| sync_manager.kind == kind);
-    of_kind.map(bytes).sum()
 }
 
 impl Reporter {
@@ -92,25 +76,8 @@ impl Reporter {
     /// The SubDevices that were found.
     pub fn table(&mut self, scan: &Scan) {
         self.say("");
-        self.say("pos  station  alias  vendor      product     out   in  connected to       name");
-        for info in &scan.subdevices {
-            let position = usize::from(info.position.0);
-            let parent = match scan.topology.connection_to(position) {
-                Some(connection) => format!("{} port {}", connection.near.node, connection.near.port),
-                None if position == 0 => "MAIN".to_owned(),
-                None => "REDUNDANT".to_owned(),
-            };
-            self.say(&format!(
-                "{:>3}  {}  {:>5}  {:#010x}  {:#010x} {:>4} {:>4}  {parent:<17}  {}",
-                position,
-                info.station,
-                info.alias,
-                info.identity.vendor_id,
-                info.identity.product_code,
-                sii_bytes(info, Direction::Outputs),
-                sii_bytes(info, Direction::Inputs),
-                info.name
-            ));
+        for line in table::lines(scan) {
+            self.say(&line);
         }
         self.say("");
     }

@@ -1,0 +1,128 @@
+//! How often times of which length occurred: round trips, delays of wake-ups.
+//!
+//! Recording takes a few instructions and no memory. Times are kept with an error of at most an eighth.
+
+use std::fmt;
+use std::time::Duration;
+
+/// Buckets per doubling.
+const FINE: usize = 8;
+/// Enough for any 64-bit number of nanoseconds.
+const BUCKETS: usize = 62 * FINE;
+
+/// Counts of times by their length.
+#[derive(Clone, Debug)]
+pub struct Histogram {
+    buckets: Box<[u64]>,
+    count: u64,
+    shortest_ns: u64,
+    longest_ns: u64,
+}
+
+impl Default for Histogram {
+    fn default() -> Histogram {
+        Histogram { buckets: vec![0; BUCKETS].into_boxed_slice(), count: 0, shortest_ns: u64::MAX, longest_ns: 0 }
+    }
+}
+
+impl Histogram {
+    /// Counts a time.
+    pub fn record(&mut self, time: Duration) {
+        let ns = u64::try_from(time.as_nanos()).unwrap_or(u64::MAX);
+        if let Some(bucket) = self.buckets.get_mut(bucket_of(ns)) {
+            *bucket += 1;
+        }
+        self.count += 1;
+        self.shortest_ns = self.shortest_ns.min(ns);
+        self.longest_ns = self.longest_ns.max(ns);
+    }
+
+    /// How many times were counted.
+    pub fn count(&self) -> u64 {
+        self.count
+    }
+
+    /// The shortest.
+    pub fn shortest(&self) -> Duration {
+        Duration::from_nanos(if self.count == 0 { 0 } else { self.shortest_ns })
+    }
+
+    /// The longest.
+    pub fn longest(&self) -> Duration {
+        Duration::from_nanos(self.longest_ns)
+    }
+
+    /// At least this part of all times, in parts per million, is not longer than the result.
+    pub fn quantile(&self, parts_per_million: u32) -> Duration {
+        let rank = (u128::from(self.count) * u128::from(parts_per_million)).div_ceil(1_000_000) as u64;
+        let mut seen = 0;
+        let found = self.buckets.iter().position(|count| {
+            seen += count;
+            seen >= rank
+        });
+        let limit_ns = found.map_or(0, |bucket| start_of(bucket + 1).saturating_sub(1));
+        Duration::from_nanos(limit_ns.clamp(self.shortest_ns.min(self.longest_ns), self.longest_ns))
+    }
+}
+
+impl fmt::Display for Histogram {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let us = |time: Duration| time.as_nanos() as f64 / 1e3;
+        write!(f, "min {:.1}", us(self.shortest()))?;
+        for (name, part) in [("50 %", 500_000), ("90 %", 900_000), ("99 %", 990_000), ("99.9 %", 999_000)] {
+            write!(f, ", {name} {:.1}", us(self.quantile(part)))?;
+        }
+        write!(f, ", max {:.1} us", us(self.longest()))
+    }
+}
+
+/// Below `FINE` one bucket per nanosecond, from there on `FINE` buckets per doubling.
+fn bucket_of(ns: u64) -> usize {
+    if ns < FINE as u64 {
+        return ns as usize;
+    }
+    let doubling = (ns / FINE as u64).ilog2();
+    (doubling as usize) * FINE + (ns >> doubling) as usize
+}
+
+/// The shortest time of a bucket.
+fn start_of(bucket: usize) -> u64 {
+    if bucket < 2 * FINE {
+        return bucket as u64;
+    }
+    let doubling = bucket / FINE - 1;
+    u64::try_from(((bucket - doubling * FINE) as u128) << doubling).unwrap_or(u64::MAX)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_time_is_in_the_bucket_that_begins_at_or_before_it() {
+        let mut times: Vec<u64> = (0..5_000).collect();
+        times.extend((12..64).flat_map(|bit| [(1u64 << bit) - 1, 1 << bit, (1 << bit) + 1]));
+        times.push(u64::MAX);
+        for ns in times {
+            let bucket = bucket_of(ns);
+            assert!(bucket < BUCKETS, "{ns}");
+            assert!(start_of(bucket) <= ns, "{ns}");
+            assert!(ns < start_of(bucket + 1) || start_of(bucket + 1) == u64::MAX, "{ns}");
+        }
+    }
+
+    #[test]
+    fn quantiles_are_at_most_an_eighth_too_long() {
+        let mut histogram = Histogram::default();
+        for us in 1..=1_000 {
+            histogram.record(Duration::from_micros(us));
+        }
+        for (part, us) in [(500_000, 500), (990_000, 990), (1_000_000, 1_000)] {
+            let found = histogram.quantile(part).as_nanos() as u64;
+            assert!((us * 1_000..=us * 1_125).contains(&found), "{part}: {found}");
+        }
+        assert_eq!((histogram.shortest(), histogram.longest()), (Duration::from_micros(1), Duration::from_millis(1)));
+        assert!(histogram.to_string().starts_with("min 1.0, 50 % "));
+        assert_eq!(Histogram::default().quantile(500_000), Duration::ZERO);
+    }
+}

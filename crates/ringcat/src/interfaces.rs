@@ -1,0 +1,194 @@
+//! What the commands on network interfaces share: how to wait, what is wrong with an interface, when to end.
+
+use std::fmt;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::{Duration, Instant};
+
+use clap::{Args, ValueEnum};
+use ringcat::packet::PacketLinks;
+use ringcat::{Error, ScanError};
+use ringcat_link::interface::{self, exclusive_use};
+use ringcat_link::realtime::{self, CpuLatency};
+use ringcat_link::{LinkError, ReceiveMode};
+use ringcat_sim::segment::SegmentError;
+
+/// A hybrid wait spins for so long: most segments answer within.
+const SPIN: Duration = Duration::from_micros(200);
+/// A link that was just switched on gets this long to find its partner.
+const LINK_UP_LIMIT: Duration = Duration::from_secs(3);
+/// Pause between two looks at the carrier.
+const LINK_PAUSE: Duration = Duration::from_millis(20);
+
+/// Why a command did not do what it was asked for, in words that say what to do.
+#[derive(Debug)]
+pub struct Failure(String);
+
+impl Failure {
+    /// In these words.
+    pub fn new(text: impl Into<String>) -> Failure {
+        Failure(text.into())
+    }
+}
+
+impl fmt::Display for Failure {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(&self.0)
+    }
+}
+
+impl From<LinkError> for Failure {
+    fn from(error: LinkError) -> Failure {
+        Failure(error.to_string())
+    }
+}
+
+impl From<SegmentError> for Failure {
+    fn from(error: SegmentError) -> Failure {
+        Failure(error.to_string())
+    }
+}
+
+impl From<Error> for Failure {
+    fn from(error: Error) -> Failure {
+        let advice = match &error {
+            Error::Scan(ScanError::NoSubDevices) => {
+                "; something sends the frames back unchanged: is this the cable to the SubDevices?"
+            }
+            Error::Scan(ScanError::Unsettled { .. }) => {
+                "; look for a loose cable or a power supply that comes and goes"
+            }
+            _ => "",
+        };
+        Failure(format!("{error}{advice}"))
+    }
+}
+
+/// How to wait for frames.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum Receive {
+    /// Spinning: fastest, takes a whole processor.
+    Busy,
+    /// Asleep: saves the processor, costs tens of microseconds per frame.
+    Block,
+    /// Spinning for 200 us, then asleep.
+    Hybrid,
+}
+
+/// The options of the thread that sends and receives.
+#[derive(Args, Clone, Copy, Debug)]
+pub struct ThreadArguments {
+    /// How to wait for frames.
+    #[arg(long, value_enum, default_value = "busy")]
+    receive: Receive,
+    /// Real-time priority (SCHED_FIFO) of the thread that sends and receives; memory is locked and processors kept awake
+    /// with it. A spinning thread with a priority leaves its processor to nobody.
+    #[arg(long, value_name = "1-99", value_parser = clap::value_parser!(i32).range(1..=99))]
+    priority: Option<i32>,
+    /// Processor to keep that thread on.
+    #[arg(long, value_name = "NUMBER")]
+    cpu: Option<usize>,
+}
+
+impl ThreadArguments {
+    /// As the links take it.
+    pub fn mode(self) -> ReceiveMode {
+        match self.receive {
+            Receive::Busy => ReceiveMode::BusyPoll,
+            Receive::Block => ReceiveMode::Blocking,
+            Receive::Hybrid => ReceiveMode::Hybrid { spin: SPIN },
+        }
+    }
+
+    /// Gives the calling thread what was asked for, as far as that is permitted; what is not is told. The result keeps
+    /// processors awake while it lives.
+    pub fn apply(self) -> Option<CpuLatency> {
+        let tell = |warning| eprintln!("ringcat: {warning}");
+        realtime::precise_timers();
+        if let Some(cpu) = self.cpu {
+            let _ = realtime::affinity(cpu).map_err(tell);
+        }
+        let priority = self.priority?;
+        let _ = realtime::lock_memory().map_err(tell);
+        if realtime::fifo(priority).map_err(tell).is_ok() && self.receive == Receive::Busy {
+            realtime::throttling().map(tell);
+        }
+        CpuLatency::request(0).map_err(tell).ok()
+    }
+}
+
+/// The options that name the interfaces.
+#[derive(Args, Clone, Debug)]
+pub struct InterfaceArguments {
+    /// Network interface that the first SubDevice is plugged into.
+    #[arg(long, value_name = "IF")]
+    pub main: String,
+    /// Network interface at the other end of a ring.
+    #[arg(long, value_name = "IF")]
+    pub redundant: Option<String>,
+}
+
+impl InterfaceArguments {
+    /// Opens the interfaces; warns of who else uses them, and fails where no cable is plugged in.
+    pub fn open(&self, thread: ThreadArguments) -> Result<PacketLinks, Failure> {
+        for name in self.names() {
+            for warning in exclusive_use(name) {
+                eprintln!("ringcat: {warning}");
+            }
+        }
+        let links = PacketLinks::open(&self.main, self.redundant.as_deref(), thread.mode())?;
+        self.await_carrier()?;
+        Ok(links)
+    }
+
+    fn names(&self) -> impl Iterator<Item = &str> {
+        std::iter::once(self.main.as_str()).chain(self.redundant.as_deref())
+    }
+
+    /// Waits a little for a link that was just switched on. One end of a ring may do without.
+    fn await_carrier(&self) -> Result<(), Failure> {
+        let until = Instant::now() + LINK_UP_LIMIT;
+        loop {
+            // A driver that cannot tell is believed to have a carrier.
+            let (up, down): (Vec<&str>, Vec<&str>) =
+                self.names().partition(|name| interface::carrier(name).unwrap_or(true));
+            if down.is_empty() {
+                return Ok(());
+            }
+            if Instant::now() >= until {
+                let text = down.iter().map(|name| describe_down(name)).collect::<Vec<_>>().join("\n");
+                if up.is_empty() {
+                    return Err(Failure(text));
+                }
+                eprintln!("ringcat: {text}");
+                return Ok(());
+            }
+            std::thread::sleep(LINK_PAUSE);
+        }
+    }
+}
+
+fn describe_down(name: &str) -> String {
+    let switched_off = interface::list().iter().any(|found| found.name == name && !found.up);
+    if switched_off {
+        format!("{name} is switched off: sudo ip link set {name} up")
+    } else {
+        format!("{name} has no link: is the cable plugged in, and has the SubDevice at its other end power?")
+    }
+}
+
+/// Becomes true when the user or the system asks this program to end.
+pub fn end_request() -> Arc<AtomicBool> {
+    let asked = Arc::new(AtomicBool::new(false));
+    for signal in [signal_hook::consts::SIGINT, signal_hook::consts::SIGTERM] {
+        if let Err(error) = signal_hook::flag::register(signal, asked.clone()) {
+            eprintln!("ringcat: signal {signal} will end this program without an orderly stop: {error}");
+        }
+    }
+    asked
+}
+
+/// Whether that has happened.
+pub fn is_asked(end: &AtomicBool) -> bool {
+    end.load(Ordering::Relaxed)
+}

@@ -1,0 +1,69 @@
+//! Links that are network interfaces: one packet socket each, in the application's thread.
+//!
+//! Time is `CLOCK_MONOTONIC`. How [`Links::wait`] waits is the user's choice ([`ReceiveMode`]): asleep, spinning, or one
+//! after the other. A link that goes down swallows frames and works again as soon as it is back.
+
+use ringcat_engine::link::Link;
+use ringcat_engine::time::Instant;
+use ringcat_link::{LinkCounters, LinkError, PacketOptions, PacketSocket, ReceiveMode, monotonic};
+use ringcat_wire::frame::MacAddress;
+
+use crate::links::Links;
+
+/// One or two network interfaces.
+#[derive(Debug)]
+pub struct PacketLinks {
+    main: PacketSocket,
+    redundant: Option<PacketSocket>,
+    mode: ReceiveMode,
+}
+
+impl PacketLinks {
+    /// Opens the interfaces.
+    ///
+    /// # Errors
+    /// An interface that is not there or carries no Ethernet, or a missing permission.
+    pub fn open(main: &str, redundant: Option<&str>, mode: ReceiveMode) -> Result<PacketLinks, LinkError> {
+        let options = PacketOptions { receive: mode, ..PacketOptions::default() };
+        let redundant = redundant.map(|name| PacketSocket::open(name, &options)).transpose()?;
+        Ok(PacketLinks { main: PacketSocket::open(main, &options)?, redundant, mode })
+    }
+
+    /// What an interface has sent, received and lost; `None` where there is none.
+    pub fn counters(&self, link: Link) -> Option<LinkCounters> {
+        match link {
+            Link::Main => Some(self.main.counters()),
+            Link::Redundant => self.redundant.as_ref().map(PacketSocket::counters),
+        }
+    }
+}
+
+impl Links for PacketLinks {
+    fn now(&self) -> Instant {
+        Instant(monotonic::now_ns())
+    }
+
+    fn addresses(&self) -> (MacAddress, Option<MacAddress>) {
+        (MacAddress(self.main.mac()), self.redundant.as_ref().map(|socket| MacAddress(socket.mac())))
+    }
+
+    fn send(&mut self, link: Link, frame: &[u8]) {
+        match link {
+            Link::Main => self.main.send(frame),
+            // The socket counts what it could not send; the engine notices by what does not come back.
+            Link::Redundant => self.redundant.as_mut().is_some_and(|socket| socket.send(frame)),
+        };
+    }
+
+    fn receive(&mut self, take: &mut dyn FnMut(Link, &[u8])) -> bool {
+        self.main.receive(&mut |frame| take(Link::Main, frame))
+            || self.redundant.as_mut().is_some_and(|socket| socket.receive(&mut |frame| take(Link::Redundant, frame)))
+    }
+
+    fn wait(&mut self, until: Instant) {
+        match &self.redundant {
+            Some(redundant) => ringcat_link::wait(&[&self.main, redundant], until.0, self.mode),
+            None => ringcat_link::wait(&[&self.main], until.0, self.mode),
+        };
+    }
+}

@@ -1,0 +1,77 @@
+//! How well the simulator keeps up with the clock: turns that came later than they were asked for.
+//!
+//! A stall of the machine that this program runs on, or a frame that takes long to simulate, delays frames without any fault of the MainDevice or of the
+//! simulated segment; it is counted and told, so that nobody looks for it elsewhere.
+
+use std::time::Duration;
+
+/// A wake-up that came later than this is late.
+pub const LATE: Duration = Duration::from_micros(200);
+/// At most one line about late wake-ups in this time.
+const QUIET: Duration = Duration::from_secs(1);
+
+/// Late wake-ups.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Lateness {
+    /// How many.
+    pub count: u64,
+    /// The latest.
+    pub longest: Duration,
+    told: u64,
+    longest_since: Duration,
+    quiet_until_ns: u64,
+}
+
+impl Lateness {
+    /// Notes a wake-up.
+    pub fn note(&mut self, asked_ns: u64, woke_ns: u64) {
+        let late = Duration::from_nanos(woke_ns.saturating_sub(asked_ns));
+        if late > LATE {
+            self.count += 1;
+            self.longest = self.longest.max(late);
+            self.longest_since = self.longest_since.max(late);
+        }
+    }
+
+    /// A line about what happened since the last one, if it is time for one.
+    pub fn line(&mut self, now_ns: u64) -> Option<String> {
+        if self.told == self.count || now_ns < self.quiet_until_ns {
+            return None;
+        }
+        let text = format!(
+            "the simulator was late {} times, by up to {:.3} ms (this machine stalled, or a frame was much work); frames \
+             were delayed by that",
+            self.count - self.told,
+            self.longest_since.as_secs_f64() * 1e3
+        );
+        self.told = self.count;
+        self.longest_since = Duration::ZERO;
+        self.quiet_until_ns = now_ns + QUIET.as_nanos() as u64;
+        Some(text)
+    }
+
+    /// For the status.
+    pub fn summary(&self) -> String {
+        let (limit, longest) = (LATE.as_micros(), self.longest.as_secs_f64() * 1e3);
+        format!("late wake-ups of this simulator (more than {limit} us): {}, the latest by {longest:.3} ms", self.count)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn late_wake_ups_are_counted_and_told_once_a_second() {
+        let mut lateness = Lateness::default();
+        lateness.note(1_000_000, 1_150_000);
+        assert_eq!(lateness.line(2_000_000), None);
+        lateness.note(1_000_000, 3_000_000);
+        let line = lateness.line(3_000_000).expect("there was one");
+        assert!(line.contains("late 1 times, by up to 2.000 ms ("), "{line}");
+        lateness.note(4_000_000, 5_000_000);
+        assert_eq!(lateness.line(5_000_000), None);
+        assert!(lateness.line(1_003_000_000).is_some_and(|line| line.contains("by up to 1.000 ms")));
+        assert!(lateness.summary().contains(": 2, the latest by 2.000 ms"));
+    }
+}
