@@ -81,22 +81,26 @@ fn has_capability(number: u32) -> bool {
 /// Lets the calling thread go before all that are not real-time (`SCHED_FIFO`, 1 to 99). Threads that it starts from
 /// now on do not inherit that.
 pub fn fifo(priority: i32) -> Result<(), RealtimeWarning> {
-    let parameter = libc::sched_param { sched_priority: priority };
-    // SAFETY: the pointer is to a live parameter; thread 0 is the calling one.
-    if unsafe { libc::sched_setscheduler(0, libc::SCHED_FIFO | libc::SCHED_RESET_ON_FORK, &parameter) } != 0 {
+    if set_scheduler(libc::SCHED_FIFO | libc::SCHED_RESET_ON_FORK, priority) != 0 {
         let what = format!("the thread does not run with real-time priority {priority}");
         return Err(RealtimeWarning::new(what, errno(), PERMIT_FIFO));
     }
     Ok(())
 }
 
+/// The bare system call for the calling thread, as not every C library passes it on.
+fn set_scheduler(policy: libc::c_int, priority: i32) -> libc::c_long {
+    // `sched_param` of the kernel has this one member only.
+    // SAFETY: the pointer is to a live parameter, which the kernel only reads; thread 0 is the calling one.
+    unsafe { libc::syscall(libc::SYS_sched_setscheduler, 0, policy, std::ptr::from_ref(&priority)) }
+}
+
 /// Makes the calling thread an ordinary one on any processor, whatever it has inherited.
 pub(crate) fn leave() {
-    let parameter = libc::sched_param { sched_priority: 0 };
-    // SAFETY: all bytes zero is an empty set, all bytes 255 a full one; the pointers are to live values and thread 0 is
-    // the calling one. Both calls only ever take away privileges or restore what the process has anyway.
+    // Both only take away privileges or restore what the process has anyway: there is nothing to tell.
+    set_scheduler(libc::SCHED_OTHER, 0);
+    // SAFETY: any bytes are a set, the pointer is to a live one and thread 0 is the calling one.
     unsafe {
-        libc::sched_setscheduler(0, libc::SCHED_OTHER, &parameter);
         let mut all: libc::cpu_set_t = zeroed();
         std::ptr::write_bytes(&mut all, 0xff, 1);
         libc::sched_setaffinity(0, size_of::<libc::cpu_set_t>(), &all);

@@ -11,7 +11,8 @@ use std::sync::atomic::{AtomicU32, Ordering};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::thread;
 
-use ringcat_link::{ClassFilter, PacketOptions, PacketSocket};
+use ringcat_link::monotonic::now_ns;
+use ringcat_link::{ClassFilter, PacketOptions, PacketSocket, ReceiveMode, wait};
 
 /// One bench at a time: the tests measure times, and machines are small.
 static TURN: Mutex<()> = Mutex::new(());
@@ -152,6 +153,19 @@ pub fn ethercat(idx: u8, number: u16) -> Vec<u8> {
     frame.extend(number.to_le_bytes());
     frame.resize(60, 0);
     frame
+}
+
+/// How long a frame may take that the kernel puts off under load.
+const LATE_NS: u64 = 2_000_000_000;
+
+/// Waits for this many frames, and takes those that are there beyond them too.
+pub fn take(socket: &mut PacketSocket, count: usize) -> Vec<Vec<u8>> {
+    let (mut frames, until) = (Vec::new(), now_ns() + LATE_NS);
+    while frames.len() < count && wait(&[socket], until, ReceiveMode::Blocking) {
+        socket.receive(&mut |frame| frames.push(frame.to_vec()));
+    }
+    frames.extend(drain(socket));
+    frames
 }
 
 /// All frames that wait.

@@ -55,6 +55,7 @@ fn a_frame_that_is_there_ends_a_wait_whose_time_is_over() {
     let mut far = bench.far_socket();
     let near = bench.near_socket(PacketOptions::default());
     assert!(far.send(&ethercat(0, 1)));
+    assert!(wait(&[&near], now_ns() + LONG_NS, ReceiveMode::Blocking));
     for mode in MODES {
         assert!(wait(&[&near], 0, mode), "{mode:?}");
     }

@@ -1,0 +1,192 @@
+//! Round trip of a bare frame over a pair of interfaces: what no MainDevice on this machine can be faster than.
+//!
+//! `echo_floor echo IF` answers every EtherCAT frame as a segment would: it counts the first datagram's WKC up and sets
+//! bit 0x02 of the source address. `echo_floor ping IF [--size 60] [--count 100000] [--receive busy|block|hybrid]`
+//! measures. `echo_floor` alone, as root, makes two namespaces with a cable and does both there for all modes and two
+//! sizes. `--cpu N` ties either end to a processor.
+
+use std::error::Error;
+use std::io::{BufRead, BufReader};
+use std::process::{Child, Command, Stdio, id};
+use std::time::Duration;
+
+use ringcat_link::monotonic::now_ns;
+use ringcat_link::{PacketOptions, PacketSocket, ReceiveMode, realtime, wait};
+
+type Outcome = Result<(), Box<dyn Error>>;
+
+/// Frames before the measured ones.
+const WARM_UP: usize = 1000;
+/// A frame that takes longer is lost.
+const LOST_AFTER_NS: u64 = 1_000_000_000;
+/// Where the first datagram's data starts: Ethernet header 14, EtherCAT header 2, datagram header 10.
+const DATA: usize = 26;
+
+fn main() -> Outcome {
+    let arguments: Vec<String> = std::env::args().skip(1).collect();
+    let option = |name: &str| arguments.iter().position(|a| a == name).and_then(|at| arguments.get(at + 1)).cloned();
+    let receive = mode(option("--receive").as_deref().unwrap_or("busy"))?;
+    if let Some(Err(warning)) = option("--cpu").map(|cpu| cpu.parse().map(realtime::affinity)).transpose()? {
+        eprintln!("{warning}");
+    }
+    match (arguments.first().map(String::as_str), arguments.get(1)) {
+        (Some("echo"), Some(interface)) => echo(interface, receive),
+        (Some("ping"), Some(interface)) => {
+            let size = option("--size").map_or(Ok(60), |size| size.parse())?;
+            let count = option("--count").map_or(Ok(100_000), |count| count.parse())?;
+            ping(interface, receive, size, count)
+        }
+        (None, _) => both(),
+        _ => Err("usage: echo_floor [echo IF | ping IF] [--size N] [--count N] [--receive MODE] [--cpu N]".into()),
+    }
+}
+
+fn mode(name: &str) -> Result<ReceiveMode, Box<dyn Error>> {
+    match name {
+        "busy" => Ok(ReceiveMode::BusyPoll),
+        "block" => Ok(ReceiveMode::Blocking),
+        "hybrid" => Ok(ReceiveMode::Hybrid { spin: Duration::from_micros(20) }),
+        other => Err(format!("--receive is busy, block or hybrid, not {other:?}").into()),
+    }
+}
+
+fn open(interface: &str, receive: ReceiveMode) -> Result<PacketSocket, Box<dyn Error>> {
+    Ok(PacketSocket::open(interface, &PacketOptions { receive, ..PacketOptions::default() })?)
+}
+
+/// Answers until it is killed.
+fn echo(interface: &str, receive: ReceiveMode) -> Outcome {
+    let mut socket = open(interface, receive)?;
+    let mut answer = [0; 2048];
+    println!("ready");
+    loop {
+        let mut length = 0;
+        wait(&[&socket], u64::MAX, receive);
+        socket.receive(&mut |frame| {
+            length = frame.len();
+            answer[..length].copy_from_slice(frame);
+        });
+        if length > DATA {
+            answer[6] |= 0x02;
+            let data = usize::from(u16::from_le_bytes([answer[22], answer[23]]) & 0x07ff);
+            if let Some(wkc) = answer.get_mut(DATA + data) {
+                *wkc = wkc.wrapping_add(1);
+            }
+            socket.send(&answer[..length]);
+        }
+    }
+}
+
+/// A broadcast of one BRD datagram that fills a frame of this length.
+fn frame(size: usize) -> Vec<u8> {
+    let data = size.saturating_sub(DATA + 2).min(1486) as u16;
+    let mut frame = vec![0xff; 6];
+    frame.extend([0x00, 0, 0, 0, 0, 1, 0x88, 0xa4]);
+    frame.extend((0x1000 | (data + 12)).to_le_bytes());
+    frame.extend([0x07, 0, 0, 0, 0, 0x10]);
+    frame.extend(data.to_le_bytes());
+    frame.resize(DATA + 2 + usize::from(data), 0);
+    frame
+}
+
+/// Sends a frame and waits for it to come back: how long that took, and whether it came back as it should. None where
+/// it is lost. Late ones of earlier rounds are passed over.
+fn round_trip(socket: &mut PacketSocket, receive: ReceiveMode, frame: &[u8]) -> Option<(u64, bool)> {
+    let sent = now_ns();
+    socket.send(frame);
+    let mut right = None;
+    while right.is_none() {
+        if !wait(&[socket], sent + LOST_AFTER_NS, receive) {
+            return None;
+        }
+        socket.receive(&mut |back| {
+            if back.len() == frame.len() && back[17] == frame[17] {
+                right = Some(back[6] & 0x02 != 0 && back[back.len() - 2] == 1);
+            }
+        });
+    }
+    right.map(|right| (now_ns() - sent, right))
+}
+
+fn ping(interface: &str, receive: ReceiveMode, size: usize, count: usize) -> Outcome {
+    let mut socket = open(interface, receive)?;
+    let mut frame = frame(size);
+    let mut times_ns = Vec::with_capacity(count);
+    let (mut lost, mut wrong) = (0, 0);
+    for round in 0..WARM_UP + count {
+        frame[17] = round as u8 & 0x7f;
+        match round_trip(&mut socket, receive, &frame) {
+            None => lost += 1,
+            Some((_, false)) => wrong += 1,
+            Some((ns, true)) if round >= WARM_UP => times_ns.push(ns),
+            Some(_) => {}
+        }
+    }
+    times_ns.sort_unstable();
+    let at = |percent: usize| times_ns.get(times_ns.len() * percent / 100).map_or(0.0, |ns| *ns as f64 / 1e3);
+    println!(
+        "{receive:?}, {} bytes: median {:.2} us, minimum {:.2}, 99 % {:.2} ({count} round trips, lost {lost}, wrong {wrong})",
+        frame.len(),
+        at(50),
+        at(0),
+        at(99),
+    );
+    Ok(())
+}
+
+/// What has to be removed at the end.
+struct Namespaces(Vec<String>);
+
+impl Drop for Namespaces {
+    fn drop(&mut self) {
+        for name in &self.0 {
+            let _ = ip(&["netns", "delete", name]);
+        }
+    }
+}
+
+struct Echo(Child);
+
+impl Drop for Echo {
+    fn drop(&mut self) {
+        let _ = self.0.kill();
+        let _ = self.0.wait();
+    }
+}
+
+fn ip(arguments: &[&str]) -> Outcome {
+    let status = Command::new("ip").args(arguments).status()?;
+    if status.success() { Ok(()) } else { Err(format!("ip {} failed", arguments.join(" ")).into()) }
+}
+
+fn both() -> Outcome {
+    let mut made = Namespaces(Vec::new());
+    let names = ["a", "b"].map(|end| format!("echo-floor-{}-{end}", id()));
+    for name in &names {
+        ip(&["netns", "add", name])?;
+        made.0.push(name.clone());
+    }
+    let [a, b] = names.each_ref().map(String::as_str);
+    let near = ["link", "add", "near", "index", "11", "netns", a, "type", "veth"];
+    ip(&[&near[..], &["peer", "name", "far", "index", "22", "netns", b]].concat())?;
+    ip(&["-n", a, "link", "set", "near", "up"])?;
+    ip(&["-n", b, "link", "set", "far", "up"])?;
+    let this = std::env::current_exe()?;
+    let inside = |namespace: &str, arguments: &[&str]| {
+        let mut command = Command::new("ip");
+        command.args(["netns", "exec", namespace]).arg(&this).args(arguments);
+        command
+    };
+    for (receive, count) in [("busy", "300000"), ("hybrid", "300000"), ("block", "20000")] {
+        let far = ["echo", "far", "--receive", receive, "--cpu", "1"];
+        let mut echo = Echo(inside(b, &far).stdout(Stdio::piped()).spawn()?);
+        // Ready when it says so.
+        let output = echo.0.stdout.take().ok_or("no output")?;
+        BufReader::new(output).read_line(&mut String::new())?;
+        for size in ["60", "1500"] {
+            let near = ["ping", "near", "--receive", receive, "--size", size, "--count", count, "--cpu", "0"];
+            inside(a, &near).status()?;
+        }
+    }
+    Ok(())
+}
