@@ -182,7 +182,7 @@ impl MainDevice {
             Layout::new(&specs, self.options.links(), self.options.supervision).map_err(ActivateError::Layout)?;
         let members = members(declaration, found, &layout)?;
         let directory = Directory::new(&plans, &layout);
-        report_oddities(&bus, &members);
+        report_oddities(&bus, &members, &layout);
         let optional = members.iter().map(|member| member.config.optional).collect();
         let board = Arc::new(Board::new(members.len()).with_optional(optional));
         let (producer, consumer) = queue(CYCLIC_EVENTS);

@@ -1,6 +1,7 @@
 //! What the application declares, held against what the scan found, and turned into domains and members.
 
 use alloc::borrow::ToOwned;
+use alloc::format;
 use alloc::rc::Rc;
 use alloc::string::ToString;
 use alloc::vec;
@@ -10,6 +11,7 @@ use core::time::Duration;
 
 use ringcat_wire::address::Position;
 use ringcat_wire::al::AlState;
+use ringcat_wire::register::{WatchdogDivider, WatchdogTime};
 
 use super::areas::Areas;
 use crate::config::{ConfigError, Resolution, SubDeviceConfig, resolve};
@@ -244,17 +246,36 @@ pub(super) fn with_domain(mut declaration: Declaration) -> Declaration {
 }
 
 /// What SubDevices may not follow, and optional ones for which the process image has no place.
-pub(super) fn report_oddities(bus: &Bus, members: &[Member]) {
+pub(super) fn report_oddities(bus: &Bus, members: &[Member], layout: &Layout) {
     for (subdevice, member) in members.iter().enumerate() {
         let warnings = member.setup.iter().flat_map(|setup| &setup.plan.warnings);
         for warning in warnings {
             bus.report(Event::PlanOddity { subdevice, what: warning.to_string() });
+        }
+        if let Some((period, watchdog)) = beyond_watchdog(subdevice, member, layout) {
+            let (period, watchdog) = (period.as_millis(), watchdog.as_millis());
+            let what = format!("its outputs come every {period} ms, its watchdog expires after {watchdog} ms");
+            bus.report(Event::PlanOddity { subdevice, what });
         }
         if member.setup.is_none() && declared_areas(&member.config).is_none() {
             let what = "not there, and its PDOs are not declared: when it comes, it has no place in the process image";
             bus.report(Event::PlanOddity { subdevice, what: what.to_owned() });
         }
     }
+}
+
+/// Period of a SubDevice's outputs and time of its watchdog, where the watchdog is the shorter one.
+fn beyond_watchdog(subdevice: usize, member: &Member, layout: &Layout) -> Option<(Duration, Duration)> {
+    let plan = &member.setup.as_ref()?.plan;
+    let divider = member.config.watchdog_divider.map_or(WatchdogDivider::default(), WatchdogDivider);
+    let intervals = member.config.watchdog_intervals.map_or(WatchdogTime::default(), WatchdogTime);
+    let watchdog = Duration::from_nanos(intervals.duration_ns(divider)?);
+    let watched = plan.process_data.iter().filter(|area| area.register.control.watchdog);
+    let periods = watched.filter_map(|area| {
+        let (domain, _) = layout.area(subdevice, area.sync_manager)?;
+        Some(layout.domains.get(domain.0)?.period)
+    });
+    periods.max().filter(|period| *period >= watchdog).map(|period| (period, watchdog))
 }
 
 pub(super) fn members(
