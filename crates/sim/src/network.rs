@@ -221,8 +221,8 @@ impl Network {
         None
     }
 
-    /// Sends a frame (without check sequence) on an interface. It leaves behind those that are queued there. On an
-    /// interface without carrier it is lost.
+    /// Sends a frame (without check sequence) on an interface, padded to the shortest that Ethernet allows. It leaves
+    /// behind those that are queued there. On an interface without carrier it is lost.
     pub fn send(&mut self, link: HostLink, bytes: &[u8]) {
         self.transmit(link, bytes);
     }

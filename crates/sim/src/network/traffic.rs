@@ -2,7 +2,7 @@
 
 use core::time::Duration;
 
-use ringcat_wire::frame::{BYTE_TIME_NS, MAX_FRAME_VLAN};
+use ringcat_wire::frame::{BYTE_TIME_NS, MAX_FRAME_VLAN, MIN_FRAME};
 
 use super::statistics::LossCause;
 use super::{Event, Network, Slot};
@@ -16,8 +16,16 @@ use crate::time::SimTime;
 const PREAMBLE: u64 = 8;
 
 impl Network {
-    /// Puts a frame into the transmit queue of an interface.
+    /// Puts a frame into the transmit queue of an interface, padded as every interface pads short ones.
     pub(super) fn transmit(&mut self, link: HostLink, bytes: &[u8]) {
+        let mut padded = [0; MIN_FRAME];
+        let bytes = match padded.get_mut(..bytes.len()) {
+            Some(head) => {
+                head.copy_from_slice(bytes);
+                &padded
+            }
+            None => bytes,
+        };
         if bytes.len() > MAX_FRAME_VLAN {
             return self.statistics.lose(LossCause::Oversized);
         }

@@ -139,3 +139,22 @@ fn a_cut_ring_keeps_the_terminal_in_op() {
     assert_eq!(al_status(&network), (0x08, 0));
     assert_eq!(network.device(TERMINAL).outputs(), [199]);
 }
+
+#[test]
+fn an_interface_pads_short_frames_so_that_their_writes_count() {
+    // APWR 0x1234 to the station address of position 1; some MainDevices leave the padding to the interface, and
+    // a veth pair does not pad.
+    let short = [
+        [0xFF; 6].as_slice(),
+        &[0x01; 6],
+        &[0x88, 0xA4, 0x0E, 0x10],
+        &[0x02, 0x00, 0xFF, 0xFF, 0x10, 0x00, 0x02, 0x00, 0x00, 0x00, 0x34, 0x12, 0x00, 0x00],
+    ]
+    .concat();
+    let mut network = operational();
+    network.send(Main, &short);
+    network.advance_by(SETTLE);
+    let back = network.receive(Redundant).unwrap().bytes;
+    assert_eq!((back.len(), &back[28..30]), (60, [1, 0].as_slice()));
+    assert_eq!(network.device(TERMINAL).controller.register(map::STATION_ADDRESS, 2), [0x34, 0x12]);
+}
