@@ -3,7 +3,7 @@
 use alloc::rc::Rc;
 use alloc::sync::Arc;
 use alloc::vec::Vec;
-use core::cell::{RefCell, RefMut};
+use core::cell::{Cell, RefCell, RefMut};
 
 use ringcat_wire::address::StationAddress;
 use ringcat_wire::al::AlState;
@@ -176,6 +176,8 @@ pub struct Fleet {
 #[derive(Clone, Debug)]
 pub struct SharedFleet {
     fleet: Rc<RefCell<Fleet>>,
+    /// How often something became known that whoever supervises has to act on.
+    news: Rc<Cell<u32>>,
     /// Who takes part in process data.
     pub board: Arc<Board>,
 }
@@ -183,12 +185,22 @@ pub struct SharedFleet {
 impl SharedFleet {
     /// Shares a fleet.
     pub fn new(fleet: Fleet, board: Arc<Board>) -> SharedFleet {
-        SharedFleet { fleet: Rc::new(RefCell::new(fleet)), board }
+        SharedFleet { fleet: Rc::new(RefCell::new(fleet)), news: Rc::default(), board }
     }
 
     /// Access between two points at which a procedure waits.
     pub fn access(&self) -> RefMut<'_, Fleet> {
         self.fleet.borrow_mut()
+    }
+
+    /// Tells whoever supervises that there is something to act on.
+    pub(super) fn note_news(&self) {
+        self.news.set(self.news.get().wrapping_add(1));
+    }
+
+    /// How often there was something to act on.
+    pub(super) fn news(&self) -> u32 {
+        self.news.get()
     }
 
     /// Notes how far a SubDevice is.

@@ -6,7 +6,7 @@ use alloc::vec::Vec;
 use core::cell::RefCell;
 use core::time::Duration;
 
-use ringcat_wire::address::{Position, StationAddress};
+use ringcat_wire::address::{Position, StationAddress, Wkc};
 use ringcat_wire::al::{AlStatus, AlStatusCode};
 use ringcat_wire::register::{DlStatus, map};
 
@@ -26,6 +26,8 @@ pub(super) enum Look {
     Unknown,
     /// Frames came back, it did not answer.
     Silent,
+    /// Several answered: somebody else has its address too.
+    Doubled,
     /// It answered.
     Answer { status: AlStatus, code: AlStatusCode, dl_status: DlStatus },
 }
@@ -49,16 +51,17 @@ pub(super) async fn look_at_all(bus: &Bus, fleet: &SharedFleet, mut so_far: impl
     looks.take()
 }
 
-/// Looks at all that are nobody's.
-pub(super) async fn look_at_strangers(bus: &Bus, fleet: &SharedFleet) -> Vec<Look> {
-    let stations: Vec<StationAddress> = fleet.access().strangers.iter().map(|s| s.info.station).collect();
-    bus.gather(stations, |bus, station| async move { look_at(&bus, station).await }).await
+/// Looks at all that are nobody's, by their addresses.
+pub(super) async fn look_at_strangers(bus: &Bus, fleet: &SharedFleet) -> Vec<(StationAddress, Look)> {
+    let stations: Vec<StationAddress> = fleet.access().strangers.iter().map(|s| s.station).collect();
+    bus.gather(stations, |bus, station| async move { (station, look_at(&bus, station).await) }).await
 }
 
 async fn look_at(bus: &Bus, station: StationAddress) -> Look {
     match read_both(bus, station).await {
         Ok(look) => look,
-        Err(BusError::Wkc { .. }) => Look::Silent,
+        Err(BusError::Wkc { got: Wkc(0), .. }) => Look::Silent,
+        Err(BusError::Wkc { .. }) => Look::Doubled,
         Err(BusError::Lost { .. } | BusError::TooLong { .. }) => Look::Unknown,
     }
 }

@@ -1,75 +1,164 @@
 //! SubDevices that answer but have no station address of ours: found, looked at, and told which declared SubDevice they
 //! are. One that is nobody's keeps a temporary address and is looked at again when a declared one is lost.
+//!
+//! Each is read by a procedure of its own, so that one whose EEPROM is slow or broken keeps nobody waiting.
+
+mod address;
+mod matching;
+mod quiet;
 
 use alloc::rc::Rc;
-use alloc::string::ToString;
+use alloc::string::{String, ToString};
+use alloc::vec;
 use alloc::vec::Vec;
-use core::ops::RangeInclusive;
+use core::time::Duration;
 
 use ringcat_wire::address::{Position, StationAddress};
 use ringcat_wire::register::map;
 
+use self::address::{View, give, view};
+use self::matching::{Fit, assign};
 use super::configure::Start;
-use super::fleet::{Phase, Setup, SharedFleet};
+use super::fleet::{Fleet, Phase, Setup, SharedFleet};
 use super::recover::start;
-use super::scan::{MAX_SUBDEVICES, ScanError, event_mask, read_one};
-use super::sii::claim;
+use super::scan::{ScanError, read_one};
+use super::sii::SiiReadError;
 use crate::config::ConfigAddress;
 use crate::event::Event;
 use crate::info::SubDeviceInfo;
 use crate::supervisor::{Bus, BusError};
+use crate::time::Instant;
 
-/// Temporary station addresses, taken in turn: one that was given to a SubDevice that vanished before anything was read
-/// from it must not be given to another one soon.
-const TEMPORARY: RangeInclusive<u16> = 0xC000..=0xFFFE;
+/// Pause before an SII that could not be read is read again; it doubles with every failure.
+const FIRST_PAUSE: Duration = Duration::from_millis(100);
+/// Longest pause.
+const LONGEST_PAUSE: Duration = Duration::from_secs(5);
+/// So long the others of a gap wait for one that is being read.
+const HOLD: Duration = Duration::from_secs(1);
+/// Searches without success in a row before that is reported.
+const PATIENCE: u32 = 100;
+/// Failures of the bus in a row before they are reported.
+const BUS_PATIENCE: u32 = 3;
+
+/// What is known about a stranger.
+#[derive(Clone, Debug)]
+enum Knowledge {
+    /// It is being read since then.
+    Reading(Instant),
+    /// Its SII cannot be read; this was reported last.
+    Unreadable(String),
+    /// Who it is, with its temporary address.
+    Known(Rc<SubDeviceInfo>),
+}
 
 /// A SubDevice that answers but is nobody's yet.
 #[derive(Clone, Debug)]
 pub struct Stranger {
-    /// Who it is, with its temporary address.
-    pub info: SubDeviceInfo,
+    /// Its temporary address.
+    pub station: StationAddress,
     /// Index of the nearest member before it, and behind it, in the order of positions.
-    pub between: (Option<usize>, Option<usize>),
+    between: (Option<usize>, Option<usize>),
+    position: Position,
     /// It was met by the copy on the main link.
-    pub from_main: bool,
+    from_main: bool,
     /// It was reported as unexpected.
-    pub reported: bool,
+    reported: bool,
+    knowledge: Knowledge,
 }
 
 impl Stranger {
     /// A stranger among the owners of all positions, of which the main copy meets the first `main_count`.
     pub(crate) fn new(info: SubDeviceInfo, owners: &[Option<usize>], main_count: usize, reported: bool) -> Stranger {
-        let at = usize::from(info.position.0);
-        let before = owners.iter().take(at).rev().copied().flatten().next();
-        let behind = owners.iter().skip(at + 1).copied().flatten().next();
-        Stranger { info, between: (before, behind), from_main: at < main_count, reported }
+        let (station, at) = (info.station, usize::from(info.position.0));
+        Stranger::at(station, at, owners, main_count, reported, Knowledge::Known(Rc::new(info)))
+    }
+
+    fn at(
+        station: StationAddress,
+        at: usize,
+        owners: &[Option<usize>],
+        main_count: usize,
+        reported: bool,
+        knowledge: Knowledge,
+    ) -> Stranger {
+        let between = (
+            owners.iter().take(at).rev().copied().flatten().next(),
+            owners.iter().skip(at + 1).copied().flatten().next(),
+        );
+        Stranger { station, between, position: Position(at as u16), from_main: at < main_count, reported, knowledge }
+    }
+
+    /// The same one at another look.
+    fn moved(&self, at: usize, owners: &[Option<usize>], main_count: usize) -> Stranger {
+        Stranger::at(self.station, at, owners, main_count, self.reported, self.knowledge.clone())
     }
 }
 
-/// Finds SubDevices without a known station address.
-pub(super) async fn find(bus: &Bus, fleet: &SharedFleet) -> Result<(), ScanError> {
-    // Positions behind a break are counted from there (facts CR-09).
-    let counted = bus.brd(map::TYPE, 1).await?;
-    let count = counted.wkc().0.min(MAX_SUBDEVICES);
-    let read = bus.gather((0..count).map(Position), |bus, position| async move {
-        let bytes = bus.aprd(position, map::STATION_ADDRESS, 2).await?;
-        Ok::<_, BusError>(StationAddress(u16::from_le_bytes([bytes[0], bytes[1]])))
-    });
-    let owners = read.await.into_iter().collect::<Result<Vec<_>, _>>()?;
-    let known = owners_of(fleet, &owners);
-    for (at, station) in owners.iter().enumerate() {
-        if known[at].is_some() || is_stranger(fleet, *station) {
-            continue;
+/// The search for strangers.
+#[derive(Debug, Default)]
+pub(super) struct Search {
+    /// Without success, in a row.
+    failures: u32,
+}
+
+impl Search {
+    /// Finds SubDevices without a known station address, gives them one and begins to read them. True where nobody is
+    /// left that is not known.
+    pub(super) async fn run(&mut self, bus: &Bus, fleet: &SharedFleet) -> bool {
+        let (complete, reason) = match find(bus, fleet).await {
+            Ok(complete) => (complete, "SubDevices answer that cannot be told apart".into()),
+            Err(error) => (false, error.to_string()),
+        };
+        if complete {
+            self.failures = 0;
+            return true;
         }
-        let position = Position(at as u16);
-        let temporary = next_temporary(fleet, &owners);
-        bus.apwr(position, map::STATION_ADDRESS, &temporary.0.to_le_bytes()).await?;
-        level(bus, temporary).await?;
-        let cache = fleet.access().cache.clone();
-        let info = read_one(bus, position, temporary, &cache).await?;
-        fleet.access().strangers.push(Stranger::new(info, &known, usize::from(counted.main.0), false));
+        self.failures = self.failures.saturating_add(1);
+        if self.failures == PATIENCE {
+            bus.report(Event::ScanFailed { reason });
+        }
+        false
     }
-    Ok(())
+}
+
+/// True where nobody is left that is not known.
+async fn find(bus: &Bus, fleet: &SharedFleet) -> Result<bool, BusError> {
+    let Some(before) = view(bus).await? else { return Ok(false) };
+    let owners = owners_of(fleet, &before.stations);
+    let old = unknown(fleet, &before, &owners);
+    if old.is_empty() {
+        refresh(fleet, &before, &owners);
+        return Ok(true);
+    }
+    // Whoever is given another address is read anew.
+    fleet.access().strangers.retain(|stranger| !old.contains(&stranger.station));
+    let (given, complete) = give(bus, fleet, &before, &old).await?;
+    let Some(mut after) = view(bus).await? else { return Ok(false) };
+    restore(bus, fleet, &owners, &before, &mut after).await?;
+    let owners = owners_of(fleet, &after.stations);
+    refresh(fleet, &after, &owners);
+    for station in given {
+        let Some(at) = after.position(station) else { continue };
+        let knowledge = Knowledge::Reading(bus.now());
+        let main_count = usize::from(after.counts.0.0);
+        fleet.access().strangers.push(Stranger::at(station, at, &owners, main_count, false, knowledge));
+        bus.spawn(read(bus.clone(), fleet.clone(), station));
+    }
+    Ok(complete && unknown(fleet, &after, &owners).is_empty())
+}
+
+/// The station addresses of those that are neither members nor strangers, or that several have.
+fn unknown(fleet: &SharedFleet, view: &View, owners: &[Option<usize>]) -> Vec<StationAddress> {
+    let access = fleet.access();
+    let mut old = Vec::new();
+    for (at, station) in view.stations.iter().enumerate() {
+        let is_listed = access.strangers.iter().any(|stranger| stranger.station == *station);
+        let is_known = owners[at].is_some() || (is_listed && view.position(*station).is_some());
+        if !is_known && !old.contains(station) {
+            old.push(*station);
+        }
+    }
+    old
 }
 
 /// The member at each position. Where two SubDevices have the address of one member, the one at its place is it.
@@ -89,74 +178,188 @@ fn owners_of(fleet: &SharedFleet, owners: &[StationAddress]) -> Vec<Option<usize
     known
 }
 
-fn is_stranger(fleet: &SharedFleet, station: StationAddress) -> bool {
-    fleet.access().strangers.iter().any(|stranger| stranger.info.station == station)
-}
-
-/// A temporary address that none of those present has.
-fn next_temporary(fleet: &SharedFleet, present: &[StationAddress]) -> StationAddress {
-    let count = TEMPORARY.end() - TEMPORARY.start() + 1;
-    let mut address = StationAddress(*TEMPORARY.start());
-    for _ in 0..count {
-        let mut access = fleet.access();
-        address = StationAddress(TEMPORARY.start() + access.next_temporary % count);
-        access.next_temporary = access.next_temporary.wrapping_add(1);
-        let taken = access.strangers.iter().any(|stranger| stranger.info.station == address);
-        if !taken && !present.contains(&address) {
-            break;
+/// A member whose address somebody else had too was given another one with him, and gets its own back.
+async fn restore(
+    bus: &Bus,
+    fleet: &SharedFleet,
+    owners: &[Option<usize>],
+    before: &View,
+    after: &mut View,
+) -> Result<(), BusError> {
+    if before.counts != after.counts {
+        return Ok(());
+    }
+    for (at, owner) in owners.iter().enumerate() {
+        let Some(station) = owner.and_then(|index| Some(fleet.access().members.get(index)?.station)) else { continue };
+        let now = after.stations[at];
+        if now != station && after.position(now).is_some() && after.positions(station).count() == 0 {
+            bus.fpwr(now, map::STATION_ADDRESS, &station.0.to_le_bytes()).await?;
+            after.stations[at] = station;
         }
     }
-    address
+    Ok(())
 }
 
-/// The same starting point as after a scan, for one SubDevice; the rest comes with its configuration.
-async fn level(bus: &Bus, station: StationAddress) -> Result<(), BusError> {
-    bus.fpwr(station, map::DL_CONTROL.offset(1), &[0]).await?;
-    bus.fpwr(station, map::DL_CONTROL.offset(3), &[0]).await?;
-    bus.fpwr(station, map::ECAT_EVENT_MASK, &event_mask().encode()).await?;
-    claim(bus, station).await
+/// Notes where the strangers are now.
+fn refresh(fleet: &SharedFleet, view: &View, owners: &[Option<usize>]) {
+    for stranger in &mut fleet.access().strangers {
+        if let Some(at) = view.position(stranger.station) {
+            *stranger = stranger.moved(at, owners, usize::from(view.counts.0.0));
+        }
+    }
+}
+
+/// Reads a stranger, again and again until it works or it is a stranger no longer.
+async fn read(bus: Bus, fleet: SharedFleet, station: StationAddress) {
+    let mut pause = FIRST_PAUSE;
+    let mut bus_failures = 0;
+    loop {
+        let result = read_once(&bus, &fleet, station).await;
+        let failed_on_bus =
+            matches!(result, Err(ScanError::Bus(_) | ScanError::Sii { error: SiiReadError::Bus(_), .. }));
+        bus_failures = if failed_on_bus { bus_failures + 1 } else { 0 };
+        let patient = failed_on_bus && bus_failures < BUS_PATIENCE;
+        if !note(&bus, &fleet, station, result, patient) {
+            return;
+        }
+        bus.sleep(pause).await;
+        pause = (pause * 2).min(LONGEST_PAUSE);
+    }
+}
+
+async fn read_once(bus: &Bus, fleet: &SharedFleet, station: StationAddress) -> Result<SubDeviceInfo, ScanError> {
+    quiet::level(bus, station).await?;
+    let position = fleet.access().strangers.iter().find(|it| it.station == station).map(|it| it.position);
+    let cache = fleet.access().cache.clone();
+    read_one(bus, position.unwrap_or_default(), station, &cache).await
+}
+
+/// Notes what reading a stranger brought; false where it need not be read again.
+fn note(
+    bus: &Bus,
+    fleet: &SharedFleet,
+    station: StationAddress,
+    result: Result<SubDeviceInfo, ScanError>,
+    patient: bool,
+) -> bool {
+    let mut access = fleet.access();
+    let Some(stranger) = access.strangers.iter_mut().find(|stranger| stranger.station == station) else {
+        return false;
+    };
+    fleet.note_news();
+    match result {
+        Ok(info) => stranger.knowledge = Knowledge::Known(Rc::new(info)),
+        Err(_) if patient => return true,
+        Err(error) => {
+            let reason = error.to_string();
+            if !matches!(&stranger.knowledge, Knowledge::Unreadable(before) if *before == reason) {
+                bus.report(Event::ScanFailed { reason: reason.clone() });
+                stranger.knowledge = Knowledge::Unreadable(reason);
+            }
+            return true;
+        }
+    }
+    false
 }
 
 /// Tells strangers which absent members they are and starts their configuration. To be called when it is known of all
 /// members whether they are there: one that is absent, but not known to be, may be the one that a stranger is.
 pub(super) async fn admit_all(bus: &Bus, fleet: &SharedFleet) {
-    let mut at = 0;
-    while let Some(stranger) = { fleet.access().strangers.get(at).cloned() } {
-        if admit(bus, fleet, &stranger).await {
-            fleet.access().strangers.retain(|other| other.info.station != stranger.info.station);
-        } else {
-            at += 1;
+    for (stranger, member) in match_all(bus, fleet) {
+        let Knowledge::Known(info) = &stranger.knowledge else { continue };
+        if let Some(index) = member {
+            if admit(bus, fleet, &stranger, info, index).await {
+                fleet.access().strangers.retain(|other| other.station != stranger.station);
+            }
+        } else if note_reported(fleet, stranger.station) {
+            bus.report(Event::Unexpected { position: stranger.position, identity: info.identity });
         }
     }
 }
 
-/// Admits one stranger; true where it is one no longer.
-async fn admit(bus: &Bus, fleet: &SharedFleet, stranger: &Stranger) -> bool {
-    let temporary = stranger.info.station;
-    let Some(index) = member_for(fleet, stranger) else {
-        if note_reported(fleet, temporary) {
-            let SubDeviceInfo { position, identity, .. } = stranger.info;
-            bus.report(Event::Unexpected { position, identity });
+/// Strangers of whom it is known which absent members they are, or that they are none.
+fn match_all(bus: &Bus, fleet: &SharedFleet) -> Vec<(Stranger, Option<usize>)> {
+    let access = fleet.access();
+    let mut strangers = access.strangers.clone();
+    strangers.sort_by_key(|stranger| stranger.position);
+    let now = bus.now();
+    let mut matched = Vec::new();
+    for gap in strangers.chunk_by(|one, other| one.between == other.between) {
+        let waits = |it: &Stranger| matches!(it.knowledge, Knowledge::Reading(since) if now.since(since) < HOLD);
+        if gap.iter().any(waits) {
+            continue;
         }
-        return false;
+        let absent = absent_between(&access, gap[0].between);
+        let from_main: Vec<bool> = gap.iter().map(|stranger| stranger.from_main).collect();
+        let fit = |stranger: usize, place: usize| fit(&access, &gap[stranger], absent[place]);
+        let places = assign(&from_main, absent.len(), fit);
+        let members = places.into_iter().map(|place| place.map(|place| absent[place]));
+        matched.extend(gap.iter().cloned().zip(members));
+    }
+    matched
+}
+
+/// Absent members between two others, in the order of the segment, which need not be that of the declaration.
+fn absent_between(fleet: &Fleet, between: (Option<usize>, Option<usize>)) -> Vec<usize> {
+    let mut last = None;
+    let mut rank = vec![(None, false, 0); fleet.members.len()];
+    for (index, member) in fleet.members.iter().enumerate() {
+        // One that was never seen belongs behind the one that is declared before it.
+        last = member.node.or(last);
+        rank[index] = (last, member.node.is_none(), index);
+    }
+    let mut absent: Vec<usize> = (0..fleet.members.len())
+        .filter(|index| fleet.members[*index].phase == Phase::Absent)
+        .filter(|index| between.0.is_none_or(|before| rank[before] < rank[*index]))
+        .filter(|index| between.1.is_none_or(|behind| rank[*index] < rank[behind]))
+        .collect();
+    absent.sort_by_key(|index| rank[*index]);
+    absent
+}
+
+/// How well a stranger fits an absent member.
+fn fit(fleet: &Fleet, stranger: &Stranger, index: usize) -> Fit {
+    let member = &fleet.members[index];
+    let Knowledge::Known(info) = &stranger.knowledge else { return Fit::Unreadable };
+    let identity = &info.identity;
+    let alias_fits = match member.config.address {
+        ConfigAddress::Alias { alias, offset: 0 } if alias != 0 => alias == info.alias,
+        _ => true,
     };
+    if !alias_fits || member.config.expected.mismatch(identity).is_some() {
+        return Fit::No;
+    }
+    let Some(known) = member.info.as_ref().map(|info| info.identity) else { return Fit::NeverSeen };
+    if (known.vendor_id, known.product_code) != (identity.vendor_id, identity.product_code) {
+        Fit::No
+    } else if identity.serial != 0 && identity.serial == known.serial {
+        Fit::Serial
+    } else {
+        Fit::Seen
+    }
+}
+
+/// Makes a stranger the member it is; true where it is a stranger no longer.
+async fn admit(bus: &Bus, fleet: &SharedFleet, stranger: &Stranger, info: &SubDeviceInfo, index: usize) -> bool {
     let (info, setup) = {
         let access = fleet.access();
         let member = &access.members[index];
-        let info = SubDeviceInfo { station: member.station, ..stranger.info.clone() };
+        let info = SubDeviceInfo { station: member.station, position: stranger.position, ..info.clone() };
         let setup = Setup::new(index, &member.config, &info, &access.layout);
         (info, setup)
     };
     let setup = match setup {
         Ok(setup) => setup,
         Err(error) => {
-            if note_reported(fleet, temporary) {
+            if note_reported(fleet, stranger.station) {
                 bus.report(Event::ConfigurationFailed { subdevice: index, reason: error.to_string() });
             }
             return false;
         }
     };
-    if bus.fpwr(temporary, map::STATION_ADDRESS, &info.station.0.to_le_bytes()).await.is_err() {
+    let written = bus.fpwr(stranger.station, map::STATION_ADDRESS, &info.station.0.to_le_bytes()).await;
+    // The reply to the first try may have been lost, and then the old address answers no more.
+    if written.is_err() && bus.fprd(info.station, map::STATION_ADDRESS, 2).await.is_err() {
         return false;
     }
     {
@@ -166,47 +369,16 @@ async fn admit(bus: &Bus, fleet: &SharedFleet, stranger: &Stranger) -> bool {
         member.configured = false;
     }
     bus.report(Event::Returned { subdevice: index });
-    start(bus, fleet, index, Start::Unknown);
+    // Whatever state it is in, it is not one that we brought it to.
+    start(bus, fleet, index, Start::Doubtful);
     true
 }
 
 /// Notes that a stranger was reported; false where it was before.
 fn note_reported(fleet: &SharedFleet, station: StationAddress) -> bool {
     let mut access = fleet.access();
-    let Some(stranger) = access.strangers.iter_mut().find(|stranger| stranger.info.station == station) else {
+    let Some(stranger) = access.strangers.iter_mut().find(|stranger| stranger.station == station) else {
         return false;
     };
     !core::mem::replace(&mut stranger.reported, true)
-}
-
-/// The absent member that a stranger is. One with the same serial number wins; else, coming from the main link, the
-/// first that fits between its neighbours, and coming from the redundant link the last: a SubDevice can only answer
-/// through its neighbours.
-fn member_for(fleet: &SharedFleet, stranger: &Stranger) -> Option<usize> {
-    let access = fleet.access();
-    let identity = &stranger.info.identity;
-    let fits = |index: &usize| {
-        let member = &access.members[*index];
-        let same_product = member.info.as_ref().is_none_or(|info| {
-            (info.identity.vendor_id, info.identity.product_code) == (identity.vendor_id, identity.product_code)
-        });
-        let same_alias = match member.config.address {
-            ConfigAddress::Alias { alias, offset: 0 } if alias != 0 => alias == stranger.info.alias,
-            _ => true,
-        };
-        member.phase == Phase::Absent
-            && same_product
-            && same_alias
-            && member.config.expected.mismatch(identity).is_none()
-    };
-    let before = stranger.between.0.map_or(0, |index| index + 1);
-    let behind = stranger.between.1.unwrap_or(access.members.len()).max(before);
-    let candidates: Vec<usize> = (before..behind).filter(fits).collect();
-    let same_serial = |index: &&usize| {
-        let info = access.members[**index].info.as_ref();
-        identity.serial != 0 && info.is_some_and(|info| info.identity.serial == identity.serial)
-    };
-    let by_serial = candidates.iter().find(same_serial);
-    let by_place = if stranger.from_main { candidates.first() } else { candidates.last() };
-    by_serial.or(by_place).copied()
 }

@@ -11,6 +11,7 @@ use alloc::vec::Vec;
 use core::cell::Cell;
 use core::time::Duration;
 
+use ringcat_wire::address::StationAddress;
 use ringcat_wire::al::{AlStatus, AlStatusCode};
 use ringcat_wire::register::{DlStatus, map};
 
@@ -18,13 +19,12 @@ use super::configure::Start;
 use super::fleet::{Phase, SharedFleet};
 use super::inspect::{Break, Look, locate_break, look_at_all, look_at_strangers};
 use super::recover::{lose, start};
-use super::scan::ScanError;
-use super::strangers;
+use super::strangers::{self, Search};
 use crate::board::{RingWord, Supervision};
 use crate::event::Event;
 use crate::link::LinkSet;
 use crate::ring::RingState;
-use crate::supervisor::{Bus, BusError};
+use crate::supervisor::Bus;
 use crate::time::Instant;
 
 /// Pause between two looks at the board.
@@ -66,6 +66,8 @@ pub(crate) async fn supervise(bus: Bus, fleet: SharedFleet) {
         place: None,
         break_looks: 0,
         next_routine: Instant::default(),
+        search: Search::default(),
+        news: 0,
     };
     loop {
         watch.bus.sleep(PAUSE).await;
@@ -94,6 +96,9 @@ struct Watch {
     /// Looks for it that are left.
     break_looks: u8,
     next_routine: Instant,
+    search: Search,
+    /// What had become known at the last check.
+    news: u32,
 }
 
 /// Reports each change of the ring once, with the counts of both links.
@@ -134,12 +139,14 @@ impl Watch {
         let reported = self.reported.get();
         let changed = supervision.is_some_and(|supervision| supervision != self.seen)
             || ring != self.ring
-            || reported != self.seen_reported;
+            || reported != self.seen_reported
+            || self.fleet.news() != self.news;
         if !changed && now < self.next_routine {
             return false;
         }
         self.seen = supervision.unwrap_or(self.seen);
         self.ring = ring;
+        self.news = self.fleet.news();
         if reported != self.seen_reported {
             self.seen_reported = reported;
             self.place = None;
@@ -151,10 +158,11 @@ impl Watch {
 
     async fn check(&mut self) {
         let strangers = look_at_strangers(&self.bus, &self.fleet).await;
+        let stranger_answers = strangers.iter().filter(|(_, look)| matches!(look, Look::Answer { .. })).count();
         let (fleet, suspended) = (&self.fleet, &mut self.suspended);
-        let looks = look_at_all(&self.bus, fleet, |so_far| suspend(fleet, suspended, so_far, &strangers)).await;
+        let looks = look_at_all(&self.bus, fleet, |so_far| suspend(fleet, suspended, so_far, stranger_answers)).await;
         let Some((_, seen)) = self.fleet.board.supervision() else { return };
-        let (count, answering) = (usize::from(seen.total().0), answers(&looks) + answers(&strangers));
+        let (count, answering) = (usize::from(seen.total().0), answers(&looks) + stranger_answers);
         // When the count and the answers agree, a silent SubDevice is certainly not there.
         let needed = if count == answering { 1 } else { SILENT_LOOKS };
         let certain = self.judge(&looks, needed);
@@ -166,10 +174,12 @@ impl Watch {
             self.again_in(SECOND_LOOK_PAUSE);
         }
         self.report_break(&looks);
-        if count > answering && !looks.contains(&Look::Unknown) {
-            self.find_strangers().await;
+        // Who else is there must be known before anybody's place is.
+        let mut complete = count <= answering;
+        if !complete && !looks.contains(&Look::Unknown) {
+            complete = self.find_strangers().await;
         }
-        if certain {
+        if certain && complete {
             strangers::admit_all(&self.bus, &self.fleet).await;
         }
     }
@@ -184,7 +194,7 @@ impl Watch {
         let mut certain = true;
         for (index, look) in looks.iter().enumerate() {
             match (look, self.fleet.phase(index)) {
-                (Look::Unknown, _) => certain = false,
+                (Look::Unknown | Look::Doubled, _) => certain = false,
                 (Look::Silent, Phase::Absent) => self.silent[index] = SILENT_LOOKS,
                 (Look::Silent, Phase::Configuring | Phase::Settled(_)) => {
                     self.silent[index] = (self.silent[index] + 1).min(SILENT_LOOKS);
@@ -222,9 +232,8 @@ impl Watch {
     }
 
     /// Strangers that no longer answer are gone.
-    fn forget_strangers(&self, looks: &[Look]) {
-        let mut looks = looks.iter();
-        self.fleet.access().strangers.retain(|_| looks.next() != Some(&Look::Silent));
+    fn forget_strangers(&self, looks: &[(StationAddress, Look)]) {
+        self.fleet.access().strangers.retain(|stranger| !looks.contains(&(stranger.station, Look::Silent)));
     }
 
     /// One event per break, when its neighbours have noticed it.
@@ -257,20 +266,15 @@ impl Watch {
         locate_break(&access.topology, &by_position)
     }
 
-    async fn find_strangers(&mut self) {
-        match strangers::find(&self.bus, &self.fleet).await {
-            // The segment changed under our hands: again when it is quiet.
-            Ok(()) | Err(ScanError::Bus(BusError::Wkc { .. } | BusError::Lost { .. })) => {}
-            Err(error) => {
-                let reason = alloc::string::ToString::to_string(&error);
-                self.bus.report(Event::ScanFailed { reason });
-            }
-        }
+    /// True where nobody is left that is not known.
+    async fn find_strangers(&mut self) -> bool {
+        let complete = self.search.run(&self.bus, &self.fleet).await;
         // Clears the requests of those that nobody looks at.
         if self.bus.brd(map::DL_STATUS, DlStatus::LEN).await.is_err() {
             self.again_in(PAUSE);
         }
         self.again_in(STRANGER_PAUSE);
+        complete
     }
 }
 
@@ -280,9 +284,9 @@ fn answers(looks: &[Look]) -> usize {
 
 /// As soon as all that the cyclic datagram counts have answered, process data no longer waits for the others: whether
 /// they are lost is seen later, whose inputs are new is seen now.
-fn suspend(fleet: &SharedFleet, suspended: &mut [bool], looks: &[Look], strangers: &[Look]) {
+fn suspend(fleet: &SharedFleet, suspended: &mut [bool], looks: &[Look], strangers: usize) {
     let count = fleet.board.supervision().map(|(_, seen)| usize::from(seen.total().0));
-    if count != Some(answers(looks) + answers(strangers)) {
+    if count != Some(answers(looks) + strangers) {
         return;
     }
     let silent = looks.iter().enumerate().filter(|(_, look)| !matches!(look, Look::Answer { .. }));

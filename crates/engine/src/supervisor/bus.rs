@@ -156,7 +156,7 @@ impl Bus {
         data: Vec<u8>,
         expected: Option<Wkc>,
     ) -> impl Future<Output = Result<Reply, BusError>> {
-        self.submit(Request { command, target, data, expected, resend: true })
+        self.submit(Request { command, target, data, redundant: None, expected, resend: true })
     }
 
     /// Like [`Bus::transfer`], but sent once: for accesses that must not happen twice.
@@ -166,7 +166,21 @@ impl Bus {
         target: Target,
         data: Vec<u8>,
     ) -> impl Future<Output = Result<Reply, BusError>> {
-        self.submit(Request { command, target, data, expected: Some(Wkc(1)), resend: false })
+        self.submit(Request { command, target, data, redundant: None, expected: Some(Wkc(1)), resend: false })
+    }
+
+    /// Exchanges a register for other data: each SubDevice with this station address hands its old value on with the
+    /// datagram, so that only the first one on each link gets what is sent there. Sent once.
+    pub fn exchange(
+        &self,
+        station: StationAddress,
+        register: RegisterAddress,
+        main: Vec<u8>,
+        redundant: Vec<u8>,
+    ) -> impl Future<Output = Result<Reply, BusError>> {
+        let target = Target::Station(station, register);
+        let redundant = Some(redundant).filter(|data| data.len() == main.len());
+        self.submit(Request { command: Command::Fprw, target, data: main, redundant, expected: None, resend: false })
     }
 
     fn submit(&self, request: Request) -> TransferFuture {

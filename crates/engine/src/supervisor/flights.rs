@@ -159,6 +159,13 @@ impl Shared {
                 copy.copy_from_slice(&flight.bytes);
                 Identity::mark_redundant(copy, true);
                 adjust_auto_increment(copy, &flight.places, self.main_count);
+                for place in &flight.places {
+                    let own = self.transfers.find(place.transfer).and_then(|it| it.request.redundant.as_ref());
+                    if let Some(data) = own {
+                        let at = place.header_at + HEADER_LEN;
+                        copy[at..at + place.length].copy_from_slice(data);
+                    }
+                }
                 transmit(Link::Redundant, copy);
             }
             let slot = Flights::slot(flight.sequence);

@@ -16,6 +16,8 @@ pub(crate) struct Request {
     pub target: Target,
     /// Data to send; zeros for reads.
     pub data: Vec<u8>,
+    /// Data of the redundant copy, where it is not the same; of the same length.
+    pub redundant: Option<Vec<u8>>,
     /// The working counter at which waiting for a second copy is pointless.
     pub expected: Option<Wkc>,
     /// Whether a lost datagram may be sent again: false where reading or writing twice is not the same as once.

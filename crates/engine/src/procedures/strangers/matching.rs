@@ -1,0 +1,122 @@
+//! Which absent SubDevices the strangers between two known ones are.
+//!
+//! Both are in the order of the segment, and that order decides: of several alike the first on the main side is the
+//! first, the last on the redundant side the last, because a SubDevice can only answer through its neighbours. Serial
+//! numbers decide before order does.
+
+use alloc::vec;
+use alloc::vec::Vec;
+
+/// How well a stranger fits an absent SubDevice.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Fit {
+    /// It is not that one.
+    No,
+    /// Its SII cannot be read: it may be that one, and keeps the place.
+    Unreadable,
+    /// It could be that one, which has never been there.
+    NeverSeen,
+    /// It could be that one.
+    Seen,
+    /// It has the serial number of that one.
+    Serial,
+}
+
+impl Fit {
+    const fn score(self) -> Option<u64> {
+        match self {
+            Fit::No => None,
+            Fit::Unreadable => Some(1),
+            Fit::NeverSeen => Some(2),
+            Fit::Seen | Fit::Serial => Some(3),
+        }
+    }
+}
+
+/// The absent SubDevice that each stranger is, if any. `fit` tells of a stranger and an absent one how well they fit;
+/// `from_main` whether a stranger answers on the main link.
+pub(super) fn assign(from_main: &[bool], absent: usize, fit: impl Fn(usize, usize) -> Fit) -> Vec<Option<usize>> {
+    let mut assigned = vec![None; from_main.len()];
+    for (stranger, slot) in assigned.iter_mut().enumerate() {
+        *slot = (0..absent).find(|place| fit(stranger, *place) == Fit::Serial);
+    }
+    let strangers: Vec<usize> = (0..assigned.len()).filter(|stranger| assigned[*stranger].is_none()).collect();
+    let places: Vec<usize> = (0..absent).filter(|place| !assigned.contains(&Some(*place))).collect();
+    // The best sum of scores; the lower half of the word prefers places near the side that a stranger answers from.
+    let value = |one: usize, other: usize| {
+        let (stranger, place) = (strangers[one], places[other]);
+        let near = if from_main[stranger] { places.len() - other } else { other + 1 };
+        fit(stranger, place).score().map(|score| (score << 32) + near as u64)
+    };
+    let width = places.len() + 1;
+    let mut best = vec![0u64; (strangers.len() + 1) * width];
+    for one in 0..strangers.len() {
+        for other in 0..places.len() {
+            let paired = value(one, other).map_or(0, |value| best[one * width + other] + value);
+            best[(one + 1) * width + other + 1] =
+                paired.max(best[one * width + other + 1]).max(best[(one + 1) * width + other]);
+        }
+    }
+    let (mut one, mut other) = (strangers.len(), places.len());
+    while one > 0 && other > 0 {
+        let here = best[one * width + other];
+        if here == best[(one - 1) * width + other] {
+            one -= 1;
+        } else if here == best[one * width + other - 1] {
+            other -= 1;
+        } else {
+            (one, other) = (one - 1, other - 1);
+            assigned[strangers[one]] = Some(places[other]);
+        }
+    }
+    assigned
+}
+
+#[cfg(test)]
+mod tests {
+    use super::Fit::{NeverSeen, No, Seen, Serial, Unreadable};
+    use super::*;
+
+    fn assigned<const N: usize>(from_main: &[bool], fits: &[[Fit; N]]) -> Vec<Option<usize>> {
+        assign(from_main, N, |stranger, place| fits[stranger][place])
+    }
+
+    #[test]
+    fn strangers_alike_keep_the_order_of_the_segment() {
+        assert_eq!(assigned(&[true, true], &[[Seen; 2]; 2]), [Some(0), Some(1)]);
+        assert_eq!(assigned(&[false, false], &[[Seen; 2]; 2]), [Some(0), Some(1)]);
+        assert_eq!(assigned(&[true, false], &[[Seen; 3]; 2]), [Some(0), Some(2)]);
+    }
+
+    #[test]
+    fn fewer_than_are_absent_are_next_to_the_neighbours_they_answer_through() {
+        assert_eq!(assigned(&[true], &[[Seen; 3]]), [Some(0)]);
+        assert_eq!(assigned(&[false], &[[Seen; 3]]), [Some(2)]);
+        assert_eq!(assigned(&[false, false], &[[Seen; 3]; 2]), [Some(1), Some(2)]);
+    }
+
+    #[test]
+    fn one_that_was_there_before_is_preferred_to_one_that_never_was() {
+        assert_eq!(assigned(&[true], &[[NeverSeen, Seen]]), [Some(1)]);
+        assert_eq!(assigned(&[true, true], &[[NeverSeen, Seen]; 2]), [Some(0), Some(1)], "both are there now");
+        assert_eq!(assigned(&[true], &[[NeverSeen, No]]), [Some(0)]);
+    }
+
+    #[test]
+    fn a_serial_number_decides_before_order_does() {
+        assert_eq!(assigned(&[true], &[[Seen, Serial]]), [Some(1)]);
+        assert_eq!(assigned(&[true, true], &[[Seen, Serial], [Seen, Seen]]), [Some(1), Some(0)]);
+    }
+
+    #[test]
+    fn one_that_cannot_be_read_keeps_its_place_unless_somebody_who_can_needs_it() {
+        assert_eq!(assigned(&[true, true], &[[Unreadable; 2], [Seen; 2]]), [Some(0), Some(1)]);
+        assert_eq!(assigned(&[true, true], &[[Unreadable], [Seen]]), [None, Some(0)]);
+    }
+
+    #[test]
+    fn one_that_fits_nowhere_is_nobody() {
+        assert_eq!(assigned(&[true, true], &[[No, No], [No, Seen]]), [None, Some(1)]);
+        assert_eq!(assigned::<0>(&[true], &[[]]), [None]);
+    }
+}
