@@ -9,7 +9,6 @@ mod quiet;
 
 use alloc::rc::Rc;
 use alloc::string::{String, ToString};
-use alloc::vec;
 use alloc::vec::Vec;
 use core::time::Duration;
 
@@ -19,7 +18,7 @@ use ringcat_wire::register::map;
 use self::address::{View, give, view};
 use self::matching::{Fit, assign};
 use super::configure::Start;
-use super::fleet::{Fleet, Phase, Setup, SharedFleet};
+use super::fleet::{Fleet, Member, Phase, Setup, SharedFleet};
 use super::recover::start;
 use super::scan::{ScanError, read_one};
 use super::sii::SiiReadError;
@@ -81,10 +80,7 @@ impl Stranger {
         reported: bool,
         knowledge: Knowledge,
     ) -> Stranger {
-        let between = (
-            owners.iter().take(at).rev().copied().flatten().next(),
-            owners.iter().skip(at + 1).copied().flatten().next(),
-        );
+        let between = neighbours(owners, at);
         Stranger { station, between, position: Position(at as u16), from_main: at < main_count, reported, knowledge }
     }
 
@@ -161,21 +157,53 @@ fn unknown(fleet: &SharedFleet, view: &View, owners: &[Option<usize>]) -> Vec<St
     old
 }
 
-/// The member at each position. Where two SubDevices have the address of one member, the one at its place is it.
-fn owners_of(fleet: &SharedFleet, owners: &[StationAddress]) -> Vec<Option<usize>> {
+/// The member at each position. Where several have the address of one member, the one between its neighbours is it; if
+/// that does not tell, none of them is.
+fn owners_of(fleet: &SharedFleet, stations: &[StationAddress]) -> Vec<Option<usize>> {
     let access = fleet.access();
     let member = |station: &StationAddress| access.members.iter().position(|member| member.station == *station);
-    let mut known: Vec<Option<usize>> = owners.iter().map(member).collect();
-    for at in 0..known.len() {
-        let Some(index) = known[at] else { continue };
-        let others = (at + 1..known.len()).filter(|other| known[*other] == Some(index)).collect::<Vec<_>>();
-        let place = access.members[index].info.as_ref().map(|info| usize::from(info.position.0));
-        let keep = others.iter().copied().find(|other| Some(*other) == place).unwrap_or(at);
-        for other in others.into_iter().chain([at]).filter(|other| *other != keep) {
-            known[other] = None;
+    let all: Vec<Option<usize>> = stations.iter().map(member).collect();
+    let is_single = |owner: &Option<usize>| all.iter().filter(|other| *other == owner).count() == 1;
+    let mut owners: Vec<Option<usize>> = all.iter().map(|owner| owner.filter(|_| is_single(owner))).collect();
+    let ranks = ranks(&access);
+    for index in 0..access.members.len() {
+        let several = |at: &usize| all[*at] == Some(index) && owners[*at].is_none();
+        let candidates: Vec<usize> = (0..all.len()).filter(several).collect();
+        let is_between = |at: &usize| {
+            let (before, behind) = neighbours(&owners, *at);
+            before.is_none_or(|before| ranks[before] < ranks[index])
+                && behind.is_none_or(|behind| ranks[index] < ranks[behind])
+        };
+        let between: Vec<usize> = candidates.iter().copied().filter(is_between).collect();
+        let keeper = match between[..] {
+            [only] => Some(only),
+            // It was there at the scan, and nobody has moved since.
+            _ => between.into_iter().find(|at| access.members[index].node == Some(*at)),
+        };
+        if let Some(at) = keeper {
+            owners[at] = Some(index);
         }
     }
-    known
+    owners
+}
+
+/// The nearest members before and behind a position.
+fn neighbours(owners: &[Option<usize>], at: usize) -> (Option<usize>, Option<usize>) {
+    let before = owners.iter().take(at).rev().copied().flatten().next();
+    (before, owners.iter().skip(at + 1).copied().flatten().next())
+}
+
+/// Where a member belongs in the order of the segment, which need not be that of the declaration.
+type Rank = (Option<usize>, bool, usize);
+
+fn ranks(fleet: &Fleet) -> Vec<Rank> {
+    let mut last = None;
+    let rank = |(index, member): (usize, &Member)| {
+        // One that was never seen belongs behind the one that is declared before it.
+        last = member.node.or(last);
+        (last, member.node.is_none(), index)
+    };
+    fleet.members.iter().enumerate().map(rank).collect()
 }
 
 /// A member whose address somebody else had too was given another one with him, and gets its own back.
@@ -299,15 +327,9 @@ fn match_all(bus: &Bus, fleet: &SharedFleet) -> Vec<(Stranger, Option<usize>)> {
     matched
 }
 
-/// Absent members between two others, in the order of the segment, which need not be that of the declaration.
+/// Absent members between two others, in the order of the segment.
 fn absent_between(fleet: &Fleet, between: (Option<usize>, Option<usize>)) -> Vec<usize> {
-    let mut last = None;
-    let mut rank = vec![(None, false, 0); fleet.members.len()];
-    for (index, member) in fleet.members.iter().enumerate() {
-        // One that was never seen belongs behind the one that is declared before it.
-        last = member.node.or(last);
-        rank[index] = (last, member.node.is_none(), index);
-    }
+    let rank = ranks(fleet);
     let mut absent: Vec<usize> = (0..fleet.members.len())
         .filter(|index| fleet.members[*index].phase == Phase::Absent)
         .filter(|index| between.0.is_none_or(|before| rank[before] < rank[*index]))

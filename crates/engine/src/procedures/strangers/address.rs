@@ -123,6 +123,8 @@ pub(super) async fn give(
 }
 
 /// Gives the first SubDevice on each link that has an address a new one. Returns on which links somebody took it.
+///
+/// The two links get different ones: there may be somebody on the other link whose answers do not arrive.
 async fn exchange(
     bus: &Bus,
     station: StationAddress,
@@ -130,12 +132,13 @@ async fn exchange(
     single: bool,
 ) -> Result<[bool; 2], BusError> {
     let bytes = |station: StationAddress| station.0.to_le_bytes().to_vec();
-    if single {
-        // Also controllers that cannot read and write at once can do this (facts 3.2, FEATURES bit 10).
+    let reply = bus.exchange(station, map::STATION_ADDRESS, bytes(main), bytes(redundant)).await?;
+    let taken = [reply.main.0 >= EXCHANGED, reply.redundant.0 >= EXCHANGED];
+    if single && taken == [false; 2] {
+        // Controllers that cannot read and write at once (FEATURES bit 10).
         let target = Target::Station(station, map::STATION_ADDRESS);
         let reply = bus.transfer_once(Command::Fpwr, target, bytes(main)).await?;
         return Ok([reply.wkc() != Wkc(0), false]);
     }
-    let reply = bus.exchange(station, map::STATION_ADDRESS, bytes(main), bytes(redundant)).await?;
-    Ok([reply.main.0 >= EXCHANGED, reply.redundant.0 >= EXCHANGED])
+    Ok(taken)
 }
