@@ -34,8 +34,8 @@ const COUNT_PAUSE: Duration = Duration::from_millis(1);
 const INIT_LIMIT: Duration = Duration::from_millis(100);
 /// A scan is begun so often: a cable may be cut or plugged in while it runs.
 const ATTEMPTS: u8 = 3;
-/// Every so many SubDevices, progress is reported.
-const PROGRESS_STEP: usize = 50;
+/// Progress is reported in so many steps.
+const PROGRESS_STEPS: usize = 10;
 
 /// How to scan.
 #[derive(Clone, Debug)]
@@ -264,13 +264,14 @@ pub const fn station_at(position: Position) -> StationAddress {
 
 async fn read_all(bus: &Bus, count: u16, cache: &SiiCache) -> Result<Vec<SubDeviceInfo>, ScanError> {
     let total = usize::from(count);
-    let done = Rc::new(Cell::new(0));
+    let step = total.div_ceil(PROGRESS_STEPS).max(1);
+    let done = Rc::new(Cell::new(0_usize));
     let read = bus.gather((0..count).map(Position), |bus, position| {
         let (done, cache) = (done.clone(), cache.clone());
         async move {
             let result = read_one(&bus, position, station_at(position), &cache).await;
             done.set(done.get() + 1);
-            if done.get() % PROGRESS_STEP == 0 || done.get() == total {
+            if done.get().is_multiple_of(step) || done.get() == total {
                 bus.report(Event::ScanProgress { done: done.get(), total });
             }
             result
