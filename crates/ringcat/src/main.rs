@@ -2,6 +2,7 @@
 
 mod demo;
 mod interfaces;
+mod output;
 mod run;
 mod scan;
 mod sim;

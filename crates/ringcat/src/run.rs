@@ -3,7 +3,7 @@
 //! Outputs stay zero: this command knows of no application. What keeps the cycle from its time is told apart: wake-ups
 //! that came late and cycles that were left out are this machine's, lost frames are the wire's.
 
-use std::io::{IsTerminal, Write, stdout};
+use std::io::{IsTerminal, stdout};
 use std::sync::atomic::AtomicBool;
 use std::time::Duration;
 
@@ -18,6 +18,7 @@ use ringcat::{
 use ringcat_wire::al::AlState;
 
 use crate::interfaces::{Failure, InterfaceArguments, ThreadArguments, end_request, is_asked};
+use crate::output::{say, write};
 
 /// From activation to OP of the last SubDevice at the most.
 const OP_LIMIT: Duration = Duration::from_secs(60);
@@ -67,7 +68,7 @@ pub fn run(arguments: &RunArguments) -> Result<bool, Failure> {
     let mut main_device = MainDevice::request(links, &Options::default());
     let begin = ringcat_link::monotonic::now_ns();
     let scan = main_device.scan()?;
-    println!("{} SubDevices; cycle {} us", scan.subdevices.len(), arguments.cycle.as_micros());
+    say!("{} SubDevices; cycle {} us", scan.subdevices.len(), arguments.cycle.as_micros());
     let names = Names(scan.subdevices.iter().map(|info| info.name.clone()).collect());
     let application =
         main_device.activate(automatic(&scan.subdevices, arguments.cycle)).map_err(ringcat::Error::from)?;
@@ -89,7 +90,7 @@ pub fn run(arguments: &RunArguments) -> Result<bool, Failure> {
     run.summary();
     let application = run.application;
     application.stop(LastOutputs::Zero, AlState::Init, STOP_LIMIT)?;
-    println!("  stopped: outputs zero, all SubDevices in INIT");
+    say!("  stopped: outputs zero, all SubDevices in INIT");
     Ok(in_op && counters.lost == before.lost)
 }
 
@@ -115,7 +116,7 @@ impl Run {
                 _ => {}
             }
             self.live.end();
-            println!("{:>12.3} ms  {}", self.since_begin(event.at), describe(&event.event, &self.names));
+            say!("{:>12.3} ms  {}", self.since_begin(event.at), describe(&event.event, &self.names));
         }
         status
     }
@@ -132,7 +133,7 @@ impl Run {
                 return false;
             }
             if self.application.now() >= until {
-                println!("not all SubDevices reached OP within {} s:", OP_LIMIT.as_secs());
+                say!("not all SubDevices reached OP within {} s:", OP_LIMIT.as_secs());
                 for (subdevice, state) in self.application.states().iter().enumerate() {
                     let state = match state {
                         SubDeviceState::Absent => "does not answer".to_owned(),
@@ -140,14 +141,14 @@ impl Run {
                         SubDeviceState::Settled(state) => state.to_string(),
                     };
                     let name = self.names.0.get(subdevice).map_or("", String::as_str);
-                    println!("  SubDevice {subdevice} \"{name}\": {state}");
+                    say!("  SubDevice {subdevice} \"{name}\": {state}");
                 }
                 return false;
             }
             self.cycle();
         }
         let now = self.application.now();
-        println!("{:>12.3} ms  all SubDevices are in OP", self.since_begin(now));
+        say!("{:>12.3} ms  all SubDevices are in OP", self.since_begin(now));
         self.application.reset_round_trips();
         self.wake_ups = Histogram::default();
         true
@@ -165,18 +166,20 @@ impl Run {
         let application = &self.application;
         let (pace, cyclic, acyclic) =
             (application.pace(), application.cyclic_counters(), application.acyclic_counters());
-        println!("\nsummary");
-        println!(
+        say!("\nsummary");
+        say!(
             "  cycles: {}, judged not complete: {}, frames still out: {}",
-            pace.cycles, cyclic.incomplete, cyclic.skipped
+            pace.cycles,
+            cyclic.incomplete,
+            cyclic.skipped
         );
-        println!(
+        say!(
             "  this machine: {} late wake-ups (more than a tenth of the cycle), {} cycles left out, the latest by {:.3} ms",
             pace.late,
             pace.skipped,
             pace.longest_delay.as_secs_f64() * 1e3
         );
-        println!(
+        say!(
             "  the wire: {} frames sent, {} lost, {} copies lost, {} late, {} corrupt, {} from others",
             cyclic.sent,
             cyclic.lost,
@@ -185,19 +188,26 @@ impl Run {
             cyclic.corrupt,
             cyclic.foreign
         );
-        println!(
+        say!(
             "  everything else: {} frames with {} datagrams, {} sent again",
-            acyclic.sent, acyclic.datagrams, acyclic.resent
+            acyclic.sent,
+            acyclic.datagrams,
+            acyclic.resent
         );
         for link in [Link::Main, Link::Redundant] {
             let Some(counters) = application.links().counters(link) else { continue };
-            println!(
+            say!(
                 "  {link}: {} sent, {} received; not sent: {} interface down, {} queue full, {} refused; {} overrun",
-                counters.sent, counters.received, counters.down, counters.busy, counters.refused, counters.overrun
+                counters.sent,
+                counters.received,
+                counters.down,
+                counters.busy,
+                counters.refused,
+                counters.overrun
             );
         }
-        println!("  round trips of process data: {}", application.round_trips());
-        println!("  wake-ups after their time: {}", self.wake_ups);
+        say!("  round trips of process data: {}", application.round_trips());
+        say!("  wake-ups after their time: {}", self.wake_ups);
     }
 }
 
@@ -216,7 +226,7 @@ impl Live {
         }
         self.next = now + LIVE;
         let (pace, cyclic) = (application.pace(), application.cyclic_counters());
-        print!(
+        write(format_args!(
             "\r{:>9} cycles  wkc {}/{}  ring {:?}  late {}  left out {}  lost {}  round trip {:.1} us ",
             pace.cycles,
             status.wkc,
@@ -226,15 +236,13 @@ impl Live {
             pace.skipped,
             cyclic.lost,
             application.round_trips().quantile(500_000).as_nanos() as f64 / 1e3
-        );
-        // A line that cannot be flushed is no reason to stop.
-        let _ = stdout().flush();
+        ));
         self.open = true;
     }
 
     fn end(&mut self) {
         if self.open {
-            println!();
+            say!();
             self.open = false;
         }
     }

@@ -5,6 +5,7 @@ use ringcat::text::{Names, describe};
 use ringcat::{Event, MainDevice, Options};
 
 use crate::interfaces::{Failure, InterfaceArguments, ThreadArguments};
+use crate::output::say;
 use crate::table;
 
 /// Options of `ringcat scan`.
@@ -30,10 +31,10 @@ pub fn run(arguments: &ScanArguments) -> Result<(), Failure> {
         }
     })?;
     if arguments.json {
-        println!("{:#}", table::json(&scan));
+        say!("{:#}", table::json(&scan));
     } else {
         for line in table::lines(&scan) {
-            println!("{line}");
+            say!("{line}");
         }
     }
     Ok(())

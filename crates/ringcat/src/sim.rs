@@ -16,6 +16,7 @@ use ringcat_sim::network::Network;
 use ringcat_sim::segment::Segment;
 
 use crate::interfaces::{Failure, ThreadArguments, end_request, is_asked};
+use crate::output::say;
 use doors::Doors;
 use orders::{Outcome, carry_out};
 use plant::Plant;
@@ -61,7 +62,7 @@ pub fn run(arguments: &SimArguments) -> Result<(), Failure> {
     // The threads above stay ordinary ones.
     let _awake = arguments.thread.apply();
     let begin = monotonic::now_ns();
-    let say = |now: u64, text: &str| println!("{:>12.3} ms  {text}", now.saturating_sub(begin) as f64 / 1e6);
+    let say = |now: u64, text: &str| say!("{:>12.3} ms  {text}", now.saturating_sub(begin) as f64 / 1e6);
     say(begin, &format!("{} SubDevices are on the wire", plant.network().devices().len()));
     loop {
         let now = wires.turn(plant.network_mut());

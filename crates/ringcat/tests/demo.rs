@@ -1,7 +1,7 @@
 //! The `ringcat` program as a user calls it.
 
 use std::path::PathBuf;
-use std::process::{Command, Output};
+use std::process::{Command, Output, Stdio};
 
 fn ringcat(arguments: &[&str]) -> Output {
     Command::new(env!("CARGO_BIN_EXE_ringcat")).args(arguments).output().expect("the program starts")
@@ -73,6 +73,20 @@ fn a_wrong_segment_file_is_named_with_its_line() {
     assert!(said.contains(&format!("{}:5:", path.display())), "{said}");
     assert!(said.contains("digital-otput-8"), "{said}");
     std::fs::remove_file(&path).expect("it was just written");
+}
+
+#[test]
+fn a_reader_that_goes_away_is_no_panic() {
+    let mut demo = Command::new(env!("CARGO_BIN_EXE_ringcat"))
+        .args(["demo", "--fast"])
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()
+        .expect("the program starts");
+    drop(demo.stdout.take());
+    let output = demo.wait_with_output().expect("it ends");
+    assert!(output.status.success(), "{}", text(&output.stderr));
+    assert!(output.stderr.is_empty());
 }
 
 #[test]

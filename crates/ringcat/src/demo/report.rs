@@ -1,6 +1,6 @@
 //! What the demonstration prints.
 
-use std::io::{IsTerminal, Write, stdout};
+use std::io::{IsTerminal, stdout};
 use std::time::Duration;
 
 use ringcat::simulated::SimulatedSegment;
@@ -9,6 +9,7 @@ use ringcat::{Application, Event, Instant, Scan, SubDeviceState, TimedEvent};
 
 use super::plan::{Incident, Plan};
 use super::watch::{Account, Watch};
+use crate::output::{say, write};
 use crate::table;
 
 /// Writes lines with the time before them.
@@ -29,28 +30,26 @@ impl Reporter {
     /// A line without a time.
     pub fn say(&mut self, text: &str) {
         self.end_line();
-        println!("{text}");
+        say!("{text}");
     }
 
     fn end_line(&mut self) {
         if self.line_open {
-            println!();
+            say!();
             self.line_open = false;
         }
     }
 
     fn timed(&mut self, at: Instant, mark: &str, text: &str) {
         self.end_line();
-        println!("{:>10.3} ms {mark} {text}", at.0 as f64 / 1e6);
+        say!("{:>10.3} ms {mark} {text}", at.0 as f64 / 1e6);
     }
 
     /// An event of the scan; progress stays on one line of a terminal.
     pub fn scan_event(&mut self, event: &TimedEvent) {
         let text = describe(&event.event, &Names::default());
         if matches!(event.event, Event::ScanProgress { .. }) && self.terminal {
-            print!("\r{:>10.3} ms   {text}", event.at.0 as f64 / 1e6);
-            // A progress line that cannot be flushed is no reason to stop.
-            let _ = stdout().flush();
+            write(format_args!("\r{:>10.3} ms   {text}", event.at.0 as f64 / 1e6));
             self.line_open = true;
         } else {
             self.timed(event.at, " ", &text);
