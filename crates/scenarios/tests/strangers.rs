@@ -1,0 +1,282 @@
+//! SubDevices that come back without an address: told apart, told who they are, and never in the way of the others.
+
+use std::time::Duration;
+
+use ringcat::{DomainId, DomainMember, Event, Options, automatic};
+use ringcat_engine::config::ConfigAddress;
+use ringcat_engine::main_device::SubDeviceState;
+use ringcat_sim::cable::{CableId, DeviceIndex, Direction};
+use ringcat_sim::fault::Fault;
+use ringcat_sim::network::{Network, NetworkOptions};
+use ringcat_wire::address::{Position, StationAddress};
+use ringcat_wire::al::{AlControl, AlState, AlStatus};
+use ringcat_wire::register::{Fmmu, map};
+use scenarios::dice::Dice;
+use scenarios::segments::{descriptions, line, ring};
+use scenarios::world::{CYCLE, World};
+
+const SIX: [&str; 6] =
+    ["coupler", "digital-input-8", "digital-output-8", "digital-input-16", "digital-output-8", "digital-input-8"];
+const SETTLED: SubDeviceState = SubDeviceState::Settled(AlState::Op);
+
+fn six(closed: bool) -> Network {
+    let build = if closed { ring } else { line };
+    build(descriptions(&SIX), NetworkOptions::default())
+}
+
+/// The first `declared` SubDevices are declared, the others are nobody's.
+fn world(network: Network, declared: usize) -> World {
+    let declare = |scan: &ringcat::Scan| automatic(&scan.subdevices[..declared], CYCLE);
+    let mut world = World::with(1, network, &Options::default(), declare).expect("scan and activation");
+    world.settle();
+    world.set_strict(false);
+    world
+}
+
+fn stations(world: &World) -> Vec<u16> {
+    let station = |device: &ringcat_sim::device::Device| {
+        let bytes = device.controller.register(map::STATION_ADDRESS, 2);
+        u16::from_le_bytes([bytes[0], bytes[1]])
+    };
+    world.network().devices().map(station).collect()
+}
+
+fn states(world: &World) -> Vec<AlState> {
+    world.network().devices().filter_map(|device| device.al_status().al_state()).collect()
+}
+
+/// All declared SubDevices are in OP, and the process data is complete.
+fn until_settled(world: &mut World) {
+    world.until(Duration::from_secs(3), "everybody in OP and complete", |world| {
+        let status = world.application().exchange().status(DomainId(0));
+        world.application().all_settled() && status.wkc == status.expected
+    });
+}
+
+#[test]
+fn strangers_that_keep_an_address_given_long_ago_do_not_share_it_with_others() {
+    let mut world = world(six(false), 4);
+    let power_cycle = |world: &mut World, device: usize| {
+        world.power_off(DeviceIndex(device));
+        world.run_cycles(300);
+        world.power_on(DeviceIndex(device));
+        world.run_cycles(500);
+    };
+    power_cycle(&mut world, 5);
+    // Out of reach, and forgotten.
+    world.cut(CableId(5));
+    world.run_cycles(300);
+    power_cycle(&mut world, 4);
+    world.heal(CableId(5));
+    world.run_cycles(500);
+    let all = stations(&world);
+    assert_ne!(all[4], all[5]);
+    assert_eq!(all[..4], [0x1001, 0x1002, 0x1003, 0x1004]);
+    power_cycle(&mut world, 2);
+    until_settled(&mut world);
+    let before = world.application().acyclic_counters().datagrams;
+    world.run_cycles(1000);
+    let quiet = world.application().acyclic_counters().datagrams - before;
+    assert!(quiet <= 30, "one look a second, not a search without end: {quiet} datagrams");
+}
+
+#[test]
+fn one_with_the_address_of_a_member_gets_another_and_the_member_stays_in_op() {
+    for (stranger, member) in [(5, 1), (5, 4), (0, 1)] {
+        let kinds = if stranger == 0 { 1..6 } else { 0..5 };
+        let declare = |scan: &ringcat::Scan| {
+            let mut declaration = automatic(&scan.subdevices[kinds.clone()], CYCLE);
+            for (config, position) in declaration.subdevices.iter_mut().zip(kinds.clone()) {
+                config.address = ConfigAddress::Position(position as u16);
+            }
+            declaration
+        };
+        let mut world = World::with(2, six(true), &Options::default(), declare).expect("scan and activation");
+        world.settle();
+        world.set_strict(false);
+        let mark = world.mark();
+        let before = stations(&world);
+        let bus = world.application().engine().bus();
+        let taken = before[member].to_le_bytes();
+        world.application_mut().engine_mut().spawn(async move {
+            let _ = bus.apwr(Position(stranger), map::STATION_ADDRESS, &taken).await;
+        });
+        world.run_cycles(1000);
+        let after = stations(&world);
+        assert_eq!(after[kinds.clone()], before[kinds], "stranger {stranger} with the address of {member}");
+        assert_eq!(world.left_op(mark), []);
+    }
+}
+
+#[test]
+fn a_stranger_that_another_main_device_has_configured_is_put_to_init_and_takes_no_part_in_our_process_data() {
+    let mut world = world(six(true), 5);
+    let temporary = StationAddress(stations(&world)[5]);
+    let ours =
+        *world.network().device(DeviceIndex(1)).controller.register(map::FMMU_BASE, Fmmu::LEN).as_array().unwrap();
+    let theirs = Fmmu { physical_start: 0x1000, ..Fmmu::decode(&ours) };
+    let bus = world.application().engine().bus();
+    world.application_mut().engine_mut().spawn(async move {
+        for state in [AlState::PreOp, AlState::SafeOp] {
+            let _ = bus.fpwr(temporary, map::AL_CONTROL, &AlControl::new(state).encode()).await;
+            bus.sleep(Duration::from_millis(20)).await;
+        }
+        let _ = bus.fpwr(temporary, map::FMMU_BASE, &theirs.encode()).await;
+        let _ = bus.fpwr(temporary, map::STATION_ADDRESS, &0x5555u16.to_le_bytes()).await;
+    });
+    world.run_cycles(2000);
+    let device = world.network().device(DeviceIndex(5));
+    assert_eq!(device.al_status(), AlStatus::new(AlState::Init));
+    assert_eq!(device.controller.register(map::FMMU_BASE, Fmmu::LEN), [0; Fmmu::LEN]);
+    let status = world.application().exchange().status(DomainId(0));
+    assert_eq!(status.wkc, status.expected);
+}
+
+#[test]
+fn neighbours_alike_keep_their_places_whichever_side_they_come_back_from() {
+    let kinds = ["coupler", "digital-input-8", "digital-output-8", "digital-output-8", "digital-input-8"];
+    for cut in [None, Some(0), Some(1), Some(3), Some(5)] {
+        for order in [[2, 3], [3, 2]] {
+            for pause in [0, 1, 30] {
+                let mut world = World::in_op(4, ring(descriptions(&kinds), NetworkOptions::default()));
+                world.set_strict(false);
+                cut.into_iter().for_each(|cable| world.cut(CableId(cable)));
+                world.run_cycles(100);
+                let before = stations(&world);
+                order.into_iter().for_each(|device| world.power_off(DeviceIndex(device)));
+                world.run_cycles(100);
+                for device in order {
+                    world.power_on(DeviceIndex(device));
+                    world.run_cycles(pause);
+                }
+                world.until(Duration::from_secs(2), "everybody in OP", |world| {
+                    world.all_in_op() && world.application().all_settled()
+                });
+                assert_eq!(stations(&world), before, "cable {cut:?}, {order:?}, {pause} ms between");
+            }
+        }
+    }
+}
+
+#[test]
+fn an_optional_subdevice_that_was_never_there_does_not_take_the_place_of_its_twin() {
+    let kinds = ["coupler", "digital-output-8", "digital-input-8"];
+    let network = ring(descriptions(&kinds), NetworkOptions::default());
+    let mut world = World::with(5, network, &Options::default(), |scan| {
+        let mut declaration = automatic(&scan.subdevices, CYCLE);
+        let mut twin = declaration.subdevices[1].clone().optional();
+        twin.address = ConfigAddress::Position(1);
+        declaration.subdevices[1].address = ConfigAddress::Position(2);
+        declaration.subdevices[2].address = ConfigAddress::Position(3);
+        declaration.subdevices.insert(1, twin);
+        let members = (0..4).map(|subdevice| DomainMember { subdevice, sync_managers: None });
+        declaration.domains[0].members = members.collect();
+        declaration
+    })
+    .expect("scan and activation");
+    world.set_strict(false);
+    world.run_cycles(300);
+    let before = stations(&world);
+    world.power_off(DeviceIndex(1));
+    world.run_cycles(200);
+    world.power_on(DeviceIndex(1));
+    world.until(Duration::from_secs(2), "back in OP", |world| world.application().states()[2] == SETTLED);
+    assert_eq!(stations(&world), before);
+    assert_eq!(world.application().states()[1], SubDeviceState::Absent);
+}
+
+/// A chain of categories without end: reading it takes seconds, and what is read makes no sense.
+fn corrupt_sii(world: &mut World, device: DeviceIndex) {
+    world.fault(Fault::CorruptSii { device, offset: 0x0E, mask: 0xFF });
+    for offset in [124, 125, 130, 131] {
+        world.fault(Fault::CorruptSii { device, offset, mask: 0x7F });
+    }
+}
+
+#[test]
+fn while_a_stranger_is_read_for_seconds_others_are_noticed_when_they_go_and_come_back() {
+    let mut world = world(six(true), 6);
+    world.power_off(DeviceIndex(2));
+    world.run_cycles(100);
+    corrupt_sii(&mut world, DeviceIndex(2));
+    world.power_on(DeviceIndex(2));
+    world.run_cycles(100);
+    let mark = world.mark();
+    world.power_off(DeviceIndex(4));
+    world.until(Duration::from_millis(50), "noticed", |world| {
+        world.saw(mark, |event| *event == Event::Lost { subdevice: 4 })
+    });
+    world.run_cycles(200);
+    world.power_on(DeviceIndex(4));
+    world.until(Duration::from_millis(500), "back", |world| world.application().states()[4] == SETTLED);
+}
+
+#[test]
+fn one_that_cannot_be_read_does_not_hide_those_behind_it() {
+    let mut world = world(six(true), 6);
+    world.power_off(DeviceIndex(2));
+    world.power_off(DeviceIndex(4));
+    world.run_cycles(100);
+    corrupt_sii(&mut world, DeviceIndex(2));
+    world.power_on(DeviceIndex(2));
+    world.power_on(DeviceIndex(4));
+    world.until(Duration::from_millis(500), "back", |world| world.application().states()[4] == SETTLED);
+}
+
+/// Cuts, losses, one-way cables and power cycles, one upon the other, then everything is put right.
+fn torture(seed: u64) {
+    let kinds = [
+        "coupler",
+        "digital-output-8",
+        "digital-output-8",
+        "analog-input-4",
+        "digital-output-8",
+        "digital-output-8",
+        "digital-input-8",
+        "servo",
+    ];
+    let mut dice = Dice::new(seed);
+    let detection = Duration::from_micros(*dice.pick(&[10, 200, 1000, 5000]));
+    let options = NetworkOptions::default().with_detection_delay(detection);
+    let mut world = World::in_op(seed, ring(descriptions(&kinds), options));
+    world.set_strict(false);
+    let before = stations(&world);
+    let cables = kinds.len() + 1;
+    for _ in 0..30 {
+        let cable = CableId(dice.below(cables as u64) as usize);
+        let device = DeviceIndex(dice.below(kinds.len() as u64) as usize);
+        match dice.below(8) {
+            0 => world.cut(cable),
+            1 => world.heal(cable),
+            2 => world.fault(Fault::Drop { cable, direction: None, count: dice.below(20) as u32 }),
+            3 => {
+                let (direction, blocked) = (*dice.pick(&Direction::ALL), dice.one_in(2));
+                world.fault(Fault::OneWay { cable, direction, blocked });
+            }
+            4 | 5 => world.power_off(device),
+            6 => world.power_on(device),
+            _ => world.corrupt(cable, dice.below(20) as u32),
+        }
+        world.run_cycles(dice.below(60));
+    }
+    for cable in (0..cables).map(CableId) {
+        for direction in Direction::ALL {
+            world.fault(Fault::OneWay { cable, direction, blocked: false });
+        }
+        world.heal(cable);
+    }
+    (0..kinds.len()).for_each(|device| world.power_on(DeviceIndex(device)));
+    world.until(Duration::from_secs(20), "everybody in OP", |world| {
+        world.all_in_op() && world.application().all_settled()
+    });
+    until_settled(&mut world);
+    assert_eq!(stations(&world), before, "everybody is who it was");
+    assert_eq!(states(&world), [AlState::Op; 8]);
+}
+
+#[test]
+fn after_any_cuts_and_power_cycles_everybody_is_back_and_who_it_was_seeds_0_to_149() {
+    let failed: Vec<u64> = (0..150).filter(|seed| std::panic::catch_unwind(|| torture(*seed)).is_err()).collect();
+    println!("seeds 0 to 149: {} fail", failed.len());
+    assert_eq!(failed, [], "seeds that fail");
+}
