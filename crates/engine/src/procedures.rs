@@ -14,3 +14,4 @@ pub mod sii;
 pub mod stop;
 pub mod strangers;
 pub mod supervise;
+mod verify;

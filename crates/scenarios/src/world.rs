@@ -306,6 +306,11 @@ impl World {
         self.devices.get(subdevice).copied().flatten()
     }
 
+    /// The station address that a device has.
+    pub fn station_of(&self, device: usize) -> u16 {
+        station(self.network().device(DeviceIndex(device)))
+    }
+
     /// Compares images with devices or not.
     pub fn set_strict(&mut self, strict: bool) {
         self.mirror.strict = strict;

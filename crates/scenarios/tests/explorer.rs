@@ -144,6 +144,9 @@ fn run(seed: u64) {
         let ring = if closed { world.application().ring() == RingState::Closed } else { true };
         world.all_in_op() && world.application().all_settled() && complete && ring
     });
+    let mistaken: Vec<usize> =
+        (0..devices).filter(|device| world.station_of(*device) != 0x1001 + *device as u16).collect();
+    assert_eq!(mistaken, [], "each is who it was");
     // Frames that were delayed for long are still to come.
     world.run_cycles(500);
     let mark = world.mark();

@@ -166,13 +166,8 @@ impl BringUp<'_> {
             self.write_sync_manager(area.sync_manager, &register).await?;
         }
         self.request(AlState::PreOp, AlState::SafeOp).await?;
-        let count = self.setup.fmmus.iter().map(|(number, _)| usize::from(*number) + 1).max().unwrap_or(0);
-        let mut fmmus = vec![0; Fmmu::LEN * count];
-        for (number, fmmu) in &self.setup.fmmus {
-            let at = Fmmu::LEN * usize::from(*number);
-            fmmus[at..at + Fmmu::LEN].copy_from_slice(&fmmu.encode());
-        }
-        if count > 0 {
+        let fmmus = self.setup.fmmu_registers();
+        if !fmmus.is_empty() {
             self.bus.fpwr(self.station, map::FMMU_BASE, &fmmus).await?;
         }
         self.fleet.board.set_taking_part(self.index, true);

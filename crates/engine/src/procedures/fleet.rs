@@ -135,6 +135,17 @@ impl Setup {
             emulated: info.device_emulation,
         })
     }
+
+    /// The FMMU registers from the first to the last one that is used, to be written at once.
+    pub fn fmmu_registers(&self) -> Vec<u8> {
+        let count = self.fmmus.iter().map(|(number, _)| usize::from(*number) + 1).max().unwrap_or(0);
+        let mut registers = alloc::vec![0; Fmmu::LEN * count];
+        for (number, fmmu) in &self.fmmus {
+            let at = Fmmu::LEN * usize::from(*number);
+            registers[at..at + Fmmu::LEN].copy_from_slice(&fmmu.encode());
+        }
+        registers
+    }
 }
 
 /// Bytes of the process data areas that a declaration fixes by itself, for a SubDevice that is not there yet.

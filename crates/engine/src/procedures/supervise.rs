@@ -20,6 +20,7 @@ use super::fleet::{Phase, SharedFleet};
 use super::inspect::{Break, Look, locate_break, look_at_all, look_at_strangers};
 use super::recover::{lose, start};
 use super::strangers::{self, Search};
+use super::verify::verify;
 use crate::board::{RingWord, Supervision};
 use crate::event::Event;
 use crate::link::LinkSet;
@@ -54,6 +55,7 @@ pub(crate) async fn supervise(bus: Bus, fleet: SharedFleet) {
     if bus.links() == LinkSet::Ring {
         bus.spawn(report_ring(bus.clone(), fleet.clone(), reported.clone()));
     }
+    bus.spawn(verify(bus.clone(), fleet.clone()));
     let mut watch = Watch {
         bus,
         fleet,
