@@ -8,7 +8,12 @@ use ringcat_sim::fault::Fault;
 use ringcat_sim::network::builder::SegmentBuilder;
 use ringcat_sim::network::{Network, NetworkOptions};
 use ringcat_sim::time::SimTime;
+use ringcat_wire::address::StationAddress;
 use ringcat_wire::al::{AlState, AlStatus, AlStatusCode};
+use ringcat_wire::command::Command;
+use ringcat_wire::datagram::Target;
+use ringcat_wire::frame::{FrameBuilder, MacAddress};
+use ringcat_wire::register::map;
 use scenarios::check::{Delivery, ring_events, troubles};
 use scenarios::segments::{SIXTEEN, descriptions, line, ring, ring_of_16};
 use scenarios::world::{CYCLE, World};
@@ -222,4 +227,35 @@ fn a_whole_segment_that_loses_power_comes_back_by_itself() {
         assert_eq!(last, Some(Delivery::Complete));
         assert!(!world.saw(world.beginning(), |event| matches!(event, Event::Unexpected { .. })));
     }
+}
+
+/// A frame of another MainDevice that clears the first FMMU of a station.
+fn fmmu_thief(station: u16) -> Vec<u8> {
+    let source = MacAddress([0x00, 0x00, 0x5E, 0x00, 0x53, 0x77]);
+    let mut bytes = vec![0; 100];
+    let length = {
+        let mut builder = FrameBuilder::ethernet(&mut bytes, MacAddress::ETHERCAT_GROUP, source).expect("room");
+        let target = Target::Station(StationAddress(station), map::FMMU_BASE);
+        builder.datagram(Command::Fpwr, 0, target, 16).expect("room");
+        builder.finish()
+    };
+    bytes.truncate(length);
+    bytes
+}
+
+#[test]
+fn a_subdevice_in_op_that_lost_its_fmmus_is_noticed_and_configured_anew() {
+    let mut world = World::in_op(9, ring_of_16(FAST));
+    let mark = world.mark();
+    let frame = fmmu_thief(0x1001 + 1);
+    world.network_mut().send(HostLink::Main, &frame);
+    world.run_cycles(20);
+    assert!(world.all_in_op());
+    assert!(world.judged(mark).last().expect("cycles went by").delivery.is_incomplete());
+    world.run_cycles(1_200);
+    assert_eq!(world.judged(mark).last().map(|judged| judged.delivery), Some(Delivery::Complete));
+    let named =
+        |event: &Event| matches!(event, Event::ConfigurationFailed { subdevice: 1, reason } if reason.contains("FMMU"));
+    assert!(world.saw(mark, named));
+    assert!(world.left_op(mark).iter().all(|device| device.0 == 1));
 }
