@@ -12,6 +12,7 @@ use ringcat_wire::al::AlState;
 use super::al_state;
 use super::configure::{BringUp, ConfigureError, Start};
 use super::fleet::{Phase, SharedFleet};
+use super::sii;
 use crate::event::Event;
 use crate::supervisor::{Bus, BusError};
 
@@ -116,11 +117,17 @@ async fn attempt(bus: &Bus, fleet: &SharedFleet, index: usize, start: Start) -> 
             target: member.config.target,
         }
     };
-    if start == Start::Unknown && quick(&bring_up).await? {
-        return Ok(bring_up.target);
+    let quickly = start == Start::Unknown && quick(&bring_up).await?;
+    let result = if quickly { Ok(()) } else { bring_up.run(start).await };
+    // An attempt that ended on the way to PREOP, this one or one before, leaves the EEPROM to the PDI.
+    let is_left = match &result {
+        Ok(()) => quickly && bring_up.target == AlState::PreOp,
+        Err(error) => !is_of_bus(error),
+    };
+    if is_left {
+        sii::claim(bus, bring_up.station).await?;
     }
-    bring_up.run(start).await?;
-    Ok(bring_up.target)
+    result.map(|()| bring_up.target)
 }
 
 /// A SubDevice that only fell from OP to SAFEOP still has its configuration: acknowledged, it may go back to OP.

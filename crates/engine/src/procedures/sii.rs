@@ -110,6 +110,14 @@ impl SiiCache {
         SiiCache { enabled, entries: Rc::default(), pace: Rc::new(Cell::new(Duration::ZERO)) }
     }
 
+    fn claim(&self, header: &[u8; SiiHeader::LEN]) -> Claim {
+        let mut entries = self.entries.borrow_mut();
+        if !entries.iter().any(|entry| entry.header == *header) {
+            entries.push(Cached { header: *header, read: None });
+        }
+        Claim { entries: self.entries.clone(), header: *header }
+    }
+
     /// SII contents that are kept.
     pub fn len(&self) -> usize {
         self.entries.borrow().len()
@@ -118,6 +126,28 @@ impl SiiCache {
     /// Whether nothing is kept.
     pub fn is_empty(&self) -> bool {
         self.len() == 0
+    }
+}
+
+/// Somebody reads the SII with this header; whoever has the same one waits. Dropped, also with the procedure that
+/// reads, the next one may try.
+struct Claim {
+    entries: Rc<RefCell<Vec<Cached>>>,
+    header: [u8; SiiHeader::LEN],
+}
+
+impl Claim {
+    fn settle(self, chain: Vec<CategoryHeader>, contents: SiiContents) {
+        let mut entries = self.entries.borrow_mut();
+        if let Some(entry) = entries.iter_mut().find(|entry| entry.header == self.header) {
+            entry.read = Some((chain, contents));
+        }
+    }
+}
+
+impl Drop for Claim {
+    fn drop(&mut self) {
+        self.entries.borrow_mut().retain(|entry| entry.header != self.header || entry.read.is_some());
     }
 }
 
@@ -170,10 +200,10 @@ impl SiiReader {
         if let Some(contents) = self.known(&header).await? {
             return Ok(contents);
         }
-        self.claim(&header);
-        let result = self.read_categories(&header).await;
-        self.settle(&header, result.as_ref().ok());
-        result.map(|(_, contents)| contents)
+        let claim = self.cache.claim(&header);
+        let (chain, contents) = self.read_categories(&header).await?;
+        claim.settle(chain, contents.clone());
+        Ok(contents)
     }
 
     /// Words that are not covered by the configuration of a scan, such as the alias; see [`SiiReader::read`].
@@ -210,26 +240,6 @@ impl SiiReader {
                 word += 2 + u32::from(expected.words);
             }
             return Ok(Some(contents));
-        }
-    }
-
-    fn claim(&self, header: &[u8; SiiHeader::LEN]) {
-        let mut entries = self.cache.entries.borrow_mut();
-        if !entries.iter().any(|entry| entry.header == *header) {
-            entries.push(Cached { header: *header, read: None });
-        }
-    }
-
-    /// Ends a claim: with contents, or so that the next SubDevice may try.
-    fn settle(&self, header: &[u8; SiiHeader::LEN], read: Option<&(Vec<CategoryHeader>, SiiContents)>) {
-        let mut entries = self.cache.entries.borrow_mut();
-        let Some(at) = entries.iter().position(|entry| entry.header == *header) else { return };
-        match read {
-            Some(read) => entries[at].read = Some(read.clone()),
-            None if entries[at].read.is_none() => {
-                entries.swap_remove(at);
-            }
-            None => {}
         }
     }
 

@@ -82,11 +82,15 @@ struct Flight {
     deadline: Instant,
     /// Answered already; kept so that the second copy is recognised.
     answered: bool,
+    /// No copy is waited for, because the link is silent on which the missing one was sent; no room is kept for it.
+    released: bool,
 }
 
 pub(crate) struct Flights {
     slots: Vec<Option<Flight>>,
     in_flight: usize,
+    /// Of these, those that no longer count against the window.
+    released: usize,
     sequence: Sequence,
     /// Flights that ended, for their memory.
     spare: Vec<Flight>,
@@ -99,6 +103,7 @@ impl Flights {
         Flights {
             slots: (0..SLOTS).map(|_| None).collect(),
             in_flight: 0,
+            released: 0,
             sequence: Sequence::default(),
             spare: Vec::new(),
             redundant: vec![0; MAX_FRAME].into_boxed_slice(),
@@ -117,7 +122,23 @@ impl Flights {
     }
 
     fn has_room(&self) -> bool {
-        self.in_flight < WINDOW && self.slots[Self::slot(self.sequence.next())].is_none()
+        let room = self.in_flight < MAX_IN_FLIGHT && self.in_flight - self.released < WINDOW;
+        room && self.slots[Self::slot(self.sequence.next())].is_none()
+    }
+
+    fn release(&mut self, slot: usize) {
+        if let Some(flight) = self.slots[slot].as_mut().filter(|flight| !flight.released) {
+            flight.released = true;
+            self.released += 1;
+        }
+    }
+
+    /// Takes a flight that ends from its slot.
+    fn take(&mut self, slot: usize) -> Option<Flight> {
+        let flight = self.slots[slot].take()?;
+        self.in_flight -= 1;
+        self.released -= usize::from(flight.released);
+        Some(flight)
     }
 
     fn fresh(&mut self, sequence: Sequence) -> Flight {
@@ -129,12 +150,14 @@ impl Flights {
             sent_at: Instant::NEVER,
             deadline: Instant::NEVER,
             answered: false,
+            released: false,
         });
         flight.sequence = sequence;
         flight.places.clear();
         flight.bytes.clear();
         flight.arrivals = Arrivals::default();
         flight.answered = false;
+        flight.released = false;
         flight
     }
 }
@@ -268,6 +291,8 @@ impl Shared {
         self.answer(slot, enough);
         if finished {
             self.end(slot);
+        } else if enough {
+            self.flights.release(slot);
         }
         Received::Taken
     }
@@ -309,8 +334,7 @@ impl Shared {
     }
 
     fn end(&mut self, slot: usize) {
-        let Some(flight) = self.flights.slots[slot].take() else { return };
-        self.flights.in_flight -= 1;
+        let Some(flight) = self.flights.take(slot) else { return };
         self.monitor.observe(flight.arrivals);
         self.flights.spare.push(flight);
     }
@@ -342,8 +366,7 @@ impl Shared {
     /// Datagrams that one copy answered as expected are done; the others count as lost: the copy that is missing may
     /// have been the one that reached the SubDevice.
     fn expire(&mut self, slot: usize) {
-        let Some(flight) = self.flights.slots[slot].take() else { return };
-        self.flights.in_flight -= 1;
+        let Some(flight) = self.flights.take(slot) else { return };
         self.monitor.observe(flight.arrivals);
         if !flight.answered {
             if flight.arrivals.arrived == 0 {

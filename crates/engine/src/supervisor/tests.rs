@@ -104,6 +104,33 @@ fn a_reply_reaches_the_procedure_that_waits_for_it() {
 }
 
 #[test]
+fn a_silent_link_does_not_hold_room_for_what_is_answered() {
+    let mut bench = Bench::new(LinkSet::Ring);
+    let mut answered_on_main = |requests: usize, length: usize| {
+        for _ in 0..requests {
+            let bus = bench.supervisor.bus();
+            bench.start(async move { bus.fprd(STATION, RegisterAddress(0x1000), length).await });
+        }
+        let mut answers = 0;
+        loop {
+            bench.step();
+            if bench.sent.is_empty() {
+                bench.pass(Duration::from_millis(1));
+                return answers;
+            }
+            for (_, frame) in bench.sent.iter().filter(|(link, _)| *link == Link::Main) {
+                answers += 1;
+                bench.supervisor.receive(Link::Main, &answered(frame, 0, 0), bench.now);
+            }
+        }
+    };
+    for _ in 0..100 {
+        answered_on_main(1, 2);
+    }
+    assert_eq!(answered_on_main(60, 1400), 60, "at one moment");
+}
+
+#[test]
 fn nobody_answering_is_an_error_that_names_register_and_counter() {
     let mut bench = Bench::new(LinkSet::Single);
     let bus = bench.supervisor.bus();

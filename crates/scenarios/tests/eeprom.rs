@@ -1,0 +1,61 @@
+//! The EEPROM is EtherCAT's again however the way to PREOP ends, for which the PDI gets it (facts 3.8, 5.6).
+
+use std::time::Duration;
+
+use ringcat::{Options, automatic};
+use ringcat_engine::main_device::SubDeviceState;
+use ringcat_sim::cable::{CableId, DeviceIndex};
+use ringcat_sim::fault::Fault;
+use ringcat_sim::network::NetworkOptions;
+use ringcat_wire::al::{AlState, AlStatusCode};
+use ringcat_wire::register::map;
+use scenarios::segments::{descriptions, ring};
+use scenarios::world::{CYCLE, World};
+
+const DEVICE: DeviceIndex = DeviceIndex(1);
+
+fn world(target: AlState, prepare: impl FnOnce(&mut ringcat_sim::network::Network)) -> World {
+    let kinds = ["coupler", "analog-input-4", "digital-input-8"];
+    let mut network = ring(descriptions(&kinds), NetworkOptions::default());
+    prepare(&mut network);
+    let mut world = World::with(1, network, &Options::default(), |scan| {
+        let mut declaration = automatic(&scan.subdevices, CYCLE);
+        declaration.subdevices[DEVICE.0].target = target;
+        declaration
+    })
+    .expect("scan and activation");
+    world.set_strict(false);
+    world
+}
+
+fn belongs_to_pdi(world: &World) -> bool {
+    world.network().device(DEVICE).controller.register(map::SII_CONFIGURATION, 1) != [0]
+}
+
+#[test]
+fn a_refused_preop_gives_the_eeprom_back() {
+    let mut world = world(AlState::Op, |network| {
+        let code = AlStatusCode::INVALID_MAILBOX_CONFIGURATION_PREOP;
+        network.apply(Fault::RefuseTransition { device: DEVICE, to: AlState::PreOp, code, times: 1_000 });
+    });
+    world.run_cycles(90);
+    assert_ne!(world.application().states()[DEVICE.0], SubDeviceState::Settled(AlState::Op));
+    assert!(!belongs_to_pdi(&world), "between two attempts");
+}
+
+#[test]
+fn a_subdevice_that_is_out_of_reach_on_the_way_to_preop_gives_the_eeprom_back_when_it_returns() {
+    let mut world = world(AlState::PreOp, |_| ());
+    world.until(Duration::from_secs(1), "the PDI has the EEPROM", belongs_to_pdi);
+    for cable in [1, 2] {
+        world.cut(CableId(cable));
+    }
+    world.run_cycles(200);
+    assert!(belongs_to_pdi(&world), "the attempt was cancelled");
+    for cable in [1, 2] {
+        world.heal(CableId(cable));
+    }
+    let settled = SubDeviceState::Settled(AlState::PreOp);
+    world.until(Duration::from_secs(1), "back", |world| world.application().states()[DEVICE.0] == settled);
+    assert!(!belongs_to_pdi(&world));
+}
