@@ -20,6 +20,8 @@ power off A      take the power from device A
 power on A       give it back
 hang A           the application of device A hangs, its controller works
 wake A           it goes on
+outputs A        the process data outputs of device A, in hexadecimal
+inputs A HEX     its process data inputs, as far as its application leaves them alone
 status           devices and their states, cut cables, counters
 quit             end the simulator";
 
@@ -71,8 +73,32 @@ fn answer(words: &[&str], plant: &mut Plant) -> Result<String, String> {
         ["power", "on", device] => on_device(plant, device, "has power", Fault::PowerOn),
         ["hang", device] => on_device(plant, device, "hangs", |device| Fault::Hang(device, true)),
         ["wake", device] => on_device(plant, device, "goes on", |device| Fault::Hang(device, false)),
+        ["outputs", device] => {
+            let device = find_device(device, plant.network())?;
+            Ok(hex(plant.network().device(device).outputs()))
+        }
+        ["inputs", device, bytes] => {
+            let device = find_device(device, plant.network())?;
+            let length = plant.network().device(device).inputs().len();
+            let bytes = unhex(bytes).ok_or_else(|| format!("expected bytes in hexadecimal, got \"{bytes}\""))?;
+            if length > 0 && bytes.len() != length {
+                return Err(format!("expected {length} bytes of inputs, got {}", bytes.len()));
+            }
+            plant.network_mut().device_mut(device).set_inputs(&bytes);
+            Ok(String::new())
+        }
         _ => Err(format!("\"{}\" is no order; `help` lists them", words.join(" "))),
     }
+}
+
+fn hex(bytes: &[u8]) -> String {
+    bytes.iter().map(|byte| format!("{byte:02x}")).collect()
+}
+
+fn unhex(text: &str) -> Option<Vec<u8>> {
+    let digits: Option<Vec<u8>> = text.chars().map(|digit| digit.to_digit(16).map(|digit| digit as u8)).collect();
+    let digits = digits.filter(|digits| digits.len() % 2 == 0)?;
+    Some(digits.chunks(2).map(|pair| pair[0] << 4 | pair[1]).collect())
 }
 
 fn on_device(
@@ -185,6 +211,7 @@ mod tests {
             ("cut 7-8", "expected main, redundant, or two devices as in 3-4"),
             ("power off 3", "names and the numbers 0 to 2"),
             ("drop main many", "expected a number of frames, got \"many\""),
+            ("inputs 0 123", "expected bytes in hexadecimal, got \"123\""),
             ("make tea", "`help` lists them"),
         ] {
             let answer = say(&mut plant, line);

@@ -1,0 +1,115 @@
+//! The MainDevice of another project (ethercrab, from the registry) on a network interface, as a check of our simulator.
+//!
+//! `ethercrab_client INTERFACE SUBDEVICES CYCLES`: brings everything to OP and exchanges process data. In cycle i byte j
+//! of the outputs of SubDevice k is i + k + j. Prints one line of figures, then keeps exchanging the last outputs until
+//! its standard input ends. Anything unexpected ends it with an error.
+
+use std::io;
+use std::process::ExitCode;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::thread;
+use std::time::{Duration, Instant};
+
+use ethercrab::std::{ethercat_now, tx_rx_task};
+use ethercrab::{MainDevice, MainDeviceConfig, PduStorage, Timeouts};
+
+/// Most SubDevices.
+const SUBDEVICES: usize = 64;
+/// Bytes of process data in both directions.
+const PROCESS_DATA: usize = 1024;
+/// Frames in flight.
+const FRAMES: usize = 32;
+/// Bytes of a datagram's data at the most.
+const DATAGRAM: usize = PduStorage::element_size(1100);
+/// The machine that this runs on may be busy with something else.
+const PATIENCE: Duration = Duration::from_millis(300);
+/// From the first frame to OP of the last SubDevice at the most.
+const OP_LIMIT: Duration = Duration::from_secs(20);
+
+static STORAGE: PduStorage<FRAMES, DATAGRAM> = PduStorage::new();
+
+fn main() -> ExitCode {
+    let arguments: Vec<String> = std::env::args().collect();
+    let [_, interface, count, cycles] = arguments.as_slice() else {
+        eprintln!("usage: ethercrab_client INTERFACE SUBDEVICES CYCLES");
+        return ExitCode::from(2);
+    };
+    let (Ok(count), Ok(cycles)) = (count.parse(), cycles.parse()) else {
+        eprintln!("SUBDEVICES and CYCLES are numbers");
+        return ExitCode::from(2);
+    };
+    match smol::block_on(run(interface, count, cycles)) {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            eprintln!("{error}");
+            ExitCode::FAILURE
+        }
+    }
+}
+
+async fn run(interface: &str, count: usize, cycles: usize) -> Result<(), String> {
+    let (sender, receiver, pdu_loop) = STORAGE.try_split().map_err(|()| "the storage is in use".to_owned())?;
+    let timeouts = Timeouts { pdu: PATIENCE, wait_loop_delay: Duration::from_millis(1), ..Timeouts::default() };
+    let main_device = Arc::new(MainDevice::new(pdu_loop, timeouts, MainDeviceConfig::default()));
+    let task = tx_rx_task(interface, sender, receiver).map_err(|error| format!("{interface}: {error}"))?;
+    thread::spawn(move || smol::block_on(task));
+
+    let begin = Instant::now();
+    let failed = |what: &'static str| move |error: ethercrab::error::Error| format!("{what}: {error}");
+    let group =
+        main_device.init_single_group::<SUBDEVICES, PROCESS_DATA>(ethercat_now).await.map_err(failed("scan"))?;
+    if group.len() != count {
+        return Err(format!("expected {count} SubDevices, found {}", group.len()));
+    }
+    let group = group.into_safe_op(&main_device).await.map_err(failed("SAFEOP"))?;
+    // Outputs have to flow before SubDevices go to OP, and keep flowing.
+    let group = group.request_into_op(&main_device).await.map_err(failed("OP"))?;
+    while !group.tx_rx(&main_device).await.map_err(failed("first process data"))?.all_op() {
+        if begin.elapsed() > OP_LIMIT {
+            return Err(format!("not all SubDevices are in OP after {} s", OP_LIMIT.as_secs()));
+        }
+        smol::Timer::after(Duration::from_millis(1)).await;
+    }
+    let to_op = begin.elapsed();
+    let mut round_trips = Vec::with_capacity(cycles);
+    let (mut wkc, mut wrong) = (0, 0);
+    for cycle in 0..cycles {
+        for (position, subdevice) in group.iter(&main_device).enumerate() {
+            for (at, byte) in subdevice.outputs_raw_mut().iter_mut().enumerate() {
+                *byte = (cycle + position + at) as u8;
+            }
+        }
+        let sent = Instant::now();
+        let response = group.tx_rx(&main_device).await.map_err(failed("process data"))?;
+        round_trips.push(sent.elapsed());
+        if cycle == 0 {
+            wkc = response.working_counter;
+        }
+        wrong += usize::from(response.working_counter != wkc);
+    }
+    let inputs: Vec<String> = group
+        .iter(&main_device)
+        .map(|subdevice| subdevice.inputs_raw().iter().map(|byte| format!("{byte:02x}")).collect())
+        .collect();
+    round_trips.sort();
+    let median = round_trips.get(cycles / 2).copied().unwrap_or_default();
+    println!(
+        "op_ms {} median_us {:.1} wkc {wkc} wrong {wrong} inputs {}",
+        to_op.as_millis(),
+        median.as_secs_f64() * 1e6,
+        inputs.join(",")
+    );
+    let ended = Arc::new(AtomicBool::new(false));
+    let end = ended.clone();
+    thread::spawn(move || {
+        // An end and an error of the input both say that nobody wants more.
+        let _ = io::copy(&mut io::stdin().lock(), &mut io::sink());
+        end.store(true, Ordering::Relaxed);
+    });
+    while !ended.load(Ordering::Relaxed) {
+        group.tx_rx(&main_device).await.map_err(failed("process data"))?;
+        smol::Timer::after(Duration::from_millis(1)).await;
+    }
+    Ok(())
+}

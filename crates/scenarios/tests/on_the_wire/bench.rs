@@ -1,0 +1,240 @@
+//! Two network namespaces with one or two veth pairs between them, a simulated segment in the one, and programs in the
+//! other. All of it is gone when the bench is dropped.
+
+use std::io::{BufRead, BufReader, Read, Write};
+use std::os::unix::net::UnixStream;
+use std::path::{Path, PathBuf};
+use std::process::{Child, ChildStdin, Command, Output, Stdio};
+use std::sync::{LazyLock, Mutex, MutexGuard, PoisonError};
+use std::time::{Duration, Instant};
+
+/// One test at a time: the others would take processor time from it.
+static ONE_AT_A_TIME: Mutex<()> = Mutex::new(());
+/// Numbers of interfaces: different at both ends of a pair.
+const FIRST_INDEX: [usize; 2] = [50, 60];
+/// The simulator has to be there within.
+const START_LIMIT: Duration = Duration::from_secs(10);
+/// A program has to end within.
+const END_LIMIT: Duration = Duration::from_secs(90);
+/// Both ends sleep until something comes, before all other programs: the machine may be busy.
+const THREAD: [&str; 4] = ["--receive", "block", "--priority", "50"];
+
+/// Where the programs of this repository lie, made if they are not up to date: the whole workspace decides on the features
+/// of what they depend on, so that nothing is built twice.
+static PROGRAMS: LazyLock<PathBuf> = LazyLock::new(|| {
+    let profile = target_directory();
+    let mut build = Command::new(env!("CARGO"));
+    build.args(["build", "--quiet", "--workspace", "--bin", "ringcat", "--example", "ethercrab_client"]);
+    build.arg("--target-dir").arg(profile.parent().expect("a target directory"));
+    if !cfg!(debug_assertions) {
+        build.arg("--release");
+    }
+    build.current_dir(env!("CARGO_MANIFEST_DIR"));
+    assert!(build.status().expect("cargo starts").success(), "the programs cannot be built");
+    profile
+});
+
+/// A program of this repository.
+pub fn program(name: &str) -> PathBuf {
+    PROGRAMS.join(name)
+}
+
+/// Where this profile's programs lie.
+pub fn target_directory() -> PathBuf {
+    let here = std::env::current_exe().expect("a test knows its path");
+    here.ancestors().nth(2).expect("tests lie in target/PROFILE/deps").to_owned()
+}
+
+/// The bench.
+pub struct Bench {
+    /// Namespace of the MainDevice, with interfaces `main0` and `main1`.
+    main: String,
+    /// Namespace of the simulator, with interfaces `sim0` and `sim1`.
+    sim: String,
+    simulator: Option<(Child, PathBuf)>,
+    _alone: MutexGuard<'static, ()>,
+}
+
+impl Bench {
+    /// A bench with so many veth pairs; `None`, with a printed line, where this user or machine cannot have one.
+    pub fn new(pairs: usize) -> Option<Bench> {
+        let alone = ONE_AT_A_TIME.lock().unwrap_or_else(PoisonError::into_inner);
+        let id = std::process::id();
+        let (main, sim) = (format!("ringcat{id}main"), format!("ringcat{id}sim"));
+        let bench = Bench { main, sim, simulator: None, _alone: alone };
+        if let Err(reason) = bench.build(pairs) {
+            println!("skipped: network namespaces need root and iproute2: {}", reason.trim());
+            return None;
+        }
+        Some(bench)
+    }
+
+    fn build(&self, pairs: usize) -> Result<(), String> {
+        for namespace in [&self.main, &self.sim] {
+            ip(&format!("netns add {namespace}"))?;
+        }
+        for pair in 0..pairs {
+            let (main, sim) = (FIRST_INDEX[0] + pair, FIRST_INDEX[1] + pair);
+            ip(&format!(
+                "-n {} link add main{pair} index {main} type veth peer name sim{pair} index {sim} netns {}",
+                self.main, self.sim
+            ))?;
+            for (namespace, end) in [(&self.main, "main"), (&self.sim, "sim")] {
+                // Addresses of the host would only make it send frames of its own.
+                let _ = ip(&format!("-n {namespace} link set {end}{pair} addrgenmode none"));
+                ip(&format!("-n {namespace} link set {end}{pair} up"))?;
+            }
+        }
+        Ok(())
+    }
+
+    /// Switches an interface of the MainDevice or of the simulator.
+    pub fn set_link(&self, interface: &str, state: &str) {
+        let namespace = if interface.starts_with("main") { &self.main } else { &self.sim };
+        ip(&format!("-n {namespace} link set {interface} {state}")).expect("the interface is there");
+    }
+
+    /// Starts the simulator on all interfaces; ends the one before.
+    pub fn simulate(&mut self, segment: &str, ring: bool) {
+        self.end_simulator();
+        let base = std::env::temp_dir().join(&self.sim);
+        let (file, socket) = (base.with_extension("toml"), base.with_extension("control"));
+        std::fs::write(&file, segment).expect("the temporary directory is writable");
+        let mut command = self.command(&self.sim, &program("ringcat"));
+        command.args(["sim", "--main", "sim0", "--segment"]).arg(&file).arg("--control").arg(&socket).args(THREAD);
+        if ring {
+            command.args(["--redundant", "sim1"]);
+        }
+        let child = command.stdin(Stdio::piped()).stdout(Stdio::null()).spawn().expect("the simulator starts");
+        self.simulator = Some((child, socket));
+        let until = Instant::now() + START_LIMIT;
+        while self.connect().is_none() {
+            assert!(Instant::now() < until, "the simulator does not answer");
+            std::thread::sleep(Duration::from_millis(20));
+        }
+        std::fs::remove_file(&file).expect("it was just written");
+    }
+
+    fn connect(&self) -> Option<UnixStream> {
+        UnixStream::connect(&self.simulator.as_ref()?.1).ok()
+    }
+
+    /// Gives the simulator an order that it obeys; its answer without the last line.
+    pub fn order(&self, line: &str) -> String {
+        let mut stream = self.connect().expect("the simulator listens");
+        writeln!(stream, "{line}").expect("the simulator reads");
+        let mut answer = String::new();
+        let mut reader = BufReader::new(stream);
+        loop {
+            let at = answer.len();
+            assert_ne!(reader.read_line(&mut answer).expect("the simulator answers"), 0, "{line}: {answer}");
+            match &answer[at..] {
+                "ok\n" => return answer[..at].trim_end().to_owned(),
+                end => assert!(!end.starts_with("error:"), "{line}: {end}"),
+            }
+        }
+    }
+
+    /// Runs `ringcat` in the namespace of the MainDevice.
+    pub fn ringcat(&self, arguments: &[&str]) -> Output {
+        finish(self.start_ringcat(arguments))
+    }
+
+    /// Starts `ringcat` in the namespace of the MainDevice.
+    pub fn start_ringcat(&self, arguments: &[&str]) -> Child {
+        self.start(&program("ringcat"), &[arguments, &THREAD].concat())
+    }
+
+    /// Starts a program in the namespace of the MainDevice.
+    pub fn start(&self, path: &Path, arguments: &[&str]) -> Child {
+        let mut command = self.command(&self.main, path);
+        command.args(arguments).stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::piped());
+        command.spawn().expect("the program starts")
+    }
+
+    fn command(&self, namespace: &str, path: &Path) -> Command {
+        let mut command = Command::new("ip");
+        command.args(["netns", "exec", namespace]).arg(path);
+        command
+    }
+
+    fn end_simulator(&mut self) {
+        if let Some((mut child, socket)) = self.simulator.take() {
+            // It may have ended by itself.
+            let _ = child.kill();
+            let _ = child.wait();
+            let _ = std::fs::remove_file(socket);
+        }
+    }
+}
+
+impl Drop for Bench {
+    fn drop(&mut self) {
+        self.end_simulator();
+        for namespace in [&self.main, &self.sim] {
+            // One that could not be made cannot be removed.
+            let _ = ip(&format!("netns del {namespace}"));
+        }
+    }
+}
+
+fn ip(arguments: &str) -> Result<(), String> {
+    let output = Command::new("ip").args(arguments.split(' ')).output().map_err(|error| format!("ip: {error}"))?;
+    if output.status.success() { Ok(()) } else { Err(String::from_utf8_lossy(&output.stderr).into_owned()) }
+}
+
+/// Waits for a program, not for ever.
+pub fn finish(mut child: Child) -> Output {
+    let until = Instant::now() + END_LIMIT;
+    while child.try_wait().expect("it is our child").is_none() {
+        if Instant::now() >= until {
+            let _ = child.kill();
+            panic!("a program does not end: {:?}", child.wait_with_output());
+        }
+        std::thread::sleep(Duration::from_millis(10));
+    }
+    child.wait_with_output().expect("it has ended")
+}
+
+/// A program that prints one line, goes on until its input ends, and is killed when it is dropped.
+pub struct Client {
+    child: Child,
+    input: Option<ChildStdin>,
+    /// The line.
+    pub line: String,
+}
+
+impl Client {
+    /// Waits for the line.
+    pub fn new(mut child: Child) -> Client {
+        let mut line = String::new();
+        let output = child.stdout.take().expect("it is piped");
+        BufReader::new(output).read_line(&mut line).expect("text");
+        let input = child.stdin.take();
+        Client { child, input, line: line.trim().to_owned() }
+    }
+
+    /// A figure of the line.
+    pub fn figure(&self, name: &str) -> &str {
+        let mut words = self.line.split(' ').skip_while(|word| *word != name);
+        words.nth(1).unwrap_or_default()
+    }
+
+    /// Ends its input and waits; what it said of errors.
+    pub fn end(mut self) -> (bool, String) {
+        drop(self.input.take());
+        let mut errors = String::new();
+        if let Some(mut stderr) = self.child.stderr.take() {
+            stderr.read_to_string(&mut errors).expect("text");
+        }
+        (self.child.wait().expect("it is our child").success(), errors)
+    }
+}
+
+impl Drop for Client {
+    fn drop(&mut self) {
+        // It has usually ended.
+        let _ = self.child.kill();
+        let _ = self.child.wait();
+    }
+}
