@@ -141,8 +141,12 @@ impl Mirror {
                     let inputs = &flight.inputs[area.device.0];
                     (image.get(area.in_image.clone()), inputs.get(area.in_device.clone()))
                 }
+                // Where somebody is missing, only fresh inputs show that it is not this one.
                 Direction::Outputs
-                    if !delivery.is_incomplete() && flight.operating[area.device.0] && uses_outputs(device) =>
+                    if (delivery == Delivery::Complete
+                        || exchange.freshness(domain, area.subdevice) == Freshness::Fresh)
+                        && flight.operating[area.device.0]
+                        && uses_outputs(device) =>
                 {
                     (device.outputs().get(area.in_device.clone()), flight.image.get(area.in_image.clone()))
                 }

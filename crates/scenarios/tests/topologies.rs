@@ -1,0 +1,180 @@
+//! Segments that are no plain line or ring: crossed cables, unconnected ports, branches; and what is told about them.
+
+use std::time::Duration;
+
+use ringcat::{Event, TimedEvent};
+use ringcat_sim::cable::{CableId, DeviceIndex, Endpoint, HostLink};
+use ringcat_sim::frame::Port;
+use ringcat_sim::network::builder::SegmentBuilder;
+use ringcat_sim::network::{Network, NetworkOptions};
+use scenarios::check::{Delivery, ring_events};
+use scenarios::segments::{descriptions, devices};
+use scenarios::world::World;
+
+const MAIN: Endpoint = Endpoint::Host(HostLink::Main);
+const REDUNDANT: Endpoint = Endpoint::Host(HostLink::Redundant);
+
+fn at(device: usize, port: Port) -> Endpoint {
+    Endpoint::Device(DeviceIndex(device), port)
+}
+
+/// Devices of these kinds, with these cables.
+fn wired(kinds: &[&str], cables: &[(Endpoint, Endpoint)]) -> Network {
+    let builder = devices(descriptions(kinds)).into_iter().fold(SegmentBuilder::new(), SegmentBuilder::device);
+    let builder = cables.iter().fold(builder, |builder, (a, b)| builder.cable(*a, *b));
+    builder.options(NetworkOptions::default()).build().expect("the cables fit")
+}
+
+/// Comes to OP and exchanges process data; inputs and outputs are compared.
+fn in_op(network: Network) -> World {
+    let mut world = World::in_op(0, network);
+    let mark = world.mark();
+    world.run_cycles(100);
+    assert_eq!(world.incomplete(mark), 0);
+    assert!(world.compared() > 0 && world.all_in_op());
+    world
+}
+
+fn crossed(events: &[TimedEvent]) -> Vec<(Option<u16>, Option<u8>)> {
+    let of = |timed: &TimedEvent| match timed.event {
+        Event::LineCrossed { position, entry_port } => Some((position.map(|position| position.0), entry_port)),
+        _ => None,
+    };
+    events.iter().filter_map(of).collect()
+}
+
+#[test]
+fn a_crossed_subdevice_in_a_line_is_located() {
+    use Port::{A, B};
+    let kinds = ["junction", "digital-output-8", "junction", "servo"];
+    let cables = [(MAIN, at(0, A)), (at(0, B), at(1, A)), (at(1, B), at(2, B)), (at(2, A), at(3, A))];
+    let world = in_op(wired(&kinds, &cables));
+    // Frames meet it on their way back, behind the one that hangs on it (facts 2.9).
+    assert_eq!(crossed(world.events(world.beginning())), [(Some(3), Some(1))]);
+    assert_eq!(world.device_of(3), Some(DeviceIndex(2)));
+}
+
+#[test]
+fn a_subdevice_without_a_cable_in_port_0_is_told_and_works() {
+    use Port::{A, B};
+    let kinds = ["coupler", "digital-output-8", "servo"];
+    let cables = [(MAIN, at(0, A)), (at(0, B), at(1, A)), (at(1, B), at(2, B))];
+    let world = in_op(wired(&kinds, &cables));
+    let told = |event: &Event| matches!(event, Event::UnconnectedPort0 { position } if position.0 == 2);
+    assert!(world.saw(world.beginning(), told));
+    assert_eq!(crossed(world.events(world.beginning())), [(Some(2), Some(1))]);
+}
+
+#[test]
+fn a_crossed_subdevice_in_a_closed_ring_is_located_and_works() {
+    use Port::{A, B};
+    let kinds = ["junction", "digital-output-8", "servo", "digital-input-8"];
+    let cables =
+        [(MAIN, at(0, A)), (at(0, B), at(1, A)), (at(1, B), at(2, B)), (at(2, A), at(3, A)), (at(3, B), REDUNDANT)];
+    let mut world = in_op(wired(&kinds, &cables));
+    // The only one that the redundant copy meets.
+    assert_eq!(crossed(world.events(world.beginning())), [(Some(3), Some(1))]);
+    assert_eq!(world.device_of(3), Some(DeviceIndex(2)));
+    for cable in 0..cables.len() {
+        let mark = world.mark();
+        world.cut(CableId(cable));
+        world.run_cycles(60);
+        assert_eq!(world.judged(mark).last().map(|judged| judged.delivery), Some(Delivery::Complete), "cable {cable}");
+        world.heal(CableId(cable));
+        world.run_cycles(60);
+        assert_eq!(world.left_op(mark), []);
+        assert!(world.incomplete(mark) <= 2, "cable {cable}: {}", world.incomplete(mark));
+        assert!(ring_events(world.events(mark)).len() >= 2);
+    }
+}
+
+/// A ring of five with a branch on a port of its second device.
+fn ring_with_branch(port: Port) -> Network {
+    use Port::{A, B};
+    let kinds = ["digital-output-8", "junction", "servo", "coupler", "digital-input-8", "block", "analog-input-4"];
+    let cables = [
+        (MAIN, at(0, A)),
+        (at(0, B), at(1, A)),
+        (at(1, B), at(2, A)),
+        (at(2, B), at(3, A)),
+        (at(3, B), at(4, A)),
+        (at(4, B), REDUNDANT),
+        (at(1, port), at(5, A)),
+        (at(5, B), at(6, A)),
+    ];
+    wired(&kinds, &cables)
+}
+
+#[test]
+fn a_ring_with_a_branch_keeps_all_in_op_when_any_cable_of_the_ring_is_cut() {
+    // On port 2 the branch is met by the redundant copy even in a closed ring (facts 2.9).
+    for port in [Port::C, Port::D] {
+        let mut world = in_op(ring_with_branch(port));
+        for cable in 0..6 {
+            let mark = world.mark();
+            world.cut(CableId(cable));
+            world.run_cycles(60);
+            assert_eq!(world.judged(mark).last().map(|judged| judged.delivery), Some(Delivery::Complete));
+            world.heal(CableId(cable));
+            world.run_cycles(60);
+            assert_eq!(world.left_op(mark), [], "branch on {port:?}, cable {cable}");
+            assert!(world.incomplete(mark) <= 2, "branch on {port:?}, cable {cable}: {}", world.incomplete(mark));
+            let opened = world.events(mark).iter().filter(|t| matches!(t.event, Event::RingOpened { .. })).count();
+            let closed = world.events(mark).iter().filter(|t| matches!(t.event, Event::RingClosed { .. })).count();
+            assert_eq!((opened, closed), (1, 1), "branch on {port:?}, cable {cable}");
+        }
+    }
+}
+
+#[test]
+fn a_branch_that_is_cut_off_comes_back_while_the_ring_goes_on() {
+    for port in [Port::C, Port::D] {
+        let mut world = in_op(ring_with_branch(port));
+        for gap in [30, 400] {
+            let mark = world.mark();
+            world.cut(CableId(6));
+            world.run_cycles(gap);
+            let stale = &world.judged(mark).last().expect("cycles went by").stale;
+            let names: Vec<_> = stale.iter().filter_map(|subdevice| world.device_of(*subdevice)).collect();
+            assert!(names.iter().all(|device| [5, 6].contains(&device.0)), "{names:?} are stale");
+            world.heal(CableId(6));
+            world.until(Duration::from_secs(3), "all in OP", |world| {
+                world.all_in_op() && world.application().all_settled()
+            });
+            world.run_cycles(50);
+            assert!(world.left_op(mark).iter().all(|device| [5, 6].contains(&device.0)));
+            assert_eq!(ring_events(world.events(mark)), Vec::<&Event>::new());
+        }
+    }
+}
+
+#[test]
+fn a_tree_comes_to_op_and_its_branches_do_not_depend_on_each_other() {
+    use Port::{A, B, C, D};
+    let kinds =
+        ["junction", "coupler", "digital-output-8", "junction", "servo", "digital-input-8", "block", "analog-output-4"];
+    let cables = [
+        (MAIN, at(0, A)),
+        (at(0, D), at(1, A)),
+        (at(1, B), at(2, A)),
+        (at(0, B), at(3, A)),
+        (at(3, D), at(4, A)),
+        (at(3, C), at(5, A)),
+        (at(0, C), at(6, A)),
+        (at(6, B), at(7, A)),
+    ];
+    let mut world = in_op(wired(&kinds, &cables));
+    for (cable, behind) in [(1, vec![1, 2]), (3, vec![3, 4, 5]), (6, vec![6, 7]), (4, vec![4])] {
+        let mark = world.mark();
+        world.cut(CableId(cable));
+        world.run_cycles(300);
+        let lost = world.events(mark).iter().filter(|timed| matches!(timed.event, Event::Lost { .. })).count();
+        assert_eq!(lost, behind.len(), "cable {cable}");
+        world.heal(CableId(cable));
+        world
+            .until(Duration::from_secs(3), "all in OP", |world| world.all_in_op() && world.application().all_settled());
+        world.run_cycles(30);
+        assert!(world.left_op(mark).iter().all(|device| behind.contains(&device.0)));
+        assert_eq!(world.judged(mark).last().map(|judged| judged.delivery), Some(Delivery::Complete));
+    }
+}
