@@ -133,6 +133,28 @@ fn a_stranger_that_another_main_device_has_configured_is_put_to_init_and_takes_n
 }
 
 #[test]
+fn another_one_with_the_address_of_an_absent_member_is_not_taken_for_it() {
+    let mut world = world(six(true), 5);
+    world.power_off(DeviceIndex(2));
+    world.run_cycles(200);
+    let temporary = StationAddress(stations(&world)[5]);
+    let bus = world.application().engine().bus();
+    let mark = world.mark();
+    world.application_mut().engine_mut().spawn(async move {
+        let _ = bus.fpwr(temporary, map::STATION_ADDRESS, &0x1003u16.to_le_bytes()).await;
+    });
+    // Nothing but the look once a second can show it.
+    world.run_cycles(1500);
+    assert!(world.saw(mark, |event| *event == Event::Returned { subdevice: 2 }));
+    assert!(stations(&world)[5] >= 0xC000, "it has a temporary address again");
+    assert_eq!(world.application().states()[2], SubDeviceState::Absent);
+    assert_eq!(world.steps(mark), [], "and was not configured");
+    world.power_on(DeviceIndex(2));
+    until_settled(&mut world);
+    assert_eq!(stations(&world)[2], 0x1003);
+}
+
+#[test]
 fn neighbours_alike_keep_their_places_whichever_side_they_come_back_from() {
     let kinds = ["coupler", "digital-input-8", "digital-output-8", "digital-output-8", "digital-input-8"];
     for cut in [None, Some(0), Some(1), Some(3), Some(5)] {

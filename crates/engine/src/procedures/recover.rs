@@ -12,7 +12,8 @@ use ringcat_wire::al::AlState;
 use super::al_state;
 use super::configure::{BringUp, ConfigureError, Start};
 use super::fleet::{Phase, SharedFleet};
-use super::sii;
+use super::sii::{self, SiiReader};
+use super::strangers::take_away;
 use crate::event::Event;
 use crate::supervisor::{Bus, BusError};
 
@@ -159,6 +160,44 @@ pub(super) fn start(bus: &Bus, fleet: &SharedFleet, index: usize, from: Start) {
     bus.spawn(async move {
         while_current(&own_fleet, index, attempt, keep_up(own_bus.clone(), own_fleet.clone(), index, from)).await;
     });
+}
+
+/// A lost SubDevice's station address answers again: it comes back, if it is the same one.
+pub(super) fn welcome(bus: &Bus, fleet: &SharedFleet, index: usize) {
+    fleet.set_phase(index, Phase::Configuring);
+    let attempt = fleet.next_attempt(index);
+    bus.report(Event::Returned { subdevice: index });
+    let (bus, fleet) = (bus.clone(), fleet.clone());
+    bus.clone().spawn(async move {
+        let checked = async {
+            if is_same(&bus, &fleet, index).await {
+                return keep_up(bus.clone(), fleet.clone(), index, Start::Unknown).await;
+            }
+            let station = fleet.access().members[index].station;
+            // Where that fails, the next look finds the address again.
+            let _ = take_away(&bus, &fleet, station).await;
+            lose(&bus, &fleet, index);
+        };
+        while_current(&fleet, index, attempt, checked).await;
+    });
+}
+
+/// Whether who has the station address of a member is that member: it may have been exchanged for one that ran
+/// elsewhere. One that cannot be read has to be trusted.
+async fn is_same(bus: &Bus, fleet: &SharedFleet, index: usize) -> bool {
+    let (station, known, cache) = {
+        let access = fleet.access();
+        let member = &access.members[index];
+        (member.station, member.info.as_ref().map(|info| info.identity), access.cache.clone())
+    };
+    let Some(known) = known else { return true };
+    if sii::claim(bus, station).await.is_err() {
+        return true;
+    }
+    match SiiReader::new(bus, station, &cache).identity().await {
+        Ok(now) => (now.vendor_id, now.product_code, now.serial) == (known.vendor_id, known.product_code, known.serial),
+        Err(_) => true,
+    }
 }
 
 /// Lets a procedure for a SubDevice run until another one begins or the SubDevice is lost.

@@ -16,7 +16,7 @@ use ringcat_wire::address::StationAddress;
 use ringcat_wire::command::Command;
 use ringcat_wire::datagram::Target;
 use ringcat_wire::register::{SiiCommand, SiiControl, map};
-use ringcat_wire::sii::{CategoryHeader, CategoryKind, SiiHeader};
+use ringcat_wire::sii::{CategoryHeader, CategoryKind, Identity, SiiHeader};
 
 use crate::supervisor::{Bus, BusError};
 use crate::time::Instant;
@@ -35,6 +35,8 @@ const MAX_CATEGORIES: usize = 256;
 const MAX_WORDS: u32 = 0x8000;
 /// Bytes of control, address and data registers in one poll with 8-byte reads.
 const POLL_LEN: usize = 14;
+/// Where vendor, product, revision and serial number lie.
+const IDENTITY_WORD: u32 = 0x08;
 /// Words before the categories.
 const HEADER_WORDS: u32 = (SiiHeader::LEN / 2) as u32;
 
@@ -204,6 +206,14 @@ impl SiiReader {
         let (chain, contents) = self.read_categories(&header).await?;
         claim.settle(chain, contents.clone());
         Ok(contents)
+    }
+
+    /// Reads vendor, product, revision and serial number.
+    pub async fn identity(&mut self) -> Result<Identity, SiiReadError> {
+        self.wait_until_loaded().await?;
+        let bytes = self.bytes(IDENTITY_WORD, 8).await?;
+        let field = |at: usize| u32::from_le_bytes([bytes[at], bytes[at + 1], bytes[at + 2], bytes[at + 3]]);
+        Ok(Identity { vendor_id: field(0), product_code: field(4), revision: field(8), serial: field(12) })
     }
 
     /// Words that are not covered by the configuration of a scan, such as the alias; see [`SiiReader::read`].
@@ -387,4 +397,22 @@ pub(super) async fn claim_all(bus: &Bus) -> Result<(), BusError> {
 pub(super) async fn assign(bus: &Bus, station: StationAddress, to_pdi: bool) -> Result<(), BusError> {
     let target = Target::Station(station, map::SII_CONFIGURATION);
     bus.transfer(Command::Fpwr, target, vec![u8::from(to_pdi)], None).await.map(drop)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_reader_that_goes_away_ends_its_claim_and_one_that_ends_keeps_what_it_read() {
+        let cache = SiiCache::new(true);
+        let header = [1; SiiHeader::LEN];
+        drop(cache.claim(&header));
+        assert!(cache.is_empty());
+        let contents = SiiContents { header: SiiHeader::decode(&header), categories: Vec::new(), complete: true };
+        cache.claim(&header).settle(Vec::new(), contents);
+        assert_eq!(cache.len(), 1);
+        drop(cache.claim(&header));
+        assert_eq!(cache.len(), 1, "another reader of the same");
+    }
 }

@@ -15,6 +15,7 @@ use core::time::Duration;
 use ringcat_wire::address::{Position, StationAddress};
 use ringcat_wire::register::map;
 
+pub(super) use self::address::take_away;
 use self::address::{View, give, view};
 use self::matching::{Fit, assign};
 use super::configure::Start;

@@ -18,7 +18,7 @@ use ringcat_wire::register::{DlStatus, map};
 use super::configure::Start;
 use super::fleet::{Phase, SharedFleet};
 use super::inspect::{Break, Look, locate_break, look_at_all, look_at_strangers};
-use super::recover::{lose, start};
+use super::recover::{lose, start, welcome};
 use super::strangers::{self, Search};
 use super::verify::verify;
 use crate::board::{RingWord, Supervision};
@@ -226,7 +226,10 @@ impl Watch {
                 return;
             }
             Phase::Settled(_) => Event::StateError { subdevice: index, requested: None, status, code },
-            Phase::Absent => Event::Returned { subdevice: index },
+            Phase::Absent => {
+                self.suspended[index] = false;
+                return welcome(&self.bus, &self.fleet, index);
+            }
         };
         self.bus.report(event);
         self.suspended[index] = false;

@@ -78,13 +78,13 @@ pub(super) async fn view(bus: &Bus) -> Result<Option<View>, BusError> {
 }
 
 /// A temporary address that nobody has.
-fn fresh(fleet: &SharedFleet, view: &View) -> StationAddress {
+fn fresh(fleet: &SharedFleet, present: &[StationAddress]) -> StationAddress {
     let mut access = fleet.access();
     let mut address = StationAddress(*TEMPORARY.start());
     for _ in TEMPORARY {
         address = StationAddress(TEMPORARY.start() + access.next_temporary % TEMPORARY.len() as u16);
         access.next_temporary = access.next_temporary.wrapping_add(1);
-        let is_taken = view.stations.contains(&address)
+        let is_taken = present.contains(&address)
             || access.members.iter().any(|member| member.station == address)
             || access.strangers.iter().any(|stranger| stranger.station == address);
         if !is_taken {
@@ -109,7 +109,7 @@ pub(super) async fn give(
             if given.len() >= ROUND {
                 return Ok((given, false));
             }
-            let new = [fresh(fleet, view), fresh(fleet, view)];
+            let new = [fresh(fleet, &view.stations), fresh(fleet, &view.stations)];
             let taken = exchange(bus, *station, new, left == 1).await?;
             if taken == [false; 2] {
                 return Ok((given, false));
@@ -120,6 +120,16 @@ pub(super) async fn give(
         }
     }
     Ok((given, true))
+}
+
+/// Takes an address from whoever has it. He is found with another one.
+pub(in super::super) async fn take_away(
+    bus: &Bus,
+    fleet: &SharedFleet,
+    station: StationAddress,
+) -> Result<(), BusError> {
+    let new = [fresh(fleet, &[]), fresh(fleet, &[])];
+    exchange(bus, station, new, true).await.map(drop)
 }
 
 /// Gives the first SubDevice on each link that has an address a new one. Returns on which links somebody took it.
