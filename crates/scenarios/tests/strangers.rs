@@ -181,6 +181,19 @@ fn neighbours_alike_keep_their_places_whichever_side_they_come_back_from() {
 }
 
 #[test]
+fn a_segment_that_loses_its_power_as_a_whole_comes_back_with_everybody_in_his_place() {
+    let kinds = ["digital-output-8"; 100];
+    let mut world = World::in_op(6, ring(descriptions(&kinds), NetworkOptions::default()));
+    world.set_strict(false);
+    let before = stations(&world);
+    (0..kinds.len()).for_each(|device| world.power_off(DeviceIndex(device)));
+    world.run_cycles(100);
+    (0..kinds.len()).for_each(|device| world.power_on(DeviceIndex(device)));
+    until_settled(&mut world);
+    assert_eq!(stations(&world), before);
+}
+
+#[test]
 fn an_optional_subdevice_that_was_never_there_does_not_take_the_place_of_its_twin() {
     let kinds = ["coupler", "digital-output-8", "digital-input-8"];
     let network = ring(descriptions(&kinds), NetworkOptions::default());
