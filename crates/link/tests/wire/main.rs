@@ -1,6 +1,6 @@
 //! The crate on interfaces of the kernel: pairs of them in namespaces that each test makes and removes.
 //!
-//! Needs root; without, each test prints "skipped: needs root" and passes.
+//! Needs root and RINGCAT_ON_THE_WIRE=1; without, each test prints what it needs and passes.
 
 mod bench;
 mod exclusive;
