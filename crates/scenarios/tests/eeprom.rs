@@ -2,11 +2,13 @@
 
 use std::time::Duration;
 
-use ringcat::{Options, automatic};
+use ringcat::simulated::SimulatedSegment;
+use ringcat::{MainDevice, Options, automatic};
 use ringcat_engine::main_device::SubDeviceState;
-use ringcat_sim::cable::{CableId, DeviceIndex};
+use ringcat_sim::cable::{CableId, DeviceIndex, Direction, HostLink};
 use ringcat_sim::fault::Fault;
 use ringcat_sim::network::NetworkOptions;
+use ringcat_sim::time::SimTime;
 use ringcat_wire::al::{AlState, AlStatusCode};
 use ringcat_wire::register::map;
 use scenarios::segments::{descriptions, ring};
@@ -58,4 +60,20 @@ fn a_subdevice_that_is_out_of_reach_on_the_way_to_preop_gives_the_eeprom_back_wh
     let settled = SubDeviceState::Settled(AlState::PreOp);
     world.until(Duration::from_secs(1), "back", |world| world.application().states()[DEVICE.0] == settled);
     assert!(!belongs_to_pdi(&world));
+}
+
+#[test]
+fn a_read_command_whose_answer_comes_too_late_does_not_end_the_scan() {
+    // Late by more than a frame is waited for, while the EEPROM is busy for longer than that.
+    let moments = (15_000..45_000).step_by(1_000).flat_map(|at| [(at, Direction::AToB), (at, Direction::BToA)]);
+    for (at_us, direction) in moments {
+        let text = "[[device]]\ntype = \"digital-output-8\"\nsii_busy_us = 8000\n";
+        let mut links = SimulatedSegment::from_toml(text).expect("the segment is right");
+        let cable = links.network().host_cable(HostLink::Main).expect("there is one");
+        let late = Fault::Delay { cable, direction: Some(direction), count: 2, by: Duration::from_millis(3) };
+        links.network_mut().schedule(SimTime(at_us * 1_000), late);
+        let mut main_device = MainDevice::request(links, &Options::default());
+        let scan = main_device.scan().unwrap_or_else(|error| panic!("delayed at {at_us} us: {error}"));
+        assert_eq!(scan.subdevices.len(), 1);
+    }
 }
