@@ -12,7 +12,7 @@ pub const VLAN: u16 = 0x8100;
 pub const CLASS_BIT: u8 = 0x80;
 
 /// Where the EtherType is.
-const ETHER_TYPE: u32 = 12;
+pub(crate) const ETHER_TYPE: u32 = 12;
 /// Where the first datagram's Idx is: Ethernet header 14, EtherCAT header 2, Cmd 1.
 const IDX: u32 = 17;
 /// What a VLAN tag moves both by.
@@ -32,12 +32,12 @@ pub enum ClassFilter {
     Acyclic,
 }
 
-const LOAD_HALF: u16 = (libc::BPF_LD | libc::BPF_H | libc::BPF_ABS) as u16;
+pub(crate) const LOAD_HALF: u16 = (libc::BPF_LD | libc::BPF_H | libc::BPF_ABS) as u16;
 const LOAD_BYTE: u16 = (libc::BPF_LD | libc::BPF_B | libc::BPF_ABS) as u16;
-const JUMP_EQUAL: u16 = (libc::BPF_JMP | libc::BPF_JEQ | libc::BPF_K) as u16;
+pub(crate) const JUMP_EQUAL: u16 = (libc::BPF_JMP | libc::BPF_JEQ | libc::BPF_K) as u16;
 const JUMP_SET: u16 = (libc::BPF_JMP | libc::BPF_JSET | libc::BPF_K) as u16;
 const JUMP: u16 = (libc::BPF_JMP | libc::BPF_JA) as u16;
-const RETURN: u16 = (libc::BPF_RET | libc::BPF_K) as u16;
+pub(crate) const RETURN: u16 = (libc::BPF_RET | libc::BPF_K) as u16;
 
 /// The program, to be attached to a packet socket. A load beyond the end of a frame ends it with "does not pass".
 pub fn program(filter: ClassFilter) -> [libc::sock_filter; 11] {

@@ -50,6 +50,16 @@ pub(crate) fn names() -> Vec<String> {
     indexed_names().into_iter().map(|(_, name)| name).collect()
 }
 
+/// Numbers of those interfaces whose name is wanted.
+pub(crate) fn indices(wanted: impl Fn(&str) -> bool) -> Vec<u32> {
+    indexed_names().into_iter().filter(|(_, name)| wanted(name)).map(|(index, _)| index).collect()
+}
+
+/// Name of the interface with this number.
+pub(crate) fn name_of(index: u32) -> Option<String> {
+    indexed_names().into_iter().find(|(number, _)| *number == index).map(|(_, name)| name)
+}
+
 fn indexed_names() -> Vec<(u32, String)> {
     let mut found = Vec::new();
     // SAFETY: no pointers are passed.

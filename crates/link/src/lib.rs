@@ -2,6 +2,7 @@
 //!
 //! * [`packet_socket`]: frames in and out of an interface: `AF_PACKET` with a memory-mapped receive ring;
 //! * [`filter`]: which frames the kernel puts into that ring;
+//! * [`listener`]: frames of one sender on all interfaces where they are not expected;
 //! * [`waiting`]: sleeping or spinning until a frame or a moment comes;
 //! * [`interface`], [`carrier`]: what interfaces there are, who else uses them, whether a cable is plugged in;
 //! * [`monotonic`], [`realtime`]: the host's clock, scheduling, memory locking, processor latency;
@@ -17,6 +18,7 @@ mod error;
 pub mod filter;
 pub mod interface;
 mod kernel;
+pub mod listener;
 pub mod monotonic;
 pub mod packet_socket;
 pub mod pcapng;
@@ -27,5 +29,6 @@ pub mod waiting;
 pub use carrier::{Carrier, CarrierWatch};
 pub use error::LinkError;
 pub use filter::ClassFilter;
+pub use listener::{Listener, Sender};
 pub use packet_socket::{LinkCounters, PacketOptions, PacketSocket};
 pub use waiting::{ReceiveMode, wait};

@@ -92,7 +92,7 @@ impl PacketSocket {
         set(kernel::PACKET_VERSION, kernel::TPACKET_V2).map_err(failed("choosing the ring's version"))?;
         // Before Linux 4.20 the ring leaves them out, at more cost.
         let _ = set(kernel::PACKET_IGNORE_OUTGOING, 1);
-        attach_filter(raw, options.filter).map_err(failed("attaching the filter"))?;
+        attach(raw, &mut filter::program(options.filter)).map_err(failed("attaching the filter"))?;
         let layout = ring::layout(options.ring_frames);
         kernel::set_option(raw, libc::SOL_PACKET, kernel::PACKET_RX_RING, &layout)
             .map_err(failed("making the receive ring"))?;
@@ -194,13 +194,12 @@ fn ethernet(name: &str) -> Result<(libc::c_int, [u8; 6]), LinkError> {
     Ok((index as libc::c_int, std::array::from_fn(|i| address.sa_data[i] as u8)))
 }
 
-fn attach_filter(fd: RawFd, class: ClassFilter) -> Result<(), i32> {
-    let mut program = filter::program(class);
+pub(crate) fn attach(fd: RawFd, program: &mut [libc::sock_filter]) -> Result<(), i32> {
     let attached = libc::sock_fprog { len: program.len() as libc::c_ushort, filter: program.as_mut_ptr() };
     kernel::set_option(fd, libc::SOL_SOCKET, libc::SO_ATTACH_FILTER, &attached)
 }
 
-fn bind(fd: RawFd, index: libc::c_int, protocol: u16) -> Result<(), i32> {
+pub(crate) fn bind(fd: RawFd, index: libc::c_int, protocol: u16) -> Result<(), i32> {
     // SAFETY: all bytes zero is a valid sockaddr_ll.
     let mut address: libc::sockaddr_ll = unsafe { zeroed() };
     address.sll_family = libc::AF_PACKET as libc::c_ushort;

@@ -7,7 +7,7 @@ use std::time::{Duration, Instant};
 
 use clap::{Args, ValueEnum};
 use ringcat::packet::PacketLinks;
-use ringcat::{Error, ScanError};
+use ringcat::{Error, Link, ScanError};
 use ringcat_link::interface::{self, exclusive_use};
 use ringcat_link::realtime::{self, CpuLatency};
 use ringcat_link::{LinkError, ReceiveMode};
@@ -141,7 +141,24 @@ impl InterfaceArguments {
         Ok(links)
     }
 
-    fn names(&self) -> impl Iterator<Item = &str> {
+    /// Name of the interface of a link.
+    pub fn name(&self, link: Link) -> &str {
+        match link {
+            Link::Main => &self.main,
+            Link::Redundant => self.redundant.as_deref().unwrap_or(&self.main),
+        }
+    }
+
+    /// What to do where a cable of the segment is plugged into an interface that was not named.
+    pub fn advice(&self, found: &str) -> String {
+        match &self.redundant {
+            None => format!("add --redundant {found} to run a ring, or unplug that cable"),
+            Some(redundant) => format!("unplug it, or put {found} in the place of {redundant}"),
+        }
+    }
+
+    /// The interfaces that are in use.
+    pub fn names(&self) -> impl Iterator<Item = &str> {
         std::iter::once(self.main.as_str()).chain(self.redundant.as_deref())
     }
 

@@ -6,6 +6,7 @@ mod output;
 mod run;
 mod scan;
 mod sim;
+mod surroundings;
 mod table;
 
 use std::process::ExitCode;

@@ -9,6 +9,7 @@ use ringcat_engine::main_device::{
     Declaration, DomainConfig, DomainMember, MainDevice as Engine, Options as Engineering,
 };
 use ringcat_engine::procedures::scan::Scan;
+use ringcat_engine::supervisor::AcyclicCounters;
 use ringcat_engine::time::Instant;
 
 use crate::application::Application;
@@ -124,6 +125,11 @@ impl<L: Links> MainDevice<L> {
                 return Ok(result?);
             }
         }
+    }
+
+    /// Counters of what was sent and received so far.
+    pub fn acyclic_counters(&self) -> AcyclicCounters {
+        self.engine.counters()
     }
 
     /// The links.

@@ -19,6 +19,7 @@ use ringcat_wire::al::AlState;
 
 use crate::interfaces::{Failure, InterfaceArguments, ThreadArguments, end_request, is_asked};
 use crate::output::{say, write};
+use crate::surroundings::Surroundings;
 
 /// From activation to OP of the last SubDevice at the most.
 const OP_LIMIT: Duration = Duration::from_secs(60);
@@ -64,10 +65,15 @@ fn time(text: &str) -> Result<Duration, String> {
 pub fn run(arguments: &RunArguments) -> Result<bool, Failure> {
     let end = end_request();
     let links = arguments.interfaces.open(arguments.thread)?;
+    let mut surroundings = Surroundings::watch(&arguments.interfaces, &links);
     let _awake = arguments.thread.apply();
     let mut main_device = MainDevice::request(links, &Options::default());
     let begin = ringcat_link::monotonic::now_ns();
-    let scan = main_device.scan()?;
+    let result = main_device.scan_with(|event| {
+        tell_of_others(&mut surroundings, &event.event);
+    });
+    let foreign = main_device.acyclic_counters().foreign;
+    let scan = result.map_err(|error| surroundings.explain(error, foreign))?;
     say!("{} SubDevices; cycle {} us", scan.subdevices.len(), arguments.cycle.as_micros());
     let names = Names(scan.subdevices.iter().map(|info| info.name.clone()).collect());
     let application =
@@ -79,6 +85,7 @@ pub fn run(arguments: &RunArguments) -> Result<bool, Failure> {
         wake_ups: Histogram::default(),
         live: Live { terminal: stdout().is_terminal(), next: Instant(0), open: false },
         judgements_told: 0,
+        surroundings,
     };
     let in_op = run.reach_op(&end);
     let before = run.application.cyclic_counters();
@@ -101,6 +108,14 @@ struct Run {
     wake_ups: Histogram,
     live: Live,
     judgements_told: u32,
+    surroundings: Surroundings,
+}
+
+/// Tells of a MainDevice that has not been told of; whether the event was a frame of one.
+fn tell_of_others(surroundings: &mut Surroundings, event: &Event) -> bool {
+    let noted = surroundings.note(event);
+    noted.iter().flatten().for_each(|words| eprintln!("ringcat: {words}"));
+    noted.is_some()
 }
 
 impl Run {
@@ -111,6 +126,10 @@ impl Run {
         while let Some(event) = self.application.pop_event() {
             match event.event {
                 Event::Skipped { .. } => continue,
+                Event::ForeignFrame { .. } => {
+                    tell_of_others(&mut self.surroundings, &event.event);
+                    continue;
+                }
                 Event::Domain { .. } if self.judgements_told == JUDGEMENTS_TOLD => continue,
                 Event::Domain { .. } => self.judgements_told += 1,
                 _ => {}
@@ -180,13 +199,12 @@ impl Run {
             pace.longest_delay.as_secs_f64() * 1e3
         );
         say!(
-            "  the wire: {} frames sent, {} lost, {} copies lost, {} late, {} corrupt, {} from others",
+            "  the wire: {} frames sent, {} lost, {} copies lost, {} late, {} corrupt",
             cyclic.sent,
             cyclic.lost,
             cyclic.copies_lost + cyclic.half,
             cyclic.late,
-            cyclic.corrupt,
-            cyclic.foreign
+            cyclic.corrupt
         );
         say!(
             "  everything else: {} frames with {} datagrams, {} sent again",
@@ -194,6 +212,10 @@ impl Run {
             acyclic.datagrams,
             acyclic.resent
         );
+        if cyclic.foreign + acyclic.foreign > 0 {
+            let (frames, senders) = (cyclic.foreign + acyclic.foreign, self.surroundings.senders());
+            say!("  other MainDevices: {frames} frames, {senders}");
+        }
         for link in [Link::Main, Link::Redundant] {
             let Some(counters) = application.links().counters(link) else { continue };
             say!(

@@ -6,6 +6,7 @@ use ringcat::{Event, MainDevice, Options};
 
 use crate::interfaces::{Failure, InterfaceArguments, ThreadArguments};
 use crate::output::say;
+use crate::surroundings::Surroundings;
 use crate::table;
 
 /// Options of `ringcat scan`.
@@ -23,13 +24,21 @@ pub struct ScanArguments {
 /// Scans and prints what was found; what happens meanwhile goes to the standard error output.
 pub fn run(arguments: &ScanArguments) -> Result<(), Failure> {
     let links = arguments.interfaces.open(arguments.thread)?;
+    let mut surroundings = Surroundings::watch(&arguments.interfaces, &links);
     let _awake = arguments.thread.apply();
     let mut main_device = MainDevice::request(links, &Options::default());
-    let scan = main_device.scan_with(|event| {
-        if !matches!(event.event, Event::ScanProgress { .. } | Event::ScanFailed { .. }) {
-            eprintln!("{}", describe(&event.event, &Names::default()));
-        }
-    })?;
+    let result = main_device.scan_with(|event| match &event.event {
+        Event::ScanProgress { .. } | Event::ScanFailed { .. } => {}
+        event => match surroundings.note(event) {
+            None => eprintln!("{}", describe(event, &Names::default())),
+            Some(words) => words.into_iter().for_each(|words| eprintln!("ringcat: {words}")),
+        },
+    });
+    let foreign = main_device.acyclic_counters().foreign;
+    let scan = result.map_err(|error| surroundings.explain(error, foreign))?;
+    if foreign > 0 {
+        eprintln!("{foreign} frames of another MainDevice arrived during the scan: {}", surroundings.senders());
+    }
     if arguments.json {
         say!("{:#}", table::json(&scan));
     } else {

@@ -5,6 +5,7 @@ use std::fmt;
 use ringcat_engine::domain::DomainState;
 use ringcat_engine::event::Event;
 use ringcat_wire::address::Position;
+use ringcat_wire::frame::MacAddress;
 
 /// Names of declared SubDevices, by their index in the declaration.
 #[derive(Clone, Debug, Default)]
@@ -29,6 +30,17 @@ impl Names {
     fn end(&self, position: Option<Position>, link: &str) -> String {
         position.map_or_else(|| format!("the {link} interface"), |position| self.at(position).to_string())
     }
+}
+
+/// The source address of a frame, if it is long enough to have one.
+pub fn address_of_sender(frame: &[u8]) -> Option<MacAddress> {
+    frame.get(6..12)?.try_into().ok().map(MacAddress)
+}
+
+/// An address as people write it.
+pub fn address(mac: MacAddress) -> String {
+    let bytes = mac.0.map(|byte| format!("{byte:02x}"));
+    bytes.join(":")
 }
 
 /// An event in one line.
@@ -79,7 +91,7 @@ pub fn describe(event: &Event, names: &Names) -> String {
             format!("{}: {what}", names.of(*subdevice))
         }
         Event::ForeignFrame { arrived_on, bytes } => {
-            let source = bytes.get(6..12).map_or_else(String::new, |b| format!(" from {:02x?}", b));
+            let source = address_of_sender(bytes).map_or_else(String::new, |mac| format!(" from {}", address(mac)));
             format!("another MainDevice sends: {} bytes on {arrived_on}{source}", bytes.len())
         }
         Event::Domain { domain, status } => {

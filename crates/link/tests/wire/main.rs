@@ -6,4 +6,5 @@ mod bench;
 mod exclusive;
 mod faults;
 mod frames;
+mod listening;
 mod waits;

@@ -51,6 +51,8 @@ pub struct Bench {
     main: String,
     /// Namespace of the simulator, with interfaces `sim0` and `sim1`.
     sim: String,
+    /// Namespace of another MainDevice, where a test wants one.
+    other: Option<String>,
     simulator: Option<(Child, PathBuf)>,
     _alone: MutexGuard<'static, ()>,
 }
@@ -74,7 +76,7 @@ impl Bench {
         let alone = ONE_AT_A_TIME.lock().unwrap_or_else(PoisonError::into_inner);
         let id = std::process::id();
         let (main, sim) = (format!("ringcat{id}main"), format!("ringcat{id}sim"));
-        let bench = Bench { main, sim, simulator: None, _alone: alone };
+        let bench = Bench { main, sim, other: None, simulator: None, _alone: alone };
         if let Err(reason) = bench.build(pairs) {
             println!("skipped: network namespaces need root and iproute2: {}", reason.trim());
             return None;
@@ -99,6 +101,32 @@ impl Bench {
             }
         }
         Ok(())
+    }
+
+    /// Takes the interface `main1` into the namespace of another MainDevice.
+    pub fn give_away_main1(&mut self) {
+        let other = format!("{}other", self.main);
+        ip(&format!("netns add {other}")).expect("a third namespace");
+        ip(&format!("-n {} link set main1 netns {other}", self.main)).expect("the interface is there");
+        let _ = ip(&format!("-n {other} link set main1 addrgenmode none"));
+        ip(&format!("-n {other} link set main1 up")).expect("the interface is there");
+        self.other = Some(other);
+    }
+
+    /// Starts `ringcat` in the namespace of the other MainDevice.
+    pub fn start_other_ringcat(&self, arguments: &[&str]) -> Child {
+        let namespace = self.other.as_ref().expect("there is one");
+        start(self.command(namespace, &program("ringcat")).args(arguments).args(THREAD))
+    }
+
+    /// Changes the network of the MainDevice.
+    pub fn ip_main(&self, arguments: &str) {
+        ip(&format!("-n {} {arguments}", self.main)).expect("a namespace of ours");
+    }
+
+    /// Starts a program beside the simulator's interfaces.
+    pub fn start_at_sim(&self, path: &Path, arguments: &[&str]) -> Child {
+        start(self.command(&self.sim, path).args(arguments))
     }
 
     /// Switches an interface of the MainDevice or of the simulator.
@@ -160,9 +188,7 @@ impl Bench {
 
     /// Starts a program in the namespace of the MainDevice.
     pub fn start(&self, path: &Path, arguments: &[&str]) -> Child {
-        let mut command = self.command(&self.main, path);
-        command.args(arguments).stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::piped());
-        command.spawn().expect("the program starts")
+        start(self.command(&self.main, path).args(arguments))
     }
 
     fn command(&self, namespace: &str, path: &Path) -> Command {
@@ -184,11 +210,16 @@ impl Bench {
 impl Drop for Bench {
     fn drop(&mut self) {
         self.end_simulator();
-        for namespace in [&self.main, &self.sim] {
+        for namespace in [&self.main, &self.sim].into_iter().chain(&self.other) {
             // One that could not be made cannot be removed.
             let _ = ip(&format!("netns del {namespace}"));
         }
     }
+}
+
+fn start(command: &mut Command) -> Child {
+    command.stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::piped());
+    command.spawn().expect("the program starts")
 }
 
 fn ip(arguments: &str) -> Result<(), String> {

@@ -5,6 +5,7 @@
 //! Times are printed, not judged: the machine that tests run on may be busy with anything.
 
 mod bench;
+mod messages;
 
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Output};
@@ -154,26 +155,6 @@ fn our_main_device_on_a_ring_of_16_loses_nobody_when_a_host_cable_or_an_inner_on
     assert!(output.contains("ring open: 8 SubDevices on MAIN, 8 on REDUNDANT"), "{output}");
     assert!(output.contains("stopped: outputs zero, all SubDevices in INIT"), "{output}{errors}");
     show_summary("ring of 16, three cuts", &output);
-}
-
-#[test]
-fn whoever_cannot_start_is_told_what_to_do() {
-    let Some(bench) = Bench::new(1) else { return };
-    let error_of = |arguments: &[&str]| {
-        let output = bench.ringcat(arguments);
-        assert_eq!(output.status.code(), Some(2), "{arguments:?}");
-        said(&output).1
-    };
-    let missing = error_of(&["scan", "--main", "nowhere"]);
-    assert!(missing.contains("\"nowhere\"; there are: ") && missing.contains("main0"), "{missing}");
-    let silent = error_of(&["scan", "--main", "main0"]);
-    assert!(silent.contains("is the cable plugged and the first SubDevice powered?"), "{silent}");
-    bench.set_link("sim0", "down");
-    let dark = error_of(&["run", "--main", "main0"]);
-    assert!(dark.contains("main0 has no link: is the cable plugged in"), "{dark}");
-    bench.set_link("main0", "down");
-    let off = error_of(&["run", "--main", "main0"]);
-    assert!(off.contains("main0 is switched off: sudo ip link set main0 up"), "{off}");
 }
 
 #[test]

@@ -1,0 +1,51 @@
+//! Frames of one sender on interfaces where they are not expected.
+
+use std::io::Write;
+use std::os::unix::net::UnixStream;
+use std::thread;
+use std::time::Duration;
+
+use ringcat_link::listener::{Heard, Listener, Sender};
+
+use crate::bench::{Bench, ethercat};
+
+/// The source address of [`ethercat`].
+const SENDER: Sender = Sender { address: [0x02, 0, 0, 0, 0, 1], mask: [0, 0, 0, 0xff, 0xff, 0xff] };
+/// Nothing that is heard takes longer, or else the machine stalls.
+const PATIENCE: Duration = Duration::from_millis(500);
+
+/// What a listener in the near namespace hears within a while, when `frames` are sent at the far end.
+fn heard(bench: &Bench, except: &[&str], frames: &[Vec<u8>]) -> Option<Heard> {
+    let listener = bench.near.run(|| Listener::open(SENDER, except)).expect("a socket");
+    let (end, mut stop) = UnixStream::pair().expect("two sockets");
+    let mut far = bench.far_socket();
+    frames.iter().for_each(|frame| assert!(far.send(frame)));
+    thread::scope(|scope| {
+        let ears = scope.spawn(|| bench.near.run(|| listener.hear(&end)));
+        for _ in 0..PATIENCE.as_millis() / 10 {
+            if ears.is_finished() {
+                break;
+            }
+            thread::sleep(Duration::from_millis(10));
+        }
+        stop.write_all(b"end").expect("its other side is there");
+        ears.join().expect("it does not panic")
+    })
+}
+
+#[test]
+fn a_frame_of_the_sender_is_heard_with_the_name_of_its_interface() {
+    let Some(bench) = Bench::make() else { return };
+    let mut other = ethercat(0, 1);
+    other[11] ^= 1;
+    assert_eq!(heard(&bench, &[], &[other.clone()]), None);
+    let ours = ethercat(0x85, 2);
+    let expected = Heard { interface: "near".to_owned(), bytes: ours.clone() };
+    assert_eq!(heard(&bench, &[], &[other, ours]), Some(expected));
+}
+
+#[test]
+fn nothing_is_heard_on_interfaces_that_are_left_out() {
+    let Some(bench) = Bench::make() else { return };
+    assert_eq!(heard(&bench, &["near"], &[ethercat(0, 1)]), None);
+}

@@ -1,0 +1,149 @@
+//! What users are told who cannot start, or whose segment somebody disturbs: each message says what to do.
+
+use std::path::Path;
+use std::time::{Duration, Instant};
+
+use crate::bench::{Bench, Client, finish, program};
+use crate::{Plant, RING_OF_16, said, states};
+
+const TERMINAL: Plant = Plant { outputs: 1, inputs: 0, servos: 0, coupler: false };
+/// Sends frames back as they came, as a cable into a switch or a loop does.
+const MIRROR: &str = "
+import socket
+s = socket.socket(socket.AF_PACKET, socket.SOCK_RAW, socket.htons(0x88A4))
+s.bind(('sim0', 0x88A4))
+print('ready', flush=True)
+while True:
+    frame, origin = s.recvfrom(2000)
+    if origin[2] != 4:
+        s.send(frame)
+";
+const OTHER_MAIN_DEVICE: &str = "another MainDevice sends into this segment: frames from ";
+
+/// What `ringcat` says of errors when it cannot do what it is asked for.
+fn error_of(bench: &Bench, arguments: &[&str]) -> String {
+    let output = bench.ringcat(arguments);
+    assert_eq!(output.status.code(), Some(2), "{arguments:?}");
+    said(&output).1
+}
+
+#[test]
+fn whoever_cannot_start_is_told_what_to_do() {
+    let Some(bench) = Bench::new(1) else { return };
+    for command in ["scan", "run"] {
+        let missing = error_of(&bench, &[command, "--main", "nowhere"]);
+        assert!(missing.contains("\"nowhere\"; there are: ") && missing.contains("main0"), "{missing}");
+        let other = error_of(&bench, &[command, "--main", "lo"]);
+        assert!(other.contains("lo is not an Ethernet interface; take the one"), "{other}");
+    }
+    let silent = error_of(&bench, &["scan", "--main", "main0"]);
+    assert!(silent.contains("is the cable plugged and the first SubDevice powered?"), "{silent}");
+    bench.set_link("sim0", "down");
+    let dark = error_of(&bench, &["run", "--main", "main0"]);
+    assert!(dark.contains("main0 has no link: is the cable plugged in"), "{dark}");
+    bench.set_link("main0", "down");
+    let off = error_of(&bench, &["scan", "--main", "main0"]);
+    assert!(off.contains("main0 is switched off: sudo ip link set main0 up"), "{off}");
+}
+
+#[test]
+fn a_cable_without_subdevices_is_told_apart_from_a_dead_one() {
+    let Some(bench) = Bench::new(1) else { return };
+    // It says that it is ready.
+    let mirror = Client::new(bench.start_at_sim(Path::new("python3"), &["-c", MIRROR]));
+    assert_eq!(mirror.line, "ready");
+    let unchanged = error_of(&bench, &["scan", "--main", "main0"]);
+    assert!(unchanged.contains("frames return, but no SubDevice processes them"), "{unchanged}");
+    assert!(unchanged.contains("is this the cable to the SubDevices?"), "{unchanged}");
+}
+
+#[test]
+fn a_user_without_the_permission_is_told_the_line_that_grants_it() {
+    let Some(bench) = Bench::new(1) else { return };
+    let nobody = ["--reuid", "65534", "--regid", "65534", "--clear-groups", "--inh-caps", "-all"];
+    let program = program("ringcat").display().to_string();
+    for command in ["scan", "run", "sim"] {
+        let mut arguments = vec![program.as_str(), command, "--main", "main0"];
+        if command == "sim" {
+            arguments.extend(["--segment", concat!(env!("CARGO_MANIFEST_DIR"), "/../sim/segments/demo.toml")]);
+        }
+        let output = finish(bench.start(Path::new("setpriv"), &[&nobody, &arguments[..]].concat()));
+        let errors = said(&output).1;
+        if errors.contains("failed to execute") {
+            println!("skipped: other users may not run {program}");
+            return;
+        }
+        assert_eq!(output.status.code(), Some(2), "{errors}");
+        assert!(errors.contains("not permitted to send and receive raw frames on main0; run as root or"), "{errors}");
+        let line = "sudo setcap cap_net_raw,cap_net_admin,cap_ipc_lock,cap_sys_nice=ep $(which ringcat)";
+        assert!(errors.contains(line), "{errors}");
+    }
+}
+
+#[test]
+fn a_ring_that_ends_at_an_interface_nobody_named_is_told_with_its_name() {
+    let Some(mut bench) = Bench::new(2) else { return };
+    bench.simulate(&RING_OF_16.segment(), true);
+    for command in ["scan", "run"] {
+        let told = error_of(&bench, &[command, "--main", "main0"]);
+        assert!(told.contains("frames sent on main0 arrive on main1: a cable of this segment"), "{told}");
+        let advice = "they arrive on main1; add --redundant main1 to run a ring, or unplug that cable";
+        assert!(told.contains(&format!("scan: no frame returns, {advice}")), "{told}");
+        assert!(!told.contains("another MainDevice"), "{told}");
+    }
+    // What the advice says helps, and so does the other way.
+    let (_, errors) = said(&bench.ringcat(&["scan", "--main", "main0", "--redundant", "main1"]));
+    assert!(!errors.contains("arrive on"), "{errors}");
+    bench.set_link("main1", "down");
+    // An interface on top of the one in use shows what that one receives: no other cable is plugged in there.
+    bench.ip_main("link add above link main0 type macvlan mode bridge");
+    bench.ip_main("link set above up");
+    let (listed, errors) = said(&bench.ringcat(&["scan", "--main", "main0", "--json"]));
+    assert_eq!(listed.matches("\"station\"").count(), 16, "{errors}");
+    assert!(!errors.contains("arrive on"), "{errors}");
+}
+
+#[test]
+fn a_cable_that_is_plugged_into_another_interface_in_operation_is_told() {
+    let Some(mut bench) = Bench::new(2) else { return };
+    bench.set_link("main1", "down");
+    bench.simulate(&TERMINAL.segment(), true);
+    let run = bench.start_ringcat(&["run", "--main", "main0", "--for", "1s"]);
+    await_op(&bench, 1);
+    bench.set_link("main1", "up");
+    std::thread::sleep(Duration::from_millis(200));
+    bench.set_link("main1", "down");
+    let (output, errors) = said(&finish(run));
+    assert_eq!(errors.matches("frames sent on main0 arrive on main1").count(), 1, "{errors}{output}");
+}
+
+#[test]
+fn a_main_device_at_the_other_end_of_the_segment_is_told_once_and_counted() {
+    let Some(mut bench) = Bench::new(2) else { return };
+    bench.give_away_main1();
+    bench.set_link("sim1", "down");
+    bench.simulate(&TERMINAL.segment(), true);
+    let run = bench.start_ringcat(&["run", "--main", "main0", "--for", "3s"]);
+    await_op(&bench, 1);
+    bench.set_link("sim1", "up");
+    let other = bench.start_other_ringcat(&["scan", "--main", "main1"]);
+    // It cannot get an answer: the segment leads its frames to us, and ours to it.
+    let (_, errors) = said(&finish(other));
+    assert_eq!(errors.matches(OTHER_MAIN_DEVICE).count(), 1, "{errors}");
+    assert!(errors.contains("arrive on main1 (MAIN)"), "{errors}");
+    assert!(errors.contains("no frame returns"), "{errors}");
+    assert!(errors.contains("frames of another MainDevice arrived: from ..:"), "{errors}");
+    let (output, errors) = said(&finish(run));
+    assert_eq!(errors.matches(OTHER_MAIN_DEVICE).count(), 1, "{errors}");
+    assert!(errors.contains("arrive on main0 (MAIN)"), "{errors}");
+    assert!(output.contains("  other MainDevices: "), "{output}");
+}
+
+/// Waits until so many SubDevices are in OP.
+fn await_op(bench: &Bench, count: usize) {
+    let until = Instant::now() + Duration::from_secs(20);
+    while states(bench, "OP") != count {
+        assert!(Instant::now() < until, "{}", bench.order("status"));
+        std::thread::sleep(Duration::from_millis(50));
+    }
+}
