@@ -54,7 +54,8 @@ pub struct Listener {
 }
 
 impl Listener {
-    /// Listens for a sender on all interfaces but `except`.
+    /// Listens for a sender on all interfaces but `except`. Those that are there now let frames to the EtherCAT group
+    /// through meanwhile, as they do broadcast. Waits for locks of the kernel: not for the cyclic thread.
     ///
     /// # Errors
     /// A missing permission, or a kernel without packet sockets.
@@ -70,6 +71,10 @@ impl Listener {
         let mut program = program(sender, &left_out);
         packet_socket::attach(raw, &mut program).map_err(failed("attaching the filter"))?;
         packet_socket::bind(raw, ALL_INTERFACES, filter::ETHERCAT).map_err(failed("binding to all interfaces"))?;
+        for index in interface::indices(|_| true).into_iter().filter(|index| !left_out.contains(index)) {
+            // One that cannot may still hear broadcast.
+            let _ = packet_socket::join(raw, index as libc::c_int, false);
+        }
         Ok(Listener { fd })
     }
 

@@ -213,7 +213,7 @@ pub(crate) fn bind(fd: RawFd, index: libc::c_int, protocol: u16) -> Result<(), i
     Ok(())
 }
 
-fn join(fd: RawFd, interface: libc::c_int, promiscuous: bool) -> Result<(), i32> {
+pub(crate) fn join(fd: RawFd, interface: libc::c_int, promiscuous: bool) -> Result<(), i32> {
     let mut address = [0; 8];
     address[..6].copy_from_slice(&GROUP_ADDRESS);
     let kind = if promiscuous { kernel::PACKET_MR_PROMISC } else { kernel::PACKET_MR_MULTICAST };

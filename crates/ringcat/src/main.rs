@@ -15,9 +15,25 @@ use clap::{Parser, Subcommand};
 
 use interfaces::Failure;
 
+/// What a newcomer wants to know first.
+const FIRST_STEPS: &str = "\
+First steps:
+  ringcat                               a demonstration on a simulated ring: no network, no permission
+  ip link                               the network interfaces of this computer
+  sudo ringcat scan --main eth1         who is on the cable in eth1?
+  sudo ringcat run --main eth1 --for 10s
+                                        everybody to OP, ten seconds of process data, figures
+  ringcat sim --help                    a simulated segment on an interface, for any MainDevice
+
+The interface must be for EtherCAT alone: no IP address, no bridge, no NetworkManager. Raw frames need root, or once:
+  sudo setcap cap_net_raw,cap_net_admin,cap_ipc_lock,cap_sys_nice=ep $(which ringcat)
+
+Exit status: 0 all went well, 1 it ran and something did not hold, 2 it could not do what was asked.
+`ringcat COMMAND --help` explains a command.";
+
 /// RingCAT: an EtherCAT MainDevice for Linux.
 #[derive(Debug, Parser)]
-#[command(version, about)]
+#[command(version, about = "RingCAT: an EtherCAT MainDevice for Linux", after_help = FIRST_STEPS)]
 struct Arguments {
     #[command(subcommand)]
     command: Option<Command>,
@@ -49,6 +65,26 @@ fn main() -> ExitCode {
         Err(error) => {
             eprintln!("ringcat: {error}");
             ExitCode::from(2)
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use clap::CommandFactory;
+
+    use super::*;
+
+    #[test]
+    fn every_command_and_option_is_explained() {
+        let program = Arguments::command();
+        program.clone().debug_assert();
+        assert!(program.get_after_help().is_some());
+        for command in program.get_subcommands() {
+            assert!(command.get_about().is_some(), "{}", command.get_name());
+            for option in command.get_arguments() {
+                assert!(option.get_help().is_some(), "{} --{}", command.get_name(), option.get_id());
+            }
         }
     }
 }

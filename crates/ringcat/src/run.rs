@@ -31,8 +31,21 @@ const LIVE: Duration = Duration::from_millis(500);
 /// Changes of the process data's judgement are told so often; all are counted.
 const JUDGEMENTS_TOLD: u32 = 20;
 
+/// How to read what it prints.
+const SUMMARY_HELP: &str = "\
+All outputs stay zero. Watchdogs, process data and mailboxes are set up as each SubDevice's EEPROM (SII) says.
+
+Ctrl-C ends it in order: outputs zero, all SubDevices to INIT. Exit status 0: all reached OP and no frame was lost.
+
+The summary tells three things apart:
+  this machine   wake-ups that came late and cycles that were left out for that. Nothing on the cable is wrong: try
+                 --priority 80, a --cpu of its own, a real-time kernel
+  the wire       frames that did not come back, came back late, or damaged: cables, plugs, power, other MainDevices
+  round trips    from sending a frame to its return: what is left of the cycle is yours";
+
 /// Options of `ringcat run`.
 #[derive(Args, Debug)]
+#[command(after_help = SUMMARY_HELP)]
 pub struct RunArguments {
     #[command(flatten)]
     interfaces: InterfaceArguments,

@@ -9,8 +9,15 @@ use crate::output::say;
 use crate::surroundings::Surroundings;
 use crate::table;
 
+/// What else there is to know.
+const ABOUT_SCAN: &str = "\
+A scan takes a segment that is in operation out of it: all SubDevices go to INIT. It waits up to 5 s for the first one to
+answer. What is odd about the cables and EEPROMs goes to the standard error output, the table or JSON to the standard
+output.";
+
 /// Options of `ringcat scan`.
 #[derive(Args, Debug)]
+#[command(after_help = ABOUT_SCAN)]
 pub struct ScanArguments {
     #[command(flatten)]
     interfaces: InterfaceArguments,

@@ -91,11 +91,12 @@ impl Surroundings {
 fn listen(interfaces: &InterfaceArguments, links: &PacketLinks, found: Arc<OnceLock<String>>) -> Option<UnixStream> {
     let (main, redundant) = links.addresses();
     let identity = Identity::new(Options::new(main, redundant).codec, main, redundant);
-    let names: Vec<&str> = interfaces.names().collect();
-    let listener = Listener::open(Sender { address: main.0, mask: SENDER_MASK }, &names).ok()?;
     let (end, ours) = UnixStream::pair().ok()?;
     let interfaces = interfaces.clone();
+    // Opened in the thread: nobody waits for that, and a scan that finds nobody asks for seconds.
     let ears = move || {
+        let names: Vec<&str> = interfaces.names().collect();
+        let Ok(listener) = Listener::open(Sender { address: main.0, mask: SENDER_MASK }, &names) else { return };
         while let Some(heard) = listener.hear(&end) {
             if matches!(identity.classify(&heard.bytes), Classified::Ours(_)) {
                 eprintln!(
