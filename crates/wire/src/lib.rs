@@ -6,7 +6,7 @@
 //! * [`register`]: the register table of a SubDevice controller and typed views of its registers;
 //! * [`al`]: states of the EtherCAT state machine and AL status codes;
 //! * [`sii`]: SubDevice information (EEPROM), reader and writer;
-//! * [`mailbox`]: the mailbox header and the SDO services of CoE;
+//! * [`mailbox`]: the mailbox header, CoE, FoE, EoE, SoE, AoE, VoE, messages of a mailbox gateway;
 //! * [`time`], [`address`]: newtypes.
 //!
 //! # Panic contract

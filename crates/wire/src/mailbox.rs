@@ -1,13 +1,22 @@
-//! Mailbox messages (facts 6.1, 6.3).
+//! Mailbox messages (facts 6, 10.1).
 //!
 //! [`Header`] stands before every message, [`Message`] is header and payload together; [`ErrorReply`] is the payload of
-//! protocol 0. [`coe`] and [`sdo`] read and write CoE. Who sends what when, counters and repeats are the engine's
-//! matter.
+//! protocol 0. One module per protocol reads and writes the others: [`coe`] with [`sdo`], [`foe`], [`eoe`], [`soe`],
+//! [`aoe`], [`voe`]; [`gateway`] is a message in UDP or TCP. Who sends what when, counters and repeats, fragments put
+//! together are the matter of both ends.
 
+pub mod aoe;
 pub mod coe;
+pub mod eoe;
 mod error_reply;
+pub mod foe;
+pub mod gateway;
 mod header;
+mod payload;
 pub mod sdo;
+pub mod soe;
+pub mod voe;
 
 pub use error_reply::ErrorReply;
 pub use header::{Header, MAX_COUNTER, Message, MessageError, Protocol, next_counter};
+pub use payload::PayloadError;

@@ -1,6 +1,23 @@
-//! The two bytes before every CoE message, and the emergency message (facts 6.3).
+//! CoE: the two bytes before every message (facts 6.3).
+//!
+//! Behind them: SDO transfers in [`super::sdo`], the [`Emergency`], SDO information in [`SdoInformation`] with the
+//! descriptions it carries, a PDO as it is. Messages of the diagnosis history (object 0x10F3) are [`DiagnosisMessage`].
+
+mod description;
+mod diagnosis;
+mod emergency;
+mod information;
+mod value;
 
 use core::fmt;
+
+pub use description::{AccessRights, EntryDescription, EntryRequest, ObjectCode, ObjectDescription, ValueInfo};
+pub use diagnosis::{
+    DiagnosisFlags, DiagnosisHistory, DiagnosisKind, DiagnosisMessage, DiagnosisParameter, DiagnosisParameters,
+};
+pub use emergency::Emergency;
+pub use information::{Indices, InformationOpcode, ListType, SdoInformation};
+pub use value::DataType;
 
 /// Service of a CoE message.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -110,38 +127,6 @@ impl CoeHeader {
     }
 }
 
-/// An emergency message, behind its CoE header. It comes unasked, also between a request and its response.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub struct Emergency {
-    /// Error code.
-    pub error_code: u16,
-    /// Error register (object 0x1001).
-    pub error_register: u8,
-    /// Data of the vendor.
-    pub data: [u8; 5],
-}
-
-impl Emergency {
-    /// Bytes of the message behind the CoE header.
-    pub const LEN: usize = 8;
-
-    /// Decodes eight bytes.
-    pub const fn decode(b: &[u8; Self::LEN]) -> Emergency {
-        Emergency {
-            error_code: u16::from_le_bytes([b[0], b[1]]),
-            error_register: b[2],
-            data: [b[3], b[4], b[5], b[6], b[7]],
-        }
-    }
-
-    /// Encodes into eight bytes.
-    pub const fn encode(&self) -> [u8; Self::LEN] {
-        let code = self.error_code.to_le_bytes();
-        let [a, b, c, d, e] = self.data;
-        [code[0], code[1], self.error_register, a, b, c, d, e]
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -173,21 +158,10 @@ mod tests {
         assert_eq!(CoeHeader::decode(&[0xA5, 0x4B]), header);
     }
 
-    #[test]
-    fn an_emergency_has_these_bytes() {
-        let emergency = Emergency { error_code: 0x8130, error_register: 0x11, data: [1, 2, 3, 4, 5] };
-        assert_eq!(emergency.encode(), [0x30, 0x81, 0x11, 1, 2, 3, 4, 5]);
-    }
-
     proptest! {
         #[test]
         fn any_header_round_trips(bytes in any::<[u8; CoeHeader::LEN]>()) {
             prop_assert_eq!(CoeHeader::decode(&bytes).encode(), bytes);
-        }
-
-        #[test]
-        fn any_emergency_round_trips(bytes in any::<[u8; Emergency::LEN]>()) {
-            prop_assert_eq!(Emergency::decode(&bytes).encode(), bytes);
         }
     }
 }

@@ -1,0 +1,151 @@
+//! EoE: Ethernet frames in fragments, and what an IP stack behind a SubDevice needs (facts 6.5).
+//!
+//! In goes or out comes the payload of a mailbox message of protocol EoE. Cutting frames into fragments and putting them
+//! together again is the matter of both ends; [`EoeFragment::max_data`] says how much fits.
+
+mod filter;
+mod fragment;
+mod ip;
+mod result;
+
+use super::payload::{PayloadError, Pen, split};
+
+pub use filter::AddressFilter;
+pub use fragment::{BLOCK, EoeFragment};
+pub use ip::{IpParameters, MAX_NAME};
+pub use result::EoeResult;
+
+const FRAGMENT: u16 = 0;
+const TIME_STAMP_RESPONSE: u16 = 1;
+const SET_IP_REQUEST: u16 = 2;
+const SET_IP_RESPONSE: u16 = 3;
+const SET_FILTER_REQUEST: u16 = 4;
+const SET_FILTER_RESPONSE: u16 = 5;
+const GET_IP_REQUEST: u16 = 6;
+const GET_IP_RESPONSE: u16 = 7;
+const GET_FILTER_REQUEST: u16 = 8;
+const GET_FILTER_RESPONSE: u16 = 9;
+
+const KIND: u16 = 0x000F;
+const PORT_SHIFT: u16 = 4;
+const LAST: u16 = 1 << 8;
+const TIME_APPENDED: u16 = 1 << 9;
+const TIME_REQUESTED: u16 = 1 << 10;
+
+/// A message, with the port of the SubDevice that it is for: 0 is the SubDevice itself or any.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct EoeMessage<'a> {
+    /// Port, 0..=15.
+    pub port: u8,
+    /// What it says.
+    pub body: EoeBody<'a>,
+}
+
+/// What a message says.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum EoeBody<'a> {
+    /// 0: a part of a frame.
+    Fragment(EoeFragment<'a>),
+    /// 1: when the SubDevice sent the frame that asked for it.
+    TimeStamp {
+        /// Number of the frame, 0..=15.
+        frame: u8,
+        /// Lower half of the time, nanoseconds.
+        time_ns: u32,
+    },
+    /// 2: sets the addresses.
+    SetIp(IpParameters<'a>),
+    /// 3: whether that worked.
+    SetIpDone(EoeResult),
+    /// 4: sets the address filter.
+    SetFilter(AddressFilter),
+    /// 5: whether that worked.
+    SetFilterDone(EoeResult),
+    /// 6: asks for the addresses.
+    GetIp,
+    /// 7: the addresses.
+    Ip(EoeResult, IpParameters<'a>),
+    /// 8: asks for the address filter.
+    GetFilter,
+    /// 9: the address filter.
+    Filter(EoeResult, AddressFilter),
+}
+
+impl<'a> EoeMessage<'a> {
+    /// Bytes before the data.
+    pub const OVERHEAD: usize = 4;
+
+    /// Decodes a payload.
+    pub fn decode(payload: &'a [u8]) -> Result<EoeMessage<'a>, PayloadError> {
+        let (&[a, b, c, d], data) = split(payload, "EoE message")?;
+        let (head, word) = (u16::from_le_bytes([a, b]), u16::from_le_bytes([c, d]));
+        let result = EoeResult(word);
+        let body = match head & KIND {
+            FRAGMENT => EoeBody::Fragment(EoeFragment::decode(head, word, data)?),
+            TIME_STAMP_RESPONSE => {
+                let (time, _) = split(data, "EoE time stamp")?;
+                EoeBody::TimeStamp { frame: (word >> 12) as u8, time_ns: u32::from_le_bytes(*time) }
+            }
+            SET_IP_REQUEST => EoeBody::SetIp(IpParameters::decode(data)?),
+            SET_IP_RESPONSE => EoeBody::SetIpDone(result),
+            SET_FILTER_REQUEST => EoeBody::SetFilter(AddressFilter::decode(data)?),
+            SET_FILTER_RESPONSE => EoeBody::SetFilterDone(result),
+            GET_IP_REQUEST => EoeBody::GetIp,
+            // Who has nothing to tell tells only that.
+            GET_IP_RESPONSE if result != EoeResult::OK && data.is_empty() => {
+                EoeBody::Ip(result, IpParameters::default())
+            }
+            GET_IP_RESPONSE => EoeBody::Ip(result, IpParameters::decode(data)?),
+            GET_FILTER_REQUEST => EoeBody::GetFilter,
+            GET_FILTER_RESPONSE if result != EoeResult::OK && data.is_empty() => {
+                EoeBody::Filter(result, AddressFilter::default())
+            }
+            GET_FILTER_RESPONSE => EoeBody::Filter(result, AddressFilter::decode(data)?),
+            kind => return Err(PayloadError::Code { what: "EoE type", got: kind }),
+        };
+        Ok(EoeMessage { port: (head >> PORT_SHIFT & 0x0F) as u8, body })
+    }
+
+    /// Encodes a payload and returns its length; `None` where it does not fit `out`, or where [`EoeFragment`] or
+    /// [`AddressFilter`] cannot be said. A port or frame number above 15 loses its upper bits.
+    pub fn encode(&self, out: &mut [u8]) -> Option<usize> {
+        let mut pen = Pen::new(out);
+        let port = u16::from(self.port & 0x0F) << PORT_SHIFT;
+        // All but fragments of more than one piece are complete in themselves.
+        let mut head = |kind: u16, word: u16| {
+            pen.put_u16(kind | port | LAST)?;
+            pen.put_u16(word)
+        };
+        match self.body {
+            EoeBody::Fragment(fragment) => return fragment.encode(port, out),
+            EoeBody::TimeStamp { frame, time_ns } => {
+                head(TIME_STAMP_RESPONSE, u16::from(frame & 0x0F) << 12)?;
+                pen.put_u32(time_ns)?;
+            }
+            EoeBody::SetIp(parameters) => {
+                head(SET_IP_REQUEST, 0)?;
+                parameters.encode(&mut pen)?;
+            }
+            EoeBody::SetIpDone(result) => head(SET_IP_RESPONSE, result.0)?,
+            EoeBody::SetFilter(filter) => {
+                head(SET_FILTER_REQUEST, 0)?;
+                filter.encode(&mut pen)?;
+            }
+            EoeBody::SetFilterDone(result) => head(SET_FILTER_RESPONSE, result.0)?,
+            EoeBody::GetIp => head(GET_IP_REQUEST, 0)?,
+            EoeBody::Ip(result, parameters) => {
+                head(GET_IP_RESPONSE, result.0)?;
+                parameters.encode(&mut pen)?;
+            }
+            EoeBody::GetFilter => head(GET_FILTER_REQUEST, 0)?,
+            EoeBody::Filter(result, filter) => {
+                head(GET_FILTER_RESPONSE, result.0)?;
+                filter.encode(&mut pen)?;
+            }
+        }
+        Some(pen.length())
+    }
+}
+
+#[cfg(test)]
+mod tests;

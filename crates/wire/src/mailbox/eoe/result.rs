@@ -1,0 +1,41 @@
+//! Results of EoE requests (facts 6.5).
+
+use core::fmt;
+
+/// Whether a request worked. Unknown codes are kept.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct EoeResult(pub u16);
+
+impl EoeResult {
+    /// It worked.
+    pub const OK: EoeResult = EoeResult(0x0000);
+    /// Unspecified error.
+    pub const UNSPECIFIED: EoeResult = EoeResult(0x0001);
+    /// The frame type is not supported.
+    pub const UNSUPPORTED_FRAME_TYPE: EoeResult = EoeResult(0x0002);
+    /// There is no IP stack.
+    pub const NO_IP_SUPPORT: EoeResult = EoeResult(0x0201);
+    /// There is no DHCP.
+    pub const NO_DHCP_SUPPORT: EoeResult = EoeResult(0x0202);
+    /// There is no address filter.
+    pub const NO_FILTER_SUPPORT: EoeResult = EoeResult(0x0401);
+
+    /// What the code means; `None` for a code that is not in the table.
+    pub const fn name(self) -> Option<&'static str> {
+        Some(match self {
+            EoeResult::OK => "No error",
+            EoeResult::UNSPECIFIED => "Unspecified error",
+            EoeResult::UNSUPPORTED_FRAME_TYPE => "Unsupported frame type",
+            EoeResult::NO_IP_SUPPORT => "No IP support",
+            EoeResult::NO_DHCP_SUPPORT => "No DHCP support",
+            EoeResult::NO_FILTER_SUPPORT => "No filter support",
+            EoeResult(_) => return None,
+        })
+    }
+}
+
+impl fmt::Display for EoeResult {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{:#06x} {}", self.0, self.name().unwrap_or("unknown EoE result"))
+    }
+}

@@ -1,0 +1,182 @@
+//! FoE: reading and writing files (facts 6.4).
+//!
+//! In goes or out comes the payload of a mailbox message of protocol FoE. Who sends which message when, packet numbers
+//! and the repetition after BUSY are the matter of both ends.
+
+mod error;
+
+use super::payload::{PayloadError, Pen, split};
+
+pub use error::FoeErrorCode;
+
+const READ: u8 = 1;
+const WRITE: u8 = 2;
+const DATA: u8 = 3;
+const ACKNOWLEDGE: u8 = 4;
+const ERROR: u8 = 5;
+const BUSY: u8 = 6;
+
+/// A message of the file transfer.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum FoeMessage<'a> {
+    /// RRQ: asks for a file.
+    Read {
+        /// Password, 0 for none.
+        password: u32,
+        /// Name of the file.
+        name: &'a [u8],
+    },
+    /// WRQ: asks for permission to send a file.
+    Write {
+        /// Password, 0 for none.
+        password: u32,
+        /// Name of the file.
+        name: &'a [u8],
+    },
+    /// DATA: a piece of the file. One shorter than [`FoeMessage::max_data`] ends it.
+    Data {
+        /// Number of the packet, the first is 1.
+        packet: u32,
+        /// The piece.
+        data: &'a [u8],
+    },
+    /// ACK: the packet has arrived; 0 answers [`FoeMessage::Write`].
+    Acknowledge {
+        /// Number of the packet.
+        packet: u32,
+    },
+    /// ERR: the transfer has failed.
+    Error {
+        /// Why.
+        code: FoeErrorCode,
+        /// What the other end says about it.
+        text: &'a [u8],
+    },
+    /// BUSY instead of an acknowledgement or of data: the last message is to be sent again later.
+    Busy {
+        /// So much is done.
+        done: u16,
+        /// Of so much.
+        entire: u16,
+        /// What the other end is doing.
+        text: &'a [u8],
+    },
+}
+
+impl<'a> FoeMessage<'a> {
+    /// Bytes before name, data or text.
+    pub const OVERHEAD: usize = 6;
+
+    /// Data bytes of each packet but the last for a mailbox of this size (header included).
+    pub const fn max_data(mailbox_size: usize) -> usize {
+        mailbox_size.saturating_sub(super::Header::LEN + Self::OVERHEAD)
+    }
+
+    /// Decodes a payload. NUL characters at the end of names and texts are left out.
+    pub fn decode(payload: &'a [u8]) -> Result<FoeMessage<'a>, PayloadError> {
+        let (&[opcode, _, a, b, c, d], rest) = split(payload, "FoE message")?;
+        let number = u32::from_le_bytes([a, b, c, d]);
+        Ok(match opcode {
+            READ => FoeMessage::Read { password: number, name: text(rest) },
+            WRITE => FoeMessage::Write { password: number, name: text(rest) },
+            DATA => FoeMessage::Data { packet: number, data: rest },
+            ACKNOWLEDGE => FoeMessage::Acknowledge { packet: number },
+            ERROR => FoeMessage::Error { code: FoeErrorCode(number), text: text(rest) },
+            BUSY => FoeMessage::Busy {
+                done: u16::from_le_bytes([a, b]),
+                entire: u16::from_le_bytes([c, d]),
+                text: text(rest),
+            },
+            opcode => return Err(PayloadError::Code { what: "FoE opcode", got: opcode.into() }),
+        })
+    }
+
+    /// Encodes a payload and returns its length; `None` where it does not fit `out`.
+    pub fn encode(&self, out: &mut [u8]) -> Option<usize> {
+        let (opcode, number, rest): (u8, u32, &[u8]) = match *self {
+            FoeMessage::Read { password, name } => (READ, password, name),
+            FoeMessage::Write { password, name } => (WRITE, password, name),
+            FoeMessage::Data { packet, data } => (DATA, packet, data),
+            FoeMessage::Acknowledge { packet } => (ACKNOWLEDGE, packet, &[]),
+            FoeMessage::Error { code, text } => (ERROR, code.0, text),
+            FoeMessage::Busy { done, entire, text } => (BUSY, u32::from(done) | u32::from(entire) << 16, text),
+        };
+        let mut pen = Pen::new(out);
+        pen.put(&[opcode, 0])?;
+        pen.put_u32(number)?;
+        pen.put(rest)?;
+        Some(pen.length())
+    }
+}
+
+/// Without the NUL characters at the end.
+fn text(bytes: &[u8]) -> &[u8] {
+    let end = bytes.iter().rposition(|byte| *byte != 0).map_or(0, |last| last + 1);
+    &bytes[..end]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+    use std::string::ToString;
+
+    #[test]
+    fn one_vector_for_every_opcode_facts_6_4() {
+        let vectors: [(FoeMessage<'_>, &[u8]); 7] = [
+            (FoeMessage::Read { password: 0x1234_5678, name: b"log.txt" }, b"\x01\x00\x78\x56\x34\x12log.txt"),
+            (FoeMessage::Write { password: 0, name: b"fw.efw" }, b"\x02\x00\x00\x00\x00\x00fw.efw"),
+            (FoeMessage::Data { packet: 258, data: &[0xAA, 0] }, b"\x03\x00\x02\x01\x00\x00\xAA\x00"),
+            (FoeMessage::Data { packet: 3, data: &[] }, b"\x03\x00\x03\x00\x00\x00"),
+            (FoeMessage::Acknowledge { packet: 7 }, b"\x04\x00\x07\x00\x00\x00"),
+            (
+                FoeMessage::Error { code: FoeErrorCode::NOT_FOUND, text: b"no such file" },
+                b"\x05\x00\x01\x80\x00\x00no such file",
+            ),
+            (FoeMessage::Busy { done: 3, entire: 10, text: b"erasing" }, b"\x06\x00\x03\x00\x0A\x00erasing"),
+        ];
+        for (message, bytes) in vectors {
+            let mut out = [0xEE; 32];
+            let length = message.encode(&mut out).unwrap();
+            assert_eq!(&out[..length], bytes, "{message:?}");
+            assert_eq!(FoeMessage::decode(bytes), Ok(message));
+            assert_eq!(message.encode(&mut out[..length - 1]), None);
+        }
+    }
+
+    #[test]
+    fn an_end_mark_is_no_part_of_a_name() {
+        let name = FoeMessage::decode(b"\x01\x00\x00\x00\x00\x00a\x00b\x00\x00");
+        assert_eq!(name, Ok(FoeMessage::Read { password: 0, name: b"a\x00b" }));
+    }
+
+    #[test]
+    fn a_packet_has_the_mailbox_without_twelve_bytes_facts_6_4() {
+        assert_eq!([128, 1024, 12, 4].map(FoeMessage::max_data), [116, 1012, 0, 0]);
+    }
+
+    #[test]
+    fn what_is_no_message_is_refused_with_both_sides_named() {
+        let error = FoeMessage::decode(&[4, 0, 1, 0, 0]).unwrap_err();
+        assert_eq!(error.to_string(), "FoE message too short: expected at least 6 bytes, got 5");
+        assert_eq!(FoeMessage::decode(&[7, 0, 0, 0, 0, 0]).unwrap_err().to_string(), "unknown FoE opcode 0x7");
+    }
+
+    proptest! {
+        #[test]
+        fn any_bytes_never_panic_and_what_decodes_reads_back(
+            opcode in 0u8..9,
+            rest in proptest::collection::vec(any::<u8>(), 0..40),
+        ) {
+            let mut bytes = std::vec![opcode];
+            bytes.extend(rest);
+            for length in 0..=bytes.len() {
+                if let Ok(message) = FoeMessage::decode(&bytes[..length]) {
+                    let mut out = [0; 64];
+                    let written = message.encode(&mut out).unwrap();
+                    prop_assert_eq!(FoeMessage::decode(&out[..written]), Ok(message));
+                }
+            }
+        }
+    }
+}

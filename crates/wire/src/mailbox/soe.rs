@@ -1,0 +1,264 @@
+//! SoE: reading and writing the elements of IDNs of a drive (facts 6.6).
+//!
+//! In goes or out comes the payload of a mailbox message of protocol SoE. Data that does not fit into one mailbox comes in
+//! fragments; all but the last are marked incomplete and tell how many follow in place of the IDN. Putting them together
+//! is the reader's matter.
+
+mod attribute;
+mod error;
+mod idn;
+
+use super::payload::{PayloadError, Pen, split};
+
+pub use attribute::{IdnAttribute, IdnLength};
+pub use error::SoeErrorCode;
+pub use idn::Idn;
+
+const INCOMPLETE: u8 = 1 << 3;
+const ERROR: u8 = 1 << 4;
+const DRIVE_SHIFT: u8 = 5;
+const OPERATION: u8 = 0x07;
+
+/// What a message is for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum SoeOperation {
+    /// 1: reads elements.
+    ReadRequest,
+    /// 2: what was read.
+    ReadResponse,
+    /// 3: writes an element.
+    WriteRequest,
+    /// 4: it is written.
+    WriteResponse,
+    /// 5: the procedure command behind an IDN has ended or changed; comes unasked.
+    Notification,
+    /// 6: emergency; comes unasked.
+    Emergency,
+    /// 0 and 7 mean nothing.
+    Other(u8),
+}
+
+impl SoeOperation {
+    /// From bits 2:0 of the first byte.
+    pub const fn from_code(code: u8) -> SoeOperation {
+        match code & OPERATION {
+            1 => SoeOperation::ReadRequest,
+            2 => SoeOperation::ReadResponse,
+            3 => SoeOperation::WriteRequest,
+            4 => SoeOperation::WriteResponse,
+            5 => SoeOperation::Notification,
+            6 => SoeOperation::Emergency,
+            code => SoeOperation::Other(code),
+        }
+    }
+
+    /// Bits 2:0 of the first byte.
+    pub const fn code(self) -> u8 {
+        match self {
+            SoeOperation::ReadRequest => 1,
+            SoeOperation::ReadResponse => 2,
+            SoeOperation::WriteRequest => 3,
+            SoeOperation::WriteResponse => 4,
+            SoeOperation::Notification => 5,
+            SoeOperation::Emergency => 6,
+            SoeOperation::Other(code) => code & OPERATION,
+        }
+    }
+}
+
+/// Which elements of an IDN; several are packed in the order of the bits.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+pub struct SoeElements(pub u8);
+
+impl SoeElements {
+    /// Bit: data state, 16 bits.
+    pub const DATA_STATE: SoeElements = SoeElements(1 << 0);
+    /// Bit: name, a string with two lengths before it.
+    pub const NAME: SoeElements = SoeElements(1 << 1);
+    /// Bit: [`IdnAttribute`], 32 bits.
+    pub const ATTRIBUTE: SoeElements = SoeElements(1 << 2);
+    /// Bit: unit, a string with two lengths before it.
+    pub const UNIT: SoeElements = SoeElements(1 << 3);
+    /// Bit: smallest value.
+    pub const MINIMUM: SoeElements = SoeElements(1 << 4);
+    /// Bit: largest value.
+    pub const MAXIMUM: SoeElements = SoeElements(1 << 5);
+    /// Bit: the value.
+    pub const VALUE: SoeElements = SoeElements(1 << 6);
+    /// Bit: default value.
+    pub const DEFAULT: SoeElements = SoeElements(1 << 7);
+
+    /// All of these bits are set.
+    pub const fn has(self, elements: SoeElements) -> bool {
+        self.0 & elements.0 == elements.0
+    }
+
+    /// The single elements, in the order in which their data follow each other.
+    pub fn iter(self) -> impl Iterator<Item = SoeElements> {
+        (0..8).map(|bit| SoeElements(1 << bit)).filter(move |element| self.has(*element))
+    }
+}
+
+/// One message, whole or a fragment.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct SoeMessage<'a> {
+    /// What it is for.
+    pub operation: SoeOperation,
+    /// Another fragment follows.
+    pub incomplete: bool,
+    /// The data is an error code.
+    pub error: bool,
+    /// Drive of the SubDevice, 0..=7.
+    pub drive: u8,
+    /// Elements.
+    pub elements: SoeElements,
+    /// The IDN, or how many fragments follow where the message is incomplete.
+    pub number: u16,
+    /// Data, or a part of it.
+    pub data: &'a [u8],
+}
+
+impl<'a> SoeMessage<'a> {
+    /// Bytes before the data.
+    pub const OVERHEAD: usize = 4;
+
+    /// A whole message without an error.
+    pub const fn whole(
+        operation: SoeOperation,
+        drive: u8,
+        elements: SoeElements,
+        idn: Idn,
+        data: &'a [u8],
+    ) -> SoeMessage<'a> {
+        SoeMessage { operation, incomplete: false, error: false, drive, elements, number: idn.0, data }
+    }
+
+    /// Data bytes of each fragment for a mailbox of this size (header included).
+    pub const fn max_data(mailbox_size: usize) -> usize {
+        mailbox_size.saturating_sub(super::Header::LEN + Self::OVERHEAD)
+    }
+
+    /// Decodes a payload; every four bytes mean something.
+    pub fn decode(payload: &'a [u8]) -> Result<SoeMessage<'a>, PayloadError> {
+        let (&[head, elements, low, high], data) = split(payload, "SoE message")?;
+        Ok(SoeMessage {
+            operation: SoeOperation::from_code(head),
+            incomplete: head & INCOMPLETE != 0,
+            error: head & ERROR != 0,
+            drive: head >> DRIVE_SHIFT,
+            elements: SoeElements(elements),
+            number: u16::from_le_bytes([low, high]),
+            data,
+        })
+    }
+
+    /// Encodes a payload and returns its length; `None` where it does not fit `out`. A drive above 7 loses its upper bits.
+    pub fn encode(&self, out: &mut [u8]) -> Option<usize> {
+        let mut head = self.operation.code() | self.drive << DRIVE_SHIFT;
+        if self.incomplete {
+            head |= INCOMPLETE;
+        }
+        if self.error {
+            head |= ERROR;
+        }
+        let mut pen = Pen::new(out);
+        pen.put(&[head, self.elements.0])?;
+        pen.put_u16(self.number)?;
+        pen.put(self.data)?;
+        Some(pen.length())
+    }
+
+    /// The IDN; `None` in a fragment that another one follows.
+    pub const fn idn(&self) -> Option<Idn> {
+        if self.incomplete { None } else { Some(Idn(self.number)) }
+    }
+
+    /// Fragments that follow.
+    pub const fn fragments_left(&self) -> u16 {
+        if self.incomplete { self.number } else { 0 }
+    }
+
+    /// Why the request failed, where it failed. An error that lacks its code is a general one.
+    pub fn error_code(&self) -> Option<SoeErrorCode> {
+        let code =
+            self.data.first_chunk().map_or(SoeErrorCode::GENERAL, |code| SoeErrorCode(u16::from_le_bytes(*code)));
+        self.error.then_some(code)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+    use std::vec::Vec;
+
+    #[test]
+    fn one_vector_for_every_operation_facts_6_6() {
+        use SoeOperation::*;
+        let idn = Idn::standard(0, 15);
+        let whole = |operation, drive, elements, data| SoeMessage::whole(operation, drive, elements, idn, data);
+        let value = SoeElements::VALUE;
+        let vectors: [(SoeMessage<'_>, &[u8]); 8] = [
+            (whole(ReadRequest, 1, value, &[]), &[0x21, 0x40, 0x0F, 0x00]),
+            (whole(ReadResponse, 0, value, &[7, 0]), &[0x02, 0x40, 0x0F, 0x00, 7, 0]),
+            (
+                SoeMessage { incomplete: true, number: 2, ..whole(ReadResponse, 7, SoeElements::NAME, b"abc") },
+                &[0xEA, 0x02, 0x02, 0x00, b'a', b'b', b'c'],
+            ),
+            (whole(WriteRequest, 2, value, &[1]), &[0x43, 0x40, 0x0F, 0x00, 1]),
+            (whole(WriteResponse, 2, value, &[]), &[0x44, 0x40, 0x0F, 0x00]),
+            (
+                SoeMessage { error: true, ..whole(WriteResponse, 0, value, &[0x07, 0x70]) },
+                &[0x14, 0x40, 0x0F, 0x00, 0x07, 0x70],
+            ),
+            (whole(Notification, 0, SoeElements(0), &[]), &[0x05, 0x00, 0x0F, 0x00]),
+            (whole(Emergency, 0, SoeElements(0), &[1, 2]), &[0x06, 0x00, 0x0F, 0x00, 1, 2]),
+        ];
+        for (message, bytes) in vectors {
+            let mut out = [0xEE; 16];
+            let length = message.encode(&mut out).unwrap();
+            assert_eq!(&out[..length], bytes, "{message:?}");
+            assert_eq!(SoeMessage::decode(bytes), Ok(message));
+            assert_eq!(message.encode(&mut out[..length - 1]), None);
+        }
+    }
+
+    #[test]
+    fn a_fragment_has_a_count_in_place_of_the_idn_facts_6_6() {
+        let last = SoeMessage::decode(&[0x02, 0x40, 0x0F, 0x80]).unwrap();
+        assert_eq!((last.idn(), last.fragments_left(), last.error_code()), (Some(Idn(0x800F)), 0, None));
+        let more = SoeMessage::decode(&[0x0A, 0x40, 3, 0]).unwrap();
+        assert_eq!((more.idn(), more.fragments_left()), (None, 3));
+    }
+
+    #[test]
+    fn an_error_has_its_code_facts_6_6() {
+        let error = SoeMessage::decode(&[0x12, 0x40, 1, 0, 0x01, 0x10]).unwrap();
+        assert_eq!(error.error_code(), Some(SoeErrorCode::NO_IDN));
+        assert_eq!(SoeMessage::decode(&[0x12, 0x40, 1, 0]).unwrap().error_code(), Some(SoeErrorCode::GENERAL));
+    }
+
+    #[test]
+    fn elements_follow_each_other_in_the_order_of_their_bits() {
+        let elements: Vec<_> = SoeElements(0xC5).iter().collect();
+        let expected = [SoeElements::DATA_STATE, SoeElements::ATTRIBUTE, SoeElements::VALUE, SoeElements::DEFAULT];
+        assert_eq!(elements, expected);
+    }
+
+    #[test]
+    fn a_fragment_has_the_mailbox_without_ten_bytes() {
+        assert_eq!([128, 10, 3].map(SoeMessage::max_data), [118, 0, 0]);
+    }
+
+    proptest! {
+        #[test]
+        fn any_bytes_never_panic_and_what_decodes_encodes_again(bytes in proptest::collection::vec(any::<u8>(), 0..40)) {
+            if let Ok(message) = SoeMessage::decode(&bytes) {
+                let _ = (message.error_code(), message.idn());
+                let mut out = [0; 64];
+                let length = message.encode(&mut out).unwrap();
+                prop_assert_eq!(&out[..length], &bytes[..]);
+            }
+        }
+    }
+}
