@@ -6,6 +6,7 @@ use alloc::vec::Vec;
 
 use ringcat_wire::address::Position;
 use ringcat_wire::al::{AlState, AlStatus, AlStatusCode};
+use ringcat_wire::mailbox::coe::Emergency;
 use ringcat_wire::sii::Identity;
 
 use crate::domain::{DomainState, DomainStatus};
@@ -153,6 +154,13 @@ pub enum Event {
         subdevice: usize,
         /// What.
         what: String,
+    },
+    /// A SubDevice sent a CoE emergency (facts 6.3). The last ones of each SubDevice are kept with its mailbox, too.
+    Emergency {
+        /// Index in the declaration; before activation the position.
+        subdevice: usize,
+        /// What it says.
+        emergency: Emergency,
     },
     /// A SubDevice that was not declared answers.
     Unexpected {

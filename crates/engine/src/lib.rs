@@ -8,7 +8,7 @@
 //! * [`exchange`]: the cyclic half. Process data and one supervision datagram. After activation it neither allocates nor
 //!   locks nor waits, and its work per call is bounded.
 //! * [`supervisor`]: everything else, as async [`procedures`] over an executor with injected time: scan, configuration,
-//!   state changes, mailbox, recovery.
+//!   state changes, recovery. Mailboxes have a router each: [`mail`].
 //!
 //! Both send through [`ring`], which marks frames, pairs the copies that travel both ways, and merges them.
 #![no_std]
@@ -27,6 +27,7 @@ pub mod exchange;
 pub mod info;
 pub mod layout;
 pub mod link;
+pub mod mail;
 pub mod main_device;
 pub mod plan;
 pub mod procedures;

@@ -6,6 +6,8 @@
 
 mod areas;
 mod declaration;
+mod mail;
+mod pending;
 
 use alloc::rc::Rc;
 use alloc::sync::Arc;
@@ -21,6 +23,7 @@ use ringcat_wire::source_address::MacCodec;
 
 pub use areas::{AreaEntries, Directory};
 pub use declaration::{ActivateError, Declaration, DomainConfig, DomainMember};
+pub use pending::Pending;
 
 use crate::board::Board;
 use crate::event::{CyclicEvent, Event, TimedEvent};
@@ -30,6 +33,7 @@ use crate::layout::Layout;
 use crate::link::{Link, LinkSet};
 use crate::procedures::configure::Start;
 use crate::procedures::fleet::{Fleet, Phase, SharedFleet};
+use crate::procedures::mail_watch::watch_mail;
 use crate::procedures::recover::start_all;
 use crate::procedures::scan::{Scan, ScanError, ScanOptions, scan};
 use crate::procedures::sii::SiiCache;
@@ -180,7 +184,7 @@ impl MainDevice {
         let specs = domain_specs(&declaration, &plans)?;
         let layout =
             Layout::new(&specs, self.options.links(), self.options.supervision).map_err(ActivateError::Layout)?;
-        let members = members(declaration, found, &layout)?;
+        let members = members(&bus, declaration, found, &layout)?;
         let directory = Directory::new(&plans, &layout);
         report_oddities(&bus, &members, &layout);
         let optional = members.iter().map(|member| member.config.optional).collect();
@@ -193,8 +197,9 @@ impl MainDevice {
         self.supervisor.attach(board);
         start_all(&bus, &fleet, Start::Cleared);
         if self.options.supervision {
-            self.supervisor.spawn(supervise(bus, fleet.clone()));
+            self.supervisor.spawn(supervise(bus.clone(), fleet.clone()));
         }
+        self.supervisor.spawn(watch_mail(bus, fleet.clone()));
         self.fleet = Some(fleet);
         self.cyclic_events = Some(consumer);
         let periods = specs.iter().map(|spec| spec.period).collect();

@@ -9,7 +9,9 @@ mod executor;
 mod flights;
 mod round_trip;
 mod shared;
+mod signal;
 mod silence;
+mod stray;
 mod transfer;
 
 use alloc::rc::Rc;
@@ -19,6 +21,7 @@ use core::future::Future;
 
 pub use bus::{Bus, BusError, Elapsed, Group, Reply};
 pub use flights::AcyclicCounters;
+pub use signal::Signal;
 
 use crate::board::Board;
 use crate::event::{Event, TimedEvent};

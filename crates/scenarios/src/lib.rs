@@ -13,6 +13,7 @@ pub mod cpu_time;
 pub mod cyclic_load;
 pub mod dice;
 pub mod figures;
+pub mod loss;
 pub mod segments;
 pub mod tap;
 pub mod terminals;

@@ -7,6 +7,8 @@ use ringcat_engine::ring::identity::{Class, class_of};
 use ringcat_sim::network::Network;
 use ringcat_wire::frame::MacAddress;
 
+use crate::loss::Loss;
+
 /// Looks and waits in a row between which no time passes; far beyond what an engine needs between two events.
 const IDLE_CALLS: u64 = 200_000;
 const FNV_OFFSET: u64 = 0xCBF2_9CE4_8422_2325;
@@ -58,6 +60,8 @@ pub struct Tap {
     out: Vec<Out>,
     /// Copies that came back when newer frames had been sent, or twice.
     outdated: u64,
+    /// Frames that are to be lost.
+    losses: Vec<Loss>,
     /// Longest time from there to a frame of the exchange that came back before it sent again, in nanoseconds.
     flight_ns: u64,
 }
@@ -74,6 +78,7 @@ impl Tap {
             cyclic_sent: Instant::default(),
             out: Vec::new(),
             outdated: 0,
+            losses: Vec::new(),
             flight_ns: 0,
         }
     }
@@ -91,6 +96,20 @@ impl Tap {
     /// A frame that the engine will find on a link next.
     pub fn inject(&mut self, link: Link, bytes: &[u8]) {
         self.injected.push((link, bytes.to_vec()));
+    }
+
+    /// Frames with a datagram like this get lost from now on.
+    pub fn lose(&mut self, loss: Loss) {
+        self.losses.push(loss);
+    }
+
+    /// Losses that have not come about yet.
+    pub fn losses_left(&self) -> u32 {
+        self.losses.iter().map(|loss| loss.count).sum()
+    }
+
+    fn is_lost(&mut self, outward: bool, bytes: &[u8]) -> bool {
+        self.losses.iter_mut().any(|loss| loss.hits(outward, bytes))
     }
 
     /// From now on reaching this time is a failure.
@@ -164,7 +183,9 @@ impl Links for Tap {
 
     fn send(&mut self, link: Link, frame: &[u8]) {
         self.note(true, link, frame);
-        self.segment.send(link, frame);
+        if !self.is_lost(true, frame) {
+            self.segment.send(link, frame);
+        }
     }
 
     fn receive(&mut self, take: &mut dyn FnMut(Link, &[u8])) -> bool {
@@ -176,7 +197,7 @@ impl Links for Tap {
         }
         let mut received = None;
         let any = self.segment.receive(&mut |link, frame| received = Some((link, frame.to_vec())));
-        if let Some((link, frame)) = received {
+        if let Some((link, frame)) = received.filter(|(_, frame)| !self.is_lost(false, frame)) {
             self.note(false, link, &frame);
             take(link, &frame);
         }

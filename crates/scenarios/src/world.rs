@@ -11,7 +11,8 @@ use ringcat::{
     Application, Declaration, Direction, DomainId, Error, Event, Instant, Links, MainDevice, Options, ProcessData,
     Scan, TimedEvent, automatic,
 };
-use ringcat_engine::main_device::Directory;
+use ringcat_engine::mail::Mailbox;
+use ringcat_engine::main_device::{Directory, Pending};
 use ringcat_sim::cable::{CableId, DeviceIndex};
 use ringcat_sim::device::Device;
 use ringcat_sim::fault::Fault;
@@ -21,6 +22,7 @@ use ringcat_wire::al::{AlState, AlStatus, AlStatusCode};
 use ringcat_wire::register::map;
 
 use crate::check::{Delivery, Judged, Mirror};
+use crate::loss::Loss;
 use crate::tap::{Fingerprint, Tap};
 
 /// Cycle time of scenarios that do not say otherwise.
@@ -215,6 +217,46 @@ impl World {
             assert!(self.application.now() < end, "not within {} ms: {what}", limit.as_millis());
             self.cycle();
         }
+    }
+
+    /// The mailbox of a declared SubDevice.
+    ///
+    /// # Panics
+    /// When nobody is declared there.
+    pub fn mailbox(&self, subdevice: usize) -> Mailbox {
+        self.application.engine().mailbox(subdevice).expect("it is declared")
+    }
+
+    /// Starts work in the acyclic half.
+    pub fn start<T: 'static>(&mut self, work: impl Future<Output = T> + 'static) -> Pending<T> {
+        self.application.engine_mut().start(work)
+    }
+
+    /// Cycles until work has ended.
+    ///
+    /// # Panics
+    /// When it has not within a time.
+    pub fn finish<T: 'static>(&mut self, limit: Duration, mut work: Pending<T>) -> T {
+        let end = self.application.now() + limit;
+        loop {
+            if let Some(result) = work.take() {
+                return result;
+            }
+            assert!(self.application.now() < end, "not within {} ms", limit.as_millis());
+            self.cycle();
+        }
+    }
+
+    /// Runs work in the acyclic half and cycles meanwhile, for 60 s at most.
+    pub fn run<T: 'static>(&mut self, work: impl Future<Output = T> + 'static) -> T {
+        let work = self.start(work);
+        self.finish(Duration::from_secs(60), work)
+    }
+
+    /// Loses frames.
+    pub fn lose(&mut self, loss: Loss) {
+        self.say(format!("{loss:?}"));
+        self.application.links_mut().lose(loss);
     }
 
     /// Lets time pass without a cycle, as an application does that is stopped. The acyclic half stands still too.

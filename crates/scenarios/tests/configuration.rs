@@ -8,8 +8,7 @@ use ringcat::{
     Declaration, Direction, Event, MainDevice, Options, PdoEntry, PdoMapping, Scan, SubDeviceConfig, Watchdog,
     automatic,
 };
-use ringcat_engine::procedures::mailbox::Mailbox;
-use ringcat_engine::procedures::sdo::{SdoAddress, SdoError, download, upload};
+use ringcat_engine::mail::coe::{SdoAddress, SdoError, read, write};
 use ringcat_sim::cable::DeviceIndex;
 use ringcat_sim::network::{Network, NetworkOptions};
 use ringcat_wire::al::AlState;
@@ -194,7 +193,7 @@ fn objects_are_downloaded_expedited_and_normal_and_an_abort_is_told_with_its_tex
 }
 
 #[test]
-fn a_download_that_needs_segments_is_refused_with_both_sizes() {
+fn a_download_that_is_too_long_for_the_object_is_told_and_tried_again() {
     let mut world = declared(ring_of_16(FAST), |number, config| match number {
         3 => config.sdo(0x8000, 3, vec![0x55; 500]),
         _ => config,
@@ -202,7 +201,7 @@ fn a_download_that_needs_segments_is_refused_with_both_sizes() {
     world.run_cycles(300);
     let told = |event: &Event| {
         matches!(event, Event::ConfigurationFailed { subdevice: 3, reason }
-            if reason.contains("500 bytes") && reason.contains("carries"))
+            if reason.contains("SDO 0x8000:03: aborted by the SubDevice"))
     };
     assert!(world.saw(world.beginning(), told));
 }
@@ -213,23 +212,21 @@ type Outcome = Rc<RefCell<Vec<Result<Vec<u8>, SdoError>>>>;
 fn objects_are_uploaded_and_downloaded_in_op_while_process_data_goes_on() {
     let mut world = World::in_op(3, ring_of_16(FAST));
     let mark = world.mark();
-    let layout = world.scan.subdevices[3].mailbox.expect("it has a mailbox");
-    let station = world.scan.subdevices[3].station;
     let outcome = Outcome::default();
-    let object = |index, sub_index| SdoAddress { index, sub_index, complete_access: false };
-    let (bus, results) = (world.application().engine().bus(), outcome.clone());
+    let object = SdoAddress::new;
+    let mailbox = world.application().engine().mailbox(3).expect("it is declared");
+    let results = outcome.clone();
     world.application_mut().engine_mut().spawn(async move {
-        let mut mailbox = Mailbox::new(station, layout);
         for address in [object(0x1018, 1), object(0x8000, 3), object(0x8000, 1), object(0x7777, 0)] {
-            let result = upload(&bus, &mut mailbox, address, LIMITS, |_| ()).await;
+            let result = read(&mailbox, address, LIMITS, 100).await;
             results.borrow_mut().push(result);
         }
-        let result = download(&bus, &mut mailbox, object(0x8000, 1), &[0x34, 0x12], LIMITS, |_| ()).await;
+        let result = write(&mailbox, object(0x8000, 1), &[0x34, 0x12], LIMITS).await;
         results.borrow_mut().push(result.map(|()| Vec::new()));
-        let result = upload(&bus, &mut mailbox, object(0x8000, 1), LIMITS, |_| ()).await;
+        let result = read(&mailbox, object(0x8000, 1), LIMITS, 100).await;
         results.borrow_mut().push(result);
         // Only in PREOP may this be written.
-        let result = download(&bus, &mut mailbox, object(0x8000, 2), &[1, 0, 0, 0], LIMITS, |_| ()).await;
+        let result = write(&mailbox, object(0x8000, 2), &[1, 0, 0, 0], LIMITS).await;
         results.borrow_mut().push(result.map(|()| Vec::new()));
     });
     world.run_cycles(100);

@@ -38,11 +38,12 @@ pub const ENGINE: &[(&str, &[&str])] = &[
     ("exchange", &["time", "link", "queue", "domain", "ring", "board", "layout", "event"]),
     // acyclic half
     ("supervisor", &["time", "link", "queue", "ring", "board", "event"]),
+    ("mail", &["time", "event", "supervisor"]),
     ("procedures", &["time", "link", "queue", "ring", "board", "info", "topology", "config", "plan", "layout", "event",
-        "supervisor"]),
+        "supervisor", "mail"]),
     // both together
     ("main_device", &["time", "link", "queue", "domain", "ring", "board", "info", "topology", "config", "plan", "layout",
-        "event", "exchange", "supervisor", "procedures"]),
+        "event", "exchange", "supervisor", "mail", "procedures"]),
 ];
 
 /// Where the engine's sources are.

@@ -18,6 +18,7 @@ use crate::config::{ConfigError, Resolution, SubDeviceConfig, resolve};
 use crate::event::Event;
 use crate::info::SubDeviceInfo;
 use crate::layout::{AreaSpec, DomainSpec, Layout, LayoutError};
+use crate::mail::Mailbox;
 use crate::plan::plan;
 use crate::procedures::fleet::{Member, Setup, SetupError, declared_areas};
 use crate::procedures::scan::{Scan, station_at};
@@ -279,6 +280,7 @@ fn beyond_watchdog(subdevice: usize, member: &Member, layout: &Layout) -> Option
 }
 
 pub(super) fn members(
+    bus: &Bus,
     declaration: Declaration,
     found: Vec<Option<SubDeviceInfo>>,
     layout: &Layout,
@@ -296,7 +298,7 @@ pub(super) fn members(
         // One that is not there yet gets an address behind those of the scan.
         let absent = station_at(Position((0x4000 + index) as u16));
         let station = info.as_ref().map_or(absent, |info| info.station);
-        members.push(Member::new(config, info, station, setup));
+        members.push(Member::new(config, info, station, setup, Mailbox::new(bus, index)));
     }
     Ok(members)
 }

@@ -11,10 +11,10 @@ use ringcat_wire::register::{Fmmu, SyncManager, map};
 
 use super::al_state::{self, StateError};
 use super::fleet::{Setup, SharedFleet};
-use super::mailbox::Mailbox;
-use super::sdo::{self, SdoAddress, SdoError};
 use super::sii;
 use crate::config::{SdoDownload, Timeouts};
+use crate::mail::Mailbox;
+use crate::mail::coe::{self, SdoAddress, SdoError};
 use crate::supervisor::{Bus, BusError};
 
 /// Cycles of the exchange that must have gone by before OP is requested, so that valid outputs are there (facts 5.2).
@@ -89,6 +89,7 @@ pub(super) struct BringUp<'a> {
     pub setup: Rc<Setup>,
     pub timeouts: Timeouts,
     pub target: AlState,
+    pub mailbox: Mailbox,
 }
 
 impl BringUp<'_> {
@@ -96,6 +97,7 @@ impl BringUp<'_> {
     pub(super) async fn run(&self, start: Start) -> Result<(), ConfigureError> {
         self.fleet.board.set_taking_part(self.index, false);
         self.fleet.set_configured(self.index, false);
+        self.mailbox.close();
         if start != Start::Cleared {
             self.back_to_init().await?;
         }
@@ -145,6 +147,10 @@ impl BringUp<'_> {
             sii::assign(self.bus, self.station, true).await?;
         }
         self.request(AlState::Init, AlState::PreOp).await?;
+        let layout = self.fleet.access().members.get(self.index).and_then(|member| member.info.as_ref()?.mailbox);
+        if let Some(layout) = layout.filter(|_| has_application) {
+            self.mailbox.open(self.station, layout);
+        }
         if has_application {
             sii::assign(self.bus, self.station, false).await?;
         }
@@ -189,15 +195,10 @@ impl BringUp<'_> {
 
     async fn download_all(&self) -> Result<(), ConfigureError> {
         let plan = &self.setup.plan;
-        let layout = self.fleet.access().members.get(self.index).and_then(|m| m.info.as_ref()?.mailbox);
-        let Some(layout) = layout.filter(|_| !(plan.sdos.is_empty() && plan.assign_sdos.is_empty())) else {
-            return Ok(());
-        };
-        let mut mailbox = Mailbox::new(self.station, layout);
         let limits = (self.timeouts.mailbox_request, self.timeouts.sdo);
         for SdoDownload { index, sub_index, complete_access, data } in plan.sdos.iter().chain(&plan.assign_sdos) {
             let object = SdoAddress { index: *index, sub_index: *sub_index, complete_access: *complete_access };
-            sdo::download(self.bus, &mut mailbox, object, data, limits, |_| ()).await?;
+            coe::write(&self.mailbox, object, data, limits).await?;
         }
         Ok(())
     }

@@ -15,6 +15,7 @@ use crate::board::Board;
 use crate::config::SubDeviceConfig;
 use crate::info::{Direction, SubDeviceInfo};
 use crate::layout::Layout;
+use crate::mail::Mailbox;
 use crate::plan::{self, AreaPlan, PlanError, SubDevicePlan};
 use crate::topology::Topology;
 
@@ -48,6 +49,8 @@ pub struct Member {
     pub node: Option<usize>,
     /// Its configuration, shared with the procedure that applies it.
     pub setup: Option<Rc<Setup>>,
+    /// Its mailbox, in use from PREOP on.
+    pub mailbox: Mailbox,
 }
 
 impl Member {
@@ -57,9 +60,10 @@ impl Member {
         info: Option<SubDeviceInfo>,
         station: StationAddress,
         setup: Option<Rc<Setup>>,
+        mailbox: Mailbox,
     ) -> Member {
         let node = info.as_ref().map(|info| usize::from(info.position.0));
-        Member { config, info, station, phase: Phase::Absent, attempt: 0, configured: false, node, setup }
+        Member { config, info, station, phase: Phase::Absent, attempt: 0, configured: false, node, setup, mailbox }
     }
 }
 
@@ -244,6 +248,11 @@ impl SharedFleet {
             member.attempt = member.attempt.wrapping_add(1);
             member.attempt
         })
+    }
+
+    /// A SubDevice's mailbox.
+    pub fn mailbox(&self, index: usize) -> Option<Mailbox> {
+        self.access().members.get(index).map(|member| member.mailbox.clone())
     }
 
     /// How far a SubDevice is.

@@ -15,6 +15,8 @@ use super::fleet::{Phase, SharedFleet};
 use super::sii::{self, SiiReader};
 use super::strangers::take_away;
 use crate::event::Event;
+use crate::mail::MailboxError;
+use crate::mail::coe::SdoFailure;
 use crate::supervisor::{Bus, BusError};
 
 /// Pause before the first new attempt to configure a SubDevice; it doubles with every failure.
@@ -63,11 +65,11 @@ pub(super) async fn keep_up(bus: Bus, fleet: SharedFleet, index: usize, start: S
 
 /// The frames are to blame, not what the SubDevice said.
 fn is_of_bus(error: &ConfigureError) -> bool {
-    use super::mailbox::MailboxError;
-    use super::sdo::SdoFailure;
     match error {
         ConfigureError::Bus(_) => true,
-        ConfigureError::Sdo(error) => matches!(error.cause, SdoFailure::Mailbox(MailboxError::Bus(_))),
+        ConfigureError::Sdo(error) => {
+            matches!(error.cause, SdoFailure::Mailbox(MailboxError::Bus(_) | MailboxError::Closed))
+        }
         ConfigureError::State(_) | ConfigureError::NoSetup => false,
     }
 }
@@ -92,6 +94,9 @@ pub(super) fn lose(bus: &Bus, fleet: &SharedFleet, index: usize) {
         bus.report(Event::Lost { subdevice: index });
     }
     fleet.board.set_taking_part(index, false);
+    if let Some(mailbox) = fleet.mailbox(index) {
+        mailbox.suspend();
+    }
 }
 
 fn failure(index: usize, error: &ConfigureError) -> Event {
@@ -116,6 +121,7 @@ async fn attempt(bus: &Bus, fleet: &SharedFleet, index: usize, start: Start) -> 
             setup,
             timeouts: member.config.timeouts,
             target: member.config.target,
+            mailbox: member.mailbox.clone(),
         }
     };
     let quickly = start == Start::Unknown && quick(&bring_up).await?;
@@ -133,16 +139,18 @@ async fn attempt(bus: &Bus, fleet: &SharedFleet, index: usize, start: Start) -> 
 
 /// A SubDevice that only fell from OP to SAFEOP still has its configuration: acknowledged, it may go back to OP.
 async fn quick(bring_up: &BringUp<'_>) -> Result<bool, ConfigureError> {
-    let BringUp { bus, fleet, index, station, setup, target, timeouts } = bring_up;
+    let BringUp { bus, fleet, index, station, setup, target, timeouts, mailbox } = bring_up;
     let (status, code) = al_state::read_status(bus, *station).await?;
     if !status.error && status.al_state() == Some(*target) {
         fleet.board.set_taking_part(*index, *target == AlState::SafeOp || *target == AlState::Op);
+        mailbox.resume();
         return Ok(true);
     }
     if status.al_state() != Some(AlState::SafeOp) || *target != AlState::Op || !fleet.is_configured(*index) {
         return Ok(false);
     }
     fleet.board.set_taking_part(*index, true);
+    mailbox.resume();
     if status.error {
         bus.report(Event::StateError { subdevice: *index, requested: None, status, code });
         al_state::acknowledge(bus, *station, setup.emulated).await?;

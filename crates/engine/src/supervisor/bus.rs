@@ -17,6 +17,7 @@ use ringcat_wire::datagram::{MAX_DATA, Target};
 
 use super::executor::TaskId;
 use super::shared::Shared;
+use super::signal::Signal;
 use super::transfer::{Request, Stage, TransferId};
 use crate::board::Board;
 use crate::event::Event;
@@ -156,7 +157,7 @@ impl Bus {
         data: Vec<u8>,
         expected: Option<Wkc>,
     ) -> impl Future<Output = Result<Reply, BusError>> {
-        self.submit(Request { command, target, data, redundant: None, expected, resend: true })
+        self.submit(Request { command, target, data, redundant: None, expected, resend: true, mail: None })
     }
 
     /// Like [`Bus::transfer`], but sent once: for accesses that must not happen twice.
@@ -166,7 +167,15 @@ impl Bus {
         target: Target,
         data: Vec<u8>,
     ) -> impl Future<Output = Result<Reply, BusError>> {
-        self.submit(Request { command, target, data, redundant: None, expected: Some(Wkc(1)), resend: false })
+        self.submit(Request {
+            command,
+            target,
+            data,
+            redundant: None,
+            expected: Some(Wkc(1)),
+            resend: false,
+            mail: None,
+        })
     }
 
     /// Exchanges a register for other data: each SubDevice with this station address hands its old value on with the
@@ -180,7 +189,35 @@ impl Bus {
     ) -> impl Future<Output = Result<Reply, BusError>> {
         let target = Target::Station(station, register);
         let redundant = Some(redundant).filter(|data| data.len() == main.len());
-        self.submit(Request { command: Command::Fprw, target, data: main, redundant, expected: None, resend: false })
+        let (command, data) = (Command::Fprw, main);
+        self.submit(Request { command, target, data, redundant, expected: None, resend: false, mail: None })
+    }
+
+    /// Reads a mailbox, once. What a second copy reads, and what comes back late, is kept for [`Bus::stray_mail`].
+    pub fn read_mail(
+        &self,
+        station: StationAddress,
+        register: RegisterAddress,
+        length: usize,
+    ) -> impl Future<Output = Result<Reply, BusError>> {
+        let (target, data) = (Target::Station(station, register), vec![0; length]);
+        let (command, expected, mail) = (Command::Fprd, Some(Wkc(1)), Some(station));
+        self.submit(Request { command, target, data, redundant: None, expected, resend: false, mail })
+    }
+
+    /// The oldest mail of a SubDevice that came back when nobody waited for it any more.
+    pub fn stray_mail(&self, station: StationAddress) -> Option<Vec<u8>> {
+        self.shared.borrow_mut().strays.take(station)
+    }
+
+    /// Stray mails of all SubDevices that nobody fetched in time.
+    pub fn stray_mails_dropped(&self) -> u64 {
+        self.shared.borrow().strays.dropped()
+    }
+
+    /// Something to wait for that another procedure brings about.
+    pub fn signal(&self) -> Signal {
+        Signal::new(self.shared.clone())
     }
 
     fn submit(&self, request: Request) -> TransferFuture {
@@ -319,6 +356,12 @@ impl Bus {
     /// A group of procedures that can be waited for together.
     pub fn group(&self) -> Group {
         Group { bus: self.clone(), state: Rc::default() }
+    }
+}
+
+impl fmt::Debug for Bus {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("Bus").finish_non_exhaustive()
     }
 }
 

@@ -5,7 +5,7 @@ use alloc::vec;
 use alloc::vec::Vec;
 use core::time::Duration;
 
-use ringcat_wire::address::Wkc;
+use ringcat_wire::address::{StationAddress, Wkc};
 use ringcat_wire::command::Command;
 use ringcat_wire::datagram::{CIRCULATING, HEADER_LEN, OVERHEAD, WKC_LEN};
 use ringcat_wire::frame::{FrameBuilder, MAX_FRAME, MacAddress};
@@ -13,6 +13,7 @@ use ringcat_wire::frame::{FrameBuilder, MAX_FRAME, MacAddress};
 use super::Received;
 use super::bus::{BusError, Reply};
 use super::shared::Shared;
+use super::stray::Overdue;
 use super::transfer::{Stage, TransferId};
 use crate::link::{Link, LinkSet};
 use crate::ring::identity::DATAGRAMS_AT;
@@ -66,6 +67,7 @@ struct Place {
     length: usize,
     command: Command,
     expected: Option<Wkc>,
+    mail: Option<StationAddress>,
     wkc: [Wkc; 2],
     /// Its procedure has the reply.
     answered: bool,
@@ -246,6 +248,7 @@ impl Shared {
                     length: request.data.len(),
                     command: request.command,
                     expected: request.expected,
+                    mail: request.mail,
                     wkc: [Wkc(0); 2],
                     answered: false,
                 });
@@ -273,6 +276,7 @@ impl Shared {
         let Some(flight) = self.flights.slots[slot].as_mut().filter(|flight| flight.sequence == copy.sequence) else {
             self.round_trip.was_late();
             self.counters.late += 1;
+            self.strays.late(copy.sequence, bytes);
             return Received::Late;
         };
         if !flight.is_what_was_sent(bytes) {
@@ -285,6 +289,11 @@ impl Shared {
             return Received::Late;
         }
         self.round_trip.took(self.now.since(flight.sent_at));
+        for read in flight.second_reads() {
+            if let Some(mail) = read.mail(bytes) {
+                self.strays.keep(read.station, mail);
+            }
+        }
         flight.take(copy.sent_on, bytes, first);
         let finished = flight.has_all(self.links);
         let enough = finished || flight.has_all_but(self.silence.mask(self.now), self.links);
@@ -368,6 +377,7 @@ impl Shared {
     fn expire(&mut self, slot: usize) {
         let Some(flight) = self.flights.take(slot) else { return };
         self.monitor.observe(flight.arrivals);
+        flight.mail_reads().for_each(|read| self.strays.remember(read));
         if !flight.answered {
             if flight.arrivals.arrived == 0 {
                 self.counters.lost += 1;
@@ -427,6 +437,23 @@ impl Flight {
             let circulating = (CIRCULATING >> 8) as u8;
             sent[..2] == got[..2] && sent[6] == got[6] && (sent[7] ^ got[7]) & !circulating == 0
         })
+    }
+
+    /// The reads of mailboxes in it.
+    fn mail_reads(&self) -> impl Iterator<Item = Overdue> {
+        let sequence = self.sequence;
+        self.places.iter().filter_map(move |place| {
+            let Place { header_at, length, mail, .. } = *place;
+            Some(Overdue { sequence, header_at, length, station: mail? })
+        })
+    }
+
+    /// The reads of mailboxes that a copy has answered before: a second one brings another mail.
+    fn second_reads(&self) -> Vec<Overdue> {
+        let answered = |read: &Overdue| {
+            self.places.iter().any(|place| place.header_at == read.header_at && place.total() != Wkc(0))
+        };
+        self.mail_reads().filter(answered).collect()
     }
 
     /// Takes in a copy that was found to be ours.

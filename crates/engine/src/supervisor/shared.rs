@@ -11,6 +11,7 @@ use super::executor::{Task, TaskId};
 use super::flights::{AcyclicCounters, Flights};
 use super::round_trip::RoundTrip;
 use super::silence::Silence;
+use super::stray::Strays;
 use super::transfer::{Request, Stage, Transfer, TransferId, Transfers};
 use crate::board::Board;
 use crate::event::EventLog;
@@ -30,6 +31,7 @@ pub(crate) struct Shared {
     pub(crate) outbox: VecDeque<TransferId>,
     pub(crate) flights: Flights,
     pub(crate) silence: Silence,
+    pub(crate) strays: Strays,
     pub(crate) round_trip: RoundTrip,
     /// SubDevices that the main copy of the last broadcast met: positions from here on live behind the redundant link.
     pub(crate) main_count: u16,
@@ -55,6 +57,7 @@ impl Shared {
             outbox: VecDeque::new(),
             flights: Flights::new(),
             silence: Silence::default(),
+            strays: Strays::default(),
             round_trip: RoundTrip::default(),
             main_count: 0,
             blocked_since: None,

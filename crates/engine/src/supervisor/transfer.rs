@@ -2,7 +2,7 @@
 
 use alloc::vec::Vec;
 
-use ringcat_wire::address::Wkc;
+use ringcat_wire::address::{StationAddress, Wkc};
 use ringcat_wire::command::Command;
 use ringcat_wire::datagram::Target;
 
@@ -22,6 +22,8 @@ pub(crate) struct Request {
     pub expected: Option<Wkc>,
     /// Whether a lost datagram may be sent again: false where reading or writing twice is not the same as once.
     pub resend: bool,
+    /// A read of this SubDevice's mailbox: what each copy reads matters, also when it comes late.
+    pub mail: Option<StationAddress>,
 }
 
 /// How far a transfer is.

@@ -1,0 +1,73 @@
+//! Why an SDO transfer failed.
+
+use core::fmt;
+
+use ringcat_wire::mailbox::sdo::AbortCode;
+
+use super::SdoAddress;
+use crate::mail::MailboxError;
+use crate::mail::stream::Overflow;
+
+/// Why an SDO transfer failed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct SdoError {
+    /// The object.
+    pub object: SdoAddress,
+    /// What happened.
+    pub cause: SdoFailure,
+}
+
+/// What happened to an SDO transfer. Whatever is not the SubDevice's abort was followed by one of ours.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum SdoFailure {
+    /// The mailbox failed.
+    Mailbox(MailboxError),
+    /// The SubDevice aborted.
+    Aborted(AbortCode),
+    /// The SubDevice did not alternate the toggle bit.
+    Toggle,
+    /// The SubDevice sent a segment without data that was not the last one.
+    EmptySegment,
+    /// The SubDevice announced another size than it sent.
+    Size {
+        /// Bytes that it announced.
+        announced: u64,
+        /// Bytes that came, until they were too many or the last one was there.
+        got: u64,
+    },
+    /// The receiver does not take so much.
+    TooLong(Overflow),
+    /// The size of what is to be written is not known, or beyond 32 bits.
+    UnknownSize,
+    /// The source ended before its size.
+    SourceEnded {
+        /// Bytes that it had.
+        got: u64,
+        /// Bytes that it announced.
+        announced: u64,
+    },
+}
+
+impl fmt::Display for SdoError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "SDO {}: ", self.object)?;
+        match &self.cause {
+            SdoFailure::Mailbox(error) => error.fmt(f),
+            SdoFailure::Aborted(code) => write!(f, "aborted by the SubDevice: {code}"),
+            SdoFailure::Toggle => f.write_str("the SubDevice did not alternate the toggle bit"),
+            SdoFailure::EmptySegment => f.write_str("the SubDevice sent an empty segment that was not the last one"),
+            SdoFailure::Size { announced, got } => {
+                write!(f, "the SubDevice announced {announced} bytes and sent {got}")
+            }
+            SdoFailure::TooLong(Overflow { bytes, limit }) => {
+                write!(f, "{bytes} bytes, at most {limit} were expected")
+            }
+            SdoFailure::UnknownSize => f.write_str("an SDO download has to say how many bytes it is, up to 4 GiB"),
+            SdoFailure::SourceEnded { got, announced } => {
+                write!(f, "expected {announced} bytes to write, the source had {got}")
+            }
+        }
+    }
+}
+
+impl core::error::Error for SdoError {}

@@ -1,0 +1,130 @@
+//! What uploads and downloads share: the lane, aborts, and telling late answers from others.
+
+use alloc::vec;
+
+use ringcat_wire::mailbox::sdo::{AbortCode, INITIATE_LEN, SdoRequest, SdoResponse};
+
+use super::error::{SdoError, SdoFailure};
+use super::{Limits, SdoAddress};
+use crate::mail::lane::Lane;
+use crate::mail::{Mailbox, MailboxError, Talk};
+
+/// Objects that every CoE device has; one that it lacks is answered with an abort, which does as well.
+const DEVICE_TYPE: u16 = 0x1000;
+const IDENTITY: u16 = 0x1018;
+
+/// A transfer under way. Ended before its time, by an error or because nobody wants it any more, it is aborted.
+pub(super) struct Transfer {
+    pub talk: Talk,
+    pub object: SdoAddress,
+    limits: Limits,
+    /// The SubDevice may wait for us.
+    busy: bool,
+    payload: alloc::vec::Vec<u8>,
+}
+
+impl Transfer {
+    pub(super) async fn begin(mailbox: &Mailbox, object: SdoAddress, limits: Limits) -> Result<Transfer, SdoError> {
+        let failed = |error| SdoError { object, cause: SdoFailure::Mailbox(error) };
+        let mut talk = mailbox.talk(Lane::Coe).await.map_err(failed)?;
+        settle(&mut talk, limits).await.map_err(failed)?;
+        talk.mark(object.index);
+        let payload = vec![0; talk.room().max(INITIATE_LEN)];
+        Ok(Transfer { talk, object, limits, busy: false, payload })
+    }
+
+    /// Sends a request and waits for the response that `accept` takes for its own. An abort is one.
+    pub(super) async fn exchange<T>(
+        &mut self,
+        request: &SdoRequest<'_>,
+        mut accept: impl FnMut(SdoResponse<'_>) -> Option<T>,
+    ) -> Result<T, SdoError> {
+        let object = self.object;
+        let Some(length) = request.encode(&mut self.payload) else {
+            let (bytes, limit) = (INITIATE_LEN, self.payload.len());
+            return Err(self.failed(SdoFailure::Mailbox(MailboxError::TooLong { bytes, limit })));
+        };
+        // In segments the object is not named; there an abort without one is understood, too.
+        let in_segments = matches!(request, SdoRequest::DownloadSegment { .. } | SdoRequest::UploadSegment { .. });
+        let accept = |payload: &[u8]| match SdoResponse::decode(payload).ok()? {
+            SdoResponse::Abort { index, sub_index, code } => {
+                let ours = index == object.index && sub_index == object.sub_index;
+                (ours || in_segments).then_some(Err(code))
+            }
+            response => accept(response).map(Ok),
+        };
+        self.busy = true;
+        match self.talk.ask(&self.payload[..length], self.limits, accept).await {
+            Ok(Ok(answer)) => Ok(answer),
+            Ok(Err(code)) => {
+                self.busy = false;
+                Err(self.failed(SdoFailure::Aborted(code)))
+            }
+            Err(error @ MailboxError::NoAnswer { .. }) => {
+                Err(self.abort(AbortCode::PROTOCOL_TIMEOUT, SdoFailure::Mailbox(error)))
+            }
+            Err(error) => {
+                // What the SubDevice refused or never got is not under way.
+                self.busy = in_segments || matches!(error, MailboxError::Bus(_));
+                Err(self.failed(SdoFailure::Mailbox(error)))
+            }
+        }
+    }
+
+    /// The transfer is through.
+    pub(super) fn done(&mut self) {
+        self.busy = false;
+    }
+
+    pub(super) fn failed(&self, cause: SdoFailure) -> SdoError {
+        SdoError { object: self.object, cause }
+    }
+
+    /// Aborts the transfer.
+    pub(super) fn abort(&mut self, code: AbortCode, cause: SdoFailure) -> SdoError {
+        self.post_abort(code);
+        self.failed(cause)
+    }
+
+    fn post_abort(&mut self, code: AbortCode) {
+        if !core::mem::take(&mut self.busy) {
+            return;
+        }
+        let SdoAddress { index, sub_index, .. } = self.object;
+        if let Some(length) = (SdoRequest::Abort { index, sub_index, code }).encode(&mut self.payload) {
+            // A mailbox that is closed has no transfer to abort.
+            let _ = self.talk.post(&self.payload[..length]);
+        }
+    }
+}
+
+impl Drop for Transfer {
+    fn drop(&mut self) {
+        self.post_abort(AbortCode::GENERAL);
+    }
+}
+
+/// After a request that was given up, its answer may still come, and be taken for that to the next request for the same
+/// object. So another object is asked for first: a SubDevice answers in order, and with that answer in hand older ones
+/// have come or never will.
+async fn settle(talk: &mut Talk, limits: Limits) -> Result<(), MailboxError> {
+    let Some(late) = talk.late_mark() else { return Ok(()) };
+    let fence = if late == DEVICE_TYPE { IDENTITY } else { DEVICE_TYPE };
+    talk.mark(fence);
+    talk.forget_late();
+    let request = SdoRequest::Upload { index: fence, sub_index: 0, complete_access: false };
+    let mut payload = [0; INITIATE_LEN];
+    let length = request.encode(&mut payload).unwrap_or(0);
+    let accept = |payload: &[u8]| match SdoResponse::decode(payload).ok()? {
+        SdoResponse::UploadExpedited { index, .. }
+        | SdoResponse::UploadNormal { index, .. }
+        | SdoResponse::Abort { index, .. } => (index == fence).then_some(()),
+        SdoResponse::DownloadDone { .. }
+        | SdoResponse::DownloadSegmentDone { .. }
+        | SdoResponse::UploadSegment { .. } => None,
+    };
+    match talk.ask(&payload[..length], limits, accept).await {
+        Ok(()) | Err(MailboxError::Error(_)) => Ok(()),
+        Err(error) => Err(error),
+    }
+}

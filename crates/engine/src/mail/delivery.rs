@@ -1,0 +1,130 @@
+//! Whose a mail is (decision 0007).
+
+use alloc::rc::Rc;
+
+use ringcat_wire::mailbox::coe::{CoeHeader, CoeService, Emergency};
+use ringcat_wire::mailbox::{ErrorReply, Message, Protocol};
+
+use super::lane::{Arrival, Lane};
+use super::room::{Room, State};
+use super::unsolicited::{Unclaimed, Unsolicited};
+use crate::event::Event;
+
+/// SoE services that are answers; the others come unasked (facts 6.6).
+const SOE_ANSWERS: [u8; 2] = [2, 4];
+/// Offset of the flags in an AoE header, and the bit of an answer (facts 6.7).
+const AOE_FLAGS_AT: usize = 18;
+const AOE_RESPONSE: u8 = 0x01;
+/// EoE types that are answers: set IP, set filter, get IP, get filter (facts 6.5).
+const EOE_ANSWERS: [u8; 4] = [3, 5, 7, 9];
+
+/// Takes in the content of the send mailbox. Any bytes are allowed.
+pub(super) fn deliver(room: &Rc<Room>, mail: &[u8]) {
+    {
+        let state = &mut *room.state();
+        let Ok(message) = Message::decode(mail) else {
+            state.counters.malformed += 1;
+            return;
+        };
+        if is_double(state, &message) {
+            state.counters.duplicates += 1;
+            return;
+        }
+        sort(room, state, &message);
+    }
+    room.news.notify();
+}
+
+fn is_double(state: &mut State, message: &Message<'_>) -> bool {
+    let disturbed = core::mem::take(&mut state.disturbed);
+    let Some(session) = &mut state.session else { return false };
+    let header = &message.header;
+    let double = session.recent.is_double(header.counter, message.payload, disturbed);
+    // What a repeat brings may be the mail before the one that was lost.
+    state.disturbed = disturbed && double;
+    double
+}
+
+fn sort(room: &Rc<Room>, state: &mut State, message: &Message<'_>) {
+    let payload = message.payload;
+    let first = payload.first().copied().unwrap_or(0);
+    match message.header.protocol {
+        Protocol::Error => refused(state, room, payload),
+        Protocol::Coe => coe(room, state, message),
+        Protocol::Foe => answer(room, state, Lane::Foe, message, Unsolicited::Other),
+        Protocol::Soe if SOE_ANSWERS.contains(&(first & 0x07)) => {
+            answer(room, state, Lane::Soe, message, Unsolicited::Other);
+        }
+        Protocol::Soe => shelve(state, message, Unsolicited::Soe),
+        Protocol::Aoe if payload.get(AOE_FLAGS_AT).is_some_and(|flags| flags & AOE_RESPONSE != 0) => {
+            answer(room, state, Lane::Aoe, message, Unsolicited::Other);
+        }
+        Protocol::Aoe => shelve(state, message, Unsolicited::Aoe),
+        Protocol::Voe => answer(room, state, Lane::Voe, message, Unsolicited::Voe),
+        Protocol::Eoe if EOE_ANSWERS.contains(&(first & 0x0F)) => {
+            answer(room, state, Lane::Eoe, message, Unsolicited::Other);
+        }
+        Protocol::Eoe => shelve(state, message, Unsolicited::Ethernet),
+        Protocol::Other(_) => shelve(state, message, Unsolicited::Other),
+    }
+}
+
+fn coe(room: &Rc<Room>, state: &mut State, message: &Message<'_>) {
+    let Some((header, rest)) = message.payload.split_first_chunk() else {
+        state.counters.malformed += 1;
+        return;
+    };
+    match CoeHeader::decode(header).service {
+        CoeService::Emergency => {
+            let Some(bytes) = rest.first_chunk() else {
+                state.counters.malformed += 1;
+                return;
+            };
+            let emergency = Emergency::decode(bytes);
+            state.shelves.emergencies().push((room.bus.now(), emergency));
+            room.bus.report(Event::Emergency { subdevice: room.subdevice, emergency });
+        }
+        // An abort has the service of a request, whoever sends it.
+        CoeService::SdoRequest | CoeService::SdoResponse | CoeService::SdoInformation => {
+            answer(room, state, Lane::Coe, message, Unsolicited::Other);
+        }
+        CoeService::TxPdo
+        | CoeService::RxPdo
+        | CoeService::TxPdoRemote
+        | CoeService::RxPdoRemote
+        | CoeService::Other(_) => shelve(state, message, Unsolicited::Other),
+    }
+}
+
+/// To whoever waits in a lane; without one, onto a shelf.
+fn answer(room: &Rc<Room>, state: &mut State, lane: Lane, message: &Message<'_>, else_to: Unsolicited) {
+    let now = room.bus.now();
+    if !state.lanes[lane as usize].arrive(Arrival::Payload(message.payload.to_vec()), now) {
+        if else_to == Unsolicited::Other {
+            state.counters.unclaimed += 1;
+        }
+        shelve(state, message, else_to);
+    }
+}
+
+fn shelve(state: &mut State, message: &Message<'_>, kind: Unsolicited) {
+    let unclaimed = Unclaimed { protocol: message.header.protocol, payload: message.payload.to_vec() };
+    state.shelves.ring(kind).push(unclaimed);
+}
+
+/// An error reply does not say to what. It goes to the request that waits; of several, first to one whose protocol the
+/// SubDevice has not shown to know, then to the oldest.
+fn refused(state: &mut State, room: &Rc<Room>, payload: &[u8]) {
+    let Some(bytes) = payload.first_chunk() else {
+        state.counters.malformed += 1;
+        return;
+    };
+    let waiting = state.lanes.iter_mut().filter(|lane| lane.waiting().is_some());
+    let whose = waiting.min_by_key(|lane| (lane.proven, lane.asked.map(|asked| asked.at)));
+    match whose {
+        Some(lane) => {
+            lane.arrive(Arrival::Refused(ErrorReply::decode(bytes)), room.bus.now());
+        }
+        None => state.counters.unclaimed += 1,
+    }
+}

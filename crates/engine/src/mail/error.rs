@@ -1,0 +1,64 @@
+//! Why there is no answer.
+
+use core::fmt;
+use core::time::Duration;
+
+use ringcat_wire::mailbox::ErrorReply;
+
+use crate::supervisor::BusError;
+
+/// Why there is no answer.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum MailboxError {
+    /// The bus failed.
+    Bus(BusError),
+    /// The mailbox is not in use: the SubDevice has none, is in INIT, or does not answer.
+    Closed,
+    /// The message does not fit.
+    TooLong {
+        /// Bytes of the message.
+        bytes: usize,
+        /// Bytes that fit.
+        limit: usize,
+    },
+    /// The SubDevice did not empty its receive mailbox in time.
+    Full {
+        /// How long was waited.
+        limit: Duration,
+    },
+    /// No answer in time.
+    NoAnswer {
+        /// How long was waited.
+        limit: Duration,
+    },
+    /// The SubDevice answered with a mailbox error.
+    Error(ErrorReply),
+}
+
+impl fmt::Display for MailboxError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            MailboxError::Bus(error) => error.fmt(f),
+            MailboxError::Closed => {
+                f.write_str("the mailbox is not in use: the SubDevice is in INIT or does not answer")
+            }
+            MailboxError::TooLong { bytes, limit } => {
+                write!(f, "message of {bytes} bytes, the mailbox takes {limit}")
+            }
+            MailboxError::Full { limit } => write!(f, "mailbox still full after {} ms", limit.as_millis()),
+            MailboxError::NoAnswer { limit } => write!(f, "no answer within {} ms", limit.as_millis()),
+            MailboxError::Error(reply) => match reply.detail_name() {
+                Some(name) => write!(f, "mailbox error {:#06x}: {name}", reply.detail),
+                None => write!(f, "mailbox error {:#06x}", reply.detail),
+            },
+        }
+    }
+}
+
+impl core::error::Error for MailboxError {}
+
+impl From<BusError> for MailboxError {
+    fn from(error: BusError) -> MailboxError {
+        MailboxError::Bus(error)
+    }
+}

@@ -1,0 +1,173 @@
+//! Lanes: what may be under way in one mailbox side by side, one conversation each.
+
+use alloc::collections::VecDeque;
+use alloc::vec::Vec;
+use core::time::Duration;
+
+use ringcat_wire::mailbox::{ErrorReply, Protocol};
+
+use super::answer_time::AnswerTime;
+use super::error::MailboxError;
+use crate::time::Instant;
+
+/// Answers that may wait in a lane; whoever talks takes one after the other.
+const INBOX: usize = 8;
+/// Messages that may wait to be written in a lane.
+const OUTBOX: usize = 64;
+
+/// One conversation at a time; different lanes run side by side.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Lane {
+    /// SDO and SDO information.
+    Coe,
+    /// Files.
+    Foe,
+    /// Servo drives.
+    Soe,
+    /// ADS.
+    Aoe,
+    /// Vendor protocol.
+    Voe,
+    /// Ethernet: its frames, and the settings of its address.
+    Eoe,
+}
+
+impl Lane {
+    /// All lanes.
+    pub const ALL: [Lane; 6] = [Lane::Coe, Lane::Foe, Lane::Soe, Lane::Aoe, Lane::Voe, Lane::Eoe];
+
+    /// The protocol of its messages.
+    pub const fn protocol(self) -> Protocol {
+        match self {
+            Lane::Coe => Protocol::Coe,
+            Lane::Foe => Protocol::Foe,
+            Lane::Soe => Protocol::Soe,
+            Lane::Aoe => Protocol::Aoe,
+            Lane::Voe => Protocol::Voe,
+            Lane::Eoe => Protocol::Eoe,
+        }
+    }
+}
+
+/// A message that waits to be written.
+#[derive(Debug)]
+pub(super) struct Outgoing {
+    pub id: u32,
+    pub payload: Vec<u8>,
+    /// How long the SubDevice may refuse it.
+    pub limit: Duration,
+    /// Who sends it: the turn of a talk.
+    pub turn: u32,
+    /// How long an answer is waited for, where one is.
+    pub asks: Option<Duration>,
+}
+
+/// A request that was written.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Asked {
+    /// When it was written, or when the last part of its answer came.
+    pub at: Instant,
+    /// Looks for the answer since then.
+    pub looks: u32,
+    /// A part of the answer is there, and whoever asked has not said that more is to come.
+    pub answered: bool,
+}
+
+impl Asked {
+    pub(super) const fn at(at: Instant) -> Asked {
+        Asked { at, looks: 0, answered: false }
+    }
+}
+
+/// What came for a lane.
+#[derive(Debug, PartialEq, Eq)]
+pub(super) enum Arrival {
+    /// Payload of a message of its protocol.
+    Payload(Vec<u8>),
+    /// The SubDevice refused a message.
+    Refused(ErrorReply),
+}
+
+/// State of one lane.
+#[derive(Debug, Default)]
+pub(super) struct LaneState {
+    /// Who wants to talk; the first one does.
+    pub turns: VecDeque<u32>,
+    pub outbox: VecDeque<Outgoing>,
+    inbox: VecDeque<Arrival>,
+    /// The message that was written last, or not.
+    pub written: Option<(u32, Result<(), MailboxError>)>,
+    pub asked: Option<Asked>,
+    /// Until when the answer to a request that was given up may still come.
+    pub late_until: Option<Instant>,
+    /// What the last request was about, so that its answer can be told from that to another one.
+    pub mark: u16,
+    pub answer_time: AnswerTime,
+    /// The SubDevice has answered in this lane: it knows the protocol.
+    pub proven: bool,
+}
+
+impl LaneState {
+    /// Forgets everything but who wants to talk and how long answers take.
+    pub(super) fn reset(&mut self) {
+        let LaneState { turns, answer_time, .. } = core::mem::take(self);
+        *self = LaneState { turns, answer_time, ..LaneState::default() };
+    }
+
+    pub(super) fn has_room(&self) -> bool {
+        self.outbox.len() < OUTBOX
+    }
+
+    /// A message of a talk was handed to the SubDevice, or may have been.
+    pub(super) fn wrote(&mut self, message: &Outgoing, result: Result<(), MailboxError>, now: Instant) {
+        let arrived = match result {
+            Ok(()) => true,
+            // Frames that were lost may have been lost on their way back.
+            Err(MailboxError::Bus(_)) => true,
+            Err(_) => false,
+        };
+        if let Some(limit) = message.asks.filter(|_| arrived) {
+            if result.is_ok() && self.turns.front() == Some(&message.turn) {
+                self.asked.get_or_insert(Asked::at(now));
+            } else {
+                self.late_until = Some(now + limit);
+            }
+        }
+        self.written = Some((message.id, result));
+    }
+
+    /// The request whose answer is looked for.
+    pub(super) fn waiting(&self) -> Option<&Asked> {
+        self.asked.as_ref().filter(|asked| !asked.answered)
+    }
+
+    /// An answer, or what may be one, for whoever talks. False where nobody waits for one.
+    pub(super) fn arrive(&mut self, arrival: Arrival, now: Instant) -> bool {
+        let Some(asked) = &mut self.asked else {
+            self.late_until = None;
+            return false;
+        };
+        self.proven |= matches!(arrival, Arrival::Payload(_));
+        if !asked.answered {
+            asked.answered = true;
+            self.answer_time.took(now.since(asked.at), asked.looks <= 1);
+        }
+        if self.inbox.len() >= INBOX {
+            self.inbox.pop_front();
+        }
+        self.inbox.push_back(arrival);
+        true
+    }
+
+    pub(super) fn take(&mut self) -> Option<Arrival> {
+        self.inbox.pop_front()
+    }
+
+    pub(super) fn has_arrivals(&self) -> bool {
+        !self.inbox.is_empty()
+    }
+
+    pub(super) fn forget_arrivals(&mut self) {
+        self.inbox.clear();
+    }
+}

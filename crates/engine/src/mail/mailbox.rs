@@ -1,0 +1,118 @@
+//! The handle to a SubDevice's mailbox.
+
+use alloc::rc::Rc;
+
+use ringcat_wire::address::StationAddress;
+use ringcat_wire::mailbox::coe::Emergency;
+use ringcat_wire::sii::MailboxLayout;
+
+use super::counters::MailCounters;
+use super::error::MailboxError;
+use super::lane::Lane;
+use super::room::{Room, Session};
+use super::talk::Talk;
+use super::unsolicited::{Unclaimed, Unsolicited};
+use crate::supervisor::Bus;
+use crate::time::Instant;
+
+/// The handle to a SubDevice's mailbox and its router; copies of it are the same mailbox. It lasts longer than the
+/// SubDevice's being there: while the mailbox is not in use, everything asked of it ends with [`MailboxError::Closed`].
+#[derive(Clone, Debug)]
+pub struct Mailbox {
+    room: Rc<Room>,
+}
+
+impl Mailbox {
+    /// A mailbox that is not in use yet. `subdevice` names it in events.
+    pub fn new(bus: &Bus, subdevice: usize) -> Mailbox {
+        Mailbox { room: Room::new(bus, subdevice) }
+    }
+
+    /// The SubDevice has entered PREOP or BOOT with this mailbox: counters begin anew.
+    pub(crate) fn open(&self, station: StationAddress, layout: MailboxLayout) {
+        self.room.close(true);
+        self.room.open(Session::new(station, layout));
+    }
+
+    /// The SubDevice goes to INIT.
+    pub(crate) fn close(&self) {
+        self.room.close(true);
+    }
+
+    /// The SubDevice does not answer; it may come back with the mailbox as it is.
+    pub(crate) fn suspend(&self) {
+        self.room.close(false);
+    }
+
+    /// The SubDevice answers again and never was in INIT.
+    pub(crate) fn resume(&self) {
+        let session = {
+            let state = self.room.look();
+            if state.open { None } else { state.session }
+        };
+        if let Some(session) = session {
+            self.room.open(session);
+        }
+    }
+
+    /// The SubDevice has mail, or may have.
+    pub(crate) fn is_full(&self) {
+        self.room.is_full();
+    }
+
+    /// Whether it may be used.
+    pub fn is_open(&self) -> bool {
+        self.room.look().open
+    }
+
+    /// Station address of the SubDevice, while the mailbox may be used.
+    pub fn station(&self) -> Option<StationAddress> {
+        let state = self.room.look();
+        state.session.filter(|_| state.open).map(|session| session.station)
+    }
+
+    /// Waits for a lane to be free, and takes it.
+    pub async fn talk(&self, lane: Lane) -> Result<Talk, MailboxError> {
+        Talk::take(&self.room, lane).await
+    }
+
+    /// The bus on which it works.
+    pub fn bus(&self) -> &Bus {
+        &self.room.bus
+    }
+
+    /// Counters since the beginning.
+    pub fn counters(&self) -> MailCounters {
+        self.room.look().counters
+    }
+
+    /// Takes the oldest emergency that is kept, with the time at which it was read. Each was an event, too.
+    pub fn pop_emergency(&self) -> Option<(Instant, Emergency)> {
+        self.room.state().shelves.emergencies().pop()
+    }
+
+    /// Forgets all emergencies that are kept.
+    pub fn clear_emergencies(&self) {
+        self.room.state().shelves.emergencies().clear();
+    }
+
+    /// Emergencies that were not kept because there were too many.
+    pub fn emergency_overruns(&self) -> u64 {
+        self.room.state().shelves.emergencies().overruns()
+    }
+
+    /// Takes the oldest mail of a kind that nobody asked for.
+    pub fn pop_unsolicited(&self, kind: Unsolicited) -> Option<Unclaimed> {
+        self.room.state().shelves.ring(kind).pop()
+    }
+
+    /// Mails of a kind that were not kept because nobody took them in time.
+    pub fn unsolicited_overruns(&self, kind: Unsolicited) -> u64 {
+        self.room.state().shelves.ring(kind).overruns()
+    }
+
+    /// Waits for mail of a kind that nobody asked for.
+    pub async fn unsolicited(&self, kind: Unsolicited) -> Unclaimed {
+        self.room.news.until(|| self.pop_unsolicited(kind)).await
+    }
+}

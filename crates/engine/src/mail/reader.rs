@@ -1,0 +1,219 @@
+//! Reading: when there is mail, or while somebody waits for an answer (facts 6.1, 6.2).
+//!
+//! A lost read is healed with the repeat request. What comes is handed to `delivery`.
+
+use alloc::rc::Rc;
+use core::time::Duration;
+
+use ringcat_wire::address::{RegisterAddress, Wkc};
+use ringcat_wire::register::{SyncManager, SyncManagerActivate, SyncManagerPdiControl, SyncManagerStatus, map};
+
+use super::answer_time::AnswerTime;
+use super::delivery;
+use super::error::MailboxError;
+use super::room::{Room, Session};
+use crate::supervisor::{Bus, BusError};
+use crate::time::Instant;
+
+/// SyncManager of the send mailbox (SubDevice to MainDevice).
+const SEND_SYNC_MANAGER: u8 = 1;
+/// How long a SubDevice may take to repeat its last mail.
+const REPEAT_LIMIT: Duration = Duration::from_millis(100);
+/// Pause between two looks whether it did.
+const REPEAT_PAUSE: Duration = Duration::from_micros(200);
+/// Pause after a failed access, so that a SubDevice that is gone is not asked without end.
+const FAILURE_PAUSE: Duration = Duration::from_millis(5);
+
+/// Starts a reader unless one runs.
+pub(super) fn start(room: &Rc<Room>) {
+    let time = {
+        let state = &mut *room.state();
+        if !state.open || !(state.full || state.repeat || state.waiting()) {
+            return;
+        }
+        state.tasks = state.tasks.wrapping_add(1);
+        if state.reader == Some(state.time) {
+            room.work.notify();
+            return;
+        }
+        state.reader = Some(state.time);
+        state.time
+    };
+    let own = room.clone();
+    room.bus.spawn(async move { run(own, time).await });
+}
+
+/// What the reader does next.
+enum Step {
+    /// Nobody waits and there is no sign of mail.
+    End,
+    /// Ask for the mail of a lost read again.
+    Repeat,
+    /// Read the mailbox.
+    Read,
+    /// Look at its status.
+    Look,
+    /// Wait.
+    Wait(Instant),
+}
+
+async fn run(room: Rc<Room>, time: u32) {
+    // When the next look is due, after one in vain, and the next access of any kind, after one that failed.
+    let (mut next_look, mut hold) = (Instant::default(), Instant::default());
+    while let Some(session) = room.session(time) {
+        while let Some(mail) = room.bus.stray_mail(session.station) {
+            room.state().counters.strays += 1;
+            room.state().disturbed = true;
+            delivery::deliver(&room, &mail);
+        }
+        let found = match step(&room, next_look, hold) {
+            Step::End => return,
+            Step::Wait(until) => {
+                let limit = until.since(room.bus.now());
+                let tasks = room.look().tasks;
+                let more = || (room.session(time).is_none() || room.look().tasks != tasks).then_some(());
+                if room.bus.within(limit, room.work.until(more)).await.is_ok() {
+                    // Somebody else's answer may come sooner.
+                    next_look = room.bus.now();
+                }
+                continue;
+            }
+            Step::Repeat => repeat(&room, &session).await,
+            Step::Read => read(&room, time, &session).await,
+            Step::Look => look(&room, &session).await,
+        };
+        let now = room.bus.now();
+        next_look = match found {
+            Ok(true) => now,
+            Ok(false) => now + pause(&room, now),
+            Err(_) => {
+                hold = now + FAILURE_PAUSE;
+                hold
+            }
+        };
+    }
+}
+
+/// What is due.
+fn step(room: &Rc<Room>, next_look: Instant, hold: Instant) -> Step {
+    let now = room.bus.now();
+    let state = &mut *room.state();
+    if now < hold {
+        return Step::Wait(hold);
+    }
+    if state.repeat {
+        return Step::Repeat;
+    }
+    if state.full {
+        return Step::Read;
+    }
+    let Some((due, sure)) = first_look(state) else {
+        state.reader = None;
+        return Step::End;
+    };
+    let due = due.max(next_look);
+    if now < due {
+        return Step::Wait(due);
+    }
+    for lane in &mut state.lanes {
+        if let Some(asked) = lane.asked.as_mut().filter(|asked| !asked.answered) {
+            asked.looks += 1;
+        }
+    }
+    if sure { Step::Read } else { Step::Look }
+}
+
+/// When the first of the answers that are waited for should be looked for, and whether it will surely be there then.
+fn first_look(state: &super::room::State) -> Option<(Instant, bool)> {
+    if state.blocked {
+        return Some((Instant::default(), false));
+    }
+    let looks = state.lanes.iter().filter_map(|lane| {
+        let asked = lane.waiting()?;
+        Some((asked.at + lane.answer_time.first_look(), asked.looks == 0 && lane.answer_time.is_sure()))
+    });
+    looks.min_by_key(|(due, _)| *due)
+}
+
+/// Pause after a look in vain: a part of the time that the oldest answer was waited for.
+fn pause(room: &Rc<Room>, now: Instant) -> Duration {
+    let state = room.look();
+    let waited = state.lanes.iter().filter_map(|lane| lane.waiting()).map(|asked| now.since(asked.at)).max();
+    AnswerTime::pause(waited.unwrap_or_default())
+}
+
+/// Looks at the status of the send mailbox; notes where it is full.
+async fn look(room: &Rc<Room>, session: &Session) -> Result<bool, MailboxError> {
+    room.state().counters.looks += 1;
+    let at = map::sync_manager(SEND_SYNC_MANAGER).offset(SyncManager::STATUS);
+    let [status] = room.bus.fprd_array(session.station, at).await?;
+    let full = SyncManagerStatus::from_bits(status).mailbox_full;
+    room.state().full |= full;
+    Ok(full)
+}
+
+/// Reads the whole send mailbox; false where it is empty.
+async fn read(room: &Rc<Room>, time: u32, session: &Session) -> Result<bool, MailboxError> {
+    let register = RegisterAddress(session.layout.send_offset);
+    let reply = room.bus.read_mail(session.station, register, usize::from(session.layout.send_size)).await;
+    if room.session(time).is_none() {
+        return Err(MailboxError::Closed);
+    }
+    match reply {
+        Ok(reply) if reply.wkc() == Wkc(0) => {
+            let state = &mut *room.state();
+            state.full = false;
+            state.counters.empty_reads += 1;
+            Ok(false)
+        }
+        Ok(reply) => {
+            {
+                let state = &mut *room.state();
+                state.full = false;
+                state.counters.read += 1;
+            }
+            delivery::deliver(room, &reply.data);
+            // What comes unasked seldom comes alone.
+            if !room.look().waiting() {
+                look(room, session).await?;
+            }
+            Ok(true)
+        }
+        Err(_) => {
+            room.state().repeat = true;
+            Ok(true)
+        }
+    }
+}
+
+/// Asks for the last mail again; it is in the mailbox then.
+async fn repeat(room: &Rc<Room>, session: &Session) -> Result<bool, MailboxError> {
+    request_repeat(&room.bus, session).await?;
+    let state = &mut *room.state();
+    state.repeat = false;
+    state.full = true;
+    state.disturbed = true;
+    state.counters.repeats += 1;
+    Ok(true)
+}
+
+/// Asks for the last mail again: toggles the repeat request and waits for its acknowledgement (facts 6.2). One that does
+/// not come in time is no matter: what is read next is then what would have come next.
+async fn request_repeat(bus: &Bus, session: &Session) -> Result<(), BusError> {
+    let register = map::sync_manager(SEND_SYNC_MANAGER);
+    let at = register.offset(SyncManager::ACTIVATE);
+    let [activate] = bus.fprd_array(session.station, at).await?;
+    let before = SyncManagerActivate::from_bits(activate);
+    let repeat_request = !before.repeat_request;
+    let activate = SyncManagerActivate { repeat_request, ..before };
+    bus.fpwr(session.station, at, &[activate.bits()]).await?;
+    let until = bus.now() + REPEAT_LIMIT;
+    loop {
+        let [control] = bus.fprd_array(session.station, register.offset(SyncManager::PDI_CONTROL)).await?;
+        let acknowledged = SyncManagerPdiControl::from_bits(control).repeat_acknowledge == repeat_request;
+        if acknowledged || bus.now() >= until {
+            return Ok(());
+        }
+        bus.sleep(REPEAT_PAUSE).await;
+    }
+}

@@ -1,0 +1,50 @@
+//! A bounded queue that keeps the oldest and counts what did not fit.
+
+use alloc::collections::VecDeque;
+
+/// A bounded queue. What comes when it is full is not taken, and counted.
+#[derive(Debug)]
+pub(super) struct Ring<T> {
+    entries: VecDeque<T>,
+    capacity: usize,
+    overruns: u64,
+}
+
+impl<T> Ring<T> {
+    pub(super) fn new(capacity: usize) -> Ring<T> {
+        Ring { entries: VecDeque::new(), capacity, overruns: 0 }
+    }
+
+    pub(super) fn push(&mut self, entry: T) {
+        if self.entries.len() < self.capacity {
+            self.entries.push_back(entry);
+        } else {
+            self.overruns += 1;
+        }
+    }
+
+    pub(super) fn pop(&mut self) -> Option<T> {
+        self.entries.pop_front()
+    }
+
+    pub(super) fn clear(&mut self) {
+        self.entries.clear();
+    }
+
+    pub(super) fn overruns(&self) -> u64 {
+        self.overruns
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_full_ring_keeps_what_it_has_and_counts_the_rest() {
+        let mut ring = Ring::new(2);
+        (0..5).for_each(|n| ring.push(n));
+        assert_eq!(ring.overruns(), 3);
+        assert_eq!([ring.pop(), ring.pop(), ring.pop()], [Some(0), Some(1), None]);
+    }
+}

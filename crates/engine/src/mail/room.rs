@@ -1,0 +1,201 @@
+//! What the tasks and handles of one mailbox share.
+
+use alloc::rc::Rc;
+use alloc::vec;
+use alloc::vec::Vec;
+use core::cell::{Ref, RefCell, RefMut};
+use core::time::Duration;
+
+use ringcat_wire::address::StationAddress;
+use ringcat_wire::mailbox::Header;
+use ringcat_wire::sii::MailboxLayout;
+
+use super::counters::MailCounters;
+use super::error::MailboxError;
+use super::lane::{Lane, LaneState, Outgoing};
+use super::recent::Recent;
+use super::unsolicited::Shelves;
+use super::{reader, writer};
+use crate::supervisor::{Bus, Signal};
+
+/// What the SubDevice and we have counted so far. It lasts from PREOP to INIT, also while the SubDevice does not answer.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Session {
+    pub station: StationAddress,
+    pub layout: MailboxLayout,
+    /// Counter of the last message sent.
+    pub counter: u8,
+    pub recent: Recent,
+}
+
+/// The part that changes.
+#[derive(Debug)]
+pub(super) struct State {
+    pub session: Option<Session>,
+    /// The session may be used.
+    pub open: bool,
+    /// Counts openings and closings, so that tasks of an earlier time end.
+    pub time: u32,
+    pub lanes: [LaneState; Lane::ALL.len()],
+    /// Lane whose turn it is to write.
+    pub next_lane: usize,
+    pub next_id: u32,
+    /// The time in which a writer runs, and a reader.
+    pub writer: Option<u32>,
+    pub reader: Option<u32>,
+    /// The send mailbox is known to be full.
+    pub full: bool,
+    /// The receive mailbox is full, and may stay so until the send mailbox is read.
+    pub blocked: bool,
+    /// A read was lost: its mail has to be asked for again.
+    pub repeat: bool,
+    /// How often there was something new for the reader.
+    pub tasks: u32,
+    /// A repeat or a late frame may bring mail that was there before.
+    pub disturbed: bool,
+    pub shelves: Shelves,
+    pub counters: MailCounters,
+}
+
+/// One mailbox.
+#[derive(Debug)]
+pub(super) struct Room {
+    pub bus: Bus,
+    /// Index in the declaration, before activation the position; for events.
+    pub subdevice: usize,
+    state: RefCell<State>,
+    /// Something changed for those that talk or listen.
+    pub news: Signal,
+    /// Something changed for the reader.
+    pub work: Signal,
+}
+
+impl Room {
+    pub(super) fn new(bus: &Bus, subdevice: usize) -> Rc<Room> {
+        let state = State {
+            session: None,
+            open: false,
+            time: 0,
+            lanes: Default::default(),
+            next_lane: 0,
+            next_id: 0,
+            writer: None,
+            reader: None,
+            full: false,
+            blocked: false,
+            repeat: false,
+            tasks: 0,
+            disturbed: false,
+            shelves: Shelves::new(),
+            counters: MailCounters::default(),
+        };
+        let (news, work) = (bus.signal(), bus.signal());
+        Rc::new(Room { bus: bus.clone(), subdevice, state: RefCell::new(state), news, work })
+    }
+
+    pub(super) fn state(&self) -> RefMut<'_, State> {
+        self.state.borrow_mut()
+    }
+
+    pub(super) fn look(&self) -> Ref<'_, State> {
+        self.state.borrow()
+    }
+
+    /// The session, while it is open and the time is still `time`.
+    pub(super) fn session(&self, time: u32) -> Option<Session> {
+        let state = self.look();
+        if state.open && state.time == time { state.session } else { None }
+    }
+
+    /// Queues a message; returns its number.
+    pub(super) fn queue(
+        self: &Rc<Room>,
+        lane: Lane,
+        payload: Vec<u8>,
+        limit: Duration,
+        (turn, asks): (u32, Option<Duration>),
+    ) -> Result<u32, MailboxError> {
+        let id = {
+            let state = &mut *self.state();
+            let session = state.session.as_ref().filter(|_| state.open).ok_or(MailboxError::Closed)?;
+            let room = usize::from(session.layout.receive_size).saturating_sub(Header::LEN);
+            if payload.len() > room {
+                return Err(MailboxError::TooLong { bytes: payload.len(), limit: room });
+            }
+            let lane = &mut state.lanes[lane as usize];
+            if !lane.has_room() {
+                state.counters.refused += 1;
+                return Err(MailboxError::Full { limit });
+            }
+            state.next_id = state.next_id.wrapping_add(1);
+            lane.outbox.push_back(Outgoing { id: state.next_id, payload, limit, turn, asks });
+            state.next_id
+        };
+        writer::start(self);
+        Ok(id)
+    }
+
+    /// The mailbox may be used, with a new session or the one that there was.
+    pub(super) fn open(&self, session: Session) {
+        {
+            let state = &mut *self.state();
+            state.session = Some(session);
+            state.begin(true);
+        }
+        self.tell();
+    }
+
+    /// The mailbox cannot be used; everything under way ends.
+    pub(super) fn close(&self, forget: bool) {
+        {
+            let state = &mut *self.state();
+            if forget {
+                state.session = None;
+            }
+            if !state.open {
+                return;
+            }
+            state.begin(false);
+        }
+        self.tell();
+    }
+
+    /// There may be mail.
+    pub(super) fn is_full(self: &Rc<Room>) {
+        self.state().full = true;
+        reader::start(self);
+    }
+
+    pub(super) fn tell(&self) {
+        self.news.notify();
+        self.work.notify();
+    }
+}
+
+impl State {
+    fn begin(&mut self, open: bool) {
+        self.time = self.time.wrapping_add(1);
+        self.open = open;
+        self.full = false;
+        self.blocked = false;
+        self.repeat = false;
+        self.lanes.iter_mut().for_each(LaneState::reset);
+    }
+
+    /// Whether mail is waited for.
+    pub(super) fn waiting(&self) -> bool {
+        self.blocked || self.lanes.iter().any(|lane| lane.waiting().is_some())
+    }
+}
+
+impl Session {
+    /// A session with a SubDevice that has just entered PREOP or BOOT.
+    pub(super) fn new(station: StationAddress, layout: MailboxLayout) -> Session {
+        Session { station, layout, counter: 0, recent: Recent::default() }
+    }
+
+    /// Bytes for a message that fills the receive mailbox.
+    pub(super) fn blank(&self) -> Vec<u8> {
+        vec![0; usize::from(self.layout.receive_size)]
+    }
+}

@@ -1,0 +1,125 @@
+//! Where the bytes of a transfer come from and go to, piece by piece, so that no transfer needs memory for all of it.
+
+use alloc::vec::Vec;
+
+/// What a transfer sends.
+pub trait Source {
+    /// Bytes in all, where that is known before.
+    fn total(&self) -> Option<u64>;
+
+    /// Puts the next bytes into `room` and returns how many; fewer than fit only at the end.
+    fn fill(&mut self, room: &mut [u8]) -> usize;
+}
+
+/// The receiver takes no more.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Overflow {
+    /// Bytes that it would have had to take.
+    pub bytes: u64,
+    /// Bytes that it takes.
+    pub limit: u64,
+}
+
+/// What takes the bytes of a transfer.
+pub trait Sink {
+    /// The transfer begins (again, where the SubDevice was asked twice); `total` bytes will come, where it says.
+    fn begin(&mut self, total: Option<u64>) -> Result<(), Overflow>;
+
+    /// Takes the next bytes.
+    fn take(&mut self, bytes: &[u8]) -> Result<(), Overflow>;
+}
+
+/// Bytes in memory as a source.
+#[derive(Clone, Copy, Debug)]
+pub struct Bytes<'a> {
+    bytes: &'a [u8],
+    at: usize,
+}
+
+impl<'a> Bytes<'a> {
+    /// A source of these bytes.
+    pub const fn new(bytes: &'a [u8]) -> Bytes<'a> {
+        Bytes { bytes, at: 0 }
+    }
+}
+
+impl Source for Bytes<'_> {
+    fn total(&self) -> Option<u64> {
+        Some(self.bytes.len() as u64)
+    }
+
+    fn fill(&mut self, room: &mut [u8]) -> usize {
+        let rest = &self.bytes[self.at..];
+        let count = rest.len().min(room.len());
+        room[..count].copy_from_slice(&rest[..count]);
+        self.at += count;
+        count
+    }
+}
+
+/// A vector with a limit as a sink.
+#[derive(Clone, Debug)]
+pub struct Bounded {
+    bytes: Vec<u8>,
+    limit: usize,
+}
+
+impl Bounded {
+    /// Takes up to `limit` bytes.
+    pub const fn new(limit: usize) -> Bounded {
+        Bounded { bytes: Vec::new(), limit }
+    }
+
+    /// What came.
+    pub fn into_bytes(self) -> Vec<u8> {
+        self.bytes
+    }
+}
+
+impl Sink for Bounded {
+    fn begin(&mut self, total: Option<u64>) -> Result<(), Overflow> {
+        self.bytes.clear();
+        let limit = self.limit as u64;
+        // Room is made as bytes come: a size that a SubDevice only claims costs nothing.
+        match total {
+            Some(bytes) if bytes > limit => Err(Overflow { bytes, limit }),
+            Some(_) | None => Ok(()),
+        }
+    }
+
+    fn take(&mut self, bytes: &[u8]) -> Result<(), Overflow> {
+        let length = self.bytes.len() + bytes.len();
+        if length > self.limit {
+            return Err(Overflow { bytes: length as u64, limit: self.limit as u64 });
+        }
+        self.bytes.extend_from_slice(bytes);
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn bytes_come_in_pieces_and_go_where_there_is_room() {
+        let mut source = Bytes::new(b"abcdefg");
+        let mut sink = Bounded::new(7);
+        assert_eq!(sink.begin(source.total()), Ok(()));
+        let mut room = [0; 3];
+        loop {
+            let count = source.fill(&mut room);
+            sink.take(&room[..count]).unwrap();
+            if count < room.len() {
+                break;
+            }
+        }
+        assert_eq!(sink.take(b"h"), Err(Overflow { bytes: 8, limit: 7 }));
+        assert_eq!(sink.into_bytes(), b"abcdefg");
+    }
+
+    #[test]
+    fn a_claimed_size_beyond_the_limit_is_refused_at_once() {
+        assert_eq!(Bounded::new(7).begin(Some(1 << 32)), Err(Overflow { bytes: 1 << 32, limit: 7 }));
+    }
+}

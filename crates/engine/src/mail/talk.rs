@@ -1,0 +1,254 @@
+//! A lane while somebody has it: sending, and waiting for what belongs to it.
+
+use alloc::rc::Rc;
+use core::time::Duration;
+
+use ringcat_wire::mailbox::Header;
+
+use super::error::MailboxError;
+use super::lane::{Arrival, Asked, Lane, LaneState};
+use super::reader;
+use super::room::Room;
+
+/// Time limits: until the mailbox takes the request, until the answer is there.
+pub type Limits = (Duration, Duration);
+
+/// Messages without an answer may stay in the mailbox for so long.
+const POST_LIMIT: Duration = Duration::from_millis(100);
+
+/// A lane of a mailbox, held by one conversation. Dropped, it is free for the next; what was asked and not answered is
+/// remembered, so that its answer is not taken for another's.
+#[derive(Debug)]
+pub struct Talk {
+    room: Rc<Room>,
+    lane: Lane,
+    turn: u32,
+    time: u32,
+    /// How long answers may take; late ones may take as long again.
+    limit: Duration,
+}
+
+/// A place in the queue for a lane; dropped while waiting, it is given up.
+struct Turn {
+    room: Rc<Room>,
+    lane: Lane,
+    turn: u32,
+    kept: bool,
+}
+
+impl Drop for Turn {
+    fn drop(&mut self) {
+        if !self.kept {
+            leave(&self.room, self.lane, self.turn);
+        }
+    }
+}
+
+fn leave(room: &Rc<Room>, lane: Lane, turn: u32) {
+    room.state().lanes[lane as usize].turns.retain(|other| *other != turn);
+    room.news.notify();
+}
+
+impl Talk {
+    /// Waits for the lane to be free.
+    pub(super) async fn take(room: &Rc<Room>, lane: Lane) -> Result<Talk, MailboxError> {
+        let (mut turn, time) = {
+            let state = &mut *room.state();
+            if !state.open {
+                return Err(MailboxError::Closed);
+            }
+            state.next_id = state.next_id.wrapping_add(1);
+            state.lanes[lane as usize].turns.push_back(state.next_id);
+            (Turn { room: room.clone(), lane, turn: state.next_id, kept: false }, state.time)
+        };
+        let ready = || {
+            let state = room.look();
+            if state.time != time {
+                return Some(Err(MailboxError::Closed));
+            }
+            (state.lanes[lane as usize].turns.front() == Some(&turn.turn)).then_some(Ok(()))
+        };
+        room.news.until(ready).await?;
+        turn.kept = true;
+        Ok(Talk { room: room.clone(), lane, turn: turn.turn, time, limit: Duration::ZERO })
+    }
+
+    fn with<T>(&self, work: impl FnOnce(&mut LaneState) -> T) -> Result<T, MailboxError> {
+        let state = &mut *self.room.state();
+        if state.time != self.time { Err(MailboxError::Closed) } else { Ok(work(&mut state.lanes[self.lane as usize])) }
+    }
+
+    /// Bytes of payload that a message may have in both directions.
+    pub fn capacity(&self) -> usize {
+        let state = self.room.look();
+        state.session.map_or(0, |session| {
+            usize::from(session.layout.receive_size.min(session.layout.send_size)).saturating_sub(Header::LEN)
+        })
+    }
+
+    /// Bytes of payload that a message to the SubDevice may have.
+    pub fn room(&self) -> usize {
+        let state = self.room.look();
+        state.session.map_or(0, |session| usize::from(session.layout.receive_size).saturating_sub(Header::LEN))
+    }
+
+    /// What the next request is about: a number by which [`Talk::late_mark`] tells requests apart.
+    pub fn mark(&mut self, mark: u16) {
+        let _ = self.with(|lane| lane.mark = mark);
+    }
+
+    /// The mark of a request that was given up and whose answer may still come.
+    pub fn late_mark(&self) -> Option<u16> {
+        self.with(|lane| lane.late_until.map(|_| lane.mark)).ok().flatten()
+    }
+
+    /// The answer that was late has come, or never will.
+    pub fn forget_late(&mut self) {
+        let _ = self.with(|lane| lane.late_until = None);
+    }
+
+    /// Waits until the answer to a request that was given up before has come or cannot come any more, in protocols whose
+    /// answers do not say to what they belong.
+    pub async fn settle(&mut self) -> Result<(), MailboxError> {
+        let now = self.room.bus.now();
+        let Some(until) = self.with(|lane| lane.late_until.take())?.filter(|until| *until > now) else { return Ok(()) };
+        self.with(|lane| lane.asked = Some(Asked::at(now)))?;
+        reader::start(&self.room);
+        let _ = self.arrival(until.since(now)).await;
+        self.with(|lane| {
+            lane.asked = None;
+            lane.forget_arrivals();
+        })
+    }
+
+    /// Sends a message to which no answer is waited for. It is written even when the talk ends.
+    pub fn post(&mut self, payload: &[u8]) -> Result<(), MailboxError> {
+        self.with(|_| ())?;
+        self.room.queue(self.lane, payload.to_vec(), POST_LIMIT, (self.turn, None)).map(drop)
+    }
+
+    /// Sends a message and waits until the SubDevice has it.
+    pub async fn send(&mut self, payload: &[u8], limit: Duration) -> Result<(), MailboxError> {
+        self.write(payload, limit, None).await
+    }
+
+    /// Sends a request and waits for the mail that `accept` takes for its answer; other mail of the lane is dropped and
+    /// counted.
+    pub async fn ask<T>(
+        &mut self,
+        payload: &[u8],
+        limits: Limits,
+        accept: impl FnMut(&[u8]) -> Option<T>,
+    ) -> Result<T, MailboxError> {
+        let answer = self.begin(payload, limits, accept).await?;
+        self.with(|lane| lane.asked = None)?;
+        Ok(answer)
+    }
+
+    /// As [`Talk::ask`], where further parts of the answer may follow: [`Talk::more`].
+    pub async fn begin<T>(
+        &mut self,
+        payload: &[u8],
+        limits: Limits,
+        accept: impl FnMut(&[u8]) -> Option<T>,
+    ) -> Result<T, MailboxError> {
+        self.limit = limits.1;
+        self.with(LaneState::forget_arrivals)?;
+        self.write(payload, limits.0, Some(limits.1)).await?;
+        self.answer(limits.1, accept).await
+    }
+
+    /// Waits for a further part of an answer.
+    pub async fn more<T>(
+        &mut self,
+        limit: Duration,
+        accept: impl FnMut(&[u8]) -> Option<T>,
+    ) -> Result<T, MailboxError> {
+        self.limit = limit;
+        self.look_on()?;
+        self.answer(limit, accept).await
+    }
+
+    /// Lets the reader look for more.
+    fn look_on(&mut self) -> Result<(), MailboxError> {
+        let now = self.room.bus.now();
+        self.with(|lane| {
+            if !lane.has_arrivals() {
+                lane.asked = Some(Asked::at(now));
+            }
+        })?;
+        reader::start(&self.room);
+        Ok(())
+    }
+
+    async fn write(&mut self, payload: &[u8], limit: Duration, asks: Option<Duration>) -> Result<(), MailboxError> {
+        let id = self.room.queue(self.lane, payload.to_vec(), limit, (self.turn, asks))?;
+        let ready = || match self.with(|lane| lane.written) {
+            Err(error) => Some(Err(error)),
+            Ok(Some((written, result))) if written == id => Some(result),
+            Ok(_) => None,
+        };
+        self.room.news.until(ready).await
+    }
+
+    async fn arrival(&self, limit: Duration) -> Result<Arrival, MailboxError> {
+        let ready = || self.with(LaneState::take).transpose();
+        match self.room.bus.within(limit, self.room.news.until(ready)).await {
+            Ok(arrival) => arrival,
+            Err(_) => Err(MailboxError::NoAnswer { limit }),
+        }
+    }
+
+    async fn answer<T>(
+        &mut self,
+        limit: Duration,
+        mut accept: impl FnMut(&[u8]) -> Option<T>,
+    ) -> Result<T, MailboxError> {
+        let until = self.room.bus.now() + limit;
+        loop {
+            let left = until.since(self.room.bus.now());
+            match self.arrival(left).await {
+                Ok(Arrival::Refused(reply)) => {
+                    self.with(|lane| lane.asked = None)?;
+                    return Err(MailboxError::Error(reply));
+                }
+                Ok(Arrival::Payload(payload)) => {
+                    if let Some(answer) = accept(&payload) {
+                        return Ok(answer);
+                    }
+                    self.room.state().counters.unclaimed += 1;
+                    self.look_on()?;
+                }
+                Err(MailboxError::NoAnswer { .. }) => {
+                    self.give_up();
+                    return Err(MailboxError::NoAnswer { limit });
+                }
+                Err(error) => return Err(error),
+            }
+        }
+    }
+
+    /// What was asked is no longer waited for; its answer may come late.
+    fn give_up(&mut self) {
+        let late_until = self.room.bus.now() + self.limit;
+        let _ = self.with(|lane| {
+            if lane.asked.take().is_some_and(|asked| !asked.answered) {
+                lane.late_until = Some(late_until);
+            }
+            lane.forget_arrivals();
+        });
+    }
+
+    /// A message that was queued and not written yet when the talk ends is taken back, unless nobody waits for it.
+    fn withdraw(&mut self) {
+        let _ = self.with(|lane| lane.outbox.retain(|message| message.asks.is_none()));
+    }
+}
+
+impl Drop for Talk {
+    fn drop(&mut self) {
+        self.withdraw();
+        self.give_up();
+        leave(&self.room, self.lane, self.turn);
+    }
+}

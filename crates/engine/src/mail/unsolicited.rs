@@ -1,0 +1,63 @@
+//! Mail that nobody asked for: kept until somebody takes it, bounded, with a count of what did not fit.
+
+use alloc::vec::Vec;
+
+use ringcat_wire::mailbox::Protocol;
+use ringcat_wire::mailbox::coe::Emergency;
+
+use super::ring::Ring;
+use crate::time::Instant;
+
+/// Emergencies that are kept.
+const EMERGENCIES: usize = 32;
+/// Fragments of Ethernet frames that are kept: a frame of 1,518 bytes in the smallest fragments, and some more.
+const ETHERNET: usize = 64;
+/// Mails of each other kind that are kept.
+const OTHERS: usize = 32;
+
+/// Kinds of mail that nobody asks for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Unsolicited {
+    /// Fragments of Ethernet frames (EoE).
+    Ethernet,
+    /// Notifications and emergencies of drives (SoE).
+    Soe,
+    /// Notifications and requests (AoE).
+    Aoe,
+    /// Messages of the vendor protocol (VoE).
+    Voe,
+    /// Everything else, late answers among them.
+    Other,
+}
+
+/// A mail that nobody asked for.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Unclaimed {
+    /// Its protocol.
+    pub protocol: Protocol,
+    /// What follows the mailbox header.
+    pub payload: Vec<u8>,
+}
+
+/// The rings.
+#[derive(Debug)]
+pub(super) struct Shelves {
+    emergencies: Ring<(Instant, Emergency)>,
+    rings: [Ring<Unclaimed>; 5],
+}
+
+impl Shelves {
+    pub(super) fn new() -> Shelves {
+        let capacity = |kind| if kind == Unsolicited::Ethernet { ETHERNET } else { OTHERS };
+        let kinds = [Unsolicited::Ethernet, Unsolicited::Soe, Unsolicited::Aoe, Unsolicited::Voe, Unsolicited::Other];
+        Shelves { emergencies: Ring::new(EMERGENCIES), rings: kinds.map(|kind| Ring::new(capacity(kind))) }
+    }
+
+    pub(super) fn emergencies(&mut self) -> &mut Ring<(Instant, Emergency)> {
+        &mut self.emergencies
+    }
+
+    pub(super) fn ring(&mut self, kind: Unsolicited) -> &mut Ring<Unclaimed> {
+        &mut self.rings[kind as usize]
+    }
+}

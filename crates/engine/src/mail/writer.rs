@@ -1,0 +1,128 @@
+//! Writing: one message after the other, the lanes in turn (facts 6.1).
+//!
+//! A lost write is sent again with the same counter until the SubDevice takes it, which drops it where the first one had
+//! arrived. No other message goes out meanwhile: one in between would make the old counter look new.
+
+use alloc::rc::Rc;
+use alloc::vec::Vec;
+use core::time::Duration;
+
+use ringcat_wire::address::{RegisterAddress, Wkc};
+use ringcat_wire::command::Command;
+use ringcat_wire::datagram::Target;
+use ringcat_wire::mailbox::{Header, next_counter};
+
+use super::error::MailboxError;
+use super::lane::{Lane, Outgoing};
+use super::reader;
+use super::room::{Room, Session};
+
+/// Pause between two attempts to write into a full mailbox: this one at first, growing to the longest.
+const FIRST_PAUSE: Duration = Duration::from_micros(100);
+/// Longest pause.
+const LONGEST_PAUSE: Duration = Duration::from_millis(1);
+/// A write is lost so often before it is given up, however long that takes.
+const RETRIES: usize = 5;
+
+/// Starts a writer unless one runs.
+pub(super) fn start(room: &Rc<Room>) {
+    let time = {
+        let state = &mut *room.state();
+        if state.writer == Some(state.time) {
+            return;
+        }
+        state.writer = Some(state.time);
+        state.time
+    };
+    let own = room.clone();
+    room.bus.spawn(async move { run(own, time).await });
+}
+
+async fn run(room: Rc<Room>, time: u32) {
+    while let Some((lane, message, session)) = next(&room, time) {
+        let result = write(&room, time, &session, lane, &message).await;
+        {
+            let state = &mut *room.state();
+            if state.time != time {
+                return;
+            }
+            state.blocked = false;
+            let now = room.bus.now();
+            state.counters.written += u64::from(result.is_ok());
+            state.lanes[lane as usize].wrote(&message, result, now);
+        }
+        room.tell();
+        reader::start(&room);
+    }
+}
+
+/// The next message, with the lanes in turn; `None` ends the writer.
+fn next(room: &Rc<Room>, time: u32) -> Option<(Lane, Outgoing, Session)> {
+    let state = &mut *room.state();
+    if state.time != time {
+        return None;
+    }
+    let count = Lane::ALL.len();
+    for step in 0..count {
+        let at = (state.next_lane + step) % count;
+        let Some(session) = state.session.as_mut().filter(|_| state.open) else { break };
+        if let Some(message) = state.lanes[at].outbox.pop_front() {
+            state.next_lane = (at + 1) % count;
+            session.counter = next_counter(session.counter);
+            return Some((Lane::ALL[at], message, *session));
+        }
+    }
+    state.writer = None;
+    None
+}
+
+async fn write(
+    room: &Rc<Room>,
+    time: u32,
+    session: &Session,
+    lane: Lane,
+    message: &Outgoing,
+) -> Result<(), MailboxError> {
+    let bus = &room.bus;
+    let mail = encode(session, lane, &message.payload);
+    let target = Target::Station(session.station, RegisterAddress(session.layout.receive_offset));
+    let until = bus.now() + message.limit;
+    let (mut losses, mut pause) = (0, FIRST_PAUSE);
+    loop {
+        match bus.transfer_once(Command::Fpwr, target, mail.clone()).await {
+            Ok(reply) if reply.wkc() != Wkc(0) => return Ok(()),
+            Ok(_) => {}
+            Err(error) => {
+                losses += 1;
+                room.state().counters.rewritten += 1;
+                if losses > RETRIES && bus.now() >= until {
+                    return Err(error.into());
+                }
+                if room.session(time).is_none() {
+                    return Err(MailboxError::Closed);
+                }
+                continue;
+            }
+        }
+        if bus.now() >= until {
+            return Err(MailboxError::Full { limit: message.limit });
+        }
+        // A SubDevice that cannot get rid of its own mail takes no other.
+        room.state().blocked = true;
+        reader::start(room);
+        bus.sleep(pause).await;
+        pause = (pause * 3 / 2).min(LONGEST_PAUSE);
+        if room.session(time).is_none() {
+            return Err(MailboxError::Closed);
+        }
+    }
+}
+
+/// The whole receive mailbox, so that its last byte is touched.
+fn encode(session: &Session, lane: Lane, payload: &[u8]) -> Vec<u8> {
+    let mut mail = session.blank();
+    let header = Header::new(lane.protocol(), session.counter, payload.len() as u16);
+    mail[..Header::LEN].copy_from_slice(&header.encode());
+    mail[Header::LEN..Header::LEN + payload.len()].copy_from_slice(payload);
+    mail
+}

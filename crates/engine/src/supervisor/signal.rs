@@ -1,0 +1,54 @@
+//! Waiting for what another procedure does.
+
+use alloc::rc::Rc;
+use alloc::vec::Vec;
+use core::cell::RefCell;
+use core::fmt;
+use core::future::poll_fn;
+use core::task::Poll;
+
+use super::executor::TaskId;
+use super::shared::Shared;
+
+/// Wakes procedures that wait for a condition which other procedures bring about.
+#[derive(Clone)]
+pub struct Signal {
+    shared: Rc<RefCell<Shared>>,
+    waiting: Rc<RefCell<Vec<TaskId>>>,
+}
+
+impl Signal {
+    pub(super) fn new(shared: Rc<RefCell<Shared>>) -> Signal {
+        Signal { shared, waiting: Rc::default() }
+    }
+
+    /// Lets all that wait look at their condition again.
+    pub fn notify(&self) {
+        let mut shared = self.shared.borrow_mut();
+        for task in self.waiting.borrow_mut().drain(..) {
+            shared.wake(task);
+        }
+    }
+
+    /// Waits until `ready` gives something; it is asked now and after each [`Signal::notify`].
+    pub async fn until<T>(&self, mut ready: impl FnMut() -> Option<T>) -> T {
+        poll_fn(|_| {
+            if let Some(value) = ready() {
+                return Poll::Ready(value);
+            }
+            let current = self.shared.borrow().current;
+            let mut waiting = self.waiting.borrow_mut();
+            if !waiting.contains(&current) {
+                waiting.push(current);
+            }
+            Poll::Pending
+        })
+        .await
+    }
+}
+
+impl fmt::Debug for Signal {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("Signal").field("waiting", &self.waiting.borrow().len()).finish()
+    }
+}
