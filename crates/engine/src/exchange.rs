@@ -274,6 +274,11 @@ impl Exchange {
         entry.write(self.image_mut(entry.domain), value);
     }
 
+    /// Whether frames are out that have not returned as expected. Those that are overdue count until they are given up.
+    pub fn in_flight(&self) -> bool {
+        self.frames.iter().any(CyclicFrame::is_waiting)
+    }
+
     /// State of the ring as the cyclic frames show it.
     pub fn ring(&self) -> RingState {
         self.monitor.state()

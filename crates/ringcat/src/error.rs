@@ -18,6 +18,10 @@ pub enum Error {
     Stop(StopError),
     /// The simulated segment cannot be built.
     Segment(SegmentError),
+    /// The system has no more threads.
+    Thread(std::io::Error),
+    /// The thread of the acyclic half has ended.
+    Gone,
 }
 
 impl fmt::Display for Error {
@@ -27,6 +31,8 @@ impl fmt::Display for Error {
             Error::Activate(error) => write!(f, "activation: {error}"),
             Error::Stop(error) => write!(f, "stop: {error}"),
             Error::Segment(error) => error.fmt(f),
+            Error::Thread(error) => write!(f, "a thread cannot be started: {error}"),
+            Error::Gone => f.write_str("the supervisor thread has ended"),
         }
     }
 }

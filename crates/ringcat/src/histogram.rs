@@ -1,8 +1,10 @@
 //! How often times of which length occurred: round trips, delays of wake-ups.
 //!
-//! Recording takes a few instructions and no memory. Times are kept with an error of at most an eighth.
+//! Recording takes a few instructions and no memory. Times are kept with an error of at most an eighth. One thread
+//! records; others may look meanwhile.
 
 use std::fmt;
+use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Duration;
 
 /// Buckets per doubling.
@@ -10,58 +12,80 @@ const FINE: usize = 8;
 /// Enough for any 64-bit number of nanoseconds.
 const BUCKETS: usize = 62 * FINE;
 
-/// Counts of times by their length.
-#[derive(Clone, Debug)]
+/// Counts of times by their length. The one thread that records needs no read-modify-write for it.
+#[derive(Debug)]
 pub struct Histogram {
-    buckets: Box<[u64]>,
-    count: u64,
-    shortest_ns: u64,
-    longest_ns: u64,
+    buckets: Box<[AtomicU64]>,
+    count: AtomicU64,
+    shortest_ns: AtomicU64,
+    longest_ns: AtomicU64,
 }
 
 impl Default for Histogram {
     fn default() -> Histogram {
-        Histogram { buckets: vec![0; BUCKETS].into_boxed_slice(), count: 0, shortest_ns: u64::MAX, longest_ns: 0 }
+        Histogram {
+            buckets: (0..BUCKETS).map(|_| AtomicU64::new(0)).collect(),
+            count: AtomicU64::new(0),
+            shortest_ns: AtomicU64::new(u64::MAX),
+            longest_ns: AtomicU64::new(0),
+        }
     }
 }
 
+fn get(word: &AtomicU64) -> u64 {
+    word.load(Ordering::Relaxed)
+}
+
+fn set(word: &AtomicU64, value: u64) {
+    word.store(value, Ordering::Relaxed);
+}
+
 impl Histogram {
-    /// Counts a time.
-    pub fn record(&mut self, time: Duration) {
+    /// Counts a time. For one thread only.
+    pub fn record(&self, time: Duration) {
         let ns = u64::try_from(time.as_nanos()).unwrap_or(u64::MAX);
-        if let Some(bucket) = self.buckets.get_mut(bucket_of(ns)) {
-            *bucket += 1;
+        if let Some(bucket) = self.buckets.get(bucket_of(ns)) {
+            set(bucket, get(bucket) + 1);
         }
-        self.count += 1;
-        self.shortest_ns = self.shortest_ns.min(ns);
-        self.longest_ns = self.longest_ns.max(ns);
+        set(&self.count, get(&self.count) + 1);
+        set(&self.shortest_ns, get(&self.shortest_ns).min(ns));
+        set(&self.longest_ns, get(&self.longest_ns).max(ns));
+    }
+
+    /// Forgets everything. For the thread that records.
+    pub fn clear(&self) {
+        for word in self.buckets.iter().chain([&self.count, &self.longest_ns]) {
+            set(word, 0);
+        }
+        set(&self.shortest_ns, u64::MAX);
     }
 
     /// How many times were counted.
     pub fn count(&self) -> u64 {
-        self.count
+        get(&self.count)
     }
 
     /// The shortest.
     pub fn shortest(&self) -> Duration {
-        Duration::from_nanos(if self.count == 0 { 0 } else { self.shortest_ns })
+        Duration::from_nanos(if self.count() == 0 { 0 } else { get(&self.shortest_ns) })
     }
 
     /// The longest.
     pub fn longest(&self) -> Duration {
-        Duration::from_nanos(self.longest_ns)
+        Duration::from_nanos(get(&self.longest_ns))
     }
 
     /// At least this part of all times, in parts per million, is not longer than the result.
     pub fn quantile(&self, parts_per_million: u32) -> Duration {
-        let rank = (u128::from(self.count) * u128::from(parts_per_million)).div_ceil(1_000_000) as u64;
+        let rank = (u128::from(self.count()) * u128::from(parts_per_million)).div_ceil(1_000_000) as u64;
         let mut seen = 0;
         let found = self.buckets.iter().position(|count| {
-            seen += count;
+            seen += get(count);
             seen >= rank
         });
         let limit_ns = found.map_or(0, |bucket| start_of(bucket + 1).saturating_sub(1));
-        Duration::from_nanos(limit_ns.clamp(self.shortest_ns.min(self.longest_ns), self.longest_ns))
+        let (shortest, longest) = (get(&self.shortest_ns), get(&self.longest_ns));
+        Duration::from_nanos(limit_ns.clamp(shortest.min(longest), longest))
     }
 }
 
@@ -113,7 +137,7 @@ mod tests {
 
     #[test]
     fn quantiles_are_at_most_an_eighth_too_long() {
-        let mut histogram = Histogram::default();
+        let histogram = Histogram::default();
         for us in 1..=1_000 {
             histogram.record(Duration::from_micros(us));
         }

@@ -100,21 +100,47 @@ impl ThreadArguments {
         }
     }
 
-    /// Gives the calling thread what was asked for, as far as that is permitted; what is not is told. The result keeps
-    /// processors awake while it lives.
+    /// Gives the calling thread and the process what was asked for. The result keeps processors awake while it lives.
     pub fn apply(self) -> Option<CpuLatency> {
-        let tell = |warning| eprintln!("ringcat: {warning}");
+        self.prepare_cycles();
+        self.prepare_process()
+    }
+
+    /// Gives the calling thread, which runs the cycles, what was asked for, as far as that is permitted; what is not is
+    /// told.
+    pub fn prepare_cycles(self) {
         realtime::precise_timers();
         if let Some(cpu) = self.cpu {
             let _ = realtime::affinity(cpu).map_err(tell);
         }
-        let priority = self.priority?;
-        let _ = realtime::lock_memory().map_err(tell);
-        if realtime::fifo(priority).map_err(tell).is_ok() && self.receive == Receive::Busy {
-            realtime::throttling().map(tell);
+        if let Some(priority) = self.priority
+            && realtime::fifo(priority).map_err(tell).is_ok()
+            && self.receive == Receive::Busy
+            && let Some(warning) = realtime::throttling()
+        {
+            tell(warning);
         }
+    }
+
+    /// Has the calling thread, which does everything but the cycles, run just below those.
+    pub fn prepare_supervisor(self) {
+        realtime::precise_timers();
+        if let Some(priority) = self.priority {
+            // Where it is not permitted, the thread of the cycles tells so.
+            let _ = realtime::fifo((priority - 1).max(1));
+        }
+    }
+
+    /// Locks memory and keeps processors awake, where a priority is asked for. The result does that while it lives.
+    pub fn prepare_process(self) -> Option<CpuLatency> {
+        self.priority?;
+        let _ = realtime::lock_memory().map_err(tell);
         CpuLatency::request(0).map_err(tell).ok()
     }
+}
+
+fn tell(warning: impl fmt::Display) {
+    eprintln!("ringcat: {warning}");
 }
 
 /// The options that name the interfaces.
@@ -131,14 +157,26 @@ pub struct InterfaceArguments {
 impl InterfaceArguments {
     /// Opens the interfaces; warns of who else uses them, and fails where no cable is plugged in.
     pub fn open(&self, thread: ThreadArguments) -> Result<PacketLinks, Failure> {
-        for name in self.names() {
-            for warning in exclusive_use(name) {
-                eprintln!("ringcat: {warning}");
-            }
-        }
+        self.warn_of_others();
         let links = PacketLinks::open(&self.main, self.redundant.as_deref(), thread.mode())?;
         self.await_carrier()?;
         Ok(links)
+    }
+
+    /// As [`InterfaceArguments::open`], for a thread of the cycles and one of the supervisor.
+    pub fn open_halves(&self, thread: ThreadArguments) -> Result<(PacketLinks, PacketLinks), Failure> {
+        self.warn_of_others();
+        let halves = PacketLinks::open_halves(&self.main, self.redundant.as_deref(), thread.mode())?;
+        self.await_carrier()?;
+        Ok(halves)
+    }
+
+    fn warn_of_others(&self) {
+        for name in self.names() {
+            for warning in exclusive_use(name) {
+                tell(warning);
+            }
+        }
     }
 
     /// Name of the interface of a link.

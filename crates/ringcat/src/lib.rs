@@ -28,20 +28,34 @@
 //!
 //! Frames, time and waiting come from the [`Links`]; everything that EtherCAT is lives in [`ringcat_engine`].
 
+pub mod acyclic;
 pub mod application;
+mod cyclic;
+pub mod cyclic_thread;
 mod error;
 pub mod histogram;
 pub mod links;
 pub mod main_device;
 pub mod memory;
+pub mod news;
+mod pace;
 pub mod packet;
+mod process_data;
+pub mod shared_segment;
 pub mod simulated;
+pub mod supervisor_thread;
 pub mod text;
+pub mod window;
 
-pub use application::{Application, LastOutputs, Pace, ProcessData};
+pub use acyclic::{AcyclicHalf, Inline};
+pub use application::{Application, LastOutputs};
+pub use cyclic_thread::CyclicThread;
 pub use error::Error;
 pub use links::Links;
 pub use main_device::{MainDevice, Options, Refused, automatic};
+pub use pace::{Pace, Trigger};
+pub use process_data::ProcessData;
+pub use supervisor_thread::SupervisorThread;
 
 pub use ringcat_engine::config::{
     ConfigAddress, PdoAssignment, PdoEntry, PdoMapping, SdoDownload, SubDeviceConfig, Timeouts, Watchdog,

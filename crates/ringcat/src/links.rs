@@ -6,7 +6,7 @@ use ringcat_wire::frame::MacAddress;
 
 /// One or two network interfaces with a clock.
 ///
-/// The runtime is single-threaded: it calls these in turn. [`Links::send`] and [`Links::receive`] are called in the
+/// Links belong to one thread, which calls these in turn. [`Links::send`] and [`Links::receive`] are called in the
 /// cyclic path and neither allocate nor wait.
 pub trait Links {
     /// Host time.
@@ -23,4 +23,9 @@ pub trait Links {
 
     /// Waits until a frame has arrived or the time has come.
     fn wait(&mut self, until: Instant);
+
+    /// Waits until the time has come. No frame is expected: one that arrives all the same may end the wait or not.
+    fn sleep(&mut self, until: Instant) {
+        self.wait(until);
+    }
 }

@@ -1,5 +1,6 @@
 //! A MainDevice on its links before it is active.
 
+use std::sync::Arc;
 use std::time::Duration;
 
 use ringcat_engine::config::SubDeviceConfig;
@@ -12,6 +13,7 @@ use ringcat_engine::procedures::scan::Scan;
 use ringcat_engine::supervisor::AcyclicCounters;
 use ringcat_engine::time::Instant;
 
+use crate::acyclic::Inline;
 use crate::application::Application;
 use crate::error::Error;
 use crate::links::Links;
@@ -40,6 +42,21 @@ impl Default for Options {
     }
 }
 
+impl Options {
+    /// An engine for these links.
+    pub(crate) fn engine(&self, links: &impl Links) -> Engine {
+        let (main, redundant) = links.addresses();
+        let options = Engineering {
+            sii_cache: self.sii_cache,
+            supervision: self.supervision,
+            settle: self.settle,
+            patience: self.patience,
+            ..Engineering::new(main, redundant)
+        };
+        Engine::new(options, links.now())
+    }
+}
+
 /// A MainDevice that has links and sends nothing by itself yet.
 #[derive(Debug)]
 pub struct MainDevice<L> {
@@ -50,15 +67,7 @@ pub struct MainDevice<L> {
 impl<L: Links> MainDevice<L> {
     /// A MainDevice on these links.
     pub fn request(links: L, options: &Options) -> MainDevice<L> {
-        let (main, redundant) = links.addresses();
-        let options = Engineering {
-            sii_cache: options.sii_cache,
-            supervision: options.supervision,
-            settle: options.settle,
-            patience: options.patience,
-            ..Engineering::new(main, redundant)
-        };
-        let engine = Engine::new(options, links.now());
+        let engine = options.engine(&links);
         MainDevice { links, engine }
     }
 
@@ -106,9 +115,9 @@ impl<L: Links> MainDevice<L> {
     /// # Errors
     /// A declaration that does not fit what was scanned, or process data that does not fit frames. The MainDevice comes
     /// back with the error, for another try.
-    pub fn activate(mut self, declaration: Declaration) -> Result<Application<L>, Box<Refused<L>>> {
+    pub fn activate(mut self, declaration: Declaration) -> Result<Application<L>, Box<Refused<MainDevice<L>>>> {
         match self.engine.activate(declaration) {
-            Ok(active) => Ok(Application::new(self.links, self.engine, active)),
+            Ok(active) => Ok(Application::new(self.links, Inline(self.engine), active, Arc::default())),
             Err(error) => Err(Box::new(Refused { error: error.into(), main_device: self })),
         }
     }
@@ -140,15 +149,15 @@ impl<L: Links> MainDevice<L> {
 
 /// A declaration that was not activated.
 #[derive(Debug)]
-pub struct Refused<L> {
+pub struct Refused<M> {
     /// Why.
     pub error: Error,
     /// The MainDevice as it was.
-    pub main_device: MainDevice<L>,
+    pub main_device: M,
 }
 
-impl<L> From<Box<Refused<L>>> for Error {
-    fn from(refused: Box<Refused<L>>) -> Error {
+impl<M> From<Box<Refused<M>>> for Error {
+    fn from(refused: Box<Refused<M>>) -> Error {
         refused.error
     }
 }

@@ -1,11 +1,11 @@
-//! Links that are network interfaces: one packet socket each, in the application's thread.
+//! Links that are network interfaces: one packet socket each, or two where both halves have threads of their own.
 //!
 //! Time is `CLOCK_MONOTONIC`. How [`Links::wait`] waits is the user's choice ([`ReceiveMode`]): asleep, spinning, or one
 //! after the other. A link that goes down swallows frames and works again as soon as it is back.
 
 use ringcat_engine::link::Link;
 use ringcat_engine::time::Instant;
-use ringcat_link::{LinkCounters, LinkError, PacketOptions, PacketSocket, ReceiveMode, monotonic};
+use ringcat_link::{ClassFilter, LinkCounters, LinkError, PacketOptions, PacketSocket, ReceiveMode, monotonic};
 use ringcat_wire::frame::MacAddress;
 
 use crate::links::Links;
@@ -24,7 +24,32 @@ impl PacketLinks {
     /// # Errors
     /// An interface that is not there or carries no Ethernet, or a missing permission.
     pub fn open(main: &str, redundant: Option<&str>, mode: ReceiveMode) -> Result<PacketLinks, LinkError> {
-        let options = PacketOptions { receive: mode, ..PacketOptions::default() };
+        PacketLinks::open_class(main, redundant, mode, ClassFilter::All)
+    }
+
+    /// Opens the interfaces twice: for the frames of the cyclic half, to be waited for in this mode, and for those of the
+    /// acyclic half, to be slept for.
+    ///
+    /// # Errors
+    /// As [`PacketLinks::open`].
+    pub fn open_halves(
+        main: &str,
+        redundant: Option<&str>,
+        cyclic: ReceiveMode,
+    ) -> Result<(PacketLinks, PacketLinks), LinkError> {
+        Ok((
+            PacketLinks::open_class(main, redundant, cyclic, ClassFilter::Cyclic)?,
+            PacketLinks::open_class(main, redundant, ReceiveMode::Blocking, ClassFilter::Acyclic)?,
+        ))
+    }
+
+    fn open_class(
+        main: &str,
+        redundant: Option<&str>,
+        mode: ReceiveMode,
+        filter: ClassFilter,
+    ) -> Result<PacketLinks, LinkError> {
+        let options = PacketOptions { receive: mode, filter, ..PacketOptions::default() };
         let redundant = redundant.map(|name| PacketSocket::open(name, &options)).transpose()?;
         Ok(PacketLinks { main: PacketSocket::open(main, &options)?, redundant, mode })
     }
@@ -65,5 +90,13 @@ impl Links for PacketLinks {
             Some(redundant) => ringcat_link::wait(&[&self.main, redundant], until.0, self.mode),
             None => ringcat_link::wait(&[&self.main], until.0, self.mode),
         };
+    }
+
+    fn sleep(&mut self, until: Instant) {
+        match self.mode {
+            // A processor that is spun on stays awake and answers at once.
+            ReceiveMode::BusyPoll => self.wait(until),
+            ReceiveMode::Blocking | ReceiveMode::Hybrid { .. } => monotonic::sleep_until_ns(until.0),
+        }
     }
 }

@@ -1,19 +1,22 @@
 //! `ringcat run`: everything on the wire to OP as its SII says, process data in a fixed cycle, and an orderly stop.
 //!
-//! Outputs stay zero: this command knows of no application. What keeps the cycle from its time is told apart: wake-ups
+//! Cycles have a thread of their own, and so has everything else; this one only tells. Outputs stay zero: this command
+//! knows of no application. What keeps the cycle from its time is told apart: wake-ups
 //! that came late and cycles that were left out are this machine's, lost frames are the wire's.
 
 use std::io::{IsTerminal, stdout};
+use std::ops::ControlFlow;
 use std::sync::atomic::AtomicBool;
+use std::thread::sleep;
 use std::time::Duration;
 
 use clap::Args;
-use ringcat::histogram::Histogram;
+use ringcat::news::News;
 use ringcat::packet::PacketLinks;
-use ringcat::text::{Names, describe};
+use ringcat::text::{Names, address_of_sender, describe};
 use ringcat::{
-    Application, DomainId, DomainStatus, Event, Instant, LastOutputs, Link, MainDevice, Options, SubDeviceState,
-    automatic,
+    Application, CyclicThread, DomainId, Event, Instant, LastOutputs, Link, Links, Options, SubDeviceState,
+    SupervisorThread, automatic,
 };
 use ringcat_wire::al::AlState;
 
@@ -25,6 +28,8 @@ use crate::surroundings::Surroundings;
 const OP_LIMIT: Duration = Duration::from_secs(60);
 /// SubDevices have this long to get to INIT in the end.
 const STOP_LIMIT: Duration = Duration::from_secs(5);
+/// Pause between two looks at what the threads do.
+const LOOK: Duration = Duration::from_millis(1);
 /// The live line is written anew so often.
 const LIVE: Duration = Duration::from_millis(500);
 
@@ -77,70 +82,84 @@ fn time(text: &str) -> Result<Duration, String> {
 /// Runs cycles; true where all SubDevices reached OP and no frame was lost afterwards.
 pub fn run(arguments: &RunArguments) -> Result<bool, Failure> {
     let end = end_request();
-    let links = arguments.interfaces.open(arguments.thread)?;
-    let mut surroundings = Surroundings::watch(&arguments.interfaces, &links);
-    let _awake = arguments.thread.apply();
-    let mut main_device = MainDevice::request(links, &Options::default());
-    let begin = ringcat_link::monotonic::now_ns();
-    let result = main_device.scan_with(|event| {
-        tell_of_others(&mut surroundings, &event.event);
+    let thread = arguments.thread;
+    let (mut cyclic, acyclic) = arguments.interfaces.open_halves(thread)?;
+    let mut surroundings = Surroundings::watch(&arguments.interfaces, &cyclic);
+    let _awake = thread.prepare_process();
+    let begin = now();
+    let supervisor = SupervisorThread::start(acyclic, &Options::default(), move || thread.prepare_supervisor())?;
+    let mut others = 0;
+    let result = supervisor.scan_while(|| {
+        tell_events(&supervisor, &mut surroundings);
+        others += tell_of_others(&mut cyclic, &mut surroundings);
     });
-    let foreign = main_device.acyclic_counters().foreign;
-    let scan = result.map_err(|error| surroundings.explain(error, foreign))?;
+    let scan = result.map_err(|error| surroundings.explain(error, others + supervisor.counters().foreign))?;
     say!("{} SubDevices; cycle {} us", scan.subdevices.len(), arguments.cycle.as_micros());
     let names = Names(scan.subdevices.iter().map(|info| info.name.clone()).collect());
-    let application =
-        main_device.activate(automatic(&scan.subdevices, arguments.cycle)).map_err(ringcat::Error::from)?;
-    let mut run = Run {
-        application,
-        names,
-        begin: Instant(begin),
-        wake_ups: Histogram::default(),
-        live: Live { terminal: stdout().is_terminal(), next: Instant(0), open: false },
-        judgements_told: 0,
-        surroundings,
-    };
+    let declaration = automatic(&scan.subdevices, arguments.cycle);
+    let application = supervisor.activate(declaration, cyclic).map_err(ringcat::Error::from)?;
+    let cycles = application.start_cycles(move || thread.prepare_cycles(), |_| ControlFlow::Continue(()))?;
+    let live = Live { terminal: stdout().is_terminal(), next: Instant(0), open: false };
+    let mut run = Run { cycles, names, begin, live, judgements_told: 0, surroundings };
     let in_op = run.reach_op(&end);
-    let before = run.application.cyclic_counters();
+    let before = run.cycles.news().counters();
     if in_op {
-        let until = arguments.lasts.map_or(Instant::NEVER, |lasts| run.application.now() + lasts);
+        let until = arguments.lasts.map_or(Instant::NEVER, |lasts| now() + lasts);
         run.exchange(until, &end);
     }
-    let counters = run.application.cyclic_counters();
-    run.summary();
-    let application = run.application;
+    let application = run.cycles.end()?;
+    summary(&application, &run.surroundings);
+    let lost = application.cyclic_counters().lost - before.lost;
     application.stop(LastOutputs::Zero, AlState::Init, STOP_LIMIT)?;
     say!("  stopped: outputs zero, all SubDevices in INIT");
-    Ok(in_op && counters.lost == before.lost)
+    Ok(in_op && lost == 0)
+}
+
+fn now() -> Instant {
+    Instant(ringcat_link::monotonic::now_ns())
 }
 
 struct Run {
-    application: Application<PacketLinks>,
+    cycles: CyclicThread<PacketLinks>,
     names: Names,
     begin: Instant,
-    wake_ups: Histogram,
     live: Live,
     judgements_told: u32,
     surroundings: Surroundings,
 }
 
-/// Tells of a MainDevice that has not been told of; whether the event was a frame of one.
-fn tell_of_others(surroundings: &mut Surroundings, event: &Event) -> bool {
-    let noted = surroundings.note(event);
-    noted.iter().flatten().for_each(|words| eprintln!("ringcat: {words}"));
-    noted.is_some()
+/// Tells of other MainDevices among the events of a scan.
+fn tell_events(supervisor: &SupervisorThread, surroundings: &mut Surroundings) {
+    while let Some(event) = supervisor.pop_event() {
+        surroundings.note(&event.event).iter().flatten().for_each(|words| eprintln!("ringcat: {words}"));
+    }
+}
+
+/// Frames that arrive for the cyclic half before it sends any are those of other MainDevices. Returns how many.
+fn tell_of_others(links: &mut PacketLinks, surroundings: &mut Surroundings) -> u64 {
+    let mut count = 0;
+    while links.receive(&mut |link, frame| {
+        count += 1;
+        if let Some(source) = address_of_sender(frame) {
+            surroundings.tell_sender(link, source);
+        }
+    }) {}
+    count
 }
 
 impl Run {
-    /// One cycle; its domain's judgement.
-    fn cycle(&mut self) -> DomainStatus {
-        let status = self.application.cycle(|data| data.status(DomainId(0)));
-        self.wake_ups.record(self.application.pace().last_delay);
-        while let Some(event) = self.application.pop_event() {
+    /// Tells what has happened since the last look.
+    fn look(&mut self) {
+        if let Some((link, source)) = self.cycles.news().foreign() {
+            self.surroundings.tell_sender(link, source);
+        }
+        while let Some(event) = self.cycles.supervisor().pop_event() {
             match event.event {
                 Event::Skipped { .. } => continue,
-                Event::ForeignFrame { .. } => {
-                    tell_of_others(&mut self.surroundings, &event.event);
+                Event::ForeignFrame { arrived_on, bytes } => {
+                    if let Some(source) = address_of_sender(&bytes) {
+                        self.surroundings.tell_sender(arrived_on, source);
+                    }
                     continue;
                 }
                 Event::Domain { .. } if self.judgements_told == JUDGEMENTS_TOLD => continue,
@@ -150,100 +169,99 @@ impl Run {
             self.live.end();
             say!("{:>12.3} ms  {}", self.since_begin(event.at), describe(&event.event, &self.names));
         }
-        status
     }
 
     fn since_begin(&self, at: Instant) -> f64 {
         at.since(self.begin).as_secs_f64() * 1e3
     }
 
-    /// Cycles until all SubDevices are in OP; false where somebody does not get there, or the user does not want it.
+    /// Until all SubDevices are in OP; false where somebody does not get there, or the user does not want it.
     fn reach_op(&mut self, end: &AtomicBool) -> bool {
-        let until = self.application.now() + OP_LIMIT;
-        while !self.application.all_settled() {
-            if is_asked(end) {
+        let until = now() + OP_LIMIT;
+        while !self.cycles.supervisor().all_settled() {
+            if is_asked(end) || self.cycles.has_ended() {
                 return false;
             }
-            if self.application.now() >= until {
-                say!("not all SubDevices reached OP within {} s:", OP_LIMIT.as_secs());
-                for (subdevice, state) in self.application.states().iter().enumerate() {
-                    let state = match state {
-                        SubDeviceState::Absent => "does not answer".to_owned(),
-                        SubDeviceState::Configuring => "is being configured".to_owned(),
-                        SubDeviceState::Settled(state) => state.to_string(),
-                    };
-                    let name = self.names.0.get(subdevice).map_or("", String::as_str);
-                    say!("  SubDevice {subdevice} \"{name}\": {state}");
-                }
+            if now() >= until {
+                self.tell_states();
                 return false;
             }
-            self.cycle();
+            self.look();
+            sleep(LOOK);
         }
-        let now = self.application.now();
-        say!("{:>12.3} ms  all SubDevices are in OP", self.since_begin(now));
-        self.application.reset_round_trips();
-        self.wake_ups = Histogram::default();
+        let reached = now();
+        self.look();
+        say!("{:>12.3} ms  all SubDevices are in OP", self.since_begin(reached));
+        self.cycles.news().restart_histograms();
         true
     }
 
-    fn exchange(&mut self, until: Instant, end: &AtomicBool) {
-        while self.application.now() < until && !is_asked(end) {
-            let status = self.cycle();
-            self.live.show(&self.application, status);
+    fn tell_states(&self) {
+        say!("not all SubDevices reached OP within {} s:", OP_LIMIT.as_secs());
+        for (subdevice, state) in self.cycles.supervisor().states().iter().enumerate() {
+            let state = match state {
+                SubDeviceState::Absent => "does not answer".to_owned(),
+                SubDeviceState::Configuring => "is being configured".to_owned(),
+                SubDeviceState::Settled(state) => state.to_string(),
+            };
+            let name = self.names.0.get(subdevice).map_or("", String::as_str);
+            say!("  SubDevice {subdevice} \"{name}\": {state}");
         }
-        self.live.end();
     }
 
-    fn summary(&self) {
-        let application = &self.application;
-        let (pace, cyclic, acyclic) =
-            (application.pace(), application.cyclic_counters(), application.acyclic_counters());
-        say!("\nsummary");
-        say!(
-            "  cycles: {}, judged not complete: {}, frames still out: {}",
-            pace.cycles,
-            cyclic.incomplete,
-            cyclic.skipped
-        );
-        say!(
-            "  this machine: {} late wake-ups (more than a tenth of the cycle), {} cycles left out, the latest by {:.3} ms",
-            pace.late,
-            pace.skipped,
-            pace.longest_delay.as_secs_f64() * 1e3
-        );
-        say!(
-            "  the wire: {} frames sent, {} lost, {} copies lost, {} late, {} corrupt",
-            cyclic.sent,
-            cyclic.lost,
-            cyclic.copies_lost + cyclic.half,
-            cyclic.late,
-            cyclic.corrupt
-        );
-        say!(
-            "  everything else: {} frames with {} datagrams, {} sent again",
-            acyclic.sent,
-            acyclic.datagrams,
-            acyclic.resent
-        );
-        if cyclic.foreign + acyclic.foreign > 0 {
-            let (frames, senders) = (cyclic.foreign + acyclic.foreign, self.surroundings.senders());
-            say!("  other MainDevices: {frames} frames, {senders}");
+    fn exchange(&mut self, until: Instant, end: &AtomicBool) {
+        while now() < until && !is_asked(end) && !self.cycles.has_ended() {
+            self.look();
+            self.live.show(self.cycles.news());
+            sleep(LOOK.min(until.since(now())));
         }
-        for link in [Link::Main, Link::Redundant] {
-            let Some(counters) = application.links().counters(link) else { continue };
-            say!(
-                "  {link}: {} sent, {} received; not sent: {} interface down, {} queue full, {} refused; {} overrun",
-                counters.sent,
-                counters.received,
-                counters.down,
-                counters.busy,
-                counters.refused,
-                counters.overrun
-            );
-        }
-        say!("  round trips of process data: {}", application.round_trips());
-        say!("  wake-ups after their time: {}", self.wake_ups);
+        self.look();
+        self.live.end();
     }
+}
+
+fn summary(application: &Application<PacketLinks, SupervisorThread>, surroundings: &Surroundings) {
+    let (pace, cyclic, acyclic) = (application.pace(), application.cyclic_counters(), application.acyclic_counters());
+    say!("\nsummary");
+    say!("  cycles: {}, judged not complete: {}, frames still out: {}", pace.cycles, cyclic.incomplete, cyclic.skipped);
+    say!(
+        "  this machine: {} late wake-ups (more than a tenth of the cycle), {} cycles left out, the latest by {:.3} ms",
+        pace.late,
+        pace.skipped,
+        pace.longest_delay.as_secs_f64() * 1e3
+    );
+    say!(
+        "  the wire: {} frames sent, {} lost, {} copies lost, {} late, {} corrupt",
+        cyclic.sent,
+        cyclic.lost,
+        cyclic.copies_lost + cyclic.half,
+        cyclic.late,
+        cyclic.corrupt
+    );
+    say!(
+        "  everything else: {} frames with {} datagrams, {} sent again",
+        acyclic.sent,
+        acyclic.datagrams,
+        acyclic.resent
+    );
+    if cyclic.foreign + acyclic.foreign > 0 {
+        let (frames, senders) = (cyclic.foreign + acyclic.foreign, surroundings.senders());
+        say!("  other MainDevices: {frames} frames, {senders}");
+    }
+    for link in [Link::Main, Link::Redundant] {
+        let Some(counters) = application.links().counters(link) else { continue };
+        say!(
+            "  {link}: {} sent, {} received; not sent: {} interface down, {} queue full, {} refused; {} overrun",
+            counters.sent,
+            counters.received,
+            counters.down,
+            counters.busy,
+            counters.refused,
+            counters.overrun
+        );
+    }
+    say!("  round trips of process data: {}", application.round_trips());
+    say!("  wake-ups after their time: {}", application.news().wake_ups());
 }
 
 /// A line on a terminal that shows how it goes.
@@ -254,23 +272,23 @@ struct Live {
 }
 
 impl Live {
-    fn show(&mut self, application: &Application<PacketLinks>, status: DomainStatus) {
-        let now = application.now();
+    fn show(&mut self, news: &News) {
+        let now = now();
         if !self.terminal || now < self.next {
             return;
         }
         self.next = now + LIVE;
-        let (pace, cyclic) = (application.pace(), application.cyclic_counters());
+        let (pace, cyclic, status) = (news.pace(), news.counters(), news.status(DomainId(0)));
         write(format_args!(
             "\r{:>9} cycles  wkc {}/{}  ring {:?}  late {}  left out {}  lost {}  round trip {:.1} us ",
             pace.cycles,
             status.wkc,
             status.expected,
-            application.ring(),
+            news.ring(),
             pace.late,
             pace.skipped,
             cyclic.lost,
-            application.round_trips().quantile(500_000).as_nanos() as f64 / 1e3
+            news.round_trips().quantile(500_000).as_nanos() as f64 / 1e3
         ));
         self.open = true;
     }

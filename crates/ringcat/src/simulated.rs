@@ -17,9 +17,9 @@ use ringcat_wire::frame::MacAddress;
 use crate::links::Links;
 
 /// Address of the main interface: locally administered would set the bit that controllers set, so a plain one.
-const MAIN: MacAddress = MacAddress([0x00, 0x00, 0x5E, 0x00, 0x53, 0x01]);
+pub(crate) const MAIN: MacAddress = MacAddress([0x00, 0x00, 0x5E, 0x00, 0x53, 0x01]);
 /// Address of the redundant interface.
-const REDUNDANT: MacAddress = MacAddress([0x00, 0x00, 0x5E, 0x00, 0x53, 0x02]);
+pub(crate) const REDUNDANT: MacAddress = MacAddress([0x00, 0x00, 0x5E, 0x00, 0x53, 0x02]);
 /// Being ahead of the wall clock by less than this is not worth a sleep.
 const SLEEP_THRESHOLD: Duration = Duration::from_micros(100);
 
@@ -90,7 +90,7 @@ impl SimulatedSegment {
     }
 }
 
-const fn host_link(link: Link) -> HostLink {
+pub(crate) const fn host_link(link: Link) -> HostLink {
     match link {
         Link::Main => HostLink::Main,
         Link::Redundant => HostLink::Redundant,

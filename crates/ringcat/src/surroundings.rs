@@ -16,6 +16,7 @@ use ringcat::{Error, Event, Link, ScanError};
 use ringcat_engine::main_device::Options;
 use ringcat_engine::ring::identity::{Classified, Identity};
 use ringcat_link::{Listener, Sender};
+use ringcat_wire::frame::MacAddress;
 
 use crate::interfaces::{Failure, InterfaceArguments};
 
@@ -48,18 +49,27 @@ impl Surroundings {
     /// ones.
     pub fn note(&mut self, event: &Event) -> Option<Option<String>> {
         let Event::ForeignFrame { arrived_on, bytes } = event else { return None };
-        let source = address_of_sender(bytes)?;
-        let sender = (*arrived_on, std::array::from_fn(|at| source.0[at] & SENDER_MASK[at]));
+        Some(self.note_sender(*arrived_on, address_of_sender(bytes)?))
+    }
+
+    /// Takes note of the sender of a foreign frame. The words to tell, if there are new ones.
+    pub fn note_sender(&mut self, arrived_on: Link, source: MacAddress) -> Option<String> {
+        let sender = (arrived_on, std::array::from_fn(|at| source.0[at] & SENDER_MASK[at]));
         if self.senders.contains(&sender) || self.senders.len() == SENDERS_TOLD {
-            return Some(None);
+            return None;
         }
         self.senders.push(sender);
-        Some(Some(format!(
+        Some(format!(
             "another MainDevice sends into this segment: frames from {} arrive on {} ({arrived_on}); the first bytes of \
              the address may carry marks. Stop one of the two, or unplug its cable",
             address(source),
-            self.interfaces.name(*arrived_on)
-        )))
+            self.interfaces.name(arrived_on)
+        ))
+    }
+
+    /// Tells of the sender of a foreign frame, if it has not been told of.
+    pub fn tell_sender(&mut self, arrived_on: Link, source: MacAddress) {
+        self.note_sender(arrived_on, source).iter().for_each(|words| eprintln!("ringcat: {words}"));
     }
 
     /// Why a scan or a run failed, with what was noticed; `foreign` counts the frames of others.

@@ -1,0 +1,93 @@
+//! Where the acyclic half runs: in the thread of the cycles, or in one of its own.
+
+use ringcat_engine::event::TimedEvent;
+use ringcat_engine::link::Link;
+use ringcat_engine::main_device::{MainDevice as Engine, SubDeviceState};
+use ringcat_engine::supervisor::AcyclicCounters;
+use ringcat_engine::time::Instant;
+
+use crate::links::Links;
+use crate::window::{Half, Window};
+
+/// What an application needs of the acyclic half, wherever that runs.
+pub trait AcyclicHalf {
+    /// Whether its frames come over the links of the cyclic half.
+    const SHARES_LINKS: bool;
+
+    /// Takes in a frame of its class that arrived on shared links.
+    fn receive(&mut self, link: Link, frame: &[u8], now: Instant);
+
+    /// Goes on with its work, and sends on shared links as far as the window allows.
+    fn work(&mut self, links: &mut impl Links, window: &Window);
+
+    /// When it has work again.
+    fn wake(&self) -> Instant;
+
+    /// How far each declared SubDevice is. Not for the cyclic path.
+    fn states(&self) -> Vec<SubDeviceState>;
+
+    /// Whether every declared SubDevice is in its target state.
+    fn all_settled(&self) -> bool;
+
+    /// Takes the oldest event. Not for the cyclic path: events own memory.
+    fn pop_event(&mut self, now: Instant) -> Option<TimedEvent>;
+
+    /// Its counters. Not for the cyclic path.
+    fn counters(&self) -> AcyclicCounters;
+}
+
+/// The acyclic half in the thread of the cycles, on the same links: what tests and simple applications use.
+#[derive(Debug)]
+pub struct Inline(pub(crate) Engine);
+
+impl AcyclicHalf for Inline {
+    const SHARES_LINKS: bool = true;
+
+    fn receive(&mut self, link: Link, frame: &[u8], now: Instant) {
+        self.0.receive(link, frame, now);
+    }
+
+    fn work(&mut self, links: &mut impl Links, window: &Window) {
+        work(&mut self.0, links, window);
+    }
+
+    fn wake(&self) -> Instant {
+        self.0.next_deadline().unwrap_or(Instant::NEVER)
+    }
+
+    fn states(&self) -> Vec<SubDeviceState> {
+        self.0.states()
+    }
+
+    fn all_settled(&self) -> bool {
+        self.0.all_settled()
+    }
+
+    fn pop_event(&mut self, now: Instant) -> Option<TimedEvent> {
+        self.0.pop_event(now)
+    }
+
+    fn counters(&self) -> AcyclicCounters {
+        self.0.counters()
+    }
+}
+
+/// Lets procedures go on and sends what they ask for, as far as the window allows. True where something has to wait for
+/// the next window.
+pub(crate) fn work(engine: &mut Engine, links: &mut impl Links, window: &Window) -> bool {
+    let now = links.now();
+    engine.poll(now);
+    if !engine.wants_to_send() {
+        return false;
+    }
+    let budget = window.bytes(now);
+    if budget > 0 {
+        engine.transmit(now, budget, &mut |link, frame| {
+            if link == Link::Main {
+                window.occupy(Half::Acyclic, now, frame.len());
+            }
+            links.send(link, frame);
+        });
+    }
+    engine.wants_to_send()
+}

@@ -1,0 +1,209 @@
+//! The cyclic half as the runtime runs it: when a cycle begins, which domains are due in it, what is counted.
+//!
+//! Nothing here waits, allocates or locks.
+
+use std::sync::Arc;
+use std::time::Duration;
+
+use ringcat_engine::domain::{DomainId, DomainStatus};
+use ringcat_engine::exchange::{Exchange, Received};
+use ringcat_engine::link::Link;
+use ringcat_engine::main_device::{Active, Directory};
+use ringcat_engine::time::Instant;
+
+use crate::links::Links;
+use crate::news::News;
+use crate::pace::{Pace, Trigger};
+use crate::process_data::{ProcessData, Rate};
+use crate::window::{Half, SHORTEST, Window};
+
+/// A cycle is late when it begins this part of its period after its time.
+const LATE_FRACTION: u32 = 10;
+/// Period of an application without domains.
+const IDLE_PERIOD: Duration = Duration::from_millis(1);
+
+#[derive(Debug)]
+pub(crate) struct Cyclic {
+    pub exchange: Exchange,
+    pub directory: Directory,
+    pub pace: Pace,
+    pub news: Arc<News>,
+    rates: Vec<Rate>,
+    period: Duration,
+    trigger: Trigger,
+    /// The next cycle begins now at the latest.
+    next_cycle: Instant,
+    /// With [`Trigger::FramesReturned`] it may begin from now on.
+    earliest: Instant,
+    cycle: u64,
+    /// When process data was sent last.
+    sent_at: Instant,
+    window: Arc<Window>,
+}
+
+impl Cyclic {
+    pub fn new(active: Active, window: Arc<Window>, now: Instant) -> Cyclic {
+        let periods = active.periods;
+        let period = periods.iter().copied().min().unwrap_or(IDLE_PERIOD).max(Duration::from_micros(1));
+        let rate = |domain: &Duration| Rate {
+            divider: (domain.as_nanos() / period.as_nanos()).max(1) as u64,
+            status: DomainStatus::default(),
+        };
+        let next_cycle = now + period;
+        window.expect_cycle(next_cycle);
+        Cyclic {
+            exchange: active.exchange,
+            directory: active.directory,
+            pace: Pace::default(),
+            news: Arc::new(News::new(periods.len())),
+            rates: periods.iter().map(rate).collect(),
+            period,
+            trigger: Trigger::default(),
+            next_cycle,
+            earliest: next_cycle,
+            cycle: 0,
+            sent_at: Instant::NEVER,
+            window,
+        }
+    }
+
+    pub fn set_trigger(&mut self, trigger: Trigger) {
+        self.trigger = trigger;
+    }
+
+    /// Takes in a frame of the cyclic class or of nobody known.
+    pub fn receive(&mut self, link: Link, frame: &[u8], now: Instant) {
+        if self.exchange.receive(link, frame, now) == Received::Taken {
+            self.news.round_trips().record(now.since(self.sent_at));
+        }
+    }
+
+    /// Whether a cycle begins now.
+    pub fn begins(&self, now: Instant) -> bool {
+        now >= self.next_cycle || (self.may_begin_early() && now >= self.earliest)
+    }
+
+    /// When to look again whether a cycle begins, unless a frame arrives before.
+    pub fn wake(&self) -> Instant {
+        if self.may_begin_early() { self.earliest.min(self.next_cycle) } else { self.next_cycle }
+    }
+
+    fn may_begin_early(&self) -> bool {
+        matches!(self.trigger, Trigger::FramesReturned { .. }) && !self.exchange.in_flight()
+    }
+
+    /// A cycle begins: notes how late it is, judges what is due.
+    pub fn begin(&mut self, now: Instant) {
+        self.keep_pace(now);
+        for (number, rate) in self.rates.iter_mut().enumerate() {
+            if self.cycle.is_multiple_of(rate.divider) {
+                rate.status = self.exchange.process(DomainId(number), now);
+            }
+        }
+    }
+
+    /// Notes how late the cycle is, and when the next one begins; leaves out those whose time has passed meanwhile.
+    fn keep_pace(&mut self, now: Instant) {
+        let delay = now.since(self.next_cycle);
+        self.pace.cycles += 1;
+        self.pace.last_delay = delay;
+        self.pace.longest_delay = self.pace.longest_delay.max(delay);
+        self.pace.late += u64::from(delay > self.period / LATE_FRACTION);
+        self.news.wake_ups().record(delay);
+        let mut passed_over = 0;
+        if delay >= self.period {
+            passed_over = (delay.as_nanos() / self.period.as_nanos()) as u64;
+            self.pace.skipped += passed_over;
+        }
+        match self.trigger {
+            Trigger::Time => {
+                let periods = (self.period.as_nanos() as u64).saturating_mul(passed_over + 1);
+                self.next_cycle += Duration::from_nanos(periods);
+            }
+            Trigger::FramesReturned { at_least } => {
+                self.earliest = now + at_least;
+                self.next_cycle = now + self.period;
+            }
+        }
+    }
+
+    /// What the application works on.
+    pub fn data(&mut self, now: Instant) -> ProcessData<'_> {
+        ProcessData {
+            exchange: &mut self.exchange,
+            directory: &self.directory,
+            rates: &self.rates,
+            cycle: self.cycle,
+            now,
+        }
+    }
+
+    /// The cycle ends: what is due is sent.
+    pub fn end(&mut self, now: Instant, links: &mut impl Links) {
+        for (number, rate) in self.rates.iter().enumerate() {
+            if self.cycle.is_multiple_of(rate.divider) {
+                self.exchange.queue(DomainId(number), now);
+            }
+        }
+        let next = match self.trigger {
+            Trigger::Time => self.next_cycle,
+            Trigger::FramesReturned { at_least } if at_least >= SHORTEST => self.earliest,
+            Trigger::FramesReturned { .. } => Instant::NEVER,
+        };
+        self.send(now, next, links);
+        self.publish();
+    }
+
+    /// Sends what was queued; the next cycle's frames leave at `next`.
+    fn send(&mut self, now: Instant, next: Instant, links: &mut impl Links) {
+        let Cyclic { exchange, window, .. } = self;
+        let before = exchange.counters().sent;
+        exchange.send(now, &mut |link, frame| {
+            if link == Link::Main {
+                window.occupy(Half::Cyclic, now, frame.len());
+            }
+            links.send(link, frame);
+        });
+        if exchange.counters().sent != before {
+            self.sent_at = now;
+        }
+        self.cycle += 1;
+        self.window.expect_cycle(next);
+    }
+
+    /// Judges a domain, for who runs the steps of a cycle itself.
+    pub fn process(&mut self, domain: DomainId, now: Instant) -> DomainStatus {
+        let status = self.exchange.process(domain, now);
+        if let Some(rate) = self.rates.get_mut(domain.0) {
+            rate.status = status;
+        }
+        status
+    }
+
+    /// Sends what was queued, for who runs the steps of a cycle itself: the next one is taken to be a period away.
+    pub fn send_by_hand(&mut self, now: Instant, links: &mut impl Links) {
+        self.pace.cycles += 1;
+        self.next_cycle = now + self.period;
+        self.earliest = self.next_cycle;
+        self.send(now, self.next_cycle, links);
+        self.publish();
+    }
+
+    fn publish(&self) {
+        self.news.publish(&self.pace, self.exchange.counters(), self.exchange.ring(), &self.rates);
+    }
+
+    /// Makes known who else sends on this wire.
+    pub fn publish_foreign(&mut self) {
+        if let Some(foreign) = self.exchange.pop_foreign()
+            && let Some(source) = foreign.bytes.get(6..12).and_then(|bytes| bytes.try_into().ok())
+        {
+            self.news.publish_foreign(foreign.arrived_on, source);
+        }
+    }
+
+    /// No cycle follows: the wire belongs to the other half.
+    pub fn retire(&self) {
+        self.window.expect_cycle(Instant::NEVER);
+    }
+}

@@ -1,0 +1,192 @@
+//! What the cyclic thread makes known to others: atomics that it alone writes, once a cycle, without waiting.
+//!
+//! Each number is right for itself; two of them may be of neighbouring cycles.
+
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::time::Duration;
+
+use ringcat_engine::domain::{DomainId, DomainState, DomainStatus};
+use ringcat_engine::exchange::CyclicCounters;
+use ringcat_engine::link::Link;
+use ringcat_engine::ring::RingState;
+use ringcat_wire::frame::MacAddress;
+
+use crate::histogram::Histogram;
+use crate::pace::Pace;
+use crate::process_data::Rate;
+
+/// News of the cyclic half.
+#[derive(Debug)]
+pub struct News {
+    pace: [AtomicU64; 5],
+    counters: [AtomicU64; COUNTERS],
+    /// Working counter and what was expected; state and how often the domain was skipped.
+    domains: Box<[[AtomicU64; 2]]>,
+    round_trips: Histogram,
+    wake_ups: Histogram,
+    restart: AtomicBool,
+    /// Source address of the last frame of another MainDevice, and the link it arrived on, plus one.
+    foreign: AtomicU64,
+    ring: AtomicU64,
+}
+
+/// Fields of [`CyclicCounters`].
+const COUNTERS: usize = 12;
+
+fn zeros<const N: usize>() -> [AtomicU64; N] {
+    [const { AtomicU64::new(0) }; N]
+}
+
+fn store(to: &[AtomicU64], values: &[u64]) {
+    for (word, value) in to.iter().zip(values) {
+        word.store(*value, Ordering::Relaxed);
+    }
+}
+
+fn load<const N: usize>(from: &[AtomicU64; N]) -> [u64; N] {
+    std::array::from_fn(|at| from[at].load(Ordering::Relaxed))
+}
+
+impl News {
+    pub(crate) fn new(domains: usize) -> News {
+        News {
+            pace: zeros(),
+            counters: zeros(),
+            domains: (0..domains).map(|_| zeros()).collect(),
+            round_trips: Histogram::default(),
+            wake_ups: Histogram::default(),
+            restart: AtomicBool::new(false),
+            foreign: AtomicU64::new(0),
+            ring: AtomicU64::new(0),
+        }
+    }
+
+    /// How well the cycles keep to their times.
+    pub fn pace(&self) -> Pace {
+        let [cycles, late, skipped, last_delay, longest_delay] = load(&self.pace);
+        let [last_delay, longest_delay] = [last_delay, longest_delay].map(Duration::from_nanos);
+        Pace { cycles, late, skipped, last_delay, longest_delay }
+    }
+
+    /// Counters of process data.
+    pub fn counters(&self) -> CyclicCounters {
+        let [sent, bytes, received, lost, half, copies_lost, late, corrupt, foreign, other, skipped, incomplete] =
+            load(&self.counters);
+        CyclicCounters {
+            sent,
+            bytes,
+            received,
+            lost,
+            half,
+            copies_lost,
+            late,
+            corrupt,
+            foreign,
+            other,
+            skipped,
+            incomplete,
+        }
+    }
+
+    /// Last judgement of a domain.
+    pub fn status(&self, domain: DomainId) -> DomainStatus {
+        let Some(words) = self.domains.get(domain.0) else { return DomainStatus::default() };
+        let [counted, state] = load(words);
+        let states = [DomainState::Zero, DomainState::Incomplete, DomainState::Complete];
+        DomainStatus {
+            wkc: counted as u32,
+            expected: (counted >> 32) as u32,
+            state: states[(state as usize & 0xFF).min(2)],
+            pending: false,
+            skipped: state >> 8,
+        }
+    }
+
+    /// Times from the sending of a cycle's frames to the arrival of their copies. (A copy that arrives after other frames
+    /// were sent counts from those.)
+    pub fn round_trips(&self) -> &Histogram {
+        &self.round_trips
+    }
+
+    /// How long after their time cycles began.
+    pub fn wake_ups(&self) -> &Histogram {
+        &self.wake_ups
+    }
+
+    /// Has the histograms begin anew with the next cycle.
+    pub fn restart_histograms(&self) {
+        self.restart.store(true, Ordering::Relaxed);
+    }
+
+    /// State of the ring as process data shows it.
+    pub fn ring(&self) -> RingState {
+        match self.ring.load(Ordering::Relaxed) {
+            1 => RingState::Closed,
+            2 => RingState::Open,
+            _ => RingState::Unknown,
+        }
+    }
+
+    /// Source address of the last frame of another MainDevice, and where it arrived.
+    pub fn foreign(&self) -> Option<(Link, MacAddress)> {
+        let bytes = self.foreign.load(Ordering::Relaxed).to_be_bytes();
+        let link = match bytes[0] {
+            1 => Link::Main,
+            2 => Link::Redundant,
+            _ => return None,
+        };
+        Some((link, MacAddress([bytes[2], bytes[3], bytes[4], bytes[5], bytes[6], bytes[7]])))
+    }
+
+    pub(crate) fn publish_foreign(&self, link: Link, source: [u8; 6]) {
+        let [a, b, c, d, e, f] = source;
+        let link = match link {
+            Link::Main => 1,
+            Link::Redundant => 2,
+        };
+        self.foreign.store(u64::from_be_bytes([link, 0, a, b, c, d, e, f]), Ordering::Relaxed);
+    }
+
+    pub(crate) fn publish(&self, pace: &Pace, counters: &CyclicCounters, ring: RingState, rates: &[Rate]) {
+        let ring = match ring {
+            RingState::Unknown => 0,
+            RingState::Closed => 1,
+            RingState::Open => 2,
+        };
+        self.ring.store(ring, Ordering::Relaxed);
+        let ns = |time: Duration| u64::try_from(time.as_nanos()).unwrap_or(u64::MAX);
+        let delays = [ns(pace.last_delay), ns(pace.longest_delay)];
+        store(&self.pace, &[pace.cycles, pace.late, pace.skipped, delays[0], delays[1]]);
+        let CyclicCounters {
+            sent,
+            bytes,
+            received,
+            lost,
+            half,
+            copies_lost,
+            late,
+            corrupt,
+            foreign,
+            other,
+            skipped,
+            incomplete,
+        } = *counters;
+        let numbers =
+            [sent, bytes, received, lost, half, copies_lost, late, corrupt, foreign, other, skipped, incomplete];
+        store(&self.counters, &numbers);
+        for (words, rate) in self.domains.iter().zip(rates) {
+            let state = match rate.status.state {
+                DomainState::Zero => 0,
+                DomainState::Incomplete => 1,
+                DomainState::Complete => 2,
+            };
+            let counted = u64::from(rate.status.wkc) | u64::from(rate.status.expected) << 32;
+            store(words, &[counted, state | rate.status.skipped << 8]);
+        }
+        if self.restart.load(Ordering::Relaxed) {
+            self.restart.store(false, Ordering::Relaxed);
+            self.round_trips.clear();
+            self.wake_ups.clear();
+        }
+    }
+}

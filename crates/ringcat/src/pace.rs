@@ -1,0 +1,31 @@
+//! How well cycles keep to their times, and what makes them begin.
+
+use std::time::Duration;
+
+/// What makes a cycle begin.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Trigger {
+    /// The time: cycles have a fixed grid of one period.
+    #[default]
+    Time,
+    /// The return of the last cycle's frames. Where they do not return, a cycle begins a period after the last one.
+    FramesReturned {
+        /// From the beginning of the last cycle to that of the next at the least; zero for cycles back to back.
+        at_least: Duration,
+    },
+}
+
+/// How well the cycles keep to their times. None of it is the wire's fault.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Pace {
+    /// Cycles that ran.
+    pub cycles: u64,
+    /// Cycles that began later than a tenth of the period after their time.
+    pub late: u64,
+    /// Cycles that were left out because their time and that of the next had passed.
+    pub skipped: u64,
+    /// How late the last cycle began.
+    pub last_delay: Duration,
+    /// How late the latest cycle began.
+    pub longest_delay: Duration,
+}

@@ -1,0 +1,336 @@
+//! The acyclic half in a thread of its own, with links of its own.
+//!
+//! The thread sleeps until a frame, a deadline or a request comes. It sends in the windows that the cyclic half leaves
+//! ([`crate::window`]). So neither half waits for the other, and an application that only runs its cycles has a living
+//! bus behind it.
+
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, SyncSender, TryRecvError, channel, sync_channel};
+use std::sync::{Arc, Mutex, PoisonError};
+use std::thread::JoinHandle;
+use std::time::Duration;
+
+use ringcat_engine::event::{Event, TimedEvent};
+use ringcat_engine::link::Link;
+use ringcat_engine::main_device::{Declaration, MainDevice as Engine, SubDeviceState};
+use ringcat_engine::procedures::scan::Scan;
+use ringcat_engine::supervisor::AcyclicCounters;
+use ringcat_engine::time::Instant;
+use ringcat_wire::al::AlState;
+
+use crate::acyclic::{AcyclicHalf, work};
+use crate::application::Application;
+use crate::error::Error;
+use crate::links::Links;
+use crate::main_device::{Options, Refused};
+use crate::window::Window;
+
+/// A request waits for so long at most until the thread looks.
+const LONGEST_SLEEP: Duration = Duration::from_millis(1);
+/// What others may see is brought up to date this often where no event does it earlier.
+const PUBLISH: Duration = Duration::from_millis(10);
+/// Events that may wait to be fetched; further ones are dropped and counted.
+const EVENTS: usize = 4096;
+/// Somebody who waits for an answer looks at other things this often.
+const MEANWHILE: Duration = Duration::from_millis(10);
+
+/// Asked again after each turn of the thread until it says true.
+type Request = Box<dyn FnMut(&mut Engine, Instant) -> bool + Send>;
+
+/// What the thread makes known.
+#[derive(Debug, Default)]
+struct Published {
+    settled: AtomicBool,
+    rest: Mutex<Rest>,
+}
+
+#[derive(Clone, Debug, Default)]
+struct Rest {
+    states: Vec<SubDeviceState>,
+    counters: AcyclicCounters,
+    events_dropped: u64,
+}
+
+/// A MainDevice whose acyclic half runs in a thread of its own: a handle, of which any thread may have one.
+///
+/// The thread ends when the last handle is dropped.
+#[derive(Clone, Debug)]
+pub struct SupervisorThread(Arc<Handle>);
+
+#[derive(Debug)]
+struct Handle {
+    requests: Option<Sender<Request>>,
+    events: Mutex<Receiver<TimedEvent>>,
+    published: Arc<Published>,
+    window: Arc<Window>,
+    thread: Option<JoinHandle<()>>,
+}
+
+impl SupervisorThread {
+    /// Starts the thread on links that carry the frames of the acyclic half. `prepare` runs in it first: the place to set
+    /// its priority and processor.
+    ///
+    /// # Errors
+    /// The system has no more threads.
+    pub fn start<L>(links: L, options: &Options, prepare: impl FnOnce() + Send + 'static) -> Result<Self, Error>
+    where
+        L: Links + Send + 'static,
+    {
+        let (requests, incoming) = channel();
+        let (outgoing, events) = sync_channel(EVENTS);
+        let published = Arc::new(Published::default());
+        let window = Arc::new(Window::default());
+        let options = options.clone();
+        let (shared, windows) = (published.clone(), window.clone());
+        let body = move || {
+            prepare();
+            // The engine is made here because its procedures stay in the thread that made them.
+            let engine = options.engine(&links);
+            let worker = Worker {
+                links,
+                engine,
+                window: windows,
+                pending: Vec::new(),
+                events: outgoing,
+                events_dropped: 0,
+                published: shared,
+                publish_at: Instant(0),
+            };
+            worker.run(&incoming);
+        };
+        let thread = std::thread::Builder::new().name("supervisor".into()).spawn(body).map_err(Error::Thread)?;
+        let (requests, events) = (Some(requests), Mutex::new(events));
+        Ok(SupervisorThread(Arc::new(Handle { requests, events, published, window, thread: Some(thread) })))
+    }
+
+    /// Has the thread ask a question of its engine again and again until it has an answer.
+    fn ask<R: Send + 'static>(
+        &self,
+        question: impl FnMut(&mut Engine, Instant) -> Option<R> + Send + 'static,
+    ) -> Result<R, Error> {
+        self.ask_while(question, || ())
+    }
+
+    /// Runs `meanwhile` every now and then until there is an answer.
+    fn ask_while<R: Send + 'static>(
+        &self,
+        mut question: impl FnMut(&mut Engine, Instant) -> Option<R> + Send + 'static,
+        mut meanwhile: impl FnMut(),
+    ) -> Result<R, Error> {
+        let (answer, answers) = channel();
+        let request: Request = Box::new(move |engine, now| match question(engine, now) {
+            // Nobody may want it any more.
+            Some(found) => answer.send(found).map_or(true, |()| true),
+            None => false,
+        });
+        let requests = self.0.requests.as_ref().ok_or(Error::Gone)?;
+        requests.send(request).map_err(|_| Error::Gone)?;
+        loop {
+            meanwhile();
+            match answers.recv_timeout(MEANWHILE) {
+                Ok(found) => return Ok(found),
+                Err(RecvTimeoutError::Timeout) => {}
+                Err(RecvTimeoutError::Disconnected) => return Err(Error::Gone),
+            }
+        }
+    }
+
+    /// Has the thread do something with its engine, and waits for what comes out.
+    ///
+    /// # Errors
+    /// The thread is gone.
+    pub fn with<R: Send + 'static>(&self, act: impl FnOnce(&mut Engine) -> R + Send + 'static) -> Result<R, Error> {
+        let mut act = Some(act);
+        self.ask(move |engine, _| act.take().map(|act| act(engine)))
+    }
+
+    /// Scans the segment; all SubDevices are in INIT afterwards.
+    ///
+    /// # Errors
+    /// No answer, no SubDevices, a count that does not settle, or an SII that cannot be read.
+    pub fn scan(&self) -> Result<Scan, Error> {
+        self.scan_while(|| ())
+    }
+
+    /// Like [`SupervisorThread::scan`], and runs `meanwhile` every now and then: to take events, for example.
+    ///
+    /// # Errors
+    /// As [`SupervisorThread::scan`].
+    pub fn scan_while(&self, mut meanwhile: impl FnMut()) -> Result<Scan, Error> {
+        self.with(Engine::start_scan)??;
+        let result = self.ask_while(|engine, _| engine.scan_result(), &mut meanwhile)?;
+        meanwhile();
+        Ok(result?)
+    }
+
+    /// Lays out process data, starts the configuration of all SubDevices, and hands out the running application, whose
+    /// cycles use `links`: they carry the frames of the cyclic half, on the same interfaces.
+    ///
+    /// # Errors
+    /// A declaration that does not fit what was scanned, or process data that does not fit frames. Everything comes back
+    /// with the error, for another try.
+    pub fn activate<C: Links>(self, declaration: Declaration, links: C) -> Activated<C> {
+        // From now on the windows of the cyclic half count, so its first cycle must not be long in coming.
+        let active = self.with(move |engine| engine.activate(declaration));
+        match active.and_then(|result| result.map_err(Error::from)) {
+            Ok(active) => {
+                let window = self.0.window.clone();
+                Ok(Application::new(links, self, active, window))
+            }
+            Err(error) => Err(Box::new(Refused { error, main_device: (self, links) })),
+        }
+    }
+
+    /// Takes all SubDevices down to a state.
+    pub(crate) fn stop(&self, state: AlState, limit: Duration) -> Result<(), Error> {
+        self.ask(move |engine, now| {
+            engine.start_stop(state, limit, now);
+            Some(())
+        })?;
+        Ok(self.ask(|engine, _| engine.stop_result())??)
+    }
+
+    fn rest(&self) -> Rest {
+        self.0.published.rest.lock().unwrap_or_else(PoisonError::into_inner).clone()
+    }
+
+    /// Events that nobody fetched in time and that were dropped.
+    pub fn events_dropped(&self) -> u64 {
+        self.rest().events_dropped
+    }
+
+    /// How far each declared SubDevice is, at most some milliseconds old.
+    pub fn states(&self) -> Vec<SubDeviceState> {
+        self.rest().states
+    }
+
+    /// Whether every declared SubDevice is in its target state. A look at an atomic.
+    pub fn all_settled(&self) -> bool {
+        self.0.published.settled.load(Ordering::Acquire)
+    }
+
+    /// Takes the oldest event.
+    pub fn pop_event(&self) -> Option<TimedEvent> {
+        self.0.events.lock().unwrap_or_else(PoisonError::into_inner).try_recv().ok()
+    }
+
+    /// Counters of everything but process data, at most some milliseconds old.
+    pub fn counters(&self) -> AcyclicCounters {
+        self.rest().counters
+    }
+}
+
+impl Drop for Handle {
+    fn drop(&mut self) {
+        self.requests = None;
+        if let Some(thread) = self.thread.take() {
+            // A panic of the thread has been told by the panic handler.
+            let _ = thread.join();
+        }
+    }
+}
+
+impl AcyclicHalf for SupervisorThread {
+    const SHARES_LINKS: bool = false;
+
+    fn receive(&mut self, _link: Link, _frame: &[u8], _now: Instant) {}
+
+    fn work(&mut self, _links: &mut impl Links, _window: &Window) {}
+
+    fn wake(&self) -> Instant {
+        Instant::NEVER
+    }
+
+    fn states(&self) -> Vec<SubDeviceState> {
+        SupervisorThread::states(self)
+    }
+
+    fn all_settled(&self) -> bool {
+        SupervisorThread::all_settled(self)
+    }
+
+    fn pop_event(&mut self, _now: Instant) -> Option<TimedEvent> {
+        SupervisorThread::pop_event(self)
+    }
+
+    fn counters(&self) -> AcyclicCounters {
+        SupervisorThread::counters(self)
+    }
+}
+
+/// A running application, or both parts for another try.
+pub type Activated<C> = Result<Application<C, SupervisorThread>, Box<Refused<(SupervisorThread, C)>>>;
+
+/// What runs in the thread.
+struct Worker<L> {
+    links: L,
+    engine: Engine,
+    window: Arc<Window>,
+    pending: Vec<Request>,
+    events: SyncSender<TimedEvent>,
+    events_dropped: u64,
+    published: Arc<Published>,
+    publish_at: Instant,
+}
+
+impl<L: Links> Worker<L> {
+    fn run(mut self, incoming: &Receiver<Request>) {
+        loop {
+            let now = self.links.now();
+            let Worker { links, engine, window, .. } = &mut self;
+            while links.receive(&mut |link, frame| {
+                engine.receive(link, frame, now);
+            }) {}
+            let blocked = work(engine, links, window);
+            loop {
+                match incoming.try_recv() {
+                    Ok(request) => self.pending.push(request),
+                    Err(TryRecvError::Empty) => break,
+                    Err(TryRecvError::Disconnected) => return,
+                }
+            }
+            let news = self.pass_on_events();
+            self.publish(news);
+            self.answer();
+            let now = self.links.now();
+            let wake = self.engine.next_deadline().unwrap_or(Instant::NEVER);
+            let wake = if blocked { wake.min(self.window.look_again(now)) } else { wake };
+            self.links.wait(wake.max(now).min(now + LONGEST_SLEEP));
+        }
+    }
+
+    /// Answers those whose question has an answer by now.
+    fn answer(&mut self) {
+        let now = self.links.now();
+        let Worker { pending, engine, .. } = self;
+        pending.retain_mut(|request| !request(engine, now));
+    }
+
+    /// True where there were any.
+    fn pass_on_events(&mut self) -> bool {
+        let now = self.links.now();
+        let mut any = false;
+        while let Some(event) = self.engine.pop_event(now) {
+            any |= !matches!(event.event, Event::Skipped { .. } | Event::Domain { .. });
+            if self.events.try_send(event).is_err() {
+                self.events_dropped += 1;
+            }
+        }
+        any
+    }
+
+    fn publish(&mut self, news: bool) {
+        let now = self.links.now();
+        if !news && now < self.publish_at {
+            return;
+        }
+        self.publish_at = now + PUBLISH;
+        let rest = Rest {
+            states: self.engine.states(),
+            counters: self.engine.counters(),
+            events_dropped: self.events_dropped + self.engine.events_dropped(),
+        };
+        *self.published.rest.lock().unwrap_or_else(PoisonError::into_inner) = rest;
+        self.published.settled.store(self.engine.all_settled(), Ordering::Release);
+    }
+}

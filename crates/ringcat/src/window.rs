@@ -1,0 +1,110 @@
+//! When frames of the acyclic half may leave: between the frames of two cycles.
+//!
+//! The cyclic half says when its next frames leave, both halves say when what they sent will have left the interface. Each
+//! word has one writer, so the halves may live in threads of their own. Both links carry the same frames; one account
+//! serves both.
+
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::time::Duration;
+
+use ringcat_engine::time::Instant;
+use ringcat_wire::frame::{BYTE_TIME_NS, MAX_FRAME, WIRE_OVERHEAD, wire_time_ns};
+
+/// Before a cycle begins, the wire is left to itself for so long: an acyclic frame that is under way then has passed
+/// the interface.
+const GUARD: Duration = Duration::from_nanos(wire_time_ns(MAX_FRAME) / 4);
+/// A pause between two cycles that is shorter has no room for a frame: there is no window to keep then.
+pub const SHORTEST: Duration = Duration::from_nanos(wire_time_ns(MAX_FRAME) + wire_time_ns(MAX_FRAME) / 2);
+/// A cyclic half that is so much later than it said has stopped: nobody's frames are in the way then.
+const SILENCE_NS: u64 = 20_000_000;
+/// A cycle that is due may begin any moment: the wire is looked at again after this.
+const LOOK_AGAIN: Duration = Duration::from_micros(50);
+
+/// The half that sends.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Half {
+    /// Process data.
+    Cyclic,
+    /// Everything else.
+    Acyclic,
+}
+
+/// What both halves know of the wire.
+#[derive(Debug)]
+pub struct Window {
+    /// When frames of the cyclic half leave next; never without a cyclic half.
+    next_cycle: AtomicU64,
+    /// When what each half sent will have left.
+    free: [AtomicU64; 2],
+}
+
+impl Default for Window {
+    fn default() -> Window {
+        Window { next_cycle: AtomicU64::new(Instant::NEVER.0), free: [AtomicU64::new(0), AtomicU64::new(0)] }
+    }
+}
+
+impl Window {
+    /// Says when cyclic frames leave next.
+    pub fn expect_cycle(&self, at: Instant) {
+        self.next_cycle.store(at.0, Ordering::Relaxed);
+    }
+
+    /// Notes a frame of `length` bytes without FCS that leaves now, or as soon as the interface is free.
+    pub fn occupy(&self, half: Half, now: Instant, length: usize) {
+        let until = self.free_at(now).0.saturating_add(wire_time_ns(length));
+        self.free[half as usize].store(until, Ordering::Relaxed);
+    }
+
+    fn free_at(&self, now: Instant) -> Instant {
+        let [cyclic, acyclic] = &self.free;
+        Instant(now.0.max(cyclic.load(Ordering::Relaxed)).max(acyclic.load(Ordering::Relaxed)))
+    }
+
+    /// Bytes that may still leave before the next cycle's frames.
+    pub fn bytes(&self, now: Instant) -> usize {
+        let next = self.next_cycle.load(Ordering::Relaxed);
+        if next == Instant::NEVER.0 || now.0.saturating_sub(next) > SILENCE_NS {
+            return usize::MAX;
+        }
+        let bytes = Instant(next).since(self.free_at(now) + GUARD).as_nanos() / u128::from(BYTE_TIME_NS);
+        usize::try_from(bytes).unwrap_or(usize::MAX).saturating_sub(WIRE_OVERHEAD)
+    }
+
+    /// When to look again for room that there is not now.
+    pub fn look_again(&self, now: Instant) -> Instant {
+        let next = Instant(self.next_cycle.load(Ordering::Relaxed));
+        next.max(now) + LOOK_AGAIN
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const MS: u64 = 1_000_000;
+
+    #[test]
+    fn acyclic_frames_end_before_the_next_cycle_begins() {
+        let window = Window::default();
+        assert_eq!(window.bytes(Instant(0)), usize::MAX, "nobody sends cyclic frames");
+        window.expect_cycle(Instant(MS));
+        let bytes = window.bytes(Instant(0));
+        assert!(wire_time_ns(bytes) <= MS && wire_time_ns(bytes) > MS * 9 / 10, "{bytes}");
+        window.occupy(Half::Cyclic, Instant(0), 1_000);
+        window.occupy(Half::Acyclic, Instant(0), 1_000);
+        let left = window.bytes(Instant(0));
+        assert!(bytes - left >= 2_000, "two frames stand in the queue of the interface: {left}");
+        assert_eq!(window.bytes(Instant(MS - 10_000)), 0);
+        assert_eq!(window.bytes(Instant(MS + 10_000)), 0, "the cycle is due");
+        assert!(window.look_again(Instant(MS - 10_000)) > Instant(MS));
+    }
+
+    #[test]
+    fn a_cyclic_half_that_has_fallen_silent_keeps_nobody_from_the_wire() {
+        let window = Window::default();
+        window.expect_cycle(Instant(MS));
+        assert_eq!(window.bytes(Instant(MS + SILENCE_NS)), 0);
+        assert_eq!(window.bytes(Instant(MS + SILENCE_NS + 1)), usize::MAX);
+    }
+}

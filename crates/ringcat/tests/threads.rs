@@ -1,0 +1,110 @@
+//! Both halves in threads of their own, on a simulated segment in real time. The machine may be busy with anything: what
+//! is asked for is that things happen, not how soon.
+
+use std::ops::ControlFlow;
+use std::path::Path;
+use std::thread::sleep;
+use std::time::{Duration, Instant};
+
+use ringcat::shared_segment::SharedSegment;
+use ringcat::{DomainId, Error, LastOutputs, Links, Options, SupervisorThread, automatic};
+use ringcat_sim::network::Network;
+use ringcat_sim::segment::Segment;
+use ringcat_wire::al::{AlState, AlStatus};
+
+const SEGMENT: &str = "[segment]\nring = true\n[[device]]\ntype = \"coupler\"\n[[device]]\ntype = \"digital-output-8\"\n\
+                       [[device]]\ntype = \"servo\"\n";
+const PERIOD: Duration = Duration::from_millis(2);
+const LIMIT: Duration = Duration::from_secs(30);
+
+fn network() -> Network {
+    let segment = Segment::from_toml(SEGMENT, Path::new(".")).expect("a good segment");
+    Network::from_description(segment).expect("it can be built")
+}
+
+/// Waits for something that another thread does.
+fn until(what: &str, mut holds: impl FnMut() -> bool) {
+    let end = Instant::now() + LIMIT;
+    while !holds() {
+        assert!(Instant::now() < end, "{what}");
+        sleep(Duration::from_millis(1));
+    }
+}
+
+#[test]
+fn two_threads_bring_everybody_to_op_exchange_data_and_stop_in_order() -> Result<(), Error> {
+    let (cyclic, acyclic) = SharedSegment::halves(network());
+    let plant = cyclic.plant();
+    let supervisor = SupervisorThread::start(acyclic, &Options::default(), || ())?;
+    let scan = supervisor.scan()?;
+    assert_eq!(scan.subdevices.len(), 3);
+    let application = supervisor.activate(automatic(&scan.subdevices, PERIOD), cyclic)?;
+    let output = application.entry(1, 0x7000, 1).expect("the terminal's first channel");
+    let cycles = application.start_cycles(
+        || (),
+        move |data| {
+            data.write(&output, 1);
+            ControlFlow::Continue(())
+        },
+    )?;
+    until("all are in OP", || cycles.supervisor().all_settled());
+    until("outputs arrive", || plant.with_network(|network| outputs(network)[0] == [1]));
+    let status = cycles.news().status(DomainId(0));
+    assert!(status.expected > 0 && status.wkc > 0, "{status:?}");
+    let events: Vec<_> = std::iter::from_fn(|| cycles.supervisor().pop_event()).collect();
+    assert!(events.len() >= 3, "{events:?}");
+    assert!(cycles.news().pace().cycles > 0 && cycles.news().counters().sent > 0);
+    assert!(cycles.news().round_trips().count() > 0);
+
+    let (supervisor, links) = cycles.end()?.stop(LastOutputs::Zero, AlState::Init, LIMIT)?;
+    plant.with_network(|network| {
+        assert!(network.devices().all(|device| device.al_status() == AlStatus::new(AlState::Init)));
+        assert!(outputs(network).iter().flatten().all(|byte| *byte == 0));
+    });
+    assert_eq!(supervisor.scan()?.subdevices.len(), 3, "a stopped MainDevice scans again");
+    assert!(links.now() > ringcat::Instant(0));
+    Ok(())
+}
+
+fn outputs(network: &Network) -> Vec<Vec<u8>> {
+    network.devices().map(|device| device.outputs().to_vec()).filter(|bytes| !bytes.is_empty()).collect()
+}
+
+#[test]
+fn an_application_whose_closure_breaks_comes_back_and_goes_on_by_hand() -> Result<(), Error> {
+    let (cyclic, acyclic) = SharedSegment::halves(network());
+    let supervisor = SupervisorThread::start(acyclic, &Options::default(), || ())?;
+    let scan = supervisor.scan()?;
+    let application = supervisor.activate(automatic(&scan.subdevices, PERIOD), cyclic)?;
+    let mut left = 10;
+    let cycles = application.start_cycles(
+        || (),
+        move |_| {
+            left -= 1;
+            if left == 0 { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+        },
+    )?;
+    until("the closure breaks", || cycles.has_ended());
+    let mut application = cycles.end()?;
+    assert_eq!(application.pace().cycles, 10);
+    until("all are in OP", || {
+        application.cycle(|_| ());
+        application.all_settled()
+    });
+    assert_eq!(application.states().len(), 3);
+    Ok(())
+}
+
+#[test]
+fn a_refused_declaration_leaves_both_parts_for_another_try() -> Result<(), Error> {
+    let (cyclic, acyclic) = SharedSegment::halves(network());
+    let supervisor = SupervisorThread::start(acyclic, &Options::default(), || ())?;
+    let good = automatic(&supervisor.scan()?.subdevices, PERIOD);
+    let mut wrong = good.clone();
+    wrong.domains[0].members[0].subdevice = 99;
+    let refused = supervisor.activate(wrong, cyclic).expect_err("there is no SubDevice 99");
+    assert!(refused.error.to_string().starts_with("activation: "), "{}", refused.error);
+    let (supervisor, cyclic) = refused.main_device;
+    assert!(supervisor.activate(good, cyclic).is_ok());
+    Ok(())
+}
