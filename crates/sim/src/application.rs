@@ -2,30 +2,33 @@
 //!
 //! In: AL events and virtual time, through [`Application::run`], and faults. Out: AL status, answers in the mailbox,
 //! inputs and latched outputs. The parts: [`state_machine`] says what a request means, [`settings`] whether the
-//! configuration suits, [`process_data`] moves data, [`mailbox`], [`coe`] and [`dictionary`] answer SDOs,
-//! [`behaviours`] and [`servo`] make inputs, `transitions` leads from state to state. Here they are put together.
+//! configuration suits, [`process_data`] moves data, [`mailbox`] carries messages to the [`servers`], of which there is
+//! one per protocol: [`coe`] with its [`dictionary`]. [`behaviours`] and [`servo`] make inputs, `transitions` leads from
+//! state to state. Here they are put together.
 
 pub mod behaviours;
 pub mod coe;
 pub mod dictionary;
+mod mail;
 pub mod mailbox;
 pub mod process_data;
+pub mod servers;
 pub mod servo;
 pub mod settings;
 pub mod state_machine;
 mod transitions;
 
 use ringcat_wire::al::{AlState, AlStatus, AlStatusCode};
-use ringcat_wire::mailbox::{ErrorReply, Protocol};
 use ringcat_wire::register::map;
 
 use crate::controller::Controller;
 use crate::description::DeviceDescription;
 use crate::time::SimTime;
-use coe::{Answer, Objects};
 use dictionary::Dictionary;
 use mailbox::Mailbox;
+use mailbox::faults::MailFaults;
 use process_data::ProcessData;
+use servers::Servers;
 use settings::Layout;
 use state_machine::{Pending, StateMachine};
 
@@ -51,6 +54,8 @@ pub struct Application {
     dictionary: Dictionary,
     process_data: ProcessData,
     mailbox: Option<Mailbox>,
+    servers: Servers,
+    faults: MailFaults,
     layout: Layout,
     refusals: Vec<Refusal>,
     hanging: bool,
@@ -69,6 +74,8 @@ impl Application {
             dictionary: Dictionary::new(description),
             process_data: ProcessData::new(&description.behaviour),
             mailbox: None,
+            servers: Servers::new(),
+            faults: MailFaults::default(),
             layout: Layout::default(),
             refusals: Vec::new(),
             hanging: false,
@@ -87,6 +94,7 @@ impl Application {
         self.dictionary = Dictionary::new(description);
         self.process_data.stop(now);
         self.mailbox = None;
+        self.servers = Servers::new();
         self.layout = Layout::default();
         self.emulated_state = AlState::Init;
         self.last_run = now;
@@ -141,11 +149,10 @@ impl Application {
         }
         let due = |pending: Pending| if self.is_waiting(pending) { pending.give_up } else { pending.at };
         let transition = self.machine.pending().map(due);
-        let answer = self.mailbox.as_ref().and_then(Mailbox::next_deadline);
-        match (transition, answer) {
-            (Some(transition), Some(answer)) => Some(transition.min(answer)),
-            (transition, answer) => transition.or(answer),
-        }
+        let mail = self.mailbox.as_ref();
+        let answer = mail.and_then(Mailbox::next_deadline);
+        let full = mail.and(self.faults.full_until());
+        [transition, answer, full].into_iter().flatten().min()
     }
 
     /// The transition could be done but something else is missing.
@@ -233,32 +240,6 @@ impl Application {
         }
     }
 
-    fn run_mailbox(&mut self, description: &DeviceDescription, controller: &mut Controller, events: u32, now: SimTime) {
-        let (Some(mailbox), Some(declared)) = (&mut self.mailbox, description.mailbox) else {
-            return;
-        };
-        // An answer that leaves makes room for the message that waits.
-        mailbox.send(controller, now);
-        if let Some(message) = mailbox.take(controller, events, now) {
-            let state = self.machine.state();
-            let mut objects = Objects {
-                dictionary: &mut self.dictionary,
-                process_data: &self.process_data,
-                state,
-                complete_access: declared.coe_details.complete_access(),
-            };
-            mailbox.serve(&message, now + declared.response_time, |protocol, payload, room| match protocol {
-                Protocol::Coe if declared.has_coe() && state != AlState::Boot => {
-                    coe::serve(payload, room, &mut objects)
-                }
-                // Errors are never answered, or two ends would answer each other for ever.
-                Protocol::Error => Answer::Silence,
-                _ => Answer::Error(ErrorReply::UNSUPPORTED_PROTOCOL),
-            });
-        }
-        mailbox.send(controller, now);
-    }
-
     /// The controller copies AL control by itself; only the process data follows.
     fn run_emulated(&mut self, description: &DeviceDescription, controller: &mut Controller, now: SimTime) {
         let events = controller.al_event();
@@ -301,7 +282,7 @@ impl Application {
             Some(_) => {}
         }
         if let Some(mailbox) = &self.mailbox {
-            interest |= mailbox.events();
+            interest |= mailbox.events(&self.faults);
         }
         self.interest = interest;
         self.polled = self.process_data.is_polled();

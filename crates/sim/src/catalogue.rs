@@ -2,13 +2,17 @@
 //!
 //! In: a name as segment files use it. Out: a [`DeviceDescription`] to be changed at will before a device is made of it.
 //! Vendor and product numbers are the simulator's own; SyncManager settings are like those of real terminals (facts
-//! 3.11). Terminals are in `terminals`, drive, block and junctions in `machines`.
+//! 3.11). Terminals are in `terminals`, drive, block and junctions in `machines`, devices for
+//! the mailbox in `protocols`.
 
 mod machines;
 mod parts;
+mod protocols;
 mod terminals;
 
 use crate::description::DeviceDescription;
+
+pub use protocols::LARGE_OBJECT_BYTES;
 
 /// Vendor number of the simulated devices; no vendor has it.
 pub const VENDOR_ID: u32 = 0x0000_0C47;
@@ -32,6 +36,7 @@ const DEVICES: &[(&str, Maker)] = &[
     ("analog-output-4", |name| terminals::analog_output(name, 4)),
     ("servo", machines::servo),
     ("block", machines::block),
+    ("all-protocols", protocols::all_protocols),
 ];
 
 /// The device with this name.

@@ -7,6 +7,7 @@
 use ringcat_wire::al::{AlState, AlStatus, AlStatusCode};
 use ringcat_wire::register::{Features, map};
 
+use crate::application::mailbox::faults::MailFault;
 use crate::application::{Application, InputSource};
 use crate::controller::{Controller, ControllerConfig};
 use crate::description::DeviceDescription;
@@ -70,6 +71,11 @@ impl Device {
     /// The next `times` requests for `to` are refused with `code`; no effect where the controller emulates the device.
     pub fn refuse_transition(&mut self, to: AlState, code: AlStatusCode, times: u32) {
         self.application.refuse(to, code, times);
+    }
+
+    /// Something goes wrong with the mail of the device.
+    pub fn disturb_mail(&mut self, fault: MailFault, now: SimTime) {
+        self.application.disturb_mail(fault, now);
     }
 
     /// Lets controller and application react to frames and to the time.

@@ -7,6 +7,7 @@ use core::time::Duration;
 
 use ringcat_wire::al::{AlState, AlStatusCode};
 
+use crate::application::mailbox::faults::MailFault;
 use crate::cable::{CableId, DeviceIndex, Direction};
 
 /// Something that goes wrong, or is put right again.
@@ -89,4 +90,6 @@ pub enum Fault {
         /// How often it refuses.
         times: u32,
     },
+    /// Something goes wrong with the mail of a device.
+    Mail(DeviceIndex, MailFault),
 }

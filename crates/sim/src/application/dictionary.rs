@@ -2,52 +2,29 @@
 //!
 //! In: the device's description, from which the standard objects, the PDO mappings (0x16xx, 0x1Axx), the PDO
 //! assignments (0x1C10 + SyncManager) and the mapped objects follow; reads and writes by index and sub index.
-//! Out: bytes or an abort code. The SDO services around it are in [`coe`](super::coe), what the process data looks
-//! like with a given assignment in [`process_data`](super::process_data).
+//! Out: bytes or an abort code. What an entry is says [`entry`], the diagnosis history is in [`history`]. The SDO services
+//! around it are in [`coe`](super::coe), what the process data looks like with a given assignment in
+//! [`process_data`](super::process_data).
 
+mod entry;
+mod history;
 mod objects;
 
 use ringcat_wire::al::AlState;
+use ringcat_wire::mailbox::coe::{DataType, ObjectCode};
 use ringcat_wire::mailbox::sdo::AbortCode;
 use ringcat_wire::sii::PdoDirection;
 
-use crate::description::DeviceDescription;
+use crate::description::{DeviceDescription, data_type};
+use history::check_acknowledge;
+
+pub use entry::{Access, Entry};
+pub use history::history;
 
 /// Index of the PDO assignment of SyncManager 0; that of SyncManager n is n further on.
 pub const ASSIGNMENT_BASE: u16 = 0x1C10;
 /// Entries that a configurable mapping may have.
 const MAX_MAPPED_ENTRIES: usize = 32;
-
-/// When an entry may be written.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Access {
-    /// Never.
-    ReadOnly,
-    /// In each state with a mailbox.
-    ReadWrite,
-    /// In PREOP.
-    ReadWritePreOp,
-}
-
-/// One sub index of an object.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Entry {
-    /// Sub index.
-    pub sub_index: u8,
-    /// Data type code of CoE.
-    pub data_type: u8,
-    /// When it may be written.
-    pub access: Access,
-    /// The value, little-endian. Its length is fixed except for strings.
-    pub value: Vec<u8>,
-}
-
-impl Entry {
-    /// An entry.
-    pub fn new(sub_index: u8, data_type: u8, access: Access, value: &[u8]) -> Entry {
-        Entry { sub_index, data_type, access, value: value.into() }
-    }
-}
 
 /// What rules apply beyond the access of the entries.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -58,6 +35,8 @@ pub enum ObjectRole {
     Assignment(PdoDirection),
     /// A list of mapped entries of this direction, same rule.
     Mapping(PdoDirection),
+    /// The diagnosis history: writing sub index 3 acknowledges or clears.
+    History,
 }
 
 /// One object.
@@ -80,7 +59,37 @@ impl Object {
         Object { index, name: name.into(), role: ObjectRole::Plain, entries }
     }
 
-    fn entry(&self, sub_index: u8) -> Option<&Entry> {
+    /// An array or record: sub index 0 is added and is the number of the entries, which follow each other from 1.
+    pub fn record(index: u16, name: &str, entries: Vec<Entry>) -> Object {
+        let count = entries.last().map_or(0, |entry| entry.sub_index);
+        let mut all = vec![Entry::new(0, data_type::U8, Access::ReadOnly, &[count])];
+        all.extend(entries);
+        Object { index, name: name.into(), role: ObjectRole::Plain, entries: all }
+    }
+
+    /// What SDO information calls it: one value is a variable, entries of one type an array.
+    pub fn code(&self) -> ObjectCode {
+        let mut values = self.entries.iter().filter(|entry| entry.sub_index != 0);
+        let Some(first) = values.next() else {
+            let domain = self.entries.first().is_some_and(|entry| entry.data_type() == DataType::DOMAIN);
+            return if domain { ObjectCode::Domain } else { ObjectCode::Variable };
+        };
+        let alike = values.all(|entry| entry.data_type == first.data_type);
+        if alike && !matches!(self.role, ObjectRole::Mapping(_)) { ObjectCode::Array } else { ObjectCode::Record }
+    }
+
+    /// Data type of the object as a whole: that of its entries where they are alike.
+    pub fn data_type(&self) -> DataType {
+        match (self.code(), self.role, self.index) {
+            (_, ObjectRole::Mapping(_), _) => DataType::PDO_MAPPING,
+            (_, _, 0x1018) => DataType::IDENTITY,
+            (ObjectCode::Record, _, _) => DataType(0),
+            _ => self.entries.last().map_or(DataType(0), Entry::data_type),
+        }
+    }
+
+    /// Looks an entry up.
+    pub fn entry(&self, sub_index: u8) -> Option<&Entry> {
         self.entries.iter().find(|entry| entry.sub_index == sub_index)
     }
 
@@ -126,12 +135,19 @@ impl MappedEntry {
 #[derive(Clone, Debug, Default)]
 pub struct Dictionary {
     objects: Vec<Object>,
+    /// Messages of the diagnosis history that were not acknowledged.
+    unacknowledged: u8,
 }
 
 impl Dictionary {
     /// The dictionary that follows from a description; it has PDO lists even where no CoE makes them visible.
     pub fn new(description: &DeviceDescription) -> Dictionary {
-        Dictionary { objects: objects::build(description) }
+        Dictionary { objects: objects::build(description), unacknowledged: 0 }
+    }
+
+    /// All objects, indices ascending.
+    pub fn objects(&self) -> &[Object] {
+        &self.objects
     }
 
     /// Looks an object up.
@@ -148,7 +164,7 @@ impl Dictionary {
     pub fn read(&self, index: u16, sub_index: u8) -> Result<&[u8], AbortCode> {
         let object = self.object(index).ok_or(AbortCode::OBJECT_DOES_NOT_EXIST)?;
         let entry = object.entry(sub_index).ok_or(AbortCode::SUB_INDEX_DOES_NOT_EXIST)?;
-        Ok(&entry.value)
+        if entry.access == Access::WriteOnly { Err(AbortCode::WRITE_ONLY) } else { Ok(&entry.value) }
     }
 
     /// All entries from sub index 0 (padded to 16 bits) or 1 on, packed (facts 6.3, complete access).
@@ -160,6 +176,9 @@ impl Dictionary {
             bytes.push(0);
         }
         for entry in object.listed() {
+            if entry.access == Access::WriteOnly {
+                return Err(AbortCode::WRITE_ONLY);
+            }
             bytes.extend_from_slice(&entry.value);
         }
         Ok(bytes)
@@ -172,6 +191,9 @@ impl Dictionary {
         let entry = object.entry_mut(sub_index).ok_or(AbortCode::SUB_INDEX_DOES_NOT_EXIST)?;
         entry.value.clear();
         entry.value.extend_from_slice(data);
+        if object.role == ObjectRole::History {
+            self.acknowledge(sub_index, data);
+        }
         Ok(())
     }
 
@@ -188,7 +210,7 @@ impl Dictionary {
     }
 
     fn write_parts(&mut self, object: &Object, from: u8, data: &[u8], state: AlState) -> Result<(), AbortCode> {
-        let list = !matches!(object.role, ObjectRole::Plain);
+        let list = matches!(object.role, ObjectRole::Assignment(_) | ObjectRole::Mapping(_));
         let mut rest = data;
         let mut count = None;
         if from == 0 {
@@ -221,23 +243,22 @@ impl Dictionary {
         }
     }
 
+    /// Whether so many bytes may be written to an entry by SDO in `state`, whatever they are.
+    pub fn check_access(&self, index: u16, sub_index: u8, length: usize, state: AlState) -> Result<(), AbortCode> {
+        let object = self.object(index).ok_or(AbortCode::OBJECT_DOES_NOT_EXIST)?;
+        let entry = object.entry(sub_index).ok_or(AbortCode::SUB_INDEX_DOES_NOT_EXIST)?;
+        entry.check_access(length, state)
+    }
+
     fn check_write(&self, index: u16, sub_index: u8, data: &[u8], state: AlState) -> Result<(), AbortCode> {
         let object = self.object(index).ok_or(AbortCode::OBJECT_DOES_NOT_EXIST)?;
         let entry = object.entry(sub_index).ok_or(AbortCode::SUB_INDEX_DOES_NOT_EXIST)?;
-        match entry.access {
-            Access::ReadOnly => return Err(AbortCode::READ_ONLY),
-            Access::ReadWritePreOp if state != AlState::PreOp => return Err(AbortCode::CANNOT_BE_STORED_DEVICE_STATE),
-            Access::ReadWritePreOp | Access::ReadWrite => {}
-        }
-        if data.len() > entry.value.len() {
-            return Err(AbortCode::LENGTH_TOO_LONG);
-        }
-        if data.len() < entry.value.len() {
-            return Err(AbortCode::LENGTH_TOO_SHORT);
-        }
+        entry.check_access(data.len(), state)?;
+        entry.check_value(data)?;
         match object.role {
             ObjectRole::Plain => Ok(()),
             ObjectRole::Assignment(_) | ObjectRole::Mapping(_) => self.check_list(object, sub_index, data),
+            ObjectRole::History => check_acknowledge(object, sub_index, data),
         }
     }
 
@@ -261,7 +282,7 @@ impl Dictionary {
                 if known { Ok(()) } else { Err(AbortCode::VALUE_RANGE) }
             }
             ObjectRole::Mapping(_) => self.check_mapped(data),
-            ObjectRole::Plain => Ok(()),
+            ObjectRole::Plain | ObjectRole::History => Ok(()),
         }
     }
 

@@ -1,7 +1,10 @@
 //! The SubDevice's end of the mailbox: counters, duplicates, answers in order, repeat of a lost one (facts 6.1, 6.2).
 //!
-//! In: AL events of the two mailbox SyncManagers, virtual time. Out: messages for a protocol server and its answers in
-//! the send mailbox, some time later. What the messages mean is the servers' matter ([`coe`](super::coe)).
+//! In: AL events of the two mailbox SyncManagers, virtual time, [`faults`]. Out: messages for a protocol server and its
+//! answers in the send mailbox, some time later, with mail that nobody asked for in between. What the messages mean is
+//! the servers' matter ([`servers`](super::servers)).
+
+pub mod faults;
 
 use std::collections::VecDeque;
 
@@ -10,19 +13,50 @@ use ringcat_wire::mailbox::{ErrorReply, Header, Message, MessageError, Protocol,
 use ringcat_wire::register::{SyncManager, SyncManagerPdiControl, map};
 use ringcat_wire::sii::MailboxLayout;
 
-use super::coe::Answer;
 use super::process_data::event_bit;
 use crate::controller::Controller;
 use crate::time::SimTime;
+use faults::MailFaults;
 
 /// Answers that may wait for the send mailbox; with more, messages stay in the receive mailbox.
 const MAX_ANSWERS: usize = 4;
 
-/// An answer on its way.
+/// Messages that may wait for the send mailbox, answers and others together; more of the others are dropped.
+const MAX_POSTED: usize = 64;
+
+/// What a message leads to.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Answer {
+    /// Answers of the same protocol, one message each.
+    Payloads(Vec<Vec<u8>>),
+    /// An error reply of the mailbox with this detail.
+    Error(u16),
+    /// Nothing.
+    Silence,
+}
+
+impl Answer {
+    /// One answer of the same protocol.
+    pub fn payload(bytes: Vec<u8>) -> Answer {
+        Answer::Payloads(vec![bytes])
+    }
+}
+
+/// A message on its way to the send mailbox.
 #[derive(Clone, Debug)]
 struct Queued {
     ready: SimTime,
-    bytes: Vec<u8>,
+    mail: Mail,
+    /// The message is written twice, both times with the same counter.
+    twice: bool,
+}
+
+#[derive(Clone, Debug)]
+enum Mail {
+    /// One that gets its counter when it is sent, unless a fault gives it this one.
+    New { protocol: Protocol, address: u16, payload: Vec<u8>, counter: Option<u8> },
+    /// One that was sent before, byte for byte.
+    Again(Vec<u8>),
 }
 
 /// The mailbox of a device while it is in use.
@@ -73,40 +107,56 @@ impl Mailbox {
     }
 
     /// AL events that call for a step.
-    pub fn events(&self) -> u32 {
-        let receive = if self.queue.len() < MAX_ANSWERS { event_bit(self.receive_manager) } else { 0 };
+    pub fn events(&self, faults: &MailFaults) -> u32 {
+        let takes = self.queue.len() < MAX_ANSWERS && faults.full_until().is_none();
+        let receive = if takes { event_bit(self.receive_manager) } else { 0 };
         let send = if self.blocked { event_bit(self.send_manager) } else { 0 };
         receive | send
     }
 
-    /// When the next answer is ready.
+    /// When the next message is ready.
     pub fn next_deadline(&self) -> Option<SimTime> {
-        if self.blocked { None } else { self.queue.front().map(|queued| queued.ready) }
+        if self.blocked { None } else { self.queue.iter().map(|queued| queued.ready).min() }
     }
 
     /// Takes the message that is in the receive mailbox, if there is one and an answer to it may be queued.
-    pub fn take(&mut self, controller: &mut Controller, events: u32, now: SimTime) -> Option<Vec<u8>> {
-        if events & event_bit(self.receive_manager) == 0 || self.queue.len() >= MAX_ANSWERS {
+    pub fn take(
+        &mut self,
+        controller: &mut Controller,
+        events: u32,
+        faults: &MailFaults,
+        now: SimTime,
+    ) -> Option<Vec<u8>> {
+        let event = event_bit(self.receive_manager);
+        if events & self.events(faults) & event == 0 {
             return None;
         }
         let mut bytes = vec![0; usize::from(self.layout.receive_size)];
         controller.pdi_read(RegisterAddress(self.layout.receive_offset), &mut bytes, now).then_some(bytes)
     }
 
-    /// Serves one message with `server`, which gets protocol, payload and the room for its answer. The answer is sent
-    /// at `ready` or later.
-    pub fn serve(&mut self, bytes: &[u8], ready: SimTime, server: impl FnOnce(Protocol, &[u8], usize) -> Answer) {
-        let room = usize::from(self.layout.send_size).saturating_sub(Header::LEN);
+    /// Serves one message with `server`, which gets protocol, payload and the room for each of its answers. They are
+    /// sent at `ready` or later.
+    pub fn serve(
+        &mut self,
+        bytes: &[u8],
+        ready: SimTime,
+        faults: &mut MailFaults,
+        server: impl FnOnce(Protocol, &[u8], usize) -> Answer,
+    ) {
+        let room = self.room();
         let (header, answer) = match Message::decode(bytes) {
             Ok(Message { header, payload }) => {
                 if header.counter != 0 && header.counter == self.received_counter {
                     return;
                 }
                 self.received_counter = header.counter;
-                let answer = if header.channel == 0 {
-                    server(header.protocol, payload, room)
-                } else {
+                let answer = if header.channel != 0 {
                     Answer::Error(ErrorReply::INVALID_CHANNEL)
+                } else if let Some(answer) = faults.instead_of_serving(header.protocol, payload) {
+                    answer
+                } else {
+                    server(header.protocol, payload, room)
                 };
                 (header, answer)
             }
@@ -116,43 +166,85 @@ impl Mailbox {
                 (header, Answer::Error(ErrorReply::INVALID_HEADER))
             }
         };
-        match answer {
-            Answer::Silence => {}
-            Answer::Payload(payload) => self.queue(header.protocol, header.address, &payload, ready),
-            Answer::Error(detail) => {
-                self.queue(Protocol::Error, header.address, &ErrorReply::new(detail).encode(), ready);
-            }
+        let (protocol, payloads) = match answer {
+            Answer::Silence => return,
+            Answer::Payloads(payloads) => (header.protocol, payloads),
+            Answer::Error(detail) => (Protocol::Error, vec![ErrorReply::new(detail).encode().to_vec()]),
+        };
+        for payload in payloads {
+            self.queue(protocol, header.address, payload, ready, faults);
         }
     }
 
-    fn queue(&mut self, protocol: Protocol, address: u16, payload: &[u8], ready: SimTime) {
-        self.sent_counter = next_counter(self.sent_counter);
-        let length = u16::try_from(payload.len()).unwrap_or(u16::MAX);
-        let header = Header { address, ..Header::new(protocol, self.sent_counter, length) };
-        let mut bytes = header.encode().to_vec();
-        bytes.extend_from_slice(payload);
-        // The last byte of the SyncManager gives the mailbox away.
-        bytes.resize(usize::from(self.layout.send_size), 0);
-        self.queue.push_back(Queued { ready, bytes });
+    /// Bytes behind the header that a message to the MainDevice may have.
+    pub fn room(&self) -> usize {
+        usize::from(self.layout.send_size).saturating_sub(Header::LEN)
     }
 
-    /// Puts the next answer into the send mailbox if it is time and there is room.
-    pub fn send(&mut self, controller: &mut Controller, now: SimTime) {
-        self.blocked = false;
-        let Some(queued) = self.queue.front() else {
+    /// Sends a message that nobody asked for; false where too many wait.
+    pub fn post(&mut self, protocol: Protocol, payload: Vec<u8>, ready: SimTime) -> bool {
+        if self.queue.len() >= MAX_POSTED || payload.len() > self.room() {
+            return false;
+        }
+        self.queue.push_back(Queued {
+            ready,
+            mail: Mail::New { protocol, address: 0, payload, counter: None },
+            twice: false,
+        });
+        true
+    }
+
+    fn queue(&mut self, protocol: Protocol, address: u16, payload: Vec<u8>, ready: SimTime, faults: &mut MailFaults) {
+        let Some(fate) = faults.answer() else {
             return;
         };
-        if queued.ready > now {
+        self.queue.push_back(Queued {
+            ready: ready + fate.delay,
+            mail: Mail::New { protocol, address, payload, counter: fate.counter },
+            twice: fate.twice,
+        });
+    }
+
+    fn encode(&mut self, mail: Mail) -> Vec<u8> {
+        let (protocol, address, payload, counter) = match mail {
+            Mail::New { protocol, address, payload, counter } => (protocol, address, payload, counter),
+            Mail::Again(bytes) => return bytes,
+        };
+        let counter = counter.unwrap_or_else(|| {
+            self.sent_counter = next_counter(self.sent_counter);
+            self.sent_counter
+        });
+        let length = u16::try_from(payload.len()).unwrap_or(u16::MAX);
+        let header = Header { address, ..Header::new(protocol, counter, length) };
+        let mut bytes = header.encode().to_vec();
+        bytes.extend_from_slice(&payload);
+        // The last byte of the SyncManager gives the mailbox away.
+        bytes.resize(usize::from(self.layout.send_size), 0);
+        bytes
+    }
+
+    /// Puts the next message that is ready into the send mailbox if there is room.
+    pub fn send(&mut self, controller: &mut Controller, now: SimTime) {
+        self.blocked = false;
+        let Some(place) = self.queue.iter().position(|queued| queued.ready <= now) else {
             return;
-        }
-        if !controller.pdi_write(RegisterAddress(self.layout.send_offset), &queued.bytes, now) {
+        };
+        let Some(Queued { ready, mail, twice }) = self.queue.remove(place) else {
+            return;
+        };
+        let bytes = self.encode(mail);
+        if !controller.pdi_write(RegisterAddress(self.layout.send_offset), &bytes, now) {
+            // It has its counter and stays the next one.
+            self.queue.push_front(Queued { ready, mail: Mail::Again(bytes), twice });
             self.blocked = true;
             return;
         }
-        self.before_last = self.last.take();
-        self.last = self.queue.pop_front().map(|queued| queued.bytes);
+        if twice {
+            self.queue.push_front(Queued { ready: now, mail: Mail::Again(bytes.clone()), twice: false });
+        }
+        self.before_last = self.last.replace(bytes);
         // What is ready too waits until this one is read.
-        self.blocked = self.queue.front().is_some_and(|next| next.ready <= now);
+        self.blocked = self.queue.iter().any(|next| next.ready <= now);
     }
 
     /// The activation of a SyncManager changed: repeats the last answer if that is what the MainDevice asks for.
@@ -165,7 +257,7 @@ impl Mailbox {
         let lost = if manager.status.mailbox_full {
             // The message that waits was put there after the lost one had been read; it goes second.
             if let Some(waiting) = self.last.take() {
-                self.queue.push_front(Queued { ready: now, bytes: waiting });
+                self.queue.push_front(Queued { ready: now, mail: Mail::Again(waiting), twice: false });
             }
             self.empty_send_mailbox(controller, now);
             self.before_last.take()
@@ -173,7 +265,7 @@ impl Mailbox {
             self.last.take()
         };
         if let Some(bytes) = lost {
-            self.queue.push_front(Queued { ready: now, bytes });
+            self.queue.push_front(Queued { ready: now, mail: Mail::Again(bytes), twice: false });
         }
         self.send(controller, now);
         self.acknowledge_repeat(controller, now);

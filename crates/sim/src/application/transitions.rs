@@ -9,6 +9,7 @@ use ringcat_wire::al::{AlState, AlStatusCode};
 use ringcat_wire::sii::MailboxLayout;
 
 use super::mailbox::Mailbox;
+use super::servers::Servers;
 use super::state_machine::{self, Pending, Reaction};
 use super::{Application, EVENT_AL_CONTROL, EVENT_SYNC_MANAGER, EVENT_WATCHDOG, settings};
 use crate::controller::Controller;
@@ -97,6 +98,7 @@ impl Application {
         }
         let numbers = settings::mailbox_numbers(description);
         self.mailbox = Some(Mailbox::open(*layout, numbers, controller, now));
+        self.servers = Servers::new();
         Ok(())
     }
 

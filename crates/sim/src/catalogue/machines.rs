@@ -51,7 +51,10 @@ pub fn servo(name: &str) -> DeviceDescription {
     let mut description = machine(name, 0x1B96_0402);
     description.group = "Drives".into();
     description.fmmus = vec![FmmuUsage::Outputs, FmmuUsage::Inputs, FmmuUsage::MailboxStatus];
-    let details = CoeDetails::PDO_ASSIGN | CoeDetails::PDO_CONFIGURATION | CoeDetails::COMPLETE_ACCESS;
+    let details = CoeDetails::SDO_INFORMATION
+        | CoeDetails::PDO_ASSIGN
+        | CoeDetails::PDO_CONFIGURATION
+        | CoeDetails::COMPLETE_ACCESS;
     description.mailbox = Some(coe_mailbox(details));
     let command = vec![
         entry(0x6040, 0, "Controlword", data_type::U16, 16),

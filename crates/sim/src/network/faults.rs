@@ -54,6 +54,10 @@ impl Network {
                     *byte ^= mask;
                 }
             }
+            Fault::Mail(device, fault) => {
+                let now = self.now;
+                self.device_mut(device).disturb_mail(fault, now);
+            }
             Fault::RefuseTransition { device, to, code, times } => {
                 self.device_mut(device).refuse_transition(to, code, times);
             }
@@ -90,6 +94,7 @@ impl Network {
             Fault::PowerOff(device)
             | Fault::PowerOn(device)
             | Fault::Hang(device, _)
+            | Fault::Mail(device, _)
             | Fault::RefuseTransition { device, .. } => self.check_device(device),
             Fault::CorruptSii { device, offset, .. } => {
                 self.check_device(device);

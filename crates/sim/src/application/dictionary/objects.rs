@@ -2,6 +2,7 @@
 
 use std::collections::BTreeMap;
 
+use ringcat_wire::mailbox::coe::AccessRights;
 use ringcat_wire::sii::{PdoDirection, SyncManagerKind};
 
 use super::{ASSIGNMENT_BASE, Access, Entry, MAX_MAPPED_ENTRIES, MappedEntry, Object, ObjectRole};
@@ -99,7 +100,7 @@ fn list(
     let mut entries = vec![Entry::new(0, data_type::U8, access, &[0])];
     for sub_index in (1..=u8::MAX).take(slots) {
         let value = values.next().inspect(|_| count = sub_index).unwrap_or_else(|| vec![0; width]);
-        entries.push(Entry { sub_index, data_type, access, value });
+        entries.push(Entry::new(sub_index, data_type, access, &value));
     }
     entries[0].value = vec![count];
     Object { index, name: name.into(), role, entries }
@@ -110,13 +111,13 @@ fn mapped_objects(description: &DeviceDescription) -> Vec<Object> {
     let mut found: BTreeMap<u16, BTreeMap<u8, Entry>> = BTreeMap::new();
     let mut names = BTreeMap::new();
     for pdo in &description.pdos {
-        let access = match pdo.direction {
-            PdoDirection::Rx => Access::ReadWrite,
-            PdoDirection::Tx => Access::ReadOnly,
+        let (access, mappable) = match pdo.direction {
+            PdoDirection::Rx => (Access::ReadWrite, AccessRights::RX_MAPPABLE),
+            PdoDirection::Tx => (Access::ReadOnly, AccessRights::TX_MAPPABLE),
         };
         for entry in pdo.entries.iter().filter(|entry| entry.index != 0) {
             let zeros = vec![0; usize::from(entry.bit_length).div_ceil(8)];
-            let value = Entry { sub_index: entry.sub_index, data_type: entry.data_type, access, value: zeros };
+            let value = Entry::new(entry.sub_index, entry.data_type, access, &zeros).named(&entry.name).allow(mappable);
             found.entry(entry.index).or_default().entry(entry.sub_index).or_insert(value);
             names.entry(entry.index).or_insert_with(|| entry.name.clone());
         }

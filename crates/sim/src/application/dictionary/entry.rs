@@ -1,0 +1,144 @@
+//! One entry of an object: its value, when it may be written, what may be written (facts 6.3).
+
+use ringcat_wire::al::AlState;
+use ringcat_wire::mailbox::coe::{AccessRights, DataType};
+use ringcat_wire::mailbox::sdo::AbortCode;
+
+use crate::application::coe::MAX_TRANSFER_BYTES;
+
+/// Longest value that has a default and a range: one number.
+const MAX_NUMBER: usize = 8;
+
+/// When an entry may be read and written.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Access {
+    /// Never written.
+    ReadOnly,
+    /// Written in each state with a mailbox.
+    ReadWrite,
+    /// Written in PREOP.
+    ReadWritePreOp,
+    /// Written in each state with a mailbox, never read.
+    WriteOnly,
+}
+
+/// One sub index of an object.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Entry {
+    /// Sub index.
+    pub sub_index: u8,
+    /// Data type code of CoE.
+    pub data_type: u8,
+    /// When it may be written.
+    pub access: Access,
+    /// The value, little-endian. Its length is fixed, except for a domain.
+    pub value: Vec<u8>,
+    /// Name for people; empty: that of the object.
+    pub name: String,
+    /// Rights beside those that the access gives: mappable, backup, setting.
+    more_rights: u16,
+    /// Smallest and largest value of a number.
+    range: Option<(i64, i64)>,
+    default: Option<Vec<u8>>,
+}
+
+impl Entry {
+    /// An entry. The value is the default value too.
+    pub fn new(sub_index: u8, data_type: u8, access: Access, value: &[u8]) -> Entry {
+        let default = (1..=MAX_NUMBER).contains(&value.len()).then(|| value.to_vec());
+        let value = value.into();
+        Entry { sub_index, data_type, access, value, name: String::new(), more_rights: 0, range: None, default }
+    }
+
+    /// The same with a name.
+    pub fn named(self, name: &str) -> Entry {
+        Entry { name: name.into(), ..self }
+    }
+
+    /// The same with rights that the access does not give: bits of [`AccessRights`].
+    pub fn allow(self, rights: u16) -> Entry {
+        Entry { more_rights: self.more_rights | rights, ..self }
+    }
+
+    /// The same, a number that is only written within this range.
+    pub fn within(self, minimum: i64, maximum: i64) -> Entry {
+        Entry { range: Some((minimum, maximum)), ..self }
+    }
+
+    /// Data type.
+    pub fn data_type(&self) -> DataType {
+        DataType(self.data_type.into())
+    }
+
+    /// Length of the value in bits.
+    pub fn bit_length(&self) -> u16 {
+        let bits = u16::try_from(self.value.len() * 8).unwrap_or(u16::MAX);
+        self.data_type().bits().unwrap_or(bits)
+    }
+
+    /// Rights as SDO information tells them.
+    pub fn rights(&self) -> AccessRights {
+        let by_access = match self.access {
+            Access::ReadOnly => AccessRights::READ,
+            Access::ReadWrite => AccessRights::READ | AccessRights::WRITE,
+            Access::ReadWritePreOp => AccessRights::READ | AccessRights::WRITE_PREOP,
+            Access::WriteOnly => AccessRights::WRITE,
+        };
+        AccessRights(by_access | self.more_rights)
+    }
+
+    /// Default value, where it has as many bytes as the type.
+    pub fn default_bytes(&self) -> Option<&[u8]> {
+        self.default.as_deref().filter(|default| default.len() == usize::from(self.bit_length()).div_ceil(8))
+    }
+
+    /// Smallest and largest value, where there are such.
+    pub fn range_bytes(&self) -> Option<(Vec<u8>, Vec<u8>)> {
+        let length = usize::from(self.bit_length()).div_ceil(8);
+        let bytes = |value: i64| value.to_le_bytes().get(..length).map(<[u8]>::to_vec);
+        let (minimum, maximum) = self.range?;
+        Some((bytes(minimum)?, bytes(maximum)?))
+    }
+
+    /// Whether so many bytes may be written in `state`, whatever they are.
+    pub(super) fn check_access(&self, length: usize, state: AlState) -> Result<(), AbortCode> {
+        match self.access {
+            Access::ReadOnly => return Err(AbortCode::READ_ONLY),
+            Access::ReadWritePreOp if state != AlState::PreOp => return Err(AbortCode::CANNOT_BE_STORED_DEVICE_STATE),
+            Access::ReadWritePreOp | Access::ReadWrite | Access::WriteOnly => {}
+        }
+        let (least, most) = match self.data_type() {
+            DataType::DOMAIN => (0, MAX_TRANSFER_BYTES),
+            _ => (self.value.len(), self.value.len()),
+        };
+        if length > most {
+            return Err(AbortCode::LENGTH_TOO_LONG);
+        }
+        if length < least { Err(AbortCode::LENGTH_TOO_SHORT) } else { Ok(()) }
+    }
+
+    /// Whether the value is one of those that the entry takes.
+    pub(super) fn check_value(&self, data: &[u8]) -> Result<(), AbortCode> {
+        let Some((minimum, maximum)) = self.range else {
+            return Ok(());
+        };
+        let value = self.number(data);
+        if value > maximum {
+            return Err(AbortCode::VALUE_TOO_HIGH);
+        }
+        if value < minimum { Err(AbortCode::VALUE_TOO_LOW) } else { Ok(()) }
+    }
+
+    /// The number that the bytes are.
+    fn number(&self, data: &[u8]) -> i64 {
+        let signed = matches!(
+            self.data_type(),
+            DataType::INTEGER8 | DataType::INTEGER16 | DataType::INTEGER24 | DataType::INTEGER32 | DataType::INTEGER64
+        );
+        let negative = signed && data.last().is_some_and(|byte| byte & 0x80 != 0);
+        let mut bytes = [if negative { 0xFF } else { 0 }; MAX_NUMBER];
+        let length = data.len().min(MAX_NUMBER);
+        bytes[..length].copy_from_slice(&data[..length]);
+        i64::from_le_bytes(bytes)
+    }
+}

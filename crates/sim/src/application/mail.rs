@@ -1,0 +1,95 @@
+//! The application's mail: messages go to the servers, answers and news go out (facts 6).
+//!
+//! In: AL events of the mailbox SyncManagers, the time, news of the device (emergencies, messages for the diagnosis
+//! history), faults. Out: what the MainDevice reads.
+
+use ringcat_wire::mailbox::Protocol;
+use ringcat_wire::mailbox::coe::{
+    CoeHeader, CoeService, DiagnosisFlags, DiagnosisMessage, DiagnosisParameter, Emergency,
+};
+
+use super::Application;
+use super::mailbox::faults::MailFault;
+use super::servers::Surroundings;
+use crate::controller::Controller;
+use crate::description::DeviceDescription;
+use crate::time::SimTime;
+
+/// Error code of the emergency that tells of a new message in the diagnosis history: device specific.
+const NEW_DIAGNOSIS: u16 = 0xFF00;
+/// Object 0x1001.
+const ERROR_REGISTER: u16 = 0x1001;
+/// Most bytes of a message in the diagnosis history.
+const MAX_DIAGNOSIS: usize = 256;
+
+impl Application {
+    /// Something goes wrong with the mail.
+    pub fn disturb_mail(&mut self, fault: MailFault, now: SimTime) {
+        self.faults.add(fault, now);
+    }
+
+    /// Sends a message that nobody asked for; false without a mailbox in use, or where too many wait.
+    pub fn post(&mut self, protocol: Protocol, payload: Vec<u8>) -> bool {
+        let ready = self.last_run;
+        self.mailbox.as_mut().is_some_and(|mailbox| mailbox.post(protocol, payload, ready))
+    }
+
+    /// Sends an emergency and sets the error register; false where it cannot be sent.
+    pub fn emergency(&mut self, emergency: &Emergency) -> bool {
+        self.dictionary.set(ERROR_REGISTER, 0, &[emergency.error_register]);
+        let mut payload = CoeHeader::new(CoeService::Emergency).encode().to_vec();
+        payload.extend_from_slice(&emergency.encode());
+        self.post(Protocol::Coe, payload)
+    }
+
+    /// Keeps a message in the diagnosis history, with the present time and these parameters; an emergency tells of it where
+    /// the flags say so. False where it is not kept.
+    pub fn diagnose(&mut self, message: &DiagnosisMessage<'_>, parameters: &[DiagnosisParameter<'_>]) -> bool {
+        let mut bytes = vec![0; MAX_DIAGNOSIS];
+        let mut length = DiagnosisMessage::OVERHEAD;
+        for parameter in parameters {
+            let Some(more) = parameter.encode(&mut bytes[length..]) else {
+                return false;
+            };
+            length += more;
+        }
+        let parameter_count = u8::try_from(parameters.len()).unwrap_or(u8::MAX);
+        let time_ns = self.last_run.0;
+        let head = DiagnosisMessage { parameter_count, parameters: &[], local_time: true, time_ns, ..*message };
+        head.encode(&mut bytes);
+        bytes.truncate(length);
+        if !self.dictionary.diagnose(message.kind, &bytes) {
+            return false;
+        }
+        if self.dictionary.diagnosis_flags().is_some_and(|flags| flags.has(DiagnosisFlags::EMERGENCY)) {
+            let [.., low, high] = message.code.to_le_bytes();
+            let [text_low, text_high] = message.text.to_le_bytes();
+            let data = [low, high, text_low, text_high, message.kind.code()];
+            self.emergency(&Emergency { error_code: NEW_DIAGNOSIS, error_register: 0x81, data });
+        }
+        true
+    }
+
+    pub(super) fn run_mailbox(
+        &mut self,
+        description: &DeviceDescription,
+        controller: &mut Controller,
+        events: u32,
+        now: SimTime,
+    ) {
+        self.faults.advance(now);
+        let (Some(mailbox), Some(declared)) = (&mut self.mailbox, description.mailbox) else {
+            return;
+        };
+        // An answer that leaves makes room for the message that waits.
+        mailbox.send(controller, now);
+        if let Some(message) = mailbox.take(controller, events, &self.faults, now) {
+            let state = self.machine.state();
+            let (servers, dictionary, process_data) = (&mut self.servers, &mut self.dictionary, &self.process_data);
+            mailbox.serve(&message, now + declared.response_time, &mut self.faults, |protocol, payload, room| {
+                servers.serve(protocol, payload, &mut Surroundings { declared, state, room, dictionary, process_data })
+            });
+        }
+        mailbox.send(controller, now);
+    }
+}

@@ -1,0 +1,204 @@
+//! What goes wrong with a device's mail on purpose (issue 4).
+//!
+//! In: [`MailFault`]s from a test. Out: what happens to the next messages. Faults outlive the mailbox: they hold until
+//! they are used up, or until [`MailFault::Heal`].
+
+use core::time::Duration;
+
+use ringcat_wire::mailbox::Protocol;
+use ringcat_wire::mailbox::foe::{FoeErrorCode, FoeMessage};
+use ringcat_wire::mailbox::sdo::{AbortCode, SdoRequest, SdoResponse};
+
+use super::Answer;
+use crate::time::SimTime;
+
+/// Something that goes wrong with the mail of a device.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum MailFault {
+    /// The next requests are carried out but not answered; `u32::MAX` for a device that answers no more.
+    LoseAnswers {
+        /// How many answers.
+        count: u32,
+    },
+    /// The next requests are taken and forgotten: neither carried out nor answered.
+    LoseRequests {
+        /// How many requests.
+        count: u32,
+    },
+    /// The next answers come twice, with the same counter.
+    RepeatAnswers {
+        /// How many answers.
+        count: u32,
+    },
+    /// The next answers come later; what is behind them may overtake them.
+    DelayAnswers {
+        /// How many answers.
+        count: u32,
+        /// How much later.
+        by: Duration,
+    },
+    /// The next answers have this counter, which the counting does not know of.
+    WrongCounter {
+        /// How many answers.
+        count: u32,
+        /// The counter, 0..=7.
+        counter: u8,
+    },
+    /// The next requests are answered with an error reply of the mailbox.
+    Refuse {
+        /// How many requests.
+        count: u32,
+        /// Detail of the error reply.
+        detail: u16,
+    },
+    /// The next SDO requests are answered with an abort.
+    AbortSdo {
+        /// How many requests.
+        count: u32,
+        /// Why.
+        code: AbortCode,
+    },
+    /// The next FoE messages are answered with BUSY; their sender has to repeat them.
+    BusyFoe {
+        /// How many messages.
+        count: u32,
+    },
+    /// The next FoE message is answered with an error.
+    FailFoe {
+        /// Why.
+        code: FoeErrorCode,
+    },
+    /// Nothing is taken from the mailbox for a while: it stays full.
+    Full {
+        /// How long.
+        during: Duration,
+    },
+    /// All of this is over.
+    Heal,
+}
+
+/// What happens to an answer.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Fate {
+    /// It comes so much later.
+    pub delay: Duration,
+    /// It comes twice.
+    pub twice: bool,
+    /// It has this counter.
+    pub counter: Option<u8>,
+}
+
+/// Faults that wait for their messages.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct MailFaults {
+    lose_answers: u32,
+    lose_requests: u32,
+    repeat: u32,
+    delay: (u32, Duration),
+    counter: (u32, u8),
+    refuse: (u32, u16),
+    abort: (u32, Option<AbortCode>),
+    busy: u32,
+    fail: Option<FoeErrorCode>,
+    full_until: Option<SimTime>,
+}
+
+/// What stands in a BUSY.
+const BUSY_ENTIRE: u16 = 100;
+
+impl MailFaults {
+    /// Adds a fault; one of the same kind is replaced.
+    pub fn add(&mut self, fault: MailFault, now: SimTime) {
+        match fault {
+            MailFault::LoseAnswers { count } => self.lose_answers = count,
+            MailFault::LoseRequests { count } => self.lose_requests = count,
+            MailFault::RepeatAnswers { count } => self.repeat = count,
+            MailFault::DelayAnswers { count, by } => self.delay = (count, by),
+            MailFault::WrongCounter { count, counter } => self.counter = (count, counter),
+            MailFault::Refuse { count, detail } => self.refuse = (count, detail),
+            MailFault::AbortSdo { count, code } => self.abort = (count, Some(code)),
+            MailFault::BusyFoe { count } => self.busy = count,
+            MailFault::FailFoe { code } => self.fail = Some(code),
+            MailFault::Full { during } => self.full_until = Some(now + during),
+            MailFault::Heal => *self = MailFaults::default(),
+        }
+    }
+
+    /// Until when nothing is taken from the mailbox.
+    pub const fn full_until(&self) -> Option<SimTime> {
+        self.full_until
+    }
+
+    /// The time goes on.
+    pub fn advance(&mut self, now: SimTime) {
+        self.full_until = self.full_until.filter(|until| *until > now);
+    }
+
+    /// The answer to a request that is not served; `None` where it is.
+    pub fn instead_of_serving(&mut self, protocol: Protocol, payload: &[u8]) -> Option<Answer> {
+        if use_up(&mut self.lose_requests) {
+            return Some(Answer::Silence);
+        }
+        if use_up(&mut self.refuse.0) {
+            return Some(Answer::Error(self.refuse.1));
+        }
+        match protocol {
+            Protocol::Coe => self.aborted(payload),
+            Protocol::Foe => self.disturbed_file(),
+            Protocol::Error | Protocol::Aoe | Protocol::Eoe | Protocol::Soe | Protocol::Voe | Protocol::Other(_) => {
+                None
+            }
+        }
+    }
+
+    fn aborted(&mut self, payload: &[u8]) -> Option<Answer> {
+        let code = self.abort.1?;
+        let (index, sub_index) = match SdoRequest::decode(payload).ok()? {
+            SdoRequest::DownloadExpedited { index, sub_index, .. }
+            | SdoRequest::DownloadNormal { index, sub_index, .. }
+            | SdoRequest::Upload { index, sub_index, .. } => (index, sub_index),
+            SdoRequest::DownloadSegment { .. } | SdoRequest::UploadSegment { .. } => (0, 0),
+            SdoRequest::Abort { .. } => return None,
+        };
+        if !use_up(&mut self.abort.0) {
+            return None;
+        }
+        let mut bytes = vec![0; 10];
+        SdoResponse::Abort { index, sub_index, code }.encode(&mut bytes)?;
+        Some(Answer::payload(bytes))
+    }
+
+    fn disturbed_file(&mut self) -> Option<Answer> {
+        let message = if use_up(&mut self.busy) {
+            let done = BUSY_ENTIRE - u16::try_from(self.busy).unwrap_or(u16::MAX).clamp(1, BUSY_ENTIRE);
+            FoeMessage::Busy { done, entire: BUSY_ENTIRE, text: b"erasing" }
+        } else {
+            FoeMessage::Error { code: self.fail.take()?, text: b"told to fail" }
+        };
+        let mut bytes = vec![0; 32];
+        let length = message.encode(&mut bytes)?;
+        bytes.truncate(length);
+        Some(Answer::payload(bytes))
+    }
+
+    /// What happens to an answer; `None` where it is lost.
+    pub fn answer(&mut self) -> Option<Fate> {
+        if use_up(&mut self.lose_answers) {
+            return None;
+        }
+        let delay = if use_up(&mut self.delay.0) { self.delay.1 } else { Duration::ZERO };
+        let counter = use_up(&mut self.counter.0).then_some(self.counter.1);
+        Some(Fate { delay, twice: use_up(&mut self.repeat), counter })
+    }
+}
+
+/// One less; true where there was one. The largest number lasts for ever.
+fn use_up(count: &mut u32) -> bool {
+    if *count != u32::MAX {
+        *count = match count.checked_sub(1) {
+            Some(left) => left,
+            None => return false,
+        };
+    }
+    true
+}
