@@ -82,7 +82,7 @@ fn download(client: &mut Client, index: u16, total: usize, data: &[u8]) -> Resul
     match SdoResponse::decode(answers.last().unwrap()).unwrap() {
         SdoResponse::DownloadDone { .. } => Ok(()),
         SdoResponse::DownloadSegmentDone { toggle } => {
-            assert_eq!(toggle, rest.len() % 2 == 0);
+            assert_eq!(toggle, rest.len().is_multiple_of(2));
             Ok(())
         }
         SdoResponse::Abort { code, .. } => Err(code),
