@@ -34,7 +34,7 @@ const LOOK: Duration = Duration::from_millis(1);
 const LIVE: Duration = Duration::from_millis(500);
 
 /// Changes of the process data's judgement are told so often; all are counted.
-const JUDGEMENTS_TOLD: u32 = 20;
+const JUDGEMENTS_TOLD: u32 = 200;
 
 /// How to read what it prints.
 const SUMMARY_HELP: &str = "\

@@ -75,7 +75,7 @@ pub fn run(arguments: &SimArguments) -> Result<(), Failure> {
         while let Some(order) = doors.next() {
             let (text, quit) = match carry_out(&order.line, &mut plant) {
                 Outcome::Answer(text) if order.line.trim() == "status" => {
-                    (format!("{}\n{text}", wires.lateness.summary()), false)
+                    (format!("{}\n{text}", wires.summary()), false)
                 }
                 Outcome::Answer(text) => (text, false),
                 Outcome::Quit => ("ok\n".to_owned(), true),
@@ -83,12 +83,12 @@ pub fn run(arguments: &SimArguments) -> Result<(), Failure> {
             // Whoever asked may have gone.
             let _ = order.answer.send(text);
             if quit {
-                say(now, &wires.lateness.summary());
+                say(now, &wires.summary());
                 return Ok(());
             }
         }
         if is_asked(&end) {
-            say(now, &wires.lateness.summary());
+            say(now, &wires.summary());
             return Ok(());
         }
         if let Some(line) = wires.lateness.line(now) {

@@ -50,7 +50,7 @@ fn main() -> ExitCode {
 
 async fn run(interface: &str, count: usize, cycles: usize) -> Result<(), String> {
     let (sender, receiver, pdu_loop) = STORAGE.try_split().map_err(|()| "the storage is in use".to_owned())?;
-    let timeouts = Timeouts { pdu: PATIENCE, ..Timeouts::default() };
+    let timeouts = Timeouts { pdu: PATIENCE, eeprom: PATIENCE, ..Timeouts::default() };
     let main_device = Arc::new(MainDevice::new(pdu_loop, timeouts, MainDeviceConfig::default()));
     let task = tx_rx_task(interface, sender, receiver).map_err(|error| format!("{interface}: {error}"))?;
     thread::spawn(move || smol::block_on(task));

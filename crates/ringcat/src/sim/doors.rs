@@ -3,11 +3,17 @@
 //! Each door has a thread that reads lines and waits for the answer; the simulator itself looks for orders between two
 //! events and never waits for them.
 
-use std::io::{self, BufRead, BufReader, Write};
+use std::io::{self, BufRead, BufReader, Read, Write};
 use std::os::unix::net::{UnixListener, UnixStream};
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 use std::sync::mpsc::{Receiver, Sender, channel};
 use std::thread;
+
+/// A line has at most so many bytes: the longest order carries the inputs of a large SubDevice.
+const LONGEST_LINE: u64 = 16_384;
+/// So many connections are served at once.
+const MOST_CONNECTIONS: usize = 32;
 
 /// A line, and where its answer goes.
 #[derive(Debug)]
@@ -75,9 +81,16 @@ fn listen(path: &Path) -> io::Result<UnixListener> {
 }
 
 fn accept(listener: &UnixListener, sender: &Sender<Order>) {
-    for connection in listener.incoming().flatten() {
-        let sender = sender.clone();
+    let open = Arc::new(());
+    for mut connection in listener.incoming().flatten() {
+        let (sender, held) = (sender.clone(), open.clone());
+        if Arc::strong_count(&open) > MOST_CONNECTIONS + 1 {
+            // Whoever asked may have hung up.
+            let _ = connection.write_all(b"error: too many connections\n");
+            continue;
+        }
         let served = thread::Builder::new().name("control connection".into()).spawn(move || {
+            let _held = held;
             let Ok(mut output) = connection.try_clone() else { return };
             // Whoever asked has hung up: nobody is left to be told.
             let _ = serve(BufReader::new(connection), &mut output, &sender);
@@ -88,15 +101,60 @@ fn accept(listener: &UnixListener, sender: &Sender<Order>) {
     }
 }
 
-fn serve(input: impl BufRead, output: &mut impl Write, sender: &Sender<Order>) -> io::Result<()> {
-    for line in input.lines() {
+fn serve(mut input: impl BufRead, output: &mut impl Write, sender: &Sender<Order>) -> io::Result<()> {
+    loop {
+        let mut bytes = Vec::new();
+        if (&mut input).take(LONGEST_LINE).read_until(b'\n', &mut bytes)? == 0 {
+            return Ok(());
+        }
+        if bytes.len() as u64 == LONGEST_LINE && bytes.last() != Some(&b'\n') {
+            output.write_all(b"error: a line is too long; nothing more is read here\n")?;
+            return Ok(());
+        }
+        let line = String::from_utf8_lossy(&bytes).trim_end_matches(['\n', '\r']).to_owned();
         let (answer, answered) = channel();
-        if sender.send(Order { line: line?, answer }).is_err() {
+        if sender.send(Order { line, answer }).is_err() {
             return Ok(());
         }
         let Ok(text) = answered.recv() else { return Ok(()) };
         output.write_all(text.as_bytes())?;
         output.flush()?;
     }
-    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// What a door answers when each order is answered with itself.
+    fn echo(input: &[u8]) -> String {
+        let (sender, orders) = channel::<Order>();
+        let simulator = thread::spawn(move || {
+            for order in orders {
+                assert!(order.answer.send(format!("{}\n", order.line)).is_ok());
+            }
+        });
+        let mut output = Vec::new();
+        assert!(serve(input, &mut output, &sender).is_ok());
+        drop(sender);
+        assert!(simulator.join().is_ok());
+        String::from_utf8_lossy(&output).into_owned()
+    }
+
+    #[test]
+    fn each_line_is_an_order_whatever_its_bytes_and_its_end() {
+        assert_eq!(echo(b"status\ncut 1-2\r\n\xff\n\nquit"), "status\ncut 1-2\n\u{fffd}\n\nquit\n");
+        assert_eq!(echo(b""), "");
+    }
+
+    #[test]
+    fn a_line_without_end_is_refused_and_takes_no_memory() {
+        let endless = BufReader::new(io::repeat(0));
+        let (sender, _orders) = channel();
+        let mut output = Vec::new();
+        assert!(serve(endless, &mut output, &sender).is_ok());
+        assert!(output.starts_with(b"error: a line is too long"));
+        let longest = vec![b'x'; LONGEST_LINE as usize - 1];
+        assert_eq!(echo(&longest).len(), LONGEST_LINE as usize);
+    }
 }

@@ -17,6 +17,8 @@ pub struct Lateness {
     pub count: u64,
     /// The latest.
     pub longest: Duration,
+    /// All of them together.
+    pub total: Duration,
     told: u64,
     longest_since: Duration,
     quiet_until_ns: u64,
@@ -29,6 +31,7 @@ impl Lateness {
         if late > LATE {
             self.count += 1;
             self.longest = self.longest.max(late);
+            self.total += late;
             self.longest_since = self.longest_since.max(late);
         }
     }
@@ -52,8 +55,14 @@ impl Lateness {
 
     /// For the status.
     pub fn summary(&self) -> String {
-        let (limit, longest) = (LATE.as_micros(), self.longest.as_secs_f64() * 1e3);
-        format!("late wake-ups of this simulator (more than {limit} us): {}, the latest by {longest:.3} ms", self.count)
+        let ms = |time: Duration| time.as_secs_f64() * 1e3;
+        format!(
+            "late wake-ups of this simulator (more than {} us): {}, the latest by {:.3} ms, together {:.3} ms",
+            LATE.as_micros(),
+            self.count,
+            ms(self.longest),
+            ms(self.total)
+        )
     }
 }
 
@@ -72,6 +81,6 @@ mod tests {
         lateness.note(4_000_000, 5_000_000);
         assert_eq!(lateness.line(5_000_000), None);
         assert!(lateness.line(1_003_000_000).is_some_and(|line| line.contains("by up to 1.000 ms")));
-        assert!(lateness.summary().contains(": 2, the latest by 2.000 ms"));
+        assert!(lateness.summary().contains(": 2, the latest by 2.000 ms, together 3.000 ms"));
     }
 }

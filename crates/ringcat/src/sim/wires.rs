@@ -10,7 +10,7 @@
 
 use std::time::Duration;
 
-use ringcat_link::{LinkError, PacketOptions, PacketSocket, ReceiveMode, monotonic};
+use ringcat_link::{LinkCounters, LinkError, PacketOptions, PacketSocket, ReceiveMode, monotonic};
 use ringcat_sim::cable::HostLink;
 use ringcat_sim::network::Network;
 use ringcat_sim::time::SimTime;
@@ -19,8 +19,8 @@ use super::lateness::Lateness;
 
 /// Orders are looked for at least this often while the simulator spins.
 const SPIN: Duration = Duration::from_micros(50);
-/// And this often while it sleeps.
-const NAP: Duration = Duration::from_millis(2);
+/// And this often while it sleeps: a stall of this machine that is not longer goes unnoticed.
+const NAP: Duration = Duration::from_micros(500);
 
 /// The network interfaces of a simulated segment.
 #[derive(Debug)]
@@ -83,5 +83,18 @@ impl Wires {
             (Some(main), None) => ringcat_link::wait(&[main], self.asked_ns, self.mode),
             (None, _) => false,
         };
+    }
+
+    /// What the interfaces have carried, and how well this simulator has kept up.
+    pub fn summary(&self) -> String {
+        let line = |(link, socket): &(HostLink, PacketSocket)| {
+            let LinkCounters { sent, received, down, busy, refused, overrun, truncated } = socket.counters();
+            let unsent = down + busy + refused;
+            format!(
+                "{link} interface: {received} frames received, {overrun} lost in a full ring, {truncated} too long, {sent} \
+                 sent, {unsent} not sent\n"
+            )
+        };
+        self.sockets.iter().map(line).collect::<String>() + &self.lateness.summary()
     }
 }

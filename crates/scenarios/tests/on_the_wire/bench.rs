@@ -1,12 +1,17 @@
 //! Two network namespaces with one or two veth pairs between them, a simulated segment in the one, and programs in the
 //! other. All of it is gone when the bench is dropped.
 
+use std::fmt::{Display, Formatter};
 use std::io::{BufRead, BufReader, Read, Write};
 use std::os::unix::net::UnixStream;
 use std::path::{Path, PathBuf};
 use std::process::{Child, ChildStdin, Command, Output, Stdio};
+use std::sync::mpsc::channel;
 use std::sync::{LazyLock, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
+
+use crate::said::Said;
+use crate::states;
 
 /// One test at a time: the others would take processor time from it.
 static ONE_AT_A_TIME: Mutex<()> = Mutex::new(());
@@ -14,6 +19,8 @@ static ONE_AT_A_TIME: Mutex<()> = Mutex::new(());
 const FIRST_INDEX: [usize; 2] = [50, 60];
 /// The simulator has to be there within.
 const START_LIMIT: Duration = Duration::from_secs(10);
+/// All SubDevices have to be in OP within.
+const OP_LIMIT: Duration = Duration::from_secs(30);
 /// A program has to end within.
 const END_LIMIT: Duration = Duration::from_secs(90);
 /// Both ends sleep until something comes, before all other programs: the machine may be busy.
@@ -53,8 +60,30 @@ pub struct Bench {
     sim: String,
     /// Namespace of another MainDevice, where a test wants one.
     other: Option<String>,
-    simulator: Option<(Child, PathBuf)>,
+    simulator: Option<Simulator>,
     _alone: MutexGuard<'static, ()>,
+}
+
+/// The simulator while it runs.
+struct Simulator {
+    child: Child,
+    socket: PathBuf,
+    said: Said,
+}
+
+/// How often and how long the simulator was late so far: the machine stalled, or had other work.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct SimulatorLateness {
+    /// Wake-ups.
+    pub count: u64,
+    /// All of them together.
+    pub together_ms: f64,
+}
+
+impl Display for SimulatorLateness {
+    fn fmt(&self, f: &mut Formatter<'_>) -> std::fmt::Result {
+        write!(f, "late {} times, {:.1} ms together", self.count, self.together_ms)
+    }
 }
 
 /// Whether a layer of tests is asked for by an environment variable; says so where it is not. Real time passes in
@@ -146,8 +175,9 @@ impl Bench {
         if ring {
             command.args(["--redundant", "sim1"]);
         }
-        let child = command.stdin(Stdio::piped()).stdout(Stdio::null()).spawn().expect("the simulator starts");
-        self.simulator = Some((child, socket));
+        let mut child = command.stdin(Stdio::piped()).stdout(Stdio::piped()).spawn().expect("the simulator starts");
+        let said = Said::by(child.stdout.take().expect("it is piped"));
+        self.simulator = Some(Simulator { child, socket, said });
         let until = Instant::now() + START_LIMIT;
         while self.connect().is_none() {
             assert!(Instant::now() < until, "the simulator does not answer");
@@ -157,7 +187,23 @@ impl Bench {
     }
 
     fn connect(&self) -> Option<UnixStream> {
-        UnixStream::connect(&self.simulator.as_ref()?.1).ok()
+        UnixStream::connect(&self.simulator.as_ref()?.socket).ok()
+    }
+
+    /// What the simulator has said.
+    pub fn simulator_said(&self) -> &Said {
+        &self.simulator.as_ref().expect("it runs").said
+    }
+
+    /// How late the simulator was so far.
+    pub fn simulator_lateness(&self) -> SimulatorLateness {
+        let status = self.order("status");
+        let line = status.lines().find(|line| line.starts_with("late wake-ups")).expect("it tells");
+        let behind = |words: &str| {
+            let rest = line.split(words).nth(1).unwrap_or_else(|| panic!("{words} in {line}"));
+            rest.split([' ', ',']).next().and_then(|figure| figure.parse::<f64>().ok()).expect("a figure")
+        };
+        SimulatorLateness { count: behind("): ") as u64, together_ms: behind("together ") }
     }
 
     /// Gives the simulator an order that it obeys; its answer without the last line.
@@ -186,6 +232,14 @@ impl Bench {
         self.start(&program("ringcat"), &[arguments, &THREAD].concat())
     }
 
+    /// Starts `ringcat` in the namespace of the MainDevice and reads along.
+    pub fn run_ringcat(&self, arguments: &[&str]) -> Running {
+        let mut child = self.start_ringcat(arguments);
+        let said = Said::by(child.stdout.take().expect("it is piped"));
+        let errors = Said::by(child.stderr.take().expect("it is piped"));
+        Running { child, said, errors }
+    }
+
     /// Starts a program in the namespace of the MainDevice.
     pub fn start(&self, path: &Path, arguments: &[&str]) -> Child {
         start(self.command(&self.main, path).args(arguments))
@@ -198,7 +252,7 @@ impl Bench {
     }
 
     fn end_simulator(&mut self) {
-        if let Some((mut child, socket)) = self.simulator.take() {
+        if let Some(Simulator { mut child, socket, .. }) = self.simulator.take() {
             // It may have ended by itself.
             let _ = child.kill();
             let _ = child.wait();
@@ -227,17 +281,73 @@ fn ip(arguments: &str) -> Result<(), String> {
     if output.status.success() { Ok(()) } else { Err(String::from_utf8_lossy(&output.stderr).into_owned()) }
 }
 
-/// Waits for a program, not for ever.
-pub fn finish(mut child: Child) -> Output {
-    let until = Instant::now() + END_LIMIT;
+/// Waits until so many SubDevices are in OP.
+pub fn await_op(bench: &Bench, count: usize) {
+    let until = Instant::now() + OP_LIMIT;
+    while states(bench, "OP") != count {
+        assert!(Instant::now() < until, "{}", bench.order("status"));
+        std::thread::sleep(Duration::from_millis(50));
+    }
+}
+
+/// A program whose lines are read while it runs; killed when it is dropped.
+pub struct Running {
+    child: Child,
+    said: Said,
+    errors: Said,
+}
+
+impl Running {
+    /// What it says.
+    pub fn said(&self) -> &Said {
+        &self.said
+    }
+
+    /// Asks it to end, as Ctrl-C does, and waits; what it said, and what of errors.
+    pub fn interrupt(self) -> (String, String) {
+        let process = self.child.id().to_string();
+        assert!(Command::new("kill").args(["-INT", &process]).status().is_ok_and(|status| status.success()));
+        self.finish()
+    }
+
+    /// Waits for its end.
+    pub fn finish(mut self) -> (String, String) {
+        wait(&mut self.child, END_LIMIT);
+        (self.said.whole(), self.errors.whole())
+    }
+}
+
+impl Drop for Running {
+    fn drop(&mut self) {
+        // It has usually ended.
+        let _ = self.child.kill();
+        let _ = self.child.wait();
+    }
+}
+
+/// Waits for a program, not for ever; reads what it says meanwhile.
+pub fn finish(child: Child) -> Output {
+    let process = child.id().to_string();
+    let (sender, ended) = channel();
+    std::thread::spawn(move || sender.send(child.wait_with_output()));
+    match ended.recv_timeout(END_LIMIT) {
+        Ok(output) => output.expect("it is our child"),
+        Err(_) => {
+            let _ = Command::new("kill").args(["-KILL", &process]).status();
+            panic!("a program does not end within {} s", END_LIMIT.as_secs());
+        }
+    }
+}
+
+fn wait(child: &mut Child, limit: Duration) {
+    let until = Instant::now() + limit;
     while child.try_wait().expect("it is our child").is_none() {
         if Instant::now() >= until {
             let _ = child.kill();
-            panic!("a program does not end: {:?}", child.wait_with_output());
+            panic!("a program does not end within {} s", limit.as_secs());
         }
         std::thread::sleep(Duration::from_millis(10));
     }
-    child.wait_with_output().expect("it has ended")
 }
 
 /// A program that prints one line, goes on until its input ends, and is killed when it is dropped.

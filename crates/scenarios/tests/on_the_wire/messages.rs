@@ -1,10 +1,10 @@
 //! What users are told who cannot start, or whose segment somebody disturbs: each message says what to do.
 
 use std::path::Path;
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
-use crate::bench::{Bench, Client, finish, program};
-use crate::{Plant, RING_OF_16, said, states};
+use crate::bench::{Bench, Client, await_op, finish, program};
+use crate::{Plant, RING_OF_16, said};
 
 const TERMINAL: Plant = Plant { outputs: 1, inputs: 0, servos: 0, coupler: false };
 /// Sends frames back as they came, as a cable into a switch or a loop does.
@@ -137,13 +137,4 @@ fn a_main_device_at_the_other_end_of_the_segment_is_told_once_and_counted() {
     assert_eq!(errors.matches(OTHER_MAIN_DEVICE).count(), 1, "{errors}");
     assert!(errors.contains("arrive on main0 (MAIN)"), "{errors}");
     assert!(output.contains("  other MainDevices: "), "{output}");
-}
-
-/// Waits until so many SubDevices are in OP.
-fn await_op(bench: &Bench, count: usize) {
-    let until = Instant::now() + Duration::from_secs(20);
-    while states(bench, "OP") != count {
-        assert!(Instant::now() < until, "{}", bench.order("status"));
-        std::thread::sleep(Duration::from_millis(50));
-    }
 }

@@ -1,0 +1,145 @@
+//! A ring of 16 in OP, and each of its cables cut and healed: those of the host at either end of the cable, by switching
+//! the interface off, the inner ones by the simulator. Nobody leaves OP, and no more cycles are incomplete than the
+//! detection of the cut and stalls of this machine explain; both are measured at each edge and printed.
+
+use std::time::{Duration, Instant};
+
+use crate::bench::{Bench, SimulatorLateness, await_op};
+use crate::said::Said;
+use crate::{RING_OF_16, states};
+
+const CYCLE_MS: f64 = 1.0;
+/// From one edge to the next.
+const PAUSE: Duration = Duration::from_millis(300);
+/// The simulator's cables are noticed as cut after 10 us: within one cycle.
+const INNER_ALLOWED: usize = 1;
+
+/// A cut or heal, and what came of it.
+struct Edge {
+    what: String,
+    incomplete: usize,
+    /// From the order until the simulator noticed; for cables of the host only.
+    noticed_ms: Option<f64>,
+    simulator: SimulatorLateness,
+    /// Cycles that our MainDevice began late or left out, and the time that it lost.
+    ours: (usize, f64),
+}
+
+impl Edge {
+    /// Incomplete cycles that the detection of the cut explains: for an interface that is switched off
+    /// `ceil(detection / cycle) + 1`.
+    fn allowed(&self) -> usize {
+        self.noticed_ms.map_or(INNER_ALLOWED, |ms| (ms / CYCLE_MS).ceil() as usize + 1)
+    }
+
+    /// Incomplete cycles that stalls explain: each is as long as it is, and reaches into one cycle more.
+    fn stalled(&self) -> usize {
+        let cycles = |count: usize, ms: f64| (ms / CYCLE_MS).ceil() as usize + count;
+        cycles(self.simulator.count as usize, self.simulator.together_ms) + cycles(self.ours.0, self.ours.1)
+    }
+
+    fn line(&self) -> String {
+        format!(
+            "{:<12} | {:>10} | {:>7} | {:>10} | {:>5} {:>8.1} | {:>5} {:>8.1}",
+            self.what,
+            self.incomplete,
+            self.allowed(),
+            self.noticed_ms.map_or_else(|| "-".to_owned(), |ms| format!("{ms:.1}")),
+            self.simulator.count,
+            self.simulator.together_ms,
+            self.ours.0,
+            self.ours.1
+        )
+    }
+}
+
+/// Does something to a cable and waits until all is over.
+fn edge(bench: &Bench, run: &Said, what: &str, noticed: Option<&str>, act: impl FnOnce()) -> Edge {
+    let (late, begin) = (bench.simulator_lateness(), Instant::now());
+    act();
+    std::thread::sleep(PAUSE);
+    let end = Instant::now();
+    let lines: Vec<String> = run.between(begin, end).into_iter().map(|(_, line)| line).collect();
+    let noticed_ms = noticed.map(|words| {
+        let said = bench.simulator_said().between(begin, end);
+        let line = said.iter().find(|(_, line)| line.ends_with(words));
+        let (at, _) = line.unwrap_or_else(|| panic!("{what}: the simulator does not say \"{words}\": {said:?}"));
+        at.duration_since(begin).as_secs_f64() * 1e3
+    });
+    let now = bench.simulator_lateness();
+    let simulator =
+        SimulatorLateness { count: now.count - late.count, together_ms: now.together_ms - late.together_ms };
+    assert_eq!(states(bench, "OP"), 16, "{what}: {}", bench.order("status"));
+    let incomplete = incomplete_cycles(&lines).unwrap_or_else(|| panic!("{what}: {lines:#?}"));
+    Edge { what: what.to_owned(), incomplete, noticed_ms, simulator, ours: stalls(&lines) }
+}
+
+/// How many cycles were not complete, by the times of the judgements; `None` where the last one was not.
+fn incomplete_cycles(lines: &[String]) -> Option<usize> {
+    let (mut since, mut cycles) = (None, 0);
+    for line in lines {
+        let Some((ms, judgement)) = line.split_once(" ms  domain 0: ") else { continue };
+        let at: f64 = ms.trim().parse().ok()?;
+        match (judgement.starts_with("complete"), since) {
+            (false, None) => since = Some(at),
+            (true, Some(begin)) => {
+                cycles += ((at - begin) / CYCLE_MS).round().max(1.0) as usize;
+                since = None;
+            }
+            _ => {}
+        }
+    }
+    since.is_none().then_some(cycles)
+}
+
+/// Wake-ups that our MainDevice tells to have come late, and how much they were late in all.
+fn stalls(lines: &[String]) -> (usize, f64) {
+    let figure = |line: &str, behind: &str| -> Option<f64> {
+        line.split(behind).nth(1)?.split(' ').next()?.trim_end_matches(',').parse().ok()
+    };
+    let told = lines.iter().filter(|line| line.contains(" ms  this machine: "));
+    let figures = told.map(|line| {
+        let both = figure(line, "this machine: ").zip(figure(line, "together "));
+        both.unwrap_or_else(|| panic!("unexpected: {line}"))
+    });
+    figures.fold((0, 0.0), |(count, ms), (late, together)| (count + late as usize, ms + together))
+}
+
+#[test]
+fn each_cable_of_a_ring_of_16_cut_and_healed_on_interfaces_costs_no_more_cycles_than_detection_and_stalls_explain() {
+    let Some(mut bench) = Bench::new(2) else { return };
+    bench.simulate(&RING_OF_16.segment(), true);
+    let run = bench.run_ringcat(&["run", "--main", "main0", "--redundant", "main1"]);
+    await_op(&bench, 16);
+    std::thread::sleep(PAUSE);
+    let mut edges = Vec::new();
+    for interface in ["main0", "main1", "sim0", "sim1"] {
+        for (state, noticed) in [("down", "carrier is gone"), ("up", "carrier is back")] {
+            let what = format!("{interface} {state}");
+            edges.push(edge(&bench, run.said(), &what, Some(noticed), || bench.set_link(interface, state)));
+        }
+    }
+    for device in 0..15 {
+        for verb in ["cut", "heal"] {
+            let order = format!("{verb} {device}-{}", device + 1);
+            edges.push(edge(&bench, run.said(), &order, None, || {
+                bench.order(&order);
+            }));
+        }
+    }
+    let (output, errors) = run.interrupt();
+    println!("ring of 16, 1 ms; late wake-ups: how many, and by how many ms in all");
+    println!("edge         | incomplete | allowed | noticed ms | simulator late | this side late");
+    edges.iter().for_each(|edge| println!("{}", edge.line()));
+    let summary = output.find("\nsummary").map_or("", |at| &output[at + 1..]);
+    println!("ringcat run, ring of 16, {} edges:\n{summary}", edges.len());
+    for edge in &edges {
+        let (incomplete, allowed, stalled) = (edge.incomplete, edge.allowed(), edge.stalled());
+        assert!(incomplete <= allowed + stalled, "{}: {incomplete} of {allowed} + {stalled}", edge.what);
+    }
+    for (part, count) in [("ring open", 19), ("ring closed", 19), ("break between", 19), ("no longer answers", 0)] {
+        assert_eq!(output.matches(part).count(), count, "{part}: {output}{errors}");
+    }
+    assert!(output.contains("ring open: 8 SubDevices on MAIN, 8 on REDUNDANT"), "{output}");
+    assert!(output.contains("stopped: outputs zero, all SubDevices in INIT"), "{output}{errors}");
+}

@@ -1,0 +1,143 @@
+//! The MainDevices of others on our simulator: they bring it to OP, and their process data is right at both ends.
+//!
+//! They have time limits of their own, which a stall of this machine breaks whatever the simulator does. So each has three
+//! tries, and each try that fails is shown with what it said and how late the simulator was.
+
+use std::path::{Path, PathBuf};
+use std::process::{Child, Command};
+
+use crate::bench::{Bench, Client, is_asked_for, program, target_directory};
+use crate::{PLANTS, Plant, RING_OF_16, input, states};
+
+/// What asks for these tests.
+const FOREIGN: &str = "RINGCAT_FOREIGN";
+/// Cycles of process data.
+const CYCLES: usize = 500;
+/// A stall of this machine that is longer than the other's patience is no fault of the simulator: so many cycles may have
+/// another working counter.
+const WRONG_ALLOWED: usize = CYCLES / 10;
+/// Tries for each MainDevice and segment.
+const TRIES: usize = 3;
+/// The version of pysoem that is installed.
+const PYSOEM: &str = "pysoem==1.1.13";
+
+/// Compares what a foreign MainDevice saw and sent with the devices, and prints its figures.
+fn check(plant: &Plant, bench: &Bench, client: Client, who: &str) -> Result<(), String> {
+    let figures = client.line.split(" inputs").next().unwrap_or_default();
+    println!("{who}, {} SubDevices: {figures}", plant.count());
+    if client.line.is_empty() {
+        return Err(client.end().1);
+    }
+    let expect = |what: &str, seen: &str, expected: String| {
+        if seen == expected { Ok(()) } else { Err(format!("{what}: {seen}, expected {expected}")) }
+    };
+    let inputs: Vec<&str> = client.figure("inputs").split(',').collect();
+    expect("SubDevices", &inputs.len().to_string(), plant.count().to_string())?;
+    for (device, seen) in inputs.iter().enumerate().skip(plant.first_input()).take(plant.inputs) {
+        expect(&format!("inputs of device {device}"), seen, format!("{:02x}", input(device)))?;
+    }
+    for device in usize::from(plant.coupler)..plant.first_input() {
+        let sent = format!("{:02x}", (CYCLES - 1 + device) as u8);
+        expect(&format!("outputs of device {device}"), &bench.order(&format!("outputs {device}")), sent)?;
+    }
+    // One output or input counts 1 for reading and 2 for writing by LRW, a servo both.
+    let wkc = 2 * plant.outputs + plant.inputs + 3 * plant.servos;
+    expect("working counter", client.figure("wkc"), wkc.to_string())?;
+    expect("SubDevices in OP", &states(bench, "OP").to_string(), plant.count().to_string())?;
+    let wrong: usize = client.figure("wrong").parse().map_err(|_| "no count of wrong cycles".to_owned())?;
+    if wrong > WRONG_ALLOWED {
+        return Err(format!("{wrong} of {CYCLES} cycles with another working counter"));
+    }
+    let (ended, errors) = client.end();
+    if ended { Ok(()) } else { Err(errors) }
+}
+
+/// Runs a foreign MainDevice on a fresh segment, up to [`TRIES`] times.
+fn exchange(bench: &mut Bench, plant: &Plant, ring: bool, who: &str, start: impl Fn(&Bench) -> Child) {
+    for attempt in 1..=TRIES {
+        bench.simulate(&plant.segment(), ring);
+        plant.set_inputs(bench);
+        let result = check(plant, bench, Client::new(start(bench)), who);
+        let late = bench.simulator_lateness();
+        match result {
+            Ok(()) => {
+                println!("  try {attempt} of {TRIES} holds; the simulator was {late}");
+                return;
+            }
+            Err(error) => println!("  try {attempt} of {TRIES} failed: {}; the simulator was {late}", error.trim()),
+        }
+    }
+    panic!("{who} failed {TRIES} times with {} SubDevices", plant.count());
+}
+
+#[test]
+fn ethercrab_exchanges_right_values_with_1_10_and_50_simulated_subdevices() {
+    if !is_asked_for(FOREIGN) {
+        return;
+    }
+    let Some(mut bench) = Bench::new(1) else { return };
+    let client = program("examples/ethercrab_client");
+    for plant in PLANTS {
+        let arguments = ["main0".to_owned(), plant.count().to_string(), CYCLES.to_string()];
+        exchange(&mut bench, &plant, false, "ethercrab", |bench| start(bench, &client, &arguments));
+    }
+}
+
+#[test]
+fn pysoem_exchanges_right_values_with_1_10_and_50_simulated_subdevices() {
+    if !is_asked_for(FOREIGN) {
+        return;
+    }
+    let Some(mut bench) = Bench::new(1) else { return };
+    let Some(python) = python() else { return };
+    for plant in PLANTS {
+        exchange(&mut bench, &plant, false, "pysoem", |bench| start_pysoem(bench, &python, "main0", plant.count()));
+    }
+}
+
+#[test]
+fn pysoem_exchanges_right_values_on_a_ring_with_two_interfaces() {
+    if !is_asked_for(FOREIGN) {
+        return;
+    }
+    let Some(mut bench) = Bench::new(2) else { return };
+    let Some(python) = python() else { return };
+    let count = RING_OF_16.count();
+    exchange(&mut bench, &RING_OF_16, true, "pysoem on a ring", |bench| {
+        start_pysoem(bench, &python, "main0,main1", count)
+    });
+}
+
+/// Starts a client, before ordinary programs.
+fn start(bench: &Bench, client: &Path, arguments: &[String]) -> Child {
+    let words = ["-n", "-15"].into_iter().map(str::to_owned).chain([client.display().to_string()]);
+    let words: Vec<String> = words.chain(arguments.iter().cloned()).collect();
+    bench.start(Path::new("nice"), &words.iter().map(String::as_str).collect::<Vec<_>>())
+}
+
+fn start_pysoem(bench: &Bench, python: &Path, interfaces: &str, count: usize) -> Child {
+    let script = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/on_the_wire/pysoem_client.py");
+    start(bench, python, &[script.to_owned(), interfaces.to_owned(), count.to_string(), CYCLES.to_string()])
+}
+
+/// A Python with pysoem in an environment below the target directory. Only CI makes one by itself.
+fn python() -> Option<PathBuf> {
+    let environment = target_directory().parent()?.join("pysoem");
+    let python = environment.join("bin/python");
+    let succeeds = |program: &Path, arguments: &[&str]| {
+        Command::new(program).args(arguments).output().is_ok_and(|output| output.status.success())
+    };
+    if succeeds(&python, &["-c", "import pysoem"]) {
+        return Some(python);
+    }
+    let path = environment.display().to_string();
+    let commands = format!("python3 -m venv {path} && {path}/bin/pip install {PYSOEM}");
+    if std::env::var("CI").is_ok_and(|ci| ci == "true")
+        && succeeds(Path::new("python3"), &["-m", "venv", &path])
+        && succeeds(&python, &["-m", "pip", "install", "--quiet", PYSOEM])
+    {
+        return Some(python);
+    }
+    println!("skipped: pysoem is not installed; only CI does that by itself. By hand: {commands}");
+    None
+}
