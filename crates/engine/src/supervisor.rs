@@ -7,6 +7,7 @@
 pub mod bus;
 mod executor;
 mod flights;
+mod group;
 mod round_trip;
 mod shared;
 mod signal;
@@ -19,8 +20,9 @@ use alloc::sync::Arc;
 use core::cell::RefCell;
 use core::future::Future;
 
-pub use bus::{Bus, BusError, Elapsed, Group, Reply};
+pub use bus::{Bus, BusError, Elapsed, Reply};
 pub use flights::AcyclicCounters;
+pub use group::Group;
 pub use signal::Signal;
 
 use crate::board::Board;

@@ -14,6 +14,8 @@ pub mod cyclic_load;
 pub mod dice;
 pub mod figures;
 pub mod loss;
+pub mod meddler;
+pub mod phases;
 pub mod segments;
 pub mod tap;
 pub mod terminals;

@@ -75,3 +75,19 @@ pub fn line(descriptions: Vec<DeviceDescription>, options: NetworkOptions) -> Ne
 pub fn ring_of_16(detection: Duration) -> Network {
     ring(descriptions(&SIXTEEN), NetworkOptions::default().with_detection_delay(detection))
 }
+
+/// The line of 1, 10 or 50 SubDevices that start-ups are measured on: outputs, inputs and servos behind a coupler.
+///
+/// # Panics
+/// For other numbers.
+pub fn plant(count: usize) -> Network {
+    let (couplers, outputs, inputs, servos) = match count {
+        1 => (0, 1, 0, 0),
+        10 => (0, 5, 5, 0),
+        50 => (1, 20, 20, 9),
+        other => panic!("no plant of {other} SubDevices"),
+    };
+    let parts = [("coupler", couplers), ("digital-output-8", outputs), ("digital-input-8", inputs), ("servo", servos)];
+    let kinds: Vec<&str> = parts.iter().flat_map(|(kind, count)| std::iter::repeat_n(*kind, *count)).collect();
+    line(descriptions(&kinds), NetworkOptions::default())
+}

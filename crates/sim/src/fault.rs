@@ -79,6 +79,15 @@ pub enum Fault {
         /// Bits to turn over.
         mask: u8,
     },
+    /// The next commands to the EEPROM take another time than usual.
+    SlowSii {
+        /// Which device.
+        device: DeviceIndex,
+        /// How long each of them takes.
+        busy: Duration,
+        /// How many commands.
+        times: u32,
+    },
     /// The device refuses to go to a state.
     RefuseTransition {
         /// Which device.

@@ -12,7 +12,7 @@ use ringcat_wire::al::AlState;
 use super::al_state;
 use super::configure::{BringUp, ConfigureError, Start};
 use super::fleet::{Phase, SharedFleet};
-use super::sii::{self, SiiReader};
+use super::sii;
 use super::strangers::take_away;
 use crate::event::Event;
 use crate::mail::MailboxError;
@@ -202,7 +202,7 @@ async fn is_same(bus: &Bus, fleet: &SharedFleet, index: usize) -> bool {
     if sii::claim(bus, station).await.is_err() {
         return true;
     }
-    match SiiReader::new(bus, station, &cache).identity().await {
+    match sii::identity(bus, station, &cache).await {
         Ok(now) => (now.vendor_id, now.product_code, now.serial) == (known.vendor_id, known.product_code, known.serial),
         Err(_) => true,
     }

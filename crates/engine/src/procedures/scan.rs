@@ -2,24 +2,34 @@
 //!
 //! All SubDevices are asked at once, one task each; their datagrams share frames by themselves.
 
+mod count;
+mod error;
+
 use alloc::rc::Rc;
 use alloc::string::ToString;
+use alloc::vec;
 use alloc::vec::Vec;
 use core::cell::Cell;
-use core::fmt;
+use core::future::{Future, poll_fn};
+use core::pin::pin;
+use core::task::Poll;
 use core::time::Duration;
 
-use ringcat_wire::address::{Position, StationAddress, Wkc};
+use ringcat_wire::address::{Position, RegisterAddress, StationAddress, Wkc};
 use ringcat_wire::al::{AlControl, AlState, AlStatus};
+use ringcat_wire::command::Command;
+use ringcat_wire::datagram::Target;
 use ringcat_wire::register::{DcReceiveTimes, DlStatus, EcatEvent, Fmmu, Information, SyncManager, map};
 
-use super::sii::{SiiCache, SiiReadError, SiiReader, claim_all};
+use self::count::Count;
+pub use self::error::ScanError;
+use super::sii::{self, SiiCache, SiiContents};
 use crate::config::duplicate_aliases;
 use crate::event::Event;
 use crate::info::{InfoWarning, Readout, SiiProblem, SubDeviceInfo};
 use crate::link::LinkSet;
 use crate::ring::RingState;
-use crate::supervisor::{Bus, BusError};
+use crate::supervisor::{Bus, BusError, Reply};
 use crate::topology::{Finding, NodeStatus, Topology};
 
 /// Station address of the SubDevice at position 0; the others follow.
@@ -28,8 +38,8 @@ pub const FIRST_STATION: u16 = 0x1001;
 pub const MAX_SUBDEVICES: u16 = u16::MAX - FIRST_STATION;
 /// Most SyncManagers and FMMUs that a controller can have.
 const MAX_CHANNELS: usize = 16;
-/// Pause between two counts.
-const COUNT_PAUSE: Duration = Duration::from_millis(1);
+/// Pause between two looks whether all are in INIT.
+const INIT_PAUSE: Duration = Duration::from_millis(1);
 /// How long SubDevices may take to get to INIT before they are addressed one by one.
 const INIT_LIMIT: Duration = Duration::from_millis(100);
 /// A scan is begun so often: a cable may be cut or plugged in while it runs.
@@ -61,167 +71,135 @@ pub struct Scan {
     pub redundant_count: usize,
 }
 
-/// Why a scan ended without a result.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum ScanError {
-    /// Frames came back, but no SubDevice had touched them.
-    NoSubDevices,
-    /// No frame came back.
-    NoAnswer,
-    /// The count did not settle.
-    Unsettled {
-        /// The last two counts.
-        counts: [u16; 2],
-    },
-    /// The segment changed while it was scanned, again and again.
-    Changed {
-        /// SubDevices on the main and on the redundant link at the beginning.
-        before: (u16, u16),
-        /// And at the end.
-        after: (u16, u16),
-    },
-    /// More SubDevices than station addresses.
-    TooMany {
-        /// SubDevices counted.
-        count: u32,
-    },
-    /// The bus failed.
-    Bus(BusError),
-    /// The SII of a SubDevice cannot be read.
-    Sii {
-        /// Where.
-        position: Position,
-        /// Why.
-        error: SiiReadError,
-    },
-}
-
-impl fmt::Display for ScanError {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            ScanError::NoSubDevices => f.write_str("frames return, but no SubDevice processes them"),
-            ScanError::NoAnswer => {
-                f.write_str("no frame returns: is the cable plugged and the first SubDevice powered?")
-            }
-            ScanError::Unsettled { counts: [a, b] } => {
-                write!(f, "the number of SubDevices does not settle: {a}, then {b}")
-            }
-            ScanError::Changed { before, after } => write!(
-                f,
-                "the segment changes while it is scanned: {} SubDevices on the main and {} on the redundant link, then \
-                 {} and {}",
-                before.0, before.1, after.0, after.1
-            ),
-            ScanError::TooMany { count } => write!(f, "{count} SubDevices, at most {MAX_SUBDEVICES} are possible"),
-            ScanError::Bus(error) => error.fmt(f),
-            ScanError::Sii { position, error } => write!(f, "SubDevice at position {position}: {error}"),
-        }
-    }
-}
-
-impl core::error::Error for ScanError {}
-
-impl From<BusError> for ScanError {
-    fn from(error: BusError) -> ScanError {
-        ScanError::Bus(error)
-    }
-}
-
 /// Scans the segment. Every SubDevice is in INIT afterwards. A scan that the segment disturbed by changing is begun
 /// again.
+///
+/// While it settles, what is there is read already: SubDevices that appear one after the other begin the scan anew
+/// until the count has settled.
 pub async fn scan(bus: &Bus, options: &ScanOptions) -> Result<Scan, ScanError> {
+    let begin = bus.now();
     let mut attempts = 1;
+    let mut expected = count::first(bus, options, begin).await?;
     loop {
-        match attempt(bus, options).await {
-            Err(ScanError::Bus(_) | ScanError::Changed { .. } | ScanError::Sii { error: SiiReadError::Bus(_), .. })
-                if attempts < ATTEMPTS =>
-            {
-                attempts += 1;
+        expected = match attempt(bus, options, expected).await {
+            Ok(scan) => return Ok(scan),
+            Err(Failure::Unsettled(now)) => {
+                if bus.now().since(begin) >= options.patience {
+                    let total = |count: Option<Count>| count.map_or(0, |count| count.total() as u16);
+                    return Err(ScanError::Unsettled { counts: [total(Some(expected)), total(now)] });
+                }
+                match now.filter(|now| now.total() > 0) {
+                    Some(now) => now,
+                    None => count::first(bus, options, begin).await?,
+                }
             }
-            result => return result,
+            Err(Failure::Scan(error)) if error.is_passing() && attempts < ATTEMPTS => {
+                attempts += 1;
+                count::first(bus, options, bus.now()).await?
+            }
+            Err(Failure::Scan(error)) => return Err(error),
         }
     }
 }
 
-async fn attempt(bus: &Bus, options: &ScanOptions) -> Result<Scan, ScanError> {
-    let (main, redundant) = count(bus, options).await?;
-    bus.report(Event::Counted { main: main.0, redundant: redundant.0 });
-    let total = u32::from(main.0) + u32::from(redundant.0);
-    if total > u32::from(MAX_SUBDEVICES) {
-        return Err(ScanError::TooMany { count: total });
+/// Why an attempt to scan came to nothing.
+enum Failure {
+    /// The count changed before it had settled.
+    Unsettled(Option<Count>),
+    Scan(ScanError),
+}
+
+impl<E: Into<ScanError>> From<E> for Failure {
+    fn from(error: E) -> Failure {
+        Failure::Scan(error.into())
     }
-    let count = total as u16;
-    level(bus).await?;
-    to_init(bus, count).await?;
-    assign_addresses(bus, count).await?;
+}
+
+async fn attempt(bus: &Bus, options: &ScanOptions, expected: Count) -> Result<Scan, Failure> {
+    let total = expected.total();
+    if total > u32::from(MAX_SUBDEVICES) {
+        return Err(ScanError::TooMany { count: total }.into());
+    }
+    let contents = {
+        let settling = async { count::settle(bus, &expected, options.settle).await.map_err(Failure::Unsettled) };
+        let mut settling = pin!(settling);
+        let mut reading = pin!(identify(bus, total as u16, &options.cache));
+        let (mut settled, mut read) = (false, None);
+        // A count that changes ends the attempt at once, whatever reading has come to.
+        poll_fn(|context| {
+            if !settled && let Poll::Ready(result) = settling.as_mut().poll(context) {
+                if let Err(failure) = result {
+                    return Poll::Ready(Err(failure));
+                }
+                settled = true;
+            }
+            if read.is_none()
+                && let Poll::Ready(result) = reading.as_mut().poll(context)
+            {
+                read = Some(result);
+            }
+            match read.take().filter(|_| settled) {
+                None => Poll::Pending,
+                Some(result) => Poll::Ready(result.map_err(Failure::from)),
+            }
+        })
+        .await?
+    };
     bus.bwr(map::DC_RECEIVE_TIME, &[0; 4]).await?;
-    let subdevices = read_all(bus, count, &options.cache).await?;
-    let counted = bus.brd(map::TYPE, 1).await?;
-    if (counted.main, counted.redundant) != (main, redundant) {
-        return Err(ScanError::Changed { before: (main.0, redundant.0), after: (counted.main.0, counted.redundant.0) });
+    let stations = (0..total as u16).map(Position).zip(contents);
+    let describing = bus.gather(stations, |bus, (position, contents)| async move {
+        let registers = read_registers(&bus, position, station_at(position)).await;
+        registers.map(|registers| describe(registers, &contents))
+    });
+    let (subdevices, counted) = bus.both(describing, bus.brd(map::TYPE, 1)).await;
+    let subdevices: Vec<SubDeviceInfo> = subdevices.into_iter().collect::<Result<_, _>>()?;
+    let counted = counted?;
+    if (counted.main, counted.redundant) != (expected.main, expected.redundant) {
+        let after = (counted.main.0, counted.redundant.0);
+        return Err(ScanError::Changed { before: expected.pair(), after }.into());
     }
     let statuses: Vec<NodeStatus> = subdevices.iter().map(node_status).collect();
-    let topology = Topology::build(&statuses, usize::from(main.0));
-    let scan =
-        Scan { subdevices, topology, main_count: usize::from(main.0), redundant_count: usize::from(redundant.0) };
+    let (main_count, redundant_count) = (usize::from(expected.main.0), usize::from(expected.redundant.0));
+    let topology = Topology::build(&statuses, main_count);
+    let scan = Scan { subdevices, topology, main_count, redundant_count };
     report_findings(bus, &scan);
     bus.report(Event::ScanFinished { subdevices: scan.subdevices.len() });
     Ok(scan)
+}
+
+/// Common ground, station addresses, and the SII of each SubDevice.
+async fn identify(bus: &Bus, count: u16, cache: &SiiCache) -> Result<Vec<SiiContents>, ScanError> {
+    level(bus).await?;
+    to_init(bus, count).await?;
+    assign_addresses(bus, count).await?;
+    read_all(bus, count, cache).await
 }
 
 pub(super) fn node_status(info: &SubDeviceInfo) -> NodeStatus {
     NodeStatus { dl_status: info.dl_status, receive_times: info.receive_times, ports: info.controller.ports }
 }
 
-/// Counts until the same number came for the settling time.
-async fn count(bus: &Bus, options: &ScanOptions) -> Result<(Wkc, Wkc), ScanError> {
-    let begin = bus.now();
-    let mut last = (Wkc(0), Wkc(0));
-    let mut since = begin;
-    let mut answered = false;
-    loop {
-        let counted = match bus.brd(map::TYPE, 1).await {
-            Ok(reply) => {
-                answered = true;
-                (reply.main, reply.redundant)
-            }
-            Err(BusError::Lost { .. }) => (Wkc(0), Wkc(0)),
-            Err(error) => return Err(error.into()),
-        };
-        let now = bus.now();
-        let previous = last;
-        if counted != last {
-            last = counted;
-            since = now;
-        }
-        let settled = now.since(since) >= options.settle;
-        if settled && last != (Wkc(0), Wkc(0)) {
-            return Ok(last);
-        }
-        if now.since(begin) >= options.patience {
-            return Err(match (answered, last.0.plus(last.1)) {
-                (false, _) => ScanError::NoAnswer,
-                (true, Wkc(0)) => ScanError::NoSubDevices,
-                (true, Wkc(count)) => ScanError::Unsettled { counts: [previous.0.plus(previous.1).0, count] },
-            });
-        }
-        bus.sleep(COUNT_PAUSE).await;
-    }
-}
-
 /// The same starting point for all: loops automatic, aliases off, event mask, no FMMU, no SyncManager, no clock
 /// activity, EEPROM to EtherCAT, error counters clear.
 async fn level(bus: &Bus) -> Result<(), BusError> {
-    let mask = event_mask();
-    bus.bwr(map::DL_CONTROL.offset(1), &[0]).await?;
-    bus.bwr(map::DL_CONTROL.offset(3), &[0]).await?;
-    bus.bwr(map::AL_CONTROL, &AlControl::with_acknowledge(AlState::Init).encode()).await?;
-    bus.bwr(map::ECAT_EVENT_MASK, &mask.encode()).await?;
-    bus.bwr(map::RX_ERROR_COUNTER, &[0; 8]).await?;
-    bus.bwr(map::FMMU_BASE, &[0; Fmmu::LEN * MAX_CHANNELS]).await?;
-    bus.bwr(map::SYNC_MANAGER_BASE, &[0; SyncManager::LEN * MAX_CHANNELS]).await?;
-    bus.bwr(map::DC_ACTIVATION, &[0]).await?;
-    claim_all(bus).await
+    let init = AlControl::with_acknowledge(AlState::Init).encode();
+    let write = |register, data: &[u8]| (Command::Bwr, Target::Broadcast(register), data.to_vec());
+    let first = [
+        write(map::DL_CONTROL.offset(1), &[0]),
+        write(map::DL_CONTROL.offset(3), &[0]),
+        write(map::AL_CONTROL, &init),
+        write(map::ECAT_EVENT_MASK, &event_mask().encode()),
+        write(map::RX_ERROR_COUNTER, &[0; 8]),
+        write(map::SII_CONFIGURATION, &sii::FORCE),
+    ];
+    let second = [
+        write(map::FMMU_BASE, &[0; Fmmu::LEN * MAX_CHANNELS]),
+        write(map::SYNC_MANAGER_BASE, &[0; SyncManager::LEN * MAX_CHANNELS]),
+        write(map::DC_ACTIVATION, &[0]),
+        write(map::SII_CONFIGURATION, &sii::ETHERCAT),
+    ];
+    bus.transfer_all(first, None).await?;
+    bus.transfer_all(second, None).await.map(drop)
 }
 
 /// ECAT events that SubDevices tell in every datagram: a port changed.
@@ -246,7 +224,7 @@ async fn to_init(bus: &Bus, count: u16) -> Result<(), BusError> {
             // Whoever is not there yet is dealt with when it is configured.
             return Ok(());
         }
-        bus.sleep(COUNT_PAUSE).await;
+        bus.sleep(INIT_PAUSE).await;
     }
 }
 
@@ -262,49 +240,78 @@ pub const fn station_at(position: Position) -> StationAddress {
     StationAddress(FIRST_STATION + position.0)
 }
 
-async fn read_all(bus: &Bus, count: u16, cache: &SiiCache) -> Result<Vec<SubDeviceInfo>, ScanError> {
+async fn read_all(bus: &Bus, count: u16, cache: &SiiCache) -> Result<Vec<SiiContents>, ScanError> {
     let total = usize::from(count);
     let step = total.div_ceil(PROGRESS_STEPS).max(1);
     let done = Rc::new(Cell::new(0_usize));
     let read = bus.gather((0..count).map(Position), |bus, position| {
         let (done, cache) = (done.clone(), cache.clone());
         async move {
-            let result = read_one(&bus, position, station_at(position), &cache).await;
+            let result = sii::read(&bus, station_at(position), &cache).await;
             done.set(done.get() + 1);
             if done.get().is_multiple_of(step) || done.get() == total {
                 bus.report(Event::ScanProgress { done: done.get(), total });
             }
-            result
+            result.map_err(|error| ScanError::Sii { position, error })
         }
     });
     read.await.into_iter().collect()
 }
 
-/// Reads what one SubDevice is: controller, ports, alias, receive times, SII.
+/// Reads what one SubDevice is: SII, controller, ports, alias, receive times.
 pub(super) async fn read_one(
     bus: &Bus,
     position: Position,
     station: StationAddress,
     cache: &SiiCache,
 ) -> Result<SubDeviceInfo, ScanError> {
-    let information = Information::decode(&bus.fprd_array(station, map::TYPE).await?);
-    let dl_status = DlStatus::decode(&bus.fprd_array(station, map::DL_STATUS).await?);
-    let alias = u16::from_le_bytes(bus.fprd_array(station, map::STATION_ALIAS).await?);
+    let contents = sii::read(bus, station, cache).await.map_err(|error| ScanError::Sii { position, error })?;
+    Ok(describe(read_registers(bus, position, station).await?, &contents))
+}
+
+/// Reads controller, ports, alias and receive times.
+async fn read_registers(bus: &Bus, position: Position, station: StationAddress) -> Result<Readout, BusError> {
+    let registers = [
+        (map::TYPE, Information::LEN),
+        (map::DL_STATUS, DlStatus::LEN),
+        (map::STATION_ALIAS, 2),
+        (map::DC_RECEIVE_TIME, DcReceiveTimes::LEN),
+    ];
+    let read = registers.map(|(register, length)| (Command::Fprd, Target::Station(station, register), vec![0; length]));
+    let replies = bus.transfer_all(read, Some(Wkc(1))).await?;
+    let information = Information::decode(answered(&replies, station, registers, 0)?);
+    let dl_status = DlStatus::decode(answered(&replies, station, registers, 1)?);
+    let alias = u16::from_le_bytes(*answered(&replies, station, registers, 2)?);
+    // Without a clock nobody answers.
     let receive_times = if information.features.dc {
-        let times = DcReceiveTimes::decode(&bus.fprd_array(station, map::DC_RECEIVE_TIME).await?);
+        let times = DcReceiveTimes::decode(answered(&replies, station, registers, 3)?);
         Some(times.ports.map(|time| time.0))
     } else {
         None
     };
-    let mut reader = SiiReader::new(bus, station, cache);
-    let contents = reader.read().await.map_err(|error| ScanError::Sii { position, error })?;
-    let readout = Readout { position, station, alias, information, dl_status, receive_times };
+    Ok(Readout { position, station, alias, information, dl_status, receive_times })
+}
+
+/// One of several replies, which exactly one SubDevice must have given.
+fn answered<const N: usize, const M: usize>(
+    replies: &[Reply],
+    station: StationAddress,
+    registers: [(RegisterAddress, usize); M],
+    number: usize,
+) -> Result<&[u8; N], BusError> {
+    let (expected, target) = (Wkc(1), Target::Station(station, registers[number].0));
+    let got = replies.get(number).map_or(Wkc(0), Reply::wkc);
+    let data = replies.get(number).filter(|_| got == expected).and_then(|reply| reply.data.first_chunk());
+    data.ok_or(BusError::Wkc { target, expected, got })
+}
+
+fn describe(readout: Readout, contents: &SiiContents) -> SubDeviceInfo {
     let categories = contents.categories.iter().map(|(kind, data)| (*kind, data.as_slice()));
     let mut info = SubDeviceInfo::from_parts(readout, &contents.header, categories);
     if !contents.complete {
         info.warnings.push(InfoWarning { category: None, offset: 0, problem: SiiProblem::NoEndMarker });
     }
-    Ok(info)
+    info
 }
 
 fn report_findings(bus: &Bus, scan: &Scan) {

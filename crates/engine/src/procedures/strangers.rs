@@ -22,7 +22,6 @@ use super::configure::Start;
 use super::fleet::{Fleet, Member, Phase, Setup, SharedFleet};
 use super::recover::start;
 use super::scan::{ScanError, read_one};
-use super::sii::SiiReadError;
 use crate::config::ConfigAddress;
 use crate::event::Event;
 use crate::info::SubDeviceInfo;
@@ -244,8 +243,11 @@ async fn read(bus: Bus, fleet: SharedFleet, station: StationAddress) {
     let mut bus_failures = 0;
     loop {
         let result = read_once(&bus, &fleet, station).await;
-        let failed_on_bus =
-            matches!(result, Err(ScanError::Bus(_) | ScanError::Sii { error: SiiReadError::Bus(_), .. }));
+        let failed_on_bus = match &result {
+            Err(ScanError::Bus(_)) => true,
+            Err(ScanError::Sii { error, .. }) => error.is_passing(),
+            Ok(_) | Err(_) => false,
+        };
         bus_failures = if failed_on_bus { bus_failures + 1 } else { 0 };
         let patient = failed_on_bus && bus_failures < BUS_PATIENCE;
         if !note(&bus, &fleet, station, result, patient) {
@@ -293,7 +295,12 @@ fn note(
 
 /// Tells strangers which absent members they are and starts their configuration. To be called when it is known of all
 /// members whether they are there: one that is absent, but not known to be, may be the one that a stranger is.
-pub(super) async fn admit_all(bus: &Bus, fleet: &SharedFleet) {
+///
+/// False where it could not be found out where they are.
+pub(super) async fn admit_all(bus: &Bus, fleet: &SharedFleet) -> bool {
+    if !find_places(bus, fleet).await {
+        return false;
+    }
     for (stranger, member) in match_all(bus, fleet) {
         let Knowledge::Known(info) = &stranger.knowledge else { continue };
         if let Some(index) = member {
@@ -304,6 +311,21 @@ pub(super) async fn admit_all(bus: &Bus, fleet: &SharedFleet) {
             bus.report(Event::Unexpected { position: stranger.position, identity: info.identity });
         }
     }
+    true
+}
+
+/// Looks again where the strangers are, if somebody is missed: since they were found the ring may have opened somewhere
+/// else, and of several alike it is the place that tells who is who.
+async fn find_places(bus: &Bus, fleet: &SharedFleet) -> bool {
+    let somebody_is_missed = {
+        let access = fleet.access();
+        !access.strangers.is_empty() && access.members.iter().any(|member| member.phase == Phase::Absent)
+    };
+    if somebody_is_missed {
+        let Ok(Some(view)) = view(bus).await else { return false };
+        refresh(fleet, &view, &owners_of(fleet, &view.stations));
+    }
+    true
 }
 
 /// Strangers of whom it is known which absent members they are, or that they are none.

@@ -181,8 +181,8 @@ impl Watch {
         if !complete && !looks.contains(&Look::Unknown) {
             complete = self.find_strangers().await;
         }
-        if certain && complete {
-            strangers::admit_all(&self.bus, &self.fleet).await;
+        if certain && complete && !strangers::admit_all(&self.bus, &self.fleet).await {
+            self.again_in(SECOND_LOOK_PAUSE);
         }
     }
 

@@ -4,7 +4,7 @@ use alloc::boxed::Box;
 use alloc::rc::Rc;
 use alloc::vec;
 use alloc::vec::Vec;
-use core::cell::{Cell, RefCell};
+use core::cell::RefCell;
 use core::fmt;
 use core::future::{Future, poll_fn};
 use core::pin::{Pin, pin};
@@ -15,7 +15,6 @@ use ringcat_wire::address::{Position, RegisterAddress, StationAddress, Wkc};
 use ringcat_wire::command::Command;
 use ringcat_wire::datagram::{MAX_DATA, Target};
 
-use super::executor::TaskId;
 use super::shared::Shared;
 use super::signal::Signal;
 use super::transfer::{Request, Stage, TransferId};
@@ -110,7 +109,7 @@ pub struct Elapsed;
 /// The handle of a procedure to the bus.
 #[derive(Clone)]
 pub struct Bus {
-    shared: Rc<RefCell<Shared>>,
+    pub(super) shared: Rc<RefCell<Shared>>,
 }
 
 impl Bus {
@@ -327,35 +326,62 @@ impl Bus {
         .await
     }
 
+    /// Runs two futures at once: what both ask of the bus first leaves in one frame, if it fits, in their order.
+    pub async fn both<A: Future, B: Future>(&self, first: A, second: B) -> (A::Output, B::Output) {
+        let (mut first, mut second) = (pin!(first), pin!(second));
+        let (mut a, mut b) = (None, None);
+        poll_fn(|context| {
+            if a.is_none() {
+                a = ready(first.as_mut().poll(context));
+            }
+            if b.is_none() {
+                b = ready(second.as_mut().poll(context));
+            }
+            match (a.take(), b.take()) {
+                (Some(first), Some(second)) => Poll::Ready((first, second)),
+                (one, other) => {
+                    (a, b) = (one, other);
+                    Poll::Pending
+                }
+            }
+        })
+        .await
+    }
+
+    /// Sends datagrams at once, in one frame if they fit, and waits for all replies; the first error counts.
+    pub async fn transfer_all(
+        &self,
+        datagrams: impl IntoIterator<Item = (Command, Target, Vec<u8>)>,
+        expected: Option<Wkc>,
+    ) -> Result<Vec<Reply>, BusError> {
+        let mut waiting: Vec<TransferFuture> = Vec::new();
+        for (command, target, data) in datagrams {
+            waiting.push(self.submit(Request {
+                command,
+                target,
+                data,
+                redundant: None,
+                expected,
+                resend: true,
+                mail: None,
+            }));
+        }
+        let mut results: Vec<Option<Result<Reply, BusError>>> = waiting.iter().map(|_| None).collect();
+        poll_fn(|context| {
+            for (future, result) in waiting.iter_mut().zip(&mut results) {
+                if result.is_none() {
+                    *result = ready(Pin::new(future).poll(context));
+                }
+            }
+            if results.iter().all(Option::is_some) { Poll::Ready(()) } else { Poll::Pending }
+        })
+        .await;
+        results.into_iter().flatten().collect()
+    }
+
     /// Starts a procedure that goes on by itself.
     pub fn spawn(&self, procedure: impl Future<Output = ()> + 'static) {
         self.shared.borrow_mut().spawn(Box::pin(procedure));
-    }
-
-    /// Runs a procedure for each item, all at once, and returns what they return in the order of the items.
-    pub async fn gather<I, T, F>(&self, items: impl IntoIterator<Item = I>, procedure: impl Fn(Bus, I) -> F) -> Vec<T>
-    where
-        T: 'static,
-        F: Future<Output = T> + 'static,
-    {
-        let group = self.group();
-        let results: Rc<RefCell<Vec<Option<T>>>> = Rc::default();
-        for (index, item) in items.into_iter().enumerate() {
-            results.borrow_mut().push(None);
-            let one = procedure(self.clone(), item);
-            let results = results.clone();
-            group.spawn(async move {
-                let result = one.await;
-                results.borrow_mut()[index] = Some(result);
-            });
-        }
-        group.done().await;
-        results.take().into_iter().flatten().collect()
-    }
-
-    /// A group of procedures that can be waited for together.
-    pub fn group(&self) -> Group {
-        Group { bus: self.clone(), state: Rc::default() }
     }
 }
 
@@ -365,45 +391,10 @@ impl fmt::Debug for Bus {
     }
 }
 
-#[derive(Default)]
-struct GroupState {
-    running: Cell<usize>,
-    waiter: Cell<Option<TaskId>>,
-}
-
-/// Procedures that were started together. Waiting costs one wake when the last of them ends.
-pub struct Group {
-    bus: Bus,
-    state: Rc<GroupState>,
-}
-
-impl Group {
-    /// Starts a procedure of the group.
-    pub fn spawn(&self, procedure: impl Future<Output = ()> + 'static) {
-        self.state.running.set(self.state.running.get() + 1);
-        let state = self.state.clone();
-        let shared = self.bus.shared.clone();
-        self.bus.spawn(async move {
-            procedure.await;
-            state.running.set(state.running.get() - 1);
-            if state.running.get() == 0
-                && let Some(task) = state.waiter.take()
-            {
-                shared.borrow_mut().wake(task);
-            }
-        });
-    }
-
-    /// Waits for all of them.
-    pub async fn done(&self) {
-        poll_fn(|_| {
-            if self.state.running.get() == 0 {
-                return Poll::Ready(());
-            }
-            self.state.waiter.set(Some(self.bus.shared.borrow().current));
-            Poll::Pending
-        })
-        .await;
+fn ready<T>(poll: Poll<T>) -> Option<T> {
+    match poll {
+        Poll::Ready(value) => Some(value),
+        Poll::Pending => None,
     }
 }
 

@@ -3,6 +3,8 @@
 //! In: writes to 0x0500..0x050F and virtual time. Out: data, busy and error bits, and after loading the registers that
 //! come from the EEPROM. A command starts at the end of its frame and takes the configured time.
 
+use core::time::Duration;
+
 use ringcat_wire::register::{SiiCommand, SiiControl, SiiPdiAccess, map};
 use ringcat_wire::sii;
 
@@ -40,11 +42,19 @@ pub(super) struct SiiInterface {
     command: Option<SiiCommand>,
     /// Bit 0 of SII_CONTROL, at hand for every frame.
     write_enabled: bool,
+    /// So many of the next commands take this long.
+    slow: (u32, Duration),
 }
 
 impl SiiInterface {
     pub const fn new() -> SiiInterface {
-        SiiInterface { task: Task::Idle, until: SimTime::NEVER, command: None, write_enabled: false }
+        SiiInterface {
+            task: Task::Idle,
+            until: SimTime::NEVER,
+            command: None,
+            write_enabled: false,
+            slow: (0, Duration::ZERO),
+        }
     }
 
     /// When the running command ends.
@@ -160,10 +170,27 @@ impl Controller {
     fn start_sii_task(&mut self, task: Task, command: SiiCommand, now: SimTime) {
         let time = match task {
             Task::Load { .. } => self.config.sii_load_time,
-            Task::Idle | Task::Read | Task::Write => self.config.sii_busy,
+            Task::Idle | Task::Read | Task::Write => self.sii_busy(),
         };
         (self.sii.task, self.sii.until) = (task, now + time);
         self.set_sii_control(SiiControl { busy: true, command, ..self.sii_control() });
+    }
+
+    /// How long the next command takes.
+    fn sii_busy(&mut self) -> Duration {
+        let (times, busy) = &mut self.sii.slow;
+        match times.checked_sub(1) {
+            Some(rest) => {
+                *times = rest;
+                *busy
+            }
+            None => self.config.sii_busy,
+        }
+    }
+
+    /// So many of the next commands take another time than usual.
+    pub fn slow_sii(&mut self, busy: Duration, times: u32) {
+        self.sii.slow = (times, busy);
     }
 
     /// Starts loading the configuration.

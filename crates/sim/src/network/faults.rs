@@ -58,6 +58,7 @@ impl Network {
                 let now = self.now;
                 self.device_mut(device).disturb_mail(fault, now);
             }
+            Fault::SlowSii { device, busy, times } => self.device_mut(device).controller.slow_sii(busy, times),
             Fault::RefuseTransition { device, to, code, times } => {
                 self.device_mut(device).refuse_transition(to, code, times);
             }
@@ -95,6 +96,7 @@ impl Network {
             | Fault::PowerOn(device)
             | Fault::Hang(device, _)
             | Fault::Mail(device, _)
+            | Fault::SlowSii { device, .. }
             | Fault::RefuseTransition { device, .. } => self.check_device(device),
             Fault::CorruptSii { device, offset, .. } => {
                 self.check_device(device);

@@ -1,0 +1,75 @@
+//! How many SubDevices there are, and whether it stays so: after power-on they appear one after the other.
+
+use core::time::Duration;
+
+use ringcat_wire::address::Wkc;
+use ringcat_wire::register::map;
+
+use super::{ScanError, ScanOptions};
+use crate::event::Event;
+use crate::supervisor::{Bus, BusError};
+use crate::time::Instant;
+
+/// Pause between two counts.
+const PAUSE: Duration = Duration::from_millis(1);
+
+/// SubDevices on both links, and since when it is so many.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Count {
+    pub main: Wkc,
+    pub redundant: Wkc,
+    pub since: Instant,
+}
+
+impl Count {
+    pub(super) fn is_same(&self, other: &Count) -> bool {
+        (self.main, self.redundant) == (other.main, other.redundant)
+    }
+
+    pub(super) fn total(&self) -> u32 {
+        u32::from(self.main.0) + u32::from(self.redundant.0)
+    }
+
+    pub(super) const fn pair(&self) -> (u16, u16) {
+        (self.main.0, self.redundant.0)
+    }
+}
+
+/// One count; `None` where no frame came back.
+async fn count(bus: &Bus) -> Result<Option<Count>, BusError> {
+    match bus.brd(map::TYPE, 1).await {
+        Ok(reply) => Ok(Some(Count { main: reply.main, redundant: reply.redundant, since: bus.now() })),
+        Err(BusError::Lost { .. }) => Ok(None),
+        Err(error) => Err(error),
+    }
+}
+
+/// Counts until somebody answers.
+pub(super) async fn first(bus: &Bus, options: &ScanOptions, begin: Instant) -> Result<Count, ScanError> {
+    let mut answered = false;
+    loop {
+        let counted = count(bus).await?;
+        answered |= counted.is_some();
+        if let Some(counted) = counted.filter(|counted| counted.total() > 0) {
+            return Ok(counted);
+        }
+        if bus.now().since(begin) >= options.patience {
+            return Err(if answered { ScanError::NoSubDevices } else { ScanError::NoAnswer });
+        }
+        bus.sleep(PAUSE).await;
+    }
+}
+
+/// Counts until the number has been the same for the settling time. Another one, or none, is the error.
+pub(super) async fn settle(bus: &Bus, expected: &Count, settle: Duration) -> Result<(), Option<Count>> {
+    while bus.now().since(expected.since) < settle {
+        bus.sleep(PAUSE.min(settle)).await;
+        let counted = count(bus).await.unwrap_or_default();
+        if !counted.is_some_and(|counted| counted.is_same(expected)) {
+            return Err(counted);
+        }
+    }
+    let (main, redundant) = expected.pair();
+    bus.report(Event::Counted { main, redundant });
+    Ok(())
+}

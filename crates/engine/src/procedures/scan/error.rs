@@ -1,0 +1,88 @@
+//! Why a scan ended without a result.
+
+use core::fmt;
+
+use ringcat_wire::address::Position;
+
+use super::MAX_SUBDEVICES;
+use crate::procedures::sii::SiiReadError;
+use crate::supervisor::BusError;
+
+/// Why a scan ended without a result.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum ScanError {
+    /// Frames came back, but no SubDevice had touched them.
+    NoSubDevices,
+    /// No frame came back.
+    NoAnswer,
+    /// The count did not settle.
+    Unsettled {
+        /// The last two counts.
+        counts: [u16; 2],
+    },
+    /// The segment changed while it was scanned, again and again.
+    Changed {
+        /// SubDevices on the main and on the redundant link at the beginning.
+        before: (u16, u16),
+        /// And at the end.
+        after: (u16, u16),
+    },
+    /// More SubDevices than station addresses.
+    TooMany {
+        /// SubDevices counted.
+        count: u32,
+    },
+    /// The bus failed.
+    Bus(BusError),
+    /// The SII of a SubDevice cannot be read.
+    Sii {
+        /// Where.
+        position: Position,
+        /// Why.
+        error: SiiReadError,
+    },
+}
+
+impl fmt::Display for ScanError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            ScanError::NoSubDevices => f.write_str("frames return, but no SubDevice processes them"),
+            ScanError::NoAnswer => {
+                f.write_str("no frame returns: is the cable plugged and the first SubDevice powered?")
+            }
+            ScanError::Unsettled { counts: [a, b] } => {
+                write!(f, "the number of SubDevices does not settle: {a}, then {b}")
+            }
+            ScanError::Changed { before, after } => write!(
+                f,
+                "the segment changes while it is scanned: {} SubDevices on the main and {} on the redundant link, then \
+                 {} and {}",
+                before.0, before.1, after.0, after.1
+            ),
+            ScanError::TooMany { count } => write!(f, "{count} SubDevices, at most {MAX_SUBDEVICES} are possible"),
+            ScanError::Bus(error) => error.fmt(f),
+            ScanError::Sii { position, error } => write!(f, "SubDevice at position {position}: {error}"),
+        }
+    }
+}
+
+impl core::error::Error for ScanError {}
+
+impl From<BusError> for ScanError {
+    fn from(error: BusError) -> ScanError {
+        ScanError::Bus(error)
+    }
+}
+
+impl ScanError {
+    /// The segment or frames may be to blame, so that another try is worth it.
+    pub(super) const fn is_passing(&self) -> bool {
+        match self {
+            ScanError::Bus(_) | ScanError::Changed { .. } => true,
+            ScanError::Sii { error, .. } => error.is_passing(),
+            ScanError::NoSubDevices | ScanError::NoAnswer | ScanError::Unsettled { .. } | ScanError::TooMany { .. } => {
+                false
+            }
+        }
+    }
+}

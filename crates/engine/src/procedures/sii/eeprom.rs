@@ -1,0 +1,242 @@
+//! Words of an EEPROM through the SII interface of its controller (facts 3.8).
+//!
+//! A poll brings the data of a command along, and the next command travels behind it in the same frame: while the EEPROM
+//! is busy the controller refuses it, and where it was in time it goes on at once. Which word the data belongs to is told
+//! by the address register, so that commands that came twice, late or not at all are noticed.
+
+use alloc::vec::Vec;
+use core::time::Duration;
+
+use ringcat_wire::address::{StationAddress, Wkc};
+use ringcat_wire::command::Command;
+use ringcat_wire::datagram::Target;
+use ringcat_wire::register::{SiiCommand, SiiControl, map};
+
+use super::SiiReadError;
+use super::pace::Pace;
+use crate::supervisor::{Bus, BusError};
+use crate::time::Instant;
+
+/// How long an EEPROM may be busy with one command (facts 5.4: 20 ms are usual; emulated ones take longer).
+const COMMAND_LIMIT: Duration = Duration::from_millis(100);
+/// How long a controller may take to load its EEPROM after power-on.
+const LOAD_LIMIT: Duration = Duration::from_millis(500);
+/// How long reading one SII may take: 64 KiB at 3 ms per command.
+pub(super) const LIMIT: Duration = Duration::from_secs(30);
+/// A command that the EEPROM did not acknowledge or the controller did not take is given again so often.
+const RETRIES: usize = 3;
+/// Bytes of control, address and data registers in one poll with 8-byte reads.
+const POLL_LEN: usize = 14;
+
+/// A read command that the controller was given.
+#[derive(Clone, Copy, Debug)]
+struct Given {
+    word: u32,
+    at: Instant,
+}
+
+/// What a poll showed.
+struct Poll {
+    control: SiiControl,
+    address: u32,
+    data: [u8; 8],
+    /// The controller took the command that came with the poll.
+    taken: bool,
+}
+
+/// Why a command brought no data.
+enum Failure {
+    /// The data register holds another word, or what the poll found is no longer there.
+    NotTaken,
+    /// The EEPROM reported an error.
+    Command(SiiControl),
+}
+
+/// The EEPROM of one SubDevice, and what was read of it.
+pub(super) struct Eeprom {
+    bus: Bus,
+    station: StationAddress,
+    pub(super) pace: Pace,
+    eight_bytes: bool,
+    given: Option<Given>,
+    until: Instant,
+    words: Vec<Option<u16>>,
+}
+
+impl Eeprom {
+    /// Waits until the controller has loaded its configuration, and until the last command of somebody else is done.
+    pub(super) async fn open(bus: &Bus, station: StationAddress, pace: Pace) -> Result<Eeprom, SiiReadError> {
+        let begin = bus.now();
+        loop {
+            let control = SiiControl::decode(&bus.fprd_array(station, map::SII_CONTROL).await?);
+            let elapsed = bus.now().since(begin);
+            if !control.busy {
+                return Ok(Eeprom {
+                    bus: bus.clone(),
+                    station,
+                    pace,
+                    eight_bytes: control.eight_byte_reads,
+                    given: None,
+                    until: begin + LIMIT,
+                    words: Vec::new(),
+                });
+            }
+            if elapsed >= LOAD_LIMIT {
+                return Err(SiiReadError::Busy { word: 0 });
+            }
+            bus.sleep(Pace::next(elapsed)).await;
+        }
+    }
+
+    /// When reading has to be over.
+    pub(super) fn until(&self) -> Instant {
+        self.until
+    }
+
+    /// Reads words. `then` is the word that will be asked for next, where that is certain: it is read ahead.
+    pub(super) async fn bytes(&mut self, first: u32, count: u32, then: Option<u32>) -> Result<Vec<u8>, SiiReadError> {
+        let end = first + count;
+        let mut bytes = Vec::with_capacity(2 * count as usize);
+        for word in first..end {
+            let value = match self.word(word) {
+                Some(value) => value,
+                None => {
+                    let beyond = word + self.width();
+                    let mut rest = (beyond..end).chain(then.filter(|then| !(word..beyond).contains(then)));
+                    let ahead = rest.find(|word| self.word(*word).is_none());
+                    self.fetch(word, ahead).await?
+                }
+            };
+            bytes.extend_from_slice(&value.to_le_bytes());
+        }
+        Ok(bytes)
+    }
+
+    /// Words that one command reads.
+    const fn width(&self) -> u32 {
+        if self.eight_bytes { 4 } else { 2 }
+    }
+
+    fn word(&self, word: u32) -> Option<u16> {
+        self.words.get(word as usize).copied().flatten()
+    }
+
+    /// Reads what begins at a word, and has what begins at `ahead` under way afterwards.
+    async fn fetch(&mut self, word: u32, ahead: Option<u32>) -> Result<u16, SiiReadError> {
+        let mut failures = 0;
+        loop {
+            if let Some(value) = self.word(word) {
+                return Ok(value);
+            }
+            if self.bus.now() >= self.until {
+                return Err(SiiReadError::TooSlow { word });
+            }
+            let Some(given) = self.given.take() else {
+                self.command(word).await?;
+                continue;
+            };
+            // Once something went wrong, one thing at a time.
+            let next = if failures > 0 {
+                None
+            } else if given.word == word {
+                ahead
+            } else {
+                Some(word)
+            };
+            let Err(failure) = self.finish(given, next).await? else { continue };
+            failures += 1;
+            match failure {
+                Failure::NotTaken if failures > RETRIES => return Err(SiiReadError::Refused { word }),
+                Failure::Command(control) if failures > RETRIES => return Err(SiiReadError::Command { word, control }),
+                Failure::Command(_) if self.given.is_none() => {
+                    self.write(SiiControl::request(SiiCommand::Idle).encode().to_vec()).await?;
+                }
+                Failure::NotTaken | Failure::Command(_) => {}
+            }
+        }
+    }
+
+    /// Writes from SII_CONTROL on; true where the controller took it. It does not while the EEPROM is busy, as when the
+    /// reply to a command was lost and the command is sent again.
+    async fn write(&self, data: Vec<u8>) -> Result<bool, BusError> {
+        let target = Target::Station(self.station, map::SII_CONTROL);
+        let reply = self.bus.transfer(Command::Fpwr, target, data, Some(Wkc(1))).await?;
+        Ok(reply.wkc() == Wkc(1))
+    }
+
+    fn read_command(word: u32) -> Vec<u8> {
+        let [low, high] = SiiControl::request(SiiCommand::Read).encode();
+        let [a, b, c, d] = word.to_le_bytes();
+        alloc::vec![low, high, a, b, c, d]
+    }
+
+    async fn command(&mut self, word: u32) -> Result<(), BusError> {
+        self.write(Eeprom::read_command(word)).await?;
+        self.given = Some(Given { word, at: self.bus.now() });
+        Ok(())
+    }
+
+    /// Polls until a command is done, and gives the next one as soon as it is.
+    async fn finish(&mut self, given: Given, next: Option<u32>) -> Result<Result<(), Failure>, SiiReadError> {
+        self.bus.sleep_until(given.at + self.pace.first()).await;
+        let mut first = true;
+        loop {
+            let poll = self.poll(next).await?;
+            let now = self.bus.now();
+            let elapsed = now.since(given.at);
+            if poll.taken
+                && let Some(word) = next
+            {
+                self.given = Some(Given { word, at: now });
+            }
+            if !poll.control.busy {
+                self.pace.took(elapsed, first);
+                if poll.control.command_error || poll.control.write_enable_error {
+                    return Ok(Err(Failure::Command(poll.control)));
+                }
+                if poll.address == given.word || Some(poll.address) == next {
+                    self.keep(poll.address, poll.data);
+                }
+                return Ok(if poll.address == given.word { Ok(()) } else { Err(Failure::NotTaken) });
+            }
+            if poll.taken {
+                // It was done between the poll and the command behind it.
+                return Ok(Err(Failure::NotTaken));
+            }
+            if elapsed > COMMAND_LIMIT {
+                return Err(SiiReadError::Busy { word: given.word });
+            }
+            if now >= self.until {
+                return Err(SiiReadError::TooSlow { word: given.word });
+            }
+            first = false;
+            self.bus.sleep(Pace::next(elapsed)).await;
+        }
+    }
+
+    async fn poll(&self, next: Option<u32>) -> Result<Poll, BusError> {
+        let length = if self.eight_bytes { POLL_LEN } else { POLL_LEN - 4 };
+        let read = self.bus.fprd(self.station, map::SII_CONTROL, length);
+        let (bytes, taken) = match next {
+            None => (read.await?, false),
+            Some(word) => {
+                let (bytes, taken) = self.bus.both(read, self.write(Eeprom::read_command(word))).await;
+                (bytes?, taken?)
+            }
+        };
+        let mut data = [0; 8];
+        data[..length - 6].copy_from_slice(&bytes[6..length]);
+        let control = SiiControl::decode(&[bytes[0], bytes[1]]);
+        Ok(Poll { control, address: u32::from_le_bytes([bytes[2], bytes[3], bytes[4], bytes[5]]), data, taken })
+    }
+
+    fn keep(&mut self, word: u32, data: [u8; 8]) {
+        let (at, count) = (word as usize, self.width() as usize);
+        if self.words.len() < at + count {
+            self.words.resize(at + count, None);
+        }
+        for (slot, pair) in self.words[at..at + count].iter_mut().zip(data.as_chunks::<2>().0) {
+            *slot = Some(u16::from_le_bytes(*pair));
+        }
+    }
+}

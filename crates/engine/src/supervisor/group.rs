@@ -1,0 +1,97 @@
+//! Procedures that are started together and waited for together.
+//!
+//! They end with whoever waits: those of a group that is dropped do nothing more, so that what is begun anew is not
+//! disturbed by what is left of the last try.
+
+use alloc::boxed::Box;
+use alloc::rc::Rc;
+use alloc::vec::Vec;
+use core::cell::{Cell, RefCell};
+use core::future::{Future, poll_fn};
+use core::task::Poll;
+
+use super::bus::Bus;
+use super::executor::TaskId;
+
+impl Bus {
+    /// Runs a procedure for each item, all at once, and returns what they return in the order of the items.
+    pub async fn gather<I, T, F>(&self, items: impl IntoIterator<Item = I>, procedure: impl Fn(Bus, I) -> F) -> Vec<T>
+    where
+        T: 'static,
+        F: Future<Output = T> + 'static,
+    {
+        let group = self.group();
+        let results: Rc<RefCell<Vec<Option<T>>>> = Rc::default();
+        for (index, item) in items.into_iter().enumerate() {
+            results.borrow_mut().push(None);
+            let one = procedure(self.clone(), item);
+            let results = results.clone();
+            group.spawn(async move {
+                let result = one.await;
+                results.borrow_mut()[index] = Some(result);
+            });
+        }
+        group.done().await;
+        results.take().into_iter().flatten().collect()
+    }
+
+    /// A group of procedures that can be waited for together.
+    pub fn group(&self) -> Group {
+        Group { bus: self.clone(), state: Rc::default() }
+    }
+}
+
+#[derive(Default)]
+struct State {
+    running: Cell<usize>,
+    waiter: Cell<Option<TaskId>>,
+    /// Nobody waits any more.
+    dropped: Cell<bool>,
+}
+
+/// Procedures that were started together. Waiting costs one wake when the last of them ends.
+pub struct Group {
+    bus: Bus,
+    state: Rc<State>,
+}
+
+impl Group {
+    /// Starts a procedure of the group.
+    pub fn spawn(&self, procedure: impl Future<Output = ()> + 'static) {
+        self.state.running.set(self.state.running.get() + 1);
+        let state = self.state.clone();
+        let shared = self.bus.shared.clone();
+        let mut procedure = Box::pin(procedure);
+        self.bus.spawn(poll_fn(move |context| {
+            // What is dropped here gives up the datagrams that it waits for.
+            if !state.dropped.get() && procedure.as_mut().poll(context).is_pending() {
+                return Poll::Pending;
+            }
+            state.running.set(state.running.get() - 1);
+            if state.running.get() == 0
+                && let Some(task) = state.waiter.take()
+            {
+                shared.borrow_mut().wake(task);
+            }
+            Poll::Ready(())
+        }));
+    }
+
+    /// Waits for all of them.
+    pub async fn done(&self) {
+        poll_fn(|_| {
+            if self.state.running.get() == 0 {
+                return Poll::Ready(());
+            }
+            self.state.waiter.set(Some(self.bus.shared.borrow().current));
+            Poll::Pending
+        })
+        .await;
+    }
+}
+
+impl Drop for Group {
+    fn drop(&mut self) {
+        self.state.dropped.set(true);
+    }
+}

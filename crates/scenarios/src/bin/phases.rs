@@ -1,0 +1,46 @@
+//! Where the time of a start-up of a few SubDevices goes, in virtual time: the end of each phase, how long nothing was on
+//! the wire, and how many exchanges followed one another.
+//!
+//! The segments are those of the tests on real interfaces: 1, 10 and 50 SubDevices of the catalogue with the simulator's
+//! usual timing (8 bytes of SII every 500 us, 1 ms per change of state).
+
+use std::process::ExitCode;
+use std::time::Duration;
+
+use ringcat::{Error, Options};
+use scenarios::figures::{Figures, verdict};
+use scenarios::phases::{Phase, start_up};
+use scenarios::segments::plant;
+
+/// Most milliseconds to OP, by SubDevices.
+const BARS: [(usize, f64); 3] = [(1, 60.0), (10, 60.0), (50, 60.0)];
+
+fn main() -> ExitCode {
+    match measure() {
+        Ok(met) => verdict(met),
+        Err(error) => {
+            eprintln!("phases: {error}");
+            ExitCode::FAILURE
+        }
+    }
+}
+
+fn measure() -> Result<bool, Error> {
+    let mut met = true;
+    for (count, bar) in BARS {
+        let mut figures = Figures::new(&format!("start-up of {count} SubDevices"));
+        let phases = start_up(plant(count), &Options::default(), Duration::from_millis(1))?;
+        phases.iter().for_each(|phase| show(&mut figures, phase));
+        let last = phases.last().map_or(Duration::MAX, |phase| phase.at);
+        figures.at_most("power-on to OP", last.as_secs_f64() * 1e3, bar, "ms");
+        met &= figures.print();
+    }
+    Ok(met)
+}
+
+fn show(figures: &mut Figures, phase: &Phase) {
+    let Phase { end, at, silent, exchanges, frames } = phase;
+    let (at, silent) = (at.as_secs_f64() * 1e3, silent.as_secs_f64() * 1e3);
+    let text = format!("{at:>7.2} ms, {silent:>6.2} ms of silence, {exchanges:>4} exchanges, {frames:>5} frames");
+    figures.show(&end.to_string(), text);
+}
