@@ -6,7 +6,8 @@
 //! * [`waiting`]: sleeping or spinning until a frame or a moment comes;
 //! * [`interface`], [`carrier`]: what interfaces there are, who else uses them, whether a cable is plugged in;
 //! * [`monotonic`], [`realtime`]: the host's clock, scheduling, memory locking, processor latency;
-//! * [`pcapng`]: captures that Wireshark reads.
+//! * [`pcapng`]: captures that Wireshark reads; [`recorder`]: writing them while frames go on; [`sniffer`]: seeing what
+//!   passes on an interface without taking part.
 //!
 //! Frames go in and out as bytes without FCS. Of EtherCAT only the EtherType and the class bit of the first datagram's
 //! Idx are known here. `docs/links.md` tells how another back end is written and what the kernel wants to be granted.
@@ -23,7 +24,9 @@ pub mod monotonic;
 pub mod packet_socket;
 pub mod pcapng;
 pub mod realtime;
+pub mod recorder;
 mod ring;
+pub mod sniffer;
 pub mod waiting;
 
 pub use carrier::{Carrier, CarrierWatch};
@@ -31,4 +34,6 @@ pub use error::LinkError;
 pub use filter::ClassFilter;
 pub use listener::{Listener, Sender};
 pub use packet_socket::{LinkCounters, PacketOptions, PacketSocket};
+pub use recorder::{Recorder, RecorderError, Tap};
+pub use sniffer::Sniffer;
 pub use waiting::{ReceiveMode, wait};

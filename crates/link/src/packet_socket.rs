@@ -12,7 +12,7 @@ use crate::error::LinkError;
 use crate::filter::{self, ClassFilter};
 use crate::interface;
 use crate::kernel::{self, Membership, Statistics};
-use crate::ring::{self, Ring, Taken};
+use crate::ring::{self, Ring, Seen, Taken};
 use crate::waiting::ReceiveMode;
 
 /// The group that EtherCAT frames may be sent to instead of broadcast.
@@ -67,6 +67,15 @@ pub struct LinkCounters {
     pub truncated: u64,
 }
 
+/// What a socket sees beyond the EtherCAT frames that arrive.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Passing {
+    /// Frames that this host sends.
+    pub outgoing: bool,
+    /// Frames of all EtherTypes.
+    pub all: bool,
+}
+
 /// A packet socket with its ring.
 #[derive(Debug)]
 pub struct PacketSocket {
@@ -83,6 +92,14 @@ pub struct PacketSocket {
 impl PacketSocket {
     /// Opens a socket on an interface, which may be down and come up later.
     pub fn open(interface: &str, options: &PacketOptions) -> Result<PacketSocket, LinkError> {
+        PacketSocket::open_with(interface, options, Passing { outgoing: false, all: false })
+    }
+
+    pub(crate) fn open_with(
+        interface: &str,
+        options: &PacketOptions,
+        passing: Passing,
+    ) -> Result<PacketSocket, LinkError> {
         let (index, mac) = ethernet(interface)?;
         let failed = |what| move |errno| LinkError::from_errno(interface, what, errno);
         // Protocol 0 receives nothing until the filter is in place and the interface chosen.
@@ -91,13 +108,19 @@ impl PacketSocket {
         let set = |option, value: libc::c_int| kernel::set_option(raw, libc::SOL_PACKET, option, &value);
         set(kernel::PACKET_VERSION, kernel::TPACKET_V2).map_err(failed("choosing the ring's version"))?;
         // Before Linux 4.20 the ring leaves them out, at more cost.
-        let _ = set(kernel::PACKET_IGNORE_OUTGOING, 1);
-        attach(raw, &mut filter::program(options.filter)).map_err(failed("attaching the filter"))?;
+        let _ = set(kernel::PACKET_IGNORE_OUTGOING, libc::c_int::from(!passing.outgoing));
+        if !passing.all {
+            attach(raw, &mut filter::program(options.filter)).map_err(failed("attaching the filter"))?;
+        }
         let layout = ring::layout(options.ring_frames);
         kernel::set_option(raw, libc::SOL_PACKET, kernel::PACKET_RX_RING, &layout)
             .map_err(failed("making the receive ring"))?;
         let ring = Ring::map(raw, &layout).map_err(failed("mapping the receive ring"))?;
-        let protocol = if options.keep_vlan_tags { libc::ETH_P_ALL as u16 } else { filter::ETHERCAT };
+        let protocol = if options.keep_vlan_tags || passing.outgoing || passing.all {
+            libc::ETH_P_ALL as u16
+        } else {
+            filter::ETHERCAT
+        };
         bind(raw, index, protocol).map_err(failed("binding to the interface"))?;
         join(raw, index, options.promiscuous).map_err(failed("joining the EtherCAT group"))?;
         // An interface that is down leaves an error behind that the first send would return.
@@ -159,6 +182,13 @@ impl PacketSocket {
                 Taken::Outgoing => {}
             }
         }
+    }
+
+    /// Hands whatever passed the interface to `take`, oldest first; false where there is nothing. No system call.
+    pub(crate) fn look(&mut self, take: &mut dyn FnMut(Seen<'_>)) -> bool {
+        let seen = self.ring.take_seen(take);
+        self.counters.received += u64::from(seen);
+        seen
     }
 
     /// Whether a frame waits in the ring. No system call.

@@ -1,12 +1,14 @@
 //! Captures that Wireshark reads, from several interfaces in one file (pcapng, draft-ietf-opsawg-pcapng).
 //!
 //! In go frames with interface, direction and time, out come bytes: one section header, one description per interface
-//! with its name and nanosecond time stamps, one enhanced packet block per frame. Little-endian throughout.
+//! with its name and nanosecond time stamps, one enhanced packet block per frame, and statistics of an interface when
+//! they are known. Little-endian throughout.
 
 use std::io::{self, Write};
 
 const SECTION_HEADER: u32 = 0x0A0D_0D0A;
 const INTERFACE_DESCRIPTION: u32 = 1;
+const INTERFACE_STATISTICS: u32 = 5;
 const ENHANCED_PACKET: u32 = 6;
 const BYTE_ORDER_MAGIC: u32 = 0x1A2B_3C4D;
 const LINK_TYPE_ETHERNET: u16 = 1;
@@ -17,6 +19,9 @@ const INTERFACE_NAME: u16 = 2;
 const INTERFACE_TEXT: u16 = 3;
 const INTERFACE_RESOLUTION: u16 = 9;
 const PACKET_FLAGS: u16 = 2;
+const STATISTICS_RECEIVED: u16 = 4;
+const STATISTICS_DROPPED: u16 = 5;
+const STATISTICS_DROPPED_BY_KERNEL: u16 = 7;
 
 /// Time stamps count 10^-9 s.
 const NANOSECONDS: u8 = 9;
@@ -37,6 +42,17 @@ impl Direction {
             Direction::Out => 2,
         }
     }
+}
+
+/// What an interface's frames came to in the end.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Statistics {
+    /// Frames seen, whether in the capture or not (`isb_ifrecv`).
+    pub seen: u64,
+    /// Frames that whoever captured had no room for (`isb_ifdrop`).
+    pub dropped: u64,
+    /// Frames that the kernel had no room for (`isb_osdrop`).
+    pub dropped_by_kernel: u64,
 }
 
 /// Writes one capture. Each call writes whole blocks and goes straight to `W`: wrap a file in a `BufWriter`.
@@ -78,19 +94,37 @@ impl<W: Write> Writer<W> {
 
     /// Adds a frame of the interface at this place of those that [`Writer::new`] was given, with the time since 1970.
     pub fn frame(&mut self, interface: usize, direction: Direction, unix_time_ns: u64, frame: &[u8]) -> io::Result<()> {
-        let length = u32::try_from(frame.len()).map_err(|_| io::Error::from(io::ErrorKind::InvalidInput))?;
-        if interface >= self.interfaces {
-            return Err(io::Error::new(io::ErrorKind::InvalidInput, "the capture has no such interface"));
-        }
-        self.begin(ENHANCED_PACKET);
-        self.put(&(interface as u32).to_le_bytes());
-        self.put(&((unix_time_ns >> 32) as u32).to_le_bytes());
-        self.put(&(unix_time_ns as u32).to_le_bytes());
-        self.put(&length.to_le_bytes());
-        self.put(&length.to_le_bytes());
-        self.put(frame);
+        self.beginning(interface, direction, unix_time_ns, frame, frame.len())
+    }
+
+    /// As [`Writer::frame`], of a frame of which only the beginning is at hand; `length` is that of the whole.
+    pub fn beginning(
+        &mut self,
+        interface: usize,
+        direction: Direction,
+        unix_time_ns: u64,
+        beginning: &[u8],
+        length: usize,
+    ) -> io::Result<()> {
+        let too_long = |_| io::Error::from(io::ErrorKind::InvalidInput);
+        let captured = u32::try_from(beginning.len()).map_err(too_long)?;
+        let length = u32::try_from(length).map_err(too_long)?;
+        self.begin_for(ENHANCED_PACKET, interface, unix_time_ns)?;
+        self.put(&captured.to_le_bytes());
+        self.put(&length.max(captured).to_le_bytes());
+        self.put(beginning);
         self.pad();
         self.option(PACKET_FLAGS, &direction.flags().to_le_bytes());
+        self.option(OPTION_END, &[]);
+        self.end()
+    }
+
+    /// Adds what the interface's frames came to.
+    pub fn statistics(&mut self, interface: usize, unix_time_ns: u64, statistics: Statistics) -> io::Result<()> {
+        self.begin_for(INTERFACE_STATISTICS, interface, unix_time_ns)?;
+        self.option(STATISTICS_RECEIVED, &statistics.seen.to_le_bytes());
+        self.option(STATISTICS_DROPPED, &statistics.dropped.to_le_bytes());
+        self.option(STATISTICS_DROPPED_BY_KERNEL, &statistics.dropped_by_kernel.to_le_bytes());
         self.option(OPTION_END, &[]);
         self.end()
     }
@@ -110,6 +144,18 @@ impl<W: Write> Writer<W> {
         self.put(&kind.to_le_bytes());
         // The length, filled in at the end.
         self.put(&[0; 4]);
+    }
+
+    /// Begins a block that is about an interface at a time.
+    fn begin_for(&mut self, kind: u32, interface: usize, unix_time_ns: u64) -> io::Result<()> {
+        if interface >= self.interfaces {
+            return Err(io::Error::new(io::ErrorKind::InvalidInput, "the capture has no such interface"));
+        }
+        self.begin(kind);
+        self.put(&(interface as u32).to_le_bytes());
+        self.put(&((unix_time_ns >> 32) as u32).to_le_bytes());
+        self.put(&(unix_time_ns as u32).to_le_bytes());
+        Ok(())
     }
 
     fn put(&mut self, bytes: &[u8]) {

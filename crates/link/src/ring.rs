@@ -18,6 +18,8 @@ use crate::kernel::{
 const SLOT: usize = 2048;
 /// Where `sll_pkttype` of the `sockaddr_ll` behind the header is.
 const PACKET_TYPE: usize = size_of::<FrameHeader>() + 10;
+/// Bytes of a VLAN tag.
+const TAG: usize = 4;
 /// What stands before the frame: header and `sockaddr_ll`.
 const HEAD: usize = size_of::<FrameHeader>() + size_of::<libc::sockaddr_ll>();
 /// More slots than this are a mistake: 32 MiB.
@@ -34,6 +36,19 @@ pub enum Taken {
     Truncated,
     /// There is no frame.
     Nothing,
+}
+
+/// A frame that passed an interface.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Seen<'a> {
+    /// Whether this host sent it.
+    pub outgoing: bool,
+    /// When the kernel saw it, in nanoseconds since 1970.
+    pub unix_time_ns: u64,
+    /// Its length; only a beginning of long frames is at hand.
+    pub length: usize,
+    /// The frame.
+    pub bytes: &'a [u8],
 }
 
 /// The mapped ring.
@@ -85,6 +100,17 @@ impl Ring {
     /// Hands the oldest frame to `take` and gives its slot back to the kernel.
     #[inline]
     pub fn take(&mut self, take: &mut dyn FnMut(&[u8])) -> Taken {
+        self.take_slot(|status, slot| hand_out(status, slot, take))
+    }
+
+    /// As [`Ring::take`], of all frames, those that this host sent and the beginnings of long ones included; false where
+    /// there is none.
+    pub fn take_seen(&mut self, take: &mut dyn FnMut(Seen<'_>)) -> bool {
+        self.take_slot(|status, slot| show(status, slot, take)) != Taken::Nothing
+    }
+
+    #[inline]
+    fn take_slot(&mut self, mut hand_out: impl FnMut(u32, &mut [u8]) -> Taken) -> Taken {
         let status = self.status().load(Ordering::Acquire);
         if status & TP_STATUS_USER == 0 {
             return Taken::Nothing;
@@ -92,7 +118,7 @@ impl Ring {
         // SAFETY: the status says that the slot is ours until it is given back, which needs `&mut self` again; the
         // slot lies within the mapping, and bytes have no invalid values.
         let slot = unsafe { std::slice::from_raw_parts_mut(self.slot().as_ptr(), SLOT) };
-        let taken = hand_out(status, slot, take);
+        let taken = hand_out(status, slot);
         self.status().store(TP_STATUS_KERNEL, Ordering::Release);
         self.head = if self.head + 1 == self.slots { 0 } else { self.head + 1 };
         taken
@@ -117,28 +143,59 @@ impl Drop for Ring {
     }
 }
 
+/// Where things are in a slot.
+struct Place {
+    length: usize,
+    start: usize,
+    captured: usize,
+}
+
+/// The place of the frame of a slot; `None` where that cannot be one.
+fn place(slot: &[u8]) -> Option<Place> {
+    let u32_at = |at: usize| u32::from_ne_bytes([slot[at], slot[at + 1], slot[at + 2], slot[at + 3]]);
+    let start = usize::from(u16::from_ne_bytes([slot[12], slot[13]]));
+    let (length, captured) = (u32_at(4) as usize, u32_at(8) as usize);
+    let whole = captured >= 14 && start >= HEAD + TAG && start + captured <= slot.len();
+    whole.then_some(Place { length, start, captured })
+}
+
+/// Puts a VLAN tag that the kernel took off back; where the frame starts then, and how many bytes longer it is.
+fn put_tag_back(status: u32, slot: &mut [u8], start: usize) -> (usize, usize) {
+    if status & TP_STATUS_VLAN_VALID == 0 {
+        return (start, 0);
+    }
+    let u16_at = |at: usize| u16::from_ne_bytes([slot[at], slot[at + 1]]);
+    let (tci, tpid) = (u16_at(24), u16_at(26));
+    let tpid = if status & TP_STATUS_VLAN_TPID_VALID == 0 { VLAN } else { tpid };
+    // The addresses move into the gap before them, the tag goes behind them.
+    slot.copy_within(start..start + 12, start - TAG);
+    slot[start + 8..start + 10].copy_from_slice(&tpid.to_be_bytes());
+    slot[start + 10..start + 12].copy_from_slice(&tci.to_be_bytes());
+    (start - TAG, TAG)
+}
+
+/// Shows whatever the slot that is ours holds.
+fn show(status: u32, slot: &mut [u8], take: &mut dyn FnMut(Seen<'_>)) -> Taken {
+    let Some(Place { length, start, captured }) = place(slot) else { return Taken::Truncated };
+    let u32_at = |at: usize| u32::from_ne_bytes([slot[at], slot[at + 1], slot[at + 2], slot[at + 3]]);
+    let unix_time_ns = u64::from(u32_at(16)) * 1_000_000_000 + u64::from(u32_at(20));
+    let outgoing = slot[PACKET_TYPE] == PACKET_OUTGOING;
+    let (start, tag) = put_tag_back(status, slot, start);
+    let bytes = &slot[start..start + captured + tag];
+    take(Seen { outgoing, unix_time_ns, length: length + tag, bytes });
+    Taken::Frame
+}
+
 /// Hands out the frame of a slot that is ours, with its VLAN tag put back if the kernel took it off.
 fn hand_out(status: u32, slot: &mut [u8], take: &mut dyn FnMut(&[u8])) -> Taken {
-    let u16_at = |at: usize| u16::from_ne_bytes([slot[at], slot[at + 1]]);
-    let u32_at = |at: usize| u32::from_ne_bytes([slot[at], slot[at + 1], slot[at + 2], slot[at + 3]]);
-    let (length, captured, start) = (u32_at(4), u32_at(8) as usize, usize::from(u16_at(12)));
-    let (tci, tpid) = (u16_at(24), u16_at(26));
     if slot[PACKET_TYPE] == PACKET_OUTGOING {
         return Taken::Outgoing;
     }
-    if captured != length as usize || start < HEAD + 4 || start + captured > slot.len() || captured < 14 {
+    let Some(Place { length, start, captured }) = place(slot).filter(|place| place.captured == place.length) else {
         return Taken::Truncated;
-    }
-    if status & TP_STATUS_VLAN_VALID == 0 {
-        take(&slot[start..start + captured]);
-        return Taken::Frame;
-    }
-    // The addresses move into the gap before them, the tag goes behind them.
-    let tpid = if status & TP_STATUS_VLAN_TPID_VALID == 0 { VLAN } else { tpid };
-    slot.copy_within(start..start + 12, start - 4);
-    slot[start + 8..start + 10].copy_from_slice(&tpid.to_be_bytes());
-    slot[start + 10..start + 12].copy_from_slice(&tci.to_be_bytes());
-    take(&slot[start - 4..start + captured]);
+    };
+    let (start, tag) = put_tag_back(status, slot, start);
+    take(&slot[start..start + length.min(captured) + tag]);
     Taken::Frame
 }
 
@@ -192,6 +249,26 @@ mod tests {
         far[12..14].copy_from_slice(&u16::MAX.to_ne_bytes());
         assert_eq!(handed(TP_STATUS_USER, far).0, Taken::Truncated);
         assert_eq!(handed(TP_STATUS_USER, slot(&FRAME[..10], 0, 0)).0, Taken::Truncated);
+    }
+
+    #[test]
+    fn whoever_looks_on_sees_sent_frames_times_and_the_beginning_of_long_frames() {
+        let mut long = slot(&FRAME, 0xe005, PACKET_OUTGOING);
+        long[4..8].copy_from_slice(&9000u32.to_ne_bytes());
+        long[16..20].copy_from_slice(&5u32.to_ne_bytes());
+        long[20..24].copy_from_slice(&7u32.to_ne_bytes());
+        let mut expected = FRAME.to_vec();
+        expected.splice(12..12, [0x81, 0x00, 0xe0, 0x05]);
+        let mut count = 0;
+        let taken = show(TP_STATUS_USER | TP_STATUS_VLAN_VALID, &mut long, &mut |seen| {
+            let bytes = expected.as_slice();
+            assert_eq!(seen, Seen { outgoing: true, unix_time_ns: 5_000_000_007, length: 9004, bytes });
+            count += 1;
+        });
+        assert_eq!((taken, count), (Taken::Frame, 1));
+        let mut far = slot(&FRAME, 0, 0);
+        far[12..14].copy_from_slice(&u16::MAX.to_ne_bytes());
+        assert_eq!(show(TP_STATUS_USER, &mut far, &mut |_| panic!("not within the slot")), Taken::Truncated);
     }
 
     #[test]

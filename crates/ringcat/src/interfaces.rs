@@ -223,7 +223,8 @@ impl InterfaceArguments {
     }
 }
 
-fn describe_down(name: &str) -> String {
+/// Why an interface has no link.
+pub fn describe_down(name: &str) -> String {
     let switched_off = interface::list().iter().any(|found| found.name == name && !found.up);
     if switched_off {
         format!("{name} is switched off: sudo ip link set {name} up")

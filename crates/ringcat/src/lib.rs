@@ -44,6 +44,7 @@ mod process_data;
 pub mod shared_segment;
 pub mod simulated;
 pub mod supervisor_thread;
+pub mod tee;
 pub mod text;
 pub mod window;
 

@@ -1,8 +1,10 @@
 //! The `ringcat` program. Without arguments it runs the demonstration.
 
+mod capture;
 mod demo;
 mod interfaces;
 mod output;
+mod recording;
 mod run;
 mod scan;
 mod sim;
@@ -47,6 +49,8 @@ enum Command {
     Scan(scan::ScanArguments),
     /// Brings all SubDevices on a network interface to OP, exchanges process data with outputs zero, and stops.
     Run(run::RunArguments),
+    /// Records what passes on network interfaces into a file for Wireshark, without taking part.
+    Capture(capture::CaptureArguments),
     /// Puts a simulated segment on network interfaces, for any EtherCAT MainDevice at their other end.
     Sim(sim::SimArguments),
 }
@@ -57,6 +61,7 @@ fn main() -> ExitCode {
         Command::Demo(arguments) => demo::run(&arguments).map_err(Failure::from),
         Command::Scan(arguments) => scan::run(&arguments).map(|()| true),
         Command::Run(arguments) => run::run(&arguments),
+        Command::Capture(arguments) => capture::run(&arguments).map(|()| true),
         Command::Sim(arguments) => sim::run(&arguments).map(|()| true),
     };
     match held {

@@ -13,6 +13,7 @@ use std::time::Duration;
 use clap::Args;
 use ringcat::news::News;
 use ringcat::packet::PacketLinks;
+use ringcat::tee::Tee;
 use ringcat::text::{Names, address_of_sender, describe};
 use ringcat::{
     Application, CyclicThread, DomainId, Event, Instant, LastOutputs, Link, Links, Options, SubDeviceState,
@@ -22,6 +23,7 @@ use ringcat_wire::al::AlState;
 
 use crate::interfaces::{Failure, InterfaceArguments, ThreadArguments, end_request, is_asked};
 use crate::output::{say, write};
+use crate::recording::RecordingArguments;
 use crate::surroundings::Surroundings;
 
 /// From activation to OP of the last SubDevice at the most.
@@ -56,6 +58,8 @@ pub struct RunArguments {
     interfaces: InterfaceArguments,
     #[command(flatten)]
     thread: ThreadArguments,
+    #[command(flatten)]
+    recording: RecordingArguments,
     /// Cycle time, with its unit: 250us, 1ms.
     #[arg(long, value_name = "TIME", default_value = "1ms", value_parser = time)]
     cycle: Duration,
@@ -65,7 +69,7 @@ pub struct RunArguments {
 }
 
 /// A time with its unit.
-fn time(text: &str) -> Result<Duration, String> {
+pub fn time(text: &str) -> Result<Duration, String> {
     let at = text.find(|c: char| !c.is_ascii_digit()).unwrap_or(text.len());
     let (number, unit) = text.split_at(at);
     let unit_ns = match unit {
@@ -83,8 +87,10 @@ fn time(text: &str) -> Result<Duration, String> {
 pub fn run(arguments: &RunArguments) -> Result<bool, Failure> {
     let end = end_request();
     let thread = arguments.thread;
-    let (mut cyclic, acyclic) = arguments.interfaces.open_halves(thread)?;
+    let (cyclic, acyclic) = arguments.interfaces.open_halves(thread)?;
     let mut surroundings = Surroundings::watch(&arguments.interfaces, &cyclic);
+    let recording = arguments.recording.start(&arguments.interfaces)?;
+    let (mut cyclic, acyclic) = (recording.tee(cyclic), recording.tee(acyclic));
     let _awake = thread.prepare_process();
     let begin = now();
     let supervisor = SupervisorThread::start(acyclic, &Options::default(), move || thread.prepare_supervisor())?;
@@ -120,7 +126,7 @@ fn now() -> Instant {
 }
 
 struct Run {
-    cycles: CyclicThread<PacketLinks>,
+    cycles: CyclicThread<Tee<PacketLinks>>,
     names: Names,
     begin: Instant,
     live: Live,
@@ -136,7 +142,7 @@ fn tell_events(supervisor: &SupervisorThread, surroundings: &mut Surroundings) {
 }
 
 /// Frames that arrive for the cyclic half before it sends any are those of other MainDevices. Returns how many.
-fn tell_of_others(links: &mut PacketLinks, surroundings: &mut Surroundings) -> u64 {
+fn tell_of_others(links: &mut impl Links, surroundings: &mut Surroundings) -> u64 {
     let mut count = 0;
     while links.receive(&mut |link, frame| {
         count += 1;
@@ -220,7 +226,7 @@ impl Run {
     }
 }
 
-fn summary(application: &Application<PacketLinks, SupervisorThread>, surroundings: &Surroundings) {
+fn summary(application: &Application<Tee<PacketLinks>, SupervisorThread>, surroundings: &Surroundings) {
     let (pace, cyclic, acyclic) = (application.pace(), application.cyclic_counters(), application.acyclic_counters());
     say!("\nsummary");
     say!("  cycles: {}, judged not complete: {}, frames still out: {}", pace.cycles, cyclic.incomplete, cyclic.skipped);
@@ -249,7 +255,7 @@ fn summary(application: &Application<PacketLinks, SupervisorThread>, surrounding
         say!("  other MainDevices: {frames} frames, {senders}");
     }
     for link in [Link::Main, Link::Redundant] {
-        let Some(counters) = application.links().counters(link) else { continue };
+        let Some(counters) = application.links().links().counters(link) else { continue };
         say!(
             "  {link}: {} sent, {} received; not sent: {} interface down, {} queue full, {} refused; {} overrun",
             counters.sent,

@@ -6,6 +6,7 @@ use ringcat::{Event, MainDevice, Options};
 
 use crate::interfaces::{Failure, InterfaceArguments, ThreadArguments};
 use crate::output::say;
+use crate::recording::RecordingArguments;
 use crate::surroundings::Surroundings;
 use crate::table;
 
@@ -23,6 +24,8 @@ pub struct ScanArguments {
     interfaces: InterfaceArguments,
     #[command(flatten)]
     thread: ThreadArguments,
+    #[command(flatten)]
+    recording: RecordingArguments,
     /// Print JSON instead of a table.
     #[arg(long)]
     json: bool,
@@ -32,6 +35,8 @@ pub struct ScanArguments {
 pub fn run(arguments: &ScanArguments) -> Result<(), Failure> {
     let links = arguments.interfaces.open(arguments.thread)?;
     let mut surroundings = Surroundings::watch(&arguments.interfaces, &links);
+    let recording = arguments.recording.start(&arguments.interfaces)?;
+    let links = recording.tee(links);
     let _awake = arguments.thread.apply();
     let mut main_device = MainDevice::request(links, &Options::default());
     let result = main_device.scan_with(|event| match &event.event {

@@ -7,6 +7,7 @@
 
 pub mod answering_double;
 pub mod callgrind;
+pub mod capture;
 pub mod check;
 pub mod counting_allocator;
 pub mod cpu_time;

@@ -2,9 +2,13 @@
 
 use std::time::Duration;
 
+use ringcat::links::Links;
+use ringcat::memory::MemoryLinks;
+use ringcat::tee::Tee;
 use ringcat_engine::domain::{DomainId, Freshness};
 use ringcat_engine::exchange::{CyclicCounters, Received};
 use ringcat_engine::link::Link;
+use ringcat_link::Recorder;
 use scenarios::answering_double::Cabling;
 use scenarios::counting_allocator::{CountingAllocator, Counts, counts};
 use scenarios::cyclic_load::{CyclicLoad, LoadSpec, PERIOD};
@@ -76,6 +80,39 @@ fn disturbed_cycles_take_no_memory() {
     }
 }
 
+#[test]
+fn recorded_cycles_take_no_memory() {
+    let path = std::env::temp_dir().join(format!("ringcat-no-memory-{}.pcapng", std::process::id()));
+    let recorder = Recorder::start(&path, &[("main", ""), ("redundant", "")]).expect("a file");
+    let mut load = load(Cabling::ClosedRing);
+    let CyclicLoad { exchange, links, double, now, .. } = &mut load;
+    let mut tee = Tee::new(std::mem::replace(links, MemoryLinks::new(links.addresses().0, None, 1)), recorder.tap());
+    let used = counted(|| {
+        for _ in 0..CYCLES {
+            *now += PERIOD;
+            tee.links_mut().set_now(*now);
+            while tee.receive(&mut |link, frame| {
+                exchange.receive(link, frame, *now);
+            }) {}
+            for domain in (0..3).map(DomainId) {
+                exchange.process(domain, *now);
+                exchange.queue(domain, *now);
+            }
+            exchange.send(*now, &mut |link, frame| tee.send(link, frame));
+            let links = tee.links_mut();
+            double.answer(&mut links.sent, &mut links.arriving);
+        }
+    });
+    let recorded = recorder.finish().expect("it was written");
+    std::fs::remove_file(&path).expect("it was written");
+    assert_eq!(used, (0, 0));
+    for link in recorded {
+        // This is faster than anybody writes: what finds the queue full is counted.
+        assert_eq!(link.sent + link.received + link.lost, CYCLES * 6 + (CYCLES - 1) * 6, "{link:?}");
+        assert!(link.sent > 0 && link.received > 0, "{link:?}");
+    }
+}
+
 /// Answers, but not quite, in a way of its own for each of ten cycles.
 fn disturb(load: &mut CyclicLoad, cycle: u64) {
     let CyclicLoad { exchange, links, board, double, now, .. } = load;
@@ -138,7 +175,7 @@ fn disturb(load: &mut CyclicLoad, cycle: u64) {
 }
 
 /// Takes the first frame that arrives and copies it.
-fn copy_first(links: &mut ringcat::memory::MemoryLinks, first: &mut [u8; 1514]) -> (Link, usize) {
+fn copy_first(links: &mut MemoryLinks, first: &mut [u8; 1514]) -> (Link, usize) {
     let (link, frame) = links.arriving.pop().expect("there is one");
     first[..frame.len()].copy_from_slice(frame);
     (link, frame.len())

@@ -22,6 +22,26 @@ fn a_capture_of_one_frame_is_these_bytes() {
     assert_eq!(writer.into_inner(), expected);
 }
 
+#[test]
+fn statistics_and_the_beginning_of_a_long_frame_are_these_bytes() {
+    let mut writer = Writer::new(Vec::new(), &[("a", "")]).expect("memory takes all");
+    let before = writer.out.len();
+    writer.beginning(0, Direction::In, 1 << 32, &[0xaa; 4], 9000).expect("memory takes all");
+    let statistics = Statistics { seen: 7, dropped: 2, dropped_by_kernel: 0x0102 };
+    writer.statistics(0, 5, statistics).expect("memory takes all");
+    #[rustfmt::skip]
+    let expected = [
+        // Packet: length 48, interface 0, time, 4 bytes of 9000, inbound.
+        6, 0, 0, 0, 48, 0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0, 4, 0, 0, 0, 0x28, 0x23, 0, 0,
+        0xaa, 0xaa, 0xaa, 0xaa, 2, 0, 4, 0, 1, 0, 0, 0, 0, 0, 0, 0, 48, 0, 0, 0,
+        // Statistics: length 64, interface 0, time, seen, dropped, dropped by the kernel.
+        5, 0, 0, 0, 64, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 5, 0, 0, 0,
+        4, 0, 8, 0, 7, 0, 0, 0, 0, 0, 0, 0, 5, 0, 8, 0, 2, 0, 0, 0, 0, 0, 0, 0,
+        7, 0, 8, 0, 2, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 64, 0, 0, 0,
+    ];
+    assert_eq!(writer.into_inner()[before..], expected);
+}
+
 /// Kind and body of each block; checks both lengths.
 fn blocks(mut bytes: &[u8]) -> Vec<(u32, Vec<u8>)> {
     let word = |bytes: &[u8], at: usize| u32::from_le_bytes(bytes[at..at + 4].try_into().expect("four bytes"));

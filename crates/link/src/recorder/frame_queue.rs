@@ -1,0 +1,230 @@
+//! Frames on their way from the thread that sees them to the one that writes them: a bounded queue of bytes with one
+//! producer and one consumer.
+//!
+//! In go frames with interface, direction and time, out come the same in the same order. Without locks and without
+//! `unsafe`: the memory is words that are atomics. The producer neither waits nor allocates nor calls the kernel; frames
+//! that find the queue full are counted per interface.
+
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
+
+use crate::pcapng::Direction;
+
+/// Bytes of a word.
+const WORD: usize = size_of::<u64>();
+/// Words in front of a frame: interface, direction and lengths; time.
+const HEAD: usize = 2;
+/// Longer frames are cut: more than a jumbo frame has.
+pub const LONGEST: usize = 0xFFFF;
+/// What the memory is filled with, so that all of it is there before it is used.
+const FILLING: u64 = u64::MAX;
+
+/// What comes with a frame.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Note {
+    /// Place of the interface among those of the capture, at most 255.
+    pub interface: usize,
+    /// Which way it went.
+    pub direction: Direction,
+    /// When.
+    pub time_ns: u64,
+    /// Bytes of the whole frame, of which only the beginning may be in the queue.
+    pub length: usize,
+}
+
+#[derive(Debug)]
+struct Shared {
+    /// A power of two of them; counts of words, modulo that, are places.
+    words: Box<[AtomicU64]>,
+    /// Words written so far; only the producer stores it.
+    written: AtomicU64,
+    /// Words read so far; only the consumer stores it.
+    read: AtomicU64,
+    /// Frames that found the queue full, by interface.
+    lost: Box<[AtomicU64]>,
+}
+
+impl Shared {
+    fn word(&self, at: u64) -> &AtomicU64 {
+        &self.words[at as usize & (self.words.len() - 1)]
+    }
+}
+
+/// The writing end.
+#[derive(Debug)]
+pub struct Producer {
+    shared: Arc<Shared>,
+    written: u64,
+    /// What is known of the consumer's count; it may be further by now.
+    read: u64,
+}
+
+/// The reading end.
+#[derive(Debug)]
+pub struct Consumer {
+    shared: Arc<Shared>,
+    read: u64,
+}
+
+/// A queue of `bytes`, rounded up to a power of two, for frames of so many interfaces.
+pub fn queue(bytes: usize, interfaces: usize) -> (Producer, Consumer) {
+    let words = bytes.div_ceil(WORD).clamp(2 * HEAD, 1 << 28).next_power_of_two();
+    let shared = Arc::new(Shared {
+        words: (0..words).map(|_| AtomicU64::new(FILLING)).collect(),
+        written: AtomicU64::new(0),
+        read: AtomicU64::new(0),
+        lost: (0..interfaces).map(|_| AtomicU64::new(0)).collect(),
+    });
+    (Producer { shared: shared.clone(), written: 0, read: 0 }, Consumer { shared, read: 0 })
+}
+
+impl Producer {
+    /// Appends a frame; false (and counted) where the queue is full.
+    pub fn push(&mut self, note: Note, frame: &[u8]) -> bool {
+        let shared = &*self.shared;
+        let frame = &frame[..frame.len().min(LONGEST)];
+        let needed = (HEAD + frame.len().div_ceil(WORD)) as u64;
+        let room = |read: u64| shared.words.len() as u64 - (self.written - read);
+        if room(self.read) < needed {
+            self.read = shared.read.load(Ordering::Acquire);
+        }
+        if room(self.read) < needed {
+            if let Some(lost) = shared.lost.get(note.interface) {
+                // Only this thread writes it.
+                lost.store(lost.load(Ordering::Relaxed) + 1, Ordering::Relaxed);
+            }
+            return false;
+        }
+        let direction = u64::from(note.direction == Direction::Out);
+        let whole = note.length.max(frame.len()).min(u32::MAX as usize) as u64;
+        let head = frame.len() as u64 | direction << 16 | (note.interface as u64 & 0xFF) << 24 | whole << 32;
+        let mut at = self.written;
+        let mut put = |word: u64| {
+            shared.word(at).store(word, Ordering::Relaxed);
+            at += 1;
+        };
+        put(head);
+        put(note.time_ns);
+        let mut words = frame.chunks_exact(WORD);
+        for word in &mut words {
+            let mut bytes = [0; WORD];
+            bytes.copy_from_slice(word);
+            put(u64::from_le_bytes(bytes));
+        }
+        if !words.remainder().is_empty() {
+            let mut bytes = [0; WORD];
+            bytes[..words.remainder().len()].copy_from_slice(words.remainder());
+            put(u64::from_le_bytes(bytes));
+        }
+        self.written = at;
+        shared.written.store(at, Ordering::Release);
+        true
+    }
+}
+
+impl Consumer {
+    /// How far the producer is now, to be compared with [`Consumer::is_before`].
+    pub fn end(&self) -> u64 {
+        self.shared.written.load(Ordering::Acquire)
+    }
+
+    /// Whether a frame waits that was there when [`Consumer::end`] said this.
+    pub fn is_before(&self, end: u64) -> bool {
+        self.read < end
+    }
+
+    /// When the oldest frame passed, if there is one before `end`.
+    pub fn oldest(&self, end: u64) -> Option<u64> {
+        self.is_before(end).then(|| self.shared.word(self.read + 1).load(Ordering::Relaxed))
+    }
+
+    /// Takes the oldest frame before `end`; its bytes replace what was in `frame`.
+    pub fn pop(&mut self, end: u64, frame: &mut Vec<u8>) -> Option<Note> {
+        let time_ns = self.oldest(end)?;
+        let head = self.shared.word(self.read).load(Ordering::Relaxed);
+        let length = head as usize & 0xFFFF;
+        let words = length.div_ceil(WORD);
+        frame.clear();
+        for at in 0..words {
+            let word = self.shared.word(self.read + (HEAD + at) as u64).load(Ordering::Relaxed);
+            frame.extend_from_slice(&word.to_le_bytes());
+        }
+        frame.truncate(length);
+        self.read += (HEAD + words) as u64;
+        self.shared.read.store(self.read, Ordering::Release);
+        let direction = if head >> 16 & 1 == 0 { Direction::In } else { Direction::Out };
+        Some(Note { interface: (head >> 24) as usize & 0xFF, direction, time_ns, length: (head >> 32) as usize })
+    }
+
+    /// Frames of an interface that found the queue full.
+    pub fn lost(&self, interface: usize) -> u64 {
+        self.shared.lost.get(interface).map_or(0, |lost| lost.load(Ordering::Relaxed))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn note(number: u64) -> Note {
+        let direction = if number.is_multiple_of(3) { Direction::In } else { Direction::Out };
+        Note { interface: number as usize % 2, direction, time_ns: number << 33, length: frame(number).len() }
+    }
+
+    fn frame(number: u64) -> Vec<u8> {
+        (0..number * 7 % 1515).map(|at| (at + number) as u8).collect()
+    }
+
+    #[test]
+    fn frames_of_every_length_come_out_as_they_went_in_however_often_the_queue_wraps() {
+        let (mut producer, mut consumer) = queue(8192, 2);
+        let mut taken = Vec::new();
+        for number in 0..5000 {
+            assert!(producer.push(note(number), &frame(number)));
+            let end = consumer.end();
+            assert_eq!(consumer.oldest(end), Some(number << 33));
+            assert_eq!(consumer.pop(end, &mut taken), Some(note(number)));
+            assert_eq!(taken, frame(number));
+            assert_eq!(consumer.pop(end, &mut taken), None);
+        }
+    }
+
+    #[test]
+    fn a_frame_that_finds_the_queue_full_is_counted_for_its_interface_and_the_others_stay() {
+        let (mut producer, mut consumer) = queue(256, 2);
+        let ones = Note { interface: 1, ..note(1) };
+        let pushed = (0..5).filter(|_| producer.push(ones, &[7; 64])).count();
+        assert_eq!((pushed, consumer.lost(0), consumer.lost(1)), (3, 0, 2));
+        let mut taken = Vec::new();
+        let end = consumer.end();
+        assert!(consumer.pop(end, &mut taken).is_some());
+        assert!(producer.push(ones, &[8; 64]), "there is room again");
+        assert!(!producer.push(ones, &[9; 4096]), "longer than the whole queue");
+        let end = consumer.end();
+        let rest: Vec<u8> = std::iter::from_fn(|| consumer.pop(end, &mut taken).map(|_| taken[0])).collect();
+        assert_eq!(rest, [7, 7, 8]);
+    }
+
+    #[test]
+    fn two_threads_at_once_lose_nothing_but_what_is_counted() {
+        const FRAMES: u64 = 20_000;
+        let (mut producer, mut consumer) = queue(16_384, 2);
+        let writer = std::thread::spawn(move || (0..FRAMES).filter(|n| producer.push(note(*n), &frame(*n))).count());
+        let (mut taken, mut seen, mut last) = (Vec::new(), 0, None);
+        loop {
+            let finished = writer.is_finished();
+            let end = consumer.end();
+            while let Some(note) = consumer.pop(end, &mut taken) {
+                let number = note.time_ns >> 33;
+                assert!(last < Some(number), "order");
+                assert_eq!((note, &taken), (self::note(number), &frame(number)));
+                (seen, last) = (seen + 1, Some(number));
+            }
+            if finished {
+                break;
+            }
+        }
+        assert_eq!(writer.join().expect("no panic"), seen);
+        assert_eq!(consumer.lost(0) + consumer.lost(1) + seen as u64, FRAMES);
+    }
+}

@@ -1,0 +1,137 @@
+use std::fs;
+use std::sync::atomic::AtomicU32;
+
+use super::*;
+
+/// A file that is removed when it is dropped.
+struct Scratch(PathBuf);
+
+impl Scratch {
+    fn new() -> Scratch {
+        static COUNT: AtomicU32 = AtomicU32::new(0);
+        let number = COUNT.fetch_add(1, Ordering::Relaxed);
+        Scratch(std::env::temp_dir().join(format!("ringcat-recorder-{}-{number}.pcapng", std::process::id())))
+    }
+}
+
+impl Drop for Scratch {
+    fn drop(&mut self) {
+        let _ = fs::remove_file(&self.0);
+    }
+}
+
+fn word(bytes: &[u8], at: usize) -> u32 {
+    u32::from_le_bytes(bytes[at..at + 4].try_into().expect("four bytes"))
+}
+
+/// Kind and body of each block of a file.
+fn blocks(path: &Path) -> Vec<(u32, Vec<u8>)> {
+    let bytes = fs::read(path).expect("the capture is there");
+    let mut rest = &bytes[..];
+    let mut blocks = Vec::new();
+    while !rest.is_empty() {
+        let length = word(rest, 4) as usize;
+        blocks.push((word(rest, 0), rest[8..length - 4].to_vec()));
+        rest = &rest[length..];
+    }
+    blocks
+}
+
+/// Interface, time and first byte of each frame.
+fn frames(blocks: &[(u32, Vec<u8>)]) -> Vec<(u32, u64, u8)> {
+    let packets = blocks.iter().filter(|(kind, _)| *kind == 6);
+    packets
+        .map(|(_, body)| (word(body, 0), u64::from(word(body, 4)) << 32 | u64::from(word(body, 8)), body[20]))
+        .collect()
+}
+
+#[test]
+fn frames_of_two_threads_are_in_one_file_in_the_order_of_time() {
+    let scratch = Scratch::new();
+    let recorder = Recorder::start(&scratch.0, &[("a", ""), ("b", "")]).expect("a file");
+    let taps = [recorder.tap(), recorder.tap()];
+    thread::scope(|scope| {
+        for (number, mut tap) in taps.into_iter().enumerate() {
+            // Each in its own order, one far ahead of the other.
+            scope.spawn(move || {
+                for step in 0..300u64 {
+                    let direction = if number == 0 { Direction::Out } else { Direction::In };
+                    tap.record(number, direction, 1_000_000 + 2 * step + number as u64, &[step as u8; 60]);
+                }
+            });
+        }
+    });
+    let recorded = recorder.finish().expect("it was written");
+    assert_eq!(recorded[0], Recorded { sent: 300, ..Recorded::default() });
+    assert_eq!(recorded[1], Recorded { received: 300, ..Recorded::default() });
+    let frames = frames(&blocks(&scratch.0));
+    let expected: Vec<_> = (0..600u64).map(|n| ((n % 2) as u32, 1_000_000 + n, (n / 2) as u8)).collect();
+    assert_eq!(frames, expected);
+}
+
+#[test]
+fn frames_that_find_the_queue_full_are_told_in_the_statistics() {
+    let scratch = Scratch::new();
+    let recorder = Recorder::start(&scratch.0, &[("a", ""), ("b", "")]).expect("a file");
+    let mut tap = recorder.tap_with(1024);
+    for length in [60, 1514, 60, 60, 1514] {
+        tap.record(1, Direction::Out, 7, &vec![0xEE; length]);
+    }
+    recorder.set_lost_by_kernel(0, 5);
+    let recorded = recorder.finish().expect("it was written");
+    assert_eq!(recorded[0], Recorded { lost_by_kernel: 5, ..Recorded::default() });
+    assert_eq!(recorded[1], Recorded { sent: 3, lost: 2, ..Recorded::default() });
+    let blocks = blocks(&scratch.0);
+    assert_eq!(frames(&blocks).len() as u64, recorded[1].sent);
+    let statistics: Vec<&Vec<u8>> = blocks.iter().filter(|(kind, _)| *kind == 5).map(|(_, body)| body).collect();
+    assert_eq!(statistics.len(), 2);
+    for (interface, body) in statistics.into_iter().enumerate() {
+        assert_eq!(word(body, 0) as usize, interface);
+        // Three options of eight bytes behind interface and time: seen, lost, lost by the kernel.
+        let option = |at: usize| (word(body, 12 + 12 * at), u64::from(word(body, 16 + 12 * at)));
+        let of = recorded[interface];
+        assert_eq!(option(0), (0x0008_0004, of.received + of.sent + of.lost));
+        assert_eq!(option(1), (0x0008_0005, of.lost));
+        assert_eq!(option(2), (0x0008_0007, of.lost_by_kernel));
+    }
+}
+
+#[test]
+fn times_of_another_clock_become_unix_time_and_all_taps_have_the_same() {
+    let scratch = Scratch::new();
+    let recorder = Recorder::start(&scratch.0, &[("a", "")]).expect("a file");
+    let mut taps = [recorder.tap(), recorder.tap()];
+    let before = unix_now_ns();
+    for tap in &mut taps {
+        tap.set_clock(1000);
+        tap.record(0, Direction::In, 1500, &[1; 60]);
+    }
+    recorder.finish().expect("it was written");
+    let frames = frames(&blocks(&scratch.0));
+    assert_eq!(frames[0], frames[1]);
+    let since = frames[0].1 - before;
+    assert!((500..10_000_000_000).contains(&since), "{since} ns");
+}
+
+#[test]
+fn a_capture_is_complete_when_its_recorder_is_dropped() {
+    let scratch = Scratch::new();
+    let recorder = Recorder::start(&scratch.0, &[("a", "")]).expect("a file");
+    let mut tap = recorder.tap();
+    tap.record(0, Direction::In, 0, &[1; 60]);
+    drop(recorder);
+    let kinds: Vec<u32> = blocks(&scratch.0).iter().map(|(kind, _)| *kind).collect();
+    assert_eq!(kinds, [0x0A0D_0D0A, 1, 6, 5]);
+    // Nobody writes any more, and nobody is stopped by that.
+    tap.record(0, Direction::In, 0, &[1; 60]);
+}
+
+#[test]
+fn a_file_that_cannot_be_written_is_named_with_what_to_do() {
+    let start = |path: &str| Recorder::start(Path::new(path), &[("a", "")]).expect_err("no file").to_string();
+    let missing = start("/nowhere/at/all.pcapng");
+    assert!(missing.contains("/nowhere/at/all.pcapng") && missing.ends_with("make its directory first"), "{missing}");
+    assert!(start("/").ends_with("name a file in it"));
+    let full = start("/dev/full");
+    assert!(full.contains("No space left") && full.contains("make room"), "{full}");
+}

@@ -1,0 +1,96 @@
+//! `ringcat capture`: what passes on network interfaces, recorded without taking part.
+//!
+//! In go the interfaces of any MainDevice on this host, out comes one pcapng file with both directions of all of them.
+
+use std::io::{IsTerminal, stdout};
+use std::path::PathBuf;
+use std::time::Duration;
+
+use clap::Args;
+use ringcat_link::{PacketSocket, ReceiveMode, Recorder, Sniffer, Tap, interface, monotonic};
+
+use crate::interfaces::{Failure, InterfaceArguments, describe_down, end_request, is_asked};
+use crate::output::{say, write};
+use crate::recording::{DESCRIPTIONS, lines};
+use crate::run::time;
+
+/// The user's wish to end, and the live line, are looked at so often.
+const LOOK: Duration = Duration::from_millis(200);
+
+/// Options of `ringcat capture`.
+#[derive(Args, Debug)]
+pub struct CaptureArguments {
+    #[command(flatten)]
+    interfaces: InterfaceArguments,
+    /// File to write, for Wireshark. An older one is overwritten.
+    #[arg(long, value_name = "FILE.pcapng")]
+    out: PathBuf,
+    /// How long, such as 10s or 5min; until Ctrl-C by default.
+    #[arg(long = "for", value_name = "TIME", value_parser = time)]
+    lasts: Option<Duration>,
+    /// Record frames of all protocols, not only EtherCAT (EtherType 0x88A4, with or without a VLAN tag).
+    #[arg(long)]
+    all: bool,
+}
+
+/// Records, and says how many frames there were.
+pub fn run(arguments: &CaptureArguments) -> Result<(), Failure> {
+    let end = end_request();
+    let names: Vec<&str> = arguments.interfaces.names().collect();
+    let mut sniffers = Vec::new();
+    for name in &names {
+        sniffers.push(Sniffer::open(name, arguments.all)?);
+        if !interface::carrier(name).unwrap_or(true) {
+            eprintln!("ringcat: {}", describe_down(name));
+        }
+    }
+    let described: Vec<(&str, &str)> = names.iter().copied().zip(DESCRIPTIONS).collect();
+    let recorder = Recorder::start(&arguments.out, &described)?;
+    let mut tap = recorder.tap();
+    let what = if arguments.all { "all frames" } else { "EtherCAT frames" };
+    say!("recording {what} of {} into {}; Ctrl-C ends it", names.join(" and "), arguments.out.display());
+    let lasts = arguments.lasts.map(|lasts| u64::try_from(lasts.as_nanos()).unwrap_or(u64::MAX));
+    let until = lasts.map_or(u64::MAX, |lasts| monotonic::now_ns().saturating_add(lasts));
+    let terminal = stdout().is_terminal();
+    let (mut frames, mut shown) = (0, 0);
+    while !is_asked(&end) && monotonic::now_ns() < until {
+        let sockets: Vec<&PacketSocket> = sniffers.iter().map(Sniffer::socket).collect();
+        let look = monotonic::now_ns() + LOOK.as_nanos() as u64;
+        ringcat_link::wait(&sockets, look.min(until), ReceiveMode::Blocking);
+        frames += drain(&mut sniffers, &mut tap);
+        let now = monotonic::now_ns();
+        if terminal && now >= shown {
+            shown = now + LOOK.as_nanos() as u64;
+            write(format_args!("\r{frames:>9} frames "));
+        }
+    }
+    if terminal {
+        say!();
+    }
+    drain(&mut sniffers, &mut tap);
+    for (number, sniffer) in sniffers.iter().enumerate() {
+        recorder.set_lost_by_kernel(number, sniffer.lost());
+    }
+    let recorded = recorder.finish()?;
+    for line in lines(names.into_iter(), &recorded) {
+        say!("{line}");
+    }
+    Ok(())
+}
+
+/// Records what has passed so far; how many frames that is. Bounded, however fast they come.
+fn drain(sniffers: &mut [Sniffer], tap: &mut Tap) -> u64 {
+    const AT_ONCE: u64 = 10_000;
+    let mut frames = 0;
+    for (number, sniffer) in sniffers.iter_mut().enumerate() {
+        let before = frames;
+        while frames - before < AT_ONCE
+            && sniffer.next(&mut |passed| {
+                tap.record_beginning(number, passed.direction, passed.unix_time_ns, passed.frame, passed.length);
+            })
+        {
+            frames += 1;
+        }
+    }
+    frames
+}

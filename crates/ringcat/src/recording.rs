@@ -1,0 +1,80 @@
+//! `--capture FILE`: what a command exchanges with the segment, as a file that Wireshark reads.
+//!
+//! In goes the option, out come [`Tee`]s around the command's links, and when the command is over a line that says what is
+//! in the file.
+
+use std::path::PathBuf;
+
+use clap::Args;
+use ringcat::Links;
+use ringcat::tee::Tee;
+use ringcat_link::recorder::Recorded;
+use ringcat_link::{Recorder, RecorderError};
+
+use crate::interfaces::{Failure, InterfaceArguments};
+
+/// The option.
+#[derive(Args, Clone, Debug)]
+pub struct RecordingArguments {
+    /// Record all frames of both links into this file, for Wireshark: interface names, directions, nanoseconds.
+    #[arg(long, value_name = "FILE.pcapng")]
+    capture: Option<PathBuf>,
+}
+
+impl RecordingArguments {
+    /// Begins the recording, if one is wanted.
+    pub fn start(&self, interfaces: &InterfaceArguments) -> Result<Recording, Failure> {
+        let names: Vec<(&str, &str)> = interfaces.names().zip(DESCRIPTIONS).collect();
+        let recorder = self.capture.as_ref().map(|path| Recorder::start(path, &names)).transpose()?;
+        Ok(Recording { recorder, arguments: self.clone(), interfaces: interfaces.clone() })
+    }
+}
+
+/// What the interfaces are to the MainDevice.
+pub const DESCRIPTIONS: [&str; 2] = ["main link", "redundant link"];
+
+impl From<RecorderError> for Failure {
+    fn from(error: RecorderError) -> Failure {
+        Failure::new(error.to_string())
+    }
+}
+
+/// A recording that goes on until it is dropped, then says what it recorded.
+#[derive(Debug)]
+pub struct Recording {
+    recorder: Option<Recorder>,
+    arguments: RecordingArguments,
+    interfaces: InterfaceArguments,
+}
+
+impl Recording {
+    /// Records these links, of one thread, if that is wanted.
+    pub fn tee<L: Links>(&self, links: L) -> Tee<L> {
+        Tee::new(links, self.recorder.as_ref().map(Recorder::tap))
+    }
+}
+
+impl Drop for Recording {
+    fn drop(&mut self) {
+        let (Some(recorder), Some(path)) = (self.recorder.take(), &self.arguments.capture) else { return };
+        match recorder.finish() {
+            Ok(recorded) => {
+                for line in lines(self.interfaces.names(), &recorded) {
+                    eprintln!("{}: {line}", path.display());
+                }
+            }
+            Err(error) => eprintln!("ringcat: {error}"),
+        }
+    }
+}
+
+/// A line for each interface.
+pub fn lines<'a>(
+    names: impl Iterator<Item = &'a str> + 'a,
+    recorded: &'a [Recorded],
+) -> impl Iterator<Item = String> + 'a {
+    names.zip(recorded).map(|(name, frames)| {
+        let Recorded { received, sent, lost, lost_by_kernel } = frames;
+        format!("{name}: {received} frames received, {sent} sent, {} not recorded", lost + lost_by_kernel)
+    })
+}

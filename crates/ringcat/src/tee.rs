@@ -1,0 +1,75 @@
+//! Links that are recorded: whatever passes goes on as before, and into a capture too.
+//!
+//! In go any [`Links`] and a [`Tap`], out come links. Frames are stamped with the links' own time, sent ones before they
+//! are handed on, received ones when they are taken. Interface 0 of the capture is the main link, 1 the redundant one. One
+//! tap serves one thread; tees of several threads write into one file.
+
+use ringcat_engine::link::Link;
+use ringcat_engine::time::Instant;
+use ringcat_link::Tap;
+use ringcat_link::pcapng::Direction;
+use ringcat_wire::frame::MacAddress;
+
+use crate::links::Links;
+
+/// Links with or without a tap.
+#[derive(Debug)]
+pub struct Tee<L> {
+    links: L,
+    tap: Option<Tap>,
+}
+
+impl<L: Links> Tee<L> {
+    /// Records what passes these links; without a tap nothing is.
+    pub fn new(links: L, tap: impl Into<Option<Tap>>) -> Tee<L> {
+        let mut tap = tap.into();
+        if let Some(tap) = &mut tap {
+            tap.set_clock(links.now().0);
+        }
+        Tee { links, tap }
+    }
+
+    /// The links below.
+    pub fn links(&self) -> &L {
+        &self.links
+    }
+
+    /// The links below.
+    pub fn links_mut(&mut self) -> &mut L {
+        &mut self.links
+    }
+}
+
+impl<L: Links> Links for Tee<L> {
+    fn now(&self) -> Instant {
+        self.links.now()
+    }
+
+    fn addresses(&self) -> (MacAddress, Option<MacAddress>) {
+        self.links.addresses()
+    }
+
+    fn send(&mut self, link: Link, frame: &[u8]) {
+        if let Some(tap) = &mut self.tap {
+            tap.record(link.index(), Direction::Out, self.links.now().0, frame);
+        }
+        self.links.send(link, frame);
+    }
+
+    fn receive(&mut self, take: &mut dyn FnMut(Link, &[u8])) -> bool {
+        let Some(tap) = &mut self.tap else { return self.links.receive(take) };
+        let now = self.links.now().0;
+        self.links.receive(&mut |link, frame| {
+            tap.record(link.index(), Direction::In, now, frame);
+            take(link, frame);
+        })
+    }
+
+    fn wait(&mut self, until: Instant) {
+        self.links.wait(until);
+    }
+
+    fn sleep(&mut self, until: Instant) {
+        self.links.sleep(until);
+    }
+}

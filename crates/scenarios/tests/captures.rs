@@ -1,0 +1,262 @@
+//! Captures: what a MainDevice sent and received, recorded by a tee in virtual time and judged from the file alone; and
+//! captures that were tampered with, so that the judge is known to see what it looks for.
+
+use std::path::PathBuf;
+use std::sync::atomic::{AtomicU32, Ordering};
+use std::time::Duration;
+
+use ringcat::simulated::SimulatedSegment;
+use ringcat::tee::Tee;
+use ringcat::{Application, LastOutputs, MainDevice, Options, automatic};
+use ringcat_link::Recorder;
+use ringcat_sim::cable::{CableId, DeviceIndex};
+use ringcat_sim::fault::Fault;
+use ringcat_sim::network::{Network, NetworkOptions};
+use ringcat_wire::al::AlState;
+use scenarios::capture::ethercat::Frame;
+use scenarios::capture::pcapng::{Capture, Packet};
+use scenarios::capture::{Verdict, judge, judge_frames};
+use scenarios::dice::Dice;
+use scenarios::segments::{descriptions, line, ring_of_16};
+
+const CYCLE: Duration = Duration::from_millis(1);
+const LIMIT: Duration = Duration::from_secs(5);
+const LRD: u8 = 10;
+const LWR: u8 = 11;
+
+type Recorded = Application<Tee<SimulatedSegment>>;
+
+/// Scan, OP, `work`, stop, all of it recorded; the file.
+fn recorded(network: Network, ring: bool, work: impl FnOnce(&mut Recorded)) -> Vec<u8> {
+    static COUNT: AtomicU32 = AtomicU32::new(0);
+    let number = COUNT.fetch_add(1, Ordering::Relaxed);
+    let path: PathBuf = std::env::temp_dir().join(format!("ringcat-capture-{}-{number}.pcapng", std::process::id()));
+    let names = [("sim-main", "main link"), ("sim-redundant", "redundant link")];
+    let recorder = Recorder::start(&path, &names[..1 + usize::from(ring)]).expect("a file");
+    let links = Tee::new(SimulatedSegment::new(network), recorder.tap());
+    let mut main_device = MainDevice::request(links, &Options::default());
+    let scan = main_device.scan().expect("a segment");
+    let mut application = main_device.activate(automatic(&scan.subdevices, CYCLE)).expect("it fits");
+    settle(&mut application);
+    work(&mut application);
+    application.stop(LastOutputs::Zero, AlState::Init, LIMIT).expect("all go to INIT");
+    let recorded = recorder.finish().expect("it was written");
+    assert!(recorded.iter().all(|interface| interface.lost == 0), "{recorded:?}");
+    let bytes = std::fs::read(&path).expect("it was written");
+    std::fs::remove_file(&path).expect("it was read");
+    bytes
+}
+
+fn settle(application: &mut Recorded) {
+    let until = application.now() + LIMIT;
+    while !application.all_settled() {
+        assert!(application.now() < until, "not in OP: {:?}", application.states());
+        application.cycle(|_| ());
+    }
+}
+
+fn cycles(application: &mut Recorded, count: usize) {
+    for _ in 0..count {
+        application.cycle(|_| ());
+        while application.pop_event().is_some() {}
+    }
+}
+
+fn fault(application: &mut Recorded, fault: &Fault) {
+    application.links_mut().links_mut().network_mut().apply(fault.clone());
+}
+
+/// One SubDevice, at rest.
+fn short() -> Vec<u8> {
+    recorded(line(descriptions(&["digital-output-8"]), NetworkOptions::default()), false, |run| cycles(run, 50))
+}
+
+/// A ring of 16 with a cut, a repair and a power cycle.
+fn eventful() -> Vec<u8> {
+    recorded(ring_of_16(Duration::from_millis(2)), true, |run| {
+        cycles(run, 100);
+        for what in [Fault::Cut(CableId(7)), Fault::Heal(CableId(7)), Fault::PowerOff(DeviceIndex(4))] {
+            fault(run, &what);
+            cycles(run, 100);
+        }
+        fault(run, &Fault::PowerOn(DeviceIndex(4)));
+        cycles(run, 200);
+        settle(run);
+        cycles(run, 100);
+    })
+}
+
+fn read(bytes: &[u8]) -> Capture {
+    Capture::parse(bytes).expect("a capture")
+}
+
+#[test]
+fn what_a_main_device_sends_keeps_every_promise_on_one_link() {
+    let verdict = judge(&short(), Some(CYCLE)).expect("a capture");
+    assert_eq!(verdict.broken, 0, "{verdict}");
+    assert!(verdict.reads > 50 && verdict.missing == 0 && verdict.pairs == 0, "{verdict}");
+    assert_eq!(verdict.returned, verdict.sent[0]);
+}
+
+#[test]
+fn what_a_main_device_sends_keeps_every_promise_on_a_ring_that_breaks_closes_and_loses_a_subdevice() {
+    let verdict = judge(&eventful(), None).expect("a capture");
+    println!("{verdict}");
+    assert_eq!(verdict.broken, 0, "{verdict}");
+    assert_eq!(verdict.pairs, verdict.sent[0]);
+    assert_eq!(verdict.returned + verdict.missing, verdict.sent[0] + verdict.sent[1]);
+    assert!((1..100).contains(&verdict.missing), "{verdict}");
+    for windows in &verdict.windows {
+        assert_eq!((windows.period, windows.late), (CYCLE, 0), "{verdict}");
+        // In virtual time nobody stalls: not a single acyclic frame is in the way of a cycle.
+        assert_eq!((windows.crossed, windows.crossed_in_stalls, windows.held_up), (0, 0, 0), "{verdict}");
+        assert!(windows.by_chance > 0, "acyclic frames would have met cycles: {verdict}");
+    }
+    assert_eq!(verdict.windows.len(), 2);
+}
+
+#[test]
+fn a_tee_changes_nothing_and_records_each_link_and_direction() {
+    let capture = read(&eventful());
+    let names: Vec<&str> = capture.interfaces.iter().map(|interface| interface.name.as_str()).collect();
+    assert_eq!(names, ["sim-main", "sim-redundant"]);
+    assert!(capture.interfaces.iter().all(|interface| interface.dropped == Some(0)));
+    let count = |link, sent| capture.packets.iter().filter(|p| p.interface == link && p.sent == sent).count();
+    assert_eq!(count(0, true), count(1, true));
+    assert!(count(0, false) > 0 && count(1, false) > 0);
+    assert!(capture.packets.is_sorted_by_key(|packet| packet.time_ns));
+}
+
+/// The verdict after something was done to the frames.
+fn tampered(capture: &Capture, tamper: impl FnOnce(&mut Vec<Packet>)) -> Verdict {
+    let mut capture = capture.clone();
+    tamper(&mut capture.packets);
+    judge_frames(&capture, Some(CYCLE)).expect("one or two interfaces")
+}
+
+/// The first frame of the second half that was sent and has such a datagram, and where that begins.
+fn sent_with(packets: &[Packet], command: u8) -> (usize, usize) {
+    let at = |packet: &Packet| {
+        let frame = Frame::parse(&packet.bytes).expect("a good frame");
+        frame.datagrams.iter().find(|datagram| datagram.command == command).map(|datagram| datagram.at)
+    };
+    let frames = packets.iter().enumerate().skip(packets.len() / 2).filter(|(_, packet)| packet.sent);
+    frames.filter_map(|(place, packet)| Some((place, at(packet)?))).next().expect("such a frame was sent")
+}
+
+fn assert_found(verdict: &Verdict, text: &str) {
+    assert!(verdict.findings.iter().any(|finding| finding.contains(text)), "{text}: {verdict}");
+}
+
+#[test]
+fn the_judge_sees_each_single_bit_that_must_not_be_set() {
+    let capture = read(&eventful());
+    let in_datagram = [
+        (1, 0x01, "has Idx"),
+        (7, 0x40, "is sent with C = 1"),
+        (8, 0x04, "working counter or event request"),
+        (10, 0x01, "a read, is sent with data"),
+        (7, 0x08, "reserved bits"),
+        (7, 0x80, "M = "),
+    ];
+    let in_frame =
+        [(6, 0x08, "the RED bit is not that of its link"), (15, 0x80, "EtherCAT header"), (12, 0x01, "EtherType")];
+    for (offset, bit, text) in in_datagram {
+        let verdict = tampered(&capture, |packets| {
+            let (place, at) = sent_with(packets, LRD);
+            packets[place].bytes[at + offset] ^= bit;
+        });
+        assert_found(&verdict, text);
+    }
+    for (at, bit, text) in in_frame {
+        let verdict = tampered(&capture, |packets| {
+            let (place, _) = sent_with(packets, LRD);
+            packets[place].bytes[at] ^= bit;
+        });
+        assert_found(&verdict, text);
+    }
+}
+
+#[test]
+fn the_judge_sees_frames_that_leave_once_or_come_back_twice_or_too_late() {
+    let capture = read(&eventful());
+    let pair = tampered(&capture, |packets| {
+        let (place, _) = sent_with(packets, LRD);
+        packets.remove(place);
+    });
+    assert_found(&pair, "left on 1 of 2 links");
+    let unlike = tampered(&capture, |packets| {
+        // Of an output, which is data that may be anything.
+        let (place, at) = sent_with(packets, LWR);
+        packets[place].bytes[at + 10] ^= 0x01;
+    });
+    assert_found(&unlike, "differs from its copy");
+    let twice = tampered(&capture, |packets| {
+        let place = packets.iter().rposition(|packet| !packet.sent).expect("something came back");
+        packets.push(packets[place].clone());
+    });
+    assert_found(&twice, "is back for the second time");
+    let stranger = tampered(&capture, |packets| {
+        let last = packets.iter_mut().rfind(|packet| !packet.sent).expect("something came back");
+        last.bytes[17] ^= 0x40;
+    });
+    assert_found(&stranger, "was never sent from here");
+    let jump = tampered(&capture, |packets| {
+        let (place, _) = sent_with(packets, LRD);
+        packets[place].bytes[7] = packets[place].bytes[7].wrapping_add(3);
+    });
+    assert_found(&jump, "has number");
+    let late = tampered(&capture, |packets| {
+        let end = packets.last().expect("frames").time_ns;
+        let place = packets.iter().position(|p| !p.sent && p.bytes[17] & 0x80 == 0).expect("a cycle came back");
+        packets[place].time_ns = end + 1;
+    });
+    assert_found(&late, "comes back after its id was used again");
+}
+
+#[test]
+fn the_judge_sees_acyclic_frames_that_are_in_the_way_of_a_cycle_and_tells_stalls_apart() {
+    let capture = read(&eventful());
+    let acyclic = |p: &Packet| p.sent && p.interface == 0 && p.bytes[17] & 0x80 != 0;
+    let cyclic = |p: &Packet| p.sent && p.interface == 0 && p.bytes[17] & 0x80 == 0;
+    let first = capture.packets.iter().position(cyclic).expect("cycles");
+    let middle = first + (capture.packets.len() - first) / 2;
+    let frame = middle + capture.packets[middle..].iter().position(acyclic).expect("acyclic frames");
+    let start = frame + capture.packets[frame..].iter().position(cyclic).expect("a cycle after it");
+    let start_ns = capture.packets[start].time_ns;
+    let before = |ns: u64| tampered(&capture, |packets| packets[frame].time_ns = start_ns - ns);
+    // A short frame takes 6.72 us.
+    let through = before(200_000);
+    assert_eq!((through.windows[0].crossed, through.windows[0].held_up), (0, 0), "{through}");
+    let crossing = before(2_000);
+    assert_eq!((crossing.windows[0].crossed, crossing.windows[0].held_up), (1, 1), "{crossing}");
+    assert!(crossing.windows[0].longest_hold_up >= Duration::from_nanos(4_720), "{crossing}");
+    let stall = tampered(&capture, |packets| {
+        packets[frame].time_ns = start_ns + 299_000;
+        for packet in packets.iter_mut().filter(|packet| packet.time_ns == start_ns) {
+            packet.time_ns += 300_000;
+        }
+    });
+    let windows = &stall.windows[0];
+    assert_eq!((windows.crossed, windows.late, windows.held_up), (0, 1, 1), "{stall}");
+    // Those that left behind the cycle as it was are now before it too.
+    assert!((1..5).contains(&windows.crossed_in_stalls), "{stall}");
+}
+
+#[test]
+fn any_damage_to_a_file_is_survived() {
+    let file = short();
+    let mut dice = Dice::new(7);
+    for _ in 0..2_000 {
+        let mut bytes = file.clone();
+        for _ in 0..=dice.below(4) {
+            let at = dice.below(bytes.len() as u64) as usize;
+            bytes[at] = dice.below(256) as u8;
+        }
+        bytes.truncate(bytes.len() - if dice.below(2) == 0 { dice.below(100) as usize } else { 0 });
+        // Whatever it says, it comes to an end.
+        let _ = judge(&bytes, None);
+    }
+    let frame = [0xFF; 70];
+    assert!((0..70).all(|length| Frame::parse(&frame[..length]).is_err()));
+}
