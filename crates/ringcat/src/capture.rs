@@ -17,8 +17,16 @@ use crate::run::time;
 /// The user's wish to end, and the live line, are looked at so often.
 const LOOK: Duration = Duration::from_millis(200);
 
+/// What to do with the file.
+const ABOUT_CAPTURE: &str = "\
+Sees both directions of the interfaces and never sends; a MainDevice on them, of whatever make, does not notice. Open the
+file with Wireshark, or: tshark -r FILE.pcapng
+
+Where the MainDevice is `ringcat scan` or `ringcat run`, --capture of these does the same without a second program.";
+
 /// Options of `ringcat capture`.
 #[derive(Args, Debug)]
+#[command(after_help = ABOUT_CAPTURE)]
 pub struct CaptureArguments {
     #[command(flatten)]
     interfaces: InterfaceArguments,

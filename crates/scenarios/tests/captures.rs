@@ -116,6 +116,29 @@ fn what_a_main_device_sends_keeps_every_promise_on_a_ring_that_breaks_closes_and
 }
 
 #[test]
+fn a_segment_that_returns_as_a_whole_leaves_every_cycle_its_time() {
+    let kinds: Vec<&str> = ["digital-output-8", "digital-input-8", "servo"].into_iter().cycle().take(40).collect();
+    let file = recorded(line(descriptions(&kinds), NetworkOptions::default()), false, |run| {
+        for device in (0..kinds.len()).map(DeviceIndex) {
+            fault(run, &Fault::PowerOff(device));
+        }
+        cycles(run, 50);
+        for device in (0..kinds.len()).map(DeviceIndex) {
+            fault(run, &Fault::PowerOn(device));
+        }
+        cycles(run, 100);
+        settle(run);
+        cycles(run, 50);
+    });
+    let verdict = judge(&file, Some(CYCLE)).expect("a capture");
+    println!("{verdict}");
+    assert_eq!(verdict.broken, 0, "{verdict}");
+    let windows = &verdict.windows[0];
+    assert_eq!((windows.late, windows.crossed, windows.held_up), (0, 0, 0), "{verdict}");
+    assert!(windows.by_chance > 10, "too few acyclic frames to show anything: {verdict}");
+}
+
+#[test]
 fn a_tee_changes_nothing_and_records_each_link_and_direction() {
     let capture = read(&eventful());
     let names: Vec<&str> = capture.interfaces.iter().map(|interface| interface.name.as_str()).collect();

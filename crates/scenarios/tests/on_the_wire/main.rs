@@ -7,6 +7,7 @@
 
 mod bench;
 mod cables;
+mod captures;
 mod foreign;
 mod messages;
 mod said;

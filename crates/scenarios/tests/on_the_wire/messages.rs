@@ -62,10 +62,13 @@ fn a_user_without_the_permission_is_told_the_line_that_grants_it() {
     let Some(bench) = Bench::new(1) else { return };
     let nobody = ["--reuid", "65534", "--regid", "65534", "--clear-groups", "--inh-caps", "-all"];
     let program = program("ringcat").display().to_string();
-    for command in ["scan", "run", "sim"] {
+    for command in ["scan", "run", "sim", "capture"] {
         let mut arguments = vec![program.as_str(), command, "--main", "main0"];
         if command == "sim" {
             arguments.extend(["--segment", concat!(env!("CARGO_MANIFEST_DIR"), "/../sim/segments/demo.toml")]);
+        }
+        if command == "capture" {
+            arguments.extend(["--out", "/dev/null"]);
         }
         let output = finish(bench.start(Path::new("setpriv"), &[&nobody, &arguments[..]].concat()));
         let errors = said(&output).1;
