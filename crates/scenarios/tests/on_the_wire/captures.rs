@@ -13,8 +13,8 @@ use std::time::Duration;
 use scenarios::capture::pcapng::Capture;
 use scenarios::capture::{Verdict, judge};
 
-use crate::bench::{Bench, finish, program};
-use crate::{PLANTS, RING_OF_16, said, states};
+use crate::bench::{Bench, await_op, finish, program};
+use crate::{PLANTS, RING_OF_16, said};
 
 /// Of so many acyclic frames one may be in the way of a cycle without a stall in sight.
 const ONE_IN: u64 = 100;
@@ -92,17 +92,6 @@ fn check_with_tshark(path: &Path, frames: u64) {
     assert!(complaints.is_empty(), "{complaints}{errors}");
     assert!(!errors.contains("invalid"), "{errors}");
     println!("tshark: {frames} EtherCAT frames, none malformed, no expert error\n");
-}
-
-/// Waits until so many devices are in OP.
-fn await_op(bench: &Bench, count: usize) {
-    for _ in 0..100 {
-        if states(bench, "OP") == count {
-            return;
-        }
-        std::thread::sleep(Duration::from_millis(100));
-    }
-    panic!("not in OP: {}", bench.order("status"));
 }
 
 /// Ends a program as Ctrl-C does.
