@@ -49,6 +49,16 @@ fn subdevices_that_appear_one_after_the_other_while_the_first_are_read_are_all_f
 }
 
 #[test]
+fn a_scan_that_has_read_everything_waits_until_the_count_has_settled() {
+    let options = Options { settle: Duration::from_millis(200), ..Options::default() };
+    let network = line(descriptions(&KINDS), NetworkOptions::default());
+    let mut main_device = MainDevice::request(Tap::new(network), &options);
+    assert_eq!(main_device.scan().expect("all are there").subdevices.len(), 5);
+    let now = main_device.links_mut().now();
+    assert!((200_000_000..202_000_000).contains(&now.0), "{now:?}");
+}
+
+#[test]
 fn a_count_that_never_settles_ends_the_scan_after_its_patience() {
     let mut network = line(descriptions(&KINDS), NetworkOptions::default());
     for ms in (3..200).step_by(6) {

@@ -138,10 +138,10 @@ async fn attempt(bus: &Bus, options: &ScanOptions, expected: Count) -> Result<Sc
             {
                 read = Some(result);
             }
-            match read.take().filter(|_| settled) {
-                None => Poll::Pending,
-                Some(result) => Poll::Ready(result.map_err(Failure::from)),
+            if !settled {
+                return Poll::Pending;
             }
+            read.take().map_or(Poll::Pending, |result| Poll::Ready(result.map_err(Failure::from)))
         })
         .await?
     };

@@ -1,0 +1,226 @@
+//! Segments that lie: EEPROMs with any content, answers with any data, working counters, lengths and bytes. Nothing
+//! panics, nothing hangs, virtual time and memory stay bounded, and when the lies end the next scan finds what is there.
+//!
+//! `SEED=17 cargo test -p scenarios --test hostile environment -- --nocapture` runs one seed of each.
+
+use std::cell::Cell;
+use std::ops::Range;
+use std::rc::Rc;
+use std::time::Duration;
+
+use ringcat::{Application, Instant, LastOutputs, Links, MainDevice, Options, automatic};
+use ringcat_sim::network::{Network, NetworkOptions};
+use ringcat_wire::al::AlState;
+use ringcat_wire::datagram::HEADER_LEN;
+use ringcat_wire::frame::Frame;
+use scenarios::counting_allocator::{CountingAllocator, counts, restart_peak};
+use scenarios::dice::Dice;
+use scenarios::meddler::{Meddled, Verdict};
+use scenarios::segments::{descriptions, line, ring};
+
+#[global_allocator]
+static ALLOCATOR: CountingAllocator = CountingAllocator;
+
+const KINDS: [&str; 6] =
+    ["coupler", "digital-input-8", "digital-output-16", "analog-input-4", "servo", "emulated-output-8"];
+/// Most virtual time of a seed: three tries of a scan, each within the limits of its EEPROMs, and what comes then.
+const LIMIT: Instant = Instant(150_000_000_000);
+/// Most bytes that MainDevice and segment may hold.
+const MEMORY: i64 = 64 << 20;
+
+/// A segment, and the product codes of its devices.
+fn segment(dice: &mut Dice, seed: u64) -> (Network, Vec<u32>) {
+    let kinds: Vec<&str> = (0..1 + dice.below(5)).map(|_| *dice.pick(&KINDS)).collect();
+    let options = NetworkOptions { seed, ..NetworkOptions::default() };
+    let descriptions = descriptions(&kinds);
+    let products = descriptions.iter().map(|description| description.identity.product_code).collect();
+    (if dice.one_in(2) { ring(descriptions, options) } else { line(descriptions, options) }, products)
+}
+
+fn bytes(dice: &mut Dice, count: u64) -> Vec<u8> {
+    let any = |dice: &mut Dice| match dice.below(4) {
+        0 => 0x00,
+        1 => 0xFF,
+        _ => dice.roll() as u8,
+    };
+    (0..count).map(|_| any(dice)).collect()
+}
+
+/// Any content: noise, an image with bytes turned over, cut off, or with categories of any kind and length.
+fn image(dice: &mut Dice, right: &[u8]) -> Vec<u8> {
+    let mut image = right.to_vec();
+    match dice.below(5) {
+        0 => {
+            let count = dice.below(5_000);
+            image = bytes(dice, count);
+        }
+        1 => image.truncate(dice.below(right.len() as u64) as usize),
+        2 => {
+            for _ in 0..1 + dice.below(20) {
+                let at = dice.below(right.len() as u64) as usize;
+                image[at] = dice.roll() as u8;
+            }
+        }
+        3 => {
+            image.truncate(128);
+            // Says that it is as large as none is.
+            image[0x7C..0x7E].copy_from_slice(&(dice.roll() as u16).to_le_bytes());
+            for _ in 0..dice.below(40) {
+                let kind: u16 = *dice.pick(&[10, 30, 40, 41, 50, 51, 60, 0, 0x8001, 0x1234]);
+                let (words, there) = (dice.below(200) as u16, dice.below(400));
+                image.extend(kind.to_le_bytes());
+                image.extend(words.to_le_bytes());
+                let data = bytes(dice, there);
+                image.extend(data);
+            }
+        }
+        _ => {}
+    }
+    image
+}
+
+/// Starts what a scan found and lets it run for a while; a refusal is an answer too. `stop` is called before the end.
+fn work<L: Links>(mut main_device: MainDevice<L>, cycles: u32, stop: impl Fn()) -> MainDevice<L> {
+    let Ok(scan) = main_device.scan() else { return main_device };
+    let declaration = automatic(&scan.subdevices, Duration::from_millis(1));
+    let mut application: Application<L> = match main_device.activate(declaration) {
+        Ok(application) => application,
+        Err(refused) => return refused.main_device,
+    };
+    for number in 0..cycles {
+        application.cycle(|data| {
+            let domain = ringcat::DomainId(0);
+            data.image_mut(domain).fill(number as u8);
+        });
+        while application.pop_event().is_some() {}
+    }
+    stop();
+    application
+        .stop(LastOutputs::Zero, AlState::Init, Duration::from_secs(1))
+        .unwrap_or_else(|error| panic!("all go to INIT: {error}"))
+}
+
+/// Runs seeds, and looks at the memory that each takes.
+fn runs(seeds: Range<u64>, run: impl Fn(u64) + std::panic::RefUnwindSafe) {
+    for seed in seeds {
+        restart_peak();
+        let before = counts().bytes;
+        if let Err(panic) = std::panic::catch_unwind(|| run(seed)) {
+            println!("seed {seed}");
+            std::panic::resume_unwind(panic);
+        }
+        let counts = counts();
+        assert!(counts.peak - before < MEMORY, "seed {seed}: {} bytes", counts.peak - before);
+    }
+}
+
+fn eeproms(seed: u64) {
+    let mut dice = Dice::new(seed);
+    let (mut network, _) = segment(&mut dice, seed);
+    for device in 0..network.devices().count() {
+        let device = ringcat_sim::cable::DeviceIndex(device);
+        let right = network.device(device).controller.sii_image().to_vec();
+        *network.device_mut(device).controller.sii_image_mut() = image(&mut dice, &right);
+    }
+    let options = Options { sii_cache: !dice.one_in(3), ..Options::default() };
+    let links = Meddled::new(network, LIMIT, |_| Verdict::Arrives);
+    work(MainDevice::request(links, &options), 200, || ());
+}
+
+/// Places of the datagrams of a frame: where each begins and how long its data is.
+fn datagrams(frame: &[u8]) -> Vec<(usize, usize)> {
+    let Ok(parsed) = Frame::parse(frame) else { return Vec::new() };
+    let mut at = parsed.payload_offset();
+    let place = |length: usize| {
+        let begin = at;
+        at += HEADER_LEN + length + 2;
+        (begin, length)
+    };
+    parsed.datagrams().map(|datagram| datagram.data.len()).map(place).collect()
+}
+
+/// Says something else than the segment did.
+fn lie(dice: &mut Dice, frame: &mut Vec<u8>) -> Verdict {
+    let places = datagrams(frame);
+    let Some(&(begin, length)) = places.get(dice.below(places.len() as u64) as usize) else {
+        return Verdict::Arrives;
+    };
+    let (data, wkc) = (begin + HEADER_LEN, begin + HEADER_LEN + length);
+    match dice.below(12) {
+        0..=3 => {
+            let said = bytes(dice, length as u64);
+            frame[data..data + length].copy_from_slice(&said);
+        }
+        4..=6 => {
+            let said = if dice.one_in(2) { dice.below(4) as u16 } else { dice.roll() as u16 };
+            frame[wkc..wkc + 2].copy_from_slice(&said.to_le_bytes());
+        }
+        7 => {
+            let said = dice.roll() as u16;
+            frame[wkc - length - 2..wkc - length].copy_from_slice(&said.to_le_bytes());
+        }
+        8 => {
+            let at = dice.below(frame.len() as u64) as usize;
+            frame[at] = dice.roll() as u8;
+        }
+        9 => frame.truncate(dice.below(frame.len() as u64) as usize),
+        10 => {
+            let count = dice.below(1_600);
+            *frame = bytes(dice, count);
+        }
+        _ => return if dice.one_in(2) { Verdict::IsLost } else { Verdict::ArrivesTwice },
+    }
+    Verdict::Arrives
+}
+
+fn lies(seed: u64) {
+    let mut dice = Dice::new(seed);
+    let (network, expected) = segment(&mut dice, seed);
+    let options = Options { sii_cache: dice.one_in(2), ..Options::default() };
+    let (one_in, left) = (*dice.pick(&[2, 10, 100]), Rc::new(Cell::new(0)));
+    let lies_left = left.clone();
+    let mut liar = dice;
+    let links = Meddled::new(network, LIMIT, move |frame| {
+        if lies_left.get() == 0 || !liar.one_in(one_in) {
+            return Verdict::Arrives;
+        }
+        lies_left.set(lies_left.get() - 1);
+        lie(&mut liar, frame)
+    });
+    let mut main_device = MainDevice::request(links, &options);
+    for _ in 0..3 {
+        left.set(20 + dice.below(200));
+        main_device = work(main_device, 200, || left.set(0));
+    }
+    left.set(0);
+    let scan = main_device.scan().unwrap_or_else(|error| panic!("nobody lies any more: {error}"));
+    let found: Vec<u32> = scan.subdevices.iter().map(|info| info.identity.product_code).collect();
+    assert_eq!(found, expected);
+    // The cache keeps what was said under a fixed area that was read rightly, which is a lie perhaps.
+    if !options.sii_cache {
+        let declaration = automatic(&scan.subdevices, Duration::from_millis(1));
+        let mut application = main_device.activate(declaration).map_err(|refused| refused.error).expect("fits");
+        (0..300).for_each(|_| application.cycle(|_| ()));
+        assert!(application.all_settled(), "{:?}", application.states());
+    }
+}
+
+#[test]
+fn eeproms_of_any_content_are_read_or_refused_seeds_0_to_149() {
+    runs(0..150, eeproms);
+}
+
+#[test]
+fn answers_that_lie_do_no_harm_beyond_their_time_seeds_0_to_149() {
+    runs(0..150, lies);
+}
+
+#[test]
+fn seeds_from_the_environment() {
+    let Ok(text) = std::env::var("SEED") else { return println!("skipped: no SEED given") };
+    let (first, last) = text.split_once("..").unwrap_or((&text, ""));
+    let first: u64 = first.parse().expect("SEED=17 or SEED=1000..2000");
+    let seeds = first..last.parse().unwrap_or(first + 1);
+    runs(seeds.clone(), eeproms);
+    runs(seeds, lies);
+}
