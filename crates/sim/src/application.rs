@@ -3,20 +3,25 @@
 //! In: AL events and virtual time, through [`Application::run`], and faults. Out: AL status, answers in the mailbox,
 //! inputs and latched outputs. The parts: [`state_machine`] says what a request means, [`settings`] whether the
 //! configuration suits, [`process_data`] moves data, [`mailbox`] carries messages to the [`servers`], of which there is
-//! one per protocol: [`coe`] with its [`dictionary`]. [`behaviours`] and [`servo`] make inputs, `transitions` leads from
+//! one per protocol: [`coe`] with its [`dictionary`], [`foe`], [`eoe`], [`soe`], [`aoe`], [`voe`]. [`behaviours`] and [`servo`] make inputs, `transitions` leads from
 //! state to state. Here they are put together.
 
+pub mod aoe;
 pub mod behaviours;
 pub mod coe;
 pub mod dictionary;
+pub mod eoe;
+pub mod foe;
 mod mail;
 pub mod mailbox;
 pub mod process_data;
 pub mod servers;
 pub mod servo;
 pub mod settings;
+pub mod soe;
 pub mod state_machine;
 mod transitions;
+pub mod voe;
 
 use ringcat_wire::al::{AlState, AlStatus, AlStatusCode};
 use ringcat_wire::register::map;
@@ -25,6 +30,7 @@ use crate::controller::Controller;
 use crate::description::DeviceDescription;
 use crate::time::SimTime;
 use dictionary::Dictionary;
+use foe::files::FileStore;
 use mailbox::Mailbox;
 use mailbox::faults::MailFaults;
 use process_data::ProcessData;
@@ -55,6 +61,10 @@ pub struct Application {
     process_data: ProcessData,
     mailbox: Option<Mailbox>,
     servers: Servers,
+    /// When the servers have something to do of themselves.
+    servers_due: Option<SimTime>,
+    /// What is kept without power.
+    files: FileStore,
     faults: MailFaults,
     layout: Layout,
     refusals: Vec<Refusal>,
@@ -74,7 +84,9 @@ impl Application {
             dictionary: Dictionary::new(description),
             process_data: ProcessData::new(&description.behaviour),
             mailbox: None,
-            servers: Servers::new(),
+            servers: Servers::default(),
+            servers_due: None,
+            files: FileStore::new(&description.services.foe),
             faults: MailFaults::default(),
             layout: Layout::default(),
             refusals: Vec::new(),
@@ -94,7 +106,8 @@ impl Application {
         self.dictionary = Dictionary::new(description);
         self.process_data.stop(now);
         self.mailbox = None;
-        self.servers = Servers::new();
+        self.servers = Servers::default();
+        self.servers_due = None;
         self.layout = Layout::default();
         self.emulated_state = AlState::Init;
         self.last_run = now;
@@ -126,6 +139,16 @@ impl Application {
         &self.dictionary
     }
 
+    /// The files of the device.
+    pub const fn files(&self) -> &FileStore {
+        &self.files
+    }
+
+    /// The protocol servers; those of a mailbox that is closed know nothing.
+    pub const fn servers(&self) -> &Servers {
+        &self.servers
+    }
+
     /// Inputs come from this source from now on.
     pub fn set_source(&mut self, source: InputSource, description: &DeviceDescription, controller: &mut Controller) {
         self.process_data.set_source(source, controller, self.last_run);
@@ -152,7 +175,8 @@ impl Application {
         let mail = self.mailbox.as_ref();
         let answer = mail.and_then(Mailbox::next_deadline);
         let full = mail.and(self.faults.full_until());
-        [transition, answer, full].into_iter().flatten().min()
+        let service = mail.and(self.servers_due);
+        [transition, answer, full, service].into_iter().flatten().min()
     }
 
     /// The transition could be done but something else is missing.

@@ -37,6 +37,8 @@ const DEVICES: &[(&str, Maker)] = &[
     ("servo", machines::servo),
     ("block", machines::block),
     ("all-protocols", protocols::all_protocols),
+    ("ethernet-terminal", protocols::ethernet_terminal),
+    ("soe-drive", protocols::soe_drive),
 ];
 
 /// The device with this name.

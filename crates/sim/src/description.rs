@@ -4,6 +4,8 @@
 //! ([`DeviceDescription::from_sii`](crate::sii_image)). Out: the SII image, the object dictionary and the settings
 //! of the controller follow from it, so that they cannot contradict each other (facts 4, 5.2, 6.3).
 
+mod services;
+
 use core::time::Duration;
 
 use ringcat_wire::register::PortKind;
@@ -13,6 +15,8 @@ use ringcat_wire::sii::{
 
 use crate::application::Behaviour;
 use crate::application::dictionary::Object;
+
+pub use services::{AoeDescription, EoeDescription, EoeEnd, FoeDescription, Services, SoeDescription};
 
 /// Data type codes of CoE that the models use (facts 6.3).
 pub mod data_type {
@@ -178,6 +182,8 @@ pub struct DeviceDescription {
     pub objects: Vec<Object>,
     /// Mailbox, if there is one.
     pub mailbox: Option<MailboxDescription>,
+    /// What the protocols of the mailbox do.
+    pub services: Services,
     /// Distributed clock, if there is one.
     pub dc: Option<DcDescription>,
     /// PDI type of register 0x0140.
@@ -224,6 +230,7 @@ impl DeviceDescription {
             pdos: Vec::new(),
             objects: Vec::new(),
             mailbox: None,
+            services: Services::default(),
             dc: None,
             pdi_type: 0x05,
             emulation: false,
@@ -254,6 +261,27 @@ impl DeviceDescription {
             return u16::try_from(bits.div_ceil(8)).unwrap_or(u16::MAX);
         }
         self.sync_managers.get(usize::from(number)).map_or(0, |entry| entry.length)
+    }
+
+    /// Gives both mailboxes another size and moves the process data behind them; false for a device without a mailbox and
+    /// for one with a real image.
+    pub fn set_mailbox_bytes(&mut self, bytes: u16) -> bool {
+        let Some(mailbox) = self.mailbox.as_mut().filter(|_| self.sii_image.is_none()) else {
+            return false;
+        };
+        let old = mailbox.standard;
+        let send_offset = old.receive_offset + bytes;
+        mailbox.standard = MailboxLayout { receive_size: bytes, send_offset, send_size: bytes, ..old };
+        let (old_end, new_end) = (old.send_offset + old.send_size, send_offset + bytes);
+        for entry in &mut self.sync_managers {
+            match entry.kind {
+                SyncManagerKind::MailboxOut => entry.length = bytes,
+                SyncManagerKind::MailboxIn => (entry.start, entry.length) = (send_offset, bytes),
+                _ if entry.start >= old_end => entry.start = entry.start - old_end + new_end,
+                _ => {}
+            }
+        }
+        true
     }
 
     /// Number of the first SyncManager of a kind.

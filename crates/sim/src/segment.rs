@@ -7,6 +7,7 @@
 mod devices;
 mod error;
 mod format;
+mod services;
 mod topology;
 
 use std::path::Path;

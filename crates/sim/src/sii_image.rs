@@ -171,6 +171,8 @@ fn general<'a>(description: &'a DeviceDescription, strings: &mut StringTable<'a>
     // String 1 is the order code, as in real images: some MainDevices take it for the name without asking this category.
     let order = strings.number(&description.order_code);
     let group = strings.number(&description.group);
+    let protocols = description.mailbox.map(|mailbox| mailbox.protocols).unwrap_or_default();
+    let drives = u8::try_from(description.services.soe.drives.len()).unwrap_or(u8::MAX);
     let mut flags = 0;
     if description.mailbox.is_some() {
         flags |= GeneralFlags::MAILBOX_DATA_LINK_LAYER;
@@ -183,6 +185,9 @@ fn general<'a>(description: &'a DeviceDescription, strings: &mut StringTable<'a>
         order,
         name: strings.number(&description.name),
         coe: description.mailbox.map(|mailbox| mailbox.coe_details).unwrap_or_default(),
+        foe: u8::from(protocols.foe()),
+        eoe: u8::from(protocols.eoe()),
+        soe_channels: if protocols.soe() { drives } else { 0 },
         flags: GeneralFlags(flags),
         ebus_current_ma: description.ebus_current_ma,
         group_again: group,

@@ -35,7 +35,7 @@ const ROOMS: &[Room] = &[
     Room {
         directory: "sim",
         internal: Internal::Only(&["ringcat-wire"]),
-        external: External::Only(&["serde", "toml"]),
+        external: External::Only(&["serde", "smoltcp", "toml"]),
     },
     Room { directory: "link", internal: Internal::Only(&[]), external: External::Only(&["libc"]) },
     Room {

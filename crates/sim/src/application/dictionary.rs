@@ -308,6 +308,13 @@ impl Dictionary {
         }
     }
 
+    /// Sets a value from inside the device, whatever its length.
+    pub fn replace(&mut self, index: u16, sub_index: u8, data: &[u8]) {
+        if let Some(entry) = self.object_mut(index).and_then(|object| object.entry_mut(sub_index)) {
+            entry.value = data.into();
+        }
+    }
+
     /// PDO indices that are assigned to a SyncManager now.
     pub fn assigned(&self, sync_manager: u8) -> impl Iterator<Item = u16> {
         let object = self.object(ASSIGNMENT_BASE + u16::from(sync_manager));

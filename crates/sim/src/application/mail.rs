@@ -83,13 +83,32 @@ impl Application {
         };
         // An answer that leaves makes room for the message that waits.
         mailbox.send(controller, now);
+        let servers = &mut self.servers;
         if let Some(message) = mailbox.take(controller, events, &self.faults, now) {
-            let state = self.machine.state();
-            let (servers, dictionary, process_data) = (&mut self.servers, &mut self.dictionary, &self.process_data);
-            mailbox.serve(&message, now + declared.response_time, &mut self.faults, |protocol, payload, room| {
-                servers.serve(protocol, payload, &mut Surroundings { declared, state, room, dictionary, process_data })
+            let mut surroundings = Surroundings {
+                description,
+                declared,
+                state: self.machine.state(),
+                room: mailbox.room(),
+                receive_room: mailbox.receive_room(),
+                now,
+                dictionary: &mut self.dictionary,
+                files: &mut self.files,
+                process_data: &self.process_data,
+            };
+            let ready = now + declared.response_time;
+            mailbox.serve(&message, ready, &mut self.faults, |protocol, payload| {
+                servers.serve(protocol, payload, &mut surroundings)
             });
         }
+        servers.work(mailbox.room(), now);
+        while mailbox.has_room()
+            && let Some((protocol, payload)) = servers.next_message()
+        {
+            mailbox.post(protocol, payload, now);
+            servers.work(mailbox.room(), now);
+        }
+        self.servers_due = servers.next_deadline(now);
         mailbox.send(controller, now);
     }
 }

@@ -21,6 +21,8 @@ use faults::MailFaults;
 /// Answers that may wait for the send mailbox; with more, messages stay in the receive mailbox.
 const MAX_ANSWERS: usize = 4;
 
+/// Messages that servers send of themselves and that may wait; behind more of them a request would wait too long.
+const MAX_OWN: usize = 2;
 /// Messages that may wait for the send mailbox, answers and others together; more of the others are dropped.
 const MAX_POSTED: usize = 64;
 
@@ -135,16 +137,14 @@ impl Mailbox {
         controller.pdi_read(RegisterAddress(self.layout.receive_offset), &mut bytes, now).then_some(bytes)
     }
 
-    /// Serves one message with `server`, which gets protocol, payload and the room for each of its answers. They are
-    /// sent at `ready` or later.
+    /// Serves one message with `server`, which gets protocol and payload. Its answers are sent at `ready` or later.
     pub fn serve(
         &mut self,
         bytes: &[u8],
         ready: SimTime,
         faults: &mut MailFaults,
-        server: impl FnOnce(Protocol, &[u8], usize) -> Answer,
+        server: impl FnOnce(Protocol, &[u8]) -> Answer,
     ) {
-        let room = self.room();
         let (header, answer) = match Message::decode(bytes) {
             Ok(Message { header, payload }) => {
                 if header.counter != 0 && header.counter == self.received_counter {
@@ -156,7 +156,7 @@ impl Mailbox {
                 } else if let Some(answer) = faults.instead_of_serving(header.protocol, payload) {
                     answer
                 } else {
-                    server(header.protocol, payload, room)
+                    server(header.protocol, payload)
                 };
                 (header, answer)
             }
@@ -174,6 +174,16 @@ impl Mailbox {
         for payload in payloads {
             self.queue(protocol, header.address, payload, ready, faults);
         }
+    }
+
+    /// Few enough messages wait that servers may add what nobody asked for.
+    pub fn has_room(&self) -> bool {
+        self.queue.len() < MAX_OWN
+    }
+
+    /// Bytes behind the header that a message from the MainDevice may have.
+    pub fn receive_room(&self) -> usize {
+        usize::from(self.layout.receive_size).saturating_sub(Header::LEN)
     }
 
     /// Bytes behind the header that a message to the MainDevice may have.

@@ -4,25 +4,41 @@
 //! announced, or that is not served in this state, gets the mailbox error "protocol not supported".
 
 use ringcat_wire::al::AlState;
+use ringcat_wire::mailbox::foe::FoeMessage;
 use ringcat_wire::mailbox::{ErrorReply, Protocol};
 
+use super::aoe::AoeServer;
 use super::coe::{CoeServer, Objects};
 use super::dictionary::Dictionary;
+use super::eoe::EoeServer;
+use super::foe::files::FileStore;
+use super::foe::{Files, FoeServer};
 use super::mailbox::Answer;
 use super::process_data::ProcessData;
-use crate::description::MailboxDescription;
+use super::soe::SoeServer;
+use super::voe;
+use crate::description::{DeviceDescription, MailboxDescription};
+use crate::time::SimTime;
 
 /// What servers share with the rest of the application while they serve.
 #[derive(Debug)]
 pub struct Surroundings<'a> {
-    /// What the device announces.
+    /// What the device says about itself.
+    pub description: &'a DeviceDescription,
+    /// What it announces.
     pub declared: MailboxDescription,
     /// Present state.
     pub state: AlState,
     /// Bytes of each answer behind the mailbox header.
     pub room: usize,
+    /// Bytes of each request behind the mailbox header.
+    pub receive_room: usize,
+    /// The present time.
+    pub now: SimTime,
     /// The objects.
     pub dictionary: &'a mut Dictionary,
+    /// The files.
+    pub files: &'a mut FileStore,
     /// Values of mapped objects.
     pub process_data: &'a ProcessData,
 }
@@ -31,20 +47,57 @@ pub struct Surroundings<'a> {
 #[derive(Clone, Debug, Default)]
 pub struct Servers {
     coe: CoeServer,
+    foe: FoeServer,
+    eoe: Option<EoeServer>,
+    soe: Option<SoeServer>,
+    aoe: Option<AoeServer>,
 }
 
 impl Servers {
     /// The servers of a device whose mailbox is opened.
-    pub fn new() -> Servers {
-        Servers::default()
+    pub fn new(description: &DeviceDescription) -> Servers {
+        let announced = description.mailbox.map(|mailbox| mailbox.protocols).unwrap_or_default();
+        let services = &description.services;
+        Servers {
+            coe: CoeServer::default(),
+            foe: FoeServer::default(),
+            eoe: announced.eoe().then(|| EoeServer::new(&services.eoe)),
+            soe: announced.soe().then(|| SoeServer::new(&services.soe)),
+            aoe: announced.aoe().then(|| AoeServer::new(&services.aoe, &description.name)),
+        }
+    }
+
+    /// Ethernet over EtherCAT, where the device speaks it.
+    pub const fn eoe(&self) -> Option<&EoeServer> {
+        self.eoe.as_ref()
+    }
+
+    /// The drives, where the device has some.
+    pub const fn soe(&self) -> Option<&SoeServer> {
+        self.soe.as_ref()
     }
 
     /// Serves one message.
     pub fn serve(&mut self, protocol: Protocol, payload: &[u8], surroundings: &mut Surroundings<'_>) -> Answer {
-        let Surroundings { declared, state, room, .. } = *surroundings;
+        let Surroundings { description, declared, state, room, receive_room, now, .. } = *surroundings;
         let boot = state == AlState::Boot;
+        let unsupported = Answer::Error(ErrorReply::UNSUPPORTED_PROTOCOL);
         match protocol {
-            Protocol::Coe if declared.has_coe() && !boot => {
+            // Errors are never answered, or two ends would answer each other for ever.
+            Protocol::Error => Answer::Silence,
+            Protocol::Foe if declared.protocols.foe() => {
+                let mut files = Files {
+                    description: &description.services.foe,
+                    store: surroundings.files,
+                    boot,
+                    receive_data: receive_room.saturating_sub(FoeMessage::OVERHEAD),
+                    send_data: room.saturating_sub(FoeMessage::OVERHEAD),
+                    now,
+                };
+                self.foe.serve(payload, &mut files)
+            }
+            _ if boot => unsupported,
+            Protocol::Coe if declared.has_coe() => {
                 let mut objects = Objects {
                     dictionary: surroundings.dictionary,
                     process_data: surroundings.process_data,
@@ -54,15 +107,37 @@ impl Servers {
                 };
                 self.coe.serve(payload, room, &mut objects)
             }
-            // Errors are never answered, or two ends would answer each other for ever.
-            Protocol::Error => Answer::Silence,
-            Protocol::Aoe
-            | Protocol::Eoe
-            | Protocol::Coe
-            | Protocol::Foe
-            | Protocol::Soe
-            | Protocol::Voe
-            | Protocol::Other(_) => Answer::Error(ErrorReply::UNSUPPORTED_PROTOCOL),
+            Protocol::Eoe => self.eoe.as_mut().map_or(unsupported, |eoe| eoe.serve(payload, room, now)),
+            Protocol::Soe => self.soe.as_mut().map_or(unsupported, |soe| soe.serve(payload, room, state, now)),
+            Protocol::Aoe => {
+                let dictionary = &mut *surroundings.dictionary;
+                self.aoe.as_mut().map_or(unsupported, |aoe| aoe.serve(payload, room, state, dictionary))
+            }
+            Protocol::Voe if declared.protocols.voe() => voe::serve(payload, room, description.identity.vendor_id),
+            Protocol::Coe | Protocol::Foe | Protocol::Voe | Protocol::Other(_) => unsupported,
         }
+    }
+
+    /// Does what is due without any request.
+    pub fn work(&mut self, room: usize, now: SimTime) {
+        if let Some(eoe) = &mut self.eoe {
+            eoe.let_stack_work(room, now);
+        }
+        if let Some(soe) = &mut self.soe {
+            soe.let_commands_end(now);
+        }
+    }
+
+    /// When there is something to do without any request.
+    pub fn next_deadline(&mut self, now: SimTime) -> Option<SimTime> {
+        let ethernet = self.eoe.as_mut().and_then(|eoe| eoe.next_deadline(now));
+        let command = self.soe.as_ref().and_then(SoeServer::next_deadline);
+        ethernet.into_iter().chain(command).min()
+    }
+
+    /// A message that nobody asked for and that waits for the mailbox.
+    pub fn next_message(&mut self) -> Option<(Protocol, Vec<u8>)> {
+        let command = self.soe.as_mut().and_then(SoeServer::next_message).map(|message| (Protocol::Soe, message));
+        command.or_else(|| self.eoe.as_mut().and_then(EoeServer::next_message).map(|message| (Protocol::Eoe, message)))
     }
 }

@@ -16,6 +16,9 @@ use crate::controller::Controller;
 use crate::description::DeviceDescription;
 use crate::time::SimTime;
 
+/// Object 0x100A.
+const SOFTWARE_VERSION: u16 = 0x100A;
+
 impl Application {
     /// AL control was written.
     pub(super) fn requested(&mut self, description: &DeviceDescription, controller: &mut Controller, now: SimTime) {
@@ -57,6 +60,7 @@ impl Application {
         }
         let from = self.machine.state();
         match (from, to) {
+            (AlState::Init, AlState::PreOp) if !self.files.has_firmware() => Err(AlStatusCode::NO_VALID_FIRMWARE),
             (AlState::Init, AlState::PreOp) => match standard(description) {
                 Some(layout) => self.check_mailbox(
                     &layout,
@@ -98,7 +102,10 @@ impl Application {
         }
         let numbers = settings::mailbox_numbers(description);
         self.mailbox = Some(Mailbox::open(*layout, numbers, controller, now));
-        self.servers = Servers::new();
+        self.servers = Servers::new(description);
+        if let Some(version) = self.files.version() {
+            self.dictionary.replace(SOFTWARE_VERSION, 0, version.as_bytes());
+        }
         Ok(())
     }
 

@@ -1,8 +1,9 @@
-//! Devices whose business is the mailbox: one that speaks every protocol.
+//! Devices whose business is the mailbox: one that speaks every protocol, an Ethernet terminal, a SERCOS drive.
 
 use core::time::Duration;
 
 use ringcat_wire::mailbox::coe::{AccessRights, DataType};
+use ringcat_wire::mailbox::soe::{Idn, IdnAttribute};
 use ringcat_wire::sii::{
     CoeDetails, FmmuUsage, Identity, MailboxLayout, MailboxProtocols, PdoDirection, SyncManagerKind,
 };
@@ -10,6 +11,7 @@ use ringcat_wire::sii::{
 use super::VENDOR_ID;
 use super::parts::{FIXED_MANDATORY, entry, pdo, sync_manager};
 use crate::application::dictionary::{Access, Entry, Object, history};
+use crate::application::soe::idn::IdnObject;
 use crate::application::{Behaviour, InputSource};
 use crate::description::{DeviceDescription, MailboxDescription, data_type};
 
@@ -73,14 +75,63 @@ fn device(name: &str, product_code: u32, protocols: u16) -> DeviceDescription {
 
 /// Every protocol on one mailbox; a dictionary with every data type, arrays, records and a large object.
 pub fn all_protocols(name: &str) -> DeviceDescription {
-    let every = MailboxProtocols::COE;
+    let every = MailboxProtocols::AOE
+        | MailboxProtocols::EOE
+        | MailboxProtocols::COE
+        | MailboxProtocols::FOE
+        | MailboxProtocols::SOE
+        | MailboxProtocols::VOE;
     let mut description = device(name, 0x0000_0A11, every);
     if let Some(mailbox) = &mut description.mailbox {
         let details = CoeDetails::SDO | CoeDetails::SDO_INFORMATION | CoeDetails::PDO_ASSIGN;
         mailbox.coe_details = CoeDetails(details | CoeDetails::COMPLETE_ACCESS);
     }
     description.objects = objects();
+    description.services.foe.files = vec![("log.txt".into(), b"nothing happened\n".repeat(100))];
+    description.services.soe.drives = vec![drive(), drive()];
     description
+}
+
+/// Ethernet over EtherCAT with an IP stack behind it, and a dictionary.
+pub fn ethernet_terminal(name: &str) -> DeviceDescription {
+    let mut description = device(name, 0x19C9_3052, MailboxProtocols::EOE | MailboxProtocols::COE);
+    let Some(mailbox) = &mut description.mailbox else {
+        return description;
+    };
+    mailbox.coe_details = CoeDetails(CoeDetails::SDO | CoeDetails::SDO_INFORMATION);
+    description
+}
+
+/// A drive with the SERCOS profile: two axes, files, no CoE.
+pub fn soe_drive(name: &str) -> DeviceDescription {
+    let mut description = device(name, 0x0000_50E1, MailboxProtocols::SOE | MailboxProtocols::FOE);
+    description.group = "Drives".into();
+    description.services.soe.drives = vec![drive(), drive()];
+    description
+}
+
+/// The IDNs of one axis.
+fn drive() -> Vec<IdnObject> {
+    let signed = 2 << 20;
+    let at_work = IdnAttribute::PROTECTED_SAFEOP | IdnAttribute::PROTECTED_OP;
+    let number = |idn, name, bytes, value| IdnObject::number(Idn::standard(0, idn), name, bytes, value);
+    let large: Vec<u8> = (0..5000u16).map(|place| (place % 251) as u8).collect();
+    vec![
+        number(1, "Control unit cycle time", 2, 1000).unit("us").within(250, 65_000).with_attribute(at_work),
+        number(2, "Communication cycle time", 2, 1000).unit("us").within(250, 65_000).with_attribute(at_work),
+        number(11, "Class 1 diagnostic", 2, 0).read_only(),
+        number(15, "Telegram type", 2, 7).with_attribute(at_work),
+        IdnObject::list(Idn::standard(0, 16), "Configuration list AT", 2, &[51, 0], 64).with_attribute(at_work),
+        IdnObject::list(Idn::standard(0, 24), "Configuration list MDT", 2, &[47, 0], 64).with_attribute(at_work),
+        IdnObject::list(Idn::standard(0, 30), "Manufacturer version", 1, b"1.0", 40).read_only(),
+        number(36, "Velocity command value", 4, 0).unit("rpm").with_attribute(signed).within(-6000, 6000),
+        number(47, "Position command value", 4, 0).unit("inc").with_attribute(signed),
+        number(51, "Position feedback value", 4, 0).unit("inc").with_attribute(signed).read_only(),
+        IdnObject::command(Idn::standard(0, 99), "Reset class 1 diagnostic", Duration::from_millis(5)),
+        number(134, "Master control word", 2, 0),
+        number(135, "Drive status word", 2, 0).read_only(),
+        IdnObject::list(Idn::product(0, 1), "Characteristic", 1, &large, 20_000),
+    ]
 }
 
 /// Objects of every kind.

@@ -1,11 +1,16 @@
 //! Devices through their controller's EtherCAT side: frames in, reactions out.
 
+mod aoe;
 mod bench;
 mod client;
 mod coe;
+mod eoe;
+mod foe;
 mod images;
 mod mail_faults;
 mod mailbox;
 mod process_data;
 mod robustness;
+mod soe;
 mod state_machine;
+mod voe;

@@ -5,6 +5,7 @@ use std::path::Path;
 
 use super::SegmentError;
 use super::format::{DeviceEntry, File, duration, line};
+use super::services::services;
 use crate::catalogue;
 use crate::description::{DeviceDescription, TransitionTimes};
 use crate::network::Random;
@@ -54,6 +55,9 @@ pub(super) fn describe(
             // Clocks that were switched on at different times (facts 11.3).
             let start = random.next() >> 16;
             description.clock_start_ns = entry.clock_start_ns.unwrap_or(start);
+            // No two devices share a MAC address.
+            let [.., high, low] = &mut description.services.eoe.mac;
+            [*high, *low] = (plan.len() as u16).wrapping_add(1).to_be_bytes();
             plan.push(PlannedDevice { description, entry: number, first: copy == 0 });
         }
     }
@@ -81,7 +85,7 @@ fn check_name(name: &str, plan: &[PlannedDevice]) -> Result<(), String> {
     Ok(())
 }
 
-type Place = Option<core::ops::Range<usize>>;
+pub(super) type Place = Option<core::ops::Range<usize>>;
 
 /// The device of one table.
 fn template(entry: &DeviceEntry, name: &str, base_dir: &Path) -> Result<DeviceDescription, (String, Place)> {
@@ -105,6 +109,7 @@ fn template(entry: &DeviceEntry, name: &str, base_dir: &Path) -> Result<DeviceDe
         (None, None) => return Err(("expected type or sii, got neither".into(), None)),
     };
     settings(entry, &mut description)?;
+    services(entry, &mut description, base_dir)?;
     Ok(description)
 }
 

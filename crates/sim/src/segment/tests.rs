@@ -2,6 +2,7 @@ use std::path::PathBuf;
 
 use super::*;
 use crate::cable::{DeviceIndex, Endpoint, HostLink};
+use crate::description::EoeEnd;
 use crate::frame::Port;
 use crate::network::Network;
 
@@ -265,4 +266,64 @@ mod any_text {
             let _ = read(&format!("{}\n{noise}", lines.join("\n")));
         }
     }
+}
+
+#[test]
+fn mailbox_keys_change_sizes_times_and_what_stands_behind() {
+    let segment = read(
+        r#"
+        [[device]]
+        type = "all-protocols"
+        count = 2
+        answer_us = 50
+        mailbox_bytes = 256
+        password = 7
+        erase_ms = 100
+        ethernet = "loop"
+        ip = "10.0.0.2/24"
+
+        [[device]]
+        type = "servo"
+        mailbox_bytes = 64
+        "#,
+    )
+    .unwrap();
+    let device = &segment.devices[0];
+    let mailbox = device.mailbox.unwrap();
+    assert_eq!((mailbox.response_time.as_micros(), mailbox.standard.send_size), (50, 256));
+    let starts: Vec<(u16, u16)> = device.sync_managers.iter().map(|entry| (entry.start, entry.length)).collect();
+    assert_eq!(starts, [(0x1000, 256), (0x1100, 256), (0x1200, 4), (0x1300, 4)]);
+    assert_eq!((device.services.foe.password, device.services.foe.erase_time.as_millis()), (7, 100));
+    let ethernet = &device.services.eoe;
+    assert_eq!((ethernet.end, ethernet.mask.unwrap().to_string()), (EoeEnd::Loop, "255.255.255.0".into()));
+    assert_ne!(ethernet.mac, segment.devices[1].services.eoe.mac);
+    let servo: Vec<u16> = segment.devices[2].sync_managers.iter().map(|entry| entry.start).collect();
+    assert_eq!(servo, [0x1000, 0x1040, 0x1080, 0x1180]);
+}
+
+#[test]
+fn mailbox_keys_that_make_no_sense_are_refused_with_what_would() {
+    let key = |key: &str| refused(&format!("[[device]]\ntype = \"all-protocols\"\n{key}\n"));
+    for (line, part) in [
+        ("mailbox_bytes = 12", "3: device \"all-protocols-1\": mailbox_bytes: expected 24 to 1486, got 12"),
+        ("ethernet = \"hub\"", "ethernet: expected stack, loop or nothing, got \"hub\""),
+        ("ip = \"10.0.0.2\"", "ip: expected an address with its prefix as in 10.0.0.2/24, got \"10.0.0.2\""),
+        ("ip = \"224.0.0.1/24\"", "expected an address"),
+        ("answer_us = -1.0", "answer_us: expected a time"),
+        ("files = [\"missing.txt\"]", "files: nowhere/missing.txt"),
+    ] {
+        let message = key(line);
+        assert!(message.contains(part), "{line}: {message}");
+    }
+    let without = refused("[[device]]\ntype = \"block\"\nmailbox_bytes = 128\n");
+    assert!(without.contains("only for a device of the catalogue with a mailbox"), "{without}");
+}
+
+#[test]
+fn files_come_from_beside_the_segment_file() {
+    let text = "[[device]]\ntype = \"soe-drive\"\nfiles = [\"demo.toml\"]\n";
+    let beside = Path::new(env!("CARGO_MANIFEST_DIR")).join("segments");
+    let segment = Segment::from_toml(text, &beside).unwrap();
+    let (name, data) = &segment.devices[0].services.foe.files[0];
+    assert_eq!((name.as_str(), data), ("demo.toml", &std::fs::read(beside.join("demo.toml")).unwrap()));
 }

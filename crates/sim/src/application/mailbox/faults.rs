@@ -98,7 +98,8 @@ pub struct MailFaults {
     counter: (u32, u8),
     refuse: (u32, u16),
     abort: (u32, Option<AbortCode>),
-    busy: u32,
+    /// How many are left, of how many.
+    busy: (u32, u32),
     fail: Option<FoeErrorCode>,
     full_until: Option<SimTime>,
 }
@@ -117,7 +118,7 @@ impl MailFaults {
             MailFault::WrongCounter { count, counter } => self.counter = (count, counter),
             MailFault::Refuse { count, detail } => self.refuse = (count, detail),
             MailFault::AbortSdo { count, code } => self.abort = (count, Some(code)),
-            MailFault::BusyFoe { count } => self.busy = count,
+            MailFault::BusyFoe { count } => self.busy = (count, count),
             MailFault::FailFoe { code } => self.fail = Some(code),
             MailFault::Full { during } => self.full_until = Some(now + during),
             MailFault::Heal => *self = MailFaults::default(),
@@ -169,8 +170,10 @@ impl MailFaults {
     }
 
     fn disturbed_file(&mut self) -> Option<Answer> {
-        let message = if use_up(&mut self.busy) {
-            let done = BUSY_ENTIRE - u16::try_from(self.busy).unwrap_or(u16::MAX).clamp(1, BUSY_ENTIRE);
+        let (left, of) = self.busy;
+        let message = if use_up(&mut self.busy.0) {
+            let done = u64::from(BUSY_ENTIRE) * u64::from(of - left) / u64::from(of);
+            let done = u16::try_from(done).unwrap_or(BUSY_ENTIRE);
             FoeMessage::Busy { done, entire: BUSY_ENTIRE, text: b"erasing" }
         } else {
             FoeMessage::Error { code: self.fail.take()?, text: b"told to fail" }

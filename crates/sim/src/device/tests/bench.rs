@@ -26,6 +26,8 @@ pub struct Bench {
     pub device: Device,
     pub now: SimTime,
     frames: u64,
+    /// The mailboxes of BOOT are meant, not those of PREOP.
+    bootstrap: bool,
 }
 
 impl Bench {
@@ -36,7 +38,8 @@ impl Bench {
 
     /// A device in INIT, its SII loaded.
     pub fn new(description: DeviceDescription) -> Bench {
-        let mut bench = Bench { device: Device::new(description), now: SimTime::from_millis(1), frames: 0 };
+        let mut bench =
+            Bench { device: Device::new(description), now: SimTime::from_millis(1), frames: 0, bootstrap: false };
         bench.power_on();
         bench
     }
@@ -165,6 +168,11 @@ impl Bench {
         self.status()
     }
 
+    /// The mailboxes of BOOT are meant from now on, or those of PREOP.
+    pub fn use_bootstrap(&mut self, bootstrap: bool) {
+        self.bootstrap = bootstrap;
+    }
+
     /// A SyncManager as the description and the default assignment want it.
     pub fn right(&self, number: u8) -> SyncManager {
         let description = &self.device.description;
@@ -173,8 +181,14 @@ impl Bench {
             SyncManagerKind::Outputs | SyncManagerKind::Inputs => description.default_length(number),
             _ => entry.length,
         };
+        let boot = description.mailbox.filter(|_| self.bootstrap).map(|mailbox| mailbox.bootstrap);
+        let (start, length) = match (entry.kind, boot) {
+            (SyncManagerKind::MailboxOut, Some(boot)) => (boot.receive_offset, boot.receive_size),
+            (SyncManagerKind::MailboxIn, Some(boot)) => (boot.send_offset, boot.send_size),
+            _ => (entry.start, length),
+        };
         SyncManager {
-            start: entry.start,
+            start,
             length,
             control: SyncManagerControl::from_bits(entry.control),
             activate: SyncManagerActivate { enable: length != 0, ..SyncManagerActivate::default() },

@@ -9,6 +9,7 @@ use ringcat_wire::register::{SyncManager, map};
 
 use super::bench::Bench;
 use crate::catalogue;
+use crate::description::DeviceDescription;
 
 /// More than a device takes to answer.
 pub const ANSWER: Duration = Duration::from_millis(1);
@@ -21,7 +22,17 @@ pub struct Client {
 
 impl Client {
     pub fn new(name: &str, state: AlState) -> Client {
-        Client { bench: Bench::up_to(catalogue::by_name(name).unwrap(), state), counter: 0 }
+        Client::of(catalogue::by_name(name).unwrap(), state)
+    }
+
+    /// A client of a device that was changed.
+    pub fn of(description: DeviceDescription, state: AlState) -> Client {
+        Client::on(Bench::up_to(description, state))
+    }
+
+    /// A client of a device on its bench.
+    pub fn on(bench: Bench) -> Client {
+        Client { bench, counter: 0 }
     }
 
     pub fn post(&mut self, protocol: Protocol, payload: &[u8]) {

@@ -5,8 +5,10 @@ use core::time::Duration;
 use proptest::prelude::*;
 use ringcat_wire::address::RegisterAddress;
 use ringcat_wire::al::AlState;
+use ringcat_wire::mailbox::{Header, Protocol, next_counter};
 
 use super::bench::Bench;
+use super::client::Client;
 use crate::catalogue;
 
 /// Something a MainDevice might do, sensible or not.
@@ -72,5 +74,68 @@ proptest! {
         bench.device.hang(false, bench.now);
         bench.power_cycle();
         bench.climb(AlState::Op);
+    }
+}
+
+/// A message of any protocol, with a beginning that has a chance to mean something.
+fn mail() -> impl Strategy<Value = (Protocol, Vec<u8>)> {
+    let protocols = (0u8..16).prop_map(Protocol::from_code);
+    let beginnings = prop::sample::select(vec![
+        &[][..],
+        // CoE: upload, download of 4096 bytes, segments, SDO information.
+        &[0, 0x20, 0x40, 0x02, 0x20, 0],
+        &[0, 0x20, 0x21, 0x02, 0x20, 0, 0, 0x10, 0, 0],
+        &[0, 0x20, 0x10],
+        &[0, 0x20, 0x60],
+        &[0, 0x80, 1, 0, 0, 0],
+        &[0, 0x80, 5, 0, 0, 0, 0x18, 0x10],
+        // FoE: reading, writing, a packet, an acknowledgement, BUSY.
+        b"\x01\0\0\0\0\0log.txt",
+        b"\x02\0\0\0\0\0file",
+        &[3, 0, 1, 0, 0, 0],
+        &[4, 0, 1, 0, 0, 0],
+        &[6, 0],
+        // EoE: a whole frame, a first and a second fragment, addresses, a filter.
+        &[0, 1, 0xC0, 0x00],
+        &[0, 0, 0xC0, 0x00],
+        &[0, 1, 0x41, 0x00],
+        &[2, 1, 0, 0, 0xFF, 0, 0, 0],
+        &[4, 1, 0, 0],
+        // SoE: reading all elements, writing, a fragment.
+        &[1, 0xFF, 36, 0],
+        &[3, 0x40, 99, 0],
+        &[0x0B, 0x40, 1, 0],
+    ]);
+    (protocols, beginnings, prop::collection::vec(any::<u8>(), 0..200)).prop_map(|(protocol, start, rest)| {
+        let mut payload = start.to_vec();
+        payload.extend(rest);
+        (protocol, payload)
+    })
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(128))]
+    #[test]
+    fn any_mail_is_answered_within_bounds_and_the_device_goes_on_facts_6(
+        letters in prop::collection::vec((mail(), any::<bool>()), 0..60),
+    ) {
+        let mut client = Client::new("all-protocols", AlState::PreOp);
+        for ((protocol, payload), fetch) in letters {
+            client.counter = next_counter(client.counter);
+            let header = Header::new(protocol, client.counter, payload.len() as u16);
+            // A full mailbox is an answer too.
+            client.bench.send_mail(header, &payload);
+            client.bench.pass(Duration::from_millis(1));
+            if fetch {
+                client.bench.fetch_mail();
+            }
+        }
+        let waiting = (0..2_000).find(|_| {
+            client.bench.pass(Duration::from_micros(300));
+            client.bench.fetch_mail().is_none()
+        });
+        prop_assert!(waiting.is_some(), "the device never stops talking");
+        client.counter = next_counter(client.counter);
+        prop_assert_eq!(client.upload(0x1018, 0), Ok(vec![4]));
     }
 }

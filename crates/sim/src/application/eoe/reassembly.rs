@@ -1,0 +1,87 @@
+//! Frames from their fragments (facts 6.5).
+//!
+//! In: fragments as they come, frames told apart by their number. Out: whole frames. A fragment 0 begins anew; one that
+//! does not follow the one before discards its frame.
+
+use ringcat_wire::mailbox::eoe::{BLOCK, EoeFragment};
+
+/// Longest frame, VLAN tag included, rounded up to blocks.
+const MAX_FRAME: usize = 48 * BLOCK;
+/// Frame numbers.
+const FRAMES: usize = 16;
+
+/// Frames of which fragments are missing.
+#[derive(Clone, Debug, Default)]
+pub struct Reassembly {
+    frames: [Option<Partial>; FRAMES],
+}
+
+#[derive(Clone, Debug)]
+struct Partial {
+    data: Vec<u8>,
+    next: u8,
+    /// Bytes that fragment 0 announced, rounded up to blocks.
+    announced: usize,
+}
+
+impl Reassembly {
+    /// Takes a fragment; a frame when it was the last one that was missing.
+    pub fn take(&mut self, fragment: &EoeFragment<'_>) -> Option<Vec<u8>> {
+        let place = &mut self.frames[usize::from(fragment.frame) % FRAMES];
+        if fragment.number == 0 {
+            let announced = usize::from(fragment.blocks) * BLOCK;
+            *place = Some(Partial { data: Vec::new(), next: 0, announced });
+        }
+        let partial = place.as_mut()?;
+        let follows = fragment.number == partial.next && fragment.offset() == partial.data.len();
+        let whole_blocks = fragment.last || fragment.data.len().is_multiple_of(BLOCK);
+        let end = partial.data.len() + fragment.data.len();
+        if !follows || !whole_blocks || end > MAX_FRAME.min(partial.announced) {
+            *place = None;
+            return None;
+        }
+        partial.data.extend_from_slice(fragment.data);
+        partial.next += 1;
+        if fragment.last { place.take().map(|partial| partial.data) } else { None }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn fragment(frame: u8, number: u8, blocks: u8, last: bool, data: &[u8]) -> EoeFragment<'_> {
+        EoeFragment { frame, number, blocks, last, time_requested: false, time_ns: None, data }
+    }
+
+    #[test]
+    fn frames_whose_fragments_mix_are_told_apart_facts_6_5() {
+        let mut reassembly = Reassembly::default();
+        assert_eq!(reassembly.take(&fragment(1, 0, 2, false, &[1; 32])), None);
+        assert_eq!(reassembly.take(&fragment(2, 0, 2, false, &[2; 32])), None);
+        let second = reassembly.take(&fragment(2, 1, 1, true, &[2; 5])).unwrap();
+        assert_eq!(second, [2; 37]);
+        assert_eq!(reassembly.take(&fragment(1, 1, 1, true, &[1; 1])).unwrap(), [1; 33]);
+    }
+
+    #[test]
+    fn a_new_fragment_0_discards_an_unfinished_frame_facts_6_5() {
+        let mut reassembly = Reassembly::default();
+        assert_eq!(reassembly.take(&fragment(1, 0, 2, false, &[1; 32])), None);
+        assert_eq!(reassembly.take(&fragment(1, 0, 1, true, &[3; 20])).unwrap(), [3; 20]);
+        assert_eq!(reassembly.take(&fragment(1, 1, 1, true, &[1; 1])), None);
+    }
+
+    #[test]
+    fn what_does_not_follow_or_grows_too_long_is_discarded() {
+        let mut reassembly = Reassembly::default();
+        reassembly.take(&fragment(1, 0, 3, false, &[1; 32]));
+        assert_eq!(reassembly.take(&fragment(1, 2, 2, true, &[1; 1])), None);
+        reassembly.take(&fragment(1, 0, 3, false, &[1; 32]));
+        assert_eq!(reassembly.take(&fragment(1, 1, 2, true, &[1; 1])), None, "wrong offset");
+        assert_eq!(reassembly.take(&fragment(1, 0, 1, true, &[1; 64])), None, "more than announced");
+        assert_eq!(reassembly.take(&fragment(1, 0, 63, true, &[1; 1600])), None, "no frame is so long");
+        assert_eq!(reassembly.take(&fragment(1, 0, 3, false, &[1; 31])), None, "no whole blocks");
+        assert_eq!(reassembly.take(&fragment(1, 1, 1, true, &[1; 1])), None);
+    }
+}

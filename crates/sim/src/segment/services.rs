@@ -1,0 +1,83 @@
+//! Keys of a device's table that concern its mailbox and what stands behind it.
+
+use core::net::Ipv4Addr;
+use std::path::Path;
+
+use super::devices::Place;
+use super::format::{DeviceEntry, duration};
+use crate::description::{DeviceDescription, EoeEnd};
+
+/// Sizes of a mailbox: the least that an SDO needs, the most that a datagram carries.
+const MAILBOX_BYTES: core::ops::RangeInclusive<u16> = 24..=1486;
+/// Longest file that a device is delivered with.
+const MAX_FILE_BYTES: u64 = 4 << 20;
+
+/// Reads them.
+pub(super) fn services(
+    entry: &DeviceEntry,
+    description: &mut DeviceDescription,
+    base_dir: &Path,
+) -> Result<(), (String, Place)> {
+    if let Some(answer) = &entry.answer_us {
+        let time = duration(answer, "answer_us", 1e-6).map_err(|error| (error.message, Some(answer.span())))?;
+        let mailbox = description.mailbox.as_mut();
+        let without = || ("answer_us: the device has no mailbox".to_owned(), Some(answer.span()));
+        mailbox.ok_or_else(without)?.response_time = time;
+    }
+    if let Some(bytes) = &entry.mailbox_bytes {
+        let error = |message: String| (format!("mailbox_bytes: {message}"), Some(bytes.span()));
+        if !MAILBOX_BYTES.contains(bytes.get_ref()) {
+            return Err(error(format!("expected 24 to 1486, got {}", bytes.get_ref())));
+        }
+        if !description.set_mailbox_bytes(*bytes.get_ref()) {
+            return Err(error("only for a device of the catalogue with a mailbox".into()));
+        }
+    }
+    let foe = &mut description.services.foe;
+    for file in &entry.files {
+        let path = base_dir.join(file.get_ref());
+        let error = |message: String| (format!("files: {}: {message}", path.display()), Some(file.span()));
+        let name = path.file_name().and_then(|name| name.to_str()).ok_or_else(|| error("expected a file".into()))?;
+        let length = std::fs::metadata(&path).map_err(|cause| error(cause.to_string()))?.len();
+        if length > MAX_FILE_BYTES {
+            return Err(error(format!("expected at most {MAX_FILE_BYTES} bytes, got {length}")));
+        }
+        let data = std::fs::read(&path).map_err(|cause| error(cause.to_string()))?;
+        foe.files.push((name.to_owned(), data));
+    }
+    foe.password = entry.password.unwrap_or(foe.password);
+    if let Some(erase) = &entry.erase_ms {
+        foe.erase_time = duration(erase, "erase_ms", 1e-3).map_err(|error| (error.message, Some(erase.span())))?;
+    }
+    let eoe = &mut description.services.eoe;
+    if let Some(end) = &entry.ethernet {
+        eoe.end = match end.get_ref().as_str() {
+            "stack" => EoeEnd::Stack,
+            "loop" => EoeEnd::Loop,
+            "nothing" => EoeEnd::Nothing,
+            other => {
+                let message = format!("ethernet: expected stack, loop or nothing, got \"{other}\"");
+                return Err((message, Some(end.span())));
+            }
+        };
+    }
+    if let Some(ip) = &entry.ip {
+        let (address, mask) = network(ip.get_ref()).ok_or_else(|| {
+            let message =
+                format!("ip: expected an address with its prefix as in 10.0.0.2/24, got \"{}\"", ip.get_ref());
+            (message, Some(ip.span()))
+        })?;
+        (eoe.address, eoe.mask) = (Some(address), Some(mask));
+    }
+    Ok(())
+}
+
+/// Address and mask; `None` where no device can have the address.
+fn network(text: &str) -> Option<(Ipv4Addr, Ipv4Addr)> {
+    let (address, prefix) = text.split_once('/')?;
+    let address: Ipv4Addr = address.parse().ok()?;
+    let prefix: u32 = prefix.parse().ok().filter(|prefix| *prefix <= 32)?;
+    let usable = !address.is_multicast() && !address.is_broadcast() && !address.is_unspecified();
+    let mask = u32::MAX.checked_shl(32 - prefix).unwrap_or(0);
+    usable.then_some((address, mask.into()))
+}
