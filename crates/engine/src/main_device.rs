@@ -105,6 +105,8 @@ type ScanSlot = Rc<RefCell<Option<Result<Scan, ScanError>>>>;
 pub struct MainDevice {
     options: Options,
     supervisor: Supervisor,
+    /// What supervisors before this one have counted.
+    counted: AcyclicCounters,
     identity: Identity,
     cache: SiiCache,
     scan: ScanSlot,
@@ -120,6 +122,7 @@ impl MainDevice {
         let identity = Identity::new(options.codec, options.main, options.redundant);
         MainDevice {
             supervisor: Supervisor::new(identity, options.links(), now),
+            counted: AcyclicCounters::default(),
             identity,
             cache: SiiCache::new(options.sii_cache),
             scan: ScanSlot::default(),
@@ -209,6 +212,7 @@ impl MainDevice {
     /// Ends supervision and all other procedures, and takes all SubDevices down to a state. The exchange must not send
     /// any more. Afterwards a new scan may start.
     pub fn start_stop(&mut self, state: AlState, limit: Duration, now: Instant) {
+        self.counted = self.counters();
         self.supervisor = Supervisor::new(self.identity, self.options.links(), now);
         self.scanning.set(false);
         self.fleet = None;
@@ -287,9 +291,9 @@ impl MainDevice {
         self.supervisor.wants_to_send()
     }
 
-    /// Counters of the acyclic half.
+    /// Counters of the acyclic half, from the first scan on.
     pub fn counters(&self) -> AcyclicCounters {
-        self.supervisor.counters()
+        self.counted.plus(self.supervisor.counters())
     }
 
     /// The handle for procedures of the application's own.

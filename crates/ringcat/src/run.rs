@@ -38,6 +38,12 @@ const LIVE: Duration = Duration::from_millis(500);
 /// Changes of the process data's judgement are told so often; all are counted.
 const JUDGEMENTS_TOLD: u32 = 200;
 
+/// Cycles that were left out are told at most this often, and so many times at most; all are counted.
+const STALL_PAUSE: Duration = Duration::from_millis(100);
+const STALLS_TOLD: u32 = 200;
+/// What is under way when the last frame was sent is back within.
+const LAST_FRAMES: Duration = Duration::from_millis(20);
+
 /// How to read what it prints.
 const SUMMARY_HELP: &str = "\
 All outputs stay zero. Watchdogs, process data and mailboxes are set up as each SubDevice's EEPROM (SII) says.
@@ -106,7 +112,7 @@ pub fn run(arguments: &RunArguments) -> Result<bool, Failure> {
     let application = supervisor.activate(declaration, cyclic).map_err(ringcat::Error::from)?;
     let cycles = application.start_cycles(move || thread.prepare_cycles(), |_| ControlFlow::Continue(()))?;
     let live = Live { terminal: stdout().is_terminal(), next: Instant(0), open: false };
-    let mut run = Run { cycles, names, begin, live, judgements_told: 0, surroundings };
+    let mut run = Run { cycles, names, begin, live, judgements_told: 0, stalls: Stalls::default(), surroundings };
     let in_op = run.reach_op(&end);
     let before = run.cycles.news().counters();
     if in_op {
@@ -116,7 +122,8 @@ pub fn run(arguments: &RunArguments) -> Result<bool, Failure> {
     let application = run.cycles.end()?;
     summary(&application, &run.surroundings);
     let lost = application.cyclic_counters().lost - before.lost;
-    application.stop(LastOutputs::Zero, AlState::Init, STOP_LIMIT)?;
+    let (supervisor, mut links) = application.stop(LastOutputs::Zero, AlState::Init, STOP_LIMIT)?;
+    final_account(&mut links, &supervisor);
     say!("  stopped: outputs zero, all SubDevices in INIT");
     Ok(in_op && lost == 0)
 }
@@ -131,7 +138,28 @@ struct Run {
     begin: Instant,
     live: Live,
     judgements_told: u32,
+    stalls: Stalls,
     surroundings: Surroundings,
+}
+
+/// Cycles that this machine was too late for, as far as they have been told.
+#[derive(Default)]
+struct Stalls {
+    told: u64,
+    lines: u32,
+    next: Instant,
+}
+
+impl Stalls {
+    /// How many there are that have not been told, if it is time to.
+    fn news(&mut self, skipped: u64, now: Instant) -> Option<u64> {
+        let more = skipped - self.told;
+        if more == 0 || now < self.next || self.lines == STALLS_TOLD {
+            return None;
+        }
+        *self = Stalls { told: skipped, lines: self.lines + 1, next: now + STALL_PAUSE };
+        Some(more)
+    }
 }
 
 /// Tells of other MainDevices among the events of a scan.
@@ -174,6 +202,10 @@ impl Run {
             }
             self.live.end();
             say!("{:>12.3} ms  {}", self.since_begin(event.at), describe(&event.event, &self.names));
+        }
+        if let Some(left_out) = self.stalls.news(self.cycles.news().pace().skipped, now()) {
+            self.live.end();
+            say!("{:>12.3} ms  this machine: {left_out} cycles left out", self.since_begin(now()));
         }
     }
 
@@ -244,20 +276,25 @@ fn summary(application: &Application<Tee<PacketLinks>, SupervisorThread>, surrou
         cyclic.late,
         cyclic.corrupt
     );
-    say!(
-        "  everything else: {} frames with {} datagrams, {} sent again",
-        acyclic.sent,
-        acyclic.datagrams,
-        acyclic.resent
-    );
     if cyclic.foreign + acyclic.foreign > 0 {
         let (frames, senders) = (cyclic.foreign + acyclic.foreign, surroundings.senders());
         say!("  other MainDevices: {frames} frames, {senders}");
     }
+    say!("  round trips of process data: {}", application.round_trips());
+    say!("  wake-ups after their time: {}", application.news().wake_ups());
+}
+
+/// What the interfaces have carried from the first frame to the last, the stop included.
+fn final_account(links: &mut Tee<PacketLinks>, supervisor: &SupervisorThread) {
+    let until = now() + LAST_FRAMES;
+    while now() < until {
+        while links.receive(&mut |_, _| ()) {}
+        links.wait(until);
+    }
     for link in [Link::Main, Link::Redundant] {
-        let Some(counters) = application.links().links().counters(link) else { continue };
+        let Some(counters) = links.links().counters(link) else { continue };
         say!(
-            "  {link}: {} sent, {} received; not sent: {} interface down, {} queue full, {} refused; {} overrun",
+            "  process data on {link}: {} sent, {} received; not sent: {} interface down, {} queue full, {} refused; {} overrun",
             counters.sent,
             counters.received,
             counters.down,
@@ -266,8 +303,16 @@ fn summary(application: &Application<Tee<PacketLinks>, SupervisorThread>, surrou
             counters.overrun
         );
     }
-    say!("  round trips of process data: {}", application.round_trips());
-    say!("  wake-ups after their time: {}", application.news().wake_ups());
+    let acyclic = supervisor.counters();
+    say!(
+        "  everything else: {} frames sent with {} datagrams, {} lost, {} copies lost, {} late; {} datagrams sent again",
+        acyclic.sent,
+        acyclic.datagrams,
+        acyclic.lost,
+        acyclic.half,
+        acyclic.late,
+        acyclic.resent
+    );
 }
 
 /// A line on a terminal that shows how it goes.
@@ -310,6 +355,16 @@ impl Live {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn cycles_that_were_left_out_are_told_once_and_not_too_often() {
+        let mut stalls = Stalls::default();
+        let ms = |ms: u64| Instant(ms * 1_000_000);
+        assert_eq!((stalls.news(0, ms(1)), stalls.news(3, ms(2)), stalls.news(3, ms(3))), (None, Some(3), None));
+        assert_eq!((stalls.news(4, ms(50)), stalls.news(9, ms(103)), stalls.news(9, ms(500))), (None, Some(6), None));
+        let told = (0..1_000).filter(|at| stalls.news(10 + at, ms(1_000 + 1_000 * at)).is_some()).count();
+        assert_eq!(told + 2, STALLS_TOLD as usize);
+    }
 
     #[test]
     fn times_have_a_unit() {

@@ -39,7 +39,11 @@ fn outputs(network: &Network) -> Vec<Vec<u8>> {
 
 #[test]
 fn an_orderly_stop_zeroes_outputs_and_takes_everybody_to_init() {
-    let mut main_device = in_op().stop(LastOutputs::Zero, AlState::Init, LIMIT).expect("all go to INIT");
+    let application = in_op();
+    let before = application.acyclic_counters();
+    let mut main_device = application.stop(LastOutputs::Zero, AlState::Init, LIMIT).expect("all go to INIT");
+    let after = main_device.acyclic_counters();
+    assert!(before.sent > 0 && after.sent > before.sent && after.received > before.received, "counted on: {after:?}");
     let network = main_device.links_mut().network();
     assert!(network.devices().all(|device| device.al_status() == AlStatus::new(AlState::Init)));
     assert!(outputs(network).iter().flatten().all(|byte| *byte == 0));

@@ -59,6 +59,26 @@ pub struct AcyclicCounters {
     pub timed_out: u64,
 }
 
+impl AcyclicCounters {
+    /// Both together.
+    #[must_use]
+    pub const fn plus(self, other: AcyclicCounters) -> AcyclicCounters {
+        AcyclicCounters {
+            sent: self.sent + other.sent,
+            bytes: self.bytes + other.bytes,
+            received: self.received + other.received,
+            lost: self.lost + other.lost,
+            half: self.half + other.half,
+            late: self.late + other.late,
+            corrupt: self.corrupt + other.corrupt,
+            foreign: self.foreign + other.foreign,
+            datagrams: self.datagrams + other.datagrams,
+            resent: self.resent + other.resent,
+            timed_out: self.timed_out + other.timed_out,
+        }
+    }
+}
+
 /// A datagram in a frame.
 #[derive(Debug)]
 struct Place {

@@ -21,6 +21,8 @@ const FIRST_INDEX: [usize; 2] = [50, 60];
 const START_LIMIT: Duration = Duration::from_secs(10);
 /// All SubDevices have to be in OP within.
 const OP_LIMIT: Duration = Duration::from_secs(30);
+/// So many lines of the simulator about its lateness are shown.
+const LATE_LINES: usize = 5;
 /// A program has to end within.
 const END_LIMIT: Duration = Duration::from_secs(90);
 /// Both ends sleep until something comes, before all other programs: the machine may be busy.
@@ -195,6 +197,13 @@ impl Bench {
         &self.simulator.as_ref().expect("it runs").said
     }
 
+    /// Shows how late the simulator was, with its own lines about that, the first of them.
+    pub fn show_simulator_lateness(&self) {
+        println!("the simulator meanwhile: {}", self.simulator_lateness());
+        let said = self.simulator_said().so_far();
+        said.lines().filter(|line| line.contains("was late")).take(LATE_LINES).for_each(|line| println!("{line}"));
+    }
+
     /// How late the simulator was so far.
     pub fn simulator_lateness(&self) -> SimulatorLateness {
         let status = self.order("status");
@@ -307,12 +316,12 @@ impl Running {
     pub fn interrupt(self) -> (String, String) {
         let process = self.child.id().to_string();
         assert!(Command::new("kill").args(["-INT", &process]).status().is_ok_and(|status| status.success()));
-        self.finish()
+        self.finish(END_LIMIT)
     }
 
-    /// Waits for its end.
-    pub fn finish(mut self) -> (String, String) {
-        wait(&mut self.child, END_LIMIT);
+    /// Waits for its end; what it said, and what of errors.
+    pub fn finish(mut self, limit: Duration) -> (String, String) {
+        wait(&mut self.child, limit);
         (self.said.whole(), self.errors.whole())
     }
 }

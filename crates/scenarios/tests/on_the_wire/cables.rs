@@ -21,8 +21,8 @@ struct Edge {
     /// From the order until the simulator noticed; for cables of the host only.
     noticed_ms: Option<f64>,
     simulator: SimulatorLateness,
-    /// Cycles that our MainDevice began late or left out, and the time that it lost.
-    ours: (usize, f64),
+    /// Cycles that our MainDevice left out because this machine stalled.
+    left_out: usize,
 }
 
 impl Edge {
@@ -34,21 +34,20 @@ impl Edge {
 
     /// Incomplete cycles that stalls explain: each is as long as it is, and reaches into one cycle more.
     fn stalled(&self) -> usize {
-        let cycles = |count: usize, ms: f64| (ms / CYCLE_MS).ceil() as usize + count;
-        cycles(self.simulator.count as usize, self.simulator.together_ms) + cycles(self.ours.0, self.ours.1)
+        let SimulatorLateness { count, together_ms } = self.simulator;
+        (together_ms / CYCLE_MS).ceil() as usize + count as usize + self.left_out
     }
 
     fn line(&self) -> String {
         format!(
-            "{:<12} | {:>10} | {:>7} | {:>10} | {:>5} {:>8.1} | {:>5} {:>8.1}",
+            "{:<12} | {:>10} | {:>7} | {:>10} | {:>5} {:>8.1} | {:>8}",
             self.what,
             self.incomplete,
             self.allowed(),
             self.noticed_ms.map_or_else(|| "-".to_owned(), |ms| format!("{ms:.1}")),
             self.simulator.count,
             self.simulator.together_ms,
-            self.ours.0,
-            self.ours.1
+            self.left_out
         )
     }
 }
@@ -71,7 +70,7 @@ fn edge(bench: &Bench, run: &Said, what: &str, noticed: Option<&str>, act: impl 
         SimulatorLateness { count: now.count - late.count, together_ms: now.together_ms - late.together_ms };
     assert_eq!(states(bench, "OP"), 16, "{what}: {}", bench.order("status"));
     let incomplete = incomplete_cycles(&lines).unwrap_or_else(|| panic!("{what}: {lines:#?}"));
-    Edge { what: what.to_owned(), incomplete, noticed_ms, simulator, ours: stalls(&lines) }
+    Edge { what: what.to_owned(), incomplete, noticed_ms, simulator, left_out: left_out(&lines) }
 }
 
 /// How many cycles were not complete, by the times of the judgements; `None` where the last one was not.
@@ -92,17 +91,10 @@ fn incomplete_cycles(lines: &[String]) -> Option<usize> {
     since.is_none().then_some(cycles)
 }
 
-/// Wake-ups that our MainDevice tells to have come late, and how much they were late in all.
-fn stalls(lines: &[String]) -> (usize, f64) {
-    let figure = |line: &str, behind: &str| -> Option<f64> {
-        line.split(behind).nth(1)?.split(' ').next()?.trim_end_matches(',').parse().ok()
-    };
-    let told = lines.iter().filter(|line| line.contains(" ms  this machine: "));
-    let figures = told.map(|line| {
-        let both = figure(line, "this machine: ").zip(figure(line, "together "));
-        both.unwrap_or_else(|| panic!("unexpected: {line}"))
-    });
-    figures.fold((0, 0.0), |(count, ms), (late, together)| (count + late as usize, ms + together))
+/// Cycles that our MainDevice tells to have left out.
+fn left_out(lines: &[String]) -> usize {
+    let counts = lines.iter().filter_map(|line| line.split_once(" ms  this machine: "));
+    counts.map(|(_, rest)| rest.split(' ').next().and_then(|count| count.parse::<usize>().ok()).expect("a count")).sum()
 }
 
 #[test]
@@ -128,11 +120,12 @@ fn each_cable_of_a_ring_of_16_cut_and_healed_on_interfaces_costs_no_more_cycles_
         }
     }
     let (output, errors) = run.interrupt();
-    println!("ring of 16, 1 ms; late wake-ups: how many, and by how many ms in all");
-    println!("edge         | incomplete | allowed | noticed ms | simulator late | this side late");
+    println!("ring of 16, 1 ms; late wake-ups of the simulator: how many, and by how many ms in all");
+    println!("edge         | incomplete | allowed | noticed ms | simulator late | left out");
     edges.iter().for_each(|edge| println!("{}", edge.line()));
     let summary = output.find("\nsummary").map_or("", |at| &output[at + 1..]);
     println!("ringcat run, ring of 16, {} edges:\n{summary}", edges.len());
+    bench.show_simulator_lateness();
     for edge in &edges {
         let (incomplete, allowed, stalled) = (edge.incomplete, edge.allowed(), edge.stalled());
         assert!(incomplete <= allowed + stalled, "{}: {incomplete} of {allowed} + {stalled}", edge.what);

@@ -9,6 +9,7 @@ mod bench;
 mod cables;
 mod captures;
 mod foreign;
+mod frames;
 mod messages;
 mod said;
 
@@ -94,6 +95,6 @@ fn our_main_device_brings_1_10_50_and_200_subdevices_to_op_and_stops_in_order() 
         assert!(output.contains("stopped: outputs zero, all SubDevices in INIT"), "{output}{errors}");
         assert_eq!(states(&bench, "INIT"), plant.count(), "{}", bench.order("status"));
         show_summary(&format!("{} SubDevices", plant.count()), &output);
-        println!("the simulator meanwhile: {}\n", bench.simulator_lateness());
+        bench.show_simulator_lateness();
     }
 }

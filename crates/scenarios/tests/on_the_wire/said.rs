@@ -29,6 +29,12 @@ impl Said {
         lines.iter().filter(|(at, _)| (begin..end).contains(at)).cloned().collect()
     }
 
+    /// Everything so far.
+    pub fn so_far(&self) -> String {
+        let lines = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        lines.iter().map(|(_, line)| format!("{line}\n")).collect()
+    }
+
     /// Everything until the output's end, which has to be near.
     pub fn whole(&self) -> String {
         let until = Instant::now() + END_LIMIT;
@@ -36,7 +42,6 @@ impl Said {
         while Arc::strong_count(&self.0) > 1 && Instant::now() < until {
             std::thread::sleep(Duration::from_millis(5));
         }
-        let lines = self.0.lock().unwrap_or_else(PoisonError::into_inner);
-        lines.iter().map(|(_, line)| format!("{line}\n")).collect()
+        self.so_far()
     }
 }
