@@ -7,23 +7,30 @@
 //! * `writer`, `reader`: the two directions, each a task that lives as long as it has something to do;
 //! * `delivery`: whose a mail is; `recent`: mail that came twice;
 //! * `talk`: a lane while somebody has it; `answer_time`: when to look for an answer;
-//! * [`coe`]: SDO and what is built on it.
+//! * [`coe`], [`foe`], [`soe`], [`aoe`], [`voe`]: the protocols.
 
 mod answer_time;
+pub mod aoe;
 pub mod coe;
 mod counters;
 mod delivery;
 mod error;
+pub mod foe;
 mod lane;
 mod mailbox;
 mod reader;
 mod recent;
 mod ring;
 mod room;
+pub mod soe;
 pub mod stream;
 mod talk;
 mod unsolicited;
+pub mod voe;
 mod writer;
+
+#[cfg(test)]
+mod tests;
 
 pub use counters::MailCounters;
 pub use error::MailboxError;

@@ -24,6 +24,7 @@ pub use bus::{Bus, BusError, Elapsed, Reply};
 pub use flights::AcyclicCounters;
 pub use group::Group;
 pub use signal::Signal;
+pub use stray::Stray;
 
 use crate::board::Board;
 use crate::event::{Event, TimedEvent};

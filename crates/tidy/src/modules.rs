@@ -38,7 +38,7 @@ pub const ENGINE: &[(&str, &[&str])] = &[
     ("exchange", &["time", "link", "queue", "domain", "ring", "board", "layout", "event"]),
     // acyclic half
     ("supervisor", &["time", "link", "queue", "ring", "board", "event"]),
-    ("mail", &["time", "event", "supervisor"]),
+    ("mail", &["time", "config", "event", "supervisor"]),
     ("procedures", &["time", "link", "queue", "ring", "board", "info", "topology", "config", "plan", "layout", "event",
         "supervisor", "mail"]),
     // both together

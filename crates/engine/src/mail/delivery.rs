@@ -6,9 +6,11 @@ use ringcat_wire::mailbox::coe::{CoeHeader, CoeService, Emergency};
 use ringcat_wire::mailbox::{ErrorReply, Message, Protocol};
 
 use super::lane::{Arrival, Lane};
+use super::recent::Way;
 use super::room::{Room, State};
 use super::unsolicited::{Unclaimed, Unsolicited};
 use crate::event::Event;
+use crate::time::Instant;
 
 /// SoE services that are answers; the others come unasked (facts 6.6).
 const SOE_ANSWERS: [u8; 2] = [2, 4];
@@ -19,14 +21,14 @@ const AOE_RESPONSE: u8 = 0x01;
 const EOE_ANSWERS: [u8; 4] = [3, 5, 7, 9];
 
 /// Takes in the content of the send mailbox. Any bytes are allowed.
-pub(super) fn deliver(room: &Rc<Room>, mail: &[u8]) {
+pub(super) fn deliver(room: &Rc<Room>, mail: &[u8], way: Way) {
     {
         let state = &mut *room.state();
         let Ok(message) = Message::decode(mail) else {
             state.counters.malformed += 1;
             return;
         };
-        if is_double(state, &message) {
+        if is_double(state, &message, way, room.bus.now()) {
             state.counters.duplicates += 1;
             return;
         }
@@ -35,13 +37,11 @@ pub(super) fn deliver(room: &Rc<Room>, mail: &[u8]) {
     room.news.notify();
 }
 
-fn is_double(state: &mut State, message: &Message<'_>) -> bool {
-    let disturbed = core::mem::take(&mut state.disturbed);
-    let Some(session) = &mut state.session else { return false };
-    let header = &message.header;
-    let double = session.recent.is_double(header.counter, message.payload, disturbed);
+fn is_double(state: &mut State, message: &Message<'_>, way: Way, now: Instant) -> bool {
     // What a repeat brings may be the mail before the one that was lost.
-    state.disturbed = disturbed && double;
+    let way = if state.repeated && way == Way::Usual { Way::Repeat } else { way };
+    let double = state.recent.is_double(message.header.counter, message.payload, way, now);
+    state.repeated &= double || way != Way::Repeat;
     double
 }
 

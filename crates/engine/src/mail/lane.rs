@@ -118,6 +118,13 @@ impl LaneState {
         self.outbox.len() < OUTBOX
     }
 
+    /// A message of a talk is about to be written. Its answer may come before it is known that it was.
+    pub(super) fn writing(&mut self, message: &Outgoing, now: Instant) {
+        if message.asks.is_some() && self.turns.front() == Some(&message.turn) {
+            self.asked = Some(Asked::at(now));
+        }
+    }
+
     /// A message of a talk was handed to the SubDevice, or may have been.
     pub(super) fn wrote(&mut self, message: &Outgoing, result: Result<(), MailboxError>, now: Instant) {
         let arrived = match result {
@@ -126,11 +133,19 @@ impl LaneState {
             Err(MailboxError::Bus(_)) => true,
             Err(_) => false,
         };
-        if let Some(limit) = message.asks.filter(|_| arrived) {
-            if result.is_ok() && self.turns.front() == Some(&message.turn) {
-                self.asked.get_or_insert(Asked::at(now));
+        if let Some(limit) = message.asks {
+            let held = self.turns.front() == Some(&message.turn);
+            if held && result.is_ok() {
+                if let Some(asked) = self.asked.as_mut().filter(|asked| !asked.answered) {
+                    *asked = Asked::at(now);
+                }
             } else {
-                self.late_until = Some(now + limit);
+                if held {
+                    self.asked = None;
+                }
+                if arrived {
+                    self.late_until = Some(now + limit);
+                }
             }
         }
         self.written = Some((message.id, result));

@@ -11,6 +11,7 @@ use ringcat_wire::register::{SyncManager, SyncManagerActivate, SyncManagerPdiCon
 use super::answer_time::AnswerTime;
 use super::delivery;
 use super::error::MailboxError;
+use super::recent::Way;
 use super::room::{Room, Session};
 use crate::supervisor::{Bus, BusError};
 use crate::time::Instant;
@@ -61,10 +62,10 @@ async fn run(room: Rc<Room>, time: u32) {
     // When the next look is due, after one in vain, and the next access of any kind, after one that failed.
     let (mut next_look, mut hold) = (Instant::default(), Instant::default());
     while let Some(session) = room.session(time) {
-        while let Some(mail) = room.bus.stray_mail(session.station) {
+        while let Some(stray) = room.bus.stray_mail(session.station) {
             room.state().counters.strays += 1;
-            room.state().disturbed = true;
-            delivery::deliver(&room, &mail);
+            let way = stray.late_since.map_or(Way::Usual, Way::Late);
+            delivery::deliver(&room, &stray.mail, way);
         }
         let found = match step(&room, next_look, hold) {
             Step::End => return,
@@ -172,7 +173,7 @@ async fn read(room: &Rc<Room>, time: u32, session: &Session) -> Result<bool, Mai
                 state.full = false;
                 state.counters.read += 1;
             }
-            delivery::deliver(room, &reply.data);
+            delivery::deliver(room, &reply.data, Way::Usual);
             // What comes unasked seldom comes alone.
             if !room.look().waiting() {
                 look(room, session).await?;
@@ -192,7 +193,7 @@ async fn repeat(room: &Rc<Room>, session: &Session) -> Result<bool, MailboxError
     let state = &mut *room.state();
     state.repeat = false;
     state.full = true;
-    state.disturbed = true;
+    state.repeated = true;
     state.counters.repeats += 1;
     Ok(true)
 }

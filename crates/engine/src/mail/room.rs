@@ -25,13 +25,14 @@ pub(super) struct Session {
     pub layout: MailboxLayout,
     /// Counter of the last message sent.
     pub counter: u8,
-    pub recent: Recent,
 }
 
 /// The part that changes.
 #[derive(Debug)]
 pub(super) struct State {
     pub session: Option<Session>,
+    /// The mails of the session that were accepted last.
+    pub recent: Recent,
     /// The session may be used.
     pub open: bool,
     /// Counts openings and closings, so that tasks of an earlier time end.
@@ -51,8 +52,8 @@ pub(super) struct State {
     pub repeat: bool,
     /// How often there was something new for the reader.
     pub tasks: u32,
-    /// A repeat or a late frame may bring mail that was there before.
-    pub disturbed: bool,
+    /// A repeat may bring mail that was there before.
+    pub repeated: bool,
     pub shelves: Shelves,
     pub counters: MailCounters,
 }
@@ -74,6 +75,7 @@ impl Room {
     pub(super) fn new(bus: &Bus, subdevice: usize) -> Rc<Room> {
         let state = State {
             session: None,
+            recent: Recent::default(),
             open: false,
             time: 0,
             lanes: Default::default(),
@@ -85,7 +87,7 @@ impl Room {
             blocked: false,
             repeat: false,
             tasks: 0,
-            disturbed: false,
+            repeated: false,
             shelves: Shelves::new(),
             counters: MailCounters::default(),
         };
@@ -151,6 +153,7 @@ impl Room {
             let state = &mut *self.state();
             if forget {
                 state.session = None;
+                state.recent = Recent::default();
             }
             if !state.open {
                 return;
@@ -191,7 +194,7 @@ impl State {
 impl Session {
     /// A session with a SubDevice that has just entered PREOP or BOOT.
     pub(super) fn new(station: StationAddress, layout: MailboxLayout) -> Session {
-        Session { station, layout, counter: 0, recent: Recent::default() }
+        Session { station, layout, counter: 0 }
     }
 
     /// Bytes for a message that fills the receive mailbox.

@@ -9,6 +9,7 @@ use super::error::MailboxError;
 use super::lane::{Arrival, Asked, Lane, LaneState};
 use super::reader;
 use super::room::Room;
+use crate::time::Instant;
 
 /// Time limits: until the mailbox takes the request, until the answer is there.
 pub type Limits = (Duration, Duration);
@@ -26,6 +27,8 @@ pub struct Talk {
     time: u32,
     /// How long answers may take; late ones may take as long again.
     limit: Duration,
+    /// A request was written, and not all of its answer has come.
+    open: bool,
 }
 
 /// A place in the queue for a lane; dropped while waiting, it is given up.
@@ -70,7 +73,7 @@ impl Talk {
         };
         room.news.until(ready).await?;
         turn.kept = true;
-        Ok(Talk { room: room.clone(), lane, turn: turn.turn, time, limit: Duration::ZERO })
+        Ok(Talk { room: room.clone(), lane, turn: turn.turn, time, limit: Duration::ZERO, open: false })
     }
 
     fn with<T>(&self, work: impl FnOnce(&mut LaneState) -> T) -> Result<T, MailboxError> {
@@ -92,6 +95,33 @@ impl Talk {
         state.session.map_or(0, |session| usize::from(session.layout.receive_size).saturating_sub(Header::LEN))
     }
 
+    /// Bytes of the receive and the send mailbox, header included.
+    pub fn mailbox_sizes(&self) -> (usize, usize) {
+        let state = self.room.look();
+        state.session.map_or((0, 0), |session| (session.layout.receive_size.into(), session.layout.send_size.into()))
+    }
+
+    /// A number that no other request of this mailbox has had of late.
+    pub fn number(&mut self) -> u32 {
+        let state = &mut *self.room.state();
+        state.next_id = state.next_id.wrapping_add(1);
+        state.next_id
+    }
+
+    /// The time.
+    pub fn now(&self) -> Instant {
+        self.room.bus.now()
+    }
+
+    /// Waits, unless the mailbox is closed meanwhile.
+    pub async fn pause(&self, pause: Duration) -> Result<(), MailboxError> {
+        let closed = || self.with(|_| ()).err();
+        match self.room.bus.within(pause, self.room.news.until(closed)).await {
+            Ok(error) => Err(error),
+            Err(_) => Ok(()),
+        }
+    }
+
     /// What the next request is about: a number by which [`Talk::late_mark`] tells requests apart.
     pub fn mark(&mut self, mark: u16) {
         let _ = self.with(|lane| lane.mark = mark);
@@ -108,17 +138,31 @@ impl Talk {
     }
 
     /// Waits until the answer to a request that was given up before has come or cannot come any more, in protocols whose
-    /// answers do not say to what they belong.
-    pub async fn settle(&mut self) -> Result<(), MailboxError> {
+    /// answers do not say to what they belong. `is_last` knows the last part of an answer.
+    pub async fn settle(&mut self, is_last: impl Fn(&[u8]) -> bool) -> Result<(), MailboxError> {
         let now = self.room.bus.now();
         let Some(until) = self.with(|lane| lane.late_until.take())?.filter(|until| *until > now) else { return Ok(()) };
-        self.with(|lane| lane.asked = Some(Asked::at(now)))?;
-        reader::start(&self.room);
-        let _ = self.arrival(until.since(now)).await;
-        self.with(|lane| {
+        self.limit = until.since(now);
+        self.open = true;
+        loop {
+            self.look_on()?;
+            match self.arrival(until.since(self.room.bus.now())).await {
+                Ok(Arrival::Payload(payload)) if !is_last(&payload) => {}
+                Ok(_) | Err(MailboxError::NoAnswer { .. }) => break,
+                Err(error) => return Err(error),
+            }
+        }
+        self.complete();
+        Ok(())
+    }
+
+    /// The answer is there, all of it.
+    pub fn complete(&mut self) {
+        self.open = false;
+        let _ = self.with(|lane| {
             lane.asked = None;
             lane.forget_arrivals();
-        })
+        });
     }
 
     /// Sends a message to which no answer is waited for. It is written even when the talk ends.
@@ -141,11 +185,11 @@ impl Talk {
         accept: impl FnMut(&[u8]) -> Option<T>,
     ) -> Result<T, MailboxError> {
         let answer = self.begin(payload, limits, accept).await?;
-        self.with(|lane| lane.asked = None)?;
+        self.complete();
         Ok(answer)
     }
 
-    /// As [`Talk::ask`], where further parts of the answer may follow: [`Talk::more`].
+    /// As [`Talk::ask`], where further parts of the answer may follow: [`Talk::more`], until [`Talk::complete`].
     pub async fn begin<T>(
         &mut self,
         payload: &[u8],
@@ -155,6 +199,7 @@ impl Talk {
         self.limit = limits.1;
         self.with(LaneState::forget_arrivals)?;
         self.write(payload, limits.0, Some(limits.1)).await?;
+        self.open = true;
         self.answer(limits.1, accept).await
     }
 
@@ -209,7 +254,7 @@ impl Talk {
             let left = until.since(self.room.bus.now());
             match self.arrival(left).await {
                 Ok(Arrival::Refused(reply)) => {
-                    self.with(|lane| lane.asked = None)?;
+                    self.complete();
                     return Err(MailboxError::Error(reply));
                 }
                 Ok(Arrival::Payload(payload)) => {
@@ -231,8 +276,9 @@ impl Talk {
     /// What was asked is no longer waited for; its answer may come late.
     fn give_up(&mut self) {
         let late_until = self.room.bus.now() + self.limit;
+        let open = core::mem::take(&mut self.open);
         let _ = self.with(|lane| {
-            if lane.asked.take().is_some_and(|asked| !asked.answered) {
+            if lane.asked.take().is_some_and(|asked| !asked.answered) || open {
                 lane.late_until = Some(late_until);
             }
             lane.forget_arrivals();

@@ -40,6 +40,7 @@ pub(super) fn start(room: &Rc<Room>) {
 
 async fn run(room: Rc<Room>, time: u32) {
     while let Some((lane, message, session)) = next(&room, time) {
+        room.state().lanes[lane as usize].writing(&message, room.bus.now());
         let result = write(&room, time, &session, lane, &message).await;
         {
             let state = &mut *room.state();

@@ -39,6 +39,10 @@ fn open_mailboxes(fleet: &SharedFleet) -> Vec<(StationAddress, Mailbox)> {
 /// One that does not answer is the matter of whoever supervises.
 async fn look(bus: Bus, (station, mailbox): (StationAddress, Mailbox)) {
     let at = map::sync_manager(SEND_SYNC_MANAGER).offset(SyncManager::STATUS);
+    if bus.has_stray_mail(station) {
+        mailbox.is_full();
+        return;
+    }
     if let Ok([status]) = bus.fprd_array(station, at).await
         && SyncManagerStatus::from_bits(status).mailbox_full
     {

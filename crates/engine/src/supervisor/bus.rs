@@ -17,6 +17,7 @@ use ringcat_wire::datagram::{MAX_DATA, Target};
 
 use super::shared::Shared;
 use super::signal::Signal;
+use super::stray::Stray;
 use super::transfer::{Request, Stage, TransferId};
 use crate::board::Board;
 use crate::event::Event;
@@ -205,8 +206,13 @@ impl Bus {
     }
 
     /// The oldest mail of a SubDevice that came back when nobody waited for it any more.
-    pub fn stray_mail(&self, station: StationAddress) -> Option<Vec<u8>> {
+    pub fn stray_mail(&self, station: StationAddress) -> Option<Stray> {
         self.shared.borrow_mut().strays.take(station)
+    }
+
+    /// Whether there is such a mail.
+    pub fn has_stray_mail(&self, station: StationAddress) -> bool {
+        self.shared.borrow().strays.has(station)
     }
 
     /// Stray mails of all SubDevices that nobody fetched in time.

@@ -13,7 +13,7 @@ use ringcat_wire::frame::{FrameBuilder, MAX_FRAME, MacAddress};
 use super::Received;
 use super::bus::{BusError, Reply};
 use super::shared::Shared;
-use super::stray::Overdue;
+use super::stray::{Overdue, Stray};
 use super::transfer::{Stage, TransferId};
 use crate::link::{Link, LinkSet};
 use crate::ring::identity::DATAGRAMS_AT;
@@ -296,7 +296,7 @@ impl Shared {
         let Some(flight) = self.flights.slots[slot].as_mut().filter(|flight| flight.sequence == copy.sequence) else {
             self.round_trip.was_late();
             self.counters.late += 1;
-            self.strays.late(copy.sequence, bytes);
+            self.strays.late(copy.sequence, bytes, self.now);
             return Received::Late;
         };
         if !flight.is_what_was_sent(bytes) {
@@ -311,7 +311,7 @@ impl Shared {
         self.round_trip.took(self.now.since(flight.sent_at));
         for read in flight.second_reads() {
             if let Some(mail) = read.mail(bytes) {
-                self.strays.keep(read.station, mail);
+                self.strays.keep(read.station, Stray { mail, late_since: None });
             }
         }
         flight.take(copy.sent_on, bytes, first);
@@ -461,10 +461,10 @@ impl Flight {
 
     /// The reads of mailboxes in it.
     fn mail_reads(&self) -> impl Iterator<Item = Overdue> {
-        let sequence = self.sequence;
+        let Flight { sequence, sent_at, .. } = *self;
         self.places.iter().filter_map(move |place| {
             let Place { header_at, length, mail, .. } = *place;
-            Some(Overdue { sequence, header_at, length, station: mail? })
+            Some(Overdue { sequence, header_at, length, station: mail?, sent_at })
         })
     }
 

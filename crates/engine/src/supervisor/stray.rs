@@ -6,16 +6,21 @@
 
 use alloc::collections::VecDeque;
 use alloc::vec::Vec;
+use core::time::Duration;
 
 use ringcat_wire::address::{StationAddress, Wkc};
 use ringcat_wire::datagram::HEADER_LEN;
 
 use crate::ring::Sequence;
+use crate::time::Instant;
 
 /// Stray mails that wait for their router; beyond, the oldest is dropped and counted.
 const KEPT: usize = 64;
 /// Reads that were given up and are remembered, in case that they come back.
 const REMEMBERED: usize = 64;
+
+/// A frame that comes back later than this counts as lost.
+const LATEST: Duration = Duration::from_millis(100);
 
 /// A read of a mailbox in a frame that was given up.
 #[derive(Clone, Copy, Debug)]
@@ -24,6 +29,16 @@ pub(crate) struct Overdue {
     pub header_at: usize,
     pub length: usize,
     pub station: StationAddress,
+    pub sent_at: Instant,
+}
+
+/// A mail without a reader.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Stray {
+    /// The content of the mailbox.
+    pub mail: Vec<u8>,
+    /// When its read was sent, where it was given up before it came back.
+    pub late_since: Option<Instant>,
 }
 
 impl Overdue {
@@ -39,7 +54,7 @@ impl Overdue {
 /// Mail without a reader.
 #[derive(Debug, Default)]
 pub(crate) struct Strays {
-    mails: VecDeque<(StationAddress, Vec<u8>)>,
+    mails: VecDeque<(StationAddress, Stray)>,
     overdue: VecDeque<Overdue>,
     dropped: u64,
 }
@@ -54,31 +69,37 @@ impl Strays {
     }
 
     /// A frame came back late: keeps the mail that is in it.
-    pub(crate) fn late(&mut self, sequence: Sequence, bytes: &[u8]) {
+    pub(crate) fn late(&mut self, sequence: Sequence, bytes: &[u8], now: Instant) {
         for at in (0..self.overdue.len()).rev() {
             let read = self.overdue[at];
             if read.sequence == sequence
+                && now.since(read.sent_at) <= LATEST
                 && let Some(mail) = read.mail(bytes)
             {
                 self.overdue.remove(at);
-                self.keep(read.station, mail);
+                self.keep(read.station, Stray { mail, late_since: Some(read.sent_at) });
             }
         }
     }
 
     /// Keeps a mail for whoever reads that mailbox next.
-    pub(crate) fn keep(&mut self, station: StationAddress, mail: Vec<u8>) {
+    pub(crate) fn keep(&mut self, station: StationAddress, stray: Stray) {
         if self.mails.len() >= KEPT {
             self.mails.pop_front();
             self.dropped += 1;
         }
-        self.mails.push_back((station, mail));
+        self.mails.push_back((station, stray));
     }
 
     /// The oldest mail of a SubDevice.
-    pub(crate) fn take(&mut self, station: StationAddress) -> Option<Vec<u8>> {
+    pub(crate) fn take(&mut self, station: StationAddress) -> Option<Stray> {
         let at = self.mails.iter().position(|(of, _)| *of == station)?;
-        self.mails.remove(at).map(|(_, mail)| mail)
+        self.mails.remove(at).map(|(_, stray)| stray)
+    }
+
+    /// Whether there is a mail of a SubDevice.
+    pub(crate) fn has(&self, station: StationAddress) -> bool {
+        self.mails.iter().any(|(of, _)| *of == station)
     }
 
     /// Mails that nobody fetched in time.

@@ -1,0 +1,212 @@
+//! SDO information: which objects a SubDevice has, and what they are (facts 6.3).
+
+use alloc::string::String;
+use alloc::vec;
+use alloc::vec::Vec;
+use core::fmt;
+
+use ringcat_wire::mailbox::PayloadError;
+use ringcat_wire::mailbox::coe::{
+    AccessRights, DataType, EntryDescription, EntryRequest, Indices, InformationOpcode, ListType, ObjectCode,
+    ObjectDescription, SdoInformation, ValueInfo,
+};
+use ringcat_wire::mailbox::sdo::AbortCode;
+
+use super::transfer::settle;
+use crate::mail::lane::Lane;
+use crate::mail::{Limits, Mailbox, MailboxError, Talk};
+
+/// Longest answer: a list of all indices that there can be.
+const LONGEST: usize = 2 + 2 * 0x1_0000;
+
+/// Why there is no information.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum InformationError {
+    /// The mailbox failed.
+    Mailbox(MailboxError),
+    /// The SubDevice refused.
+    Refused(AbortCode),
+    /// Fragments are missing, or come in another order than they say.
+    Fragments {
+        /// Fragments that should have followed.
+        expected: u16,
+        /// Fragments that follow.
+        got: u16,
+    },
+    /// More than any list can have.
+    TooLong,
+    /// The answer cannot be read.
+    Malformed(PayloadError),
+}
+
+impl fmt::Display for InformationError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str("SDO information: ")?;
+        match self {
+            InformationError::Mailbox(error) => error.fmt(f),
+            InformationError::Refused(code) => write!(f, "refused by the SubDevice: {code}"),
+            InformationError::Fragments { expected, got } => {
+                write!(f, "expected {expected} fragments to follow, got {got}")
+            }
+            InformationError::TooLong => write!(f, "more than {LONGEST} bytes"),
+            InformationError::Malformed(error) => error.fmt(f),
+        }
+    }
+}
+
+impl core::error::Error for InformationError {}
+
+impl From<MailboxError> for InformationError {
+    fn from(error: MailboxError) -> InformationError {
+        InformationError::Mailbox(error)
+    }
+}
+
+impl From<PayloadError> for InformationError {
+    fn from(error: PayloadError) -> InformationError {
+        InformationError::Malformed(error)
+    }
+}
+
+/// An object of the dictionary.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Object {
+    /// Index.
+    pub index: u16,
+    /// Data type.
+    pub data_type: DataType,
+    /// Largest subindex.
+    pub max_sub_index: u8,
+    /// What it is.
+    pub code: ObjectCode,
+    /// Name.
+    pub name: String,
+}
+
+/// An entry of an object.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Entry {
+    /// Index.
+    pub index: u16,
+    /// Subindex.
+    pub sub_index: u8,
+    /// Data type.
+    pub data_type: DataType,
+    /// Bits.
+    pub bit_length: u16,
+    /// Access rights.
+    pub access: AccessRights,
+    /// Unit, where the SubDevice names one.
+    pub unit: Option<u16>,
+    /// Default value, where the SubDevice names one.
+    pub default: Option<Vec<u8>>,
+    /// Smallest value, where the SubDevice names one.
+    pub minimum: Option<Vec<u8>>,
+    /// Largest value, where the SubDevice names one.
+    pub maximum: Option<Vec<u8>>,
+    /// Name.
+    pub name: String,
+}
+
+/// Indices of the objects in a list.
+pub async fn list(mailbox: &Mailbox, list: ListType, limits: Limits) -> Result<Vec<u16>, InformationError> {
+    let code = list.code().to_le_bytes();
+    let data = ask(mailbox, InformationOpcode::ListRequest, &code, InformationOpcode::ListResponse, 2, limits).await?;
+    Ok(Indices(&data[2..]).iter().collect())
+}
+
+/// Lengths of the five lists, in the order of [`ListType::LISTS`].
+pub async fn lengths(mailbox: &Mailbox, limits: Limits) -> Result<[u16; 5], InformationError> {
+    let counts = list(mailbox, ListType::Lengths, limits).await?;
+    let short = PayloadError::Short { what: "lengths of the lists", expected: 12, got: 2 + 2 * counts.len() };
+    Ok(*counts.first_chunk().ok_or(short)?)
+}
+
+/// What an object is.
+pub async fn object(mailbox: &Mailbox, index: u16, limits: Limits) -> Result<Object, InformationError> {
+    let (request, response) = (InformationOpcode::ObjectRequest, InformationOpcode::ObjectResponse);
+    let data = ask(mailbox, request, &index.to_le_bytes(), response, 2, limits).await?;
+    let ObjectDescription { index, data_type, max_sub_index, code, name } = ObjectDescription::decode(&data)?;
+    Ok(Object { index, data_type, max_sub_index, code, name: text(name) })
+}
+
+/// What an entry is; `wanted` says which optional parts are asked for.
+pub async fn entry(
+    mailbox: &Mailbox,
+    (index, sub_index): (u16, u8),
+    wanted: ValueInfo,
+    limits: Limits,
+) -> Result<Entry, InformationError> {
+    let asked = EntryRequest { index, sub_index, value_info: wanted }.encode();
+    let (request, response) = (InformationOpcode::EntryRequest, InformationOpcode::EntryResponse);
+    let data = ask(mailbox, request, &asked, response, 3, limits).await?;
+    let entry = EntryDescription::decode(&data)?;
+    Ok(Entry {
+        index: entry.index,
+        sub_index: entry.sub_index,
+        data_type: entry.data_type,
+        bit_length: entry.bit_length,
+        access: entry.access,
+        unit: entry.unit,
+        default: entry.default.map(<[u8]>::to_vec),
+        minimum: entry.minimum.map(<[u8]>::to_vec),
+        maximum: entry.maximum.map(<[u8]>::to_vec),
+        name: text(entry.name),
+    })
+}
+
+/// Bytes as text; what is no UTF-8 is replaced.
+fn text(bytes: &[u8]) -> String {
+    let end = bytes.iter().rposition(|byte| *byte != 0).map_or(0, |last| last + 1);
+    String::from_utf8_lossy(&bytes[..end]).into_owned()
+}
+
+/// A fragment of an answer: its data, and how many follow.
+type Fragment = (Vec<u8>, u16);
+
+/// Asks, and puts the fragments of the answer together. The first `key` bytes of the request begin the answer, too.
+async fn ask(
+    mailbox: &Mailbox,
+    request: InformationOpcode,
+    data: &[u8],
+    response: InformationOpcode,
+    key: usize,
+    limits: Limits,
+) -> Result<Vec<u8>, InformationError> {
+    let mut talk = mailbox.talk(Lane::Coe).await?;
+    settle(&mut talk, limits).await?;
+    let mut payload = vec![0; SdoInformation::OVERHEAD + data.len()];
+    let length = SdoInformation::whole(request, data).encode(&mut payload).unwrap_or(0);
+    let first = |payload: &[u8]| take(payload, response, &data[..key]);
+    let begun = talk.begin(&payload[..length], limits, first).await?;
+    let (mut all, mut left) = begun.inspect_err(|_| talk.complete())?;
+    while left > 0 {
+        let (data, follow) = next(&mut talk, response, limits).await?;
+        if follow != left - 1 {
+            return Err(InformationError::Fragments { expected: left - 1, got: follow });
+        }
+        left = follow;
+        all.extend_from_slice(&data);
+        if all.len() > LONGEST {
+            return Err(InformationError::TooLong);
+        }
+    }
+    talk.complete();
+    Ok(all)
+}
+
+async fn next(talk: &mut Talk, response: InformationOpcode, limits: Limits) -> Result<Fragment, InformationError> {
+    talk.more(limits.1, |payload| take(payload, response, &[])).await?
+}
+
+/// A message that belongs to the answer.
+fn take(payload: &[u8], response: InformationOpcode, key: &[u8]) -> Option<Result<Fragment, InformationError>> {
+    let message = SdoInformation::decode(payload).ok()?;
+    if message.opcode == InformationOpcode::Error {
+        return Some(message.abort_code().map_err(Into::into).and_then(|code| Err(InformationError::Refused(code))));
+    }
+    let ours = message.opcode == response && message.data.starts_with(key);
+    // The mark counts, not the number: there are SubDevices that count down to 1.
+    let left = if message.incomplete { message.fragments_left.max(1) } else { 0 };
+    ours.then(|| Ok((message.data.to_vec(), left)))
+}

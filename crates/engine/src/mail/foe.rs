@@ -1,0 +1,179 @@
+//! FoE: files of a SubDevice, read into a sink and written from a source, piece by piece (facts 6.4).
+
+mod error;
+mod read;
+mod write;
+
+use alloc::string::String;
+use core::time::Duration;
+
+use ringcat_wire::mailbox::foe::{FoeErrorCode, FoeMessage};
+
+pub use error::{FoeError, FoeFailure};
+pub use read::read;
+pub use write::write;
+
+use super::lane::Lane;
+use super::talk::{Limits, Talk};
+use super::{Mailbox, MailboxError};
+
+/// What a transfer needs to know besides the file.
+#[derive(Clone, Copy, Debug)]
+pub struct FoeOptions {
+    /// Password, 0 for none.
+    pub password: u32,
+    /// Time limits of one message.
+    pub limits: Limits,
+    /// Pause before a message is sent again that the SubDevice was too busy to take.
+    pub busy_pause: Duration,
+    /// How long it may be busy without a sign of progress.
+    pub busy_limit: Duration,
+}
+
+impl Default for FoeOptions {
+    fn default() -> FoeOptions {
+        FoeOptions {
+            password: 0,
+            limits: (Duration::from_millis(100), Duration::from_secs(3)),
+            busy_pause: Duration::from_millis(5),
+            busy_limit: Duration::from_secs(30),
+        }
+    }
+}
+
+/// How far a transfer is.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum FoeProgress {
+    /// So many bytes are through.
+    Bytes(u64),
+    /// The SubDevice is busy.
+    Busy {
+        /// So much is done.
+        done: u16,
+        /// Of so much.
+        entire: u16,
+        /// What it is doing.
+        text: String,
+    },
+}
+
+/// A transfer under way. Dropped before its end, the SubDevice is told that it is over.
+struct Transfer<P> {
+    talk: Talk,
+    options: FoeOptions,
+    progress: P,
+    /// Payload of a message.
+    payload: alloc::vec::Vec<u8>,
+    /// The SubDevice waits for us, or we for it.
+    busy: bool,
+    /// Since when it has been busy without progress, and how far it was.
+    since: Option<(crate::time::Instant, u16)>,
+}
+
+/// What the SubDevice said to a message.
+enum Said<T> {
+    Answer(T),
+    Busy,
+}
+
+impl<P: FnMut(FoeProgress)> Transfer<P> {
+    async fn begin(mailbox: &Mailbox, options: FoeOptions, progress: P) -> Result<Transfer<P>, FoeFailure> {
+        let mut talk = mailbox.talk(Lane::Foe).await?;
+        talk.settle(|_| true).await?;
+        let payload = alloc::vec![0; talk.room()];
+        Ok(Transfer { talk, options, progress, payload, busy: false, since: None })
+    }
+
+    /// Sends a message, again while the SubDevice is busy, and returns what `accept` takes for the answer.
+    async fn ask<T>(
+        &mut self,
+        message: &FoeMessage<'_>,
+        mut accept: impl FnMut(FoeMessage<'_>) -> Option<T>,
+    ) -> Result<T, FoeFailure> {
+        self.since = None;
+        loop {
+            match self.try_once(message, &mut accept).await? {
+                Said::Answer(answer) => return Ok(answer),
+                Said::Busy => {
+                    let pause = self.options.busy_pause;
+                    self.talk.pause(pause).await?;
+                }
+            }
+        }
+    }
+
+    async fn try_once<T>(
+        &mut self,
+        message: &FoeMessage<'_>,
+        accept: &mut impl FnMut(FoeMessage<'_>) -> Option<T>,
+    ) -> Result<Said<T>, FoeFailure> {
+        let Some(length) = message.encode(&mut self.payload) else {
+            let bytes = FoeMessage::OVERHEAD + name_of(message).len();
+            return Err(MailboxError::TooLong { bytes, limit: self.payload.len() }.into());
+        };
+        enum Heard<T> {
+            Answer(T),
+            Busy { done: u16, entire: u16, text: String },
+            Error(FoeErrorCode, String),
+        }
+        let heard = |payload: &[u8]| match FoeMessage::decode(payload).ok()? {
+            FoeMessage::Error { code, text } => Some(Heard::Error(code, to_text(text))),
+            FoeMessage::Busy { done, entire, text } => Some(Heard::Busy { done, entire, text: to_text(text) }),
+            other => accept(other).map(Heard::Answer),
+        };
+        self.busy = true;
+        match self.talk.ask(&self.payload[..length], self.options.limits, heard).await? {
+            Heard::Answer(answer) => Ok(Said::Answer(answer)),
+            Heard::Error(code, text) => {
+                self.busy = false;
+                Err(FoeFailure::Refused { code, text })
+            }
+            Heard::Busy { done, entire, text } => {
+                let now = self.talk.now();
+                let (since, before) = self.since.unwrap_or((now, done));
+                let since = if before == done { since } else { now };
+                self.since = Some((since, done));
+                if now.since(since) >= self.options.busy_limit {
+                    return Err(FoeFailure::BusyForTooLong { limit: self.options.busy_limit });
+                }
+                (self.progress)(FoeProgress::Busy { done, entire, text });
+                Ok(Said::Busy)
+            }
+        }
+    }
+
+    /// Tells the SubDevice that the transfer is over.
+    fn give_up(&mut self, code: FoeErrorCode, text: &[u8]) {
+        if !core::mem::take(&mut self.busy) {
+            return;
+        }
+        if let Some(length) = (FoeMessage::Error { code, text }).encode(&mut self.payload) {
+            // A mailbox that is closed has nobody to tell.
+            let _ = self.talk.post(&self.payload[..length]);
+        }
+    }
+}
+
+impl<P> Drop for Transfer<P> {
+    fn drop(&mut self) {
+        if !self.busy {
+            return;
+        }
+        let message = FoeMessage::Error { code: FoeErrorCode::NOT_DEFINED, text: b"given up" };
+        if let Some(length) = message.encode(&mut self.payload) {
+            let _ = self.talk.post(&self.payload[..length]);
+        }
+    }
+}
+
+fn name_of<'a>(message: &FoeMessage<'a>) -> &'a [u8] {
+    match *message {
+        FoeMessage::Read { name, .. } | FoeMessage::Write { name, .. } => name,
+        FoeMessage::Data { data, .. } => data,
+        FoeMessage::Acknowledge { .. } | FoeMessage::Error { .. } | FoeMessage::Busy { .. } => &[],
+    }
+}
+
+fn to_text(bytes: &[u8]) -> String {
+    String::from_utf8_lossy(bytes).into_owned()
+}

@@ -1,0 +1,81 @@
+//! Why a file transfer failed.
+
+use alloc::string::String;
+use core::fmt;
+use core::time::Duration;
+
+use ringcat_wire::mailbox::foe::FoeErrorCode;
+
+use crate::mail::MailboxError;
+use crate::mail::stream::Overflow;
+
+/// Why a file transfer failed.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct FoeError {
+    /// Name of the file.
+    pub file: String,
+    /// What happened.
+    pub cause: FoeFailure,
+}
+
+/// What happened to a file transfer.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum FoeFailure {
+    /// The mailbox failed.
+    Mailbox(MailboxError),
+    /// The SubDevice refused or gave up.
+    Refused {
+        /// Why.
+        code: FoeErrorCode,
+        /// What it says about it; may be empty.
+        text: String,
+    },
+    /// A packet came with another number than expected.
+    Packet {
+        /// Expected.
+        expected: u32,
+        /// Came.
+        got: u32,
+    },
+    /// The SubDevice was busy without progress.
+    BusyForTooLong {
+        /// For so long.
+        limit: Duration,
+    },
+    /// The receiver does not take so much.
+    TooLong(Overflow),
+    /// The mailbox has no room for data.
+    SmallMailbox,
+}
+
+impl fmt::Display for FoeError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "FoE \"{}\": {}", self.file, self.cause)
+    }
+}
+
+impl fmt::Display for FoeFailure {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            FoeFailure::Mailbox(error) => error.fmt(f),
+            FoeFailure::Refused { code, text } if text.is_empty() => write!(f, "refused by the SubDevice: {code}"),
+            FoeFailure::Refused { code, text } => write!(f, "refused by the SubDevice: {code}: {text}"),
+            FoeFailure::Packet { expected, got } => write!(f, "expected packet {expected}, got packet {got}"),
+            FoeFailure::BusyForTooLong { limit } => {
+                write!(f, "the SubDevice was busy for {} ms without progress", limit.as_millis())
+            }
+            FoeFailure::TooLong(Overflow { bytes, limit }) => {
+                write!(f, "{bytes} bytes or more, at most {limit} were expected")
+            }
+            FoeFailure::SmallMailbox => f.write_str("the mailbox has no room for data"),
+        }
+    }
+}
+
+impl core::error::Error for FoeError {}
+
+impl From<MailboxError> for FoeFailure {
+    fn from(error: MailboxError) -> FoeFailure {
+        FoeFailure::Mailbox(error)
+    }
+}

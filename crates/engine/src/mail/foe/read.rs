@@ -1,0 +1,83 @@
+//! Reading a file.
+
+use alloc::borrow::ToOwned;
+use alloc::vec::Vec;
+
+use ringcat_wire::mailbox::foe::{FoeErrorCode, FoeMessage};
+
+use super::error::{FoeError, FoeFailure};
+use super::{FoeOptions, FoeProgress, Transfer};
+use crate::mail::Mailbox;
+use crate::mail::stream::Sink;
+
+/// Reads a file; returns its length in bytes. `progress` is told after each packet.
+pub async fn read(
+    mailbox: &Mailbox,
+    file: &str,
+    options: FoeOptions,
+    sink: &mut impl Sink,
+    progress: impl FnMut(FoeProgress),
+) -> Result<u64, FoeError> {
+    let result = run(mailbox, file, options, sink, progress).await;
+    result.map_err(|cause| FoeError { file: file.to_owned(), cause })
+}
+
+async fn run(
+    mailbox: &Mailbox,
+    file: &str,
+    options: FoeOptions,
+    sink: &mut impl Sink,
+    progress: impl FnMut(FoeProgress),
+) -> Result<u64, FoeFailure> {
+    let mut transfer = Transfer::begin(mailbox, options, progress).await?;
+    let full = FoeMessage::max_data(transfer.talk.mailbox_sizes().1);
+    if full == 0 {
+        return Err(FoeFailure::SmallMailbox);
+    }
+    let mut packet: u32 = 1;
+    let mut bytes = 0;
+    let request = FoeMessage::Read { password: options.password, name: file.as_bytes() };
+    let mut data = next(&mut transfer, &request, packet).await?;
+    let mut taken = sink.begin(None);
+    loop {
+        taken = taken.and_then(|()| sink.take(&data));
+        if let Err(overflow) = taken {
+            transfer.give_up(FoeErrorCode::DISK_FULL, b"no room");
+            return Err(FoeFailure::TooLong(overflow));
+        }
+        bytes += data.len() as u64;
+        (transfer.progress)(FoeProgress::Bytes(bytes));
+        let acknowledge = FoeMessage::Acknowledge { packet };
+        if data.len() < full {
+            // The file is whole; whether the SubDevice hears of it is its matter.
+            transfer.busy = false;
+            let length = acknowledge.encode(&mut transfer.payload).ok_or(FoeFailure::SmallMailbox)?;
+            transfer.talk.send(&transfer.payload[..length], options.limits.0).await?;
+            return Ok(bytes);
+        }
+        packet = packet.wrapping_add(1);
+        data = next(&mut transfer, &acknowledge, packet).await?;
+    }
+}
+
+/// Sends a message to which a packet is the answer.
+async fn next<P: FnMut(FoeProgress)>(
+    transfer: &mut Transfer<P>,
+    message: &FoeMessage<'_>,
+    expected: u32,
+) -> Result<Vec<u8>, FoeFailure> {
+    let accept = |answer: FoeMessage<'_>| match answer {
+        // The last packet once more: its acknowledgement crossed it.
+        FoeMessage::Data { packet, .. } if packet == expected.wrapping_sub(1) => None,
+        FoeMessage::Data { packet, data } if packet == expected => Some(Ok(data.to_vec())),
+        FoeMessage::Data { packet, .. } => Some(Err(packet)),
+        _ => None,
+    };
+    match transfer.ask(message, accept).await? {
+        Ok(data) => Ok(data),
+        Err(got) => {
+            transfer.give_up(FoeErrorCode::PACKET_NUMBER_WRONG, b"another packet was expected");
+            Err(FoeFailure::Packet { expected, got })
+        }
+    }
+}

@@ -1,0 +1,61 @@
+//! Writing a file.
+
+use alloc::borrow::ToOwned;
+use alloc::vec;
+
+use ringcat_wire::mailbox::foe::FoeMessage;
+
+use super::error::{FoeError, FoeFailure};
+use super::{FoeOptions, FoeProgress, Transfer};
+use crate::mail::Mailbox;
+use crate::mail::stream::Source;
+
+/// Writes a file; returns its length in bytes. `progress` is told after each packet.
+pub async fn write(
+    mailbox: &Mailbox,
+    file: &str,
+    options: FoeOptions,
+    source: &mut impl Source,
+    progress: impl FnMut(FoeProgress),
+) -> Result<u64, FoeError> {
+    let result = run(mailbox, file, options, source, progress).await;
+    result.map_err(|cause| FoeError { file: file.to_owned(), cause })
+}
+
+async fn run(
+    mailbox: &Mailbox,
+    file: &str,
+    options: FoeOptions,
+    source: &mut impl Source,
+    progress: impl FnMut(FoeProgress),
+) -> Result<u64, FoeFailure> {
+    let mut transfer = Transfer::begin(mailbox, options, progress).await?;
+    let full = FoeMessage::max_data(transfer.talk.mailbox_sizes().0);
+    if full == 0 {
+        return Err(FoeFailure::SmallMailbox);
+    }
+    let request = FoeMessage::Write { password: options.password, name: file.as_bytes() };
+    transfer.ask(&request, acknowledged(0)).await?;
+    let mut data = vec![0; full];
+    let (mut packet, mut bytes) = (0u32, 0);
+    loop {
+        let count = source.fill(&mut data).min(full);
+        packet = packet.wrapping_add(1);
+        transfer.ask(&FoeMessage::Data { packet, data: &data[..count] }, acknowledged(packet)).await?;
+        bytes += count as u64;
+        (transfer.progress)(FoeProgress::Bytes(bytes));
+        // A packet that is not full ends the file, an empty one where the last full one was the end.
+        if count < full {
+            transfer.busy = false;
+            return Ok(bytes);
+        }
+    }
+}
+
+/// The acknowledgement of a packet; others are of packets that were sent again while the SubDevice was busy.
+fn acknowledged(expected: u32) -> impl FnMut(FoeMessage<'_>) -> Option<()> {
+    move |answer| match answer {
+        FoeMessage::Acknowledge { packet } => (packet == expected).then_some(()),
+        _ => None,
+    }
+}

@@ -1,0 +1,132 @@
+//! The router and its protocols against a SubDevice that is nothing but a mailbox, undisturbed and with frames lost,
+//! late and doubled. Time is virtual, chance comes from a seed.
+
+mod device;
+mod protocols;
+mod server;
+mod storm;
+
+use alloc::rc::Rc;
+use alloc::vec::Vec;
+use core::cell::RefCell;
+use core::future::Future;
+use core::time::Duration;
+
+use ringcat_wire::address::StationAddress;
+use ringcat_wire::frame::MacAddress;
+use ringcat_wire::source_address::MacCodec;
+
+use self::device::{Device, STATION};
+use self::server::Everything;
+use super::{Limits, Mailbox};
+use crate::link::{Link, LinkSet};
+use crate::ring::Identity;
+use crate::supervisor::Supervisor;
+use crate::time::Instant;
+
+const LIMITS: Limits = (Duration::from_millis(100), Duration::from_secs(1));
+const MAIN: MacAddress = MacAddress([0, 0, 0x5E, 0, 0x53, 1]);
+const REDUNDANT: MacAddress = MacAddress([0, 0, 0x5E, 0, 0x53, 2]);
+/// Time of a frame there and back.
+const ROUND_TRIP: Duration = Duration::from_micros(50);
+
+/// What becomes of a frame.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Fate {
+    Passes,
+    LostOut,
+    LostBack,
+    /// Comes back later.
+    Late(Duration),
+    /// In a ring at the edge of its repair: both copies meet the SubDevice.
+    MetTwice,
+}
+
+/// A MainDevice with one SubDevice.
+struct Bench {
+    supervisor: Supervisor,
+    mailbox: Mailbox,
+    device: Device<Everything>,
+    now: Instant,
+    under_way: Vec<(Instant, Link, Vec<u8>)>,
+}
+
+impl Bench {
+    fn new(links: LinkSet, size: u16) -> Bench {
+        let identity = Identity::new(MacCodec::FlagsFirst, MAIN, Some(REDUNDANT));
+        let supervisor = Supervisor::new(identity, links, Instant(0));
+        let server = Everything::new(usize::from(size) - 6);
+        let device = Device::new(size, server);
+        let mailbox = Mailbox::new(&supervisor.bus(), 0);
+        mailbox.open(StationAddress(STATION), device.layout);
+        Bench { supervisor, mailbox, device, now: Instant(1_000), under_way: Vec::new() }
+    }
+
+    fn start<T: 'static>(&mut self, work: impl Future<Output = T> + 'static) -> Rc<RefCell<Option<T>>> {
+        let result = Rc::new(RefCell::new(None));
+        let slot = result.clone();
+        self.supervisor.spawn(async move {
+            let value = work.await;
+            *slot.borrow_mut() = Some(value);
+        });
+        result
+    }
+
+    /// Sends what is to be sent and lets time go on to the next thing that happens, a millisecond at most.
+    fn step(&mut self, mut fate: impl FnMut() -> Fate) {
+        self.supervisor.poll(self.now);
+        let mut sent = Vec::new();
+        self.supervisor.transmit(self.now, usize::MAX, &mut |link, frame| sent.push((link, frame.to_vec())));
+        let mut last = Fate::Passes;
+        for (link, mut frame) in sent {
+            if link == Link::Main {
+                last = fate();
+            }
+            if last == Fate::LostOut {
+                continue;
+            }
+            if link == Link::Main || last == Fate::MetTwice {
+                self.device.pass(&mut frame, self.now);
+            } else {
+                frame[6] |= 0x02;
+            }
+            let late = if let Fate::Late(by) = last { by } else { Duration::ZERO };
+            if last != Fate::LostBack {
+                self.under_way.push((self.now + ROUND_TRIP + late, link, frame));
+            }
+        }
+        let frame = self.under_way.iter().map(|(at, _, _)| *at).min();
+        let deadline = self.supervisor.next_deadline().filter(|at| *at > self.now);
+        let soon = self.now + Duration::from_millis(1);
+        self.now = frame.into_iter().chain(deadline).fold(soon, Instant::min).max(self.now);
+        self.device.run(self.now);
+        let now = self.now;
+        let (arrived, left) = self.under_way.drain(..).partition(|(at, _, _)| *at <= now);
+        self.under_way = left;
+        let arrived: Vec<(Instant, Link, Vec<u8>)> = arrived;
+        for (_, link, frame) in arrived {
+            self.supervisor.receive(link, &frame, now);
+        }
+    }
+
+    /// Runs work to its end.
+    fn run<T: 'static>(&mut self, work: impl Future<Output = T> + 'static) -> T {
+        let result = self.start(work);
+        let end = self.now + Duration::from_secs(60);
+        loop {
+            if let Some(result) = result.borrow_mut().take() {
+                return result;
+            }
+            assert!(self.now < end, "no end in 60 s");
+            self.step(|| Fate::Passes);
+        }
+    }
+
+    /// Lets time pass.
+    fn pass(&mut self, time: Duration) {
+        let end = self.now + time;
+        while self.now < end {
+            self.step(|| Fate::Passes);
+        }
+    }
+}

@@ -1,0 +1,178 @@
+//! All protocols at once over one mailbox, while frames are lost, late and doubled, and procedures are dropped.
+
+use alloc::rc::Rc;
+use alloc::vec;
+use alloc::vec::Vec;
+use core::cell::RefCell;
+use core::time::Duration;
+
+use ringcat_wire::mailbox::Protocol;
+use ringcat_wire::mailbox::aoe::{AmsAddress, NetId};
+use ringcat_wire::mailbox::coe::Emergency;
+use ringcat_wire::mailbox::soe::Idn;
+
+use super::device::pattern;
+use super::{Bench, Fate};
+use crate::link::LinkSet;
+use crate::mail::aoe::AoeRoute;
+use crate::mail::coe::{SdoAddress, read, write};
+use crate::mail::foe::FoeOptions;
+use crate::mail::soe::SoeAddress;
+use crate::mail::stream::{Bounded, Bytes};
+use crate::mail::voe::Voe;
+use crate::mail::{Limits, Mailbox, aoe, foe, soe, voe};
+
+/// Long, so that what is lost is healed before.
+const LIMITS: Limits = (Duration::from_secs(5), Duration::from_secs(5));
+
+/// Chance from a seed (xorshift).
+struct Dice(u64);
+
+impl Dice {
+    fn below(&mut self, limit: u64) -> u64 {
+        self.0 ^= self.0 << 13;
+        self.0 ^= self.0 >> 7;
+        self.0 ^= self.0 << 17;
+        self.0 % limit
+    }
+}
+
+/// Works that ended well, by kind.
+type Done = Rc<RefCell<[u32; 5]>>;
+
+async fn objects(mailbox: Mailbox, done: Done) {
+    for round in 0..6u16 {
+        let data = pattern(round.into(), [3, 40, 300, 700][usize::from(round) % 4]);
+        let object = SdoAddress::new(0x2000 + round, 1);
+        write(&mailbox, object, &data, LIMITS).await.unwrap();
+        assert_eq!(read(&mailbox, object, LIMITS, 1000).await.unwrap(), data);
+    }
+    done.borrow_mut()[0] += 1;
+}
+
+async fn files(mailbox: Mailbox, done: Done) {
+    let options = FoeOptions { limits: LIMITS, ..FoeOptions::default() };
+    let data = pattern(77, 900);
+    foe::write(&mailbox, "file", options, &mut Bytes::new(&data), |_| ()).await.unwrap();
+    let mut sink = Bounded::new(1000);
+    foe::read(&mailbox, "file", options, &mut sink, |_| ()).await.unwrap();
+    assert_eq!(sink.into_bytes(), data);
+    done.borrow_mut()[1] += 1;
+}
+
+async fn idns(mailbox: Mailbox, done: Done) {
+    for round in 0..5u16 {
+        let data = pattern(round.into(), 150);
+        let address = SoeAddress::value(1, Idn::standard(0, round));
+        soe::write(&mailbox, address, &data, LIMITS).await.unwrap();
+        assert_eq!(soe::read(&mailbox, address, LIMITS, 1000).await.unwrap(), data);
+    }
+    done.borrow_mut()[2] += 1;
+}
+
+async fn ads(mailbox: Mailbox, done: Done) {
+    let address = |port| AmsAddress { net_id: NetId([1, 2, 3, 4, 5, 6]), port };
+    let route = AoeRoute { target: address(1), source: address(2) };
+    for round in 0..10u32 {
+        let data = pattern(round, 12);
+        aoe::write(&mailbox, route, (1, round), &data, LIMITS).await.unwrap();
+        assert_eq!(aoe::read(&mailbox, route, (1, round), 12, LIMITS).await.unwrap(), data);
+    }
+    done.borrow_mut()[3] += 1;
+}
+
+async fn vendor(mailbox: Mailbox, done: Done) {
+    for round in 0..10u16 {
+        let message = Voe { vendor_id: 1, vendor_type: round, data: pattern(round.into(), 20) };
+        assert_eq!(voe::exchange(&mailbox, &message, LIMITS).await.unwrap(), message);
+    }
+    done.borrow_mut()[4] += 1;
+}
+
+/// One run; `percent` of the frames meet with something.
+fn storm(seed: u64, links: LinkSet, percent: u64, drops: bool) {
+    let mut dice = Dice(seed.wrapping_mul(0x9E37_79B9_7F4A_7C15) | 1);
+    let mut bench = Bench::new(links, 64);
+    let done = Done::default();
+    let mailbox = || bench.mailbox.clone();
+    let own = [mailbox(), mailbox(), mailbox(), mailbox(), mailbox()];
+    let [a, b, c, d, e] = own;
+    bench.start(objects(a, done.clone()));
+    bench.start(files(b, done.clone()));
+    bench.start(idns(c, done.clone()));
+    bench.start(ads(d, done.clone()));
+    bench.start(vendor(e, done.clone()));
+    let end = bench.now + Duration::from_secs(60);
+    let (mut said, mut heard) = (0u16, Vec::new());
+    while *done.borrow() != [1; 5] {
+        assert!(bench.now < end, "seed {seed}: not done in 60 s: {:?}, {:?}", done.borrow(), bench.mailbox.counters());
+        if dice.below(40) == 0 && said < 200 {
+            said += 1;
+            let emergency = Emergency { error_code: said, error_register: 0, data: [0; 5] };
+            let mut mail = vec![0x00, 0x10];
+            mail.extend(emergency.encode());
+            bench.device.say(Protocol::Coe, &mail, bench.now);
+        }
+        if drops && dice.below(60) == 0 {
+            // Somebody else wants something and loses patience.
+            let (mailbox, bus) = (bench.mailbox.clone(), bench.supervisor.bus());
+            let (limit, which) = (Duration::from_micros(dice.below(3000)), dice.below(3));
+            bench.start(async move {
+                let object = SdoAddress::new(0x2000, 1);
+                let _ = match which {
+                    0 => bus.within(limit, read(&mailbox, object, LIMITS, 1000)).await.map(drop),
+                    1 => {
+                        bus.within(limit, write(&mailbox, SdoAddress::new(0x3000, 1), &[1; 90], LIMITS)).await.map(drop)
+                    }
+                    _ => bus
+                        .within(limit, soe::read(&mailbox, SoeAddress::value(1, Idn(0)), LIMITS, 900))
+                        .await
+                        .map(drop),
+                };
+            });
+        }
+        bench.step(|| {
+            if dice.below(100) >= percent {
+                return Fate::Passes;
+            }
+            match dice.below(4) {
+                0 => Fate::LostOut,
+                1 => Fate::LostBack,
+                2 => Fate::Late(Duration::from_micros(dice.below(60_000))),
+                _ if links == LinkSet::Ring => Fate::MetTwice,
+                _ => Fate::LostBack,
+            }
+        });
+        heard.extend(core::iter::from_fn(|| bench.mailbox.pop_emergency()).map(|(_, emergency)| emergency.error_code));
+    }
+    for _ in 0..10 {
+        bench.mailbox.is_full();
+        bench.pass(Duration::from_millis(100));
+        heard.extend(core::iter::from_fn(|| bench.mailbox.pop_emergency()).map(|(_, emergency)| emergency.error_code));
+    }
+    heard.sort_unstable();
+    let counters = bench.mailbox.counters();
+    assert_eq!(heard, (1..=said).collect::<Vec<_>>(), "seed {seed}: each emergency once, {counters:?}");
+    let steps = bench.device.served.windows(2);
+    // A message that was never taken leaves a gap; nothing is served twice in a row.
+    assert!(steps.clone().all(|pair| pair[0] != pair[1]), "seed {seed}");
+}
+
+#[test]
+fn all_protocols_run_side_by_side_over_one_mailbox() {
+    storm(1, LinkSet::Single, 0, false);
+}
+
+#[test]
+fn nothing_is_lost_or_mistaken_whatever_becomes_of_frames_seeds_0_to_99() {
+    for seed in 0..100 {
+        storm(seed, if seed % 2 == 0 { LinkSet::Ring } else { LinkSet::Single }, 1 + seed % 15, false);
+    }
+}
+
+#[test]
+fn procedures_that_are_dropped_harm_nobody_seeds_0_to_99() {
+    for seed in 0..100 {
+        storm(seed, LinkSet::Single, seed % 10, true);
+    }
+}

@@ -1,0 +1,65 @@
+//! VoE: messages of a vendor to and from a SubDevice (facts 6.8). What they mean is the vendor's matter.
+
+use alloc::vec;
+use alloc::vec::Vec;
+use core::time::Duration;
+
+use ringcat_wire::mailbox::voe::VoeMessage;
+
+use super::lane::Lane;
+use super::talk::{Limits, Talk};
+use super::unsolicited::Unsolicited;
+use super::{Mailbox, MailboxError};
+
+/// A message of a vendor.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Voe {
+    /// Vendor, as in the identity.
+    pub vendor_id: u32,
+    /// Kind of message, the vendor's own.
+    pub vendor_type: u16,
+    /// The data.
+    pub data: Vec<u8>,
+}
+
+/// Sends a message and waits until the SubDevice has it.
+pub async fn send(mailbox: &Mailbox, message: &Voe, limit: Duration) -> Result<(), MailboxError> {
+    let mut talk = mailbox.talk(Lane::Voe).await?;
+    let payload = encode(&talk, message)?;
+    talk.send(&payload, limit).await
+}
+
+/// Sends a message and waits for the next one of the same vendor.
+pub async fn exchange(mailbox: &Mailbox, message: &Voe, limits: Limits) -> Result<Voe, MailboxError> {
+    let mut talk = mailbox.talk(Lane::Voe).await?;
+    talk.settle(|_| true).await?;
+    let payload = encode(&talk, message)?;
+    let accept = |payload: &[u8]| decode(payload).filter(|answer| answer.vendor_id == message.vendor_id);
+    talk.ask(&payload, limits, accept).await
+}
+
+/// Waits for a message that is no answer to [`exchange`]. What cannot be read is left out.
+pub async fn receive(mailbox: &Mailbox, limit: Duration) -> Result<Voe, MailboxError> {
+    let next = async {
+        loop {
+            if let Some(message) = decode(&mailbox.unsolicited(Unsolicited::Voe).await.payload) {
+                return message;
+            }
+        }
+    };
+    mailbox.bus().within(limit, next).await.map_err(|_| MailboxError::NoAnswer { limit })
+}
+
+fn encode(talk: &Talk, message: &Voe) -> Result<Vec<u8>, MailboxError> {
+    let Voe { vendor_id, vendor_type, ref data } = *message;
+    let (bytes, limit) = (VoeMessage::OVERHEAD + data.len(), talk.room());
+    let mut payload = vec![0; limit];
+    let length = VoeMessage { vendor_id, vendor_type, data }.encode(&mut payload);
+    payload.truncate(length.ok_or(MailboxError::TooLong { bytes, limit })?);
+    Ok(payload)
+}
+
+fn decode(payload: &[u8]) -> Option<Voe> {
+    let VoeMessage { vendor_id, vendor_type, data } = VoeMessage::decode(payload).ok()?;
+    Some(Voe { vendor_id, vendor_type, data: data.to_vec() })
+}
