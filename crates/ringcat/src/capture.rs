@@ -12,7 +12,7 @@ use ringcat_link::{PacketSocket, ReceiveMode, Recorder, Sniffer, Tap, interface,
 use crate::interfaces::{Failure, InterfaceArguments, describe_down, end_request, is_asked};
 use crate::output::{say, write};
 use crate::recording::{DESCRIPTIONS, lines};
-use crate::run::time;
+use crate::times::time;
 
 /// The user's wish to end, and the live line, are looked at so often.
 const LOOK: Duration = Duration::from_millis(200);

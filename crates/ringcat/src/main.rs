@@ -10,6 +10,7 @@ mod scan;
 mod sim;
 mod surroundings;
 mod table;
+mod times;
 
 use std::process::ExitCode;
 

@@ -1,0 +1,149 @@
+//! A table on a terminal that is drawn anew over itself: how the cycles go, and which SubDevice is how far.
+//!
+//! Where the standard output is no terminal, nothing is drawn.
+
+use std::fmt::Write as _;
+use std::io::{IsTerminal, stdout};
+use std::time::Duration;
+
+use ringcat::news::News;
+use ringcat::text::Names;
+use ringcat::{DomainId, DomainState, Instant, RingState, SubDeviceState, SupervisorThread};
+use ringcat_wire::al::AlState;
+
+use crate::output::write;
+
+/// It is drawn anew so often.
+const PERIOD: Duration = Duration::from_millis(500);
+/// SubDevices that are listed; of more of them, first those that are not in OP.
+const LISTED: usize = 16;
+/// Lines must not break on any terminal, or there would be more of them than are drawn over.
+const WIDTH: usize = 79;
+
+/// The table.
+#[derive(Debug)]
+pub struct Live {
+    terminal: bool,
+    /// Whether there is a ring whose state is worth a word.
+    ring: bool,
+    next: Instant,
+    /// Lines on the terminal that will be drawn over.
+    drawn: usize,
+}
+
+impl Live {
+    /// A table on the standard output, if that is a terminal, of a MainDevice with two links or one.
+    pub fn new(ring: bool) -> Live {
+        Live { terminal: stdout().is_terminal(), ring, next: Instant(0), drawn: 0 }
+    }
+
+    /// Draws it where it is time to.
+    pub fn show(&mut self, now: Instant, news: &News, supervisor: &SupervisorThread, names: &Names) {
+        if !self.terminal || now < self.next {
+            return;
+        }
+        self.next = now + PERIOD;
+        self.clear();
+        let lines = table(news, self.ring, &supervisor.states(), names);
+        self.drawn = lines.len();
+        write(format_args!("{}\n", lines.join("\n")));
+    }
+
+    /// Takes it off the terminal, so that something else can be told.
+    pub fn clear(&mut self) {
+        if self.drawn > 0 {
+            // To the first line of the table, then clear to the end of the screen (ECMA-48: CPL, ED).
+            write(format_args!("\x1b[{}F\x1b[J", self.drawn));
+            self.drawn = 0;
+        }
+    }
+}
+
+fn table(news: &News, ring: bool, states: &[SubDeviceState], names: &Names) -> Vec<String> {
+    let (pace, counters, status) = (news.pace(), news.counters(), news.status(DomainId(0)));
+    let us = |time: Duration| time.as_nanos() as f64 / 1e3;
+    let judgement = match status.state {
+        DomainState::Zero => "nobody answers",
+        DomainState::Incomplete => "incomplete",
+        DomainState::Complete => "complete",
+    };
+    let ring = match news.ring() {
+        _ if !ring => "",
+        RingState::Unknown => "",
+        RingState::Closed => "   ring closed",
+        RingState::Open => "   ring OPEN",
+    };
+    let (trips, wake_ups) = (news.round_trips(), news.wake_ups());
+    let mut lines = vec![
+        format!("{} cycles   wkc {} of {}, {judgement}{ring}", pace.cycles, status.wkc, status.expected),
+        format!("the wire      {} frames lost, {} late, {} corrupt", counters.lost, counters.late, counters.corrupt),
+        format!("this machine  {} late wake-ups, {} cycles left out", pace.late, pace.skipped),
+    ];
+    for (title, times) in [("round trips", trips), ("wake-ups", wake_ups)] {
+        let (half, most, longest) = (times.quantile(500_000), times.quantile(990_000), times.longest());
+        lines.push(format!("{title:<13} 50 % {:.1}, 99 % {:.1}, longest {:.1} us", us(half), us(most), us(longest)));
+    }
+    lines.push(count(states));
+    lines.extend(list(states, names));
+    for line in &mut lines {
+        if let Some((at, _)) = line.char_indices().nth(WIDTH) {
+            line.truncate(at);
+        }
+    }
+    lines
+}
+
+/// How far a SubDevice is, in words.
+pub fn word(state: SubDeviceState) -> String {
+    match state {
+        SubDeviceState::Absent => "does not answer".to_owned(),
+        SubDeviceState::Configuring => "is being configured".to_owned(),
+        SubDeviceState::Settled(state) => state.to_string(),
+    }
+}
+
+/// How many are how far.
+fn count(states: &[SubDeviceState]) -> String {
+    let mut kinds: Vec<(SubDeviceState, usize)> = Vec::new();
+    for state in states {
+        match kinds.iter_mut().find(|(kind, _)| kind == state) {
+            Some((_, count)) => *count += 1,
+            None => kinds.push((*state, 1)),
+        }
+    }
+    let mut line = format!("{:<13}", "SubDevices");
+    for (at, (state, count)) in kinds.iter().enumerate() {
+        // Writing into a String cannot fail.
+        let _ = write!(line, "{}{count} {}", if at == 0 { " " } else { ", " }, word(*state));
+    }
+    line
+}
+
+/// One line each, as far as there is room.
+fn list(states: &[SubDeviceState], names: &Names) -> Vec<String> {
+    let in_op = |state: &SubDeviceState| *state == SubDeviceState::Settled(AlState::Op);
+    let all = states.len() <= LISTED;
+    let shown = states.iter().enumerate().filter(|(_, state)| all || !in_op(state)).take(LISTED);
+    let line = |(number, state): (usize, &SubDeviceState)| {
+        let name = names.0.get(number).map_or("", String::as_str);
+        format!("{number:>13} {:<24.24} {}", name, word(*state))
+    };
+    shown.map(line).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn of_many_subdevices_those_that_are_not_in_op_are_listed() {
+        let mut states = vec![SubDeviceState::Settled(AlState::Op); 40];
+        states[7] = SubDeviceState::Absent;
+        let names = Names((0..40).map(|n| format!("a name that is longer than its column {n}")).collect());
+        assert_eq!(count(&states), "SubDevices    39 OP, 1 does not answer");
+        assert_eq!(list(&states, &names), ["            7 a name that is longer th does not answer"]);
+        assert_eq!(list(&states[..16], &names).len(), 16);
+        states.fill(SubDeviceState::Configuring);
+        assert_eq!(list(&states, &names).len(), LISTED);
+    }
+}

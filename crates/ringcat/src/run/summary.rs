@@ -1,0 +1,72 @@
+//! What `ringcat run` tells in the end.
+
+use std::time::Duration;
+
+use ringcat::packet::PacketLinks;
+use ringcat::tee::Tee;
+use ringcat::{Application, Link, Links, SupervisorThread};
+
+use super::now;
+use crate::output::say;
+use crate::surroundings::Surroundings;
+
+/// What is under way when the last frame was sent is back within.
+const LAST_FRAMES: Duration = Duration::from_millis(20);
+
+/// How the exchange of process data went.
+pub fn summary(application: &Application<Tee<PacketLinks>, SupervisorThread>, surroundings: &Surroundings) {
+    let (pace, cyclic, acyclic) = (application.pace(), application.cyclic_counters(), application.acyclic_counters());
+    say!("\nsummary");
+    say!("  cycles: {}, judged not complete: {}, frames still out: {}", pace.cycles, cyclic.incomplete, cyclic.skipped);
+    say!(
+        "  this machine: {} late wake-ups (more than a tenth of the cycle), {} cycles left out, the latest by {:.3} ms",
+        pace.late,
+        pace.skipped,
+        pace.longest_delay.as_secs_f64() * 1e3
+    );
+    say!(
+        "  the wire: {} frames sent, {} lost, {} copies lost, {} late, {} corrupt",
+        cyclic.sent,
+        cyclic.lost,
+        cyclic.copies_lost + cyclic.half,
+        cyclic.late,
+        cyclic.corrupt
+    );
+    if cyclic.foreign + acyclic.foreign > 0 {
+        let (frames, senders) = (cyclic.foreign + acyclic.foreign, surroundings.senders());
+        say!("  other MainDevices: {frames} frames, {senders}");
+    }
+    say!("  round trips of process data: {}", application.round_trips());
+    say!("  wake-ups after their time: {}", application.news().wake_ups());
+}
+
+/// What the interfaces have carried from the first frame to the last, the stop included.
+pub fn final_account(links: &mut Tee<PacketLinks>, supervisor: &SupervisorThread) {
+    let until = now() + LAST_FRAMES;
+    while now() < until {
+        while links.receive(&mut |_, _| ()) {}
+        links.wait(until);
+    }
+    for link in [Link::Main, Link::Redundant] {
+        let Some(counters) = links.links().counters(link) else { continue };
+        say!(
+            "  process data on {link}: {} sent, {} received; not sent: {} interface down, {} queue full, {} refused; {} overrun",
+            counters.sent,
+            counters.received,
+            counters.down,
+            counters.busy,
+            counters.refused,
+            counters.overrun
+        );
+    }
+    let acyclic = supervisor.counters();
+    say!(
+        "  everything else: {} frames sent with {} datagrams, {} lost, {} copies lost, {} late; {} datagrams sent again",
+        acyclic.sent,
+        acyclic.datagrams,
+        acyclic.lost,
+        acyclic.half,
+        acyclic.late,
+        acyclic.resent
+    );
+}
