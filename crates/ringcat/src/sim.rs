@@ -2,6 +2,7 @@
 
 mod doors;
 mod lateness;
+mod mail_orders;
 mod orders;
 mod plant;
 mod wires;

@@ -8,6 +8,7 @@ use ringcat_sim::cable::{CableId, DeviceIndex, Endpoint, HostLink};
 use ringcat_sim::fault::Fault;
 use ringcat_sim::network::Network;
 
+use super::mail_orders;
 use super::plant::Plant;
 
 /// What `help` says.
@@ -22,6 +23,7 @@ hang A           the application of device A hangs, its controller works
 wake A           it goes on
 outputs A        the process data outputs of device A, in hexadecimal
 inputs A HEX     its process data inputs, as far as its application leaves them alone
+mail             orders about mailboxes: `help mail` lists them
 status           devices and their states, cut cables, counters
 quit             end the simulator";
 
@@ -51,6 +53,7 @@ pub fn carry_out(line: &str, plant: &mut Plant) -> Outcome {
 fn answer(words: &[&str], plant: &mut Plant) -> Result<String, String> {
     match words {
         ["help"] => Ok(HELP.to_owned()),
+        ["help", "mail"] => Ok(mail_orders::HELP.to_owned()),
         ["status"] => Ok(plant.status()),
         ["heal", "all"] => Ok(plant.heal_all()),
         ["cut", cable] => {
@@ -73,6 +76,15 @@ fn answer(words: &[&str], plant: &mut Plant) -> Result<String, String> {
         ["power", "on", device] => on_device(plant, device, "has power", Fault::PowerOn),
         ["hang", device] => on_device(plant, device, "hangs", |device| Fault::Hang(device, true)),
         ["wake", device] => on_device(plant, device, "goes on", |device| Fault::Hang(device, false)),
+        ["mail", device, rest @ ..] => {
+            let fault = mail_orders::fault(rest)?;
+            on_device(plant, device, "its mail", |device| Fault::Mail(device, fault))
+        }
+        ["emergency", device, code] => {
+            let device = find_device(device, plant.network())?;
+            mail_orders::emergency(plant.network_mut().device_mut(device), code)?;
+            Ok(format!("{}: an emergency", describe_device(device, plant.network())))
+        }
         ["outputs", device] => {
             let device = find_device(device, plant.network())?;
             Ok(hex(plant.network().device(device).outputs()))
@@ -200,6 +212,8 @@ mod tests {
         assert!(!plant.network().device(DeviceIndex(0)).controller.is_powered());
         assert_eq!(say(&mut plant, "power on 0"), "0 \"head\": has power\nok\n");
         assert!(say(&mut plant, "drop main 3").ends_with("ok\n"));
+        assert_eq!(say(&mut plant, "mail left-axis lose 1"), "1 \"left-axis\": its mail\nok\n");
+        assert!(say(&mut plant, "help mail").contains("emergency A CODE"));
         assert_eq!(say(&mut plant, "quit"), "quit");
     }
 
@@ -212,6 +226,9 @@ mod tests {
             ("power off 3", "names and the numbers 0 to 2"),
             ("drop main many", "expected a number of frames, got \"many\""),
             ("inputs 0 123", "expected bytes in hexadecimal, got \"123\""),
+            ("mail 1 eat 3", "\"mail A eat 3\" is no order"),
+            ("emergency 1 8130", "its mailbox is not in use"),
+            ("emergency 1 12345", "expected a code of 16 bits"),
             ("make tea", "`help` lists them"),
         ] {
             let answer = say(&mut plant, line);

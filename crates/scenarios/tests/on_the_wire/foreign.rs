@@ -6,7 +6,7 @@
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command};
 
-use crate::bench::{Bench, Client, is_asked_for, program, target_directory};
+use crate::bench::{Bench, Client, finish, is_asked_for, program, target_directory};
 use crate::{PLANTS, Plant, RING_OF_16, input, states};
 
 /// What asks for these tests.
@@ -106,6 +106,31 @@ fn pysoem_exchanges_right_values_on_a_ring_with_two_interfaces() {
     exchange(&mut bench, &RING_OF_16, true, "pysoem on a ring", |bench| {
         start_pysoem(bench, &python, "main0,main1", count)
     });
+}
+
+#[test]
+fn pysoem_moves_objects_files_and_firmware_of_a_simulated_subdevice() {
+    if !is_asked_for(FOREIGN) {
+        return;
+    }
+    let Some(mut bench) = Bench::new(1) else { return };
+    let Some(python) = python() else { return };
+    let script = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/on_the_wire/pysoem_mailbox.py");
+    let mut failures = Vec::new();
+    while failures.len() < TRIES {
+        bench.simulate("[[device]]\ntype = \"all-protocols\"\n", false);
+        let output = finish(start(&bench, &python, &[script.to_owned(), "main0".to_owned()]));
+        let said = String::from_utf8_lossy(&output.stdout).into_owned();
+        println!("{said}");
+        if output.status.success() {
+            for step in ["objects ok", "dictionary ok", "files ok", "firmware ok"] {
+                assert!(said.contains(step), "{step}");
+            }
+            return;
+        }
+        failures.push(String::from_utf8_lossy(&output.stderr).into_owned());
+    }
+    panic!("{failures:?}");
 }
 
 /// Starts a client, before ordinary programs.
