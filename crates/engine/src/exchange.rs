@@ -168,7 +168,7 @@ impl Exchange {
     }
 
     /// Puts a domain's outputs into its frames, to go out with the next [`Exchange::send`]. A domain whose frames are
-    /// still out is skipped, counted and reported; false then.
+    /// still out is skipped, counted and reported; false then. Queued twice, it leaves with its last outputs.
     pub fn queue(&mut self, id: DomainId, now: Instant) -> bool {
         let Some(domain) = self.domains.get_mut(id.0) else { return false };
         let range = domain.frames();
@@ -179,14 +179,14 @@ impl Exchange {
             self.events.push(CyclicEvent::Skipped { domain: id.0 as u16 }.pack());
             return false;
         }
-        domain.note_queued();
+        let is_new = domain.note_queued();
         for (frame, index) in frames.iter_mut().zip(range.start as u16..) {
             if frame.is_open() {
                 self.counters.copies_lost += 1;
                 close(frame, &mut self.monitor, &self.board);
             }
             frame.load(domain.image());
-            if self.to_send.len() < self.to_send.capacity() {
+            if is_new && self.to_send.len() < self.to_send.capacity() {
                 self.to_send.push(index);
             }
         }
@@ -200,7 +200,9 @@ impl Exchange {
             let Some(frame) = self.frames.get_mut(usize::from(index)) else { continue };
             self.sequence = self.sequence.next();
             self.by_id[usize::from(self.sequence.frame_id())] = index;
-            let timeout_ns = self.domains[frame.domain()].timeout_ns();
+            let domain = &mut self.domains[frame.domain()];
+            domain.note_sent();
+            let timeout_ns = domain.timeout_ns();
             let bytes = frame.depart(&self.identity, self.sequence, Instant(now.0.saturating_add(timeout_ns)));
             self.counters.sent += 1;
             self.counters.bytes += bytes.len() as u64;

@@ -23,6 +23,7 @@ use core::future::Future;
 pub use bus::{Bus, BusError, Elapsed, Reply};
 pub use flights::AcyclicCounters;
 pub use group::Group;
+pub(crate) use group::{TURN, TURN_PAUSE};
 pub use signal::Signal;
 pub use stray::Stray;
 

@@ -34,6 +34,8 @@ pub struct Domain {
     members: Vec<Member>,
     status: DomainStatus,
     queued: bool,
+    /// Its frames have not left since it was queued.
+    waiting: bool,
     /// Cycle, plus one, of the last judgement.
     judged: u64,
 }
@@ -55,6 +57,7 @@ impl Domain {
             members: subdevices.into_iter().map(member).collect(),
             status: DomainStatus { expected, ..DomainStatus::default() },
             queued: false,
+            waiting: false,
             judged: 0,
         }
     }
@@ -83,8 +86,14 @@ impl Domain {
         self.queued
     }
 
-    pub(crate) fn note_queued(&mut self) {
+    /// Notes that it is queued; false where it was already, and its frames have not left.
+    pub(crate) fn note_queued(&mut self) -> bool {
         self.queued = true;
+        !core::mem::replace(&mut self.waiting, true)
+    }
+
+    pub(crate) fn note_sent(&mut self) {
+        self.waiting = false;
     }
 
     pub(crate) fn count_skip(&mut self) {

@@ -309,3 +309,33 @@ fn without_its_optional_subdevice_a_domain_is_complete_and_without_another_it_is
         assert_eq!(ring.freshness()[0], Freshness::Fresh);
     }
 }
+
+#[test]
+fn a_domain_that_is_queued_twice_leaves_once_with_its_last_outputs_and_keeps_no_other_from_leaving() {
+    let spec = |subdevice| {
+        let areas = vec![AreaSpec { subdevice, sync_manager: 0, direction: Direction::Outputs, length: 1 }];
+        DomainSpec { period: PERIOD, lrw: false, areas }
+    };
+    let layout = Layout::new(&[spec(0), spec(1)], LinkSet::Single, false).unwrap();
+    let identity = Identity::new(MacCodec::FlagsFirst, MacAddress([0, 1, 2, 3, 4, 5]), None);
+    let (producer, _events) = queue(16);
+    let mut exchange = Exchange::new(identity, LinkSet::Single, &layout, Arc::new(Board::new(2)), producer);
+    for round in 0..3 {
+        let now = Instant(0) + PERIOD * round;
+        for (domain, value) in [(0, 1), (0, 2), (1, 3), (1, 4), (0, 5)] {
+            exchange.process(DomainId(domain), now);
+            exchange.image_mut(DomainId(domain))[0] = value;
+            assert!(exchange.queue(DomainId(domain), now));
+        }
+        let mut frames = vec![];
+        exchange.send(now, &mut |_, bytes| frames.push(bytes.to_vec()));
+        let outputs: Vec<u8> = frames.iter().map(|frame| frame[OUTPUTS_AT]).collect();
+        assert_eq!(outputs, [5, 4], "round {round}");
+        for mut frame in frames {
+            frame[6] |= 0x02;
+            assert_eq!(exchange.receive(Link::Main, &frame, now), Received::Taken);
+        }
+    }
+    let counters = exchange.counters();
+    assert_eq!((counters.sent, counters.received, counters.late, counters.lost), (6, 6, 0, 0));
+}

@@ -9,7 +9,7 @@ use ringcat_wire::register::map;
 
 use crate::supervisor::{Bus, BusError};
 
-/// First pause between two looks at AL status; later ones grow by a half, so that a change that takes milliseconds is
+/// First two pauses between looks at AL status; later ones grow by a half, so that a change that takes milliseconds is
 /// seen soon and one that takes seconds costs few datagrams.
 const FIRST_PAUSE: Duration = Duration::from_micros(500);
 /// Longest pause.
@@ -105,7 +105,7 @@ pub async fn request(
 ) -> Result<(), StateError> {
     bus.fpwr(station, map::AL_CONTROL, &AlControl::new(state).encode()).await?;
     let until = bus.now() + limit;
-    let mut pause = FIRST_PAUSE;
+    let (mut pause, mut looks) = (FIRST_PAUSE, 0_u32);
     loop {
         let (status, code) = read_status(bus, station).await?;
         if status.error {
@@ -118,7 +118,10 @@ pub async fn request(
         if bus.now() >= until {
             return Err(StateError::Timeout { requested: state, status, limit });
         }
+        looks += 1;
+        if looks > 2 {
+            pause = (pause * 3 / 2).min(LONGEST_PAUSE);
+        }
         bus.sleep(pause).await;
-        pause = (pause * 3 / 2).min(LONGEST_PAUSE);
     }
 }

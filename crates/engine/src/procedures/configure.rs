@@ -20,7 +20,7 @@ use crate::supervisor::{Bus, BusError};
 /// Cycles of the exchange that must have gone by before OP is requested, so that valid outputs are there (facts 5.2).
 const CYCLES_BEFORE_OP: u64 = 2;
 /// Pause between two looks at the cycle counter.
-const CYCLE_PAUSE: Duration = Duration::from_micros(500);
+const CYCLE_PAUSE: Duration = Duration::from_micros(200);
 
 /// Why a SubDevice is not configured.
 #[derive(Clone, Debug, PartialEq)]

@@ -12,7 +12,7 @@ use ringcat_wire::register::{DlStatus, map};
 
 use super::al_state::split_status;
 use super::fleet::SharedFleet;
-use crate::supervisor::{Bus, BusError};
+use crate::supervisor::{Bus, BusError, TURN, TURN_PAUSE};
 use crate::topology::Topology;
 
 /// Between two reports of what looks have brought so far: most answers are there by then.
@@ -32,21 +32,34 @@ pub(super) enum Look {
     Answer { status: AlStatus, code: AlStatusCode, dl_status: DlStatus },
 }
 
-/// Looks at all members at once. What there is after each step is shown to `so_far`, because looks at SubDevices that
-/// are not there take longer.
-pub(super) async fn look_at_all(bus: &Bus, fleet: &SharedFleet, mut so_far: impl FnMut(&[Look])) -> Vec<Look> {
+/// Looks at all members: a few at a time while `is_calm`, at once otherwise. What there is after each step is shown to
+/// `so_far`, because looks at SubDevices that are not there take longer.
+pub(super) async fn look_at_all(
+    bus: &Bus,
+    fleet: &SharedFleet,
+    is_calm: impl Fn() -> bool,
+    mut so_far: impl FnMut(&[Look]),
+) -> Vec<Look> {
     let stations: Vec<StationAddress> = fleet.access().members.iter().map(|member| member.station).collect();
     let looks = Rc::new(RefCell::new(vec![Look::Unknown; stations.len()]));
-    let group = bus.group();
-    for (index, station) in stations.into_iter().enumerate() {
-        let (bus, looks) = (bus.clone(), looks.clone());
-        group.spawn(async move {
-            let look = look_at(&bus, station).await;
-            looks.borrow_mut()[index] = look;
-        });
-    }
-    while bus.within(STEP, group.done()).await.is_err() {
-        so_far(&looks.borrow());
+    let mut next = 0;
+    while next < stations.len() {
+        let end = if is_calm() { stations.len().min(next + TURN) } else { stations.len() };
+        let group = bus.group();
+        for (index, station) in stations.iter().copied().enumerate().take(end).skip(next) {
+            let (bus, looks) = (bus.clone(), looks.clone());
+            group.spawn(async move {
+                let look = look_at(&bus, station).await;
+                looks.borrow_mut()[index] = look;
+            });
+        }
+        while bus.within(STEP, group.done()).await.is_err() {
+            so_far(&looks.borrow());
+        }
+        next = end;
+        if next < stations.len() && is_calm() {
+            bus.sleep(TURN_PAUSE).await;
+        }
     }
     looks.take()
 }

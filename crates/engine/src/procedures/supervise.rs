@@ -68,6 +68,8 @@ pub(crate) async fn supervise(bus: Bus, fleet: SharedFleet) {
         place: None,
         break_looks: 0,
         next_routine: Instant::default(),
+        is_awaited: false,
+        is_routine: false,
         search: Search::default(),
         news: 0,
     };
@@ -98,6 +100,10 @@ struct Watch {
     /// Looks for it that are left.
     break_looks: u8,
     next_routine: Instant,
+    /// The next check was asked for before its time.
+    is_awaited: bool,
+    /// The check that is under way has no other reason than that its time has come.
+    is_routine: bool,
     search: Search,
     /// What had become known at the last check.
     news: u32,
@@ -134,18 +140,26 @@ async fn report_ring(bus: Bus, fleet: SharedFleet, reported: Rc<Cell<RingState>>
 }
 
 impl Watch {
-    fn is_called_for(&mut self) -> bool {
-        let ring = self.fleet.board.ring();
-        let now = self.bus.now();
+    /// Something is not as it was at the last check.
+    fn has_changed(&self) -> bool {
         let supervision = self.fleet.board.supervision().map(|(_, supervision)| supervision);
-        let reported = self.reported.get();
-        let changed = supervision.is_some_and(|supervision| supervision != self.seen)
-            || ring != self.ring
-            || reported != self.seen_reported
-            || self.fleet.news() != self.news;
+        supervision.is_some_and(|supervision| supervision != self.seen)
+            || self.fleet.board.ring() != self.ring
+            || self.reported.get() != self.seen_reported
+            || self.fleet.news() != self.news
+    }
+
+    fn is_called_for(&mut self) -> bool {
+        let now = self.bus.now();
+        let changed = self.has_changed();
         if !changed && now < self.next_routine {
             return false;
         }
+        self.is_routine = !changed && !self.is_awaited;
+        self.is_awaited = false;
+        let ring = self.fleet.board.ring();
+        let supervision = self.fleet.board.supervision().map(|(_, supervision)| supervision);
+        let reported = self.reported.get();
         self.seen = supervision.unwrap_or(self.seen);
         self.ring = ring;
         self.news = self.fleet.news();
@@ -161,8 +175,11 @@ impl Watch {
     async fn check(&mut self) {
         let strangers = look_at_strangers(&self.bus, &self.fleet).await;
         let stranger_answers = strangers.iter().filter(|(_, look)| matches!(look, Look::Answer { .. })).count();
-        let (fleet, suspended) = (&self.fleet, &mut self.suspended);
-        let looks = look_at_all(&self.bus, fleet, |so_far| suspend(fleet, suspended, so_far, stranger_answers)).await;
+        let mut suspended = core::mem::take(&mut self.suspended);
+        let is_calm = || self.is_routine && !self.has_changed();
+        let so_far = |looks: &[Look]| suspend(&self.fleet, &mut suspended, looks, stranger_answers);
+        let looks = look_at_all(&self.bus, &self.fleet, is_calm, so_far).await;
+        self.suspended = suspended;
         let Some((_, seen)) = self.fleet.board.supervision() else { return };
         let (count, answering) = (usize::from(seen.total().0), answers(&looks) + stranger_answers);
         // When the count and the answers agree, a silent SubDevice is certainly not there.
@@ -187,6 +204,7 @@ impl Watch {
     }
 
     fn again_in(&mut self, pause: Duration) {
+        self.is_awaited = true;
         self.next_routine = self.next_routine.min(self.bus.now() + pause);
     }
 

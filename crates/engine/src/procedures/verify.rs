@@ -31,7 +31,7 @@ struct Suspect {
 pub(crate) async fn verify(bus: Bus, fleet: SharedFleet) {
     loop {
         bus.sleep(PAUSE).await;
-        let all = bus.gather(settled(&fleet), look).await;
+        let all = bus.gather_in_turns(settled(&fleet), look).await;
         // Once may be the edge of a change.
         let wrong = bus.gather(all.into_iter().flatten(), look).await;
         for suspect in wrong.into_iter().flatten() {

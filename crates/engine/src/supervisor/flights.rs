@@ -191,7 +191,7 @@ impl Shared {
         while !self.outbox.is_empty() && self.flights.has_room() && used < budget {
             let limit = (budget - used).min(MAX_FRAME);
             let Some(flight) = self.pack(limit) else { break };
-            self.blocked_since = None;
+            self.blocked = None;
             used += flight.bytes.len();
             self.counters.sent += 1;
             self.counters.bytes += flight.bytes.len() as u64;
@@ -222,9 +222,9 @@ impl Shared {
 
     /// Whether a first datagram that is too long for the window has waited for so long that it goes out all the same:
     /// it may be too long for every window.
-    fn is_starved(&mut self) -> bool {
-        let since = *self.blocked_since.get_or_insert(self.now);
-        self.now.since(since) >= STARVED
+    fn is_starved(blocked: &mut Option<(TransferId, Instant)>, first: TransferId, now: Instant) -> bool {
+        let (_, since) = *blocked.insert(blocked.filter(|(id, _)| *id == first).unwrap_or((first, now)));
+        now.since(since) >= STARVED
     }
 
     /// Builds one frame of at most `limit` bytes from the front of the outbox; `None` where nothing fits.
@@ -233,7 +233,6 @@ impl Shared {
         let mut flight = self.flights.fresh(sequence);
         flight.bytes.resize(MAX_FRAME, 0);
         let mut retry = 0;
-        let starved = self.is_starved();
         let length = {
             let source = self.identity.source();
             let mut builder = FrameBuilder::ethernet(&mut flight.bytes, MacAddress::ETHERCAT_GROUP, source)?;
@@ -250,7 +249,10 @@ impl Shared {
                 }
                 let request = &transfer.request;
                 let bytes = OVERHEAD + request.data.len();
-                if total + bytes > limit && (!flight.places.is_empty() || !starved) {
+                // Only the first datagram of a frame may be longer than the window.
+                if total + bytes > limit
+                    && (!flight.places.is_empty() || !Shared::is_starved(&mut self.blocked, id, self.now))
+                {
                     break;
                 }
                 let index = sequence.index(Class::Acyclic);

@@ -9,9 +9,15 @@ use alloc::vec::Vec;
 use core::cell::{Cell, RefCell};
 use core::future::{Future, poll_fn};
 use core::task::Poll;
+use core::time::Duration;
 
 use super::bus::Bus;
 use super::executor::TaskId;
+
+/// So many SubDevices are asked at a time where there is no hurry: a frame of 20 us.
+pub(crate) const TURN: usize = 8;
+/// Pause between two such turns.
+pub(crate) const TURN_PAUSE: Duration = Duration::from_micros(250);
 
 impl Bus {
     /// Runs a procedure for each item, all at once, and returns what they return in the order of the items.
@@ -33,6 +39,22 @@ impl Bus {
         }
         group.done().await;
         results.take().into_iter().flatten().collect()
+    }
+
+    /// As [`Bus::gather`], a few at a time with pauses: for what is not urgent, so that frames are short and cyclic ones
+    /// hardly ever wait behind them.
+    pub async fn gather_in_turns<I, T, F>(&self, items: Vec<I>, procedure: impl Fn(Bus, I) -> F) -> Vec<T>
+    where
+        T: 'static,
+        F: Future<Output = T> + 'static,
+    {
+        let mut results = Vec::with_capacity(items.len());
+        let mut items = items.into_iter().peekable();
+        while items.peek().is_some() {
+            results.extend(self.gather(items.by_ref().take(TURN), &procedure).await);
+            self.sleep(TURN_PAUSE).await;
+        }
+        results
     }
 
     /// A group of procedures that can be waited for together.

@@ -35,8 +35,8 @@ pub(crate) struct Shared {
     pub(crate) round_trip: RoundTrip,
     /// SubDevices that the main copy of the last broadcast met: positions from here on live behind the redundant link.
     pub(crate) main_count: u16,
-    /// Since when the first datagram of the outbox has been too long for the send window.
-    pub(crate) blocked_since: Option<Instant>,
+    /// The first datagram of the outbox where it was too long for the send window, and since when.
+    pub(crate) blocked: Option<(TransferId, Instant)>,
     pub(crate) current: TaskId,
     pub(crate) spawned: VecDeque<Task>,
     ready: VecDeque<TaskId>,
@@ -60,7 +60,7 @@ impl Shared {
             strays: Strays::default(),
             round_trip: RoundTrip::default(),
             main_count: 0,
-            blocked_since: None,
+            blocked: None,
             current: TaskId(0),
             spawned: VecDeque::new(),
             ready: VecDeque::new(),

@@ -412,3 +412,38 @@ proptest! {
         bench.step();
     }
 }
+
+#[test]
+fn a_datagram_that_was_given_up_does_not_make_a_later_one_starve() {
+    let mut bench = Bench::new(LinkSet::Single);
+    let ask = |bench: &mut Bench| {
+        let bus = bench.supervisor.bus();
+        bench.start(async move {
+            let long = bus.fprd(STATION, RegisterAddress(0x1000), 1_000);
+            bus.within(Duration::from_millis(1), long).await.is_err()
+        });
+        bench.supervisor.poll(bench.now);
+    };
+    let offer = |bench: &mut Bench, budget: usize| bench.supervisor.transmit(bench.now, budget, &mut |_, _| ());
+    ask(&mut bench);
+    assert_eq!(offer(&mut bench, 100), 0, "it does not fit");
+    bench.pass(Duration::from_millis(1));
+    bench.supervisor.poll(bench.now);
+    assert_eq!(offer(&mut bench, 100), 0, "nobody waits for it any more");
+    assert!(!bench.supervisor.wants_to_send());
+    bench.pass(Duration::from_millis(100));
+    ask(&mut bench);
+    assert_eq!(offer(&mut bench, 100), 0, "it has not waited yet");
+    bench.pass(Duration::from_micros(500));
+    assert!(offer(&mut bench, 1_500) > 1_000);
+    // Nor does one that takes the place of another.
+    ask(&mut bench);
+    offer(&mut bench, 100);
+    bench.pass(Duration::from_micros(900));
+    ask(&mut bench);
+    for _ in 0..2 {
+        bench.pass(Duration::from_micros(100));
+        bench.supervisor.poll(bench.now);
+        assert_eq!(offer(&mut bench, 100), 0);
+    }
+}
