@@ -75,16 +75,17 @@ impl AcyclicHalf for Inline {
 /// Lets procedures go on and sends what they ask for, as far as the window allows. True where something has to wait for
 /// the next window.
 pub(crate) fn work(engine: &mut Engine, links: &mut impl Links, window: &Window) -> bool {
-    let now = links.now();
-    engine.poll(now);
+    engine.poll(links.now());
     if !engine.wants_to_send() {
         return false;
     }
+    // Procedures have taken their time, the kernel takes some for each frame: the window is looked at as late as possible.
+    let now = links.now();
     let budget = window.bytes(now);
     if budget > 0 {
         engine.transmit(now, budget, &mut |link, frame| {
             if link == Link::Main {
-                window.occupy(Half::Acyclic, now, frame.len());
+                window.occupy(Half::Acyclic, links.now(), frame.len());
             }
             links.send(link, frame);
         });
