@@ -15,7 +15,7 @@ mod said;
 
 use std::process::Output;
 
-use bench::Bench;
+use bench::{Bench, await_op};
 
 /// So many SubDevices of the catalogue: outputs first, then inputs, with a coupler and drives where there is room.
 struct Plant {
@@ -97,4 +97,18 @@ fn our_main_device_brings_1_10_50_and_200_subdevices_to_op_and_stops_in_order() 
         show_summary(&format!("{} SubDevices", plant.count()), &output);
         bench.show_simulator_lateness();
     }
+}
+
+#[test]
+fn the_next_main_device_takes_over_from_one_that_was_killed_in_operation() {
+    let Some(mut bench) = Bench::new(1) else { return };
+    bench.simulate(&PLANTS[1].segment(), false);
+    for _ in 0..3 {
+        let killed = bench.run_ringcat(&["run", "--main", "main0"]);
+        await_op(&bench, PLANTS[1].count());
+        drop(killed);
+    }
+    let (output, errors) = said(&bench.ringcat(&["run", "--main", "main0", "--for", "500ms"]));
+    assert!(output.contains("all SubDevices are in OP"), "{output}{errors}");
+    assert!(output.contains("stopped: outputs zero, all SubDevices in INIT"), "{output}{errors}");
 }
