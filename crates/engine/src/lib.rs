@@ -33,6 +33,7 @@ pub mod plan;
 pub mod procedures;
 pub mod queue;
 pub mod ring;
+pub mod sdo_request;
 pub mod supervisor;
 pub mod time;
 pub mod topology;

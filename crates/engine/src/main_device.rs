@@ -31,11 +31,13 @@ use crate::exchange::Exchange;
 use crate::info::SubDeviceInfo;
 use crate::layout::Layout;
 use crate::link::{Link, LinkSet};
+use crate::mail::Mailbox;
 use crate::procedures::configure::Start;
 use crate::procedures::fleet::{Fleet, Phase, SharedFleet};
 use crate::procedures::mail_watch::watch_mail;
 use crate::procedures::recover::start_all;
 use crate::procedures::scan::{Scan, ScanError, ScanOptions, scan};
+use crate::procedures::serve_requests::{Requests, serve_requests};
 use crate::procedures::sii::SiiCache;
 use crate::procedures::stop::{StopError, stop};
 use crate::procedures::supervise::supervise;
@@ -114,6 +116,9 @@ pub struct MainDevice {
     stopped: StopSlot,
     fleet: Option<SharedFleet>,
     cyclic_events: Option<Consumer>,
+    /// Mailboxes by position, before activation.
+    visited: Vec<Mailbox>,
+    requests: Requests,
 }
 
 impl MainDevice {
@@ -130,6 +135,8 @@ impl MainDevice {
             stopped: StopSlot::default(),
             fleet: None,
             cyclic_events: None,
+            visited: Vec::new(),
+            requests: Requests::default(),
             options,
         }
     }
@@ -143,6 +150,7 @@ impl MainDevice {
             return Err(ActivateError::Scanning);
         }
         *self.scan.borrow_mut() = None;
+        self.visited.drain(..).for_each(|mailbox| mailbox.close());
         let (bus, slot, scanning) = (self.supervisor.bus(), self.scan.clone(), self.scanning.clone());
         let options =
             ScanOptions { settle: self.options.settle, patience: self.options.patience, cache: self.cache.clone() };
@@ -198,11 +206,14 @@ impl MainDevice {
             Fleet { members, strangers, next_temporary: 0, layout, topology: scan.topology, cache: self.cache.clone() };
         let fleet = SharedFleet::new(fleet, board.clone());
         self.supervisor.attach(board);
-        start_all(&bus, &fleet, Start::Cleared);
+        let start = if self.has_visited() { Start::Doubtful } else { Start::Cleared };
+        self.visited.drain(..).for_each(|mailbox| mailbox.close());
+        start_all(&bus, &fleet, start);
         if self.options.supervision {
             self.supervisor.spawn(supervise(bus.clone(), fleet.clone()));
         }
-        self.supervisor.spawn(watch_mail(bus, fleet.clone()));
+        self.supervisor.spawn(watch_mail(bus.clone(), fleet.clone()));
+        self.supervisor.spawn(serve_requests(bus, fleet.clone(), self.requests.clone()));
         self.fleet = Some(fleet);
         self.cyclic_events = Some(consumer);
         let periods = specs.iter().map(|spec| spec.period).collect();
@@ -215,6 +226,8 @@ impl MainDevice {
         self.counted = self.counters();
         self.supervisor = Supervisor::new(self.identity, self.options.links(), now);
         self.scanning.set(false);
+        self.requests.end();
+        self.visited.clear();
         self.fleet = None;
         self.cyclic_events = None;
         *self.stopped.borrow_mut() = None;

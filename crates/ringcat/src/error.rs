@@ -2,7 +2,9 @@
 
 use core::fmt;
 
+use ringcat_engine::mail::coe::SdoError;
 use ringcat_engine::main_device::ActivateError;
+use ringcat_engine::procedures::configure::ConfigureError;
 use ringcat_engine::procedures::scan::ScanError;
 use ringcat_engine::procedures::stop::StopError;
 use ringcat_sim::segment::SegmentError;
@@ -14,6 +16,10 @@ pub enum Error {
     Scan(ScanError),
     /// The declaration cannot be activated.
     Activate(ActivateError),
+    /// A SubDevice could not be brought to a state before activation.
+    Configure(ConfigureError),
+    /// An SDO transfer failed.
+    Sdo(SdoError),
     /// The segment could not be stopped in order.
     Stop(StopError),
     /// The simulated segment cannot be built.
@@ -29,6 +35,8 @@ impl fmt::Display for Error {
         match self {
             Error::Scan(error) => write!(f, "scan: {error}"),
             Error::Activate(error) => write!(f, "activation: {error}"),
+            Error::Configure(error) => error.fmt(f),
+            Error::Sdo(error) => error.fmt(f),
             Error::Stop(error) => write!(f, "stop: {error}"),
             Error::Segment(error) => error.fmt(f),
             Error::Thread(error) => write!(f, "a thread cannot be started: {error}"),
@@ -48,6 +56,18 @@ impl From<ScanError> for Error {
 impl From<ActivateError> for Error {
     fn from(error: ActivateError) -> Error {
         Error::Activate(error)
+    }
+}
+
+impl From<ConfigureError> for Error {
+    fn from(error: ConfigureError) -> Error {
+        Error::Configure(error)
+    }
+}
+
+impl From<SdoError> for Error {
+    fn from(error: SdoError) -> Error {
+        Error::Sdo(error)
     }
 }
 

@@ -6,12 +6,15 @@ use std::time::Duration;
 use ringcat_engine::config::SubDeviceConfig;
 use ringcat_engine::event::TimedEvent;
 use ringcat_engine::info::SubDeviceInfo;
+use ringcat_engine::mail::coe::SdoAddress;
+use ringcat_engine::mail::{Limits, Mailbox};
 use ringcat_engine::main_device::{
-    Declaration, DomainConfig, DomainMember, MainDevice as Engine, Options as Engineering,
+    Declaration, DomainConfig, DomainMember, MainDevice as Engine, Options as Engineering, Pending,
 };
 use ringcat_engine::procedures::scan::Scan;
 use ringcat_engine::supervisor::AcyclicCounters;
 use ringcat_engine::time::Instant;
+use ringcat_wire::al::AlState;
 
 use crate::acyclic::Inline;
 use crate::application::Application;
@@ -107,6 +110,76 @@ impl<L: Links> MainDevice<L> {
         engine.transmit(now, usize::MAX, &mut |link, frame| links.send(link, frame));
         if let Some(wake) = engine.next_deadline() {
             links.wait(wake.min(until));
+        }
+    }
+
+    /// Reads an object of at most `limit` bytes from a scanned SubDevice; one in INIT is brought to PREOP before. The
+    /// time limits are: until the mailbox takes a message, until its answer is there.
+    ///
+    /// # Errors
+    /// The SubDevice does not reach PREOP, or the transfer fails.
+    pub fn sdo_upload(
+        &mut self,
+        position: usize,
+        object: SdoAddress,
+        limits: Limits,
+        limit: usize,
+    ) -> Result<Vec<u8>, Error> {
+        self.visit(position)?;
+        let transfer = self.engine.start_sdo_upload(position, object, limits, limit);
+        Ok(self.finish(transfer)?)
+    }
+
+    /// Writes an object of a scanned SubDevice; as [`MainDevice::sdo_upload`].
+    ///
+    /// # Errors
+    /// As [`MainDevice::sdo_upload`].
+    pub fn sdo_download(
+        &mut self,
+        position: usize,
+        object: SdoAddress,
+        data: &[u8],
+        limits: Limits,
+    ) -> Result<(), Error> {
+        self.visit(position)?;
+        let transfer = self.engine.start_sdo_download(position, object, data.to_vec(), limits);
+        Ok(self.finish(transfer)?)
+    }
+
+    /// Brings a scanned SubDevice to PREOP, BOOT or back to INIT; in PREOP and BOOT its mailbox may be used.
+    ///
+    /// # Errors
+    /// It has no mailbox for that state, refuses, or does not answer.
+    pub fn bring_to(&mut self, position: usize, state: AlState) -> Result<(), Error> {
+        let visit = self.engine.start_visit(position, state);
+        Ok(self.finish(visit)?)
+    }
+
+    /// The mailbox of a scanned SubDevice, for the functions of [`ringcat_engine::mail`]; see [`MainDevice::run`].
+    pub fn mailbox(&self, position: usize) -> Option<Mailbox> {
+        self.engine.mailbox(position)
+    }
+
+    /// Runs an async function of the engine to its end.
+    pub fn run<T: 'static>(&mut self, work: impl Future<Output = T> + 'static) -> T {
+        let work = self.engine.start(work);
+        self.finish(work)
+    }
+
+    fn visit(&mut self, position: usize) -> Result<(), Error> {
+        if self.engine.mailbox(position).is_some_and(|mailbox| mailbox.is_open()) {
+            return Ok(());
+        }
+        self.bring_to(position, AlState::PreOp)
+    }
+
+    /// Waits for the end of work. Nothing here stops the engine meanwhile, so there is one.
+    fn finish<T: 'static>(&mut self, mut work: Pending<T>) -> T {
+        loop {
+            self.step(Instant::NEVER);
+            if let Some(result) = work.take() {
+                return result;
+            }
         }
     }
 

@@ -3,15 +3,57 @@
 use alloc::vec::Vec;
 use core::future::Future;
 
+use ringcat_wire::al::AlState;
+
 use super::MainDevice;
 use super::pending::Pending;
 use crate::mail::coe::{self, SdoAddress, SdoError, SdoFailure};
 use crate::mail::{Limits, Mailbox, MailboxError};
+use crate::procedures::configure::ConfigureError;
+use crate::procedures::visit::visit;
+use crate::sdo_request::{self, SdoRequest};
 
 impl MainDevice {
-    /// Mailbox of a SubDevice: by its index in the declaration. `None` where there is no such one.
+    /// Mailbox of a SubDevice: by its index in the declaration; before activation by its position in the last scan, and
+    /// to be used once [`MainDevice::start_visit`] has brought it to PREOP. `None` where there is no such one.
     pub fn mailbox(&self, subdevice: usize) -> Option<Mailbox> {
-        self.fleet.as_ref()?.mailbox(subdevice)
+        match &self.fleet {
+            Some(fleet) => fleet.mailbox(subdevice),
+            None => self.visited.get(subdevice).cloned(),
+        }
+    }
+
+    /// Before activation: starts to bring a scanned SubDevice to PREOP or BOOT, where its mailbox can be used, or back to
+    /// INIT.
+    pub fn start_visit(&mut self, position: usize, state: AlState) -> Pending<Result<(), ConfigureError>> {
+        let info = match (&self.fleet, &*self.scan.borrow()) {
+            (None, Some(Ok(scan))) => scan.subdevices.get(position).cloned(),
+            _ => None,
+        };
+        let bus = self.supervisor.bus();
+        while self.visited.len() <= position && info.is_some() {
+            self.visited.push(Mailbox::new(&bus, self.visited.len()));
+        }
+        let mailbox = self.visited.get(position).cloned();
+        self.start(async move {
+            match (info, mailbox) {
+                (Some(info), Some(mailbox)) => visit(&bus, &info, &mailbox, state).await,
+                _ => Err(ConfigureError::NoSetup),
+            }
+        })
+    }
+
+    /// Whether a SubDevice was visited since the scan, so that it may not be in INIT.
+    pub(super) fn has_visited(&self) -> bool {
+        !self.visited.is_empty()
+    }
+
+    /// A request for objects of a declared SubDevice of up to `size` bytes, to be made from the cyclic thread once the
+    /// MainDevice is active. It may be created before or after activation; dropped, it is forgotten.
+    pub fn create_sdo_request(&mut self, subdevice: usize, size: usize) -> SdoRequest {
+        let (request, served) = sdo_request::request(subdevice, size);
+        self.requests.add(served);
+        request
     }
 
     /// Starts work of the application's own: any async function over a [`Mailbox`] or the bus.

@@ -1,0 +1,63 @@
+//! Bringing a scanned SubDevice to PREOP or BOOT before activation, so that its mailbox can be used (facts 5.2).
+
+use alloc::vec;
+use core::time::Duration;
+
+use ringcat_wire::al::AlState;
+use ringcat_wire::register::{SyncManager, map};
+
+use super::al_state;
+use super::configure::ConfigureError;
+use super::sii;
+use crate::config::{SubDeviceConfig, Timeouts};
+use crate::info::SubDeviceInfo;
+use crate::mail::Mailbox;
+use crate::plan::plan;
+use crate::supervisor::Bus;
+
+/// Brings a SubDevice to a state with a mailbox, PREOP or BOOT, and opens the mailbox; or to INIT, and closes it.
+pub(crate) async fn visit(
+    bus: &Bus,
+    info: &SubDeviceInfo,
+    mailbox: &Mailbox,
+    state: AlState,
+) -> Result<(), ConfigureError> {
+    let (station, emulated) = (info.station, info.device_emulation);
+    let limits = Timeouts::default();
+    let request = async |from, to| -> Result<(), ConfigureError> {
+        let limit: Duration = limits.transition(from, to);
+        Ok(al_state::request(bus, station, to, emulated, limit).await?)
+    };
+    mailbox.close();
+    let (status, _) = al_state::read_status(bus, station).await?;
+    if status.error {
+        al_state::acknowledge(bus, station, emulated).await?;
+    }
+    request(AlState::Op, AlState::Init).await?;
+    sii::claim(bus, station).await?;
+    // Place and length of one that is switched on cannot be changed.
+    let sync_managers = vec![0; SyncManager::LEN * usize::from(info.controller.sync_manager_count)];
+    bus.fpwr(station, map::SYNC_MANAGER_BASE, &sync_managers).await?;
+    let layout = match state {
+        AlState::Boot => info.bootstrap,
+        AlState::Init | AlState::PreOp | AlState::SafeOp | AlState::Op => info.mailbox,
+    };
+    let (Some(layout), false) = (layout, state == AlState::Init) else { return Ok(()) };
+    let Ok(plan) = plan(&SubDeviceConfig::from_info(info), info) else { return Err(ConfigureError::NoSetup) };
+    let managers = if state == AlState::Boot { &plan.bootstrap } else { &plan.mailbox };
+    if managers.is_empty() {
+        return Err(ConfigureError::NoSetup);
+    }
+    for manager in managers {
+        bus.fpwr(station, map::sync_manager(manager.index), &manager.register.encode()).await?;
+    }
+    sii::assign(bus, station, true).await?;
+    let result = request(AlState::Init, state).await;
+    // A boot loader may need it for as long as it runs.
+    if state != AlState::Boot || result.is_err() {
+        sii::claim(bus, station).await?;
+    }
+    result?;
+    mailbox.open(station, layout);
+    Ok(())
+}

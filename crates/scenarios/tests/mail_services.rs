@@ -1,0 +1,101 @@
+//! Mailbox services of the MainDevice: before activation, from the cyclic thread, and firmware through BOOT.
+
+use std::time::Duration;
+
+use ringcat::{Limits, MainDevice, Options, RequestFailure, RequestState, SdoAddress, automatic};
+use ringcat_engine::mail::foe::{self, FoeOptions};
+use ringcat_engine::mail::stream::Bytes;
+use ringcat_sim::application::foe::firmware;
+use ringcat_sim::cable::DeviceIndex;
+use ringcat_sim::network::NetworkOptions;
+use ringcat_wire::al::AlState;
+use ringcat_wire::mailbox::sdo::AbortCode;
+use scenarios::segments::{descriptions, line, ring_of_16};
+use scenarios::tap::Tap;
+use scenarios::world::{CYCLE, World};
+
+const LIMITS: Limits = (Duration::from_millis(100), Duration::from_secs(1));
+const KINDS: [&str; 3] = ["coupler", "all-protocols", "digital-output-8"];
+
+#[test]
+fn objects_are_read_and_written_before_activation_which_configures_everything_anew() {
+    let mut main_device =
+        MainDevice::request(Tap::new(line(descriptions(&KINDS), NetworkOptions::default())), &Options::default());
+    let scan = main_device.scan().expect("a scan");
+    let object = SdoAddress::new(0x2001, 7);
+    main_device.sdo_download(1, object, &[0x34, 0x12], LIMITS).expect("it is there");
+    assert_eq!(main_device.sdo_upload(1, object, LIMITS, 2).expect("it is there"), [0x34, 0x12]);
+    let large = main_device.sdo_upload(1, SdoAddress::new(0x2002, 0), LIMITS, 200_000).expect("in segments");
+    assert_eq!(large.len(), 100_000);
+    let error = main_device.sdo_upload(1, SdoAddress::new(0x7777, 0), LIMITS, 2).expect_err("there is no such object");
+    assert!(error.to_string().contains("0x06020000 Object does not exist"), "{error}");
+    let error = main_device.sdo_upload(2, object, LIMITS, 2).expect_err("it has no mailbox");
+    assert!(error.to_string().contains("mailbox"), "{error}");
+    let mut application = main_device.activate(automatic(&scan.subdevices, CYCLE)).expect("activation");
+    for _ in 0..2000 {
+        application.cycle(|_| ());
+    }
+    assert!(application.all_settled());
+}
+
+#[test]
+fn requests_are_made_and_made_again_from_the_cyclic_thread() {
+    let mut world = World::in_op(1, ring_of_16(Duration::from_micros(10)));
+    let mut request = world.application_mut().engine_mut().create_sdo_request(3, 16);
+    let busy = |world: &mut World, request: &ringcat::SdoRequest| {
+        let mut cycles = 0;
+        while request.state() == RequestState::Busy {
+            world.cycle();
+            cycles += 1;
+            assert!(cycles < 3000);
+        }
+        cycles
+    };
+    for round in 0..5u16 {
+        request.set_object(0x8000 + 0x10 * (round % 4), 1, false).unwrap();
+        request.write(&round.to_le_bytes()).unwrap();
+        busy(&mut world, &request);
+        assert_eq!(request.state(), RequestState::Success);
+        request.read().unwrap();
+        let cycles = busy(&mut world, &request);
+        assert!(cycles <= 4, "{cycles} cycles of 1 ms");
+        let mut value = [0; 16];
+        assert_eq!(request.data(&mut value), 2);
+        assert_eq!(value[..2], round.to_le_bytes());
+    }
+    request.set_object(0x7777, 0, false).unwrap();
+    request.read().unwrap();
+    busy(&mut world, &request);
+    assert_eq!(request.failure(), Some(RequestFailure::Aborted(AbortCode::OBJECT_DOES_NOT_EXIST)));
+    request.set_timeout(Duration::from_millis(20)).unwrap();
+    request.set_object(0x8000, 1, false).unwrap();
+    world.hang(DeviceIndex(3), true);
+    request.read().unwrap();
+    let cycles = busy(&mut world, &request);
+    assert_eq!(request.failure(), Some(RequestFailure::Timeout));
+    assert!((19..25).contains(&cycles), "{cycles} cycles of 1 ms");
+    world.hang(DeviceIndex(3), false);
+    world.power_off(DeviceIndex(3));
+    world.run_cycles(20);
+    request.read().unwrap();
+    busy(&mut world, &request);
+    assert_eq!(request.failure(), Some(RequestFailure::Failed));
+}
+
+#[test]
+fn firmware_is_written_through_boot_and_the_new_version_is_reported_facts_6_4() {
+    let network = line(descriptions(&KINDS), NetworkOptions::default());
+    let mut main_device = MainDevice::request(Tap::new(network), &Options::default());
+    main_device.scan().expect("a scan");
+    let version = SdoAddress::new(0x100A, 0);
+    assert_eq!(main_device.sdo_upload(1, version, LIMITS, 50).expect("a version"), b"1.0");
+    main_device.bring_to(1, AlState::Boot).expect("it has a boot loader");
+    let image = firmware::image("2.7", &[0x5A; 20_000]);
+    let mailbox = main_device.mailbox(1).expect("it was visited");
+    let written = main_device.run(async move {
+        foe::write(&mailbox, "firmware.bin", FoeOptions::default(), &mut Bytes::new(&image), |_| ()).await
+    });
+    assert_eq!(written, Ok(20_000 + 4 + 1 + 3 + 4));
+    main_device.bring_to(1, AlState::Init).expect("it leaves the boot loader");
+    assert_eq!(main_device.sdo_upload(1, version, LIMITS, 50).expect("a version"), b"2.7");
+}
