@@ -1,5 +1,6 @@
 //! The `ringcat` program. Without arguments it runs the demonstration.
 
+mod bench;
 mod capture;
 mod demo;
 mod interfaces;
@@ -54,6 +55,8 @@ enum Command {
     Capture(capture::CaptureArguments),
     /// Puts a simulated segment on network interfaces, for any EtherCAT MainDevice at their other end.
     Sim(sim::SimArguments),
+    /// Measures: round trips against a bare echo, cycles back to back, start-up.
+    Bench(bench::BenchArguments),
 }
 
 fn main() -> ExitCode {
@@ -64,6 +67,7 @@ fn main() -> ExitCode {
         Command::Run(arguments) => run::run(&arguments),
         Command::Capture(arguments) => capture::run(&arguments).map(|()| true),
         Command::Sim(arguments) => sim::run(&arguments).map(|()| true),
+        Command::Bench(arguments) => bench::run(&arguments),
     };
     match held {
         Ok(true) => ExitCode::SUCCESS,

@@ -21,7 +21,7 @@ use crate::output::say;
 use doors::Doors;
 use orders::{Outcome, carry_out};
 use plant::Plant;
-use wires::Wires;
+use wires::{Pace, Wires};
 
 /// The carriers of the interfaces are looked at so often.
 const CARRIER_PERIOD: Duration = Duration::from_millis(1);
@@ -42,6 +42,10 @@ pub struct SimArguments {
     /// Unix socket at which orders are taken; each answer ends with a line `ok` or `error: ...`.
     #[arg(long, value_name = "PATH")]
     control: Option<PathBuf>,
+    /// How long frames take: as long as at 100 Mbit/s through real SubDevices, or as long as this machine needs to
+    /// compute the answer. Timers of SubDevices then run a little ahead of the clock, never behind it.
+    #[arg(long, value_enum, default_value = "real-time")]
+    pace: Pace,
     #[command(flatten)]
     thread: ThreadArguments,
 }
@@ -49,7 +53,8 @@ pub struct SimArguments {
 /// Runs the simulator until it is told to end.
 pub fn run(arguments: &SimArguments) -> Result<(), Failure> {
     let mut plant = Plant::new(load(arguments)?);
-    let mut wires = Wires::open(&arguments.main, arguments.redundant.as_deref(), arguments.thread.mode())?;
+    let mut wires =
+        Wires::open(&arguments.main, arguments.redundant.as_deref(), arguments.thread.mode(), arguments.pace)?;
     let names: Vec<&str> = std::iter::once(arguments.main.as_str()).chain(arguments.redundant.as_deref()).collect();
     let carriers = CarrierWatch::start(&names, CARRIER_PERIOD)?;
     if arguments.redundant.is_none() {

@@ -201,10 +201,9 @@ impl Leg {
         self.faulty = blocked || drop > 0 || duplicate > 0 || corrupt > 0 || delay > 0;
     }
 
-    /// Fate of a frame that took `wire_ns` from first to last bit and whose last bit is due at the far end at `at`: the
-    /// leg must have carried a signal from the first bit's entry to the last bit's exit.
-    pub(crate) fn fate(&self, at: SimTime, wire_ns: u64) -> Fate {
-        let first_out = at.back_ns(wire_ns);
+    /// Fate of a frame whose first bit was due at the far end at `first_out` and whose last one is due now: the leg must
+    /// have carried a signal from the first bit's entry to the last bit's exit.
+    pub(crate) fn fate(&self, first_out: SimTime) -> Fate {
         let first_in = first_out.back_ns(self.delay_ns);
         if self.signal && self.up_since <= first_in {
             return Fate::Arrives;
@@ -230,9 +229,9 @@ mod tests {
     fn a_frame_that_enters_before_the_cut_and_leaves_after_it_is_lost() {
         let mut leg = leg();
         leg.set_signal(false, SimTime(100_000));
-        assert_eq!(leg.fate(SimTime(100_000 + 5_760), WIRE), Fate::Lost);
-        assert_eq!(leg.fate(SimTime(100_000 + 5_759), WIRE), Fate::Truncated { seen: Duration::from_nanos(1) });
-        assert_eq!(leg.fate(SimTime(100_001), WIRE), Fate::Truncated { seen: Duration::from_nanos(5_759) });
+        assert_eq!(leg.fate(SimTime(100_000)), Fate::Lost);
+        assert_eq!(leg.fate(SimTime(105759 - WIRE)), Fate::Truncated { seen: Duration::from_nanos(1) });
+        assert_eq!(leg.fate(SimTime(100001 - WIRE)), Fate::Truncated { seen: Duration::from_nanos(5_759) });
     }
 
     #[test]
@@ -240,8 +239,8 @@ mod tests {
         let mut leg = leg();
         leg.set_signal(false, SimTime(100_000));
         leg.set_signal(true, SimTime(200_000));
-        assert_eq!(leg.fate(SimTime(200_000 + 6_259), WIRE), Fate::Lost);
-        assert_eq!(leg.fate(SimTime(200_000 + 6_260), WIRE), Fate::Arrives);
+        assert_eq!(leg.fate(SimTime(206259 - WIRE)), Fate::Lost);
+        assert_eq!(leg.fate(SimTime(206260 - WIRE)), Fate::Arrives);
     }
 
     #[test]
@@ -249,6 +248,6 @@ mod tests {
         let mut leg = leg();
         leg.set_signal(false, SimTime(100_000));
         leg.set_signal(true, SimTime(100_010));
-        assert_eq!(leg.fate(SimTime(104_000), WIRE), Fate::Truncated { seen: Duration::from_nanos(1_760) });
+        assert_eq!(leg.fate(SimTime(104000 - WIRE)), Fate::Truncated { seen: Duration::from_nanos(1_760) });
     }
 }

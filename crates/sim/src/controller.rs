@@ -133,6 +133,18 @@ impl Controller {
 
     /// Takes a frame whose last bit came in at `port` at `now` all the way to the port by which it leaves.
     pub fn receive(&mut self, frame: &mut SimFrame, port: Port, now: SimTime) -> Passage {
+        self.receive_between(frame, port, now.back_ns(frame.first_to_last_bit_ns()), now)
+    }
+
+    /// [`Controller::receive`] for a caller who knows when the first bit came in.
+    #[inline]
+    pub(crate) fn receive_between(
+        &mut self,
+        frame: &mut SimFrame,
+        port: Port,
+        first_bit: SimTime,
+        now: SimTime,
+    ) -> Passage {
         if !self.powered || !self.ports.link(port) {
             return Passage::Destroyed;
         }
@@ -146,7 +158,6 @@ impl Controller {
             }
             return Passage::Destroyed;
         }
-        let first_bit = now.back_ns(frame.first_to_last_bit_ns());
         if self.clock.arrived(port, frame.id, first_bit) && good {
             self.store_receive_time(port, first_bit);
         }
@@ -163,7 +174,8 @@ impl Controller {
         first_bit: SimTime,
         now: SimTime,
     ) -> Passage {
-        let open = Port::ALL.map(|port| self.ports.passes(port) || (returns && port == entry));
+        // What the frame itself opens or closes holds for the frames behind it.
+        let passing = self.ports.passing() | u8::from(returns) << entry.index();
         let mut processed = false;
         let mut at = entry;
         loop {
@@ -174,7 +186,7 @@ impl Controller {
                 processed = true;
             }
             at = ports::next(at);
-            if open[at.index()] {
+            if passing & 1 << at.index() != 0 {
                 return Passage::Leaves { port: at, processed };
             }
         }
@@ -218,7 +230,7 @@ impl Controller {
     }
 
     /// Brings up to date what is due.
-    fn catch_up(&mut self, now: SimTime) {
+    pub(crate) fn catch_up(&mut self, now: SimTime) {
         if now >= self.deadline {
             self.tick(now);
         }

@@ -83,7 +83,7 @@ impl Device {
         if !self.controller.is_powered() {
             return;
         }
-        self.controller.tick(now);
+        self.controller.catch_up(now);
         self.follow_restart(now);
         self.application.run(&self.description, &mut self.controller, now);
     }

@@ -205,6 +205,21 @@ impl Network {
         self.now = self.now.max(to);
     }
 
+    /// Lets everything happen, in its order and at its time, until no frame is under way any more: the time goes on to
+    /// the moment at which the last one has left the segment, but not beyond `limit`.
+    pub fn advance_until_quiet(&mut self, limit: SimTime) {
+        let mut follows = None;
+        while self.frames.under_way() > 0 {
+            let due = match follows.take() {
+                Some((at, event)) => self.queue.push_pop(at, event, limit),
+                None => self.queue.pop_until(limit),
+            };
+            let Some((at, event)) = due else { break };
+            self.now = at;
+            follows = self.handle(event);
+        }
+    }
+
     /// Lets the time pass.
     pub fn advance_by(&mut self, time: Duration) {
         self.advance(self.now + time);

@@ -57,11 +57,8 @@ impl Mapping {
     pub fn value(&self, index: u16, sub_index: u8, image: &[u8]) -> Option<u64> {
         let placed = self.find(index, sub_index)?;
         (placed.entry.bit_length <= 64).then(|| {
-            (0..usize::from(placed.entry.bit_length)).fold(0, |value, bit| {
-                let place = placed.bit_offset + bit;
-                let set = image.get(place / 8).is_some_and(|byte| byte >> (place % 8) & 1 != 0);
-                value | u64::from(set) << bit
-            })
+            let bits = u128::from_le_bytes(placed.bytes(image)) >> (placed.bit_offset % 8);
+            bits as u64 & placed.mask()
         })
     }
 
@@ -70,12 +67,31 @@ impl Mapping {
         let Some(placed) = self.find(index, sub_index) else {
             return;
         };
-        for bit in 0..usize::from(placed.entry.bit_length).min(64) {
-            let place = placed.bit_offset + bit;
-            if let Some(byte) = image.get_mut(place / 8) {
-                *byte = *byte & !(1 << (place % 8)) | ((value >> bit & 1) as u8) << (place % 8);
-            }
+        let (shift, mask) = (placed.bit_offset % 8, placed.mask());
+        let old = u128::from_le_bytes(placed.bytes(image));
+        let new = old & !(u128::from(mask) << shift) | u128::from(value & mask) << shift;
+        let touched = (shift + usize::from(placed.entry.bit_length.min(64))).div_ceil(8);
+        let start = placed.bit_offset / 8;
+        for (to, from) in image.iter_mut().skip(start).take(touched).zip(new.to_le_bytes()) {
+            *to = from;
         }
+    }
+}
+
+impl PlacedEntry {
+    /// The bytes from that of the first bit on, zeros behind the end of the image.
+    fn bytes(&self, image: &[u8]) -> [u8; 16] {
+        let rest = image.get(self.bit_offset / 8..).unwrap_or_default();
+        rest.first_chunk().copied().unwrap_or_else(|| {
+            let mut bytes = [0; 16];
+            bytes.iter_mut().zip(rest).for_each(|(to, from)| *to = *from);
+            bytes
+        })
+    }
+
+    /// As many ones as it has bits, at most 64.
+    fn mask(&self) -> u64 {
+        u64::MAX.checked_shr(64u32.saturating_sub(self.entry.bit_length.into())).unwrap_or(0)
     }
 }
 
@@ -93,6 +109,8 @@ pub struct ProcessData {
     output_mapping: Mapping,
     input_mapping: Mapping,
     received: Vec<u8>,
+    /// Room for what was received before.
+    before: Vec<u8>,
     outputs: Vec<u8>,
     inputs: Vec<u8>,
     source: Source,
@@ -112,6 +130,7 @@ impl ProcessData {
             output_mapping: Mapping::default(),
             input_mapping: Mapping::default(),
             received: Vec::new(),
+            before: Vec::new(),
             outputs: Vec::new(),
             inputs: Vec::new(),
             source,
@@ -269,8 +288,9 @@ impl ProcessData {
                     fresh |= controller.pdi_read(address, image, now);
                 }
             } else {
-                let before = image.to_vec();
-                fresh |= controller.pdi_read(address, image, now) && image != before.as_slice();
+                self.before.clear();
+                self.before.extend_from_slice(image);
+                fresh |= controller.pdi_read(address, image, now) && *image != *self.before;
             }
         }
         self.seen |= fresh;

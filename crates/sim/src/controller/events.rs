@@ -30,8 +30,11 @@ const ENHANCED_LINK_DETECTION: u8 = 0xF2;
 
 impl Controller {
     pub(super) fn set_ecat_event(&mut self, bits: u16) {
-        self.memory.set_u16(map::ECAT_EVENT, self.memory.u16(map::ECAT_EVENT) | bits);
-        self.refresh_irq();
+        let pending = self.memory.u16(map::ECAT_EVENT);
+        if pending & bits != bits {
+            self.memory.set_u16(map::ECAT_EVENT, pending | bits);
+            self.refresh_irq();
+        }
     }
 
     pub(super) fn clear_ecat_event(&mut self, bits: u16) {
@@ -76,13 +79,12 @@ impl Controller {
     /// Brings the status byte and the events of SyncManager `n` up to date.
     pub(super) fn refresh_sync_manager(&mut self, n: usize) {
         let status = map::sync_manager(n as u8).offset(ringcat_wire::register::SyncManager::STATUS);
-        self.memory.set_u8(status, self.sync_managers.status(n).bits());
+        self.memory.set_u8(status, self.sync_managers.status(n));
         let (ecat, pdi) = self.sync_managers.events(n);
         let bit = 1 << (EVENT_SYNC_MANAGER_PDI + n as u32);
-        if pdi {
-            self.set_al_event(bit)
-        } else {
-            self.clear_al_event(bit)
+        let pending = self.memory.u32(map::AL_EVENT);
+        if (pending & bit != 0) != pdi {
+            self.memory.set_u32(map::AL_EVENT, pending ^ bit);
         }
         if n < MIRRORED {
             let bit = 1 << (EVENT_SYNC_MANAGER_ECAT + n as u32);

@@ -91,6 +91,9 @@ impl Fmmus {
         let mapping = self.mappings.get(n).filter(|mapping| mapping.has(direction))?;
         let mut start = from.max(mapping.first);
         let mut stop = end.min(mapping.end);
+        if start >= stop {
+            return None;
+        }
         let lower = || self.mappings[..n].iter().filter(|lower| lower.has(direction));
         while let Some(covering) = lower().find(|lower| lower.first <= start && start < lower.end) {
             start = covering.end;

@@ -43,6 +43,15 @@ struct Region {
     needs: Needs,
 }
 
+impl Region {
+    const fn writable(&self, side: Side) -> bool {
+        match side {
+            Side::Ecat => self.ecat_writes,
+            Side::Pdi => self.pdi_writes,
+        }
+    }
+}
+
 const fn region(address: RegisterAddress, len: u16, ecat_writes: bool, pdi_writes: bool, needs: Needs) -> Region {
     Region { start: address.0, end: address.0 + len, ecat_writes, pdi_writes, needs }
 }
@@ -154,6 +163,28 @@ static UPPER_REGIONS: [Region; 5] = [
     fixed(map::GPI, 8),
 ];
 
+/// Where the latter begin.
+const UPPER_START: u32 = map::DC_PDI_BUFFER_START.0 as u32;
+
+/// For each address below user RAM, the place of the first region that ends behind it, in [`REGIONS`] or from where they
+/// begin on in [`UPPER_REGIONS`]: every read of a register looks here.
+static NEXT_REGION: [u8; USER_RAM as usize] = {
+    let mut next = [0; USER_RAM as usize];
+    let (mut place, mut address) = (0, 0);
+    while address < next.len() {
+        if address == UPPER_START as usize {
+            place = 0;
+        }
+        let all: &[Region] = if address < UPPER_START as usize { &REGIONS } else { &UPPER_REGIONS };
+        while place < all.len() && all[place].end as usize <= address {
+            place += 1;
+        }
+        next[address] = place as u8;
+        address += 1;
+    }
+    next
+};
+
 /// A run of addresses with equal rights, from where it was asked for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Run {
@@ -203,7 +234,18 @@ impl Memory {
     }
 
     /// The run of equal rights that starts at `address`.
+    #[inline]
     pub fn run(&self, address: u32, side: Side) -> Run {
+        if address < UPPER_START {
+            // Most registers are always there: the way of nearly every access.
+            let place = usize::from(NEXT_REGION[address as usize]);
+            return match REGIONS.get(place) {
+                Some(region) if region.needs == Needs::Nothing && u32::from(region.start) <= address => {
+                    Run { end: region.end.into(), exists: true, writable: region.writable(side) }
+                }
+                _ => self.register_run(address, side),
+            };
+        }
         if address < USER_RAM {
             return self.register_run(address, side);
         }
@@ -216,26 +258,17 @@ impl Memory {
     }
 
     fn register_run(&self, address: u32, side: Side) -> Run {
-        let all = if address < u32::from(UPPER_REGIONS[0].start) { &REGIONS[..] } else { &UPPER_REGIONS[..] };
-        let next = all.partition_point(|region| u32::from(region.end) <= address);
+        let all = if address < UPPER_START { &REGIONS[..] } else { &UPPER_REGIONS[..] };
+        let next = NEXT_REGION.get(address as usize).map_or(usize::MAX, |next| usize::from(*next));
         let Some(region) = all.get(next) else {
-            let end =
-                if address < u32::from(UPPER_REGIONS[0].start) { UPPER_REGIONS[0].start.into() } else { USER_RAM };
+            let end = if address < UPPER_START { UPPER_START } else { USER_RAM };
             return Run { end, exists: false, writable: false };
         };
         if address < u32::from(region.start) {
             return Run { end: region.start.into(), exists: false, writable: false };
         }
         let exists = self.has(region.needs);
-        let mut run = Run {
-            end: region.end.into(),
-            exists,
-            writable: exists
-                && match side {
-                    Side::Ecat => region.ecat_writes,
-                    Side::Pdi => region.pdi_writes,
-                },
-        };
+        let mut run = Run { end: region.end.into(), exists, writable: exists && region.writable(side) };
         match region.needs {
             Needs::Fmmu => run.limit(address, self.fmmus_end),
             Needs::SyncManager => {
@@ -286,10 +319,14 @@ impl Memory {
     }
 
     pub fn array<const N: usize>(&self, address: RegisterAddress) -> [u8; N] {
-        let mut out = [0; N];
-        let bytes = self.span(address.0.into(), N);
-        out[..bytes.len()].copy_from_slice(bytes);
-        out
+        self.bytes.get(usize::from(address.0)..).and_then(<[u8]>::first_chunk).copied().unwrap_or([0; N])
+    }
+
+    fn set_array<const N: usize>(&mut self, address: RegisterAddress, value: [u8; N]) {
+        let bytes = self.bytes.get_mut(usize::from(address.0)..).and_then(<[u8]>::first_chunk_mut);
+        if let Some(bytes) = bytes {
+            *bytes = value;
+        }
     }
 
     pub fn set_u8(&mut self, address: RegisterAddress, value: u8) {
@@ -297,15 +334,15 @@ impl Memory {
     }
 
     pub fn set_u16(&mut self, address: RegisterAddress, value: u16) {
-        self.store(address.0.into(), &value.to_le_bytes());
+        self.set_array(address, value.to_le_bytes());
     }
 
     pub fn set_u32(&mut self, address: RegisterAddress, value: u32) {
-        self.store(address.0.into(), &value.to_le_bytes());
+        self.set_array(address, value.to_le_bytes());
     }
 
     pub fn set_u64(&mut self, address: RegisterAddress, value: u64) {
-        self.store(address.0.into(), &value.to_le_bytes());
+        self.set_array(address, value.to_le_bytes());
     }
 
     /// Counts an 8-bit counter up to 0xFF (facts 2.5).
@@ -347,6 +384,15 @@ mod tests {
         let all: Vec<_> = REGIONS.iter().chain(&UPPER_REGIONS).collect();
         assert!(all.windows(2).all(|pair| pair[0].end <= pair[1].start));
         assert!(u32::from(all.last().unwrap().end) <= USER_RAM);
+    }
+
+    #[test]
+    fn the_table_of_addresses_finds_what_a_search_finds() {
+        for address in 0..USER_RAM {
+            let all = if address < UPPER_START { &REGIONS[..] } else { &UPPER_REGIONS[..] };
+            let next = all.partition_point(|region| u32::from(region.end) <= address);
+            assert_eq!(usize::from(NEXT_REGION[address as usize]), next, "{address:#06x}");
+        }
     }
 
     #[test]

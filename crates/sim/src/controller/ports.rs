@@ -21,6 +21,9 @@ pub(super) struct Ports {
     usable: [bool; 4],
     link: [bool; 4],
     open: [bool; 4],
+    /// The ports that frames pass, bit by bit: those that are open, and port 0 as the way back in when none is (facts
+    /// 2.2). At hand for every frame.
+    passing: u8,
     modes: [LoopControl; 4],
     /// The frame that closed loops by writing DL_CONTROL, and the loops: it may still come back through them.
     closing: Option<(u64, [bool; 4])>,
@@ -32,6 +35,7 @@ impl Ports {
             usable: kinds.map(|kind| kind != PortKind::NotImplemented),
             link: [false; 4],
             open: [false; 4],
+            passing: 1,
             modes: [LoopControl::Auto; 4],
             closing: None,
         }
@@ -40,6 +44,7 @@ impl Ports {
     /// Takes all links away.
     pub fn unplug(&mut self) {
         (self.link, self.open) = ([false; 4], [false; 4]);
+        self.note_passing();
     }
 
     pub fn link(&self, port: Port) -> bool {
@@ -69,6 +74,7 @@ impl Ports {
         let p = port.index();
         let opens = !self.open[p] && self.link[p] && self.modes[p] == LoopControl::AutoClose;
         self.open[p] |= opens;
+        self.note_passing();
         opens
     }
 
@@ -80,6 +86,12 @@ impl Ports {
                 LoopControl::Open => true,
                 LoopControl::Closed => false,
             };
+        self.note_passing();
+    }
+
+    fn note_passing(&mut self) {
+        let open = (0..4).fold(0, |mask, p| mask | u8::from(self.open[p]) << p);
+        self.passing = if open == 0 { 1 } else { open };
     }
 
     /// Whether the loop is closed, as DL status shows it.
@@ -89,7 +101,12 @@ impl Ports {
 
     /// Whether frames pass the port. Port 0 is the way back in when all loops are closed (facts 2.2).
     pub fn passes(&self, port: Port) -> bool {
-        self.open[port.index()] || (port == Port::A && self.open == [false; 4])
+        self.passing & 1 << port.index() != 0
+    }
+
+    /// The ports that frames pass, bit by bit.
+    pub const fn passing(&self) -> u8 {
+        self.passing
     }
 
     /// Whether a frame passes the port although its loop is closed: it is the frame that closed it, on its way back.

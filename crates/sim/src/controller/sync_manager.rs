@@ -7,7 +7,7 @@
 //! Not configured areas are free. The area of a SyncManager that is switched off, by either side, is locked. The second
 //! and third buffer are not addressable. Areas of one byte, and areas in register space, have a single buffer.
 
-use ringcat_wire::register::{SyncManager, SyncManagerDirection, SyncManagerMode, SyncManagerStatus};
+use ringcat_wire::register::{SyncManager, SyncManagerDirection, SyncManagerMode};
 
 use super::memory::{PROCESS_RAM, Side};
 
@@ -185,7 +185,7 @@ impl SyncManagers {
     }
 
     /// The status byte (+5).
-    pub fn status(&self, n: usize) -> SyncManagerStatus {
+    pub fn status(&self, n: usize) -> u8 {
         self.units[n].status()
     }
 
@@ -345,23 +345,22 @@ impl Unit {
         (0..NO_BUFFER).find(|&b| !taken(b)).unwrap_or(0)
     }
 
-    fn status(&self) -> SyncManagerStatus {
-        let mailbox = self.buffering == Buffering::Mailbox;
-        SyncManagerStatus {
-            write_event: self.write_event,
-            read_event: self.read_event,
-            mailbox_full: self.full,
-            last_buffer: if mailbox { 0 } else { self.last_buffer },
-            read_buffer_open: self.reader_open,
-            write_buffer_open: self.writer_open,
-            reserved: 0,
-        }
+    /// The bits of [`ringcat_wire::register::SyncManagerStatus`]: every access writes them.
+    fn status(&self) -> u8 {
+        let last_buffer = if self.buffering == Buffering::Mailbox { 0 } else { self.last_buffer };
+        u8::from(self.write_event)
+            | u8::from(self.read_event) << 1
+            | u8::from(self.full) << 3
+            | last_buffer << 4
+            | u8::from(self.reader_open) << 6
+            | u8::from(self.writer_open) << 7
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use ringcat_wire::register::SyncManagerStatus;
 
     fn managers(control: u8, length: u16) -> SyncManagers {
         let mut managers = SyncManagers::new(8);
@@ -400,6 +399,32 @@ mod tests {
 
     #[test]
     fn after_a_reset_no_buffer_was_written() {
-        assert_eq!(SyncManagers::new(1).status(0).bits(), 0x30);
+        assert_eq!(SyncManagers::new(1).status(0), 0x30);
+    }
+
+    #[test]
+    fn the_status_byte_is_that_of_the_codec() {
+        for bits in 0..0x80u8 {
+            let flag = |bit: u8| bits >> bit & 1 != 0;
+            let unit = Unit {
+                write_event: flag(0),
+                read_event: flag(1),
+                full: flag(2),
+                last_buffer: bits >> 3 & 3,
+                reader_open: flag(5),
+                writer_open: flag(6),
+                ..Unit::default()
+            };
+            let status = SyncManagerStatus {
+                write_event: unit.write_event,
+                read_event: unit.read_event,
+                mailbox_full: unit.full,
+                last_buffer: unit.last_buffer,
+                read_buffer_open: unit.reader_open,
+                write_buffer_open: unit.writer_open,
+                reserved: 0,
+            };
+            assert_eq!(unit.status(), status.bits());
+        }
     }
 }

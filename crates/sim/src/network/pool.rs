@@ -48,6 +48,11 @@ impl FramePool {
         &mut self.frames[slot.0 as usize]
     }
 
+    /// Frames that have not gone as far as they go.
+    pub(crate) fn under_way(&self) -> usize {
+        self.frames.len() - self.free.len()
+    }
+
     /// The frame goes no further.
     pub(crate) fn remove(&mut self, slot: Slot) {
         self.free.push(slot);

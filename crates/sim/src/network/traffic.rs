@@ -48,10 +48,10 @@ impl Network {
         if self.legs[id.index()].faulty && !meddled {
             return self.meddle(slot, id);
         }
-        let wire_ns = self.frames.frame(slot).first_to_last_bit_ns();
+        let first_bit = self.now.back_ns(self.frames.frame(slot).first_to_last_bit_ns());
         let leg = &self.legs[id.index()];
-        let (to, detected) = (leg.to, leg.detected && leg.detected_at <= self.now.back_ns(wire_ns));
-        match leg.fate(self.now, wire_ns) {
+        let (to, detected) = (leg.to, leg.detected && leg.detected_at <= first_bit);
+        match leg.fate(first_bit) {
             Fate::Arrives => {}
             Fate::Truncated { seen } if bytes_within(seen) > 0 => {
                 let frame = self.frames.frame_mut(slot);
@@ -64,7 +64,7 @@ impl Network {
             return self.lose_hop(slot, LossCause::NoLink);
         }
         match to {
-            Endpoint::Device(device, port) => self.hop(slot, device.0, port),
+            Endpoint::Device(device, port) => self.hop(slot, device.0, port, first_bit),
             Endpoint::Host(link) => {
                 self.deliver(slot, link);
                 None
@@ -73,13 +73,15 @@ impl Network {
     }
 
     /// A frame passes a device.
-    fn hop(&mut self, slot: Slot, index: usize, from: Port) -> Option<(SimTime, Event)> {
+    fn hop(&mut self, slot: Slot, index: usize, from: Port, first_bit: SimTime) -> Option<(SimTime, Event)> {
         self.statistics.hops += 1;
         let frame = self.frames.frame_mut(slot);
-        let first_bit = self.now.back_ns(frame.first_to_last_bit_ns());
         let node = &mut self.nodes[index];
-        let passage = node.device.controller.receive(frame, from, self.now);
-        self.settle(index);
+        let passage = node.device.controller.receive_between(frame, from, first_bit, self.now);
+        // A frame that only passes by gives the application nothing to do.
+        if !matches!(passage, Passage::Leaves { processed: false, .. }) {
+            self.settle(index);
+        }
         let Passage::Leaves { port, processed } = passage else {
             return self.lose_hop(slot, LossCause::Destroyed);
         };

@@ -212,3 +212,34 @@ fn an_interface_without_carrier_sends_nothing() {
     assert_eq!(network.statistics().link(Redundant).frames_sent, 0);
     assert!(!network.carrier(Redundant));
 }
+
+#[test]
+fn time_leaps_to_the_moment_the_last_frame_has_left_and_not_beyond() {
+    let mut leaping = segment(&ring(3));
+    let mut waiting = segment(&ring(3));
+    let start = leaping.now();
+    for network in [&mut leaping, &mut waiting] {
+        network.send(Main, &shortest());
+        network.send(Main, &shortest());
+    }
+    waiting.advance_by(SETTLE);
+    let expected = arrivals(&mut waiting, Redundant, start);
+    leaping.advance_until_quiet(start + SETTLE);
+    assert_eq!(leaping.now(), start + ns(expected[1]));
+    assert_eq!(arrivals(&mut leaping, Redundant, start), expected);
+    // Nothing is under way: time stands still.
+    leaping.advance_until_quiet(start + SETTLE);
+    assert_eq!(leaping.now(), start + ns(expected[1]));
+}
+
+#[test]
+fn a_leap_ends_at_its_limit_and_the_next_one_goes_on() {
+    let mut network = segment(&ring(3));
+    let start = network.now();
+    network.send(Main, &shortest());
+    network.advance_until_quiet(start + ns(WIRE_NS));
+    assert!(network.now() <= start + ns(WIRE_NS));
+    assert_eq!(network.receive(Redundant), None);
+    network.advance_until_quiet(start + SETTLE);
+    assert_eq!(arrivals(&mut network, Redundant, start).len(), 1);
+}

@@ -1,0 +1,131 @@
+//! All SubDevices to OP, and process data as fast as the frames come back.
+//!
+//! A cycle is receive, judge, work, queue, send; it begins when all frames of the last one are back. The halves run as
+//! in `ringcat run`, the cycles in the thread that measures.
+
+use std::time::Duration;
+
+use clap::Args;
+use ringcat::packet::PacketLinks;
+use ringcat::{
+    AcyclicHalf, Application, Declaration, DomainId, DomainState, LastOutputs, MainDevice, Options, Scan,
+    SupervisorThread, Trigger, automatic,
+};
+use ringcat_link::monotonic;
+use ringcat_wire::al::AlState;
+
+use super::quantile_us;
+use crate::interfaces::{Failure, InterfaceArguments, ThreadArguments};
+use crate::output::say;
+
+/// The domain that `automatic` declares.
+const DOMAIN: DomainId = DomainId(0);
+/// Cycle time until all are in OP.
+const START_UP_CYCLE: Duration = Duration::from_millis(1);
+/// From activation to OP of the last SubDevice at the most.
+const OP_LIMIT: Duration = Duration::from_secs(60);
+/// SubDevices have this long to get to INIT in the end.
+const STOP_LIMIT: Duration = Duration::from_secs(5);
+/// Cycles back to back before the measured ones.
+const WARM_UP: u32 = 1000;
+
+/// Options of `ringcat bench cycles`.
+#[derive(Args, Debug)]
+pub struct CyclesArguments {
+    #[command(flatten)]
+    interfaces: InterfaceArguments,
+    #[command(flatten)]
+    thread: ThreadArguments,
+    /// Cycles to be measured; 0 for the start-up alone.
+    #[arg(long, value_name = "CYCLES", default_value = "20000", value_parser = clap::value_parser!(u32).range(0..=10_000_000))]
+    count: u32,
+    /// Leaves the supervision datagram out, for a comparison with those that send process data alone.
+    #[arg(long)]
+    unsupervised: bool,
+    /// Both halves in one thread, as small applications have them.
+    #[arg(long)]
+    one_thread: bool,
+}
+
+/// Measures; true where every cycle was complete.
+pub fn run(arguments: &CyclesArguments) -> Result<bool, Failure> {
+    let thread = arguments.thread;
+    let options = Options { supervision: !arguments.unsupervised, ..Options::default() };
+    if arguments.one_thread {
+        let links = arguments.interfaces.open(thread)?;
+        let _awake = thread.apply();
+        let begin = monotonic::now_ns();
+        let mut main_device = MainDevice::request(links, &options);
+        let scan = main_device.scan()?;
+        let declaration = declare(&scan, begin);
+        let mut application = main_device.activate(declaration).map_err(ringcat::Error::from)?;
+        let incomplete = exchange(&mut application, arguments.count, begin)?;
+        application.stop(LastOutputs::Zero, AlState::Init, STOP_LIMIT)?;
+        Ok(incomplete == 0)
+    } else {
+        let (cyclic, acyclic) = arguments.interfaces.open_halves(thread)?;
+        let begin = monotonic::now_ns();
+        let supervisor = SupervisorThread::start(acyclic, &options, move || thread.prepare_supervisor())?;
+        let _awake = thread.apply();
+        let scan = supervisor.scan()?;
+        let declaration = declare(&scan, begin);
+        let mut application = supervisor.activate(declaration, cyclic).map_err(ringcat::Error::from)?;
+        let incomplete = exchange(&mut application, arguments.count, begin)?;
+        application.stop(LastOutputs::Zero, AlState::Init, STOP_LIMIT)?;
+        Ok(incomplete == 0)
+    }
+}
+
+fn declare(scan: &Scan, begin: u64) -> Declaration {
+    say!("SubDevices: {}", scan.subdevices.len());
+    say!("scanned after: {:.1} ms", (monotonic::now_ns() - begin) as f64 / 1e6);
+    automatic(&scan.subdevices, START_UP_CYCLE)
+}
+
+/// To OP, then cycles back to back; how many of them were not complete.
+fn exchange<H: AcyclicHalf>(
+    application: &mut Application<PacketLinks, H>,
+    count: u32,
+    begin: u64,
+) -> Result<usize, Failure> {
+    let until = application.now() + OP_LIMIT;
+    while !application.all_settled() {
+        application.cycle(|_| ());
+        if application.now() >= until {
+            return Err(Failure::new("not all SubDevices get to OP; `ringcat run` tells which, and why"));
+        }
+    }
+    say!("all in OP after: {:.1} ms", (application.now().0 - begin) as f64 / 1e6);
+    if count == 0 {
+        return Ok(0);
+    }
+    application.set_trigger(Trigger::FramesReturned { at_least: Duration::ZERO });
+    let mut cycle = || {
+        application.cycle(|data| {
+            // The application's part: an output changes, and answers to an input.
+            if let [first, second, .., last] = data.image_mut(DOMAIN) {
+                *first = first.wrapping_add(1);
+                *second = *last;
+            }
+            (data.now().0, data.status(DOMAIN).state == DomainState::Complete)
+        })
+    };
+    for _ in 0..WARM_UP {
+        cycle();
+    }
+    let mut times_ns = Vec::with_capacity(count as usize);
+    let (first, _) = cycle();
+    let (mut last, mut incomplete) = (first, 0);
+    for _ in 0..count {
+        let (now, complete) = cycle();
+        times_ns.push(now - last);
+        incomplete += usize::from(!complete);
+        last = now;
+    }
+    times_ns.sort_unstable();
+    say!("cycles per second: {:.0}", f64::from(count) * 1e9 / (last - first) as f64);
+    say!("cycle median: {:.2} us", quantile_us(&times_ns, 50));
+    say!("cycle minimum: {:.2} us", quantile_us(&times_ns, 0));
+    say!("incomplete: {incomplete} of {count}");
+    Ok(incomplete)
+}
