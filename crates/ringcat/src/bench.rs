@@ -5,6 +5,7 @@
 
 mod cycles;
 mod echo;
+mod rate;
 mod round_trip;
 
 use clap::{Args, Subcommand};
@@ -27,6 +28,8 @@ enum What {
     RoundTrip(round_trip::RoundTripArguments),
     /// Brings all SubDevices to OP, then exchanges process data as fast as the frames come back, then stops.
     Cycles(cycles::CyclesArguments),
+    /// Brings all SubDevices to OP, then looks for the shortest cycle that can be kept.
+    Rate(rate::RateArguments),
 }
 
 /// Runs a measurement; true where nothing was lost.
@@ -35,6 +38,7 @@ pub fn run(arguments: &BenchArguments) -> Result<bool, Failure> {
         What::Echo(arguments) => echo::run(arguments),
         What::RoundTrip(arguments) => round_trip::run(arguments),
         What::Cycles(arguments) => cycles::run(arguments),
+        What::Rate(arguments) => rate::run(arguments),
     }
 }
 

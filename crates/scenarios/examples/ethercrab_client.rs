@@ -1,7 +1,8 @@
 //! The MainDevice of another project (ethercrab, from the registry) on a network interface, as a check of our simulator.
 //!
 //! `ethercrab_client INTERFACE SUBDEVICES CYCLES`: brings everything to OP and exchanges process data. In cycle i byte j
-//! of the outputs of SubDevice k is i + k + j. Prints one line of figures, then keeps exchanging the last outputs until
+//! of the outputs of SubDevice k is i + k + j. As many cycles follow without any work but the exchange, to tell
+//! how many there are in a second. Prints one line of figures, then keeps exchanging the last outputs until
 //! its standard input ends. Anything unexpected ends it with an error.
 
 use std::io;
@@ -88,6 +89,11 @@ async fn run(interface: &str, count: usize, cycles: usize) -> Result<(), String>
         }
         wrong += usize::from(response.working_counter != wkc);
     }
+    let back_to_back = Instant::now();
+    for _ in 0..cycles {
+        group.tx_rx(&main_device).await.map_err(failed("process data"))?;
+    }
+    let per_second = cycles as f64 / back_to_back.elapsed().as_secs_f64().max(f64::EPSILON);
     let inputs: Vec<String> = group
         .iter(&main_device)
         .map(|subdevice| subdevice.inputs_raw().iter().map(|byte| format!("{byte:02x}")).collect())
@@ -95,7 +101,7 @@ async fn run(interface: &str, count: usize, cycles: usize) -> Result<(), String>
     round_trips.sort();
     let median = round_trips.get(cycles / 2).copied().unwrap_or_default();
     println!(
-        "op_ms {} median_us {:.1} wkc {wkc} wrong {wrong} inputs {}",
+        "op_ms {} median_us {:.1} per_second {per_second:.0} wkc {wkc} wrong {wrong} inputs {}",
         to_op.as_millis(),
         median.as_secs_f64() * 1e6,
         inputs.join(",")

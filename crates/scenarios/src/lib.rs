@@ -3,7 +3,7 @@
 //! per theme.
 //!
 //! Benches (`src/bin/`) run on [`cyclic_load`] and [`answering_double`], count with [`callgrind`] and
-//! [`counting_allocator`] and print [`figures`].
+//! [`counting_allocator`] and print [`figures`]; what is measured on real interfaces runs in [`namespaces`].
 
 pub mod answering_double;
 pub mod callgrind;
@@ -16,6 +16,7 @@ pub mod dice;
 pub mod figures;
 pub mod loss;
 pub mod meddler;
+pub mod namespaces;
 pub mod phases;
 pub mod segments;
 pub mod tap;

@@ -19,13 +19,13 @@ use crate::interfaces::{Failure, InterfaceArguments, ThreadArguments};
 use crate::output::say;
 
 /// The domain that `automatic` declares.
-const DOMAIN: DomainId = DomainId(0);
+pub const DOMAIN: DomainId = DomainId(0);
 /// Cycle time until all are in OP.
 const START_UP_CYCLE: Duration = Duration::from_millis(1);
 /// From activation to OP of the last SubDevice at the most.
 const OP_LIMIT: Duration = Duration::from_secs(60);
 /// SubDevices have this long to get to INIT in the end.
-const STOP_LIMIT: Duration = Duration::from_secs(5);
+pub const STOP_LIMIT: Duration = Duration::from_secs(5);
 /// Cycles back to back before the measured ones.
 const WARM_UP: u32 = 1000;
 
@@ -76,18 +76,15 @@ pub fn run(arguments: &CyclesArguments) -> Result<bool, Failure> {
     }
 }
 
-fn declare(scan: &Scan, begin: u64) -> Declaration {
+/// Everything as its SII says; tells of the scan.
+pub fn declare(scan: &Scan, begin: u64) -> Declaration {
     say!("SubDevices: {}", scan.subdevices.len());
     say!("scanned after: {:.1} ms", (monotonic::now_ns() - begin) as f64 / 1e6);
     automatic(&scan.subdevices, START_UP_CYCLE)
 }
 
-/// To OP, then cycles back to back; how many of them were not complete.
-fn exchange<H: AcyclicHalf>(
-    application: &mut Application<PacketLinks, H>,
-    count: u32,
-    begin: u64,
-) -> Result<usize, Failure> {
+/// Cycles until all are in OP.
+pub fn reach_op<H: AcyclicHalf>(application: &mut Application<PacketLinks, H>, begin: u64) -> Result<(), Failure> {
     let until = application.now() + OP_LIMIT;
     while !application.all_settled() {
         application.cycle(|_| ());
@@ -96,6 +93,16 @@ fn exchange<H: AcyclicHalf>(
         }
     }
     say!("all in OP after: {:.1} ms", (application.now().0 - begin) as f64 / 1e6);
+    Ok(())
+}
+
+/// To OP, then cycles back to back; how many of them were not complete.
+fn exchange<H: AcyclicHalf>(
+    application: &mut Application<PacketLinks, H>,
+    count: u32,
+    begin: u64,
+) -> Result<usize, Failure> {
+    reach_op(application, begin)?;
     if count == 0 {
         return Ok(0);
     }

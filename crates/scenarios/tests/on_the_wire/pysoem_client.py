@@ -1,7 +1,8 @@
 """The MainDevice of another project (SOEM, through pysoem) on a network interface, as a check of our simulator.
 
 pysoem_client.py INTERFACE[,REDUNDANT] SUBDEVICES CYCLES: brings everything to OP and exchanges process data. In cycle i
-byte j of the outputs of SubDevice k is i + k + j. Prints one line of figures, then keeps exchanging the last outputs
+byte j of the outputs of SubDevice k is i + k + j. As many cycles follow without any work but sending and receiving, to
+tell how many there are in a second. Prints one line of figures, then keeps exchanging the last outputs
 until its standard input ends.
 """
 
@@ -40,11 +41,16 @@ def main():
         sent = time.monotonic()
         wrong += exchange(main_device) != main_device.expected_wkc
         times.append(time.monotonic() - sent)
+    begin = time.monotonic()
+    for cycle in range(cycles):
+        exchange(main_device)
+    per_second = cycles / (time.monotonic() - begin)
     times.sort()
     inputs = ",".join(bytes(subdevice.input).hex() for subdevice in main_device.slaves)
     median = times[cycles // 2] * 1e6
     print(
-        f"op_ms {to_op * 1e3:.0f} median_us {median:.1f} wkc {main_device.expected_wkc} wrong {wrong} inputs {inputs}",
+        f"op_ms {to_op * 1e3:.0f} median_us {median:.1f} per_second {per_second:.0f} wkc {main_device.expected_wkc} "
+        f"wrong {wrong} inputs {inputs}",
         flush=True,
     )
     while not select.select([sys.stdin], [], [], 0.001)[0]:

@@ -1,0 +1,94 @@
+//! Two network namespaces with a veth pair between them, and programs in them: what benches on real interfaces run in.
+//!
+//! The MainDevice's end is `near0`, the segment's `far0`. Both namespaces are gone when the value is dropped.
+
+use std::ffi::OsStr;
+use std::process::{Child, Command, Stdio};
+use std::time::Duration;
+
+/// Numbers of the interfaces: different at both ends, so that the loss of a carrier is told in time.
+const INDEX: [u32; 2] = [50, 60];
+/// A program that serves gets this long to be ready.
+const START: Duration = Duration::from_millis(400);
+
+/// The namespaces.
+#[derive(Debug)]
+pub struct Namespaces {
+    near: String,
+    far: String,
+}
+
+impl Namespaces {
+    /// Makes them.
+    ///
+    /// # Errors
+    /// What `ip` says: mostly that only root may.
+    pub fn new() -> Result<Namespaces, String> {
+        let id = std::process::id();
+        let made = Namespaces { near: format!("ringcat{id}near"), far: format!("ringcat{id}far") };
+        for namespace in [&made.near, &made.far] {
+            ip(&format!("netns add {namespace}"))?;
+        }
+        let ([near, far], Namespaces { near: here, far: there }) = (INDEX, &made);
+        ip(&format!("-n {here} link add near0 index {near} type veth peer name far0 index {far} netns {there}"))?;
+        for (namespace, interface) in [(here, "near0"), (there, "far0")] {
+            // Addresses of the host would only make it send frames of its own; old kernels do not know the mode.
+            let _ = ip(&format!("-n {namespace} link set {interface} addrgenmode none"));
+            ip(&format!("-n {namespace} link set {interface} up"))?;
+        }
+        Ok(made)
+    }
+
+    /// A command at the MainDevice's end.
+    pub fn near(&self, program: impl AsRef<OsStr>) -> Command {
+        inside(&self.near, program.as_ref())
+    }
+
+    /// Starts a program at the segment's end that serves until it is dropped.
+    ///
+    /// # Errors
+    /// It does not start.
+    pub fn serve(&self, program: impl AsRef<OsStr>, arguments: &[&str]) -> Result<Server, String> {
+        let mut command = inside(&self.far, program.as_ref());
+        command.args(arguments).stdin(Stdio::null()).stdout(Stdio::null());
+        let child = command.spawn().map_err(|error| error.to_string())?;
+        let mut server = Server(child);
+        std::thread::sleep(START);
+        match server.0.try_wait() {
+            Ok(None) => Ok(server),
+            other => Err(format!("{arguments:?} ended at once: {other:?}")),
+        }
+    }
+}
+
+impl Drop for Namespaces {
+    fn drop(&mut self) {
+        for namespace in [&self.near, &self.far] {
+            // One that could not be made cannot be removed.
+            let _ = ip(&format!("netns del {namespace}"));
+        }
+    }
+}
+
+/// A program that serves.
+#[derive(Debug)]
+pub struct Server(Child);
+
+impl Drop for Server {
+    fn drop(&mut self) {
+        // It may have ended by itself.
+        let _ = self.0.kill();
+        let _ = self.0.wait();
+    }
+}
+
+fn inside(namespace: &str, program: &OsStr) -> Command {
+    let mut command = Command::new("ip");
+    command.args(["netns", "exec", namespace]).arg(program);
+    command
+}
+
+fn ip(arguments: &str) -> Result<(), String> {
+    let output = Command::new("ip").args(arguments.split(' ')).output().map_err(|error| format!("ip: {error}"))?;
+    if output.status.success() { Ok(()) } else { Err(String::from_utf8_lossy(&output.stderr).trim().to_owned()) }
+}
