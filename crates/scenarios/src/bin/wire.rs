@@ -12,6 +12,8 @@ use scenarios::figures::{Figures, verdict};
 use scenarios::namespaces::{Namespaces, Server};
 
 type Tried<T> = Result<T, String>;
+/// Fills a table with figures.
+type Measure<'a> = &'a dyn Fn(&mut Figures) -> Tried<()>;
 
 /// Tries of each figure.
 const TRIES: usize = 3;
@@ -48,7 +50,7 @@ fn main() -> ExitCode {
             return ExitCode::SUCCESS;
         }
     };
-    let figures: [(&str, &dyn Fn(&mut Figures) -> Tried<()>); 5] = [
+    let figures: [(&str, Measure<'_>); 5] = [
         ("round trip of a process-data cycle, against a bare echo client", &|figures| wire.round_trips(figures)),
         ("system calls of a cycle, one frame, one link, busy-poll", &|figures| wire.system_calls(figures)),
         ("cycles back to back, 50 SubDevices, simulator as fast as possible", &|figures| wire.cycles(figures)),
@@ -65,7 +67,7 @@ fn main() -> ExitCode {
     verdict(missed.is_empty())
 }
 
-fn show(heading: &str, attempt: usize, measure: &dyn Fn(&mut Figures) -> Tried<()>) -> bool {
+fn show(heading: &str, attempt: usize, measure: Measure<'_>) -> bool {
     let mut figures = Figures::new(&format!("{heading} (try {attempt} of {TRIES})"));
     let result = measure(&mut figures);
     let met = figures.print();
