@@ -1,11 +1,12 @@
 //! The CoE server of a device (facts 6.3): tells the services apart; [`transfer`] serves SDOs, [`information`] SDO
-//! information.
+//! information, [`pdo`] PDOs by mailbox.
 //!
 //! In: the payload of a CoE message, the dictionary, the process data (mapped objects show what is in it), the state.
-//! Out: the payloads of the answer. Emergencies are sent by whoever makes them; PDOs by mailbox get the mailbox error
+//! Out: the payloads of the answer. Emergencies are sent by whoever makes them; what is no request gets the mailbox error
 //! "service not supported".
 
 mod information;
+mod pdo;
 mod transfer;
 
 use ringcat_wire::al::AlState;
@@ -46,15 +47,17 @@ impl CoeServer {
         let Some(header) = payload.first_chunk() else {
             return Answer::Error(ErrorReply::SIZE_TOO_SHORT);
         };
-        match CoeHeader::decode(header).service {
+        let data = &payload[CoeHeader::LEN..];
+        let CoeHeader { number, service, .. } = CoeHeader::decode(header);
+        match service {
             CoeService::SdoRequest => self.transfer.serve(payload, room, objects),
             CoeService::SdoInformation if objects.information => information::serve(payload, room, objects.dictionary),
+            CoeService::RxPdo => pdo::receive(number, data, objects),
+            CoeService::TxPdoRemote => pdo::send(CoeService::TxPdo, number, room, objects),
+            CoeService::RxPdoRemote => pdo::send(CoeService::RxPdo, number, room, objects),
             CoeService::Emergency
             | CoeService::SdoResponse
             | CoeService::TxPdo
-            | CoeService::RxPdo
-            | CoeService::TxPdoRemote
-            | CoeService::RxPdoRemote
             | CoeService::SdoInformation
             | CoeService::Other(_) => Answer::Error(ErrorReply::SERVICE_NOT_SUPPORTED),
         }

@@ -18,6 +18,8 @@ use idn::IdnObject;
 
 /// Most bytes of an element that is written in fragments.
 const MAX_ELEMENT: usize = 1 << 16;
+/// Notifications that wait for the mailbox; more are dropped.
+const MAX_NOTIFICATIONS: usize = 64;
 /// IDN of the list of all IDNs, and of that of all procedure commands.
 const ALL_IDNS: Idn = Idn::standard(0, 17);
 const ALL_COMMANDS: Idn = Idn::standard(0, 25);
@@ -125,7 +127,7 @@ impl SoeServer {
     pub fn let_commands_end(&mut self, now: SimTime) {
         for (number, drive) in (0u8..).zip(&mut self.drives) {
             for object in drive {
-                if object.ends(now) {
+                if object.ends(now) && self.notifications.len() < MAX_NOTIFICATIONS {
                     let message =
                         SoeMessage::whole(SoeOperation::Notification, number, SoeElements::VALUE, object.idn, &[]);
                     self.notifications.push_back(encode(&message));

@@ -7,7 +7,7 @@ use ringcat_wire::mailbox::coe::{
     ObjectDescription, SdoInformation, ValueInfo,
 };
 use ringcat_wire::mailbox::sdo::{AbortCode, SdoRequest, SdoResponse};
-use ringcat_wire::mailbox::{Header, Protocol};
+use ringcat_wire::mailbox::{ErrorReply, Header, Protocol};
 
 use super::client::{ANSWER, Client};
 use crate::catalogue::LARGE_OBJECT_BYTES;
@@ -364,4 +364,46 @@ fn flags_of_the_diagnosis_history_keep_messages_out_or_send_emergencies_facts_6_
     assert!(!diagnose(&mut client, 22), "full of messages that nobody acknowledged");
     client.download(DiagnosisHistory::INDEX, 3, &[6]).unwrap();
     assert!(diagnose(&mut client, 23));
+}
+
+fn pdo(client: &mut Client, service: CoeService, number: u16, data: &[u8]) -> Option<(Header, Vec<u8>)> {
+    let mut payload = CoeHeader { number, ..CoeHeader::new(service) }.encode().to_vec();
+    payload.extend_from_slice(data);
+    client.post(Protocol::Coe, &payload);
+    client.bench.pass(ANSWER);
+    client.bench.fetch_mail()
+}
+
+#[test]
+fn pdos_come_and_go_by_mailbox_facts_6_3() {
+    let mut client = Client::new("servo", AlState::PreOp);
+    // Controlword, target position, target velocity, mode, gap.
+    let command = [0x0F, 0, 0x44, 0x33, 0x22, 0x11, 0, 0, 0, 0, 8, 0];
+    assert_eq!(pdo(&mut client, CoeService::RxPdo, 0, &command), None, "an RxPDO is not answered");
+    assert_eq!(client.upload(0x607A, 0), Ok(vec![0x44, 0x33, 0x22, 0x11]));
+    assert_eq!(client.upload(0x6060, 0), Ok(vec![8]));
+    let (_, back) = pdo(&mut client, CoeService::RxPdoRemote, 0, &[]).unwrap();
+    assert_eq!((&back[..2], &back[2..]), (&[0x00, 0x50][..], &command[..]));
+    let (_, status) = pdo(&mut client, CoeService::TxPdoRemote, 1, &[]).unwrap();
+    assert_eq!((&status[..2], status.len()), (&[0x01, 0x40][..], 4), "0x1A01, the statusword alone");
+    let mut refused = |service, number, data: &[u8]| {
+        let (header, payload) = pdo(&mut client, service, number, data).unwrap();
+        assert_eq!(header.protocol, Protocol::Error);
+        ErrorReply::decode(payload.first_chunk().unwrap()).detail
+    };
+    assert_eq!(refused(CoeService::RxPdo, 0, &command[1..]), ErrorReply::INVALID_SIZE);
+    assert_eq!(refused(CoeService::RxPdo, 2, &[]), ErrorReply::SERVICE_NOT_SUPPORTED);
+    assert_eq!(refused(CoeService::TxPdoRemote, 0x1FF, &[]), ErrorReply::SERVICE_NOT_SUPPORTED);
+}
+
+#[test]
+fn a_pdo_by_mailbox_shows_process_data_and_does_not_touch_it_in_op_facts_6_3() {
+    let mut client = Client::new("all-protocols", AlState::Op);
+    client.bench.output(&[1, 2, 3, 4]);
+    client.bench.pass(ANSWER);
+    let (_, inputs) = pdo(&mut client, CoeService::TxPdoRemote, 0, &[]).unwrap();
+    assert_eq!(inputs[2..], [1, 2, 3, 4], "the inputs are the outputs");
+    assert_eq!(pdo(&mut client, CoeService::RxPdo, 0, &[9; 4]), None);
+    assert_eq!(client.bench.device.outputs(), [1, 2, 3, 4]);
+    assert_eq!(client.upload(0x7000, 1), Ok(vec![1, 2, 3, 4]));
 }

@@ -1,0 +1,81 @@
+//! PDOs by mailbox instead of with the process data (facts 6.3).
+//!
+//! In: an RxPDO, whose values go to the objects that it maps; a request for a TxPDO or RxPDO. Out: that PDO with the present
+//! values. An RxPDO is not answered. The number of the CoE header is the distance of the PDO from 0x1600 or 0x1A00.
+
+use ringcat_wire::al::AlState;
+use ringcat_wire::mailbox::ErrorReply;
+use ringcat_wire::mailbox::coe::{CoeHeader, CoeService};
+use ringcat_wire::sii::PdoDirection;
+
+use super::{Answer, Objects};
+use crate::application::dictionary::{MappedEntry, ObjectRole};
+
+const RX_BASE: u16 = 0x1600;
+const TX_BASE: u16 = 0x1A00;
+
+/// Takes an RxPDO.
+pub fn receive(number: u16, data: &[u8], objects: &mut Objects<'_>) -> Answer {
+    let Some(mapped) = mapping(RX_BASE + number, PdoDirection::Rx, objects) else {
+        return Answer::Error(ErrorReply::SERVICE_NOT_SUPPORTED);
+    };
+    let bits: usize = mapped.iter().map(|entry| usize::from(entry.bit_length)).sum();
+    if data.len() != bits.div_ceil(8) {
+        return Answer::Error(ErrorReply::INVALID_SIZE);
+    }
+    let mut at = 0;
+    for entry in mapped {
+        let length = usize::from(entry.bit_length);
+        // What comes with the process data in OP goes before what comes by mailbox.
+        let cyclic = objects.state == AlState::Op && objects.process_data.is_output(entry.index, entry.sub_index);
+        if entry.index != 0 && !cyclic {
+            let mut value = vec![0; length.div_ceil(8)];
+            copy_bits(data, at, &mut value, 0, length);
+            objects.dictionary.set(entry.index, entry.sub_index, &value);
+        }
+        at += length;
+    }
+    Answer::Silence
+}
+
+/// Sends a PDO that is asked for.
+pub fn send(service: CoeService, number: u16, room: usize, objects: &Objects<'_>) -> Answer {
+    let (base, direction) = match service {
+        CoeService::TxPdo => (TX_BASE, PdoDirection::Tx),
+        _ => (RX_BASE, PdoDirection::Rx),
+    };
+    let Some(mapped) = mapping(base + number, direction, objects) else {
+        return Answer::Error(ErrorReply::SERVICE_NOT_SUPPORTED);
+    };
+    let bits: usize = mapped.iter().map(|entry| usize::from(entry.bit_length)).sum();
+    let mut data = vec![0; bits.div_ceil(8)];
+    let mut at = 0;
+    for entry in mapped {
+        let length = usize::from(entry.bit_length);
+        let current =
+            objects.process_data.value(entry.index, entry.sub_index).map(|value| value.to_le_bytes().to_vec());
+        let kept = || objects.dictionary.read(entry.index, entry.sub_index).map(<[u8]>::to_vec).unwrap_or_default();
+        copy_bits(&current.unwrap_or_else(kept), 0, &mut data, at, length);
+        at += length;
+    }
+    let mut payload = CoeHeader { number, ..CoeHeader::new(service) }.encode().to_vec();
+    payload.extend(data);
+    if payload.len() > room { Answer::Error(ErrorReply::INVALID_SIZE) } else { Answer::payload(payload) }
+}
+
+/// What a PDO maps; `None` where there is no such PDO.
+fn mapping(index: u16, direction: PdoDirection, objects: &Objects<'_>) -> Option<Vec<MappedEntry>> {
+    objects.dictionary.object(index).filter(|object| object.role == ObjectRole::Mapping(direction))?;
+    Some(objects.dictionary.mapped(index).collect())
+}
+
+/// Copies bits; those beyond the end of the source are zero.
+fn copy_bits(from: &[u8], from_bit: usize, to: &mut [u8], to_bit: usize, length: usize) {
+    for bit in 0..length {
+        let (source, target) = (from_bit + bit, to_bit + bit);
+        let set = from.get(source / 8).is_some_and(|byte| byte >> (source % 8) & 1 != 0);
+        if set && let Some(byte) = to.get_mut(target / 8) {
+            *byte |= 1 << (target % 8);
+        }
+    }
+}
