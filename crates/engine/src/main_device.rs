@@ -8,6 +8,7 @@ mod areas;
 mod declaration;
 mod mail;
 mod pending;
+mod ticket;
 
 use alloc::rc::Rc;
 use alloc::sync::Arc;
@@ -24,6 +25,7 @@ use ringcat_wire::source_address::MacCodec;
 pub use areas::{AreaEntries, Directory};
 pub use declaration::{ActivateError, Declaration, DomainConfig, DomainMember};
 pub use pending::Pending;
+pub use ticket::Ticket;
 
 use crate::board::Board;
 use crate::event::{CyclicEvent, Event, TimedEvent};
@@ -119,6 +121,7 @@ pub struct MainDevice {
     /// Mailboxes by position, before activation.
     visited: Vec<Mailbox>,
     requests: Requests,
+    parked: ticket::Cloakroom,
 }
 
 impl MainDevice {
@@ -137,6 +140,7 @@ impl MainDevice {
             cyclic_events: None,
             visited: Vec::new(),
             requests: Requests::default(),
+            parked: ticket::Cloakroom::default(),
             options,
         }
     }

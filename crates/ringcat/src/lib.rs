@@ -41,6 +41,7 @@ pub mod news;
 mod pace;
 pub mod packet;
 mod process_data;
+mod services;
 pub mod shared_segment;
 pub mod simulated;
 pub mod supervisor_thread;

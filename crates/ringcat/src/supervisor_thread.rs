@@ -104,7 +104,7 @@ impl SupervisorThread {
     }
 
     /// Has the thread ask a question of its engine again and again until it has an answer.
-    fn ask<R: Send + 'static>(
+    pub(crate) fn ask<R: Send + 'static>(
         &self,
         question: impl FnMut(&mut Engine, Instant) -> Option<R> + Send + 'static,
     ) -> Result<R, Error> {

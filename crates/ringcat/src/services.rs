@@ -1,0 +1,92 @@
+//! Mailbox services of a MainDevice whose acyclic half has a thread of its own, from any thread, before and during
+//! process data: objects, files, and whatever else the engine's async functions do.
+
+use std::future::Future;
+
+use ringcat_engine::mail::Limits;
+use ringcat_engine::mail::coe::SdoAddress;
+use ringcat_engine::main_device::MainDevice as Engine;
+use ringcat_engine::sdo_request::SdoRequest;
+use ringcat_wire::al::AlState;
+
+use crate::error::Error;
+use crate::supervisor_thread::SupervisorThread;
+
+impl SupervisorThread {
+    /// Runs an async function of the engine in the thread and waits for its end: `make` gets the engine, whose mailboxes
+    /// it may take. SubDevices are named by their index in the declaration, before activation by their position.
+    ///
+    /// # Errors
+    /// The thread is gone, or the MainDevice was stopped meanwhile.
+    pub fn run<T, W>(&self, make: impl FnOnce(&mut Engine) -> W + Send + 'static) -> Result<T, Error>
+    where
+        T: Send + 'static,
+        W: Future<Output = T> + 'static,
+    {
+        let ticket = self.with(move |engine| {
+            let work = make(engine);
+            let pending = engine.start(work);
+            engine.park(pending)
+        })?;
+        self.ask(move |engine, _| engine.collect(&ticket))?.ok_or(Error::Gone)
+    }
+
+    /// Reads an object of at most `limit` bytes. The time limits are: until the mailbox takes a message, until its answer
+    /// is there.
+    ///
+    /// # Errors
+    /// The transfer fails, or as [`SupervisorThread::run`].
+    pub fn sdo_upload(
+        &self,
+        subdevice: usize,
+        object: SdoAddress,
+        limits: Limits,
+        limit: usize,
+    ) -> Result<Vec<u8>, Error> {
+        let ticket = self.with(move |engine| {
+            let pending = engine.start_sdo_upload(subdevice, object, limits, limit);
+            engine.park(pending)
+        })?;
+        Ok(self.ask(move |engine, _| engine.collect(&ticket))?.ok_or(Error::Gone)??)
+    }
+
+    /// Writes an object; as [`SupervisorThread::sdo_upload`].
+    ///
+    /// # Errors
+    /// As [`SupervisorThread::sdo_upload`].
+    pub fn sdo_download(
+        &self,
+        subdevice: usize,
+        object: SdoAddress,
+        data: Vec<u8>,
+        limits: Limits,
+    ) -> Result<(), Error> {
+        let ticket = self.with(move |engine| {
+            let pending = engine.start_sdo_download(subdevice, object, data, limits);
+            engine.park(pending)
+        })?;
+        Ok(self.ask(move |engine, _| engine.collect(&ticket))?.ok_or(Error::Gone)??)
+    }
+
+    /// Before activation: brings a scanned SubDevice to PREOP, BOOT or back to INIT; in PREOP and BOOT its mailbox may be
+    /// used.
+    ///
+    /// # Errors
+    /// It has no mailbox for that state, refuses, or does not answer; or as [`SupervisorThread::run`].
+    pub fn bring_to(&self, position: usize, state: AlState) -> Result<(), Error> {
+        let ticket = self.with(move |engine| {
+            let pending = engine.start_visit(position, state);
+            engine.park(pending)
+        })?;
+        Ok(self.ask(move |engine, _| engine.collect(&ticket))?.ok_or(Error::Gone)??)
+    }
+
+    /// A request for objects of a declared SubDevice of up to `size` bytes, to be made from the cyclic thread. It may be
+    /// created before or after activation.
+    ///
+    /// # Errors
+    /// The thread is gone.
+    pub fn create_sdo_request(&self, subdevice: usize, size: usize) -> Result<SdoRequest, Error> {
+        self.with(move |engine| engine.create_sdo_request(subdevice, size))
+    }
+}
