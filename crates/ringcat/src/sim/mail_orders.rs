@@ -16,6 +16,7 @@ mail A lose N    the next N answers in the mailbox of device A are lost (or: for
 mail A twice N   they come twice with one counter
 mail A late N MS they come MS milliseconds later
 mail A count N C they have the counter C
+mail A emergency N CODE  right before them comes an emergency with this code, in hexadecimal
 mail A refuse N  the next N requests get an error reply
 mail A abort N CODE  the next N SDO requests are aborted with this code, in hexadecimal
 mail A busy N    the next N FoE messages are answered with BUSY
@@ -42,6 +43,7 @@ pub fn fault(words: &[&str]) -> Result<MailFault, String> {
             let counter = counter.ok_or_else(|| "expected a counter from 0 to 7".to_owned())?;
             MailFault::WrongCounter { count: count(n)?, counter }
         }
+        ["emergency", n, code] => MailFault::EmergencyBefore { count: count(n)?, code: error_code(code)? },
         ["refuse", n] => MailFault::Refuse { count: count(n)?, detail: IN_WORK },
         ["abort", n, code] => MailFault::AbortSdo { count: count(n)?, code: AbortCode(hexadecimal(code)?) },
         ["busy", n] => MailFault::BusyFoe { count: count(n)? },
@@ -69,6 +71,10 @@ fn time(text: &str) -> Result<Duration, String> {
     Ok(Duration::from_millis(ms.into()))
 }
 
+fn error_code(text: &str) -> Result<u16, String> {
+    u16::try_from(hexadecimal(text)?).map_err(|_| format!("expected a code of 16 bits, got {text}"))
+}
+
 fn hexadecimal(text: &str) -> Result<u32, String> {
     let digits = text.strip_prefix("0x").unwrap_or(text);
     u32::from_str_radix(digits, 16).map_err(|_| format!("expected a code in hexadecimal, got \"{text}\""))
@@ -87,6 +93,7 @@ mod tests {
             ("twice 2", MailFault::RepeatAnswers { count: 2 }),
             ("late 1 50", MailFault::DelayAnswers { count: 1, by: ms(50) }),
             ("count 1 7", MailFault::WrongCounter { count: 1, counter: 7 }),
+            ("emergency 1 8130", MailFault::EmergencyBefore { count: 1, code: 0x8130 }),
             ("refuse 3", MailFault::Refuse { count: 3, detail: 9 }),
             ("abort 1 0x08000000", MailFault::AbortSdo { count: 1, code: AbortCode::GENERAL }),
             ("busy 5", MailFault::BusyFoe { count: 5 }),

@@ -11,7 +11,7 @@ mod transfer;
 
 use ringcat_wire::al::AlState;
 use ringcat_wire::mailbox::ErrorReply;
-use ringcat_wire::mailbox::coe::{CoeHeader, CoeService};
+use ringcat_wire::mailbox::coe::{CoeHeader, CoeService, Emergency};
 
 use super::dictionary::Dictionary;
 use super::mailbox::Answer;
@@ -62,4 +62,11 @@ impl CoeServer {
             | CoeService::Other(_) => Answer::Error(ErrorReply::SERVICE_NOT_SUPPORTED),
         }
     }
+}
+
+/// An emergency as the payload of a message.
+pub fn emergency_payload(emergency: &Emergency) -> Vec<u8> {
+    let mut payload = CoeHeader::new(CoeService::Emergency).encode().to_vec();
+    payload.extend_from_slice(&emergency.encode());
+    payload
 }

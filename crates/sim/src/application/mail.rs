@@ -4,11 +4,10 @@
 //! history), faults. Out: what the MainDevice reads.
 
 use ringcat_wire::mailbox::Protocol;
-use ringcat_wire::mailbox::coe::{
-    CoeHeader, CoeService, DiagnosisFlags, DiagnosisMessage, DiagnosisParameter, Emergency,
-};
+use ringcat_wire::mailbox::coe::{DiagnosisFlags, DiagnosisMessage, DiagnosisParameter, Emergency};
 
 use super::Application;
+use super::coe::emergency_payload;
 use super::mailbox::faults::MailFault;
 use super::servers::Surroundings;
 use crate::controller::Controller;
@@ -37,9 +36,7 @@ impl Application {
     /// Sends an emergency and sets the error register; false where it cannot be sent.
     pub fn emergency(&mut self, emergency: &Emergency) -> bool {
         self.dictionary.set(ERROR_REGISTER, 0, &[emergency.error_register]);
-        let mut payload = CoeHeader::new(CoeService::Emergency).encode().to_vec();
-        payload.extend_from_slice(&emergency.encode());
-        self.post(Protocol::Coe, payload)
+        self.post(Protocol::Coe, emergency_payload(emergency))
     }
 
     /// Keeps a message in the diagnosis history, with the present time and these parameters; an emergency tells of it where

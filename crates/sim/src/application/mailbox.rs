@@ -208,11 +208,13 @@ impl Mailbox {
         let Some(fate) = faults.answer() else {
             return;
         };
-        self.queue.push_back(Queued {
-            ready: ready + fate.delay,
-            mail: Mail::New { protocol, address, payload, counter: fate.counter },
-            twice: fate.twice,
-        });
+        let ready = ready + fate.delay;
+        if let Some(payload) = fate.before {
+            let mail = Mail::New { protocol: Protocol::Coe, address: 0, payload, counter: None };
+            self.queue.push_back(Queued { ready, mail, twice: false });
+        }
+        let mail = Mail::New { protocol, address, payload, counter: fate.counter };
+        self.queue.push_back(Queued { ready, mail, twice: fate.twice });
     }
 
     fn encode(&mut self, mail: Mail) -> Vec<u8> {

@@ -6,10 +6,12 @@
 use core::time::Duration;
 
 use ringcat_wire::mailbox::Protocol;
+use ringcat_wire::mailbox::coe::Emergency;
 use ringcat_wire::mailbox::foe::{FoeErrorCode, FoeMessage};
 use ringcat_wire::mailbox::sdo::{AbortCode, SdoRequest, SdoResponse};
 
 use super::Answer;
+use crate::application::coe::emergency_payload;
 use crate::time::SimTime;
 
 /// Something that goes wrong with the mail of a device.
@@ -43,6 +45,13 @@ pub enum MailFault {
         count: u32,
         /// The counter, 0..=7.
         counter: u8,
+    },
+    /// Right before the next answers comes an emergency.
+    EmergencyBefore {
+        /// How many answers.
+        count: u32,
+        /// Error code of the emergency.
+        code: u16,
     },
     /// The next requests are answered with an error reply of the mailbox.
     Refuse {
@@ -78,7 +87,7 @@ pub enum MailFault {
 }
 
 /// What happens to an answer.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Debug, Default)]
 pub struct Fate {
     /// It comes so much later.
     pub delay: Duration,
@@ -86,6 +95,8 @@ pub struct Fate {
     pub twice: bool,
     /// It has this counter.
     pub counter: Option<u8>,
+    /// This CoE message goes before it.
+    pub before: Option<Vec<u8>>,
 }
 
 /// Faults that wait for their messages.
@@ -96,6 +107,7 @@ pub struct MailFaults {
     repeat: u32,
     delay: (u32, Duration),
     counter: (u32, u8),
+    emergency: (u32, u16),
     refuse: (u32, u16),
     abort: (u32, Option<AbortCode>),
     /// How many are left, of how many.
@@ -116,6 +128,7 @@ impl MailFaults {
             MailFault::RepeatAnswers { count } => self.repeat = count,
             MailFault::DelayAnswers { count, by } => self.delay = (count, by),
             MailFault::WrongCounter { count, counter } => self.counter = (count, counter),
+            MailFault::EmergencyBefore { count, code } => self.emergency = (count, code),
             MailFault::Refuse { count, detail } => self.refuse = (count, detail),
             MailFault::AbortSdo { count, code } => self.abort = (count, Some(code)),
             MailFault::BusyFoe { count } => self.busy = (count, count),
@@ -191,7 +204,11 @@ impl MailFaults {
         }
         let delay = if use_up(&mut self.delay.0) { self.delay.1 } else { Duration::ZERO };
         let counter = use_up(&mut self.counter.0).then_some(self.counter.1);
-        Some(Fate { delay, twice: use_up(&mut self.repeat), counter })
+        let before = use_up(&mut self.emergency.0).then(|| {
+            let error_code = self.emergency.1;
+            emergency_payload(&Emergency { error_code, error_register: 0x01, data: [0; 5] })
+        });
+        Some(Fate { delay, twice: use_up(&mut self.repeat), counter, before })
     }
 }
 

@@ -108,3 +108,15 @@ fn a_full_mailbox_takes_nothing_for_a_while_facts_6_1() {
     client.bench.pass(Duration::from_millis(12));
     assert!(client.bench.fetch_mail().is_some());
 }
+
+#[test]
+fn an_emergency_comes_right_before_an_answer_facts_6_3() {
+    let mut client = disturbed(MailFault::EmergencyBefore { count: 1, code: 0x8130 });
+    client.post_sdo(&REQUEST);
+    let (first, emergency) = client.answer();
+    assert_eq!((first.counter, &emergency[..5]), (1, &[0x00, 0x10, 0x30, 0x81, 0x01][..]));
+    let (second, answer) = client.answer();
+    assert_eq!(second.counter, 2);
+    assert!(matches!(SdoResponse::decode(&answer), Ok(SdoResponse::UploadExpedited { sub_index: 1, .. })));
+    assert_eq!(counter(&mut client), Some(3));
+}
