@@ -1,5 +1,5 @@
-//! The CoE server of a device (facts 6.3): tells the services apart; [`transfer`] serves SDOs, [`information`] SDO
-//! information, [`pdo`] PDOs by mailbox.
+//! The CoE server of a device (facts 6.3): tells the services apart; `transfer` serves SDOs, `information` SDO
+//! information, `pdo` PDOs by mailbox.
 //!
 //! In: the payload of a CoE message, the dictionary, the process data (mapped objects show what is in it), the state.
 //! Out: the payloads of the answer. Emergencies are sent by whoever makes them; what is no request gets the mailbox error
