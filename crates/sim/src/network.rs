@@ -114,6 +114,8 @@ struct Node {
     last_loop_change: SimTime,
     /// The earliest event that will wake the device.
     wake_at: SimTime,
+    /// The frame that the device has not reacted to yet, during a leap.
+    unsettled_by: Option<u64>,
 }
 
 /// A cable.
@@ -139,6 +141,10 @@ pub struct Network {
     scheduled: Vec<Option<Fault>>,
     random: Random,
     statistics: Statistics,
+    /// Time leaps: devices react when the frames have left the segment.
+    leaping: bool,
+    /// Devices that have not reacted yet.
+    unsettled: Vec<u32>,
 }
 
 impl Network {
@@ -167,6 +173,8 @@ impl Network {
             random: Random::new(options.seed),
             statistics: Statistics::default(),
             options,
+            leaping: false,
+            unsettled: Vec::new(),
         };
         network.start();
         Ok(network)
@@ -193,6 +201,7 @@ impl Network {
 
     /// Lets everything happen that is due up to and including `to`.
     pub fn advance(&mut self, to: SimTime) {
+        self.settle_all();
         let mut due = self.queue.pop_until(to);
         while let Some((at, event)) = due {
             debug_assert!(at >= self.now, "time goes back from {} to {at}", self.now);
@@ -207,7 +216,16 @@ impl Network {
 
     /// Lets everything happen, in its order and at its time, until no frame is under way any more: the time goes on to
     /// the moment at which the last one has left the segment, but not beyond `limit`.
+    ///
+    /// The devices react to what has passed them with [`Network::settle_all`], or when the next frame reaches them: who
+    /// wants answers as soon as possible takes the frames first.
     pub fn advance_until_quiet(&mut self, limit: SimTime) {
+        self.leaping = true;
+        self.pass_all_frames(limit);
+        self.leaping = false;
+    }
+
+    fn pass_all_frames(&mut self, limit: SimTime) {
         let mut follows = None;
         while self.frames.under_way() > 0 {
             let due = match follows.take() {

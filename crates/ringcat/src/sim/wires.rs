@@ -119,6 +119,7 @@ impl Wires {
                 network.give_back(received.bytes);
             }
         }
+        network.settle_all();
         now
     }
 

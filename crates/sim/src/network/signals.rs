@@ -19,6 +19,7 @@ impl Node {
             loop_changed_at: [SimTime::ZERO; 4],
             last_loop_change: SimTime::ZERO,
             wake_at: SimTime::NEVER,
+            unsettled_by: None,
         }
     }
 
@@ -74,6 +75,39 @@ impl Network {
         if let Some(deadline) = node.device.next_deadline() {
             self.wake_at(index, deadline);
         }
+    }
+
+    /// Has a device react to a frame when that has left the segment.
+    pub(super) fn settle_later(&mut self, index: usize, frame: u64) {
+        let node = &mut self.nodes[index];
+        if node.unsettled_by.replace(frame).is_none() {
+            self.unsettled.push(index as u32);
+        }
+    }
+
+    /// Has a device react to the frames that have passed it, before another one does.
+    pub(super) fn settle_before(&mut self, index: usize, frame: u64) {
+        if self.nodes[index].unsettled_by.is_some_and(|by| by != frame) {
+            self.settle_if_due(index);
+        }
+    }
+
+    fn settle_if_due(&mut self, index: usize) {
+        if self.nodes[index].unsettled_by.take().is_some() {
+            self.settle(index);
+        }
+    }
+
+    /// Has all devices react to what passed them while time leapt.
+    pub fn settle_all(&mut self) {
+        if self.unsettled.is_empty() {
+            return;
+        }
+        let mut unsettled = core::mem::take(&mut self.unsettled);
+        for index in unsettled.drain(..) {
+            self.settle_if_due(index as usize);
+        }
+        self.unsettled = unsettled;
     }
 
     /// Wakes a device at a time, or earlier if that is arranged already. A deadline can have passed when it is set: a

@@ -75,12 +75,18 @@ impl Network {
     /// A frame passes a device.
     fn hop(&mut self, slot: Slot, index: usize, from: Port, first_bit: SimTime) -> Option<(SimTime, Event)> {
         self.statistics.hops += 1;
+        let id = self.frames.frame(slot).id;
+        self.settle_before(index, id);
         let frame = self.frames.frame_mut(slot);
         let node = &mut self.nodes[index];
         let passage = node.device.controller.receive_between(frame, from, first_bit, self.now);
         // A frame that only passes by gives the application nothing to do.
         if !matches!(passage, Passage::Leaves { processed: false, .. }) {
-            self.settle(index);
+            if self.leaping {
+                self.settle_later(index, id);
+            } else {
+                self.settle(index);
+            }
         }
         let Passage::Leaves { port, processed } = passage else {
             return self.lose_hop(slot, LossCause::Destroyed);

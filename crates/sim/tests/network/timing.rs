@@ -7,6 +7,7 @@ use ringcat_sim::cable::{DeviceIndex, HostLink};
 use ringcat_sim::network::statistics::LossCause;
 use ringcat_sim::network::{Network, NetworkOptions};
 use ringcat_sim::time::SimTime;
+use ringcat_wire::al::{AlState, AlStatus};
 use ringcat_wire::command::Command;
 use ringcat_wire::datagram::Target;
 use ringcat_wire::register::map;
@@ -242,4 +243,27 @@ fn a_leap_ends_at_its_limit_and_the_next_one_goes_on() {
     assert_eq!(network.receive(Redundant), None);
     network.advance_until_quiet(start + SETTLE);
     assert_eq!(arrivals(&mut network, Redundant, start).len(), 1);
+}
+
+#[test]
+fn devices_react_to_what_passed_in_a_leap_when_they_are_told_to_or_before_the_next_frame() {
+    let request = |state: u8| command(Command::Bwr, Target::Broadcast(map::AL_CONTROL), &[state, 0]);
+    let status = |network: &Network| network.device(DeviceIndex(0)).al_status();
+    let mut network = segment(&ring(2));
+    let limit = network.now() + SETTLE;
+    assert_eq!(network.next_event(), None);
+
+    network.send(Main, &request(2));
+    network.advance_until_quiet(limit);
+    assert!(network.receive(Redundant).is_some());
+    assert_eq!(network.next_event(), None, "nobody has begun a transition");
+    network.settle_all();
+    assert!(network.next_event().is_some());
+    network.advance_by(SETTLE);
+    assert_eq!(status(&network), AlStatus::new(AlState::PreOp));
+
+    network.send(Main, &request(1));
+    network.send(Main, &shortest());
+    network.advance_until_quiet(network.now() + SETTLE);
+    assert!(network.next_event().is_some(), "the second frame met devices that had begun the transition");
 }
