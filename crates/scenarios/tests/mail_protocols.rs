@@ -19,6 +19,7 @@ use ringcat_wire::mailbox::aoe::{AmsAddress, NetId};
 use ringcat_wire::mailbox::coe::{Emergency, ListType, ValueInfo};
 use ringcat_wire::mailbox::foe::FoeErrorCode;
 use ringcat_wire::mailbox::soe::Idn;
+use ringcat_wire::register::{Fmmu, map};
 use scenarios::loss::Loss;
 use scenarios::segments::{descriptions, ring};
 use scenarios::world::World;
@@ -346,4 +347,26 @@ fn the_diagnosis_history_is_read_and_acknowledged_facts_6_3() {
         .collect();
     assert!(times.is_sorted(), "the oldest first: {times:?}");
     assert!(!left.new_available);
+}
+
+#[test]
+fn mail_of_all_who_can_show_it_is_found_with_one_read_facts_6_1() {
+    let mut world = world(12);
+    // The two that have mailboxes show a bit each: 0x080D.3 through their third FMMU.
+    for device in [ALL, 3] {
+        let registers = world.network().device(DeviceIndex(device)).controller.register(map::fmmu(2), Fmmu::LEN);
+        let fmmu = Fmmu::decode(registers[..].try_into().unwrap());
+        assert_eq!((fmmu.physical_start, fmmu.physical_start_bit, fmmu.active), (0x080D, 3, true));
+        assert_eq!((fmmu.logical_start.0, fmmu.logical_start_bit), (0xF000_0000, device as u8));
+    }
+    let before = world.application().acyclic_counters();
+    world.run_cycles(900);
+    let datagrams = world.application().acyclic_counters().datagrams - before.datagrams;
+    // 180 reads of the bits, and what supervision asks once a second.
+    assert!((170..200).contains(&datagrams), "{datagrams} datagrams in 900 ms");
+    let emergency = Emergency { error_code: 1, error_register: 1, data: [0; 5] };
+    let mark = world.mark();
+    assert!(world.network_mut().device_mut(DeviceIndex(ALL)).application.emergency(&emergency));
+    world.run_cycles(9);
+    assert!(world.saw(mark, |event| matches!(event, ringcat::Event::Emergency { subdevice: ALL, .. })));
 }

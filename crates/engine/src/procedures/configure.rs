@@ -149,12 +149,20 @@ impl BringUp<'_> {
         self.request(AlState::Init, AlState::PreOp).await?;
         let layout = self.fleet.access().members.get(self.index).and_then(|member| member.info.as_ref()?.mailbox);
         if let Some(layout) = layout.filter(|_| has_application) {
+            self.show_mail().await?;
             self.mailbox.open(self.station, layout);
         }
         if has_application {
             sii::assign(self.bus, self.station, false).await?;
         }
         Ok(())
+    }
+
+    /// Maps the bit that says whether there is mail; the other FMMUs follow in SAFEOP.
+    async fn show_mail(&self) -> Result<(), BusError> {
+        let mail = self.setup.fmmus.iter().find(|(number, _)| Some(*number) == self.setup.mail_fmmu);
+        let Some((number, register)) = mail else { return Ok(()) };
+        self.bus.fpwr(self.station, map::fmmu(*number), &register.encode()).await
     }
 
     /// SDOs, watchdog, process data SyncManagers, SAFEOP, FMMUs. The FMMUs come last and all at once: before SAFEOP a

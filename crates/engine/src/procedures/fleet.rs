@@ -9,6 +9,7 @@ use ringcat_wire::address::StationAddress;
 use ringcat_wire::al::AlState;
 use ringcat_wire::register::Fmmu;
 
+use super::mail_watch;
 use super::sii::SiiCache;
 use super::strangers::Stranger;
 use crate::board::Board;
@@ -74,6 +75,8 @@ pub struct Setup {
     pub plan: SubDevicePlan,
     /// FMMU number and registers.
     pub fmmus: Vec<(u8, Fmmu)>,
+    /// Of these, the number of the one that shows whether there is mail.
+    pub mail_fmmu: Option<u8>,
     /// FMMUs that the controller has.
     pub fmmu_count: u8,
     /// SyncManagers that the controller has.
@@ -131,9 +134,13 @@ impl Setup {
             }
             fmmus.push((number, plan::fmmu(area, placed.logical)));
         }
+        let mail = mail_watch::fmmu(index, &plan, info);
+        let mail_fmmu = mail.map(|(number, _)| number);
+        fmmus.extend(mail);
         Ok(Setup {
             plan,
             fmmus,
+            mail_fmmu,
             fmmu_count: info.controller.fmmu_count,
             sync_manager_count: info.controller.sync_manager_count,
             emulated: info.device_emulation,
