@@ -1,7 +1,6 @@
 //! What the tasks and handles of one mailbox share.
 
 use alloc::rc::Rc;
-use alloc::vec;
 use alloc::vec::Vec;
 use core::cell::{Ref, RefCell, RefMut};
 use core::time::Duration;
@@ -195,10 +194,5 @@ impl Session {
     /// A session with a SubDevice that has just entered PREOP or BOOT.
     pub(super) fn new(station: StationAddress, layout: MailboxLayout) -> Session {
         Session { station, layout, counter: 0 }
-    }
-
-    /// Bytes for a message that fills the receive mailbox.
-    pub(super) fn blank(&self) -> Vec<u8> {
-        vec![0; usize::from(self.layout.receive_size)]
     }
 }

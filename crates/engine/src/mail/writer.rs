@@ -8,8 +8,6 @@ use alloc::vec::Vec;
 use core::time::Duration;
 
 use ringcat_wire::address::{RegisterAddress, Wkc};
-use ringcat_wire::command::Command;
-use ringcat_wire::datagram::Target;
 use ringcat_wire::mailbox::{Header, next_counter};
 
 use super::error::MailboxError;
@@ -86,11 +84,11 @@ async fn write(
 ) -> Result<(), MailboxError> {
     let bus = &room.bus;
     let mail = encode(session, lane, &message.payload);
-    let target = Target::Station(session.station, RegisterAddress(session.layout.receive_offset));
+    let register = RegisterAddress(session.layout.receive_offset);
     let until = bus.now() + message.limit;
     let (mut losses, mut pause) = (0, FIRST_PAUSE);
     loop {
-        match bus.transfer_once(Command::Fpwr, target, mail.clone()).await {
+        match bus.write_mail(session.station, register, mail.clone(), session.layout.receive_size).await {
             Ok(reply) if reply.wkc() != Wkc(0) => return Ok(()),
             Ok(_) => {}
             Err(error) => {
@@ -119,11 +117,11 @@ async fn write(
     }
 }
 
-/// The whole receive mailbox, so that its last byte is touched.
+/// The message with its header.
 fn encode(session: &Session, lane: Lane, payload: &[u8]) -> Vec<u8> {
-    let mut mail = session.blank();
+    let mut mail = Vec::with_capacity(Header::LEN + payload.len());
     let header = Header::new(lane.protocol(), session.counter, payload.len() as u16);
-    mail[..Header::LEN].copy_from_slice(&header.encode());
-    mail[Header::LEN..Header::LEN + payload.len()].copy_from_slice(payload);
+    mail.extend_from_slice(&header.encode());
+    mail.extend_from_slice(payload);
     mail
 }

@@ -13,7 +13,7 @@ use core::time::Duration;
 
 use ringcat_wire::address::{Position, RegisterAddress, StationAddress, Wkc};
 use ringcat_wire::command::Command;
-use ringcat_wire::datagram::{MAX_DATA, Target};
+use ringcat_wire::datagram::{MAX_DATA, OVERHEAD, Target};
 
 use super::shared::Shared;
 use super::signal::Signal;
@@ -157,7 +157,7 @@ impl Bus {
         data: Vec<u8>,
         expected: Option<Wkc>,
     ) -> impl Future<Output = Result<Reply, BusError>> {
-        self.submit(Request { command, target, data, redundant: None, expected, resend: true, mail: None })
+        self.submit(Request { command, target, data, redundant: None, expected, resend: true, lead: None, mail: None })
     }
 
     /// Like [`Bus::transfer`], but sent once: for accesses that must not happen twice.
@@ -174,6 +174,7 @@ impl Bus {
             redundant: None,
             expected: Some(Wkc(1)),
             resend: false,
+            lead: None,
             mail: None,
         })
     }
@@ -190,7 +191,29 @@ impl Bus {
         let target = Target::Station(station, register);
         let redundant = Some(redundant).filter(|data| data.len() == main.len());
         let (command, data) = (Command::Fprw, main);
-        self.submit(Request { command, target, data, redundant, expected: None, resend: false, mail: None })
+        self.submit(Request { command, target, data, redundant, expected: None, resend: false, lead: None, mail: None })
+    }
+
+    /// Writes a mailbox of `size` bytes, once: its beginning and its last byte, which hands it over, in one frame
+    /// (facts 6.1). The working counter is that of the last byte.
+    pub fn write_mail(
+        &self,
+        station: StationAddress,
+        register: RegisterAddress,
+        mail: Vec<u8>,
+        size: u16,
+    ) -> impl Future<Output = Result<Reply, BusError>> {
+        let at = |offset: u16| Target::Station(station, register.offset(offset));
+        let (command, expected) = (Command::Fpwr, Some(Wkc(1)));
+        // A second datagram has a cost of its own.
+        let (lead, target, data) = if mail.len() + OVERHEAD < usize::from(size) {
+            (Some((at(0), mail)), at(size - 1), vec![0; 1])
+        } else {
+            let mut whole = mail;
+            whole.resize(usize::from(size), 0);
+            (None, at(0), whole)
+        };
+        self.submit(Request { command, target, data, redundant: None, expected, resend: false, lead, mail: None })
     }
 
     /// Reads a mailbox, once. What a second copy reads, and what comes back late, is kept for [`Bus::stray_mail`].
@@ -202,7 +225,7 @@ impl Bus {
     ) -> impl Future<Output = Result<Reply, BusError>> {
         let (target, data) = (Target::Station(station, register), vec![0; length]);
         let (command, expected, mail) = (Command::Fprd, Some(Wkc(1)), Some(station));
-        self.submit(Request { command, target, data, redundant: None, expected, resend: false, mail })
+        self.submit(Request { command, target, data, redundant: None, expected, resend: false, lead: None, mail })
     }
 
     /// The oldest mail of a SubDevice that came back when nobody waited for it any more.
@@ -369,6 +392,7 @@ impl Bus {
                 redundant: None,
                 expected,
                 resend: true,
+                lead: None,
                 mail: None,
             }));
         }

@@ -248,7 +248,8 @@ impl Shared {
                     continue;
                 }
                 let request = &transfer.request;
-                let bytes = OVERHEAD + request.data.len();
+                let lead = request.lead.as_ref().map_or(0, |(_, data)| OVERHEAD + data.len());
+                let bytes = lead + OVERHEAD + request.data.len();
                 // Only the first datagram of a frame may be longer than the window.
                 if total + bytes > limit
                     && (!flight.places.is_empty() || !Shared::is_starved(&mut self.blocked, id, self.now))
@@ -256,6 +257,12 @@ impl Shared {
                     break;
                 }
                 let index = sequence.index(Class::Acyclic);
+                if let Some((target, lead)) = &request.lead {
+                    let Some(at) = builder.datagram(request.command, index, *target, lead.len()) else { break };
+                    if let Some(data) = builder.data_mut(at, lead.len()) {
+                        data.copy_from_slice(lead);
+                    }
+                }
                 let Some(data_at) = builder.datagram(request.command, index, request.target, request.data.len()) else {
                     break;
                 };

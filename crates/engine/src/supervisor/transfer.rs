@@ -22,6 +22,8 @@ pub(crate) struct Request {
     pub expected: Option<Wkc>,
     /// Whether a lost datagram may be sent again: false where reading or writing twice is not the same as once.
     pub resend: bool,
+    /// A datagram that goes before it in the same frame, and whose own working counter does not matter.
+    pub lead: Option<(Target, Vec<u8>)>,
     /// A read of this SubDevice's mailbox: what each copy reads matters, also when it comes late.
     pub mail: Option<StationAddress>,
 }

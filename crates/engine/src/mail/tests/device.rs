@@ -27,6 +27,7 @@ pub struct Device<S> {
     pub server: S,
     pub layout: MailboxLayout,
     pub delay: Duration,
+    begun: Vec<u8>,
     received: Option<Vec<u8>>,
     ready: Option<Vec<u8>>,
     queue: VecDeque<(Instant, Vec<u8>)>,
@@ -47,6 +48,7 @@ impl<S: Server> Device<S> {
             server,
             layout,
             delay: Duration::from_micros(300),
+            begun: Vec::new(),
             received: None,
             ready: None,
             queue: VecDeque::new(),
@@ -133,9 +135,21 @@ impl<S: Server> Device<S> {
             (Command::Fpwr, at) if at == self.layout.receive_offset => {
                 let free = self.received.is_none();
                 if free {
-                    self.received = Some(data.to_vec());
+                    self.begun = data.to_vec();
+                    self.begun.resize(usize::from(self.layout.receive_size), 0);
+                    if data.len() == self.begun.len() {
+                        self.received = Some(core::mem::take(&mut self.begun));
+                    }
                 }
                 free
+            }
+            // The last byte hands it over.
+            (Command::Fpwr, at) if at == self.layout.receive_offset + self.layout.receive_size - 1 => {
+                let complete = self.received.is_none() && !self.begun.is_empty();
+                if complete {
+                    self.received = Some(core::mem::take(&mut self.begun));
+                }
+                complete
             }
             (Command::Fprd, at) if at == self.layout.send_offset => match self.ready.take() {
                 Some(mail) => {
