@@ -34,9 +34,14 @@ fn start_up(drives: usize, objects: u32) -> (Duration, Duration) {
     let (start, before) = (world.now(), world.application().acyclic_counters());
     world.settle();
     let after = world.application().acyclic_counters();
+    let (mut empty, mut looks) = (0, 0);
     for drive in 0..drives {
-        assert_eq!(world.mailbox(drive).counters().unclaimed, 0);
+        let counters = world.mailbox(drive).counters();
+        assert_eq!(counters.unclaimed, 0);
+        empty += counters.empty_reads;
+        looks += counters.looks;
     }
+    println!("{drives} drives, {objects} objects each: {empty} empty reads, {looks} looks");
     let bytes = after.bytes - before.bytes + (after.sent - before.sent) * FRAME_OVERHEAD;
     (world.now() - start, Duration::from_nanos(bytes * BYTE_NS))
 }
