@@ -85,7 +85,7 @@ pub(crate) async fn watch_mail(bus: Bus, fleet: SharedFleet) {
             others.extend(mapped);
         }
         alone = u32::try_from(others.len()).unwrap_or(u32::MAX);
-        bus.gather(others, look).await;
+        bus.gather_in_turns(others, look).await;
     }
 }
 
