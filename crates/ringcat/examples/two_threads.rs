@@ -1,0 +1,67 @@
+//! A running light whose cycles have a thread of their own: what a machine runs.
+//!
+//! `cargo run -p ringcat --example two_threads` on a simulated segment;
+//! `cargo run -p ringcat --example two_threads -- eth1` (as root) on a network interface whose second SubDevice has outputs.
+
+use std::ops::ControlFlow;
+use std::path::Path;
+use std::thread::sleep;
+use std::time::{Duration, Instant};
+
+use ringcat::packet::PacketLinks;
+use ringcat::shared_segment::SharedSegment;
+use ringcat::text::{Names, describe};
+use ringcat::{DomainId, Error, LastOutputs, Links, Options, SupervisorThread, automatic};
+use ringcat_link::ReceiveMode;
+use ringcat_sim::network::Network;
+use ringcat_sim::segment::Segment;
+use ringcat_wire::al::AlState;
+
+const SEGMENT: &str = "[segment]\n[[device]]\ntype = \"coupler\"\n[[device]]\ntype = \"digital-output-8\"\n";
+const LAMPS: usize = 1;
+
+fn main() -> Result<(), Box<dyn std::error::Error>> {
+    match std::env::args().nth(1) {
+        Some(interface) => {
+            let (cyclic, acyclic) = PacketLinks::open_halves(&interface, None, ReceiveMode::Blocking)?;
+            run(cyclic, acyclic)?;
+        }
+        None => {
+            let network = Network::from_description(Segment::from_toml(SEGMENT, Path::new("."))?)?;
+            let (cyclic, acyclic) = SharedSegment::halves(network);
+            run(cyclic, acyclic)?;
+        }
+    }
+    Ok(())
+}
+
+fn run<L: Links + Send + 'static>(cyclic: L, acyclic: L) -> Result<(), Error> {
+    // Scan, configuration, mailboxes, recovery: all that is not process data has this thread.
+    let supervisor = SupervisorThread::start(acyclic, &Options::default(), || ())?;
+    let scan = supervisor.scan()?;
+    let application = supervisor.clone().activate(automatic(&scan.subdevices, Duration::from_millis(1)), cyclic)?;
+    let lamps: Vec<_> = (0..8).filter_map(|channel| application.entry(LAMPS, 0x7000 + 0x10 * channel, 1)).collect();
+
+    // The cycles: no allocation, no lock, no waiting in here. `prepare` is the place for `ringcat_link::realtime`.
+    let prepare = ringcat_link::realtime::precise_timers;
+    let cycles = application.start_cycles(prepare, move |data| {
+        let lit = (data.cycle() / 50) as usize;
+        for (channel, lamp) in lamps.iter().enumerate() {
+            data.write(lamp, u64::from(channel == lit % lamps.len()));
+        }
+        ControlFlow::Continue(())
+    })?;
+
+    let end = Instant::now() + Duration::from_secs(1);
+    while Instant::now() < end {
+        while let Some(event) = supervisor.pop_event() {
+            println!("{}", describe(&event.event, &Names::default()));
+        }
+        sleep(Duration::from_millis(10));
+    }
+    let status = cycles.news().status(DomainId(0));
+    println!("working counter {} of {}; {:?}", status.wkc, status.expected, cycles.news().pace());
+    println!("round trips: {}", cycles.news().round_trips());
+    cycles.end()?.stop(LastOutputs::Zero, AlState::Init, Duration::from_secs(1))?;
+    Ok(())
+}
