@@ -157,10 +157,15 @@ fn tampered(capture: &Capture, tamper: impl FnOnce(&mut Vec<Packet>)) -> Verdict
     judge_frames(&capture, Some(CYCLE)).expect("one or two interfaces")
 }
 
-/// The first frame of the second half that was sent and has such a datagram, and where that begins.
+/// The first frame of process data of the second half that was sent and has such a datagram, and where that begins. (On
+/// two links process data is an LWR and an LRD; mail is looked for with an LRD alone.)
 fn sent_with(packets: &[Packet], command: u8) -> (usize, usize) {
     let at = |packet: &Packet| {
         let frame = Frame::parse(&packet.bytes).expect("a good frame");
+        let has = |wanted| frame.datagrams.iter().any(|datagram| datagram.command == wanted);
+        if !has(LWR) || !has(LRD) {
+            return None;
+        }
         frame.datagrams.iter().find(|datagram| datagram.command == command).map(|datagram| datagram.at)
     };
     let frames = packets.iter().enumerate().skip(packets.len() / 2).filter(|(_, packet)| packet.sent);
