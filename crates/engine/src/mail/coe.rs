@@ -1,7 +1,7 @@
 //! CoE: objects of a SubDevice's dictionary (facts 6.3).
 //!
 //! [`upload`] and [`download`] move objects of any size, expedited, normal or in segments, between the SubDevice and a
-//! [`Sink`](super::stream::Sink) or [`Source`](super::stream::Source); [`read`] and [`write`] do so with bytes in memory.
+//! [`Sink`](super::stream::Sink) or [`Source`](super::stream::Source); [`read`] and [`write()`] do so with bytes in memory.
 //! [`information`] asks which objects there are, [`pdo`] reads and writes assignment and mapping, [`history`] the diagnosis
 //! history.
 
