@@ -5,7 +5,7 @@ use std::future::Future;
 
 use ringcat_engine::mail::Limits;
 use ringcat_engine::mail::coe::SdoAddress;
-use ringcat_engine::main_device::MainDevice as Engine;
+use ringcat_engine::main_device::{MainDevice as Engine, Pending};
 use ringcat_engine::sdo_request::SdoRequest;
 use ringcat_wire::al::AlState;
 
@@ -23,9 +23,19 @@ impl SupervisorThread {
         T: Send + 'static,
         W: Future<Output = T> + 'static,
     {
-        let ticket = self.with(move |engine| {
+        self.wait_for(move |engine| {
             let work = make(engine);
-            let pending = engine.start(work);
+            engine.start(work)
+        })
+    }
+
+    /// Starts work in the thread, where it stays, and waits for its end.
+    fn wait_for<T: Send + 'static>(
+        &self,
+        start: impl FnOnce(&mut Engine) -> Pending<T> + Send + 'static,
+    ) -> Result<T, Error> {
+        let ticket = self.with(move |engine| {
+            let pending = start(engine);
             engine.park(pending)
         })?;
         self.ask(move |engine, _| engine.collect(&ticket))?.ok_or(Error::Gone)
@@ -43,11 +53,7 @@ impl SupervisorThread {
         limits: Limits,
         limit: usize,
     ) -> Result<Vec<u8>, Error> {
-        let ticket = self.with(move |engine| {
-            let pending = engine.start_sdo_upload(subdevice, object, limits, limit);
-            engine.park(pending)
-        })?;
-        Ok(self.ask(move |engine, _| engine.collect(&ticket))?.ok_or(Error::Gone)??)
+        Ok(self.wait_for(move |engine| engine.start_sdo_upload(subdevice, object, limits, limit))??)
     }
 
     /// Writes an object; as [`SupervisorThread::sdo_upload`].
@@ -61,11 +67,7 @@ impl SupervisorThread {
         data: Vec<u8>,
         limits: Limits,
     ) -> Result<(), Error> {
-        let ticket = self.with(move |engine| {
-            let pending = engine.start_sdo_download(subdevice, object, data, limits);
-            engine.park(pending)
-        })?;
-        Ok(self.ask(move |engine, _| engine.collect(&ticket))?.ok_or(Error::Gone)??)
+        Ok(self.wait_for(move |engine| engine.start_sdo_download(subdevice, object, data, limits))??)
     }
 
     /// Before activation: brings a scanned SubDevice to PREOP, BOOT or back to INIT; in PREOP and BOOT its mailbox may be
@@ -74,11 +76,7 @@ impl SupervisorThread {
     /// # Errors
     /// It has no mailbox for that state, refuses, or does not answer; or as [`SupervisorThread::run`].
     pub fn bring_to(&self, position: usize, state: AlState) -> Result<(), Error> {
-        let ticket = self.with(move |engine| {
-            let pending = engine.start_visit(position, state);
-            engine.park(pending)
-        })?;
-        Ok(self.ask(move |engine, _| engine.collect(&ticket))?.ok_or(Error::Gone)??)
+        Ok(self.wait_for(move |engine| engine.start_visit(position, state))??)
     }
 
     /// A request for objects of a declared SubDevice of up to `size` bytes, to be made from the cyclic thread. It may be
