@@ -1,0 +1,8 @@
+//! The public API as an application uses it, on the embedded simulator.
+
+mod declarations;
+mod demo;
+mod services;
+mod stop;
+mod threads;
+mod triggers;

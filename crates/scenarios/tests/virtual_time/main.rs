@@ -1,0 +1,25 @@
+//! Whole systems in virtual time: an engine and a simulated segment, one module per subject.
+//!
+//! One program and not twenty, because each would be linked with everything; only those that count allocations are apart.
+
+mod broken_ring;
+mod calm;
+mod captures;
+mod configuration;
+mod determinism;
+mod disturbed_frames;
+mod domains;
+mod eeprom;
+mod explorer;
+mod failures;
+mod mail;
+mod mail_protocols;
+mod mail_services;
+mod mail_startup;
+mod power_cycles;
+mod real_images;
+mod ring_matrix;
+mod slow_eeprom;
+mod start_up;
+mod strangers;
+mod topologies;
