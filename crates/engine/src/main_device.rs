@@ -8,6 +8,7 @@ mod areas;
 mod declaration;
 mod mail;
 mod pending;
+mod services;
 mod ticket;
 
 use alloc::rc::Rc;

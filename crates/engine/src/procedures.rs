@@ -10,6 +10,7 @@ pub mod mail_watch;
 pub mod recover;
 pub mod scan;
 pub mod serve_requests;
+pub mod services;
 pub mod sii;
 pub mod stop;
 pub mod strangers;

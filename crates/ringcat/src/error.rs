@@ -6,6 +6,7 @@ use ringcat_engine::mail::coe::SdoError;
 use ringcat_engine::main_device::ActivateError;
 use ringcat_engine::procedures::configure::ConfigureError;
 use ringcat_engine::procedures::scan::ScanError;
+use ringcat_engine::procedures::services::ServiceError;
 use ringcat_engine::procedures::stop::StopError;
 use ringcat_sim::segment::SegmentError;
 
@@ -20,6 +21,8 @@ pub enum Error {
     Configure(ConfigureError),
     /// An SDO transfer failed.
     Sdo(SdoError),
+    /// A service besides the mailbox protocols failed.
+    Service(ServiceError),
     /// The segment could not be stopped in order.
     Stop(StopError),
     /// The simulated segment cannot be built.
@@ -37,6 +40,7 @@ impl fmt::Display for Error {
             Error::Activate(error) => write!(f, "activation: {error}"),
             Error::Configure(error) => error.fmt(f),
             Error::Sdo(error) => error.fmt(f),
+            Error::Service(error) => error.fmt(f),
             Error::Stop(error) => write!(f, "stop: {error}"),
             Error::Segment(error) => error.fmt(f),
             Error::Thread(error) => write!(f, "a thread cannot be started: {error}"),
@@ -68,6 +72,12 @@ impl From<ConfigureError> for Error {
 impl From<SdoError> for Error {
     fn from(error: SdoError) -> Error {
         Error::Sdo(error)
+    }
+}
+
+impl From<ServiceError> for Error {
+    fn from(error: ServiceError) -> Error {
+        Error::Service(error)
     }
 }
 

@@ -72,7 +72,9 @@ pub use ringcat_engine::mail::{Limits, Mailbox};
 pub use ringcat_engine::main_device::{ActivateError, Declaration, DomainConfig, DomainMember, SubDeviceState};
 pub use ringcat_engine::procedures::scan::{Scan, ScanError};
 pub use ringcat_engine::procedures::stop::StopError;
+pub use ringcat_engine::request::{
+    RegisterRequest, RequestFailure, RequestRefused, RequestState, SdoRequest, SoeRequest, VoeHandler,
+};
 pub use ringcat_engine::ring::RingState;
-pub use ringcat_engine::sdo_request::{RequestFailure, RequestState, SdoRequest};
 pub use ringcat_engine::supervisor::AcyclicCounters;
 pub use ringcat_engine::time::Instant;

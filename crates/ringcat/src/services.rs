@@ -6,7 +6,8 @@ use std::future::Future;
 use ringcat_engine::mail::Limits;
 use ringcat_engine::mail::coe::SdoAddress;
 use ringcat_engine::main_device::{MainDevice as Engine, Pending};
-use ringcat_engine::sdo_request::SdoRequest;
+use ringcat_engine::request::{RegisterRequest, SdoRequest, SoeRequest, VoeHandler};
+use ringcat_wire::address::RegisterAddress;
 use ringcat_wire::al::AlState;
 
 use crate::error::Error;
@@ -86,5 +87,46 @@ impl SupervisorThread {
     /// The thread is gone.
     pub fn create_sdo_request(&self, subdevice: usize, size: usize) -> Result<SdoRequest, Error> {
         self.with(move |engine| engine.create_sdo_request(subdevice, size))
+    }
+
+    /// A request for registers of a declared SubDevice; as [`SupervisorThread::create_sdo_request`].
+    ///
+    /// # Errors
+    /// The thread is gone.
+    pub fn create_register_request(&self, subdevice: usize, size: usize) -> Result<RegisterRequest, Error> {
+        self.with(move |engine| engine.create_register_request(subdevice, size))
+    }
+
+    /// A request for IDNs of a declared SubDevice; as [`SupervisorThread::create_sdo_request`].
+    ///
+    /// # Errors
+    /// The thread is gone.
+    pub fn create_soe_request(&self, subdevice: usize, size: usize) -> Result<SoeRequest, Error> {
+        self.with(move |engine| engine.create_soe_request(subdevice, size))
+    }
+
+    /// A handler of vendor messages of a declared SubDevice; as [`SupervisorThread::create_sdo_request`].
+    ///
+    /// # Errors
+    /// The thread is gone.
+    pub fn create_voe_handler(&self, subdevice: usize, size: usize) -> Result<VoeHandler, Error> {
+        self.with(move |engine| engine.create_voe_handler(subdevice, size))
+    }
+
+    /// Reads registers or memory of a SubDevice, by its index in the declaration, before activation by its position.
+    ///
+    /// # Errors
+    /// It does not answer, or as [`SupervisorThread::run`].
+    pub fn register_read(&self, subdevice: usize, address: RegisterAddress, length: usize) -> Result<Vec<u8>, Error> {
+        Ok(self.wait_for(move |engine| engine.start_register_read(subdevice, address, length))??)
+    }
+
+    /// Writes registers or memory of a SubDevice; as [`SupervisorThread::register_read`]. Where a frame is lost, a
+    /// register may be written twice.
+    ///
+    /// # Errors
+    /// As [`SupervisorThread::register_read`].
+    pub fn register_write(&self, subdevice: usize, address: RegisterAddress, data: Vec<u8>) -> Result<(), Error> {
+        Ok(self.wait_for(move |engine| engine.start_register_write(subdevice, address, data))??)
     }
 }

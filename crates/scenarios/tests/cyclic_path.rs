@@ -8,7 +8,13 @@ use ringcat::tee::Tee;
 use ringcat_engine::domain::{DomainId, Freshness};
 use ringcat_engine::exchange::{CyclicCounters, Received};
 use ringcat_engine::link::Link;
+use ringcat_engine::main_device::{MainDevice, Options};
+use ringcat_engine::request::{RequestRefused, RequestState};
+use ringcat_engine::time::Instant;
 use ringcat_link::Recorder;
+use ringcat_wire::address::RegisterAddress;
+use ringcat_wire::frame::MacAddress;
+use ringcat_wire::mailbox::soe::Idn;
 use scenarios::answering_double::Cabling;
 use scenarios::counting_allocator::{CountingAllocator, Counts, counts};
 use scenarios::cyclic_load::{CyclicLoad, LoadSpec, PERIOD};
@@ -111,6 +117,30 @@ fn recorded_cycles_take_no_memory() {
         assert_eq!(link.sent + link.received + link.lost, CYCLES * 6 + (CYCLES - 1) * 6, "{link:?}");
         assert!(link.sent > 0 && link.received > 0, "{link:?}");
     }
+}
+
+#[test]
+fn requests_take_no_memory_on_the_side_of_the_cyclic_thread() {
+    let options = Options::new(MacAddress([0x00, 0x00, 0x5E, 0x00, 0x53, 0x01]), None);
+    let mut engine = MainDevice::new(options, Instant(0));
+    let (mut object, mut register) = (engine.create_sdo_request(0, 100), engine.create_register_request(0, 100));
+    let (mut idn, mut vendor) = (engine.create_soe_request(0, 100), engine.create_voe_handler(0, 100));
+    let mut out = [0; 100];
+    let used = counted(|| {
+        for _ in 0..CYCLES {
+            let timeout = Duration::from_millis(5);
+            let _ = (object.set_object(0x2000, 1, false), object.set_timeout(timeout), object.write(&[1; 100]));
+            let _ = (register.set_timeout(timeout), register.read(RegisterAddress(0), 100));
+            let _ = (idn.set_idn(0, Idn(1)), idn.set_timeout(timeout), idn.write(&[1; 100]));
+            let _ = (vendor.set_send_header(1, 2), vendor.write(&[1; 100]), vendor.execute());
+            object.cancel();
+            let states = [object.state(), register.state(), idn.state(), vendor.state()];
+            assert_eq!(states, [RequestState::Busy; 4]);
+            assert_eq!((object.data(&mut out), register.data(&mut out), idn.failure()), (0, 0, None));
+            assert_eq!((vendor.received_header(), vendor.read()), (None, Err(RequestRefused::Busy)));
+        }
+    });
+    assert_eq!(used, (0, 0));
 }
 
 /// Answers, but not quite, in a way of its own for each of ten cycles.

@@ -23,7 +23,7 @@ pub const ENGINE: &[(&str, &[&str])] = &[
     ("queue", &[]),
     ("direction", &[]),
     ("domain", &[]),
-    ("sdo_request", &[]),
+    ("request", &[]),
     // frames
     ("ring", &["time", "link"]),
     ("board", &["time", "link", "ring"]),
@@ -41,10 +41,10 @@ pub const ENGINE: &[(&str, &[&str])] = &[
     ("supervisor", &["time", "link", "queue", "ring", "board", "event"]),
     ("mail", &["time", "config", "event", "supervisor"]),
     ("procedures", &["time", "link", "queue", "ring", "board", "info", "topology", "config", "plan", "layout", "event",
-        "supervisor", "mail", "sdo_request"]),
+        "supervisor", "mail", "request"]),
     // both together
     ("main_device", &["time", "link", "queue", "domain", "ring", "board", "info", "topology", "config", "plan", "layout",
-        "event", "exchange", "supervisor", "mail", "sdo_request", "procedures"]),
+        "event", "exchange", "supervisor", "mail", "request", "procedures"]),
 ];
 
 /// Where the engine's sources are.

@@ -1,6 +1,7 @@
 //! The handle to a SubDevice's mailbox.
 
 use alloc::rc::Rc;
+use core::time::Duration;
 
 use ringcat_wire::address::StationAddress;
 use ringcat_wire::mailbox::coe::Emergency;
@@ -60,6 +61,11 @@ impl Mailbox {
         self.room.is_full();
     }
 
+    /// Has the reader look once whether the SubDevice has mail.
+    pub(super) fn look_for_mail(&self) {
+        self.room.look_once();
+    }
+
     /// Whether it may be used.
     pub fn is_open(&self) -> bool {
         self.room.look().open
@@ -109,6 +115,20 @@ impl Mailbox {
     /// Mails of a kind that were not kept because nobody took them in time.
     pub fn unsolicited_overruns(&self, kind: Unsolicited) -> u64 {
         self.room.state().shelves.ring(kind).overruns()
+    }
+
+    /// Waits for a time for mail of a kind that nobody asked for; `None` where none came.
+    pub(super) async fn unsolicited_within(
+        &self,
+        kind: Unsolicited,
+        limit: Duration,
+    ) -> Result<Option<Unclaimed>, MailboxError> {
+        let ready = || match self.pop_unsolicited(kind) {
+            Some(mail) => Some(Ok(Some(mail))),
+            None if !self.is_open() => Some(Err(MailboxError::Closed)),
+            None => None,
+        };
+        self.room.bus.within(limit, self.room.news.until(ready)).await.unwrap_or(Ok(None))
     }
 
     /// Waits for mail of a kind that nobody asked for.

@@ -29,7 +29,7 @@ const FAILURE_PAUSE: Duration = Duration::from_millis(5);
 pub(super) fn start(room: &Rc<Room>) {
     let time = {
         let state = &mut *room.state();
-        if !state.open || !(state.full || state.repeat || state.waiting()) {
+        if !state.open || !(state.full || state.curious || state.repeat || state.waiting()) {
             return;
         }
         state.tasks = state.tasks.wrapping_add(1);
@@ -107,6 +107,9 @@ fn step(room: &Rc<Room>, next_look: Instant, hold: Instant) -> Step {
     }
     if state.full {
         return Step::Read;
+    }
+    if core::mem::take(&mut state.curious) {
+        return Step::Look;
     }
     let Some((due, sure)) = first_look(state) else {
         state.reader = None;

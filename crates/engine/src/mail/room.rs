@@ -45,6 +45,8 @@ pub(super) struct State {
     pub reader: Option<u32>,
     /// The send mailbox is known to be full.
     pub full: bool,
+    /// Somebody wants to know whether the send mailbox is full.
+    pub curious: bool,
     /// The receive mailbox is full, and may stay so until the send mailbox is read.
     pub blocked: bool,
     /// A read was lost: its mail has to be asked for again.
@@ -83,6 +85,7 @@ impl Room {
             writer: None,
             reader: None,
             full: false,
+            curious: false,
             blocked: false,
             repeat: false,
             tasks: 0,
@@ -168,6 +171,12 @@ impl Room {
         reader::start(self);
     }
 
+    /// There might be mail: the reader looks once.
+    pub(super) fn look_once(self: &Rc<Room>) {
+        self.state().curious = true;
+        reader::start(self);
+    }
+
     pub(super) fn tell(&self) {
         self.news.notify();
         self.work.notify();
@@ -179,6 +188,7 @@ impl State {
         self.time = self.time.wrapping_add(1);
         self.open = open;
         self.full = false;
+        self.curious = false;
         self.blocked = false;
         self.repeat = false;
         self.lanes.iter_mut().for_each(LaneState::reset);

@@ -11,6 +11,11 @@ use super::talk::{Limits, Talk};
 use super::unsolicited::Unsolicited;
 use super::{Mailbox, MailboxError};
 
+/// Pause between two looks for a message: this one at first, growing to the longest.
+const FIRST_PAUSE: Duration = Duration::from_micros(200);
+/// Longest pause.
+const LONGEST_PAUSE: Duration = Duration::from_millis(2);
+
 /// A message of a vendor.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Voe {
@@ -38,16 +43,35 @@ pub async fn exchange(mailbox: &Mailbox, message: &Voe, limits: Limits) -> Resul
     talk.ask(&payload, limits, accept).await
 }
 
-/// Waits for a message that is no answer to [`exchange`]. What cannot be read is left out.
+/// Waits for a message that is no answer to [`exchange`], and looks for it at the mailbox's status meanwhile. What cannot
+/// be read is left out.
 pub async fn receive(mailbox: &Mailbox, limit: Duration) -> Result<Voe, MailboxError> {
-    let next = async {
-        loop {
-            if let Some(message) = decode(&mailbox.unsolicited(Unsolicited::Voe).await.payload) {
-                return message;
+    wait(mailbox, limit, Mailbox::look_for_mail).await
+}
+
+/// As [`receive`], but reads the mailbox without a look at its status.
+pub async fn receive_directly(mailbox: &Mailbox, limit: Duration) -> Result<Voe, MailboxError> {
+    wait(mailbox, limit, Mailbox::is_full).await
+}
+
+async fn wait(mailbox: &Mailbox, limit: Duration, look: impl Fn(&Mailbox)) -> Result<Voe, MailboxError> {
+    let bus = mailbox.bus();
+    let (until, mut pause) = (bus.now() + limit, Duration::ZERO);
+    loop {
+        let left = until.since(bus.now());
+        match mailbox.unsolicited_within(Unsolicited::Voe, pause.min(left)).await? {
+            Some(unclaimed) => {
+                if let Some(message) = decode(&unclaimed.payload) {
+                    return Ok(message);
+                }
+            }
+            None if left.is_zero() => return Err(MailboxError::NoAnswer { limit }),
+            None => {
+                look(mailbox);
+                pause = (pause * 3 / 2).clamp(FIRST_PAUSE, LONGEST_PAUSE);
             }
         }
-    };
-    mailbox.bus().within(limit, next).await.map_err(|_| MailboxError::NoAnswer { limit })
+    }
 }
 
 fn encode(talk: &Talk, message: &Voe) -> Result<Vec<u8>, MailboxError> {

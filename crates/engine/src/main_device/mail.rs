@@ -12,7 +12,7 @@ use crate::mail::coe::{self, SdoAddress, SdoError, SdoFailure};
 use crate::mail::{Limits, Mailbox, MailboxError};
 use crate::procedures::configure::ConfigureError;
 use crate::procedures::visit::visit;
-use crate::sdo_request::{self, SdoRequest};
+use crate::request::{RegisterRequest, SdoRequest, SoeRequest, VoeHandler};
 
 impl MainDevice {
     /// Mailbox of a SubDevice: by its index in the declaration; before activation by its position in the last scan, and
@@ -52,9 +52,31 @@ impl MainDevice {
     /// A request for objects of a declared SubDevice of up to `size` bytes, to be made from the cyclic thread once the
     /// MainDevice is active. It may be created before or after activation; dropped, it is forgotten.
     pub fn create_sdo_request(&mut self, subdevice: usize, size: usize) -> SdoRequest {
-        let (request, served) = sdo_request::request(subdevice, size);
+        let (request, served) = SdoRequest::new(subdevice, size);
         self.requests.add(served);
         request
+    }
+
+    /// A request for registers of a declared SubDevice of up to `size` bytes; as [`MainDevice::create_sdo_request`].
+    pub fn create_register_request(&mut self, subdevice: usize, size: usize) -> RegisterRequest {
+        let (request, served) = RegisterRequest::new(subdevice, size);
+        self.requests.add(served);
+        request
+    }
+
+    /// A request for IDNs of a declared SubDevice of up to `size` bytes; as [`MainDevice::create_sdo_request`].
+    pub fn create_soe_request(&mut self, subdevice: usize, size: usize) -> SoeRequest {
+        let (request, served) = SoeRequest::new(subdevice, size);
+        self.requests.add(served);
+        request
+    }
+
+    /// A handler of vendor messages of a declared SubDevice of up to `size` bytes; as
+    /// [`MainDevice::create_sdo_request`].
+    pub fn create_voe_handler(&mut self, subdevice: usize, size: usize) -> VoeHandler {
+        let (handler, served) = VoeHandler::new(subdevice, size);
+        self.requests.add(served);
+        handler
     }
 
     /// Starts work of the application's own: any async function over a [`Mailbox`] or the bus.

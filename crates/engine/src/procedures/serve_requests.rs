@@ -1,15 +1,24 @@
-//! Serving the SDO requests of cyclic threads ([`crate::sdo_request`]).
+//! Serving the requests of cyclic threads ([`crate::request`]).
 
 use alloc::rc::Rc;
 use alloc::vec::Vec;
 use core::cell::RefCell;
+use core::future::poll_fn;
+use core::pin::pin;
+use core::task::Poll;
 use core::time::Duration;
 
+use ringcat_wire::address::{RegisterAddress, StationAddress};
+use ringcat_wire::mailbox::soe::{Idn, SoeElements};
+
 use super::fleet::SharedFleet;
+use super::services::registers;
 use crate::mail::coe::{self, SdoAddress, SdoError, SdoFailure};
-use crate::mail::{Mailbox, MailboxError};
-use crate::sdo_request::{Order, RequestFailure, Served};
-use crate::supervisor::Bus;
+use crate::mail::soe::{self, SoeAddress, SoeError, SoeFailure};
+use crate::mail::voe::{self, Voe};
+use crate::mail::{Limits, Mailbox, MailboxError};
+use crate::request::{Access, Order, RequestFailure, Served, Subject};
+use crate::supervisor::{Bus, Signal};
 
 /// Pause between two looks at the requests.
 const PAUSE: Duration = Duration::from_micros(500);
@@ -35,49 +44,152 @@ impl Requests {
         all.retain(|served| !served.is_abandoned());
         all.iter().filter_map(|served| Some((served.clone(), served.take()?))).collect()
     }
+
+    fn any_cancelled(&self) -> bool {
+        self.all.borrow().iter().any(Served::is_cancelled)
+    }
 }
 
 /// Runs for ever.
 pub(crate) async fn serve_requests(bus: Bus, fleet: SharedFleet, requests: Requests) {
+    let cancelled = bus.signal();
     loop {
         bus.sleep(PAUSE).await;
+        if requests.any_cancelled() {
+            cancelled.notify();
+        }
         for (served, order) in requests.asked() {
-            let mailbox = fleet.mailbox(order.subdevice);
-            bus.spawn(serve(bus.clone(), served, order, mailbox));
+            let member = fleet.access().members.get(order.subdevice).map(|m| (m.station, m.mailbox.clone()));
+            match member {
+                Some(target) => bus.spawn(serve(bus.clone(), served, order, target, cancelled.clone())),
+                None => served.fail(RequestFailure::Failed),
+            }
         }
     }
 }
 
-async fn serve(bus: Bus, served: Served, order: Order, mailbox: Option<Mailbox>) {
-    let Some(mailbox) = mailbox else { return served.fail(RequestFailure::Failed) };
-    let timeout = order.timeout;
-    let work = async {
-        let Order { index, sub_index, complete_access, .. } = order;
-        let object = SdoAddress { index, sub_index, complete_access };
-        // The whole has a limit; no part of it needs a shorter one.
-        let limits = (timeout, timeout);
-        match &order.data {
-            Some(data) => coe::write(&mailbox, object, data, limits).await.map(|()| None),
-            None => coe::read(&mailbox, object, limits, order.room).await.map(Some),
-        }
+/// What a request that has worked brought: data of a read, and what the data says it is about.
+type Done = (Option<Vec<u8>>, Option<Subject>);
+
+async fn serve(bus: Bus, served: Served, order: Order, target: (StationAddress, Mailbox), cancelled: Signal) {
+    let result = {
+        let mut work = pin!(bus.within(order.timeout, execute(&bus, &order, target)));
+        let mut cancel = pin!(cancelled.until(|| served.is_cancelled().then_some(())));
+        poll_fn(|context| {
+            if cancel.as_mut().poll(context).is_ready() {
+                return Poll::Ready(Err(RequestFailure::Cancelled));
+            }
+            work.as_mut().poll(context).map(|result| result.unwrap_or(Err(RequestFailure::Timeout)))
+        })
+        .await
     };
-    match bus.within(timeout, work).await {
-        Ok(Ok(read)) => served.succeed(read.as_deref()),
-        Ok(Err(error)) => served.fail(failure(&error)),
-        Err(_) => served.fail(RequestFailure::Timeout),
+    match result {
+        Ok((read, answered)) => served.succeed(read.as_deref(), answered),
+        Err(failure) => served.fail(failure),
     }
 }
 
-fn failure(error: &SdoError) -> RequestFailure {
+async fn execute(bus: &Bus, order: &Order, target: (StationAddress, Mailbox)) -> Result<Done, RequestFailure> {
+    let (station, mailbox) = target;
+    // The whole has a limit; no part of it needs a shorter one.
+    let limits = (order.timeout, order.timeout);
+    let read = match order.subject {
+        Subject::Object { index, sub_index, complete_access } => {
+            object(&mailbox, SdoAddress { index, sub_index, complete_access }, order, limits).await?
+        }
+        Subject::Register { address, length } => {
+            register(bus, station, RegisterAddress(address), length, order).await?
+        }
+        Subject::Idn { drive, idn, elements } => {
+            let address = SoeAddress { drive, idn: Idn(idn), elements: SoeElements(elements) };
+            element(&mailbox, address, order, limits).await?
+        }
+        Subject::Vendor { id, kind } => return message(&mailbox, (id, kind), order).await,
+    };
+    Ok((read, None))
+}
+
+async fn object(
+    mailbox: &Mailbox,
+    object: SdoAddress,
+    order: &Order,
+    limits: Limits,
+) -> Result<Option<Vec<u8>>, RequestFailure> {
+    let result = match &order.access {
+        Access::Write(data) => coe::write(mailbox, object, data, limits).await.map(|()| None),
+        Access::Read | Access::ReadDirectly => coe::read(mailbox, object, limits, order.room).await.map(Some),
+    };
+    result.map_err(|error| of_object(&error))
+}
+
+async fn register(
+    bus: &Bus,
+    station: StationAddress,
+    address: RegisterAddress,
+    length: u16,
+    order: &Order,
+) -> Result<Option<Vec<u8>>, RequestFailure> {
+    let result = match &order.access {
+        Access::Write(data) => registers::write(bus, station, address, data).await.map(|()| None),
+        Access::Read | Access::ReadDirectly => registers::read(bus, station, address, length.into()).await.map(Some),
+    };
+    result.map_err(|_| RequestFailure::Failed)
+}
+
+async fn element(
+    mailbox: &Mailbox,
+    address: SoeAddress,
+    order: &Order,
+    limits: Limits,
+) -> Result<Option<Vec<u8>>, RequestFailure> {
+    let result = match &order.access {
+        Access::Write(data) => soe::write(mailbox, address, data, limits).await.map(|()| None),
+        Access::Read | Access::ReadDirectly => soe::read(mailbox, address, limits, order.room).await.map(Some),
+    };
+    result.map_err(|error| of_element(&error))
+}
+
+async fn message(mailbox: &Mailbox, (id, kind): (u32, u16), order: &Order) -> Result<Done, RequestFailure> {
+    let received = match &order.access {
+        Access::Write(data) => {
+            let message = Voe { vendor_id: id, vendor_type: kind, data: data.clone() };
+            voe::send(mailbox, &message, order.timeout).await.map_err(of_mailbox)?;
+            return Ok((None, None));
+        }
+        Access::Read => voe::receive(mailbox, order.timeout).await,
+        Access::ReadDirectly => voe::receive_directly(mailbox, order.timeout).await,
+    };
+    let Voe { vendor_id, vendor_type, data } = received.map_err(of_mailbox)?;
+    Ok((Some(data), Some(Subject::Vendor { id: vendor_id, kind: vendor_type })))
+}
+
+fn of_object(error: &SdoError) -> RequestFailure {
     match error.cause {
         SdoFailure::Aborted(code) => RequestFailure::Aborted(code),
         SdoFailure::TooLong(_) => RequestFailure::TooLong,
-        SdoFailure::Mailbox(MailboxError::NoAnswer { .. } | MailboxError::Full { .. }) => RequestFailure::Timeout,
-        SdoFailure::Mailbox(_)
-        | SdoFailure::Toggle
+        SdoFailure::Mailbox(error) => of_mailbox(error),
+        SdoFailure::Toggle
         | SdoFailure::EmptySegment
         | SdoFailure::Size { .. }
         | SdoFailure::UnknownSize
         | SdoFailure::SourceEnded { .. } => RequestFailure::Failed,
+    }
+}
+
+fn of_element(error: &SoeError) -> RequestFailure {
+    match error.cause {
+        SoeFailure::Refused(code) => RequestFailure::Refused(code),
+        SoeFailure::TooLong(_) => RequestFailure::TooLong,
+        SoeFailure::Mailbox(error) => of_mailbox(error),
+        SoeFailure::Drive | SoeFailure::Fragments { .. } => RequestFailure::Failed,
+    }
+}
+
+fn of_mailbox(error: MailboxError) -> RequestFailure {
+    match error {
+        MailboxError::NoAnswer { .. } | MailboxError::Full { .. } => RequestFailure::Timeout,
+        MailboxError::Bus(_) | MailboxError::Closed | MailboxError::TooLong { .. } | MailboxError::Error(_) => {
+            RequestFailure::Failed
+        }
     }
 }

@@ -18,6 +18,7 @@ mod mail_services;
 mod mail_startup;
 mod power_cycles;
 mod real_images;
+mod requests;
 mod ring_matrix;
 mod slow_eeprom;
 mod start_up;

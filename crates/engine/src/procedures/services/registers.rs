@@ -1,0 +1,49 @@
+//! Registers and memory of one SubDevice, any number of bytes (facts 3).
+
+use alloc::vec::Vec;
+
+use ringcat_wire::address::{RegisterAddress, StationAddress};
+use ringcat_wire::datagram::MAX_DATA;
+
+use super::ServiceError;
+use crate::supervisor::Bus;
+
+/// Bytes that a SubDevice has.
+const MEMORY: usize = 1 << 16;
+
+/// Reads bytes from an address on, in as many datagrams as it takes.
+pub async fn read(
+    bus: &Bus,
+    station: StationAddress,
+    address: RegisterAddress,
+    length: usize,
+) -> Result<Vec<u8>, ServiceError> {
+    check(address, length)?;
+    let mut bytes = Vec::with_capacity(length);
+    while bytes.len() < length {
+        let at = address.offset(bytes.len() as u16);
+        let piece = (length - bytes.len()).min(MAX_DATA);
+        bytes.extend(bus.fprd(station, at, piece).await?);
+    }
+    Ok(bytes)
+}
+
+/// Writes bytes from an address on, in as many datagrams as it takes. A datagram whose frame is lost is sent again, so
+/// that a register may be written twice.
+pub async fn write(
+    bus: &Bus,
+    station: StationAddress,
+    address: RegisterAddress,
+    data: &[u8],
+) -> Result<(), ServiceError> {
+    check(address, data.len())?;
+    for (number, piece) in data.chunks(MAX_DATA).enumerate() {
+        bus.fpwr(station, address.offset((number * MAX_DATA) as u16), piece).await?;
+    }
+    Ok(())
+}
+
+fn check(address: RegisterAddress, length: usize) -> Result<(), ServiceError> {
+    let fits = length <= MEMORY - usize::from(address.0);
+    if fits { Ok(()) } else { Err(ServiceError::Range { address: address.0, length }) }
+}

@@ -1,0 +1,136 @@
+//! SDO requests of a cyclic thread.
+
+use core::time::Duration;
+
+use super::slot::{Owned, RequestFailure, RequestRefused, RequestState, Served, Subject, pair};
+
+/// A request for objects of one SubDevice. It may be moved to the cyclic thread.
+#[derive(Debug)]
+pub struct SdoRequest {
+    owned: Owned,
+}
+
+impl SdoRequest {
+    /// A request of `size` bytes for an object of a declared SubDevice, and its other side.
+    pub(crate) fn new(subdevice: usize, size: usize) -> (SdoRequest, Served) {
+        let subject = Subject::Object { index: 0, sub_index: 0, complete_access: false };
+        let (owned, served) = pair(subdevice, size, subject);
+        (SdoRequest { owned }, served)
+    }
+
+    /// Turns to another object of the same SubDevice.
+    pub fn set_object(&mut self, index: u16, sub_index: u8, complete_access: bool) -> Result<(), RequestRefused> {
+        self.owned.set_subject(Subject::Object { index, sub_index, complete_access })
+    }
+
+    /// Starts to read.
+    pub fn read(&mut self) -> Result<(), RequestRefused> {
+        self.owned.read()
+    }
+
+    /// Starts to write.
+    pub fn write(&mut self, data: &[u8]) -> Result<(), RequestRefused> {
+        self.owned.write(data)
+    }
+
+    /// How far it is.
+    pub fn state(&self) -> RequestState {
+        self.owned.state()
+    }
+
+    /// Sets the time that the request may take in all, for all later uses, up to an hour.
+    pub fn set_timeout(&mut self, timeout: Duration) -> Result<(), RequestRefused> {
+        self.owned.set_timeout(timeout)
+    }
+
+    /// Has a request that is under way end as soon as the acyclic half looks, with [`RequestFailure::Cancelled`].
+    pub fn cancel(&self) {
+        self.owned.cancel();
+    }
+
+    /// Bytes that were read or written last.
+    pub fn len(&self) -> usize {
+        self.owned.len()
+    }
+
+    /// Whether nothing was read or written.
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+
+    /// Copies the data out, as much as fits, and returns how much that is. Nothing while the request is busy.
+    pub fn data(&self, out: &mut [u8]) -> usize {
+        self.owned.data(out)
+    }
+
+    /// Why it failed, where it did.
+    pub fn failure(&self) -> Option<RequestFailure> {
+        self.owned.failure()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use alloc::vec;
+
+    use ringcat_wire::mailbox::sdo::AbortCode;
+
+    use super::*;
+    use crate::request::Access;
+
+    #[test]
+    fn a_request_goes_to_the_other_side_and_comes_back_with_what_was_read() {
+        let (mut request, served) = SdoRequest::new(3, 8);
+        assert_eq!((request.state(), served.take()), (RequestState::Unused, None));
+        request.set_object(0x2000, 7, true).unwrap();
+        request.set_timeout(Duration::from_millis(5)).unwrap();
+        request.read().unwrap();
+        assert_eq!(request.state(), RequestState::Busy);
+        let order = served.take().unwrap();
+        assert_eq!(order.subject, Subject::Object { index: 0x2000, sub_index: 7, complete_access: true });
+        assert_eq!((order.subdevice, order.timeout, order.room), (3, Duration::from_millis(5), 8));
+        assert_eq!((order.access, served.take()), (Access::Read, None));
+        assert_eq!(request.set_object(1, 1, false), Err(RequestRefused::Busy));
+        assert_eq!(request.read(), Err(RequestRefused::Busy));
+        let mut out = [0; 8];
+        assert_eq!(request.data(&mut out), 0);
+        served.succeed(Some(&[1, 2, 3]), None);
+        assert_eq!((request.state(), request.data(&mut out)), (RequestState::Success, 3));
+        assert_eq!(out[..3], [1, 2, 3]);
+        request.set_object(0x2001, 0, false).unwrap();
+        assert_eq!(request.state(), RequestState::Unused);
+    }
+
+    #[test]
+    fn data_that_has_no_room_is_refused_and_failures_are_named() {
+        let (mut request, served) = SdoRequest::new(0, 2);
+        assert_eq!(request.write(&[1, 2, 3]), Err(RequestRefused::TooLong { bytes: 3, limit: 2 }));
+        request.write(&[1, 2]).unwrap();
+        assert_eq!(served.take().unwrap().access, Access::Write(vec![1, 2]));
+        served.fail(RequestFailure::Aborted(AbortCode::READ_ONLY));
+        assert_eq!(request.failure(), Some(RequestFailure::Aborted(AbortCode::READ_ONLY)));
+        request.read().unwrap();
+        served.take().unwrap();
+        served.succeed(Some(&[1, 2, 3]), None);
+        assert_eq!(request.failure(), Some(RequestFailure::TooLong));
+        request.read().unwrap();
+        served.end();
+        assert_eq!(request.failure(), Some(RequestFailure::Failed));
+        assert!(!served.is_abandoned());
+        drop(request);
+        assert!(served.is_abandoned());
+    }
+
+    #[test]
+    fn only_a_request_that_is_under_way_is_cancelled() {
+        let (mut request, served) = SdoRequest::new(0, 2);
+        request.cancel();
+        assert!(!served.is_cancelled());
+        request.read().unwrap();
+        request.cancel();
+        assert!(served.is_cancelled());
+        served.fail(RequestFailure::Cancelled);
+        request.read().unwrap();
+        assert!(!served.is_cancelled(), "the next one is not");
+    }
+}
