@@ -2,7 +2,7 @@
 //!
 //! In: frames at ports, link changes, accesses of the application, virtual time. Out: frames at ports, events for the
 //! application, deadlines. The network carries frames between controllers; the application behind the PDI makes a device
-//! of it. Not modelled: the control loop and SYNC units of distributed clocks, MII management.
+//! of it. Not modelled: MII management.
 //!
 //! A frame is handled when its last bit has come in. It makes its whole way inside at once: along 0-(EPU)-3-1-2 to the
 //! next open port. What happens by itself (watchdogs, busy EEPROM, temporary loops) is brought up to date at the next
@@ -10,6 +10,7 @@
 
 mod access;
 mod clock;
+mod clock_registers;
 mod config;
 mod counters;
 mod events;
@@ -23,8 +24,11 @@ mod registers;
 mod reset;
 mod sii;
 mod sync_manager;
+mod sync_unit;
 mod watchdog;
 
+pub use clock::{ClockErrors, Wander};
+pub use clock_registers::LatchPin;
 pub use config::{ControllerConfig, MAX_UNITS};
 
 use ringcat_wire::address::RegisterAddress;
@@ -40,6 +44,7 @@ use pass::Pass;
 use ports::Ports;
 use sii::SiiInterface;
 use sync_manager::SyncManagers;
+use sync_unit::{LatchUnit, SyncUnit};
 use watchdog::Watchdog;
 
 /// What becomes of a frame that a controller received.
@@ -70,6 +75,8 @@ pub struct Controller {
     pdi_watchdog: Watchdog,
     sii: SiiInterface,
     clock: Clock,
+    sync_unit: SyncUnit,
+    latch_units: [LatchUnit; 2],
     pass: Pass,
     /// Loop settings as last written, and those that return when temporary ones end.
     lasting_loops: [LoopControl; 4],
@@ -100,7 +107,9 @@ impl Controller {
             process_data_watchdog: Watchdog::new(),
             pdi_watchdog: Watchdog::new(),
             sii: SiiInterface::new(),
-            clock: Clock::new(config.clock_start, config.clock_drift_ppb),
+            clock: Clock::new(config.clock_start, config.clock_errors),
+            sync_unit: SyncUnit::default(),
+            latch_units: [LatchUnit::default(); 2],
             pass: Pass::new(),
             lasting_loops: [LoopControl::Auto; 4],
             temporary_loops: None,
@@ -248,12 +257,6 @@ impl Controller {
     /// The local clock in nanoseconds (facts 3.12).
     pub fn local_time(&self, now: SimTime) -> u64 {
         self.clock.local(now)
-    }
-
-    /// Local clock plus DC_SYSTEM_TIME_OFFSET; 32 bits where the clock has no more.
-    pub fn system_time(&self, now: SimTime) -> u64 {
-        let time = self.clock.local(now).wrapping_add(self.memory.u64(map::DC_SYSTEM_TIME_OFFSET));
-        if self.config.features.dc_64bit { time } else { u64::from(time as u32) }
     }
 
     /// Registers and RAM as they are, without the effects of reading; what is brought up to date when read may be old.

@@ -15,6 +15,7 @@ use ringcat_wire::sii::{
 
 use crate::application::Behaviour;
 use crate::application::dictionary::Object;
+use crate::controller::{ClockErrors, Wander};
 
 pub use services::{AoeDescription, EoeDescription, EoeEnd, FoeDescription, Services, SoeDescription};
 
@@ -206,6 +207,12 @@ pub struct DeviceDescription {
     pub eight_byte_sii: bool,
     /// Error of the local clock.
     pub clock_drift_ppb: i64,
+    /// How this changes in the course of time.
+    pub clock_wander: Wander,
+    /// Arrivals of frames are seen by up to so much too late, at random.
+    pub receive_jitter: Duration,
+    /// The controller latches receive times of frames in processing direction only, unless 0x0936 says otherwise.
+    pub latches_processing_only: bool,
     /// Local clock at power-on.
     pub clock_start_ns: u64,
     /// Where the inputs come from.
@@ -215,6 +222,11 @@ pub struct DeviceDescription {
 }
 
 impl DeviceDescription {
+    /// What is not ideal about its clock.
+    pub fn clock_errors(&self) -> ClockErrors {
+        ClockErrors { drift_ppb: self.clock_drift_ppb, wander: self.clock_wander, receive_jitter: self.receive_jitter }
+    }
+
     /// A device without process data, mailbox and clock: two MII ports, state machine in an application.
     pub fn plain(name: &str, identity: Identity) -> DeviceDescription {
         DeviceDescription {
@@ -242,6 +254,9 @@ impl DeviceDescription {
             sii_busy: Duration::from_micros(500),
             eight_byte_sii: true,
             clock_drift_ppb: 0,
+            clock_wander: Wander::default(),
+            receive_jitter: Duration::ZERO,
+            latches_processing_only: false,
             clock_start_ns: 0,
             behaviour: Behaviour::default(),
             sii_image: None,

@@ -164,8 +164,9 @@ fn controller_config(description: &DeviceDescription) -> ControllerConfig {
         sii: sii_image::build(description),
         sii_busy: description.sii_busy,
         eight_byte_reads: description.eight_byte_sii,
-        clock_drift_ppb: description.clock_drift_ppb,
+        clock_errors: description.clock_errors(),
         clock_start: description.clock_start_ns,
+        receive_time_latch_mode: description.latches_processing_only,
         ..ControllerConfig::default()
     }
 }

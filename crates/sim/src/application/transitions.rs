@@ -128,9 +128,10 @@ impl Application {
         controller: &mut Controller,
         now: SimTime,
     ) {
-        if pending.to == AlState::Op && !self.process_data.outputs_seen() {
+        let no_sync = controller.waits_for_sync0(now);
+        if pending.to == AlState::Op && (no_sync || !self.process_data.outputs_seen()) {
             if now >= pending.give_up {
-                self.machine.refuse(AlStatusCode::NO_VALID_OUTPUTS);
+                self.machine.refuse(if no_sync { AlStatusCode::NO_SYNC } else { AlStatusCode::NO_VALID_OUTPUTS });
                 self.report(controller, now);
             } else if controller.al_event() & EVENT_AL_CONTROL != 0 {
                 self.machine.abandon();

@@ -85,6 +85,7 @@ impl Controller {
                 let mut pass = mem::replace(&mut self.pass, Pass::new());
                 pass.clear();
                 pass.write(address, bytes, mask);
+                self.pass.start = pass.start;
                 self.apply(Side::Pdi, address, &pass.bytes, pass.start, None);
                 pass.clear();
                 self.pass = pass;
@@ -170,9 +171,8 @@ impl Controller {
         let reads = |address: ringcat_wire::address::RegisterAddress, len: u32| {
             at < u32::from(address.0) + len && u32::from(address.0) < until
         };
-        if reads(map::DC_SYSTEM_TIME, 8) {
-            let time = self.system_time(self.pass.start);
-            self.memory.set_u64(map::DC_SYSTEM_TIME, time);
+        if at >= u32::from(map::DC_RECEIVE_TIME.0) && at < u32::from(map::PRODUCT_ID.0) {
+            self.clock_read(side, at, until);
         }
         match side {
             Side::Ecat => {

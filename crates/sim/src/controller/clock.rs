@@ -1,38 +1,137 @@
-//! The local clock of distributed clocks and the receive-time latches (facts 3.12, 7.1).
+//! The local clock of distributed clocks and the receive-time latches (facts 3.12, 7.1, 7.2.1).
 //!
-//! In: virtual time. Out: local time with drift, and which ports' receive times belong to a latching frame. The control
-//! loop and the SYNC units are not modelled: writes to DC_SYSTEM_TIME are accepted and ignored.
+//! In: virtual time, and the system times that EtherCAT writes. Out: local time, with the error of a free clock
+//! ([`oscillator`]) and steered by the control loop ([`control_loop`]), and which ports' receive times belong to a
+//! latching frame. SYNC and LATCH units are in [`super::sync_unit`].
+
+mod control_loop;
+mod oscillator;
+
+use core::time::Duration;
+
+pub(super) use control_loop::LoopSettings;
+pub use oscillator::Wander;
 
 use crate::frame::Port;
 use crate::time::SimTime;
+use control_loop::{ControlLoop, Steering};
+use oscillator::{FRACTION, Oscillator};
 
-const BILLION: i128 = 1_000_000_000;
+/// What is not ideal about a clock.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct ClockErrors {
+    /// How much it runs ahead of virtual time, in parts per billion.
+    pub drift_ppb: i64,
+    /// How this changes in the course of time.
+    pub wander: Wander,
+    /// Every arrival of a frame is seen by up to so much too late, at random.
+    pub receive_jitter: Duration,
+}
 
 /// The local clock.
 #[derive(Clone, Debug)]
 pub(super) struct Clock {
     started: SimTime,
     start: u64,
-    drift_ppb: i64,
+    oscillator: Oscillator,
+    jitter_ns: u64,
+    control: ControlLoop,
+    steering: Steering,
+    /// What the free clock had counted when steering began, and local time then, both with fraction.
+    anchor: (i128, i128),
     arrivals: [Option<(u64, SimTime)>; 4],
     /// The frame whose further arrivals are latched.
     latching: Option<u64>,
 }
 
 impl Clock {
-    pub fn new(start: u64, drift_ppb: i64) -> Clock {
-        Clock { started: SimTime::ZERO, start, drift_ppb, arrivals: [None; 4], latching: None }
+    pub fn new(start: u64, errors: ClockErrors) -> Clock {
+        Clock {
+            started: SimTime::ZERO,
+            start,
+            oscillator: Oscillator { drift_ppb: errors.drift_ppb, wander: errors.wander },
+            jitter_ns: u64::try_from(errors.receive_jitter.as_nanos()).unwrap_or(u64::MAX - 1),
+            control: ControlLoop::default(),
+            steering: Steering::FREE,
+            anchor: (0, 0),
+            arrivals: [None; 4],
+            latching: None,
+        }
     }
 
     pub fn restart(&mut self, now: SimTime) {
-        *self = Clock { started: now, ..Clock::new(self.start, self.drift_ppb) };
+        self.started = now;
+        self.restart_loop(now);
+        self.anchor = (0, 0);
+        (self.arrivals, self.latching) = ([None; 4], None);
     }
 
     /// Local time in nanoseconds.
     pub fn local(&self, now: SimTime) -> u64 {
-        let elapsed = now.0.saturating_sub(self.started.0);
-        let drift = (i128::from(elapsed) * i128::from(self.drift_ppb) / BILLION) as u64;
-        self.start.wrapping_add(elapsed).wrapping_add(drift)
+        self.start.wrapping_add((self.counted(now).1 >> FRACTION) as u64)
+    }
+
+    /// Local time that the controller notes for the first bit of a frame at a port.
+    pub fn stamp(&self, port: Port, first_bit: SimTime) -> u64 {
+        self.local(self.seen(port, first_bit))
+    }
+
+    /// When the controller sees the first bit of a frame.
+    fn seen(&self, port: Port, first_bit: SimTime) -> SimTime {
+        if self.jitter_ns == 0 {
+            return first_bit;
+        }
+        let mut hash = first_bit.0 ^ self.start.rotate_left(32) ^ (port.index() as u64) << 62;
+        for factor in [0xBF58_476D_1CE4_E5B9, 0x94D0_49BB_1331_11EB_u64] {
+            hash = (hash ^ hash >> 31).wrapping_mul(factor);
+        }
+        SimTime(first_bit.0.saturating_add((hash >> 11) % (self.jitter_ns + 1)))
+    }
+
+    /// What the free and the steered clock have counted since power-on, with fraction.
+    fn counted(&self, now: SimTime) -> (i128, i128) {
+        let free = self.oscillator.counted(i128::from(now.0) - i128::from(self.started.0));
+        let since = free - self.anchor.0;
+        (free, self.anchor.1 + since + self.steering.added(since))
+    }
+
+    /// Compares the copy of the system time that was taken at the first bit of a frame with the one received, and
+    /// steers. `correction` is what the registers add to local time: offset minus delay.
+    pub fn compare(&mut self, received: u32, correction: u64, first_bit: SimTime, settings: LoopSettings) {
+        let copy = self.stamp(Port::A, first_bit).wrapping_add(correction) as u32;
+        let dt = copy.wrapping_sub(received) as i32;
+        self.control.sample(i128::from(dt) << FRACTION, settings);
+        self.steer(first_bit, self.control.steering(settings));
+    }
+
+    /// Forgets what the loop has learned: the clock runs free.
+    pub fn restart_loop(&mut self, now: SimTime) {
+        self.control = ControlLoop::default();
+        self.steer(now, Steering::FREE);
+    }
+
+    fn steer(&mut self, now: SimTime, steering: Steering) {
+        self.anchor = self.counted(now);
+        self.steering = steering;
+    }
+
+    /// Contents of DC_SYSTEM_TIME_DIFFERENCE and DC_SPEED_COUNTER_DIFFERENCE.
+    pub fn loop_registers(&self) -> (u32, i16) {
+        (self.control.difference_register(), self.control.speed_register())
+    }
+
+    /// When local time reaches a value that is not long ago or far away: the clock is steered by less than a
+    /// thousandth, so a few steps are enough.
+    pub fn when(&self, local: u64, now: SimTime) -> SimTime {
+        let mut at = now;
+        for _ in 0..8 {
+            let missing = local.wrapping_sub(self.local(at)) as i64;
+            if missing == 0 {
+                break;
+            }
+            at = SimTime(at.0.saturating_add_signed(missing));
+        }
+        at
     }
 
     /// Notes the first bit of a frame at a port. Returns whether it is a latching frame that came back.
@@ -53,16 +152,4 @@ impl Clock {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_drift_of_100_ppm_is_100_us_in_a_second() {
-        let mut clock = Clock::new(5, 100_000);
-        clock.restart(SimTime(1_000));
-        assert_eq!(clock.local(SimTime(1_000_001_000)), 1_000_100_005);
-        let mut slow = Clock::new(0, -100_000);
-        slow.restart(SimTime(0));
-        assert_eq!(slow.local(SimTime(1_000_000_000)), 999_900_000);
-    }
-}
+mod tests;

@@ -6,6 +6,8 @@ use core::time::Duration;
 
 use ringcat_wire::register::{Features, PortKind};
 
+use super::clock::ClockErrors;
+
 /// Most FMMUs and SyncManagers of a controller (facts 3.1).
 pub const MAX_UNITS: u8 = 16;
 
@@ -38,8 +40,8 @@ pub struct ControllerConfig {
     pub sii_load_time: Duration,
     /// One read command yields 8 bytes (otherwise 4).
     pub eight_byte_reads: bool,
-    /// How much the local clock runs ahead of virtual time, in parts per billion.
-    pub clock_drift_ppb: i64,
+    /// What is not ideal about the local clock.
+    pub clock_errors: ClockErrors,
     /// The local clock when power comes.
     pub clock_start: u64,
     /// The controller has DC_LATCH_MODE (0x0936) and, while it is 0, does not latch the receive time of frames that come
@@ -63,7 +65,7 @@ impl Default for ControllerConfig {
             sii_busy: Duration::from_micros(500),
             sii_load_time: Duration::from_millis(1),
             eight_byte_reads: true,
-            clock_drift_ppb: 0,
+            clock_errors: ClockErrors::default(),
             clock_start: 0,
             receive_time_latch_mode: false,
         }

@@ -242,6 +242,7 @@ impl Controller {
     /// Carries out the frame's register writes in the order of its datagrams, then the SII command among them.
     fn apply_writes(&mut self, now: SimTime) {
         let mut pass = mem::replace(&mut self.pass, Pass::new());
+        self.pass.start = pass.start;
         let mut at = 0;
         for &(address, len) in &pass.writes {
             let bytes = &pass.bytes[at..at + usize::from(len)];

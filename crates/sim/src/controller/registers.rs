@@ -61,7 +61,7 @@ impl Controller {
             0x05 => self.sii_written(side, at, bytes, now),
             0x06 => self.configure_fmmus(),
             0x08 => self.sync_managers_written(touched),
-            0x09 => self.clock_written(touched),
+            0x09 => self.clock_written(at, bytes, self.pass.start, now),
             _ => {}
         }
         if side == Side::Pdi {
@@ -192,13 +192,6 @@ impl Controller {
         }
     }
 
-    fn clock_written(&mut self, touched: Touched) {
-        if touched.is(map::DC_SPEED_COUNTER_START, 2) {
-            self.memory.set_u32(map::DC_SYSTEM_TIME_DIFFERENCE, 0);
-            self.memory.set_u16(map::DC_SPEED_COUNTER_DIFFERENCE, 0);
-        }
-    }
-
     /// Latches the receive times of the ports at which the frame has come in, and of the processing unit (facts 3.12).
     pub(super) fn latch_receive_times(&mut self, frame: u64, at_unit: SimTime) {
         let forwarding = !self.config.receive_time_latch_mode || self.memory.u8(map::DC_LATCH_MODE) & 1 != 0;
@@ -207,7 +200,7 @@ impl Controller {
                 self.store_receive_time(port, at);
             }
         }
-        let local = self.clock.local(at_unit);
+        let local = self.clock.stamp(Port::A, at_unit);
         if self.config.features.dc_64bit {
             self.memory.set_u64(map::DC_RECEIVE_TIME_EPU, local);
         } else {
@@ -217,6 +210,6 @@ impl Controller {
 
     pub(super) fn store_receive_time(&mut self, port: Port, at: SimTime) {
         let register = map::dc_receive_time(port.index() as u8);
-        self.memory.set_u32(register, self.clock.local(at) as u32);
+        self.memory.set_u32(register, self.clock.stamp(port, at) as u32);
     }
 }

@@ -68,6 +68,7 @@ impl Controller {
         self.fmmus.clear();
         self.pass.clear();
         self.clock.restart(now);
+        (self.sync_unit, self.latch_units) = Default::default();
         self.lasting_loops = [LoopControl::Auto; 4];
         self.temporary_loops = None;
         self.reset_frame = None;

@@ -7,7 +7,8 @@ use super::SegmentError;
 use super::format::{DeviceEntry, File, duration, line};
 use super::services::services;
 use crate::catalogue;
-use crate::description::{DeviceDescription, TransitionTimes};
+use crate::controller::Wander;
+use crate::description::{DcDescription, DeviceDescription, TransitionTimes};
 use crate::network::Random;
 
 /// Most devices of a segment: station addresses are 16 bits wide.
@@ -128,14 +129,7 @@ fn settings(entry: &DeviceEntry, description: &mut DeviceDescription) -> Result<
     if let Some(serial) = entry.serial {
         description.identity.serial = serial;
     }
-    if let Some(drift) = &entry.drift_ppm {
-        let ppb = *drift.get_ref() * 1e3;
-        if !(-1e9..=1e9).contains(&ppb) {
-            let message = format!("drift_ppm: expected -1000000 to 1000000, got {}", drift.get_ref());
-            return Err((message, Some(drift.span())));
-        }
-        description.clock_drift_ppb = ppb.round() as i64;
-    }
+    clock(entry, description)?;
     if let Some(eight) = entry.eight_byte_sii {
         description.eight_byte_sii = eight;
     }
@@ -155,5 +149,47 @@ fn settings(entry: &DeviceEntry, description: &mut DeviceDescription) -> Result<
     ] {
         *target = time(value, key, 1e-3)?.unwrap_or(*target);
     }
+    Ok(())
+}
+
+/// Keys of the clock.
+fn clock(entry: &DeviceEntry, description: &mut DeviceDescription) -> Result<(), (String, Place)> {
+    let ppb = |value: &Option<toml::Spanned<f64>>, key: &str, limit: f64| -> Result<Option<i64>, (String, Place)> {
+        let Some(given) = value else { return Ok(None) };
+        if !(-limit..=limit).contains(given.get_ref()) {
+            let message = format!("{key}: expected -{limit} to {limit}, got {}", given.get_ref());
+            return Err((message, Some(given.span())));
+        }
+        Ok(Some((*given.get_ref() * 1e3).round() as i64))
+    };
+    if let Some(drift) = ppb(&entry.drift_ppm, "drift_ppm", 1e6)? {
+        description.clock_drift_ppb = drift;
+    }
+    if let Some(wander) = ppb(&entry.wander_ppm, "wander_ppm", 1e4)? {
+        // Temperature in a cabinet changes in minutes.
+        let period = Duration::from_secs(60);
+        description.clock_wander = Wander { amplitude_ppb: wander, period };
+    }
+    for (value, key, unit, target) in [
+        (&entry.wander_s, "wander_s", 1.0, &mut description.clock_wander.period),
+        (&entry.receive_jitter_ns, "receive_jitter_ns", 1e-9, &mut description.receive_jitter),
+    ] {
+        if let Some(value) = value {
+            *target = duration(value, key, unit).map_err(|error| (error.message, Some(value.span())))?;
+        }
+    }
+    if let Some(only) = entry.latches_processing_only {
+        description.latches_processing_only = only;
+    }
+    let Some(bits) = &entry.clock_bits else { return Ok(()) };
+    description.dc = match *bits.get_ref() {
+        0 => None,
+        width @ (32 | 64) => {
+            let before = description.dc.take();
+            let (modes, minimum_cycle_ns) = before.map_or_else(Default::default, |dc| (dc.modes, dc.minimum_cycle_ns));
+            Some(DcDescription { wide: width == 64, modes, minimum_cycle_ns })
+        }
+        other => return Err((format!("clock_bits: expected 0, 32 or 64, got {other}"), Some(bits.span()))),
+    };
     Ok(())
 }

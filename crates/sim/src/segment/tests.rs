@@ -327,3 +327,27 @@ fn files_come_from_beside_the_segment_file() {
     let (name, data) = &segment.devices[0].services.foe.files[0];
     assert_eq!((name.as_str(), data), ("demo.toml", &std::fs::read(beside.join("demo.toml")).unwrap()));
 }
+
+#[test]
+fn what_is_not_ideal_about_a_clock_is_written_in_the_file() {
+    let text = r#"
+        [[device]]
+        type = "servo"
+        clock_bits = 32
+        drift_ppm = 50
+        wander_ppm = 1.5
+        wander_s = 10
+        receive_jitter_ns = 40
+        latches_processing_only = true
+        "#;
+    let device = read(text).unwrap().devices.remove(0);
+    let errors = device.clock_errors();
+    assert_eq!((errors.drift_ppb, errors.wander.amplitude_ppb, errors.wander.period.as_secs()), (50_000, 1_500, 10));
+    assert_eq!((errors.receive_jitter.as_nanos(), device.latches_processing_only), (40, true));
+    let dc = device.dc.unwrap();
+    assert!(!dc.wide && !dc.modes.is_empty());
+    let wrong = |line: &str| read(&format!("[[device]]\ntype = \"servo\"\n{line}")).unwrap_err().to_string();
+    assert!(wrong("clock_bits = 48").contains("expected 0, 32 or 64, got 48"));
+    assert!(wrong("wander_ppm = 20000").contains("wander_ppm"));
+    assert!(read("[[device]]\ntype = \"servo\"\nclock_bits = 0").unwrap().devices[0].dc.is_none());
+}

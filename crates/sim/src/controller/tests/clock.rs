@@ -4,6 +4,10 @@ use super::*;
 
 const FIRST_BIT: u64 = 5_760;
 
+fn drift(ppb: i64) -> ClockErrors {
+    ClockErrors { drift_ppb: ppb, ..ClockErrors::default() }
+}
+
 fn receive_times(bench: &Bench) -> [u32; 4] {
     let bytes: [u8; 16] = bench.register(0x0900);
     core::array::from_fn(|p| u32::from_le_bytes(bytes[4 * p..4 * p + 4].try_into().unwrap()))
@@ -20,7 +24,7 @@ fn local_first_bit(bench: &Bench) -> u64 {
 
 #[test]
 fn a_write_to_0x0900_latches_every_port_the_frame_comes_in_at_facts_3_12() {
-    let mut bench = Bench::with(ControllerConfig { clock_start: 0xFFFF_F000, clock_drift_ppb: 20_000, ..config() });
+    let mut bench = Bench::with(ControllerConfig { clock_start: 0xFFFF_F000, clock_errors: drift(20_000), ..config() });
     bench.link(Port::B, true);
     let mut frame = latch(&mut bench, Command::Bwr);
     bench.receive(&mut frame, Port::A);
@@ -78,7 +82,7 @@ fn a_frame_entering_at_port_1_is_latched_where_it_came_in_facts_7_1() {
 
 #[test]
 fn system_time_is_local_time_plus_offset_at_the_start_of_the_frame_facts_3_12() {
-    let mut bench = Bench::with(ControllerConfig { clock_drift_ppb: -50_000, ..config() });
+    let mut bench = Bench::with(ControllerConfig { clock_errors: drift(-50_000), ..config() });
     bench.write(0x0920, &0x0011_2233_4455_6677u64.to_le_bytes());
     let (data, wkc) = bench.read(0x0910, 8);
     let expected = local_first_bit(&bench) + 0x0011_2233_4455_6677;
@@ -121,4 +125,78 @@ fn a_32_bit_clock_answers_four_bytes_and_one_without_clock_none_facts_3_12() {
 fn reset_values_of_the_control_loop_facts_3_12() {
     let mut bench = Bench::new();
     assert_eq!(bench.read(0x0930, 6).0, [0x00, 0x10, 0x00, 0x00, 0x04, 0x0C]);
+}
+
+#[test]
+fn the_loop_takes_its_sample_at_the_start_of_a_good_frame_facts_7_2_1() {
+    let mut bench = Bench::new();
+    bench.write(0x0928, &1_000u32.to_le_bytes());
+    bench.now += Duration::from_micros(10);
+    let first_bit = SimTime(bench.now.0 + 10_000 - FIRST_BIT);
+    let ahead = (bench.controller.local_time(first_bit) as u32).wrapping_sub(1_000 + 1_600);
+    let payload = [&ahead.to_le_bytes()[..], &[0xEE; 4]].concat();
+    bench.damaged(&[(Command::Frmw, 0x7777, 0x0910, &payload)]);
+    assert_eq!(bench.register(0x092C), 0u32.to_le_bytes());
+    bench.now.0 -= 10_000;
+    assert_eq!(bench.one((Command::Frmw, 0x7777, 0x0910, &payload)).1, 1);
+    // 1,600 ns ahead of what was received plus the delay; a sixteenth of it is in the mean.
+    assert_eq!(bench.register(0x092C), (0x8000_0000u32 | 100).to_le_bytes());
+    bench.write(0x0930, &0x1000u16.to_le_bytes());
+    assert_eq!(bench.register(0x092C), [0; 4]);
+    assert_eq!(bench.register(0x0932), [0; 2]);
+}
+
+#[test]
+fn the_addressed_controller_of_a_multiple_write_does_not_move_itself_facts_7_5() {
+    let mut bench = Bench::new();
+    for _ in 0..50 {
+        assert_eq!(bench.one((Command::Armw, 0, 0x0910, &[0; 8])).1, 1);
+    }
+    assert_eq!((bench.register(0x092C), bench.register(0x0932)), ([0; 4], [0; 2]));
+}
+
+#[test]
+fn sync0_comes_at_its_start_time_in_system_time_facts_7_3() {
+    for bits64 in [true, false] {
+        let mut config = config();
+        config.features.dc_64bit = bits64;
+        // A 32-bit clock wraps before the start.
+        let clock_start = 0xFFFF_FFFF_u64 - 5_000_000;
+        let mut bench = Bench::with(ControllerConfig { clock_start, clock_errors: drift(40_000), ..config });
+        bench.write(0x0920, &(-500i64).to_le_bytes());
+        let start = bench.controller.system_time(bench.now).wrapping_add(10_000_000);
+        bench.write(0x0990, &start.to_le_bytes());
+        bench.write(0x09A0, &1_000_000u32.to_le_bytes());
+        bench.write(0x0981, &[0x03]);
+        assert_eq!(bench.register(0x0984), [0x01]);
+        assert_eq!(bench.controller.sync0_pulses(bench.now), 0);
+        let first = bench.controller.next_sync0(bench.now).unwrap();
+        let width = if bits64 { u64::MAX } else { u32::MAX.into() };
+        assert_eq!(bench.controller.system_time(first), start & width);
+        bench.wait(Duration::from_nanos(12_500_000));
+        assert_eq!(bench.controller.sync0_pulses(bench.now), 3);
+        let next = u64::from_le_bytes(bench.read(0x0990, 8).0.try_into().unwrap());
+        assert_eq!(next & width, start.wrapping_add(3_000_000) & width);
+        bench.write(0x0981, &[0x00]);
+        assert_eq!((bench.controller.next_sync0(bench.now), bench.register(0x0984)), (None, [0]));
+    }
+}
+
+#[test]
+fn edges_at_latch_pins_leave_their_time_facts_3_12() {
+    let mut bench = Bench::new();
+    bench.write(0x09A8, &[0x01]);
+    let first = bench.controller.system_time(bench.now);
+    bench.controller.latch_edge(LatchPin::Latch0, true, bench.now);
+    bench.wait(Duration::from_micros(50));
+    // A single event keeps its first time until it is read; the other edge has no such limit.
+    bench.controller.latch_edge(LatchPin::Latch0, true, bench.now);
+    bench.controller.latch_edge(LatchPin::Latch0, false, bench.now);
+    let second = bench.controller.system_time(bench.now);
+    bench.controller.latch_edge(LatchPin::Latch1, true, bench.now);
+    assert_eq!(bench.read(0x09AE, 2).0, [0x03, 0x05]);
+    assert_eq!(bench.read(0x09B0, 8).0, first.to_le_bytes());
+    assert_eq!(bench.read(0x09C0, 8).0, second.to_le_bytes());
+    assert_eq!(bench.read(0x09AE, 2).0, [0x02, 0x04]);
+    assert_eq!(bench.read(0x09B8, 8).0, second.to_le_bytes());
 }

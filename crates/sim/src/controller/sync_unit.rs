@@ -1,0 +1,199 @@
+//! SYNC and LATCH units (facts 3.12, 7.3).
+//!
+//! In: the registers as they are when DC_ACTIVATION is written, the system time. Out: when pulses come, whether a start
+//! time was plausible, the times that edges at the LATCH pins leave in the registers.
+
+use ringcat_wire::register::{DcActivation, DcActivationStatus};
+
+/// What counts as near future where DC_ACTIVATION asks for it: 2^31 ns.
+const NEAR_FUTURE_NS: u64 = 1 << 31;
+
+/// What the registers say when the unit is activated.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(super) struct SyncSettings {
+    /// DC_START_TIME.
+    pub start: u64,
+    /// DC_SYNC0_CYCLE.
+    pub sync0_cycle_ns: u32,
+    /// DC_SYNC1_CYCLE.
+    pub sync1_cycle_ns: u32,
+    /// The clock has 64 bits.
+    pub wide: bool,
+}
+
+/// The SYNC unit.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct SyncUnit {
+    activation: DcActivation,
+    settings: SyncSettings,
+    /// System time of the first pulse, in 64 bits; `None` while it stands still or the time will not come.
+    first: Option<u64>,
+    implausible: bool,
+}
+
+impl SyncUnit {
+    /// DC_ACTIVATION was written at this system time, in 64 bits.
+    pub fn activate(&mut self, activation: DcActivation, settings: SyncSettings, now: u64) {
+        let runs = self.activation.cyclic_unit && activation.cyclic_unit;
+        self.activation = activation;
+        if runs {
+            return;
+        }
+        (self.first, self.implausible) = (None, false);
+        if !activation.cyclic_unit {
+            return;
+        }
+        self.settings = settings;
+        let extended = activation.extend_start_time || !settings.wide;
+        let ahead = if extended {
+            // 32 bits: what is past comes again when the clock has wrapped.
+            u64::from((settings.start as u32).wrapping_sub(now as u32))
+        } else {
+            settings.start.wrapping_sub(now)
+        };
+        let half = if extended { 1 << 31 } else { 1 << 63 };
+        let limit = if activation.near_future_select { NEAR_FUTURE_NS } else { half };
+        self.implausible = activation.start_plausibility && ahead >= limit;
+        // A 64-bit time that is past comes again in centuries.
+        let comes = extended || ahead < 1 << 63;
+        self.first = (!self.implausible && comes).then(|| now.wrapping_add(ahead));
+    }
+
+    /// Pulses of SYNC0 up to a system time.
+    pub fn pulses(&self, now: u64) -> u64 {
+        let Some(first) = self.first.filter(|_| self.activation.sync0) else { return 0 };
+        let since = now.wrapping_sub(first);
+        match (since < 1 << 63, u64::from(self.settings.sync0_cycle_ns)) {
+            (false, _) => 0,
+            (true, 0) => 1,
+            (true, cycle) => since / cycle + 1,
+        }
+    }
+
+    /// System time of the first SYNC0 pulse at `now` or later; `None` when there will be none.
+    pub fn next_sync0(&self, now: u64) -> Option<u64> {
+        let first = self.first.filter(|_| self.activation.sync0)?;
+        let since = now.wrapping_sub(first);
+        if since >= 1 << 63 {
+            return Some(first);
+        }
+        match u64::from(self.settings.sync0_cycle_ns) {
+            0 => (since == 0).then_some(first),
+            cycle => Some(first.wrapping_add(since.div_ceil(cycle) * cycle)),
+        }
+    }
+
+    /// System time of the first SYNC1 pulse at `now` or later. It follows SYNC0 by DC_SYNC1_CYCLE, and comes again with
+    /// the first SYNC0 that is later than that.
+    pub fn next_sync1(&self, now: u64) -> Option<u64> {
+        let first = self.first.filter(|_| self.activation.sync1)?.wrapping_add(self.settings.sync1_cycle_ns.into());
+        let since = now.wrapping_sub(first);
+        if since >= 1 << 63 {
+            return Some(first);
+        }
+        let sync0 = u64::from(self.settings.sync0_cycle_ns);
+        let sync1 = u64::from(self.settings.sync1_cycle_ns);
+        match sync0 {
+            0 => (since == 0).then_some(first),
+            sync0 => {
+                let cycle = sync0 * (sync1 / sync0 + 1);
+                Some(first.wrapping_add(since.div_ceil(cycle) * cycle))
+            }
+        }
+    }
+
+    /// DC_ACTIVATION_STATUS.
+    pub fn status(&self) -> DcActivationStatus {
+        DcActivationStatus {
+            sync0_pending: self.first.is_some() && self.activation.sync0,
+            sync1_pending: self.first.is_some() && self.activation.sync1,
+            start_implausible: self.implausible,
+            ..DcActivationStatus::default()
+        }
+    }
+
+    /// Whether SYNC0 is asked for.
+    pub fn wants_sync0(&self) -> bool {
+        self.activation.cyclic_unit && self.activation.sync0
+    }
+}
+
+/// Which edges a LATCH unit has seen.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct LatchUnit {
+    seen: [bool; 2],
+}
+
+impl LatchUnit {
+    /// An edge; `single`: only the first one counts until it was read. Whether its time is taken over.
+    pub fn edge(&mut self, positive: bool, single: bool) -> bool {
+        let seen = &mut self.seen[usize::from(!positive)];
+        !core::mem::replace(seen, true) || !single
+    }
+
+    /// The time of an edge was read.
+    pub fn read(&mut self, positive: bool) {
+        self.seen[usize::from(!positive)] = false;
+    }
+
+    /// Bits of DC_LATCH0_STATUS or DC_LATCH1_STATUS without the pin.
+    pub fn status(&self) -> u8 {
+        u8::from(self.seen[0]) | u8::from(self.seen[1]) << 1
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const BOTH: DcActivation = DcActivation {
+        cyclic_unit: true,
+        sync0: true,
+        sync1: true,
+        auto_activation: false,
+        extend_start_time: false,
+        start_plausibility: false,
+        near_future_select: false,
+        debug_pulse: false,
+    };
+
+    fn started(start: u64, now: u64, wide: bool, activation: DcActivation) -> SyncUnit {
+        let mut unit = SyncUnit::default();
+        let settings = SyncSettings { start, sync0_cycle_ns: 1_000, sync1_cycle_ns: 300, wide };
+        unit.activate(activation, settings, now);
+        unit
+    }
+
+    #[test]
+    fn pulses_begin_at_the_start_time_and_follow_the_cycle_facts_7_3() {
+        let unit = started(10_000, 5_000, true, BOTH);
+        assert_eq!((unit.pulses(9_999), unit.pulses(10_000), unit.pulses(12_500)), (0, 1, 3));
+        assert_eq!((unit.next_sync0(5_000), unit.next_sync0(10_001)), (Some(10_000), Some(11_000)));
+        assert_eq!((unit.next_sync1(5_000), unit.next_sync1(10_301)), (Some(10_300), Some(11_300)));
+    }
+
+    #[test]
+    fn a_start_in_the_past_never_comes_or_comes_after_the_wrap_facts_7_3() {
+        assert_eq!(started(4_999, 5_000, true, BOTH).next_sync0(5_000), None);
+        let narrow = started(4_999, 0x7_0000_1388, false, BOTH);
+        assert_eq!(narrow.next_sync0(0x7_0000_1388), Some(0x8_0000_1387));
+    }
+
+    #[test]
+    fn an_implausible_start_is_refused_where_that_is_asked_for_facts_7_3() {
+        let checked = DcActivation { start_plausibility: true, ..BOTH };
+        let past = started(4_999, 5_000, true, checked);
+        assert!(past.status().start_implausible && past.next_sync0(5_000).is_none());
+        let near = DcActivation { near_future_select: true, ..checked };
+        assert!(started(5_000 + (1 << 31), 5_000, true, near).status().start_implausible);
+        assert!(started(4_999 + (1 << 31), 5_000, true, near).status().sync0_pending);
+    }
+
+    #[test]
+    fn sync1_with_a_longer_time_divides_sync0_facts_7_3() {
+        let mut unit = SyncUnit::default();
+        let settings = SyncSettings { start: 10_000, sync0_cycle_ns: 1_000, sync1_cycle_ns: 3_000, wide: true };
+        unit.activate(BOTH, settings, 0);
+        assert_eq!((unit.next_sync1(0), unit.next_sync1(13_001)), (Some(13_000), Some(17_000)));
+    }
+}
