@@ -7,13 +7,14 @@
 //! * `writer`, `reader`: the two directions, each a task that lives as long as it has something to do;
 //! * `delivery`: whose a mail is; `recent`: mail that came twice;
 //! * `talk`: a lane while somebody has it; `answer_time`: when to look for an answer;
-//! * [`coe`], [`foe`], [`soe`], [`aoe`], [`voe`]: the protocols.
+//! * [`coe`], [`eoe`], [`foe`], [`soe`], [`aoe`], [`voe`]: the protocols.
 
 mod answer_time;
 pub mod aoe;
 pub mod coe;
 mod counters;
 mod delivery;
+pub mod eoe;
 mod error;
 pub mod foe;
 mod lane;

@@ -64,6 +64,7 @@ fn sort(room: &Rc<Room>, state: &mut State, message: &Message<'_>) {
         Protocol::Eoe if EOE_ANSWERS.contains(&(first & 0x0F)) => {
             answer(room, state, Lane::Eoe, message, Unsolicited::Other);
         }
+        Protocol::Eoe if state.ethernet.attached => state.ethernet.take(payload, room.bus.now()),
         Protocol::Eoe => shelve(state, message, Unsolicited::Ethernet),
         Protocol::Other(_) => shelve(state, message, Unsolicited::Other),
     }

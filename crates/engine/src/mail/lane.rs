@@ -28,13 +28,15 @@ pub enum Lane {
     Aoe,
     /// Vendor protocol.
     Voe,
-    /// Ethernet: its frames, and the settings of its address.
+    /// Ethernet: the settings of its addresses.
     Eoe,
+    /// Ethernet: its frames. Nobody answers them.
+    Frames,
 }
 
 impl Lane {
     /// All lanes.
-    pub const ALL: [Lane; 6] = [Lane::Coe, Lane::Foe, Lane::Soe, Lane::Aoe, Lane::Voe, Lane::Eoe];
+    pub const ALL: [Lane; 7] = [Lane::Coe, Lane::Foe, Lane::Soe, Lane::Aoe, Lane::Voe, Lane::Eoe, Lane::Frames];
 
     /// The protocol of its messages.
     pub const fn protocol(self) -> Protocol {
@@ -44,7 +46,7 @@ impl Lane {
             Lane::Soe => Protocol::Soe,
             Lane::Aoe => Protocol::Aoe,
             Lane::Voe => Protocol::Voe,
-            Lane::Eoe => Protocol::Eoe,
+            Lane::Eoe | Lane::Frames => Protocol::Eoe,
         }
     }
 }

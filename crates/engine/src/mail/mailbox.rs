@@ -66,6 +66,10 @@ impl Mailbox {
         self.room.look_once();
     }
 
+    pub(super) fn room(&self) -> &Rc<Room> {
+        &self.room
+    }
+
     /// Whether it may be used.
     pub fn is_open(&self) -> bool {
         self.room.look().open

@@ -29,7 +29,8 @@ const FAILURE_PAUSE: Duration = Duration::from_millis(5);
 pub(super) fn start(room: &Rc<Room>) {
     let time = {
         let state = &mut *room.state();
-        if !state.open || !(state.full || state.curious || state.repeat || state.waiting()) {
+        let lively = state.ethernet.lively(room.bus.now()).is_some();
+        if !state.open || !(state.full || state.curious || state.repeat || state.waiting() || lively) {
             return;
         }
         state.tasks = state.tasks.wrapping_add(1);
@@ -111,7 +112,7 @@ fn step(room: &Rc<Room>, next_look: Instant, hold: Instant) -> Step {
     if core::mem::take(&mut state.curious) {
         return Step::Look;
     }
-    let Some((due, sure)) = first_look(state) else {
+    let Some((due, sure)) = first_look(state, now) else {
         state.reader = None;
         return Step::End;
     };
@@ -120,7 +121,9 @@ fn step(room: &Rc<Room>, next_look: Instant, hold: Instant) -> Step {
         return Step::Wait(due);
     }
     for lane in &mut state.lanes {
-        if let Some(asked) = lane.asked.as_mut().filter(|asked| !asked.answered) {
+        let first = lane.answer_time.first_look();
+        // A look for something else is none for an answer that is not due yet.
+        if let Some(asked) = lane.asked.as_mut().filter(|asked| !asked.answered && asked.at + first <= now) {
             asked.looks += 1;
         }
     }
@@ -128,22 +131,27 @@ fn step(room: &Rc<Room>, next_look: Instant, hold: Instant) -> Step {
 }
 
 /// When the first of the answers that are waited for should be looked for, and whether it will surely be there then.
-fn first_look(state: &super::room::State) -> Option<(Instant, bool)> {
-    if state.blocked {
+/// Fragments of Ethernet frames are looked for while some have passed of late.
+fn first_look(state: &super::room::State, now: Instant) -> Option<(Instant, bool)> {
+    if state.blocked || (state.ethernet.lively(now).is_some() && !state.waiting()) {
         return Some((Instant::default(), false));
     }
     let looks = state.lanes.iter().filter_map(|lane| {
         let asked = lane.waiting()?;
         Some((asked.at + lane.answer_time.first_look(), asked.looks == 0 && lane.answer_time.is_sure()))
     });
-    looks.min_by_key(|(due, _)| *due)
+    // One that is due now comes first: it may be a read.
+    let ethernet = state.ethernet.lively(now).map(|_| (now, false));
+    looks.chain(ethernet).min_by_key(|(due, _)| *due)
 }
 
-/// Pause after a look in vain: a part of the time that the oldest answer was waited for.
+/// Pause after a look in vain: a part of the time that the oldest answer was waited for, or the time since the last
+/// fragment of an Ethernet frame.
 fn pause(room: &Rc<Room>, now: Instant) -> Duration {
     let state = room.look();
     let waited = state.lanes.iter().filter_map(|lane| lane.waiting()).map(|asked| now.since(asked.at)).max();
-    AnswerTime::pause(waited.unwrap_or_default())
+    let pause = waited.map(AnswerTime::pause).into_iter().chain(state.ethernet.pause(now)).min();
+    pause.unwrap_or(AnswerTime::pause(Duration::ZERO))
 }
 
 /// Looks at the status of the send mailbox; notes where it is full.
@@ -178,7 +186,7 @@ async fn read(room: &Rc<Room>, time: u32, session: &Session) -> Result<bool, Mai
             }
             delivery::deliver(room, &reply.data, Way::Usual);
             // What comes unasked seldom comes alone.
-            if !room.look().waiting() {
+            if !room.look().waiting() && room.look().ethernet.lively(room.bus.now()).is_none() {
                 look(room, session).await?;
             }
             Ok(true)

@@ -10,6 +10,7 @@ use ringcat_wire::mailbox::Header;
 use ringcat_wire::sii::MailboxLayout;
 
 use super::counters::MailCounters;
+use super::eoe::Traffic;
 use super::error::MailboxError;
 use super::lane::{Lane, LaneState, Outgoing};
 use super::recent::Recent;
@@ -56,6 +57,7 @@ pub(super) struct State {
     /// A repeat may bring mail that was there before.
     pub repeated: bool,
     pub shelves: Shelves,
+    pub ethernet: Traffic,
     pub counters: MailCounters,
 }
 
@@ -91,6 +93,7 @@ impl Room {
             tasks: 0,
             repeated: false,
             shelves: Shelves::new(),
+            ethernet: Traffic::new(),
             counters: MailCounters::default(),
         };
         let (news, work) = (bus.signal(), bus.signal());
@@ -192,6 +195,7 @@ impl State {
         self.blocked = false;
         self.repeat = false;
         self.lanes.iter_mut().for_each(LaneState::reset);
+        self.ethernet.reset();
     }
 
     /// Whether mail is waited for.

@@ -48,6 +48,9 @@ async fn run(room: Rc<Room>, time: u32) {
             state.blocked = false;
             let now = room.bus.now();
             state.counters.written += u64::from(result.is_ok());
+            if lane == Lane::Frames {
+                state.ethernet.note_fragment(now);
+            }
             state.lanes[lane as usize].wrote(&message, result, now);
         }
         room.tell();

@@ -10,6 +10,7 @@ mod determinism;
 mod disturbed_frames;
 mod domains;
 mod eeprom;
+mod ethernet;
 mod explorer;
 mod failures;
 mod mail;

@@ -1,0 +1,54 @@
+//! Why addresses or the filter were not set or told.
+
+use core::fmt;
+
+use ringcat_wire::mailbox::eoe::EoeResult;
+
+use crate::mail::MailboxError;
+
+/// Why addresses or the filter of a SubDevice were not set or told.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct EoeError {
+    /// Port of the SubDevice.
+    pub port: u8,
+    /// What happened.
+    pub cause: EoeFailure,
+}
+
+/// What happened to a request.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum EoeFailure {
+    /// The mailbox failed.
+    Mailbox(MailboxError),
+    /// The SubDevice refused.
+    Refused(EoeResult),
+    /// A name is longer than 32 bytes.
+    LongName {
+        /// Bytes of the name.
+        bytes: usize,
+    },
+}
+
+impl fmt::Display for EoeError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "EoE port {}: {}", self.port, self.cause)
+    }
+}
+
+impl fmt::Display for EoeFailure {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            EoeFailure::Mailbox(error) => error.fmt(f),
+            EoeFailure::Refused(result) => write!(f, "the SubDevice refused: {result}"),
+            EoeFailure::LongName { bytes } => write!(f, "a name of {bytes} bytes, there is room for 32"),
+        }
+    }
+}
+
+impl core::error::Error for EoeError {}
+
+impl From<MailboxError> for EoeFailure {
+    fn from(error: MailboxError) -> EoeFailure {
+        EoeFailure::Mailbox(error)
+    }
+}

@@ -1,0 +1,171 @@
+//! The handle to the Ethernet of one SubDevice, and the task that sends.
+
+use alloc::rc::Rc;
+use core::time::Duration;
+
+use super::fragments::Fragments;
+use super::traffic::{EthernetFrame, EthernetStatus, Outgoing, QueueError, TimeStamp};
+use crate::mail::lane::Lane;
+use crate::mail::room::Room;
+use crate::mail::talk::Talk;
+use crate::mail::{Mailbox, MailboxError};
+use ringcat_wire::mailbox::eoe::EoeFragment;
+
+/// A SubDevice may leave a fragment in its mailbox for so long; then its frame is dropped, as a network does.
+const SEND_LIMIT: Duration = Duration::from_millis(500);
+
+/// The Ethernet of one SubDevice: frames to it and from it. There is one port for a mailbox; dropped, it ends.
+///
+/// It lasts longer than the SubDevice's being there. While the mailbox is not in use it is down: frames are refused, and
+/// those that waited are dropped and counted.
+#[derive(Debug)]
+pub struct EthernetPort {
+    room: Rc<Room>,
+}
+
+impl EthernetPort {
+    /// Opens the port of a mailbox; `None` where somebody has it.
+    pub fn open(mailbox: &Mailbox) -> Option<EthernetPort> {
+        let room = mailbox.room().clone();
+        let attachment = {
+            let traffic = &mut room.state().ethernet;
+            if core::mem::replace(&mut traffic.attached, true) {
+                return None;
+            }
+            traffic.attachment = traffic.attachment.wrapping_add(1);
+            traffic.attachment
+        };
+        let own = room.clone();
+        room.bus.spawn(async move { send_all(own, attachment).await });
+        Some(EthernetPort { room })
+    }
+
+    /// Whether frames can be sent and may come.
+    pub fn is_up(&self) -> bool {
+        is_up(&self.room)
+    }
+
+    /// Takes a frame, without check sequence, to be sent.
+    pub fn send(&self, frame: &[u8]) -> Result<(), QueueError> {
+        self.queue(frame, false).map(drop)
+    }
+
+    /// As [`EthernetPort::send`], and asks the SubDevice when it sends the frame on: the answer is a [`TimeStamp`] with the
+    /// number that is returned.
+    pub fn send_with_time(&self, frame: &[u8]) -> Result<u8, QueueError> {
+        self.queue(frame, true)
+    }
+
+    fn queue(&self, frame: &[u8], wants_time: bool) -> Result<u8, QueueError> {
+        if !self.is_up() {
+            return Err(QueueError::Down);
+        }
+        let number = self.room.state().ethernet.queue(frame, wants_time)?;
+        self.room.news.notify();
+        Ok(number)
+    }
+
+    /// Frames that can be taken for sending now; 0 while it is down.
+    pub fn room(&self) -> usize {
+        if self.is_up() { self.room.look().ethernet.room() } else { 0 }
+    }
+
+    /// Waits until a frame can be taken for sending.
+    pub async fn ready(&self) {
+        self.room.news.until(|| (self.room() > 0).then_some(())).await;
+    }
+
+    /// Takes the oldest frame that has come.
+    pub fn pop_frame(&self) -> Option<EthernetFrame> {
+        self.room.state().ethernet.pop_received()
+    }
+
+    /// Waits for a frame from the SubDevice.
+    pub async fn frame(&self) -> EthernetFrame {
+        self.room.news.until(|| self.pop_frame()).await
+    }
+
+    /// Takes the oldest time stamp that has come.
+    pub fn pop_time_stamp(&self) -> Option<TimeStamp> {
+        self.room.state().ethernet.pop_time_stamp()
+    }
+
+    /// Counters, rates, what waits.
+    pub fn status(&self) -> EthernetStatus {
+        let up = self.is_up();
+        self.room.state().ethernet.status(up, self.room.bus.now())
+    }
+}
+
+impl Drop for EthernetPort {
+    fn drop(&mut self) {
+        {
+            let traffic = &mut self.room.state().ethernet;
+            traffic.attached = false;
+            traffic.reset();
+        }
+        self.room.news.notify();
+    }
+}
+
+fn is_up(room: &Room) -> bool {
+    let state = room.look();
+    state.session.is_some_and(|session| {
+        let size = session.layout.receive_size.min(session.layout.send_size);
+        state.open && EoeFragment::max_data(usize::from(size)) > 0
+    })
+}
+
+/// Sends frames as they are queued, for as long as there is the port.
+async fn send_all(room: Rc<Room>, attachment: u32) {
+    loop {
+        let work = || {
+            let here = {
+                let traffic = &room.look().ethernet;
+                (traffic.attached && traffic.attachment == attachment).then(|| traffic.has_outgoing())
+            };
+            match here {
+                None => Some(false),
+                Some(any) => (any && is_up(&room)).then_some(true),
+            }
+        };
+        if !room.news.until(work).await {
+            return;
+        }
+        // Closed meanwhile: the frames are gone, too.
+        let Ok(mut talk) = Talk::take(&room, Lane::Frames).await else { continue };
+        while let Some(frame) = next(&room, attachment) {
+            let result = send(&mut talk, &frame).await;
+            let now = room.bus.now();
+            room.state().ethernet.sent(frame.bytes.len(), result.is_ok(), now);
+            if result == Err(MailboxError::Closed) {
+                // It may be open again, and then wants another talk.
+                break;
+            }
+        }
+    }
+}
+
+fn next(room: &Rc<Room>, attachment: u32) -> Option<Outgoing> {
+    let frame = {
+        let traffic = &mut room.state().ethernet;
+        if traffic.attachment != attachment {
+            return None;
+        }
+        traffic.next_outgoing()
+    };
+    // Somebody may wait for room.
+    room.news.notify();
+    frame
+}
+
+async fn send(talk: &mut Talk, frame: &Outgoing) -> Result<(), MailboxError> {
+    let size = talk.mailbox_sizes().0;
+    let Some(fragments) = Fragments::new(&frame.bytes, frame.number, size, frame.wants_time) else {
+        return Err(MailboxError::Closed);
+    };
+    for payload in fragments {
+        talk.send(&payload, SEND_LIMIT).await?;
+    }
+    Ok(())
+}

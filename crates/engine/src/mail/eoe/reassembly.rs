@@ -1,0 +1,156 @@
+//! Frames put together from fragments as they come (facts 6.5).
+//!
+//! Frames are told apart by their number, so fragments of several may mix. A fragment that does not go on where its frame
+//! ended loses that frame; a fragment 0 begins anew. What a SubDevice sends takes no more memory than one frame for each
+//! number.
+
+use alloc::vec::Vec;
+
+use ringcat_wire::mailbox::eoe::{BLOCK, EoeFragment};
+
+use super::traffic::MAX_FRAME;
+
+/// Frame numbers.
+const NUMBERS: usize = 16;
+
+/// What a fragment led to.
+#[derive(Debug, PartialEq, Eq)]
+pub(super) enum Outcome {
+    /// More of the frame is to come.
+    Part,
+    /// The whole frame.
+    Frame(Vec<u8>),
+    /// The fragment belongs to no frame, or its frame cannot be completed.
+    Lost,
+    /// The fragment begins a frame, and the frame of this number before it was not complete.
+    Replaced(Option<Vec<u8>>),
+}
+
+/// Frames of which fragments are missing.
+#[derive(Debug, Default)]
+pub(super) struct Reassembly {
+    frames: [Option<Partial>; NUMBERS],
+}
+
+#[derive(Debug)]
+struct Partial {
+    bytes: Vec<u8>,
+    /// Number of the fragment that has to come next.
+    next: u8,
+    /// Bytes that fragment 0 announced, rounded up to blocks.
+    announced: usize,
+}
+
+impl Reassembly {
+    /// Takes a fragment.
+    pub(super) fn take(&mut self, fragment: &EoeFragment<'_>) -> Outcome {
+        let place = &mut self.frames[usize::from(fragment.frame) % NUMBERS];
+        let mut replaced = false;
+        if fragment.number == 0 {
+            let announced = usize::from(fragment.blocks) * BLOCK;
+            replaced = place.replace(Partial { bytes: Vec::new(), next: 0, announced }).is_some();
+        }
+        let Some(mut partial) = place.take() else { return Outcome::Lost };
+        if !partial.append(fragment) {
+            return Outcome::Lost;
+        }
+        let frame = if fragment.last {
+            Some(partial.bytes)
+        } else {
+            *place = Some(partial);
+            None
+        };
+        match (replaced, frame) {
+            (true, frame) => Outcome::Replaced(frame),
+            (false, Some(frame)) => Outcome::Frame(frame),
+            (false, None) => Outcome::Part,
+        }
+    }
+
+    /// Forgets all that is not complete.
+    pub(super) fn clear(&mut self) {
+        *self = Reassembly::default();
+    }
+}
+
+impl Partial {
+    /// False where the fragment does not belong here.
+    fn append(&mut self, fragment: &EoeFragment<'_>) -> bool {
+        let goes_on = fragment.number == self.next && fragment.offset() == self.bytes.len();
+        let whole = fragment.last || (!fragment.data.is_empty() && fragment.data.len().is_multiple_of(BLOCK));
+        let length = self.bytes.len() + fragment.data.len();
+        if !goes_on || !whole || length > self.announced.min(MAX_FRAME) {
+            return false;
+        }
+        self.bytes.extend_from_slice(fragment.data);
+        self.next += 1;
+        true
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::fragments::Fragments;
+    use super::*;
+    use ringcat_wire::mailbox::eoe::{EoeBody, EoeMessage};
+
+    fn take(reassembly: &mut Reassembly, payload: &[u8]) -> Outcome {
+        match EoeMessage::decode(payload).unwrap().body {
+            EoeBody::Fragment(fragment) => reassembly.take(&fragment),
+            other => panic!("{other:?}"),
+        }
+    }
+
+    fn cut(fill: u8, length: usize, number: u8) -> Vec<Vec<u8>> {
+        Fragments::new(&alloc::vec![fill; length], number, 128, false).unwrap().collect()
+    }
+
+    #[test]
+    fn fragments_of_sixteen_frames_that_mix_are_told_apart_facts_6_5() {
+        let mut reassembly = Reassembly::default();
+        let frames: Vec<_> = (0..16).map(|number| cut(number, 100 + usize::from(number), number)).collect();
+        for frame in &frames {
+            assert_eq!(take(&mut reassembly, &frame[0]), Outcome::Part);
+        }
+        for (number, frame) in frames.iter().enumerate().rev() {
+            let whole = alloc::vec![number as u8; 100 + number];
+            assert_eq!(take(&mut reassembly, &frame[1]), Outcome::Frame(whole));
+        }
+    }
+
+    #[test]
+    fn a_lost_fragment_loses_its_frame_and_no_other_facts_6_5() {
+        let mut reassembly = Reassembly::default();
+        let [first, second] = [cut(1, 250, 1), cut(2, 250, 2)];
+        take(&mut reassembly, &first[0]);
+        take(&mut reassembly, &second[0]);
+        assert_eq!(take(&mut reassembly, &first[2]), Outcome::Lost);
+        assert_eq!(take(&mut reassembly, &first[1]), Outcome::Lost, "its frame is gone");
+        take(&mut reassembly, &second[1]);
+        assert_eq!(take(&mut reassembly, &second[2]), Outcome::Frame(alloc::vec![2; 250]));
+        // The last fragment is lost: the number comes again sixteen frames later.
+        take(&mut reassembly, &first[0]);
+        let next = cut(3, 60, 1);
+        assert_eq!(take(&mut reassembly, &next[0]), Outcome::Replaced(Some(alloc::vec![3; 60])));
+    }
+
+    #[test]
+    fn what_claims_too_much_or_no_whole_blocks_is_lost() {
+        let mut reassembly = Reassembly::default();
+        let fragment = |number, blocks, last, data| EoeFragment {
+            frame: 0,
+            number,
+            blocks,
+            last,
+            time_requested: false,
+            time_ns: None,
+            data,
+        };
+        assert_eq!(reassembly.take(&fragment(0, 1, true, &[0; 64])), Outcome::Lost, "more than announced");
+        assert_eq!(reassembly.take(&fragment(0, 63, true, &[0; 1600])), Outcome::Lost, "no frame is so long");
+        assert_eq!(reassembly.take(&fragment(0, 4, false, &[0; 31])), Outcome::Lost, "no whole blocks");
+        assert_eq!(reassembly.take(&fragment(0, 4, false, &[])), Outcome::Lost, "nothing");
+        reassembly.take(&fragment(0, 4, false, &[0; 32]));
+        assert_eq!(reassembly.take(&fragment(1, 2, true, &[0; 8])), Outcome::Lost, "another place");
+    }
+}

@@ -1,0 +1,121 @@
+//! IP parameters and address filter of a SubDevice: set and asked for (facts 6.5).
+
+use alloc::vec;
+use alloc::vec::Vec;
+use core::net::Ipv4Addr;
+
+use ringcat_wire::mailbox::eoe::{AddressFilter, EoeBody, EoeMessage, EoeResult, IpParameters, MAX_NAME};
+
+use super::error::{EoeError, EoeFailure};
+use crate::mail::lane::Lane;
+use crate::mail::talk::Limits;
+use crate::mail::{Mailbox, MailboxError};
+
+/// Bytes of the longest request: the address filter.
+const MAX_REQUEST: usize = 128;
+
+/// The addresses of the IP stack behind a SubDevice; what is `None` is not set, or was not told.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct IpSettings {
+    /// MAC address.
+    pub mac: Option<[u8; 6]>,
+    /// IP address.
+    pub address: Option<Ipv4Addr>,
+    /// Subnet mask.
+    pub mask: Option<Ipv4Addr>,
+    /// Default gateway.
+    pub gateway: Option<Ipv4Addr>,
+    /// DNS server.
+    pub dns: Option<Ipv4Addr>,
+    /// Name, at most 32 bytes.
+    pub name: Option<Vec<u8>>,
+}
+
+impl IpSettings {
+    fn parameters(&self) -> Result<IpParameters<'_>, EoeFailure> {
+        let IpSettings { mac, address, mask, gateway, dns, name } = self;
+        match name {
+            Some(name) if name.len() > MAX_NAME => Err(EoeFailure::LongName { bytes: name.len() }),
+            _ => Ok(IpParameters {
+                mac: *mac,
+                address: *address,
+                mask: *mask,
+                gateway: *gateway,
+                dns: *dns,
+                name: name.as_deref(),
+            }),
+        }
+    }
+}
+
+impl From<IpParameters<'_>> for IpSettings {
+    fn from(parameters: IpParameters<'_>) -> IpSettings {
+        let IpParameters { mac, address, mask, gateway, dns, name } = parameters;
+        IpSettings { mac, address, mask, gateway, dns, name: name.map(<[u8]>::to_vec) }
+    }
+}
+
+/// Sets addresses behind a port of the SubDevice; 0 is the SubDevice itself or any.
+pub async fn set_ip(mailbox: &Mailbox, port: u8, settings: &IpSettings, limits: Limits) -> Result<(), EoeError> {
+    let parameters = settings.parameters().map_err(|cause| EoeError { port, cause })?;
+    request(mailbox, port, EoeBody::SetIp(parameters), limits, |body| match body {
+        EoeBody::SetIpDone(result) => Some((result, ())),
+        _ => None,
+    })
+    .await
+}
+
+/// Asks for the addresses behind a port of the SubDevice.
+pub async fn ask_ip(mailbox: &Mailbox, port: u8, limits: Limits) -> Result<IpSettings, EoeError> {
+    request(mailbox, port, EoeBody::GetIp, limits, |body| match body {
+        EoeBody::Ip(result, parameters) => Some((result, parameters.into())),
+        _ => None,
+    })
+    .await
+}
+
+/// Sets the address filter of a port of the SubDevice.
+pub async fn set_filter(mailbox: &Mailbox, port: u8, filter: AddressFilter, limits: Limits) -> Result<(), EoeError> {
+    request(mailbox, port, EoeBody::SetFilter(filter), limits, |body| match body {
+        EoeBody::SetFilterDone(result) => Some((result, ())),
+        _ => None,
+    })
+    .await
+}
+
+/// Asks for the address filter of a port of the SubDevice.
+pub async fn ask_filter(mailbox: &Mailbox, port: u8, limits: Limits) -> Result<AddressFilter, EoeError> {
+    request(mailbox, port, EoeBody::GetFilter, limits, |body| match body {
+        EoeBody::Filter(result, filter) => Some((result, filter)),
+        _ => None,
+    })
+    .await
+}
+
+async fn request<T>(
+    mailbox: &Mailbox,
+    port: u8,
+    body: EoeBody<'_>,
+    limits: Limits,
+    answer: impl Fn(EoeBody<'_>) -> Option<(EoeResult, T)>,
+) -> Result<T, EoeError> {
+    let failed = |cause| EoeError { port, cause };
+    let mut payload = vec![0; MAX_REQUEST];
+    let too_long = MailboxError::TooLong { bytes: MAX_REQUEST, limit: payload.len() };
+    let length = EoeMessage { port, body }.encode(&mut payload).ok_or(failed(too_long.into()))?;
+    let exchange = async {
+        let mut talk = mailbox.talk(Lane::Eoe).await?;
+        talk.settle(|_| true).await?;
+        let accept = |payload: &[u8]| {
+            let message = EoeMessage::decode(payload).ok()?;
+            // Some SubDevices leave the port out.
+            if message.port == port || message.port == 0 { answer(message.body) } else { None }
+        };
+        talk.ask(&payload[..length], limits, accept).await
+    };
+    match exchange.await {
+        Ok((EoeResult::OK, told)) => Ok(told),
+        Ok((result, _)) => Err(failed(EoeFailure::Refused(result))),
+        Err(error) => Err(failed(error.into())),
+    }
+}

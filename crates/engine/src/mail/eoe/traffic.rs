@@ -1,0 +1,337 @@
+//! What passes through one mailbox as Ethernet: queues, counters, rates.
+
+use alloc::collections::VecDeque;
+use alloc::vec::Vec;
+use core::fmt;
+use core::time::Duration;
+
+use ringcat_wire::mailbox::eoe::{EoeBody, EoeMessage};
+
+use super::reassembly::{Outcome, Reassembly};
+use crate::mail::answer_time::AnswerTime;
+use crate::mail::ring::Ring;
+use crate::time::Instant;
+
+/// Longest frame without check sequence: 1,500 bytes of payload, header, a VLAN tag.
+pub const MAX_FRAME: usize = 1518;
+/// Shortest frame: its header.
+const MIN_FRAME: usize = 14;
+/// Frames that may wait to be sent: some twenty milliseconds of what a mailbox carries. Who sends more has to wait.
+pub const QUEUE: usize = 32;
+/// Frames that are kept until somebody takes them.
+const RECEIVED: usize = 64;
+/// Time stamps that are kept until somebody takes them.
+const TIME_STAMPS: usize = 16;
+/// For so long after a fragment others are looked for; afterwards whoever watches the mail finds them.
+const LIVELY: Duration = Duration::from_millis(20);
+/// Rates are those of the last full second.
+const RATE_PERIOD: Duration = Duration::from_secs(1);
+
+/// A frame from a SubDevice.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct EthernetFrame {
+    /// The frame, without check sequence.
+    pub bytes: Vec<u8>,
+    /// When it arrived at the SubDevice, where that says so: lower half of the time, nanoseconds.
+    pub time_ns: Option<u32>,
+}
+
+/// When a SubDevice sent on a frame for which that was asked.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct TimeStamp {
+    /// Number of the frame, as [`super::EthernetPort::send_with_time`] returned it.
+    pub frame: u8,
+    /// Lower half of the time, nanoseconds.
+    pub time_ns: u32,
+}
+
+/// Why a frame was not taken for sending.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum QueueError {
+    /// The mailbox is not in use: the SubDevice is in INIT or does not answer; or it has no room for a fragment.
+    Down,
+    /// Enough frames wait; another can be taken after [`super::EthernetPort::ready`].
+    Full,
+    /// It is no Ethernet frame: of 14 to 1,518 bytes.
+    Length {
+        /// Its bytes.
+        bytes: usize,
+    },
+}
+
+impl fmt::Display for QueueError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            QueueError::Down => f.write_str("there is no EoE at present: the SubDevice is in INIT or does not answer"),
+            QueueError::Full => write!(f, "{QUEUE} frames wait to be sent"),
+            QueueError::Length { bytes } => {
+                write!(f, "an Ethernet frame has {MIN_FRAME} to {MAX_FRAME} bytes, got {bytes}")
+            }
+        }
+    }
+}
+
+impl core::error::Error for QueueError {}
+
+/// Counters of one SubDevice's Ethernet.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct EthernetCounters {
+    /// Frames that the SubDevice took.
+    pub tx_frames: u64,
+    /// Their bytes.
+    pub tx_bytes: u64,
+    /// Frames that were taken for sending and did not get through: the SubDevice went away, or took no mail for too long.
+    pub tx_dropped: u64,
+    /// Frames that came from the SubDevice.
+    pub rx_frames: u64,
+    /// Their bytes.
+    pub rx_bytes: u64,
+    /// Frames that came and that nobody took in time.
+    pub rx_overruns: u64,
+    /// Frames of which fragments did not come, or did not fit together.
+    pub rx_lost: u64,
+    /// Messages that make no sense.
+    pub malformed: u64,
+}
+
+/// How things stand.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct EthernetStatus {
+    /// Frames can be sent and may come.
+    pub up: bool,
+    /// Counters since the port was opened.
+    pub counters: EthernetCounters,
+    /// Bytes and frames per second to the SubDevice.
+    pub tx_rate: (u64, u64),
+    /// Bytes and frames per second from the SubDevice.
+    pub rx_rate: (u64, u64),
+    /// Frames that wait to be sent, of [`QUEUE`].
+    pub queued: usize,
+}
+
+/// A frame on its way to the SubDevice.
+#[derive(Debug)]
+pub(in crate::mail) struct Outgoing {
+    pub bytes: Vec<u8>,
+    pub number: u8,
+    pub wants_time: bool,
+}
+
+/// Bytes and frames in the last full second.
+#[derive(Debug, Default)]
+struct Rate {
+    since: Instant,
+    now: (u64, u64),
+    last: (u64, u64),
+}
+
+impl Rate {
+    fn add(&mut self, now: Instant, bytes: usize) {
+        self.turn(now);
+        self.now = (self.now.0 + bytes as u64, self.now.1 + 1);
+    }
+
+    fn turn(&mut self, now: Instant) {
+        let passed = now.since(self.since);
+        if passed >= RATE_PERIOD {
+            self.last = if passed < RATE_PERIOD * 2 { self.now } else { (0, 0) };
+            self.now = (0, 0);
+            let periods = passed.as_nanos() / RATE_PERIOD.as_nanos();
+            self.since += RATE_PERIOD.saturating_mul(u32::try_from(periods).unwrap_or(u32::MAX));
+        }
+    }
+
+    fn per_second(&mut self, now: Instant) -> (u64, u64) {
+        self.turn(now);
+        self.last
+    }
+}
+
+/// The Ethernet of one mailbox.
+#[derive(Debug)]
+pub(in crate::mail) struct Traffic {
+    /// Somebody has a port. Without one, fragments are unasked mail like any other.
+    pub attached: bool,
+    /// Which port that is.
+    pub attachment: u32,
+    outgoing: VecDeque<Outgoing>,
+    number: u8,
+    reassembly: Reassembly,
+    received: Ring<EthernetFrame>,
+    time_stamps: Ring<TimeStamp>,
+    counters: EthernetCounters,
+    tx_rate: Rate,
+    rx_rate: Rate,
+    /// When a fragment passed last, either way.
+    last_fragment: Option<Instant>,
+}
+
+impl Traffic {
+    pub(in crate::mail) fn new() -> Traffic {
+        Traffic {
+            attached: false,
+            attachment: 0,
+            outgoing: VecDeque::new(),
+            number: 0,
+            reassembly: Reassembly::default(),
+            received: Ring::new(RECEIVED),
+            time_stamps: Ring::new(TIME_STAMPS),
+            counters: EthernetCounters::default(),
+            tx_rate: Rate::default(),
+            rx_rate: Rate::default(),
+            last_fragment: None,
+        }
+    }
+
+    /// What was under way when the mailbox was closed or opened is gone.
+    pub(in crate::mail) fn reset(&mut self) {
+        self.counters.tx_dropped += self.outgoing.len() as u64;
+        self.outgoing.clear();
+        self.reassembly.clear();
+        self.last_fragment = None;
+    }
+
+    /// Takes a frame for sending; returns its number.
+    pub(super) fn queue(&mut self, bytes: &[u8], wants_time: bool) -> Result<u8, QueueError> {
+        if !(MIN_FRAME..=MAX_FRAME).contains(&bytes.len()) {
+            return Err(QueueError::Length { bytes: bytes.len() });
+        }
+        if self.outgoing.len() >= QUEUE {
+            return Err(QueueError::Full);
+        }
+        self.number = (self.number + 1) & 0x0F;
+        self.outgoing.push_back(Outgoing { bytes: bytes.to_vec(), number: self.number, wants_time });
+        Ok(self.number)
+    }
+
+    /// Frames that may still be queued.
+    pub(super) fn room(&self) -> usize {
+        QUEUE - self.outgoing.len()
+    }
+
+    pub(super) fn has_outgoing(&self) -> bool {
+        !self.outgoing.is_empty()
+    }
+
+    pub(super) fn next_outgoing(&mut self) -> Option<Outgoing> {
+        self.outgoing.pop_front()
+    }
+
+    /// A frame was sent or not.
+    pub(super) fn sent(&mut self, bytes: usize, arrived: bool, now: Instant) {
+        if arrived {
+            self.counters.tx_frames += 1;
+            self.counters.tx_bytes += bytes as u64;
+            self.tx_rate.add(now, bytes);
+        } else {
+            self.counters.tx_dropped += 1;
+        }
+    }
+
+    /// A fragment was written.
+    pub(in crate::mail) fn note_fragment(&mut self, now: Instant) {
+        self.last_fragment = Some(now);
+    }
+
+    /// Takes a message that is no answer.
+    pub(in crate::mail) fn take(&mut self, payload: &[u8], now: Instant) {
+        match EoeMessage::decode(payload).map(|message| message.body) {
+            Ok(EoeBody::Fragment(fragment)) => {
+                self.note_fragment(now);
+                let (lost, frame) = match self.reassembly.take(&fragment) {
+                    Outcome::Part => (false, None),
+                    Outcome::Frame(frame) => (false, Some(frame)),
+                    Outcome::Lost => (true, None),
+                    Outcome::Replaced(frame) => (true, frame),
+                };
+                self.counters.rx_lost += u64::from(lost);
+                if let Some(bytes) = frame {
+                    self.arrive(EthernetFrame { bytes, time_ns: fragment.time_ns }, now);
+                }
+            }
+            Ok(EoeBody::TimeStamp { frame, time_ns }) => self.time_stamps.push(TimeStamp { frame, time_ns }),
+            Ok(_) | Err(_) => self.counters.malformed += 1,
+        }
+    }
+
+    fn arrive(&mut self, frame: EthernetFrame, now: Instant) {
+        if frame.bytes.len() < MIN_FRAME {
+            self.counters.malformed += 1;
+            return;
+        }
+        self.counters.rx_frames += 1;
+        self.counters.rx_bytes += frame.bytes.len() as u64;
+        self.rx_rate.add(now, frame.bytes.len());
+        self.received.push(frame);
+    }
+
+    pub(super) fn pop_received(&mut self) -> Option<EthernetFrame> {
+        self.received.pop()
+    }
+
+    pub(super) fn pop_time_stamp(&mut self) -> Option<TimeStamp> {
+        self.time_stamps.pop()
+    }
+
+    /// For how long no fragment has passed, where others may follow soon.
+    pub(in crate::mail) fn lively(&self, now: Instant) -> Option<Duration> {
+        let idle = now.since(self.last_fragment.filter(|_| self.attached)?);
+        (idle < LIVELY).then_some(idle)
+    }
+
+    /// Pause to the next look for a fragment.
+    pub(in crate::mail) fn pause(&self, now: Instant) -> Option<Duration> {
+        self.lively(now).map(AnswerTime::pause)
+    }
+
+    pub(super) fn status(&mut self, up: bool, now: Instant) -> EthernetStatus {
+        EthernetStatus {
+            up,
+            counters: EthernetCounters { rx_overruns: self.received.overruns(), ..self.counters },
+            tx_rate: self.tx_rate.per_second(now),
+            rx_rate: self.rx_rate.per_second(now),
+            queued: self.outgoing.len(),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::fragments::Fragments;
+    use super::*;
+
+    const SECOND: u64 = 1_000_000_000;
+
+    #[test]
+    fn rates_are_those_of_the_last_full_second() {
+        let mut rate = Rate::default();
+        for at in 0..10 {
+            rate.add(Instant(5 * SECOND + at * SECOND / 10), 100);
+        }
+        assert_eq!(rate.per_second(Instant(5 * SECOND + SECOND / 2)), (0, 0), "it is not over");
+        assert_eq!(rate.per_second(Instant(6 * SECOND + SECOND / 2)), (1000, 10));
+        assert_eq!(rate.per_second(Instant(7 * SECOND)), (0, 0));
+    }
+
+    #[test]
+    fn queues_are_bounded_and_what_does_not_fit_is_told_or_counted() {
+        let mut traffic = Traffic::new();
+        for _ in 0..QUEUE {
+            assert!(traffic.queue(&[0; 60], false).is_ok());
+        }
+        assert_eq!((traffic.queue(&[0; 60], false), traffic.room()), (Err(QueueError::Full), 0));
+        assert_eq!(traffic.queue(&[0; 13], false), Err(QueueError::Length { bytes: 13 }));
+        assert_eq!(traffic.queue(&[0; 1519], false), Err(QueueError::Length { bytes: 1519 }));
+        for number in 0..RECEIVED + 3 {
+            for fragment in Fragments::new(&[7; 100], number as u8 & 0x0F, 128, false).unwrap() {
+                traffic.take(&fragment, Instant(0));
+            }
+        }
+        traffic.take(&[0x0F, 0, 0, 0], Instant(0));
+        let counters = traffic.status(true, Instant(0)).counters;
+        assert_eq!((counters.rx_frames, counters.rx_overruns, counters.malformed), (67, 3, 1));
+        traffic.reset();
+        assert_eq!(traffic.status(false, Instant(0)).counters.tx_dropped, QUEUE as u64);
+        assert_eq!(traffic.pop_received().map(|frame| frame.bytes), Some(alloc::vec![7; 100]));
+    }
+}

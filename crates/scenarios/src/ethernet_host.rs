@@ -1,0 +1,216 @@
+//! A host behind an EoE port in virtual time: an IP stack of its own (smoltcp) that downloads over TCP.
+//!
+//! It runs as a procedure of the acyclic half, as a network interface would beside it: nothing of it waits for a cycle.
+
+use std::collections::VecDeque;
+use std::time::Duration;
+
+use ringcat::Instant;
+use ringcat_engine::mail::eoe::EthernetPort;
+use ringcat_engine::supervisor::Bus;
+use smoltcp::iface::{Config, Interface, PollResult, SocketHandle, SocketSet};
+use smoltcp::phy::{Device, DeviceCapabilities, Medium, RxToken, TxToken};
+use smoltcp::socket::tcp;
+use smoltcp::wire::{EthernetAddress, HardwareAddress, IpCidr, Ipv4Address};
+
+/// Longest frame without check sequence.
+const MAX_FRAME: usize = 1514;
+/// As much as Linux begins with.
+const BUFFER: usize = 64 * 1024;
+const LOCAL_PORT: u16 = 49_152;
+const WEB_PORT: u16 = 80;
+/// The stack looks at its timers at least this often.
+const LONGEST_WAIT: Duration = Duration::from_millis(50);
+/// Frames that the stack may have ready.
+const READY: usize = 64;
+
+/// What a download came to.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Download {
+    /// Bytes of the file.
+    pub bytes: usize,
+    /// From the first frame of the connection to the last byte.
+    pub time: Duration,
+}
+
+impl Download {
+    /// Kilobytes (1,000 bytes) of the file per second.
+    pub fn kilobytes_per_second(&self) -> f64 {
+        self.bytes as f64 / 1e3 / self.time.as_secs_f64()
+    }
+}
+
+/// Who connects to whom.
+#[derive(Clone, Copy, Debug)]
+pub struct Addresses {
+    /// MAC address of the host.
+    pub mac: [u8; 6],
+    /// IP address of the host, in a network of 24 bits.
+    pub host: [u8; 4],
+    /// IP address of the device.
+    pub device: [u8; 4],
+}
+
+struct Host {
+    interface: Interface,
+    sockets: SocketSet<'static>,
+    handle: SocketHandle,
+    frames: Frames,
+}
+
+/// Downloads so many bytes from the web server of a simulated device; gives up after a time.
+///
+/// # Errors
+/// Not everything came in time, or something else.
+pub async fn download(
+    bus: Bus,
+    port: &EthernetPort,
+    addresses: Addresses,
+    bytes: usize,
+    limit: Duration,
+) -> Result<Download, String> {
+    let mut host = Host::new(addresses, bus.now());
+    let (begin, until) = (bus.now(), bus.now() + limit);
+    let request = format!("GET /bytes/{bytes} HTTP/1.0\r\n\r\n");
+    let (mut asked, mut head, mut got) = (false, Vec::new(), 0);
+    loop {
+        while let Some(frame) = port.pop_frame() {
+            host.frames.received.push_back(frame.bytes);
+        }
+        let socket = host.poll(bus.now());
+        if !asked && socket.can_send() {
+            asked = socket.send_slice(request.as_bytes()).is_ok();
+        }
+        got += take(socket, &mut head)?;
+        // What was taken makes room, which the other end is told.
+        host.poll(bus.now());
+        while port.room() > 0
+            && let Some(frame) = host.frames.sent.pop_front()
+        {
+            port.send(&frame).map_err(|error| error.to_string())?;
+        }
+        let now = bus.now();
+        if got >= bytes {
+            return Ok(Download { bytes: got, time: now.since(begin) });
+        }
+        if now >= until {
+            return Err(format!("{got} of {bytes} bytes; {:?}", port.status()));
+        }
+        let wait = host.wait(now);
+        if host.frames.sent.is_empty() || port.room() == 0 {
+            let any = async {
+                let frame = port.frame().await;
+                host.frames.received.push_back(frame.bytes);
+            };
+            // A time that runs out is a reason to look, too.
+            let _ = bus.within(wait, any).await;
+        }
+    }
+}
+
+/// Takes what has come; how much of it is behind the head.
+fn take(socket: &mut tcp::Socket<'_>, head: &mut Vec<u8>) -> Result<usize, String> {
+    const END: &[u8] = b"\r\n\r\n";
+    let mut count = 0;
+    while socket.can_recv() {
+        let mut piece = [0; 2048];
+        let length = socket.recv_slice(&mut piece).map_err(|error| format!("{error:?}"))?;
+        let mut body = &piece[..length];
+        if !head.ends_with(END) {
+            for byte in &piece[..length] {
+                head.push(*byte);
+                body = &body[1..];
+                if head.ends_with(END) {
+                    break;
+                }
+            }
+        }
+        if body.iter().any(|byte| *byte != b'.') {
+            return Err("the file is not what was sent".to_owned());
+        }
+        count += body.len();
+    }
+    Ok(count)
+}
+
+impl Host {
+    fn new(addresses: Addresses, now: Instant) -> Host {
+        let mut frames = Frames::default();
+        let config = Config::new(HardwareAddress::Ethernet(EthernetAddress(addresses.mac)));
+        let mut interface = Interface::new(config, &mut frames, instant(now));
+        let [a, b, c, d] = addresses.host;
+        // There is room for one.
+        interface.update_ip_addrs(|known| {
+            let _ = known.push(IpCidr::new(Ipv4Address::new(a, b, c, d).into(), 24));
+        });
+        let buffer = || tcp::SocketBuffer::new(vec![0; BUFFER]);
+        let mut socket = tcp::Socket::new(buffer(), buffer());
+        let [a, b, c, d] = addresses.device;
+        let device = (Ipv4Address::new(a, b, c, d), WEB_PORT);
+        // Both ends are valid addresses.
+        let _ = socket.connect(interface.context(), device, LOCAL_PORT);
+        let mut sockets = SocketSet::new(Vec::new());
+        let handle = sockets.add(socket);
+        Host { interface, sockets, handle, frames }
+    }
+
+    fn poll(&mut self, now: Instant) -> &mut tcp::Socket<'static> {
+        while self.interface.poll(instant(now), &mut self.frames, &mut self.sockets) != PollResult::None {}
+        self.sockets.get_mut(self.handle)
+    }
+
+    fn wait(&mut self, now: Instant) -> Duration {
+        let delay = self.interface.poll_delay(instant(now), &self.sockets);
+        delay.map_or(LONGEST_WAIT, |delay| Duration::from(delay).min(LONGEST_WAIT)).max(Duration::from_micros(10))
+    }
+}
+
+fn instant(now: Instant) -> smoltcp::time::Instant {
+    smoltcp::time::Instant::from_micros(i64::try_from(now.0 / 1000).unwrap_or(i64::MAX))
+}
+
+#[derive(Default)]
+struct Frames {
+    received: VecDeque<Vec<u8>>,
+    sent: VecDeque<Vec<u8>>,
+}
+
+struct Received(Vec<u8>);
+
+struct Sending<'a>(&'a mut VecDeque<Vec<u8>>);
+
+impl RxToken for Received {
+    fn consume<R, F: FnOnce(&[u8]) -> R>(self, f: F) -> R {
+        f(&self.0)
+    }
+}
+
+impl TxToken for Sending<'_> {
+    fn consume<R, F: FnOnce(&mut [u8]) -> R>(self, length: usize, f: F) -> R {
+        let mut frame = vec![0; length];
+        let result = f(&mut frame);
+        self.0.push_back(frame);
+        result
+    }
+}
+
+impl Device for Frames {
+    type RxToken<'a> = Received;
+    type TxToken<'a> = Sending<'a>;
+
+    fn receive(&mut self, _: smoltcp::time::Instant) -> Option<(Received, Sending<'_>)> {
+        let frame = self.received.pop_front()?;
+        Some((Received(frame), Sending(&mut self.sent)))
+    }
+
+    fn transmit(&mut self, _: smoltcp::time::Instant) -> Option<Sending<'_>> {
+        (self.sent.len() < READY).then_some(Sending(&mut self.sent))
+    }
+
+    fn capabilities(&self) -> DeviceCapabilities {
+        let mut capabilities = DeviceCapabilities::default();
+        capabilities.medium = Medium::Ethernet;
+        capabilities.max_transmission_unit = MAX_FRAME;
+        capabilities
+    }
+}
