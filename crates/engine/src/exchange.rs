@@ -7,6 +7,7 @@
 //! A frame is delivered when its working counters are as expected, or all its copies are in, or at its deadline. Inputs
 //! are delivered per SubDevice: see [`domain`].
 
+pub mod copy;
 pub mod counters;
 pub mod domain;
 pub mod entry;
@@ -17,6 +18,7 @@ use alloc::sync::Arc;
 use alloc::vec::Vec;
 use core::time::Duration;
 
+pub use copy::{CopyError, CopyRule, WhenStale};
 pub use counters::CyclicCounters;
 pub use domain::Domain;
 pub use entry::Entry;
@@ -30,6 +32,7 @@ use crate::link::{Link, LinkSet};
 use crate::queue::Producer;
 use crate::ring::{Class, Classified, Identity, RingMonitor, RingState, Sequence};
 use crate::time::Instant;
+use copy::Copies;
 use flight::{CyclicFrame, Step};
 use foreign::ForeignFrames;
 
@@ -68,6 +71,7 @@ pub struct Exchange {
     monitor: RingMonitor,
     counters: CyclicCounters,
     foreign: ForeignFrames,
+    copies: Copies,
     taking_part_changes: u32,
     cycle: u64,
 }
@@ -95,6 +99,7 @@ impl Exchange {
             monitor: RingMonitor::default(),
             counters: CyclicCounters::default(),
             foreign: ForeignFrames::new(),
+            copies: Copies::default(),
             taking_part_changes: 0,
             cycle: 0,
         }
@@ -180,6 +185,10 @@ impl Exchange {
             return false;
         }
         let is_new = domain.note_queued();
+        if !self.copies.is_empty() {
+            self.counters.stale_copies += self.copies.run(id.0, &mut self.domains, &self.frames, self.cycle);
+        }
+        let (domain, frames) = (&self.domains[id.0], &mut self.frames[range.clone()]);
         for (frame, index) in frames.iter_mut().zip(range.start as u16..) {
             if frame.is_open() {
                 self.counters.copies_lost += 1;
@@ -257,6 +266,22 @@ impl Exchange {
     pub fn freshness(&self, id: DomainId, subdevice: usize) -> Freshness {
         let Some(domain) = self.domains.get(id.0) else { return Freshness::Never };
         domain.freshness(subdevice, &self.frames[domain.frames()])
+    }
+
+    /// Sets the inputs that are copied to outputs in every cycle, in place of those that were before: when a domain is
+    /// queued, behind everything that the application wrote. Not for the cyclic path: this allocates.
+    ///
+    /// # Errors
+    /// Sources that are no inputs, targets that are no outputs or have two sources, different lengths; nothing is changed
+    /// then.
+    pub fn set_copies(&mut self, rules: &[CopyRule]) -> Result<(), CopyError> {
+        self.copies = Copies::new(rules, &self.domains, &self.frames)?;
+        Ok(())
+    }
+
+    /// Whether a copy, by its place in the table, was refused the last time because its source was stale.
+    pub fn is_copy_stale(&self, rule: usize) -> bool {
+        self.copies.is_stale(rule)
     }
 
     /// Overrides how long a domain's frames are waited for; the default is three quarters of its period.

@@ -16,7 +16,7 @@ use std::time::Duration;
 
 use ringcat_engine::domain::{DomainId, DomainStatus};
 use ringcat_engine::event::{Event, TimedEvent};
-use ringcat_engine::exchange::{CyclicCounters, Entry, Exchange};
+use ringcat_engine::exchange::{CopyError, CopyRule, CyclicCounters, Entry, Exchange};
 use ringcat_engine::main_device::{Active, Directory, MainDevice as Engine, SubDeviceState};
 use ringcat_engine::ring::RingState;
 use ringcat_engine::ring::identity::{Class, class_of};
@@ -133,6 +133,16 @@ impl<L: Links, H: AcyclicHalf> Application<L, H> {
     /// Chooses what makes a cycle begin; the time unless another trigger is chosen.
     pub fn set_trigger(&mut self, trigger: Trigger) {
         self.cyclic.set_trigger(trigger);
+    }
+
+    /// Has inputs copied to outputs in every cycle, in place of the copies that were set before: what came in with this
+    /// cycle's frames leaves with its next ones, whatever `work` writes there. A source in a domain with a longer period
+    /// may be as old as that; `max_age` is what it may be older, in cycles. To be called before the cycles begin.
+    ///
+    /// # Errors
+    /// Sources that are no inputs, targets that are no outputs or have two sources, different lengths.
+    pub fn set_copies(&mut self, rules: &[CopyRule]) -> Result<(), CopyError> {
+        self.cyclic.set_copies(rules)
     }
 
     /// A few more cycles, with all outputs zero where `outputs` says so. Afterwards the wire belongs to the acyclic half.

@@ -6,7 +6,7 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use ringcat_engine::domain::{DomainId, DomainStatus};
-use ringcat_engine::exchange::{Exchange, Received};
+use ringcat_engine::exchange::{CopyError, CopyRule, Exchange, Received};
 use ringcat_engine::link::Link;
 use ringcat_engine::main_device::{Active, Directory};
 use ringcat_engine::time::Instant;
@@ -69,6 +69,16 @@ impl Cyclic {
 
     pub fn set_trigger(&mut self, trigger: Trigger) {
         self.trigger = trigger;
+    }
+
+    /// Sets what is copied in every cycle; the ages that rules tolerate count from the period of the source's domain.
+    pub fn set_copies(&mut self, rules: &[CopyRule]) -> Result<(), CopyError> {
+        let of_domain = |rule: &CopyRule| {
+            let divider = self.rates.get(rule.source.domain.0).map_or(1, |rate| rate.divider);
+            CopyRule { max_age: rule.max_age.saturating_add(divider - 1), ..*rule }
+        };
+        let rules: Vec<CopyRule> = rules.iter().map(of_domain).collect();
+        self.exchange.set_copies(&rules)
     }
 
     /// Takes in a frame of the cyclic class or of nobody known.

@@ -64,7 +64,7 @@ pub use ringcat_engine::config::{
 };
 pub use ringcat_engine::domain::{DomainId, DomainState, DomainStatus, Freshness};
 pub use ringcat_engine::event::{Event, TimedEvent};
-pub use ringcat_engine::exchange::{CyclicCounters, Entry};
+pub use ringcat_engine::exchange::{CopyError, CopyRule, CyclicCounters, Entry, WhenStale};
 pub use ringcat_engine::info::{Direction, SubDeviceInfo};
 pub use ringcat_engine::link::Link;
 pub use ringcat_engine::mail::coe::{SdoAddress, SdoError, SdoFailure};

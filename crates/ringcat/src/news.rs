@@ -31,7 +31,7 @@ pub struct News {
 }
 
 /// Fields of [`CyclicCounters`].
-const COUNTERS: usize = 12;
+const COUNTERS: usize = 13;
 
 fn zeros<const N: usize>() -> [AtomicU64; N] {
     [const { AtomicU64::new(0) }; N]
@@ -70,8 +70,21 @@ impl News {
 
     /// Counters of process data.
     pub fn counters(&self) -> CyclicCounters {
-        let [sent, bytes, received, lost, half, copies_lost, late, corrupt, foreign, other, skipped, incomplete] =
-            load(&self.counters);
+        let [
+            sent,
+            bytes,
+            received,
+            lost,
+            half,
+            copies_lost,
+            late,
+            corrupt,
+            foreign,
+            other,
+            skipped,
+            incomplete,
+            stale_copies,
+        ] = load(&self.counters);
         CyclicCounters {
             sent,
             bytes,
@@ -85,6 +98,7 @@ impl News {
             other,
             skipped,
             incomplete,
+            stale_copies,
         }
     }
 
@@ -170,9 +184,23 @@ impl News {
             other,
             skipped,
             incomplete,
+            stale_copies,
         } = *counters;
-        let numbers =
-            [sent, bytes, received, lost, half, copies_lost, late, corrupt, foreign, other, skipped, incomplete];
+        let numbers = [
+            sent,
+            bytes,
+            received,
+            lost,
+            half,
+            copies_lost,
+            late,
+            corrupt,
+            foreign,
+            other,
+            skipped,
+            incomplete,
+            stale_copies,
+        ];
         store(&self.counters, &numbers);
         for (words, rate) in self.domains.iter().zip(rates) {
             let state = match rate.status.state {

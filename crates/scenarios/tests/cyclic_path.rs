@@ -6,7 +6,7 @@ use ringcat::links::Links;
 use ringcat::memory::MemoryLinks;
 use ringcat::tee::Tee;
 use ringcat_engine::domain::{DomainId, Freshness};
-use ringcat_engine::exchange::{CyclicCounters, Received};
+use ringcat_engine::exchange::{CopyRule, CyclicCounters, Entry, Received};
 use ringcat_engine::link::Link;
 use ringcat_engine::main_device::{MainDevice, Options};
 use ringcat_engine::request::{RequestRefused, RequestState};
@@ -117,6 +117,30 @@ fn recorded_cycles_take_no_memory() {
         assert_eq!(link.sent + link.received + link.lost, CYCLES * 6 + (CYCLES - 1) * 6, "{link:?}");
         assert!(link.sent > 0 && link.received > 0, "{link:?}");
     }
+}
+
+#[test]
+fn copying_takes_no_memory() {
+    let mut load = load(Cabling::ClosedRing);
+    let image = load.exchange.image(DomainId(0)).len() as u32;
+    // The first SubDevice's inputs, and the last one's.
+    let inputs = [image * 4, image * 8 - 60 * 8];
+    let entry = |domain, bit_offset| Entry { domain: DomainId(domain), bit_offset, bit_length: 60 * 8 };
+    let rules = [CopyRule::new(entry(0, inputs[0]), entry(1, 0)), CopyRule::new(entry(0, inputs[1]), entry(0, 0))];
+    let set = load.exchange.set_copies(&rules);
+    let used = counted(|| {
+        for cycle in 0..CYCLES {
+            load.exchange_once();
+            if cycle % 10 == 9 {
+                disturb(&mut load, cycle);
+            } else {
+                load.answer();
+            }
+        }
+    });
+    assert_eq!((set, used), (Ok(()), (0, 0)));
+    assert!(!load.exchange.is_copy_stale(0));
+    println!("{} words refused", load.exchange.counters().stale_copies);
 }
 
 #[test]

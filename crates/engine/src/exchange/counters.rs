@@ -27,4 +27,6 @@ pub struct CyclicCounters {
     pub skipped: u64,
     /// Judgements that were not complete, summed over domains.
     pub incomplete: u64,
+    /// Words that were not copied from inputs to outputs because their source was stale.
+    pub stale_copies: u64,
 }

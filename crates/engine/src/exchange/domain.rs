@@ -141,6 +141,16 @@ impl Domain {
         }
     }
 
+    /// Number of a SubDevice among those of the domain.
+    pub(crate) fn member(&self, subdevice: usize) -> Option<usize> {
+        self.members.binary_search_by_key(&subdevice, |member| member.subdevice).ok()
+    }
+
+    /// From when on deliveries to those that take part include a member: a cycle, plus one.
+    pub(crate) fn part_since(&self, member: usize) -> u64 {
+        self.members.get(member).map_or(u64::MAX, |member| member.part_since)
+    }
+
     pub(crate) fn freshness(&self, subdevice: usize, frames: &[CyclicFrame]) -> Freshness {
         let Ok(at) = self.members.binary_search_by_key(&subdevice, |member| member.subdevice) else {
             return Freshness::Never;

@@ -6,6 +6,7 @@
 use alloc::boxed::Box;
 use alloc::vec;
 use alloc::vec::Vec;
+use core::ops::Range;
 
 use ringcat_wire::address::Wkc;
 use ringcat_wire::command::Command;
@@ -39,6 +40,12 @@ struct Span {
     frame_at: usize,
     image_at: usize,
     length: usize,
+}
+
+impl Span {
+    fn holds(&self, image: &Range<usize>) -> bool {
+        self.image_at <= image.start && image.end <= self.image_at + self.length
+    }
 }
 
 /// Inputs of one SubDevice within a datagram.
@@ -330,6 +337,28 @@ impl CyclicFrame {
                 }
             }
         }
+    }
+
+    /// The datagrams with inputs of a SubDevice.
+    pub(crate) fn places_of(&self, subdevice: usize) -> impl Iterator<Item = usize> {
+        let has = move |place: &Place| place.segments.iter().any(|segment| segment.subdevice == subdevice);
+        self.places.iter().enumerate().filter(move |(_, place)| has(place)).map(|(number, _)| number)
+    }
+
+    /// As [`CyclicFrame::delivered`], of a datagram.
+    pub(crate) fn delivered_at(&self, place: usize) -> (u64, u64) {
+        self.places.get(place).map_or((0, 0), |place| (place.delivered_all, place.delivered_part))
+    }
+
+    /// The SubDevice in whose inputs bytes of the image lie, all of them.
+    pub(crate) fn whose_inputs(&self, bytes: Range<usize>) -> Option<usize> {
+        let mut segments = self.places.iter().flat_map(|place| &place.segments);
+        segments.find(|segment| segment.span.holds(&bytes)).map(|segment| segment.subdevice)
+    }
+
+    /// Whether bytes of the image lie in outputs, all of them.
+    pub(crate) fn has_outputs(&self, bytes: Range<usize>) -> bool {
+        self.places.iter().any(|place| place.outputs.holds(&bytes))
     }
 
     /// Cycles (plus one) in which all inputs that include this SubDevice's, and those of the ones taking part, were

@@ -6,6 +6,7 @@ mod broken_ring;
 mod calm;
 mod captures;
 mod configuration;
+mod copies;
 mod determinism;
 mod disturbed_frames;
 mod domains;
