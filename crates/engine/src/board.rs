@@ -65,6 +65,8 @@ pub struct Board {
     taking_part_changes: AtomicU32,
     /// SubDevices that may be missing without a domain being incomplete.
     optional: Vec<bool>,
+    /// One bit per SubDevice: it is away on purpose.
+    excused: Vec<AtomicU64>,
 }
 
 impl Board {
@@ -76,6 +78,7 @@ impl Board {
             ring: AtomicU64::new(0),
             cycles: AtomicU64::new(0),
             taking_part: (0..subdevices.div_ceil(64)).map(|_| AtomicU64::new(0)).collect(),
+            excused: (0..subdevices.div_ceil(64)).map(|_| AtomicU64::new(0)).collect(),
             taking_part_changes: AtomicU32::new(0),
             optional: Vec::new(),
         }
@@ -90,7 +93,12 @@ impl Board {
 
     /// Whether a SubDevice may be missing without a domain being incomplete.
     pub fn is_optional(&self, subdevice: usize) -> bool {
-        self.optional.get(subdevice).copied().unwrap_or(false)
+        self.optional.get(subdevice).copied().unwrap_or(false) || bit(&self.excused, subdevice)
+    }
+
+    /// Says whether a SubDevice is away on purpose, so that no domain is incomplete without it.
+    pub fn set_excused(&self, subdevice: usize, excused: bool) {
+        self.set(&self.excused, subdevice, excused);
     }
 
     pub(crate) fn post_supervision(&self, supervision: Supervision) {
@@ -139,26 +147,32 @@ impl Board {
 
     /// Says whether a SubDevice takes part in process data. Indices beyond the board are ignored.
     pub fn set_taking_part(&self, subdevice: usize, takes_part: bool) {
-        let Some(word) = self.taking_part.get(subdevice / 64) else { return };
+        self.set(&self.taking_part, subdevice, takes_part);
+    }
+
+    /// Sets a bit, and counts where it changes something.
+    fn set(&self, words: &[AtomicU64], subdevice: usize, set: bool) {
+        let Some(word) = words.get(subdevice / 64) else { return };
         let bit = 1 << (subdevice % 64);
-        let before =
-            if takes_part { word.fetch_or(bit, Ordering::Relaxed) } else { word.fetch_and(!bit, Ordering::Relaxed) };
-        if (before & bit != 0) != takes_part {
+        let before = if set { word.fetch_or(bit, Ordering::Relaxed) } else { word.fetch_and(!bit, Ordering::Relaxed) };
+        if (before & bit != 0) != set {
             self.taking_part_changes.fetch_add(1, Ordering::Release);
         }
     }
 
     /// Whether a SubDevice takes part in process data.
     pub fn takes_part(&self, subdevice: usize) -> bool {
-        self.taking_part
-            .get(subdevice / 64)
-            .is_some_and(|word| word.load(Ordering::Relaxed) & (1 << (subdevice % 64)) != 0)
+        bit(&self.taking_part, subdevice)
     }
 
-    /// Changes to who takes part since the beginning.
+    /// Changes to who takes part, or is away on purpose, since the beginning.
     pub(crate) fn taking_part_changes(&self) -> u32 {
         self.taking_part_changes.load(Ordering::Acquire)
     }
+}
+
+fn bit(words: &[AtomicU64], subdevice: usize) -> bool {
+    words.get(subdevice / 64).is_some_and(|word| word.load(Ordering::Relaxed) & (1 << (subdevice % 64)) != 0)
 }
 
 #[cfg(test)]
@@ -183,5 +197,16 @@ mod tests {
         board.set_taking_part(1000, true);
         assert_eq!(board.taking_part_changes(), 1);
         assert!(board.takes_part(69) && !board.takes_part(68) && !board.takes_part(1000));
+    }
+
+    #[test]
+    fn one_that_is_away_on_purpose_is_optional_for_as_long() {
+        let board = Board::new(2).with_optional(alloc::vec![true, false]);
+        assert!(board.is_optional(0) && !board.is_optional(1));
+        board.set_excused(1, true);
+        assert!(board.is_optional(1));
+        board.set_excused(1, false);
+        assert!(!board.is_optional(1) && !board.is_optional(7));
+        assert_eq!(board.taking_part_changes(), 2);
     }
 }

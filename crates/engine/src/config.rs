@@ -1,19 +1,25 @@
 //! What the application declares about each SubDevice: where it is expected, who it is, its process data, watchdog,
-//! SDO downloads and time limits.
+//! start-up commands and time limits.
 //!
 //! Everything not declared comes from the SII. Which declaration belongs to which SubDevice of a scan is the matter
 //! of [`resolve`]; what follows for its registers, of [`crate::plan`].
 
 mod resolve;
+mod startup;
+mod timeouts;
 
 use alloc::vec::Vec;
 use core::fmt;
 use core::time::Duration;
 
 use ringcat_wire::al::AlState;
+use ringcat_wire::mailbox::soe::Idn;
 use ringcat_wire::sii::Identity;
 
 use crate::info::{Direction, SubDeviceInfo};
+
+pub use startup::{IdnWrite, SdoDownload, StartupAction, StartupCommand, Transition};
+pub use timeouts::{StateTimeout, Timeouts};
 
 pub use resolve::{ConfigError, DuplicateAlias, IdentityField, Resolution, duplicate_aliases, resolve};
 
@@ -122,61 +128,6 @@ pub struct PdoAssignment {
     pub pdos: Vec<PdoMapping>,
 }
 
-/// An SDO download in PREOP.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct SdoDownload {
-    /// Index of the object.
-    pub index: u16,
-    /// Subindex; with complete access 0 or 1, where to start.
-    pub sub_index: u8,
-    /// All entries at once.
-    pub complete_access: bool,
-    /// What to write, little-endian.
-    pub data: Vec<u8>,
-}
-
-/// Time limits (facts 5.4).
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Timeouts {
-    /// INIT to PREOP or BOOT.
-    pub preop: Duration,
-    /// PREOP to SAFEOP, SAFEOP to OP.
-    pub safeop_op: Duration,
-    /// Any state to INIT.
-    pub back_to_init: Duration,
-    /// OP to SAFEOP, OP or SAFEOP to PREOP.
-    pub back_to_safeop: Duration,
-    /// Until a mailbox takes a request.
-    pub mailbox_request: Duration,
-    /// Until the answer to an SDO request is there.
-    pub sdo: Duration,
-}
-
-impl Default for Timeouts {
-    fn default() -> Timeouts {
-        Timeouts {
-            preop: Duration::from_secs(3),
-            safeop_op: Duration::from_secs(10),
-            back_to_init: Duration::from_secs(5),
-            back_to_safeop: Duration::from_millis(200),
-            mailbox_request: Duration::from_millis(100),
-            sdo: Duration::from_secs(1),
-        }
-    }
-}
-
-impl Timeouts {
-    /// Limit of a state change.
-    pub const fn transition(&self, from: AlState, to: AlState) -> Duration {
-        match (from, to) {
-            (_, AlState::Init) => self.back_to_init,
-            (AlState::SafeOp | AlState::Op, AlState::PreOp) | (AlState::Op, AlState::SafeOp) => self.back_to_safeop,
-            (_, AlState::PreOp | AlState::Boot) => self.preop,
-            (_, AlState::SafeOp | AlState::Op) => self.safeop_op,
-        }
-    }
-}
-
 /// What the application declares about one SubDevice. The default expects anybody at position 0, with everything else
 /// from the SII.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -195,10 +146,18 @@ pub struct SubDeviceConfig {
     pub watchdog_divider: Option<u16>,
     /// Register WATCHDOG_TIME_PROCESS_DATA, in units of the divider; 0 switches the watchdog off.
     pub watchdog_intervals: Option<u16>,
-    /// SDO downloads in PREOP, in this order, before the PDO assignment is written.
-    pub sdos: Vec<SdoDownload>,
+    /// Register WATCHDOG_TIME_PDI, in units of the divider; 0 switches the watchdog off.
+    pub pdi_watchdog_intervals: Option<u16>,
+    /// Start-up commands. Those of a transition are sent in this order, all of them each time it is passed.
+    pub startup: Vec<StartupCommand>,
+    /// The PDI keeps the EEPROM that it has on the way to PREOP. Whoever reads or writes the EEPROM takes it back.
+    pub sii_to_pdi: bool,
+    /// Pause in PREOP before SAFEOP is requested, for SubDevices that need it.
+    pub wait_before_safeop: Duration,
     /// Time limits.
     pub timeouts: Timeouts,
+    /// Time limits of single state changes, which count before `timeouts`.
+    pub state_timeouts: Vec<StateTimeout>,
     /// State to which it is to be brought.
     pub target: AlState,
 }
@@ -213,8 +172,12 @@ impl Default for SubDeviceConfig {
             pdos: None,
             watchdog_divider: None,
             watchdog_intervals: None,
-            sdos: Vec::new(),
+            pdi_watchdog_intervals: None,
+            startup: Vec::new(),
+            sii_to_pdi: false,
+            wait_before_safeop: Duration::ZERO,
             timeouts: Timeouts::default(),
+            state_timeouts: Vec::new(),
             target: AlState::Op,
         }
     }
@@ -291,18 +254,79 @@ impl SubDeviceConfig {
         self
     }
 
-    /// Appends an SDO download.
+    /// Declares the time of the PDI watchdog, in units of the divider.
     #[must_use]
-    pub fn sdo(mut self, index: u16, sub_index: u8, data: impl Into<Vec<u8>>) -> SubDeviceConfig {
-        self.sdos.push(SdoDownload { index, sub_index, complete_access: false, data: data.into() });
+    pub fn pdi_watchdog(mut self, intervals: u16) -> SubDeviceConfig {
+        self.pdi_watchdog_intervals = Some(intervals);
         self
     }
 
-    /// Appends an SDO download with complete access, from subindex 0 or 1.
+    /// Appends an SDO download before SAFEOP.
     #[must_use]
-    pub fn sdo_complete(mut self, index: u16, sub_index: u8, data: impl Into<Vec<u8>>) -> SubDeviceConfig {
-        self.sdos.push(SdoDownload { index, sub_index, complete_access: true, data: data.into() });
+    pub fn sdo(self, index: u16, sub_index: u8, data: impl Into<Vec<u8>>) -> SubDeviceConfig {
+        self.sdo_at(Transition::Ps, index, sub_index, data)
+    }
+
+    /// Appends an SDO download with complete access before SAFEOP, from subindex 0 or 1.
+    #[must_use]
+    pub fn sdo_complete(self, index: u16, sub_index: u8, data: impl Into<Vec<u8>>) -> SubDeviceConfig {
+        let sdo = SdoDownload { index, sub_index, complete_access: true, data: data.into() };
+        self.startup(Transition::Ps, StartupAction::Sdo(sdo))
+    }
+
+    /// Appends an SDO download at a transition.
+    #[must_use]
+    pub fn sdo_at(
+        self,
+        transition: Transition,
+        index: u16,
+        sub_index: u8,
+        data: impl Into<Vec<u8>>,
+    ) -> SubDeviceConfig {
+        let sdo = SdoDownload { index, sub_index, complete_access: false, data: data.into() };
+        self.startup(transition, StartupAction::Sdo(sdo))
+    }
+
+    /// Appends a write of the value of an IDN at a transition: in PREOP for [`Transition::Ps`], in SAFEOP for
+    /// [`Transition::So`].
+    #[must_use]
+    pub fn idn_at(self, transition: Transition, drive: u8, idn: Idn, data: impl Into<Vec<u8>>) -> SubDeviceConfig {
+        self.startup(transition, StartupAction::Idn(IdnWrite { drive, idn, data: data.into() }))
+    }
+
+    /// Appends a start-up command.
+    #[must_use]
+    pub fn startup(mut self, transition: Transition, action: StartupAction) -> SubDeviceConfig {
+        self.startup.push(StartupCommand { transition, action });
         self
+    }
+
+    /// Leaves the EEPROM to the PDI from the way to PREOP on.
+    #[must_use]
+    pub fn sii_to_pdi(mut self) -> SubDeviceConfig {
+        self.sii_to_pdi = true;
+        self
+    }
+
+    /// Waits in PREOP before SAFEOP is requested.
+    #[must_use]
+    pub fn wait_before_safeop(mut self, pause: Duration) -> SubDeviceConfig {
+        self.wait_before_safeop = pause;
+        self
+    }
+
+    /// Sets the time limit of one state change; a later one for the same change replaces the earlier.
+    #[must_use]
+    pub fn state_timeout(mut self, from: AlState, to: AlState, limit: Duration) -> SubDeviceConfig {
+        self.state_timeouts.retain(|own| (own.from, own.to) != (from, to));
+        self.state_timeouts.push(StateTimeout { from, to, limit });
+        self
+    }
+
+    /// Limit of a state change.
+    pub fn limit(&self, from: AlState, to: AlState) -> Duration {
+        let own = self.state_timeouts.iter().find(|own| (own.from, own.to) == (from, to));
+        own.map_or_else(|| self.timeouts.transition(from, to), |own| own.limit)
     }
 
     /// Sets the time limits.

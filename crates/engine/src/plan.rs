@@ -90,9 +90,8 @@ pub struct SubDevicePlan {
     pub process_data: Vec<AreaPlan>,
     /// SyncManagers of the controller to be switched off before SAFEOP: neither mailbox nor process data.
     pub unused: Vec<u8>,
-    /// SDO downloads of the application.
-    pub sdos: Vec<SdoDownload>,
-    /// SDO downloads that make PDO assignment and mapping what they are planned to be; they come after `sdos`.
+    /// SDO downloads that make PDO assignment and mapping what they are planned to be; they come after the start-up
+    /// commands of PREOP.
     pub assign_sdos: Vec<SdoDownload>,
     /// LRW reaches the SubDevice.
     pub lrw_supported: bool,
@@ -122,9 +121,7 @@ fn plan_inner(config: &SubDeviceConfig, info: &SubDeviceInfo) -> Result<SubDevic
     check::check(info, &mailbox, &process_data)?;
     let mut warnings = Vec::new();
     let assign_sdos = sdos::assign_sdos(config, info, &process_data, &mut warnings)?;
-    if !config.sdos.is_empty() && (mailbox.is_empty() || !info.protocols.coe()) {
-        return Err(PlanProblem::NoCoe { index: config.sdos[0].index, sub_index: config.sdos[0].sub_index });
-    }
+    config.startup.iter().try_for_each(|command| check::command(info, !mailbox.is_empty(), &command.action))?;
     let used = |index: &u8| {
         mailbox.iter().any(|sm| sm.index == *index) || process_data.iter().any(|area| area.sync_manager == *index)
     };
@@ -134,7 +131,6 @@ fn plan_inner(config: &SubDeviceConfig, info: &SubDeviceInfo) -> Result<SubDevic
         mailbox,
         bootstrap,
         process_data,
-        sdos: config.sdos.clone(),
         assign_sdos,
         lrw_supported: info.lrw_supported(),
         watchdog: watchdog(config),
@@ -183,10 +179,13 @@ fn sync_manager(start: u16, length: u16, control: u8) -> SyncManager {
 }
 
 fn watchdog(config: &SubDeviceConfig) -> Vec<(RegisterAddress, Vec<u8>)> {
-    [(map::WATCHDOG_DIVIDER, config.watchdog_divider), (map::WATCHDOG_TIME_PROCESS_DATA, config.watchdog_intervals)]
-        .into_iter()
-        .filter_map(|(address, value)| Some((address, value?.to_le_bytes().to_vec())))
-        .collect()
+    let registers = [
+        (map::WATCHDOG_DIVIDER, config.watchdog_divider),
+        (map::WATCHDOG_TIME_PDI, config.pdi_watchdog_intervals),
+        (map::WATCHDOG_TIME_PROCESS_DATA, config.watchdog_intervals),
+    ];
+    let written = registers.into_iter().filter_map(|(address, value)| Some((address, value?.to_le_bytes().to_vec())));
+    written.collect()
 }
 
 #[cfg(test)]

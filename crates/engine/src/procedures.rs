@@ -8,6 +8,7 @@ pub mod fleet;
 pub mod inspect;
 pub mod mail_watch;
 pub mod recover;
+pub(crate) mod request_state;
 pub mod scan;
 pub mod serve_requests;
 pub mod services;

@@ -44,6 +44,7 @@ mod process_data;
 mod services;
 pub mod shared_segment;
 pub mod simulated;
+mod states;
 pub mod supervisor_thread;
 pub mod tee;
 pub mod text;
@@ -60,7 +61,8 @@ pub use process_data::ProcessData;
 pub use supervisor_thread::SupervisorThread;
 
 pub use ringcat_engine::config::{
-    ConfigAddress, PdoAssignment, PdoEntry, PdoMapping, SdoDownload, SubDeviceConfig, Timeouts, Watchdog,
+    ConfigAddress, IdnWrite, PdoAssignment, PdoEntry, PdoMapping, SdoDownload, StartupAction, StartupCommand,
+    StateTimeout, SubDeviceConfig, Timeouts, Transition, Watchdog,
 };
 pub use ringcat_engine::domain::{DomainId, DomainState, DomainStatus, Freshness};
 pub use ringcat_engine::event::{Event, TimedEvent};

@@ -31,7 +31,7 @@ impl SupervisorThread {
     }
 
     /// Starts work in the thread, where it stays, and waits for its end.
-    fn wait_for<T: Send + 'static>(
+    pub(crate) fn wait_for<T: Send + 'static>(
         &self,
         start: impl FnOnce(&mut Engine) -> Pending<T> + Send + 'static,
     ) -> Result<T, Error> {

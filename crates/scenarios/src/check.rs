@@ -209,7 +209,8 @@ impl Mirror {
 pub fn uses_outputs(device: &Device) -> bool {
     let in_op = device.al_status() == AlStatus::new(AlState::Op);
     let alive = !device.description.emulation || device.controller.register(map::WATCHDOG_STATUS, 2)[0] & 1 != 0;
-    device.controller.is_powered() && in_op && alive && !device.application.is_hanging()
+    let steady = !device.application.is_hanging() && !device.application.is_changing_state();
+    device.controller.is_powered() && in_op && alive && steady
 }
 
 /// Events about the ring, in order.

@@ -38,6 +38,8 @@ use servers::Servers;
 use settings::Layout;
 use state_machine::{Pending, StateMachine};
 
+pub use mail::ServedMail;
+
 pub use behaviours::{Behaviour, InputFunction, InputSource};
 
 /// AL_EVENT bits (facts 3.5).
@@ -67,6 +69,10 @@ pub struct Application {
     files: FileStore,
     faults: MailFaults,
     layout: Layout,
+    /// Requests that were served, where they are recorded.
+    record: Option<Vec<ServedMail>>,
+    /// Since when it is in PREOP.
+    preop_since: SimTime,
     refusals: Vec<Refusal>,
     hanging: bool,
     interest: u32,
@@ -89,6 +95,8 @@ impl Application {
             files: FileStore::new(&description.services.foe),
             faults: MailFaults::default(),
             layout: Layout::default(),
+            record: None,
+            preop_since: SimTime::ZERO,
             refusals: Vec::new(),
             hanging: false,
             interest: 0,
@@ -122,6 +130,11 @@ impl Application {
     /// A hanging application reacts to nothing.
     pub fn hang(&mut self, hanging: bool) {
         self.hanging = hanging;
+    }
+
+    /// A transition is on its way; one out of OP makes the outputs safe at once.
+    pub const fn is_changing_state(&self) -> bool {
+        self.machine.pending().is_some()
     }
 
     /// It hangs.

@@ -195,6 +195,8 @@ pub struct DeviceDescription {
     pub watchdog_required: bool,
     /// How long the application waits for outputs between SAFEOP and OP before it refuses with 0x0019.
     pub outputs_timeout: Duration,
+    /// After INIT the application refuses SAFEOP for so long (0x0052): its hardware is not ready yet.
+    pub preop_settling: Duration,
     /// Current drawn from the E-bus; negative = feeds.
     pub ebus_current_ma: i16,
     /// Durations of the state transitions.
@@ -248,6 +250,7 @@ impl DeviceDescription {
             emulation: false,
             watchdog_required: false,
             outputs_timeout: Duration::from_secs(1),
+            preop_settling: Duration::ZERO,
             ebus_current_ma: 0,
             transitions: TransitionTimes::default(),
             sii_size_bytes: 512,

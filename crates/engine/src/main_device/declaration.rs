@@ -21,6 +21,7 @@ use crate::layout::{AreaSpec, DomainSpec, Layout, LayoutError};
 use crate::mail::Mailbox;
 use crate::plan::plan;
 use crate::procedures::fleet::{Member, Setup, SetupError, declared_areas};
+use crate::procedures::request_state::exchanges;
 use crate::procedures::scan::{Scan, station_at};
 use crate::procedures::strangers::Stranger;
 use crate::supervisor::Bus;
@@ -184,11 +185,6 @@ pub(super) fn plan_all(
             None => Ok(Areas::Declared(declared_areas(config).unwrap_or_default(), config.clone())),
         })
         .collect()
-}
-
-/// Whether process data flows in a state.
-const fn exchanges(target: AlState) -> bool {
-    matches!(target, AlState::SafeOp | AlState::Op)
 }
 
 /// What needs no SubDevice to be found wrong.

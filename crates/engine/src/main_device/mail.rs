@@ -11,6 +11,7 @@ use super::ticket::Ticket;
 use crate::mail::coe::{self, SdoAddress, SdoError, SdoFailure};
 use crate::mail::{Limits, Mailbox, MailboxError};
 use crate::procedures::configure::ConfigureError;
+use crate::procedures::request_state::request_state;
 use crate::procedures::visit::visit;
 use crate::request::{RegisterRequest, SdoRequest, SoeRequest, VoeHandler};
 
@@ -40,6 +41,22 @@ impl MainDevice {
             match (info, mailbox) {
                 (Some(info), Some(mailbox)) => visit(&bus, &info, &mailbox, state).await,
                 _ => Err(ConfigureError::NoSetup),
+            }
+        })
+    }
+
+    /// Once active: starts to bring one SubDevice to a state, BOOT among them, while the others go on. Its whole
+    /// configuration is written again on the way up. The state is kept: a SubDevice that loses its power comes back to it,
+    /// one that does not answer goes there when it comes. One that refuses is brought back to the state before.
+    ///
+    /// Without process data its working counters are not expected, and its inputs are not fresh.
+    pub fn start_state_request(&mut self, subdevice: usize, state: AlState) -> Pending<Result<(), ConfigureError>> {
+        let bus = self.supervisor.bus();
+        let work = self.fleet.as_ref().map(|fleet| request_state(&bus, fleet, subdevice, state));
+        self.start(async move {
+            match work {
+                Some(work) => work.await,
+                None => Err(ConfigureError::NoSetup),
             }
         })
     }

@@ -7,6 +7,7 @@ use ringcat_wire::register::SyncManager;
 use super::areas::{PROCESS_RAM, occupied};
 use super::error::PlanProblem;
 use super::{AreaPlan, SmPlan};
+use crate::config::{IdnWrite, SdoDownload, StartupAction};
 use crate::info::SubDeviceInfo;
 
 /// Checks mailbox and process data SyncManagers against the controller and against each other.
@@ -39,6 +40,19 @@ pub(super) fn check(info: &SubDeviceInfo, mailbox: &[SmPlan], areas: &[AreaPlan]
             second_bytes: (b.start, b.end),
         }),
         _ => Ok(()),
+    }
+}
+
+/// Whether a SubDevice can be given a start-up command.
+pub(super) fn command(info: &SubDeviceInfo, mailbox: bool, action: &StartupAction) -> Result<(), PlanProblem> {
+    match action {
+        StartupAction::Sdo(SdoDownload { index, sub_index, .. }) if !mailbox || !info.protocols.coe() => {
+            Err(PlanProblem::NoCoe { index: *index, sub_index: *sub_index })
+        }
+        StartupAction::Idn(IdnWrite { drive, idn, .. }) if !mailbox || !info.protocols.soe() => {
+            Err(PlanProblem::NoSoe { drive: *drive, idn: *idn })
+        }
+        StartupAction::Sdo(_) | StartupAction::Idn(_) => Ok(()),
     }
 }
 

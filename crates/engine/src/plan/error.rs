@@ -3,6 +3,7 @@
 use core::fmt;
 
 use ringcat_wire::address::{Position, StationAddress};
+use ringcat_wire::mailbox::soe::Idn;
 
 use crate::info::Direction;
 
@@ -136,6 +137,13 @@ pub enum PlanProblem {
         /// Subindex of the object.
         sub_index: u8,
     },
+    /// An IDN for a SubDevice without SoE.
+    NoSoe {
+        /// The drive.
+        drive: u8,
+        /// The IDN.
+        idn: Idn,
+    },
 }
 
 /// What the application asked for and the SubDevice may not follow. The plan takes it as asked for.
@@ -208,6 +216,9 @@ impl fmt::Display for PlanProblem {
             }
             PlanProblem::NoCoe { index, sub_index } => {
                 write!(f, "object {index:#06x}:{sub_index:02x} is to be written, but there is no CoE")
+            }
+            PlanProblem::NoSoe { drive, idn } => {
+                write!(f, "{idn} of drive {drive} is to be written, but there is no SoE")
             }
         }
     }

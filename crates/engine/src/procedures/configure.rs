@@ -1,73 +1,31 @@
 //! Bringing one SubDevice from INIT to its target state with its whole configuration (facts 5.2, order of IgH).
 
+mod error;
+mod leave;
+mod startup;
+
 use alloc::rc::Rc;
 use alloc::vec;
-use core::fmt;
 use core::time::Duration;
 
 use ringcat_wire::address::StationAddress;
 use ringcat_wire::al::AlState;
 use ringcat_wire::register::{Fmmu, SyncManager, map};
 
-use super::al_state::{self, StateError};
+use super::al_state;
 use super::fleet::{Setup, SharedFleet};
 use super::sii;
-use crate::config::{SdoDownload, Timeouts};
+use crate::config::{SdoDownload, SubDeviceConfig, Transition};
 use crate::mail::Mailbox;
-use crate::mail::coe::{self, SdoAddress, SdoError};
+use crate::mail::coe::{self, SdoAddress};
 use crate::supervisor::{Bus, BusError};
+
+pub use error::{ConfigureError, StartupError};
 
 /// Cycles of the exchange that must have gone by before OP is requested, so that valid outputs are there (facts 5.2).
 const CYCLES_BEFORE_OP: u64 = 2;
 /// Pause between two looks at the cycle counter.
 const CYCLE_PAUSE: Duration = Duration::from_micros(200);
-
-/// Why a SubDevice is not configured.
-#[derive(Clone, Debug, PartialEq)]
-pub enum ConfigureError {
-    /// The bus failed.
-    Bus(BusError),
-    /// A state was not reached.
-    State(StateError),
-    /// An SDO failed.
-    Sdo(SdoError),
-    /// It never was there, so nothing is known to write.
-    NoSetup,
-}
-
-impl fmt::Display for ConfigureError {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            ConfigureError::Bus(error) => error.fmt(f),
-            ConfigureError::State(error) => error.fmt(f),
-            ConfigureError::Sdo(error) => error.fmt(f),
-            ConfigureError::NoSetup => f.write_str("nothing is known about this SubDevice yet"),
-        }
-    }
-}
-
-impl core::error::Error for ConfigureError {}
-
-impl From<BusError> for ConfigureError {
-    fn from(error: BusError) -> ConfigureError {
-        ConfigureError::Bus(error)
-    }
-}
-
-impl From<StateError> for ConfigureError {
-    fn from(error: StateError) -> ConfigureError {
-        match error {
-            StateError::Bus(error) => ConfigureError::Bus(error),
-            error => ConfigureError::State(error),
-        }
-    }
-}
-
-impl From<SdoError> for ConfigureError {
-    fn from(error: SdoError) -> ConfigureError {
-        ConfigureError::Sdo(error)
-    }
-}
 
 /// What a SubDevice is like when its configuration begins.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -87,7 +45,7 @@ pub(super) struct BringUp<'a> {
     pub index: usize,
     pub station: StationAddress,
     pub setup: Rc<Setup>,
-    pub timeouts: Timeouts,
+    pub config: Rc<SubDeviceConfig>,
     pub target: AlState,
     pub mailbox: Mailbox,
 }
@@ -101,10 +59,18 @@ impl BringUp<'_> {
         if start != Start::Cleared {
             self.back_to_init().await?;
         }
-        if self.target == AlState::Init {
-            return Ok(());
+        match self.target {
+            AlState::Init => Ok(()),
+            AlState::Boot => self.boot().await,
+            AlState::PreOp | AlState::SafeOp | AlState::Op => {
+                self.preop().await?;
+                self.up_from_preop().await
+            }
         }
-        self.preop().await?;
+    }
+
+    /// From PREOP to the target state.
+    async fn up_from_preop(&self) -> Result<(), ConfigureError> {
         if self.target == AlState::PreOp {
             return Ok(());
         }
@@ -116,18 +82,19 @@ impl BringUp<'_> {
     }
 
     async fn request(&self, from: AlState, to: AlState) -> Result<(), ConfigureError> {
-        let limit = self.timeouts.transition(from, to);
+        let limit = self.config.limit(from, to);
         Ok(al_state::request(self.bus, self.station, to, self.setup.emulated, limit).await?)
     }
 
+    /// The FMMUs go first: a SubDevice that leaves OP may take part in process data by halves on its way.
     async fn back_to_init(&self) -> Result<(), ConfigureError> {
         let (status, _) = al_state::read_status(self.bus, self.station).await?;
+        let fmmus = vec![0; Fmmu::LEN * usize::from(self.setup.fmmu_count)];
+        self.bus.fpwr(self.station, map::FMMU_BASE, &fmmus).await?;
         if status.error {
             al_state::acknowledge(self.bus, self.station, self.setup.emulated).await?;
         }
-        self.request(AlState::Op, AlState::Init).await?;
-        let fmmus = vec![0; Fmmu::LEN * usize::from(self.setup.fmmu_count)];
-        self.bus.fpwr(self.station, map::FMMU_BASE, &fmmus).await?;
+        self.request(status.al_state().unwrap_or(AlState::Op), AlState::Init).await?;
         let sync_managers = vec![0; SyncManager::LEN * usize::from(self.setup.sync_manager_count)];
         self.bus.fpwr(self.station, map::SYNC_MANAGER_BASE, &sync_managers).await?;
         Ok(())
@@ -137,13 +104,13 @@ impl BringUp<'_> {
         self.bus.fpwr(self.station, map::sync_manager(index), &register.encode()).await
     }
 
-    /// Mailbox, EEPROM to the PDI for the time of the transition, PREOP.
+    /// Mailbox, EEPROM to the PDI for the time of the transition, PREOP, commands of IP.
     async fn preop(&self) -> Result<(), ConfigureError> {
         for sync_manager in &self.setup.plan.mailbox {
             self.write_sync_manager(sync_manager.index, &sync_manager.register).await?;
         }
         let has_application = !self.setup.plan.mailbox.is_empty();
-        if has_application {
+        if has_application || self.config.sii_to_pdi {
             sii::assign(self.bus, self.station, true).await?;
         }
         self.request(AlState::Init, AlState::PreOp).await?;
@@ -152,9 +119,25 @@ impl BringUp<'_> {
             self.show_mail().await?;
             self.mailbox.open(self.station, layout);
         }
-        if has_application {
+        if has_application && !self.config.sii_to_pdi {
             sii::assign(self.bus, self.station, false).await?;
         }
+        self.command(Transition::Ip).await
+    }
+
+    /// Mailboxes of the boot loader, which keeps the EEPROM, BOOT.
+    async fn boot(&self) -> Result<(), ConfigureError> {
+        let layout = self.fleet.access().members.get(self.index).and_then(|member| member.info.as_ref()?.bootstrap);
+        let Some(layout) = layout.filter(|_| !self.setup.plan.bootstrap.is_empty()) else {
+            return Err(ConfigureError::NoBoot);
+        };
+        for sync_manager in &self.setup.plan.bootstrap {
+            self.write_sync_manager(sync_manager.index, &sync_manager.register).await?;
+        }
+        sii::assign(self.bus, self.station, true).await?;
+        self.request(AlState::Init, AlState::Boot).await?;
+        self.show_mail().await?;
+        self.mailbox.open(self.station, layout);
         Ok(())
     }
 
@@ -165,12 +148,13 @@ impl BringUp<'_> {
         self.bus.fpwr(self.station, map::fmmu(*number), &register.encode()).await
     }
 
-    /// SDOs, watchdog, process data SyncManagers, SAFEOP, FMMUs. The FMMUs come last and all at once: before SAFEOP a
-    /// SubDevice takes outputs and gives no inputs, so that nobody could tell from a working counter whose inputs are
-    /// missing, and the others' would count as stale for as long as it takes.
+    /// Commands of PS, PDO assignment and mapping, watchdog, process data SyncManagers, SAFEOP, FMMUs. The FMMUs come
+    /// last and all at once: before SAFEOP a SubDevice takes outputs and gives no inputs, so that nobody could tell from a
+    /// working counter whose inputs are missing, and the others' would count as stale for as long as it takes.
     async fn safeop(&self) -> Result<(), ConfigureError> {
         let plan = &self.setup.plan;
-        self.download_all().await?;
+        self.command(Transition::Ps).await?;
+        self.assign_pdos().await?;
         for (register, data) in &plan.watchdog {
             self.bus.fpwr(self.station, *register, data).await?;
         }
@@ -178,6 +162,9 @@ impl BringUp<'_> {
             let mut register = area.register;
             register.activate.enable &= !area.op_only;
             self.write_sync_manager(area.sync_manager, &register).await?;
+        }
+        if !self.config.wait_before_safeop.is_zero() {
+            self.bus.sleep(self.config.wait_before_safeop).await;
         }
         self.request(AlState::PreOp, AlState::SafeOp).await?;
         let fmmus = self.setup.fmmu_registers();
@@ -189,8 +176,9 @@ impl BringUp<'_> {
         Ok(())
     }
 
-    /// Waits until outputs flow, then OP.
-    async fn op(&self) -> Result<(), ConfigureError> {
+    /// Commands of SO; waits until outputs flow, then OP.
+    pub(super) async fn op(&self) -> Result<(), ConfigureError> {
+        self.command(Transition::So).await?;
         for area in self.setup.plan.process_data.iter().filter(|area| area.op_only) {
             self.write_sync_manager(area.sync_manager, &area.register).await?;
         }
@@ -201,10 +189,9 @@ impl BringUp<'_> {
         self.request(AlState::SafeOp, AlState::Op).await
     }
 
-    async fn download_all(&self) -> Result<(), ConfigureError> {
-        let plan = &self.setup.plan;
-        let limits = (self.timeouts.mailbox_request, self.timeouts.sdo);
-        for SdoDownload { index, sub_index, complete_access, data } in plan.sdos.iter().chain(&plan.assign_sdos) {
+    async fn assign_pdos(&self) -> Result<(), ConfigureError> {
+        let limits = (self.config.timeouts.mailbox_request, self.config.timeouts.sdo);
+        for SdoDownload { index, sub_index, complete_access, data } in &self.setup.plan.assign_sdos {
             let object = SdoAddress { index: *index, sub_index: *sub_index, complete_access: *complete_access };
             coe::write(&self.mailbox, object, data, limits).await?;
         }

@@ -35,7 +35,9 @@ pub enum Phase {
 #[derive(Debug)]
 pub struct Member {
     /// The declaration.
-    pub config: SubDeviceConfig,
+    pub config: Rc<SubDeviceConfig>,
+    /// The state to which it is brought: that of the declaration, or another one that was requested since.
+    pub target: AlState,
     /// Who it is; `None` while it has never been seen.
     pub info: Option<SubDeviceInfo>,
     /// Its station address.
@@ -64,7 +66,18 @@ impl Member {
         mailbox: Mailbox,
     ) -> Member {
         let node = info.as_ref().map(|info| usize::from(info.position.0));
-        Member { config, info, station, phase: Phase::Absent, attempt: 0, configured: false, node, setup, mailbox }
+        Member {
+            target: config.target,
+            config: Rc::new(config),
+            info,
+            station,
+            phase: Phase::Absent,
+            attempt: 0,
+            configured: false,
+            node,
+            setup,
+            mailbox,
+        }
     }
 }
 
@@ -242,6 +255,11 @@ impl SharedFleet {
     /// Whether a SubDevice's registers hold its configuration.
     pub fn is_configured(&self, index: usize) -> bool {
         self.access().members.get(index).is_some_and(|member| member.configured)
+    }
+
+    /// Notes the state to which a SubDevice is to be brought. Returns the one before.
+    pub fn set_target(&self, index: usize, target: AlState) -> Option<AlState> {
+        self.access().members.get_mut(index).map(|member| core::mem::replace(&mut member.target, target))
     }
 
     /// Number of the attempt under way.

@@ -10,13 +10,14 @@ use core::time::Duration;
 use ringcat_wire::al::AlState;
 
 use super::al_state;
-use super::configure::{BringUp, ConfigureError, Start};
+use super::configure::{BringUp, ConfigureError, Start, StartupError};
 use super::fleet::{Phase, SharedFleet};
 use super::sii;
 use super::strangers::take_away;
 use crate::event::Event;
 use crate::mail::MailboxError;
 use crate::mail::coe::SdoFailure;
+use crate::mail::soe::SoeFailure;
 use crate::supervisor::{Bus, BusError};
 
 /// Pause before the first new attempt to configure a SubDevice; it doubles with every failure.
@@ -64,13 +65,20 @@ pub(super) async fn keep_up(bus: Bus, fleet: SharedFleet, index: usize, start: S
 }
 
 /// The frames are to blame, not what the SubDevice said.
-fn is_of_bus(error: &ConfigureError) -> bool {
+pub(super) fn is_of_bus(error: &ConfigureError) -> bool {
     match error {
         ConfigureError::Bus(_) => true,
-        ConfigureError::Sdo(error) => {
+        ConfigureError::Sdo(error) | ConfigureError::Startup { error: StartupError::Sdo(error), .. } => {
             matches!(error.cause, SdoFailure::Mailbox(MailboxError::Bus(_) | MailboxError::Closed))
         }
-        ConfigureError::State(_) | ConfigureError::NoSetup => false,
+        ConfigureError::Startup { error: StartupError::Soe(error), .. } => {
+            matches!(error.cause, SoeFailure::Mailbox(MailboxError::Bus(_) | MailboxError::Closed))
+        }
+        ConfigureError::State(_)
+        | ConfigureError::NoSetup
+        | ConfigureError::NoBoot
+        | ConfigureError::Absent
+        | ConfigureError::Interrupted => false,
     }
 }
 
@@ -99,7 +107,7 @@ pub(super) fn lose(bus: &Bus, fleet: &SharedFleet, index: usize) {
     }
 }
 
-fn failure(index: usize, error: &ConfigureError) -> Event {
+pub(super) fn failure(index: usize, error: &ConfigureError) -> Event {
     match error {
         ConfigureError::State(al_state::StateError::Refused { requested, status, code }) => {
             Event::StateError { subdevice: index, requested: Some(*requested), status: *status, code: *code }
@@ -108,22 +116,24 @@ fn failure(index: usize, error: &ConfigureError) -> Event {
     }
 }
 
+/// The bring-up of a SubDevice to its present target.
+pub(super) fn bring_up<'a>(bus: &'a Bus, fleet: &'a SharedFleet, index: usize) -> Result<BringUp<'a>, ConfigureError> {
+    let access = fleet.access();
+    let member = access.members.get(index).ok_or(ConfigureError::NoSetup)?;
+    Ok(BringUp {
+        bus,
+        fleet,
+        index,
+        station: member.station,
+        setup: member.setup.clone().ok_or(ConfigureError::NoSetup)?,
+        config: member.config.clone(),
+        target: member.target,
+        mailbox: member.mailbox.clone(),
+    })
+}
+
 async fn attempt(bus: &Bus, fleet: &SharedFleet, index: usize, start: Start) -> Result<AlState, ConfigureError> {
-    let bring_up = {
-        let access = fleet.access();
-        let member = access.members.get(index).ok_or(ConfigureError::NoSetup)?;
-        let setup = member.setup.clone().ok_or(ConfigureError::NoSetup)?;
-        BringUp {
-            bus,
-            fleet,
-            index,
-            station: member.station,
-            setup,
-            timeouts: member.config.timeouts,
-            target: member.config.target,
-            mailbox: member.mailbox.clone(),
-        }
-    };
+    let bring_up = bring_up(bus, fleet, index)?;
     let quickly = start == Start::Unknown && quick(&bring_up).await?;
     let result = if quickly { Ok(()) } else { bring_up.run(start).await };
     // An attempt that ended on the way to PREOP, this one or one before, leaves the EEPROM to the PDI.
@@ -131,7 +141,7 @@ async fn attempt(bus: &Bus, fleet: &SharedFleet, index: usize, start: Start) -> 
         Ok(()) => quickly && bring_up.target == AlState::PreOp,
         Err(error) => !is_of_bus(error),
     };
-    if is_left {
+    if is_left && !bring_up.config.sii_to_pdi {
         sii::claim(bus, bring_up.station).await?;
     }
     result.map(|()| bring_up.target)
@@ -139,7 +149,7 @@ async fn attempt(bus: &Bus, fleet: &SharedFleet, index: usize, start: Start) -> 
 
 /// A SubDevice that only fell from OP to SAFEOP still has its configuration: acknowledged, it may go back to OP.
 async fn quick(bring_up: &BringUp<'_>) -> Result<bool, ConfigureError> {
-    let BringUp { bus, fleet, index, station, setup, target, timeouts, mailbox } = bring_up;
+    let BringUp { bus, fleet, index, station, setup, target, mailbox, .. } = bring_up;
     let (status, code) = al_state::read_status(bus, *station).await?;
     if !status.error && status.al_state() == Some(*target) {
         fleet.board.set_taking_part(*index, *target == AlState::SafeOp || *target == AlState::Op);
@@ -155,8 +165,7 @@ async fn quick(bring_up: &BringUp<'_>) -> Result<bool, ConfigureError> {
         bus.report(Event::StateError { subdevice: *index, requested: None, status, code });
         al_state::acknowledge(bus, *station, setup.emulated).await?;
     }
-    let limit = timeouts.transition(AlState::SafeOp, AlState::Op);
-    al_state::request(bus, *station, AlState::Op, setup.emulated, limit).await?;
+    bring_up.op().await?;
     Ok(true)
 }
 
@@ -209,7 +218,12 @@ async fn is_same(bus: &Bus, fleet: &SharedFleet, index: usize) -> bool {
 }
 
 /// Lets a procedure for a SubDevice run until another one begins or the SubDevice is lost.
-async fn while_current(fleet: &SharedFleet, index: usize, attempt: u32, procedure: impl Future<Output = ()>) {
+pub(super) async fn while_current(
+    fleet: &SharedFleet,
+    index: usize,
+    attempt: u32,
+    procedure: impl Future<Output = ()>,
+) {
     let mut procedure = pin!(procedure);
     poll_fn(|context| {
         if fleet.attempt(index) != attempt {

@@ -24,5 +24,7 @@ mod requests;
 mod ring_matrix;
 mod slow_eeprom;
 mod start_up;
+mod startup_commands;
+mod states;
 mod strangers;
 mod topologies;

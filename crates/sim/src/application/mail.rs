@@ -3,6 +3,7 @@
 //! In: AL events of the mailbox SyncManagers, the time, news of the device (emergencies, messages for the diagnosis
 //! history), faults. Out: what the MainDevice reads.
 
+use ringcat_wire::al::AlState;
 use ringcat_wire::mailbox::Protocol;
 use ringcat_wire::mailbox::coe::{DiagnosisFlags, DiagnosisMessage, DiagnosisParameter, Emergency};
 
@@ -21,7 +22,33 @@ const ERROR_REGISTER: u16 = 0x1001;
 /// Most bytes of a message in the diagnosis history.
 const MAX_DIAGNOSIS: usize = 256;
 
+/// Requests that a record keeps; later ones are not recorded.
+const MAX_RECORDED: usize = 1 << 18;
+
+/// A request that was served.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct ServedMail {
+    /// When.
+    pub at: SimTime,
+    /// In which state.
+    pub state: AlState,
+    /// Protocol.
+    pub protocol: Protocol,
+    /// What follows the mailbox header.
+    pub payload: Vec<u8>,
+}
+
 impl Application {
+    /// Begins to record the requests that are served; those that came before are forgotten. A restart ends nothing.
+    pub fn record_mail(&mut self) {
+        self.record = Some(Vec::new());
+    }
+
+    /// Requests that were served since the record began, the oldest first.
+    pub fn served_mail(&self) -> &[ServedMail] {
+        self.record.as_deref().unwrap_or_default()
+    }
+
     /// Something goes wrong with the mail.
     pub fn disturb_mail(&mut self, fault: MailFault, now: SimTime) {
         self.faults.add(fault, now);
@@ -94,7 +121,11 @@ impl Application {
                 process_data: &self.process_data,
             };
             let ready = now + declared.response_time;
+            let (record, state) = (&mut self.record, self.machine.state());
             mailbox.serve(&message, ready, &mut self.faults, |protocol, payload| {
+                if let Some(record) = record.as_mut().filter(|record| record.len() < MAX_RECORDED) {
+                    record.push(ServedMail { at: now, state, protocol, payload: payload.to_vec() });
+                }
                 servers.serve(protocol, payload, &mut surroundings)
             });
         }

@@ -76,6 +76,9 @@ impl Application {
                 let wrong = AlStatusCode::INVALID_MAILBOX_CONFIGURATION_BOOT;
                 self.check_mailbox(&layout, wrong, description, controller, now)
             }
+            (AlState::PreOp, AlState::SafeOp) if now < self.preop_since + description.preop_settling => {
+                Err(AlStatusCode::EXTERNAL_HARDWARE_NOT_READY)
+            }
             (AlState::PreOp, AlState::SafeOp) => {
                 let actual = settings::sync_managers(controller, now);
                 let ram_kib = controller.config().ram_kib;
@@ -140,6 +143,9 @@ impl Application {
             return;
         }
         let from = self.machine.complete();
+        if (from, pending.to) == (AlState::Init, AlState::PreOp) {
+            self.preop_since = now;
+        }
         match (from, pending.to) {
             (_, AlState::Init) => {
                 self.process_data.stop(now);

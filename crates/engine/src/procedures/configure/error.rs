@@ -1,0 +1,97 @@
+//! Why a SubDevice is not configured.
+
+use core::fmt;
+
+use crate::config::Transition;
+use crate::mail::coe::SdoError;
+use crate::mail::soe::SoeError;
+use crate::procedures::al_state::StateError;
+use crate::supervisor::BusError;
+
+/// Why a SubDevice is not configured.
+#[derive(Clone, Debug, PartialEq)]
+pub enum ConfigureError {
+    /// The bus failed.
+    Bus(BusError),
+    /// A state was not reached.
+    State(StateError),
+    /// An SDO of the PDO assignment or mapping failed.
+    Sdo(SdoError),
+    /// A start-up command failed.
+    Startup {
+        /// Number of the command in the declaration, from 0.
+        number: usize,
+        /// The transition to which it belongs.
+        transition: Transition,
+        /// What happened.
+        error: StartupError,
+    },
+    /// It never was there, so nothing is known to write.
+    NoSetup,
+    /// It has no boot loader: its SII gives no mailboxes for BOOT.
+    NoBoot,
+    /// It does not answer. It is brought to the requested state when it comes back.
+    Absent,
+    /// Another state was requested meanwhile, or it was lost.
+    Interrupted,
+}
+
+/// What happened to a start-up command.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum StartupError {
+    /// CoE.
+    Sdo(SdoError),
+    /// SoE.
+    Soe(SoeError),
+}
+
+impl fmt::Display for ConfigureError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            ConfigureError::Bus(error) => error.fmt(f),
+            ConfigureError::State(error) => error.fmt(f),
+            ConfigureError::Sdo(error) => error.fmt(f),
+            ConfigureError::Startup { number, transition, error } => {
+                write!(f, "start-up command {number} ({transition}): {error}")
+            }
+            ConfigureError::NoSetup => f.write_str("nothing is known about this SubDevice yet"),
+            ConfigureError::NoBoot => f.write_str("its SII gives no mailboxes for BOOT"),
+            ConfigureError::Absent => f.write_str("it does not answer"),
+            ConfigureError::Interrupted => f.write_str("it was lost, or another state was requested"),
+        }
+    }
+}
+
+impl fmt::Display for StartupError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            StartupError::Sdo(error) => error.fmt(f),
+            StartupError::Soe(error) => error.fmt(f),
+        }
+    }
+}
+
+impl core::error::Error for ConfigureError {}
+
+impl core::error::Error for StartupError {}
+
+impl From<BusError> for ConfigureError {
+    fn from(error: BusError) -> ConfigureError {
+        ConfigureError::Bus(error)
+    }
+}
+
+impl From<StateError> for ConfigureError {
+    fn from(error: StateError) -> ConfigureError {
+        match error {
+            StateError::Bus(error) => ConfigureError::Bus(error),
+            error => ConfigureError::State(error),
+        }
+    }
+}
+
+impl From<SdoError> for ConfigureError {
+    fn from(error: SdoError) -> ConfigureError {
+        ConfigureError::Sdo(error)
+    }
+}

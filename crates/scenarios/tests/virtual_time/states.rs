@@ -1,0 +1,192 @@
+//! One SubDevice in another state while the others go on: nobody misses it, and it comes back with everything.
+
+use std::time::Duration;
+
+use ringcat::{DomainId, Event, Freshness, Limits, Options, Scan, SdoAddress, SubDeviceState, Transition, automatic};
+use ringcat_engine::mail::coe;
+use ringcat_engine::mail::foe::{self, FoeOptions};
+use ringcat_engine::mail::stream::Bytes;
+use ringcat_engine::procedures::configure::ConfigureError;
+use ringcat_sim::application::foe::firmware;
+use ringcat_sim::cable::DeviceIndex;
+use ringcat_sim::fault::Fault;
+use ringcat_sim::network::NetworkOptions;
+use ringcat_wire::al::{AlState, AlStatus, AlStatusCode};
+use ringcat_wire::mailbox::Protocol;
+use ringcat_wire::register::map;
+use scenarios::segments::{descriptions, line, ring_of_16};
+use scenarios::world::{CYCLE, Mark, World};
+
+const LIMITS: Limits = (Duration::from_millis(100), Duration::from_secs(1));
+const LIMIT: Duration = Duration::from_secs(5);
+const KINDS: [&str; 4] = ["coupler", "digital-output-8", "all-protocols", "digital-input-8"];
+/// The one with a mailbox and a boot loader.
+const DRIVE: usize = 2;
+
+fn request(world: &mut World, subdevice: usize, state: AlState) -> Result<(), ConfigureError> {
+    let work = world.application_mut().request_state(subdevice, state);
+    world.finish(LIMIT, work)
+}
+
+fn state(world: &World, device: usize) -> AlStatus {
+    world.network().device(DeviceIndex(device)).al_status()
+}
+
+/// Nobody but one has left OP, and no cycle missed anybody.
+fn assert_undisturbed(world: &World, since: Mark, but: usize) {
+    assert_eq!(world.incomplete(since), 0, "cycles that missed somebody");
+    assert!(world.judged(since).iter().all(|judged| judged.status.state == ringcat::DomainState::Complete));
+    assert!(world.judged(since).iter().all(|judged| judged.stale.iter().all(|stale| *stale == but)));
+    assert!(world.left_op(since).iter().all(|device| device.0 == but), "{:?}", world.left_op(since));
+}
+
+fn registers(world: &World, device: usize) -> Vec<u8> {
+    let controller = &world.network().device(DeviceIndex(device)).controller;
+    let sync_managers = (0..4).flat_map(|number| controller.register(map::sync_manager(number), 5).to_vec());
+    controller.register(map::FMMU_BASE, 64).iter().copied().chain(sync_managers).collect()
+}
+
+#[test]
+fn each_of_16_goes_to_preop_init_and_safeop_and_back_and_no_cycle_misses_another() {
+    let mut world = World::in_op(1, ring_of_16(Duration::from_micros(10)));
+    for device in 0..16 {
+        let before = registers(&world, device);
+        for to in [AlState::PreOp, AlState::Init, AlState::SafeOp] {
+            let mark = world.mark();
+            assert_eq!(request(&mut world, device, to), Ok(()), "device {device} to {to}");
+            world.run_cycles(20);
+            assert_eq!(state(&world, device), AlStatus::new(to));
+            assert_eq!(world.application().states()[device], SubDeviceState::Settled(to));
+            assert_eq!(request(&mut world, device, AlState::Op), Ok(()), "device {device} from {to}");
+            world.run_cycles(20);
+            assert_eq!(state(&world, device), AlStatus::new(AlState::Op));
+            assert_undisturbed(&world, mark, device);
+            assert_eq!(registers(&world, device), before, "the whole configuration is back");
+            let last = world.judged(mark).last().expect("cycles");
+            assert_eq!((last.status.wkc, last.stale.len()), (last.status.expected, 0));
+        }
+    }
+}
+
+#[test]
+fn in_preop_the_mailbox_works_and_inputs_are_not_fresh() {
+    let mut world = World::in_op(2, line(descriptions(&KINDS), NetworkOptions::default()));
+    assert_eq!(request(&mut world, DRIVE, AlState::PreOp), Ok(()));
+    world.run_cycles(5);
+    let exchange = world.application().exchange();
+    assert!(matches!(exchange.freshness(DomainId(0), DRIVE), Freshness::Stale { .. }));
+    assert_eq!(exchange.freshness(DomainId(0), 3), Freshness::Fresh);
+    // Only in PREOP may this be written.
+    let mailbox = world.mailbox(DRIVE);
+    let ramp = SdoAddress::new(0x2003, 2);
+    let written = world.run(async move { coe::write(&mailbox, ramp, &7u32.to_le_bytes(), LIMITS).await });
+    assert_eq!(written, Ok(()));
+    assert_eq!(request(&mut world, DRIVE, AlState::Op), Ok(()));
+    world.run_cycles(2);
+    assert_eq!(world.application().exchange().freshness(DomainId(0), DRIVE), Freshness::Fresh);
+    let dictionary = world.network().device(DeviceIndex(DRIVE)).application.dictionary();
+    assert_eq!(dictionary.read(0x2003, 2), Ok(7u32.to_le_bytes().as_slice()), "it never left PREOP downwards");
+}
+
+#[test]
+fn firmware_is_updated_through_boot_while_the_others_stay_in_op_facts_6_4() {
+    let mut world = World::in_op(3, line(descriptions(&KINDS), NetworkOptions::default()));
+    let mark = world.mark();
+    assert_eq!(request(&mut world, DRIVE, AlState::Boot), Ok(()));
+    assert_eq!(state(&world, DRIVE), AlStatus::new(AlState::Boot));
+    let image = firmware::image("2.7", &[0x5A; 20_000]);
+    let mailbox = world.mailbox(DRIVE);
+    let written = world.run(async move {
+        foe::write(&mailbox, "firmware.bin", FoeOptions::default(), &mut Bytes::new(&image), |_| ()).await
+    });
+    assert_eq!(written, Ok(20_000 + 4 + 1 + 3 + 4));
+    assert_eq!(request(&mut world, DRIVE, AlState::Op), Ok(()));
+    let mailbox = world.mailbox(DRIVE);
+    let version = world.run(async move { coe::read(&mailbox, SdoAddress::new(0x100A, 0), LIMITS, 50).await });
+    assert_eq!(version, Ok(b"2.7".to_vec()));
+    world.run_cycles(20);
+    assert!(world.all_in_op());
+    assert_undisturbed(&world, mark, DRIVE);
+}
+
+#[test]
+fn commands_of_the_way_down_and_up_are_sent_in_order() {
+    let declare = |scan: &Scan| {
+        let mut declaration = automatic(&scan.subdevices, CYCLE);
+        let config = declaration.subdevices[DRIVE].clone();
+        declaration.subdevices[DRIVE] = config
+            .sdo_at(Transition::Os, 0x2001, 1, [1, 0])
+            .sdo_at(Transition::Sp, 0x2001, 2, [2, 0])
+            .sdo_at(Transition::Ip, 0x2001, 3, [3, 0])
+            .sdo_at(Transition::Ps, 0x2001, 4, [4, 0])
+            .sdo_at(Transition::So, 0x2001, 5, [5, 0]);
+        declaration
+    };
+    let network = line(descriptions(&KINDS), NetworkOptions::default());
+    let mut world = World::with(4, network, &Options::default(), declare).expect("scan and activation");
+    world.settle();
+    let device = DeviceIndex(DRIVE);
+    world.network_mut().device_mut(device).application.record_mail();
+    for to in [AlState::PreOp, AlState::Op, AlState::SafeOp, AlState::Op] {
+        assert_eq!(request(&mut world, DRIVE, to), Ok(()));
+    }
+    let served = world.network().device(device).application.served_mail();
+    let coe = served.iter().filter(|mail| mail.protocol == Protocol::Coe);
+    let got: Vec<(AlState, u8)> = coe.map(|mail| (mail.state, mail.payload[5])).collect();
+    let expected = [
+        (AlState::Op, 1),
+        (AlState::SafeOp, 2),
+        (AlState::PreOp, 4),
+        (AlState::SafeOp, 5),
+        (AlState::Op, 1),
+        (AlState::SafeOp, 5),
+    ];
+    assert_eq!(got, expected);
+}
+
+#[test]
+fn one_that_refuses_is_brought_back_and_the_refusal_is_told() {
+    let mut world = World::in_op(5, line(descriptions(&KINDS), NetworkOptions::default()));
+    assert_eq!(request(&mut world, 3, AlState::Boot), Err(ConfigureError::NoBoot), "nothing happens to it");
+    assert_eq!(state(&world, 3), AlStatus::new(AlState::Op));
+    let code = AlStatusCode(0x8123);
+    world.fault(Fault::RefuseTransition { device: DeviceIndex(DRIVE), to: AlState::Boot, code, times: 1 });
+    let mark = world.mark();
+    let error = request(&mut world, DRIVE, AlState::Boot).expect_err("it refuses");
+    assert!(error.to_string().contains("refused BOOT"), "{error}");
+    assert!(world.saw(mark, |event| matches!(event, Event::StateError { subdevice: DRIVE, .. })));
+    world.settle();
+    assert_eq!(state(&world, DRIVE), AlStatus::new(AlState::Op));
+}
+
+#[test]
+fn the_state_that_was_requested_is_kept_over_a_loss_of_power() {
+    let mut world = World::in_op(6, line(descriptions(&KINDS), NetworkOptions::default()));
+    let last = KINDS.len() - 1;
+    assert_eq!(request(&mut world, last, AlState::PreOp), Ok(()));
+    let mark = world.mark();
+    world.power_off(DeviceIndex(last));
+    world.run_cycles(50);
+    assert_eq!(request(&mut world, last, AlState::SafeOp), Err(ConfigureError::Absent));
+    assert_eq!(request(&mut world, last, AlState::PreOp), Err(ConfigureError::Absent));
+    world.power_on(DeviceIndex(last));
+    world.until(LIMIT, "back in PREOP", |world| {
+        world.application().states()[last] == SubDeviceState::Settled(AlState::PreOp)
+    });
+    world.run_cycles(100);
+    assert_eq!(state(&world, last), AlStatus::new(AlState::PreOp));
+    assert_eq!(request(&mut world, last, AlState::Op), Ok(()));
+    world.settle();
+    assert!(world.left_op(mark).iter().all(|device| device.0 == last));
+}
+
+#[test]
+fn a_later_request_ends_an_earlier_one() {
+    let mut world = World::in_op(7, line(descriptions(&KINDS), NetworkOptions::default()));
+    let first = world.application_mut().request_state(DRIVE, AlState::Init);
+    world.cycle();
+    let second = world.application_mut().request_state(DRIVE, AlState::Op);
+    assert_eq!(world.finish(LIMIT, first), Err(ConfigureError::Interrupted));
+    assert_eq!(world.finish(LIMIT, second), Ok(()));
+    world.settle();
+}
