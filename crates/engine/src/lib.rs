@@ -25,6 +25,7 @@ pub mod domain;
 pub mod event;
 pub mod exchange;
 pub mod info;
+pub mod junction;
 pub mod layout;
 pub mod link;
 pub mod mail;

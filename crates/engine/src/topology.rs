@@ -6,7 +6,10 @@
 //!
 //! In a broken ring the SubDevices of the redundant link form a tree of their own. It is oriented like the intact
 //! ring, with the SubDevice next to the break as its head: that its port 0 is unconnected is the break, no finding.
+//!
+//! Rings behind junctions ([`LocalRing`]) have to be known: open ports do not tell them from a tree.
 
+mod local_ring;
 mod place;
 mod stub;
 
@@ -16,6 +19,8 @@ use core::fmt;
 use ringcat_wire::register::{DlStatus, PortKind};
 
 use crate::info::SubDeviceInfo;
+use local_ring::Rings;
+pub use local_ring::{Closing, LocalRing, RingCable, candidates};
 
 /// What a SubDevice reported about its ports.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -165,12 +170,27 @@ pub struct Topology {
     pub open_ports: Vec<PortOf>,
     /// What is odd, by position.
     pub findings: Vec<Finding>,
+    /// Rings behind a junction, as far as they are known.
+    pub local_rings: Vec<LocalRing>,
 }
 
 impl Topology {
     /// Builds the tree. The first `main_count` SubDevices are those that the frames of the main link met.
     pub fn build(nodes: &[NodeStatus], main_count: usize) -> Topology {
-        place::build(nodes, main_count.min(nodes.len()))
+        Topology::with_local_rings(nodes, main_count, &[])
+    }
+
+    /// As [`Topology::build`], with rings behind junctions. Each of them is a branch on the port where it begins, whole or
+    /// broken; a connection that does not fit is left out.
+    pub fn with_local_rings(nodes: &[NodeStatus], main_count: usize, closings: &[Closing]) -> Topology {
+        place::build(nodes, main_count.min(nodes.len()), &Rings::new(nodes, closings))
+    }
+
+    /// Whether the cable that leads to a SubDevice from the one before it is part of a local ring.
+    pub fn is_in_local_ring(&self, node: usize) -> bool {
+        let Some(here) = self.nodes.get(node) else { return false };
+        let far = PortOf { node, port: here.entry_port };
+        self.local_rings.iter().flat_map(|ring| &ring.cables).any(|cable| cable.far == far)
     }
 
     /// The cable that leads to a SubDevice from the one before it.

@@ -24,6 +24,7 @@ pub const ENGINE: &[(&str, &[&str])] = &[
     ("direction", &[]),
     ("domain", &[]),
     ("request", &[]),
+    ("junction", &[]),
     // frames
     ("ring", &["time", "link"]),
     ("board", &["time", "link", "ring"]),
@@ -41,10 +42,10 @@ pub const ENGINE: &[(&str, &[&str])] = &[
     ("supervisor", &["time", "link", "queue", "ring", "board", "event"]),
     ("mail", &["time", "config", "event", "supervisor"]),
     ("procedures", &["time", "link", "queue", "ring", "board", "info", "topology", "config", "plan", "layout", "event",
-        "supervisor", "mail", "request"]),
+        "supervisor", "mail", "request", "junction"]),
     // both together
     ("main_device", &["time", "link", "queue", "domain", "ring", "board", "info", "topology", "config", "plan", "layout",
-        "event", "exchange", "supervisor", "mail", "request", "procedures"]),
+        "event", "exchange", "supervisor", "mail", "request", "junction", "procedures"]),
 ];
 
 /// Where the engine's sources are.

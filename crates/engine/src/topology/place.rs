@@ -9,6 +9,7 @@ use alloc::vec::Vec;
 
 use ringcat_wire::register::PortKind;
 
+use super::local_ring::Rings;
 use super::{Finding, Node, NodeStatus, PortOf, Topology};
 
 /// Order in which a frame passes the ports (facts 2.1). The processing unit is behind port 0.
@@ -28,6 +29,7 @@ struct Placed {
 /// The walk so far.
 pub(super) struct Walk<'s> {
     status: &'s [NodeStatus],
+    rings: &'s Rings,
     trust_times: bool,
     pub(super) nodes: Vec<Node>,
     /// Slots that the frame will still come to, the next one last.
@@ -41,15 +43,15 @@ pub(super) struct Walk<'s> {
 }
 
 /// See [`Topology::build`].
-pub(super) fn build(status: &[NodeStatus], main_count: usize) -> Topology {
+pub(super) fn build(status: &[NodeStatus], main_count: usize, rings: &Rings) -> Topology {
     // In a closed ring frames come in from both sides, and the earlier one need not be that which the processing unit
     // meets: receive times say nothing about crossed lines (LC-02). A closed ring leaves a slot over.
-    let mut walk = Walk::along_main(status, main_count, false);
+    let mut walk = Walk::along_main(status, rings, main_count, false);
     if walk.slots.is_empty() {
-        walk = Walk::along_main(status, main_count, true);
+        walk = Walk::along_main(status, rings, main_count, true);
     }
     let rest = main_count..status.len();
-    let head = rest.clone().find(|node| !walk.is_open(*node, 0));
+    let head = rest.clone().find(|node| !walk.is_open(*node, 0) && !walk.is_orphan(*node));
     let redundant_head = match head {
         Some(head) => {
             walk.close();
@@ -69,18 +71,21 @@ pub(super) fn build(status: &[NodeStatus], main_count: usize) -> Topology {
     };
     walk.close();
     for node in 0..status.len() {
-        walk.report_ports(node, Some(node) == redundant_head);
+        walk.report_ports(node, Some(node) == redundant_head || walk.is_orphan(node));
     }
     let Walk { nodes, open_ports, mut findings, .. } = walk;
     findings.sort_by_key(Finding::node);
-    Topology { nodes, main_count, redundant_head, open_ports, findings }
+    let mut topology = Topology { nodes, main_count, redundant_head, open_ports, findings, local_rings: Vec::new() };
+    rings.finish(&mut topology);
+    topology
 }
 
 impl<'s> Walk<'s> {
     /// Hangs those that the frames of the main link met.
-    fn along_main(status: &'s [NodeStatus], main_count: usize, trust_times: bool) -> Walk<'s> {
+    fn along_main(status: &'s [NodeStatus], rings: &'s Rings, main_count: usize, trust_times: bool) -> Walk<'s> {
         let mut walk = Walk {
             status,
+            rings,
             trust_times,
             nodes: vec![Node::default(); status.len()],
             slots: vec![None],
@@ -93,10 +98,15 @@ impl<'s> Walk<'s> {
         walk
     }
 
-    /// Whether frames pass a port.
+    /// Whether frames pass a port. Those of closing cables are left out of the tree.
     pub(super) fn is_open(&self, node: usize, port: u8) -> bool {
         let state = self.status[node].dl_status.ports[usize::from(port)];
-        self.exists(node, port) && state.communication && !state.loop_closed
+        self.exists(node, port) && state.communication && !state.loop_closed && !self.rings.closes(node, port)
+    }
+
+    /// Whether it is a member of a broken local ring with nothing on its port 0.
+    pub(super) fn is_orphan(&self, node: usize) -> bool {
+        self.rings.orphans.contains(&node)
     }
 
     /// Whether the controller has the port. One that claims to have none is not believed.
@@ -113,7 +123,8 @@ impl<'s> Walk<'s> {
 
     /// The open port at which the frame came in first by its receive times (LC-05); `None` where they do not say.
     pub(super) fn earliest(&self, node: usize) -> Option<u8> {
-        let times = self.status[node].receive_times.filter(|_| self.trust_times)?;
+        let trusted = self.trust_times && !self.rings.untimed[node];
+        let times = self.status[node].receive_times.filter(|_| trusted)?;
         let open = || (0..4).filter(|port| self.is_open(node, *port));
         let first = open().reduce(|a, b| if before(&times, b, a) { b } else { a })?;
         open().all(|port| port == first || before(&times, first, port)).then_some(first)
@@ -128,6 +139,9 @@ impl<'s> Walk<'s> {
 
     /// Hangs the SubDevice that the frame met next.
     pub(super) fn place(&mut self, node: usize) {
+        if self.is_orphan(node) {
+            return self.orphan(node);
+        }
         let entry = self.entry(node);
         if entry != 0 && self.is_open(node, 0) && self.take_over(node, entry) {
             return;
@@ -249,7 +263,7 @@ impl<'s> Walk<'s> {
     }
 
     /// Slots for what hangs on the ports that the frame passes after it met the SubDevice.
-    fn expect_children(&mut self, node: usize, entry: u8) {
+    pub(super) fn expect_children(&mut self, node: usize, entry: u8) {
         let passed = self.passed_before(node, entry);
         let after: Vec<u8> = self.open_after(node, entry).filter(|port| !passed.contains(port)).collect();
         self.slots.extend(after.into_iter().rev().map(|port| Some(PortOf { node, port })));

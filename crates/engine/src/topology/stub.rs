@@ -25,7 +25,7 @@ impl Walk<'_> {
         let mut trunk = None;
         self.trunk(head, None, &mut branches, &mut trunk);
         for node in head + 1..range.end {
-            if trunk.is_some() && self.slots.last() == Some(&trunk) {
+            if trunk.is_some() && self.slots.last() == Some(&trunk) && !self.is_orphan(node) {
                 let slot = self.slots.pop().flatten();
                 self.trunk(node, slot, &mut branches, &mut trunk);
             } else {

@@ -8,6 +8,7 @@ use ringcat_wire::register::{DlStatus, PortKind};
 use super::{Connection, Finding, Node, NodeStatus, PortOf, Topology};
 use walk_model::{End, Segment};
 
+mod local_rings;
 mod walk_model;
 
 /// High byte of DL_STATUS as in facts 2.3; a link wherever there is communication.
@@ -24,7 +25,7 @@ const END: u8 = 0x56;
 const PASS: u8 = 0x5A;
 const HEAD: u8 = 0x59;
 
-fn at(node: usize, port: u8) -> PortOf {
+const fn at(node: usize, port: u8) -> PortOf {
     PortOf { node, port }
 }
 

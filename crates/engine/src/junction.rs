@@ -1,0 +1,160 @@
+//! Junction redundancy as the application asks for it (facts 9.4): the mode, and connections that it declares.
+//!
+//! A local ring leaves a junction through one port and comes back to it through another one. The cable that comes back,
+//! the *closing* cable, is what a connection names: its *head* is the junction, its *tail* the last SubDevice of the
+//! ring. What a connection must look like is checked here; whether it fits the segment, when it is applied.
+
+use core::fmt;
+
+/// Port of a junction to which the closing cable of a declared connection leads (JR-06).
+pub const HEAD_PORT: u8 = 1;
+/// Port at which the ring begins then: the one that frames pass before [`HEAD_PORT`] (facts 9.4).
+pub const START_PORT: u8 = 3;
+/// Ports that a SubDevice can have.
+const PORTS: u8 = 4;
+
+/// What becomes of local rings (JR-03).
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum JunctionMode {
+    /// They are not known: one that breaks reads as a crossed line (JR-04).
+    #[default]
+    Disabled,
+    /// Those that are there at the scan are learned, and watched from then on.
+    Automatic,
+    /// Those that the application declares are watched, from the start on.
+    Strict,
+}
+
+impl fmt::Display for JunctionMode {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            JunctionMode::Disabled => "disabled",
+            JunctionMode::Automatic => "automatic",
+            JunctionMode::Strict => "strict",
+        })
+    }
+}
+
+/// The closing cable of a local ring, as the application declares it. SubDevices by their index in the declaration.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub struct JunctionConnection {
+    /// The junction.
+    pub head: usize,
+    /// Its port: [`HEAD_PORT`].
+    pub head_port: u8,
+    /// The last SubDevice of the ring.
+    pub tail: usize,
+    /// Its port: any but 0.
+    pub tail_port: u8,
+}
+
+impl fmt::Display for JunctionConnection {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let JunctionConnection { head, head_port, tail, tail_port } = self;
+        write!(f, "junction connection {head}:{head_port}-{tail}:{tail_port}")
+    }
+}
+
+/// Why a connection is refused: the configuration is to blame.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum JunctionError {
+    /// Nothing is loaded to which a connection could be added.
+    NotLoaded,
+    /// The head is not declared.
+    UnknownHead(JunctionConnection),
+    /// The tail is not declared.
+    UnknownTail(JunctionConnection),
+    /// The head's port is not [`HEAD_PORT`].
+    HeadPort(JunctionConnection),
+    /// The tail's port is 0, or no port.
+    TailPort(JunctionConnection),
+    /// Head and tail are one port, or one of them is part of another connection.
+    Taken(JunctionConnection),
+    /// The tail does not lie behind the head.
+    NotBehind(JunctionConnection),
+    /// A SubDevice does not have one of the ports; the head needs [`START_PORT`] too.
+    NoSuchPort {
+        /// The connection.
+        connection: JunctionConnection,
+        /// Index of the SubDevice in the declaration.
+        subdevice: usize,
+        /// The port.
+        port: u8,
+    },
+    /// The mode is strict and there is no connection.
+    NoConnection,
+}
+
+impl fmt::Display for JunctionError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            JunctionError::NotLoaded => f.write_str("nothing is loaded: load a configuration before adding to it"),
+            JunctionError::UnknownHead(connection) => write!(f, "{connection}: its head is not declared"),
+            JunctionError::UnknownTail(connection) => write!(f, "{connection}: its tail is not declared"),
+            JunctionError::HeadPort(connection) => {
+                write!(f, "{connection}: expected head port {HEAD_PORT}, got {}", connection.head_port)
+            }
+            JunctionError::TailPort(connection) => {
+                write!(f, "{connection}: expected tail port 1, 2 or 3, got {}", connection.tail_port)
+            }
+            JunctionError::Taken(connection) => write!(f, "{connection}: one of its ports is in use already"),
+            JunctionError::NotBehind(connection) => write!(f, "{connection}: its tail does not lie behind its head"),
+            JunctionError::NoSuchPort { connection, subdevice, port } => {
+                write!(f, "{connection}: SubDevice {subdevice} has no port {port}")
+            }
+            JunctionError::NoConnection => f.write_str("strict junction redundancy needs at least one connection"),
+        }
+    }
+}
+
+impl core::error::Error for JunctionError {}
+
+impl JunctionConnection {
+    /// Checks a connection against those that were added before and against the number of declared SubDevices (JR-06).
+    pub fn check(&self, before: &[JunctionConnection], declared: usize) -> Result<(), JunctionError> {
+        if self.head >= declared {
+            return Err(JunctionError::UnknownHead(*self));
+        }
+        if self.tail >= declared {
+            return Err(JunctionError::UnknownTail(*self));
+        }
+        if self.head_port != HEAD_PORT {
+            return Err(JunctionError::HeadPort(*self));
+        }
+        if self.tail_port == 0 || self.tail_port >= PORTS {
+            return Err(JunctionError::TailPort(*self));
+        }
+        let ends = |it: &JunctionConnection| [(it.head, it.head_port), (it.tail, it.tail_port)];
+        let [head, tail] = ends(self);
+        let taken = before.iter().flat_map(ends).any(|end| end == head || end == tail);
+        if taken || head == tail {
+            return Err(JunctionError::Taken(*self));
+        }
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn connections_have_their_head_at_port_1_and_their_tail_at_another_port_than_0_jr_06() {
+        let good = JunctionConnection { head: 1, head_port: 1, tail: 4, tail_port: 1 };
+        assert_eq!(good.check(&[], 5), Ok(()));
+        let head = |head_port| JunctionConnection { head_port, ..good };
+        for port in [0, 2, 3, 4, 255] {
+            assert_eq!(head(port).check(&[], 5), Err(JunctionError::HeadPort(head(port))));
+        }
+        let tail = |tail_port| JunctionConnection { tail_port, ..good };
+        for port in [0, 4, 255] {
+            assert_eq!(tail(port).check(&[], 5), Err(JunctionError::TailPort(tail(port))));
+        }
+        assert_eq!(tail(3).check(&[], 5), Ok(()));
+        assert_eq!(good.check(&[], 4), Err(JunctionError::UnknownTail(good)));
+        assert_eq!(good.check(&[], 1), Err(JunctionError::UnknownHead(good)));
+        let itself = JunctionConnection { tail: 1, ..good };
+        assert_eq!(itself.check(&[], 5), Err(JunctionError::Taken(itself)));
+        assert_eq!(good.check(&[tail(2)], 5), Err(JunctionError::Taken(good)), "the head has one port 1");
+    }
+}

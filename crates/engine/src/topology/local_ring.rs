@@ -1,0 +1,202 @@
+//! Rings behind a junction (facts 9.4): how they lie in the tree, and which cables they have.
+//!
+//! A local ring leaves its junction through one port, passes its members, and comes back through a later one; frames
+//! meet the members in the same order whether it is whole or broken at one place. So the tree has it as a branch on the
+//! port where it begins, with the two ports of the closing cable left out: whole and broken, it reads the same.
+
+use alloc::vec::Vec;
+
+use super::place::Walk;
+use super::{NodeStatus, PortOf, Topology};
+
+/// The cable through which a local ring comes back to its junction.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub struct Closing {
+    /// The junction, and the port at which frames come back.
+    pub head: PortOf,
+    /// The last SubDevice of the ring, and the port through which they leave it.
+    pub tail: PortOf,
+}
+
+/// A cable of a local ring.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub struct RingCable {
+    /// The port from which frames come. `None` where it is not known: the ring was broken there when it was looked at.
+    pub near: Option<PortOf>,
+    /// The port that they reach.
+    pub far: PortOf,
+}
+
+/// A ring behind a junction.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct LocalRing {
+    /// Where it closes.
+    pub closing: Closing,
+    /// Its cables in the order in which frames run, the closing one last. From the break on where it was broken when it
+    /// was looked at.
+    pub cables: Vec<RingCable>,
+}
+
+/// The local rings among the SubDevices that frames meet in this order.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Rings {
+    closings: Vec<Closing>,
+    /// Members of broken rings that have nothing on their port 0.
+    pub(super) orphans: Vec<usize>,
+    /// SubDevices whose receive times say nothing about their place: some port never receives, or frames pass twice.
+    pub(super) untimed: Vec<bool>,
+}
+
+impl Rings {
+    /// Rings that close like this. A broken one is that which holds a SubDevice with nothing on its port 0.
+    pub(super) fn new(status: &[NodeStatus], closings: &[Closing]) -> Rings {
+        let count = status.len();
+        let fits = |closing: &&Closing| closing.head.node < closing.tail.node && closing.tail.node < count;
+        let closings: Vec<Closing> = closings.iter().filter(fits).copied().collect();
+        let mut rings = Rings { closings, orphans: Vec::new(), untimed: alloc::vec![false; count] };
+        for node in 0..count {
+            if unconnected(&status[node]) && rings.around(node).is_some() {
+                rings.orphans.push(node);
+            }
+        }
+        for closing in &rings.closings {
+            rings.untimed[closing.head.node..=closing.tail.node].fill(true);
+        }
+        rings
+    }
+
+    /// The innermost ring of which a SubDevice is a member.
+    fn around(&self, node: usize) -> Option<&Closing> {
+        let holds = |closing: &&Closing| closing.head.node < node && node <= closing.tail.node;
+        self.closings.iter().filter(holds).max_by_key(|closing| closing.head.node)
+    }
+
+    /// Whether a port belongs to a closing cable.
+    pub(super) fn closes(&self, node: usize, port: u8) -> bool {
+        let at = PortOf { node, port };
+        self.closings.iter().any(|closing| closing.head == at || closing.tail == at)
+    }
+
+    /// The rings with their cables, from the tree in which they are branches.
+    pub(super) fn finish(&self, topology: &mut Topology) {
+        topology.local_rings = self.closings.iter().map(|closing| trace(topology, *closing)).collect();
+    }
+}
+
+/// Nothing leads to its port 0, though frames reach it.
+pub(super) fn unconnected(status: &NodeStatus) -> bool {
+    let port = status.dl_status.ports[0];
+    !port.communication || port.loop_closed
+}
+
+/// Follows the tree from the tail up to the junction, or to the break.
+fn trace(topology: &Topology, closing: Closing) -> LocalRing {
+    let mut cables = alloc::vec![RingCable { near: Some(closing.tail), far: closing.head }];
+    let mut node = closing.tail.node;
+    while node > closing.head.node {
+        let Some(here) = topology.nodes.get(node) else { break };
+        let near = here.parent.map(|(node, port)| PortOf { node, port });
+        cables.push(RingCable { near, far: PortOf { node, port: here.entry_port } });
+        let Some(parent) = near else { break };
+        node = parent.node;
+    }
+    cables.reverse();
+    LocalRing { closing, cables }
+}
+
+/// Sets of closing cables that would explain the open ports, those first whose tails are met early; at most `most`.
+///
+/// Open ports alone do not tell where a ring ends: whatever follows the junction could as well hang on its last member.
+/// Whoever asks has to find out which of these it is. Where the redundant link meets somebody (a broken ring, or branches
+/// that only its frames meet), nothing is looked for.
+pub fn candidates(nodes: &[NodeStatus], main_count: usize, ring_closed: bool, most: usize) -> Vec<Vec<Closing>> {
+    if main_count != nodes.len() {
+        return Vec::new();
+    }
+    // One open port leads to the redundant link.
+    let spare = usize::from(ring_closed);
+    let further = |node: &NodeStatus| (1..4).filter(|port| open(node, *port)).count();
+    let open_ports: usize = nodes.iter().map(further).sum();
+    let hanging = nodes.iter().skip(1).filter(|node| !unconnected(node)).count();
+    let rings = open_ports.saturating_sub(spare + hanging) / 2;
+    if rings == 0 || rings > MOST_RINGS {
+        return Vec::new();
+    }
+    let mut search = Search { nodes, spare, rings, most, steps: STEPS, found: Vec::new() };
+    search.go(0, Vec::new(), Vec::new());
+    search.found
+}
+
+/// Steps of a search: enough for all places where a ring of a thousand SubDevices may close.
+const STEPS: usize = 200_000;
+/// Local rings that are looked for.
+const MOST_RINGS: usize = 16;
+
+struct Search<'s> {
+    nodes: &'s [NodeStatus],
+    /// Ports that stay open in the end.
+    spare: usize,
+    rings: usize,
+    most: usize,
+    steps: usize,
+    found: Vec<Vec<Closing>>,
+}
+
+impl Search<'_> {
+    fn go(&mut self, mut node: usize, mut slots: Vec<PortOf>, closings: Vec<Closing>) {
+        while self.found.len() < self.most && self.steps > 0 {
+            self.steps -= 1;
+            if closings.len() < self.rings
+                && let Some(closing) = closing_at(&slots, self.nodes)
+            {
+                let mut closed = closings.clone();
+                closed.push(closing);
+                self.go(node, slots[..slots.len() - 2].to_vec(), closed);
+            }
+            let Some(status) = self.nodes.get(node) else {
+                if slots.len() == self.spare && closings.len() == self.rings {
+                    self.found.push(closings);
+                }
+                return;
+            };
+            if node > 0 && !unconnected(status) && slots.pop().is_none() {
+                return;
+            }
+            // Frames pass port 3, then 1, then 2.
+            let ports = [2, 1, 3].into_iter().filter(|port| open(status, *port));
+            slots.extend(ports.map(|port| PortOf { node, port }));
+            node += 1;
+        }
+    }
+}
+
+/// The cable that a frame would take if it left through the next slot and came back through the one below it.
+fn closing_at(slots: &[PortOf], nodes: &[NodeStatus]) -> Option<Closing> {
+    let [.., head, tail] = *slots else { return None };
+    // A ring begins at a port that frames pass before the one at which they come back.
+    let before: &[u8] = match head.port {
+        1 => &[3],
+        2 => &[3, 1],
+        _ => &[],
+    };
+    let begins = before.iter().any(|port| exists(&nodes[head.node], *port));
+    (begins && head.node < tail.node).then_some(Closing { head, tail })
+}
+
+fn exists(node: &NodeStatus, port: u8) -> bool {
+    use ringcat_wire::register::PortKind::NotImplemented;
+    node.ports[usize::from(port)] != NotImplemented || node.ports == [NotImplemented; 4]
+}
+
+fn open(node: &NodeStatus, port: u8) -> bool {
+    let state = node.dl_status.ports[usize::from(port)];
+    exists(node, port) && state.communication && !state.loop_closed
+}
+
+impl Walk<'_> {
+    /// Hangs a member of a broken ring that has nothing on its port 0 nowhere, as if it were entered there.
+    pub(super) fn orphan(&mut self, node: usize) {
+        self.hang(node, None, 0);
+        self.expect_children(node, 0);
+    }
+}

@@ -1,0 +1,137 @@
+//! Rings behind junctions (facts 9.4): vectors, and random trees with rings that are whole or broken at one place.
+
+use std::vec;
+use std::vec::Vec;
+
+use proptest::prelude::*;
+
+use super::walk_model::{End, Segment};
+use super::{END, HEAD, PASS, at, parents, status, trees};
+use crate::topology::{Closing, RingCable, Topology, candidates};
+
+/// J, 10, 11, 12 on J's port 3, closed from 12's port 1 to J's port 1, and 20 on J's port 2.
+const JUNCTION: u8 = 0xAA;
+const CLOSING: Closing = Closing { head: at(0, 1), tail: at(3, 1) };
+
+#[test]
+fn a_whole_ring_behind_a_junction_is_a_branch_on_the_port_where_it_begins_jr_01() {
+    let nodes = [status(JUNCTION), status(PASS), status(PASS), status(PASS), status(END)];
+    let topology = Topology::with_local_rings(&nodes, 5, &[CLOSING]);
+    assert_eq!(parents(&topology), [None, Some((0, 3)), Some((1, 1)), Some((2, 1)), Some((0, 2))]);
+    assert_eq!((topology.open_ports, topology.findings), (vec![], vec![]));
+    let cable = |near, far| RingCable { near: Some(near), far };
+    let cables =
+        vec![cable(at(0, 3), at(1, 0)), cable(at(1, 1), at(2, 0)), cable(at(2, 1), at(3, 0)), cable(at(3, 1), at(0, 1))];
+    assert_eq!(topology.local_rings[0].cables, cables);
+}
+
+#[test]
+fn a_broken_ring_behind_a_junction_keeps_order_and_place_and_is_no_crossed_line_lc_06() {
+    // Between 10 and 11.
+    let nodes = [status(JUNCTION), status(END), status(HEAD), status(PASS), status(END)];
+    let topology = Topology::with_local_rings(&nodes, 5, &[CLOSING]);
+    assert_eq!(parents(&topology), [None, Some((0, 3)), None, Some((2, 1)), Some((0, 2))]);
+    assert_eq!((topology.open_ports, topology.findings), (vec![], vec![]));
+    assert_eq!(topology.local_rings[0].cables[0], RingCable { near: None, far: at(2, 0) });
+    assert_eq!(topology.local_rings[0].cables.len(), 3);
+}
+
+#[test]
+fn without_junction_redundancy_a_broken_ring_reads_as_a_crossed_line_jr_04() {
+    let nodes = [status(0x9A), status(END), status(HEAD), status(PASS)];
+    let topology = Topology::build(&nodes, 4);
+    assert!(topology.findings.contains(&super::Finding::CrossedLine { node: 2, entry_port: 1 }));
+    assert!(topology.findings.contains(&super::Finding::UnconnectedPort0 { node: 2 }));
+}
+
+#[test]
+fn open_ports_allow_every_member_to_be_the_last_of_its_ring() {
+    let nodes = [status(JUNCTION), status(PASS), status(PASS), status(PASS), status(END)];
+    let tails = |found: Vec<Vec<Closing>>| found.iter().map(|set| (set[0].tail, set.len())).collect::<Vec<_>>();
+    assert_eq!(tails(candidates(&nodes, 5, false, 9)), [(at(1, 1), 1), (at(2, 1), 1), (at(3, 1), 1)]);
+    assert_eq!(tails(candidates(&nodes, 5, false, 2)).len(), 2);
+    // A plain line, and one whose last port leads to the redundant link.
+    assert_eq!(candidates(&[status(PASS), status(PASS), status(END)], 3, false, 9), Vec::<Vec<_>>::new());
+    assert_eq!(candidates(&[status(PASS), status(PASS), status(PASS)], 3, true, 9), Vec::<Vec<_>>::new());
+}
+
+/// A segment with a local ring: the segment, how it closes, and the port where it begins.
+#[derive(Clone, Debug)]
+struct WithRing {
+    segment: Segment,
+    closing: Closing,
+}
+
+/// All ways in which one more cable makes a local ring of which frames meet every SubDevice in the order of before.
+fn rings_of(tree: &Segment) -> Vec<WithRing> {
+    let before = tree.walk().order;
+    let free = tree.free_ports();
+    let pairs = free.iter().flat_map(|head| free.iter().map(move |tail| (*head, *tail)));
+    let place = |node: usize| before.iter().position(|met| *met == node).unwrap();
+    pairs
+        .filter(|((head, _), (tail, _))| tree.trunk(*tail).contains(head) && head != tail)
+        .filter_map(|(head, tail)| {
+            let mut segment = tree.clone();
+            segment.connect(End::Port(head.0, head.1), End::Port(tail.0, tail.1));
+            let closing = Closing { head: at(place(head.0), head.1), tail: at(place(tail.0), tail.1) };
+            (segment.walk().order == before).then_some(WithRing { segment, closing })
+        })
+        .collect()
+}
+
+fn with_ring() -> impl Strategy<Value = WithRing> {
+    (trees(), any::<prop::sample::Index>()).prop_filter_map("no place for a ring", |(tree, pick)| {
+        let rings = rings_of(&tree);
+        (!rings.is_empty()).then(|| rings[pick.index(rings.len())].clone())
+    })
+}
+
+proptest! {
+    #[test]
+    fn any_ring_behind_a_junction_is_met_in_the_same_order_whole_and_broken_jr_02(
+        WithRing { segment, closing } in with_ring(), cut in any::<prop::sample::Index>(), times in any::<bool>()
+    ) {
+        let whole = segment.walk();
+        prop_assert_eq!(whole.main_count, segment.len());
+        let topology = Topology::with_local_rings(&whole.status(times), segment.len(), &[closing]);
+        prop_assert_eq!(parents(&topology), whole.parents(&segment));
+        prop_assert_eq!(&topology.findings, &[]);
+        prop_assert_eq!(&topology.open_ports, &[]);
+        let found = candidates(&whole.status(false), segment.len(), false, usize::MAX);
+        prop_assert!(found.contains(&vec![closing]), "{:?} not in {:?}", closing, found);
+
+        let cables = topology.local_rings[0].cables.clone();
+        let cable = cables[cut.index(cables.len())];
+        let mut broken = segment.clone();
+        broken.cut(whole.order[cable.far.node], cable.far.port);
+        let seen = broken.walk();
+        prop_assert_eq!(&seen.order, &whole.order);
+        let again = Topology::with_local_rings(&seen.status(times), segment.len(), &[closing]);
+        let mut expected = parents(&topology);
+        if cable.far != closing.head {
+            expected[cable.far.node] = None;
+        }
+        prop_assert_eq!(parents(&again), expected);
+        prop_assert_eq!(&again.findings, &[]);
+        prop_assert_eq!(&again.open_ports, &[]);
+        let last = |topology: &Topology| topology.local_rings[0].cables.last().copied();
+        prop_assert_eq!(last(&again), last(&topology));
+    }
+
+    #[test]
+    fn any_connections_and_status_words_give_a_tree_without_panic(
+        nodes in proptest::collection::vec(any::<u8>(), 0..24),
+        connections in proptest::collection::vec((0usize..30, any::<u8>(), 0usize..30, any::<u8>()), 0..4),
+        ring_closed in any::<bool>(),
+    ) {
+        let nodes: Vec<_> = nodes.into_iter().map(status).collect();
+        let closing = |(a, b, c, d)| Closing { head: at(a, b), tail: at(c, d) };
+        let closings: Vec<Closing> = connections.into_iter().map(closing).collect();
+        let topology = Topology::with_local_rings(&nodes, nodes.len(), &closings);
+        prop_assert_eq!(topology.nodes.len(), nodes.len());
+        prop_assert!(topology.local_rings.iter().all(|ring| ring.cables.len() <= nodes.len() + 1));
+        for set in candidates(&nodes, nodes.len(), ring_closed, 8) {
+            Topology::with_local_rings(&nodes, nodes.len(), &set);
+        }
+    }
+}
