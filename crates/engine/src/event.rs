@@ -13,6 +13,7 @@ use crate::domain::{DomainState, DomainStatus};
 use crate::link::Link;
 use crate::queue::WORDS;
 use crate::time::Instant;
+use crate::topology::{Closing, PortOf};
 
 /// Frames of other MainDevices among them: a collision must be seen, not archived.
 const FOREIGN_KEPT: usize = 8;
@@ -75,6 +76,30 @@ pub enum Event {
         position: Option<Position>,
         /// The port of entry, where known.
         entry_port: Option<u8>,
+    },
+    /// A scan found a ring behind a junction (JR-03).
+    JunctionLearned {
+        /// Its closing cable, from the last SubDevice back to the junction; nodes are positions.
+        closing: Closing,
+    },
+    /// A cable of a ring behind a junction broke or is whole again (JUNCTION_RED_CHANGE of the seeds). Nodes are positions.
+    JunctionChanged {
+        /// The port from which frames come; `None` where the ring has not been seen whole yet.
+        near: Option<PortOf>,
+        /// The port that they reach. Behind a break it is port 0 of the SubDevice that is entered from behind; at the
+        /// closing cable it is the junction's.
+        far: PortOf,
+        /// It broke.
+        broken: bool,
+        /// Broken cables of all such rings now. One is tolerated; with two, SubDevices between them in one ring are cut
+        /// off, or no frame comes back where they are in two rings (JR-02).
+        breaks: usize,
+    },
+    /// No frame comes back while a ring behind a junction is open: with a second unconnected port 0 in one path, frames are
+    /// destroyed (JR-02). Or the cable of the only link is broken too.
+    JunctionsBlocked {
+        /// True when it begins, false when frames come back.
+        blocked: bool,
     },
     /// Something else that is odd about a SubDevice's ports.
     CablingOddity {

@@ -9,6 +9,7 @@ mod declaration;
 mod mail;
 mod pending;
 mod services;
+mod steps;
 mod ticket;
 
 use alloc::rc::Rc;
@@ -32,6 +33,7 @@ use crate::board::Board;
 use crate::event::{CyclicEvent, Event, TimedEvent};
 use crate::exchange::Exchange;
 use crate::info::SubDeviceInfo;
+use crate::junction::JunctionMode;
 use crate::layout::Layout;
 use crate::link::{Link, LinkSet};
 use crate::mail::Mailbox;
@@ -48,7 +50,8 @@ use crate::queue::{Consumer, queue};
 use crate::ring::Identity;
 use crate::supervisor::{AcyclicCounters, Bus, Received, Supervisor};
 use crate::time::Instant;
-use declaration::{check, domain_specs, match_declaration, members, plan_all, report_oddities, with_domain};
+use declaration::{domain_specs, match_declaration, members, plan_all, report_oddities, with_domain};
+use steps::Loaded;
 
 /// Messages of the exchange that may wait until somebody fetches events.
 const CYCLIC_EVENTS: usize = 1024;
@@ -70,6 +73,8 @@ pub struct Options {
     pub settle: Duration,
     /// So long a scan waits for the first SubDevice.
     pub patience: Duration,
+    /// What becomes of rings behind junctions. A connection that is added makes it strict.
+    pub junctions: JunctionMode,
 }
 
 impl Options {
@@ -83,6 +88,7 @@ impl Options {
             supervision: true,
             settle: Duration::from_millis(5),
             patience: Duration::from_secs(5),
+            junctions: JunctionMode::Disabled,
         }
     }
 
@@ -123,6 +129,7 @@ pub struct MainDevice {
     visited: Vec<Mailbox>,
     requests: Requests,
     parked: ticket::Cloakroom,
+    loaded: Option<Loaded>,
 }
 
 impl MainDevice {
@@ -142,6 +149,7 @@ impl MainDevice {
             visited: Vec::new(),
             requests: Requests::default(),
             parked: ticket::Cloakroom::default(),
+            loaded: None,
             options,
         }
     }
@@ -157,8 +165,12 @@ impl MainDevice {
         *self.scan.borrow_mut() = None;
         self.visited.drain(..).for_each(|mailbox| mailbox.close());
         let (bus, slot, scanning) = (self.supervisor.bus(), self.scan.clone(), self.scanning.clone());
-        let options =
-            ScanOptions { settle: self.options.settle, patience: self.options.patience, cache: self.cache.clone() };
+        let options = ScanOptions {
+            settle: self.options.settle,
+            patience: self.options.patience,
+            cache: self.cache.clone(),
+            junctions: self.options.junctions,
+        };
         self.supervisor.spawn(async move {
             let result = scan(&bus, &options).await;
             if let Err(error) = &result {
@@ -183,19 +195,16 @@ impl MainDevice {
         }
     }
 
-    /// Lays out process data, starts configuration and supervision, and hands out the cyclic half.
-    pub fn activate(&mut self, declaration: Declaration) -> Result<Active, ActivateError> {
-        if self.fleet.is_some() {
-            return Err(ActivateError::Active);
-        }
+    /// Starts what was loaded.
+    fn start_loaded(&mut self, loaded: Loaded) -> Result<Active, ActivateError> {
         let scan = match &*self.scan.borrow() {
             Some(Ok(scan)) => scan.clone(),
             Some(Err(_)) | None => return Err(ActivateError::NoScan),
         };
-        check(&declaration)?;
         let bus = self.supervisor.bus();
-        let declaration = with_domain(declaration);
+        let declaration = with_domain(loaded.declaration.clone());
         let (found, strangers) = match_declaration(&bus, &declaration, &scan)?;
+        let topology = loaded.topology(&bus, self.options.junctions, &scan, &found)?;
         let plans = plan_all(&declaration, &found)?;
         let specs = domain_specs(&declaration, &plans)?;
         let layout =
@@ -207,8 +216,7 @@ impl MainDevice {
         let board = Arc::new(Board::new(members.len()).with_optional(optional));
         let (producer, consumer) = queue(CYCLIC_EVENTS);
         let exchange = Exchange::new(self.identity, self.options.links(), &layout, board.clone(), producer);
-        let fleet =
-            Fleet { members, strangers, next_temporary: 0, layout, topology: scan.topology, cache: self.cache.clone() };
+        let fleet = Fleet { members, strangers, next_temporary: 0, layout, topology, cache: self.cache.clone() };
         let fleet = SharedFleet::new(fleet, board.clone());
         self.supervisor.attach(board);
         let start = if self.has_visited() { Start::Doubtful } else { Start::Cleared };

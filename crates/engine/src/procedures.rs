@@ -6,6 +6,7 @@ pub mod al_state;
 pub mod configure;
 pub mod fleet;
 pub mod inspect;
+mod junction;
 pub mod mail_watch;
 pub mod recover;
 pub(crate) mod request_state;

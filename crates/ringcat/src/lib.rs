@@ -68,6 +68,7 @@ pub use ringcat_engine::domain::{DomainId, DomainState, DomainStatus, Freshness}
 pub use ringcat_engine::event::{Event, TimedEvent};
 pub use ringcat_engine::exchange::{CopyError, CopyRule, CyclicCounters, Entry, WhenStale};
 pub use ringcat_engine::info::{Direction, SubDeviceInfo};
+pub use ringcat_engine::junction::{JunctionConnection, JunctionError, JunctionMode};
 pub use ringcat_engine::link::Link;
 pub use ringcat_engine::mail::coe::{SdoAddress, SdoError, SdoFailure};
 pub use ringcat_engine::mail::{Limits, Mailbox};

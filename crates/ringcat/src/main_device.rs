@@ -6,10 +6,11 @@ use std::time::Duration;
 use ringcat_engine::config::SubDeviceConfig;
 use ringcat_engine::event::TimedEvent;
 use ringcat_engine::info::SubDeviceInfo;
+use ringcat_engine::junction::{JunctionConnection, JunctionMode};
 use ringcat_engine::mail::coe::SdoAddress;
 use ringcat_engine::mail::{Limits, Mailbox};
 use ringcat_engine::main_device::{
-    Declaration, DomainConfig, DomainMember, MainDevice as Engine, Options as Engineering, Pending,
+    ActivateError, Declaration, DomainConfig, DomainMember, MainDevice as Engine, Options as Engineering, Pending,
 };
 use ringcat_engine::procedures::scan::Scan;
 use ringcat_engine::supervisor::AcyclicCounters;
@@ -32,6 +33,8 @@ pub struct Options {
     pub settle: Duration,
     /// So long a scan waits for the first SubDevice.
     pub patience: Duration,
+    /// What becomes of rings behind junctions. A connection that is added makes it strict.
+    pub junctions: JunctionMode,
 }
 
 impl Default for Options {
@@ -41,6 +44,7 @@ impl Default for Options {
             supervision: true,
             settle: Duration::from_millis(5),
             patience: Duration::from_secs(5),
+            junctions: JunctionMode::Disabled,
         }
     }
 }
@@ -54,6 +58,7 @@ impl Options {
             supervision: self.supervision,
             settle: self.settle,
             patience: self.patience,
+            junctions: self.junctions,
             ..Engineering::new(main, redundant)
         };
         Engine::new(options, links.now())
@@ -189,7 +194,36 @@ impl<L: Links> MainDevice<L> {
     /// A declaration that does not fit what was scanned, or process data that does not fit frames. The MainDevice comes
     /// back with the error, for another try.
     pub fn activate(mut self, declaration: Declaration) -> Result<Application<L>, Box<Refused<MainDevice<L>>>> {
-        match self.engine.activate(declaration) {
+        match self.load(declaration) {
+            Ok(()) => self.apply(),
+            Err(error) => Err(Box::new(Refused { error, main_device: self })),
+        }
+    }
+
+    /// First of the steps that [`MainDevice::activate`] takes at once: a declaration is loaded. It takes the place of one
+    /// that was loaded before, with all connections.
+    ///
+    /// # Errors
+    /// What is wrong with the declaration by itself.
+    pub fn load(&mut self, declaration: Declaration) -> Result<(), Error> {
+        Ok(self.engine.load(declaration)?)
+    }
+
+    /// Second step, as often as needed: the connection of a ring behind a junction is added; the mode is strict then.
+    ///
+    /// # Errors
+    /// Nothing is loaded, or the connection cannot be.
+    pub fn add_junction_connection(&mut self, connection: JunctionConnection) -> Result<(), Error> {
+        Ok(self.engine.add_junction_connection(connection).map_err(ActivateError::Junction)?)
+    }
+
+    /// Last step: lays out process data, starts the configuration of all SubDevices, and hands out the running application.
+    ///
+    /// # Errors
+    /// Nothing is loaded, or it does not fit what was scanned. The MainDevice comes back with the error, and what was
+    /// loaded with it.
+    pub fn apply(mut self) -> Result<Application<L>, Box<Refused<MainDevice<L>>>> {
+        match self.engine.apply() {
             Ok(active) => Ok(Application::new(self.links, Inline(self.engine), active, Arc::default())),
             Err(error) => Err(Box::new(Refused { error: error.into(), main_device: self })),
         }

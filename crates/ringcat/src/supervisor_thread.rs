@@ -11,8 +11,9 @@ use std::thread::JoinHandle;
 use std::time::Duration;
 
 use ringcat_engine::event::{Event, TimedEvent};
+use ringcat_engine::junction::JunctionConnection;
 use ringcat_engine::link::Link;
-use ringcat_engine::main_device::{Declaration, MainDevice as Engine, SubDeviceState};
+use ringcat_engine::main_device::{ActivateError, Declaration, MainDevice as Engine, SubDeviceState};
 use ringcat_engine::procedures::scan::Scan;
 use ringcat_engine::supervisor::AcyclicCounters;
 use ringcat_engine::time::Instant;
@@ -170,8 +171,36 @@ impl SupervisorThread {
     /// A declaration that does not fit what was scanned, or process data that does not fit frames. Everything comes back
     /// with the error, for another try.
     pub fn activate<C: Links>(self, declaration: Declaration, links: C) -> Activated<C> {
+        match self.load(declaration) {
+            Ok(()) => self.apply(links),
+            Err(error) => Err(Box::new(Refused { error, main_device: (self, links) })),
+        }
+    }
+
+    /// First of the steps that [`SupervisorThread::activate`] takes at once, as [`crate::MainDevice::load`].
+    ///
+    /// # Errors
+    /// What is wrong with the declaration by itself.
+    pub fn load(&self, declaration: Declaration) -> Result<(), Error> {
+        Ok(self.with(move |engine| engine.load(declaration))??)
+    }
+
+    /// Second step, as [`crate::MainDevice::add_junction_connection`].
+    ///
+    /// # Errors
+    /// Nothing is loaded, or the connection cannot be.
+    pub fn add_junction_connection(&self, connection: JunctionConnection) -> Result<(), Error> {
+        let added = self.with(move |engine| engine.add_junction_connection(connection))?;
+        Ok(added.map_err(ActivateError::Junction)?)
+    }
+
+    /// Last step, as [`crate::MainDevice::apply`]; cycles run on `links`.
+    ///
+    /// # Errors
+    /// Nothing is loaded, or it does not fit what was scanned.
+    pub fn apply<C: Links>(self, links: C) -> Activated<C> {
         // From now on the windows of the cyclic half count, so its first cycle must not be long in coming.
-        let active = self.with(move |engine| engine.activate(declaration));
+        let active = self.with(move |engine| engine.apply());
         match active.and_then(|result| result.map_err(Error::from)) {
             Ok(active) => {
                 let window = self.0.window.clone();

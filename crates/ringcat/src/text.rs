@@ -4,6 +4,7 @@ use std::fmt;
 
 use ringcat_engine::domain::DomainState;
 use ringcat_engine::event::Event;
+use ringcat_engine::topology::PortOf;
 use ringcat_wire::address::Position;
 use ringcat_wire::frame::MacAddress;
 
@@ -23,6 +24,14 @@ impl Names {
         match self.0.get(usize::from(position.0)) {
             Some(name) => format!("position {position} \"{name}\""),
             None => format!("position {position}"),
+        }
+    }
+
+    fn port(&self, at: PortOf) -> String {
+        let number = at.node;
+        match self.0.get(number) {
+            Some(name) => format!("SubDevice {number} \"{name}\" port {}", at.port),
+            None => format!("SubDevice {number} port {}", at.port),
         }
     }
 
@@ -67,6 +76,25 @@ pub fn describe(event: &Event, names: &Names) -> String {
             format!("break between {} and {}", names.end(*after, "MAIN"), names.end(*before, "REDUNDANT"))
         }
         Event::RingClosed { main, .. } => format!("ring closed: {main} SubDevices on MAIN"),
+        Event::JunctionLearned { closing } => {
+            let (head, tail) = (names.port(closing.head), names.port(closing.tail));
+            format!("ring behind a junction: from {tail} back to {head}")
+        }
+        Event::JunctionChanged { near, far, broken, breaks } => {
+            let before = near.map_or_else(|| "an unknown SubDevice".to_owned(), |near| names.port(near));
+            let place = format!("between {before} and {}", names.port(*far));
+            match (broken, breaks) {
+                (true, 0 | 1) => format!("Line break {place}: the ring behind the junction goes on without this cable"),
+                (true, _) => format!("Line break {place}: {breaks} cables of rings behind junctions are broken, one is tolerated"),
+                (false, 0) => format!("Line is fixed {place}"),
+                (false, _) => format!("Line is fixed {place}: broken cables left: {breaks}"),
+            }
+        }
+        Event::JunctionsBlocked { blocked: true } => {
+            "no frame comes back while a ring behind a junction is open: a second one is open too, or the cable of the interface"
+                .to_owned()
+        }
+        Event::JunctionsBlocked { blocked: false } => "frames come back again".to_owned(),
         Event::StateReached { subdevice, state } => format!("{}: {state}", names.of(*subdevice)),
         Event::StateError { subdevice, requested: Some(state), status, code } => {
             format!("{}: refused {state}: {status}, {code}", names.of(*subdevice))

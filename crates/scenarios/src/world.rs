@@ -8,8 +8,8 @@ use std::ops::Range;
 use std::time::Duration;
 
 use ringcat::{
-    Application, Declaration, Direction, DomainId, Error, Event, Instant, Links, MainDevice, Options, ProcessData,
-    Scan, TimedEvent, automatic,
+    Application, Declaration, Direction, DomainId, Error, Event, Instant, JunctionConnection, Links, MainDevice,
+    Options, ProcessData, Scan, TimedEvent, automatic,
 };
 use ringcat_engine::mail::Mailbox;
 use ringcat_engine::main_device::{Directory, Pending};
@@ -116,6 +116,20 @@ impl World {
         options: &Options,
         declare: impl FnOnce(&Scan) -> Declaration,
     ) -> Result<World, Error> {
+        World::with_junctions(seed, network, options, declare, &[])
+    }
+
+    /// As [`World::with`], with connections of rings behind junctions.
+    ///
+    /// # Errors
+    /// As [`World::with`], and [`MainDevice::add_junction_connection`].
+    pub fn with_junctions(
+        seed: u64,
+        network: Network,
+        options: &Options,
+        declare: impl FnOnce(&Scan) -> Declaration,
+        connections: &[JunctionConnection],
+    ) -> Result<World, Error> {
         let mut tap = Tap::new(network);
         tap.set_limit(tap.now() + SCAN_LIMIT);
         let mut main_device = MainDevice::request(tap, options);
@@ -124,7 +138,9 @@ impl World {
         main_device.links_mut().set_limit(Instant::NEVER);
         let declaration = declare(&scan);
         let (domains, declared) = (declaration.domains.len(), declaration.subdevices.len());
-        let application = main_device.activate(declaration)?;
+        main_device.load(declaration)?;
+        connections.iter().try_for_each(|connection| main_device.add_junction_connection(*connection))?;
+        let application = main_device.apply()?;
         let network = application.links().network();
         let devices: Vec<Option<DeviceIndex>> = Vec::new();
         let mirror = Mirror::new(application.directory(), &devices, domains);

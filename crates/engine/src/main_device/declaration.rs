@@ -17,6 +17,7 @@ use super::areas::Areas;
 use crate::config::{ConfigError, Resolution, SubDeviceConfig, resolve};
 use crate::event::Event;
 use crate::info::SubDeviceInfo;
+use crate::junction::JunctionError;
 use crate::layout::{AreaSpec, DomainSpec, Layout, LayoutError};
 use crate::mail::Mailbox;
 use crate::plan::plan;
@@ -76,6 +77,10 @@ pub enum ActivateError {
     },
     /// A scan is running.
     Scanning,
+    /// Nothing was loaded that could be applied.
+    NotLoaded,
+    /// A connection of a local ring does not fit.
+    Junction(JunctionError),
     /// A SubDevice is to stay in a state that process data and mailbox do not lead to.
     Target {
         /// Index in the declaration.
@@ -120,6 +125,8 @@ impl fmt::Display for ActivateError {
             ActivateError::Config { subdevice, error } => write!(f, "declaration {subdevice}: {error}"),
             ActivateError::Setup { subdevice, error } => write!(f, "declaration {subdevice}: {error}"),
             ActivateError::Scanning => f.write_str("a scan is running"),
+            ActivateError::NotLoaded => f.write_str("nothing is loaded: load a declaration before applying it"),
+            ActivateError::Junction(error) => error.fmt(f),
             ActivateError::Target { subdevice, target } => {
                 write!(f, "declaration {subdevice}: expected target INIT, PREOP, SAFEOP or OP, got {target}")
             }

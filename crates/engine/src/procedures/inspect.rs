@@ -105,6 +105,10 @@ pub(super) fn locate_break(topology: &Topology, dl_status: &[Option<DlStatus>]) 
         return Some(Break { after: None, before: position(0) });
     }
     for node in 0..topology.nodes.len() {
+        // Breaks in rings behind junctions are told apart.
+        if topology.is_in_local_ring(node) {
+            continue;
+        }
         let Some(connection) = topology.connection_to(node) else { continue };
         let near = down(connection.near.node, connection.near.port);
         let far = down(connection.far.node, connection.far.port);

@@ -23,10 +23,12 @@ use ringcat_wire::register::{DcReceiveTimes, DlStatus, EcatEvent, Fmmu, Informat
 
 use self::count::Count;
 pub use self::error::ScanError;
+use super::junction::learn;
 use super::sii::{self, SiiCache, SiiContents};
 use crate::config::duplicate_aliases;
 use crate::event::Event;
 use crate::info::{InfoWarning, Readout, SiiProblem, SubDeviceInfo};
+use crate::junction::JunctionMode;
 use crate::link::LinkSet;
 use crate::ring::RingState;
 use crate::supervisor::{Bus, BusError, Reply};
@@ -56,6 +58,8 @@ pub struct ScanOptions {
     pub patience: Duration,
     /// SII contents read before.
     pub cache: SiiCache,
+    /// What becomes of rings behind junctions.
+    pub junctions: JunctionMode,
 }
 
 /// What a scan found.
@@ -160,9 +164,20 @@ async fn attempt(bus: &Bus, options: &ScanOptions, expected: Count) -> Result<Sc
     }
     let statuses: Vec<NodeStatus> = subdevices.iter().map(node_status).collect();
     let (main_count, redundant_count) = (usize::from(expected.main.0), usize::from(expected.redundant.0));
-    let topology = Topology::build(&statuses, main_count);
+    let closings = match options.junctions {
+        JunctionMode::Automatic => learn(bus, &statuses, main_count, bus.ring() == RingState::Closed).await?,
+        JunctionMode::Disabled | JunctionMode::Strict => Vec::new(),
+    };
+    let topology = Topology::with_local_rings(&statuses, main_count, &closings);
     let scan = Scan { subdevices, topology, main_count, redundant_count };
     report_findings(bus, &scan);
+    // Connections that are declared are not known yet.
+    if options.junctions != JunctionMode::Strict {
+        report_cabling(bus, &scan);
+    }
+    for closing in closings {
+        bus.report(Event::JunctionLearned { closing });
+    }
     bus.report(Event::ScanFinished { subdevices: scan.subdevices.len() });
     Ok(scan)
 }
@@ -175,7 +190,7 @@ async fn identify(bus: &Bus, count: u16, cache: &SiiCache) -> Result<Vec<SiiCont
     read_all(bus, count, cache).await
 }
 
-pub(super) fn node_status(info: &SubDeviceInfo) -> NodeStatus {
+pub(crate) fn node_status(info: &SubDeviceInfo) -> NodeStatus {
     NodeStatus { dl_status: info.dl_status, receive_times: info.receive_times, ports: info.controller.ports }
 }
 
@@ -323,6 +338,10 @@ fn report_findings(bus: &Bus, scan: &Scan) {
     for duplicate in duplicate_aliases(&scan.subdevices) {
         bus.report(Event::DuplicateAlias { alias: duplicate.alias, first: duplicate.first, second: duplicate.second });
     }
+}
+
+/// What is odd about the cabling.
+pub(crate) fn report_cabling(bus: &Bus, scan: &Scan) {
     let position = |node: usize| scan.subdevices.get(node).map_or(Position(node as u16), |info| info.position);
     for finding in &scan.topology.findings {
         match *finding {

@@ -18,6 +18,7 @@ use ringcat_wire::register::{DlStatus, map};
 use super::configure::Start;
 use super::fleet::{Phase, SharedFleet};
 use super::inspect::{Break, Look, locate_break, look_at_all, look_at_strangers};
+use super::junction::{JunctionWatch, watch_blocked};
 use super::recover::{lose, start, welcome};
 use super::strangers::{self, Search};
 use super::verify::verify;
@@ -27,6 +28,7 @@ use crate::link::LinkSet;
 use crate::ring::RingState;
 use crate::supervisor::Bus;
 use crate::time::Instant;
+use crate::topology::NodeStatus;
 
 /// Pause between two looks at the board.
 const PAUSE: Duration = Duration::from_micros(500);
@@ -56,6 +58,10 @@ pub(crate) async fn supervise(bus: Bus, fleet: SharedFleet) {
         bus.spawn(report_ring(bus.clone(), fleet.clone(), reported.clone()));
     }
     bus.spawn(verify(bus.clone(), fleet.clone()));
+    let junctions = JunctionWatch::new(&fleet.access().topology);
+    if !junctions.is_empty() {
+        bus.spawn(watch_blocked(bus.clone(), fleet.clone(), junctions.broken()));
+    }
     let mut watch = Watch {
         bus,
         fleet,
@@ -72,6 +78,7 @@ pub(crate) async fn supervise(bus: Bus, fleet: SharedFleet) {
         is_routine: false,
         search: Search::default(),
         news: 0,
+        junctions,
     };
     loop {
         watch.bus.sleep(PAUSE).await;
@@ -107,6 +114,7 @@ struct Watch {
     search: Search,
     /// What had become known at the last check.
     news: u32,
+    junctions: JunctionWatch,
 }
 
 /// Reports each change of the ring once, with the counts of both links.
@@ -193,6 +201,7 @@ impl Watch {
             self.again_in(SECOND_LOOK_PAUSE);
         }
         self.report_break(&looks);
+        self.report_junctions(&looks);
         // Who else is there must be known before anybody's place is.
         let mut complete = count <= answering;
         if !complete && !looks.contains(&Look::Unknown) {
@@ -278,15 +287,34 @@ impl Watch {
     }
 
     fn break_place(&self, looks: &[Look]) -> Option<Break> {
+        let by_position: Vec<_> = self.by_position(looks).iter().map(|it| it.map(|node| node.dl_status)).collect();
+        locate_break(&self.fleet.access().topology, &by_position)
+    }
+
+    /// What members said about their ports, by their position in the scan.
+    fn by_position(&self, looks: &[Look]) -> Vec<Option<NodeStatus>> {
         let access = self.fleet.access();
         let mut by_position = vec![None; access.topology.nodes.len()];
         for (member, look) in access.members.iter().zip(looks) {
             let (Some(node), Look::Answer { dl_status, .. }) = (member.node, look) else { continue };
+            let ports = member.info.as_ref().map(|info| info.controller.ports).unwrap_or_default();
             if let Some(slot) = by_position.get_mut(node) {
-                *slot = Some(*dl_status);
+                *slot = Some(NodeStatus { dl_status: *dl_status, receive_times: None, ports });
             }
         }
-        locate_break(&access.topology, &by_position)
+        by_position
+    }
+
+    /// Events of rings behind junctions.
+    fn report_junctions(&mut self, looks: &[Look]) {
+        if self.junctions.is_empty() {
+            return;
+        }
+        let status = self.by_position(looks);
+        let bus = self.bus.clone();
+        if let Some(pause) = self.junctions.observe(bus.now(), &status, |event| bus.report(event)) {
+            self.again_in(pause);
+        }
     }
 
     /// True where nobody is left that is not known.

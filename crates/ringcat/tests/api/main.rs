@@ -2,6 +2,7 @@
 
 mod declarations;
 mod demo;
+mod junctions;
 mod services;
 mod stop;
 mod threads;

@@ -14,6 +14,7 @@ mod eeprom;
 mod ethernet;
 mod explorer;
 mod failures;
+mod junctions;
 mod mail;
 mod mail_protocols;
 mod mail_services;

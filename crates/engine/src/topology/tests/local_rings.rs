@@ -20,8 +20,12 @@ fn a_whole_ring_behind_a_junction_is_a_branch_on_the_port_where_it_begins_jr_01(
     assert_eq!(parents(&topology), [None, Some((0, 3)), Some((1, 1)), Some((2, 1)), Some((0, 2))]);
     assert_eq!((topology.open_ports, topology.findings), (vec![], vec![]));
     let cable = |near, far| RingCable { near: Some(near), far };
-    let cables =
-        vec![cable(at(0, 3), at(1, 0)), cable(at(1, 1), at(2, 0)), cable(at(2, 1), at(3, 0)), cable(at(3, 1), at(0, 1))];
+    let cables = vec![
+        cable(at(0, 3), at(1, 0)),
+        cable(at(1, 1), at(2, 0)),
+        cable(at(2, 1), at(3, 0)),
+        cable(at(3, 1), at(0, 1)),
+    ];
     assert_eq!(topology.local_rings[0].cables, cables);
 }
 

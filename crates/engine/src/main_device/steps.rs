@@ -1,0 +1,132 @@
+//! Configuration in steps: load what the application declares, add connections of local rings, apply (JR-05).
+//!
+//! [`MainDevice::activate`] is all of it at once, for those who have nothing to add.
+
+use alloc::vec::Vec;
+
+use super::declaration::{ActivateError, Declaration, check};
+use super::{Active, MainDevice};
+use crate::event::Event;
+use crate::info::SubDeviceInfo;
+use crate::junction::{JunctionConnection, JunctionError, JunctionMode, START_PORT};
+use crate::procedures::scan::{Scan, node_status, report_cabling};
+use crate::supervisor::Bus;
+use crate::topology::{Closing, NodeStatus, PortOf, Topology};
+
+use ringcat_wire::register::PortKind;
+
+/// What was loaded and is not applied yet.
+#[derive(Clone, Debug)]
+pub(super) struct Loaded {
+    pub declaration: Declaration,
+    connections: Vec<JunctionConnection>,
+}
+
+impl MainDevice {
+    /// First step: takes a declaration. It takes the place of one that was loaded before, with all that was added to it.
+    ///
+    /// # Errors
+    /// [`ActivateError::Active`], and what is wrong with the declaration by itself.
+    pub fn load(&mut self, declaration: Declaration) -> Result<(), ActivateError> {
+        if self.fleet.is_some() {
+            return Err(ActivateError::Active);
+        }
+        check(&declaration)?;
+        self.loaded = Some(Loaded { declaration, connections: Vec::new() });
+        Ok(())
+    }
+
+    /// Second step, as often as needed: adds the connection of a local ring. The mode is strict then, whatever the
+    /// options say. Nothing is added with an error.
+    ///
+    /// # Errors
+    /// [`JunctionError`]: nothing is loaded, or what is wrong with the connection (JR-06).
+    pub fn add_junction_connection(&mut self, connection: JunctionConnection) -> Result<(), JunctionError> {
+        let loaded = self.loaded.as_mut().ok_or(JunctionError::NotLoaded)?;
+        connection.check(&loaded.connections, loaded.declaration.subdevices.len())?;
+        loaded.connections.push(connection);
+        Ok(())
+    }
+
+    /// Last step: lays out process data, starts configuration and supervision, and hands out the cyclic half. What was
+    /// loaded stays so if it cannot be applied: after another scan, or with another connection, it may be.
+    ///
+    /// # Errors
+    /// [`ActivateError`]: nothing is loaded or scanned, or what does not fit what was found.
+    pub fn apply(&mut self) -> Result<Active, ActivateError> {
+        if self.fleet.is_some() {
+            return Err(ActivateError::Active);
+        }
+        let loaded = self.loaded.clone().ok_or(ActivateError::NotLoaded)?;
+        let active = self.start_loaded(loaded)?;
+        self.loaded = None;
+        Ok(active)
+    }
+
+    /// Lays out process data, starts configuration and supervision, and hands out the cyclic half: [`MainDevice::load`]
+    /// and [`MainDevice::apply`], with nothing in between.
+    pub fn activate(&mut self, declaration: Declaration) -> Result<Active, ActivateError> {
+        self.load(declaration)?;
+        let result = self.apply();
+        self.loaded = None;
+        result
+    }
+}
+
+impl Loaded {
+    /// The topology with the local rings that were declared, if any were; otherwise that of the scan.
+    pub(super) fn topology(
+        &self,
+        bus: &Bus,
+        mode: JunctionMode,
+        scan: &Scan,
+        found: &[Option<SubDeviceInfo>],
+    ) -> Result<Topology, ActivateError> {
+        if self.connections.is_empty() {
+            return match mode {
+                JunctionMode::Strict => Err(ActivateError::Junction(JunctionError::NoConnection)),
+                JunctionMode::Disabled | JunctionMode::Automatic => Ok(scan.topology.clone()),
+            };
+        }
+        let mut closings = Vec::new();
+        for connection in &self.connections {
+            closings.extend(closing(bus, connection, found).map_err(ActivateError::Junction)?);
+        }
+        let nodes: Vec<NodeStatus> = scan.subdevices.iter().map(node_status).collect();
+        let topology = Topology::with_local_rings(&nodes, scan.main_count, &closings);
+        if mode == JunctionMode::Strict {
+            // The scan has kept it back.
+            report_cabling(bus, &Scan { topology: topology.clone(), ..scan.clone() });
+        }
+        Ok(topology)
+    }
+}
+
+/// Where a declared connection is in the segment; `None` where one of its SubDevices is optional and not there.
+fn closing(
+    bus: &Bus,
+    connection: &JunctionConnection,
+    found: &[Option<SubDeviceInfo>],
+) -> Result<Option<Closing>, JunctionError> {
+    let JunctionConnection { head, head_port, tail, tail_port } = *connection;
+    for (subdevice, port) in [(head, head_port), (head, START_PORT), (tail, tail_port)] {
+        let Some(info) = found.get(subdevice).and_then(Option::as_ref) else {
+            let what = alloc::format!("not there: its {connection} is not watched");
+            bus.report(Event::PlanOddity { subdevice, what });
+            return Ok(None);
+        };
+        let ports = &info.controller.ports;
+        if ports[usize::from(port)] == PortKind::NotImplemented && *ports != [PortKind::NotImplemented; 4] {
+            return Err(JunctionError::NoSuchPort { connection: *connection, subdevice, port });
+        }
+    }
+    let node = |subdevice: usize| found[subdevice].as_ref().map_or(0, |info| usize::from(info.position.0));
+    let closing = Closing {
+        head: PortOf { node: node(head), port: head_port },
+        tail: PortOf { node: node(tail), port: tail_port },
+    };
+    if closing.tail.node <= closing.head.node {
+        return Err(JunctionError::NotBehind(*connection));
+    }
+    Ok(Some(closing))
+}

@@ -1,0 +1,10 @@
+//! Rings behind junctions (facts 9.4): which there are ([`learn`]), and what becomes of them ([`watch`]).
+//!
+//! The controllers keep a local ring going by themselves; nothing here is needed for that. It is about knowing: who may
+//! be entered from behind without being cabled wrongly, that a cable is broken, and when there must not be another one.
+
+mod learn;
+mod watch;
+
+pub(super) use self::learn::learn;
+pub(super) use self::watch::{JunctionWatch, watch_blocked};

@@ -1,0 +1,121 @@
+//! Finding out where local rings close, at a scan in mode automatic (JR-03).
+//!
+//! Open ports allow several answers ([`candidates`]), so each is tried: both ends of a supposed closing cable are closed
+//! for a moment, in one frame. If it is that cable, the ring is open there and all SubDevices still answer; any other pair
+//! of ports cuts somebody off. Where the ring is broken already, the end at the junction alone is closed, and those between
+//! the break and the closing cable, and nobody else, must fall silent. The loops return to what they were in any case:
+//! the setting is temporary (facts 2.2, DL control bit 1).
+
+use alloc::vec::Vec;
+use core::time::Duration;
+
+use ringcat_wire::address::{Position, StationAddress, Wkc};
+use ringcat_wire::command::Command;
+use ringcat_wire::datagram::Target;
+use ringcat_wire::register::{DlControl, LoopControl, map};
+
+use super::super::scan::station_at;
+use crate::supervisor::{Bus, BusError};
+use crate::topology::{Closing, NodeStatus, PortOf, candidates};
+
+/// Sets of closing cables that are tried. Wrong ones of which frames do not come back cost [`TEMPORARY`] each.
+const TRIES: usize = 16;
+/// Until temporary loop settings have certainly ended.
+const TEMPORARY: Duration = Duration::from_millis(1_200);
+/// Bytes of DL_CONTROL that are written: forwarding rule and temporary bit, loops.
+const WRITTEN: usize = 2;
+
+/// The closing cables of all local rings, whole or broken; none where they cannot be found out. Every SubDevice has the
+/// station address of its position.
+pub(in super::super) async fn learn(
+    bus: &Bus,
+    nodes: &[NodeStatus],
+    main_count: usize,
+    ring_closed: bool,
+) -> Result<Vec<Closing>, BusError> {
+    let mut known: Vec<(Closing, bool)> = Vec::new();
+    'sets: for set in candidates(nodes, main_count, ring_closed, TRIES) {
+        for closing in &set {
+            let before = known.iter().find(|(tried, _)| tried == closing).map(|(_, result)| *result);
+            let closes = match before {
+                Some(result) => result,
+                None => {
+                    let result = attempt(bus, nodes, *closing).await?;
+                    known.push((*closing, result));
+                    result
+                }
+            };
+            if !closes {
+                continue 'sets;
+            }
+        }
+        return Ok(set);
+    }
+    Ok(Vec::new())
+}
+
+/// Whether a ring closes here.
+async fn attempt(bus: &Bus, nodes: &[NodeStatus], closing: Closing) -> Result<bool, BusError> {
+    let Closing { head, tail } = closing;
+    let mut members = head.node + 1..=tail.node;
+    let broken = members.find(|node| !nodes[*node].dl_status.ports[0].communication);
+    // Behind a break all is reached through the closing cable.
+    let silent = broken.map_or(0..0, |first| first..tail.node + 1);
+    let ports = if broken.is_some() { Vec::from([head]) } else { Vec::from([head, tail]) };
+    let mut controls = Vec::new();
+    for port in &ports {
+        controls.push(DlControl::decode(&bus.fprd_array(station(*port), map::DL_CONTROL).await?));
+    }
+    let close = ports.iter().zip(&controls).map(|(port, control)| (*port, closed(*control, port.port)));
+    let result = match write(bus, close.collect()).await {
+        Ok(()) => answering(bus, nodes.len()).await,
+        Err(error) => Err(error),
+    };
+    let before = |control: &DlControl| DlControl { temporary: false, ..*control };
+    let open = ports.iter().zip(&controls).map(|(port, control)| (*port, before(control)));
+    if result.is_err() || write(bus, open.collect()).await.is_err() {
+        // Frames get lost, or one of the two does not answer: the settings end by themselves.
+        bus.sleep(TEMPORARY).await;
+    }
+    let expected = |answers: &Vec<bool>| answers.iter().enumerate().all(|(node, is)| *is != silent.contains(&node));
+    Ok(result.as_ref().is_ok_and(expected))
+}
+
+/// Who answers, by position.
+async fn answering(bus: &Bus, count: usize) -> Result<Vec<bool>, BusError> {
+    // Where frames do not come back at all this is the quicker way to know.
+    bus.brd(map::TYPE, 1).await?;
+    let asked = bus.gather((0..count).map(|node| PortOf { node, port: 0 }), |bus, at| async move {
+        match bus.fprd(station(at), map::TYPE, 1).await {
+            Ok(_) => Ok(true),
+            Err(BusError::Wkc { .. }) => Ok(false),
+            Err(error) => Err(error),
+        }
+    });
+    asked.await.into_iter().collect()
+}
+
+fn closed(control: DlControl, port: u8) -> DlControl {
+    let mut loops = control.loops;
+    if let Some(setting) = loops.get_mut(usize::from(port)) {
+        *setting = LoopControl::Closed;
+    }
+    DlControl { temporary: true, loops, ..control }
+}
+
+fn station(port: PortOf) -> StationAddress {
+    station_at(Position(port.node as u16))
+}
+
+/// All in one frame: in between, frames would be sent into a closed port.
+async fn write(bus: &Bus, controls: Vec<(PortOf, DlControl)>) -> Result<(), BusError> {
+    let target = |port: &PortOf| Target::Station(station(*port), map::DL_CONTROL);
+    let writes =
+        controls.iter().map(|(port, control)| (Command::Fpwr, target(port), control.encode()[..WRITTEN].to_vec()));
+    let expected = Wkc(1);
+    let replies = bus.transfer_all(writes, Some(expected)).await?;
+    match controls.iter().zip(&replies).find(|(_, reply)| reply.wkc() != expected) {
+        Some(((port, _), reply)) => Err(BusError::Wkc { target: target(port), expected, got: reply.wkc() }),
+        None => Ok(()),
+    }
+}

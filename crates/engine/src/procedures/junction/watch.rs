@@ -1,0 +1,244 @@
+//! What becomes of local rings in operation: which of their cables are broken, seen in the DL status of the SubDevices at
+//! both ends (JR-09), and whether frames still come back at all (JR-02).
+
+use alloc::rc::Rc;
+use alloc::vec::Vec;
+use core::cell::Cell;
+use core::time::Duration;
+
+use super::super::fleet::SharedFleet;
+use crate::event::Event;
+use crate::supervisor::Bus;
+use crate::time::Instant;
+use crate::topology::{Closing, LocalRing, NodeStatus, PortOf, RingCable, Topology};
+
+/// A cable counts as whole again when it was so for this long: a plug that makes bad contact must not flood anybody.
+const STEADY: Duration = Duration::from_millis(50);
+/// Pause between two looks whether frames come back.
+const PAUSE: Duration = Duration::from_millis(5);
+/// Frames have not come back for so long: beyond what a break of a single cable can cost.
+const BLOCKED: Duration = Duration::from_millis(20);
+/// Cycles that must have been sent in that time; an application that stands still sends none.
+const BLOCKED_CYCLES: u64 = 3;
+
+/// A cable, and what is known about it.
+#[derive(Clone, Debug)]
+struct Watched {
+    cable: RingCable,
+    /// It was reported as broken.
+    reported: bool,
+    /// It has been whole again since then.
+    whole_since: Option<Instant>,
+}
+
+/// Watches the cables of all local rings.
+#[derive(Debug)]
+pub(in super::super) struct JunctionWatch {
+    rings: Vec<Vec<Watched>>,
+    closings: Vec<Closing>,
+    main_count: usize,
+    /// How many cables are broken, for whoever else wants to know.
+    broken: Rc<Cell<usize>>,
+}
+
+impl JunctionWatch {
+    /// Watches the rings of a topology.
+    pub fn new(topology: &Topology) -> JunctionWatch {
+        JunctionWatch {
+            rings: topology.local_rings.iter().map(watched).collect(),
+            closings: topology.local_rings.iter().map(|ring| ring.closing).collect(),
+            main_count: topology.main_count,
+            broken: Rc::default(),
+        }
+    }
+
+    /// Whether there is anything to watch.
+    pub fn is_empty(&self) -> bool {
+        self.rings.is_empty()
+    }
+
+    /// How many cables are known to be broken.
+    pub fn broken(&self) -> Rc<Cell<usize>> {
+        self.broken.clone()
+    }
+
+    /// Takes in what SubDevices said about their ports, by position; reports each edge once. Returns when to look again
+    /// though nothing changes.
+    pub fn observe(
+        &mut self,
+        now: Instant,
+        status: &[Option<NodeStatus>],
+        mut report: impl FnMut(Event),
+    ) -> Option<Duration> {
+        let mut again = None;
+        for watched in self.rings.iter_mut().flatten() {
+            match (is_down(&watched.cable, status), watched.reported) {
+                (Some(true), false) => {
+                    watched.reported = true;
+                    self.broken.set(self.broken.get() + 1);
+                    report(changed(&watched.cable, true, self.broken.get()));
+                }
+                (Some(true), true) | (None, _) => watched.whole_since = None,
+                (Some(false), true) => {
+                    let since = *watched.whole_since.get_or_insert(now);
+                    if now.since(since) < STEADY {
+                        again = Some(STEADY);
+                        continue;
+                    }
+                    (watched.reported, watched.whole_since) = (false, None);
+                    self.broken.set(self.broken.get().saturating_sub(1));
+                    report(changed(&watched.cable, false, self.broken.get()));
+                }
+                (Some(false), false) => {}
+            }
+        }
+        self.complete(status);
+        again
+    }
+
+    /// A ring that was broken when it was looked at is known as a whole once it is whole.
+    fn complete(&mut self, status: &[Option<NodeStatus>]) {
+        let is_unknown = |watched: &Watched| watched.cable.near.is_none() && !watched.reported;
+        if !self.rings.iter().flatten().any(is_unknown) {
+            return;
+        }
+        let Some(nodes) = status.iter().copied().collect::<Option<Vec<NodeStatus>>>() else { return };
+        let topology = Topology::with_local_rings(&nodes, self.main_count, &self.closings);
+        for (ring, known) in topology.local_rings.iter().zip(&mut self.rings) {
+            let is_whole = ring.cables.iter().all(|cable| cable.near.is_some());
+            if is_whole && known.iter().any(is_unknown) && !known.iter().any(|watched| watched.reported) {
+                *known = watched(ring);
+            }
+        }
+    }
+}
+
+fn watched(ring: &LocalRing) -> Vec<Watched> {
+    ring.cables.iter().map(|cable| Watched { cable: *cable, reported: false, whole_since: None }).collect()
+}
+
+/// Whether a cable has no communication at one end; `None` where neither end says anything.
+fn is_down(cable: &RingCable, status: &[Option<NodeStatus>]) -> Option<bool> {
+    let end = |at: PortOf| {
+        let status = status.get(at.node).copied().flatten()?;
+        Some(!status.dl_status.ports[usize::from(at.port & 3)].communication)
+    };
+    match (cable.near.and_then(end), end(cable.far)) {
+        (None, None) => None,
+        (near, far) => Some(near == Some(true) || far == Some(true)),
+    }
+}
+
+fn changed(cable: &RingCable, broken: bool, breaks: usize) -> Event {
+    Event::JunctionChanged { near: cable.near, far: cable.far, broken, breaks }
+}
+
+/// Reports when no frame comes back while a local ring is open, and when they do again. Runs for ever.
+pub(in super::super) async fn watch_blocked(bus: Bus, fleet: SharedFleet, broken: Rc<Cell<usize>>) {
+    let number = |fleet: &SharedFleet| fleet.board.supervision().map(|(number, _)| number);
+    let mut last = (number(&fleet), bus.now(), fleet.board.cycles());
+    let mut blocked = false;
+    loop {
+        bus.sleep(PAUSE).await;
+        let seen = number(&fleet);
+        if seen != last.0 {
+            last = (seen, bus.now(), fleet.board.cycles());
+            if core::mem::take(&mut blocked) {
+                bus.report(Event::JunctionsBlocked { blocked: false });
+                // Who is where has to be looked at anew.
+                fleet.note_news();
+            }
+            continue;
+        }
+        let sent = fleet.board.cycles().wrapping_sub(last.2);
+        let is_long = bus.now().since(last.1) >= BLOCKED && sent >= BLOCKED_CYCLES;
+        if is_long && broken.get() > 0 && !blocked {
+            blocked = true;
+            bus.report(Event::JunctionsBlocked { blocked: true });
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use alloc::vec;
+
+    use ringcat_wire::register::{DlStatus, PortKind};
+
+    use super::*;
+
+    fn node(open: &[u8]) -> NodeStatus {
+        let bits = (0..4u8).map(|port| if open.contains(&port) { 0x0200 << (2 * port) } else { 0x0100 << (2 * port) });
+        NodeStatus { dl_status: DlStatus::from_bits(bits.sum::<u16>()), receive_times: None, ports: [PortKind::Mii; 4] }
+    }
+
+    const fn at(node: usize, port: u8) -> PortOf {
+        PortOf { node, port }
+    }
+
+    /// J, and 1 to 3 from its port 3 back to its port 1.
+    const WHOLE: [&[u8]; 4] = [&[0, 1, 3], &[0, 1], &[0, 1], &[0, 1]];
+    const CUT_1_2: [&[u8]; 4] = [&[0, 1, 3], &[0], &[1], &[0, 1]];
+
+    fn nodes(open: [&[u8]; 4]) -> Vec<NodeStatus> {
+        open.into_iter().map(node).collect()
+    }
+
+    fn watch(open: [&[u8]; 4]) -> JunctionWatch {
+        let closing = Closing { head: at(0, 1), tail: at(3, 1) };
+        JunctionWatch::new(&Topology::with_local_rings(&nodes(open), 4, &[closing]))
+    }
+
+    fn seen(watch: &mut JunctionWatch, ms: u64, open: [&[u8]; 4]) -> Vec<Event> {
+        let status: Vec<Option<NodeStatus>> = nodes(open).into_iter().map(Some).collect();
+        let mut events = Vec::new();
+        watch.observe(Instant(ms * 1_000_000), &status, |event| events.push(event));
+        events
+    }
+
+    fn event(near: Option<PortOf>, far: PortOf, broken: bool, breaks: usize) -> Event {
+        Event::JunctionChanged { near, far, broken, breaks }
+    }
+
+    #[test]
+    fn each_edge_is_reported_once_with_both_ends_jr_07() {
+        let mut watch = watch(WHOLE);
+        assert_eq!(seen(&mut watch, 0, WHOLE), []);
+        assert_eq!(seen(&mut watch, 1, CUT_1_2), [event(Some(at(1, 1)), at(2, 0), true, 1)]);
+        assert_eq!(seen(&mut watch, 2, CUT_1_2), []);
+        assert_eq!(seen(&mut watch, 3, WHOLE), []);
+        assert_eq!(seen(&mut watch, 60, WHOLE), [event(Some(at(1, 1)), at(2, 0), false, 0)]);
+        assert_eq!(seen(&mut watch, 61, WHOLE), []);
+    }
+
+    #[test]
+    fn a_plug_with_bad_contact_is_one_break() {
+        let mut watch = watch(WHOLE);
+        let events: usize =
+            (0..1000).map(|ms| seen(&mut watch, ms, if ms % 7 < 3 { CUT_1_2 } else { WHOLE }).len()).sum();
+        assert_eq!(events, 1);
+        assert_eq!(seen(&mut watch, 1_000, WHOLE).len() + seen(&mut watch, 2_000, WHOLE).len(), 1);
+    }
+
+    #[test]
+    fn a_ring_that_was_broken_at_the_scan_is_known_as_a_whole_once_it_is_whole() {
+        let mut watch = watch(CUT_1_2);
+        assert_eq!(seen(&mut watch, 0, CUT_1_2), [event(None, at(2, 0), true, 1)]);
+        assert_eq!(seen(&mut watch, 10, WHOLE), []);
+        assert_eq!(seen(&mut watch, 100, WHOLE), [event(None, at(2, 0), false, 0)]);
+        let at_its_beginning: [&[u8]; 4] = [&[0, 1], &[1], &[0, 1], &[0, 1]];
+        assert_eq!(seen(&mut watch, 200, at_its_beginning), [event(Some(at(0, 3)), at(1, 0), true, 1)]);
+    }
+
+    #[test]
+    fn a_member_without_power_is_two_breaks_and_silence_is_none() {
+        let mut watch = watch(WHOLE);
+        let mut status: Vec<Option<NodeStatus>> = nodes([&[0, 1, 3], &[0], &[], &[1]]).into_iter().map(Some).collect();
+        status[2] = None;
+        let mut events = vec![];
+        watch.observe(Instant(0), &status, |event| events.push(event));
+        assert_eq!(events, [event(Some(at(1, 1)), at(2, 0), true, 1), event(Some(at(2, 1)), at(3, 0), true, 2)]);
+        assert_eq!(watch.broken().get(), 2);
+        watch.observe(Instant(1), &[None; 4], |event| panic!("{event:?}"));
+    }
+}

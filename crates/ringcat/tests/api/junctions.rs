@@ -1,0 +1,108 @@
+//! Rings behind junctions through the public API: configuration in steps, and the words for what happens.
+
+use std::time::Duration;
+
+use ringcat::simulated::SimulatedSegment;
+use ringcat::text::{Names, describe};
+use ringcat::{
+    ActivateError, Declaration, Error, Event, JunctionConnection, JunctionError, JunctionMode, MainDevice, Options,
+    Refused, automatic,
+};
+use ringcat_engine::topology::{Closing, PortOf};
+
+const SEGMENT: &str = include_str!("../../../sim/segments/junction-ring.toml");
+/// The junction is number 1, the members of its ring are 2 to 4.
+const GOOD: JunctionConnection = JunctionConnection { head: 1, head_port: 1, tail: 4, tail_port: 1 };
+
+fn requested(junctions: JunctionMode) -> MainDevice<SimulatedSegment> {
+    let segment = SimulatedSegment::from_toml(SEGMENT).expect("the example is a segment");
+    MainDevice::request(segment, &Options { junctions, ..Options::default() })
+}
+
+fn junction_error(result: Result<(), Error>) -> JunctionError {
+    match result {
+        Err(Error::Activate(ActivateError::Junction(error))) => error,
+        other => panic!("{other:?}"),
+    }
+}
+
+fn refused<T: std::fmt::Debug>(
+    result: Result<T, Box<Refused<MainDevice<SimulatedSegment>>>>,
+) -> (ActivateError, MainDevice<SimulatedSegment>) {
+    match result {
+        Err(refused) => match *refused {
+            Refused { error: Error::Activate(error), main_device } => (error, main_device),
+            other => panic!("{other:?}"),
+        },
+        Ok(application) => panic!("applied: {application:?}"),
+    }
+}
+
+#[test]
+fn load_add_apply_and_each_misuse_is_an_error_of_its_own_jr_05_jr_06() {
+    let mut main_device = requested(JunctionMode::Strict);
+    assert_eq!(junction_error(main_device.add_junction_connection(GOOD)), JunctionError::NotLoaded);
+    let (error, mut main_device) = refused(main_device.apply());
+    assert_eq!(error, ActivateError::NotLoaded);
+
+    main_device.load(Declaration::default()).expect("nothing is wrong with nothing");
+    let (error, mut main_device) = refused(main_device.apply());
+    assert_eq!(error, ActivateError::NoScan);
+
+    let scan = main_device.scan().expect("the segment answers");
+    let declaration = automatic(&scan.subdevices, Duration::from_millis(1));
+    main_device.load(declaration.clone()).expect("it is what was found");
+    let (error, mut main_device) = refused(main_device.apply());
+    assert_eq!(error, ActivateError::Junction(JunctionError::NoConnection));
+
+    let head = JunctionConnection { head_port: 2, ..GOOD };
+    assert_eq!(junction_error(main_device.add_junction_connection(head)), JunctionError::HeadPort(head));
+    let tail = JunctionConnection { tail_port: 0, ..GOOD };
+    assert_eq!(junction_error(main_device.add_junction_connection(tail)), JunctionError::TailPort(tail));
+    let unknown = JunctionConnection { tail: 6, ..GOOD };
+    assert_eq!(junction_error(main_device.add_junction_connection(unknown)), JunctionError::UnknownTail(unknown));
+    main_device.add_junction_connection(GOOD).expect("it fits");
+    assert_eq!(junction_error(main_device.add_junction_connection(GOOD)), JunctionError::Taken(GOOD));
+
+    // What only the segment shows comes with the last step; loading again forgets what was added.
+    for (wrong, error) in [
+        (JunctionConnection { tail: 0, tail_port: 2, ..GOOD }, None),
+        (JunctionConnection { head: 2, ..GOOD }, Some((2, 3))),
+        (JunctionConnection { tail_port: 3, ..GOOD }, Some((4, 3))),
+    ] {
+        main_device.load(declaration.clone()).expect("it is what was found");
+        main_device.add_junction_connection(wrong).expect("it looks as it should");
+        let (got, back) = refused(main_device.apply());
+        let expected = match error {
+            Some((subdevice, port)) => JunctionError::NoSuchPort { connection: wrong, subdevice, port },
+            None => JunctionError::NotBehind(wrong),
+        };
+        assert_eq!(got, ActivateError::Junction(expected));
+        main_device = back;
+    }
+    main_device.load(declaration).expect("it is what was found");
+    main_device.add_junction_connection(GOOD).expect("it fits");
+    let mut application = main_device.apply().expect("it fits");
+    for _ in 0..1_000 {
+        application.cycle(|_| ());
+    }
+    assert!(application.all_settled());
+    assert!(matches!(application.engine_mut().load(Declaration::default()), Err(ActivateError::Active)));
+}
+
+#[test]
+fn breaks_of_rings_behind_junctions_are_told_in_the_words_of_seed_001() {
+    let names = Names(vec!["head".into(), "junction".into(), "first".into(), "second".into()]);
+    let port = |node, port| PortOf { node, port };
+    let changed = |broken, breaks| Event::JunctionChanged { near: Some(port(2, 1)), far: port(3, 0), broken, breaks };
+    let place = "between SubDevice 2 \"first\" port 1 and SubDevice 3 \"second\" port 0";
+    assert!(describe(&changed(true, 1), &names).starts_with(&format!("Line break {place}")));
+    assert_eq!(describe(&changed(false, 0), &names), format!("Line is fixed {place}"));
+    assert!(describe(&changed(true, 2), &names).contains("2 cables"));
+    let learned = Event::JunctionLearned { closing: Closing { head: port(1, 1), tail: port(3, 1) } };
+    assert!(
+        describe(&learned, &names)
+            .contains("from SubDevice 3 \"second\" port 1 back to SubDevice 1 \"junction\" port 1")
+    );
+    assert!(describe(&Event::JunctionsBlocked { blocked: true }, &names).contains("no frame comes back"));
+}

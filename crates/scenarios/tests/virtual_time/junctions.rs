@@ -1,0 +1,278 @@
+//! Rings behind junctions on one link (facts 9.4): every cable cut and healed, in every mode.
+
+use std::time::Duration;
+
+use ringcat::{Event, JunctionConnection, JunctionMode, Options, automatic};
+use ringcat_engine::topology::PortOf;
+use ringcat_sim::cable::{CableId, DeviceIndex, Endpoint, HostLink};
+use ringcat_sim::frame::Port::{self, A, B, C, D};
+use ringcat_sim::network::builder::SegmentBuilder;
+use ringcat_sim::network::{Network, NetworkOptions};
+use scenarios::check::{Delivery, troubles};
+use scenarios::segments::{descriptions, devices};
+use scenarios::world::{CYCLE, Mark, World};
+
+const MAIN: Endpoint = Endpoint::Host(HostLink::Main);
+/// What a mode and its connections make of a segment.
+type Setting<'a> = (JunctionMode, &'a [JunctionConnection]);
+
+fn at(device: usize, port: Port) -> Endpoint {
+    Endpoint::Device(DeviceIndex(device), port)
+}
+
+fn wired(kinds: &[&str], cables: &[(Endpoint, Endpoint)]) -> Network {
+    let builder = devices(descriptions(kinds)).into_iter().fold(SegmentBuilder::new(), SegmentBuilder::device);
+    let builder = cables.iter().fold(builder, |builder, (a, b)| builder.cable(*a, *b));
+    builder.options(NetworkOptions::default()).build().expect("the cables fit")
+}
+
+/// An output, a junction with a ring of three on port 3 that comes back to port 1, and two more on its port 2. The ring's
+/// cables are [`RING`], its last one closes it. Only some of them have clocks.
+const ONE: [&str; 7] =
+    ["digital-output-8", "junction", "servo", "digital-input-8", "block", "coupler", "analog-input-4"];
+const RING: [usize; 4] = [2, 3, 4, 5];
+const STRICT: JunctionConnection = JunctionConnection { head: 1, head_port: 1, tail: 4, tail_port: 1 };
+
+fn one_ring() -> Network {
+    let cables = [
+        (MAIN, at(0, A)),
+        (at(0, B), at(1, A)),
+        (at(1, D), at(2, A)),
+        (at(2, B), at(3, A)),
+        (at(3, B), at(4, A)),
+        (at(4, B), at(1, B)),
+        (at(1, C), at(5, A)),
+        (at(5, B), at(6, A)),
+    ];
+    wired(&ONE, &cables)
+}
+
+/// Both ends of a cable of [`one_ring`]'s ring, as events name them.
+fn ends(cable: usize) -> (PortOf, PortOf) {
+    let port = |node, port| PortOf { node, port };
+    match cable {
+        2 => (port(1, 3), port(2, 0)),
+        5 => (port(4, 1), port(1, 1)),
+        cable => (port(cable - 1, 1), port(cable, 0)),
+    }
+}
+
+fn world(seed: u64, network: Network, (mode, connections): Setting<'_>) -> World {
+    let options = Options { junctions: mode, ..Options::default() };
+    let declare = |scan: &ringcat::Scan| automatic(&scan.subdevices, CYCLE);
+    World::with_junctions(seed, network, &options, declare, connections).unwrap_or_else(|error| panic!("{error}"))
+}
+
+fn in_op(seed: u64, network: Network, setting: Setting<'_>) -> World {
+    let mut world = world(seed, network, setting);
+    world.settle();
+    world.run_cycles(20);
+    assert!(world.all_in_op());
+    world
+}
+
+/// Events about local rings since a point.
+fn told(world: &World, mark: Mark) -> Vec<Event> {
+    let events = world.events(mark).iter().map(|timed| timed.event.clone());
+    let of_junctions = |event: &Event| matches!(event, Event::JunctionChanged { .. } | Event::JunctionsBlocked { .. });
+    events.filter(of_junctions).collect()
+}
+
+fn crossed(world: &World, mark: Mark) -> usize {
+    world.events(mark).iter().filter(|timed| matches!(timed.event, Event::LineCrossed { .. })).count()
+}
+
+fn changed(cable: usize, broken: bool) -> Event {
+    let (near, far) = ends(cable);
+    Event::JunctionChanged { near: Some(near), far, broken, breaks: usize::from(broken) }
+}
+
+/// One edge in OP: nobody leaves it, at most one cycle is incomplete, process data is complete again.
+fn edge(world: &mut World, what: &str, act: impl FnOnce(&mut World)) -> Mark {
+    let mark = world.mark();
+    act(world);
+    world.run_cycles(120);
+    assert_eq!(world.left_op(mark), [], "{what}");
+    assert_eq!(troubles(world.events(mark)), Vec::<&Event>::new(), "{what}");
+    assert!(world.incomplete(mark) <= 1, "{what}: {} cycles", world.incomplete(mark));
+    assert_eq!(world.judged(mark).last().map(|judged| judged.delivery), Some(Delivery::Complete), "{what}");
+    mark
+}
+
+#[test]
+fn every_cable_of_a_ring_behind_a_junction_is_cut_and_healed_in_op_jr_01_jr_07() {
+    for setting in [(JunctionMode::Automatic, &[][..]), (JunctionMode::Strict, &[STRICT])] {
+        let mut world = in_op(1, one_ring(), setting);
+        assert_eq!(told(&world, world.beginning()), [], "it is whole");
+        for cable in RING {
+            for phase in [0, 40, 500] {
+                let what = format!("{setting:?}, cable {cable}, phase {phase}");
+                let cut = |world: &mut World| {
+                    world.fault_in(CYCLE * phase / 1000, ringcat_sim::fault::Fault::Cut(CableId(cable)))
+                };
+                let mark = edge(&mut world, &what, cut);
+                assert_eq!(told(&world, mark), [changed(cable, true)], "{what}");
+                let heal = |world: &mut World| {
+                    world.fault_in(CYCLE * phase / 1000, ringcat_sim::fault::Fault::Heal(CableId(cable)))
+                };
+                let mark = edge(&mut world, &what, heal);
+                assert_eq!(told(&world, mark), [changed(cable, false)], "{what}");
+            }
+        }
+        assert_eq!(crossed(&world, world.beginning()), 0, "LC-06");
+        assert!(world.compared() > 10_000);
+    }
+}
+
+#[test]
+fn a_ring_behind_a_junction_that_is_broken_from_the_start_is_told_jr_03() {
+    for setting in [(JunctionMode::Automatic, &[][..]), (JunctionMode::Strict, &[STRICT])] {
+        for cable in RING {
+            let mut network = one_ring();
+            network.cut(CableId(cable));
+            let mut world = in_op(2, network, setting);
+            world.run_cycles(100);
+            let what = format!("{setting:?}, cable {cable}");
+            let told_then = told(&world, world.beginning());
+            assert_eq!(troubles(world.events(world.beginning())), Vec::<&Event>::new(), "{what}");
+            assert_eq!(crossed(&world, world.beginning()), 0, "{what}");
+            if cable == 5 && setting.0 == JunctionMode::Automatic {
+                // Nothing shows that there could be a ring.
+                assert_eq!(told_then, []);
+                continue;
+            }
+            let (near, far) = ends(cable);
+            // What is before the break is not known yet, but where the closing cable is was declared.
+            let near = (cable == 5).then_some(near);
+            assert_eq!(told_then, [Event::JunctionChanged { near, far, broken: true, breaks: 1 }], "{what}");
+            let mark = edge(&mut world, &what, |world| world.heal(CableId(cable)));
+            assert_eq!(told(&world, mark), [Event::JunctionChanged { near, far, broken: false, breaks: 0 }], "{what}");
+            // Afterwards it is known as a whole.
+            for cable in RING {
+                let mark = edge(&mut world, &what, |world| world.cut(CableId(cable)));
+                assert_eq!(told(&world, mark), [changed(cable, true)], "{what}");
+                edge(&mut world, &what, |world| world.heal(CableId(cable)));
+            }
+        }
+    }
+}
+
+#[test]
+fn a_ring_behind_a_junction_that_breaks_during_start_up_comes_to_op() {
+    for at_us in (0..60_000).step_by(4_000) {
+        for cable in [2, 4, 5] {
+            let mut network = one_ring();
+            network.schedule(
+                ringcat_sim::time::SimTime::from_micros(at_us),
+                ringcat_sim::fault::Fault::Cut(CableId(cable)),
+            );
+            let mut world = in_op(at_us, network, (JunctionMode::Strict, &[STRICT]));
+            world.run_cycles(50);
+            let told = told(&world, world.beginning());
+            assert_eq!(told.len(), 1, "cut at {at_us} us: {told:?}");
+            let lost = world.saw(world.beginning(), |event| matches!(event, Event::Lost { .. }));
+            assert!(!lost, "cut at {at_us} us, cable {cable}");
+        }
+    }
+}
+
+/// Two junctions in a row, each with a ring of two, and an input behind them.
+fn two_rings() -> Network {
+    let kinds = ["junction", "digital-output-8", "servo", "junction", "digital-input-8", "servo", "digital-input-8"];
+    let cables = [
+        (MAIN, at(0, A)),
+        (at(0, D), at(1, A)),
+        (at(1, B), at(2, A)),
+        (at(2, B), at(0, B)),
+        (at(0, C), at(3, A)),
+        (at(3, D), at(4, A)),
+        (at(4, B), at(5, A)),
+        (at(5, B), at(3, B)),
+        (at(3, C), at(6, A)),
+    ];
+    wired(&kinds, &cables)
+}
+
+const TWO_STRICT: [JunctionConnection; 2] = [
+    JunctionConnection { head: 0, head_port: 1, tail: 2, tail_port: 1 },
+    JunctionConnection { head: 3, head_port: 1, tail: 5, tail_port: 1 },
+];
+
+#[test]
+fn of_two_rings_either_may_break_and_a_second_break_is_told_for_what_it_is_jr_02() {
+    for setting in [(JunctionMode::Automatic, &[][..]), (JunctionMode::Strict, &TWO_STRICT)] {
+        let mut world = in_op(3, two_rings(), setting);
+        for cable in [1, 2, 3, 5, 6, 7] {
+            let what = format!("{setting:?}, cable {cable}");
+            let mark = edge(&mut world, &what, |world| world.cut(CableId(cable)));
+            assert_eq!(told(&world, mark).len(), 1, "{what}");
+            let mark = edge(&mut world, &what, |world| world.heal(CableId(cable)));
+            assert_eq!(told(&world, mark).len(), 1, "{what}");
+        }
+        // The second ring breaks too: frames are destroyed at the second unconnected port 0.
+        edge(&mut world, "first break", |world| world.cut(CableId(2)));
+        let mark = world.mark();
+        world.cut(CableId(6));
+        world.run_cycles(300);
+        assert_eq!(told(&world, mark), [Event::JunctionsBlocked { blocked: true }]);
+        assert_eq!(world.judged(mark).last().map(|judged| judged.delivery), Some(Delivery::Zero));
+        assert!(!world.saw(mark, |event| matches!(event, Event::Lost { .. })), "nobody knows who is there");
+        // One of them is mended: everybody comes back, the other one is still broken.
+        world.heal(CableId(6));
+        world.until(Duration::from_secs(3), "all in OP", |w| w.all_in_op() && w.application().all_settled());
+        world.run_cycles(100);
+        assert_eq!(told(&world, mark)[1..], [Event::JunctionsBlocked { blocked: false }]);
+        let mark = edge(&mut world, "first break healed", |world| world.heal(CableId(2)));
+        assert!(matches!(told(&world, mark)[..], [Event::JunctionChanged { broken: false, breaks: 0, .. }]));
+    }
+}
+
+#[test]
+fn two_breaks_in_one_ring_cut_off_what_is_between_them_and_nobody_else() {
+    let mut world = in_op(4, one_ring(), (JunctionMode::Automatic, &[]));
+    edge(&mut world, "first break", |world| world.cut(CableId(3)));
+    let mark = world.mark();
+    world.cut(CableId(4));
+    world.until(Duration::from_millis(60), "3 is lost", |world| {
+        world.saw(mark, |event| *event == Event::Lost { subdevice: 3 })
+    });
+    world.run_cycles(200);
+    let (near, far) = ends(4);
+    assert_eq!(told(&world, mark), [Event::JunctionChanged { near: Some(near), far, broken: true, breaks: 2 }]);
+    assert_eq!(world.judged(mark).last().map(|judged| judged.stale.clone()), Some(vec![3]));
+    world.heal(CableId(3));
+    world.until(Duration::from_secs(3), "all in OP", |world| world.all_in_op() && world.application().all_settled());
+    edge(&mut world, "second repair", |world| world.heal(CableId(4)));
+    let left: Vec<usize> = world.left_op(mark).iter().map(|device| device.0).collect();
+    assert!(left.iter().all(|device| *device == 3), "{left:?}: the others go on");
+    assert!(matches!(told(&world, mark).last(), Some(Event::JunctionChanged { broken: false, breaks: 0, .. })));
+}
+
+#[test]
+fn a_member_that_loses_its_power_breaks_the_ring_at_both_its_ports_and_comes_back() {
+    let mut world = in_op(5, one_ring(), (JunctionMode::Strict, &[STRICT]));
+    let mark = world.mark();
+    world.power_off(DeviceIndex(3));
+    world.run_cycles(100);
+    assert_eq!(told(&world, mark).len(), 2);
+    world.power_on(DeviceIndex(3));
+    world.until(Duration::from_secs(5), "all in OP", |world| world.all_in_op() && world.application().all_settled());
+    world.run_cycles(100);
+    assert_eq!(told(&world, mark).len(), 4);
+    assert!(world.left_op(mark).iter().all(|device| device.0 == 3));
+}
+
+#[test]
+fn a_cut_in_the_line_loses_what_is_behind_it_and_is_no_matter_of_the_ring() {
+    let mut world = in_op(6, one_ring(), (JunctionMode::Automatic, &[]));
+    let mark = world.mark();
+    world.cut(CableId(6));
+    world.run_cycles(200);
+    assert_eq!(told(&world, mark), []);
+    for subdevice in 0..7 {
+        assert_eq!(world.saw(mark, |event| *event == Event::Lost { subdevice }), subdevice >= 5);
+    }
+    world.heal(CableId(6));
+    world.until(Duration::from_secs(3), "all in OP", |world| world.all_in_op() && world.application().all_settled());
+    assert!(world.left_op(mark).iter().all(|device| device.0 >= 5));
+}
