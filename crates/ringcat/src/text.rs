@@ -85,14 +85,18 @@ pub fn describe(event: &Event, names: &Names) -> String {
             let place = format!("between {before} and {}", names.port(*far));
             match (broken, breaks) {
                 (true, 0 | 1) => format!("Line break {place}: the ring behind the junction goes on without this cable"),
-                (true, _) => format!("Line break {place}: {breaks} cables of rings behind junctions are broken, one is tolerated"),
+                (true, _) => {
+                    format!(
+                        "Line break {place}: {breaks} cables of rings behind junctions are broken, one is tolerated"
+                    )
+                }
                 (false, 0) => format!("Line is fixed {place}"),
                 (false, _) => format!("Line is fixed {place}: broken cables left: {breaks}"),
             }
         }
         Event::JunctionsBlocked { blocked: true } => {
-            "no frame comes back while a ring behind a junction is open: a second one is open too, or the cable of the interface"
-                .to_owned()
+            let why = "a second one is open too, or the cable of the interface";
+            format!("no frame comes back while a ring behind a junction is open: {why}")
         }
         Event::JunctionsBlocked { blocked: false } => "frames come back again".to_owned(),
         Event::StateReached { subdevice, state } => format!("{}: {state}", names.of(*subdevice)),

@@ -1,10 +1,10 @@
 //! Finding out where local rings close, at a scan in mode automatic (JR-03).
 //!
-//! Open ports allow several answers ([`candidates`]), so each is tried: both ends of a supposed closing cable are closed
-//! for a moment, in one frame. If it is that cable, the ring is open there and all SubDevices still answer; any other pair
-//! of ports cuts somebody off. Where the ring is broken already, the end at the junction alone is closed, and those between
-//! the break and the closing cable, and nobody else, must fall silent. The loops return to what they were in any case:
-//! the setting is temporary (facts 2.2, DL control bit 1).
+//! Open ports allow several answers ([`candidates`]), so each is tried: both ends of a supposed closing cable are
+//! closed for a moment, in one frame. If it is that cable, the ring is open there and all SubDevices still answer; any
+//! other pair of ports cuts somebody off. Where the ring is broken already, the end at the junction alone is closed, and
+//! those between the break and the closing cable, and nobody else, must fall silent. The loops return to what they were
+//! in any case: the setting is temporary (facts 2.2, DL control bit 1).
 
 use alloc::vec::Vec;
 use core::time::Duration;

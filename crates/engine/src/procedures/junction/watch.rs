@@ -1,5 +1,5 @@
-//! What becomes of local rings in operation: which of their cables are broken, seen in the DL status of the SubDevices at
-//! both ends (JR-09), and whether frames still come back at all (JR-02).
+//! What becomes of local rings in operation: which of their cables are broken, seen in the DL status of the SubDevices
+//! at both ends (JR-09), and whether frames still come back at all (JR-02).
 
 use alloc::rc::Rc;
 use alloc::vec::Vec;
