@@ -54,8 +54,8 @@ impl Rings {
         let fits = |closing: &&Closing| closing.head.node < closing.tail.node && closing.tail.node < count;
         let closings: Vec<Closing> = closings.iter().filter(fits).copied().collect();
         let mut rings = Rings { closings, orphans: Vec::new(), untimed: alloc::vec![false; count] };
-        for node in 0..count {
-            if unconnected(&status[node]) && rings.around(node).is_some() {
+        for (node, status) in status.iter().enumerate() {
+            if unconnected(status) && rings.around(node).is_some() {
                 rings.orphans.push(node);
             }
         }
