@@ -8,6 +8,7 @@ pub mod bus;
 mod executor;
 mod flights;
 mod group;
+mod outbox;
 mod round_trip;
 mod shared;
 mod signal;

@@ -20,6 +20,7 @@ pub mod meddler;
 pub mod namespaces;
 pub mod phases;
 pub mod segments;
+pub mod start_lists;
 pub mod tap;
 pub mod terminals;
 pub mod world;

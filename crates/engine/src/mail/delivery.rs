@@ -20,21 +20,22 @@ const AOE_RESPONSE: u8 = 0x01;
 /// EoE types that are answers: set IP, set filter, get IP, get filter (facts 6.5).
 const EOE_ANSWERS: [u8; 4] = [3, 5, 7, 9];
 
-/// Takes in the content of the send mailbox. Any bytes are allowed.
-pub(super) fn deliver(room: &Rc<Room>, mail: &[u8], way: Way) {
-    {
+/// Takes in the content of the send mailbox. Any bytes are allowed. True where somebody waited for it.
+pub(super) fn deliver(room: &Rc<Room>, mail: &[u8], way: Way) -> bool {
+    let wanted = {
         let state = &mut *room.state();
         let Ok(message) = Message::decode(mail) else {
             state.counters.malformed += 1;
-            return;
+            return false;
         };
         if is_double(state, &message, way, room.bus.now()) {
             state.counters.duplicates += 1;
-            return;
+            return false;
         }
-        sort(room, state, &message);
-    }
+        sort(room, state, &message)
+    };
     room.news.notify();
+    wanted
 }
 
 fn is_double(state: &mut State, message: &Message<'_>, way: Way, now: Instant) -> bool {
@@ -45,49 +46,49 @@ fn is_double(state: &mut State, message: &Message<'_>, way: Way, now: Instant) -
     double
 }
 
-fn sort(room: &Rc<Room>, state: &mut State, message: &Message<'_>) {
+fn sort(room: &Rc<Room>, state: &mut State, message: &Message<'_>) -> bool {
     let payload = message.payload;
     let first = payload.first().copied().unwrap_or(0);
     match message.header.protocol {
-        Protocol::Error => refused(state, room, payload),
+        Protocol::Error => refused(state, payload),
         Protocol::Coe => coe(room, state, message),
-        Protocol::Foe => answer(room, state, Lane::Foe, message, Unsolicited::Other),
-        Protocol::Soe if SOE_ANSWERS.contains(&(first & 0x07)) => {
-            answer(room, state, Lane::Soe, message, Unsolicited::Other);
-        }
+        Protocol::Foe => answer(state, Lane::Foe, message, Unsolicited::Other),
+        Protocol::Soe if SOE_ANSWERS.contains(&(first & 0x07)) => answer(state, Lane::Soe, message, Unsolicited::Other),
         Protocol::Soe => shelve(state, message, Unsolicited::Soe),
         Protocol::Aoe if payload.get(AOE_FLAGS_AT).is_some_and(|flags| flags & AOE_RESPONSE != 0) => {
-            answer(room, state, Lane::Aoe, message, Unsolicited::Other);
+            answer(state, Lane::Aoe, message, Unsolicited::Other)
         }
         Protocol::Aoe => shelve(state, message, Unsolicited::Aoe),
-        Protocol::Voe => answer(room, state, Lane::Voe, message, Unsolicited::Voe),
-        Protocol::Eoe if EOE_ANSWERS.contains(&(first & 0x0F)) => {
-            answer(room, state, Lane::Eoe, message, Unsolicited::Other);
+        Protocol::Voe => answer(state, Lane::Voe, message, Unsolicited::Voe),
+        Protocol::Eoe if EOE_ANSWERS.contains(&(first & 0x0F)) => answer(state, Lane::Eoe, message, Unsolicited::Other),
+        Protocol::Eoe if state.ethernet.attached => {
+            state.ethernet.take(payload, room.bus.now());
+            false
         }
-        Protocol::Eoe if state.ethernet.attached => state.ethernet.take(payload, room.bus.now()),
         Protocol::Eoe => shelve(state, message, Unsolicited::Ethernet),
         Protocol::Other(_) => shelve(state, message, Unsolicited::Other),
     }
 }
 
-fn coe(room: &Rc<Room>, state: &mut State, message: &Message<'_>) {
+fn coe(room: &Rc<Room>, state: &mut State, message: &Message<'_>) -> bool {
     let Some((header, rest)) = message.payload.split_first_chunk() else {
         state.counters.malformed += 1;
-        return;
+        return false;
     };
     match CoeHeader::decode(header).service {
         CoeService::Emergency => {
             let Some(bytes) = rest.first_chunk() else {
                 state.counters.malformed += 1;
-                return;
+                return false;
             };
             let emergency = Emergency::decode(bytes);
             state.shelves.emergencies().push((room.bus.now(), emergency));
             room.bus.report(Event::Emergency { subdevice: room.subdevice, emergency });
+            false
         }
         // An abort has the service of a request, whoever sends it.
         CoeService::SdoRequest | CoeService::SdoResponse | CoeService::SdoInformation => {
-            answer(room, state, Lane::Coe, message, Unsolicited::Other);
+            answer(state, Lane::Coe, message, Unsolicited::Other)
         }
         CoeService::TxPdo
         | CoeService::RxPdo
@@ -98,34 +99,37 @@ fn coe(room: &Rc<Room>, state: &mut State, message: &Message<'_>) {
 }
 
 /// To whoever waits in a lane; without one, onto a shelf.
-fn answer(room: &Rc<Room>, state: &mut State, lane: Lane, message: &Message<'_>, else_to: Unsolicited) {
-    let now = room.bus.now();
-    if !state.lanes[lane as usize].arrive(Arrival::Payload(message.payload.to_vec()), now) {
-        if else_to == Unsolicited::Other {
-            state.counters.unclaimed += 1;
-        }
-        shelve(state, message, else_to);
+fn answer(state: &mut State, lane: Lane, message: &Message<'_>, else_to: Unsolicited) -> bool {
+    let arrival = Arrival::Payload(message.payload.to_vec());
+    if state.lanes[lane as usize].arrive(arrival, state.seen) {
+        return true;
     }
+    if else_to == Unsolicited::Other {
+        state.counters.unclaimed += 1;
+    }
+    shelve(state, message, else_to)
 }
 
-fn shelve(state: &mut State, message: &Message<'_>, kind: Unsolicited) {
+fn shelve(state: &mut State, message: &Message<'_>, kind: Unsolicited) -> bool {
     let unclaimed = Unclaimed { protocol: message.header.protocol, payload: message.payload.to_vec() };
     state.shelves.ring(kind).push(unclaimed);
+    false
 }
 
 /// An error reply does not say to what. It goes to the request that waits; of several, first to one whose protocol the
 /// SubDevice has not shown to know, then to the oldest.
-fn refused(state: &mut State, room: &Rc<Room>, payload: &[u8]) {
+fn refused(state: &mut State, payload: &[u8]) -> bool {
     let Some(bytes) = payload.first_chunk() else {
         state.counters.malformed += 1;
-        return;
+        return false;
     };
     let waiting = state.lanes.iter_mut().filter(|lane| lane.waiting().is_some());
     let whose = waiting.min_by_key(|lane| (lane.proven, lane.asked.map(|asked| asked.at)));
     match whose {
-        Some(lane) => {
-            lane.arrive(Arrival::Refused(ErrorReply::decode(bytes)), room.bus.now());
+        Some(lane) => lane.arrive(Arrival::Refused(ErrorReply::decode(bytes)), state.seen),
+        None => {
+            state.counters.unclaimed += 1;
+            false
         }
-        None => state.counters.unclaimed += 1,
     }
 }

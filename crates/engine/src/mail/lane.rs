@@ -69,15 +69,17 @@ pub(super) struct Outgoing {
 pub(super) struct Asked {
     /// When it was written, or when the last part of its answer came.
     pub at: Instant,
-    /// Looks for the answer since then.
-    pub looks: u32,
+    /// Whether it was looked for.
+    pub looked: bool,
+    /// How long after that the last look found nothing.
+    pub vain: Option<Duration>,
     /// A part of the answer is there, and whoever asked has not said that more is to come.
     pub answered: bool,
 }
 
 impl Asked {
     pub(super) const fn at(at: Instant) -> Asked {
-        Asked { at, looks: 0, answered: false }
+        Asked { at, looked: false, vain: None, answered: false }
     }
 }
 
@@ -153,13 +155,27 @@ impl LaneState {
         self.written = Some((message.id, result));
     }
 
+    /// When the answer that is waited for is looked for first.
+    pub(super) fn due(&self) -> Option<Instant> {
+        self.waiting().map(|asked| asked.at + self.answer_time.first_look())
+    }
+
+    /// A look that began then, for all one knows, has found nothing.
+    pub(super) fn looked_in_vain(&mut self, seen: Instant) {
+        if let Some(asked) = self.asked.as_mut().filter(|asked| asked.looked) {
+            asked.vain = Some(seen.since(asked.at));
+        }
+    }
+
     /// The request whose answer is looked for.
     pub(super) fn waiting(&self) -> Option<&Asked> {
         self.asked.as_ref().filter(|asked| !asked.answered)
     }
 
     /// An answer, or what may be one, for whoever talks. False where nobody waits for one.
-    pub(super) fn arrive(&mut self, arrival: Arrival, now: Instant) -> bool {
+    ///
+    /// `seen` is when it was there, for all one knows.
+    pub(super) fn arrive(&mut self, arrival: Arrival, seen: Instant) -> bool {
         let Some(asked) = &mut self.asked else {
             self.late_until = None;
             return false;
@@ -167,7 +183,7 @@ impl LaneState {
         self.proven |= matches!(arrival, Arrival::Payload(_));
         if !asked.answered {
             asked.answered = true;
-            self.answer_time.took(now.since(asked.at), asked.looks <= 1);
+            self.answer_time.took(seen.since(asked.at), asked.vain);
         }
         if self.inbox.len() >= INBOX {
             self.inbox.pop_front();

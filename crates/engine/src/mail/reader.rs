@@ -8,7 +8,7 @@ use core::time::Duration;
 use ringcat_wire::address::{RegisterAddress, Wkc};
 use ringcat_wire::register::{SyncManager, SyncManagerActivate, SyncManagerPdiControl, SyncManagerStatus, map};
 
-use super::answer_time::AnswerTime;
+use super::answer_time::{AnswerTime, ShortestTrip};
 use super::delivery;
 use super::error::MailboxError;
 use super::recent::Way;
@@ -24,6 +24,10 @@ const REPEAT_LIMIT: Duration = Duration::from_millis(100);
 const REPEAT_PAUSE: Duration = Duration::from_micros(200);
 /// Pause after a failed access, so that a SubDevice that is gone is not asked without end.
 const FAILURE_PAUSE: Duration = Duration::from_millis(5);
+
+/// Kinds of accesses.
+const LOOK: usize = 0;
+const READ: usize = 1;
 
 /// Starts a reader unless one runs.
 pub(super) fn start(room: &Rc<Room>) {
@@ -64,7 +68,11 @@ async fn run(room: Rc<Room>, time: u32) {
     let (mut next_look, mut hold) = (Instant::default(), Instant::default());
     while let Some(session) = room.session(time) {
         while let Some(stray) = room.bus.stray_mail(session.station) {
-            room.state().counters.strays += 1;
+            {
+                let state = &mut *room.state();
+                state.counters.strays += 1;
+                state.seen = room.bus.now();
+            }
             let way = stray.late_since.map_or(Way::Usual, Way::Late);
             delivery::deliver(&room, &stray.mail, way);
         }
@@ -121,10 +129,10 @@ fn step(room: &Rc<Room>, next_look: Instant, hold: Instant) -> Step {
         return Step::Wait(due);
     }
     for lane in &mut state.lanes {
-        let first = lane.answer_time.first_look();
-        // A look for something else is none for an answer that is not due yet.
-        if let Some(asked) = lane.asked.as_mut().filter(|asked| !asked.answered && asked.at + first <= now) {
-            asked.looks += 1;
+        if lane.due().is_some_and(|due| due <= now)
+            && let Some(asked) = &mut lane.asked
+        {
+            asked.looked = true;
         }
     }
     if sure { Step::Read } else { Step::Look }
@@ -138,7 +146,7 @@ fn first_look(state: &super::room::State, now: Instant) -> Option<(Instant, bool
     }
     let looks = state.lanes.iter().filter_map(|lane| {
         let asked = lane.waiting()?;
-        Some((asked.at + lane.answer_time.first_look(), asked.looks == 0 && lane.answer_time.is_sure()))
+        Some((lane.due()?, !asked.looked && lane.answer_time.is_sure()))
     });
     // One that is due now comes first: it may be a read.
     let ethernet = state.ethernet.lively(now).map(|_| (now, false));
@@ -154,19 +162,34 @@ fn pause(room: &Rc<Room>, now: Instant) -> Duration {
     pause.unwrap_or(AnswerTime::pause(Duration::ZERO))
 }
 
+/// When an access that began then and has just ended would have begun, had it not waited for its turn.
+fn asked_at(bus: &Bus, begun: Instant, trip: &mut ShortestTrip) -> Instant {
+    let took = bus.now().since(begun);
+    begun + (took - trip.took(took).min(took))
+}
+
 /// Looks at the status of the send mailbox; notes where it is full.
 async fn look(room: &Rc<Room>, session: &Session) -> Result<bool, MailboxError> {
     room.state().counters.looks += 1;
     let at = map::sync_manager(SEND_SYNC_MANAGER).offset(SyncManager::STATUS);
+    let begun = room.bus.now();
     let [status] = room.bus.fprd_array(session.station, at).await?;
     let full = SyncManagerStatus::from_bits(status).mailbox_full;
-    room.state().full |= full;
+    let state = &mut *room.state();
+    let seen = asked_at(&room.bus, begun, &mut state.trips[LOOK]);
+    if full && !state.full {
+        state.full = true;
+        state.seen = seen;
+    } else if !full {
+        state.lanes.iter_mut().for_each(|lane| lane.looked_in_vain(seen));
+    }
     Ok(full)
 }
 
 /// Reads the whole send mailbox; false where it is empty.
 async fn read(room: &Rc<Room>, time: u32, session: &Session) -> Result<bool, MailboxError> {
     let register = RegisterAddress(session.layout.send_offset);
+    let begun = room.bus.now();
     let reply = room.bus.read_mail(session.station, register, usize::from(session.layout.send_size)).await;
     if room.session(time).is_none() {
         return Err(MailboxError::Closed);
@@ -176,17 +199,22 @@ async fn read(room: &Rc<Room>, time: u32, session: &Session) -> Result<bool, Mai
             let state = &mut *room.state();
             state.full = false;
             state.counters.empty_reads += 1;
+            let seen = asked_at(&room.bus, begun, &mut state.trips[READ]);
+            state.lanes.iter_mut().for_each(|lane| lane.looked_in_vain(seen));
             Ok(false)
         }
         Ok(reply) => {
             {
                 let state = &mut *room.state();
-                state.full = false;
+                let seen = asked_at(&room.bus, begun, &mut state.trips[READ]);
+                if !core::mem::take(&mut state.full) {
+                    state.seen = seen;
+                }
                 state.counters.read += 1;
             }
-            delivery::deliver(room, &reply.data, Way::Usual);
+            let wanted = delivery::deliver(room, &reply.data, Way::Usual);
             // What comes unasked seldom comes alone.
-            if !room.look().waiting() && room.look().ethernet.lively(room.bus.now()).is_none() {
+            if !wanted && !room.look().waiting() && room.look().ethernet.lively(room.bus.now()).is_none() {
                 look(room, session).await?;
             }
             Ok(true)

@@ -9,6 +9,7 @@ use ringcat_wire::address::StationAddress;
 use ringcat_wire::mailbox::Header;
 use ringcat_wire::sii::MailboxLayout;
 
+use super::answer_time::ShortestTrip;
 use super::counters::MailCounters;
 use super::eoe::Traffic;
 use super::error::MailboxError;
@@ -17,6 +18,7 @@ use super::recent::Recent;
 use super::unsolicited::Shelves;
 use super::{reader, writer};
 use crate::supervisor::{Bus, Signal};
+use crate::time::Instant;
 
 /// What the SubDevice and we have counted so far. It lasts from PREOP to INIT, also while the SubDevice does not answer.
 #[derive(Clone, Copy, Debug)]
@@ -48,6 +50,10 @@ pub(super) struct State {
     pub full: bool,
     /// Somebody wants to know whether the send mailbox is full.
     pub curious: bool,
+    /// When the mail that is read was there, for all one knows.
+    pub seen: Instant,
+    /// How long accesses take: looks, and reads.
+    pub trips: [ShortestTrip; 2],
     /// The receive mailbox is full, and may stay so until the send mailbox is read.
     pub blocked: bool,
     /// A read was lost: its mail has to be asked for again.
@@ -88,6 +94,8 @@ impl Room {
             reader: None,
             full: false,
             curious: false,
+            seen: Instant::default(),
+            trips: Default::default(),
             blocked: false,
             repeat: false,
             tasks: 0,
@@ -170,7 +178,11 @@ impl Room {
 
     /// There may be mail.
     pub(super) fn is_full(self: &Rc<Room>) {
-        self.state().full = true;
+        {
+            let state = &mut *self.state();
+            state.full = true;
+            state.seen = self.bus.now();
+        }
         reader::start(self);
     }
 

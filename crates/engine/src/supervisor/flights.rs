@@ -12,6 +12,7 @@ use ringcat_wire::frame::{FrameBuilder, MAX_FRAME, MacAddress};
 
 use super::Received;
 use super::bus::{BusError, Reply};
+use super::outbox::Rank;
 use super::shared::Shared;
 use super::stray::{Overdue, Stray};
 use super::transfer::{Stage, TransferId};
@@ -101,7 +102,11 @@ struct Flight {
     bytes: Vec<u8>,
     arrivals: Arrivals,
     sent_at: Instant,
+    /// When the interface has sent it, if it sends nothing else meanwhile.
+    left_at: Instant,
     deadline: Instant,
+    /// Bytes of its reads of mailboxes, while they are under way.
+    reads: usize,
     /// Answered already; kept so that the second copy is recognised.
     answered: bool,
     /// No copy is waited for, because the link is silent on which the missing one was sent; no room is kept for it.
@@ -170,7 +175,9 @@ impl Flights {
             bytes: Vec::with_capacity(MAX_FRAME),
             arrivals: Arrivals::default(),
             sent_at: Instant::NEVER,
+            left_at: Instant::NEVER,
             deadline: Instant::NEVER,
+            reads: 0,
             answered: false,
             released: false,
         });
@@ -178,6 +185,7 @@ impl Flights {
         flight.places.clear();
         flight.bytes.clear();
         flight.arrivals = Arrivals::default();
+        flight.reads = 0;
         flight.answered = false;
         flight.released = false;
         flight
@@ -188,7 +196,7 @@ impl Shared {
     /// Packs what waits in the outbox into frames and sends them, within the budget and the window.
     pub(super) fn transmit(&mut self, budget: usize, transmit: &mut impl FnMut(Link, &[u8])) -> usize {
         let mut used = 0;
-        while !self.outbox.is_empty() && self.flights.has_room() && used < budget {
+        while self.outbox.is_ready(self.now) && self.flights.has_room() && used < budget {
             let limit = (budget - used).min(MAX_FRAME);
             let Some(flight) = self.pack(limit) else { break };
             self.blocked = None;
@@ -237,13 +245,14 @@ impl Shared {
             let source = self.identity.source();
             let mut builder = FrameBuilder::ethernet(&mut flight.bytes, MacAddress::ETHERCAT_GROUP, source)?;
             let mut total = DATAGRAMS_AT;
-            while let Some(&id) = self.outbox.front() {
+            let reads = self.outbox.may_read(self.now);
+            while let Some((id, rank)) = self.outbox.front(reads, self.now) {
                 let Some(transfer) = self.transfers.find(id) else {
-                    self.outbox.pop_front();
+                    self.outbox.pop(rank);
                     continue;
                 };
                 if transfer.abandoned {
-                    self.outbox.pop_front();
+                    self.outbox.pop(rank);
                     self.transfers.remove(id);
                     continue;
                 }
@@ -282,7 +291,11 @@ impl Shared {
                     answered: false,
                 });
                 transfer.stage = Stage::InFlight;
-                self.outbox.pop_front();
+                self.outbox.pop(rank);
+                if rank == Rank::Read {
+                    flight.reads += bytes;
+                    self.outbox.set_out(bytes);
+                }
             }
             builder.finish()
         };
@@ -294,7 +307,9 @@ impl Shared {
         }
         self.flights.sequence = sequence;
         flight.sent_at = self.now;
-        flight.deadline = self.now + self.round_trip.wait(retry);
+        let (begins, left_at) = self.outbox.hand_over(flight.bytes.len(), self.now);
+        flight.left_at = left_at;
+        flight.deadline = begins + self.round_trip.wait(retry);
         Some(flight)
     }
 
@@ -318,6 +333,7 @@ impl Shared {
             return Received::Late;
         }
         self.round_trip.took(self.now.since(flight.sent_at));
+        self.outbox.took(self.now.since(flight.left_at));
         for read in flight.second_reads() {
             if let Some(mail) = read.mail(bytes) {
                 self.strays.keep(read.station, Stray { mail, late_since: None });
@@ -359,6 +375,7 @@ impl Shared {
         if !flight.answered && flight.places.iter().all(|place| place.answered) {
             flight.answered = true;
             self.counters.received += 1;
+            self.outbox.came_back(core::mem::take(&mut flight.reads));
         }
         self.flights.slots[slot] = Some(flight);
     }
@@ -406,6 +423,7 @@ impl Shared {
     fn expire(&mut self, slot: usize) {
         let Some(flight) = self.flights.take(slot) else { return };
         self.monitor.observe(flight.arrivals);
+        self.outbox.came_back(flight.reads);
         flight.mail_reads().for_each(|read| self.strays.remember(read));
         if !flight.answered {
             if flight.arrivals.arrived == 0 {
@@ -432,7 +450,7 @@ impl Shared {
             transfer.retries += 1;
             transfer.stage = Stage::Queued;
             self.counters.resent += 1;
-            self.outbox.push_back(id);
+            self.outbox.push(id, Rank::First, 0, self.now);
             return;
         }
         let error = BusError::Lost { target: transfer.request.target, retries: transfer.retries };

@@ -4,11 +4,12 @@ use alloc::collections::{BinaryHeap, VecDeque};
 use alloc::sync::Arc;
 use core::cmp::Reverse;
 
-use ringcat_wire::datagram::MAX_DATA;
+use ringcat_wire::datagram::{MAX_DATA, OVERHEAD};
 
 use super::bus::BusError;
 use super::executor::{Task, TaskId};
 use super::flights::{AcyclicCounters, Flights};
+use super::outbox::{Outbox, Rank};
 use super::round_trip::RoundTrip;
 use super::silence::Silence;
 use super::stray::Strays;
@@ -28,7 +29,7 @@ pub(crate) struct Shared {
     pub(crate) counters: AcyclicCounters,
     pub(crate) events: EventLog,
     pub(crate) transfers: Transfers,
-    pub(crate) outbox: VecDeque<TransferId>,
+    pub(crate) outbox: Outbox,
     pub(crate) flights: Flights,
     pub(crate) silence: Silence,
     pub(crate) strays: Strays,
@@ -54,7 +55,7 @@ impl Shared {
             counters: AcyclicCounters::default(),
             events: EventLog::default(),
             transfers: Transfers::default(),
-            outbox: VecDeque::new(),
+            outbox: Outbox::default(),
             flights: Flights::new(),
             silence: Silence::default(),
             strays: Strays::default(),
@@ -100,14 +101,11 @@ impl Shared {
             return Some(self.now);
         }
         let timer = self.timers.peek().map(|Reverse((at, _))| *at);
-        match (timer, self.flights.next_deadline()) {
-            (Some(a), Some(b)) => Some(a.min(b)),
-            (a, b) => a.or(b),
-        }
+        [timer, self.flights.next_deadline(), self.outbox.next_deadline(self.now)].into_iter().flatten().min()
     }
 
     pub(crate) fn wants_to_send(&self) -> bool {
-        !self.outbox.is_empty()
+        self.outbox.is_ready(self.now)
     }
 
     /// Queues a datagram for the current task. One that no frame can carry fails at once.
@@ -116,9 +114,10 @@ impl Shared {
         let fits = length <= MAX_DATA;
         let stage =
             if fits { Stage::Queued } else { Stage::Done(Err(BusError::TooLong { target: request.target, length })) };
+        let rank = if request.mail.is_some() { Rank::Read } else { Rank::First };
         let id = self.transfers.insert(Transfer { request, stage, task: self.current, retries: 0, abandoned: false });
         if fits {
-            self.outbox.push_back(id);
+            self.outbox.push(id, rank, OVERHEAD + length, self.now);
         } else {
             self.wake(self.current);
         }

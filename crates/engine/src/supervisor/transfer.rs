@@ -49,6 +49,17 @@ pub(crate) struct Transfer {
     pub abandoned: bool,
 }
 
+#[cfg(test)]
+impl Transfer {
+    /// A datagram to nobody.
+    pub(crate) fn for_test() -> Transfer {
+        let (command, target) = (Command::Nop, Target::None);
+        let (redundant, expected, resend, lead, mail) = (None, None, false, None, None);
+        let request = Request { command, target, data: Vec::new(), redundant, expected, resend, lead, mail };
+        Transfer { request, stage: Stage::Queued, task: TaskId(0), retries: 0, abandoned: false }
+    }
+}
+
 /// A transfer in the table; the generation tells re-used places apart.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct TransferId {
