@@ -8,6 +8,7 @@ use core::sync::atomic::{AtomicU32, AtomicU64, Ordering};
 
 use ringcat_wire::address::Wkc;
 
+use crate::link::Link;
 use crate::ring::RingState;
 
 /// What one supervision datagram brought back: a BRD of AL status.
@@ -17,11 +18,18 @@ pub struct Supervision {
     pub main: Wkc,
     /// SubDevices that the redundant copy met.
     pub redundant: Wkc,
-    /// OR of all AL status words.
-    pub al_status: u16,
+    /// OR of the lower bytes of all AL status words, by the copy that read them.
+    pub al_status: [u8; 2],
     /// OR of all ECAT event requests (register 0x0210 under its mask).
     pub irq: u16,
+    /// A copy came back on the link it was sent on: these are counts of an open ring, or of one link.
+    pub returned: bool,
 }
+
+/// Bits of both AL status bytes that are kept: the upper two say nothing (facts 5.3).
+const AL_MASK: u16 = 0x3F3F;
+/// Where [`Supervision::returned`] travels: among those that are left out of AL status.
+const RETURNED_BIT: u32 = 32 + 15;
 
 impl Supervision {
     /// SubDevices that answered on either copy.
@@ -30,15 +38,20 @@ impl Supervision {
     }
 
     const fn pack(self) -> u64 {
-        self.main.0 as u64 | (self.redundant.0 as u64) << 16 | (self.al_status as u64) << 32 | (self.irq as u64) << 48
+        self.main.0 as u64
+            | (self.redundant.0 as u64) << 16
+            | ((u16::from_le_bytes(self.al_status) & AL_MASK) as u64) << 32
+            | (self.returned as u64) << RETURNED_BIT
+            | (self.irq as u64) << 48
     }
 
     const fn unpack(word: u64) -> Supervision {
         Supervision {
             main: Wkc(word as u16),
             redundant: Wkc((word >> 16) as u16),
-            al_status: (word >> 32) as u16,
+            al_status: ((word >> 32) as u16 & AL_MASK).to_le_bytes(),
             irq: (word >> 48) as u16,
+            returned: word >> RETURNED_BIT & 1 != 0,
         }
     }
 }
@@ -50,6 +63,46 @@ pub struct RingWord {
     pub state: RingState,
     /// How often it changed, so that a quick double change is seen too.
     pub changes: u32,
+    /// In an open ring the first copy that showed it: the link it was sent on and came back on, and the SubDevices it
+    /// met, where it carried a supervision datagram.
+    pub returned: Option<(Link, u16)>,
+    /// The link whose copies do not come back though those of the other one cross the ring.
+    pub dead_way: Option<Link>,
+}
+
+impl RingWord {
+    /// State in bits 0 and 1, link that returned plus one in 2 and 3, dead way plus one in 4 and 5, SubDevices in 16 to
+    /// 31, changes above.
+    const fn pack(self) -> u64 {
+        let state = match self.state {
+            RingState::Unknown => 0,
+            RingState::Closed => 1,
+            RingState::Open => 2,
+        };
+        let (returned, count) = match self.returned {
+            None => (0, 0),
+            Some((link, count)) => (link.index() as u64 + 1, count as u64),
+        };
+        let dead_way = match self.dead_way {
+            None => 0,
+            Some(link) => link.index() as u64 + 1,
+        };
+        state | returned << 2 | dead_way << 4 | count << 16 | (self.changes as u64) << 32
+    }
+
+    fn unpack(word: u64) -> RingWord {
+        let link = |bits: u64| (bits & 3).checked_sub(1).and_then(|index| Link::ALL.get(index as usize).copied());
+        RingWord {
+            state: match word & 3 {
+                1 => RingState::Closed,
+                2 => RingState::Open,
+                _ => RingState::Unknown,
+            },
+            changes: (word >> 32) as u32,
+            returned: link(word >> 2).map(|link| (link, (word >> 16) as u16)),
+            dead_way: link(word >> 4),
+        }
+    }
 }
 
 /// The shared words.
@@ -114,25 +167,16 @@ impl Board {
         (count != 0).then(|| (count, Supervision::unpack(self.supervision.load(Ordering::Relaxed))))
     }
 
-    pub(crate) fn post_ring(&self, state: RingState) {
-        let changes = ((self.ring.load(Ordering::Relaxed) >> 32) as u32).wrapping_add(1);
-        let code = match state {
-            RingState::Unknown => 0,
-            RingState::Closed => 1,
-            RingState::Open => 2,
-        };
-        self.ring.store(code | u64::from(changes) << 32, Ordering::Release);
+    /// The state of the ring; its changes are counted here.
+    pub(crate) fn post_ring(&self, word: RingWord) {
+        let before = RingWord::unpack(self.ring.load(Ordering::Relaxed));
+        let changes = before.changes.wrapping_add(u32::from(before.state != word.state));
+        self.ring.store(RingWord { changes, ..word }.pack(), Ordering::Release);
     }
 
     /// The state of the ring as the exchange sees it.
     pub fn ring(&self) -> RingWord {
-        let word = self.ring.load(Ordering::Acquire);
-        let state = match word as u32 {
-            1 => RingState::Closed,
-            2 => RingState::Open,
-            _ => RingState::Unknown,
-        };
-        RingWord { state, changes: (word >> 32) as u32 }
+        RingWord::unpack(self.ring.load(Ordering::Acquire))
     }
 
     pub(crate) fn post_cycle(&self) {
@@ -183,10 +227,24 @@ mod tests {
     fn the_latest_supervision_result_is_read_with_its_number() {
         let board = Board::new(1);
         assert_eq!(board.supervision(), None);
-        let first = Supervision { main: Wkc(3), redundant: Wkc(1), al_status: 0x18, irq: 4 };
+        let first = Supervision { main: Wkc(3), redundant: Wkc(1), al_status: [0x18, 8], irq: 4, returned: false };
         board.post_supervision(first);
-        board.post_supervision(Supervision { irq: 0x8004, ..first });
-        assert_eq!(board.supervision(), Some((2, Supervision { irq: 0x8004, ..first })));
+        board.post_supervision(Supervision { irq: 0x8004, returned: true, ..first });
+        assert_eq!(board.supervision(), Some((2, Supervision { irq: 0x8004, returned: true, ..first })));
+    }
+
+    #[test]
+    fn the_state_of_the_ring_survives_the_word() {
+        let board = Board::new(1);
+        assert_eq!(board.ring(), RingWord::default());
+        let open =
+            RingWord { state: RingState::Open, changes: 1, returned: Some((Link::Redundant, 700)), dead_way: None };
+        board.post_ring(open);
+        assert_eq!(board.ring(), open);
+        let closed = RingWord { state: RingState::Closed, changes: 2, returned: None, dead_way: Some(Link::Main) };
+        board.post_ring(RingWord { changes: 0, ..closed });
+        board.post_ring(RingWord { changes: 0, ..closed });
+        assert_eq!(board.ring(), closed, "a change is counted once");
     }
 
     #[test]

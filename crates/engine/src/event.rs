@@ -12,6 +12,7 @@ use ringcat_wire::sii::Identity;
 use crate::domain::{DomainState, DomainStatus};
 use crate::link::Link;
 use crate::queue::WORDS;
+use crate::ring_status::{Cable, CableErrors, RedundancyLoss};
 use crate::time::Instant;
 use crate::topology::{Closing, PortOf};
 
@@ -126,10 +127,8 @@ pub enum Event {
     },
     /// The place of the break, from the topology.
     BreakLocated {
-        /// Last SubDevice before the break, `None` for the main link itself.
-        after: Option<Position>,
-        /// First SubDevice behind it, `None` for the redundant link itself.
-        before: Option<Position>,
+        /// The cable that is broken; its ends are ports of SubDevices by position, or interfaces of the host.
+        cable: Cable,
     },
     /// The ring closed again (RED_LINEFIXED).
     RingClosed {
@@ -137,6 +136,36 @@ pub enum Event {
         main: u16,
         /// SubDevices on the redundant link.
         redundant: u16,
+    },
+    /// The ring opens and closes so often that not every change is told any more: the next one when it has been steady
+    /// for a second.
+    RingUnsteady {
+        /// How often it changed since activation.
+        changes: u32,
+    },
+    /// The next break isolates somebody. This is no fault of the bus: everybody is still reached.
+    RedundancyLost {
+        /// Why.
+        cause: RedundancyLoss,
+    },
+    /// The ring is closed again and passes frames both ways.
+    RedundancyRegained,
+    /// Frames get damaged on a cable, again and again. Told of each cable once in ten seconds at the most.
+    CableErrors {
+        /// Which cable.
+        cable: Cable,
+        /// What its ends have counted since it was told of last.
+        errors: CableErrors,
+    },
+    /// An interface has no carrier any more.
+    LinkDown {
+        /// Which one.
+        link: Link,
+    },
+    /// An interface has its carrier back.
+    LinkUp {
+        /// Which one.
+        link: Link,
     },
     /// A SubDevice reached a state.
     StateReached {

@@ -24,7 +24,7 @@ pub use domain::Domain;
 pub use entry::Entry;
 pub use foreign::ForeignFrame;
 
-use crate::board::Board;
+use crate::board::{Board, RingWord};
 use crate::domain::{DomainId, DomainState, DomainStatus, Freshness};
 use crate::event::CyclicEvent;
 use crate::layout::Layout;
@@ -127,7 +127,13 @@ impl Exchange {
         };
         let Some(domain) = self.domains.get_mut(frame.domain()) else { return Received::Other };
         match frame.receive(copy, arrived_on, bytes, self.links.mask(), domain.image_mut(), self.cycle) {
-            Step::Waiting => Received::Taken,
+            Step::Waiting => {
+                // Told at once: the other copy may never come.
+                if frame.arrivals().returned != 0 && self.monitor.state() != RingState::Open {
+                    observe(frame, &mut self.monitor, &self.board);
+                }
+                Received::Taken
+            }
             Step::Finished => {
                 self.counters.received += 1;
                 close(frame, &mut self.monitor, &self.board);
@@ -346,13 +352,29 @@ fn give_up_overdue(
 
 /// A flight is over: what it proves about the ring and what its supervision datagram saw go on the board.
 fn close(frame: &mut CyclicFrame, monitor: &mut RingMonitor, board: &Board) {
-    if let Some(state) = monitor.observe(frame.arrivals()) {
-        board.post_ring(state);
-    }
+    // Counts first: whoever sees the change finds those that belong to it.
     if let Some(supervision) = frame.supervision() {
         board.post_supervision(supervision);
     }
+    if monitor.observe(frame.arrivals()) {
+        post_ring(frame, monitor, board);
+    }
     frame.close();
+}
+
+#[cold]
+fn observe(frame: &CyclicFrame, monitor: &mut RingMonitor, board: &Board) {
+    if monitor.observe(frame.arrivals()) {
+        post_ring(frame, monitor, board);
+    }
+}
+
+#[cold]
+fn post_ring(frame: &CyclicFrame, monitor: &RingMonitor, board: &Board) {
+    let link = if frame.arrivals().returned & Link::Main.bit() != 0 { Link::Main } else { Link::Redundant };
+    let seen = frame.supervision().filter(|_| frame.arrivals().returned != 0);
+    let returned = seen.map(|seen| (link, if link == Link::Main { seen.main.0 } else { seen.redundant.0 }));
+    board.post_ring(RingWord { state: monitor.state(), returned, dead_way: monitor.dead_way(), changes: 0 });
 }
 
 #[cfg(test)]

@@ -30,6 +30,19 @@ pub struct AreaSpec {
     pub length: u16,
 }
 
+/// Where LRW is used instead of LWR and LRD (facts 9.2.2).
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum LrwPolicy {
+    /// On one link, where every SubDevice of a domain knows it; never on two.
+    #[default]
+    Automatic,
+    /// As the application or its configuration says so: refused with two links, or where a SubDevice does not know it.
+    Explicit,
+    /// One datagram per SubDevice, with LRW where it has outputs and inputs. Allowed with two links too, because one copy
+    /// meets all that a datagram addresses.
+    PerSubDevice,
+}
+
 /// What a domain exchanges.
 #[derive(Clone, Debug)]
 pub struct DomainSpec {
@@ -145,14 +158,24 @@ impl core::error::Error for LayoutError {}
 pub(crate) const SUPERVISION_LEN: usize = 2;
 
 impl Layout {
-    /// Lays out domains. Two links forbid LRW (facts 9.2.2). `supervision` adds the supervision datagram to the domain
-    /// with the shortest period.
+    /// As [`Layout::with_lrw`], with LRW where it is of use.
     pub fn new(specs: &[DomainSpec], links: LinkSet, supervision: bool) -> Result<Layout, LayoutError> {
+        Layout::with_lrw(specs, links, supervision, LrwPolicy::Automatic)
+    }
+
+    /// Lays out domains. `supervision` adds the supervision datagram to the domain with the shortest period.
+    pub fn with_lrw(
+        specs: &[DomainSpec],
+        links: LinkSet,
+        supervision: bool,
+        policy: LrwPolicy,
+    ) -> Result<Layout, LayoutError> {
         let mut layout = Layout::default();
         let mut logical = 0u32;
         for spec in specs {
-            let lrw = spec.lrw && links == LinkSet::Single;
-            let domain = lay_out(spec, lrw, LogicalAddress(logical))?;
+            let each = policy == LrwPolicy::PerSubDevice;
+            let lrw = spec.lrw && (links == LinkSet::Single || each);
+            let domain = lay_out(spec, lrw, each, LogicalAddress(logical))?;
             // Domains start at multiples of four bytes: easier to read in a capture.
             let end = logical.checked_add(domain.image_len).filter(|end| *end < 1 << 31);
             logical = end.ok_or(LayoutError::TooLarge)?.next_multiple_of(4);
@@ -219,15 +242,22 @@ impl Chunk {
     }
 }
 
-fn lay_out(spec: &DomainSpec, lrw: bool, base: LogicalAddress) -> Result<PlannedDomain, LayoutError> {
+/// `each`: every SubDevice has datagrams of its own.
+fn lay_out(spec: &DomainSpec, lrw: bool, each: bool, base: LogicalAddress) -> Result<PlannedDomain, LayoutError> {
     let mut domain = PlannedDomain { period: spec.period, image_len: 0, areas: Vec::new(), frames: Vec::new() };
-    for chunk in chunks(spec, lrw)? {
-        domain.place(&chunk, lrw, base)?;
+    for chunk in chunks(spec, lrw, each)? {
+        let frame = domain.place(&chunk, lrw, base)?;
+        match domain.frames.last_mut() {
+            Some(last) if each && last.used() + frame.used() <= MAX_DATA + OVERHEAD => {
+                last.datagrams.extend(frame.datagrams);
+            }
+            _ => domain.frames.push(frame),
+        }
     }
     Ok(domain)
 }
 
-fn chunks(spec: &DomainSpec, lrw: bool) -> Result<Vec<Chunk>, LayoutError> {
+fn chunks(spec: &DomainSpec, lrw: bool, each: bool) -> Result<Vec<Chunk>, LayoutError> {
     let mut chunks = Vec::new();
     let mut chunk = Chunk::default();
     let used = spec.areas.iter().filter(|area| area.length > 0);
@@ -239,7 +269,7 @@ fn chunks(spec: &DomainSpec, lrw: bool) -> Result<Vec<Chunk>, LayoutError> {
         }
         // A SubDevice's areas stay together where they can: fewer working counters to look at.
         let total = group.iter().map(|area| usize::from(area.length)).sum();
-        if !chunk.fits(total, lrw) {
+        if !chunk.fits(total, lrw) || (each && chunk.bytes > 0) {
             chunks.push(core::mem::take(&mut chunk));
         }
         for area in group {
@@ -256,7 +286,8 @@ fn chunks(spec: &DomainSpec, lrw: bool) -> Result<Vec<Chunk>, LayoutError> {
 }
 
 impl PlannedDomain {
-    fn place(&mut self, chunk: &Chunk, lrw: bool, base: LogicalAddress) -> Result<(), LayoutError> {
+    /// Gives a chunk its place in the image; returns its frame.
+    fn place(&mut self, chunk: &Chunk, lrw: bool, base: LogicalAddress) -> Result<PlannedFrame, LayoutError> {
         let start = self.image_len;
         let mut placed = Vec::new();
         for area in chunk.outputs.iter().chain(&chunk.inputs) {
@@ -290,8 +321,7 @@ impl PlannedDomain {
             }
         }
         self.areas.extend(placed);
-        self.frames.push(frame);
-        Ok(())
+        Ok(frame)
     }
 }
 

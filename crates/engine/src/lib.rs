@@ -35,6 +35,7 @@ pub mod procedures;
 pub mod queue;
 pub mod request;
 pub mod ring;
+pub mod ring_status;
 pub mod supervisor;
 pub mod time;
 pub mod topology;

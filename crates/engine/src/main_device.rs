@@ -48,9 +48,10 @@ use crate::procedures::stop::{StopError, stop};
 use crate::procedures::supervise::supervise;
 use crate::queue::{Consumer, queue};
 use crate::ring::Identity;
+use crate::ring_status::{Cable, CableErrors, LinkStatus, Redundancy, RingStatus, cables};
 use crate::supervisor::{AcyclicCounters, Bus, Received, Supervisor};
 use crate::time::Instant;
-use declaration::{domain_specs, match_declaration, members, plan_all, report_oddities, with_domain};
+use declaration::{check_lrw, domain_specs, match_declaration, members, plan_all, report_oddities, with_domain};
 use steps::Loaded;
 
 /// Messages of the exchange that may wait until somebody fetches events.
@@ -207,8 +208,9 @@ impl MainDevice {
         let topology = loaded.topology(&bus, self.options.junctions, &scan, &found)?;
         let plans = plan_all(&declaration, &found)?;
         let specs = domain_specs(&declaration, &plans)?;
-        let layout =
-            Layout::new(&specs, self.options.links(), self.options.supervision).map_err(ActivateError::Layout)?;
+        let (links, lrw) = (self.options.links(), declaration.lrw);
+        check_lrw(lrw, &specs, links)?;
+        let layout = Layout::with_lrw(&specs, links, self.options.supervision, lrw).map_err(ActivateError::Layout)?;
         let members = members(&bus, declaration, found, &layout)?;
         let directory = Directory::new(&plans, &layout);
         report_oddities(&bus, &members, &layout);
@@ -216,7 +218,17 @@ impl MainDevice {
         let board = Arc::new(Board::new(members.len()).with_optional(optional));
         let (producer, consumer) = queue(CYCLIC_EVENTS);
         let exchange = Exchange::new(self.identity, self.options.links(), &layout, board.clone(), producer);
-        let fleet = Fleet { members, strangers, next_temporary: 0, layout, topology, cache: self.cache.clone() };
+        let cables = cables(&topology, self.options.links());
+        let fleet = Fleet {
+            members,
+            strangers,
+            next_temporary: 0,
+            layout,
+            topology,
+            ring: self.first_ring_status(),
+            cables: cables.into_iter().map(|cable| (cable, CableErrors::default())).collect(),
+            cache: self.cache.clone(),
+        };
         let fleet = SharedFleet::new(fleet, board.clone());
         self.supervisor.attach(board);
         let start = if self.has_visited() { Start::Doubtful } else { Start::Cleared };
@@ -330,6 +342,40 @@ impl MainDevice {
     /// Starts a procedure of the application's own.
     pub fn spawn(&mut self, procedure: impl Future<Output = ()> + 'static) {
         self.supervisor.spawn(procedure);
+    }
+
+    /// What the links tell of their carriers, by [`Link::index`]; `None` where they do not. To be called now and then.
+    pub fn set_carriers(&mut self, carriers: [Option<bool>; 2]) {
+        self.supervisor.set_carriers(carriers);
+    }
+
+    /// The ring and both links. What comes from frames needs the supervision datagram.
+    pub fn ring_status(&self) -> RingStatus {
+        let mut status = match &self.fleet {
+            Some(fleet) => fleet.access().ring,
+            None => RingStatus { state: self.ring(), ..self.first_ring_status() },
+        };
+        let board = self.fleet.as_ref().map(|fleet| &fleet.board);
+        let seen = board.and_then(|board| board.supervision()).map(|(_, seen)| seen).unwrap_or_default();
+        let carriers = self.supervisor.bus().carriers();
+        for (at, answering) in [seen.main.0, seen.redundant.0].into_iter().enumerate() {
+            let al_states = seen.al_status[at] & 0x0F;
+            status.links[at] = LinkStatus { carrier: carriers[at], answering, al_states };
+        }
+        status
+    }
+
+    /// Every cable of the scan with what the ports at its ends have counted since activation, read once a second.
+    pub fn cable_errors(&self) -> Vec<(Cable, CableErrors)> {
+        self.fleet.as_ref().map(|fleet| fleet.access().cables.clone()).unwrap_or_default()
+    }
+
+    fn first_ring_status(&self) -> RingStatus {
+        let redundancy = match self.options.links() {
+            LinkSet::Single => Redundancy::None,
+            LinkSet::Ring => Redundancy::Unknown,
+        };
+        RingStatus { redundancy, ..RingStatus::default() }
     }
 
     /// State of the ring: the exchange's view once it runs, before that the acyclic half's.

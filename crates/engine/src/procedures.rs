@@ -4,12 +4,15 @@
 
 pub mod al_state;
 pub mod configure;
+mod error_watch;
 pub mod fleet;
 pub mod inspect;
 mod junction;
+pub mod look_at_ring;
 pub mod mail_watch;
 pub mod recover;
 pub(crate) mod request_state;
+mod ring_watch;
 pub mod scan;
 pub mod serve_requests;
 pub mod services;

@@ -80,6 +80,11 @@ impl Supervisor {
         self.shared.borrow_mut().board = Some(board);
     }
 
+    /// What the links tell of their carriers.
+    pub fn set_carriers(&mut self, carriers: [Option<bool>; 2]) {
+        self.shared.borrow_mut().carriers = carriers;
+    }
+
     /// Takes in a frame that arrived on a link. Any bytes are allowed.
     pub fn receive(&mut self, arrived_on: Link, bytes: &[u8], now: Instant) -> Received {
         let shared = &mut *self.shared.borrow_mut();

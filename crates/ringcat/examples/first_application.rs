@@ -43,7 +43,7 @@ fn main() -> Result<(), ringcat::Error> {
     ];
     let members = [LAMPS, BUTTONS].map(|subdevice| DomainMember { subdevice, sync_managers: None });
     let domains = vec![DomainConfig { period: Duration::from_millis(1), members: members.into() }];
-    let mut application = main_device.activate(Declaration { subdevices, domains })?;
+    let mut application = main_device.activate(Declaration { subdevices, domains, ..Declaration::default() })?;
 
     // Places of PDO entries: object index and subindex, as in the SubDevice's documentation.
     let lamps: Vec<_> = (0..8).filter_map(|channel| application.entry(LAMPS, 0x7000 + 0x10 * channel, 1)).collect();

@@ -3,6 +3,7 @@
 use ringcat_engine::event::TimedEvent;
 use ringcat_engine::link::Link;
 use ringcat_engine::main_device::{MainDevice as Engine, SubDeviceState};
+use ringcat_engine::ring_status::RingStatus;
 use ringcat_engine::supervisor::AcyclicCounters;
 use ringcat_engine::time::Instant;
 
@@ -28,6 +29,9 @@ pub trait AcyclicHalf {
 
     /// Whether every declared SubDevice is in its target state.
     fn all_settled(&self) -> bool;
+
+    /// The ring and both links. Not for the cyclic path.
+    fn ring_status(&self) -> RingStatus;
 
     /// Takes the oldest event. Not for the cyclic path: events own memory.
     fn pop_event(&mut self, now: Instant) -> Option<TimedEvent>;
@@ -63,6 +67,10 @@ impl AcyclicHalf for Inline {
         self.0.all_settled()
     }
 
+    fn ring_status(&self) -> RingStatus {
+        self.0.ring_status()
+    }
+
     fn pop_event(&mut self, now: Instant) -> Option<TimedEvent> {
         self.0.pop_event(now)
     }
@@ -75,6 +83,7 @@ impl AcyclicHalf for Inline {
 /// Lets procedures go on and sends what they ask for, as far as the window allows. True where something has to wait for
 /// the next window.
 pub(crate) fn work(engine: &mut Engine, links: &mut impl Links, window: &Window) -> bool {
+    engine.set_carriers(Link::ALL.map(|link| links.carrier(link)));
     engine.poll(links.now());
     if !engine.wants_to_send() {
         return false;

@@ -20,6 +20,7 @@ use ringcat_engine::exchange::{CopyError, CopyRule, CyclicCounters, Entry, Excha
 use ringcat_engine::main_device::{Active, Directory, MainDevice as Engine, SubDeviceState};
 use ringcat_engine::ring::RingState;
 use ringcat_engine::ring::identity::{Class, class_of};
+use ringcat_engine::ring_status::RingStatus;
 use ringcat_engine::supervisor::AcyclicCounters;
 use ringcat_engine::time::Instant;
 use ringcat_wire::al::AlState;
@@ -202,6 +203,12 @@ impl<L: Links, H: AcyclicHalf> Application<L, H> {
             return Some(TimedEvent { at: now, event });
         }
         self.acyclic.pop_event(now)
+    }
+
+    /// The ring and both links: carriers, who answers on each in which states, the place of a break, redundancy. Not for
+    /// the cyclic path.
+    pub fn ring_status(&self) -> RingStatus {
+        self.acyclic.ring_status()
     }
 
     /// State of the ring as process data shows it.

@@ -7,7 +7,7 @@ use std::time::{Duration, Instant};
 
 use clap::{Args, ValueEnum};
 use ringcat::packet::PacketLinks;
-use ringcat::{Error, Link, ScanError};
+use ringcat::{Error, Link, MacCodec, Options, ScanError};
 use ringcat_link::interface::{self, exclusive_use};
 use ringcat_link::realtime::{self, CpuLatency};
 use ringcat_link::{LinkError, ReceiveMode};
@@ -152,9 +152,31 @@ pub struct InterfaceArguments {
     /// Network interface at the other end of a ring.
     #[arg(long, value_name = "IF")]
     pub redundant: Option<String>,
+    /// How frames are marked in their source address: flags-first, or id-last as older MainDevices with two interfaces do.
+    #[arg(long, value_name = "HOW", value_enum, default_value_t = SourceAddress::FlagsFirst)]
+    pub source_address: SourceAddress,
+}
+
+/// Marks in the source address (facts 9.7.1).
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
+pub enum SourceAddress {
+    /// Flags and retries in the first byte, the frame's number in the second.
+    #[default]
+    FlagsFirst,
+    /// Flags in the first byte, retries in the second, the frame's number in the last.
+    IdLast,
 }
 
 impl InterfaceArguments {
+    /// Options of a MainDevice on these interfaces.
+    pub fn options(&self) -> Options {
+        let source_address = match self.source_address {
+            SourceAddress::FlagsFirst => MacCodec::FlagsFirst,
+            SourceAddress::IdLast => MacCodec::IdLast,
+        };
+        Options { source_address, ..Options::default() }
+    }
+
     /// Opens the interfaces; warns of who else uses them, and fails where no cable is plugged in.
     pub fn open(&self, thread: ThreadArguments) -> Result<PacketLinks, Failure> {
         self.warn_of_others();

@@ -69,15 +69,20 @@ pub use ringcat_engine::event::{Event, TimedEvent};
 pub use ringcat_engine::exchange::{CopyError, CopyRule, CyclicCounters, Entry, WhenStale};
 pub use ringcat_engine::info::{Direction, SubDeviceInfo};
 pub use ringcat_engine::junction::{JunctionConnection, JunctionError, JunctionMode};
+pub use ringcat_engine::layout::LrwPolicy;
 pub use ringcat_engine::link::Link;
 pub use ringcat_engine::mail::coe::{SdoAddress, SdoError, SdoFailure};
 pub use ringcat_engine::mail::{Limits, Mailbox};
 pub use ringcat_engine::main_device::{ActivateError, Declaration, DomainConfig, DomainMember, SubDeviceState};
+pub use ringcat_engine::procedures::look_at_ring::RingLook;
 pub use ringcat_engine::procedures::scan::{Scan, ScanError};
 pub use ringcat_engine::procedures::stop::StopError;
 pub use ringcat_engine::request::{
     RegisterRequest, RequestFailure, RequestRefused, RequestState, SdoRequest, SoeRequest, VoeHandler,
 };
 pub use ringcat_engine::ring::RingState;
+pub use ringcat_engine::ring_status::{Cable, CableErrors, LinkStatus, Redundancy, RedundancyLoss, RingStatus};
 pub use ringcat_engine::supervisor::AcyclicCounters;
 pub use ringcat_engine::time::Instant;
+pub use ringcat_engine::topology::PortOf;
+pub use ringcat_wire::source_address::MacCodec;

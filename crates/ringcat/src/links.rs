@@ -21,6 +21,11 @@ pub trait Links {
     /// Hands the oldest frame that has arrived to `take`; false where there is none.
     fn receive(&mut self, take: &mut dyn FnMut(Link, &[u8])) -> bool;
 
+    /// Whether an interface has a carrier; `None` where these links do not tell. Cheap: an atomic or two.
+    fn carrier(&self, _link: Link) -> Option<bool> {
+        None
+    }
+
     /// Waits until a frame has arrived or the time has come.
     fn wait(&mut self, until: Instant);
 

@@ -6,6 +6,7 @@ mod demo;
 mod interfaces;
 mod output;
 mod recording;
+mod ring;
 mod run;
 mod scan;
 mod sim;
@@ -51,6 +52,8 @@ enum Command {
     Scan(scan::ScanArguments),
     /// Brings all SubDevices on a network interface to OP, exchanges process data with outputs zero, and stops.
     Run(run::RunArguments),
+    /// Shows how a ring is: who answers on which interface, where it is broken, errors of each cable. It only reads.
+    Ring(ring::RingArguments),
     /// Records what passes on network interfaces into a file for Wireshark, without taking part.
     Capture(capture::CaptureArguments),
     /// Puts a simulated segment on network interfaces, for any EtherCAT MainDevice at their other end.
@@ -65,6 +68,7 @@ fn main() -> ExitCode {
         Command::Demo(arguments) => demo::run(&arguments).map_err(Failure::from),
         Command::Scan(arguments) => scan::run(&arguments).map(|()| true),
         Command::Run(arguments) => run::run(&arguments),
+        Command::Ring(arguments) => ring::run(&arguments),
         Command::Capture(arguments) => capture::run(&arguments).map(|()| true),
         Command::Sim(arguments) => sim::run(&arguments).map(|()| true),
         Command::Bench(arguments) => bench::run(&arguments),

@@ -7,15 +7,18 @@ use ringcat_engine::config::SubDeviceConfig;
 use ringcat_engine::event::TimedEvent;
 use ringcat_engine::info::SubDeviceInfo;
 use ringcat_engine::junction::{JunctionConnection, JunctionMode};
+use ringcat_engine::layout::LrwPolicy;
 use ringcat_engine::mail::coe::SdoAddress;
 use ringcat_engine::mail::{Limits, Mailbox};
 use ringcat_engine::main_device::{
     ActivateError, Declaration, DomainConfig, DomainMember, MainDevice as Engine, Options as Engineering, Pending,
 };
-use ringcat_engine::procedures::scan::Scan;
+use ringcat_engine::procedures::look_at_ring::{RingLook, look_at_ring};
+use ringcat_engine::procedures::scan::{Scan, ScanError};
 use ringcat_engine::supervisor::AcyclicCounters;
 use ringcat_engine::time::Instant;
 use ringcat_wire::al::AlState;
+use ringcat_wire::source_address::MacCodec;
 
 use crate::acyclic::Inline;
 use crate::application::Application;
@@ -29,6 +32,8 @@ pub struct Options {
     pub sii_cache: bool,
     /// Whether a supervision datagram rides with the process data. Without it nothing is noticed by itself.
     pub supervision: bool,
+    /// How marks are written into source addresses (facts 9.7.1).
+    pub source_address: MacCodec,
     /// For so long the number of SubDevices must not change at the beginning of a scan.
     pub settle: Duration,
     /// So long a scan waits for the first SubDevice.
@@ -42,6 +47,7 @@ impl Default for Options {
         Options {
             sii_cache: true,
             supervision: true,
+            source_address: MacCodec::FlagsFirst,
             settle: Duration::from_millis(5),
             patience: Duration::from_secs(5),
             junctions: JunctionMode::Disabled,
@@ -56,6 +62,7 @@ impl Options {
         let options = Engineering {
             sii_cache: self.sii_cache,
             supervision: self.supervision,
+            codec: self.source_address,
             settle: self.settle,
             patience: self.patience,
             junctions: self.junctions,
@@ -102,6 +109,15 @@ impl<L: Links> MainDevice<L> {
                 return Ok(result?);
             }
         }
+    }
+
+    /// Looks at the ring without changing anything on it: counts, cabling, the place of a break, error counters.
+    ///
+    /// # Errors
+    /// Frames that are lost again and again, or SubDevices that come or go meanwhile.
+    pub fn look_at_ring(&mut self) -> Result<RingLook, Error> {
+        let bus = self.engine.bus();
+        Ok(self.run(look_at_ring(bus)).map_err(ScanError::Bus)?)
     }
 
     /// Receives, lets procedures go on, sends, and waits for the next thing to happen, at most until `until`.
@@ -273,6 +289,7 @@ impl<M> From<Box<Refused<M>>> for Error {
 pub fn automatic(subdevices: &[SubDeviceInfo], period: Duration) -> Declaration {
     let members = (0..subdevices.len()).map(|subdevice| DomainMember { subdevice, sync_managers: None });
     Declaration {
+        lrw: LrwPolicy::default(),
         domains: vec![DomainConfig { period, members: members.collect() }],
         subdevices: subdevices.iter().map(SubDeviceConfig::from_info).collect(),
     }

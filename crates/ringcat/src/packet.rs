@@ -5,7 +5,9 @@
 
 use ringcat_engine::link::Link;
 use ringcat_engine::time::Instant;
-use ringcat_link::{ClassFilter, LinkCounters, LinkError, PacketOptions, PacketSocket, ReceiveMode, monotonic};
+use ringcat_link::{
+    CarrierWatch, ClassFilter, LinkCounters, LinkError, PacketOptions, PacketSocket, ReceiveMode, monotonic,
+};
 use ringcat_wire::frame::MacAddress;
 
 use crate::links::Links;
@@ -16,6 +18,8 @@ pub struct PacketLinks {
     main: PacketSocket,
     redundant: Option<PacketSocket>,
     mode: ReceiveMode,
+    /// Polls the carriers; not for the cyclic half, which goes by what comes back.
+    carriers: Option<CarrierWatch>,
 }
 
 impl PacketLinks {
@@ -24,7 +28,7 @@ impl PacketLinks {
     /// # Errors
     /// An interface that is not there or carries no Ethernet, or a missing permission.
     pub fn open(main: &str, redundant: Option<&str>, mode: ReceiveMode) -> Result<PacketLinks, LinkError> {
-        PacketLinks::open_class(main, redundant, mode, ClassFilter::All)
+        PacketLinks::open_class(main, redundant, mode, ClassFilter::All)?.watch_carriers(main, redundant)
     }
 
     /// Opens the interfaces twice: for the frames of the cyclic half, to be waited for in this mode, and for those of the
@@ -39,7 +43,8 @@ impl PacketLinks {
     ) -> Result<(PacketLinks, PacketLinks), LinkError> {
         Ok((
             PacketLinks::open_class(main, redundant, cyclic, ClassFilter::Cyclic)?,
-            PacketLinks::open_class(main, redundant, ReceiveMode::Blocking, ClassFilter::Acyclic)?,
+            PacketLinks::open_class(main, redundant, ReceiveMode::Blocking, ClassFilter::Acyclic)?
+                .watch_carriers(main, redundant)?,
         ))
     }
 
@@ -51,7 +56,13 @@ impl PacketLinks {
     ) -> Result<PacketLinks, LinkError> {
         let options = PacketOptions { receive: mode, filter, ..PacketOptions::default() };
         let redundant = redundant.map(|name| PacketSocket::open(name, &options)).transpose()?;
-        Ok(PacketLinks { main: PacketSocket::open(main, &options)?, redundant, mode })
+        Ok(PacketLinks { main: PacketSocket::open(main, &options)?, redundant, mode, carriers: None })
+    }
+
+    fn watch_carriers(mut self, main: &str, redundant: Option<&str>) -> Result<PacketLinks, LinkError> {
+        let interfaces: Vec<&str> = core::iter::once(main).chain(redundant).collect();
+        self.carriers = Some(CarrierWatch::start(&interfaces, CarrierWatch::PERIOD)?);
+        Ok(self)
     }
 
     /// What an interface has sent, received and lost; `None` where there is none.
@@ -83,6 +94,11 @@ impl Links for PacketLinks {
     fn receive(&mut self, take: &mut dyn FnMut(Link, &[u8])) -> bool {
         self.main.receive(&mut |frame| take(Link::Main, frame))
             || self.redundant.as_mut().is_some_and(|socket| socket.receive(&mut |frame| take(Link::Redundant, frame)))
+    }
+
+    fn carrier(&self, link: Link) -> Option<bool> {
+        let has_link = link == Link::Main || self.redundant.is_some();
+        self.carriers.as_ref().filter(|_| has_link).map(|watch| watch.carrier(link.index()).is_up())
     }
 
     fn wait(&mut self, until: Instant) {

@@ -17,7 +17,7 @@ use clap::Args;
 use ringcat::packet::PacketLinks;
 use ringcat::tee::Tee;
 use ringcat::text::{Names, address_of_sender, describe};
-use ringcat::{CyclicThread, Event, Instant, LastOutputs, Links, Options, SupervisorThread, automatic};
+use ringcat::{CyclicThread, Event, Instant, LastOutputs, Links, SupervisorThread, automatic};
 use ringcat_wire::al::AlState;
 
 use crate::interfaces::{Failure, InterfaceArguments, ThreadArguments, end_request, is_asked};
@@ -78,7 +78,8 @@ pub fn run(arguments: &RunArguments) -> Result<bool, Failure> {
     let (mut cyclic, acyclic) = (recording.tee(cyclic), recording.tee(acyclic));
     let _awake = thread.prepare_process();
     let begin = now();
-    let supervisor = SupervisorThread::start(acyclic, &Options::default(), move || thread.prepare_supervisor())?;
+    let supervisor =
+        SupervisorThread::start(acyclic, &arguments.interfaces.options(), move || thread.prepare_supervisor())?;
     let mut others = 0;
     let result = supervisor.scan_while(|| {
         tell_events(&supervisor, &mut surroundings);

@@ -2,7 +2,7 @@
 
 use clap::Args;
 use ringcat::text::{Names, describe};
-use ringcat::{Event, MainDevice, Options};
+use ringcat::{Event, MainDevice};
 
 use crate::interfaces::{Failure, InterfaceArguments, ThreadArguments};
 use crate::output::say;
@@ -38,7 +38,7 @@ pub fn run(arguments: &ScanArguments) -> Result<(), Failure> {
     let recording = arguments.recording.start(&arguments.interfaces)?;
     let links = recording.tee(links);
     let _awake = arguments.thread.apply();
-    let mut main_device = MainDevice::request(links, &Options::default());
+    let mut main_device = MainDevice::request(links, &arguments.interfaces.options());
     let result = main_device.scan_with(|event| match &event.event {
         Event::ScanProgress { .. } | Event::ScanFailed { .. } => {}
         event => match surroundings.note(event) {

@@ -119,6 +119,10 @@ impl Links for SharedSegment {
         true
     }
 
+    fn carrier(&self, link: Link) -> Option<bool> {
+        Some(lock(&self.inner).network.carrier(host_link(link)))
+    }
+
     fn wait(&mut self, until: Instant) {
         loop {
             let now = self.now();

@@ -118,6 +118,10 @@ impl Links for SimulatedSegment {
         true
     }
 
+    fn carrier(&self, link: Link) -> Option<bool> {
+        Some(self.network.carrier(host_link(link)))
+    }
+
     fn wait(&mut self, until: Instant) {
         let until = SimTime(until.0);
         while !self.fetch() && self.network.now() < until {

@@ -15,6 +15,7 @@ use ringcat_engine::junction::JunctionConnection;
 use ringcat_engine::link::Link;
 use ringcat_engine::main_device::{ActivateError, Declaration, MainDevice as Engine, SubDeviceState};
 use ringcat_engine::procedures::scan::Scan;
+use ringcat_engine::ring_status::RingStatus;
 use ringcat_engine::supervisor::AcyclicCounters;
 use ringcat_engine::time::Instant;
 use ringcat_wire::al::AlState;
@@ -48,6 +49,7 @@ struct Published {
 #[derive(Clone, Debug, Default)]
 struct Rest {
     states: Vec<SubDeviceState>,
+    ring: RingStatus,
     counters: AcyclicCounters,
     events_dropped: u64,
 }
@@ -233,6 +235,11 @@ impl SupervisorThread {
         self.rest().states
     }
 
+    /// The ring and both links, at most some milliseconds old.
+    pub fn ring_status(&self) -> RingStatus {
+        self.rest().ring
+    }
+
     /// Whether every declared SubDevice is in its target state. A look at an atomic.
     pub fn all_settled(&self) -> bool {
         self.0.published.settled.load(Ordering::Acquire)
@@ -276,6 +283,10 @@ impl AcyclicHalf for SupervisorThread {
 
     fn all_settled(&self) -> bool {
         SupervisorThread::all_settled(self)
+    }
+
+    fn ring_status(&self) -> RingStatus {
+        SupervisorThread::ring_status(self)
     }
 
     fn pop_event(&mut self, _now: Instant) -> Option<TimedEvent> {
@@ -356,6 +367,7 @@ impl<L: Links> Worker<L> {
         self.publish_at = now + PUBLISH;
         let rest = Rest {
             states: self.engine.states(),
+            ring: self.engine.ring_status(),
             counters: self.engine.counters(),
             events_dropped: self.events_dropped + self.engine.events_dropped(),
         };

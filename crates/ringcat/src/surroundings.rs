@@ -132,7 +132,11 @@ mod tests {
 
     fn surroundings(elsewhere: Option<&str>) -> Surroundings {
         Surroundings {
-            interfaces: InterfaceArguments { main: "eth1".to_owned(), redundant: None },
+            interfaces: InterfaceArguments {
+                main: "eth1".to_owned(),
+                redundant: None,
+                source_address: crate::interfaces::SourceAddress::default(),
+            },
             elsewhere: Arc::new(elsewhere.map_or_else(OnceLock::new, |name| OnceLock::from(name.to_owned()))),
             senders: Vec::new(),
             _end: None,

@@ -65,6 +65,10 @@ impl<L: Links> Links for Tee<L> {
         })
     }
 
+    fn carrier(&self, link: Link) -> Option<bool> {
+        self.links.carrier(link)
+    }
+
     fn wait(&mut self, until: Instant) {
         self.links.wait(until);
     }

@@ -4,6 +4,8 @@ use std::fmt;
 
 use ringcat_engine::domain::DomainState;
 use ringcat_engine::event::Event;
+use ringcat_engine::link::Link;
+use ringcat_engine::ring_status::Cable;
 use ringcat_engine::topology::PortOf;
 use ringcat_wire::address::Position;
 use ringcat_wire::frame::MacAddress;
@@ -35,9 +37,14 @@ impl Names {
         }
     }
 
-    /// Neighbour of a break: a SubDevice, or the link itself.
-    fn end(&self, position: Option<Position>, link: &str) -> String {
-        position.map_or_else(|| format!("the {link} interface"), |position| self.at(position).to_string())
+    /// End of a cable: a SubDevice with its port, or the interface of the host.
+    fn end(&self, port: Option<PortOf>, link: Link) -> String {
+        port.map_or_else(|| format!("the {link} interface"), |at| self.port(at))
+    }
+
+    /// A cable by its ends.
+    pub fn cable(&self, cable: Cable) -> String {
+        format!("between {} and {}", self.end(cable.near, Link::Main), self.end(cable.far, Link::Redundant))
     }
 }
 
@@ -72,10 +79,11 @@ pub fn describe(event: &Event, names: &Names) -> String {
         Event::RingOpened { main, redundant } => {
             format!("ring open: {main} SubDevices on MAIN, {redundant} on REDUNDANT")
         }
-        Event::BreakLocated { after, before } => {
-            format!("break between {} and {}", names.end(*after, "MAIN"), names.end(*before, "REDUNDANT"))
+        Event::BreakLocated { cable } => format!("Line break {}", names.cable(*cable)),
+        Event::RingClosed { main, .. } => format!("Line is fixed: ring closed, {main} SubDevices on MAIN"),
+        Event::RingUnsteady { changes } => {
+            format!("ring unsteady: {changes} changes so far, the next is told when it has held for a second")
         }
-        Event::RingClosed { main, .. } => format!("ring closed: {main} SubDevices on MAIN"),
         Event::JunctionLearned { closing } => {
             let (head, tail) = (names.port(closing.head), names.port(closing.tail));
             format!("ring behind a junction: from {tail} back to {head}")
@@ -99,6 +107,11 @@ pub fn describe(event: &Event, names: &Names) -> String {
             format!("no frame comes back while a ring behind a junction is open: {why}")
         }
         Event::JunctionsBlocked { blocked: false } => "frames come back again".to_owned(),
+        Event::RedundancyLost { cause } => format!("redundancy lost: {cause}"),
+        Event::RedundancyRegained => "redundancy regained: the ring stands a break".to_owned(),
+        Event::CableErrors { cable, errors } => format!("CRC errors rise {}: {errors}", names.cable(*cable)),
+        Event::LinkDown { link } => format!("{link}: no carrier"),
+        Event::LinkUp { link } => format!("{link}: the carrier is back"),
         Event::StateReached { subdevice, state } => format!("{}: {state}", names.of(*subdevice)),
         Event::StateError { subdevice, requested: Some(state), status, code } => {
             format!("{}: refused {state}: {status}, {code}", names.of(*subdevice))

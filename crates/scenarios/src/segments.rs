@@ -2,6 +2,7 @@
 
 use std::time::Duration;
 
+use ringcat::{Cable, PortOf};
 use ringcat_sim::catalogue;
 use ringcat_sim::description::DeviceDescription;
 use ringcat_sim::device::Device;
@@ -69,6 +70,14 @@ pub fn ring(descriptions: Vec<DeviceDescription>, options: NetworkOptions) -> Ne
 /// When the segment cannot be built.
 pub fn line(descriptions: Vec<DeviceDescription>, options: NetworkOptions) -> Network {
     SegmentBuilder::line(devices(descriptions)).options(options).build().expect("a line can be built")
+}
+
+/// A cable of a straight [`ring`] of `count` SubDevices, as the engine names it.
+pub fn cable_of_ring(cable: usize, count: usize) -> Cable {
+    Cable {
+        near: cable.checked_sub(1).map(|node| PortOf { node, port: 1 }),
+        far: (cable < count).then_some(PortOf { node: cable, port: 0 }),
+    }
 }
 
 /// The ring of [`SIXTEEN`] with a detection delay.

@@ -207,6 +207,10 @@ impl Links for Tap {
         any
     }
 
+    fn carrier(&self, link: Link) -> Option<bool> {
+        self.segment.carrier(link)
+    }
+
     fn wait(&mut self, until: Instant) {
         let before = self.segment.now();
         let until = until.min(self.limit);

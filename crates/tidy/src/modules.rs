@@ -31,21 +31,22 @@ pub const ENGINE: &[(&str, &[&str])] = &[
     // knowledge of the bus
     ("info", &["direction"]),
     ("topology", &["info", "link"]),
+    ("ring_status", &["time", "link", "ring", "topology"]),
     ("config", &["info"]),
     ("plan", &["info", "topology", "config"]),
     ("layout", &["link", "ring", "direction", "domain"]),
     // what happened
-    ("event", &["time", "link", "queue", "ring", "domain", "info", "topology"]),
+    ("event", &["time", "link", "queue", "ring", "domain", "info", "topology", "ring_status"]),
     // cyclic half
     ("exchange", &["time", "link", "queue", "domain", "ring", "board", "layout", "event"]),
     // acyclic half
     ("supervisor", &["time", "link", "queue", "ring", "board", "event"]),
     ("mail", &["time", "config", "event", "supervisor"]),
-    ("procedures", &["time", "link", "queue", "ring", "board", "info", "topology", "config", "plan", "layout", "event",
-        "supervisor", "mail", "request", "junction"]),
+    ("procedures", &["time", "link", "queue", "ring", "board", "info", "topology", "ring_status", "config", "plan", "layout",
+        "event", "supervisor", "mail", "request", "junction"]),
     // both together
-    ("main_device", &["time", "link", "queue", "domain", "ring", "board", "info", "topology", "config", "plan", "layout",
-        "event", "exchange", "supervisor", "mail", "request", "junction", "procedures"]),
+    ("main_device", &["time", "link", "queue", "domain", "ring", "board", "info", "topology", "ring_status", "config", "plan",
+        "layout", "event", "exchange", "supervisor", "mail", "request", "junction", "procedures"]),
 ];
 
 /// Where the engine's sources are.

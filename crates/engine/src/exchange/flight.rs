@@ -202,7 +202,8 @@ impl CyclicFrame {
 
     /// What the supervision datagram of this flight saw, if it has one and anything came back.
     pub(crate) fn supervision(&self) -> Option<Supervision> {
-        (self.supervision_at.is_some() && self.arrivals.arrived != 0).then_some(self.seen)
+        let seen = Supervision { returned: self.arrivals.returned != 0, ..self.seen };
+        (self.supervision_at.is_some() && self.arrivals.arrived != 0).then_some(seen)
     }
 
     /// Copies the outputs in and forgets the flight before.
@@ -273,8 +274,21 @@ impl CyclicFrame {
                 deliver(&mut self.places, &self.merged, image, cycle);
             }
             self.stage = Stage::Delivered;
+        } else if !complete {
+            self.withdraw(cycle);
         }
         if finished { Step::Finished } else { Step::Waiting }
+    }
+
+    /// The second copy met somebody whom the first one had met: the ring closed meanwhile. What was delivered is not new
+    /// any more.
+    #[cold]
+    fn withdraw(&mut self, cycle: u64) {
+        for place in self.places.iter_mut().filter(|place| place.wkc.0 > place.expected.0) {
+            for delivered in [&mut place.delivered_all, &mut place.delivered_part] {
+                *delivered = (*delivered).min(cycle);
+            }
+        }
     }
 
     fn is_what_was_sent(&self, bytes: &[u8]) -> bool {
@@ -294,9 +308,9 @@ impl CyclicFrame {
         if let Some(at) = self.supervision_at
             && let Some(datagram) = bytes[at..].first_chunk::<{ OVERHEAD + SUPERVISION_LEN }>()
         {
-            let [.., irq_low, irq_high, al_low, al_high, wkc_low, wkc_high] = *datagram;
+            let [.., irq_low, irq_high, al_low, _, wkc_low, wkc_high] = *datagram;
             self.seen.irq |= u16::from_le_bytes([irq_low, irq_high]);
-            self.seen.al_status |= u16::from_le_bytes([al_low, al_high]);
+            self.seen.al_status[sent_on.index()] = al_low;
             let wkc = Wkc(u16::from_le_bytes([wkc_low, wkc_high]));
             match sent_on {
                 Link::Main => self.seen.main = wkc,

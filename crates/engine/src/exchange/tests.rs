@@ -93,6 +93,7 @@ fn meet(frame: &mut [u8], subdevices: &[usize], base: u8) {
     }
 }
 
+// Facts CR-24.
 #[test]
 fn in_a_closed_ring_the_complete_copy_is_delivered_without_waiting_for_the_other() {
     let mut ring = Ring::new();
@@ -107,9 +108,25 @@ fn in_a_closed_ring_the_complete_copy_is_delivered_without_waiting_for_the_other
     assert_eq!((status.wkc, status.expected, status.state), (6, 6, DomainState::Complete));
     assert_eq!(ring.exchange.ring(), RingState::Closed);
     assert_eq!(ring.freshness(), [Freshness::Fresh; 3]);
-    let seen = Supervision { main: Wkc(3), redundant: Wkc(0), al_status: 8, irq: 0 };
+    let seen = Supervision { main: Wkc(3), redundant: Wkc(0), al_status: [8, 0], irq: 0, returned: false };
     assert_eq!(ring.board.supervision(), Some((1, seen)));
     assert!(ring.events.pop().is_some() && ring.events.pop().is_none(), "one change of state");
+}
+
+#[test]
+fn a_second_copy_that_met_somebody_again_makes_the_cycle_incomplete_and_the_inputs_stale() {
+    let mut ring = Ring::new();
+    for again in [false, true] {
+        let [mut main, mut redundant] = ring.send();
+        meet(&mut main, &[0, 1, 2], 0x40);
+        meet(&mut redundant, if again { &[2] } else { &[] }, 0x40);
+        assert_eq!(ring.receive(Link::Redundant, &main), Received::Taken);
+        assert_eq!(ring.receive(Link::Redundant, &redundant), Received::Taken);
+        let status = ring.judge();
+        assert_eq!(status.state, if again { DomainState::Incomplete } else { DomainState::Complete });
+        assert_eq!(status.wkc, 6 + 2 * u32::from(again));
+    }
+    assert_eq!(ring.freshness(), [Freshness::Stale { cycles: 1 }; 3]);
 }
 
 #[test]
@@ -179,6 +196,7 @@ fn inputs_of_those_that_take_part_are_new_and_the_missing_one_keeps_its_last() {
     }
 }
 
+// Facts CR-06.
 #[test]
 fn one_lost_copy_of_a_closed_ring_costs_nothing_and_both_lost_cost_a_cycle() {
     let mut ring = Ring::new();

@@ -1,6 +1,7 @@
 //! Layouts of literal and random domains.
 
 use std::vec;
+use std::vec::Vec;
 
 use proptest::prelude::*;
 
@@ -30,6 +31,30 @@ fn one_link_uses_lrw_and_two_links_use_lwr_and_lrd() {
     let commands: Vec<_> = ring.domains[0].frames[0].datagrams.iter().map(|d| (d.command, d.logical.0)).collect();
     assert_eq!(commands, vec![(Command::Lwr, 0), (Command::Lrd, 5)]);
     assert_eq!(ring.domains[0].frames[0].datagrams[1].contributions, vec![(0, Wkc(1))]);
+}
+
+#[test]
+fn one_lrw_per_subdevice_is_allowed_on_two_links_facts_9_2_2() {
+    let pair = |n: usize, out, inp| [area(n, 2, Direction::Outputs, out), area(n, 3, Direction::Inputs, inp)];
+    let areas: Vec<_> = (0..3).flat_map(|n| pair(n, 4, 6)).chain([area(3, 3, Direction::Inputs, 2)]).collect();
+    let layout = Layout::with_lrw(&[spec(areas)], LinkSet::Ring, true, LrwPolicy::PerSubDevice).unwrap();
+    let frames = &layout.domains[0].frames;
+    assert_eq!(frames.len(), 1, "datagrams share a frame");
+    let datagrams: Vec<_> =
+        frames[0].datagrams.iter().map(|d| (d.command, d.logical.0, d.contributions.clone())).collect();
+    assert_eq!(
+        datagrams,
+        [
+            (Command::Lrw, 0, vec![(0, Wkc(3))]),
+            (Command::Lrw, 10, vec![(1, Wkc(3))]),
+            (Command::Lrw, 20, vec![(2, Wkc(3))]),
+            (Command::Lrd, 30, vec![(3, Wkc(1))]),
+        ]
+    );
+    let large: Vec<_> = (0..4).flat_map(|n| pair(n, 700, 700)).collect();
+    let layout = Layout::with_lrw(&[spec(large)], LinkSet::Ring, false, LrwPolicy::PerSubDevice).unwrap();
+    assert_eq!(layout.domains[0].frames.len(), 4);
+    assert!(layout.domains[0].frames.iter().all(|frame| frame.used() <= MAX_DATA + OVERHEAD));
 }
 
 #[test]

@@ -9,8 +9,9 @@ use alloc::vec::Vec;
 use core::fmt;
 use core::time::Duration;
 
-use ringcat_wire::address::Position;
+use ringcat_wire::address::{LogicalAddress, Position};
 use ringcat_wire::al::AlState;
+use ringcat_wire::command::Command;
 use ringcat_wire::register::{WatchdogDivider, WatchdogTime};
 
 use super::areas::Areas;
@@ -18,7 +19,8 @@ use crate::config::{ConfigError, Resolution, SubDeviceConfig, resolve};
 use crate::event::Event;
 use crate::info::SubDeviceInfo;
 use crate::junction::JunctionError;
-use crate::layout::{AreaSpec, DomainSpec, Layout, LayoutError};
+use crate::layout::{AreaSpec, DomainSpec, Layout, LayoutError, LrwPolicy};
+use crate::link::LinkSet;
 use crate::mail::Mailbox;
 use crate::plan::plan;
 use crate::procedures::fleet::{Member, Setup, SetupError, declared_areas};
@@ -52,6 +54,8 @@ pub struct Declaration {
     pub subdevices: Vec<SubDeviceConfig>,
     /// The domains.
     pub domains: Vec<DomainConfig>,
+    /// Where LRW is used.
+    pub lrw: LrwPolicy,
 }
 
 /// Why a declaration cannot be activated.
@@ -106,6 +110,25 @@ pub enum ActivateError {
         /// The shortest period.
         shortest: Duration,
     },
+    /// LRW was asked for on two links. When the ring breaks, half of its SubDevices would be met by one copy and half by the
+    /// other (facts CR-16, 9.2.2).
+    LrwOnTwoLinks {
+        /// Number of the domain.
+        domain: usize,
+        /// First logical address of the datagram.
+        logical: LogicalAddress,
+        /// Its bytes.
+        length: usize,
+        /// Indices in the declaration of the SubDevices that it addresses.
+        subdevices: Vec<usize>,
+    },
+    /// LRW was asked for, and a SubDevice does not know it.
+    LrwUnknown {
+        /// Number of the domain.
+        domain: usize,
+        /// Index in the declaration.
+        subdevice: usize,
+    },
     /// Process data does not fit.
     Layout(LayoutError),
     /// A domain names a SubDevice that was not declared.
@@ -140,6 +163,14 @@ impl fmt::Display for ActivateError {
                 shortest.as_micros(),
                 period.as_micros()
             ),
+            ActivateError::LrwOnTwoLinks { domain, logical, length, subdevices } => write!(
+                f,
+                "domain {domain}: an LRW at logical address {logical} of {length} bytes for declarations {subdevices:?} \
+                 cannot be used with two links: leave it to the MainDevice, or use one LRW per SubDevice"
+            ),
+            ActivateError::LrwUnknown { domain, subdevice } => {
+                write!(f, "domain {domain}: LRW was asked for, declaration {subdevice} does not know it")
+            }
             ActivateError::Layout(error) => error.fmt(f),
             ActivateError::UnknownMember { domain, subdevice } => {
                 write!(f, "domain {domain} names declaration {subdevice}, which does not exist")
@@ -219,6 +250,9 @@ pub(super) fn domain_specs(declaration: &Declaration, plans: &[Areas]) -> Result
             let Some(areas) = plans.get(subdevice) else {
                 return Err(ActivateError::UnknownMember { domain, subdevice });
             };
+            if declaration.lrw == LrwPolicy::Explicit && !areas.lrw() {
+                return Err(ActivateError::LrwUnknown { domain, subdevice });
+            }
             spec.lrw &= areas.lrw();
             for (sync_manager, direction, length) in areas.list() {
                 if member.sync_managers.as_ref().is_none_or(|wanted| wanted.contains(&sync_manager)) {
@@ -236,6 +270,26 @@ pub(super) fn domain_specs(declaration: &Declaration, plans: &[Areas]) -> Result
         specs.push(spec);
     }
     Ok(specs)
+}
+
+/// Refuses LRW over several SubDevices on two links, and names the datagram.
+pub(super) fn check_lrw(lrw: LrwPolicy, specs: &[DomainSpec], links: LinkSet) -> Result<(), ActivateError> {
+    if lrw != LrwPolicy::Explicit || links == LinkSet::Single {
+        return Ok(());
+    }
+    let asked = Layout::with_lrw(specs, LinkSet::Single, false, lrw).map_err(ActivateError::Layout)?;
+    for (domain, planned) in asked.domains.iter().enumerate() {
+        let datagrams = planned.frames.iter().flat_map(|frame| &frame.datagrams);
+        if let Some(datagram) = datagrams.clone().find(|datagram| datagram.command == Command::Lrw) {
+            return Err(ActivateError::LrwOnTwoLinks {
+                domain,
+                logical: datagram.logical,
+                length: usize::from(datagram.outputs) + usize::from(datagram.inputs),
+                subdevices: datagram.contributions.iter().map(|(subdevice, _)| *subdevice).collect(),
+            });
+        }
+    }
+    Ok(())
 }
 
 /// Period of the domain that only carries the supervision datagram.

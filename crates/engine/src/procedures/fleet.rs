@@ -18,6 +18,7 @@ use crate::info::{Direction, SubDeviceInfo};
 use crate::layout::Layout;
 use crate::mail::Mailbox;
 use crate::plan::{self, AreaPlan, PlanError, SubDevicePlan};
+use crate::ring_status::{Cable, CableErrors, RingStatus};
 use crate::topology::Topology;
 
 /// How far a SubDevice is.
@@ -203,6 +204,10 @@ pub struct Fleet {
     pub layout: Layout,
     /// Connections as the scan found them.
     pub topology: Topology,
+    /// What was told of the ring; counts and carriers are added where it is asked for.
+    pub ring: RingStatus,
+    /// All cables with what their ends have counted.
+    pub cables: Vec<(Cable, CableErrors)>,
     /// SII contents read before.
     pub cache: SiiCache,
 }

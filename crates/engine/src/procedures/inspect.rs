@@ -6,14 +6,15 @@ use alloc::vec::Vec;
 use core::cell::RefCell;
 use core::time::Duration;
 
-use ringcat_wire::address::{Position, StationAddress, Wkc};
+use ringcat_wire::address::{StationAddress, Wkc};
 use ringcat_wire::al::{AlStatus, AlStatusCode};
 use ringcat_wire::register::{DlStatus, map};
 
 use super::al_state::split_status;
 use super::fleet::SharedFleet;
+use crate::ring_status::Cable;
 use crate::supervisor::{Bus, BusError, TURN, TURN_PAUSE};
-use crate::topology::Topology;
+use crate::topology::{PortOf, Topology};
 
 /// Between two reports of what looks have brought so far: most answers are there by then.
 const STEP: Duration = Duration::from_micros(300);
@@ -86,23 +87,12 @@ async fn read_both(bus: &Bus, station: StationAddress) -> Result<Look, BusError>
     Ok(Look::Answer { status, code, dl_status })
 }
 
-/// Neighbours of a break: the last SubDevice before it and the first behind it, in the order of the scan. `None` on a
-/// side is the link itself.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) struct Break {
-    pub after: Option<Position>,
-    pub before: Option<Position>,
-}
-
 /// The place where a connection of the scan no longer has communication. `dl_status` by position.
-pub(super) fn locate_break(topology: &Topology, dl_status: &[Option<DlStatus>]) -> Option<Break> {
-    let down = |node: usize, port: u8| {
-        let status = dl_status.get(node).copied().flatten()?;
-        Some(!status.ports[usize::from(port & 3)].communication)
-    };
-    let position = |node: usize| Some(Position(u16::try_from(node).unwrap_or(u16::MAX)));
-    if down(0, topology.nodes.first()?.entry_port) == Some(true) {
-        return Some(Break { after: None, before: position(0) });
+pub(super) fn locate_break(topology: &Topology, dl_status: &[Option<DlStatus>]) -> Option<Cable> {
+    let is_down = |at: PortOf| communicates(dl_status, at) == Some(false);
+    let first = PortOf { node: 0, port: topology.nodes.first()?.entry_port };
+    if is_down(first) {
+        return Some(Cable { near: None, far: Some(first) });
     }
     for node in 0..topology.nodes.len() {
         // Breaks in rings behind junctions are told apart.
@@ -110,35 +100,51 @@ pub(super) fn locate_break(topology: &Topology, dl_status: &[Option<DlStatus>]) 
             continue;
         }
         let Some(connection) = topology.connection_to(node) else { continue };
-        let near = down(connection.near.node, connection.near.port);
-        let far = down(connection.far.node, connection.far.port);
         // One end is enough: the other may have no power.
-        if near == Some(true) || far == Some(true) {
-            return Some(Break { after: position(connection.near.node), before: position(node) });
+        if is_down(connection.near) || is_down(connection.far) {
+            return Some(Cable { near: Some(connection.near), far: Some(connection.far) });
         }
     }
-    match topology.open_ports.iter().find(|at| down(at.node, at.port) == Some(true)) {
-        Some(lost) => Some(Break { after: position(lost.node), before: None }),
+    match topology.open_ports.iter().copied().find(|at| is_down(*at)) {
+        Some(lost) => Some(Cable { near: Some(lost), far: None }),
         None => seam(topology, dl_status),
     }
 }
 
+/// Whether a port has communication, where that is known.
+fn communicates(dl_status: &[Option<DlStatus>], at: PortOf) -> Option<bool> {
+    let status = dl_status.get(at.node).copied().flatten()?;
+    Some(status.ports[usize::from(at.port & 3)].communication)
+}
+
 /// A connection that the scan did not see, because the ring was broken there already.
-fn seam(topology: &Topology, dl_status: &[Option<DlStatus>]) -> Option<Break> {
-    let position = |node: usize| Position(u16::try_from(node).unwrap_or(u16::MAX));
+fn seam(topology: &Topology, dl_status: &[Option<DlStatus>]) -> Option<Cable> {
     let last = topology.main_count.checked_sub(1);
-    let communicates = |node: usize, port: u8| {
-        let status = dl_status.get(node).copied().flatten()?;
-        Some(status.ports[usize::from(port & 3)].communication)
-    };
     if let Some(head) = topology.redundant_head {
-        let broken = communicates(head, topology.nodes.get(head)?.entry_port) == Some(false);
-        return broken.then(|| Break { after: last.map(position), before: Some(position(head)) });
+        let far = PortOf { node: head, port: topology.nodes.get(head)?.entry_port };
+        if communicates(dl_status, far) != Some(false) {
+            return None;
+        }
+        let near = last.map(|node| PortOf { node, port: loose_port(topology, node, dl_status) });
+        return Some(Cable { near, far: Some(far) });
     }
     // Only then was nothing seen of the redundant link.
-    let last = last.filter(|_| topology.open_ports.is_empty())?;
-    let node = topology.nodes.get(last)?;
-    let known = |port: u8| port == node.entry_port || node.children[usize::from(port)].is_some();
-    let broken = (0..4).filter(|port| !known(*port)).all(|port| communicates(last, port) == Some(false));
-    broken.then(|| Break { after: Some(position(last)), before: None })
+    let node = last.filter(|_| topology.open_ports.is_empty())?;
+    let mut loose = (0..4).filter(|port| !is_known(topology, node, *port)).map(|port| PortOf { node, port });
+    let is_broken = loose.all(|at| communicates(dl_status, at) == Some(false));
+    is_broken.then(|| Cable { near: Some(PortOf { node, port: loose_port(topology, node, dl_status) }), far: None })
+}
+
+/// Whether the scan saw what is plugged into a port.
+fn is_known(topology: &Topology, node: usize, port: u8) -> bool {
+    topology.nodes.get(node).is_some_and(|it| port == it.entry_port || it.children[usize::from(port & 3)].is_some())
+}
+
+/// The port at which a line ends: of those without a neighbour the one that is the usual way on, port 1, or else the
+/// first in the order of travel that has no communication.
+fn loose_port(topology: &Topology, node: usize, dl_status: &[Option<DlStatus>]) -> u8 {
+    let is_loose = |port: &u8| {
+        !is_known(topology, node, *port) && communicates(dl_status, PortOf { node, port: *port }) != Some(true)
+    };
+    [1, 3, 2, 0].into_iter().find(is_loose).unwrap_or(1)
 }

@@ -3,7 +3,7 @@
 //! The exchange posts one word per cycle: how many SubDevices answered on each link, the OR of their AL status, the OR
 //! of their event requests. As long as it does not change, nothing is asked of the bus but one look per second.
 //!
-//! Changes of the ring are reported from these words alone, by a procedure of their own: a look waits for lost frames.
+//! Changes of the ring are told by a procedure of their own ([`super::ring_watch`]): a look waits for lost frames.
 
 use alloc::rc::Rc;
 use alloc::vec;
@@ -16,16 +16,18 @@ use ringcat_wire::al::{AlStatus, AlStatusCode};
 use ringcat_wire::register::{DlStatus, map};
 
 use super::configure::Start;
+use super::error_watch::watch_errors;
 use super::fleet::{Phase, SharedFleet};
-use super::inspect::{Break, Look, locate_break, look_at_all, look_at_strangers};
+use super::inspect::{Look, locate_break, look_at_all, look_at_strangers};
 use super::junction::{JunctionWatch, watch_blocked};
 use super::recover::{lose, start, welcome};
+use super::ring_watch::watch_ring;
 use super::strangers::{self, Search};
 use super::verify::verify;
 use crate::board::{RingWord, Supervision};
 use crate::event::Event;
-use crate::link::LinkSet;
 use crate::ring::RingState;
+use crate::ring_status::Cable;
 use crate::supervisor::Bus;
 use crate::time::Instant;
 use crate::topology::NodeStatus;
@@ -38,13 +40,12 @@ const ROUTINE: Duration = Duration::from_secs(1);
 const SILENT_LOOKS: u8 = 2;
 /// Pause before a silent SubDevice is looked at again.
 const SECOND_LOOK_PAUSE: Duration = Duration::from_millis(2);
-/// Supervision results until the counts of both links must be the same twice in a row: at the edge of a cut one copy
-/// may meet fewer SubDevices than live on its side.
-const SETTLING_RESULTS: u32 = 20;
 /// Looks for the place of a break: its neighbours may notice the lost link later than frames do.
-const BREAK_LOOKS: u8 = 20;
-/// Pause between two of them.
+const BREAK_LOOKS: u8 = 25;
+/// Pause between two of them, and between the first few.
 const BREAK_LOOK_PAUSE: Duration = Duration::from_millis(10);
+const FIRST_BREAK_LOOKS: u8 = 5;
+const FIRST_BREAK_LOOK_PAUSE: Duration = Duration::from_millis(1);
 
 /// Pause between two searches for SubDevices that answer and are not known.
 const STRANGER_PAUSE: Duration = Duration::from_millis(10);
@@ -53,15 +54,13 @@ const STRANGER_PAUSE: Duration = Duration::from_millis(10);
 pub(crate) async fn supervise(bus: Bus, fleet: SharedFleet) {
     let members = fleet.access().members.len();
     let reported = Rc::new(Cell::new(RingState::Unknown));
-    // One link is a ring of one, which is no news.
-    if bus.links() == LinkSet::Ring {
-        bus.spawn(report_ring(bus.clone(), fleet.clone(), reported.clone()));
-    }
+    bus.spawn(watch_ring(bus.clone(), fleet.clone(), reported.clone()));
     bus.spawn(verify(bus.clone(), fleet.clone()));
     let junctions = JunctionWatch::new(&fleet.access().topology);
     if !junctions.is_empty() {
         bus.spawn(watch_blocked(bus.clone(), fleet.clone(), junctions.broken()));
     }
+    bus.spawn(watch_errors(bus.clone(), fleet.clone()));
     let mut watch = Watch {
         bus,
         fleet,
@@ -71,7 +70,6 @@ pub(crate) async fn supervise(bus: Bus, fleet: SharedFleet) {
         ring: RingWord::default(),
         reported,
         seen_reported: RingState::Unknown,
-        place: None,
         break_looks: 0,
         next_routine: Instant::default(),
         is_awaited: false,
@@ -102,8 +100,6 @@ struct Watch {
     reported: Rc<Cell<RingState>>,
     /// The same, as of the last check.
     seen_reported: RingState,
-    /// The break that was reported last.
-    place: Option<Break>,
     /// Looks for it that are left.
     break_looks: u8,
     next_routine: Instant,
@@ -115,36 +111,6 @@ struct Watch {
     /// What had become known at the last check.
     news: u32,
     junctions: JunctionWatch,
-}
-
-/// Reports each change of the ring once, with the counts of both links.
-async fn report_ring(bus: Bus, fleet: SharedFleet, reported: Rc<Cell<RingState>>) {
-    let (mut last, mut results) = (None, 0);
-    loop {
-        bus.sleep(PAUSE).await;
-        let state = fleet.board.ring().state;
-        let Some((number, supervision)) = fleet.board.supervision() else { continue };
-        if state == reported.get() {
-            last = None;
-            continue;
-        }
-        let counts = (supervision.main.0, supervision.redundant.0);
-        match last {
-            None => results = 0,
-            Some((before, _)) if before == number => continue,
-            Some((_, before)) if before == counts || results >= SETTLING_RESULTS => {
-                let was_open = reported.replace(state) == RingState::Open;
-                let (main, redundant) = counts;
-                match state {
-                    RingState::Open => bus.report(Event::RingOpened { main, redundant }),
-                    RingState::Closed if was_open => bus.report(Event::RingClosed { main, redundant }),
-                    RingState::Closed | RingState::Unknown => {}
-                }
-            }
-            Some(_) => results += 1,
-        }
-        last = Some((number, counts));
-    }
 }
 
 impl Watch {
@@ -173,7 +139,6 @@ impl Watch {
         self.news = self.fleet.news();
         if reported != self.seen_reported {
             self.seen_reported = reported;
-            self.place = None;
             self.break_looks = BREAK_LOOKS;
         }
         self.next_routine = now + ROUTINE;
@@ -181,6 +146,7 @@ impl Watch {
     }
 
     async fn check(&mut self) {
+        let phases: Vec<Phase> = self.fleet.access().members.iter().map(|member| member.phase).collect();
         let strangers = look_at_strangers(&self.bus, &self.fleet).await;
         let stranger_answers = strangers.iter().filter(|(_, look)| matches!(look, Look::Answer { .. })).count();
         let mut suspended = core::mem::take(&mut self.suspended);
@@ -192,7 +158,7 @@ impl Watch {
         let (count, answering) = (usize::from(seen.total().0), answers(&looks) + stranger_answers);
         // When the count and the answers agree, a silent SubDevice is certainly not there.
         let needed = if count == answering { 1 } else { SILENT_LOOKS };
-        let certain = self.judge(&looks, needed);
+        let certain = self.judge(&looks, &phases, needed);
         if needed == 1 {
             self.forget_strangers(&strangers);
         }
@@ -217,9 +183,9 @@ impl Watch {
         self.next_routine = self.next_routine.min(self.bus.now() + pause);
     }
 
-    /// Acts on what each SubDevice said; so many silent looks make one lost. True where it is known of all whether they
+    /// Acts on what each SubDevice said, `before` being how far each was then; so many silent looks make one lost. True where it is known of all whether they
     /// are there.
-    fn judge(&mut self, looks: &[Look], needed: u8) -> bool {
+    fn judge(&mut self, looks: &[Look], before: &[Phase], needed: u8) -> bool {
         let mut certain = true;
         for (index, look) in looks.iter().enumerate() {
             match (look, self.fleet.phase(index)) {
@@ -232,6 +198,11 @@ impl Watch {
                     } else {
                         certain = false;
                     }
+                }
+                // It has got there since: what it said is not what it says now.
+                (Look::Answer { .. }, Phase::Settled(_)) if before.get(index) != Some(&self.fleet.phase(index)) => {
+                    self.silent[index] = 0;
+                    self.again_in(SECOND_LOOK_PAUSE);
                 }
                 (Look::Answer { status, code, .. }, phase) => {
                     self.silent[index] = 0;
@@ -273,20 +244,22 @@ impl Watch {
         if self.seen_reported != RingState::Open {
             return;
         }
+        let reported = self.fleet.access().ring.place;
         match self.break_place(looks) {
-            Some(place) if self.place != Some(place) => {
-                self.place = Some(place);
-                self.bus.report(Event::BreakLocated { after: place.after, before: place.before });
+            Some(place) if reported != Some(place) => {
+                self.fleet.access().ring.place = Some(place);
+                self.bus.report(Event::BreakLocated { cable: place });
             }
-            None if self.place.is_none() && self.break_looks > 0 => {
+            None if reported.is_none() && self.break_looks > 0 => {
+                let is_first = BREAK_LOOKS - self.break_looks < FIRST_BREAK_LOOKS;
                 self.break_looks -= 1;
-                self.again_in(BREAK_LOOK_PAUSE);
+                self.again_in(if is_first { FIRST_BREAK_LOOK_PAUSE } else { BREAK_LOOK_PAUSE });
             }
             Some(_) | None => {}
         }
     }
 
-    fn break_place(&self, looks: &[Look]) -> Option<Break> {
+    fn break_place(&self, looks: &[Look]) -> Option<Cable> {
         let by_position: Vec<_> = self.by_position(looks).iter().map(|it| it.map(|node| node.dl_status)).collect();
         locate_break(&self.fleet.access().topology, &by_position)
     }

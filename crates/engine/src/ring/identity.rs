@@ -198,6 +198,7 @@ mod tests {
         bytes
     }
 
+    // Facts CR-04, CR-24.
     #[test]
     fn both_copies_of_a_frame_are_recognised_after_controllers_marked_them() {
         let mut sequence = Sequence::default();
@@ -213,6 +214,7 @@ mod tests {
         }
     }
 
+    // Facts CR-04.
     #[test]
     fn a_frame_that_is_256_frames_old_has_another_sequence_number() {
         let old = Sequence::default();

@@ -13,7 +13,8 @@ pub enum MergeRule {
     AsSent,
     /// Broadcast and logical reads, sent as zeros: each bit belongs to one SubDevice, or is an OR of all.
     Or,
-    /// One SubDevice answers: the copy whose working counter is not zero.
+    /// One SubDevice answers: the copy whose working counter is not zero. An LRW on two links addresses one SubDevice
+    /// (facts 9.2.2).
     Answered,
     /// The copy that was sent on this link, because the addressed SubDevice is visible there (ARMW, FRMW: every other
     /// SubDevice counts too, so the working counter cannot tell).
@@ -27,8 +28,8 @@ impl MergeRule {
             Command::Nop | Command::Apwr | Command::Fpwr | Command::Bwr | Command::Lwr | Command::Reserved(_) => {
                 MergeRule::AsSent
             }
-            Command::Brd | Command::Brw | Command::Lrd | Command::Lrw => MergeRule::Or,
-            Command::Aprd | Command::Fprd | Command::Aprw | Command::Fprw => MergeRule::Answered,
+            Command::Brd | Command::Brw | Command::Lrd => MergeRule::Or,
+            Command::Aprd | Command::Fprd | Command::Aprw | Command::Fprw | Command::Lrw => MergeRule::Answered,
             Command::Armw | Command::Frmw => MergeRule::SentOn(visible),
         }
     }
@@ -75,7 +76,7 @@ mod tests {
 
     #[test]
     fn reads_by_one_subdevice_come_from_the_copy_it_answered() {
-        for command in [Command::Aprd, Command::Fprd, Command::Fprw, Command::Aprw] {
+        for command in [Command::Aprd, Command::Fprd, Command::Fprw, Command::Aprw, Command::Lrw] {
             assert_eq!(merged(command, (&[0, 0], 0), (&[1, 2], 1)), [1, 2]);
             assert_eq!(merged(command, (&[1, 2], 1), (&[0, 0], 0)), [1, 2]);
         }

@@ -47,10 +47,16 @@ impl Arrivals {
     }
 }
 
+/// Flights in a row of which the same one copy came back, crossed, until the other direction counts as dead. A few are
+/// single losses.
+const ONE_WAY_AFTER: u16 = 50;
+
 /// Follows the state of the ring.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct RingMonitor {
     state: RingState,
+    /// Flights in a row of which just one copy came back, by the link it was sent on.
+    alone: [u16; 2],
 }
 
 impl RingMonitor {
@@ -59,14 +65,39 @@ impl RingMonitor {
         self.state
     }
 
-    /// Takes in one frame; returns the state where it changed (facts CR-12: once per change).
-    pub fn observe(&mut self, arrivals: Arrivals) -> Option<RingState> {
-        let verdict = arrivals.verdict()?;
-        if verdict == self.state {
-            return None;
+    /// The link on which frames are sent in vain: the copies of the other one come back, crossed, and these do not.
+    pub fn dead_way(&self) -> Option<Link> {
+        match self.alone.map(|flights| flights >= ONE_WAY_AFTER) {
+            [true, _] => Some(Link::Redundant),
+            [_, true] => Some(Link::Main),
+            [false, false] => None,
         }
-        self.state = verdict;
-        Some(verdict)
+    }
+
+    /// Takes in one frame; true where the state changed (facts CR-12: once per change) or a direction died or revived.
+    pub fn observe(&mut self, arrivals: Arrivals) -> bool {
+        let Some(verdict) = arrivals.verdict() else { return self.observe_alone(arrivals) };
+        if verdict == self.state && self.alone == [0; 2] {
+            return false;
+        }
+        let revived = self.dead_way().is_some();
+        self.alone = [0; 2];
+        core::mem::replace(&mut self.state, verdict) != verdict || revived
+    }
+
+    /// One copy crossed, or none came back, which says nothing about either way.
+    #[cold]
+    fn observe_alone(&mut self, arrivals: Arrivals) -> bool {
+        let before = self.dead_way();
+        for link in Link::ALL {
+            let flights = &mut self.alone[link.index()];
+            if arrivals.arrived == link.bit() {
+                *flights = flights.saturating_add(1);
+            } else if arrivals.arrived != 0 {
+                *flights = 0;
+            }
+        }
+        self.dead_way() != before
     }
 }
 
@@ -82,6 +113,7 @@ mod tests {
         arrivals
     }
 
+    // Facts CR-11.
     #[test]
     fn the_table_of_facts_9_2_1() {
         use Link::{Main, Redundant};
@@ -104,11 +136,27 @@ mod tests {
     fn a_thousand_broken_cycles_are_one_change() {
         let mut monitor = RingMonitor::default();
         let broken = arrivals(&[(Link::Main, Link::Main), (Link::Redundant, Link::Redundant)]);
-        let changes = (0..1000).filter(|_| monitor.observe(broken).is_some()).count();
+        let changes = (0..1000).filter(|_| monitor.observe(broken)).count();
         assert_eq!(changes, 1);
         let lost = Arrivals::default();
-        assert_eq!(monitor.observe(lost), None);
+        assert!(!monitor.observe(lost));
         assert_eq!(monitor.state(), RingState::Open);
+    }
+
+    #[test]
+    fn one_copy_that_keeps_coming_alone_shows_a_dead_direction_and_single_losses_do_not_facts_9_2_1() {
+        let mut monitor = RingMonitor::default();
+        let closed = arrivals(&[(Link::Main, Link::Redundant), (Link::Redundant, Link::Main)]);
+        let main_alone = arrivals(&[(Link::Main, Link::Redundant)]);
+        assert!(monitor.observe(closed));
+        for _ in 0..1000 {
+            assert!(!monitor.observe(main_alone) && !monitor.observe(closed), "a single loss is no change");
+        }
+        let changes = (0..1000).filter(|_| monitor.observe(main_alone)).count();
+        assert_eq!((changes, monitor.dead_way(), monitor.state()), (1, Some(Link::Redundant), RingState::Closed));
+        assert!(!monitor.observe(Arrivals::default()), "a total loss says nothing about the ways");
+        assert!(monitor.observe(closed));
+        assert_eq!(monitor.dead_way(), None);
     }
 
     #[test]

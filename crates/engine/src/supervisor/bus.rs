@@ -137,6 +137,11 @@ impl Bus {
         }
     }
 
+    /// Whether the interfaces have carriers, by [`crate::link::Link::index`]; `None` where the links do not tell.
+    pub fn carriers(&self) -> [Option<bool>; 2] {
+        self.shared.borrow().carriers
+    }
+
     /// What the exchange posts, once there is one.
     pub fn board(&self) -> Option<alloc::sync::Arc<Board>> {
         self.shared.borrow().board.clone()
@@ -149,7 +154,8 @@ impl Bus {
     }
 
     /// Sends a datagram as often as needed and returns what came back, whatever its working counter. `expected` is the
-    /// working counter at which a second copy need not be waited for.
+    /// working counter at which a second copy need not be waited for. Commands that read and write at once are sent once:
+    /// a second time they would read what they wrote.
     pub fn transfer(
         &self,
         command: Command,
@@ -157,7 +163,13 @@ impl Bus {
         data: Vec<u8>,
         expected: Option<Wkc>,
     ) -> impl Future<Output = Result<Reply, BusError>> {
-        self.submit(Request { command, target, data, redundant: None, expected, resend: true, lead: None, mail: None })
+        let resend = !matches!(command, Command::Aprw | Command::Fprw | Command::Brw | Command::Lrw);
+        self.submit(Request { command, target, data, redundant: None, expected, resend, lead: None, mail: None })
+    }
+
+    /// Positions from here on live behind the redundant link (facts CR-09). Broadcasts show it, too.
+    pub(crate) fn set_main_count(&self, count: u16) {
+        self.shared.borrow_mut().main_count = count;
     }
 
     /// Like [`Bus::transfer`], but sent once: for accesses that must not happen twice.

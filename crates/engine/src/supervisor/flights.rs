@@ -432,6 +432,9 @@ impl Shared {
                 self.counters.half += 1;
             }
             let enough = flight.has_all_but(self.silence.mask(self.now), self.links);
+            if enough {
+                self.learn_main_count(&flight);
+            }
             for place in flight.places.iter().filter(|place| !place.answered) {
                 if enough {
                     let reply = place.reply(&flight.bytes);

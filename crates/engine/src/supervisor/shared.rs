@@ -32,6 +32,8 @@ pub(crate) struct Shared {
     pub(crate) outbox: Outbox,
     pub(crate) flights: Flights,
     pub(crate) silence: Silence,
+    /// By link, where the links tell.
+    pub(crate) carriers: [Option<bool>; 2],
     pub(crate) strays: Strays,
     pub(crate) round_trip: RoundTrip,
     /// SubDevices that the main copy of the last broadcast met: positions from here on live behind the redundant link.
@@ -58,6 +60,7 @@ impl Shared {
             outbox: Outbox::default(),
             flights: Flights::new(),
             silence: Silence::default(),
+            carriers: [None; 2],
             strays: Strays::default(),
             round_trip: RoundTrip::default(),
             main_count: 0,

@@ -227,6 +227,7 @@ fn in_an_open_ring_counts_are_added_and_reads_are_ored() {
     assert_eq!(bench.supervisor.ring(), RingState::Open);
 }
 
+// Facts CR-09.
 #[test]
 fn positions_behind_the_break_are_shifted_on_the_redundant_copy() {
     // facts CR-09: three on the main link, so position 4 is position 1 on the redundant one: ADP -4 + 3 = -1.
@@ -248,6 +249,7 @@ fn positions_behind_the_break_are_shifted_on_the_redundant_copy() {
     assert_eq!(adp(&bench.sent[1].1), 0u16.wrapping_sub(1));
 }
 
+// Facts CR-06.
 #[test]
 fn one_copy_is_enough_where_the_counter_is_as_expected() {
     // facts CR-06.

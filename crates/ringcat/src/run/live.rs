@@ -8,7 +8,10 @@ use std::time::Duration;
 
 use ringcat::news::News;
 use ringcat::text::Names;
-use ringcat::{DomainId, DomainState, Instant, RingState, SubDeviceState, SupervisorThread};
+use ringcat::{
+    DomainId, DomainState, Instant, Link, Redundancy, RedundancyLoss, RingState, RingStatus, SubDeviceState,
+    SupervisorThread,
+};
 use ringcat_wire::al::AlState;
 
 use crate::output::write;
@@ -44,7 +47,8 @@ impl Live {
         }
         self.next = now + PERIOD;
         self.clear();
-        let lines = table(news, self.ring, &supervisor.states(), names);
+        let ring = self.ring.then(|| supervisor.ring_status());
+        let lines = table(news, ring.as_ref(), &supervisor.states(), names);
         self.drawn = lines.len();
         write(format_args!("{}\n", lines.join("\n")));
     }
@@ -59,7 +63,7 @@ impl Live {
     }
 }
 
-fn table(news: &News, ring: bool, states: &[SubDeviceState], names: &Names) -> Vec<String> {
+fn table(news: &News, ring: Option<&RingStatus>, states: &[SubDeviceState], names: &Names) -> Vec<String> {
     let (pace, counters, status) = (news.pace(), news.counters(), news.status(DomainId(0)));
     let us = |time: Duration| time.as_nanos() as f64 / 1e3;
     let judgement = match status.state {
@@ -67,15 +71,9 @@ fn table(news: &News, ring: bool, states: &[SubDeviceState], names: &Names) -> V
         DomainState::Incomplete => "incomplete",
         DomainState::Complete => "complete",
     };
-    let ring = match news.ring() {
-        _ if !ring => "",
-        RingState::Unknown => "",
-        RingState::Closed => "   ring closed",
-        RingState::Open => "   ring OPEN",
-    };
     let (trips, wake_ups) = (news.round_trips(), news.wake_ups());
     let mut lines = vec![
-        format!("{} cycles   wkc {} of {}, {judgement}{ring}", pace.cycles, status.wkc, status.expected),
+        format!("{} cycles   wkc {} of {}, {judgement}", pace.cycles, status.wkc, status.expected),
         format!("the wire      {} frames lost, {} late, {} corrupt", counters.lost, counters.late, counters.corrupt),
         format!("this machine  {} late wake-ups, {} cycles left out", pace.late, pace.skipped),
     ];
@@ -83,12 +81,39 @@ fn table(news: &News, ring: bool, states: &[SubDeviceState], names: &Names) -> V
         let (half, most, longest) = (times.quantile(500_000), times.quantile(990_000), times.longest());
         lines.push(format!("{title:<13} 50 % {:.1}, 99 % {:.1}, longest {:.1} us", us(half), us(most), us(longest)));
     }
+    lines.extend(ring.into_iter().flat_map(|ring| ring_lines(ring, names)));
     lines.push(count(states));
     lines.extend(list(states, names));
     for line in &mut lines {
         if let Some((at, _)) = line.char_indices().nth(WIDTH) {
             line.truncate(at);
         }
+    }
+    lines
+}
+
+/// The ring and both links.
+fn ring_lines(status: &RingStatus, names: &Names) -> Vec<String> {
+    let state = match status.state {
+        RingState::Unknown => "unknown",
+        RingState::Closed => "closed",
+        RingState::Open => "OPEN",
+    };
+    let more = match (status.place, status.redundancy) {
+        (Some(cable), _) => format!(", break {}", names.cable(cable)),
+        (None, Redundancy::Lost { cause: cause @ RedundancyLoss::OneWay(_), .. }) => format!(", {cause}"),
+        (None, _) if status.unsteady => format!(", unsteady: {} changes", status.changes),
+        (None, _) => String::new(),
+    };
+    let mut lines = vec![format!("{:<13} {state}{more}", "ring")];
+    for link in [Link::Main, Link::Redundant] {
+        let it = status.link(link);
+        let carrier = match it.carrier {
+            Some(true) => "",
+            Some(false) => ", no carrier",
+            None => ", carrier unknown",
+        };
+        lines.push(format!("{:<13} {} SubDevices{carrier}", link.to_string(), it.answering));
     }
     lines
 }
@@ -133,7 +158,24 @@ fn list(states: &[SubDeviceState], names: &Names) -> Vec<String> {
 
 #[cfg(test)]
 mod tests {
+    use ringcat::{Cable, PortOf};
+
     use super::*;
+
+    #[test]
+    fn the_ring_is_shown_with_its_break_and_both_links() {
+        let mut status = RingStatus { state: RingState::Closed, ..RingStatus::default() };
+        status.links[0].answering = 3;
+        status.links[1].carrier = Some(false);
+        let names = Names::default();
+        let expected = ["ring          closed", "MAIN          3 SubDevices, carrier unknown"];
+        assert_eq!(ring_lines(&status, &names)[..2], expected);
+        assert_eq!(ring_lines(&status, &names)[2], "REDUNDANT     0 SubDevices, no carrier");
+        status.state = RingState::Open;
+        status.place = Some(Cable { near: Some(PortOf { node: 2, port: 1 }), far: None });
+        let expected = "ring          OPEN, break between SubDevice 2 port 1 and the REDUNDANT interface";
+        assert_eq!(ring_lines(&status, &names)[0], expected);
+    }
 
     #[test]
     fn of_many_subdevices_those_that_are_not_in_op_are_listed() {

@@ -99,7 +99,7 @@ fn outputs_that_come_slower_than_their_watchdog_are_named() -> Result<(), Error>
 fn without_a_domain_subdevices_are_still_supervised() -> Result<(), Error> {
     let (main_device, declaration) = scanned(SEGMENT);
     let subdevices = declaration.subdevices.into_iter().map(|config| config.target(AlState::PreOp)).collect();
-    let mut application = main_device.activate(Declaration { subdevices, domains: Vec::new() })?;
+    let mut application = main_device.activate(Declaration { subdevices, ..Declaration::default() })?;
     run(&mut application, 20);
     assert!(application.all_settled());
     let device = ringcat_sim::cable::DeviceIndex(1);

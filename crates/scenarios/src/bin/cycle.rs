@@ -48,7 +48,9 @@ const SPLIT: Case = case("lwr+lrd", 1, 2, false, Cabling::Line);
 const CLOSED: Case = case("closed", 1, 2, false, Cabling::ClosedRing);
 const CUT_MAIN: Case = case("cut-main", 1, 2, false, ON_MAIN);
 const CUT_REDUNDANT: Case = case("cut-redundant", 1, 2, false, ON_REDUNDANT);
-const CASES: [Case; 14] = [
+/// Most that two links may cost with 16 SubDevices, as a multiple of one link (issue 5).
+const SIXTEEN_BAR: f64 = 1.7;
+const CASES: [Case; 19] = [
     unsupervised(LRW, "lrw-unsupervised"),
     unsupervised(SPLIT, "lwr+lrd-unsupervised"),
     unsupervised(CLOSED, "closed-unsupervised"),
@@ -63,6 +65,11 @@ const CASES: [Case; 14] = [
     case("fifty-of-2", 50, 2, true, Cabling::Line),
     case("one-of-100-cut", 1, 100, false, ON_REDUNDANT),
     case("fifty-of-2-cut", 50, 2, false, Cabling::CutRing { before: 25 }),
+    case("sixteen-lrw", 16, 2, true, Cabling::Line),
+    case("sixteen-closed", 16, 2, false, Cabling::ClosedRing),
+    case("sixteen-cut-main", 16, 2, false, Cabling::CutRing { before: 16 }),
+    case("sixteen-cut-middle", 16, 2, false, Cabling::CutRing { before: 8 }),
+    case("sixteen-cut-redundant", 16, 2, false, Cabling::CutRing { before: 0 }),
 ];
 
 fn main() -> ExitCode {
@@ -192,6 +199,11 @@ fn print(measured: &[Measured]) -> bool {
     }
     for name in ["closed", "cut-main", "cut-redundant"] {
         figures.at_most(&format!("two links, {name}, against one link"), find(name).net() / one_link, RING_BAR, "x");
+    }
+    let sixteen = find("sixteen-lrw").net();
+    for name in ["sixteen-closed", "sixteen-cut-main", "sixteen-cut-middle", "sixteen-cut-redundant"] {
+        let title = format!("two links, {name}, against 16 on one link");
+        figures.at_most(&title, find(name).net() / sixteen, SIXTEEN_BAR, "x");
     }
     let fifty = find("fifty-of-2").net() / find("one-of-100").net();
     figures.at_most("50 SubDevices of 2 + 2 bytes against one of 100 + 100", fifty, FIFTY_BAR, "x");

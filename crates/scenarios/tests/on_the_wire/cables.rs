@@ -1,6 +1,7 @@
 //! A ring of 16 in OP, and each of its cables cut and healed: those of the host at either end of the cable, by switching
 //! the interface off, the inner ones by the simulator. Nobody leaves OP, and no more cycles are incomplete than the
-//! detection of the cut and stalls of this machine explain; both are measured at each edge and printed.
+//! detection of the cut and stalls of this machine explain; both are measured at each edge and printed. Each edge is told
+//! once, with the counts of both sides and its place. All of it takes more than 20 s of cycles.
 
 use std::time::{Duration, Instant};
 
@@ -10,7 +11,7 @@ use crate::{RING_OF_16, states};
 
 const CYCLE_MS: f64 = 1.0;
 /// From one edge to the next.
-const PAUSE: Duration = Duration::from_millis(300);
+const PAUSE: Duration = Duration::from_millis(550);
 /// The simulator's cables are noticed as cut after 10 us: within one cycle.
 const INNER_ALLOWED: usize = 1;
 
@@ -23,6 +24,8 @@ struct Edge {
     simulator: SimulatorLateness,
     /// Cycles that our MainDevice left out because this machine stalled.
     left_out: usize,
+    /// What was told of the ring and the links.
+    told: Vec<String>,
 }
 
 impl Edge {
@@ -70,7 +73,35 @@ fn edge(bench: &Bench, run: &Said, what: &str, noticed: Option<&str>, act: impl 
         SimulatorLateness { count: now.count - late.count, together_ms: now.together_ms - late.together_ms };
     assert_eq!(states(bench, "OP"), 16, "{what}: {}", bench.order("status"));
     let incomplete = incomplete_cycles(&lines).unwrap_or_else(|| panic!("{what}: {lines:#?}"));
-    Edge { what: what.to_owned(), incomplete, noticed_ms, simulator, left_out: left_out(&lines) }
+    let told = lines.iter().filter_map(|line| line.split_once(" ms  ")).map(|(_, words)| words.to_owned());
+    let told =
+        told.filter(|words| ["ring", "Line", "redundancy", "MAIN", "REDUNDANT"].iter().any(|it| words.starts_with(it)));
+    Edge { what: what.to_owned(), incomplete, noticed_ms, simulator, left_out: left_out(&lines), told: told.collect() }
+}
+
+/// An inner cable that is cut or healed is told in just these words.
+fn check_words(edge: &Edge, device: usize, is_cut: bool) {
+    let (main, redundant) = (device + 1, 15 - device);
+    let expected: &[String] = if is_cut {
+        &[
+            format!("ring open: {main} SubDevices on MAIN, {redundant} on REDUNDANT"),
+            "redundancy lost: the ring is open".into(),
+        ]
+    } else {
+        &[
+            "Line is fixed: ring closed, 16 SubDevices on MAIN".into(),
+            "redundancy regained: the ring stands a break".into(),
+        ]
+    };
+    for words in expected {
+        assert_eq!(edge.told.iter().filter(|told| *told == words).count(), 1, "{}: {:?}", edge.what, edge.told);
+    }
+    let places: Vec<&String> = edge.told.iter().filter(|told| told.starts_with("Line break")).collect();
+    assert_eq!(places.len(), usize::from(is_cut), "{}: {places:?}", edge.what);
+    if let Some(place) = places.first() {
+        let ends = [format!("between SubDevice {device} "), format!("port 1 and SubDevice {} ", device + 1)];
+        assert!(ends.iter().all(|end| place.contains(end)) && place.ends_with("port 0"), "{}: {place}", edge.what);
+    }
 }
 
 /// How many cycles were not complete, by the times of the judgements; `None` where the last one was not.
@@ -114,9 +145,11 @@ fn each_cable_of_a_ring_of_16_cut_and_healed_on_interfaces_costs_no_more_cycles_
     for device in 0..15 {
         for verb in ["cut", "heal"] {
             let order = format!("{verb} {device}-{}", device + 1);
-            edges.push(edge(&bench, run.said(), &order, None, || {
+            let edge = edge(&bench, run.said(), &order, None, || {
                 bench.order(&order);
-            }));
+            });
+            check_words(&edge, device, verb == "cut");
+            edges.push(edge);
         }
     }
     let (output, errors) = run.interrupt();
@@ -130,7 +163,8 @@ fn each_cable_of_a_ring_of_16_cut_and_healed_on_interfaces_costs_no_more_cycles_
         let (incomplete, allowed, stalled) = (edge.incomplete, edge.allowed(), edge.stalled());
         assert!(incomplete <= allowed + stalled, "{}: {incomplete} of {allowed} + {stalled}", edge.what);
     }
-    for (part, count) in [("ring open", 19), ("ring closed", 19), ("break between", 19), ("no longer answers", 0)] {
+    for (part, count) in [("ring open", 19), ("ring closed", 19), ("Line break between", 19), ("no longer answers", 0)]
+    {
         assert_eq!(output.matches(part).count(), count, "{part}: {output}{errors}");
     }
     assert!(output.contains("ring open: 8 SubDevices on MAIN, 8 on REDUNDANT"), "{output}");

@@ -10,7 +10,7 @@ use crate::bench::{Bench, Client, finish, is_asked_for, program, target_director
 use crate::{PLANTS, Plant, RING_OF_16, input, states};
 
 /// What asks for these tests.
-const FOREIGN: &str = "RINGCAT_FOREIGN";
+pub const FOREIGN: &str = "RINGCAT_FOREIGN";
 /// Cycles of process data.
 const CYCLES: usize = 500;
 /// A stall of this machine that is longer than the other's patience is no fault of the simulator: so many cycles may have
@@ -134,7 +134,7 @@ fn pysoem_moves_objects_files_and_firmware_of_a_simulated_subdevice() {
 }
 
 /// Starts a client, before ordinary programs.
-fn start(bench: &Bench, client: &Path, arguments: &[String]) -> Child {
+pub fn start(bench: &Bench, client: &Path, arguments: &[String]) -> Child {
     let words = ["-n", "-15"].into_iter().map(str::to_owned).chain([client.display().to_string()]);
     let words: Vec<String> = words.chain(arguments.iter().cloned()).collect();
     bench.start(Path::new("nice"), &words.iter().map(String::as_str).collect::<Vec<_>>())
@@ -146,7 +146,7 @@ fn start_pysoem(bench: &Bench, python: &Path, interfaces: &str, count: usize) ->
 }
 
 /// A Python with pysoem in an environment below the target directory. Only CI makes one by itself.
-fn python() -> Option<PathBuf> {
+pub fn python() -> Option<PathBuf> {
     let environment = target_directory().parent()?.join("pysoem");
     let python = environment.join("bin/python");
     let succeeds = |program: &Path, arguments: &[&str]| {

@@ -8,6 +8,7 @@
 mod bench;
 mod cables;
 mod captures;
+mod cuts_beside;
 mod foreign;
 mod frames;
 mod messages;

@@ -7,10 +7,9 @@ use ringcat_sim::cable::{CableId, DeviceIndex};
 use ringcat_sim::fault::Fault;
 use ringcat_sim::network::Network;
 use ringcat_sim::time::SimTime;
-use ringcat_wire::address::Position;
 use ringcat_wire::al::AlStatus;
 use scenarios::check::{Delivery, ring_events, troubles};
-use scenarios::segments::{SIXTEEN, ring_of_16};
+use scenarios::segments::{SIXTEEN, cable_of_ring, ring_of_16};
 use scenarios::world::{CYCLE, World};
 
 const COUNT: u16 = SIXTEEN.len() as u16;
@@ -25,8 +24,7 @@ fn broken(cable: usize, detection: Duration) -> Network {
 fn break_at(cable: usize) -> (Event, Event) {
     let main = cable as u16;
     let opened = Event::RingOpened { main, redundant: COUNT - main };
-    let after = main.checked_sub(1).map(Position);
-    (opened, Event::BreakLocated { after, before: (main < COUNT).then_some(Position(main)) })
+    (opened, Event::BreakLocated { cable: cable_of_ring(cable, COUNT.into()) })
 }
 
 /// SDOs that take a while to download.
@@ -143,6 +141,7 @@ fn a_break_and_its_repair_during_downloads_lose_no_object() {
     }
 }
 
+// Facts CR-18.
 #[test]
 fn two_breaks_isolate_a_piece_which_returns_without_losing_others() {
     for (first, second, isolated) in [(4, 7, 4..7), (10, 3, 3..10), (1, 2, 1..2), (0, 3, 0..3), (13, 16, 13..16)] {
@@ -184,6 +183,7 @@ fn two_breaks_isolate_a_piece_which_returns_without_losing_others() {
     }
 }
 
+// Facts CR-12.
 #[test]
 fn a_thousand_cycles_with_a_break_are_one_event() {
     let mut world = World::in_op(8, ring_of_16(FAST));

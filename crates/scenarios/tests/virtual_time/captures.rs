@@ -98,6 +98,7 @@ fn what_a_main_device_sends_keeps_every_promise_on_one_link() {
     assert_eq!(verdict.returned, verdict.sent[0]);
 }
 
+// Facts CR-01, CR-25.
 #[test]
 fn what_a_main_device_sends_keeps_every_promise_on_a_ring_that_breaks_closes_and_loses_a_subdevice() {
     let verdict = judge(&eventful(), None).expect("a capture");

@@ -53,6 +53,7 @@ fn in_a_closed_ring_the_unprocessed_copy_is_not_missed() {
     assert!(world.application().cyclic_counters().copies_lost > 0);
 }
 
+// Facts CR-04, CR-07.
 #[test]
 fn a_frame_that_comes_back_late_or_twice_is_counted_and_never_taken_for_a_new_one() {
     // Up to 600 ms: more than 256 frames, after which frame ids come again.

@@ -15,6 +15,7 @@ fn copies(cables: &str, cuts: &[&str]) -> [Option<Journey>; 2] {
     [travel(&mut network, Main), travel(&mut network, Redundant)]
 }
 
+// Facts CR-02.
 #[test]
 fn an_intact_ring_is_processed_once_and_crossed_once() {
     let [main, red] = copies(RING, &[]);
@@ -88,6 +89,7 @@ fn a_line_that_ends_in_an_unconnected_port_0_sets_the_c_bit() {
     assert_eq!(main, journey(Main, &[1, 3, 2], 0x02, true));
 }
 
+// Facts CR-03.
 #[test]
 fn every_single_break_shares_the_devices_among_the_copies() {
     for count in [1, 2, 5, 16] {

@@ -1,0 +1,182 @@
+//! Reading the error counters of all ports in the background, and telling of cables whose errors rise.
+//!
+//! Once a second, a few SubDevices at a time. A cut damages the frame that is under way: only errors that come in numbers,
+//! or second after second, are worth a word.
+
+use alloc::vec;
+use alloc::vec::Vec;
+use core::time::Duration;
+
+use ringcat_wire::address::StationAddress;
+use ringcat_wire::register::{ErrorCounters, map};
+
+use super::fleet::{Phase, SharedFleet};
+use crate::event::Event;
+use crate::ring_status::{Cable, CableErrors, port_errors};
+use crate::supervisor::{Bus, BusError};
+use crate::time::Instant;
+use crate::topology::PortOf;
+
+/// Pause between two looks.
+const PAUSE: Duration = Duration::from_secs(1);
+/// Damaged frames between two looks that are told at once; fewer when there were some before, too.
+const MANY: u64 = 3;
+/// The same cable is told of again after this time at the earliest.
+const AGAIN: Duration = Duration::from_secs(10);
+/// Counters end at 255: from here on they are cleared.
+const FULL: u8 = 128;
+
+/// Runs for ever.
+pub(super) async fn watch_errors(bus: Bus, fleet: SharedFleet) {
+    let count = fleet.access().members.len();
+    let mut last = vec![None; count];
+    let mut watched: Vec<Watched> = fleet.access().cables.iter().map(|(cable, _)| Watched::new(*cable)).collect();
+    let at_node = by_node(&watched);
+    // Others look once a second, too: not all at once.
+    bus.sleep(PAUSE / 2).await;
+    loop {
+        bus.sleep(PAUSE).await;
+        for (index, counters) in bus.gather_in_turns(present(&fleet), read).await.into_iter().flatten() {
+            let before = last[index].replace(counters);
+            let Some(node) = fleet.access().members.get(index).and_then(|member| member.node) else { continue };
+            for at in at_node.get(node).into_iter().flatten() {
+                watched[*at].take(node, before.as_ref(), &counters);
+            }
+            if is_full(&counters) && clear(&bus, &fleet, index).await.is_ok() {
+                last[index] = Some(ErrorCounters::default());
+            }
+        }
+        let now = bus.now();
+        for (at, watched) in watched.iter_mut().enumerate() {
+            let (fresh, event) = watched.close(now);
+            if let Some((_, total)) = fleet.access().cables.get_mut(at) {
+                *total = total.plus(fresh);
+            }
+            event.into_iter().for_each(|event| bus.report(event));
+        }
+    }
+}
+
+/// Cables at each SubDevice, by its position.
+fn by_node(watched: &[Watched]) -> Vec<Vec<usize>> {
+    let mut found: Vec<Vec<usize>> = Vec::new();
+    for (at, watched) in watched.iter().enumerate() {
+        for end in [watched.cable.near, watched.cable.far].into_iter().flatten() {
+            if found.len() <= end.node {
+                found.resize(end.node + 1, Vec::new());
+            }
+            found[end.node].push(at);
+        }
+    }
+    found
+}
+
+/// Members that answer, by index.
+fn present(fleet: &SharedFleet) -> Vec<(usize, StationAddress)> {
+    let access = fleet.access();
+    let members = access.members.iter().enumerate().filter(|(_, member)| member.phase != Phase::Absent);
+    members.map(|(index, member)| (index, member.station)).collect()
+}
+
+async fn read(bus: Bus, (index, station): (usize, StationAddress)) -> Option<(usize, ErrorCounters)> {
+    let bytes = bus.fprd_array(station, map::RX_ERROR_COUNTER).await.ok()?;
+    Some((index, ErrorCounters::decode(&bytes)))
+}
+
+fn is_full(counters: &ErrorCounters) -> bool {
+    counters.rx.iter().map(|rx| rx.invalid_frames).chain(counters.lost_link).any(|count| count >= FULL)
+}
+
+async fn clear(bus: &Bus, fleet: &SharedFleet, index: usize) -> Result<(), BusError> {
+    let Some(station) = fleet.access().members.get(index).map(|member| member.station) else { return Ok(()) };
+    bus.fpwr(station, map::RX_ERROR_COUNTER, &[0]).await?;
+    bus.fpwr(station, map::LOST_LINK_COUNTER, &[0]).await
+}
+
+/// A cable and what its ends have counted lately.
+struct Watched {
+    cable: Cable,
+    /// Since the last look.
+    fresh: CableErrors,
+    /// Since it was told of last.
+    untold: CableErrors,
+    /// There were damaged frames at the look before, too.
+    continues: bool,
+    told_at: Option<Instant>,
+}
+
+impl Watched {
+    fn new(cable: Cable) -> Watched {
+        let (fresh, untold) = Default::default();
+        Watched { cable, fresh, untold, continues: false, told_at: None }
+    }
+
+    /// Takes in the counters of a SubDevice, if it is at one of the ends.
+    fn take(&mut self, node: usize, before: Option<&ErrorCounters>, now: &ErrorCounters) {
+        let ends = [self.cable.near, self.cable.far];
+        for PortOf { port, .. } in ends.into_iter().flatten().filter(|end| end.node == node) {
+            let before = before.map(|counters| port_errors(counters, port)).unwrap_or_default();
+            self.fresh = self.fresh.plus(rise(before, port_errors(now, port)));
+        }
+    }
+
+    /// Ends a look: what is new, and an event where it is worth one.
+    fn close(&mut self, now: Instant) -> (CableErrors, Option<Event>) {
+        let fresh = core::mem::take(&mut self.fresh);
+        self.untold = self.untold.plus(fresh);
+        let came = fresh.invalid_frames;
+        let is_worth_it = came >= MANY || (came > 0 && self.continues);
+        self.continues = came > 0;
+        if !is_worth_it || self.told_at.is_some_and(|at| now.since(at) < AGAIN) {
+            return (fresh, None);
+        }
+        self.told_at = Some(now);
+        let errors = core::mem::take(&mut self.untold);
+        (fresh, Some(Event::CableErrors { cable: self.cable, errors }))
+    }
+}
+
+/// Counters that fell were cleared, or their SubDevice has lost its power.
+fn rise(before: CableErrors, now: CableErrors) -> CableErrors {
+    let rise = |before: u64, now: u64| if now >= before { now - before } else { now };
+    CableErrors {
+        invalid_frames: rise(before.invalid_frames, now.invalid_frames),
+        lost_links: rise(before.lost_links, now.lost_links),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const CABLE: Cable = Cable { near: Some(PortOf { node: 4, port: 1 }), far: Some(PortOf { node: 5, port: 0 }) };
+
+    fn counters(invalid_frames: u8) -> ErrorCounters {
+        let mut counters = ErrorCounters::default();
+        counters.rx[0].invalid_frames = invalid_frames;
+        counters
+    }
+
+    #[test]
+    fn one_damaged_frame_is_no_event_but_many_or_lasting_ones_are() {
+        let mut watched = Watched::new(CABLE);
+        let mut told = Vec::new();
+        for (second, count) in [0, 1, 1, 2, 3, 3, 9, 250, 2, 2].into_iter().enumerate() {
+            let before = told.len();
+            let last = if second == 0 { 0 } else { [0, 1, 1, 2, 3, 3, 9, 250, 2, 2][second - 1] };
+            watched.take(5, Some(&counters(last)), &counters(count));
+            watched.take(3, Some(&counters(last)), &counters(count));
+            let (_, event) = watched.close(Instant(0) + Duration::from_secs(second as u64));
+            told.extend(event);
+            assert_eq!(told.len() - before, usize::from(second == 4), "second {second}");
+        }
+        let errors = CableErrors { invalid_frames: 3, lost_links: 0 };
+        assert_eq!(told, [Event::CableErrors { cable: CABLE, errors }]);
+        watched.take(5, Some(&counters(0)), &counters(100));
+        let (fresh, event) = watched.close(Instant(0) + Duration::from_secs(14));
+        assert_eq!(fresh.invalid_frames, 100);
+        // 6 and 241 that came within ten seconds of the first event, 2 after the counters were cleared, and these.
+        let errors = CableErrors { invalid_frames: 349, lost_links: 0 };
+        assert_eq!(event, Some(Event::CableErrors { cable: CABLE, errors }));
+    }
+}

@@ -1,0 +1,100 @@
+//! Looking at a ring without changing anything: who answers on which link, how they are cabled, what their ports have
+//! counted. Only reads, so that a segment which somebody else operates goes on.
+
+use alloc::vec::Vec;
+
+use ringcat_wire::address::Position;
+use ringcat_wire::al::AlStatus;
+use ringcat_wire::register::{DlStatus, ErrorCounters, Information, map};
+
+use crate::link::LinkSet;
+use crate::ring::RingState;
+use crate::ring_status::{Cable, CableErrors, cables, port_errors};
+use crate::supervisor::{Bus, BusError};
+use crate::topology::{NodeStatus, PortOf, Topology};
+
+/// What was found.
+#[derive(Clone, Debug)]
+pub struct RingLook {
+    /// Closed or open.
+    pub state: RingState,
+    /// SubDevices on the main and on the redundant link.
+    pub counts: (u16, u16),
+    /// AL states by position.
+    pub states: Vec<AlStatus>,
+    /// How they are cabled.
+    pub topology: Topology,
+    /// Error counters by position.
+    pub counters: Vec<ErrorCounters>,
+    /// Every cable with what the ports at its ends have counted since the counters were cleared. They end at 255.
+    pub cables: Vec<(Cable, CableErrors)>,
+    /// Where the ring is broken.
+    pub place: Option<Cable>,
+}
+
+/// Looks once. SubDevices are addressed by position, which needs no station addresses.
+///
+/// # Errors
+/// Frames that are lost again and again, or SubDevices that come or go meanwhile.
+pub async fn look_at_ring(bus: Bus) -> Result<RingLook, BusError> {
+    let counted = bus.brd(map::TYPE, 1).await?;
+    let counts = (counted.main.0, counted.redundant.0);
+    let positions = (0..counted.wkc().0).map(Position);
+    let looks = bus.gather_in_turns(positions.collect(), look_at).await;
+    let mut statuses = Vec::with_capacity(looks.len());
+    let (mut states, mut counters) = (Vec::new(), Vec::new());
+    for look in looks {
+        let (status, state, counted) = look?;
+        statuses.push(status);
+        states.push(state);
+        counters.push(counted);
+    }
+    let state = bus.ring();
+    let topology = Topology::build(&statuses, usize::from(counts.0));
+    let place = broken(&topology, bus.links(), state);
+    let errors = |end: Option<PortOf>| {
+        let end = end.and_then(|at| Some(port_errors(counters.get(at.node)?, at.port)));
+        end.unwrap_or_default()
+    };
+    let cables = cables(&topology, bus.links());
+    let cables = cables.into_iter().map(|cable| (cable, errors(cable.near).plus(errors(cable.far)))).collect();
+    Ok(RingLook { state, counts, states, topology, counters, cables, place })
+}
+
+async fn look_at(bus: Bus, position: Position) -> Result<(NodeStatus, AlStatus, ErrorCounters), BusError> {
+    let (ports, (state, (dl_status, counters))) = bus
+        .both(
+            bus.aprd(position, map::TYPE, Information::LEN),
+            bus.both(
+                bus.aprd(position, map::AL_STATUS, AlStatus::LEN),
+                bus.both(
+                    bus.aprd(position, map::DL_STATUS, DlStatus::LEN),
+                    bus.aprd(position, map::RX_ERROR_COUNTER, ErrorCounters::LEN),
+                ),
+            ),
+        )
+        .await;
+    let status = NodeStatus {
+        dl_status: DlStatus::decode(&array(&dl_status?)),
+        // Latching receive times would disturb the clocks of a segment in operation.
+        receive_times: None,
+        ports: Information::decode(&array(&ports?)).port_descriptor.ports,
+    };
+    Ok((status, AlStatus::decode(&array(&state?)), ErrorCounters::decode(&array(&counters?))))
+}
+
+fn array<const N: usize>(bytes: &[u8]) -> [u8; N] {
+    bytes.first_chunk().copied().unwrap_or([0; N])
+}
+
+/// The cable without which the ring is open.
+fn broken(topology: &Topology, links: LinkSet, state: RingState) -> Option<Cable> {
+    if links != LinkSet::Ring || state != RingState::Open {
+        return None;
+    }
+    let all = cables(topology, links);
+    match topology.redundant_head {
+        Some(head) => all.get(head).copied(),
+        None => all.last().copied(),
+    }
+}

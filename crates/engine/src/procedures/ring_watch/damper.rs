@@ -1,0 +1,141 @@
+//! How often a state that changes is told: each change at once, as long as changes are rare.
+//!
+//! A change that follows another one closely is told when the state has held for a moment. Who changes too often for
+//! long is told only when it has been steady for a second: a loose plug bounces for hours.
+
+use core::time::Duration;
+
+use crate::time::Instant;
+
+/// A change that comes so long after the one before is told at once; one that comes earlier when it has held so long.
+const QUIET: Duration = Duration::from_millis(20);
+/// A state that changes too often is told when it has held for so long.
+const STEADY: Duration = Duration::from_secs(1);
+/// Changes that may be told in a row.
+const BUDGET: u32 = 32;
+/// One more may be told each time this has passed: four a second in the long run.
+const REFILL: Duration = Duration::from_millis(250);
+
+/// Decides when a change is told.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Damper {
+    changed_at: Option<Instant>,
+    is_prompt: bool,
+    budget: u32,
+    refilled_at: Instant,
+    is_unsteady: bool,
+}
+
+impl Default for Damper {
+    fn default() -> Damper {
+        Damper {
+            changed_at: None,
+            is_prompt: true,
+            budget: BUDGET,
+            refilled_at: Instant::default(),
+            is_unsteady: false,
+        }
+    }
+}
+
+impl Damper {
+    /// The state changed since the last look, so many times.
+    pub(crate) fn changed(&mut self, now: Instant, times: u32) {
+        self.is_prompt = times == 1 && self.changed_at.is_none_or(|at| now.since(at) >= QUIET);
+        self.changed_at = Some(now);
+    }
+
+    /// Whether the state as it is may be told.
+    pub(crate) fn may_tell(&mut self, now: Instant) -> bool {
+        let held = self.changed_at.map_or(Duration::MAX, |at| now.since(at));
+        if self.is_unsteady {
+            return held >= STEADY;
+        }
+        self.is_prompt || held >= QUIET
+    }
+
+    /// It is told. True where from now on it changes too often to be told each time.
+    pub(crate) fn tell(&mut self, now: Instant) -> bool {
+        let refills = now.since(self.refilled_at).as_nanos() / REFILL.as_nanos();
+        if refills > 0 {
+            self.budget = BUDGET.min(self.budget.saturating_add(u32::try_from(refills).unwrap_or(BUDGET)));
+            self.refilled_at = now;
+        }
+        self.budget = self.budget.saturating_sub(1);
+        let was = core::mem::replace(&mut self.is_unsteady, self.budget == 0);
+        self.is_unsteady && !was
+    }
+
+    /// Whether it changes too often to be told each time.
+    pub(crate) fn is_unsteady(&self, now: Instant) -> bool {
+        self.is_unsteady && self.changed_at.is_some_and(|at| now.since(at) < STEADY)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Looks every 500 us at a state that flips every `half_period`; returns how often it was told, and how often that
+    /// it is unsteady.
+    fn flap(half_period: Duration, lasts: Duration) -> (u32, u32) {
+        let (mut damper, mut told_state, mut told, mut unsteady, mut flips) = (Damper::default(), 0, 0, 0, 0);
+        let mut now = Instant(0);
+        while now < Instant(0) + lasts {
+            now += Duration::from_micros(500);
+            let due = u32::try_from(now.0 / half_period.as_nanos() as u64).unwrap();
+            if due != flips {
+                damper.changed(now, due - flips);
+                flips = due;
+            }
+            if told_state != flips % 2 && damper.may_tell(now) {
+                told_state = flips % 2;
+                told += 1;
+                unsteady += u32::from(damper.tell(now));
+            }
+        }
+        (told, unsteady)
+    }
+
+    #[test]
+    fn changes_that_are_rare_are_told_each_and_at_once() {
+        assert_eq!(flap(Duration::from_millis(300), Duration::from_secs(60)), (200, 0));
+        let mut damper = Damper::default();
+        damper.changed(Instant(5), 1);
+        assert!(damper.may_tell(Instant(5)));
+    }
+
+    #[test]
+    fn flapping_at_any_rate_is_told_a_bounded_number_of_times() {
+        let lasts = Duration::from_secs(60);
+        for micros in [1, 10, 100, 700, 3_000, 15_000, 25_000, 60_000, 150_000, 240_000, 1_000_000] {
+            let (told, unsteady) = flap(Duration::from_micros(micros), lasts);
+            let most = BUDGET + (lasts.as_nanos() / REFILL.as_nanos()) as u32;
+            assert!(told <= most, "{told} of {most} with a half period of {micros} us");
+            assert!(unsteady <= 1, "{unsteady}");
+        }
+        assert_eq!(flap(Duration::from_micros(10), lasts).0, 0, "back again before anybody looked");
+        assert_eq!(flap(Duration::from_millis(25), lasts), (BUDGET + 3, 1), "then told no more until it is steady");
+    }
+
+    #[test]
+    fn what_was_unsteady_is_told_when_it_has_been_steady_for_a_second() {
+        let mut damper = Damper::default();
+        let mut now = Instant(0);
+        let mut became = 0;
+        for _ in 0..1000 {
+            now += Duration::from_millis(30);
+            damper.changed(now, 1);
+            if damper.may_tell(now) {
+                became += u32::from(damper.tell(now));
+            }
+        }
+        assert_eq!(became, 1);
+        assert!(damper.is_unsteady(now) && !damper.may_tell(now + Duration::from_millis(999)));
+        now += STEADY;
+        assert!(!damper.is_unsteady(now) && damper.may_tell(now));
+        assert!(!damper.tell(now), "some are told again");
+        damper.changed(now + STEADY, 1);
+        assert!(damper.may_tell(now + STEADY));
+    }
+}

@@ -1,0 +1,142 @@
+//! The cables of a segment, from its topology, and the errors that the ports at their ends have counted.
+//!
+//! A controller counts an invalid frame where it is seen first (facts 2.5): at the receiving end of the cable that
+//! damaged it. Controllers behind count it as forwarded, which says nothing about their own cables.
+
+use alloc::vec::Vec;
+use core::fmt;
+
+use ringcat_wire::register::ErrorCounters;
+
+use super::Cable;
+use crate::link::LinkSet;
+use crate::topology::{PortOf, Topology};
+
+/// What the ports at both ends of a cable have counted.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct CableErrors {
+    /// Frames that arrived damaged at either end and were damaged here.
+    pub invalid_frames: u64,
+    /// Losses of the link at either end.
+    pub lost_links: u64,
+}
+
+impl CableErrors {
+    /// Nothing was counted.
+    pub const fn is_none(&self) -> bool {
+        self.invalid_frames == 0 && self.lost_links == 0
+    }
+
+    /// Both together.
+    #[must_use]
+    pub const fn plus(self, other: CableErrors) -> CableErrors {
+        CableErrors {
+            invalid_frames: self.invalid_frames + other.invalid_frames,
+            lost_links: self.lost_links + other.lost_links,
+        }
+    }
+}
+
+impl fmt::Display for CableErrors {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{} damaged frames, {} lost links", self.invalid_frames, self.lost_links)
+    }
+}
+
+/// What one port has counted. Symbol errors are left out: they come with every plug that is pulled.
+pub fn port_errors(counters: &ErrorCounters, port: u8) -> CableErrors {
+    let at = usize::from(port & 3);
+    CableErrors { invalid_frames: counters.rx[at].invalid_frames.into(), lost_links: counters.lost_link[at].into() }
+}
+
+/// All cables, in the order in which frames of MAIN pass them; a broken one too, as far as both ends are known.
+pub fn cables(topology: &Topology, links: LinkSet) -> Vec<Cable> {
+    let port = |node: usize| PortOf { node, port: topology.nodes[node].entry_port };
+    let mut cables = Vec::with_capacity(topology.nodes.len() + 1);
+    let is_headed = |node: usize| topology.redundant_head == Some(node);
+    for (node, it) in topology.nodes.iter().enumerate() {
+        let near = match it.parent {
+            Some((parent, port)) => Some(PortOf { node: parent, port }),
+            None if is_headed(node) => topology.main_count.checked_sub(1).map(|last| loose_end(topology, last)),
+            None => None,
+        };
+        cables.push(Cable { near, far: Some(port(node)) });
+    }
+    let Some(last) = topology.nodes.len().checked_sub(1).filter(|_| links == LinkSet::Ring) else { return cables };
+    let open = topology.open_ports.first().copied();
+    cables.push(Cable { near: Some(open.unwrap_or_else(|| loose_end(topology, last))), far: None });
+    cables
+}
+
+/// The port at which a line ends: of those without a neighbour the usual way on, port 1, or else the next in the order
+/// of travel.
+fn loose_end(topology: &Topology, node: usize) -> PortOf {
+    let it = &topology.nodes[node];
+    let is_loose = |port: &u8| *port != it.entry_port && it.children[usize::from(*port)].is_none();
+    PortOf { node, port: [1, 3, 2, 0].into_iter().find(is_loose).unwrap_or(1) }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::string::{String, ToString};
+    use std::vec::Vec;
+
+    use ringcat_wire::register::{DlStatus, PortKind};
+
+    use super::*;
+    use crate::topology::NodeStatus;
+
+    /// High bytes of DL_STATUS (facts 2.3).
+    fn named(high: &[u8], main_count: usize, links: LinkSet) -> Vec<String> {
+        let node = |high: &u8| NodeStatus {
+            dl_status: DlStatus::from_bits(u16::from(*high) << 8),
+            receive_times: None,
+            ports: [PortKind::Mii; 4],
+        };
+        let nodes: Vec<NodeStatus> = high.iter().map(node).collect();
+        let cables = cables(&Topology::build(&nodes, main_count), links);
+        cables.iter().map(ToString::to_string).collect()
+    }
+
+    const END: u8 = 0x56;
+    const PASS: u8 = 0x5A;
+    const HEAD: u8 = 0x59;
+
+    #[test]
+    fn every_cable_of_a_closed_ring_is_named() {
+        let expected = [
+            "between the MAIN interface and SubDevice 0 port 0",
+            "between SubDevice 0 port 1 and SubDevice 1 port 0",
+            "between SubDevice 1 port 1 and the REDUNDANT interface",
+        ];
+        assert_eq!(named(&[PASS, PASS], 2, LinkSet::Ring), expected);
+    }
+
+    #[test]
+    fn a_broken_cable_is_among_them_wherever_it_is() {
+        let expected = [
+            "between the MAIN interface and SubDevice 0 port 0",
+            "between SubDevice 0 port 1 and SubDevice 1 port 0",
+            "between SubDevice 1 port 1 and the REDUNDANT interface",
+        ];
+        assert_eq!(named(&[END, HEAD], 1, LinkSet::Ring), expected);
+        assert_eq!(named(&[PASS, END], 2, LinkSet::Ring), expected);
+        assert_eq!(named(&[HEAD, PASS], 0, LinkSet::Ring), expected);
+    }
+
+    #[test]
+    fn a_line_has_no_cable_to_the_redundant_link() {
+        assert_eq!(named(&[PASS, END], 2, LinkSet::Single).len(), 2);
+    }
+
+    #[test]
+    fn errors_are_those_of_the_port() {
+        let mut bytes = [0; ErrorCounters::LEN];
+        (bytes[2], bytes[0x11]) = (7, 2);
+        let counters = ErrorCounters::decode(&bytes);
+        let errors = port_errors(&counters, 1);
+        assert_eq!(errors, CableErrors { invalid_frames: 7, lost_links: 2 });
+        assert_eq!(errors.plus(errors).to_string(), "14 damaged frames, 4 lost links");
+        assert!(port_errors(&counters, 0).is_none());
+    }
+}

@@ -1,0 +1,182 @@
+//! `ringcat ring`: how a ring is, without changing anything: who answers on which link, where it is broken, what the
+//! ports at the ends of each cable have counted.
+
+use std::time::Duration;
+
+use clap::Args;
+use ringcat::text::Names;
+use ringcat::{CableErrors, Link, MainDevice, RingLook, RingState};
+
+use crate::interfaces::{Failure, InterfaceArguments, ThreadArguments};
+use crate::output::say;
+use crate::recording::RecordingArguments;
+use crate::times::time;
+
+/// How to read what it prints.
+const ABOUT_RING: &str = "\
+It only reads, so that a segment in operation stays in operation; but do not run it beside another MainDevice that counts
+its frames. Counters end at 255, and nothing here clears them: look at them twice (--for) to see which ones rise. A cable
+whose counter rises has a bad plug, or is bent, or lies beside something that disturbs it.
+
+Exit status: 0 the ring is closed (or there is one link), 1 it is open, 2 it could not be looked at.";
+
+/// Options of `ringcat ring`.
+#[derive(Args, Debug)]
+#[command(after_help = ABOUT_RING)]
+pub struct RingArguments {
+    #[command(flatten)]
+    interfaces: InterfaceArguments,
+    #[command(flatten)]
+    thread: ThreadArguments,
+    #[command(flatten)]
+    recording: RecordingArguments,
+    /// Look again after this time, such as 10s, and show what the counters have gained.
+    #[arg(long = "for", value_name = "TIME", value_parser = time)]
+    lasts: Option<Duration>,
+    /// Print JSON instead of a table.
+    #[arg(long)]
+    json: bool,
+}
+
+/// Looks and prints; true where the ring is not open.
+pub fn run(arguments: &RingArguments) -> Result<bool, Failure> {
+    let links = arguments.interfaces.open(arguments.thread)?;
+    let recording = arguments.recording.start(&arguments.interfaces)?;
+    let links = recording.tee(links);
+    let _awake = arguments.thread.apply();
+    let mut main_device = MainDevice::request(links, &arguments.interfaces.options());
+    let mut look = main_device.look_at_ring()?;
+    if let Some(lasts) = arguments.lasts {
+        std::thread::sleep(lasts);
+        let before = std::mem::replace(&mut look, main_device.look_at_ring()?);
+        for ((cable, errors), (same, earlier)) in look.cables.iter_mut().zip(&before.cables) {
+            if cable == same {
+                *errors = gained(*earlier, *errors);
+            }
+        }
+    }
+    let two_links = arguments.interfaces.redundant.is_some();
+    if arguments.json {
+        say!("{:#}", json(&look));
+    } else {
+        lines(&look, two_links).iter().for_each(|line| say!("{line}"));
+    }
+    Ok(!two_links || look.state != RingState::Open)
+}
+
+fn gained(before: CableErrors, now: CableErrors) -> CableErrors {
+    CableErrors {
+        invalid_frames: now.invalid_frames.saturating_sub(before.invalid_frames),
+        lost_links: now.lost_links.saturating_sub(before.lost_links),
+    }
+}
+
+fn lines(look: &RingLook, two_links: bool) -> Vec<String> {
+    let names = Names::default();
+    let (main, redundant) = look.counts;
+    let state = match look.state {
+        _ if !two_links => "one link",
+        RingState::Closed => "closed",
+        RingState::Open => "OPEN: the next break isolates somebody",
+        RingState::Unknown => "unknown: not all copies come back",
+    };
+    let mut lines = vec![format!("ring        {state}")];
+    for (link, count) in [(Link::Main, main), (Link::Redundant, redundant)].into_iter().take(1 + usize::from(two_links))
+    {
+        lines.push(format!("{:<11} {count} SubDevices", link.to_string()));
+    }
+    if let Some(place) = look.place {
+        lines.push(format!("line break  {}", names.cable(place)));
+    }
+    lines.push(String::from("damaged frames, lost links of each cable:"));
+    for (cable, errors) in &look.cables {
+        let mark = if look.place == Some(*cable) { "  <- line break" } else { "" };
+        lines.push(format!("{:>6} {:>6}  {}{mark}", errors.invalid_frames, errors.lost_links, names.cable(*cable)));
+    }
+    lines
+}
+
+fn json(look: &RingLook) -> serde_json::Value {
+    let end =
+        |port: Option<ringcat::PortOf>| port.map(|at| serde_json::json!({ "position": at.node, "port": at.port }));
+    let cable = |cable: ringcat::Cable| serde_json::json!({ "near": end(cable.near), "far": end(cable.far) });
+    let cables: Vec<_> = look
+        .cables
+        .iter()
+        .map(|(it, errors)| {
+            serde_json::json!({
+                "cable": cable(*it),
+                "damaged_frames": errors.invalid_frames,
+                "lost_links": errors.lost_links,
+            })
+        })
+        .collect();
+    serde_json::json!({
+        "state": match look.state {
+            RingState::Unknown => "unknown",
+            RingState::Closed => "closed",
+            RingState::Open => "open",
+        },
+        "main": look.counts.0,
+        "redundant": look.counts.1,
+        "line_break": look.place.map(cable),
+        "cables": cables,
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use ringcat::Options;
+    use ringcat::simulated::SimulatedSegment;
+
+    use super::*;
+
+    const RING: &str = "[segment]\nring = true\n[[device]]\ntype = \"coupler\"\n[[device]]\ntype = \"digital-output-8\"\n\
+                        [[device]]\ntype = \"digital-input-8\"\n";
+
+    fn look(cut: Option<usize>, corrupt: Option<usize>) -> RingLook {
+        let mut segment = SimulatedSegment::from_toml(RING).unwrap();
+        let network = segment.network_mut();
+        network.advance_by(Duration::from_millis(20));
+        if let Some(cable) = cut {
+            network.cut(ringcat_sim::cable::CableId(cable));
+        }
+        if let Some(cable) = corrupt {
+            let cable = ringcat_sim::cable::CableId(cable);
+            network.apply(ringcat_sim::fault::Fault::Corrupt { cable, direction: None, count: 2 });
+        }
+        network.advance_by(Duration::from_millis(20));
+        MainDevice::request(segment, &Options::default()).look_at_ring().unwrap()
+    }
+
+    #[test]
+    fn a_closed_ring_is_shown_with_every_cable() {
+        let look = look(None, None);
+        assert_eq!((look.state, look.counts, look.place), (RingState::Closed, (3, 0), None));
+        let lines = lines(&look, true);
+        assert_eq!(lines[0], "ring        closed");
+        assert_eq!(lines[2], "REDUNDANT   0 SubDevices");
+        assert_eq!(lines[4], "     0      0  between the MAIN interface and SubDevice 0 port 0");
+        assert_eq!(lines.len(), 8);
+    }
+
+    #[test]
+    fn the_place_of_a_break_and_damaged_frames_are_shown_wherever_they_are() {
+        for cable in 0..=3 {
+            let look = look(Some(cable), None);
+            assert_eq!((look.state, look.counts), (RingState::Open, (cable as u16, 3 - cable as u16)));
+            assert_eq!(look.place, Some(look.cables[cable].0), "cable {cable}");
+            assert!(lines(&look, true).iter().any(|line| line.ends_with("<- line break")));
+            assert_eq!(json(&look)["state"], "open");
+        }
+        for cable in 0..=3 {
+            let look = look(None, Some(cable));
+            let counted: Vec<u64> = look.cables.iter().map(|(_, errors)| errors.invalid_frames).collect();
+            let at_the_host = cable == 0 || cable == 3;
+            // What is damaged on the way to the host is counted by nobody.
+            let expected = if at_the_host { 1..=2 } else { 2..=4 };
+            assert!(expected.contains(&counted[cable]), "cable {cable}: {counted:?}");
+            assert_eq!(counted.iter().sum::<u64>(), counted[cable], "cable {cable}: {counted:?}");
+        }
+    }
+}

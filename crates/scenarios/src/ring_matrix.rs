@@ -1,0 +1,357 @@
+//! The matrix of rings: any cable of a ring of any length cut and healed at any phase of its life, with everything that
+//! must hold checked ([`Bed::run`]). Scenarios run a part of it, the bench of the ring all of it.
+
+use std::time::Duration;
+
+use ringcat::{DomainId, Event, Options, Redundancy, RingState, automatic};
+use ringcat_engine::mail::coe::{self, SdoAddress};
+use ringcat_engine::mail::foe::{self, FoeOptions};
+use ringcat_engine::mail::stream::{Bounded, Bytes};
+use ringcat_engine::mail::{Limits, Mailbox};
+use ringcat_engine::main_device::Pending;
+use ringcat_sim::application::behaviours::{Behaviour, InputSource};
+use ringcat_sim::cable::{CableId, DeviceIndex};
+use ringcat_sim::description::DeviceDescription;
+use ringcat_sim::fault::Fault;
+use ringcat_sim::network::{Network, NetworkOptions};
+use ringcat_sim::time::SimTime;
+
+use crate::check::{Delivery, ring_events, troubles};
+use crate::phases::{End, Phase as StartPhase, start_up};
+use crate::segments::{cable_of_ring, descriptions, ring};
+use crate::world::{CYCLE, World};
+
+const LIMITS: Limits = (Duration::from_millis(500), Duration::from_secs(2));
+const OBJECT: SdoAddress = SdoAddress::new(0x2002, 0);
+/// Some segments of an SDO, and some packets of a file.
+const BYTES: usize = 12_000;
+/// Cycles after an edge.
+const AFTER_EDGE: u64 = 25;
+/// Cycles in OP before anything happens.
+const BEFORE: u64 = 5;
+/// Cycles for which the SubDevice that falls hangs: a little longer than its watchdog.
+const FALL: u64 = 110;
+/// Inputs are functions of outputs, so that they are what they would have been this many cycles after the last one that
+/// was not complete.
+const ECHO: usize = 2;
+
+/// What is going on when the cable is cut.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Phase {
+    /// The segment has just got its power.
+    PowerOn,
+    /// SII contents are being read.
+    Scan,
+    /// On the way to PREOP.
+    ToPreOp,
+    /// On the way to SAFEOP.
+    ToSafeOp,
+    /// On the way to OP.
+    ToOp,
+    /// All are in OP, mailboxes are idle.
+    Idle,
+    /// A segmented SDO is written and read back.
+    Sdo,
+    /// A file is written by FoE and read back.
+    Foe,
+    /// One SubDevice fell to SAFEOP and is on its way back.
+    StateChange,
+}
+
+impl Phase {
+    /// In the order of a life.
+    pub const ALL: [Phase; 9] = [
+        Phase::PowerOn,
+        Phase::Scan,
+        Phase::ToPreOp,
+        Phase::ToSafeOp,
+        Phase::ToOp,
+        Phase::Idle,
+        Phase::Sdo,
+        Phase::Foe,
+        Phase::StateChange,
+    ];
+
+    /// Before all are in OP.
+    pub const fn is_start_up(self) -> bool {
+        matches!(self, Phase::PowerOn | Phase::Scan | Phase::ToPreOp | Phase::ToSafeOp | Phase::ToOp)
+    }
+}
+
+/// A run.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Case {
+    /// SubDevices.
+    pub count: usize,
+    /// The cable, from the main link on.
+    pub cable: usize,
+    /// What is going on.
+    pub phase: Phase,
+    /// Moment of the edges within the cycle, or within the phase of the start-up, in thousandths.
+    pub moment: u32,
+    /// Detection delay of all ports.
+    pub detection: Duration,
+}
+
+/// What came of it.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Outcome {
+    /// Incomplete cycles at the cut and at the repair; none are counted in a start-up.
+    pub incomplete: [usize; 2],
+    /// From the first frames that went the original way to the event.
+    pub fixed_after: Duration,
+    /// Bytes of inputs that were compared with the uncut twin.
+    pub compared: u64,
+}
+
+/// The device that has mailboxes with all protocols.
+pub const fn speaker(count: usize) -> usize {
+    count / 2
+}
+
+/// Inputs from the number of the cycle and the outputs that were latched last.
+fn echo(now: SimTime, outputs: &[u8], inputs: &mut [u8]) {
+    let cycle = (now.0 / CYCLE.as_nanos() as u64) as u8;
+    for (at, input) in inputs.iter_mut().enumerate() {
+        let output = if outputs.is_empty() { 0 } else { outputs[at % outputs.len()] };
+        *input = output.rotate_left(3) ^ cycle.wrapping_mul(29).wrapping_add(at as u8);
+    }
+}
+
+/// A ring of terminals and blocks whose inputs are functions of outputs and cycle.
+pub fn segment(count: usize, detection: Duration) -> Network {
+    const KINDS: [&str; 6] =
+        ["digital-output-8", "digital-input-8", "block", "digital-output-16", "digital-input-16", "analog-output-4"];
+    let mut kinds: Vec<&str> = KINDS.into_iter().cycle().take(count).collect();
+    kinds[speaker(count)] = "all-protocols";
+    let mut described: Vec<DeviceDescription> = descriptions(&kinds);
+    for it in &mut described {
+        if let Behaviour::Terminal(source) = &mut it.behaviour {
+            *source = InputSource::Function(echo);
+        }
+    }
+    ring(described, NetworkOptions::default().with_detection_delay(detection))
+}
+
+/// The moment of a case in a start-up.
+fn moment(case: &Case, phases: &[StartPhase]) -> SimTime {
+    let end = |wanted: End| phases.iter().find(|phase| phase.end == wanted).map_or(Duration::ZERO, |phase| phase.at);
+    use ringcat_wire::al::AlState::{Op, PreOp, SafeOp};
+    let (from, to) = match case.phase {
+        Phase::PowerOn => (Duration::ZERO, end(End::Addressed)),
+        Phase::Scan => (end(End::Addressed), end(End::Scanned)),
+        Phase::ToPreOp => (end(End::Scanned), end(End::State(PreOp))),
+        Phase::ToSafeOp => (end(End::State(PreOp)), end(End::State(SafeOp))),
+        Phase::ToOp | Phase::Idle | Phase::Sdo | Phase::Foe | Phase::StateChange => {
+            (end(End::State(SafeOp)), end(End::State(Op)))
+        }
+    };
+    SimTime::from_micros(((from + (to - from) * case.moment / 1000).as_nanos() / 1000) as u64)
+}
+
+/// What the runs of one length have in common: when the phases of its start end, and the twin that nobody cuts.
+#[derive(Debug)]
+pub struct Bed {
+    count: usize,
+    detection: Duration,
+    phases: Vec<StartPhase>,
+    /// Inputs and outputs of each cycle from OP on; of one whose SubDevice falls, too.
+    twins: [Vec<Vec<u8>>; 2],
+}
+
+impl Bed {
+    /// A bed for rings of so many SubDevices.
+    pub fn new(count: usize, detection: Duration) -> Bed {
+        let phases = start_up(segment(count, detection), &Options::default(), CYCLE).expect("it starts");
+        let cycles = 2 * wait(detection) + FALL + 40;
+        let twins = [false, true].map(|falls| {
+            let mut world = World::in_op(0, segment(count, detection));
+            let mut images = Vec::new();
+            for cycle in 0..cycles {
+                if falls && (cycle == BEFORE || cycle == BEFORE + FALL) {
+                    world.hang(DeviceIndex(speaker(count)), cycle == BEFORE);
+                }
+                world.cycle();
+                images.push(world.application().exchange().image(DomainId(0)).to_vec());
+            }
+            images
+        });
+        Bed { count, detection, phases, twins }
+    }
+
+    /// Cuts and heals a cable in a phase, at a moment of the cycle (or of the phase of the start-up) in thousandths.
+    ///
+    /// # Panics
+    /// When something does not hold.
+    pub fn run(&self, cable: usize, phase: Phase, moment: u32) -> Outcome {
+        let case = Case { count: self.count, cable, phase, moment, detection: self.detection };
+        if phase.is_start_up() { start(&case, &self.phases) } else { operate(&case, &self.twins[falls(phase)]) }
+    }
+}
+
+fn falls(phase: Phase) -> usize {
+    usize::from(phase == Phase::StateChange)
+}
+
+/// A break that comes and goes while the ring starts.
+fn start(case: &Case, phases: &[StartPhase]) -> Outcome {
+    let mut network = segment(case.count, case.detection);
+    let at = moment(case, phases);
+    network.schedule(at, Fault::Cut(CableId(case.cable)));
+    let healed = at + Duration::from_millis(40 + u64::from(case.moment) / 10);
+    network.schedule(healed, Fault::Heal(CableId(case.cable)));
+    let seed = case.cable as u64 * 1000 + u64::from(case.moment);
+    let mut world = World::with(seed, network, &Options::default(), |scan| automatic(&scan.subdevices, CYCLE))
+        .unwrap_or_else(|error| panic!("{case:?}: {error}"));
+    world.settle();
+    while world.now() < healed + case.detection {
+        world.cycle();
+    }
+    world.run_cycles(AFTER_EDGE);
+    let all = world.events(world.beginning());
+    assert_eq!(troubles(all), Vec::<&Event>::new(), "{case:?}");
+    let told = ring_events(all);
+    let opened = told.iter().filter(|event| matches!(event, Event::RingOpened { .. })).count();
+    let closed = told.iter().filter(|event| matches!(event, Event::RingClosed { .. })).count();
+    assert!(opened <= 1 && opened == closed, "{case:?}: {told:?}");
+    let cable = cable_of_ring(case.cable, case.count);
+    let misplaced = told.iter().find(|event| matches!(event, Event::BreakLocated { cable: at } if *at != cable));
+    assert_eq!(misplaced, None, "{case:?}");
+    is_whole(&world, case);
+    Outcome::default()
+}
+
+/// The ring is closed, all are in OP, everything is complete.
+fn is_whole(world: &World, case: &Case) {
+    let status = world.application().ring_status();
+    assert_eq!(
+        (status.state, status.redundancy, status.place),
+        (RingState::Closed, Redundancy::Ready, None),
+        "{case:?}"
+    );
+    assert!(world.all_in_op() && world.application().all_settled(), "{case:?}");
+    let last = world.judged(world.beginning()).last().map(|judged| judged.delivery);
+    assert_eq!(last, Some(Delivery::Complete), "{case:?}");
+}
+
+/// A ring in OP, beside what its twin that nobody cuts had in each cycle.
+struct Pair<'a> {
+    cut: World,
+    twin: std::slice::Iter<'a, Vec<u8>>,
+    /// Complete cycles in a row.
+    calm: usize,
+    compared: u64,
+}
+
+impl Pair<'_> {
+    /// One cycle. Outside the edges the inputs are the twin's.
+    fn cycle(&mut self, case: &Case) {
+        self.cut.cycle();
+        let world = &self.cut;
+        let last = world.judged(world.beginning()).last();
+        self.calm = if last.is_some_and(|it| it.delivery == Delivery::Complete) { self.calm + 1 } else { 0 };
+        let Some(twin) = self.twin.next().filter(|_| self.calm > ECHO) else { return };
+        let image = world.application().exchange().image(DomainId(0));
+        assert_eq!(image, twin, "{case:?}: other inputs than the twin's, {}", world.now());
+        self.compared += image.len() as u64;
+    }
+
+    fn cycles(&mut self, case: &Case, count: u64) {
+        (0..count).for_each(|_| self.cycle(case));
+    }
+}
+
+fn pattern() -> Vec<u8> {
+    (0..BYTES).map(|at| (at * 11 % 251) as u8).collect()
+}
+
+async fn write_and_read_object(mailbox: Mailbox) -> Vec<u8> {
+    coe::write(&mailbox, OBJECT, &pattern(), LIMITS).await.expect("a break is no error");
+    coe::read(&mailbox, OBJECT, LIMITS, BYTES).await.expect("a break is no error")
+}
+
+async fn write_and_read_file(mailbox: Mailbox) -> Vec<u8> {
+    let options = FoeOptions { limits: LIMITS, ..FoeOptions::default() };
+    let data = pattern();
+    foe::write(&mailbox, "recipe", options, &mut Bytes::new(&data), |_| ()).await.expect("a break is no error");
+    let mut sink = Bounded::new(BYTES);
+    foe::read(&mailbox, "recipe", options, &mut sink, |_| ()).await.expect("a break is no error");
+    sink.into_bytes()
+}
+
+/// Something begins that goes on over both edges.
+fn begin(world: &mut World, case: &Case) -> Option<Pending<Vec<u8>>> {
+    let mailbox = world.mailbox(speaker(case.count));
+    match case.phase {
+        Phase::Sdo => Some(world.start(write_and_read_object(mailbox))),
+        Phase::Foe => Some(world.start(write_and_read_file(mailbox))),
+        _ => None,
+    }
+}
+
+/// Incomplete cycles that an edge may cost (issue 5, bars).
+pub fn allowed(detection: Duration, flight: Duration) -> usize {
+    let time = detection + flight;
+    if time < CYCLE / 2 { 1 } else { time.as_nanos().div_ceil(CYCLE.as_nanos()) as usize + 1 }
+}
+
+/// Cycles after an edge, detection included.
+fn wait(detection: Duration) -> u64 {
+    detection.as_nanos().div_ceil(CYCLE.as_nanos()) as u64 + AFTER_EDGE
+}
+
+fn operate(case: &Case, twin: &[Vec<u8>]) -> Outcome {
+    let cut = World::in_op(0, segment(case.count, case.detection));
+    let mut pair = Pair { cut, twin: twin.iter(), calm: 0, compared: 0 };
+    pair.cut.application_mut().links_mut().measure_flights();
+    pair.cycles(case, BEFORE);
+    let fallen = (case.phase == Phase::StateChange).then(|| fall(&mut pair, case));
+    let work = begin(&mut pair.cut, case);
+    pair.cycles(case, if work.is_some() { 8 } else { 0 });
+    let flight = Duration::from_nanos(pair.cut.application().links().flight_ns());
+    let bound = allowed(case.detection, flight);
+    let (main, redundant) = (case.cable as u16, (case.count - case.cable) as u16);
+    let cable = cable_of_ring(case.cable, case.count);
+    let opened = [Event::RingOpened { main, redundant }, Event::BreakLocated { cable }];
+    let closed = [Event::RingClosed { main: case.count as u16, redundant: 0 }];
+    let mut outcome = Outcome::default();
+    for (at, fault) in [Fault::Cut(CableId(case.cable)), Fault::Heal(CableId(case.cable))].into_iter().enumerate() {
+        let mark = pair.cut.mark();
+        pair.cut.fault_in(CYCLE * case.moment / 1000, fault);
+        pair.cycles(case, wait(case.detection));
+        let world = &pair.cut;
+        let expected: Vec<&Event> = if at == 0 { opened.iter().collect() } else { closed.iter().collect() };
+        assert_eq!(ring_events(world.events(mark)), expected, "{case:?}");
+        let left: Vec<usize> = world.left_op(mark).iter().map(|who| who.0).filter(|who| Some(*who) != fallen).collect();
+        assert_eq!(left, Vec::<usize>::new(), "{case:?}: they left OP");
+        if fallen.is_none() {
+            assert_eq!(troubles(world.events(mark)), Vec::<&Event>::new(), "{case:?}");
+            outcome.incomplete[at] = world.incomplete(mark);
+            assert!(outcome.incomplete[at] <= bound, "{case:?}: {} of {bound}", outcome.incomplete[at]);
+        }
+        if at == 1 {
+            let told = world.events(mark).iter().find(|timed| timed.event == closed[0]).map(|timed| timed.at);
+            let since = world.judged(mark).first().map(|judged| judged.at);
+            outcome.fixed_after = told.zip(since).map_or(Duration::ZERO, |(told, since)| told.since(since));
+        }
+    }
+    if let Some(work) = work {
+        assert!(pair.cut.finish(Duration::from_secs(10), work) == pattern(), "{case:?}: other bytes were read");
+    }
+    let limit = Duration::from_secs(5);
+    pair.cut.until(limit, "all in OP", |world| world.all_in_op() && world.application().all_settled());
+    pair.cut.run_cycles(5);
+    is_whole(&pair.cut, case);
+    outcome.compared = pair.compared;
+    outcome
+}
+
+/// The SubDevice with mailboxes falls out of OP, as in the twin, and is on its way back.
+fn fall(pair: &mut Pair<'_>, case: &Case) -> usize {
+    let who = speaker(case.count);
+    pair.cut.hang(DeviceIndex(who), true);
+    pair.cycles(case, FALL);
+    pair.cut.hang(DeviceIndex(who), false);
+    pair.cycles(case, 2);
+    who
+}

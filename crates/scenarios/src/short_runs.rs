@@ -1,0 +1,104 @@
+//! Short seeded runs of small rings: cuts, repairs, losses, delays and power cycles at random, and in the end everything is
+//! back ([`run`]). So short that ten thousand of them fit into a minute.
+
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::time::Duration;
+
+use ringcat::{Event, Redundancy, RingState};
+use ringcat_sim::cable::{CableId, DeviceIndex, Direction};
+use ringcat_sim::fault::Fault;
+use ringcat_sim::network::NetworkOptions;
+
+use crate::check::{Delivery, ring_events};
+use crate::dice::Dice;
+use crate::segments::{descriptions, ring};
+use crate::world::{CYCLE, World};
+
+const KINDS: [&str; 7] = [
+    "coupler",
+    "digital-input-8",
+    "digital-output-16",
+    "emulated-output-8",
+    "emulated-input-8",
+    "analog-output-4",
+    "digital-input-16",
+];
+/// Time until all is well again.
+const RECOVERY: Duration = Duration::from_secs(12);
+
+/// Runs a seed.
+///
+/// # Panics
+/// When something does not hold.
+pub fn run(seed: u64) {
+    let mut dice = Dice::new(seed);
+    let count = 2 + dice.below(5) as usize;
+    let kinds: Vec<&str> = (0..count).map(|_| *dice.pick(&KINDS)).collect();
+    let detection = Duration::from_micros(*dice.pick(&[10, 200, 1_500]));
+    let options = NetworkOptions { seed, ..NetworkOptions::default() }.with_detection_delay(detection);
+    let mut world = World::in_op(seed, ring(descriptions(&kinds), options));
+    // Late and doubled frames leave their own traces in the devices.
+    world.set_strict(false);
+    let mut cut: Option<CableId> = None;
+    let mut off: Option<DeviceIndex> = None;
+    let cables = count as u64 + 1;
+    for _ in 0..3 + dice.below(6) {
+        let cable = CableId(dice.below(cables) as usize);
+        let direction = *dice.pick(&[None, Some(Direction::AToB), Some(Direction::BToA)]);
+        let few = 1 + dice.below(3) as u32;
+        let fault = match dice.below(9) {
+            0..=3 => match cut.take() {
+                Some(cable) => Fault::Heal(cable),
+                None => Fault::Cut(*cut.insert(cable)),
+            },
+            4 => Fault::Drop { cable, direction, count: few },
+            5 => Fault::Corrupt { cable, direction, count: few },
+            6 => Fault::Delay { cable, direction, count: few, by: Duration::from_micros(dice.below(3_000)) },
+            7 => Fault::Duplicate { cable, direction, count: few },
+            _ => match off.take() {
+                Some(device) => Fault::PowerOn(device),
+                None => Fault::PowerOff(*off.insert(DeviceIndex(dice.below(count as u64) as usize))),
+            },
+        };
+        world.fault_in(Duration::from_micros(dice.below(1_000)), fault);
+        world.run_cycles(1 + dice.below(10));
+    }
+    for cable in (0..=count).map(CableId) {
+        world.fault(Fault::Drop { cable, direction: None, count: 0 });
+        world.fault(Fault::Duplicate { cable, direction: None, count: 0 });
+        world.fault(Fault::Corrupt { cable, direction: None, count: 0 });
+        world.fault(Fault::Delay { cable, direction: None, count: 0, by: Duration::ZERO });
+    }
+    cut.into_iter().for_each(|cable| world.heal(cable));
+    off.into_iter().for_each(|device| world.power_on(device));
+    world.until(RECOVERY, "all back", |world| {
+        let complete =
+            world.judged(world.beginning()).last().is_some_and(|judged| judged.delivery == Delivery::Complete);
+        let redundancy = world.application().ring_status().redundancy;
+        let settled = world.all_in_op() && world.application().all_settled();
+        settled && complete && world.application().ring() == RingState::Closed && redundancy == Redundancy::Ready
+    });
+    world.set_strict(true);
+    world.run_cycles(5);
+    let mark = world.mark();
+    world.run_cycles(15);
+    assert_eq!((world.incomplete(mark), world.left_op(mark)), (0, Vec::new()));
+    let told = ring_events(world.events(world.beginning()));
+    // Each change once: never the same twice in a row.
+    let (mut is_open, mut edges) = (false, 0);
+    for event in told {
+        match event {
+            Event::RingOpened { .. } => assert!(!std::mem::replace(&mut is_open, true), "opened twice"),
+            Event::RingClosed { .. } => assert!(std::mem::replace(&mut is_open, false), "closed twice"),
+            _ => continue,
+        }
+        edges += 1;
+    }
+    assert!(!is_open && edges % 2 == 0);
+    assert!(world.application().pace().skipped == 0 && world.now().0 > CYCLE.as_nanos() as u64);
+}
+
+/// Runs seeds; returns those that fail, each printed with what happened.
+pub fn runs(seeds: std::ops::Range<u64>) -> Vec<u64> {
+    seeds.filter(|seed| catch_unwind(AssertUnwindSafe(|| run(*seed))).is_err()).collect()
+}

@@ -1,0 +1,66 @@
+//! The same schedule of cuts and repairs for another MainDevice (pysoem with two interfaces) and for ours, on the same
+//! simulated ring: incomplete cycles of both, side by side.
+
+use std::io::{BufRead, BufReader};
+use std::time::Duration;
+
+use crate::bench::{Bench, await_op, is_asked_for};
+use crate::foreign::{FOREIGN, python, start};
+use crate::{RING_OF_16, states};
+
+/// Inner cables, by the SubDevice before them.
+const CUT: [usize; 8] = [0, 14, 7, 3, 11, 5, 9, 1];
+/// From one edge to the next.
+const PAUSE: Duration = Duration::from_millis(250);
+/// Cycles go on for so long: the schedule and a little more.
+const SECONDS: u64 = 5;
+
+/// Cuts and heals one cable after the other.
+fn schedule(bench: &Bench) {
+    std::thread::sleep(PAUSE);
+    for device in CUT {
+        for verb in ["cut", "heal"] {
+            bench.order(&format!("{verb} {device}-{}", device + 1));
+            std::thread::sleep(PAUSE);
+        }
+    }
+}
+
+#[test]
+fn pysoem_and_ours_meet_the_same_cuts_of_a_ring() {
+    if !is_asked_for(FOREIGN) {
+        return;
+    }
+    let Some(mut bench) = Bench::new(2) else { return };
+    let edges = 2 * CUT.len();
+    println!("ring of 16, 1 ms, {edges} cuts and repairs of inner cables");
+    if let Some(python) = python() {
+        bench.simulate(&RING_OF_16.segment(), true);
+        let script = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/on_the_wire/pysoem_cuts.py");
+        let arguments = [script, "main0,main1", "16", &SECONDS.to_string()].map(str::to_owned);
+        let mut child = start(&bench, &python, &arguments);
+        let mut lines = BufReader::new(child.stdout.take().expect("it is piped")).lines();
+        if lines.next().is_some_and(|line| line.is_ok_and(|line| line == "in OP")) {
+            schedule(&bench);
+        }
+        let said = lines.next().and_then(Result::ok).unwrap_or_else(|| "it ended early".to_owned());
+        println!("pysoem:  {said}; in OP by the simulator: {}", states(&bench, "OP"));
+        bench.show_simulator_lateness();
+        let _ = child.wait();
+    }
+    bench.simulate(&RING_OF_16.segment(), true);
+    let run = bench.run_ringcat(&["run", "--main", "main0", "--redundant", "main1"]);
+    await_op(&bench, 16);
+    schedule(&bench);
+    let in_op = states(&bench, "OP");
+    let (output, errors) = run.interrupt();
+    let summary = output.find("\nsummary").map_or("", |at| &output[at + 1..]);
+    let line = |words: &str| summary.lines().find(|line| line.contains(words)).unwrap_or_default().trim().to_owned();
+    println!("RingCAT: {}; {}; in OP by the simulator: {in_op}", line("cycles:"), line("this machine:"));
+    println!("RingCAT: {}", line("the wire:"));
+    bench.show_simulator_lateness();
+    assert_eq!(in_op, 16, "{output}{errors}");
+    for (words, count) in [("ring open:", CUT.len()), ("Line is fixed", CUT.len()), ("no longer answers", 0)] {
+        assert_eq!(output.matches(words).count(), count, "{words}: {output}{errors}");
+    }
+}

@@ -1,0 +1,116 @@
+//! A merge that was written apart from the engine (`remerge.py`, from the capture of both links alone) comes to the same
+//! inputs and to the same incomplete cycles as the engine, in runs with random breaks. CR-05, CR-06, CR-07, facts 9.3.
+
+use std::path::{Path, PathBuf};
+use std::process::Command;
+use std::time::Duration;
+
+use ringcat::simulated::SimulatedSegment;
+use ringcat::tee::Tee;
+use ringcat::{Direction, DomainId, DomainState, MainDevice, Options, automatic};
+use ringcat_link::Recorder;
+use ringcat_sim::cable::CableId;
+use ringcat_sim::fault::Fault;
+use ringcat_sim::network::NetworkOptions;
+use scenarios::dice::Dice;
+use scenarios::segments::{descriptions, ring};
+
+const CYCLE: Duration = Duration::from_millis(1);
+const KINDS: [&str; 6] =
+    ["coupler", "analog-input-4", "digital-output-8", "digital-input-16", "servo", "emulated-input-8"];
+const SCRIPT: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/virtual_time/remerge.py");
+const CYCLES: usize = 400;
+
+/// What a cycle came to.
+#[derive(Debug, PartialEq, Eq)]
+struct Cycle {
+    complete: bool,
+    inputs: String,
+}
+
+fn hex(bytes: &[u8]) -> String {
+    bytes.iter().map(|byte| format!("{byte:02x}")).collect()
+}
+
+/// Runs with random breaks; returns what the engine made of each cycle, from OP on with the number of the first one.
+fn run(seed: u64, path: &Path) -> (usize, Vec<Cycle>) {
+    let mut dice = Dice::new(seed);
+    let detection = Duration::from_micros(*dice.pick(&[10, 600, 3_000]));
+    let network = ring(descriptions(&KINDS), NetworkOptions::default().with_detection_delay(detection));
+    let recorder = Recorder::start(path, &[("main", "main link"), ("redundant", "redundant link")]).expect("a file");
+    let links = Tee::new(SimulatedSegment::new(network), recorder.tap());
+    let mut main_device = MainDevice::request(links, &Options::default());
+    let scan = main_device.scan().expect("a segment");
+    let mut application = main_device.activate(automatic(&scan.subdevices, CYCLE)).expect("it fits");
+    let areas: Vec<_> =
+        (0..KINDS.len()).flat_map(|subdevice| application.directory().areas(subdevice).to_vec()).collect();
+    let mut inputs: Vec<_> = areas
+        .iter()
+        .filter(|area| area.direction == Direction::Inputs)
+        .map(|area| {
+            area.placed.image_offset as usize..(area.placed.image_offset + u32::from(area.placed.area.length)) as usize
+        })
+        .collect();
+    inputs.sort_by_key(|range| range.start);
+    let (mut cycles, mut first, mut cut) = (Vec::new(), None, None);
+    while first.is_none_or(|first| cycles.len() < first + CYCLES) {
+        if first.is_some() && dice.one_in(12) {
+            let fault = match cut.take() {
+                Some(cable) => Fault::Heal(cable),
+                None => Fault::Cut(*cut.insert(CableId(dice.below(KINDS.len() as u64 + 1) as usize))),
+            };
+            let network = application.links_mut().links_mut().network_mut();
+            let at = network.now() + Duration::from_micros(dice.below(1_000));
+            network.schedule(at, fault);
+        }
+        let status = application.cycle(|data| data.status(DomainId(0)));
+        while application.pop_event().is_some() {}
+        let image = application.exchange().image(DomainId(0));
+        let text = inputs.iter().map(|range| hex(&image[range.clone()])).collect();
+        cycles.push(Cycle { complete: status.state == DomainState::Complete, inputs: text });
+        if first.is_none() && application.all_settled() && cycles.last().is_some_and(|cycle| cycle.complete) {
+            first = Some(cycles.len());
+        }
+        assert!(cycles.len() < 5_000, "not in OP: {:?}", application.states());
+    }
+    drop(application);
+    let recorded = recorder.finish().expect("it was written");
+    assert!(recorded.iter().all(|interface| interface.lost == 0), "{recorded:?}");
+    (first.unwrap_or_default(), cycles)
+}
+
+/// What the script makes of the capture; `None` where there is no Python.
+fn remerged(path: &Path) -> Option<Vec<Cycle>> {
+    let output = Command::new("python3").arg(SCRIPT).arg(path).output().ok()?;
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    let text = String::from_utf8(output.stdout).expect("JSON is text");
+    // [{"complete": true, "inputs": "00"}, ...]
+    let one = |part: &str| Cycle {
+        complete: part.contains("\"complete\": true"),
+        inputs: part.split('"').rev().nth(1).unwrap_or_default().to_owned(),
+    };
+    Some(text.split('}').filter(|part| part.contains("complete")).map(one).collect())
+}
+
+#[test]
+fn a_merge_written_apart_comes_to_the_same_inputs_and_the_same_incomplete_cycles_cr_05_cr_06_cr_07_facts_9_3() {
+    let (mut compared, mut incomplete) = (0, 0);
+    for seed in 0..12 {
+        let path: PathBuf = std::env::temp_dir().join(format!("ringcat-remerge-{}-{seed}.pcapng", std::process::id()));
+        let (first, cycles) = run(seed, &path);
+        let again = remerged(&path);
+        std::fs::remove_file(&path).expect("it was written");
+        let Some(again) = again else { return println!("skipped: there is no python3") };
+        assert!(again.len() >= cycles.len(), "seed {seed}: {} of {} cycles", again.len(), cycles.len());
+        for (number, (ours, theirs)) in cycles.iter().zip(&again).enumerate().skip(first) {
+            assert_eq!(ours.complete, theirs.complete, "seed {seed}, cycle {number}");
+            if ours.complete {
+                assert_eq!(ours.inputs, theirs.inputs, "seed {seed}, cycle {number}");
+            }
+            incomplete += usize::from(!ours.complete);
+            compared += 1;
+        }
+    }
+    println!("{compared} cycles merged twice, {incomplete} of them incomplete by both");
+    assert!(compared >= 12 * CYCLES && incomplete > 50);
+}
