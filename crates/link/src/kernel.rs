@@ -134,7 +134,8 @@ pub fn link_up(fd: RawFd, name: &str) -> Result<bool, i32> {
     if unsafe { libc::ioctl(fd, libc::SIOCETHTOOL as _, &mut ifreq) } < 0 { Err(errno()) } else { Ok(value.data != 0) }
 }
 
-fn named(name: &str) -> Result<libc::ifreq, i32> {
+/// A question about an interface of this name; `ENODEV` where it cannot be one.
+pub fn named(name: &str) -> Result<libc::ifreq, i32> {
     // SAFETY: all bytes zero is a valid ifreq.
     let mut ifreq: libc::ifreq = unsafe { zeroed() };
     if name.is_empty() || name.len() >= ifreq.ifr_name.len() || name.contains('\0') {

@@ -5,6 +5,7 @@
 //! * [`listener`]: frames of one sender on all interfaces where they are not expected;
 //! * [`waiting`]: sleeping or spinning until a frame or a moment comes;
 //! * [`interface`], [`carrier`]: what interfaces there are, who else uses them, whether a cable is plugged in;
+//! * [`tap`]: network interfaces of the host whose other end is this process;
 //! * [`monotonic`], [`realtime`]: the host's clock, scheduling, memory locking, processor latency;
 //! * [`pcapng`]: captures that Wireshark reads; [`recorder`]: writing them while frames go on; [`sniffer`]: seeing what
 //!   passes on an interface without taking part.
@@ -27,6 +28,7 @@ pub mod realtime;
 pub mod recorder;
 mod ring;
 pub mod sniffer;
+pub mod tap;
 pub mod waiting;
 
 pub use carrier::{Carrier, CarrierWatch};
@@ -36,4 +38,5 @@ pub use listener::{Listener, Sender};
 pub use packet_socket::{LinkCounters, PacketOptions, PacketSocket};
 pub use recorder::{Recorder, RecorderError, Tap};
 pub use sniffer::Sniffer;
+pub use tap::{TapError, TapInterface};
 pub use waiting::{ReceiveMode, wait};

@@ -7,4 +7,5 @@ mod exclusive;
 mod faults;
 mod frames;
 mod listening;
+mod taps;
 mod waits;

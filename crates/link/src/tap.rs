@@ -1,0 +1,198 @@
+//! TAP interfaces: network interfaces of this host whose other end is this process.
+//!
+//! What the host sends into one is read here as an Ethernet frame, what is written here the host receives. An interface
+//! lasts as long as its value. The host decides when it is switched on, what addresses it has and where it is plugged in
+//! (`ip link set NAME up`, a bridge); without a carrier it sends nothing.
+//!
+//! Creating one needs CAP_NET_ADMIN; reading and writing do not. Constants are those of `linux/if_tun.h`.
+
+use std::error::Error;
+use std::ffi::CStr;
+use std::fmt;
+use std::io;
+use std::mem::size_of;
+use std::os::fd::{AsRawFd, FromRawFd, OwnedFd};
+
+use crate::kernel::{self, errno};
+
+const DEVICE: &CStr = c"/dev/net/tun";
+const TUNSETIFF: libc::c_ulong = 0x4004_54CA;
+const TUNSETCARRIER: libc::c_ulong = 0x4004_54E2;
+/// Where the bytes of an address begin in `sockaddr`, and what kind it is.
+const MAC_LEN: usize = 6;
+
+/// Why there is no interface, in words that say what to do.
+#[derive(Clone, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum TapError {
+    /// This process may not make network interfaces.
+    Permission {
+        /// The interface that was to be made.
+        name: String,
+    },
+    /// The kernel has no TAP interfaces, or this process does not see them.
+    NoDevice {
+        /// The kernel's answer.
+        errno: i32,
+    },
+    /// There is an interface of this name, or somebody else has it.
+    Taken {
+        /// The name.
+        name: String,
+    },
+    /// A system call failed in a way that is not one of the above.
+    Os {
+        /// The interface.
+        name: String,
+        /// What was tried.
+        what: &'static str,
+        /// The kernel's answer.
+        errno: i32,
+    },
+}
+
+impl TapError {
+    fn from_errno(name: &str, what: &'static str, errno: i32) -> TapError {
+        let name = name.to_owned();
+        match errno {
+            libc::EPERM | libc::EACCES => TapError::Permission { name },
+            libc::EBUSY | libc::EEXIST | libc::EINVAL => TapError::Taken { name },
+            errno => TapError::Os { name, what, errno },
+        }
+    }
+}
+
+impl fmt::Display for TapError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            TapError::Permission { name } => write!(
+                f,
+                "not permitted to make the network interface {name}; run as root or permit it once with\n  \
+                 sudo setcap cap_net_raw,cap_net_admin,cap_ipc_lock,cap_sys_nice=ep $(which ringcat)"
+            ),
+            TapError::NoDevice { errno } => write!(
+                f,
+                "no network interfaces can be made: /dev/net/tun: {}; try `sudo modprobe tun`, in a container \
+                 `--device /dev/net/tun`",
+                io::Error::from_raw_os_error(*errno)
+            ),
+            TapError::Taken { name } => {
+                write!(f, "there is an interface {name} already: another MainDevice with this number? See `ip link`")
+            }
+            TapError::Os { name, what, errno } => {
+                write!(f, "{name}: {what}: {}", io::Error::from_raw_os_error(*errno))
+            }
+        }
+    }
+}
+
+impl Error for TapError {}
+
+/// A TAP interface; removed when it is dropped.
+#[derive(Debug)]
+pub struct TapInterface {
+    fd: OwnedFd,
+    name: String,
+}
+
+impl TapInterface {
+    /// Makes an interface with this name and address, switched off and without a carrier, in the network namespace of the
+    /// calling thread.
+    ///
+    /// # Errors
+    /// A missing permission or device, or a name that is taken.
+    pub fn create(name: &str, mac: [u8; MAC_LEN]) -> Result<TapInterface, TapError> {
+        // SAFETY: the path is a string with its end.
+        let fd = unsafe { libc::open(DEVICE.as_ptr(), libc::O_RDWR | libc::O_NONBLOCK | libc::O_CLOEXEC) };
+        if fd < 0 {
+            return Err(match errno() {
+                libc::EPERM | libc::EACCES => TapError::Permission { name: name.to_owned() },
+                errno => TapError::NoDevice { errno },
+            });
+        }
+        // SAFETY: the descriptor was just made and nobody else owns it.
+        let fd = unsafe { OwnedFd::from_raw_fd(fd) };
+        let failed = |what, errno| TapError::from_errno(name, what, errno);
+        let mut request = kernel::named(name).map_err(|errno| failed("its name", errno))?;
+        request.ifr_ifru.ifru_flags = (libc::IFF_TAP | libc::IFF_NO_PI | libc::IFF_TUN_EXCL) as libc::c_short;
+        ioctl(&fd, TUNSETIFF, &mut request).map_err(|errno| failed("making it", errno))?;
+        let tap = TapInterface { fd, name: name.to_owned() };
+        tap.set_mac(mac).map_err(|errno| failed("setting its address", errno))?;
+        tap.set_carrier(false);
+        Ok(tap)
+    }
+
+    /// Its name.
+    pub fn name(&self) -> &str {
+        &self.name
+    }
+
+    /// Plugs the cable in or out, so to say. False where the kernel cannot: those before Linux 5.0.
+    pub fn set_carrier(&self, carrier: bool) -> bool {
+        let mut value = libc::c_int::from(carrier);
+        ioctl(&self.fd, TUNSETCARRIER, &mut value).is_ok()
+    }
+
+    fn set_mac(&self, mac: [u8; MAC_LEN]) -> Result<(), i32> {
+        let mut request = kernel::named(&self.name)?;
+        let mut address = libc::sockaddr { sa_family: libc::ARPHRD_ETHER, sa_data: [0; 14] };
+        for (to, from) in address.sa_data.iter_mut().zip(mac) {
+            *to = from as libc::c_char;
+        }
+        request.ifr_ifru.ifru_hwaddr = address;
+        ioctl(&self.fd, libc::SIOCSIFHWADDR as _, &mut request)
+    }
+
+    /// Takes the oldest frame that the host sent into the interface; its length, `None` where there is none. What does not
+    /// fit is cut off.
+    pub fn receive(&self, room: &mut [u8]) -> Option<usize> {
+        // SAFETY: pointer and length describe live memory that the kernel writes.
+        let count = unsafe { libc::read(self.fd.as_raw_fd(), room.as_mut_ptr().cast(), room.len()) };
+        usize::try_from(count).ok().filter(|count| *count > 0)
+    }
+
+    /// Hands a frame to the host. False where it does not take it: the interface is switched off, or memory is short.
+    pub fn send(&self, frame: &[u8]) -> bool {
+        // SAFETY: pointer and length describe live memory that the kernel only reads.
+        let count = unsafe { libc::write(self.fd.as_raw_fd(), frame.as_ptr().cast(), frame.len()) };
+        usize::try_from(count).is_ok_and(|count| count == frame.len())
+    }
+}
+
+/// Types that requests of TAP descriptors take.
+///
+/// # Safety
+/// Only for what the kernel reads and writes by its full size.
+unsafe trait Argument {}
+// SAFETY: what TUNSETIFF and SIOCSIFHWADDR take.
+unsafe impl Argument for libc::ifreq {}
+// SAFETY: what TUNSETCARRIER takes.
+unsafe impl Argument for libc::c_int {}
+
+const _: () = assert!(size_of::<libc::c_int>() == 4, "the size is part of the request's number");
+
+fn ioctl<T: Argument>(fd: &OwnedFd, request: libc::c_ulong, argument: &mut T) -> Result<(), i32> {
+    // SAFETY: the argument is live and of the type that the request takes (`Argument`).
+    let result = unsafe { libc::ioctl(fd.as_raw_fd(), request as _, std::ptr::from_mut(argument)) };
+    if result < 0 { Err(errno()) } else { Ok(()) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_keeps_an_interface_from_being_made_is_told_with_what_to_do() {
+        let text = TapError::from_errno("eoe0s1", "making it", libc::EPERM).to_string();
+        assert!(
+            text.starts_with("not permitted to make the network interface eoe0s1") && text.contains("setcap"),
+            "{text}"
+        );
+        let text = TapError::from_errno("eoe0s1", "making it", libc::EBUSY).to_string();
+        assert!(text.contains("an interface eoe0s1 already"), "{text}");
+        let text = TapError::NoDevice { errno: libc::ENOENT }.to_string();
+        assert!(text.contains("/dev/net/tun: No such file") && text.contains("modprobe tun"), "{text}");
+        let text = TapError::from_errno("eoe0s1", "making it", libc::ENOMEM).to_string();
+        assert!(text.starts_with("eoe0s1: making it: "), "{text}");
+    }
+}
