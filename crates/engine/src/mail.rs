@@ -7,7 +7,7 @@
 //! * `writer`, `reader`: the two directions, each a task that lives as long as it has something to do;
 //! * `delivery`: whose a mail is; `recent`: mail that came twice;
 //! * `talk`: a lane while somebody has it; `answer_time`: when to look for an answer;
-//! * [`coe`], [`eoe`], [`foe`], [`soe`], [`aoe`], [`voe`]: the protocols.
+//! * [`coe`], [`eoe`], [`foe`], [`soe`], [`aoe`], [`voe`]: the protocols; [`relay`]: messages of others.
 
 mod answer_time;
 pub mod aoe;
@@ -21,6 +21,7 @@ mod lane;
 mod mailbox;
 mod reader;
 mod recent;
+pub mod relay;
 mod ring;
 mod room;
 pub mod soe;

@@ -6,6 +6,8 @@
 
 mod areas;
 mod declaration;
+mod ethernet;
+mod gateway;
 mod mail;
 mod pending;
 mod services;
@@ -26,6 +28,7 @@ use ringcat_wire::source_address::MacCodec;
 
 pub use areas::{AreaEntries, Directory};
 pub use declaration::{ActivateError, Declaration, DomainConfig, DomainMember};
+pub use ethernet::EthernetSubDevice;
 pub use pending::Pending;
 pub use ticket::Ticket;
 
@@ -37,6 +40,8 @@ use crate::junction::JunctionMode;
 use crate::layout::Layout;
 use crate::link::{Link, LinkSet};
 use crate::mail::Mailbox;
+use crate::mail::eoe::EthernetPort;
+use crate::mail::relay::Desk;
 use crate::procedures::configure::Start;
 use crate::procedures::fleet::{Fleet, Phase, SharedFleet};
 use crate::procedures::mail_watch::watch_mail;
@@ -131,6 +136,10 @@ pub struct MainDevice {
     requests: Requests,
     parked: ticket::Cloakroom,
     loaded: Option<Loaded>,
+    /// Ethernet of declared SubDevices, where it was asked for.
+    ports: Vec<Option<EthernetPort>>,
+    /// Messages of a gateway's clients.
+    desk: Option<Desk>,
 }
 
 impl MainDevice {
@@ -151,6 +160,8 @@ impl MainDevice {
             requests: Requests::default(),
             parked: ticket::Cloakroom::default(),
             loaded: None,
+            ports: Vec::new(),
+            desk: None,
             options,
         }
     }
@@ -253,6 +264,8 @@ impl MainDevice {
         self.scanning.set(false);
         self.requests.end();
         self.visited.clear();
+        self.ports.clear();
+        self.desk = None;
         self.fleet = None;
         self.cyclic_events = None;
         *self.stopped.borrow_mut() = None;

@@ -17,6 +17,7 @@ use core::fmt;
 
 pub use download::{download, write};
 pub use error::{SdoError, SdoFailure};
+pub(in crate::mail) use transfer::settle;
 pub use upload::{read, upload};
 
 use super::talk::Limits;

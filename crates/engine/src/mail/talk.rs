@@ -101,6 +101,11 @@ impl Talk {
         state.session.map_or((0, 0), |session| (session.layout.receive_size.into(), session.layout.send_size.into()))
     }
 
+    /// Whether somebody waits for the lane.
+    pub fn is_wanted(&self) -> bool {
+        self.with(|lane| lane.turns.len() > 1).unwrap_or(true)
+    }
+
     /// A number that no other request of this mailbox has had of late.
     pub fn number(&mut self) -> u32 {
         let state = &mut *self.room.state();

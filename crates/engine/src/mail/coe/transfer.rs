@@ -107,7 +107,7 @@ impl Drop for Transfer {
 /// After a request that was given up, its answer may still come, and be taken for that to the next request for the same
 /// object. So another object is asked for first: a SubDevice answers in order, and with that answer in hand older ones
 /// have come or never will.
-pub(super) async fn settle(talk: &mut Talk, limits: Limits) -> Result<(), MailboxError> {
+pub(in crate::mail) async fn settle(talk: &mut Talk, limits: Limits) -> Result<(), MailboxError> {
     let Some(late) = talk.late_mark() else { return Ok(()) };
     let fence = if late == DEVICE_TYPE { IDENTITY } else { DEVICE_TYPE };
     talk.mark(fence);

@@ -1,0 +1,341 @@
+//! Where clients' messages wait, and the tasks that carry them to the mailboxes.
+
+use alloc::collections::{BTreeMap, VecDeque};
+use alloc::rc::Rc;
+use alloc::vec;
+use alloc::vec::Vec;
+use core::cell::RefCell;
+use core::time::Duration;
+
+use ringcat_wire::mailbox::{ErrorReply, Header, Message, Protocol, gateway};
+
+use super::dialogue::{Asks, Dialogue, Question, lane};
+use crate::mail::coe;
+use crate::mail::lane::Lane;
+use crate::mail::talk::{Limits, Talk};
+use crate::mail::{Mailbox, MailboxError};
+use crate::supervisor::{Bus, Signal};
+use crate::time::Instant;
+
+/// Messages of one client that may wait in one lane.
+const PER_CLIENT: usize = 8;
+/// Messages of all clients that may wait in one lane.
+const QUEUE: usize = 64;
+/// Answers that are kept until somebody takes them.
+const ANSWERS: usize = 1024;
+/// Until a SubDevice takes a message, and until it answers; files may have to be erased first.
+const LIMITS: Limits = (Duration::from_millis(500), Duration::from_secs(1));
+const FILE_LIMITS: Limits = (Duration::from_millis(500), Duration::from_secs(3));
+/// Who has waited for so long has asked again or gone.
+const STALE: Duration = Duration::from_secs(5);
+/// For so long a client may pause within a transfer.
+const PAUSE: Duration = Duration::from_secs(1);
+/// A transfer that others wait for may take so long.
+const PATIENCE: Duration = Duration::from_secs(10);
+
+/// An answer for a client.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Relayed {
+    /// The client, as it was named with its message.
+    pub client: u64,
+    /// EtherCAT header of type 5 and the mailbox message.
+    pub bytes: Vec<u8>,
+}
+
+/// What passed.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct RelayCounters {
+    /// Messages that came from clients.
+    pub messages: u64,
+    /// Answers of SubDevices, error replies among them.
+    pub answers: u64,
+    /// Messages that were refused with an error of ours.
+    pub refused: u64,
+    /// Messages that were not answered: the SubDevice did not, or is not there.
+    pub unanswered: u64,
+    /// Transfers that were ended because their client paused, left, or kept others waiting.
+    pub ended: u64,
+    /// Messages that are none.
+    pub malformed: u64,
+}
+
+struct Job {
+    client: u64,
+    header: Header,
+    payload: Vec<u8>,
+    at: Instant,
+}
+
+#[derive(Default)]
+struct Queue {
+    jobs: VecDeque<Job>,
+    /// A task carries its messages.
+    served: bool,
+    /// Number of the turn that a client had last.
+    turns: BTreeMap<u64, u64>,
+    turn: u64,
+}
+
+#[derive(Default)]
+struct State {
+    queues: BTreeMap<(u16, u8), Queue>,
+    answers: VecDeque<Relayed>,
+    counters: RelayCounters,
+}
+
+/// Takes messages of clients and gives out answers.
+pub struct Desk {
+    shared: Rc<Shared>,
+}
+
+struct Shared {
+    bus: Bus,
+    state: RefCell<State>,
+    news: Signal,
+}
+
+impl core::fmt::Debug for Desk {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        f.debug_struct("Desk").field("counters", &self.counters()).finish_non_exhaustive()
+    }
+}
+
+impl Desk {
+    /// A desk at which nobody waits.
+    pub fn new(bus: &Bus) -> Desk {
+        Desk { shared: Rc::new(Shared { bus: bus.clone(), state: RefCell::default(), news: bus.signal() }) }
+    }
+
+    /// Takes a client's message, EtherCAT header included. `find` knows the mailbox of a station address, and whether the
+    /// SubDevice speaks a protocol. What cannot be passed on is answered with an error reply.
+    pub fn take(&self, client: u64, bytes: &[u8], find: impl FnOnce(u16, Protocol) -> Result<Mailbox, u16>) {
+        self.shared.state.borrow_mut().counters.messages += 1;
+        let Ok(Message { header, payload }) = gateway::decode(bytes) else {
+            self.shared.state.borrow_mut().counters.malformed += 1;
+            return;
+        };
+        let job = Job { client, header, payload: payload.to_vec(), at: self.shared.bus.now() };
+        let found = lane(header.protocol, payload).and_then(|lane| Ok((find(header.address, header.protocol)?, lane)));
+        match found {
+            Ok((mailbox, lane)) => self.queue(job, mailbox, lane),
+            Err(detail) => self.shared.refuse(&job, detail),
+        }
+    }
+
+    fn queue(&self, job: Job, mailbox: Mailbox, lane: Lane) {
+        let key = (job.header.address, lane as u8);
+        let state = &mut *self.shared.state.borrow_mut();
+        let queue = state.queues.entry(key).or_default();
+        let of_client = queue.jobs.iter().filter(|other| other.client == job.client).count();
+        if of_client >= PER_CLIENT || queue.jobs.len() >= QUEUE {
+            state.refuse(&job, ErrorReply::SERVICE_IN_WORK);
+            return;
+        }
+        queue.jobs.push_back(job);
+        if !core::mem::replace(&mut queue.served, true) {
+            let shared = self.shared.clone();
+            self.shared.bus.spawn(async move { serve(shared, key, mailbox, lane).await });
+        }
+        self.shared.news.notify();
+    }
+
+    /// A client has gone: what it asked for is forgotten, a transfer of it is ended.
+    pub fn forget(&self, client: u64) {
+        {
+            let state = &mut *self.shared.state.borrow_mut();
+            for queue in state.queues.values_mut() {
+                queue.jobs.retain(|job| job.client != client);
+                // No turn is left: whoever carries its transfer sees that.
+                queue.turns.remove(&client);
+            }
+            state.answers.retain(|answer| answer.client != client);
+        }
+        self.shared.news.notify();
+    }
+
+    /// Takes the oldest answer.
+    pub fn pop(&self) -> Option<Relayed> {
+        self.shared.state.borrow_mut().answers.pop_front()
+    }
+
+    /// What passed.
+    pub fn counters(&self) -> RelayCounters {
+        self.shared.state.borrow().counters
+    }
+}
+
+impl State {
+    /// Puts an answer where the client finds it; false where it does not fit.
+    fn put(&mut self, job: &Job, protocol: Protocol, payload: &[u8]) -> bool {
+        let header = Header { protocol, length: payload.len() as u16, ..job.header };
+        let mut bytes = vec![0; gateway::HEADER_LEN + Header::LEN + payload.len()];
+        let fits = gateway::encode(&Message { header, payload }, &mut bytes).is_some() && self.answers.len() < ANSWERS;
+        if fits {
+            self.answers.push_back(Relayed { client: job.client, bytes });
+        }
+        fits
+    }
+
+    fn answer(&mut self, job: &Job, protocol: Protocol, payload: &[u8]) {
+        let answered = self.put(job, protocol, payload);
+        self.counters.answers += u64::from(answered);
+        self.counters.unanswered += u64::from(!answered);
+    }
+
+    fn refuse(&mut self, job: &Job, detail: u16) {
+        self.counters.refused += 1;
+        self.put(job, Protocol::Error, &ErrorReply::new(detail).encode());
+    }
+}
+
+impl Shared {
+    fn refuse(&self, job: &Job, detail: u16) {
+        self.state.borrow_mut().refuse(job, detail);
+    }
+
+    /// The next message: of the client whose last turn is the longest ago. `None` where there is none.
+    fn next(&self, key: (u16, u8)) -> Option<Job> {
+        let now = self.bus.now();
+        let state = &mut *self.state.borrow_mut();
+        let queue = state.queues.get_mut(&key)?;
+        let waiting = queue.jobs.len();
+        queue.jobs.retain(|job| now.since(job.at) < STALE);
+        state.counters.unanswered += (waiting - queue.jobs.len()) as u64;
+        let turn_of = |job: &Job| queue.turns.get(&job.client).copied().unwrap_or(0);
+        let first = queue.jobs.iter().enumerate().min_by_key(|(at, job)| (turn_of(job), *at)).map(|(at, _)| at);
+        let job = first.and_then(|at| queue.jobs.remove(at));
+        match &job {
+            Some(job) => {
+                queue.turn += 1;
+                queue.turns.insert(job.client, queue.turn);
+            }
+            None => {
+                state.queues.remove(&key);
+            }
+        }
+        job
+    }
+
+    /// The next message of a client, `None` in it where the client has left.
+    fn next_of(&self, key: (u16, u8), client: u64) -> Option<Option<Job>> {
+        let state = &mut *self.state.borrow_mut();
+        let queue = state.queues.get_mut(&key)?;
+        if !queue.turns.contains_key(&client) {
+            return Some(None);
+        }
+        let at = queue.jobs.iter().position(|job| job.client == client)?;
+        queue.jobs.remove(at).map(Some)
+    }
+
+    /// Whether other clients wait.
+    fn others_wait(&self, key: (u16, u8), client: u64) -> bool {
+        let state = self.state.borrow();
+        state.queues.get(&key).is_some_and(|queue| queue.jobs.iter().any(|job| job.client != client))
+    }
+}
+
+/// Carries the messages for one SubDevice and lane, until there are none.
+async fn serve(shared: Rc<Shared>, key: (u16, u8), mailbox: Mailbox, lane: Lane) {
+    while let Some(job) = shared.next(key) {
+        let talk = async {
+            let mut talk = mailbox.talk(lane).await?;
+            settle(&mut talk, lane).await?;
+            Ok::<Talk, MailboxError>(talk)
+        };
+        match talk.await {
+            Ok(talk) => converse(&shared, key, talk, lane, job).await,
+            Err(_) => shared.state.borrow_mut().counters.unanswered += 1,
+        }
+    }
+}
+
+async fn settle(talk: &mut Talk, lane: Lane) -> Result<(), MailboxError> {
+    match lane {
+        Lane::Coe => coe::settle(talk, LIMITS).await,
+        _ => talk.settle(|_| true).await,
+    }
+}
+
+/// One message and its answers, and what belongs to the same transfer.
+async fn converse(shared: &Rc<Shared>, key: (u16, u8), mut talk: Talk, lane: Lane, first: Job) {
+    let (client, begin) = (first.client, shared.bus.now());
+    let mut dialogue = Dialogue::default();
+    let mut job = first;
+    loop {
+        let went_well = exchange(shared, &mut talk, &mut dialogue, lane, &job).await;
+        if !dialogue.is_open() {
+            return;
+        }
+        let wanted = || talk.is_wanted() || shared.others_wait(key, client);
+        let next = if !went_well || (wanted() && shared.bus.now().since(begin) > PATIENCE) {
+            None
+        } else {
+            let next = shared.news.until(|| shared.next_of(key, client));
+            shared.bus.within(PAUSE, next).await.ok().flatten()
+        };
+        match next {
+            Some(next) => job = next,
+            None => break,
+        }
+    }
+    shared.state.borrow_mut().counters.ended += 1;
+    if let Some(end) = dialogue.end() {
+        // A mailbox that is closed has no transfer to end.
+        let _ = talk.post(&end);
+    }
+}
+
+/// One message and its answers; false where an answer did not come.
+async fn exchange(shared: &Rc<Shared>, talk: &mut Talk, dialogue: &mut Dialogue, lane: Lane, job: &Job) -> bool {
+    let (receive, send) = talk.mailbox_sizes();
+    if job.payload.len() > talk.room() {
+        shared.refuse(job, ErrorReply::INVALID_SIZE);
+        return true;
+    }
+    let limits = if lane == Lane::Foe { FILE_LIMITS } else { LIMITS };
+    let result = match dialogue.ask(lane, &job.payload, receive) {
+        Err(detail) => {
+            shared.refuse(job, detail);
+            return true;
+        }
+        Ok(Asks::Nothing) => talk.send(&job.payload, limits.0).await,
+        Ok(Asks::Answer(question)) => answers(shared, talk, dialogue, &question, job, limits, send).await,
+    };
+    match result {
+        Ok(()) => true,
+        Err(MailboxError::Error(reply)) => {
+            shared.state.borrow_mut().answer(job, Protocol::Error, &reply.encode());
+            true
+        }
+        Err(_) => {
+            dialogue.unanswered();
+            shared.state.borrow_mut().counters.unanswered += 1;
+            false
+        }
+    }
+}
+
+async fn answers(
+    shared: &Rc<Shared>,
+    talk: &mut Talk,
+    dialogue: &mut Dialogue,
+    question: &Question,
+    job: &Job,
+    limits: Limits,
+    send: usize,
+) -> Result<(), MailboxError> {
+    if let Some(index) = question.index() {
+        talk.mark(index);
+    }
+    let accept = |payload: &[u8]| question.knows(payload).then(|| payload.to_vec());
+    let mut answer = talk.begin(&job.payload, limits, accept).await?;
+    loop {
+        let more = dialogue.answered(question, &answer, send);
+        shared.state.borrow_mut().answer(job, job.header.protocol, &answer);
+        if !more {
+            talk.complete();
+            return Ok(());
+        }
+        answer = talk.more(limits.1, accept).await?;
+    }
+}

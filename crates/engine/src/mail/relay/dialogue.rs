@@ -1,0 +1,446 @@
+//! What follows a message of a client: an answer or none, one or several, and whether a transfer is under way then.
+
+use alloc::vec;
+use alloc::vec::Vec;
+
+use ringcat_wire::mailbox::aoe::AmsHeader;
+use ringcat_wire::mailbox::coe::{CoeHeader, CoeService, SdoInformation};
+use ringcat_wire::mailbox::foe::{FoeErrorCode, FoeMessage};
+use ringcat_wire::mailbox::sdo::{AbortCode, INITIATE_LEN, SdoRequest, SdoResponse};
+use ringcat_wire::mailbox::soe::{SoeMessage, SoeOperation};
+use ringcat_wire::mailbox::{ErrorReply, Protocol};
+
+use crate::mail::lane::Lane;
+
+/// EoE types that are requests: set IP, set filter, get IP, get filter. The types of their answers follow them.
+const EOE_REQUESTS: [u8; 4] = [2, 4, 6, 8];
+const EOE_TYPE: u8 = 0x0F;
+/// Bytes of the vendor before a vendor message.
+const VENDOR_LEN: usize = 4;
+/// Bytes that messages which end a transfer have at most.
+const END_LEN: usize = 64;
+
+/// What a client's message asks for.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(super) enum Asks {
+    /// An answer that [`Question`] knows.
+    Answer(Question),
+    /// Nothing.
+    Nothing,
+}
+
+/// By what an answer is known.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(super) enum Question {
+    /// Beginning of an SDO transfer, with the index.
+    Initiate(u16),
+    /// Part of an SDO transfer.
+    Segment,
+    /// SDO information.
+    Information,
+    /// A packet of a file, or its acknowledgement.
+    File {
+        /// The number of the packet that has to come.
+        data: Option<u32>,
+        /// The number that has to be acknowledged.
+        acknowledge: Option<u32>,
+    },
+    /// SoE of a drive.
+    Soe(SoeOperation, u8),
+    /// AoE, with the invoke id.
+    Aoe(u32),
+    /// A message of the same vendor.
+    Voe([u8; VENDOR_LEN]),
+    /// EoE of this type.
+    Eoe(u8),
+}
+
+/// A transfer of a client.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+enum Transfer {
+    #[default]
+    None,
+    /// An object: index, subindex, bytes that are still to come where it is an upload.
+    Object(u16, u8),
+    /// A file.
+    File,
+    /// The last packet of a file was read; its acknowledgement ends the transfer.
+    FileRead,
+    /// Fragments of an SoE request.
+    Fragments,
+}
+
+/// What is known of a client's transfer in one lane.
+#[derive(Debug, Default)]
+pub(super) struct Dialogue {
+    transfer: Transfer,
+    /// A request whose answer decides: what the transfer is if it is well.
+    pending: Transfer,
+}
+
+/// The lane for messages of a protocol, or the error for who asks for it.
+pub(super) fn lane(protocol: Protocol, payload: &[u8]) -> Result<Lane, u16> {
+    match protocol {
+        Protocol::Aoe => Ok(Lane::Aoe),
+        Protocol::Coe => Ok(Lane::Coe),
+        Protocol::Foe => Ok(Lane::Foe),
+        Protocol::Soe => Ok(Lane::Soe),
+        Protocol::Voe => Ok(Lane::Voe),
+        // Frames belong to the network interface.
+        Protocol::Eoe if payload.first().is_some_and(|first| EOE_REQUESTS.contains(&(first & EOE_TYPE))) => {
+            Ok(Lane::Eoe)
+        }
+        Protocol::Eoe => Err(ErrorReply::SERVICE_NOT_SUPPORTED),
+        Protocol::Error | Protocol::Other(_) => Err(ErrorReply::UNSUPPORTED_PROTOCOL),
+    }
+}
+
+impl Dialogue {
+    /// A transfer is under way.
+    pub(super) fn is_open(&self) -> bool {
+        self.transfer != Transfer::None
+    }
+
+    /// A message of the client goes to the SubDevice, whose receive mailbox has this size. The error is for the client: no
+    /// such service passes.
+    pub(super) fn ask(&mut self, lane: Lane, payload: &[u8], mailbox_size: usize) -> Result<Asks, u16> {
+        self.pending = self.transfer.clone();
+        match lane {
+            Lane::Coe => self.ask_coe(payload),
+            Lane::Foe => self.ask_foe(payload, mailbox_size),
+            Lane::Soe => self.ask_soe(payload),
+            Lane::Aoe => {
+                let (header, _) = AmsHeader::decode(payload).map_err(|_| ErrorReply::SIZE_TOO_SHORT)?;
+                // Bit 0 is that of a response.
+                let request = header.flags & AmsHeader::REQUEST != 0 && header.flags & 0x0001 == 0;
+                Ok(if request { Asks::Answer(Question::Aoe(header.invoke_id)) } else { Asks::Nothing })
+            }
+            Lane::Voe => {
+                let vendor = payload.first_chunk().ok_or(ErrorReply::SIZE_TOO_SHORT)?;
+                Ok(Asks::Answer(Question::Voe(*vendor)))
+            }
+            Lane::Eoe | Lane::Frames => {
+                let kind = payload.first().ok_or(ErrorReply::SIZE_TOO_SHORT)? & EOE_TYPE;
+                Ok(Asks::Answer(Question::Eoe(kind + 1)))
+            }
+        }
+    }
+
+    fn ask_coe(&mut self, payload: &[u8]) -> Result<Asks, u16> {
+        let bytes = payload.first_chunk().ok_or(ErrorReply::SIZE_TOO_SHORT)?;
+        match CoeHeader::decode(bytes).service {
+            CoeService::SdoInformation => return Ok(Asks::Answer(Question::Information)),
+            CoeService::SdoRequest => {}
+            _ => return Err(ErrorReply::SERVICE_NOT_SUPPORTED),
+        }
+        let request = SdoRequest::decode(payload).map_err(|_| ErrorReply::SIZE_TOO_SHORT)?;
+        Ok(match request {
+            SdoRequest::Upload { index, sub_index, .. } => self.initiate(index, sub_index, true),
+            SdoRequest::DownloadExpedited { index, sub_index, .. } => self.initiate(index, sub_index, false),
+            SdoRequest::DownloadNormal { index, sub_index, total, data, .. } => {
+                self.initiate(index, sub_index, (data.len() as u64) < u64::from(total))
+            }
+            SdoRequest::DownloadSegment { last, .. } => {
+                if last {
+                    self.pending = Transfer::None;
+                }
+                Asks::Answer(Question::Segment)
+            }
+            SdoRequest::UploadSegment { .. } => Asks::Answer(Question::Segment),
+            SdoRequest::Abort { .. } => {
+                self.transfer = Transfer::None;
+                Asks::Nothing
+            }
+        })
+    }
+
+    fn initiate(&mut self, index: u16, sub_index: u8, may_go_on: bool) -> Asks {
+        self.transfer = Transfer::None;
+        self.pending = if may_go_on { Transfer::Object(index, sub_index) } else { Transfer::None };
+        Asks::Answer(Question::Initiate(index))
+    }
+
+    fn ask_foe(&mut self, payload: &[u8], mailbox_size: usize) -> Result<Asks, u16> {
+        let message = FoeMessage::decode(payload).map_err(|_| ErrorReply::SIZE_TOO_SHORT)?;
+        let answer = |data, acknowledge| Asks::Answer(Question::File { data, acknowledge });
+        Ok(match message {
+            FoeMessage::Read { .. } => {
+                self.pending = Transfer::File;
+                answer(Some(1), None)
+            }
+            FoeMessage::Write { .. } => {
+                self.pending = Transfer::File;
+                answer(None, Some(0))
+            }
+            FoeMessage::Data { packet, data } => {
+                let last = data.len() < FoeMessage::max_data(mailbox_size);
+                self.pending = if last { Transfer::None } else { Transfer::File };
+                answer(None, Some(packet))
+            }
+            FoeMessage::Acknowledge { .. } if self.transfer == Transfer::FileRead => {
+                self.transfer = Transfer::None;
+                Asks::Nothing
+            }
+            FoeMessage::Acknowledge { packet } => answer(Some(packet.wrapping_add(1)), None),
+            // A client that is busy gets the packet again.
+            FoeMessage::Busy { .. } => answer(None, None),
+            FoeMessage::Error { .. } => {
+                self.transfer = Transfer::None;
+                Asks::Nothing
+            }
+        })
+    }
+
+    fn ask_soe(&mut self, payload: &[u8]) -> Result<Asks, u16> {
+        let message = SoeMessage::decode(payload).map_err(|_| ErrorReply::SIZE_TOO_SHORT)?;
+        self.pending = Transfer::None;
+        Ok(match message.operation {
+            SoeOperation::WriteRequest if message.incomplete => {
+                self.transfer = Transfer::Fragments;
+                Asks::Nothing
+            }
+            SoeOperation::ReadRequest => Asks::Answer(Question::Soe(SoeOperation::ReadResponse, message.drive)),
+            SoeOperation::WriteRequest => Asks::Answer(Question::Soe(SoeOperation::WriteResponse, message.drive)),
+            _ => return Err(ErrorReply::SERVICE_NOT_SUPPORTED),
+        })
+    }
+
+    /// An answer to the question has come, from a send mailbox of this size; true where more of it follows unasked.
+    pub(super) fn answered(&mut self, question: &Question, payload: &[u8], mailbox_size: usize) -> bool {
+        let pending = core::mem::take(&mut self.pending);
+        let mut more = false;
+        self.transfer = match question {
+            Question::Initiate(_) | Question::Segment => match SdoResponse::decode(payload) {
+                Ok(SdoResponse::UploadNormal { total, data, .. }) if (data.len() as u64) < u64::from(total) => pending,
+                Ok(SdoResponse::UploadSegment { last: false, .. }) => pending,
+                Ok(SdoResponse::DownloadDone { .. } | SdoResponse::DownloadSegmentDone { .. }) => pending,
+                _ => Transfer::None,
+            },
+            Question::File { .. } => match FoeMessage::decode(payload) {
+                Ok(FoeMessage::Data { data, .. }) if data.len() < FoeMessage::max_data(mailbox_size) => {
+                    Transfer::FileRead
+                }
+                Ok(FoeMessage::Data { .. }) => Transfer::File,
+                Ok(FoeMessage::Acknowledge { .. }) => pending,
+                // The client sends its message again; that one counts.
+                Ok(FoeMessage::Busy { .. }) => Transfer::File,
+                _ => Transfer::None,
+            },
+            Question::Information => {
+                more = SdoInformation::decode(payload).is_ok_and(|part| part.incomplete || part.fragments_left > 0);
+                Transfer::None
+            }
+            Question::Soe(..) => {
+                more = SoeMessage::decode(payload).is_ok_and(|part| part.incomplete && !part.error);
+                Transfer::None
+            }
+            Question::Aoe(_) | Question::Voe(_) | Question::Eoe(_) => Transfer::None,
+        };
+        more
+    }
+
+    /// What tells the SubDevice that the transfer has ended; nothing where none is under way or no message says so.
+    pub(super) fn end(&mut self) -> Option<Vec<u8>> {
+        let mut out = vec![0; END_LEN];
+        let length = match core::mem::take(&mut self.transfer) {
+            Transfer::Object(index, sub_index) => {
+                let code = AbortCode::PROTOCOL_TIMEOUT;
+                SdoRequest::Abort { index, sub_index, code }.encode(&mut out[..INITIATE_LEN])
+            }
+            Transfer::File => {
+                let text = b"the client of the gateway has gone";
+                FoeMessage::Error { code: FoeErrorCode::ILLEGAL, text }.encode(&mut out)
+            }
+            Transfer::None | Transfer::FileRead | Transfer::Fragments => None,
+        }?;
+        out.truncate(length);
+        Some(out)
+    }
+
+    /// The request was written and its answer did not come: the SubDevice may be in the middle of what was asked.
+    pub(super) fn unanswered(&mut self) {
+        let pending = core::mem::take(&mut self.pending);
+        if !self.is_open() {
+            self.transfer = pending;
+        }
+    }
+}
+
+impl Question {
+    /// The object that is asked for, where that is known.
+    pub(super) fn index(&self) -> Option<u16> {
+        match self {
+            Question::Initiate(index) => Some(*index),
+            _ => None,
+        }
+    }
+
+    /// Whether a mail is an answer.
+    pub(super) fn knows(&self, payload: &[u8]) -> bool {
+        match self {
+            Question::Initiate(asked) => match SdoResponse::decode(payload) {
+                Ok(
+                    SdoResponse::DownloadDone { index, .. }
+                    | SdoResponse::UploadExpedited { index, .. }
+                    | SdoResponse::UploadNormal { index, .. }
+                    | SdoResponse::Abort { index, .. },
+                ) => index == *asked,
+                _ => false,
+            },
+            Question::Segment => matches!(
+                SdoResponse::decode(payload),
+                Ok(SdoResponse::DownloadSegmentDone { .. }
+                    | SdoResponse::UploadSegment { .. }
+                    | SdoResponse::Abort { .. })
+            ),
+            Question::Information => SdoInformation::decode(payload).is_ok(),
+            Question::File { data, acknowledge } => match FoeMessage::decode(payload) {
+                Ok(FoeMessage::Data { packet, .. }) => {
+                    *data == Some(packet) || (data.is_none() && acknowledge.is_none())
+                }
+                Ok(FoeMessage::Acknowledge { packet }) => *acknowledge == Some(packet),
+                Ok(FoeMessage::Error { .. } | FoeMessage::Busy { .. }) => true,
+                _ => false,
+            },
+            Question::Soe(operation, drive) => SoeMessage::decode(payload)
+                .is_ok_and(|message| message.operation == *operation && message.drive == *drive),
+            Question::Aoe(invoke_id) => {
+                AmsHeader::decode(payload).is_ok_and(|(header, _)| header.invoke_id == *invoke_id)
+            }
+            Question::Voe(vendor) => payload.starts_with(vendor),
+            Question::Eoe(kind) => payload.first().is_some_and(|first| first & EOE_TYPE == *kind),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const SIZE: usize = 128;
+
+    fn sdo(request: SdoRequest<'_>) -> Vec<u8> {
+        let mut out = vec![0; SIZE];
+        let length = request.encode(&mut out).unwrap();
+        out.truncate(length);
+        out
+    }
+
+    fn reply(response: SdoResponse<'_>) -> Vec<u8> {
+        let mut out = vec![0; SIZE];
+        let length = response.encode(&mut out).unwrap();
+        out.truncate(length);
+        out
+    }
+
+    fn foe(message: FoeMessage<'_>) -> Vec<u8> {
+        let mut out = vec![0; SIZE];
+        let length = message.encode(&mut out).unwrap();
+        out.truncate(length);
+        out
+    }
+
+    fn question(dialogue: &mut Dialogue, lane: Lane, payload: &[u8]) -> Question {
+        match dialogue.ask(lane, payload, SIZE) {
+            Ok(Asks::Answer(question)) => question,
+            other => panic!("{other:?}"),
+        }
+    }
+
+    #[test]
+    fn an_upload_in_segments_is_open_until_its_last_segment() {
+        let mut dialogue = Dialogue::default();
+        let upload = sdo(SdoRequest::Upload { index: 0x2000, sub_index: 1, complete_access: false });
+        let asked = question(&mut dialogue, Lane::Coe, &upload);
+        let normal = |index| {
+            reply(SdoResponse::UploadNormal {
+                index,
+                sub_index: 1,
+                complete_access: false,
+                total: 200,
+                data: &[1; 100],
+            })
+        };
+        assert!(asked.knows(&normal(0x2000)) && !asked.knows(&normal(0x2001)));
+        dialogue.answered(&asked, &normal(0x2000), SIZE);
+        assert!(dialogue.is_open());
+        for (last, open) in [(false, true), (true, false)] {
+            let asked = question(&mut dialogue, Lane::Coe, &sdo(SdoRequest::UploadSegment { toggle: false }));
+            let part = reply(SdoResponse::UploadSegment { toggle: false, last, data: &[2; 50] });
+            assert!(asked.knows(&part));
+            dialogue.answered(&asked, &part, SIZE);
+            assert_eq!(dialogue.is_open(), open);
+        }
+        assert_eq!(dialogue.end(), None);
+    }
+
+    #[test]
+    fn a_download_that_ends_in_the_middle_is_aborted_for_its_object() {
+        let mut dialogue = Dialogue::default();
+        let begin = SdoRequest::DownloadNormal {
+            index: 0x2002,
+            sub_index: 3,
+            complete_access: false,
+            total: 500,
+            data: &[0; 90],
+        };
+        let asked = question(&mut dialogue, Lane::Coe, &sdo(begin));
+        dialogue.answered(&asked, &reply(SdoResponse::DownloadDone { index: 0x2002, sub_index: 3 }), SIZE);
+        assert!(dialogue.is_open());
+        let code = AbortCode::PROTOCOL_TIMEOUT;
+        assert_eq!(dialogue.end(), Some(sdo(SdoRequest::Abort { index: 0x2002, sub_index: 3, code })));
+        assert!(!dialogue.is_open());
+        // All in one, and refused ones, leave nothing behind.
+        let small = SdoRequest::DownloadExpedited { index: 1, sub_index: 0, complete_access: false, data: &[1] };
+        let asked = question(&mut dialogue, Lane::Coe, &sdo(small));
+        dialogue.answered(&asked, &reply(SdoResponse::DownloadDone { index: 1, sub_index: 0 }), SIZE);
+        assert!(!dialogue.is_open());
+        let asked = question(&mut dialogue, Lane::Coe, &sdo(begin));
+        dialogue.answered(&asked, &reply(SdoResponse::Abort { index: 0x2002, sub_index: 3, code }), SIZE);
+        assert!(!dialogue.is_open());
+    }
+
+    #[test]
+    fn a_file_is_open_from_its_request_to_its_last_packet() {
+        let mut dialogue = Dialogue::default();
+        let asked = question(&mut dialogue, Lane::Foe, &foe(FoeMessage::Read { password: 0, name: b"a" }));
+        let (full, rest) = ([1; 116], [2; 5]);
+        dialogue.answered(&asked, &foe(FoeMessage::Data { packet: 1, data: &full }), SIZE);
+        assert!(dialogue.is_open());
+        let asked = question(&mut dialogue, Lane::Foe, &foe(FoeMessage::Acknowledge { packet: 1 }));
+        let last = foe(FoeMessage::Data { packet: 2, data: &rest });
+        assert!(asked.knows(&last) && !asked.knows(&foe(FoeMessage::Data { packet: 1, data: &full })));
+        dialogue.answered(&asked, &last, SIZE);
+        assert!(dialogue.is_open());
+        let end = dialogue.ask(Lane::Foe, &foe(FoeMessage::Acknowledge { packet: 2 }), SIZE);
+        assert_eq!((end, dialogue.is_open()), (Ok(Asks::Nothing), false));
+
+        let asked = question(&mut dialogue, Lane::Foe, &foe(FoeMessage::Write { password: 0, name: b"a" }));
+        dialogue.answered(&asked, &foe(FoeMessage::Acknowledge { packet: 0 }), SIZE);
+        let asked = question(&mut dialogue, Lane::Foe, &foe(FoeMessage::Data { packet: 1, data: &full }));
+        dialogue.answered(&asked, &foe(FoeMessage::Busy { done: 1, entire: 2, text: b"" }), SIZE);
+        assert!(dialogue.is_open());
+        let error = dialogue.end().unwrap();
+        assert!(matches!(FoeMessage::decode(&error), Ok(FoeMessage::Error { .. })));
+    }
+
+    #[test]
+    fn what_must_not_pass_is_refused_with_its_code() {
+        let mut dialogue = Dialogue::default();
+        assert_eq!(lane(Protocol::Eoe, &[0, 1, 0, 0]), Err(ErrorReply::SERVICE_NOT_SUPPORTED));
+        assert_eq!(lane(Protocol::Eoe, &[6, 1, 0, 0]), Ok(Lane::Eoe));
+        assert_eq!(lane(Protocol::Other(9), &[]), Err(ErrorReply::UNSUPPORTED_PROTOCOL));
+        assert_eq!(dialogue.ask(Lane::Coe, &[0], SIZE), Err(ErrorReply::SIZE_TOO_SHORT));
+        assert_eq!(dialogue.ask(Lane::Coe, &[0, 0x10, 0, 0], SIZE), Err(ErrorReply::SERVICE_NOT_SUPPORTED));
+        assert_eq!(dialogue.ask(Lane::Voe, &[0, 0x10, 0], SIZE), Err(ErrorReply::SIZE_TOO_SHORT));
+        for lane in Lane::ALL {
+            for length in 0..40 {
+                for byte in [0, 1, 2, 3, 4, 5, 6, 0x20, 0xFF] {
+                    // Any bytes.
+                    let _ = dialogue.ask(lane, &vec![byte; length], SIZE);
+                    let _ = dialogue.end();
+                }
+            }
+        }
+    }
+}

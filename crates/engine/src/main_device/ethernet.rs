@@ -1,0 +1,52 @@
+//! Ethernet of declared SubDevices: who has it, and one port for each.
+
+use alloc::vec::Vec;
+
+use ringcat_wire::address::Position;
+use ringcat_wire::sii::MailboxProtocols;
+
+use super::MainDevice;
+use crate::mail::eoe::EthernetPort;
+
+/// A SubDevice through which Ethernet frames may pass.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct EthernetSubDevice {
+    /// Index in the declaration.
+    pub subdevice: usize,
+    /// Position in the scan's order.
+    pub position: Position,
+    /// Alias; 0 is none.
+    pub alias: u16,
+}
+
+impl MainDevice {
+    /// Declared SubDevices that have been seen and whose SII offers EoE, whether they are there now or not; nobody before
+    /// activation.
+    pub fn ethernet_subdevices(&self) -> Vec<EthernetSubDevice> {
+        let Some(fleet) = &self.fleet else { return Vec::new() };
+        let access = fleet.access();
+        let members = access.members.iter().enumerate();
+        members
+            .filter_map(|(subdevice, member)| {
+                let info = member.info.as_ref()?;
+                let speaks = info.protocols.0 & MailboxProtocols::EOE != 0 && info.mailbox.is_some();
+                let (position, alias) = (info.position, info.alias);
+                speaks.then_some(EthernetSubDevice { subdevice, position, alias })
+            })
+            .collect()
+    }
+
+    /// The Ethernet of a declared SubDevice. Its port is opened when it is asked for first and lasts until the MainDevice
+    /// stops; `None` where nobody is declared, or somebody has a port of this mailbox.
+    pub fn ethernet_port(&mut self, subdevice: usize) -> Option<&EthernetPort> {
+        let mailbox = self.fleet.as_ref()?.mailbox(subdevice)?;
+        while self.ports.len() <= subdevice {
+            self.ports.push(None);
+        }
+        let port = self.ports.get_mut(subdevice)?;
+        if port.is_none() {
+            *port = EthernetPort::open(&mailbox);
+        }
+        port.as_ref()
+    }
+}
