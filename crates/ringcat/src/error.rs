@@ -29,6 +29,13 @@ pub enum Error {
     Segment(SegmentError),
     /// The system has no more threads.
     Thread(std::io::Error),
+    /// The mailbox gateway cannot listen.
+    Gateway {
+        /// Where.
+        address: std::net::SocketAddr,
+        /// The system's answer.
+        cause: std::io::Error,
+    },
     /// The thread of the acyclic half has ended.
     Gone,
 }
@@ -44,6 +51,7 @@ impl fmt::Display for Error {
             Error::Stop(error) => write!(f, "stop: {error}"),
             Error::Segment(error) => error.fmt(f),
             Error::Thread(error) => write!(f, "a thread cannot be started: {error}"),
+            Error::Gateway { address, cause } => write!(f, "mailbox gateway on {address}: {cause}"),
             Error::Gone => f.write_str("the supervisor thread has ended"),
         }
     }

@@ -4,6 +4,7 @@
 //! knows of no application. What keeps the cycle from its time is told apart: wake-ups
 //! that came late and cycles that were left out are this machine's, lost frames are the wire's.
 
+mod beside;
 mod live;
 mod stalls;
 mod summary;
@@ -25,6 +26,7 @@ use crate::output::say;
 use crate::recording::RecordingArguments;
 use crate::surroundings::Surroundings;
 use crate::times::time;
+use beside::{Beside, BesideArguments};
 use live::Live;
 use stalls::Stalls;
 use summary::{final_account, summary};
@@ -60,6 +62,8 @@ pub struct RunArguments {
     thread: ThreadArguments,
     #[command(flatten)]
     recording: RecordingArguments,
+    #[command(flatten)]
+    beside: BesideArguments,
     /// Cycle time, with its unit: 250us, 1ms.
     #[arg(long, value_name = "TIME", default_value = "1ms", value_parser = time)]
     cycle: Duration,
@@ -80,6 +84,7 @@ pub fn run(arguments: &RunArguments) -> Result<bool, Failure> {
     let begin = now();
     let supervisor =
         SupervisorThread::start(acyclic, &arguments.interfaces.options(), move || thread.prepare_supervisor())?;
+    let beside = arguments.beside.start(&supervisor, &arguments.interfaces)?;
     let mut others = 0;
     let result = supervisor.scan_while(|| {
         tell_events(&supervisor, &mut surroundings);
@@ -92,7 +97,8 @@ pub fn run(arguments: &RunArguments) -> Result<bool, Failure> {
     let application = supervisor.activate(declaration, cyclic).map_err(ringcat::Error::from)?;
     let cycles = application.start_cycles(move || thread.prepare_cycles(), |_| ControlFlow::Continue(()))?;
     let live = Live::new(arguments.interfaces.redundant.is_some());
-    let mut run = Run { cycles, names, begin, live, judgements_told: 0, stalls: Stalls::default(), surroundings };
+    let mut run =
+        Run { cycles, names, begin, live, judgements_told: 0, stalls: Stalls::default(), surroundings, beside };
     let in_op = run.reach_op(&end);
     let before = run.cycles.news().counters();
     if in_op {
@@ -101,6 +107,7 @@ pub fn run(arguments: &RunArguments) -> Result<bool, Failure> {
     }
     let application = run.cycles.end()?;
     summary(&application, &run.surroundings);
+    run.beside.account();
     let lost = application.cyclic_counters().lost - before.lost;
     let (supervisor, mut links) = application.stop(LastOutputs::Zero, AlState::Init, STOP_LIMIT)?;
     final_account(&mut links, &supervisor);
@@ -120,6 +127,7 @@ struct Run {
     judgements_told: u32,
     stalls: Stalls,
     surroundings: Surroundings,
+    beside: Beside,
 }
 
 /// Tells of other MainDevices among the events of a scan.
@@ -162,6 +170,10 @@ impl Run {
             }
             self.live.clear();
             say!("{:>12.3} ms  {}", self.since_begin(event.at), describe(&event.event, &self.names));
+        }
+        for words in self.beside.news() {
+            self.live.clear();
+            eprintln!("ringcat: {words}");
         }
         if let Some(left_out) = self.stalls.news(self.cycles.news().pace().skipped, now()) {
             self.live.clear();

@@ -138,6 +138,12 @@ impl SupervisorThread {
         }
     }
 
+    /// Has the thread do something with its engine in each of its turns, until it says true.
+    pub(crate) fn attend(&self, work: impl FnMut(&mut Engine, Instant) -> bool + Send + 'static) -> Result<(), Error> {
+        let requests = self.0.requests.as_ref().ok_or(Error::Gone)?;
+        requests.send(Box::new(work)).map_err(|_| Error::Gone)
+    }
+
     /// Has the thread do something with its engine, and waits for what comes out.
     ///
     /// # Errors

@@ -2,6 +2,8 @@
 
 mod declarations;
 mod demo;
+mod ethernet;
+mod gateway;
 mod junctions;
 mod services;
 mod stop;

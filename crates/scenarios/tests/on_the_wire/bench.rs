@@ -155,6 +155,12 @@ impl Bench {
         ip(&format!("-n {} {arguments}", self.main)).expect("a namespace of ours");
     }
 
+    /// The interfaces of the MainDevice's namespace, a line each.
+    pub fn links_main(&self) -> String {
+        let output = Command::new("ip").args(["-n", &self.main, "-o", "link"]).output().expect("ip starts");
+        String::from_utf8_lossy(&output.stdout).into_owned()
+    }
+
     /// Starts a program beside the simulator's interfaces.
     pub fn start_at_sim(&self, path: &Path, arguments: &[&str]) -> Child {
         start(self.command(&self.sim, path).args(arguments))

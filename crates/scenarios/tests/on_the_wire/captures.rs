@@ -31,14 +31,16 @@ for _ in range(5):
 const PAUSE: Duration = Duration::from_millis(300);
 
 /// A file that is removed when it is dropped, unless the test failed: then somebody wants to look at it.
-struct CaptureFile(PathBuf);
+pub struct CaptureFile(PathBuf);
 
 impl CaptureFile {
-    fn new(name: &str) -> CaptureFile {
+    /// One of this name, that is not there yet.
+    pub fn new(name: &str) -> CaptureFile {
         CaptureFile(std::env::temp_dir().join(format!("ringcat-wire-{}-{name}.pcapng", std::process::id())))
     }
 
-    fn path(&self) -> &str {
+    /// Where it is.
+    pub fn path(&self) -> &str {
         self.0.to_str().expect("a path in Unicode")
     }
 
@@ -46,15 +48,21 @@ impl CaptureFile {
         std::fs::read(&self.0).expect("the capture was written")
     }
 
-    /// Everything there is to check of a capture of ours; what the judge saw.
-    fn check(&self, title: &str) -> Verdict {
+    /// What the judge and tshark say of the frames; not when they were sent.
+    pub fn check_frames(&self, title: &str) -> Verdict {
         let verdict = judge(&self.bytes(), Some(Duration::from_millis(1))).expect("a capture");
         println!("{title}:\n{verdict}");
         assert_eq!(verdict.broken, 0, "{title}");
+        check_with_tshark(&self.0, verdict.sent.iter().sum::<u64>() + verdict.received.iter().sum::<u64>());
+        verdict
+    }
+
+    /// Everything there is to check of a capture of ours; what the judge saw.
+    fn check(&self, title: &str) -> Verdict {
+        let verdict = self.check_frames(title);
         for windows in &verdict.windows {
             assert!(windows.crossed <= TOLERATED + windows.by_chance / PART_OF_CHANCE, "{title}: {windows}");
         }
-        check_with_tshark(&self.0, verdict.sent.iter().sum::<u64>() + verdict.received.iter().sum::<u64>());
         verdict
     }
 }

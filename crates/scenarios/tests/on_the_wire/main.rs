@@ -9,6 +9,7 @@ mod bench;
 mod cables;
 mod captures;
 mod cuts_beside;
+mod ethernet;
 mod foreign;
 mod frames;
 mod messages;

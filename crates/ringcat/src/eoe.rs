@@ -1,0 +1,349 @@
+//! Ethernet over EtherCAT as network interfaces of this host: one for each SubDevice that speaks EoE.
+//!
+//! [`SupervisorThread::start_ethernet`] makes interfaces as SubDevices are found, and from then on the supervisor's thread
+//! moves frames between them and the mailboxes: what the host sends is taken as far as the queue of the SubDevice has room,
+//! and waits in the kernel otherwise. While a SubDevice is away its interface has no carrier; addresses, routes and its
+//! place in a bridge stay. Interfaces go when the MainDevice stops.
+//!
+//! An interface that cannot be made is told once, and everything else goes on.
+
+use std::fmt;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Mutex, PoisonError};
+use std::time::Duration;
+
+use ringcat_engine::mail::eoe::{EthernetStatus, MAX_FRAME, QUEUE};
+use ringcat_engine::main_device::{EthernetSubDevice, MainDevice as Engine};
+use ringcat_engine::time::Instant;
+use ringcat_link::tap::{TapError, TapInterface};
+
+use crate::error::Error;
+use crate::supervisor_thread::SupervisorThread;
+
+/// SubDevices that have appeared are looked for this often, and statistics are brought up to date.
+const LOOK: Duration = Duration::from_millis(20);
+/// Frames that one interface may hand to the host in one go, so that the others and the bus have their turn.
+const BURST: usize = 64;
+/// News that are kept until somebody takes them.
+const NEWS: usize = 64;
+
+/// A network interface of the host, seen from its other end.
+pub trait HostInterface: Send {
+    /// Takes the oldest frame that the host sent; its length, `None` where there is none.
+    fn receive(&mut self, room: &mut [u8]) -> Option<usize>;
+
+    /// Hands a frame to the host; false where it does not take it.
+    fn send(&mut self, frame: &[u8]) -> bool;
+
+    /// Whether frames can pass.
+    fn set_carrier(&mut self, carrier: bool);
+}
+
+impl HostInterface for TapInterface {
+    fn receive(&mut self, room: &mut [u8]) -> Option<usize> {
+        TapInterface::receive(self, room)
+    }
+
+    fn send(&mut self, frame: &[u8]) -> bool {
+        TapInterface::send(self, frame)
+    }
+
+    fn set_carrier(&mut self, carrier: bool) {
+        // A kernel that cannot shows a carrier all the time; frames are dropped then.
+        TapInterface::set_carrier(self, carrier);
+    }
+}
+
+/// Makes an interface of this name and address.
+pub type MakeInterface = Box<dyn FnMut(&str, [u8; 6]) -> Result<Box<dyn HostInterface>, TapError> + Send>;
+
+/// How interfaces are named and addressed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct EthernetOptions {
+    /// Number of this MainDevice, for names.
+    pub index: u16,
+    /// Address of the main link: the interfaces' own are made from it.
+    pub main: [u8; 6],
+}
+
+impl EthernetOptions {
+    /// Name of a SubDevice's interface: `eoeXsY` by its position, `eoeXaY` by its alias where it has one.
+    pub fn name(&self, subdevice: &EthernetSubDevice) -> String {
+        match subdevice.alias {
+            0 => format!("eoe{}s{}", self.index, subdevice.position.0),
+            alias => format!("eoe{}a{alias}", self.index),
+        }
+    }
+
+    /// Address of a SubDevice's interface, the same each time: locally administered, with the last three bytes of the main
+    /// link's address and the position or the alias.
+    pub fn mac(&self, subdevice: &EthernetSubDevice) -> [u8; 6] {
+        let [.., a, b, c] = self.main;
+        let (kind, number) = match subdevice.alias {
+            0 => (0x02, subdevice.position.0),
+            alias => (0x06, alias),
+        };
+        let [high, low] = number.to_be_bytes();
+        [kind, a, b, c, high, low]
+    }
+}
+
+/// Something that happened to an interface.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum EthernetNews {
+    /// It was made.
+    Made {
+        /// Its name.
+        name: String,
+        /// The SubDevice, by its index in the declaration.
+        subdevice: usize,
+    },
+    /// It cannot be made. Frames of that SubDevice do not pass.
+    Refused(TapError),
+    /// Its SubDevice can be reached, or no longer.
+    Carrier {
+        /// Its name.
+        name: String,
+        /// Whether frames can pass.
+        carrier: bool,
+    },
+}
+
+impl fmt::Display for EthernetNews {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            EthernetNews::Made { name, subdevice } => {
+                write!(f, "network interface {name} leads to SubDevice {subdevice}")
+            }
+            EthernetNews::Refused(error) => write!(f, "EoE: {error}"),
+            EthernetNews::Carrier { name, carrier: true } => write!(f, "{name}: frames can pass"),
+            EthernetNews::Carrier { name, carrier: false } => write!(f, "{name}: no carrier, its SubDevice is away"),
+        }
+    }
+}
+
+/// What passes one interface.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct EthernetInterface {
+    /// Its name.
+    pub name: String,
+    /// The SubDevice.
+    pub subdevice: EthernetSubDevice,
+    /// Counters, rates and the queue; `tx` is to the SubDevice.
+    pub status: EthernetStatus,
+    /// Frames that the host did not take: its interface is switched off.
+    pub refused: u64,
+}
+
+#[derive(Debug, Default)]
+struct Shared {
+    ended: AtomicBool,
+    told: Mutex<Told>,
+}
+
+#[derive(Debug, Default)]
+struct Told {
+    interfaces: Vec<EthernetInterface>,
+    news: Vec<EthernetNews>,
+}
+
+impl Shared {
+    fn told(&self) -> std::sync::MutexGuard<'_, Told> {
+        self.told.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+/// The interfaces; dropped, they are removed.
+#[derive(Debug)]
+pub struct Ethernet(Arc<Shared>);
+
+impl Ethernet {
+    /// The interfaces that there are, with what has passed them, some milliseconds old.
+    pub fn interfaces(&self) -> Vec<EthernetInterface> {
+        self.0.told().interfaces.clone()
+    }
+
+    /// What has happened since this was asked last.
+    pub fn take_news(&self) -> Vec<EthernetNews> {
+        std::mem::take(&mut self.0.told().news)
+    }
+}
+
+impl Drop for Ethernet {
+    fn drop(&mut self) {
+        self.0.ended.store(true, Ordering::Relaxed);
+    }
+}
+
+impl SupervisorThread {
+    /// Makes a network interface for each SubDevice that speaks EoE as soon as it is known, from activation on.
+    ///
+    /// # Errors
+    /// The thread is gone.
+    pub fn start_ethernet(&self, options: EthernetOptions) -> Result<Ethernet, Error> {
+        let make = |name: &str, mac| {
+            let tap = TapInterface::create(name, mac)?;
+            Ok(Box::new(tap) as Box<dyn HostInterface>)
+        };
+        self.start_ethernet_on(options, Box::new(make))
+    }
+
+    /// As [`SupervisorThread::start_ethernet`], with interfaces of another kind.
+    ///
+    /// # Errors
+    /// The thread is gone.
+    pub fn start_ethernet_on(&self, options: EthernetOptions, make: MakeInterface) -> Result<Ethernet, Error> {
+        let shared = Arc::new(Shared::default());
+        let mut switch = Switch {
+            options,
+            make,
+            shared: shared.clone(),
+            ends: Vec::new(),
+            refused: Vec::new(),
+            look_at: Instant(0),
+        };
+        self.attend(move |engine, now| switch.work(engine, now))?;
+        Ok(Ethernet(shared))
+    }
+}
+
+/// One interface and what it leads to.
+struct End {
+    name: String,
+    subdevice: EthernetSubDevice,
+    interface: Box<dyn HostInterface>,
+    carrier: bool,
+    refused: u64,
+}
+
+/// Runs in the supervisor's thread.
+struct Switch {
+    options: EthernetOptions,
+    make: MakeInterface,
+    shared: Arc<Shared>,
+    ends: Vec<End>,
+    /// SubDevices whose interface cannot be made.
+    refused: Vec<usize>,
+    look_at: Instant,
+}
+
+impl Switch {
+    /// Moves frames; true at the end.
+    fn work(&mut self, engine: &mut Engine, now: Instant) -> bool {
+        if self.shared.ended.load(Ordering::Relaxed) {
+            self.ends.clear();
+            return true;
+        }
+        if now >= self.look_at {
+            self.look_at = now + LOOK;
+            self.look(engine);
+        }
+        for end in &mut self.ends {
+            if let Some(up) = end.pass(engine) {
+                end.interface.set_carrier(up);
+                end.carrier = up;
+                tell(&self.shared, EthernetNews::Carrier { name: end.name.clone(), carrier: up });
+            }
+        }
+        false
+    }
+
+    /// Interfaces for those that have appeared, none for those of a MainDevice that has stopped.
+    fn look(&mut self, engine: &mut Engine) {
+        let found = engine.ethernet_subdevices();
+        self.ends.retain(|end| found.contains(&end.subdevice));
+        if found.is_empty() {
+            self.refused.clear();
+        }
+        for subdevice in found {
+            let known = self.ends.iter().any(|end| end.subdevice == subdevice);
+            if known || self.refused.contains(&subdevice.subdevice) {
+                continue;
+            }
+            match self.make(subdevice) {
+                Ok(end) => {
+                    let name = end.name.clone();
+                    tell(&self.shared, EthernetNews::Made { name, subdevice: subdevice.subdevice });
+                    self.ends.push(end);
+                }
+                Err(error) => {
+                    self.refused.push(subdevice.subdevice);
+                    tell(&self.shared, EthernetNews::Refused(error));
+                }
+            }
+        }
+        let interfaces = self.ends.iter().filter_map(|end| {
+            let status = engine.ethernet_port(end.subdevice.subdevice)?.status();
+            let End { name, subdevice, refused, .. } = end;
+            Some(EthernetInterface { name: name.clone(), subdevice: *subdevice, status, refused: *refused })
+        });
+        let interfaces: Vec<EthernetInterface> = interfaces.collect();
+        // The last figures stay when the interfaces go.
+        if !interfaces.is_empty() {
+            self.shared.told().interfaces = interfaces;
+        }
+    }
+
+    fn make(&mut self, subdevice: EthernetSubDevice) -> Result<End, TapError> {
+        let mut name = self.options.name(&subdevice);
+        if self.ends.iter().any(|end| end.name == name) {
+            // An alias that two of them have names neither.
+            name = self.options.name(&EthernetSubDevice { alias: 0, ..subdevice });
+        }
+        let interface = (self.make)(&name, self.options.mac(&subdevice))?;
+        Ok(End { name, subdevice, interface, carrier: false, refused: 0 })
+    }
+}
+
+fn tell(shared: &Shared, news: EthernetNews) {
+    let told = &mut shared.told().news;
+    if told.len() < NEWS {
+        told.push(news);
+    }
+}
+
+impl End {
+    /// Moves frames both ways; whether the carrier has to change, and to what.
+    fn pass(&mut self, engine: &mut Engine) -> Option<bool> {
+        let mut room = [0; MAX_FRAME + 1];
+        let port = engine.ethernet_port(self.subdevice.subdevice);
+        let Some(port) = port.filter(|port| port.is_up()) else {
+            // What was sent to a SubDevice that is away must not reach it when it is back.
+            for _ in 0..QUEUE {
+                if self.interface.receive(&mut room).is_none() {
+                    break;
+                }
+            }
+            return self.carrier.then_some(false);
+        };
+        for _ in 0..BURST {
+            let Some(frame) = port.pop_frame() else { break };
+            self.refused += u64::from(!self.interface.send(&frame.bytes));
+        }
+        while port.room() > 0 {
+            let Some(length) = self.interface.receive(&mut room) else { break };
+            // A frame that is too long cannot pass; there is room for it.
+            let _ = port.send(&room[..length]);
+        }
+        (!self.carrier).then_some(true)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use ringcat_wire::address::Position;
+
+    #[test]
+    fn interfaces_are_named_and_addressed_by_position_or_alias() {
+        let options = EthernetOptions { index: 0, main: [0x00, 0x1B, 0x21, 0xAA, 0xBB, 0xCC] };
+        let by_position = EthernetSubDevice { subdevice: 4, position: Position(2), alias: 0 };
+        let by_alias = EthernetSubDevice { alias: 1000, ..by_position };
+        assert_eq!((options.name(&by_position), options.name(&by_alias)), ("eoe0s2".into(), "eoe0a1000".into()));
+        assert_eq!(options.mac(&by_position), [0x02, 0xAA, 0xBB, 0xCC, 0, 2]);
+        assert_eq!(options.mac(&by_alias), [0x06, 0xAA, 0xBB, 0xCC, 0x03, 0xE8]);
+        let longest = EthernetOptions { index: u16::MAX, ..options };
+        let last = EthernetSubDevice { position: Position(u16::MAX), ..by_position };
+        assert_eq!(longest.name(&last).len(), 14, "the kernel allows 15");
+    }
+}

@@ -1,0 +1,147 @@
+//! Network interfaces for EoE, with interfaces of the test's own in the place of the kernel's.
+
+use std::collections::VecDeque;
+use std::ops::ControlFlow;
+use std::path::Path;
+use std::sync::{Arc, Mutex};
+use std::thread::sleep;
+use std::time::{Duration, Instant};
+
+use ringcat::eoe::{EthernetNews, EthernetOptions, HostInterface};
+use ringcat::shared_segment::SharedSegment;
+use ringcat::{CyclicThread, Error, LastOutputs, Options, SupervisorThread, automatic};
+use ringcat_link::TapError;
+use ringcat_sim::network::Network;
+use ringcat_sim::segment::Segment;
+use ringcat_wire::al::AlState;
+
+const SEGMENT: &str = "
+[segment]
+ring = true
+[[device]]
+type = \"coupler\"
+[[device]]
+type = \"ethernet-terminal\"
+ethernet = \"loop\"
+[[device]]
+type = \"all-protocols\"
+ethernet = \"loop\"
+alias = 1000
+";
+const PERIOD: Duration = Duration::from_millis(2);
+const LIMIT: Duration = Duration::from_secs(30);
+const OPTIONS: EthernetOptions = EthernetOptions { index: 3, main: [0, 0, 0, 7, 8, 9] };
+
+/// One interface, as the host sees it.
+#[derive(Default)]
+struct Cable {
+    name: String,
+    mac: [u8; 6],
+    carrier: bool,
+    to_device: VecDeque<Vec<u8>>,
+    to_host: Vec<Vec<u8>>,
+}
+
+struct End(Arc<Mutex<Cable>>);
+
+impl HostInterface for End {
+    fn receive(&mut self, room: &mut [u8]) -> Option<usize> {
+        let frame = self.0.lock().unwrap().to_device.pop_front()?;
+        room[..frame.len()].copy_from_slice(&frame);
+        Some(frame.len())
+    }
+
+    fn send(&mut self, frame: &[u8]) -> bool {
+        self.0.lock().unwrap().to_host.push(frame.to_vec());
+        true
+    }
+
+    fn set_carrier(&mut self, carrier: bool) {
+        self.0.lock().unwrap().carrier = carrier;
+    }
+}
+
+type Cables = Arc<Mutex<Vec<Arc<Mutex<Cable>>>>>;
+
+fn start() -> Result<(SupervisorThread, SharedSegment), Error> {
+    let segment = Segment::from_toml(SEGMENT, Path::new(".")).expect("a good segment");
+    let (cyclic, acyclic) = SharedSegment::halves(Network::from_description(segment).expect("it can be built"));
+    Ok((SupervisorThread::start(acyclic, &Options::default(), || ())?, cyclic))
+}
+
+fn cycles(supervisor: &SupervisorThread, cyclic: SharedSegment) -> Result<CyclicThread<SharedSegment>, Error> {
+    let scan = supervisor.scan()?;
+    let application = supervisor.clone().activate(automatic(&scan.subdevices, PERIOD), cyclic)?;
+    application.start_cycles(|| (), |_| ControlFlow::Continue(()))
+}
+
+fn wait(what: &str, condition: impl Fn() -> bool) {
+    let end = Instant::now() + LIMIT;
+    while !condition() {
+        assert!(Instant::now() < end, "{what}");
+        sleep(Duration::from_millis(1));
+    }
+}
+
+#[test]
+fn each_eoe_subdevice_has_an_interface_by_position_or_alias_until_the_stop() -> Result<(), Error> {
+    let (supervisor, cyclic) = start()?;
+    let made: Cables = Cables::default();
+    let cables = made.clone();
+    let make = move |name: &str, mac| {
+        let cable = Arc::new(Mutex::new(Cable { name: name.to_owned(), mac, ..Cable::default() }));
+        cables.lock().unwrap().push(cable.clone());
+        Ok(Box::new(End(cable)) as Box<dyn HostInterface>)
+    };
+    let ethernet = supervisor.start_ethernet_on(OPTIONS, Box::new(make))?;
+    let cycles = cycles(&supervisor, cyclic)?;
+    wait("both have a carrier", || {
+        let made = made.lock().unwrap();
+        made.len() == 2 && made.iter().all(|cable| cable.lock().unwrap().carrier)
+    });
+    let cables: Vec<Arc<Mutex<Cable>>> = made.lock().unwrap().drain(..).collect();
+    let names = cables.iter().map(|cable| cable.lock().unwrap().name.clone()).collect::<Vec<_>>();
+    assert_eq!(names, ["eoe3s1", "eoe3a1000"]);
+    assert_eq!(cables[1].lock().unwrap().mac, [0x06, 7, 8, 9, 0x03, 0xE8]);
+    let frame = |cable: usize, number: usize| vec![(cable * 16 + number) as u8; 60 + number * 37];
+    for (number, cable) in cables.iter().enumerate() {
+        // More than the queue of a mailbox holds.
+        cable.lock().unwrap().to_device.extend((0..39).map(|at| frame(number, at)));
+    }
+    for (number, cable) in cables.iter().enumerate() {
+        wait("all frames come back", || cable.lock().unwrap().to_host.len() == 39);
+        let came = &cable.lock().unwrap().to_host;
+        assert!((0..39).all(|at| came[at] == frame(number, at)), "in order, each to its own");
+    }
+    wait("statistics follow", || {
+        let interfaces = ethernet.interfaces();
+        interfaces.len() == 2
+            && interfaces.iter().all(|interface| {
+                let counters = interface.status.counters;
+                interface.status.up && (counters.tx_frames, counters.rx_frames) == (39, 39)
+            })
+    });
+    let news = ethernet.take_news();
+    assert_eq!(news[0], EthernetNews::Made { name: "eoe3s1".to_owned(), subdevice: 1 });
+    assert!(news.iter().any(|news| news.to_string() == "eoe3a1000: frames can pass"), "{news:?}");
+    cycles.supervisor().all_settled();
+    let (supervisor, _) = cycles.end()?.stop(LastOutputs::Zero, AlState::Init, LIMIT)?;
+    wait("the interfaces go", || cables.iter().all(|cable| Arc::strong_count(cable) == 1));
+    drop(supervisor);
+    Ok(())
+}
+
+#[test]
+fn an_interface_that_must_not_be_made_is_told_once_and_everything_else_goes_on() -> Result<(), Error> {
+    let (supervisor, cyclic) = start()?;
+    let make = |name: &str, _| Err(TapError::Permission { name: name.to_owned() });
+    let ethernet = supervisor.start_ethernet_on(OPTIONS, Box::new(make))?;
+    let cycles = cycles(&supervisor, cyclic)?;
+    wait("all are in OP", || cycles.supervisor().all_settled());
+    sleep(Duration::from_millis(100));
+    let told: Vec<String> = ethernet.take_news().iter().map(ToString::to_string).collect();
+    assert_eq!(told.len(), 2, "{told:?}");
+    assert!(told[0].starts_with("EoE: not permitted to make the network interface eoe3s1; run as root"), "{told:?}");
+    assert_eq!(ethernet.interfaces(), []);
+    Ok(())
+}
