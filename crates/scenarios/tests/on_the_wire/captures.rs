@@ -48,18 +48,19 @@ impl CaptureFile {
         std::fs::read(&self.0).expect("the capture was written")
     }
 
-    /// What the judge and tshark say of the frames; not when they were sent.
-    pub fn check_frames(&self, title: &str) -> Verdict {
+    /// What the judge and tshark say of the frames; not when they were sent. `unread` are protocols that tshark leaves
+    /// alone.
+    pub fn check_frames(&self, title: &str, unread: &[&str]) -> Verdict {
         let verdict = judge(&self.bytes(), Some(Duration::from_millis(1))).expect("a capture");
         println!("{title}:\n{verdict}");
         assert_eq!(verdict.broken, 0, "{title}");
-        check_with_tshark(&self.0, verdict.sent.iter().sum::<u64>() + verdict.received.iter().sum::<u64>());
+        check_with_tshark(&self.0, verdict.sent.iter().sum::<u64>() + verdict.received.iter().sum::<u64>(), unread);
         verdict
     }
 
     /// Everything there is to check of a capture of ours; what the judge saw.
     fn check(&self, title: &str) -> Verdict {
-        let verdict = self.check_frames(title);
+        let verdict = self.check_frames(title, &[]);
         for windows in &verdict.windows {
             assert!(windows.crossed <= TOLERATED + windows.by_chance / PART_OF_CHANCE, "{title}: {windows}");
         }
@@ -78,9 +79,10 @@ impl Drop for CaptureFile {
 }
 
 /// Every frame is EtherCAT to tshark, none malformed, none with an expert's error.
-fn check_with_tshark(path: &Path, frames: u64) {
+fn check_with_tshark(path: &Path, frames: u64, unread: &[&str]) {
     let found = |filter: &str| {
         let mut tshark = Command::new("tshark");
+        tshark.args(unread.iter().flat_map(|protocol| ["--disable-protocol", protocol]));
         tshark.arg("-r").arg(path).args([
             "-Y",
             filter,

@@ -33,8 +33,9 @@ def checksum(data):
     return ~(total + (total >> 16)) & 0xFFFF
 def ping(address, count):
     s = socket.socket(socket.AF_INET, socket.SOCK_RAW, socket.IPPROTO_ICMP)
-    s.settimeout(3)
+    s.settimeout(1)
     times = []
+    lost = 0
     for number in range(count):
         body = bytes(range(256)) * (1 + number % 5)
         head = struct.pack('!BBHHH', 8, 0, 0, 0x4711, number)
@@ -42,13 +43,21 @@ def ping(address, count):
         begin = time.monotonic()
         s.sendto(head + body, (address, 0))
         while True:
-            packet, sender = s.recvfrom(4096)
+            try:
+                packet, sender = s.recvfrom(4096)
+            except TimeoutError:
+                # The host takes up to a second to act on a carrier.
+                assert times == [] and lost < 4, 'no answer to number %d' % number
+                lost += 1
+                begin = time.monotonic()
+                s.sendto(head + body, (address, 0))
+                continue
             kind, _, _, ident, seq = struct.unpack('!BBHHH', packet[20:28])
             if sender[0] == address and (kind, ident, seq) == (0, 0x4711, number):
                 break
         assert packet[28:] == body, 'another body'
         times.append(time.monotonic() - begin)
-    print('ping', address, 'median_ms %.2f' % (sorted(times)[count // 2] * 1e3))
+    print('ping', address, 'lost', lost, 'median_ms %.2f' % (sorted(times)[count // 2] * 1e3))
 def download(address, length):
     begin = time.monotonic()
     s = socket.create_connection((address, 80), timeout=10)
@@ -138,7 +147,8 @@ fn two_eoe_devices_are_pinged_and_downloaded_from_through_a_bridge_and_without()
     assert!(output.contains("stopped: outputs zero"), "{output}{errors}");
     let links = bench.links_main();
     assert!(INTERFACES.iter().all(|name| line(&links, name).is_none()), "{links}");
-    capture.check_frames("two EoE devices");
+    // It takes fragments for whole frames, and what is in them for cut off.
+    capture.check_frames("two EoE devices", &["ip"]);
 }
 
 #[test]
