@@ -15,6 +15,7 @@ pub mod cyclic_load;
 pub mod dice;
 pub mod ethernet_host;
 pub mod figures;
+pub mod fuzz_targets;
 pub mod loss;
 pub mod meddler;
 pub mod namespaces;

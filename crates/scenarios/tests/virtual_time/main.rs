@@ -19,6 +19,7 @@ mod mail;
 mod mail_protocols;
 mod mail_services;
 mod mail_startup;
+mod mailbox_decoders;
 mod power_cycles;
 mod real_images;
 mod requests;

@@ -1,0 +1,85 @@
+//! Mailbox decoders and any bytes: the corpora of the fuzz targets and mutants of them, without a fuzzer.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use scenarios::dice::Dice;
+use scenarios::fuzz_targets::{TARGETS, Target, mutate, seeds};
+
+/// Mutants of each file of a corpus.
+const MUTANTS: usize = 400;
+
+fn corpus(target: &str) -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("../../fuzz/corpus").join(target)
+}
+
+/// What is in a corpus, by name.
+fn read(target: &str) -> Vec<(String, Vec<u8>)> {
+    let entries = fs::read_dir(corpus(target)).unwrap_or_else(|error| panic!("corpus of {target}: {error}"));
+    let mut files: Vec<PathBuf> = entries.map(|entry| entry.unwrap().path()).collect();
+    files.sort();
+    files.iter().map(|path| (path.file_name().unwrap().display().to_string(), fs::read(path).unwrap())).collect()
+}
+
+/// Says which bytes it was, if the target panics.
+struct Running<'a>(&'a str, &'a [u8]);
+
+impl Drop for Running<'_> {
+    fn drop(&mut self) {
+        if std::thread::panicking() {
+            println!("target {}, bytes {:02x?}", self.0, self.1);
+        }
+    }
+}
+
+fn run(name: &str, target: Target, bytes: &[u8]) {
+    let _running = Running(name, bytes);
+    target(bytes);
+}
+
+#[test]
+fn corpora_hold_what_our_encoders_write_and_each_target_takes_it() {
+    for (name, target) in TARGETS {
+        let seeds = seeds::of(name);
+        if std::env::var_os("RINGCAT_WRITE_CORPUS").is_some() {
+            fs::create_dir_all(corpus(name)).unwrap();
+            for (number, seed) in seeds.iter().enumerate() {
+                fs::write(corpus(name).join(format!("{number:02}")), seed).unwrap();
+            }
+        }
+        let files = read(name);
+        assert!(seeds.iter().all(|seed| files.iter().any(|(_, bytes)| bytes == seed)), "corpus of {name} is old");
+        for (_, bytes) in &files {
+            run(name, target, bytes);
+        }
+    }
+}
+
+#[test]
+fn mutants_of_the_corpora_never_panic_and_what_decodes_survives_being_encoded() {
+    let mut dice = Dice::new(4);
+    for (name, target) in TARGETS {
+        let files = read(name);
+        for (_, bytes) in &files {
+            for _ in 0..MUTANTS {
+                let mut mutant = bytes.clone();
+                mutate(&mut mutant, &dice.pick(&files).1.clone(), &mut dice);
+                run(name, target, &mutant);
+            }
+        }
+    }
+}
+
+#[test]
+fn a_target_whose_decoder_breaks_is_found() {
+    let broken: Target = |bytes| assert!(bytes.get(5) != Some(&0xFF), "a decoder that cannot bear this");
+    let found = std::panic::catch_unwind(|| {
+        let mut dice = Dice::new(4);
+        for _ in 0..10_000 {
+            let mut mutant = vec![0; 8];
+            mutate(&mut mutant, &[0xFF; 4], &mut dice);
+            broken(&mutant);
+        }
+    });
+    assert!(found.is_err(), "mutants reach every byte and its edges");
+}
