@@ -124,9 +124,8 @@ impl Links for SimulatedSegment {
 
     fn wait(&mut self, until: Instant) {
         let until = SimTime(until.0);
-        while !self.fetch() && self.network.now() < until {
-            let next = self.network.next_event().map_or(until, |next| next.min(until));
-            self.network.advance(next);
+        if !self.fetch() && self.network.now() < until {
+            self.network.advance_until_received(until);
         }
         self.keep_pace();
     }

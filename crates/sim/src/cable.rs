@@ -201,6 +201,13 @@ impl Leg {
         self.faulty = blocked || drop > 0 || duplicate > 0 || corrupt > 0 || delay > 0;
     }
 
+    /// Frames whose first bit arrives at this time or later arrive whole, as long as nothing changes. `None` where there
+    /// is no signal or a fault waits.
+    pub(crate) fn steady_since(&self) -> Option<SimTime> {
+        let steady = self.signal && self.detected && !self.faulty;
+        steady.then(|| SimTime(self.up_since.0.saturating_add(self.delay_ns)).max(self.detected_at))
+    }
+
     /// Fate of a frame whose first bit was due at the far end at `first_out` and whose last one is due now: the leg must
     /// have carried a signal from the first bit's entry to the last bit's exit.
     pub(crate) fn fate(&self, first_out: SimTime) -> Fate {

@@ -11,6 +11,7 @@
 mod access;
 mod clock;
 mod clock_registers;
+mod compiled;
 mod config;
 mod counters;
 mod events;
@@ -37,6 +38,7 @@ use ringcat_wire::register::{LoopControl, map};
 use crate::frame::{Fcs, Port, SimFrame};
 use crate::time::SimTime;
 use clock::Clock;
+use compiled::Compiled;
 use events::EVENT_PROCESS_DATA_WATCHDOG;
 use fmmu::Fmmus;
 use memory::Memory;
@@ -61,6 +63,16 @@ pub enum Passage {
     Destroyed,
 }
 
+/// Where frames that come in at a port leave.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct Way {
+    pub exit: Port,
+    /// Whether the processing unit is on the way.
+    pub processed: bool,
+    /// It holds while [`Controller::stays`] says so.
+    pub port_changes: u32,
+}
+
 /// A SubDevice controller.
 #[derive(Clone, Debug)]
 pub struct Controller {
@@ -70,6 +82,7 @@ pub struct Controller {
     memory: Memory,
     ports: Ports,
     fmmus: Fmmus,
+    compiled: Compiled,
     sync_managers: SyncManagers,
     process_data_watchdog: Watchdog,
     pdi_watchdog: Watchdog,
@@ -92,6 +105,8 @@ pub struct Controller {
     irq: u16,
     /// When something happens by itself next.
     deadline: SimTime,
+    /// Counts how often that was found out.
+    schedules: u32,
 }
 
 impl Controller {
@@ -103,6 +118,7 @@ impl Controller {
             memory: Memory::new(&config),
             ports: Ports::new(config.ports),
             fmmus: Fmmus::default(),
+            compiled: Compiled::default(),
             sync_managers: SyncManagers::new(config.sync_manager_count.min(MAX_UNITS)),
             process_data_watchdog: Watchdog::new(),
             pdi_watchdog: Watchdog::new(),
@@ -119,6 +135,7 @@ impl Controller {
             forwarding_rule: true,
             irq: 0,
             deadline: SimTime::NEVER,
+            schedules: 0,
             config,
         }
     }
@@ -201,6 +218,50 @@ impl Controller {
         }
     }
 
+    /// The way of frames that come in at a port, where they all take the same: not through one that breaks circulations.
+    pub(crate) fn way(&self, entry: Port) -> Option<Way> {
+        let open = self.powered && self.ports.link(entry) && self.ports.passes(entry);
+        if !open || self.ports.breaks_circulation() || self.fmmus.reach_registers() {
+            return None;
+        }
+        let (mut at, mut processed) = (entry, false);
+        loop {
+            if at == Port::A {
+                if processed {
+                    return None;
+                }
+                processed = true;
+            }
+            at = ports::next(at);
+            if self.ports.passes(at) {
+                return Some(Way { exit: at, processed, port_changes: self.ports.changes() });
+            }
+        }
+    }
+
+    /// Whether a frame that comes in at a port may meet the processing unit.
+    pub(crate) fn may_process(&self, entry: Port) -> bool {
+        entry == Port::A || !self.ports.passes(Port::A)
+    }
+
+    /// Whether ports and everything else stay as they are up to and including a time, unless somebody changes them.
+    #[inline]
+    pub(crate) fn stays(&self, port_changes: u32, until: SimTime) -> bool {
+        self.ports.changes() == port_changes && self.deadline > until
+    }
+
+    /// See [`Way`].
+    pub(crate) fn port_changes(&self) -> u32 {
+        self.ports.changes()
+    }
+
+    /// Processes a good frame on a way that [`Controller::way`] found.
+    #[inline]
+    pub(crate) fn process_on_way(&mut self, frame: &mut SimFrame, first_bit: SimTime, now: SimTime) {
+        let goes_on = self.process(frame, first_bit, now);
+        debug_assert!(goes_on, "the ways that are found break no circulation");
+    }
+
     /// Whether the loop of a port is closed, as DL status shows it.
     pub fn loop_closed(&self, port: Port) -> bool {
         self.ports.loop_closed(port)
@@ -238,6 +299,11 @@ impl Controller {
         self.schedule();
     }
 
+    /// As long as this stays the same, [`Controller::next_deadline`] does.
+    pub(crate) fn schedules(&self) -> u32 {
+        self.schedules
+    }
+
     /// Brings up to date what is due.
     pub(crate) fn catch_up(&mut self, now: SimTime) {
         if now >= self.deadline {
@@ -247,6 +313,7 @@ impl Controller {
 
     /// Finds out when something happens by itself next.
     fn schedule(&mut self) {
+        self.schedules = self.schedules.wrapping_add(1);
         let loops = self.temporary_loops.map_or(SimTime::NEVER, |(until, _)| until);
         self.deadline = (self.sii.deadline())
             .min(self.process_data_watchdog.deadline())

@@ -4,8 +4,9 @@
 use core::time::Duration;
 use std::collections::VecDeque;
 
-use crate::cable::LegId;
+use crate::cable::{HostLink, LegId};
 use crate::frame::SimFrame;
+use crate::queue::Lane;
 use crate::time::SimTime;
 
 /// A frame that came back to the MainDevice.
@@ -28,6 +29,16 @@ pub(crate) struct HostInterface {
     ends: VecDeque<SimTime>,
     transmit_limit: usize,
     receive_limit: usize,
+}
+
+impl HostLink {
+    /// The lane of events for frames that enter the segment here.
+    pub(crate) const fn entry_lane(self) -> Lane {
+        match self {
+            HostLink::Main => Lane::EntryMain,
+            HostLink::Redundant => Lane::EntryRedundant,
+        }
+    }
 }
 
 impl HostInterface {

@@ -1,19 +1,34 @@
 //! The event queue: what happens next in virtual time (issue 2, part 3).
 //!
 //! In go events with the time at which they are due, out they come in the order of time; events of the same time come
-//! in the order in which they were put in, so that a run is the same every time. The queue keeps its memory: once it
-//! has been as long as it gets, it allocates no more.
+//! in the order in which they were put in, so that a run is the same every time. Events go into lanes, so that who wants
+//! to go ahead of some kinds of events sees when the others are due. The queue keeps its memory: once it has been as long
+//! as it gets, it allocates no more.
 
 use std::cmp::Ordering;
 use std::collections::BinaryHeap;
-use std::collections::binary_heap::PeekMut;
 
 use crate::time::SimTime;
+
+/// Kinds of events that are told apart when somebody asks what is due next. Their order is one.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Lane {
+    /// Whatever has no lane of its own.
+    Any = 0,
+    /// Frames of the main interface that enter the segment and change no ways.
+    EntryMain = 1,
+    /// Frames of the redundant interface that enter the segment and change no ways.
+    EntryRedundant = 2,
+    /// Frames that have passed all devices.
+    Exit = 3,
+}
+
+const LANES: usize = 4;
 
 /// Events in the order of their time.
 #[derive(Debug)]
 pub(crate) struct EventQueue<E> {
-    heap: BinaryHeap<Entry<E>>,
+    lanes: [BinaryHeap<Entry<E>>; LANES],
     sequence: u64,
 }
 
@@ -46,48 +61,53 @@ impl<E> Ord for Entry<E> {
 }
 
 impl<E: Copy> EventQueue<E> {
-    /// An empty queue with room for this many events.
+    /// An empty queue with room for this many events of any kind.
     pub(crate) fn with_capacity(capacity: usize) -> EventQueue<E> {
-        EventQueue { heap: BinaryHeap::with_capacity(capacity), sequence: 0 }
+        let mut lanes = [const { BinaryHeap::new() }; LANES];
+        lanes[Lane::Any as usize].reserve(capacity);
+        EventQueue { lanes, sequence: 0 }
     }
 
     /// Puts in an event.
-    pub(crate) fn push(&mut self, at: SimTime, event: E) {
-        let sequence = self.next_sequence();
-        self.heap.push(Entry { at, sequence, event });
+    pub(crate) fn push(&mut self, lane: Lane, at: SimTime, event: E) {
+        self.sequence += 1;
+        self.lanes[lane as usize].push(Entry { at, sequence: self.sequence, event });
     }
 
-    /// Puts in an event and takes out the earliest that is due by `limit`, the new one included. One walk through the
-    /// heap instead of two: this is the step of a frame from one device to the next.
+    /// Puts in an event and takes out the earliest that is due by `limit`, the new one included: the step of a frame from
+    /// one device to the next, which mostly comes out at once.
     pub(crate) fn push_pop(&mut self, at: SimTime, event: E, limit: SimTime) -> Option<(SimTime, E)> {
         if self.next_at().is_none_or(|first| at < first) && at <= limit {
             return Some((at, event));
         }
-        let sequence = self.next_sequence();
-        if self.next_at().is_none_or(|first| first > limit) {
-            self.heap.push(Entry { at, sequence, event });
-            return None;
-        }
-        let mut first = self.heap.peek_mut()?;
-        let taken = std::mem::replace(&mut *first, Entry { at, sequence, event });
-        Some((taken.at, taken.event))
+        self.push(Lane::Any, at, event);
+        self.pop_until(limit)
     }
 
     /// Takes out the earliest event that is due by `limit`.
     pub(crate) fn pop_until(&mut self, limit: SimTime) -> Option<(SimTime, E)> {
-        let first = self.heap.peek_mut().filter(|first| first.at <= limit)?;
-        let Entry { at, event, .. } = PeekMut::pop(first);
+        let order = |heap: &BinaryHeap<Entry<E>>| heap.peek().map(|first| (first.at, first.sequence));
+        let mut earliest = None;
+        for (lane, heap) in self.lanes.iter().enumerate() {
+            if let Some(first) = order(heap)
+                && earliest.is_none_or(|(other, _)| first < other)
+            {
+                earliest = Some((first, lane));
+            }
+        }
+        let (_, lane) = earliest.filter(|((at, _), _)| *at <= limit)?;
+        let Entry { at, event, .. } = self.lanes[lane].pop()?;
         Some((at, event))
     }
 
     /// When the earliest event is due.
     pub(crate) fn next_at(&self) -> Option<SimTime> {
-        self.heap.peek().map(|entry| entry.at)
+        self.lanes.iter().filter_map(|heap| heap.peek()).map(|entry| entry.at).min()
     }
 
-    fn next_sequence(&mut self) -> u64 {
-        self.sequence += 1;
-        self.sequence
+    /// When the earliest event of a lane is due; never where there is none.
+    pub(crate) fn next_in(&self, lane: Lane) -> SimTime {
+        self.lanes[lane as usize].peek().map_or(SimTime::NEVER, |entry| entry.at)
     }
 }
 
@@ -99,8 +119,9 @@ mod tests {
     #[test]
     fn events_of_one_time_come_in_the_order_they_were_put_in() {
         let mut queue = EventQueue::with_capacity(4);
-        for (at, event) in [(5, 'c'), (3, 'a'), (5, 'd'), (3, 'b')] {
-            queue.push(SimTime(at), event);
+        use Lane::{Any, EntryMain, EntryRedundant, Exit};
+        for (lane, at, event) in [(Any, 5, 'c'), (Exit, 3, 'a'), (EntryMain, 5, 'd'), (EntryRedundant, 3, 'b')] {
+            queue.push(lane, SimTime(at), event);
         }
         let order: String = std::iter::from_fn(|| queue.pop_until(SimTime(9))).map(|(_, event)| event).collect();
         assert_eq!(order, "abcd");
@@ -109,7 +130,8 @@ mod tests {
     #[test]
     fn nothing_comes_before_its_time() {
         let mut queue = EventQueue::with_capacity(1);
-        queue.push(SimTime(10), ());
+        queue.push(Lane::Exit, SimTime(10), ());
+        assert_eq!((queue.next_in(Lane::Exit), queue.next_in(Lane::Any)), (SimTime(10), SimTime::NEVER));
         assert_eq!(queue.pop_until(SimTime(9)), None);
         assert_eq!(queue.next_at(), Some(SimTime(10)));
         assert_eq!(queue.pop_until(SimTime(10)), Some((SimTime(10), ())));
@@ -128,11 +150,11 @@ mod tests {
             for (number, (at, together)) in steps.into_iter().enumerate() {
                 if together {
                     let got = one.push_pop(SimTime(at), number, limit);
-                    two.push(SimTime(at), number);
+                    two.push(Lane::Any, SimTime(at), number);
                     prop_assert_eq!(got, two.pop_until(limit));
                 } else {
-                    one.push(SimTime(at), number);
-                    two.push(SimTime(at), number);
+                    one.push(Lane::Any, SimTime(at), number);
+                    two.push(Lane::Any, SimTime(at), number);
                 }
             }
             let rest = |mut queue: EventQueue<usize>| -> Vec<_> {

@@ -53,6 +53,33 @@ impl Controller {
         count
     }
 
+    /// [`Controller::read`] by EtherCAT of bytes inside one register that is always there and is no time: the way of
+    /// nearly all reads. False where it is another.
+    #[inline]
+    pub(super) fn read_register(&mut self, address: u32, out: &mut [u8], or: bool) -> bool {
+        const END: u32 = map::FMMU_BASE.0 as u32;
+        let end = address + out.len() as u32;
+        if end > END || out.is_empty() {
+            return false;
+        }
+        let run = self.memory.run(address, Side::Ecat);
+        if !run.exists || end > run.end {
+            return false;
+        }
+        let reads = |register: ringcat_wire::address::RegisterAddress| {
+            address < u32::from(register.0) + 2 && u32::from(register.0) < end
+        };
+        self.pass.read_dl_status |= reads(map::DL_STATUS);
+        self.pass.read_al_status |= reads(map::AL_STATUS);
+        let bytes = self.memory.span(address, out.len());
+        if or {
+            out.iter_mut().zip(bytes).for_each(|(out, byte)| *out |= byte);
+        } else {
+            out.copy_from_slice(bytes);
+        }
+        true
+    }
+
     /// Writes `data`. Where `mask` is not 0xFF, only its bits are written (in [`BITWISE`]; elsewhere the others become 0).
     /// Returns how many bytes were accessible.
     pub(super) fn write(&mut self, side: Side, address: u32, data: &[u8], mask: u8) -> usize {

@@ -78,9 +78,9 @@ impl Controller {
 
     /// Brings the status byte and the events of SyncManager `n` up to date.
     pub(super) fn refresh_sync_manager(&mut self, n: usize) {
-        let status = map::sync_manager(n as u8).offset(ringcat_wire::register::SyncManager::STATUS);
-        self.memory.set_u8(status, self.sync_managers.status(n));
-        let (ecat, pdi) = self.sync_managers.events(n);
+        let Some((status, ecat, pdi)) = self.sync_managers.show(n) else { return };
+        let register = map::sync_manager(n as u8).offset(ringcat_wire::register::SyncManager::STATUS);
+        self.memory.set_u8(register, status);
         let bit = 1 << (EVENT_SYNC_MANAGER_PDI + n as u32);
         let pending = self.memory.u32(map::AL_EVENT);
         if (pending & bit != 0) != pdi {

@@ -3,7 +3,10 @@
 //! In: the FMMU registers and the bit range of a datagram. Out: the pieces of that range that this controller maps, in one
 //! direction, the lower-numbered FMMU winning where several hit. Moving the bits is [`super::access`]'s.
 
-use ringcat_wire::register::Fmmu;
+use ringcat_wire::register::{Fmmu, map};
+
+/// First bit behind the registers that do more than keep a value.
+const REGISTERS_END: u64 = map::DIGITAL_OUTPUTS.0 as u64 * 8;
 
 /// A piece of logical bits and where they are.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -41,13 +44,15 @@ pub(super) struct Fmmus {
     hull: (u64, u64),
     reads: bool,
     writes: bool,
+    /// Registers that do more than keep a value can be written.
+    reaches_registers: bool,
 }
 
 impl Fmmus {
     pub fn clear(&mut self) {
         self.mappings.clear();
         self.hull = (0, 0);
-        (self.reads, self.writes) = (false, false);
+        (self.reads, self.writes, self.reaches_registers) = (false, false, false);
     }
 
     /// Takes over the registers of the next FMMU, in the order of their numbers.
@@ -69,6 +74,7 @@ impl Fmmus {
         };
         self.reads |= mapping.read;
         self.writes |= mapping.write;
+        self.reaches_registers |= mapping.write && mapping.physical < REGISTERS_END;
         self.mappings.push(mapping);
     }
 
@@ -80,6 +86,11 @@ impl Fmmus {
     /// Whether there are FMMUs of both directions.
     pub fn both_ways(&self) -> bool {
         self.reads && self.writes
+    }
+
+    /// Whether a logical write may change how the controller works.
+    pub fn reach_registers(&self) -> bool {
+        self.reaches_registers
     }
 
     pub fn count(&self) -> usize {

@@ -27,6 +27,8 @@ pub(super) struct Ports {
     modes: [LoopControl; 4],
     /// The frame that closed loops by writing DL_CONTROL, and the loops: it may still come back through them.
     closing: Option<(u64, [bool; 4])>,
+    /// Counts whatever may change the way of a frame.
+    changes: u32,
 }
 
 impl Ports {
@@ -38,6 +40,7 @@ impl Ports {
             passing: 1,
             modes: [LoopControl::Auto; 4],
             closing: None,
+            changes: 0,
         }
     }
 
@@ -74,7 +77,8 @@ impl Ports {
         let p = port.index();
         let opens = !self.open[p] && self.link[p] && self.modes[p] == LoopControl::AutoClose;
         self.open[p] |= opens;
-        self.note_passing();
+        self.refresh_passing();
+        self.changes = self.changes.wrapping_add(u32::from(opens));
         opens
     }
 
@@ -89,7 +93,17 @@ impl Ports {
         self.note_passing();
     }
 
+    /// Ways have to be found anew.
+    pub fn note_change(&mut self) {
+        self.changes = self.changes.wrapping_add(1);
+    }
+
     fn note_passing(&mut self) {
+        self.note_change();
+        self.refresh_passing();
+    }
+
+    fn refresh_passing(&mut self) {
         let open = (0..4).fold(0, |mask, p| mask | u8::from(self.open[p]) << p);
         self.passing = if open == 0 { 1 } else { open };
     }
@@ -102,6 +116,11 @@ impl Ports {
     /// Whether frames pass the port. Port 0 is the way back in when all loops are closed (facts 2.2).
     pub fn passes(&self, port: Port) -> bool {
         self.passing & 1 << port.index() != 0
+    }
+
+    /// As long as this stays the same, frames take the same way, but for one that closed ports itself.
+    pub const fn changes(&self) -> u32 {
+        self.changes
     }
 
     /// The ports that frames pass, bit by bit.

@@ -140,7 +140,10 @@ impl Controller {
                 u16::from(written)
             }
             _ if multiple && !matches => u16::from(self.write(Side::Ecat, at, data, 0xFF) > 0),
-            _ => u16::from(self.read(Side::Ecat, at, data, command == Command::Brd) > 0),
+            _ => {
+                let combine = command == Command::Brd;
+                u16::from(self.read_register(at, data, combine) || self.read(Side::Ecat, at, data, combine) > 0)
+            }
         }
     }
 
@@ -170,6 +173,12 @@ impl Controller {
         let end = first + data.len() as u64 * 8;
         if !self.fmmus.concern(first, end) || (command == Command::Lrw && self.config.features.lrw_unsupported) {
             return 0;
+        }
+        if let Some((read, written)) = self.logical_compiled(command, address, data) {
+            return match command {
+                Command::Lwr => u16::from(written),
+                _ => u16::from(read) + 2 * u16::from(written),
+            };
         }
         if command == Command::Lrw && self.fmmus.both_ways() {
             self.pass.keep_incoming(data);

@@ -49,6 +49,9 @@ impl Controller {
             }
         }
         let first = bytes.first().map_or(0, |&(value, _)| value);
+        if matches!(at >> 8, 0x00 | 0x06 | 0x08) {
+            self.compiled.forget();
+        }
         match at >> 8 {
             0x00 => self.addressing_written(touched, first, now, frame),
             0x01 => self.layers_written(touched, al_control_pending, now, frame),
@@ -175,6 +178,9 @@ impl Controller {
         for n in 0..self.config.fmmu_count.min(super::MAX_UNITS) {
             let fmmu = Fmmu::decode(&self.memory.array(map::fmmu(n)));
             self.fmmus.push(&fmmu, self.config.features.fmmu_byte_oriented);
+        }
+        if self.fmmus.reach_registers() {
+            self.ports.note_change();
         }
     }
 

@@ -66,6 +66,7 @@ impl Controller {
         self.memory.process_ram_open = false;
         self.sync_managers.reset();
         self.fmmus.clear();
+        self.compiled.forget();
         self.pass.clear();
         self.clock.restart(now);
         (self.sync_unit, self.latch_units) = Default::default();

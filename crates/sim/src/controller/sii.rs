@@ -265,6 +265,7 @@ impl Controller {
             }
         }
         self.memory.process_ram_open = valid.is_some();
+        self.compiled.forget();
         self.refresh_dl_status();
     }
 }

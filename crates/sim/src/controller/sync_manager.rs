@@ -85,6 +85,8 @@ struct Unit {
     frame_opened: bool,
     /// EtherCAT accessed the last byte in this frame.
     frame_completed: bool,
+    /// What the registers show: the status byte, the ECAT event, the AL event.
+    shown: Option<(u8, bool, bool)>,
 }
 
 /// All SyncManagers of a controller.
@@ -118,7 +120,7 @@ impl SyncManagers {
         *unit = new;
         if old.layout() == new.layout() {
             let Unit { ecat_event, pdi_event, watchdog, activate, .. } = new;
-            *unit = Unit { ecat_event, pdi_event, watchdog, activate, ..old };
+            *unit = Unit { ecat_event, pdi_event, watchdog, activate, shown: None, ..old };
         }
         self.configured = self.configured & !(1 << n) | u16::from(new.length != 0) << n;
         old.activate != new.activate
@@ -184,19 +186,16 @@ impl SyncManagers {
         self.units[n].finish(role, grant.opened, grant.completed)
     }
 
-    /// The status byte (+5).
-    pub fn status(&self, n: usize) -> u8 {
-        self.units[n].status()
-    }
-
-    /// The bits for the ECAT event and the AL event.
-    pub fn events(&self, n: usize) -> (bool, bool) {
-        let unit = &self.units[n];
-        let (ecat, pdi) = match unit.ecat_writes {
-            true => (unit.read_event, unit.write_event),
-            false => (unit.write_event, unit.read_event),
-        };
-        (ecat && unit.ecat_event, pdi && unit.pdi_event)
+    /// The status byte (+5) and the bits for the ECAT event and the AL event, if they are not as they were shown last.
+    #[inline]
+    pub fn show(&mut self, n: usize) -> Option<(u8, bool, bool)> {
+        let unit = &mut self.units[n];
+        let now = Some((unit.status(), unit.events().0, unit.events().1));
+        if unit.shown == now {
+            return None;
+        }
+        unit.shown = now;
+        now
     }
 }
 
@@ -345,6 +344,15 @@ impl Unit {
         (0..NO_BUFFER).find(|&b| !taken(b)).unwrap_or(0)
     }
 
+    /// The bits for the ECAT event and the AL event.
+    fn events(&self) -> (bool, bool) {
+        let (ecat, pdi) = match self.ecat_writes {
+            true => (self.read_event, self.write_event),
+            false => (self.write_event, self.read_event),
+        };
+        (ecat && self.ecat_event, pdi && self.pdi_event)
+    }
+
     /// The bits of [`ringcat_wire::register::SyncManagerStatus`]: every access writes them.
     fn status(&self) -> u8 {
         let last_buffer = if self.buffering == Buffering::Mailbox { 0 } else { self.last_buffer };
@@ -399,7 +407,9 @@ mod tests {
 
     #[test]
     fn after_a_reset_no_buffer_was_written() {
-        assert_eq!(SyncManagers::new(1).status(0), 0x30);
+        let mut managers = SyncManagers::new(1);
+        assert_eq!(managers.show(0), Some((0x30, false, false)));
+        assert_eq!(managers.show(0), None, "it is shown already");
     }
 
     #[test]

@@ -3,6 +3,7 @@
 use super::{Event, Network};
 use crate::cable::{CableId, DeviceIndex, Direction, LegFaults};
 use crate::fault::Fault;
+use crate::queue::Lane;
 use crate::time::SimTime;
 
 impl Network {
@@ -17,7 +18,7 @@ impl Network {
             self.scheduled.push(None);
         }
         self.scheduled[free] = Some(fault);
-        self.queue.push(at.max(self.now), Event::Fault { number: free as u32 });
+        self.queue.push(Lane::Any, at.max(self.now), Event::Fault { number: free as u32 });
     }
 
     /// Brings about a fault now.
@@ -73,6 +74,7 @@ impl Network {
     }
 
     fn set_faults(&mut self, cable: CableId, direction: Option<Direction>, change: impl Fn(&mut LegFaults)) {
+        self.wiring_changed();
         for candidate in Direction::ALL {
             if direction.is_none_or(|wanted| wanted == candidate) {
                 self.leg_mut(cable, candidate).set_faults(&change);

@@ -6,6 +6,7 @@ use super::{Event, Network, Node};
 use crate::cable::{CableId, DeviceIndex, Direction, Endpoint, LegId};
 use crate::device::Device;
 use crate::frame::Port;
+use crate::queue::Lane;
 use crate::time::SimTime;
 
 /// The order in which a frame travels through a controller (facts 2.1), as the successor of each port.
@@ -19,6 +20,7 @@ impl Node {
             loop_changed_at: [SimTime::ZERO; 4],
             last_loop_change: SimTime::ZERO,
             wake_at: SimTime::NEVER,
+            arranged: None,
             unsettled_by: None,
         }
     }
@@ -31,6 +33,12 @@ impl Node {
             self.loop_changed_at[port.index()] = now;
             self.last_loop_change = now;
         }
+    }
+
+    /// Whether the deadlines of the controller may have changed since the device was last settled without a run. Those of
+    /// the application change when it runs.
+    fn has_news(&self) -> bool {
+        self.arranged != Some(self.device.controller.schedules())
     }
 
     /// Whether a port opened or closed while a frame passed from one port to another, first bit at `first_bit`.
@@ -71,7 +79,10 @@ impl Network {
         let node = &mut self.nodes[index];
         if node.device.needs_run() {
             node.device.run(self.now);
+        } else if !node.has_news() {
+            return;
         }
+        node.arranged = Some(node.device.controller.schedules());
         if let Some(deadline) = node.device.next_deadline() {
             self.wake_at(index, deadline);
         }
@@ -80,6 +91,9 @@ impl Network {
     /// Has a device react to a frame when that has left the segment.
     pub(super) fn settle_later(&mut self, index: usize, frame: u64) {
         let node = &mut self.nodes[index];
+        if !node.device.needs_run() && !node.has_news() {
+            return;
+        }
         if node.unsettled_by.replace(frame).is_none() {
             self.unsettled.push(index as u32);
         }
@@ -117,7 +131,7 @@ impl Network {
         let node = &mut self.nodes[index];
         if at < node.wake_at {
             node.wake_at = at;
-            self.queue.push(at, Event::Wake { device: index as u32 });
+            self.queue.push(Lane::Any, at, Event::Wake { device: index as u32 });
         }
     }
 
@@ -164,6 +178,7 @@ impl Network {
             return;
         }
         node.device.power_off(self.now);
+        self.wiring += 1;
         for out in node.out.into_iter().flatten() {
             self.legs[out.reverse().index()].detected = false;
             self.refresh_signal(out.cable());
@@ -180,6 +195,7 @@ impl Network {
             return;
         }
         node.device.power_on(self.now);
+        self.wiring += 1;
         for out in node.out.into_iter().flatten() {
             self.refresh_signal(out.cable());
         }
@@ -200,6 +216,7 @@ impl Network {
         if up == self.leg_mut(id, Direction::AToB).signal() {
             return;
         }
+        self.wiring_changed();
         let cable = &mut self.cables[id.0];
         cable.epoch += 1;
         let epoch = cable.epoch;
@@ -207,7 +224,7 @@ impl Network {
         for direction in Direction::ALL {
             let now = self.now;
             self.leg_mut(id, direction).set_signal(up, now);
-            self.queue.push(now + delay, Event::Detection { leg: LegId::new(id, direction), epoch });
+            self.queue.push(Lane::Any, now + delay, Event::Detection { leg: LegId::new(id, direction), epoch });
         }
     }
 
@@ -223,6 +240,7 @@ impl Network {
         }
         leg.detected = up;
         leg.detected_at = self.now;
+        self.wiring += 1;
         if let Endpoint::Device(device, port) = leg.to {
             self.nodes[device.0].link_changed(port, up, self.now);
             self.settle(device.0);

@@ -4,12 +4,14 @@ use core::time::Duration;
 
 use ringcat_wire::frame::{BYTE_TIME_NS, MAX_FRAME_VLAN, MIN_FRAME};
 
+use super::route::leaves_ways;
 use super::statistics::LossCause;
 use super::{Event, Network, Slot};
 use crate::cable::{Endpoint, Fate, HostLink, LegFaults, LegId};
 use crate::controller::Passage;
 use crate::frame::{Fcs, Port, SimFrame};
 use crate::host::Received;
+use crate::queue::Lane;
 use crate::time::SimTime;
 
 /// Bytes of preamble and delimiter before a frame.
@@ -40,7 +42,11 @@ impl Network {
         counters.frames_sent += 1;
         counters.bytes_sent += bytes.len() as u64;
         let at = last_bit + Duration::from_nanos(self.legs[out.index()].delay_ns);
-        self.queue.push(at, Event::Arrival { slot, leg: out, meddled: false });
+        if leaves_ways(self.frames.frame(slot)) {
+            self.queue.push(link.entry_lane(), at, Event::Entry { slot, link, leg: out });
+        } else {
+            self.queue.push(Lane::Any, at, Event::Arrival { slot, leg: out, meddled: false });
+        }
     }
 
     /// The last bit of a frame is due at the end of a leg. Returns its next arrival.
@@ -76,7 +82,9 @@ impl Network {
     fn hop(&mut self, slot: Slot, index: usize, from: Port, first_bit: SimTime) -> Option<(SimTime, Event)> {
         self.statistics.hops += 1;
         let id = self.frames.frame(slot).id;
-        self.settle_before(index, id);
+        if self.nodes[index].device.controller.may_process(from) {
+            self.settle_before(index, id);
+        }
         let frame = self.frames.frame_mut(slot);
         let node = &mut self.nodes[index];
         let passage = node.device.controller.receive_between(frame, from, first_bit, self.now);
@@ -141,7 +149,7 @@ impl Network {
         if doubled {
             let copy = self.frames.put_copy(slot);
             let behind = at + Duration::from_nanos(self.frames.frame(slot).occupies_ns());
-            self.queue.push(behind, Event::Arrival { slot: copy, leg: id, meddled: true });
+            self.queue.push(Lane::Any, behind, Event::Arrival { slot: copy, leg: id, meddled: true });
         }
         Some((at, Event::Arrival { slot, leg: id, meddled: true }))
     }

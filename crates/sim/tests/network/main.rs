@@ -6,6 +6,7 @@ mod clocks;
 mod determinism;
 mod examples;
 mod faults;
+mod flights;
 mod mail;
 mod operation;
 mod random_walks;
