@@ -3,6 +3,8 @@
 //! The exchange posts what its supervision datagram saw and the state of the ring; the supervisor posts which SubDevices
 //! take part in process data. Readers look at the latest value, so nothing is lost when they are slow.
 
+pub mod clocks;
+
 use alloc::vec::Vec;
 use core::sync::atomic::{AtomicU32, AtomicU64, Ordering};
 
@@ -120,6 +122,8 @@ pub struct Board {
     optional: Vec<bool>,
     /// One bit per SubDevice: it is away on purpose.
     excused: Vec<AtomicU64>,
+    /// Distributed clocks.
+    pub clocks: clocks::ClockWords,
 }
 
 impl Board {
@@ -134,6 +138,7 @@ impl Board {
             excused: (0..subdevices.div_ceil(64)).map(|_| AtomicU64::new(0)).collect(),
             taking_part_changes: AtomicU32::new(0),
             optional: Vec::new(),
+            clocks: clocks::ClockWords::default(),
         }
     }
 

@@ -4,6 +4,7 @@
 //! Everything not declared comes from the SII. Which declaration belongs to which SubDevice of a scan is the matter
 //! of [`resolve`]; what follows for its registers, of [`crate::plan`].
 
+mod clocks;
 mod resolve;
 mod startup;
 mod timeouts;
@@ -21,6 +22,7 @@ use crate::info::{Direction, SubDeviceInfo};
 pub use startup::{IdnWrite, SdoDownload, StartupAction, StartupCommand, Transition};
 pub use timeouts::{StateTimeout, Timeouts};
 
+pub use clocks::{ClockConfig, ReferenceClock, SyncSignals};
 pub use resolve::{ConfigError, DuplicateAlias, IdentityField, Resolution, duplicate_aliases, resolve};
 
 /// Where a SubDevice is expected.
@@ -154,6 +156,8 @@ pub struct SubDeviceConfig {
     pub sii_to_pdi: bool,
     /// Pause in PREOP before SAFEOP is requested, for SubDevices that need it.
     pub wait_before_safeop: Duration,
+    /// SYNC signals of its distributed clock; `None` runs it without them.
+    pub sync: Option<SyncSignals>,
     /// Time limits.
     pub timeouts: Timeouts,
     /// Time limits of single state changes, which count before `timeouts`.
@@ -176,6 +180,7 @@ impl Default for SubDeviceConfig {
             startup: Vec::new(),
             sii_to_pdi: false,
             wait_before_safeop: Duration::ZERO,
+            sync: None,
             timeouts: Timeouts::default(),
             state_timeouts: Vec::new(),
             target: AlState::Op,
@@ -327,6 +332,13 @@ impl SubDeviceConfig {
     pub fn limit(&self, from: AlState, to: AlState) -> Duration {
         let own = self.state_timeouts.iter().find(|own| (own.from, own.to) == (from, to));
         own.map_or_else(|| self.timeouts.transition(from, to), |own| own.limit)
+    }
+
+    /// Declares SYNC signals.
+    #[must_use]
+    pub fn sync(mut self, signals: SyncSignals) -> SubDeviceConfig {
+        self.sync = Some(signals);
+        self
     }
 
     /// Sets the time limits.

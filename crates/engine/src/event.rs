@@ -249,6 +249,28 @@ pub enum Event {
         /// Number of the domain.
         domain: usize,
     },
+    /// All clocks are locked (facts 7.2).
+    ClocksLocked {
+        /// Largest |0x092C| in nanoseconds.
+        largest_ns: u32,
+    },
+    /// Another SubDevice's clock is the reference now.
+    ReferenceClock {
+        /// Where in the scan; `None` where nobody is left.
+        position: Option<Position>,
+    },
+    /// Distributed clocks could not be set up; it is tried again.
+    ClocksFailed {
+        /// What and why.
+        reason: String,
+    },
+    /// The differences of the clocks came into their window or left it.
+    SyncWindow {
+        /// They are inside.
+        inside: bool,
+        /// OR of all |0x092C| in nanoseconds: at most twice the largest.
+        spread_ns: u32,
+    },
 }
 
 /// Events of one half, oldest first.
@@ -306,10 +328,18 @@ pub enum CyclicEvent {
         /// Number of the domain.
         domain: u16,
     },
+    /// The differences of the clocks came into their window or left it.
+    SyncWindow {
+        /// They are inside.
+        inside: bool,
+        /// OR of all magnitudes in nanoseconds.
+        spread_ns: u32,
+    },
 }
 
 const KIND_DOMAIN: u64 = 1;
 const KIND_SKIPPED: u64 = 2;
+const KIND_SYNC_WINDOW: u64 = 3;
 
 impl CyclicEvent {
     /// As two words: kind 8 bits, state 8, domain 16, then the working counters.
@@ -327,6 +357,9 @@ impl CyclicEvent {
                 ]
             }
             CyclicEvent::Skipped { domain } => [KIND_SKIPPED | (domain as u64) << 16, 0],
+            CyclicEvent::SyncWindow { inside, spread_ns } => {
+                [KIND_SYNC_WINDOW | (inside as u64) << 8, spread_ns as u64]
+            }
         }
     }
 
@@ -351,6 +384,9 @@ impl CyclicEvent {
                 Some(CyclicEvent::Domain { domain, status })
             }
             KIND_SKIPPED => Some(CyclicEvent::Skipped { domain }),
+            KIND_SYNC_WINDOW => {
+                Some(CyclicEvent::SyncWindow { inside: words[0] >> 8 & 1 != 0, spread_ns: words[1] as u32 })
+            }
             _ => None,
         }
     }
@@ -360,6 +396,7 @@ impl CyclicEvent {
         match self {
             CyclicEvent::Domain { domain, status } => Event::Domain { domain: domain.into(), status },
             CyclicEvent::Skipped { domain } => Event::Skipped { domain: domain.into() },
+            CyclicEvent::SyncWindow { inside, spread_ns } => Event::SyncWindow { inside, spread_ns },
         }
     }
 }
@@ -372,7 +409,8 @@ mod tests {
     fn cyclic_events_survive_the_words() {
         let status =
             DomainStatus { wkc: 3, expected: 70_000, state: DomainState::Incomplete, pending: false, skipped: 9 };
-        for event in [CyclicEvent::Domain { domain: 7, status }, CyclicEvent::Skipped { domain: 65_535 }] {
+        let window = CyclicEvent::SyncWindow { inside: true, spread_ns: u32::MAX };
+        for event in [CyclicEvent::Domain { domain: 7, status }, CyclicEvent::Skipped { domain: 65_535 }, window] {
             assert_eq!(CyclicEvent::unpack(event.pack()), Some(event));
         }
         assert_eq!(CyclicEvent::unpack([0xFF, 0]), None);

@@ -7,6 +7,7 @@
 //! A frame is delivered when its working counters are as expected, or all its copies are in, or at its deadline. Inputs
 //! are delivered per SubDevice: see [`domain`].
 
+mod clocks;
 pub mod copy;
 pub mod counters;
 pub mod domain;
@@ -18,6 +19,7 @@ use alloc::sync::Arc;
 use alloc::vec::Vec;
 use core::time::Duration;
 
+pub use clocks::{ClockSetup, ReferenceTime};
 pub use copy::{CopyError, CopyRule, WhenStale};
 pub use counters::CyclicCounters;
 pub use domain::Domain;
@@ -32,6 +34,7 @@ use crate::link::{Link, LinkSet};
 use crate::queue::Producer;
 use crate::ring::{Class, Classified, Identity, RingMonitor, RingState, Sequence};
 use crate::time::Instant;
+use clocks::Clocks;
 use copy::Copies;
 use flight::{CyclicFrame, Step};
 use foreign::ForeignFrames;
@@ -72,6 +75,7 @@ pub struct Exchange {
     counters: CyclicCounters,
     foreign: ForeignFrames,
     copies: Copies,
+    clocks: Clocks,
     taking_part_changes: u32,
     cycle: u64,
 }
@@ -100,6 +104,7 @@ impl Exchange {
             counters: CyclicCounters::default(),
             foreign: ForeignFrames::new(),
             copies: Copies::default(),
+            clocks: Clocks::default(),
             taking_part_changes: 0,
             cycle: 0,
         }
@@ -136,7 +141,7 @@ impl Exchange {
             }
             Step::Finished => {
                 self.counters.received += 1;
-                close(frame, &mut self.monitor, &self.board);
+                close(frame, &mut self.monitor, &mut self.clocks, &self.board, &mut self.events);
                 Received::Taken
             }
             Step::Late => {
@@ -198,7 +203,7 @@ impl Exchange {
         for (frame, index) in frames.iter_mut().zip(range.start as u16..) {
             if frame.is_open() {
                 self.counters.copies_lost += 1;
-                close(frame, &mut self.monitor, &self.board);
+                close(frame, &mut self.monitor, &mut self.clocks, &self.board, &mut self.events);
             }
             frame.load(domain.image());
             if is_new && self.to_send.len() < self.to_send.capacity() {
@@ -218,11 +223,21 @@ impl Exchange {
             let domain = &mut self.domains[frame.domain()];
             domain.note_sent();
             let timeout_ns = domain.timeout_ns();
+            let clocks = frame.clocks_leave(now);
             let bytes = frame.depart(&self.identity, self.sequence, Instant(now.0.saturating_add(timeout_ns)));
+            let mut redundant = None;
+            if let Some(places) = clocks {
+                let payloads = self.clocks.depart(&self.board, now);
+                places.write(bytes, &payloads[0]);
+                redundant = Some((places, payloads[1]));
+            }
             self.counters.sent += 1;
             self.counters.bytes += bytes.len() as u64;
             transmit(Link::Main, bytes);
             if self.links == LinkSet::Ring {
+                if let Some((places, payload)) = redundant {
+                    places.write(bytes, &payload);
+                }
                 Identity::mark_redundant(bytes, true);
                 transmit(Link::Redundant, bytes);
                 Identity::mark_redundant(bytes, false);
@@ -317,6 +332,37 @@ impl Exchange {
         self.monitor.state()
     }
 
+    /// Says what the application chose about distributed clocks.
+    pub fn set_up_clocks(&mut self, setup: ClockSetup) {
+        self.clocks.set_up(setup);
+    }
+
+    /// The application's time now, in nanoseconds of system time: what bus shift leads the reference clock to. Without
+    /// it, host time plus the epoch of the configuration counts.
+    pub fn set_application_time(&mut self, time: u64, now: Instant) {
+        self.clocks.set_application_time(time, now);
+    }
+
+    /// The application's time.
+    pub fn application_time(&self, now: Instant) -> u64 {
+        self.clocks.application_time(now)
+    }
+
+    /// The next frame steers the reference clock towards this time, once. What follows it follows.
+    pub fn sync_reference_to(&mut self, time: u64) {
+        self.clocks.want_reference_at(time);
+    }
+
+    /// The last reading of the reference clock; `None` before the first and without distributed clocks.
+    pub fn reference_time(&self) -> Option<ReferenceTime> {
+        self.clocks.reference_time()
+    }
+
+    /// OR of all |0x092C| in nanoseconds as the last cycle saw it: at most twice the largest.
+    pub fn clock_spread_ns(&self) -> Option<u32> {
+        self.clocks.spread_ns()
+    }
+
     /// Counters since activation.
     pub fn counters(&self) -> &CyclicCounters {
         &self.counters
@@ -351,7 +397,16 @@ fn give_up_overdue(
 }
 
 /// A flight is over: what it proves about the ring and what its supervision datagram saw go on the board.
-fn close(frame: &mut CyclicFrame, monitor: &mut RingMonitor, board: &Board) {
+fn close(
+    frame: &mut CyclicFrame,
+    monitor: &mut RingMonitor,
+    clocks: &mut Clocks,
+    board: &Board,
+    events: &mut Producer,
+) {
+    if let Some(seen) = frame.clocks_seen() {
+        clocks.observe(seen, frame.arrivals(), board, events);
+    }
     // Counts first: whoever sees the change finds those that belong to it.
     if let Some(supervision) = frame.supervision() {
         board.post_supervision(supervision);

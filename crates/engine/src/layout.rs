@@ -91,6 +91,8 @@ pub struct PlannedFrame {
     pub datagrams: Vec<PlannedDatagram>,
     /// Whether the supervision datagram rides in this frame.
     pub supervision: bool,
+    /// Whether the datagrams of distributed clocks ride in this frame.
+    pub clocks: bool,
 }
 
 /// A domain that was laid out.
@@ -156,6 +158,8 @@ impl core::error::Error for LayoutError {}
 
 /// Data of the supervision datagram: AL status.
 pub(crate) const SUPERVISION_LEN: usize = 2;
+/// Distributed clocks take three datagrams of four bytes.
+const CLOCKS_LEN: usize = 3 * (OVERHEAD + 4);
 
 impl Layout {
     /// As [`Layout::with_lrw`], with LRW where it is of use.
@@ -196,8 +200,24 @@ impl Layout {
         let room = |frame: &PlannedFrame| frame.used() + OVERHEAD + SUPERVISION_LEN <= MAX_DATA + OVERHEAD;
         match domain.frames.iter_mut().find(|frame| room(frame)) {
             Some(frame) => frame.supervision = true,
-            None => domain.frames.push(PlannedFrame { datagrams: Vec::new(), supervision: true }),
+            None => domain.frames.push(PlannedFrame { supervision: true, ..PlannedFrame::default() }),
         }
+    }
+
+    /// Adds the datagrams of distributed clocks to the domain with the shortest period.
+    pub fn add_clocks(&mut self) -> Result<(), LayoutError> {
+        let Some(domain) = self.domains.iter_mut().min_by_key(|domain| domain.period) else { return Ok(()) };
+        let others = |frame: &PlannedFrame| if frame.supervision { OVERHEAD + SUPERVISION_LEN } else { 0 };
+        let room = |frame: &PlannedFrame| frame.used() + others(frame) + CLOCKS_LEN <= MAX_DATA + OVERHEAD;
+        match domain.frames.iter_mut().find(|frame| room(frame)) {
+            Some(frame) => frame.clocks = true,
+            None => domain.frames.push(PlannedFrame { clocks: true, ..PlannedFrame::default() }),
+        }
+        let frames = self.domains.iter().map(|domain| domain.frames.len()).sum();
+        if frames > crate::ring::MAX_IN_FLIGHT {
+            return Err(LayoutError::TooManyFrames { frames });
+        }
+        Ok(())
     }
 
     /// Where an area of a SubDevice lies, with its domain.

@@ -19,6 +19,7 @@ extern crate alloc;
 extern crate std;
 
 pub mod board;
+pub mod clocks;
 pub mod config;
 pub mod direction;
 pub mod domain;

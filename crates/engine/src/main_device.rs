@@ -33,8 +33,9 @@ pub use pending::Pending;
 pub use ticket::Ticket;
 
 use crate::board::Board;
+use crate::config::ClockConfig;
 use crate::event::{CyclicEvent, Event, TimedEvent};
-use crate::exchange::Exchange;
+use crate::exchange::{ClockSetup, Exchange};
 use crate::info::SubDeviceInfo;
 use crate::junction::JunctionMode;
 use crate::layout::Layout;
@@ -42,8 +43,9 @@ use crate::link::{Link, LinkSet};
 use crate::mail::Mailbox;
 use crate::mail::eoe::EthernetPort;
 use crate::mail::relay::Desk;
+use crate::procedures::clocks::{self, ClockStatus, SharedClocks};
 use crate::procedures::configure::Start;
-use crate::procedures::fleet::{Fleet, Phase, SharedFleet};
+use crate::procedures::fleet::{Fleet, Member, Phase, SharedFleet};
 use crate::procedures::mail_watch::watch_mail;
 use crate::procedures::recover::start_all;
 use crate::procedures::scan::{Scan, ScanError, ScanOptions, scan};
@@ -56,7 +58,9 @@ use crate::ring::Identity;
 use crate::ring_status::{Cable, CableErrors, LinkStatus, Redundancy, RingStatus, cables};
 use crate::supervisor::{AcyclicCounters, Bus, Received, Supervisor};
 use crate::time::Instant;
-use declaration::{check_lrw, domain_specs, match_declaration, members, plan_all, report_oddities, with_domain};
+use declaration::{
+    check_clocks, check_lrw, domain_specs, match_declaration, members, plan_all, report_oddities, with_domain,
+};
 use steps::Loaded;
 
 /// Messages of the exchange that may wait until somebody fetches events.
@@ -217,18 +221,25 @@ impl MainDevice {
         let declaration = with_domain(loaded.declaration.clone());
         let (found, strangers) = match_declaration(&bus, &declaration, &scan)?;
         let topology = loaded.topology(&bus, self.options.junctions, &scan, &found)?;
+        check_clocks(&declaration, &found)?;
+        let clock_config = declaration.clocks.clone();
         let plans = plan_all(&declaration, &found)?;
         let specs = domain_specs(&declaration, &plans)?;
         let (links, lrw) = (self.options.links(), declaration.lrw);
         check_lrw(lrw, &specs, links)?;
-        let layout = Layout::with_lrw(&specs, links, self.options.supervision, lrw).map_err(ActivateError::Layout)?;
+        let mut layout =
+            Layout::with_lrw(&specs, links, self.options.supervision, lrw).map_err(ActivateError::Layout)?;
+        if clock_config.is_some() {
+            layout.add_clocks().map_err(ActivateError::Layout)?;
+        }
         let members = members(&bus, declaration, found, &layout)?;
+        let clocks = clocks_of(clock_config.clone(), &scan, &members);
         let directory = Directory::new(&plans, &layout);
         report_oddities(&bus, &members, &layout);
         let optional = members.iter().map(|member| member.config.optional).collect();
         let board = Arc::new(Board::new(members.len()).with_optional(optional));
         let (producer, consumer) = queue(CYCLIC_EVENTS);
-        let exchange = Exchange::new(self.identity, self.options.links(), &layout, board.clone(), producer);
+        let mut exchange = Exchange::new(self.identity, self.options.links(), &layout, board.clone(), producer);
         let cables = cables(&topology, self.options.links());
         let fleet = Fleet {
             members,
@@ -240,11 +251,27 @@ impl MainDevice {
             cables: cables.into_iter().map(|cable| (cable, CableErrors::default())).collect(),
             cache: self.cache.clone(),
         };
-        let fleet = SharedFleet::new(fleet, board.clone());
+        let fleet = SharedFleet::new(fleet, board.clone(), clocks);
         self.supervisor.attach(board);
         let start = if self.has_visited() { Start::Doubtful } else { Start::Cleared };
         self.visited.drain(..).for_each(|mailbox| mailbox.close());
-        start_all(&bus, &fleet, start);
+        match clock_config {
+            Some(config) => {
+                exchange.set_up_clocks(ClockSetup {
+                    epoch: config.epoch,
+                    bus_shift: config.bus_shift,
+                    sync_window_ns: config.sync_window_ns,
+                });
+                let (bus, fleet) = (bus.clone(), fleet.clone());
+                // Receive times are latched before other frames are on the way (facts 7.1).
+                self.supervisor.spawn(async move {
+                    clocks::begin(&bus, &fleet).await;
+                    start_all(&bus, &fleet, start);
+                    clocks::keep(bus, fleet).await;
+                });
+            }
+            None => start_all(&bus, &fleet, start),
+        }
         if self.options.supervision {
             self.supervisor.spawn(supervise(bus.clone(), fleet.clone()));
         }
@@ -290,6 +317,19 @@ impl MainDevice {
     pub fn states(&self) -> Vec<SubDeviceState> {
         let Some(fleet) = &self.fleet else { return Vec::new() };
         fleet.access().members.iter().map(|member| member.phase.into()).collect()
+    }
+
+    /// What is known about each clock of the segment, by position; empty without distributed clocks.
+    pub fn clocks(&self) -> Vec<ClockStatus> {
+        self.fleet
+            .as_ref()
+            .filter(|fleet| fleet.clocks.are_declared())
+            .map_or(Vec::new(), |fleet| fleet.clocks.status())
+    }
+
+    /// Whether all clocks are locked (facts 7.2).
+    pub fn clocks_locked(&self) -> bool {
+        self.fleet.as_ref().is_some_and(|fleet| fleet.clocks.are_locked())
     }
 
     /// Station addresses of the declared SubDevices.
@@ -395,6 +435,16 @@ impl MainDevice {
     pub fn ring(&self) -> crate::ring::RingState {
         self.supervisor.bus().ring()
     }
+}
+
+/// Clocks of everybody that was scanned.
+fn clocks_of(config: Option<ClockConfig>, scan: &Scan, members: &[Member]) -> SharedClocks {
+    let member = |info: &SubDeviceInfo| {
+        let index = members.iter().position(|member| member.station == info.station)?;
+        Some((index, members[index].config.sync.is_some()))
+    };
+    let scanned: &[SubDeviceInfo] = if config.is_some() { &scan.subdevices } else { &[] };
+    SharedClocks::new(config, scanned, member)
 }
 
 impl From<Phase> for SubDeviceState {

@@ -3,6 +3,7 @@
 //! They see the bus through [`crate::supervisor::Bus`] and time through nothing else.
 
 pub mod al_state;
+pub mod clocks;
 pub mod configure;
 mod error_watch;
 pub mod fleet;

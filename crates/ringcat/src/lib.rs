@@ -63,8 +63,8 @@ pub use process_data::ProcessData;
 pub use supervisor_thread::SupervisorThread;
 
 pub use ringcat_engine::config::{
-    ConfigAddress, IdnWrite, PdoAssignment, PdoEntry, PdoMapping, SdoDownload, StartupAction, StartupCommand,
-    StateTimeout, SubDeviceConfig, Timeouts, Transition, Watchdog,
+    ClockConfig, ConfigAddress, IdnWrite, PdoAssignment, PdoEntry, PdoMapping, ReferenceClock, SdoDownload,
+    StartupAction, StartupCommand, StateTimeout, SubDeviceConfig, SyncSignals, Timeouts, Transition, Watchdog,
 };
 pub use ringcat_engine::domain::{DomainId, DomainState, DomainStatus, Freshness};
 pub use ringcat_engine::event::{Event, TimedEvent};

@@ -292,5 +292,6 @@ pub fn automatic(subdevices: &[SubDeviceInfo], period: Duration) -> Declaration 
         lrw: LrwPolicy::default(),
         domains: vec![DomainConfig { period, members: members.collect() }],
         subdevices: subdevices.iter().map(SubDeviceConfig::from_info).collect(),
+        clocks: None,
     }
 }

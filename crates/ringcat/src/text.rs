@@ -148,6 +148,14 @@ pub fn describe(event: &Event, names: &Names) -> String {
             format!("domain {domain}: {state}, working counter {} of {}", status.wkc, status.expected)
         }
         Event::Skipped { domain } => format!("domain {domain}: skipped, its frames are still out"),
+        Event::ClocksLocked { largest_ns } => format!("all clocks are locked, within {largest_ns} ns"),
+        Event::ReferenceClock { position: Some(position) } => {
+            format!("the clock of position {position} is the reference")
+        }
+        Event::ReferenceClock { position: None } => "no clock is left that could be the reference".into(),
+        Event::ClocksFailed { reason } => format!("distributed clocks: {reason}"),
+        Event::SyncWindow { inside: true, spread_ns } => format!("clocks came into their window: {spread_ns} ns"),
+        Event::SyncWindow { inside: false, spread_ns } => format!("clocks left their window: {spread_ns} ns"),
         other => format!("{other:?}"),
     }
 }

@@ -9,6 +9,7 @@ pub mod answering_double;
 pub mod callgrind;
 pub mod capture;
 pub mod check;
+pub mod clocks;
 pub mod counting_allocator;
 pub mod cpu_time;
 pub mod cyclic_load;

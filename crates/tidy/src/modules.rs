@@ -33,16 +33,18 @@ pub const ENGINE: &[(&str, &[&str])] = &[
     ("topology", &["info", "link"]),
     ("ring_status", &["time", "link", "ring", "topology"]),
     ("config", &["info"]),
+    ("clocks", &["topology"]),
     ("plan", &["info", "topology", "config"]),
     ("layout", &["link", "ring", "direction", "domain"]),
     // what happened
     ("event", &["time", "link", "queue", "ring", "domain", "info", "topology", "ring_status"]),
     // cyclic half
-    ("exchange", &["time", "link", "queue", "domain", "ring", "board", "layout", "event"]),
+    ("exchange", &["time", "link", "queue", "domain", "ring", "board", "clocks", "layout", "event"]),
     // acyclic half
     ("supervisor", &["time", "link", "queue", "ring", "board", "event"]),
     ("mail", &["time", "config", "event", "supervisor"]),
-    ("procedures", &["time", "link", "queue", "ring", "board", "info", "topology", "ring_status", "config", "plan", "layout",
+    ("procedures", &["time", "link", "queue", "ring", "board", "info", "topology", "ring_status", "config", "clocks", "plan",
+        "layout",
         "event", "supervisor", "mail", "request", "junction"]),
     // both together
     ("main_device", &["time", "link", "queue", "domain", "ring", "board", "info", "topology", "ring_status", "config", "plan",

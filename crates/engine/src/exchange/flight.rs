@@ -8,12 +8,13 @@ use alloc::vec;
 use alloc::vec::Vec;
 use core::ops::Range;
 
-use ringcat_wire::address::Wkc;
+use ringcat_wire::address::{RegisterAddress, StationAddress, Wkc};
 use ringcat_wire::command::Command;
 use ringcat_wire::datagram::{CIRCULATING, HEADER_LEN, OVERHEAD, Target};
 use ringcat_wire::frame::{FrameBuilder, MAX_FRAME, MacAddress};
 use ringcat_wire::register::map;
 
+use super::clocks::{CLOCK_DATA, Places, Seen};
 use crate::board::Supervision;
 use crate::layout::{PlacedArea, PlannedDatagram, PlannedFrame, SUPERVISION_LEN};
 use crate::link::Link;
@@ -116,6 +117,9 @@ pub(crate) struct CyclicFrame {
     seen: Supervision,
     /// Offset of the supervision datagram's header.
     supervision_at: Option<usize>,
+    /// Datagrams of distributed clocks.
+    clocks: Option<Places>,
+    clocks_seen: Seen,
     headers: Box<[Header]>,
     places: Box<[Place]>,
     tx: Box<[u8]>,
@@ -126,7 +130,7 @@ pub(crate) struct CyclicFrame {
 impl CyclicFrame {
     pub(crate) fn new(identity: &Identity, domain: usize, planned: &PlannedFrame) -> CyclicFrame {
         let mut buffer = vec![0; MAX_FRAME];
-        let (mut places, mut headers_at, mut supervision_at) = (Vec::new(), Vec::new(), None);
+        let (mut places, mut headers_at, mut supervision_at, mut clocks) = (Vec::new(), Vec::new(), None, None);
         let mut length = 0;
         if let Some(mut builder) = FrameBuilder::ethernet(&mut buffer, MacAddress::ETHERCAT_GROUP, identity.source()) {
             for datagram in &planned.datagrams {
@@ -135,6 +139,17 @@ impl CyclicFrame {
                 if let Some(data_at) = builder.datagram(datagram.command, 0, target, bytes) {
                     headers_at.push(data_at - HEADER_LEN);
                     places.push(Place::new(datagram, data_at));
+                }
+            }
+            if planned.clocks {
+                let nobody = Target::Station(StationAddress(0), RegisterAddress(0));
+                let spread = Target::Broadcast(map::DC_SYSTEM_TIME_DIFFERENCE);
+                let datagrams = [(Command::Frmw, nobody), (Command::Fpwr, nobody), (Command::Brd, spread)];
+                let at = datagrams.map(|(command, target)| builder.datagram(command, 0, target, CLOCK_DATA));
+                if let [Some(sync), Some(steer), Some(spread)] = at {
+                    let header = [sync, steer, spread].map(|data_at| data_at - HEADER_LEN);
+                    headers_at.extend(header);
+                    clocks = Some(Places { sync_at: header[0], steer_at: header[1], spread_at: header[2] });
                 }
             }
             if planned.supervision {
@@ -158,6 +173,8 @@ impl CyclicFrame {
             complete: false,
             seen: Supervision::default(),
             supervision_at,
+            clocks,
+            clocks_seen: Seen::default(),
             headers: headers_at.into_iter().map(|at| Header { at, sent: header_at(&buffer, at) }).collect(),
             places: places.into_boxed_slice(),
             merged: vec![0; length].into_boxed_slice(),
@@ -216,6 +233,18 @@ impl CyclicFrame {
         self.complete = self.places.is_empty();
         self.arrivals = Arrivals::default();
         self.seen = Supervision::default();
+        self.clocks_seen = Seen::default();
+    }
+
+    /// Where the datagrams of distributed clocks are, if there are any; the frame leaves now.
+    pub(crate) fn clocks_leave(&mut self, now: Instant) -> Option<Places> {
+        self.clocks_seen.sent_at = now;
+        self.clocks
+    }
+
+    /// What they brought back, if there are any.
+    pub(crate) fn clocks_seen(&self) -> Option<&Seen> {
+        self.clocks.map(|_| &self.clocks_seen)
     }
 
     /// Starts a flight of what was loaded; returns the bytes of the main copy.
@@ -305,6 +334,9 @@ impl CyclicFrame {
             complete &= place.wkc == place.expected || (place.part_suffices && place.wkc == place.expected_part);
         }
         self.complete = complete;
+        if let Some(clocks) = self.clocks {
+            clocks.read(&mut self.clocks_seen, sent_on, bytes);
+        }
         if let Some(at) = self.supervision_at
             && let Some(datagram) = bytes[at..].first_chunk::<{ OVERHEAD + SUPERVISION_LEN }>()
         {

@@ -15,7 +15,7 @@ use ringcat_wire::command::Command;
 use ringcat_wire::register::{WatchdogDivider, WatchdogTime};
 
 use super::areas::Areas;
-use crate::config::{ConfigError, Resolution, SubDeviceConfig, resolve};
+use crate::config::{ClockConfig, ConfigError, Resolution, SubDeviceConfig, resolve};
 use crate::event::Event;
 use crate::info::SubDeviceInfo;
 use crate::junction::JunctionError;
@@ -56,6 +56,8 @@ pub struct Declaration {
     pub domains: Vec<DomainConfig>,
     /// Where LRW is used.
     pub lrw: LrwPolicy,
+    /// Distributed clocks; `None` leaves them alone.
+    pub clocks: Option<ClockConfig>,
 }
 
 /// Why a declaration cannot be activated.
@@ -131,6 +133,13 @@ pub enum ActivateError {
     },
     /// Process data does not fit.
     Layout(LayoutError),
+    /// SYNC signals are declared for a SubDevice, but no distributed clocks, or it has no clock.
+    NoClock {
+        /// Index in the declaration.
+        subdevice: usize,
+        /// It has a clock.
+        has_clock: bool,
+    },
     /// A domain names a SubDevice that was not declared.
     UnknownMember {
         /// Number of the domain.
@@ -172,6 +181,12 @@ impl fmt::Display for ActivateError {
                 write!(f, "domain {domain}: LRW was asked for, declaration {subdevice} does not know it")
             }
             ActivateError::Layout(error) => error.fmt(f),
+            ActivateError::NoClock { subdevice, has_clock: false } => {
+                write!(f, "declaration {subdevice}: SYNC signals for a SubDevice without a distributed clock")
+            }
+            ActivateError::NoClock { subdevice, has_clock: true } => {
+                write!(f, "declaration {subdevice}: SYNC signals, but no distributed clocks are declared")
+            }
             ActivateError::UnknownMember { domain, subdevice } => {
                 write!(f, "domain {domain} names declaration {subdevice}, which does not exist")
             }
@@ -208,6 +223,17 @@ pub(super) fn match_declaration(bus: &Bus, declaration: &Declaration, scan: &Sca
         Stranger::new(info, &owners, scan.main_count, true)
     });
     Ok((found, strangers.collect()))
+}
+
+/// SYNC signals need a clock, and clocks that are kept together.
+pub(super) fn check_clocks(declaration: &Declaration, found: &[Option<SubDeviceInfo>]) -> Result<(), ActivateError> {
+    for (subdevice, (config, info)) in declaration.subdevices.iter().zip(found).enumerate() {
+        let has_clock = info.as_ref().is_none_or(|info| info.controller.features.dc);
+        if config.sync.is_some() && (!has_clock || declaration.clocks.is_none()) {
+            return Err(ActivateError::NoClock { subdevice, has_clock });
+        }
+    }
+    Ok(())
 }
 
 pub(super) fn plan_all(

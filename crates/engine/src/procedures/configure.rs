@@ -13,6 +13,7 @@ use ringcat_wire::al::AlState;
 use ringcat_wire::register::{Fmmu, SyncManager, map};
 
 use super::al_state;
+use super::clocks;
 use super::fleet::{Setup, SharedFleet};
 use super::sii;
 use crate::config::{SdoDownload, SubDeviceConfig, Transition};
@@ -166,6 +167,7 @@ impl BringUp<'_> {
         if !self.config.wait_before_safeop.is_zero() {
             self.bus.sleep(self.config.wait_before_safeop).await;
         }
+        self.start_clock().await?;
         self.request(AlState::PreOp, AlState::SafeOp).await?;
         let fmmus = self.setup.fmmu_registers();
         if !fmmus.is_empty() {
@@ -173,6 +175,19 @@ impl BringUp<'_> {
         }
         self.fleet.board.set_taking_part(self.index, true);
         self.fleet.set_configured(self.index, true);
+        Ok(())
+    }
+
+    /// The SYNC signals that are declared, or what is left of others.
+    async fn start_clock(&self) -> Result<(), ConfigureError> {
+        if !self.fleet.clocks.are_declared() {
+            return Ok(());
+        }
+        clocks::restore(self.bus, self.fleet, self.index).await?;
+        let limit = self.config.limit(AlState::PreOp, AlState::SafeOp);
+        if let Some(signals) = &self.config.sync {
+            clocks::start_signals(self.bus, self.fleet, self.index, self.station, signals, limit).await?;
+        }
         Ok(())
     }
 
@@ -185,6 +200,9 @@ impl BringUp<'_> {
         let cycles = self.fleet.board.cycles() + CYCLES_BEFORE_OP;
         while self.fleet.board.cycles() < cycles {
             self.bus.sleep(CYCLE_PAUSE).await;
+        }
+        if self.config.sync.is_some() {
+            clocks::wait_for_lock(self.bus, self.fleet, self.index).await.map_err(ConfigureError::NotLocked)?;
         }
         self.request(AlState::SafeOp, AlState::Op).await
     }

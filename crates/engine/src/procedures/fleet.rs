@@ -9,6 +9,7 @@ use ringcat_wire::address::StationAddress;
 use ringcat_wire::al::AlState;
 use ringcat_wire::register::Fmmu;
 
+use super::clocks::SharedClocks;
 use super::mail_watch;
 use super::sii::SiiCache;
 use super::strangers::Stranger;
@@ -220,12 +221,14 @@ pub struct SharedFleet {
     news: Rc<Cell<u32>>,
     /// Who takes part in process data.
     pub board: Arc<Board>,
+    /// Distributed clocks.
+    pub clocks: SharedClocks,
 }
 
 impl SharedFleet {
     /// Shares a fleet.
-    pub fn new(fleet: Fleet, board: Arc<Board>) -> SharedFleet {
-        SharedFleet { fleet: Rc::new(RefCell::new(fleet)), news: Rc::default(), board }
+    pub fn new(fleet: Fleet, board: Arc<Board>, clocks: SharedClocks) -> SharedFleet {
+        SharedFleet { fleet: Rc::new(RefCell::new(fleet)), news: Rc::default(), board, clocks }
     }
 
     /// Access between two points at which a procedure waits.

@@ -75,6 +75,7 @@ pub(super) fn is_of_bus(error: &ConfigureError) -> bool {
             matches!(error.cause, SoeFailure::Mailbox(MailboxError::Bus(_) | MailboxError::Closed))
         }
         ConfigureError::State(_)
+        | ConfigureError::NotLocked(_)
         | ConfigureError::NoSetup
         | ConfigureError::NoBoot
         | ConfigureError::Absent

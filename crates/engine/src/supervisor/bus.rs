@@ -164,7 +164,17 @@ impl Bus {
         expected: Option<Wkc>,
     ) -> impl Future<Output = Result<Reply, BusError>> {
         let resend = !matches!(command, Command::Aprw | Command::Fprw | Command::Brw | Command::Lrw);
-        self.submit(Request { command, target, data, redundant: None, expected, resend, lead: None, mail: None })
+        self.submit(Request {
+            command,
+            target,
+            data,
+            redundant: None,
+            redundant_station: None,
+            expected,
+            resend,
+            lead: None,
+            mail: None,
+        })
     }
 
     /// Positions from here on live behind the redundant link (facts CR-09). Broadcasts show it, too.
@@ -184,6 +194,7 @@ impl Bus {
             target,
             data,
             redundant: None,
+            redundant_station: None,
             expected: Some(Wkc(1)),
             resend: false,
             lead: None,
@@ -203,7 +214,40 @@ impl Bus {
         let target = Target::Station(station, register);
         let redundant = Some(redundant).filter(|data| data.len() == main.len());
         let (command, data) = (Command::Fprw, main);
-        self.submit(Request { command, target, data, redundant, expected: None, resend: false, lead: None, mail: None })
+        self.submit(Request {
+            command,
+            target,
+            data,
+            redundant,
+            redundant_station: None,
+            expected: None,
+            resend: false,
+            lead: None,
+            mail: None,
+        })
+    }
+
+    /// Hands the time of one SubDevice's clock to all others, once: on each link that of a station of its own. Where nobody
+    /// on a link has the station, `time` is what the others get. `expected` as for [`Bus::transfer`].
+    pub fn distribute_time(
+        &self,
+        stations: [StationAddress; 2],
+        register: RegisterAddress,
+        time: u32,
+        expected: Wkc,
+    ) -> impl Future<Output = Result<Reply, BusError>> {
+        let [main, redundant] = stations;
+        self.submit(Request {
+            command: Command::Frmw,
+            target: Target::Station(main, register),
+            data: time.to_le_bytes().to_vec(),
+            redundant: None,
+            redundant_station: Some(redundant),
+            expected: Some(expected),
+            resend: false,
+            lead: None,
+            mail: None,
+        })
     }
 
     /// Writes a mailbox of `size` bytes, once: its beginning and its last byte, which hands it over, in one frame
@@ -225,7 +269,17 @@ impl Bus {
             whole.resize(usize::from(size), 0);
             (None, at(0), whole)
         };
-        self.submit(Request { command, target, data, redundant: None, expected, resend: false, lead, mail: None })
+        self.submit(Request {
+            command,
+            target,
+            data,
+            redundant: None,
+            redundant_station: None,
+            expected,
+            resend: false,
+            lead,
+            mail: None,
+        })
     }
 
     /// Reads a mailbox, once. What a second copy reads, and what comes back late, is kept for [`Bus::stray_mail`].
@@ -237,7 +291,17 @@ impl Bus {
     ) -> impl Future<Output = Result<Reply, BusError>> {
         let (target, data) = (Target::Station(station, register), vec![0; length]);
         let (command, expected, mail) = (Command::Fprd, Some(Wkc(1)), Some(station));
-        self.submit(Request { command, target, data, redundant: None, expected, resend: false, lead: None, mail })
+        self.submit(Request {
+            command,
+            target,
+            data,
+            redundant: None,
+            redundant_station: None,
+            expected,
+            resend: false,
+            lead: None,
+            mail,
+        })
     }
 
     /// The oldest mail of a SubDevice that came back when nobody waited for it any more.
@@ -402,6 +466,7 @@ impl Bus {
                 target,
                 data,
                 redundant: None,
+                redundant_station: None,
                 expected,
                 resend: true,
                 lead: None,

@@ -213,8 +213,12 @@ impl Shared {
                 Identity::mark_redundant(copy, true);
                 adjust_auto_increment(copy, &flight.places, self.main_count);
                 for place in &flight.places {
-                    let own = self.transfers.find(place.transfer).and_then(|it| it.request.redundant.as_ref());
-                    if let Some(data) = own {
+                    let Some(transfer) = self.transfers.find(place.transfer) else { continue };
+                    if let Some(station) = transfer.request.redundant_station {
+                        let at = place.header_at + 2;
+                        copy[at..at + 2].copy_from_slice(&station.0.to_le_bytes());
+                    }
+                    if let Some(data) = &transfer.request.redundant {
                         let at = place.header_at + HEADER_LEN;
                         copy[at..at + place.length].copy_from_slice(data);
                     }

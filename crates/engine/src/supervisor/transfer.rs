@@ -18,6 +18,8 @@ pub(crate) struct Request {
     pub data: Vec<u8>,
     /// Data of the redundant copy, where it is not the same; of the same length.
     pub redundant: Option<Vec<u8>>,
+    /// Station that the redundant copy addresses, where it is not the same.
+    pub redundant_station: Option<StationAddress>,
     /// The working counter at which waiting for a second copy is pointless.
     pub expected: Option<Wkc>,
     /// Whether a lost datagram may be sent again: false where reading or writing twice is not the same as once.
@@ -55,7 +57,9 @@ impl Transfer {
     pub(crate) fn for_test() -> Transfer {
         let (command, target) = (Command::Nop, Target::None);
         let (redundant, expected, resend, lead, mail) = (None, None, false, None, None);
-        let request = Request { command, target, data: Vec::new(), redundant, expected, resend, lead, mail };
+        let redundant_station = None;
+        let request =
+            Request { command, target, data: Vec::new(), redundant, redundant_station, expected, resend, lead, mail };
         Transfer { request, stage: Stage::Queued, task: TaskId(0), retries: 0, abandoned: false }
     }
 }

@@ -6,6 +6,7 @@ use crate::config::Transition;
 use crate::mail::coe::SdoError;
 use crate::mail::soe::SoeError;
 use crate::procedures::al_state::StateError;
+use crate::procedures::clocks::{NotLocked, SignalsError};
 use crate::supervisor::BusError;
 
 /// Why a SubDevice is not configured.
@@ -26,6 +27,8 @@ pub enum ConfigureError {
         /// What happened.
         error: StartupError,
     },
+    /// A clock did not lock.
+    NotLocked(NotLocked),
     /// It never was there, so nothing is known to write.
     NoSetup,
     /// It has no boot loader: its SII gives no mailboxes for BOOT.
@@ -54,6 +57,7 @@ impl fmt::Display for ConfigureError {
             ConfigureError::Startup { number, transition, error } => {
                 write!(f, "start-up command {number} ({transition}): {error}")
             }
+            ConfigureError::NotLocked(error) => error.fmt(f),
             ConfigureError::NoSetup => f.write_str("nothing is known about this SubDevice yet"),
             ConfigureError::NoBoot => f.write_str("its SII gives no mailboxes for BOOT"),
             ConfigureError::Absent => f.write_str("it does not answer"),
@@ -93,5 +97,14 @@ impl From<StateError> for ConfigureError {
 impl From<SdoError> for ConfigureError {
     fn from(error: SdoError) -> ConfigureError {
         ConfigureError::Sdo(error)
+    }
+}
+
+impl From<SignalsError> for ConfigureError {
+    fn from(error: SignalsError) -> ConfigureError {
+        match error {
+            SignalsError::Bus(error) => ConfigureError::Bus(error),
+            SignalsError::NotLocked(error) => ConfigureError::NotLocked(error),
+        }
     }
 }

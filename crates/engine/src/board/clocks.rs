@@ -1,0 +1,117 @@
+//! What the halves tell each other about distributed clocks.
+//!
+//! The supervisor posts whose time each copy of a cyclic frame distributes; the exchange posts what the broadcast read
+//! of the differences showed.
+
+use core::sync::atomic::{AtomicBool, AtomicU32, AtomicU64, Ordering};
+
+use ringcat_wire::address::StationAddress;
+
+use crate::link::Link;
+
+/// Whose time the copies of cyclic frames distribute.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct References {
+    /// On the copy sent on the main link; `None`: that copy distributes nothing.
+    pub main: Option<StationAddress>,
+    /// On the copy sent on the redundant link.
+    pub redundant: Option<StationAddress>,
+    /// Where both do: the redundant one is the reference of the segment, and the main one is steered towards it.
+    pub redundant_leads: bool,
+}
+
+impl References {
+    /// The one on a copy.
+    pub const fn on(self, link: Link) -> Option<StationAddress> {
+        match link {
+            Link::Main => self.main,
+            Link::Redundant => self.redundant,
+        }
+    }
+
+    /// The link of the segment's reference, and that of the one that is steered towards it.
+    pub const fn leader(self) -> (Option<Link>, Option<Link>) {
+        match (self.main.is_some(), self.redundant.is_some()) {
+            (true, true) if self.redundant_leads => (Some(Link::Redundant), Some(Link::Main)),
+            (true, true) => (Some(Link::Main), Some(Link::Redundant)),
+            (true, false) => (Some(Link::Main), None),
+            (false, true) => (Some(Link::Redundant), None),
+            (false, false) => (None, None),
+        }
+    }
+}
+
+/// The shared words.
+#[derive(Debug, Default)]
+pub struct ClockWords {
+    /// Stations in the lower half, the leader in bit 32, and in the upper 31 bits how often they were posted.
+    references: AtomicU64,
+    spread: AtomicU32,
+    is_window_watched: AtomicBool,
+    spread_count: AtomicU32,
+}
+
+const LEADER: u64 = 1 << 32;
+const CHANGE: u32 = 33;
+
+impl ClockWords {
+    /// Posts the references.
+    pub fn post_references(&self, references: References) {
+        let station = |station: Option<StationAddress>| u64::from(station.map_or(0, |station| station.0));
+        let changes = (self.references.load(Ordering::Relaxed) >> CHANGE).wrapping_add(1);
+        let leader = if references.redundant_leads { LEADER } else { 0 };
+        let word = station(references.main) | station(references.redundant) << 16 | leader | changes << CHANGE;
+        self.references.store(word, Ordering::Release);
+    }
+
+    /// The references, and how often they were posted.
+    pub fn references(&self) -> (References, u32) {
+        let word = self.references.load(Ordering::Acquire);
+        let station = |bits: u64| Some(StationAddress(bits as u16)).filter(|station| station.0 != 0);
+        let references =
+            References { main: station(word), redundant: station(word >> 16), redundant_leads: word & LEADER != 0 };
+        (references, (word >> CHANGE) as u32)
+    }
+
+    /// From now on the exchange reports when the differences come into their window and leave it.
+    pub(crate) fn watch_window(&self) {
+        self.is_window_watched.store(true, Ordering::Relaxed);
+    }
+
+    pub(crate) fn is_window_watched(&self) -> bool {
+        self.is_window_watched.load(Ordering::Relaxed)
+    }
+
+    pub(crate) fn post_spread(&self, spread_ns: u32) {
+        self.spread.store(spread_ns, Ordering::Relaxed);
+        let count = self.spread_count.load(Ordering::Relaxed);
+        self.spread_count.store(count.wrapping_add(1).max(1), Ordering::Release);
+    }
+
+    /// OR of all |0x092C| in nanoseconds that the last cyclic frame saw; `None` before the first.
+    pub fn spread_ns(&self) -> Option<u32> {
+        (self.spread_count.load(Ordering::Acquire) != 0).then(|| self.spread.load(Ordering::Relaxed))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn references_survive_their_word() {
+        let words = ClockWords::default();
+        assert_eq!(words.references(), (References::default(), 0));
+        for (number, redundant_leads) in [false, true].into_iter().enumerate() {
+            let (main, redundant) = (Some(StationAddress(0x1001)), Some(StationAddress(0xFFFE)));
+            let references = References { main, redundant, redundant_leads };
+            words.post_references(references);
+            assert_eq!(words.references(), (references, number as u32 + 1));
+        }
+        words.post_references(References::default());
+        assert_eq!(words.references().0.leader(), (None, None));
+        assert_eq!(words.spread_ns(), None);
+        words.post_spread(7);
+        assert_eq!(words.spread_ns(), Some(7));
+    }
+}

@@ -1,0 +1,45 @@
+//! Distributed clocks as arithmetic: what follows from latched times, and what to do about it (facts 7).
+//!
+//! * [`delay`]: propagation delays of any tree;
+//! * [`measurement`]: the mean of several measurements, corrected for the drift of each clock;
+//! * [`start`]: when SYNC signals begin;
+//! * [`follow`]: making a cycle of the host follow the reference clock.
+//!
+//! Nothing here talks to the bus: [`crate::procedures::clocks`] does, and the cyclic datagrams are in
+//! [`crate::exchange`].
+
+pub mod delay;
+pub mod follow;
+pub mod measurement;
+pub mod start;
+
+pub use delay::{Delays, PortTimes, TREES, propagation};
+pub use follow::{Follower, phase_error};
+pub use measurement::{Latched, Measurements};
+pub use start::first_pulse;
+
+/// Fractional bits of times in nanoseconds here: halves add up over hundreds of hops.
+pub const FRACTION: u32 = 8;
+
+/// The 64-bit time nearest to `near` whose low half is `low`: what a clock or a datagram of 32 bits means.
+pub const fn extend(low: u32, near: u64) -> u64 {
+    near.wrapping_add(low.wrapping_sub(near as u32) as i32 as u64)
+}
+
+/// Rounds a time with [`FRACTION`] to nanoseconds.
+pub const fn round(time: i64) -> i64 {
+    (time + (1 << (FRACTION - 1))) >> FRACTION
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_low_half_is_extended_across_a_wrap_facts_7_1() {
+        assert_eq!(extend(0x0000_0010, 0x5_FFFF_FFF0), 0x6_0000_0010);
+        assert_eq!(extend(0xFFFF_FFF0, 0x6_0000_0010), 0x5_FFFF_FFF0);
+        assert_eq!(extend(7, 9), 7);
+        assert_eq!((round(127), round(128), round(-128), round(-129)), (0, 1, 0, -1));
+    }
+}

@@ -1,0 +1,104 @@
+//! A cycle of the host follows the reference clock (master shift, facts 7.4).
+//!
+//! In: how far the next cycle of the host's grid is from where the reference clock wants it. Out: by how much to move
+//! it. The reference clock is read with every cyclic frame, and the host knows when that was sent, so neither wake-ups
+//! that come late nor the frame's way count.
+
+/// Part of a phase error that one cycle takes back, as a shift.
+const PROPORTIONAL: u32 = 4;
+/// Part of a phase error by which the length of all cycles changes, as a shift.
+const INTEGRAL: u32 = 9;
+/// Fractional bits of the length.
+const FRACTION: u32 = 16;
+
+/// How far `time` is behind (positive) or ahead of the next place at which it is `phase_ns` modulo the period.
+pub const fn phase_error(time: u64, period_ns: u64, phase_ns: i64) -> i64 {
+    if period_ns == 0 {
+        return 0;
+    }
+    let period = period_ns as i64;
+    let behind = (time.wrapping_sub(phase_ns.rem_euclid(period) as u64) % period_ns) as i64;
+    if behind > period / 2 { behind - period } else { behind }
+}
+
+/// The loop that keeps the phase.
+#[derive(Clone, Copy, Debug)]
+pub struct Follower {
+    period_ns: u64,
+    phase_ns: i64,
+    /// What each cycle is longer than the host's period, with fraction.
+    length: i64,
+    error_ns: i64,
+    /// Cycles in a row that were near.
+    near: u32,
+}
+
+impl Follower {
+    /// Cycles of `period_ns` begin when the system time is `phase_ns` modulo the period.
+    pub const fn new(period_ns: u64, phase_ns: i64) -> Follower {
+        Follower { period_ns, phase_ns, length: 0, error_ns: 0, near: 0 }
+    }
+
+    /// `time` is the system time at which the host's grid has its next cycle. Returns by how many nanoseconds the one
+    /// after it moves.
+    pub fn correction(&mut self, time: u64) -> i64 {
+        self.error_ns = phase_error(time, self.period_ns, self.phase_ns);
+        self.near = if self.error_ns.unsigned_abs() <= self.period_ns / 100 { self.near.saturating_add(1) } else { 0 };
+        let scaled = self.error_ns << FRACTION;
+        // Clocks differ by 1,000 ppm at the most.
+        let limit = ((self.period_ns as i64) << FRACTION) / 1_000;
+        self.length = (self.length - (scaled >> (INTEGRAL + PROPORTIONAL / 2))).clamp(-limit, limit);
+        let step = (self.length - (scaled >> PROPORTIONAL) + (1 << (FRACTION - 1))) >> FRACTION;
+        let most = (self.period_ns / 10) as i64;
+        step.clamp(-most, most)
+    }
+
+    /// The last phase error in nanoseconds; positive: the host is late.
+    pub const fn error_ns(&self) -> i64 {
+        self.error_ns
+    }
+
+    /// Whether the phase has been kept to within a hundredth of the period for a hundred cycles.
+    pub const fn is_locked(&self) -> bool {
+        self.near >= 100
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn errors_are_those_to_the_nearest_place() {
+        assert_eq!(phase_error(5_000_100, 1_000_000, 0), 100);
+        assert_eq!(phase_error(4_999_900, 1_000_000, 0), -100);
+        assert_eq!(phase_error(5_200_100, 1_000_000, 200_000), 100);
+        assert_eq!(phase_error(4_800_100, 1_000_000, -200_000), 100);
+        assert_eq!(phase_error(1, 0, 0), 0);
+    }
+
+    /// Follows a reference that runs `ppm` fast, from a phase; errors at the end of 5 s at 1 ms.
+    fn settle(ppm: i64, first_error: i64) -> (Follower, i64) {
+        let mut follower = Follower::new(1_000_000, 300_000);
+        let (mut host, mut worst) = (first_error + 300_000, 0);
+        for cycle in 0..5_000 {
+            let reference = (host + host * ppm / 1_000_000) as u64;
+            let step = follower.correction(reference);
+            if cycle > 4_000 {
+                worst = worst.max(follower.error_ns().abs());
+            }
+            host += 1_000_000 + step;
+        }
+        (follower, worst)
+    }
+
+    #[test]
+    fn any_drift_and_any_first_phase_settle_within_seconds() {
+        for ppm in [-100, -1, 0, 50, 100] {
+            for first in [0, 499_000, -400_000] {
+                let (follower, worst) = settle(ppm, first);
+                assert!(worst <= 20 && follower.is_locked(), "{ppm} ppm, {first} ns: {worst} ns");
+            }
+        }
+    }
+}

@@ -1,0 +1,121 @@
+//! What the application declares about distributed clocks: of the whole segment, and of one SubDevice (facts 7).
+
+use core::time::Duration;
+
+/// Whose clock all others follow.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+pub enum ReferenceClock {
+    /// The first SubDevice with a clock, declared or not.
+    #[default]
+    FirstWithClock,
+    /// The first SubDevice with a clock among those for which SYNC signals are declared.
+    FirstConfigured,
+    /// The one with this index in the declaration. SubDevices that frames meet before it follow the host's idea of its
+    /// time, not the time itself: a reference in front of all others is more exact.
+    Declared(usize),
+}
+
+/// Distributed clocks of the segment.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct ClockConfig {
+    /// Whose clock all others follow. Where it is lost, the next one with a clock is chosen.
+    pub reference: ReferenceClock,
+    /// System time when the host's monotonic time is zero, in nanoseconds (facts 3.12: since 2000).
+    pub epoch: u64,
+    /// The reference clock follows the host (bus shift). Otherwise it runs free.
+    pub bus_shift: bool,
+    /// Measurements of propagation delays, of which the mean is taken.
+    pub measurements: u32,
+    /// Distributions of the reference time that the static drift phase sends as fast as the segment allows, beside the
+    /// cyclic ones (facts 7.2: about 15,000).
+    pub drift_distributions: u32,
+    /// A clock is locked when |0x092C| was at most this for [`ClockConfig::lock_samples`] samples.
+    pub lock_window_ns: u32,
+    /// See [`ClockConfig::lock_window_ns`].
+    pub lock_samples: u32,
+    /// How long a SubDevice with SYNC signals is held in SAFEOP until all clocks are locked.
+    pub lock_limit: Duration,
+    /// The broadcast read of 0x092C beyond which clocks count as out of their window. It is the OR of all magnitudes: at
+    /// most twice the largest.
+    pub sync_window_ns: u32,
+}
+
+impl Default for ClockConfig {
+    fn default() -> ClockConfig {
+        ClockConfig {
+            reference: ReferenceClock::default(),
+            epoch: 0,
+            bus_shift: false,
+            measurements: 16,
+            drift_distributions: 15_000,
+            lock_window_ns: 100,
+            lock_samples: 100,
+            lock_limit: Duration::from_secs(10),
+            sync_window_ns: 1_000,
+        }
+    }
+}
+
+/// SYNC signals of one SubDevice (facts 7.3).
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+pub struct SyncSignals {
+    /// Registers 0x0980 (low byte) and 0x0981 (high byte), as ESI and SII give them: 0x0300, 0x0700.
+    pub assign_activate: u16,
+    /// Cycle of SYNC0 in nanoseconds; 0 is a single pulse.
+    pub sync0_cycle_ns: u32,
+    /// SYNC0 comes so much after the multiples of the cycle in system time; negative: before.
+    pub sync0_shift_ns: i32,
+    /// Cycle of SYNC1 in nanoseconds: 0 or that of SYNC0, or a multiple of it.
+    pub sync1_cycle_ns: u32,
+    /// SYNC1 comes so much after SYNC0; what is negative counts back from the next SYNC0.
+    pub sync1_shift_ns: i32,
+}
+
+impl SyncSignals {
+    /// SYNC0 alone.
+    pub const fn sync0(cycle_ns: u32, shift_ns: i32) -> SyncSignals {
+        SyncSignals {
+            assign_activate: 0x0300,
+            sync0_cycle_ns: cycle_ns,
+            sync0_shift_ns: shift_ns,
+            sync1_cycle_ns: 0,
+            sync1_shift_ns: 0,
+        }
+    }
+
+    /// Value of DC_SYNC1_CYCLE: time from SYNC0 to SYNC1, and beyond a whole cycle the division of SYNC0.
+    pub const fn sync1_register_ns(&self) -> u32 {
+        let longer = self.sync1_cycle_ns.saturating_sub(self.sync0_cycle_ns);
+        let shift = match self.sync0_cycle_ns {
+            0 => self.sync1_shift_ns as i64,
+            cycle => (self.sync1_shift_ns as i64).rem_euclid(cycle as i64),
+        };
+        let sum = longer as i64 + shift;
+        if sum < 0 {
+            0
+        } else if sum > u32::MAX as i64 {
+            u32::MAX
+        } else {
+            sum as u32
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_register_of_sync1_counts_from_sync0_facts_7_3() {
+        let signals = |cycle, shift| SyncSignals {
+            assign_activate: 0x0700,
+            sync1_cycle_ns: cycle,
+            sync1_shift_ns: shift,
+            ..SyncSignals::sync0(1_000_000, 0)
+        };
+        assert_eq!(signals(0, 0).sync1_register_ns(), 0);
+        assert_eq!(signals(1_000_000, 250_000).sync1_register_ns(), 250_000);
+        assert_eq!(signals(1_000_000, -250_000).sync1_register_ns(), 750_000);
+        assert_eq!(signals(4_000_000, 1).sync1_register_ns(), 3_000_001);
+    }
+}

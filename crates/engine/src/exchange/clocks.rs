@@ -1,0 +1,308 @@
+//! Distributed clocks in the cyclic frames (facts 7.2, 7.4, 7.5).
+//!
+//! Three datagrams ride in one frame: an FRMW of 0x0910 that hands the reference's time to all others, an FPWR of 0x0910
+//! that steers one clock (the reference towards the host, or a second reference towards the first), a BRD of 0x092C.
+//! What the supervisor posts on the board says whose time each copy distributes. The FRMW leaves with the predicted time
+//! of the reference: whoever the frame meets before the reference, or without one, takes what was sent.
+
+use ringcat_wire::address::{RegisterAddress, StationAddress, Wkc};
+use ringcat_wire::datagram::HEADER_LEN;
+use ringcat_wire::register::map;
+
+use crate::board::Board;
+use crate::board::clocks::References;
+use crate::clocks::extend;
+use crate::event::CyclicEvent;
+use crate::link::Link;
+use crate::queue::Producer;
+use crate::ring::{Arrivals, RingState};
+use crate::time::Instant;
+
+/// Data of each datagram: the low half of a time.
+pub(crate) const CLOCK_DATA: usize = 4;
+/// A second reference is steered once in so many cycles: what little the host's sending jitters stays small.
+const STEERING_INTERVAL: u32 = 8;
+/// It is steered in each cycle while it differs by more than this.
+const NEAR_NS: i64 = 300;
+/// A second reference is told of at most this difference at a time.
+const MOST_STEERING_NS: i64 = 50_000;
+/// A change of the difference counts like the difference that it would lead to within this time: without that, the loop
+/// in the controller swings for seconds at the pace of cycles.
+const FORESIGHT_NS: i64 = 150_000_000;
+/// Filter depth of that change, as a shift.
+const CHANGE_DEPTH: u32 = 5;
+/// Results in a row inside or outside of the window until that is reported.
+const WINDOW_RESULTS: u8 = 3;
+
+/// What the application chose.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct ClockSetup {
+    /// System time when host time is zero.
+    pub epoch: u64,
+    /// The reference follows the host.
+    pub bus_shift: bool,
+    /// The OR of all differences beyond which the clocks are out of their window.
+    pub sync_window_ns: u32,
+}
+
+/// The reference clock was read.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct ReferenceTime {
+    /// System time when the frame passed the reference clock, in nanoseconds.
+    pub time: u64,
+    /// When the host sent that frame.
+    pub sent_at: Instant,
+}
+
+impl ReferenceTime {
+    /// What the reference clock shows when a frame sent at `now` passes it, as long as both clocks run alike.
+    pub const fn at(self, now: Instant) -> u64 {
+        self.time.wrapping_add(now.0.wrapping_sub(self.sent_at.0))
+    }
+}
+
+/// Where the datagrams are in a frame: offsets of their headers.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Places {
+    pub sync_at: usize,
+    pub steer_at: usize,
+    pub spread_at: usize,
+}
+
+/// What a copy carries.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Payload {
+    sync: Option<(StationAddress, u32)>,
+    steer: Option<(StationAddress, u32)>,
+}
+
+/// What the copies of a flight brought back.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Seen {
+    pub sent_at: Instant,
+    /// Low half of the distributed time and working counter, by the link the copy was sent on.
+    sync: [(u32, Wkc); 2],
+    spread: u32,
+    spread_wkc: u16,
+}
+
+impl Places {
+    /// Writes what a copy is to carry.
+    pub(crate) fn write(&self, bytes: &mut [u8], payload: &Payload) {
+        write(bytes, self.sync_at, payload.sync);
+        write(bytes, self.steer_at, payload.steer);
+    }
+
+    /// Takes in a copy.
+    pub(crate) fn read(&self, seen: &mut Seen, sent_on: Link, bytes: &[u8]) {
+        let (time, wkc) = data_at(bytes, self.sync_at);
+        seen.sync[sent_on.index()] = (time, Wkc(wkc));
+        let (spread, wkc) = data_at(bytes, self.spread_at);
+        seen.spread |= spread & 0x7FFF_FFFF;
+        seen.spread_wkc = seen.spread_wkc.saturating_add(wkc);
+    }
+}
+
+/// Address and data of a datagram. One that is not wanted addresses nobody, at a register that takes nothing: the command
+/// of both copies stays the same.
+fn write(bytes: &mut [u8], at: usize, content: Option<(StationAddress, u32)>) {
+    let (station, register, data) = match content {
+        Some((station, data)) => (station, map::DC_SYSTEM_TIME, data),
+        None => (StationAddress(0), RegisterAddress(0), 0),
+    };
+    if let Some(bytes) = bytes.get_mut(at + 2..at + HEADER_LEN + CLOCK_DATA) {
+        bytes[..2].copy_from_slice(&station.0.to_le_bytes());
+        bytes[2..4].copy_from_slice(&register.0.to_le_bytes());
+        bytes[HEADER_LEN - 2..].copy_from_slice(&data.to_le_bytes());
+    }
+}
+
+fn data_at(bytes: &[u8], at: usize) -> (u32, u16) {
+    match bytes.get(at + HEADER_LEN..).and_then(<[u8]>::first_chunk::<{ CLOCK_DATA + 2 }>) {
+        Some([a, b, c, d, low, high]) => (u32::from_le_bytes([*a, *b, *c, *d]), u16::from_le_bytes([*low, *high])),
+        None => (0, 0),
+    }
+}
+
+/// How the time of a steered reference differs from that of the segment's, when frames that left together pass them.
+#[derive(Clone, Copy, Debug)]
+struct Lead {
+    /// What it differs when both show the same: their ways from the host are not equally long.
+    gap: i64,
+    /// Nanoseconds that it is ahead.
+    ahead: i64,
+    /// How fast this changes, filtered.
+    change_ppb: i64,
+    seen_at: Instant,
+}
+
+impl Lead {
+    fn begin(difference: i64, seen_at: Instant) -> Lead {
+        Lead { gap: difference, ahead: 0, change_ppb: 0, seen_at }
+    }
+
+    fn go_on(self, difference: i64, seen_at: Instant) -> Lead {
+        let ahead = difference - self.gap;
+        let passed = seen_at.0.saturating_sub(self.seen_at.0).max(1) as i64;
+        // Clocks are never further apart than what their loops can take out.
+        let change =
+            ((ahead - self.ahead).clamp(-1_000_000, 1_000_000) * 1_000_000_000 / passed).clamp(-800_000, 800_000);
+        let change_ppb = self.change_ppb + ((change - self.change_ppb) >> CHANGE_DEPTH);
+        Lead { ahead, change_ppb, seen_at, ..self }
+    }
+}
+
+/// The clocks as the exchange sees them.
+#[derive(Debug, Default)]
+pub(crate) struct Clocks {
+    setup: ClockSetup,
+    references: References,
+    changes: u32,
+    /// Nothing is distributed until other references are posted: these are out of date.
+    held: bool,
+    /// The reference on each copy.
+    times: [Option<ReferenceTime>; 2],
+    /// How the steered reference differs from the other one.
+    lead: Option<Lead>,
+    /// The application's time, and when it said so.
+    application: Option<ReferenceTime>,
+    /// The reference is to have this time when the next frame passes it.
+    wanted: Option<u64>,
+    cycle: u32,
+    spread_ns: Option<u32>,
+    inside: Option<bool>,
+    /// Results in a row that contradict `inside`.
+    contrary: u8,
+}
+
+impl Clocks {
+    pub(crate) fn set_up(&mut self, setup: ClockSetup) {
+        self.setup = setup;
+    }
+
+    /// The application's time now, from which the references are predicted and to which bus shift leads.
+    pub(crate) fn set_application_time(&mut self, time: u64, now: Instant) {
+        self.application = Some(ReferenceTime { time, sent_at: now });
+    }
+
+    pub(crate) fn application_time(&self, now: Instant) -> u64 {
+        self.application.map_or(self.setup.epoch.wrapping_add(now.0), |application| application.at(now))
+    }
+
+    pub(crate) fn want_reference_at(&mut self, time: u64) {
+        self.wanted = Some(time);
+    }
+
+    /// The last reading of the segment's reference.
+    pub(crate) fn reference_time(&self) -> Option<ReferenceTime> {
+        self.times[self.references.leader().0?.index()]
+    }
+
+    pub(crate) fn spread_ns(&self) -> Option<u32> {
+        self.spread_ns
+    }
+
+    /// What the reference on a copy will show when a frame sent now passes it.
+    fn predicted(&self, link: Link, now: Instant) -> u64 {
+        let [main, redundant] = self.times;
+        let (own, other) = if link == Link::Main { (main, redundant) } else { (redundant, main) };
+        own.or(other).map_or_else(|| self.application_time(now), |time| time.at(now))
+    }
+
+    /// What the copies of a frame that leaves now carry.
+    pub(crate) fn depart(&mut self, board: &Board, now: Instant) -> [Payload; 2] {
+        let (references, changes) = board.clocks.references();
+        if changes != self.changes {
+            self.follow(references, changes, now);
+        }
+        let mut payloads = [Payload::default(); 2];
+        if self.held {
+            return payloads;
+        }
+        let steer = self.steering(now);
+        for link in Link::ALL {
+            let sync = self.references.on(link).map(|station| (station, self.predicted(link, now) as u32));
+            payloads[link.index()] = Payload { sync, steer };
+        }
+        self.cycle = self.cycle.wrapping_add(1);
+        payloads
+    }
+
+    /// Other references were posted.
+    #[cold]
+    fn follow(&mut self, references: References, changes: u32, now: Instant) {
+        for link in Link::ALL {
+            if references.on(link) != self.references.on(link) {
+                // The clock of another reference shows the same time, as far as is known.
+                let time = ReferenceTime { time: self.predicted(link, now), sent_at: now };
+                self.times[link.index()] = references.on(link).map(|_| time);
+            }
+        }
+        self.lead = None;
+        (self.references, self.changes, self.held) = (references, changes, false);
+    }
+
+    /// Who is told another time than its own, and which.
+    fn steering(&mut self, now: Instant) -> Option<(StationAddress, u32)> {
+        let (leader, steered) = self.references.leader();
+        if let Some(leader) = leader
+            && (self.wanted.is_some() || (self.setup.bus_shift && steered.is_none()))
+        {
+            let time = self.wanted.take().unwrap_or_else(|| self.application_time(now));
+            return Some((self.references.on(leader)?, time as u32));
+        }
+        let (steered, own) = (steered?, self.times[steered?.index()]?);
+        let Lead { ahead, change_ppb, .. } = self.lead?;
+        let expected = ahead + change_ppb * (FORESIGHT_NS / 1_000) / 1_000_000;
+        if expected.abs() <= NEAR_NS && !self.cycle.is_multiple_of(STEERING_INTERVAL) {
+            return None;
+        }
+        let wanted = own.at(now).wrapping_sub(expected.clamp(-MOST_STEERING_NS, MOST_STEERING_NS) as u64);
+        Some((self.references.on(steered)?, wanted as u32))
+    }
+
+    /// A flight is over.
+    pub(crate) fn observe(&mut self, seen: &Seen, arrivals: Arrivals, board: &Board, events: &mut Producer) {
+        let (_, steered) = self.references.leader();
+        let mut fresh = 0;
+        for link in Link::ALL {
+            let (low, wkc) = seen.sync[link.index()];
+            if wkc.0 == 0 || self.references.on(link).is_none() {
+                continue;
+            }
+            let time = extend(low, self.predicted(link, seen.sent_at));
+            self.times[link.index()] = Some(ReferenceTime { time, sent_at: seen.sent_at });
+            fresh += 1;
+        }
+        if let Some(steered) = steered {
+            if fresh == 2 {
+                let leader = if steered == Link::Main { Link::Redundant } else { Link::Main };
+                let time = |link: Link| self.times[link.index()].map_or(0, |time| time.time);
+                let difference = time(steered).wrapping_sub(time(leader)) as i64;
+                let begin = Lead::begin(difference, seen.sent_at);
+                self.lead = Some(self.lead.map_or(begin, |lead| lead.go_on(difference, seen.sent_at)));
+            }
+            // The ring is closed again: one reference is enough, and delays are not what they were.
+            self.held |= arrivals.verdict() == Some(RingState::Closed);
+        }
+        if seen.spread_wkc > 0 {
+            self.judge_spread(seen.spread, board, events);
+        }
+    }
+
+    fn judge_spread(&mut self, spread_ns: u32, board: &Board, events: &mut Producer) {
+        self.spread_ns = Some(spread_ns);
+        board.clocks.post_spread(spread_ns);
+        let inside = spread_ns <= self.setup.sync_window_ns;
+        // Before they have been inside there is nothing to leave.
+        if self.inside.unwrap_or(false) == inside || !board.clocks.is_window_watched() {
+            self.contrary = 0;
+            return;
+        }
+        self.contrary += 1;
+        if self.contrary >= WINDOW_RESULTS {
+            (self.inside, self.contrary) = (Some(inside), 0);
+            events.push(CyclicEvent::SyncWindow { inside, spread_ns }.pack());
+        }
+    }
+}

@@ -1,0 +1,196 @@
+//! Distributed clocks: set up, brought together, watched (facts 7).
+//!
+//! * [`set_up`]: propagation delays, offsets, filters;
+//! * [`signals`]: SYNC signals of one SubDevice;
+//! * [`watch`]: the static drift phase, who is locked, whose time each link distributes.
+//!
+//! What they know about the clocks is in [`SharedClocks`], which the bring-up of SubDevices looks at too.
+
+mod set_up;
+mod signals;
+mod watch;
+
+use alloc::rc::Rc;
+use alloc::vec::Vec;
+use core::cell::{RefCell, RefMut};
+
+use ringcat_wire::address::StationAddress;
+
+use crate::config::{ClockConfig, ReferenceClock};
+use crate::info::SubDeviceInfo;
+use crate::link::Link;
+
+pub use signals::NotLocked;
+pub(super) use signals::{SignalsError, restore, start_signals, wait_for_lock};
+pub(crate) use watch::{begin, keep};
+
+/// A SubDevice of the scan, as far as clocks are concerned.
+#[derive(Clone, Debug)]
+pub(super) struct Node {
+    pub station: StationAddress,
+    /// Index in the declaration.
+    pub member: Option<usize>,
+    /// It has a clock.
+    pub has_clock: bool,
+    /// SYNC signals are declared for it.
+    pub is_configured: bool,
+    /// From where frames come into its tree to its processing unit, with fraction.
+    pub unit: Option<i64>,
+    /// What was written to DC_SYSTEM_TIME_DELAY.
+    pub delay_ns: i64,
+    /// What was written to DC_SYSTEM_TIME_OFFSET.
+    pub offset_ns: i64,
+    /// How much faster than the reference it ran when it was measured.
+    pub drift_ppb: i64,
+    /// DC_SYSTEM_TIME_DIFFERENCE, when it answered last.
+    pub difference_ns: Option<i32>,
+    /// Largest magnitude of that since it was locked.
+    pub worst_ns: u32,
+    /// Samples in a row within the window.
+    pub good: u32,
+    /// On which link it answered last.
+    pub link: Option<Link>,
+}
+
+/// What is known about the clocks of a segment.
+#[derive(Debug, Default)]
+pub(super) struct Clocks {
+    /// `None`: distributed clocks were not declared.
+    pub config: Option<ClockConfig>,
+    /// By position of the scan.
+    pub nodes: Vec<Node>,
+    /// Position of the reference.
+    pub reference: Option<usize>,
+    /// Delays and offsets are written.
+    pub is_set_up: bool,
+    /// The ring is kept open on purpose.
+    pub is_measuring: bool,
+    /// The static drift phase runs: what differences show then does not hold for the pace of cycles.
+    pub is_drifting: bool,
+    /// All clocks were within the window for long enough.
+    pub is_locked: bool,
+    /// System time when host time is zero, as the reference clock has it.
+    pub epoch: u64,
+}
+
+/// Shared by the procedures of one MainDevice.
+#[derive(Clone, Debug, Default)]
+pub struct SharedClocks {
+    clocks: Rc<RefCell<Clocks>>,
+}
+
+/// What is known about the clock of one SubDevice.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct ClockStatus {
+    /// Position in the scan.
+    pub position: u16,
+    /// Its station address.
+    pub station: StationAddress,
+    /// Index in the declaration.
+    pub subdevice: Option<usize>,
+    /// It is the reference of the segment.
+    pub is_reference: bool,
+    /// Nanoseconds from the reference of its part of the segment (0x0928).
+    pub delay_ns: i64,
+    /// System time less local time when it was set up (0x0920).
+    pub offset_ns: i64,
+    /// How much faster than the reference it ran while it was free, in parts per billion.
+    pub drift_ppb: i64,
+    /// Its time less that of the reference in nanoseconds (0x092C); `None` before it was read.
+    pub difference_ns: Option<i32>,
+    /// Largest magnitude of that since it was locked.
+    pub worst_ns: u32,
+    /// It was within the window for as many samples as configured.
+    pub is_locked: bool,
+}
+
+impl SharedClocks {
+    /// Clocks of a scan. `members` by position: index in the declaration, and whether SYNC signals are declared.
+    pub fn new(
+        config: Option<ClockConfig>,
+        scanned: &[SubDeviceInfo],
+        members: impl Fn(&SubDeviceInfo) -> Option<(usize, bool)>,
+    ) -> SharedClocks {
+        let node = |info: &SubDeviceInfo| {
+            let member = members(info);
+            Node {
+                station: info.station,
+                member: member.map(|(index, _)| index),
+                has_clock: info.controller.features.dc,
+                is_configured: member.is_some_and(|(_, configured)| configured),
+                unit: None,
+                delay_ns: 0,
+                offset_ns: 0,
+                drift_ppb: 0,
+                difference_ns: None,
+                worst_ns: 0,
+                good: 0,
+                link: None,
+            }
+        };
+        let epoch = config.as_ref().map_or(0, |config| config.epoch);
+        let nodes = scanned.iter().map(node).collect();
+        SharedClocks { clocks: Rc::new(RefCell::new(Clocks { config, nodes, epoch, ..Clocks::default() })) }
+    }
+
+    pub(super) fn access(&self) -> RefMut<'_, Clocks> {
+        self.clocks.borrow_mut()
+    }
+
+    /// Whether distributed clocks were declared.
+    pub(crate) fn are_declared(&self) -> bool {
+        self.access().config.is_some()
+    }
+
+    /// Whether the ring is kept open to measure delays.
+    pub(crate) fn are_measuring(&self) -> bool {
+        self.access().is_measuring
+    }
+
+    /// Whether all clocks are locked.
+    pub fn are_locked(&self) -> bool {
+        self.access().is_locked
+    }
+
+    /// Each clock of the segment, by position.
+    pub fn status(&self) -> Vec<ClockStatus> {
+        let clocks = self.access();
+        let samples = clocks.config.as_ref().map_or(u32::MAX, |config| config.lock_samples);
+        let with_clock = clocks.nodes.iter().enumerate().filter(|(_, node)| node.has_clock);
+        let status = |(position, node): (usize, &Node)| ClockStatus {
+            position: position as u16,
+            station: node.station,
+            subdevice: node.member,
+            is_reference: clocks.reference == Some(position),
+            delay_ns: node.delay_ns,
+            offset_ns: node.offset_ns,
+            drift_ppb: node.drift_ppb,
+            difference_ns: node.difference_ns,
+            worst_ns: node.worst_ns,
+            is_locked: node.good >= samples,
+        };
+        with_clock.map(status).collect()
+    }
+}
+
+impl Clocks {
+    /// The reference among those that `can` be it: the chosen one, or the first as the configuration wants it.
+    pub fn elect(&self, can: impl Fn(usize, &Node) -> bool) -> Option<usize> {
+        let choice = self.config.as_ref()?.reference;
+        let able = |(position, node): &(usize, &Node)| node.has_clock && can(*position, node);
+        let candidates = || self.nodes.iter().enumerate().filter(able).map(|(position, _)| position);
+        let preferred = match choice {
+            ReferenceClock::FirstWithClock => None,
+            ReferenceClock::FirstConfigured => candidates().find(|position| self.nodes[*position].is_configured),
+            ReferenceClock::Declared(index) => {
+                candidates().find(|position| self.nodes[*position].member == Some(index))
+            }
+        };
+        preferred.or_else(|| candidates().next())
+    }
+
+    /// Position of a declared SubDevice.
+    pub fn position_of(&self, member: usize) -> Option<usize> {
+        self.nodes.iter().position(|node| node.member == Some(member))
+    }
+}

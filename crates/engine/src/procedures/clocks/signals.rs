@@ -1,0 +1,178 @@
+//! SYNC signals of one SubDevice, and waiting until its clock is good enough for them (facts 7.3).
+
+use core::fmt;
+use core::time::Duration;
+
+use ringcat_wire::address::StationAddress;
+use ringcat_wire::register::{DcSystemTimeDifference, map};
+
+use super::SharedClocks;
+use super::set_up::set_up_one;
+use super::watch::drift_phase;
+use crate::clocks::{extend, first_pulse, start::whole_cycle};
+use crate::config::SyncSignals;
+use crate::procedures::fleet::SharedFleet;
+use crate::supervisor::{Bus, BusError};
+
+/// From the look at the clock to the first pulse at the least (facts 7.3).
+const AHEAD_NS: u64 = 100_000_000;
+/// Signals are started when the clock differs by at most this (facts 7.2: as IgH does).
+const GOOD_ENOUGH_NS: u32 = 10_000;
+/// Pause between two looks.
+const PAUSE: Duration = Duration::from_millis(1);
+
+/// A clock did not come into its window.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct NotLocked {
+    /// How long that was waited for.
+    pub waited: Duration,
+    /// Its difference to the reference when it was read last.
+    pub difference_ns: Option<i32>,
+    /// The window.
+    pub window_ns: u32,
+    /// Its position where another clock of the segment is to blame.
+    pub other: Option<u16>,
+}
+
+impl fmt::Display for NotLocked {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self.other {
+            Some(position) => write!(f, "the clock of position {position}")?,
+            None => f.write_str("its clock")?,
+        }
+        write!(f, " did not lock within {} ms: ", self.waited.as_millis())?;
+        match self.difference_ns {
+            Some(ns) => write!(f, "expected a difference of at most {} ns, got {ns} ns", self.window_ns),
+            None => f.write_str("its difference to the reference clock could not be read"),
+        }
+    }
+}
+
+/// Sets up anew what a clock has lost with its power.
+pub(in crate::procedures) async fn restore(bus: &Bus, fleet: &SharedFleet, member: usize) -> Result<(), BusError> {
+    let Some(position) = position(&fleet.clocks, member) else { return Ok(()) };
+    let (station, expected) = {
+        let clocks = fleet.clocks.access();
+        (clocks.nodes[position].station, clocks.nodes[position].offset_ns)
+    };
+    let offset: [u8; 4] = bus.fprd_array(station, map::DC_SYSTEM_TIME_OFFSET).await?;
+    if u32::from_le_bytes(offset) == expected as u32 {
+        return Ok(());
+    }
+    set_up_one(bus, &fleet.clocks, position).await?;
+    bus.spawn(drift_phase(bus.clone(), fleet.clone()));
+    Ok(())
+}
+
+fn position(clocks: &SharedClocks, member: usize) -> Option<usize> {
+    let clocks = clocks.access();
+    let position = clocks.position_of(member)?;
+    (clocks.is_set_up && clocks.nodes[position].has_clock).then_some(position)
+}
+
+/// Programs the SYNC unit and starts it. The clock must be about right by then.
+pub(in crate::procedures) async fn start_signals(
+    bus: &Bus,
+    fleet: &SharedFleet,
+    member: usize,
+    station: StationAddress,
+    signals: &SyncSignals,
+    limit: Duration,
+) -> Result<(), SignalsError> {
+    let [control, activation] = signals.assign_activate.to_le_bytes();
+    bus.fpwr(station, map::DC_ACTIVATION, &[0]).await?;
+    wait_until_about_right(bus, fleet, member, limit).await.map_err(SignalsError::NotLocked)?;
+    bus.fpwr(station, map::DC_CYCLIC_UNIT_CONTROL, &[control]).await?;
+    let sync1 = if activation & 0x04 != 0 { signals.sync1_register_ns() } else { 0 };
+    let mut cycles = [0; 8];
+    cycles[..4].copy_from_slice(&signals.sync0_cycle_ns.to_le_bytes());
+    cycles[4..].copy_from_slice(&sync1.to_le_bytes());
+    bus.fpwr(station, map::DC_SYNC0_CYCLE, &cycles).await?;
+    let low = u32::from_le_bytes(bus.fprd_array(station, map::DC_SYSTEM_TIME).await?);
+    let near = bus.now().0.wrapping_add(fleet.clocks.access().epoch);
+    let earliest = extend(low, near).wrapping_add(AHEAD_NS);
+    let cycle = whole_cycle(signals.sync0_cycle_ns, sync1);
+    let start = first_pulse(earliest, cycle, signals.sync0_shift_ns.into());
+    bus.fpwr(station, map::DC_START_TIME, &start.to_le_bytes()).await?;
+    Ok(bus.fpwr(station, map::DC_ACTIVATION, &[activation]).await?)
+}
+
+/// Why SYNC signals were not started.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(in crate::procedures) enum SignalsError {
+    Bus(BusError),
+    NotLocked(NotLocked),
+}
+
+impl From<BusError> for SignalsError {
+    fn from(error: BusError) -> SignalsError {
+        SignalsError::Bus(error)
+    }
+}
+
+async fn wait_until_about_right(
+    bus: &Bus,
+    fleet: &SharedFleet,
+    member: usize,
+    limit: Duration,
+) -> Result<(), NotLocked> {
+    let is_right = |clocks: &super::Clocks| {
+        let position = clocks.position_of(member);
+        let node = position.and_then(|position| clocks.nodes.get(position));
+        let difference = node.and_then(|node| node.difference_ns);
+        let near = difference.is_some_and(|ns| ns.unsigned_abs() <= GOOD_ENOUGH_NS);
+        (clocks.is_set_up && (near || position == clocks.reference), difference, None)
+    };
+    wait(bus, fleet, limit, GOOD_ENOUGH_NS, is_right).await
+}
+
+/// Waits until all clocks are locked.
+pub(in crate::procedures) async fn wait_for_lock(
+    bus: &Bus,
+    fleet: &SharedFleet,
+    member: usize,
+) -> Result<(), NotLocked> {
+    let (limit, window, samples) = {
+        let clocks = fleet.clocks.access();
+        let Some(config) = &clocks.config else { return Ok(()) };
+        (config.lock_limit, config.lock_window_ns, config.lock_samples)
+    };
+    let is_locked = |clocks: &super::Clocks| {
+        let own = clocks.position_of(member);
+        let open = |position: &usize| {
+            let node = &clocks.nodes[*position];
+            node.has_clock && node.link.is_some() && node.good < samples && Some(*position) != clocks.reference
+        };
+        // Its own clock first: if that is right, another one keeps all waiting.
+        let to_blame = own.filter(open).or_else(|| (0..clocks.nodes.len()).find(open));
+        let difference = to_blame.or(own).and_then(|position| clocks.nodes[position].difference_ns);
+        let other = to_blame.filter(|position| Some(*position) != own).map(|position| position as u16);
+        (clocks.is_set_up && to_blame.is_none(), difference, other)
+    };
+    wait(bus, fleet, limit, window, is_locked).await
+}
+
+async fn wait(
+    bus: &Bus,
+    fleet: &SharedFleet,
+    limit: Duration,
+    window_ns: u32,
+    is_good: impl Fn(&super::Clocks) -> (bool, Option<i32>, Option<u16>),
+) -> Result<(), NotLocked> {
+    let begin = bus.now();
+    loop {
+        let (good, difference_ns, other) = is_good(&fleet.clocks.access());
+        if good {
+            return Ok(());
+        }
+        if bus.now() >= begin + limit {
+            return Err(NotLocked { waited: limit, difference_ns, window_ns, other });
+        }
+        bus.sleep(PAUSE).await;
+    }
+}
+
+/// The difference as a register value says it, in nanoseconds.
+pub(super) fn difference(bytes: [u8; 4]) -> i32 {
+    DcSystemTimeDifference::decode(&bytes).signed_ns()
+}

@@ -1,0 +1,254 @@
+//! The static drift phase, who is locked, and whose time each link distributes (facts 7.2, 7.5).
+//!
+//! Two procedures run side by side: one hands the reference time to all clocks many times, as fast as the segment allows,
+//! the other reads their differences, every millisecond until all are locked and now and again afterwards. When the
+//! ring opens or closes, or a SubDevice is lost, the second one finds out who answers on which link, lets the delays
+//! there count from the clock that is followed there, and posts the references for the cyclic frames.
+
+use core::time::Duration;
+
+use alloc::string::ToString;
+use alloc::vec;
+use alloc::vec::Vec;
+
+use ringcat_wire::address::{Position, StationAddress, Wkc};
+use ringcat_wire::command::Command;
+use ringcat_wire::datagram::Target;
+use ringcat_wire::register::map;
+
+use super::set_up::{set_up, write_delays};
+use super::signals::difference;
+use crate::board::clocks::References;
+use crate::clocks::extend;
+use crate::event::Event;
+use crate::link::Link;
+use crate::procedures::fleet::SharedFleet;
+use crate::supervisor::Bus;
+use crate::time::Instant;
+
+/// Between two looks at the board, and at the differences before all are locked.
+const PAUSE: Duration = Duration::from_millis(1);
+/// Between two looks at the differences afterwards.
+const ROUTINE: Duration = Duration::from_millis(100);
+/// Between two tries to set the clocks up.
+const RETRY: Duration = Duration::from_millis(100);
+/// Distributions in a row; then the bus belongs to others for [`BURST_PAUSE`].
+const BURST: u32 = 8;
+const BURST_PAUSE: Duration = Duration::from_micros(100);
+/// A burst and its pause take at least this: the loops need their time as well as their samples, and what they have not
+/// learned by the end of the phase, cycles of a millisecond take seconds for.
+const BURST_TIME: Duration = Duration::from_micros(640);
+
+/// The first try to set the clocks up, before anything else is asked of the SubDevices.
+pub(crate) async fn begin(bus: &Bus, fleet: &SharedFleet) {
+    try_set_up(bus, fleet).await;
+}
+
+async fn try_set_up(bus: &Bus, fleet: &SharedFleet) {
+    if let Err(reason) = set_up(bus, fleet).await {
+        bus.report(Event::ClocksFailed { reason });
+        return;
+    }
+    post(bus, fleet);
+    let reference = fleet.clocks.access().reference;
+    bus.report(Event::ReferenceClock { position: reference.map(|position| Position(position as u16)) });
+    bus.spawn(drift_phase(bus.clone(), fleet.clone()));
+}
+
+/// Runs for ever.
+pub(crate) async fn keep(bus: Bus, fleet: SharedFleet) {
+    while !fleet.clocks.access().is_set_up {
+        if !fleet.clocks.access().nodes.iter().any(|node| node.has_clock) {
+            return;
+        }
+        bus.sleep(RETRY).await;
+        try_set_up(&bus, &fleet).await;
+    }
+    let mut next_look = Instant::default();
+    let mut seen = (fleet.board.ring().changes, answering(&fleet));
+    loop {
+        bus.sleep(PAUSE).await;
+        let now = (fleet.board.ring().changes, answering(&fleet));
+        let changed = now != seen;
+        seen = now;
+        let is_locked = fleet.clocks.are_locked();
+        if changed || bus.now() >= next_look {
+            look(&bus, &fleet).await;
+            next_look = if is_locked && !is_anybody_open(&fleet) { bus.now() + ROUTINE } else { bus.now() };
+        }
+    }
+}
+
+/// Whether a clock that is there is not locked, or not again.
+fn is_anybody_open(fleet: &SharedFleet) -> bool {
+    let clocks = fleet.clocks.access();
+    let samples = clocks.config.as_ref().map_or(0, |config| config.lock_samples);
+    clocks.nodes.iter().any(|node| node.has_clock && node.link.is_some() && node.good < samples)
+}
+
+/// How many SubDevices answered on each link.
+fn answering(fleet: &SharedFleet) -> (u16, u16) {
+    fleet.board.supervision().map_or((0, 0), |(_, seen)| (seen.main.0, seen.redundant.0))
+}
+
+/// Hands the reference time out, many times. One of these runs at a time.
+pub(super) async fn drift_phase(bus: Bus, fleet: SharedFleet) {
+    let count = {
+        let mut clocks = fleet.clocks.access();
+        if core::mem::replace(&mut clocks.is_drifting, true) {
+            return;
+        }
+        clocks.config.as_ref().map_or(0, |config| config.drift_distributions)
+    };
+    let followers = fleet.clocks.access().nodes.iter().filter(|node| node.has_clock).count() as u16;
+    let mut next = bus.now();
+    for number in 0..count {
+        let (references, _) = fleet.board.clocks.references();
+        // With a ring that opens or closes right now, the wrong clocks would follow.
+        let is_certain = references == wanted(&fleet);
+        let nobody = StationAddress(0);
+        let stations = Link::ALL.map(|link| references.on(link).unwrap_or(nobody));
+        if !is_certain || stations == [nobody; 2] {
+            bus.sleep(PAUSE).await;
+            continue;
+        }
+        // A link without a reference has nobody who takes a time.
+        let near = bus.now().0.wrapping_add(fleet.clocks.access().epoch) as u32;
+        if bus.distribute_time(stations, map::DC_SYSTEM_TIME, near, Wkc(followers)).await.is_err() {
+            bus.sleep(PAUSE).await;
+        }
+        if number % BURST == BURST - 1 {
+            next += BURST_TIME;
+            bus.sleep_until(next.max(bus.now() + BURST_PAUSE)).await;
+        }
+    }
+    fleet.clocks.access().is_drifting = false;
+}
+
+/// What one clock said, and on which link.
+#[derive(Clone, Copy, Default)]
+struct Answer {
+    link: Option<Link>,
+    difference_ns: Option<i32>,
+}
+
+/// Reads all differences and draws conclusions.
+async fn look(bus: &Bus, fleet: &SharedFleet) {
+    let stations: Vec<Option<StationAddress>> = {
+        let clocks = fleet.clocks.access();
+        clocks.nodes.iter().map(|node| node.has_clock.then_some(node.station)).collect()
+    };
+    let answers = bus.gather(stations, |bus, station| async move {
+        let Some(station) = station else { return Some(Answer::default()) };
+        let target = Target::Station(station, map::DC_SYSTEM_TIME_DIFFERENCE);
+        // A lost frame says nothing about anybody.
+        let reply = bus.transfer(Command::Fprd, target, vec![0; 4], Some(Wkc(1))).await.ok()?;
+        let link = match (reply.main.0, reply.redundant.0) {
+            (0, 0) => return Some(Answer::default()),
+            (0, _) => Link::Redundant,
+            _ => Link::Main,
+        };
+        let difference_ns = reply.data.first_chunk().map(|bytes| difference(*bytes));
+        Some(Answer { link: Some(link), difference_ns })
+    });
+    let answers: Vec<Option<Answer>> = answers.await;
+    judge(bus, fleet, &answers);
+    follow_links(bus, fleet, &answers).await;
+    follow_reference(bus, fleet).await;
+}
+
+/// Notes the differences; all locked is an event.
+fn judge(bus: &Bus, fleet: &SharedFleet, answers: &[Option<Answer>]) {
+    let clocks = &mut *fleet.clocks.access();
+    let Some(config) = &clocks.config else { return };
+    let references = Link::ALL.map(|link| clocks.reference_on(link));
+    let (mut all, mut largest) = (clocks.reference.is_some(), 0);
+    for (position, (node, answer)) in clocks.nodes.iter_mut().zip(answers).enumerate() {
+        let Some(Answer { difference_ns: Some(difference), .. }) = answer else {
+            all &= !node.has_clock || node.link.is_none();
+            continue;
+        };
+        // Nothing is written to a reference, so that its own difference is none.
+        let difference = if references.contains(&Some(position)) { 0 } else { *difference };
+        let magnitude = difference.unsigned_abs();
+        node.difference_ns = Some(difference);
+        node.good =
+            if magnitude <= config.lock_window_ns && !clocks.is_drifting { node.good.saturating_add(1) } else { 0 };
+        if node.good >= config.lock_samples || (node.worst_ns > 0 && clocks.is_locked) {
+            node.worst_ns = node.worst_ns.max(magnitude);
+        }
+        all &= node.good >= config.lock_samples;
+        largest = largest.max(magnitude);
+    }
+    if all && !clocks.is_locked {
+        clocks.is_locked = true;
+        fleet.board.clocks.watch_window();
+        bus.report(Event::ClocksLocked { largest_ns: largest });
+    }
+}
+
+/// Follows SubDevices from link to link, and replaces a reference that is gone.
+async fn follow_links(bus: &Bus, fleet: &SharedFleet, answers: &[Option<Answer>]) {
+    let (moved, elected) = {
+        let mut clocks = fleet.clocks.access();
+        let mut moved = false;
+        for (node, answer) in clocks.nodes.iter_mut().zip(answers) {
+            let Some(answer) = answer.filter(|_| node.has_clock) else { continue };
+            moved |= answer.link != node.link;
+            node.link = answer.link;
+        }
+        let before = clocks.reference;
+        let is_there = before.is_some_and(|position| clocks.nodes[position].link.is_some());
+        if !is_there {
+            clocks.reference = clocks.elect(|_, node| node.link.is_some() && node.unit.is_some());
+        }
+        (moved, (clocks.reference != before).then_some(clocks.reference))
+    };
+    if let Some(reference) = elected {
+        bus.report(Event::ReferenceClock { position: reference.map(|position| Position(position as u16)) });
+    }
+    let held = fleet.board.clocks.references().0 != wanted(fleet);
+    if !moved && !held && elected.is_none() {
+        return;
+    }
+    let changed: Vec<Link> = {
+        let mut clocks = fleet.clocks.access();
+        Link::ALL.into_iter().filter(|link| clocks.refer(*link)).collect()
+    };
+    if !changed.is_empty() {
+        // Nobody is told a time while delays count from different clocks.
+        fleet.board.clocks.post_references(References::default());
+        for link in changed {
+            if let Err(error) = write_delays(bus, &fleet.clocks, link).await {
+                bus.report(Event::ClocksFailed { reason: error.to_string() });
+            }
+        }
+    }
+    post(bus, fleet);
+}
+
+/// Whose time the copies are to distribute.
+fn wanted(fleet: &SharedFleet) -> References {
+    let clocks = fleet.clocks.access();
+    let station = |link| clocks.reference_on(link).map(|position| clocks.nodes[position].station);
+    let leads = clocks.reference.and_then(|position| clocks.nodes[position].link) == Some(Link::Redundant);
+    References { main: station(Link::Main), redundant: station(Link::Redundant), redundant_leads: leads }
+}
+
+fn post(_bus: &Bus, fleet: &SharedFleet) {
+    fleet.board.clocks.post_references(wanted(fleet));
+}
+
+/// Keeps in mind what the reference clock shows at which host time.
+async fn follow_reference(bus: &Bus, fleet: &SharedFleet) {
+    let station = {
+        let clocks = fleet.clocks.access();
+        clocks.reference.map(|position| clocks.nodes[position].station)
+    };
+    let Some(station) = station else { return };
+    let Ok(bytes) = bus.fprd_array::<4>(station, map::DC_SYSTEM_TIME).await else { return };
+    let mut clocks = fleet.clocks.access();
+    let host = bus.now().0;
+    let near = host.wrapping_add(clocks.epoch);
+    clocks.epoch = extend(u32::from_le_bytes(bytes), near).wrapping_sub(host);
+}

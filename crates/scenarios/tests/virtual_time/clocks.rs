@@ -1,0 +1,227 @@
+//! Distributed clocks: delays, lock, spread, SYNC signals (facts 7).
+
+use std::time::Duration;
+
+use ringcat::{ClockConfig, Event, Options, ReferenceClock, SyncSignals};
+use ringcat_sim::cable::{CableId, DeviceIndex};
+use ringcat_sim::network::NetworkOptions;
+use ringcat_wire::al::AlStatusCode;
+use scenarios::clocks::{EPOCH, clocked, config, delay, differences, largest_spread, lock, spread, with_clocks, world};
+use scenarios::segments::{line, ring};
+use scenarios::world::World;
+
+/// Time of a passage and of a cable.
+const HOP_NS: i64 = 300 + 50;
+
+fn all(count: usize) -> Vec<usize> {
+    (0..count).collect()
+}
+
+#[test]
+fn delays_of_a_line_are_those_of_its_cables_facts_7_1() {
+    for count in [2, 7, 30] {
+        let mut world = world(1, line(clocked(count, 100), NetworkOptions::default()), config());
+        world.until(Duration::from_secs(1), "set up", |world| {
+            world
+                .network()
+                .device(DeviceIndex(1))
+                .controller
+                .register(ringcat_wire::register::map::DC_SYSTEM_TIME_DELAY, 1)
+                != [0]
+        });
+        world.run_cycles(10);
+        for device in 0..count {
+            let error = i64::from(delay(world.network(), device)) - HOP_NS * device as i64;
+            let limit = 10 + (100.0 * device as f64).sqrt() as i64;
+            assert!(error.abs() <= limit, "device {device} of {count}: {error} ns");
+        }
+    }
+}
+
+#[test]
+fn clocks_of_a_line_lock_and_stay_together_facts_7_2() {
+    let mut world = world(2, line(clocked(20, 50), NetworkOptions::default()), config());
+    let mark = world.beginning();
+    lock(&mut world, Duration::from_secs(3));
+    assert!(world.saw(mark, |event| matches!(event, Event::ClocksLocked { .. })));
+    let largest = largest_spread(&mut world, &all(20), 2_000);
+    assert!(world.saw(mark, |event| matches!(event, Event::SyncWindow { inside: true, .. })));
+    assert!(!world.saw(mark, |event| matches!(event, Event::SyncWindow { inside: false, .. })));
+    assert!(largest <= 100, "{largest} ns");
+    // What the MainDevice believes is what is.
+    let status = world.application().engine().clocks();
+    assert_eq!(status.len(), 20);
+    for (clock, truth) in status.iter().zip(differences(world.network(), &all(20))) {
+        let believed = i64::from(clock.difference_ns.expect("it was read"));
+        assert!((believed - truth).abs() <= 60, "{clock:?}: {truth} ns");
+        assert!(clock.is_locked && clock.worst_ns <= 100, "{clock:?}");
+    }
+    let reference = world.application().exchange().reference_time().expect("it was read");
+    let now = world.application().now();
+    let network = world.network();
+    let truth = network.device(DeviceIndex(0)).controller.system_time(network.now());
+    let error = reference.at(now).wrapping_sub(truth) as i64;
+    // A minimal frame and the domain's take their time on the wire.
+    assert!(error.abs() <= 30_000, "{error} ns");
+    let host = now.0.wrapping_add(EPOCH);
+    assert!((truth.wrapping_sub(host) as i64).abs() < 2_000_000, "the reference began with the host's time");
+}
+
+#[test]
+fn sync0_comes_at_one_time_everywhere_and_where_it_was_wanted_facts_7_3() {
+    const COUNT: usize = 9;
+    let network = line(clocked(COUNT, 50), NetworkOptions::default());
+    let mut world = World::with(3, network, &Options::default(), |scan| {
+        let mut declaration = with_clocks(scan, config());
+        for (number, subdevice) in declaration.subdevices.iter_mut().enumerate() {
+            let shift = if number < 5 { 200_000 } else { -300_000 };
+            subdevice.sync = Some(SyncSignals::sync0(1_000_000, shift));
+        }
+        declaration
+    })
+    .expect("it can be activated");
+    world.until(Duration::from_secs(4), "all in OP", World::all_in_op);
+    assert!(world.application().engine().clocks_locked(), "OP before the clocks are locked");
+    world.run_cycles(300);
+    let network = world.network();
+    let now = network.now();
+    let at: Vec<i64> = (0..COUNT)
+        .map(|device| {
+            let controller = &network.device(DeviceIndex(device)).controller;
+            let next = controller.next_sync0(now).expect("it runs");
+            let reference = network.device(DeviceIndex(0)).controller.system_time(next);
+            (reference % 1_000_000) as i64
+        })
+        .collect();
+    for (device, phase) in at.iter().enumerate() {
+        let wanted = if device < 5 { 200_000 } else { 700_000 };
+        assert!((phase - wanted).abs() <= 100, "device {device}: {phase} ns");
+    }
+}
+
+#[test]
+fn without_lock_a_subdevice_with_sync_stays_in_safeop_with_a_clear_error() {
+    let mut descriptions = clocked(3, 0);
+    // Beyond what the control loop can take out (facts 7.2.1).
+    descriptions[2].clock_drift_ppb = 900_000;
+    let mut world = World::with(4, line(descriptions, NetworkOptions::default()), &Options::default(), |scan| {
+        let limit = Duration::from_secs(2);
+        let mut declaration = with_clocks(scan, ClockConfig { lock_limit: limit, ..config() });
+        declaration.subdevices[0].sync = Some(SyncSignals::sync0(1_000_000, 0));
+        declaration
+    })
+    .expect("it can be activated");
+    let mark = world.beginning();
+    world.run_cycles(2_500);
+    let told = |event: &Event| match event {
+        Event::ConfigurationFailed { subdevice: 0, reason } => reason.starts_with(
+            "the clock of position 2 did not lock within 2000 ms: expected a difference of at most 100 ns",
+        ),
+        _ => false,
+    };
+    assert!(world.saw(mark, told));
+    assert!(!world.all_in_op());
+}
+
+#[test]
+fn a_reference_that_the_application_chooses_is_followed() {
+    let chosen = ClockConfig { reference: ReferenceClock::Declared(2), ..config() };
+    let mut world = world(5, line(clocked(6, 30), NetworkOptions::default()), chosen);
+    let mark = world.beginning();
+    world.run_cycles(2_500);
+    let told = |event: &Event| matches!(event, Event::ReferenceClock { position: Some(position) } if position.0 == 2);
+    assert!(world.saw(mark, told));
+    let behind: Vec<usize> = (2..6).collect();
+    assert!(spread(world.network(), &behind) <= 100);
+    // Those before it follow the host's idea of its time.
+    assert!(spread(world.network(), &all(6)) <= 1_000, "{:?}", differences(world.network(), &all(6)));
+}
+
+#[test]
+fn with_bus_shift_the_reference_follows_the_host_facts_7_4() {
+    let shift = ClockConfig { bus_shift: true, ..config() };
+    let mut world = world(6, line(clocked(5, 50), NetworkOptions::default()), shift);
+    world.run_cycles(6_000);
+    let network = world.network();
+    let host = world.application().now().0.wrapping_add(EPOCH);
+    let truth = network.device(DeviceIndex(0)).controller.system_time(network.now());
+    let error = truth.wrapping_sub(host) as i64;
+    assert!(error.abs() <= 20_000, "{error} ns");
+    assert!(spread(network, &all(5)) <= 200);
+}
+
+#[test]
+fn a_subdevice_that_lost_its_power_has_its_clock_back_in_op() {
+    let network = line(clocked(6, 50), NetworkOptions::default());
+    let mut world = World::with(7, network, &Options::default(), |scan| {
+        let mut declaration = with_clocks(scan, config());
+        for subdevice in &mut declaration.subdevices {
+            subdevice.sync = Some(SyncSignals::sync0(1_000_000, 0));
+        }
+        declaration
+    })
+    .expect("it can be activated");
+    world.until(Duration::from_secs(4), "all in OP", World::all_in_op);
+    world.power_off(DeviceIndex(5));
+    world.run_cycles(50);
+    world.power_on(DeviceIndex(5));
+    world.until(Duration::from_secs(10), "all in OP again", World::all_in_op);
+    assert!(spread(world.network(), &all(6)) <= 200, "{:?}", differences(world.network(), &all(6)));
+    assert!(world.network().devices().all(|device| device.al_status_code() != AlStatusCode::NO_SYNC));
+}
+
+#[test]
+fn a_closed_ring_has_the_delays_of_a_line_and_a_broken_one_too_facts_7_5() {
+    const COUNT: usize = 8;
+    for cut in [None, Some(3), Some(1)] {
+        let mut network = ring(clocked(COUNT, 50), NetworkOptions::default());
+        if let Some(cable) = cut {
+            network.cut(CableId(cable));
+            network.advance_by(Duration::from_millis(1));
+        }
+        let mut world = world(8, network, config());
+        let mark = world.beginning();
+        lock(&mut world, Duration::from_secs(8));
+        assert!(cut.is_some() || !world.saw(mark, |event| matches!(event, Event::RingOpened { .. })));
+        let first_behind = cut.unwrap_or(COUNT);
+        for device in 0..COUNT {
+            let hops = if device < first_behind { device } else { device - first_behind };
+            let error = i64::from(delay(world.network(), device)) - HOP_NS * hops as i64;
+            assert!(error.abs() <= 30, "cut {cut:?}, device {device}: {error} ns");
+        }
+        let (front, behind) = (all(first_behind), (first_behind..COUNT).collect::<Vec<_>>());
+        assert!(largest_spread(&mut world, &front, 500) <= 100);
+        assert!(spread(world.network(), &behind) <= 100);
+        let across = spread(world.network(), &all(COUNT));
+        assert!(across <= 5_000, "cut {cut:?}: {across} ns across");
+    }
+}
+
+#[test]
+fn a_cut_and_a_heal_at_any_cable_leave_no_clock_behind_facts_7_5() {
+    const COUNT: usize = 6;
+    for cable in 0..=COUNT {
+        let mut world = world(9, ring(clocked(COUNT, 50), NetworkOptions::default()), config());
+        lock(&mut world, Duration::from_secs(8));
+        world.run_cycles(300);
+        let (front, behind): (Vec<usize>, Vec<usize>) = ((0..cable).collect(), (cable..COUNT).collect());
+        let mut worst = [0; 3];
+        let mut watch = |world: &mut World, cycles: u64| {
+            for _ in 0..cycles {
+                world.cycle();
+                let network = world.network();
+                for (worst, part) in worst.iter_mut().zip([&front, &behind, &all(COUNT)]) {
+                    *worst = (*worst).max(spread(network, part));
+                }
+            }
+        };
+        world.cut(CableId(cable));
+        watch(&mut world, 700);
+        world.heal(CableId(cable));
+        watch(&mut world, 500);
+        assert!(worst[0] <= 1_000 && worst[1] <= 1_000 && worst[2] <= 5_000, "cable {cable}: {worst:?} ns");
+        world.run_cycles(1_000);
+        let after = largest_spread(&mut world, &all(COUNT), 200);
+        assert!(after <= 100, "cable {cable}: {after} ns after the repair");
+    }
+}
