@@ -10,6 +10,7 @@ use ringcat_wire::mailbox::coe::Emergency;
 use ringcat_wire::sii::Identity;
 
 use crate::domain::{DomainState, DomainStatus};
+use crate::info::IdentityField;
 use crate::link::Link;
 use crate::queue::WORDS;
 use crate::ring_status::{Cable, CableErrors, RedundancyLoss};
@@ -222,6 +223,29 @@ pub enum Event {
         position: Position,
         /// Who.
         identity: Identity,
+    },
+    /// Another SubDevice is where a declared one is expected. It is left alone.
+    Mismatch {
+        /// Index in the declaration.
+        subdevice: usize,
+        /// Where.
+        position: Position,
+        /// What differs.
+        field: IdentityField,
+        /// What was declared.
+        expected: u32,
+        /// What is there.
+        got: u32,
+    },
+    /// All SubDevices of a hot connect group are in the states that were declared.
+    GroupJoined {
+        /// Its number.
+        group: usize,
+    },
+    /// Of a hot connect group that had joined not all SubDevices are in the states that were declared any more.
+    GroupLeft {
+        /// Its number.
+        group: usize,
     },
     /// A declared SubDevice is not there.
     Missing {

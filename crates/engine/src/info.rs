@@ -6,6 +6,7 @@
 //! leaves unfit for process data is refused by [`crate::plan`].
 
 mod collect;
+mod identity_field;
 mod warning;
 
 use alloc::string::String;
@@ -19,6 +20,7 @@ use ringcat_wire::sii::{
 };
 
 pub use crate::direction::Direction;
+pub use identity_field::IdentityField;
 pub use warning::{InfoWarning, SiiProblem};
 
 /// What the controller of a SubDevice is and can do.
@@ -124,6 +126,8 @@ pub struct SubDeviceInfo {
     pub alias: u16,
     /// Vendor, product, revision, serial number.
     pub identity: Identity,
+    /// Explicit device identification, as set at its switches; `None` where it has none (facts 5.3, 4.3).
+    pub identification: Option<u16>,
     /// The controller.
     pub controller: ControllerInfo,
     /// The controller copies AL control into AL status by itself: no application, and no acknowledge bit (facts 3.4).
@@ -160,6 +164,8 @@ pub struct SubDeviceInfo {
     pub fmmu_usages: Vec<FmmuUsage>,
     /// PDOs of both directions: outputs first, each direction in the order of the SII.
     pub pdos: Vec<PdoInfo>,
+    /// SyncManagers whose PDOs are those of the dictionary, read online.
+    pub read_online: Vec<u8>,
     /// Operation modes of the distributed clock.
     pub dc_modes: Vec<DcMode>,
     /// What is odd in the SII.
@@ -176,6 +182,14 @@ impl SubDeviceInfo {
     ) -> SubDeviceInfo {
         let parts: Vec<_> = categories.into_iter().collect();
         collect::collect(readout, header, &parts)
+    }
+
+    /// Takes over the PDOs that were read online when the same SubDevice was met before.
+    pub(crate) fn keep_read_online(&mut self, known: &SubDeviceInfo) {
+        if !known.read_online.is_empty() {
+            self.pdos.clone_from(&known.pdos);
+            self.read_online.clone_from(&known.read_online);
+        }
     }
 
     /// The PDO with this index.

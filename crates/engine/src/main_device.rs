@@ -27,7 +27,7 @@ use ringcat_wire::frame::MacAddress;
 use ringcat_wire::source_address::MacCodec;
 
 pub use areas::{AreaEntries, Directory};
-pub use declaration::{ActivateError, Declaration, DomainConfig, DomainMember};
+pub use declaration::{ActivateError, Declaration, DomainConfig, DomainMember, Required};
 pub use ethernet::EthernetSubDevice;
 pub use pending::Pending;
 pub use ticket::Ticket;
@@ -45,6 +45,7 @@ use crate::mail::eoe::EthernetPort;
 use crate::mail::relay::Desk;
 use crate::procedures::clocks::{self, ClockStatus, SharedClocks};
 use crate::procedures::configure::Start;
+use crate::procedures::dictionary::ReadPdos;
 use crate::procedures::fleet::{Fleet, Member, Phase, SharedFleet};
 use crate::procedures::mail_watch::watch_mail;
 use crate::procedures::recover::start_all;
@@ -53,6 +54,7 @@ use crate::procedures::serve_requests::{Requests, serve_requests};
 use crate::procedures::sii::SiiCache;
 use crate::procedures::stop::{StopError, stop};
 use crate::procedures::supervise::supervise;
+use crate::procedures::watch_groups::{counts, watch_groups};
 use crate::queue::{Consumer, queue};
 use crate::ring::Identity;
 use crate::ring_status::{Cable, CableErrors, LinkStatus, Redundancy, RingStatus, cables};
@@ -77,6 +79,8 @@ pub struct Options {
     pub codec: MacCodec,
     /// Whether SII contents are kept and used for SubDevices with the same first 64 words.
     pub sii_cache: bool,
+    /// Whose dictionaries are asked for PDOs after a scan.
+    pub pdos: ReadPdos,
     /// Whether a supervision datagram rides with the process data. Without it nothing is noticed by itself.
     pub supervision: bool,
     /// For so long the number of SubDevices must not change at the beginning of a scan.
@@ -95,6 +99,7 @@ impl Options {
             redundant,
             codec: MacCodec::FlagsFirst,
             sii_cache: true,
+            pdos: ReadPdos::default(),
             supervision: true,
             settle: Duration::from_millis(5),
             patience: Duration::from_secs(5),
@@ -116,6 +121,24 @@ pub enum SubDeviceState {
     Configuring,
     /// It is in its target state.
     Settled(AlState),
+}
+
+/// How far a hot connect group is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct GroupState {
+    /// SubDevices of it that answer.
+    pub present: usize,
+    /// Those in the states that were declared.
+    pub settled: usize,
+    /// All that belong to it.
+    pub members: usize,
+}
+
+impl GroupState {
+    /// All of them are in the states that were declared.
+    pub const fn has_joined(&self) -> bool {
+        self.settled == self.members
+    }
 }
 
 type StopSlot = Rc<RefCell<Option<Result<(), StopError>>>>;
@@ -186,6 +209,7 @@ impl MainDevice {
             patience: self.options.patience,
             cache: self.cache.clone(),
             junctions: self.options.junctions,
+            pdos: self.options.pdos,
         };
         self.supervisor.spawn(async move {
             let result = scan(&bus, &options).await;
@@ -275,6 +299,7 @@ impl MainDevice {
         if self.options.supervision {
             self.supervisor.spawn(supervise(bus.clone(), fleet.clone()));
         }
+        self.supervisor.spawn(watch_groups(bus.clone(), fleet.clone()));
         self.supervisor.spawn(watch_mail(bus.clone(), fleet.clone()));
         self.supervisor.spawn(serve_requests(bus, fleet.clone(), self.requests.clone()));
         self.fleet = Some(fleet);
@@ -346,6 +371,20 @@ impl MainDevice {
             .members
             .iter()
             .all(|m| matches!(m.phase, Phase::Settled(_)) || (m.config.optional && m.phase == Phase::Absent))
+    }
+
+    /// Whether every declared SubDevice that is not optional is in its target state.
+    pub fn mandatory_settled(&self) -> bool {
+        let Some(fleet) = &self.fleet else { return false };
+        let access = fleet.access();
+        access.members.iter().all(|member| member.config.optional || matches!(member.phase, Phase::Settled(_)))
+    }
+
+    /// How far each hot connect group is, by its number.
+    pub fn groups(&self) -> Vec<GroupState> {
+        let Some(fleet) = &self.fleet else { return Vec::new() };
+        let counts = counts(&fleet.access());
+        counts.into_iter().map(|(present, settled, members)| GroupState { present, settled, members }).collect()
     }
 
     /// Takes the oldest event of either half.

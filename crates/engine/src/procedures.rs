@@ -5,6 +5,7 @@
 pub mod al_state;
 pub mod clocks;
 pub mod configure;
+pub mod dictionary;
 mod error_watch;
 pub mod fleet;
 pub mod inspect;
@@ -23,3 +24,4 @@ pub mod strangers;
 pub mod supervise;
 mod verify;
 pub mod visit;
+pub(crate) mod watch_groups;

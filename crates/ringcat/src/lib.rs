@@ -63,8 +63,9 @@ pub use process_data::ProcessData;
 pub use supervisor_thread::SupervisorThread;
 
 pub use ringcat_engine::config::{
-    ClockConfig, ConfigAddress, IdnWrite, PdoAssignment, PdoEntry, PdoMapping, ReferenceClock, SdoDownload,
-    StartupAction, StartupCommand, StateTimeout, SubDeviceConfig, SyncSignals, Timeouts, Transition, Watchdog,
+    ClockConfig, ConfigAddress, Expected, Group, IdentityField, IdnWrite, PdoAssignment, PdoEntry, PdoMapping,
+    ReferenceClock, SdoDownload, StartupAction, StartupCommand, StateTimeout, SubDeviceConfig, SyncSignals, Timeouts,
+    Transition, Watchdog,
 };
 pub use ringcat_engine::domain::{DomainId, DomainState, DomainStatus, Freshness};
 pub use ringcat_engine::event::{Event, TimedEvent};
@@ -75,7 +76,10 @@ pub use ringcat_engine::layout::LrwPolicy;
 pub use ringcat_engine::link::Link;
 pub use ringcat_engine::mail::coe::{SdoAddress, SdoError, SdoFailure};
 pub use ringcat_engine::mail::{Limits, Mailbox};
-pub use ringcat_engine::main_device::{ActivateError, Declaration, DomainConfig, DomainMember, SubDeviceState};
+pub use ringcat_engine::main_device::{
+    ActivateError, Declaration, DomainConfig, DomainMember, GroupState, Required, SubDeviceState,
+};
+pub use ringcat_engine::procedures::dictionary::ReadPdos;
 pub use ringcat_engine::procedures::look_at_ring::RingLook;
 pub use ringcat_engine::procedures::scan::{Scan, ScanError};
 pub use ringcat_engine::procedures::stop::StopError;

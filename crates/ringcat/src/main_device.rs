@@ -13,10 +13,10 @@ use ringcat_engine::mail::{Limits, Mailbox};
 use ringcat_engine::main_device::{
     ActivateError, Declaration, DomainConfig, DomainMember, MainDevice as Engine, Options as Engineering, Pending,
 };
+use ringcat_engine::procedures::dictionary::ReadPdos;
 use ringcat_engine::procedures::look_at_ring::{RingLook, look_at_ring};
 use ringcat_engine::procedures::scan::{Scan, ScanError};
 use ringcat_engine::supervisor::AcyclicCounters;
-use ringcat_engine::time::Instant;
 use ringcat_wire::al::AlState;
 use ringcat_wire::source_address::MacCodec;
 
@@ -30,6 +30,8 @@ use crate::links::Links;
 pub struct Options {
     /// Whether SII contents are kept and used for SubDevices with the same first 64 words.
     pub sii_cache: bool,
+    /// Whose dictionaries are asked for PDOs after a scan.
+    pub pdos: ReadPdos,
     /// Whether a supervision datagram rides with the process data. Without it nothing is noticed by itself.
     pub supervision: bool,
     /// How marks are written into source addresses (facts 9.7.1).
@@ -46,6 +48,7 @@ impl Default for Options {
     fn default() -> Options {
         Options {
             sii_cache: true,
+            pdos: ReadPdos::default(),
             supervision: true,
             source_address: MacCodec::FlagsFirst,
             settle: Duration::from_millis(5),
@@ -61,6 +64,7 @@ impl Options {
         let (main, redundant) = links.addresses();
         let options = Engineering {
             sii_cache: self.sii_cache,
+            pdos: self.pdos,
             supervision: self.supervision,
             codec: self.source_address,
             settle: self.settle,
@@ -101,13 +105,14 @@ impl<L: Links> MainDevice<L> {
     pub fn scan_with(&mut self, mut on_event: impl FnMut(&TimedEvent)) -> Result<Scan, Error> {
         self.engine.start_scan()?;
         loop {
-            self.step(Instant::NEVER);
+            self.work();
             while let Some(event) = self.engine.pop_event(self.links.now()) {
                 on_event(&event);
             }
             if let Some(result) = self.engine.scan_result() {
                 return Ok(result?);
             }
+            self.wait();
         }
     }
 
@@ -120,8 +125,8 @@ impl<L: Links> MainDevice<L> {
         Ok(self.run(look_at_ring(bus)).map_err(ScanError::Bus)?)
     }
 
-    /// Receives, lets procedures go on, sends, and waits for the next thing to happen, at most until `until`.
-    fn step(&mut self, until: Instant) {
+    /// Receives, lets procedures go on, sends.
+    fn work(&mut self) {
         let MainDevice { links, engine } = self;
         let now = links.now();
         while links.receive(&mut |link, frame| {
@@ -129,8 +134,12 @@ impl<L: Links> MainDevice<L> {
         }) {}
         engine.poll(now);
         engine.transmit(now, usize::MAX, &mut |link, frame| links.send(link, frame));
-        if let Some(wake) = engine.next_deadline() {
-            links.wait(wake.min(until));
+    }
+
+    /// Waits for the next thing to happen.
+    fn wait(&mut self) {
+        if let Some(wake) = self.engine.next_deadline() {
+            self.links.wait(wake);
         }
     }
 
@@ -197,10 +206,11 @@ impl<L: Links> MainDevice<L> {
     /// Waits for the end of work. Nothing here stops the engine meanwhile, so there is one.
     fn finish<T: 'static>(&mut self, mut work: Pending<T>) -> T {
         loop {
-            self.step(Instant::NEVER);
+            self.work();
             if let Some(result) = work.take() {
                 return result;
             }
+            self.wait();
         }
     }
 
@@ -252,10 +262,11 @@ impl<L: Links> MainDevice<L> {
     /// Waits for the end of a stop that the engine has begun.
     pub(crate) fn finish_stop(&mut self) -> Result<(), Error> {
         loop {
-            self.step(Instant::NEVER);
+            self.work();
             if let Some(result) = self.engine.stop_result() {
                 return Ok(result?);
             }
+            self.wait();
         }
     }
 
@@ -292,6 +303,6 @@ pub fn automatic(subdevices: &[SubDeviceInfo], period: Duration) -> Declaration 
         lrw: LrwPolicy::default(),
         domains: vec![DomainConfig { period, members: members.collect() }],
         subdevices: subdevices.iter().map(SubDeviceConfig::from_info).collect(),
-        clocks: None,
+        ..Declaration::default()
     }
 }

@@ -1,6 +1,6 @@
 //! States of single SubDevices while the others exchange process data (facts 5.1).
 
-use ringcat_engine::main_device::Pending;
+use ringcat_engine::main_device::{GroupState, Pending};
 use ringcat_engine::procedures::configure::ConfigureError;
 use ringcat_wire::al::AlState;
 
@@ -18,6 +18,16 @@ impl<L: Links> Application<L, Inline> {
     pub fn request_state(&mut self, subdevice: usize, state: AlState) -> Pending<Result<(), ConfigureError>> {
         self.engine_mut().start_state_request(subdevice, state)
     }
+
+    /// Whether every declared SubDevice that is not optional is in its target state.
+    pub fn mandatory_settled(&self) -> bool {
+        self.engine().mandatory_settled()
+    }
+
+    /// How far each hot connect group is, by its number. Not for the cyclic path.
+    pub fn groups(&self) -> Vec<GroupState> {
+        self.engine().groups()
+    }
 }
 
 impl SupervisorThread {
@@ -27,5 +37,21 @@ impl SupervisorThread {
     /// It refuses, does not answer or has no boot loader; or as [`SupervisorThread::run`].
     pub fn request_state(&self, subdevice: usize, state: AlState) -> Result<(), Error> {
         Ok(self.wait_for(move |engine| engine.start_state_request(subdevice, state))??)
+    }
+
+    /// Whether every declared SubDevice that is not optional is in its target state.
+    ///
+    /// # Errors
+    /// The thread is gone.
+    pub fn mandatory_settled(&self) -> Result<bool, Error> {
+        self.with(|engine| engine.mandatory_settled())
+    }
+
+    /// How far each hot connect group is, by its number.
+    ///
+    /// # Errors
+    /// The thread is gone.
+    pub fn groups(&self) -> Result<Vec<GroupState>, Error> {
+        self.with(|engine| engine.groups())
     }
 }

@@ -6,32 +6,9 @@ use core::fmt;
 
 use ringcat_wire::address::Position;
 
+use super::groups::{self, groups};
 use super::{ConfigAddress, SubDeviceConfig};
-use crate::info::SubDeviceInfo;
-
-/// A field of the identity.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub enum IdentityField {
-    /// Vendor id.
-    VendorId,
-    /// Product code.
-    ProductCode,
-    /// Revision.
-    Revision,
-    /// Serial number.
-    Serial,
-}
-
-impl fmt::Display for IdentityField {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(match self {
-            IdentityField::VendorId => "vendor id",
-            IdentityField::ProductCode => "product code",
-            IdentityField::Revision => "revision",
-            IdentityField::Serial => "serial number",
-        })
-    }
-}
+use crate::info::{IdentityField, SubDeviceInfo};
 
 /// Why a declaration has no SubDevice.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -54,10 +31,10 @@ pub enum ConfigError {
         /// SubDevices in the segment.
         present: usize,
     },
-    /// Several SubDevices have the alias.
-    AmbiguousAlias {
-        /// The alias.
-        alias: u16,
+    /// Several SubDevices have the alias or the identification.
+    Ambiguous {
+        /// Of the one that they are looked for by.
+        address: ConfigAddress,
         /// Position of the first one.
         first: Position,
         /// Position of the second one.
@@ -81,8 +58,8 @@ impl fmt::Display for ConfigError {
             ConfigError::Missing { address, present } => {
                 write!(f, "no SubDevice at {address}; {present} are present")
             }
-            ConfigError::AmbiguousAlias { alias, first, second } => {
-                write!(f, "alias {alias} belongs to SubDevice {first} and to SubDevice {second}")
+            ConfigError::Ambiguous { address, first, second } => {
+                write!(f, "{} belongs to SubDevice {first} and to SubDevice {second}", address.mark())
             }
             ConfigError::DeclaredTwice { position, first } => {
                 write!(f, "SubDevice {position} is declared by declaration {first} already")
@@ -108,6 +85,8 @@ pub enum Resolution {
     Absent {
         /// The declaration.
         config: usize,
+        /// What is there instead, if anything.
+        error: ConfigError,
     },
     /// The declaration has no SubDevice though it needs one.
     Failed {
@@ -159,30 +138,47 @@ pub fn duplicate_aliases(infos: &[SubDeviceInfo]) -> Vec<DuplicateAlias> {
 /// Finds the SubDevice of each declaration: one [`Resolution`] per declaration in their order, then the SubDevices that
 /// nobody declared.
 ///
-/// Where an optional SubDevice is absent, declarations by position that come behind it are looked for one place
-/// nearer to the start. With several ways to leave optional ones out, the one with the fewest errors counts.
+/// Groups are found first, wherever they are; positions count those that belong to none. Where an optional SubDevice is
+/// absent, declarations by position that come behind it are looked for one place nearer to the start. With several ways
+/// to leave optional ones out, the one with the fewest errors counts.
 pub fn resolve(configs: &[SubDeviceConfig], infos: &[SubDeviceInfo]) -> Vec<Resolution> {
     let mut resolutions = vec![None; configs.len()];
+    for members in groups(configs) {
+        groups::find(configs, &members, infos, &mut resolutions);
+    }
+    let grouped =
+        |at: usize| resolutions.iter().any(|r| matches!(r, Some(Resolution::Found { info, .. }) if *info == at));
+    let places = (0..infos.len()).filter(|at| !grouped(*at)).collect();
+    let segment = Segment { infos, places };
     let by_position = by_position(configs);
-    let skips = Skips::new(&by_position, configs, infos);
+    let skips = Skips::new(&by_position, configs, &segment);
     let mut absent = 0;
     for (n, (position, config)) in by_position.iter().enumerate() {
         let skip = configs[*config].optional && skips.better_absent(n, absent);
         resolutions[*config] = Some(if skip {
             absent += 1;
-            Resolution::Absent { config: *config }
+            Resolution::Absent { config: *config, error: nobody(&configs[*config], infos) }
         } else {
-            at_place(configs, infos, *config, position.checked_sub(absent))
+            at_place(configs, infos, *config, position.checked_sub(absent).and_then(|place| segment.at(place)))
         });
     }
-    for (config, resolution) in resolutions.iter_mut().enumerate() {
-        if let ConfigAddress::Alias { alias, offset } = configs[config].address
-            && alias != 0
-        {
-            *resolution = Some(by_alias(configs, infos, config, alias, offset));
-        }
+    for (config, resolution) in resolutions.iter_mut().enumerate().filter(|(_, resolution)| resolution.is_none()) {
+        *resolution = Some(by_mark(configs, infos, config));
     }
     claim(resolutions.into_iter().flatten().collect(), infos)
+}
+
+/// The SubDevices that positions count.
+struct Segment<'a> {
+    infos: &'a [SubDeviceInfo],
+    places: Vec<usize>,
+}
+
+impl Segment<'_> {
+    /// Index of the SubDevice at a position.
+    fn at(&self, position: usize) -> Option<usize> {
+        self.places.get(position).copied()
+    }
 }
 
 /// Declarations by position, in that order: position and index.
@@ -190,11 +186,12 @@ fn by_position(configs: &[SubDeviceConfig]) -> Vec<(usize, usize)> {
     let mut found: Vec<_> = configs
         .iter()
         .enumerate()
+        .filter(|(_, config)| config.group.is_none())
         .filter_map(|(index, config)| match config.address {
             ConfigAddress::Position(position) | ConfigAddress::Alias { alias: 0, offset: position } => {
                 Some((usize::from(position), index))
             }
-            ConfigAddress::Alias { .. } => None,
+            ConfigAddress::Alias { .. } | ConfigAddress::Identification { .. } => None,
         })
         .collect();
     found.sort_unstable();
@@ -210,7 +207,7 @@ struct Skips {
 }
 
 impl Skips {
-    fn new(by_position: &[(usize, usize)], configs: &[SubDeviceConfig], infos: &[SubDeviceInfo]) -> Skips {
+    fn new(by_position: &[(usize, usize)], configs: &[SubDeviceConfig], segment: &Segment<'_>) -> Skips {
         let optional = by_position.iter().filter(|(_, config)| configs[*config].optional).count();
         let width = optional + 1;
         let mut costs = vec![[0, u32::MAX]; by_position.len() * width];
@@ -219,8 +216,8 @@ impl Skips {
             let config = &configs[*config];
             let mut here = vec![0u32; width];
             for absent in 0..width {
-                let info = position.checked_sub(absent).and_then(|place| infos.get(place));
-                let fits = info.is_some_and(|info| config.expected.mismatch(&info.identity).is_none());
+                let info = position.checked_sub(absent).and_then(|place| segment.infos.get(segment.at(place)?));
+                let fits = info.is_some_and(|info| config.expected.mismatch(info).is_none());
                 let present = behind[absent].saturating_add(u32::from(!fits));
                 let skipped = match behind.get(absent + 1) {
                     Some(cost) if config.optional => *cost,
@@ -240,13 +237,18 @@ impl Skips {
     }
 }
 
-fn at_place(configs: &[SubDeviceConfig], infos: &[SubDeviceInfo], config: usize, place: Option<usize>) -> Resolution {
+/// The SubDevice with this index, where it is the expected one.
+pub(super) fn at_place(
+    configs: &[SubDeviceConfig],
+    infos: &[SubDeviceInfo],
+    config: usize,
+    place: Option<usize>,
+) -> Resolution {
     let declared = &configs[config];
     let Some((index, info)) = place.and_then(|place| Some((place, infos.get(place)?))) else {
-        let error = ConfigError::Missing { address: declared.address, present: infos.len() };
-        return missing(declared, config, error);
+        return missing(declared, config, nobody(declared, infos));
     };
-    match declared.expected.mismatch(&info.identity) {
+    match declared.expected.mismatch(info) {
         None => Resolution::Found { config, info: index },
         Some((field, expected, got)) => {
             let error = ConfigError::Mismatch { position: info.position, field, expected, got };
@@ -255,27 +257,31 @@ fn at_place(configs: &[SubDeviceConfig], infos: &[SubDeviceInfo], config: usize,
     }
 }
 
-fn missing(declared: &SubDeviceConfig, config: usize, error: ConfigError) -> Resolution {
-    if declared.optional { Resolution::Absent { config } } else { Resolution::Failed { config, error } }
+fn nobody(declared: &SubDeviceConfig, infos: &[SubDeviceInfo]) -> ConfigError {
+    ConfigError::Missing { address: declared.address, present: infos.len() }
 }
 
-fn by_alias(
-    configs: &[SubDeviceConfig],
-    infos: &[SubDeviceInfo],
-    config: usize,
-    alias: u16,
-    offset: u16,
-) -> Resolution {
-    let mut bearers = infos.iter().enumerate().filter(|(_, info)| info.alias == alias);
+pub(super) fn missing(declared: &SubDeviceConfig, config: usize, error: ConfigError) -> Resolution {
+    if declared.optional { Resolution::Absent { config, error } } else { Resolution::Failed { config, error } }
+}
+
+/// Finds one by alias or identification.
+fn by_mark(configs: &[SubDeviceConfig], infos: &[SubDeviceInfo], config: usize) -> Resolution {
+    let address = configs[config].address;
+    match bearer(address, infos) {
+        Ok(place) => at_place(configs, infos, config, place.map(|place| place + address.offset())),
+        Err(error) => Resolution::Failed { config, error },
+    }
+}
+
+/// The one SubDevice with the alias or identification of an address.
+pub(super) fn bearer(address: ConfigAddress, infos: &[SubDeviceInfo]) -> Result<Option<usize>, ConfigError> {
+    let mut bearers = infos.iter().enumerate().filter(|(_, info)| address.is_borne_by(info));
     match (bearers.next(), bearers.next()) {
         (Some((_, first)), Some((_, second))) => {
-            let error = ConfigError::AmbiguousAlias { alias, first: first.position, second: second.position };
-            Resolution::Failed { config, error }
+            Err(ConfigError::Ambiguous { address, first: first.position, second: second.position })
         }
-        (first, _) => {
-            let place = first.map(|(index, _)| index + usize::from(offset));
-            at_place(configs, infos, config, place)
-        }
+        (first, _) => Ok(first.map(|(index, _)| index)),
     }
 }
 

@@ -26,6 +26,12 @@ fn found(config: usize, info: usize) -> Resolution {
     Resolution::Found { config, info }
 }
 
+/// Not at its position, among so many.
+fn absent(config: usize, position: u16, present: usize) -> Resolution {
+    let error = ConfigError::Missing { address: ConfigAddress::Position(position), present };
+    Resolution::Absent { config, error }
+}
+
 #[test]
 fn each_declaration_finds_its_position_in_any_order() {
     let configs = [config(1, 11), config(0, 10), SubDeviceConfig::at_position(2)];
@@ -62,14 +68,14 @@ fn a_missing_subdevice_is_an_error_and_an_undeclared_one_is_extra() {
 #[test]
 fn an_absent_optional_subdevice_moves_those_behind_it_forward() {
     let configs = [config(0, 10), config(1, 11).optional(), config(2, 12)];
-    assert_eq!(resolve(&configs, &infos(&[10, 12])), [found(0, 0), Resolution::Absent { config: 1 }, found(2, 1)]);
+    assert_eq!(resolve(&configs, &infos(&[10, 12])), [found(0, 0), absent(1, 1, 2), found(2, 1)]);
     assert_eq!(resolve(&configs, &infos(&[10, 11, 12])), [found(0, 0), found(1, 1), found(2, 2)]);
 }
 
 #[test]
 fn a_mandatory_subdevice_goes_before_an_optional_one_of_the_same_product() {
     let configs = [config(0, 10).optional(), config(1, 10)];
-    assert_eq!(resolve(&configs, &infos(&[10])), [Resolution::Absent { config: 0 }, found(1, 0)]);
+    assert_eq!(resolve(&configs, &infos(&[10])), [absent(0, 0, 1), found(1, 0)]);
 }
 
 #[test]
@@ -88,7 +94,11 @@ fn an_alias_counts_from_its_bearer_and_alias_0_from_the_start() {
 fn two_subdevices_with_one_alias_are_ambiguous_and_named() {
     let mut infos = infos(&[10, 11, 12, 13]);
     (infos[0].alias, infos[2].alias, infos[3].alias) = (7, 7, 8);
-    let error = ConfigError::AmbiguousAlias { alias: 7, first: Position(0), second: Position(2) };
+    let error = ConfigError::Ambiguous {
+        address: ConfigAddress::Alias { alias: 7, offset: 1 },
+        first: Position(0),
+        second: Position(2),
+    };
     let failed = Resolution::Failed { config: 0, error };
     assert_eq!(resolve(&[SubDeviceConfig::at_alias(7, 1)], &infos)[0], failed);
     let duplicate = DuplicateAlias { alias: 7, first: Position(0), second: Position(2) };
@@ -133,4 +143,71 @@ fn a_declaration_from_a_scan_finds_its_subdevice_again() {
     let infos = infos(&[10, 11]);
     let configs: Vec<_> = infos.iter().map(SubDeviceConfig::from_info).collect();
     assert_eq!(resolve(&configs, &infos), [found(0, 0), found(1, 1)]);
+}
+
+#[test]
+fn a_revision_may_be_a_lowest_one_and_an_identification_counts_where_declared() {
+    let mut infos = infos(&[10]);
+    assert_eq!(resolve(&[config(0, 10).expect_revision_from(3)], &infos), [found(0, 0)]);
+    let Resolution::Failed { error, .. } = resolve(&[config(0, 10).expect_revision_from(4)], &infos)[0] else {
+        panic!()
+    };
+    assert_eq!(error.to_string(), "SubDevice 0: expected a revision not below 0x00000004, got 0x00000003");
+    let identified = config(0, 10).expect_identification(7);
+    let error =
+        ConfigError::Mismatch { position: Position(0), field: IdentityField::Identification, expected: 7, got: 0 };
+    assert_eq!(resolve(core::slice::from_ref(&identified), &infos)[0], Resolution::Failed { config: 0, error });
+    infos[0].identification = Some(7);
+    assert_eq!(resolve(&[identified], &infos), [found(0, 0)]);
+}
+
+#[test]
+fn an_identification_finds_its_bearer_wherever_it_is_facts_5_3() {
+    let mut infos = infos(&[10, 11, 12]);
+    infos[2].identification = Some(5);
+    let configs = [SubDeviceConfig::at_identification(5), config(0, 10), config(1, 11)];
+    assert_eq!(resolve(&configs, &infos), [found(0, 2), found(1, 0), found(2, 1)]);
+    infos[0].identification = Some(5);
+    let address = ConfigAddress::Identification { value: 5, offset: 0 };
+    let error = ConfigError::Ambiguous { address, first: Position(0), second: Position(2) };
+    assert_eq!(resolve(&configs, &infos)[0], Resolution::Failed { config: 0, error });
+    assert_eq!(error.to_string(), "identification 5 belongs to SubDevice 0 and to SubDevice 2");
+}
+
+/// A group of two behind an alias, and two others.
+fn with_group() -> Vec<SubDeviceConfig> {
+    let head = SubDeviceConfig::at_alias(5, 0).expect_product(2, 20);
+    let group = Group::new(head).then(SubDeviceConfig::default().expect_product(2, 21));
+    [config(0, 10), config(1, 11)].into_iter().chain(group.into_configs(0)).collect()
+}
+
+#[test]
+fn a_group_is_found_at_any_place_and_positions_do_not_count_it() {
+    for place in 0..3 {
+        let mut infos = infos(&[10, 11]);
+        for product in [21, 20] {
+            let mut member = self::infos(&[product]).remove(0);
+            member.alias = if product == 20 { 5 } else { 0 };
+            infos.insert(place, member);
+        }
+        let others: Vec<usize> = (0..4).filter(|at| *at != place && *at != place + 1).collect();
+        let expected = [found(0, others[0]), found(1, others[1]), found(2, place), found(3, place + 1)];
+        assert_eq!(resolve(&with_group(), &infos), expected, "at {place}");
+    }
+}
+
+#[test]
+fn a_group_that_is_not_there_or_broken_off_leaves_the_others_where_they_are() {
+    let missing = |config, offset, present| {
+        let address = ConfigAddress::Alias { alias: 5, offset };
+        Resolution::Absent { config, error: ConfigError::Missing { address, present } }
+    };
+    let expected = [found(0, 0), found(1, 1), missing(2, 0, 2), missing(3, 1, 2)];
+    assert_eq!(resolve(&with_group(), &infos(&[10, 11])), expected);
+    let mut infos = infos(&[10, 20, 11]);
+    infos[1].alias = 5;
+    let error =
+        ConfigError::Mismatch { position: Position(2), field: IdentityField::ProductCode, expected: 21, got: 11 };
+    let expected = [found(0, 0), found(1, 2), found(2, 1), Resolution::Absent { config: 3, error }];
+    assert_eq!(resolve(&with_group(), &infos), expected);
 }

@@ -16,6 +16,8 @@ const CHECKSUM_AT: usize = 2 * 0x07;
 const BOOTSTRAP_AT: usize = 2 * 0x14;
 const STANDARD_AT: usize = 2 * 0x18;
 const PROTOCOLS_AT: usize = 2 * 0x1C;
+/// Bytes of the fixed area that a scan reads without a gap.
+const READ_BYTES: usize = 2 * 0x24;
 
 /// The categories that were read.
 struct Parts<'p, 'a> {
@@ -54,7 +56,8 @@ pub(super) fn collect(readout: Readout, header: &SiiHeader, parts: &[(CategoryKi
         receive_times: readout.receive_times,
         ..SubDeviceInfo::default()
     };
-    let bytes = header.encode();
+    // Reserved words behind are not read.
+    let bytes = &header.encode()[..READ_BYTES];
     if [0x00, 0xFF].iter().any(|erased| bytes.iter().all(|byte| byte == erased)) {
         info.warnings.push(fixed_area(0, SiiProblem::Blank));
         return info;

@@ -85,6 +85,15 @@ pub enum SiiProblem {
         /// The SyncManager.
         sync_manager: u8,
     },
+    /// The dictionary of the SubDevice has other PDOs for a SyncManager than the SII; the dictionary counts.
+    Dictionary {
+        /// The SyncManager.
+        sync_manager: u8,
+        /// Bits of process data that the SII describes.
+        sii: u32,
+        /// Bits of process data in the dictionary.
+        dictionary: u32,
+    },
     /// The direction in the control byte of a SyncManager is not that of its type; the type counts.
     ControlDirection {
         /// The SyncManager.
@@ -127,6 +136,10 @@ impl fmt::Display for InfoWarning {
             SiiProblem::PdoDirection { pdo, sync_manager } => {
                 write!(f, "PDO {pdo:#06x} is assigned to SM {sync_manager}, which is of another type")
             }
+            SiiProblem::Dictionary { sync_manager, sii, dictionary } => write!(
+                f,
+                "SM {sync_manager}: {sii} bits of process data, the dictionary has other PDOs with {dictionary} bits, which count"
+            ),
             SiiProblem::ControlDirection { sync_manager, control } => {
                 write!(f, "SM {sync_manager}: direction in control byte {control:#04x} is not that of its type")
             }

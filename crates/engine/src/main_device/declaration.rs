@@ -7,6 +7,7 @@ use alloc::string::ToString;
 use alloc::vec;
 use alloc::vec::Vec;
 use core::fmt;
+use core::ops::Range;
 use core::time::Duration;
 
 use ringcat_wire::address::{LogicalAddress, Position};
@@ -15,7 +16,7 @@ use ringcat_wire::command::Command;
 use ringcat_wire::register::{WatchdogDivider, WatchdogTime};
 
 use super::areas::Areas;
-use crate::config::{ClockConfig, ConfigError, Resolution, SubDeviceConfig, resolve};
+use crate::config::{ClockConfig, ConfigError, Group, Resolution, SubDeviceConfig, can_lead, groups, resolve};
 use crate::event::Event;
 use crate::info::SubDeviceInfo;
 use crate::junction::JunctionError;
@@ -26,7 +27,7 @@ use crate::plan::plan;
 use crate::procedures::fleet::{Member, Setup, SetupError, declared_areas};
 use crate::procedures::request_state::exchanges;
 use crate::procedures::scan::{Scan, station_at};
-use crate::procedures::strangers::Stranger;
+use crate::procedures::strangers::{Owners, Stranger};
 use crate::supervisor::Bus;
 
 /// A domain as the application declares it.
@@ -58,6 +59,32 @@ pub struct Declaration {
     pub lrw: LrwPolicy,
     /// Distributed clocks; `None` leaves them alone.
     pub clocks: Option<ClockConfig>,
+    /// Who must be there for the activation.
+    pub required: Required,
+}
+
+/// Who must be there, and be who is expected, for an activation. Whoever is not is told by an event, is left alone and
+/// may come later.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Required {
+    /// Everybody that is declared, optional or not.
+    Everybody,
+    /// Those that are not optional.
+    #[default]
+    Mandatory,
+    /// Nobody.
+    Nobody,
+}
+
+impl Declaration {
+    /// Declares a hot connect group. Returns its number, and the indices of its members, head first.
+    pub fn add_group(&mut self, group: Group) -> (usize, Range<usize>) {
+        let numbers = self.subdevices.iter().filter_map(|config| config.group);
+        let number = numbers.max().map_or(0, |last| last + 1);
+        let first = self.subdevices.len();
+        self.subdevices.extend(group.into_configs(number));
+        (number, first..self.subdevices.len())
+    }
 }
 
 /// Why a declaration cannot be activated.
@@ -93,6 +120,11 @@ pub enum ActivateError {
         subdevice: usize,
         /// The state that was declared.
         target: AlState,
+    },
+    /// The head of a hot connect group has neither alias nor identification.
+    Headless {
+        /// Index in the declaration.
+        subdevice: usize,
     },
     /// Process data of a SubDevice was put into two domains.
     TwoDomains {
@@ -162,6 +194,10 @@ impl fmt::Display for ActivateError {
             ActivateError::Target { subdevice, target } => {
                 write!(f, "declaration {subdevice}: expected target INIT, PREOP, SAFEOP or OP, got {target}")
             }
+            ActivateError::Headless { subdevice } => write!(
+                f,
+                "declaration {subdevice}: the head of a group is found by alias or identification, got another address"
+            ),
             ActivateError::TwoDomains { subdevice, sync_manager, domains: [a, b] } => write!(
                 f,
                 "declaration {subdevice}: process data of SyncManager {sync_manager} is in domain {a} and in domain {b}"
@@ -210,13 +246,19 @@ pub(super) fn match_declaration(bus: &Bus, declaration: &Declaration, scan: &Sca
                 owners[info] = Some(config);
                 found[config] = Some(scan.subdevices[info].clone());
             }
-            Resolution::Absent { config } => bus.report(Event::Missing { subdevice: config, optional: true }),
-            Resolution::Failed { config, error } => {
+            Resolution::Absent { config, error } if declaration.required != Required::Everybody => {
+                report_absence(bus, config, true, error);
+            }
+            Resolution::Failed { config, error } if declaration.required == Required::Nobody => {
+                report_absence(bus, config, false, error);
+            }
+            Resolution::Absent { config, error } | Resolution::Failed { config, error } => {
                 return Err(ActivateError::Config { subdevice: config, error });
             }
             Resolution::Extra { info } => extra.push(info),
         }
     }
+    let owners = Owners::new(owners, |index| declaration.subdevices[index].group.is_some());
     let strangers = extra.into_iter().map(|at| {
         let info = scan.subdevices[at].clone();
         bus.report(Event::Unexpected { position: info.position, identity: info.identity });
@@ -234,6 +276,17 @@ pub(super) fn check_clocks(declaration: &Declaration, found: &[Option<SubDeviceI
         }
     }
     Ok(())
+}
+
+fn report_absence(bus: &Bus, subdevice: usize, optional: bool, error: ConfigError) {
+    bus.report(match error {
+        ConfigError::Mismatch { position, field, expected, got } => {
+            Event::Mismatch { subdevice, position, field, expected, got }
+        }
+        ConfigError::Missing { .. } | ConfigError::Ambiguous { .. } | ConfigError::DeclaredTwice { .. } => {
+            Event::Missing { subdevice, optional }
+        }
+    });
 }
 
 pub(super) fn plan_all(
@@ -256,6 +309,13 @@ pub(super) fn check(declaration: &Declaration) -> Result<(), ActivateError> {
     let boot = declaration.subdevices.iter().position(|config| config.target == AlState::Boot);
     if let Some(subdevice) = boot {
         return Err(ActivateError::Target { subdevice, target: AlState::Boot });
+    }
+    let headless = groups(&declaration.subdevices).into_iter().find_map(|members| {
+        let head = *members.first()?;
+        (!can_lead(&declaration.subdevices[head])).then_some(head)
+    });
+    if let Some(subdevice) = headless {
+        return Err(ActivateError::Headless { subdevice });
     }
     let shortest = declaration.domains.iter().map(|domain| domain.period).min().unwrap_or_default();
     for (domain, config) in declaration.domains.iter().enumerate() {

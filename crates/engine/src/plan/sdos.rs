@@ -22,11 +22,14 @@ pub(super) fn assign_sdos(
     let mut sdos = Vec::new();
     for area in areas {
         let declared = config.pdos.iter().flatten().any(|assignment| assignment.sync_manager == area.sync_manager);
-        if !declared {
+        // What was read may have been written by somebody before, and be gone after the next loss of power.
+        let read = info.read_online.contains(&area.sync_manager) && info.coe.pdo_assign();
+        if !declared && !read {
             continue;
         }
-        let changed: Vec<_> = area.pdos.iter().filter(|pdo| mapping_differs(info, pdo)).collect();
-        let reassigned = assignment_differs(info, area);
+        let remap = |pdo: &&MappedPdo| mapping_differs(info, pdo) || (declared && read && info.coe.pdo_configuration());
+        let changed: Vec<_> = area.pdos.iter().filter(remap).collect();
+        let reassigned = read || assignment_differs(info, area);
         if !reassigned && changed.is_empty() {
             continue;
         }

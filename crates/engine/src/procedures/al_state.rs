@@ -17,6 +17,9 @@ const LONGEST_PAUSE: Duration = Duration::from_millis(10);
 /// How long a SubDevice may take to clear its error bit after the acknowledgement.
 const ACKNOWLEDGE_LIMIT: Duration = Duration::from_millis(500);
 
+/// How long a SubDevice may take to give its identification.
+const IDENTIFICATION_LIMIT: Duration = Duration::from_millis(50);
+
 /// Why a SubDevice is not in the requested state.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum StateError {
@@ -74,6 +77,31 @@ pub async fn read_status(bus: &Bus, station: StationAddress) -> Result<(AlStatus
 pub(super) fn split_status(bytes: &[u8; 6]) -> (AlStatus, AlStatusCode) {
     let [a, b, _, _, c, d] = *bytes;
     (AlStatus::decode(&[a, b]), AlStatusCode::decode(&[c, d]))
+}
+
+/// Asks a SubDevice for its explicit device identification, in any state without an error; `None` where it does not give
+/// it in time (facts 5.3).
+pub async fn identification(bus: &Bus, station: StationAddress) -> Result<Option<u16>, BusError> {
+    let (status, _) = read_status(bus, station).await?;
+    let Some(state) = status.al_state().filter(|_| !status.error) else { return Ok(None) };
+    let plain = AlControl::new(state);
+    bus.fpwr(station, map::AL_CONTROL, &AlControl { identification: true, ..plain }.encode()).await?;
+    let until = bus.now() + IDENTIFICATION_LIMIT;
+    let value = loop {
+        let (status, code) = read_status(bus, station).await?;
+        if status.error {
+            break None;
+        }
+        if status.identification {
+            break Some(code.0);
+        }
+        if bus.now() >= until {
+            break None;
+        }
+        bus.sleep(FIRST_PAUSE).await;
+    };
+    bus.fpwr(station, map::AL_CONTROL, &plain.encode()).await?;
+    Ok(value)
 }
 
 /// Clears an error by acknowledging it in the present state. Devices that copy AL control into AL status must not be

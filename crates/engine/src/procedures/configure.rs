@@ -1,5 +1,6 @@
 //! Bringing one SubDevice from INIT to its target state with its whole configuration (facts 5.2, order of IgH).
 
+mod compare;
 mod error;
 mod leave;
 mod startup;
@@ -168,7 +169,11 @@ impl BringUp<'_> {
             self.bus.sleep(self.config.wait_before_safeop).await;
         }
         self.start_clock().await?;
-        self.request(AlState::PreOp, AlState::SafeOp).await?;
+        let reached = self.request(AlState::PreOp, AlState::SafeOp).await;
+        if let Err(error) = &reached {
+            self.explain(error).await;
+        }
+        reached?;
         let fmmus = self.setup.fmmu_registers();
         if !fmmus.is_empty() {
             self.bus.fpwr(self.station, map::FMMU_BASE, &fmmus).await?;

@@ -136,7 +136,10 @@ async fn read_again(bus: &Bus, fleet: &SharedFleet, index: usize) {
         read_one(bus, known.position, known.station, &SiiCache::new(false)).await
     };
     let info = match read.await {
-        Ok(info) => info,
+        Ok(mut info) => {
+            info.keep_read_online(&known);
+            info
+        }
         Err(error) => return bus.report(Event::ScanFailed { reason: error.to_string() }),
     };
     let mut access = fleet.access();

@@ -4,6 +4,7 @@
 
 mod count;
 mod error;
+mod identification;
 
 use alloc::rc::Rc;
 use alloc::string::ToString;
@@ -23,6 +24,7 @@ use ringcat_wire::register::{DcReceiveTimes, DlStatus, EcatEvent, Fmmu, Informat
 
 use self::count::Count;
 pub use self::error::ScanError;
+use super::dictionary::{ReadPdos, complete};
 use super::junction::learn;
 use super::sii::{self, SiiCache, SiiContents};
 use crate::config::duplicate_aliases;
@@ -60,6 +62,8 @@ pub struct ScanOptions {
     pub cache: SiiCache,
     /// What becomes of rings behind junctions.
     pub junctions: JunctionMode,
+    /// Whose dictionaries are asked for PDOs.
+    pub pdos: ReadPdos,
 }
 
 /// What a scan found.
@@ -86,7 +90,11 @@ pub async fn scan(bus: &Bus, options: &ScanOptions) -> Result<Scan, ScanError> {
     let mut expected = count::first(bus, options, begin).await?;
     loop {
         expected = match attempt(bus, options, expected).await {
-            Ok(scan) => return Ok(scan),
+            Ok(mut scan) => {
+                complete(bus, &mut scan, options.pdos).await;
+                bus.report(Event::ScanFinished { subdevices: scan.subdevices.len() });
+                return Ok(scan);
+            }
             Err(Failure::Unsettled(now)) => {
                 if bus.now().since(begin) >= options.patience {
                     let total = |count: Option<Count>| count.map_or(0, |count| count.total() as u16);
@@ -178,12 +186,14 @@ async fn attempt(bus: &Bus, options: &ScanOptions, expected: Count) -> Result<Sc
     for closing in closings {
         bus.report(Event::JunctionLearned { closing });
     }
-    bus.report(Event::ScanFinished { subdevices: scan.subdevices.len() });
     Ok(scan)
 }
 
-/// Common ground, station addresses, and the SII of each SubDevice.
-async fn identify(bus: &Bus, count: u16, cache: &SiiCache) -> Result<Vec<SiiContents>, ScanError> {
+/// What one SubDevice says about itself: its SII and its identification.
+type Said = (SiiContents, Option<u16>);
+
+/// Common ground, station addresses, and what each SubDevice says about itself.
+async fn identify(bus: &Bus, count: u16, cache: &SiiCache) -> Result<Vec<Said>, ScanError> {
     level(bus).await?;
     to_init(bus, count).await?;
     assign_addresses(bus, count).await?;
@@ -255,22 +265,28 @@ pub const fn station_at(position: Position) -> StationAddress {
     StationAddress(FIRST_STATION + position.0)
 }
 
-async fn read_all(bus: &Bus, count: u16, cache: &SiiCache) -> Result<Vec<SiiContents>, ScanError> {
+async fn read_all(bus: &Bus, count: u16, cache: &SiiCache) -> Result<Vec<Said>, ScanError> {
     let total = usize::from(count);
     let step = total.div_ceil(PROGRESS_STEPS).max(1);
     let done = Rc::new(Cell::new(0_usize));
     let read = bus.gather((0..count).map(Position), |bus, position| {
         let (done, cache) = (done.clone(), cache.clone());
         async move {
-            let result = sii::read(&bus, station_at(position), &cache).await;
+            let result = ask(&bus, position, station_at(position), &cache).await;
             done.set(done.get() + 1);
             if done.get().is_multiple_of(step) || done.get() == total {
                 bus.report(Event::ScanProgress { done: done.get(), total });
             }
-            result.map_err(|error| ScanError::Sii { position, error })
+            result
         }
     });
     read.await.into_iter().collect()
+}
+
+async fn ask(bus: &Bus, position: Position, station: StationAddress, cache: &SiiCache) -> Result<Said, ScanError> {
+    let contents = sii::read(bus, station, cache).await.map_err(|error| ScanError::Sii { position, error })?;
+    let identification = identification::read(bus, station, &contents).await?;
+    Ok((contents, identification))
 }
 
 /// Reads what one SubDevice is: SII, controller, ports, alias, receive times.
@@ -280,7 +296,7 @@ pub(super) async fn read_one(
     station: StationAddress,
     cache: &SiiCache,
 ) -> Result<SubDeviceInfo, ScanError> {
-    let contents = sii::read(bus, station, cache).await.map_err(|error| ScanError::Sii { position, error })?;
+    let contents = ask(bus, position, station, cache).await?;
     Ok(describe(read_registers(bus, position, station).await?, &contents))
 }
 
@@ -320,9 +336,10 @@ fn answered<const N: usize, const M: usize>(
     data.ok_or(BusError::Wkc { target, expected, got })
 }
 
-fn describe(readout: Readout, contents: &SiiContents) -> SubDeviceInfo {
+fn describe(readout: Readout, (contents, identification): &Said) -> SubDeviceInfo {
     let categories = contents.categories.iter().map(|(kind, data)| (*kind, data.as_slice()));
     let mut info = SubDeviceInfo::from_parts(readout, &contents.header, categories);
+    info.identification = *identification;
     if !contents.complete {
         info.warnings.push(InfoWarning { category: None, offset: 0, problem: SiiProblem::NoEndMarker });
     }

@@ -4,7 +4,9 @@
 //! Each is read by a procedure of its own, so that one whose EEPROM is slow or broken keeps nobody waiting.
 
 mod address;
+mod groups;
 mod matching;
+mod owners;
 mod quiet;
 
 use alloc::rc::Rc;
@@ -18,8 +20,10 @@ use ringcat_wire::register::map;
 pub(super) use self::address::take_away;
 use self::address::{View, give, view};
 use self::matching::{Fit, assign};
+pub(crate) use self::owners::Owners;
+use self::owners::{owners_of, ranks};
 use super::configure::Start;
-use super::fleet::{Fleet, Member, Phase, Setup, SharedFleet};
+use super::fleet::{Fleet, Phase, Setup, SharedFleet};
 use super::recover::start;
 use super::scan::{ScanError, read_one};
 use crate::config::ConfigAddress;
@@ -55,8 +59,10 @@ enum Knowledge {
 pub struct Stranger {
     /// Its temporary address.
     pub station: StationAddress,
-    /// Index of the nearest member before it, and behind it, in the order of positions.
+    /// Index of the nearest member before it, and behind it, in the order of positions. Those of groups are left out.
     between: (Option<usize>, Option<usize>),
+    /// Index of the member right before it.
+    behind: Option<usize>,
     position: Position,
     /// It was met by the copy on the main link.
     from_main: bool,
@@ -67,7 +73,7 @@ pub struct Stranger {
 
 impl Stranger {
     /// A stranger among the owners of all positions, of which the main copy meets the first `main_count`.
-    pub(crate) fn new(info: SubDeviceInfo, owners: &[Option<usize>], main_count: usize, reported: bool) -> Stranger {
+    pub(crate) fn new(info: SubDeviceInfo, owners: &Owners, main_count: usize, reported: bool) -> Stranger {
         let (station, at) = (info.station, usize::from(info.position.0));
         Stranger::at(station, at, owners, main_count, reported, Knowledge::Known(Rc::new(info)))
     }
@@ -75,17 +81,23 @@ impl Stranger {
     fn at(
         station: StationAddress,
         at: usize,
-        owners: &[Option<usize>],
+        owners: &Owners,
         main_count: usize,
         reported: bool,
         knowledge: Knowledge,
     ) -> Stranger {
-        let between = neighbours(owners, at);
-        Stranger { station, between, position: Position(at as u16), from_main: at < main_count, reported, knowledge }
+        let (between, behind) = (owners.neighbours(at), owners.before(at));
+        let position = Position(at as u16);
+        Stranger { station, between, behind, position, from_main: at < main_count, reported, knowledge }
+    }
+
+    /// It is being read, and those around it should wait.
+    fn is_awaited(&self, now: Instant) -> bool {
+        matches!(self.knowledge, Knowledge::Reading(since) if now.since(since) < HOLD)
     }
 
     /// The same one at another look.
-    fn moved(&self, at: usize, owners: &[Option<usize>], main_count: usize) -> Stranger {
+    fn moved(&self, at: usize, owners: &Owners, main_count: usize) -> Stranger {
         Stranger::at(self.station, at, owners, main_count, self.reported, self.knowledge.clone())
     }
 }
@@ -144,12 +156,12 @@ async fn find(bus: &Bus, fleet: &SharedFleet) -> Result<bool, BusError> {
 }
 
 /// The station addresses of those that are neither members nor strangers, or that several have.
-fn unknown(fleet: &SharedFleet, view: &View, owners: &[Option<usize>]) -> Vec<StationAddress> {
+fn unknown(fleet: &SharedFleet, view: &View, owners: &Owners) -> Vec<StationAddress> {
     let access = fleet.access();
     let mut old = Vec::new();
     for (at, station) in view.stations.iter().enumerate() {
         let is_listed = access.strangers.iter().any(|stranger| stranger.station == *station);
-        let is_known = owners[at].is_some() || (is_listed && view.position(*station).is_some());
+        let is_known = owners.at(at).is_some() || (is_listed && view.position(*station).is_some());
         if !is_known && !old.contains(station) {
             old.push(*station);
         }
@@ -157,67 +169,18 @@ fn unknown(fleet: &SharedFleet, view: &View, owners: &[Option<usize>]) -> Vec<St
     old
 }
 
-/// The member at each position. Where several have the address of one member, the one between its neighbours is it; if
-/// that does not tell, none of them is.
-fn owners_of(fleet: &SharedFleet, stations: &[StationAddress]) -> Vec<Option<usize>> {
-    let access = fleet.access();
-    let member = |station: &StationAddress| access.members.iter().position(|member| member.station == *station);
-    let all: Vec<Option<usize>> = stations.iter().map(member).collect();
-    let is_single = |owner: &Option<usize>| all.iter().filter(|other| *other == owner).count() == 1;
-    let mut owners: Vec<Option<usize>> = all.iter().map(|owner| owner.filter(|_| is_single(owner))).collect();
-    let ranks = ranks(&access);
-    for index in 0..access.members.len() {
-        let several = |at: &usize| all[*at] == Some(index) && owners[*at].is_none();
-        let candidates: Vec<usize> = (0..all.len()).filter(several).collect();
-        let is_between = |at: &usize| {
-            let (before, behind) = neighbours(&owners, *at);
-            before.is_none_or(|before| ranks[before] < ranks[index])
-                && behind.is_none_or(|behind| ranks[index] < ranks[behind])
-        };
-        let between: Vec<usize> = candidates.iter().copied().filter(is_between).collect();
-        let keeper = match between[..] {
-            [only] => Some(only),
-            // It was there at the scan, and nobody has moved since.
-            _ => between.into_iter().find(|at| access.members[index].node == Some(*at)),
-        };
-        if let Some(at) = keeper {
-            owners[at] = Some(index);
-        }
-    }
-    owners
-}
-
-/// The nearest members before and behind a position.
-fn neighbours(owners: &[Option<usize>], at: usize) -> (Option<usize>, Option<usize>) {
-    let before = owners.iter().take(at).rev().copied().flatten().next();
-    (before, owners.iter().skip(at + 1).copied().flatten().next())
-}
-
-/// Where a member belongs in the order of the segment, which need not be that of the declaration.
-type Rank = (Option<usize>, bool, usize);
-
-fn ranks(fleet: &Fleet) -> Vec<Rank> {
-    let mut last = None;
-    let rank = |(index, member): (usize, &Member)| {
-        // One that was never seen belongs behind the one that is declared before it.
-        last = member.node.or(last);
-        (last, member.node.is_none(), index)
-    };
-    fleet.members.iter().enumerate().map(rank).collect()
-}
-
 /// A member whose address somebody else had too was given another one with him, and gets its own back.
 async fn restore(
     bus: &Bus,
     fleet: &SharedFleet,
-    owners: &[Option<usize>],
+    owners: &Owners,
     before: &View,
     after: &mut View,
 ) -> Result<(), BusError> {
     if before.counts != after.counts {
         return Ok(());
     }
-    for (at, owner) in owners.iter().enumerate() {
+    for (at, owner) in owners.all().iter().enumerate() {
         let Some(station) = owner.and_then(|index| Some(fleet.access().members.get(index)?.station)) else { continue };
         let now = after.stations[at];
         if now != station && after.position(now).is_some() && after.positions(station).count() == 0 {
@@ -229,7 +192,7 @@ async fn restore(
 }
 
 /// Notes where the strangers are now.
-fn refresh(fleet: &SharedFleet, view: &View, owners: &[Option<usize>]) {
+fn refresh(fleet: &SharedFleet, view: &View, owners: &Owners) {
     for stranger in &mut fleet.access().strangers {
         if let Some(at) = view.position(stranger.station) {
             *stranger = stranger.moved(at, owners, usize::from(view.counts.0.0));
@@ -309,6 +272,9 @@ pub(super) async fn admit_all(bus: &Bus, fleet: &SharedFleet) -> bool {
             }
         } else if note_reported(fleet, stranger.station) {
             bus.report(Event::Unexpected { position: stranger.position, identity: info.identity });
+            if let Some(mismatch) = mismatch(fleet, &stranger, info) {
+                bus.report(mismatch);
+            }
         }
     }
     true
@@ -334,10 +300,9 @@ fn match_all(bus: &Bus, fleet: &SharedFleet) -> Vec<(Stranger, Option<usize>)> {
     let mut strangers = access.strangers.clone();
     strangers.sort_by_key(|stranger| stranger.position);
     let now = bus.now();
-    let mut matched = Vec::new();
+    let mut matched = groups::members(&access, &mut strangers, now);
     for gap in strangers.chunk_by(|one, other| one.between == other.between) {
-        let waits = |it: &Stranger| matches!(it.knowledge, Knowledge::Reading(since) if now.since(since) < HOLD);
-        if gap.iter().any(waits) {
+        if gap.iter().any(|stranger| stranger.is_awaited(now)) {
             continue;
         }
         let absent = absent_between(&access, gap[0].between);
@@ -354,7 +319,7 @@ fn match_all(bus: &Bus, fleet: &SharedFleet) -> Vec<(Stranger, Option<usize>)> {
 fn absent_between(fleet: &Fleet, between: (Option<usize>, Option<usize>)) -> Vec<usize> {
     let rank = ranks(fleet);
     let mut absent: Vec<usize> = (0..fleet.members.len())
-        .filter(|index| fleet.members[*index].phase == Phase::Absent)
+        .filter(|index| fleet.members[*index].phase == Phase::Absent && fleet.members[*index].config.group.is_none())
         .filter(|index| between.0.is_none_or(|before| rank[before] < rank[*index]))
         .filter(|index| between.1.is_none_or(|behind| rank[*index] < rank[behind]))
         .collect();
@@ -367,11 +332,13 @@ fn fit(fleet: &Fleet, stranger: &Stranger, index: usize) -> Fit {
     let member = &fleet.members[index];
     let Knowledge::Known(info) = &stranger.knowledge else { return Fit::Unreadable };
     let identity = &info.identity;
-    let alias_fits = match member.config.address {
-        ConfigAddress::Alias { alias, offset: 0 } if alias != 0 => alias == info.alias,
-        _ => true,
+    let mark_fits = match member.config.address {
+        address @ (ConfigAddress::Alias { offset: 0, .. } | ConfigAddress::Identification { offset: 0, .. }) => {
+            matches!(address, ConfigAddress::Alias { alias: 0, .. }) || address.is_borne_by(info)
+        }
+        ConfigAddress::Alias { .. } | ConfigAddress::Identification { .. } | ConfigAddress::Position(_) => true,
     };
-    if !alias_fits || member.config.expected.mismatch(identity).is_some() {
+    if !mark_fits || member.config.expected.mismatch(info).is_some() {
         return Fit::No;
     }
     let Some(known) = member.info.as_ref().map(|info| info.identity) else { return Fit::NeverSeen };
@@ -384,12 +351,23 @@ fn fit(fleet: &Fleet, stranger: &Stranger, index: usize) -> Fit {
     }
 }
 
+/// Where a stranger is in the place of the one absent member that belongs there: what differs.
+fn mismatch(fleet: &SharedFleet, stranger: &Stranger, info: &SubDeviceInfo) -> Option<Event> {
+    let access = fleet.access();
+    let [subdevice] = absent_between(&access, stranger.between)[..] else { return None };
+    let (field, expected, got) = access.members.get(subdevice)?.config.expected.mismatch(info)?;
+    Some(Event::Mismatch { subdevice, position: stranger.position, field, expected, got })
+}
+
 /// Makes a stranger the member it is; true where it is a stranger no longer.
 async fn admit(bus: &Bus, fleet: &SharedFleet, stranger: &Stranger, info: &SubDeviceInfo, index: usize) -> bool {
     let (info, setup) = {
         let access = fleet.access();
         let member = &access.members[index];
-        let info = SubDeviceInfo { station: member.station, position: stranger.position, ..info.clone() };
+        let mut info = SubDeviceInfo { station: member.station, position: stranger.position, ..info.clone() };
+        if let Some(known) = &member.info {
+            info.keep_read_online(known);
+        }
         let setup = Setup::new(index, &member.config, &info, &access.layout);
         (info, setup)
     };

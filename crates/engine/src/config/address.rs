@@ -1,0 +1,81 @@
+//! Where a SubDevice is expected.
+
+use core::fmt;
+
+use crate::info::SubDeviceInfo;
+
+/// Where a SubDevice is expected.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum ConfigAddress {
+    /// Position in the configured order, from 0. Where an optional SubDevice is absent, those behind it stand one place
+    /// nearer to the start of the segment. Members of [groups](super::Group) are not counted.
+    Position(u16),
+    /// `offset` SubDevices behind the one with this alias; alias 0 counts from the start of the segment.
+    Alias {
+        /// The alias.
+        alias: u16,
+        /// SubDevices behind it.
+        offset: u16,
+    },
+    /// `offset` SubDevices behind the one with this explicit device identification (facts 5.3).
+    Identification {
+        /// The identification.
+        value: u16,
+        /// SubDevices behind it.
+        offset: u16,
+    },
+}
+
+impl ConfigAddress {
+    /// SubDevices behind the one with the alias or identification.
+    pub(super) fn offset(self) -> usize {
+        match self {
+            ConfigAddress::Alias { offset, .. } | ConfigAddress::Identification { offset, .. } => offset.into(),
+            ConfigAddress::Position(_) => 0,
+        }
+    }
+
+    /// So many places behind.
+    pub(super) fn behind(self, places: u16) -> ConfigAddress {
+        match self {
+            ConfigAddress::Alias { alias, .. } => ConfigAddress::Alias { alias, offset: places },
+            ConfigAddress::Identification { value, .. } => ConfigAddress::Identification { value, offset: places },
+            ConfigAddress::Position(position) => ConfigAddress::Position(position.saturating_add(places)),
+        }
+    }
+
+    /// Whether a SubDevice has the alias or identification from which the address counts.
+    pub(crate) fn is_borne_by(self, info: &SubDeviceInfo) -> bool {
+        match self {
+            ConfigAddress::Alias { alias, .. } => alias != 0 && alias == info.alias,
+            ConfigAddress::Identification { value, .. } => info.identification == Some(value),
+            ConfigAddress::Position(_) => false,
+        }
+    }
+
+    /// What tells the SubDevice from which the address counts.
+    pub(super) fn mark(self) -> impl fmt::Display {
+        struct Mark(ConfigAddress);
+        impl fmt::Display for Mark {
+            fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+                match self.0 {
+                    ConfigAddress::Alias { alias, .. } => write!(f, "alias {alias}"),
+                    ConfigAddress::Identification { value, .. } => write!(f, "identification {value}"),
+                    ConfigAddress::Position(position) => write!(f, "position {position}"),
+                }
+            }
+        }
+        Mark(self)
+    }
+}
+
+impl fmt::Display for ConfigAddress {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            ConfigAddress::Position(_) => self.mark().fmt(f),
+            ConfigAddress::Alias { offset, .. } | ConfigAddress::Identification { offset, .. } => {
+                write!(f, "{} offset {offset}", self.mark())
+            }
+        }
+    }
+}

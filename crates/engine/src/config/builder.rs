@@ -1,0 +1,214 @@
+//! How an application says what it declares about a SubDevice.
+
+use alloc::vec::Vec;
+use core::time::Duration;
+
+use ringcat_wire::al::AlState;
+use ringcat_wire::mailbox::soe::Idn;
+
+use super::{
+    ConfigAddress, IdnWrite, PdoAssignment, PdoEntry, PdoMapping, SdoDownload, StartupAction, StartupCommand,
+    StateTimeout, SubDeviceConfig, SyncManagerOverride, SyncSignals, Timeouts, Transition, Watchdog,
+};
+use crate::info::{Direction, PdoEntryInfo, PdoInfo, SubDeviceInfo};
+
+impl SubDeviceConfig {
+    /// Anybody at a position.
+    pub fn at_position(position: u16) -> SubDeviceConfig {
+        SubDeviceConfig { address: ConfigAddress::Position(position), ..SubDeviceConfig::default() }
+    }
+
+    /// Anybody `offset` SubDevices behind the one with an alias.
+    pub fn at_alias(alias: u16, offset: u16) -> SubDeviceConfig {
+        SubDeviceConfig { address: ConfigAddress::Alias { alias, offset }, ..SubDeviceConfig::default() }
+    }
+
+    /// Anybody with an explicit device identification, wherever it is.
+    pub fn at_identification(value: u16) -> SubDeviceConfig {
+        SubDeviceConfig { address: ConfigAddress::Identification { value, offset: 0 }, ..SubDeviceConfig::default() }
+    }
+
+    /// The SubDevice that a scan found: at its position, of its vendor and product, everything else from its SII.
+    pub fn from_info(info: &SubDeviceInfo) -> SubDeviceConfig {
+        SubDeviceConfig::at_position(info.position.0)
+            .expect_product(info.identity.vendor_id, info.identity.product_code)
+    }
+
+    /// Expects a vendor and a product.
+    #[must_use]
+    pub fn expect_product(mut self, vendor_id: u32, product_code: u32) -> SubDeviceConfig {
+        self.expected.vendor_id = Some(vendor_id);
+        self.expected.product_code = Some(product_code);
+        self
+    }
+
+    /// Expects a revision.
+    #[must_use]
+    pub fn expect_revision(mut self, revision: u32) -> SubDeviceConfig {
+        self.expected.revision = Some(revision);
+        self
+    }
+
+    /// Expects a revision or a later one.
+    #[must_use]
+    pub fn expect_revision_from(mut self, revision: u32) -> SubDeviceConfig {
+        self.expected.minimum_revision = Some(revision);
+        self
+    }
+
+    /// Expects an explicit device identification.
+    #[must_use]
+    pub fn expect_identification(mut self, value: u16) -> SubDeviceConfig {
+        self.expected.identification = Some(value);
+        self
+    }
+
+    /// Expects a serial number.
+    #[must_use]
+    pub fn expect_serial(mut self, serial: u32) -> SubDeviceConfig {
+        self.expected.serial = Some(serial);
+        self
+    }
+
+    /// The segment works without it.
+    #[must_use]
+    pub fn optional(mut self) -> SubDeviceConfig {
+        self.optional = true;
+        self
+    }
+
+    /// Declares a SyncManager; a later declaration of the same one replaces the earlier.
+    #[must_use]
+    pub fn sync_manager(mut self, index: u8, direction: Direction, watchdog: Watchdog) -> SubDeviceConfig {
+        self.sync_managers.retain(|sync_manager| sync_manager.index != index);
+        self.sync_managers.push(SyncManagerOverride { index, direction, watchdog });
+        self
+    }
+
+    /// Declares the PDOs of a SyncManager; a later declaration for the same one replaces the earlier.
+    #[must_use]
+    pub fn assign(mut self, sync_manager: u8, direction: Direction, pdos: Vec<PdoMapping>) -> SubDeviceConfig {
+        let assignments = self.pdos.get_or_insert_with(Vec::new);
+        assignments.retain(|assignment| assignment.sync_manager != sync_manager);
+        assignments.push(PdoAssignment { sync_manager, direction, pdos });
+        self
+    }
+
+    /// Declares the PDOs that a SubDevice of this kind has, so that there is a place for them while it is absent.
+    #[must_use]
+    pub fn pdos_of(mut self, info: &SubDeviceInfo) -> SubDeviceConfig {
+        for sync_manager in 0..info.controller.sync_manager_count {
+            let mut pdos = info.assigned_pdos(sync_manager).peekable();
+            let Some(direction) = pdos.peek().map(|pdo| pdo.direction) else { continue };
+            let entry = |entry: &PdoEntryInfo| PdoEntry::new(entry.index, entry.sub_index, entry.bit_length);
+            let mapping = |pdo: &PdoInfo| PdoMapping::of(pdo.index, pdo.entries.iter().map(entry).collect::<Vec<_>>());
+            let pdos = pdos.map(mapping).collect();
+            self = self.assign(sync_manager, direction, pdos);
+        }
+        self
+    }
+
+    /// Declares the watchdog: divider and, in units of it, the time for process data.
+    #[must_use]
+    pub fn watchdog(mut self, divider: Option<u16>, intervals: Option<u16>) -> SubDeviceConfig {
+        self.watchdog_divider = divider;
+        self.watchdog_intervals = intervals;
+        self
+    }
+
+    /// Declares the time of the PDI watchdog, in units of the divider.
+    #[must_use]
+    pub fn pdi_watchdog(mut self, intervals: u16) -> SubDeviceConfig {
+        self.pdi_watchdog_intervals = Some(intervals);
+        self
+    }
+
+    /// Appends an SDO download before SAFEOP.
+    #[must_use]
+    pub fn sdo(self, index: u16, sub_index: u8, data: impl Into<Vec<u8>>) -> SubDeviceConfig {
+        self.sdo_at(Transition::Ps, index, sub_index, data)
+    }
+
+    /// Appends an SDO download with complete access before SAFEOP, from subindex 0 or 1.
+    #[must_use]
+    pub fn sdo_complete(self, index: u16, sub_index: u8, data: impl Into<Vec<u8>>) -> SubDeviceConfig {
+        let sdo = SdoDownload { index, sub_index, complete_access: true, data: data.into() };
+        self.startup(Transition::Ps, StartupAction::Sdo(sdo))
+    }
+
+    /// Appends an SDO download at a transition.
+    #[must_use]
+    pub fn sdo_at(
+        self,
+        transition: Transition,
+        index: u16,
+        sub_index: u8,
+        data: impl Into<Vec<u8>>,
+    ) -> SubDeviceConfig {
+        let sdo = SdoDownload { index, sub_index, complete_access: false, data: data.into() };
+        self.startup(transition, StartupAction::Sdo(sdo))
+    }
+
+    /// Appends a write of the value of an IDN at a transition: in PREOP for [`Transition::Ps`], in SAFEOP for
+    /// [`Transition::So`].
+    #[must_use]
+    pub fn idn_at(self, transition: Transition, drive: u8, idn: Idn, data: impl Into<Vec<u8>>) -> SubDeviceConfig {
+        self.startup(transition, StartupAction::Idn(IdnWrite { drive, idn, data: data.into() }))
+    }
+
+    /// Appends a start-up command.
+    #[must_use]
+    pub fn startup(mut self, transition: Transition, action: StartupAction) -> SubDeviceConfig {
+        self.startup.push(StartupCommand { transition, action });
+        self
+    }
+
+    /// Leaves the EEPROM to the PDI from the way to PREOP on.
+    #[must_use]
+    pub fn sii_to_pdi(mut self) -> SubDeviceConfig {
+        self.sii_to_pdi = true;
+        self
+    }
+
+    /// Waits in PREOP before SAFEOP is requested.
+    #[must_use]
+    pub fn wait_before_safeop(mut self, pause: Duration) -> SubDeviceConfig {
+        self.wait_before_safeop = pause;
+        self
+    }
+
+    /// Sets the time limit of one state change; a later one for the same change replaces the earlier.
+    #[must_use]
+    pub fn state_timeout(mut self, from: AlState, to: AlState, limit: Duration) -> SubDeviceConfig {
+        self.state_timeouts.retain(|own| (own.from, own.to) != (from, to));
+        self.state_timeouts.push(StateTimeout { from, to, limit });
+        self
+    }
+
+    /// Limit of a state change.
+    pub fn limit(&self, from: AlState, to: AlState) -> Duration {
+        let own = self.state_timeouts.iter().find(|own| (own.from, own.to) == (from, to));
+        own.map_or_else(|| self.timeouts.transition(from, to), |own| own.limit)
+    }
+
+    /// Declares SYNC signals.
+    #[must_use]
+    pub fn sync(mut self, signals: SyncSignals) -> SubDeviceConfig {
+        self.sync = Some(signals);
+        self
+    }
+
+    /// Sets the time limits.
+    #[must_use]
+    pub fn timeouts(mut self, timeouts: Timeouts) -> SubDeviceConfig {
+        self.timeouts = timeouts;
+        self
+    }
+
+    /// Sets the state to which it is to be brought.
+    #[must_use]
+    pub fn target(mut self, target: AlState) -> SubDeviceConfig {
+        self.target = target;
+        self
+    }
+}

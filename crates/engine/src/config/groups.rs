@@ -1,0 +1,83 @@
+//! Hot connect groups: SubDevices in a row that may be there or not, at any place of the segment.
+//!
+//! The first one, the head, is found by alias or explicit device identification; the others follow it in the order of the
+//! processing units. What the scan found is matched here, those that come later by the procedures.
+
+use alloc::collections::BTreeMap;
+use alloc::vec::Vec;
+
+use super::resolve::{Resolution, at_place, bearer, missing};
+use super::{ConfigAddress, SubDeviceConfig};
+use crate::info::SubDeviceInfo;
+
+/// A hot connect group.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Group {
+    /// Head first.
+    members: Vec<SubDeviceConfig>,
+}
+
+impl Group {
+    /// A group of one: its head, declared [at an alias](SubDeviceConfig::at_alias) with offset 0 or [with an
+    /// identification](SubDeviceConfig::at_identification).
+    pub fn new(head: SubDeviceConfig) -> Group {
+        Group { members: Vec::from([head]) }
+    }
+
+    /// Appends the one behind. Where it is declared does not matter.
+    #[must_use]
+    pub fn then(mut self, member: SubDeviceConfig) -> Group {
+        self.members.push(member);
+        self
+    }
+
+    /// The declarations of a group with this number: optional, with places behind the head.
+    pub fn into_configs(self, number: usize) -> impl Iterator<Item = SubDeviceConfig> {
+        let head = self.members.first().map(|head| head.address).unwrap_or(ConfigAddress::Position(0));
+        (0..).zip(self.members).map(move |(offset, config)| SubDeviceConfig {
+            address: head.behind(offset),
+            optional: true,
+            group: Some(number),
+            ..config
+        })
+    }
+}
+
+/// Indices of the members of each group, head first.
+pub fn groups<'a>(configs: impl IntoIterator<Item = &'a SubDeviceConfig>) -> Vec<Vec<usize>> {
+    let mut groups: BTreeMap<usize, Vec<usize>> = BTreeMap::new();
+    for (index, config) in configs.into_iter().enumerate() {
+        if let Some(number) = config.group {
+            groups.entry(number).or_default().push(index);
+        }
+    }
+    groups.into_values().collect()
+}
+
+/// Finds a group in a scan: its head, then those behind it as long as they are the right ones.
+pub(super) fn find(
+    configs: &[SubDeviceConfig],
+    members: &[usize],
+    infos: &[SubDeviceInfo],
+    resolutions: &mut [Option<Resolution>],
+) {
+    let head = members.first().map_or(Ok(None), |head| bearer(configs[*head].address, infos));
+    let mut intact = true;
+    for (offset, config) in members.iter().enumerate() {
+        let resolution = match head {
+            Ok(head) => at_place(configs, infos, *config, head.filter(|_| intact).map(|head| head + offset)),
+            Err(error) => missing(&configs[*config], *config, error),
+        };
+        intact &= matches!(resolution, Resolution::Found { .. });
+        resolutions[*config] = Some(resolution);
+    }
+}
+
+/// Whether a declaration can be the head of a group.
+pub(crate) fn can_lead(config: &SubDeviceConfig) -> bool {
+    match config.address {
+        ConfigAddress::Alias { alias, offset: 0 } => alias != 0,
+        ConfigAddress::Identification { offset: 0, .. } => true,
+        ConfigAddress::Alias { .. } | ConfigAddress::Identification { .. } | ConfigAddress::Position(_) => false,
+    }
+}

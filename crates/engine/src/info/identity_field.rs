@@ -1,0 +1,33 @@
+//! The parts of who a SubDevice is, by which it may be expected.
+
+use core::fmt;
+
+/// A part of who a SubDevice is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum IdentityField {
+    /// Vendor id.
+    VendorId,
+    /// Product code.
+    ProductCode,
+    /// Revision.
+    Revision,
+    /// Lowest revision.
+    MinimumRevision,
+    /// Serial number.
+    Serial,
+    /// Explicit device identification (facts 5.3); 0 is that of a SubDevice without one.
+    Identification,
+}
+
+impl fmt::Display for IdentityField {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            IdentityField::VendorId => "vendor id",
+            IdentityField::ProductCode => "product code",
+            IdentityField::Revision => "revision",
+            IdentityField::MinimumRevision => "a revision not below",
+            IdentityField::Serial => "serial number",
+            IdentityField::Identification => "identification",
+        })
+    }
+}

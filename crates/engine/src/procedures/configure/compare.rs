@@ -1,0 +1,45 @@
+//! Why SAFEOP may have been refused: the process data that is configured beside that of the SubDevice's dictionary.
+
+use alloc::format;
+
+use ringcat_wire::al::AlStatusCode;
+
+use super::{BringUp, ConfigureError};
+use crate::event::Event;
+use crate::mail::coe::pdo;
+use crate::procedures::al_state::StateError;
+
+/// Codes that may mean that the sizes are wrong (facts 5.5).
+const OF_SIZES: [AlStatusCode; 5] = [
+    AlStatusCode::INVALID_SYNC_MANAGER_CONFIGURATION,
+    AlStatusCode::INVALID_OUTPUT_CONFIGURATION,
+    AlStatusCode::INVALID_INPUT_CONFIGURATION,
+    AlStatusCode::INVALID_INPUT_MAPPING,
+    AlStatusCode::INVALID_OUTPUT_MAPPING,
+];
+
+impl BringUp<'_> {
+    /// Tells where dictionary and configuration differ, if that may be why.
+    pub(super) async fn explain(&self, error: &ConfigureError) {
+        let ConfigureError::State(StateError::Refused { code, .. }) = error else { return };
+        if !OF_SIZES.contains(code) || !self.mailbox.is_open() {
+            return;
+        }
+        let limits = (self.config.timeouts.mailbox_request, self.config.timeouts.sdo);
+        for area in &self.setup.plan.process_data {
+            // One without such lists has nothing to compare.
+            let Ok(pdos) = pdo::read_assignment(&self.mailbox, area.sync_manager, limits).await else { return };
+            let entries = pdos.iter().flat_map(|pdo| pdo.entries.iter().flatten());
+            let bits: u32 = entries.map(|entry| u32::from(entry.bit_length)).sum();
+            if bits.div_ceil(8) != u32::from(area.length) {
+                let what = format!(
+                    "SM {}: {} bytes are configured, the PDOs in the dictionary have {}",
+                    area.sync_manager,
+                    area.length,
+                    bits.div_ceil(8)
+                );
+                self.bus.report(Event::PlanOddity { subdevice: self.index, what });
+            }
+        }
+    }
+}

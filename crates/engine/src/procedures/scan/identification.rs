@@ -1,0 +1,31 @@
+//! The explicit device identification of SubDevices whose SII offers it (facts 4.3, 5.3).
+
+use ringcat_wire::address::{RegisterAddress, StationAddress};
+use ringcat_wire::register::EscConfiguration;
+use ringcat_wire::sii::{CategoryKind, General};
+
+use crate::procedures::al_state;
+use crate::procedures::sii::SiiContents;
+use crate::supervisor::{Bus, BusError};
+
+/// Reads it; `None` where there is none, or where it is not given.
+pub(super) async fn read(bus: &Bus, station: StationAddress, contents: &SiiContents) -> Result<Option<u16>, BusError> {
+    let general = contents.categories.iter().find(|(kind, _)| *kind == CategoryKind::General);
+    let Some(general) = general.and_then(|(_, data)| General::decode(data.first_chunk::<{ General::LEN }>()?)) else {
+        return Ok(None);
+    };
+    // Behind a controller that copies AL control there is nobody to answer.
+    let emulated = EscConfiguration::from_bits((contents.header.pdi_control >> 8) as u8).device_emulation;
+    if general.flags.identification_al_status_code() && !emulated {
+        return al_state::identification(bus, station).await;
+    }
+    if !general.flags.identification_memory() {
+        return Ok(None);
+    }
+    match bus.fprd_array(station, RegisterAddress(general.id_switch_address)).await {
+        Ok(bytes) => Ok(Some(u16::from_le_bytes(bytes))),
+        // There is no such memory.
+        Err(BusError::Wkc { .. }) => Ok(None),
+        Err(error) => Err(error),
+    }
+}

@@ -1,0 +1,100 @@
+//! Which member is at which position, and where members belong in the order of the segment.
+
+use alloc::vec::Vec;
+
+use ringcat_wire::address::StationAddress;
+
+use crate::procedures::fleet::{Fleet, Member, SharedFleet};
+
+/// The member at each position.
+#[derive(Debug)]
+pub(crate) struct Owners {
+    all: Vec<Option<usize>>,
+    /// Without those of groups, which may be anywhere.
+    anchors: Vec<Option<usize>>,
+}
+
+impl Owners {
+    /// Owners by position; some of them float.
+    pub(crate) fn new(all: Vec<Option<usize>>, floats: impl Fn(usize) -> bool) -> Owners {
+        let anchors = all.iter().map(|owner| owner.filter(|index| !floats(*index))).collect();
+        Owners { all, anchors }
+    }
+
+    pub(super) fn all(&self) -> &[Option<usize>] {
+        &self.all
+    }
+
+    /// The member at a position.
+    pub(super) fn at(&self, at: usize) -> Option<usize> {
+        self.all.get(at).copied().flatten()
+    }
+
+    /// The member right before a position.
+    pub(super) fn before(&self, at: usize) -> Option<usize> {
+        self.at(at.checked_sub(1)?)
+    }
+
+    /// The nearest members before and behind a position, without those of groups.
+    pub(super) fn neighbours(&self, at: usize) -> (Option<usize>, Option<usize>) {
+        neighbours(&self.anchors, at)
+    }
+}
+
+/// The member at each position. Where several have the address of one member, the one between its neighbours is it; if
+/// that does not tell, none of them is.
+pub(super) fn owners_of(fleet: &SharedFleet, stations: &[StationAddress]) -> Owners {
+    let access = fleet.access();
+    let floats = |index: usize| access.members[index].config.group.is_some();
+    let member = |station: &StationAddress| access.members.iter().position(|member| member.station == *station);
+    let all: Vec<Option<usize>> = stations.iter().map(member).collect();
+    let is_single = |owner: &Option<usize>| all.iter().filter(|other| *other == owner).count() == 1;
+    let mut owners: Vec<Option<usize>> = all.iter().map(|owner| owner.filter(|_| is_single(owner))).collect();
+    let ranks = ranks(&access);
+    for index in 0..access.members.len() {
+        let several = |at: &usize| all[*at] == Some(index) && owners[*at].is_none();
+        let candidates: Vec<usize> = (0..all.len()).filter(several).collect();
+        if candidates.is_empty() {
+            continue;
+        }
+        let anchors: Vec<Option<usize>> = owners.iter().map(|owner| owner.filter(|owner| !floats(*owner))).collect();
+        let is_between = |at: &usize| {
+            let (before, behind) = neighbours(&anchors, *at);
+            floats(index)
+                || (before.is_none_or(|before| ranks[before] < ranks[index])
+                    && behind.is_none_or(|behind| ranks[index] < ranks[behind]))
+        };
+        let between: Vec<usize> = candidates.iter().copied().filter(is_between).collect();
+        let keeper = match between[..] {
+            [only] => Some(only),
+            // It was there at the scan, and nobody has moved since.
+            _ => between.into_iter().find(|at| access.members[index].node == Some(*at)),
+        };
+        if let Some(at) = keeper {
+            owners[at] = Some(index);
+        }
+    }
+    Owners::new(owners, floats)
+}
+
+/// The nearest members before and behind a position.
+fn neighbours(owners: &[Option<usize>], at: usize) -> (Option<usize>, Option<usize>) {
+    let before = owners.iter().take(at).rev().copied().flatten().next();
+    (before, owners.iter().skip(at + 1).copied().flatten().next())
+}
+
+/// Where a member belongs in the order of the segment, which need not be that of the declaration.
+pub(super) type Rank = (Option<usize>, bool, usize);
+
+/// The ranks of all members; those of groups mean nothing.
+pub(super) fn ranks(fleet: &Fleet) -> Vec<Rank> {
+    let mut last = None;
+    let rank = |(index, member): (usize, &Member)| {
+        // One that was never seen belongs behind the one that is declared before it.
+        if member.config.group.is_none() {
+            last = member.node.or(last);
+        }
+        (last, member.node.is_none(), index)
+    };
+    fleet.members.iter().enumerate().map(rank).collect()
+}

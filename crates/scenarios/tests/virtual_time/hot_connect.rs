@@ -1,0 +1,260 @@
+//! Hot connect groups: SubDevices in a row that come and go, at any place, while the others exchange process data.
+
+use std::time::Duration;
+
+use ringcat::{
+    Declaration, DomainConfig, DomainId, DomainMember, DomainState, Event, Group, MainDevice, Options, Scan,
+    SubDeviceConfig, SubDeviceInfo, automatic,
+};
+use ringcat_sim::cable::{CableId, DeviceIndex};
+use ringcat_sim::description::DeviceDescription;
+use ringcat_sim::fault::Fault;
+use ringcat_sim::frame::Port;
+use ringcat_sim::network::builder::SegmentBuilder;
+use ringcat_sim::network::{Network, NetworkOptions};
+use ringcat_wire::al::{AlState, AlStatus};
+use scenarios::segments::{descriptions, devices, line, ring};
+use scenarios::tap::Tap;
+use scenarios::world::{CYCLE, Mark, World};
+
+const LIMIT: Duration = Duration::from_secs(5);
+/// Alias of the group's head.
+const TOOL: u16 = 5;
+/// Those that are always there, and those of the group.
+const BASE: [&str; 4] = ["coupler", "digital-input-8", "digital-output-8", "digital-input-16"];
+const GROUP: [&str; 2] = ["analog-input-4", "digital-output-16"];
+
+/// What a scan says about devices of these kinds.
+fn infos(kinds: &[&str]) -> Vec<SubDeviceInfo> {
+    let links = Tap::new(line(descriptions(kinds), NetworkOptions::default()));
+    MainDevice::request(links, &Options::default()).scan().expect("a scan").subdevices
+}
+
+/// The two of the group, the head with an alias.
+fn tool() -> Vec<DeviceDescription> {
+    let mut devices = descriptions(&GROUP);
+    devices[0].alias = TOOL;
+    devices
+}
+
+fn group(head: SubDeviceConfig) -> Group {
+    let infos = infos(&GROUP);
+    let expect = |config: SubDeviceConfig, info: &SubDeviceInfo| {
+        config.expect_product(info.identity.vendor_id, info.identity.product_code).pdos_of(info)
+    };
+    Group::new(expect(head, &infos[0])).then(expect(SubDeviceConfig::default(), &infos[1]))
+}
+
+/// The base by position, then the group.
+fn declare(_: &Scan) -> Declaration {
+    let mut declaration = automatic(&infos(&BASE), CYCLE);
+    let (number, members) = declaration.add_group(group(SubDeviceConfig::at_alias(TOOL, 0)));
+    assert_eq!((number, members.clone()), (0, 4..6));
+    declaration.domains[0].members.extend(members.map(|subdevice| DomainMember { subdevice, sync_managers: None }));
+    declaration
+}
+
+fn world(network: Network) -> World {
+    let mut world = World::with(1, network, &Options::default(), declare).expect("scan and activation");
+    world.until(LIMIT, "all that are there settled", |world| world.application().all_settled());
+    world.run_cycles(20);
+    world
+}
+
+fn has_joined(world: &World) -> bool {
+    world.application().groups()[0].has_joined()
+}
+
+fn until_joined(world: &mut World) {
+    world.until(LIMIT, "the group has joined", has_joined);
+    world.recognise();
+    world.run_cycles(20);
+    for subdevice in [4, 5] {
+        let device = world.device_of(subdevice).expect("it is there");
+        assert_eq!(world.network().device(device).al_status(), AlStatus::new(AlState::Op));
+    }
+    let last = world.judged(world.beginning()).last().expect("cycles went by");
+    assert_eq!((last.status.wkc, last.stale.clone()), (last.status.expected, Vec::new()));
+}
+
+fn until_left(world: &mut World) {
+    world.until(LIMIT, "the group has left", |world| world.application().groups()[0].present == 0);
+    world.run_cycles(20);
+}
+
+/// Cycles in which a domain was not complete: the group is optional.
+fn errors(world: &World, since: Mark) -> usize {
+    world.judged(since).iter().filter(|judged| judged.status.state != DomainState::Complete).count()
+}
+
+fn count(world: &World, since: Mark, wanted: &Event) -> usize {
+    world.events(since).iter().filter(|timed| timed.event == *wanted).count()
+}
+
+/// The group behind the last cable of a line.
+fn at_the_end() -> (Network, CableId) {
+    let all = descriptions(&BASE).into_iter().chain(tool()).collect();
+    let mut network = line(all, NetworkOptions::default());
+    let cable = CableId(BASE.len());
+    network.apply(Fault::Cut(cable));
+    (network, cable)
+}
+
+/// Between two cycles, so that no frame is on its way there.
+const BETWEEN: Duration = Duration::from_micros(500);
+
+#[test]
+fn a_group_joins_and_leaves_the_end_of_a_line_without_a_working_counter_error_on_the_others() {
+    let (network, cable) = at_the_end();
+    let mut world = world(network);
+    assert_eq!(world.application().groups()[0].present, 0);
+    for round in 0..5 {
+        let mark = world.mark();
+        world.fault_in(BETWEEN, Fault::Heal(cable));
+        if round > 0 {
+            for subdevice in [4, 5] {
+                let _ = world.application_mut().request_state(subdevice, AlState::Op);
+            }
+        }
+        until_joined(&mut world);
+        assert_eq!(count(&world, mark, &Event::GroupJoined { group: 0 }), 1);
+        // Whoever is to be unplugged is sent away before.
+        for subdevice in [5, 4] {
+            let work = world.application_mut().request_state(subdevice, AlState::Init);
+            assert_eq!(world.finish(LIMIT, work), Ok(()));
+        }
+        world.fault_in(BETWEEN, Fault::Cut(cable));
+        until_left(&mut world);
+        assert_eq!(errors(&world, mark), 0, "round {round}");
+        assert_eq!(count(&world, mark, &Event::GroupLeft { group: 0 }), 1);
+    }
+    assert!(world.left_op(world.beginning()).iter().all(|device| device.0 >= BASE.len()));
+}
+
+#[test]
+fn a_group_that_is_torn_off_costs_the_others_nothing_where_it_has_a_domain_of_its_own() {
+    let (network, cable) = at_the_end();
+    let declare = |scan: &Scan| {
+        let mut declaration = declare(scan);
+        let members = declaration.domains[0].members.split_off(BASE.len());
+        declaration.domains.push(DomainConfig { period: CYCLE, members });
+        declaration
+    };
+    let mut world = World::with(4, network, &Options::default(), declare).expect("scan and activation");
+    world.until(LIMIT, "all that are there settled", |world| world.application().all_settled());
+    let mark = world.mark();
+    for round in 0..5 {
+        world.fault_in(BETWEEN, Fault::Heal(cable));
+        world.until(LIMIT, "the group has joined", has_joined);
+        world.run_cycles(20);
+        world.fault_in(BETWEEN, Fault::Cut(cable));
+        until_left(&mut world);
+        let all = world.judged(mark).iter().filter(|judged| judged.status.state != DomainState::Complete);
+        let (others, own): (Vec<_>, Vec<_>) = all.partition(|judged| judged.domain == DomainId(0));
+        println!("round {round}: {} cycles of the others, {} of the group's own domain", others.len(), own.len());
+        assert_eq!(others.len(), 0);
+    }
+    assert!(world.left_op(mark).iter().all(|device| device.0 >= BASE.len()));
+}
+
+#[test]
+fn a_group_joins_at_another_place_than_it_left() {
+    // One place behind a branch of the junction, another at the end of the line: of two alike one has power.
+    let line = descriptions(&["coupler", "digital-input-8", "junction", "digital-output-8", "digital-input-16"]);
+    let ends = [tool(), tool()].map(devices);
+    let [branch, end] = ends;
+    let all = devices(line).into_iter().chain(end).collect();
+    let network = SegmentBuilder::line(all).branch(DeviceIndex(2), Port::C, branch).build();
+    let mut network = network.expect("a segment can be built");
+    let places = [[5, 6], [7, 8]].map(|place| place.map(DeviceIndex));
+    places.iter().flatten().for_each(|device| network.power_off(*device));
+    let declare = |_: &Scan| {
+        let base = ["coupler", "digital-input-8", "junction", "digital-output-8", "digital-input-16"];
+        let mut declaration = automatic(&infos(&base), CYCLE);
+        let (_, members) = declaration.add_group(group(SubDeviceConfig::at_alias(TOOL, 0)));
+        declaration.domains[0].members.extend(members.map(|subdevice| DomainMember { subdevice, sync_managers: None }));
+        declaration
+    };
+    let mut world = World::with(2, network, &Options::default(), declare).expect("scan and activation");
+    world.until(LIMIT, "all that are there settled", |world| world.application().all_settled());
+    for round in 0..4 {
+        let place = places[round % 2];
+        let mark = world.mark();
+        place.iter().for_each(|device| world.power_on(*device));
+        world.until(LIMIT, "the group has joined", has_joined);
+        world.run_cycles(20);
+        let is_in_op = |device: &DeviceIndex| world.network().device(*device).al_status() == AlStatus::new(AlState::Op);
+        assert!(place.iter().all(is_in_op), "round {round}");
+        assert_eq!(errors(&world, mark), 0, "joining, round {round}");
+        place.iter().rev().for_each(|device| world.power_off(*device));
+        until_left(&mut world);
+        assert!(world.left_op(mark).iter().all(|device| device.0 >= 5), "{:?}", world.left_op(mark));
+    }
+}
+
+#[test]
+fn a_group_in_the_middle_of_a_ring_joins_while_the_others_stay_in_op() {
+    let mut all = descriptions(&BASE);
+    let tail = all.split_off(2);
+    let all: Vec<_> = all.into_iter().chain(tool()).chain(tail).collect();
+    let mut network = ring(all, NetworkOptions::default());
+    let place = [2, 3].map(DeviceIndex);
+    place.iter().for_each(|device| network.power_off(*device));
+    let mut world = world(network);
+    let mark = world.mark();
+    for device in place {
+        world.power_on(device);
+        world.run_cycles(3);
+    }
+    // The ring closes: that is the matter of its edges.
+    let edges = errors(&world, mark);
+    let mark = world.mark();
+    until_joined(&mut world);
+    println!("{edges} cycles at the edges of the ring, {} while the group was configured", errors(&world, mark));
+    assert!(edges <= 4 && errors(&world, mark) == 0);
+    assert!(world.left_op(world.beginning()).is_empty());
+}
+
+#[test]
+fn a_group_is_there_from_the_beginning_and_found_by_its_identification_facts_5_3() {
+    let mut head = tool();
+    head[0].alias = 0;
+    head[0].identification = Some(4711);
+    // In front of those with positions.
+    let mut all = descriptions(&BASE);
+    let tail = all.split_off(1);
+    let all = all.into_iter().chain(head).chain(tail).collect();
+    let declare = |_: &Scan| {
+        let mut declaration = automatic(&infos(&BASE), CYCLE);
+        let (_, members) = declaration.add_group(group(SubDeviceConfig::at_identification(4711)));
+        declaration.domains[0].members.extend(members.map(|subdevice| DomainMember { subdevice, sync_managers: None }));
+        declaration
+    };
+    let network = line(all, NetworkOptions::default());
+    let mut world = World::with(3, network, &Options::default(), declare).expect("scan and activation");
+    world.settle();
+    assert!(has_joined(&world));
+    let found: Vec<Option<usize>> = (0..6).map(|index| world.device_of(index).map(|device| device.0)).collect();
+    assert_eq!(found, [0, 3, 4, 5, 1, 2].map(Some));
+    // Its power goes and comes: the ones behind it come back too, by their places.
+    world.power_off(DeviceIndex(1));
+    world.run_cycles(50);
+    world.power_on(DeviceIndex(1));
+    world.until(LIMIT, "the group has joined", has_joined);
+    world.settle();
+    assert!(world.all_in_op());
+}
+
+#[test]
+fn a_group_that_breaks_off_is_told_and_its_rest_is_taken() {
+    let mut all: Vec<_> = descriptions(&BASE).into_iter().chain(tool()).collect();
+    all.pop();
+    all.extend(descriptions(&["digital-input-4"]));
+    let mut world = world(line(all, NetworkOptions::default()));
+    let state = world.application().groups()[0];
+    assert_eq!((state.present, state.settled, state.members), (1, 1, 2));
+    let told = |event: &Event| matches!(event, Event::Mismatch { subdevice: 5, position, .. } if position.0 == 5);
+    assert!(world.saw(world.beginning(), told));
+    world.run_cycles(200);
+    assert_eq!(world.network().device(DeviceIndex(5)).al_status(), AlStatus::new(AlState::Init), "it is left alone");
+}

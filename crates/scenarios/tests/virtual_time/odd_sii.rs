@@ -1,0 +1,186 @@
+//! SubDevices whose SII is odd: no PDOs in it, others than the dictionary has, no end marker, SyncManagers in another order,
+//! nothing at all.
+
+use std::time::Duration;
+
+use ringcat::{Event, MainDevice, Options, PdoMapping, ReadPdos, SubDeviceInfo, automatic};
+use ringcat_engine::mail::coe::pdo;
+use ringcat_sim::cable::DeviceIndex;
+use ringcat_sim::description::DeviceDescription;
+use ringcat_sim::network::NetworkOptions;
+use ringcat_sim::sii_image;
+use ringcat_wire::al::{AlState, AlStatus};
+use ringcat_wire::sii::SyncManagerKind;
+use scenarios::check::troubles;
+use scenarios::segments::{descriptions, line};
+use scenarios::tap::Tap;
+use scenarios::world::{CYCLE, World};
+
+const KINDS: [&str; 4] = ["coupler", "digital-output-8", "all-protocols", "digital-input-8"];
+/// The odd one.
+const ODD: usize = 2;
+
+/// A segment in which one device has the SII of another one.
+fn with_sii(kind: &str, other: impl FnOnce(&mut DeviceDescription)) -> Vec<DeviceDescription> {
+    let mut kinds = KINDS;
+    kinds[ODD] = kind;
+    let mut devices = descriptions(&kinds);
+    let mut described = devices[ODD].clone();
+    other(&mut described);
+    devices[ODD].sii_image = Some(sii_image::build(&described));
+    devices
+}
+
+fn world(devices: Vec<DeviceDescription>, pdos: ReadPdos) -> World {
+    let options = Options { pdos, ..Options::default() };
+    let network = line(devices, NetworkOptions::default());
+    World::with(1, network, &options, |scan| automatic(&scan.subdevices, CYCLE)).expect("scan and activation")
+}
+
+fn odd(world: &World) -> &SubDeviceInfo {
+    &world.scan.subdevices[ODD]
+}
+
+fn told(world: &World, text: &str) -> bool {
+    world.saw(world.beginning(), |event| {
+        matches!(event, Event::SiiOddity { position, what } if usize::from(position.0) == ODD && what.contains(text))
+    })
+}
+
+#[test]
+fn pdos_that_the_sii_leaves_out_are_read_from_the_dictionary_facts_6_3() {
+    let devices = || with_sii("servo", |described| described.pdos.clear());
+    let mut read = world(devices(), ReadPdos::Missing);
+    read.settle();
+    read.run_cycles(50);
+    let pdos: Vec<(u16, Option<u8>)> = odd(&read).pdos.iter().map(|pdo| (pdo.index, pdo.sync_manager)).collect();
+    assert_eq!(pdos, [(0x1600, Some(2)), (0x1A00, Some(3))]);
+    assert!(read.application().entry(ODD, 0x6041, 0).is_some(), "entries have names by index");
+    assert_eq!(troubles(read.events(read.beginning())), Vec::<&Event>::new());
+    assert!(!told(&read, "dictionary"), "what is only missing is no contradiction");
+    read.power_off(DeviceIndex(ODD));
+    read.run_cycles(20);
+    read.power_on(DeviceIndex(ODD));
+    read.settle();
+    let unread = world(devices(), ReadPdos::Never);
+    assert_eq!(odd(&unread).pdos, []);
+}
+
+#[test]
+fn where_sii_and_dictionary_disagree_the_dictionary_counts_and_that_is_told() {
+    // The SII has a PDO of half the size.
+    let devices = || {
+        with_sii("all-protocols", |described| {
+            for pdo in &mut described.pdos {
+                pdo.entries[0].bit_length = 16;
+            }
+        })
+    };
+    let mut asked = world(devices(), ReadPdos::Always);
+    asked.settle();
+    asked.run_cycles(50);
+    assert!(told(&asked, "SM 3: 16 bits of process data, the dictionary has other PDOs with 32 bits, which count"));
+    let areas = asked.application().directory().areas(ODD);
+    assert_eq!(areas.iter().map(|area| area.placed.area.length).collect::<Vec<_>>(), [4, 4]);
+    let mut trusting = world(devices(), ReadPdos::Missing);
+    trusting.run_cycles(100);
+    // The SubDevice refuses, and the reason is found.
+    let explained = |event: &Event| {
+        matches!(event, Event::PlanOddity { subdevice: ODD, what }
+            if what == "SM 2: 2 bytes are configured, the PDOs in the dictionary have 4")
+    };
+    assert!(trusting.saw(trusting.beginning(), explained), "{:?}", troubles(trusting.events(trusting.beginning())));
+}
+
+#[test]
+fn what_somebody_assigned_before_is_assigned_again_after_a_loss_of_power() {
+    let mut devices = descriptions(&KINDS);
+    devices[ODD] = descriptions(&["analog-input-4"]).remove(0);
+    let links = Tap::new(line(devices, NetworkOptions::default()));
+    let options = Options { pdos: ReadPdos::Always, ..Options::default() };
+    let mut main_device = MainDevice::request(links, &options);
+    main_device.scan().expect("a scan");
+    main_device.bring_to(ODD, AlState::PreOp).expect("it goes there");
+    let mailbox = main_device.mailbox(ODD).expect("it was visited");
+    // The compact PDOs, without status.
+    let compact: Vec<PdoMapping> = (0..4).map(|channel| PdoMapping::from_sii(0x1A01 + 2 * channel)).collect();
+    let limits = (Duration::from_millis(100), Duration::from_secs(1));
+    let written = main_device.run(async move { pdo::write_assignment(&mailbox, 3, &compact, limits).await });
+    assert_eq!(written, Ok(()));
+    let found = main_device.scan().expect("a scan");
+    let mut application = main_device.activate(automatic(&found.subdevices, CYCLE)).expect("activation");
+    let mut settle = |power: Option<bool>| {
+        match power {
+            Some(true) => application.links_mut().network_mut().power_on(DeviceIndex(ODD)),
+            Some(false) => application.links_mut().network_mut().power_off(DeviceIndex(ODD)),
+            None => {}
+        }
+        (0..300).for_each(|_| application.cycle(|_| ()));
+        let device = application.links().network().device(DeviceIndex(ODD));
+        (device.al_status(), device.inputs().len())
+    };
+    assert_eq!(settle(None), (AlStatus::new(AlState::Op), 8));
+    settle(Some(false));
+    assert_eq!(settle(Some(true)), (AlStatus::new(AlState::Op), 8), "not the sixteen bytes of its default");
+}
+
+#[test]
+fn sync_managers_in_another_order_are_taken_as_the_sii_says_facts_4_4() {
+    let mut devices = descriptions(&KINDS);
+    let device = &mut devices[ODD];
+    device.sync_managers.swap(2, 3);
+    for pdo in &mut device.pdos {
+        pdo.sync_manager = pdo.sync_manager.map(|number| 5 - number);
+    }
+    assert_eq!(device.sync_managers[2].kind, SyncManagerKind::Inputs);
+    let mut world = world(devices, ReadPdos::Missing);
+    world.settle();
+    let mark = world.mark();
+    world.run_cycles(50);
+    assert_eq!(world.incomplete(mark), 0);
+    assert!(world.compared() > 0);
+}
+
+#[test]
+fn an_sii_without_an_end_marker_is_told_and_used() {
+    let mut devices = descriptions(&KINDS);
+    let used = sii_image::used_bytes(&devices[ODD]);
+    let mut image = sii_image::build(&devices[ODD]);
+    // Where the end marker was, the rest of an older image.
+    for (at, byte) in image[used - 2..].iter_mut().enumerate() {
+        *byte = [0x01, 0x80, 0x02, 0x00, 0xAA, 0xAA, 0x55, 0x55][at % 8];
+    }
+    devices[ODD].sii_image = Some(image);
+    let mut world = world(devices, ReadPdos::Missing);
+    world.settle();
+    assert!(told(&world, "no end marker"), "{:?}", world.events(world.beginning()));
+}
+
+#[test]
+fn one_with_a_blank_eeprom_is_told_and_keeps_nobody_from_op() {
+    for blank in [0x00, 0xFF] {
+        let mut devices = descriptions(&KINDS);
+        devices[ODD].sii_image = Some(vec![blank; 512]);
+        // The simulator writes these into images.
+        devices[ODD].alias = u16::from_le_bytes([blank; 2]);
+        devices[ODD].identity.serial = u32::from_le_bytes([blank; 4]);
+        let mut world = world(devices, ReadPdos::Always);
+        world.run_cycles(300);
+        assert!(told(&world, "the EEPROM is blank"));
+        let others = world.network().devices().enumerate().filter(|(number, _)| *number != ODD);
+        assert!(others.into_iter().all(|(_, device)| device.al_status() == AlStatus::new(AlState::Op)));
+    }
+}
+
+#[test]
+fn a_dictionary_that_does_not_answer_costs_its_own_time_only() {
+    let devices = with_sii("servo", |described| described.pdos.clear());
+    let mut network = line(devices, NetworkOptions::default());
+    network.apply(ringcat_sim::fault::Fault::Hang(DeviceIndex(ODD), true));
+    let options = Options::default();
+    let world = World::with(1, network, &options, |scan| automatic(&scan.subdevices, CYCLE)).expect("scan");
+    assert!(told(&world, "its dictionary does not tell its PDOs"));
+    let seconds = Duration::from_nanos(world.now().0).as_secs();
+    assert!(seconds < 10, "{seconds} s");
+    assert_eq!(world.application().entry(ODD, 0x6041, 0), None);
+}

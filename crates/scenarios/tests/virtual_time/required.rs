@@ -1,0 +1,124 @@
+//! Who must be there for an activation, who may be missing or somebody else, and what is told about it.
+
+use std::time::Duration;
+
+use ringcat::{Declaration, Event, IdentityField, Options, Required, Scan, SubDeviceConfig, SubDeviceState, automatic};
+use ringcat_sim::cable::DeviceIndex;
+use ringcat_sim::description::DeviceDescription;
+use ringcat_sim::network::NetworkOptions;
+use ringcat_wire::al::{AlState, AlStatus};
+use scenarios::segments::{descriptions, line};
+use scenarios::world::{CYCLE, World};
+
+const KINDS: [&str; 4] = ["coupler", "digital-output-8", "servo", "digital-input-8"];
+const LIMIT: Duration = Duration::from_secs(5);
+
+fn activate(
+    change: impl FnOnce(&mut Vec<DeviceDescription>),
+    declare: impl Fn(&mut Declaration),
+) -> Result<World, ringcat::Error> {
+    let mut devices = descriptions(&KINDS);
+    change(&mut devices);
+    let declaring = |scan: &Scan| {
+        let mut declaration = automatic(&scan.subdevices, CYCLE);
+        declare(&mut declaration);
+        declaration
+    };
+    World::with(1, line(devices, NetworkOptions::default()), &Options::default(), declaring)
+}
+
+fn states(world: &World) -> Vec<AlStatus> {
+    world.network().devices().map(|device| device.al_status()).collect()
+}
+
+#[test]
+fn a_mismatch_is_told_with_both_sides_and_leaves_that_one_alone() {
+    let op = AlStatus::new(AlState::Op);
+    type Change = fn(SubDeviceConfig) -> SubDeviceConfig;
+    let cases: [(Change, IdentityField, u32); 4] = [
+        (|config| config.expect_product(0x9999, 1), IdentityField::VendorId, 0x9999),
+        (|config| config.expect_revision(0x77), IdentityField::Revision, 0x77),
+        (|config| config.expect_revision_from(u32::MAX), IdentityField::MinimumRevision, u32::MAX),
+        (|config| config.expect_identification(12), IdentityField::Identification, 12),
+    ];
+    for (change, wanted, value) in cases {
+        let mut world = activate(
+            |_| (),
+            |declaration| {
+                declaration.subdevices[2] = change(declaration.subdevices[2].clone());
+                declaration.required = Required::Nobody;
+            },
+        )
+        .expect("activation");
+        world.run_cycles(200);
+        let told = |event: &Event| match event {
+            Event::Mismatch { subdevice: 2, position, field, expected, .. } => {
+                (position.0, *field, *expected) == (2, wanted, value)
+            }
+            _ => false,
+        };
+        assert!(world.saw(world.beginning(), told), "{wanted}");
+        assert_eq!(states(&world), [op, op, AlStatus::new(AlState::Init), op], "{wanted}");
+        assert_eq!(world.application().states()[2], SubDeviceState::Absent);
+        assert!(!world.application().mandatory_settled());
+    }
+}
+
+#[test]
+fn an_identification_that_is_right_is_no_mismatch_facts_5_3() {
+    let declare = |declaration: &mut Declaration| {
+        declaration.subdevices[2] = declaration.subdevices[2].clone().expect_identification(0x1234);
+    };
+    let mut world = activate(|devices| devices[2].identification = Some(0x1234), declare).expect("activation");
+    world.settle();
+    assert_eq!(world.scan.subdevices[2].identification, Some(0x1234));
+    assert_eq!(world.scan.subdevices[1].identification, None);
+    let error = activate(|devices| devices[2].identification = Some(0x1235), declare).expect_err("another one");
+    assert!(error.to_string().contains("SubDevice 2: expected identification 0x00001234, got 0x00001235"), "{error}");
+}
+
+#[test]
+fn everybody_may_be_required_those_that_are_optional_too() {
+    let with = |required| {
+        activate(
+            |devices| drop(devices.pop()),
+            move |declaration| {
+                declaration.subdevices.push(SubDeviceConfig::at_position(3).optional());
+                declaration.required = required;
+            },
+        )
+    };
+    let error = with(Required::Everybody).expect_err("one is missing");
+    assert!(error.to_string().contains("no SubDevice at position 3; 3 are present"), "{error}");
+    let mut world = with(Required::Mandatory).expect("activation");
+    world.until(LIMIT, "settled", |world| world.application().mandatory_settled());
+    assert!(world.saw(world.beginning(), |event| *event == Event::Missing { subdevice: 3, optional: true }));
+}
+
+#[test]
+fn a_mandatory_one_that_is_missing_is_told_and_may_come_later() {
+    let declare = |declaration: &mut Declaration| declaration.required = Required::Nobody;
+    let mut devices = descriptions(&KINDS);
+    for device in &mut devices {
+        device.alias = 0;
+    }
+    let mut network = line(devices, NetworkOptions::default());
+    let infos = {
+        let tap = scenarios::tap::Tap::new(line(descriptions(&KINDS), NetworkOptions::default()));
+        ringcat::MainDevice::request(tap, &Options::default()).scan().expect("a scan").subdevices
+    };
+    network.power_off(DeviceIndex(3));
+    let declaring = |_: &Scan| {
+        let mut declaration = automatic(&infos, CYCLE);
+        declaration.subdevices[3] = declaration.subdevices[3].clone().pdos_of(&infos[3]);
+        declare(&mut declaration);
+        declaration
+    };
+    let mut world = World::with(2, network, &Options::default(), declaring).expect("activation");
+    world.run_cycles(100);
+    assert!(world.saw(world.beginning(), |event| *event == Event::Missing { subdevice: 3, optional: false }));
+    assert!(world.judged(world.beginning()).iter().all(|judged| judged.status.state != ringcat::DomainState::Complete));
+    world.power_on(DeviceIndex(3));
+    world.settle();
+    assert!(world.all_in_op());
+}
