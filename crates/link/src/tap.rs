@@ -20,6 +20,8 @@ const TUNSETIFF: libc::c_ulong = 0x4004_54CA;
 const TUNSETCARRIER: libc::c_ulong = 0x4004_54E2;
 /// Where the bytes of an address begin in `sockaddr`, and what kind it is.
 const MAC_LEN: usize = 6;
+/// Frames that the host keeps for us; what is more it drops, so that its connections notice in time.
+const QUEUE: libc::c_int = 64;
 
 /// Why there is no interface, in words that say what to do.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -118,6 +120,7 @@ impl TapInterface {
         ioctl(&fd, TUNSETIFF, &mut request).map_err(|errno| failed("making it", errno))?;
         let tap = TapInterface { fd, name: name.to_owned() };
         tap.set_mac(mac).map_err(|errno| failed("setting its address", errno))?;
+        tap.set_queue().map_err(|errno| failed("setting its queue", errno))?;
         tap.set_carrier(false);
         Ok(tap)
     }
@@ -143,6 +146,14 @@ impl TapInterface {
         ioctl(&self.fd, libc::SIOCSIFHWADDR as _, &mut request)
     }
 
+    /// Shortens the queue, which is a second long else.
+    fn set_queue(&self) -> Result<(), i32> {
+        let mut request = kernel::named(&self.name)?;
+        // The length is an integer where the MTU is one (`ifr_qlen`, `ifr_mtu`).
+        request.ifr_ifru.ifru_mtu = QUEUE;
+        ioctl(&kernel::question_socket()?, libc::SIOCSIFTXQLEN as _, &mut request)
+    }
+
     /// Takes the oldest frame that the host sent into the interface; its length, `None` where there is none. What does not
     /// fit is cut off.
     pub fn receive(&self, room: &mut [u8]) -> Option<usize> {
@@ -164,7 +175,7 @@ impl TapInterface {
 /// # Safety
 /// Only for what the kernel reads and writes by its full size.
 unsafe trait Argument {}
-// SAFETY: what TUNSETIFF and SIOCSIFHWADDR take.
+// SAFETY: what TUNSETIFF, SIOCSIFHWADDR and SIOCSIFTXQLEN take.
 unsafe impl Argument for libc::ifreq {}
 // SAFETY: what TUNSETCARRIER takes.
 unsafe impl Argument for libc::c_int {}
