@@ -8,6 +8,7 @@ mod address;
 mod builder;
 mod clocks;
 mod groups;
+mod ip;
 mod resolve;
 mod startup;
 mod timeouts;
@@ -24,6 +25,7 @@ pub use crate::info::IdentityField;
 pub use address::ConfigAddress;
 pub(crate) use groups::can_lead;
 pub use groups::{Group, groups};
+pub use ip::IpSettings;
 pub use startup::{IdnWrite, SdoDownload, StartupAction, StartupCommand, Transition};
 pub use timeouts::{StateTimeout, Timeouts};
 

@@ -63,9 +63,9 @@ pub use process_data::ProcessData;
 pub use supervisor_thread::SupervisorThread;
 
 pub use ringcat_engine::config::{
-    ClockConfig, ConfigAddress, Expected, Group, IdentityField, IdnWrite, PdoAssignment, PdoEntry, PdoMapping,
-    ReferenceClock, SdoDownload, StartupAction, StartupCommand, StateTimeout, SubDeviceConfig, SyncSignals, Timeouts,
-    Transition, Watchdog,
+    ClockConfig, ConfigAddress, Expected, Group, IdentityField, IdnWrite, IpSettings, PdoAssignment, PdoEntry,
+    PdoMapping, ReferenceClock, SdoDownload, StartupAction, StartupCommand, StateTimeout, SubDeviceConfig, SyncSignals,
+    Timeouts, Transition, Watchdog,
 };
 pub use ringcat_engine::domain::{DomainId, DomainState, DomainStatus, Freshness};
 pub use ringcat_engine::event::{Event, TimedEvent};

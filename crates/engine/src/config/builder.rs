@@ -7,8 +7,8 @@ use ringcat_wire::al::AlState;
 use ringcat_wire::mailbox::soe::Idn;
 
 use super::{
-    ConfigAddress, IdnWrite, PdoAssignment, PdoEntry, PdoMapping, SdoDownload, StartupAction, StartupCommand,
-    StateTimeout, SubDeviceConfig, SyncManagerOverride, SyncSignals, Timeouts, Transition, Watchdog,
+    ConfigAddress, IdnWrite, IpSettings, PdoAssignment, PdoEntry, PdoMapping, SdoDownload, StartupAction,
+    StartupCommand, StateTimeout, SubDeviceConfig, SyncManagerOverride, SyncSignals, Timeouts, Transition, Watchdog,
 };
 use crate::info::{Direction, PdoEntryInfo, PdoInfo, SubDeviceInfo};
 
@@ -154,6 +154,12 @@ impl SubDeviceConfig {
     #[must_use]
     pub fn idn_at(self, transition: Transition, drive: u8, idn: Idn, data: impl Into<Vec<u8>>) -> SubDeviceConfig {
         self.startup(transition, StartupAction::Idn(IdnWrite { drive, idn, data: data.into() }))
+    }
+
+    /// Appends a setting of the addresses behind EoE, before SAFEOP.
+    #[must_use]
+    pub fn ip(self, settings: IpSettings) -> SubDeviceConfig {
+        self.startup(Transition::Ps, StartupAction::Ip(settings))
     }
 
     /// Appends a start-up command.

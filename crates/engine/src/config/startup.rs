@@ -1,10 +1,13 @@
-//! Start-up commands: objects and IDNs that are written whenever a SubDevice passes a transition (facts 5.1, 6.3, 6.6).
+//! Start-up commands: objects, IDNs and addresses that are written whenever a SubDevice passes a transition (facts 5.1,
+//! 6.3, 6.5, 6.6).
 
 use alloc::vec::Vec;
 use core::fmt;
 
 use ringcat_wire::al::AlState;
 use ringcat_wire::mailbox::soe::Idn;
+
+use super::ip::IpSettings;
 
 /// A transition at which start-up commands are sent. Towards OP they come before the upper state is requested, on the way
 /// back before the lower one is; those of IP come as soon as PREOP is reached, because INIT has no mailbox.
@@ -73,6 +76,8 @@ pub enum StartupAction {
     Sdo(SdoDownload),
     /// SoE.
     Idn(IdnWrite),
+    /// EoE: the addresses behind it.
+    Ip(IpSettings),
 }
 
 /// A start-up command.

@@ -21,6 +21,8 @@ pub struct Timeouts {
     pub sdo: Duration,
     /// Until the answer to a SoE request is there.
     pub soe: Duration,
+    /// Until the answer to an EoE request is there.
+    pub eoe: Duration,
 }
 
 impl Default for Timeouts {
@@ -33,6 +35,7 @@ impl Default for Timeouts {
             mailbox_request: Duration::from_millis(100),
             sdo: Duration::from_secs(1),
             soe: Duration::from_secs(1),
+            eoe: Duration::from_secs(3),
         }
     }
 }

@@ -16,9 +16,10 @@ mod reassembly;
 pub mod settings;
 mod traffic;
 
+pub use crate::config::IpSettings;
 pub use error::{EoeError, EoeFailure};
 pub use port::EthernetPort;
-pub use settings::{IpSettings, ask_filter, ask_ip, set_filter, set_ip};
+pub use settings::{ask_filter, ask_ip, set_filter, set_ip};
 pub use traffic::{EthernetCounters, EthernetFrame, EthernetStatus, MAX_FRAME, QUEUE, QueueError, TimeStamp};
 
 pub(super) use traffic::Traffic;

@@ -52,7 +52,8 @@ pub(super) fn command(info: &SubDeviceInfo, mailbox: bool, action: &StartupActio
         StartupAction::Idn(IdnWrite { drive, idn, .. }) if !mailbox || !info.protocols.soe() => {
             Err(PlanProblem::NoSoe { drive: *drive, idn: *idn })
         }
-        StartupAction::Sdo(_) | StartupAction::Idn(_) => Ok(()),
+        StartupAction::Ip(_) if !mailbox || !info.protocols.eoe() => Err(PlanProblem::NoEoe),
+        StartupAction::Sdo(_) | StartupAction::Idn(_) | StartupAction::Ip(_) => Ok(()),
     }
 }
 

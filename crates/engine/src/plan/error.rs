@@ -144,6 +144,8 @@ pub enum PlanProblem {
         /// The IDN.
         idn: Idn,
     },
+    /// Addresses for a SubDevice without EoE.
+    NoEoe,
 }
 
 /// What the application asked for and the SubDevice may not follow. The plan takes it as asked for.
@@ -220,6 +222,7 @@ impl fmt::Display for PlanProblem {
             PlanProblem::NoSoe { drive, idn } => {
                 write!(f, "{idn} of drive {drive} is to be written, but there is no SoE")
             }
+            PlanProblem::NoEoe => f.write_str("addresses are to be set, but there is no EoE"),
         }
     }
 }

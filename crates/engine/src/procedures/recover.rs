@@ -17,6 +17,7 @@ use super::strangers::take_away;
 use crate::event::Event;
 use crate::mail::MailboxError;
 use crate::mail::coe::SdoFailure;
+use crate::mail::eoe::EoeFailure;
 use crate::mail::soe::SoeFailure;
 use crate::supervisor::{Bus, BusError};
 
@@ -73,6 +74,9 @@ pub(super) fn is_of_bus(error: &ConfigureError) -> bool {
         }
         ConfigureError::Startup { error: StartupError::Soe(error), .. } => {
             matches!(error.cause, SoeFailure::Mailbox(MailboxError::Bus(_) | MailboxError::Closed))
+        }
+        ConfigureError::Startup { error: StartupError::Eoe(error), .. } => {
+            matches!(error.cause, EoeFailure::Mailbox(MailboxError::Bus(_) | MailboxError::Closed))
         }
         ConfigureError::State(_)
         | ConfigureError::NotLocked(_)

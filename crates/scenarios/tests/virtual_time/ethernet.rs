@@ -4,7 +4,7 @@
 use std::net::Ipv4Addr;
 use std::time::Duration;
 
-use ringcat::{Limits, Options, automatic};
+use ringcat::{Event, Limits, Options, automatic};
 use ringcat_engine::mail::coe::{self, SdoAddress};
 use ringcat_engine::mail::eoe::{
     self, EoeFailure, EthernetCounters, EthernetPort, IpSettings, QUEUE, QueueError, TimeStamp,
@@ -19,7 +19,7 @@ use ringcat_wire::mailbox::eoe::{AddressFilter, EoeResult};
 use scenarios::ethernet_host::{Addresses, Download, download};
 use scenarios::loss::Loss;
 use scenarios::segments::{descriptions, line, ring};
-use scenarios::world::World;
+use scenarios::world::{CYCLE, World};
 
 const LIMITS: Limits = (Duration::from_millis(500), Duration::from_secs(2));
 const KINDS: [&str; 4] = ["coupler", "digital-input-8", "ethernet-terminal", "all-protocols"];
@@ -253,4 +253,37 @@ fn a_time_stamp_comes_with_the_number_of_its_frame_facts_6_5() {
     let stamps: Vec<TimeStamp> = std::iter::from_fn(|| port.pop_time_stamp()).collect();
     assert_eq!(stamps.iter().map(|stamp| stamp.frame).collect::<Vec<_>>(), numbers);
     assert!(stamps.windows(2).all(|pair| pair[0].time_ns < pair[1].time_ns), "{stamps:?}");
+}
+
+#[test]
+fn declared_addresses_are_set_at_each_start_and_refused_ones_are_told_facts_6_5() {
+    let address = Some(Ipv4Addr::new(10, 0, 0, 7));
+    let settings = IpSettings { address, name: Some(b"axis".to_vec()), ..IpSettings::default() };
+    let start = |settings: &IpSettings, subdevice: usize| {
+        let network = line(segment(256, EoeEnd::Stack), NetworkOptions::default());
+        World::with(8, network, &Options::default(), |scan| {
+            let mut declaration = automatic(&scan.subdevices, CYCLE);
+            declaration.subdevices[subdevice] = declaration.subdevices[subdevice].clone().ip(settings.clone());
+            declaration
+        })
+    };
+    let mut world = start(&settings, TERMINAL).expect("it can be activated");
+    for _ in 0..2 {
+        world.settle();
+        let own = world.mailbox(TERMINAL);
+        let told = world.run(async move { eoe::ask_ip(&own, 0, LIMITS).await }).expect("it has an IP stack");
+        assert_eq!((told.address, &told.name), (settings.address, &settings.name));
+        // Without power it forgets them.
+        world.power_off(DeviceIndex(TERMINAL));
+        world.run_cycles(20);
+        world.power_on(DeviceIndex(TERMINAL));
+    }
+    let multicast = IpSettings { address: Some(Ipv4Addr::new(224, 0, 0, 1)), ..IpSettings::default() };
+    let mut world = start(&multicast, TERMINAL).expect("it can be activated");
+    let mark = world.mark();
+    world.run_cycles(200);
+    let told = |event: &Event| matches!(event, Event::ConfigurationFailed { subdevice: TERMINAL, reason } if reason.contains("EoE port 0: the SubDevice refused"));
+    assert!(world.saw(mark, told), "{:?}", world.events(mark));
+    let without = start(&settings, 1).expect_err("a terminal without a mailbox");
+    assert!(without.to_string().contains("addresses are to be set, but there is no EoE"), "{without}");
 }

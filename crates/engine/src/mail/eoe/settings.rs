@@ -1,35 +1,17 @@
 //! IP parameters and address filter of a SubDevice: set and asked for (facts 6.5).
 
 use alloc::vec;
-use alloc::vec::Vec;
-use core::net::Ipv4Addr;
 
 use ringcat_wire::mailbox::eoe::{AddressFilter, EoeBody, EoeMessage, EoeResult, IpParameters, MAX_NAME};
 
 use super::error::{EoeError, EoeFailure};
+use crate::config::IpSettings;
 use crate::mail::lane::Lane;
 use crate::mail::talk::Limits;
 use crate::mail::{Mailbox, MailboxError};
 
 /// Bytes of the longest request: the address filter.
 const MAX_REQUEST: usize = 128;
-
-/// The addresses of the IP stack behind a SubDevice; what is `None` is not set, or was not told.
-#[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub struct IpSettings {
-    /// MAC address.
-    pub mac: Option<[u8; 6]>,
-    /// IP address.
-    pub address: Option<Ipv4Addr>,
-    /// Subnet mask.
-    pub mask: Option<Ipv4Addr>,
-    /// Default gateway.
-    pub gateway: Option<Ipv4Addr>,
-    /// DNS server.
-    pub dns: Option<Ipv4Addr>,
-    /// Name, at most 32 bytes.
-    pub name: Option<Vec<u8>>,
-}
 
 impl IpSettings {
     fn parameters(&self) -> Result<IpParameters<'_>, EoeFailure> {

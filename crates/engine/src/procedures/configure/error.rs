@@ -4,6 +4,7 @@ use core::fmt;
 
 use crate::config::Transition;
 use crate::mail::coe::SdoError;
+use crate::mail::eoe::EoeError;
 use crate::mail::soe::SoeError;
 use crate::procedures::al_state::StateError;
 use crate::procedures::clocks::{NotLocked, SignalsError};
@@ -46,6 +47,8 @@ pub enum StartupError {
     Sdo(SdoError),
     /// SoE.
     Soe(SoeError),
+    /// EoE.
+    Eoe(EoeError),
 }
 
 impl fmt::Display for ConfigureError {
@@ -71,6 +74,7 @@ impl fmt::Display for StartupError {
         match self {
             StartupError::Sdo(error) => error.fmt(f),
             StartupError::Soe(error) => error.fmt(f),
+            StartupError::Eoe(error) => error.fmt(f),
         }
     }
 }

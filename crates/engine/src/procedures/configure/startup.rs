@@ -3,6 +3,7 @@
 use super::{BringUp, ConfigureError, StartupError};
 use crate::config::{IdnWrite, SdoDownload, StartupAction, Transition};
 use crate::mail::coe::{self, SdoAddress};
+use crate::mail::eoe;
 use crate::mail::soe::{self, SoeAddress};
 
 impl BringUp<'_> {
@@ -28,6 +29,10 @@ impl BringUp<'_> {
                 let limits = (timeouts.mailbox_request, timeouts.soe);
                 let address = SoeAddress::value(*drive, *idn);
                 soe::write(&self.mailbox, address, data, limits).await.map_err(StartupError::Soe)
+            }
+            StartupAction::Ip(settings) => {
+                let limits = (timeouts.mailbox_request, timeouts.eoe);
+                eoe::set_ip(&self.mailbox, 0, settings, limits).await.map_err(StartupError::Eoe)
             }
         }
     }
