@@ -7,7 +7,8 @@
 //! * `writer`, `reader`: the two directions, each a task that lives as long as it has something to do;
 //! * `delivery`: whose a mail is; `recent`: mail that came twice;
 //! * `talk`: a lane while somebody has it; `answer_time`: when to look for an answer;
-//! * [`coe`], [`eoe`], [`foe`], [`soe`], [`aoe`], [`voe`]: the protocols; [`relay`]: messages of others.
+//! * [`coe`], [`eoe`], [`foe`], [`soe`], [`aoe`], [`voe`]: the protocols; [`relay`]: messages of others; [`raw`]: those
+//!   of the application's own making.
 
 mod answer_time;
 pub mod aoe;
@@ -19,6 +20,7 @@ mod error;
 pub mod foe;
 mod lane;
 mod mailbox;
+pub mod raw;
 mod reader;
 mod recent;
 pub mod relay;

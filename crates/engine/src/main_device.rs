@@ -30,6 +30,7 @@ pub use areas::{AreaEntries, Directory};
 pub use declaration::{ActivateError, Declaration, DomainConfig, DomainMember, Required};
 pub use ethernet::EthernetSubDevice;
 pub use pending::Pending;
+pub use services::{MAX_DATAGRAMS, RawDatagram};
 pub use ticket::Ticket;
 
 use crate::board::Board;
@@ -51,6 +52,7 @@ use crate::procedures::mail_watch::watch_mail;
 use crate::procedures::recover::start_all;
 use crate::procedures::scan::{Scan, ScanError, ScanOptions, scan};
 use crate::procedures::serve_requests::{Requests, serve_requests};
+use crate::procedures::services::statistics::{Book, collect};
 use crate::procedures::sii::SiiCache;
 use crate::procedures::stop::{StopError, stop};
 use crate::procedures::supervise::supervise;
@@ -161,6 +163,9 @@ pub struct MainDevice {
     /// Mailboxes by position, before activation.
     visited: Vec<Mailbox>,
     requests: Requests,
+    /// Error counters, once active.
+    statistics: Option<Book>,
+    statistics_period: Option<Duration>,
     parked: ticket::Cloakroom,
     loaded: Option<Loaded>,
     /// Ethernet of declared SubDevices, where it was asked for.
@@ -185,6 +190,8 @@ impl MainDevice {
             cyclic_events: None,
             visited: Vec::new(),
             requests: Requests::default(),
+            statistics: None,
+            statistics_period: None,
             parked: ticket::Cloakroom::default(),
             loaded: None,
             ports: Vec::new(),
@@ -274,7 +281,9 @@ impl MainDevice {
             ring: self.first_ring_status(),
             cables: cables.into_iter().map(|cable| (cable, CableErrors::default())).collect(),
             cache: self.cache.clone(),
+            blocked: Vec::new(),
         };
+        let book = Book::new(&bus, fleet.members.len(), self.statistics_period);
         let fleet = SharedFleet::new(fleet, board.clone(), clocks);
         self.supervisor.attach(board);
         let start = if self.has_visited() { Start::Doubtful } else { Start::Cleared };
@@ -301,7 +310,9 @@ impl MainDevice {
         }
         self.supervisor.spawn(watch_groups(bus.clone(), fleet.clone()));
         self.supervisor.spawn(watch_mail(bus.clone(), fleet.clone()));
-        self.supervisor.spawn(serve_requests(bus, fleet.clone(), self.requests.clone()));
+        self.supervisor.spawn(serve_requests(bus.clone(), fleet.clone(), self.requests.clone()));
+        self.supervisor.spawn(collect(bus, fleet.clone(), book.clone()));
+        self.statistics = Some(book);
         self.fleet = Some(fleet);
         self.cyclic_events = Some(consumer);
         let periods = specs.iter().map(|spec| spec.period).collect();
@@ -319,6 +330,7 @@ impl MainDevice {
         self.ports.clear();
         self.desk = None;
         self.fleet = None;
+        self.statistics = None;
         self.cyclic_events = None;
         *self.stopped.borrow_mut() = None;
         let (bus, slot) = (self.supervisor.bus(), self.stopped.clone());

@@ -32,10 +32,12 @@ pub mod acyclic;
 pub mod application;
 mod cyclic;
 pub mod cyclic_thread;
+mod device_services;
 pub mod eoe;
 mod error;
 pub mod gateway;
 pub mod histogram;
+mod jobs;
 pub mod links;
 pub mod main_device;
 pub mod memory;
@@ -56,6 +58,7 @@ pub use acyclic::{AcyclicHalf, Inline};
 pub use application::{Application, LastOutputs};
 pub use cyclic_thread::CyclicThread;
 pub use error::Error;
+pub use jobs::Job;
 pub use links::Links;
 pub use main_device::{MainDevice, Options, Refused, automatic};
 pub use pace::{Pace, Trigger};
@@ -77,11 +80,13 @@ pub use ringcat_engine::link::Link;
 pub use ringcat_engine::mail::coe::{SdoAddress, SdoError, SdoFailure};
 pub use ringcat_engine::mail::{Limits, Mailbox};
 pub use ringcat_engine::main_device::{
-    ActivateError, Declaration, DomainConfig, DomainMember, GroupState, Required, SubDeviceState,
+    ActivateError, Declaration, DomainConfig, DomainMember, GroupState, RawDatagram, Required, SubDeviceState,
 };
 pub use ringcat_engine::procedures::dictionary::ReadPdos;
 pub use ringcat_engine::procedures::look_at_ring::RingLook;
 pub use ringcat_engine::procedures::scan::{Scan, ScanError};
+pub use ringcat_engine::procedures::services::ServiceError;
+pub use ringcat_engine::procedures::services::statistics::{PortErrors, Statistics};
 pub use ringcat_engine::procedures::stop::StopError;
 pub use ringcat_engine::request::{
     RegisterRequest, RequestFailure, RequestRefused, RequestState, SdoRequest, SoeRequest, VoeHandler,

@@ -7,7 +7,6 @@ use ringcat_engine::mail::Limits;
 use ringcat_engine::mail::coe::SdoAddress;
 use ringcat_engine::main_device::{MainDevice as Engine, Pending};
 use ringcat_engine::request::{RegisterRequest, SdoRequest, SoeRequest, VoeHandler};
-use ringcat_wire::address::RegisterAddress;
 use ringcat_wire::al::AlState;
 
 use crate::error::Error;
@@ -111,22 +110,5 @@ impl SupervisorThread {
     /// The thread is gone.
     pub fn create_voe_handler(&self, subdevice: usize, size: usize) -> Result<VoeHandler, Error> {
         self.with(move |engine| engine.create_voe_handler(subdevice, size))
-    }
-
-    /// Reads registers or memory of a SubDevice, by its index in the declaration, before activation by its position.
-    ///
-    /// # Errors
-    /// It does not answer, or as [`SupervisorThread::run`].
-    pub fn register_read(&self, subdevice: usize, address: RegisterAddress, length: usize) -> Result<Vec<u8>, Error> {
-        Ok(self.wait_for(move |engine| engine.start_register_read(subdevice, address, length))??)
-    }
-
-    /// Writes registers or memory of a SubDevice; as [`SupervisorThread::register_read`]. Where a frame is lost, a
-    /// register may be written twice.
-    ///
-    /// # Errors
-    /// As [`SupervisorThread::register_read`].
-    pub fn register_write(&self, subdevice: usize, address: RegisterAddress, data: Vec<u8>) -> Result<(), Error> {
-        Ok(self.wait_for(move |engine| engine.start_register_write(subdevice, address, data))??)
     }
 }

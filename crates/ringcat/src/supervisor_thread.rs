@@ -153,6 +153,17 @@ impl SupervisorThread {
         self.ask(move |engine, _| act.take().map(|act| act(engine)))
     }
 
+    /// Has the thread do something with its engine, without waiting for it.
+    pub(crate) fn post(&self, act: impl FnOnce(&mut Engine) + Send + 'static) {
+        let mut act = Some(act);
+        let request: Request = Box::new(move |engine, _| {
+            act.take().into_iter().for_each(|act| act(engine));
+            true
+        });
+        // A thread that is gone has nothing to do.
+        let _ = self.0.requests.as_ref().map(|requests| requests.send(request));
+    }
+
     /// Scans the segment; all SubDevices are in INIT afterwards.
     ///
     /// # Errors

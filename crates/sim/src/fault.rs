@@ -10,6 +10,15 @@ use ringcat_wire::al::{AlState, AlStatusCode};
 use crate::application::mailbox::faults::MailFault;
 use crate::cable::{CableId, DeviceIndex, Direction};
 
+/// How a write to an EEPROM goes wrong.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum SpoiltWrite {
+    /// It is acknowledged, and the word stays as it was: the EEPROM is write-protected.
+    NotStored,
+    /// It is not acknowledged: the EEPROM is still busy inside.
+    NotAcknowledged,
+}
+
 /// Something that goes wrong, or is put right again.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Fault {
@@ -86,6 +95,15 @@ pub enum Fault {
         /// How long each of them takes.
         busy: Duration,
         /// How many commands.
+        times: u32,
+    },
+    /// The next writes of a word to the EEPROM go wrong.
+    SpoilSiiWrites {
+        /// Which device.
+        device: DeviceIndex,
+        /// How.
+        how: SpoiltWrite,
+        /// How many.
         times: u32,
     },
     /// The device refuses to go to a state.

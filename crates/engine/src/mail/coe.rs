@@ -3,13 +3,14 @@
 //! [`upload`] and [`download`] move objects of any size, expedited, normal or in segments, between the SubDevice and a
 //! [`Sink`](super::stream::Sink) or [`Source`](super::stream::Source); [`read`] and [`write()`] do so with bytes in memory.
 //! [`information`] asks which objects there are, [`pdo`] reads and writes assignment and mapping, [`history`] the diagnosis
-//! history.
+//! history; [`pdo_mail`] moves PDOs by mailbox.
 
 mod download;
 mod error;
 pub mod history;
 pub mod information;
 pub mod pdo;
+pub mod pdo_mail;
 mod transfer;
 mod upload;
 

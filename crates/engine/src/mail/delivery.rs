@@ -90,6 +90,9 @@ fn coe(room: &Rc<Room>, state: &mut State, message: &Message<'_>) -> bool {
         CoeService::SdoRequest | CoeService::SdoResponse | CoeService::SdoInformation => {
             answer(state, Lane::Coe, message, Unsolicited::Other)
         }
+        CoeService::TxPdo | CoeService::RxPdo if state.lanes[Lane::Coe as usize].pdo == Some(*header) => {
+            answer(room, state, Lane::Coe, message, Unsolicited::Other);
+        }
         CoeService::TxPdo
         | CoeService::RxPdo
         | CoeService::TxPdoRemote

@@ -106,6 +106,8 @@ pub(super) struct LaneState {
     pub late_until: Option<Instant>,
     /// What the last request was about, so that its answer can be told from that to another one.
     pub mark: u16,
+    /// CoE header of the PDO that was asked for by mailbox.
+    pub pdo: Option<[u8; 2]>,
     pub answer_time: AnswerTime,
     /// The SubDevice has answered in this lane: it knows the protocol.
     pub proven: bool,

@@ -1,5 +1,7 @@
 //! SoE: elements of the IDNs of a drive, read and written, in fragments where they are long (facts 6.6).
 
+pub mod command;
+
 use alloc::vec;
 use alloc::vec::Vec;
 use core::fmt;

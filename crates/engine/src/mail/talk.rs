@@ -132,6 +132,11 @@ impl Talk {
         let _ = self.with(|lane| lane.mark = mark);
     }
 
+    /// A PDO with this CoE header is what the next request asks for; others are kept as mail that nobody asked for.
+    pub(super) fn expect_pdo(&mut self, header: Option<[u8; 2]>) {
+        let _ = self.with(|lane| lane.pdo = header);
+    }
+
     /// The mark of a request that was given up and whose answer may still come.
     pub fn late_mark(&self) -> Option<u16> {
         self.with(|lane| lane.late_until.map(|_| lane.mark)).ok().flatten()
@@ -300,6 +305,7 @@ impl Drop for Talk {
     fn drop(&mut self) {
         self.withdraw();
         self.give_up();
+        self.expect_pdo(None);
         leave(&self.room, self.lane, self.turn);
     }
 }

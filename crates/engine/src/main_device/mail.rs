@@ -111,6 +111,11 @@ impl MainDevice {
         self.parked.collect(ticket)
     }
 
+    /// Gives up work that was parked.
+    pub fn discard<T: 'static>(&mut self, ticket: Ticket<T>) {
+        self.parked.discard(&ticket);
+    }
+
     /// Starts to read an object of at most `limit` bytes.
     pub fn start_sdo_upload(
         &mut self,

@@ -4,13 +4,36 @@
 
 use alloc::vec::Vec;
 use core::future::Future;
+use core::time::Duration;
 
 use ringcat_wire::address::{RegisterAddress, StationAddress};
+use ringcat_wire::command::Command;
+use ringcat_wire::datagram::Target;
+use ringcat_wire::register::LoopControl;
 
 use super::MainDevice;
 use super::pending::Pending;
-use crate::procedures::services::{ServiceError, registers};
-use crate::supervisor::Bus;
+use crate::procedures::services::ports::BlockedPort;
+use crate::procedures::services::statistics::{self, Statistics};
+use crate::procedures::services::{ServiceError, ports, registers, reset};
+use crate::procedures::sii::program::{self, SiiWritten};
+use crate::supervisor::{Bus, BusError, Reply};
+
+/// Datagrams of the application that are taken at once.
+pub const MAX_DATAGRAMS: usize = 1024;
+
+/// A datagram of the application's own.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct RawDatagram {
+    /// The command.
+    pub command: Command,
+    /// Whom it addresses, as the command wants it.
+    pub target: Target,
+    /// What is sent; for reads, zeros.
+    pub data: Vec<u8>,
+    /// Whether it may be sent again when its frame is lost.
+    pub resend: bool,
+}
 
 impl MainDevice {
     /// Station address of a SubDevice, by which it is reached on the bus.
@@ -23,19 +46,20 @@ impl MainDevice {
     }
 
     /// Starts a procedure on one SubDevice.
-    pub(super) fn start_on<T, W>(
+    fn start_on<T, E, W>(
         &mut self,
         subdevice: usize,
         work: impl FnOnce(Bus, StationAddress) -> W,
     ) -> Pending<Result<T, ServiceError>>
     where
         T: 'static,
-        W: Future<Output = Result<T, ServiceError>> + 'static,
+        ServiceError: From<E>,
+        W: Future<Output = Result<T, E>> + 'static,
     {
         let work = self.station(subdevice).map(|station| work(self.bus(), station));
         self.start(async move {
             match work {
-                Some(work) => work.await,
+                Some(work) => Ok(work.await?),
                 None => Err(ServiceError::NoSubDevice { subdevice }),
             }
         })
@@ -66,5 +90,145 @@ impl MainDevice {
             subdevice,
             move |bus, station| async move { registers::write(&bus, station, address, &data).await },
         )
+    }
+
+    /// Starts to send datagrams of the application's own, at once, in one frame where they fit. Each brings its answer,
+    /// whatever its working counter.
+    pub fn start_datagrams(
+        &mut self,
+        datagrams: Vec<RawDatagram>,
+    ) -> Pending<Result<Vec<Result<Reply, BusError>>, ServiceError>> {
+        let bus = self.bus();
+        self.start(async move {
+            if datagrams.len() > MAX_DATAGRAMS {
+                return Err(ServiceError::TooMany { got: datagrams.len(), limit: MAX_DATAGRAMS });
+            }
+            let send = |bus: Bus, datagram: RawDatagram| async move {
+                let RawDatagram { command, target, data, resend } = datagram;
+                bus.datagram(command, target, data, resend).await
+            };
+            Ok(bus.gather(datagrams, send).await)
+        })
+    }
+
+    /// Starts to ask what a port does about its loop.
+    pub fn start_port_read(&mut self, subdevice: usize, port: u8) -> Pending<Result<LoopControl, ServiceError>> {
+        self.start_on(subdevice, move |bus, station| async move { ports::read(&bus, station, port).await })
+    }
+
+    /// Starts to open or close a port. Who is behind one that is closed is gone for everybody.
+    pub fn start_port_set(
+        &mut self,
+        subdevice: usize,
+        port: u8,
+        control: LoopControl,
+    ) -> Pending<Result<(), ServiceError>> {
+        self.start_on(subdevice, move |bus, station| async move { ports::set(&bus, station, port, control).await })
+    }
+
+    /// Starts to cut a declared SubDevice off, by closing the ports of its neighbours. In a line those behind it go with it.
+    pub fn start_block(&mut self, subdevice: usize) -> Pending<Result<Vec<BlockedPort>, ServiceError>> {
+        let (bus, fleet) = (self.bus(), self.fleet.clone());
+        self.start(async move {
+            let fleet = fleet.ok_or(ServiceError::NotActive)?;
+            ports::block(&bus, &fleet, subdevice).await
+        })
+    }
+
+    /// Starts to open all ports that were closed to cut somebody off.
+    pub fn start_open_blocked(&mut self) -> Pending<Result<usize, ServiceError>> {
+        let (bus, fleet) = (self.bus(), self.fleet.clone());
+        self.start(async move {
+            let fleet = fleet.ok_or(ServiceError::NotActive)?;
+            ports::open_blocked(&bus, &fleet).await
+        })
+    }
+
+    /// Starts to reset a SubDevice controller. A declared SubDevice is lost and found again, and configured anew.
+    pub fn start_reset(&mut self, subdevice: usize) -> Pending<Result<(), ServiceError>> {
+        self.start_on(subdevice, move |bus, station| async move { reset::reset_controller(&bus, station).await })
+    }
+
+    /// Has whoever supervises look at all SubDevices now, and for new ones, as if the segment had changed. False before
+    /// activation: there a scan looks.
+    pub fn force_topology_change(&mut self) -> bool {
+        if let Some(fleet) = &self.fleet {
+            fleet.note_news();
+        }
+        self.fleet.is_some()
+    }
+
+    /// Starts to read an EEPROM, as large as it says that it is.
+    pub fn start_sii_read(&mut self, subdevice: usize) -> Pending<Result<Vec<u8>, ServiceError>> {
+        self.start_on(subdevice, move |bus, station| async move { program::read_all(&bus, station).await })
+    }
+
+    /// Starts to write an EEPROM: each word that is not right already, and read back. What is no SII image is refused
+    /// unless `force` says so. What a SubDevice does with it, it does after its next start or [`MainDevice::start_sii_reload`].
+    pub fn start_sii_write(
+        &mut self,
+        subdevice: usize,
+        image: Vec<u8>,
+        force: bool,
+    ) -> Pending<Result<SiiWritten, ServiceError>> {
+        let cache = self.cache.clone();
+        self.start_on(subdevice, move |bus, station| async move {
+            let written = program::write(&bus, station, &image, force).await;
+            cache.clear();
+            written
+        })
+    }
+
+    /// Starts to write the alias into the EEPROM, with the checksum that belongs to it. One that is wrong already is made
+    /// right only with `force`. The alias counts from the SubDevice's next start on.
+    pub fn start_alias_write(
+        &mut self,
+        subdevice: usize,
+        alias: u16,
+        force: bool,
+    ) -> Pending<Result<SiiWritten, ServiceError>> {
+        let cache = self.cache.clone();
+        self.start_on(subdevice, move |bus, station| async move {
+            let written = program::write_alias(&bus, station, alias, force).await;
+            cache.clear();
+            written
+        })
+    }
+
+    /// Starts to have a controller load its configuration from the EEPROM again.
+    pub fn start_sii_reload(&mut self, subdevice: usize) -> Pending<Result<(), ServiceError>> {
+        self.start_on(subdevice, move |bus, station| async move { program::reload(&bus, station).await })
+    }
+
+    /// Sets how often the error counters of all declared SubDevices are read in the background; `None`, as at the
+    /// beginning, is never.
+    pub fn set_statistics_period(&mut self, period: Option<Duration>) {
+        self.statistics_period = period;
+        if let Some(book) = &self.statistics {
+            book.set_period(period);
+        }
+    }
+
+    /// What a declared SubDevice has counted, as far as it was read. `None` before activation.
+    pub fn statistics(&self, subdevice: usize) -> Option<Statistics> {
+        self.statistics.as_ref()?.find(subdevice)
+    }
+
+    /// Starts to read the error counters of a declared SubDevice now.
+    pub fn start_statistics_read(&mut self, subdevice: usize) -> Pending<Result<Statistics, ServiceError>> {
+        let book = self.statistics.clone();
+        self.start_on(subdevice, move |bus, station| async move {
+            let book = book.ok_or(ServiceError::NotActive)?;
+            statistics::read(&bus, &book, subdevice, station).await
+        })
+    }
+
+    /// Starts to clear the error counters of a declared SubDevice, and what was kept of them.
+    pub fn start_statistics_clear(&mut self, subdevice: usize) -> Pending<Result<(), ServiceError>> {
+        let book = self.statistics.clone();
+        self.start_on(subdevice, move |bus, station| async move {
+            let book = book.ok_or(ServiceError::NotActive)?;
+            statistics::clear(&bus, &book, subdevice, station).await
+        })
     }
 }

@@ -40,6 +40,11 @@ impl Cloakroom {
         Ticket { number: self.last, result: PhantomData }
     }
 
+    /// Gives work up.
+    pub(super) fn discard<T>(&mut self, ticket: &Ticket<T>) {
+        self.parked.remove(&ticket.number);
+    }
+
     /// The result, once; `Some(None)` where there will be none, `None` while the work goes on.
     pub(super) fn collect<T: 'static>(&mut self, ticket: &Ticket<T>) -> Option<Option<T>> {
         let Some(pending) = self.parked.get_mut(&ticket.number).and_then(|any| any.downcast_mut::<Pending<T>>()) else {

@@ -11,6 +11,7 @@ use ringcat_wire::register::Fmmu;
 
 use super::clocks::SharedClocks;
 use super::mail_watch;
+use super::services::ports::BlockedPort;
 use super::sii::SiiCache;
 use super::strangers::Stranger;
 use crate::board::Board;
@@ -211,6 +212,8 @@ pub struct Fleet {
     pub cables: Vec<(Cable, CableErrors)>,
     /// SII contents read before.
     pub cache: SiiCache,
+    /// Ports that were closed to cut SubDevices off.
+    pub blocked: Vec<BlockedPort>,
 }
 
 /// Shared by all procedures of one MainDevice.
@@ -237,7 +240,7 @@ impl SharedFleet {
     }
 
     /// Tells whoever supervises that there is something to act on.
-    pub(super) fn note_news(&self) {
+    pub(crate) fn note_news(&self) {
         self.news.set(self.news.get().wrapping_add(1));
     }
 

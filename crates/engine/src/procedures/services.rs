@@ -1,9 +1,13 @@
 //! What can be asked of one SubDevice besides its mailbox (000 10.8): registers, ports, resets, error counters, its EEPROM.
 
+pub mod ports;
 pub mod registers;
+pub mod reset;
+pub mod statistics;
 
 use core::fmt;
 
+use super::sii::program::SiiProgramError;
 use crate::supervisor::BusError;
 
 /// Why a service was not done.
@@ -16,12 +20,33 @@ pub enum ServiceError {
     },
     /// The bus failed, or the SubDevice does not answer.
     Bus(BusError),
+    /// The EEPROM was not written or loaded.
+    Sii(SiiProgramError),
     /// The address and the length leave the memory of 64 KiB.
     Range {
         /// The first byte.
         address: u16,
         /// Bytes.
         length: usize,
+    },
+    /// There are ports 0 to 3.
+    Port {
+        /// The port.
+        port: u8,
+    },
+    /// It hangs on the main link itself: there is no port before it.
+    OnTheLink {
+        /// The SubDevice.
+        subdevice: usize,
+    },
+    /// Nothing is declared yet.
+    NotActive,
+    /// More than are taken at once.
+    TooMany {
+        /// How many.
+        got: usize,
+        /// At most.
+        limit: usize,
     },
 }
 
@@ -30,6 +55,13 @@ impl fmt::Display for ServiceError {
         match self {
             ServiceError::NoSubDevice { subdevice } => write!(f, "there is no SubDevice {subdevice}"),
             ServiceError::Bus(error) => error.fmt(f),
+            ServiceError::Sii(error) => error.fmt(f),
+            ServiceError::Port { port } => write!(f, "there is no port {port}, only 0 to 3"),
+            ServiceError::OnTheLink { subdevice } => {
+                write!(f, "SubDevice {subdevice} hangs on the main link: there is no port before it")
+            }
+            ServiceError::NotActive => f.write_str("nothing is declared yet"),
+            ServiceError::TooMany { got, limit } => write!(f, "{got} at once, at most {limit} are taken"),
             ServiceError::Range { address, length } => {
                 write!(f, "{length} bytes from {address:#06x} on: the memory ends at 0xffff")
             }
@@ -38,6 +70,12 @@ impl fmt::Display for ServiceError {
 }
 
 impl core::error::Error for ServiceError {}
+
+impl From<SiiProgramError> for ServiceError {
+    fn from(error: SiiProgramError) -> ServiceError {
+        ServiceError::Sii(error)
+    }
+}
 
 impl From<BusError> for ServiceError {
     fn from(error: BusError) -> ServiceError {

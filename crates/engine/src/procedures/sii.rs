@@ -6,6 +6,7 @@
 mod cache;
 mod eeprom;
 mod pace;
+pub mod program;
 
 use alloc::vec::Vec;
 use core::fmt;

@@ -202,6 +202,18 @@ impl Bus {
         })
     }
 
+    /// A datagram of the application's own: its answer is that of all copies, whatever its working counter. Where it may
+    /// be sent again when its frame is lost, `resend` says so.
+    pub fn datagram(
+        &self,
+        command: Command,
+        target: Target,
+        data: Vec<u8>,
+        resend: bool,
+    ) -> impl Future<Output = Result<Reply, BusError>> {
+        self.submit(Request { command, target, data, redundant: None, expected: None, resend, lead: None, mail: None })
+    }
+
     /// Exchanges a register for other data: each SubDevice with this station address hands its old value on with the
     /// datagram, so that only the first one on each link gets what is sent there. Sent once.
     pub fn exchange(

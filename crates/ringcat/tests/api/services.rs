@@ -8,16 +8,25 @@ use std::thread::sleep;
 use std::time::{Duration, Instant};
 
 use ringcat::shared_segment::SharedSegment;
-use ringcat::{Error, LastOutputs, Limits, Options, RequestState, SdoAddress, SupervisorThread, automatic};
+use ringcat::{
+    Error, LastOutputs, Limits, Options, RawDatagram, RequestState, SdoAddress, SupervisorThread, automatic,
+};
+use ringcat_engine::mail::coe;
 use ringcat_engine::mail::foe::{self, FoeOptions};
 use ringcat_engine::mail::stream::{Bounded, Bytes};
 use ringcat_sim::network::Network;
 use ringcat_sim::segment::Segment;
+use ringcat_wire::address::RegisterAddress;
 use ringcat_wire::al::AlState;
+use ringcat_wire::command::Command;
+use ringcat_wire::datagram::Target;
+use ringcat_wire::register::{LoopControl, map};
 
 const SEGMENT: &str = "[segment]\nring = true\n[[device]]\ntype = \"coupler\"\n[[device]]\ntype = \"all-protocols\"\n";
 const PERIOD: Duration = Duration::from_millis(2);
 const LIMIT: Duration = Duration::from_secs(30);
+/// Memory that nothing uses.
+const USER_RAM: RegisterAddress = RegisterAddress(0x0F80);
 const LIMITS: Limits = (Duration::from_secs(5), Duration::from_secs(10));
 
 #[test]
@@ -82,5 +91,49 @@ fn objects_and_files_are_moved_from_any_thread_and_requests_from_the_cyclic_one(
     let (supervisor, _) = cycles.end()?.stop(LastOutputs::Zero, AlState::Init, LIMIT)?;
     let gone = supervisor.sdo_upload(1, SdoAddress::new(0x2001, 7), LIMITS, 4).expect_err("it is in INIT");
     assert!(gone.to_string().contains("the mailbox is not in use"), "{gone}");
+    Ok(())
+}
+
+#[test]
+fn services_on_single_subdevices_and_jobs_work_from_any_thread() -> Result<(), Error> {
+    let segment = Segment::from_toml(SEGMENT, Path::new(".")).expect("a good segment");
+    let (cyclic, acyclic) = SharedSegment::halves(Network::from_description(segment).expect("it can be built"));
+    let supervisor = SupervisorThread::start(acyclic, &Options::default(), || ())?;
+    let scan = supervisor.scan()?;
+    // Before activation.
+    supervisor.register_write(1, USER_RAM, vec![1, 2, 3])?;
+    assert_eq!(supervisor.register_read(1, USER_RAM, 3)?, [1, 2, 3]);
+    let image = supervisor.sii_read(1)?;
+    assert!(supervisor.sii_write(1, image[..64].to_vec(), false).is_err(), "no image");
+    assert_eq!(supervisor.sii_write(1, image, false)?.written, 0);
+    assert_eq!(supervisor.statistics(1)?, None);
+    assert!(!supervisor.force_topology_change()?);
+    let application = supervisor.activate(automatic(&scan.subdevices, PERIOD), cyclic)?;
+    let cycles = application.start_cycles(|| (), |_| ControlFlow::Continue(()))?;
+    let end = Instant::now() + LIMIT;
+    while !cycles.supervisor().all_settled() {
+        assert!(Instant::now() < end, "all are in OP");
+        sleep(Duration::from_millis(1));
+    }
+    let handle = cycles.supervisor().clone();
+    assert_eq!(handle.read_statistics(1)?.readings, 1);
+    handle.clear_statistics(1)?;
+    assert_eq!(handle.port(1, 0)?, LoopControl::Auto);
+    let read = RawDatagram { command: Command::Brd, target: Target::Broadcast(map::TYPE), data: vec![0], resend: true };
+    let replies = handle.datagrams(vec![read.clone(), read])?;
+    assert!(replies.iter().all(|reply| reply.as_ref().is_ok_and(|reply| reply.wkc().0 == 2)), "{replies:?}");
+    // Jobs: one that is waited for, one that is aborted, and one that is dropped.
+    let start = |object: SdoAddress| {
+        handle.start_job(move |engine| {
+            let mailbox = engine.mailbox(1).expect("it is declared");
+            async move { coe::read(&mailbox, object, LIMITS, 200_000).await }
+        })
+    };
+    let [large, small] = [SdoAddress::new(0x2002, 0), SdoAddress::new(0x2001, 7)];
+    start(large)?.abort()?;
+    drop(start(large)?);
+    assert_eq!(start(small)?.wait()?.map(|value| value.len()), Ok(2));
+    assert_eq!(start(large)?.wait()?.map(|value| value.len()), Ok(100_000));
+    cycles.end()?.stop(LastOutputs::Zero, AlState::Init, LIMIT)?;
     Ok(())
 }

@@ -10,6 +10,7 @@ use ringcat_wire::sii;
 
 use super::Controller;
 use super::memory::Side;
+use crate::fault::SpoiltWrite;
 use crate::time::SimTime;
 
 /// Bytes of words 0 to 7, which are loaded.
@@ -44,6 +45,8 @@ pub(super) struct SiiInterface {
     write_enabled: bool,
     /// So many of the next commands take this long.
     slow: (u32, Duration),
+    /// So many of the next writes go wrong in this way.
+    spoilt: (u32, SpoiltWrite),
 }
 
 impl SiiInterface {
@@ -54,6 +57,7 @@ impl SiiInterface {
             command: None,
             write_enabled: false,
             slow: (0, Duration::ZERO),
+            spoilt: (0, SpoiltWrite::NotStored),
         }
     }
 
@@ -193,6 +197,11 @@ impl Controller {
         self.sii.slow = (times, busy);
     }
 
+    /// So many of the next writes go wrong.
+    pub fn spoil_sii_writes(&mut self, how: SpoiltWrite, times: u32) {
+        self.sii.spoilt = (times, how);
+    }
+
     /// Starts loading the configuration.
     pub(super) fn start_loading(&mut self, first: bool, now: SimTime) {
         (self.sii.command, self.sii.write_enabled) = (None, false);
@@ -233,6 +242,16 @@ impl Controller {
     }
 
     fn write_sii(&mut self) {
+        if let Some(rest) = self.sii.spoilt.0.checked_sub(1) {
+            self.sii.spoilt.0 = rest;
+            match self.sii.spoilt.1 {
+                SpoiltWrite::NotStored => {}
+                SpoiltWrite::NotAcknowledged => {
+                    self.set_sii_control(SiiControl { command_error: true, ..self.sii_control() });
+                }
+            }
+            return;
+        }
         let offset = self.sii_offset();
         let word: [u8; 2] = self.memory.array(map::SII_DATA);
         match self.config.sii.get_mut(offset..offset.saturating_add(2)) {

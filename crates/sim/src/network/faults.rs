@@ -59,6 +59,9 @@ impl Network {
                 let now = self.now;
                 self.device_mut(device).disturb_mail(fault, now);
             }
+            Fault::SpoilSiiWrites { device, how, times } => {
+                self.device_mut(device).controller.spoil_sii_writes(how, times);
+            }
             Fault::SlowSii { device, busy, times } => self.device_mut(device).controller.slow_sii(busy, times),
             Fault::RefuseTransition { device, to, code, times } => {
                 self.device_mut(device).refuse_transition(to, code, times);
@@ -99,6 +102,7 @@ impl Network {
             | Fault::Hang(device, _)
             | Fault::Mail(device, _)
             | Fault::SlowSii { device, .. }
+            | Fault::SpoilSiiWrites { device, .. }
             | Fault::RefuseTransition { device, .. } => self.check_device(device),
             Fault::CorruptSii { device, offset, .. } => {
                 self.check_device(device);

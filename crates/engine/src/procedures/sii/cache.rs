@@ -59,6 +59,11 @@ impl SiiCache {
         self.len() == 0
     }
 
+    /// Forgets everything: an EEPROM was written.
+    pub fn clear(&self) {
+        self.entries.borrow_mut().retain(|entry| entry.read.is_none());
+    }
+
     /// What there is, or the right to read it.
     pub(super) fn find(&self, area: &FixedArea) -> Found {
         let mut entries = self.entries.borrow_mut();

@@ -1,0 +1,109 @@
+//! Ports of a SubDevice: opened and closed by DL control; SubDevices cut off from the others on purpose (facts 2.2).
+
+use alloc::vec::Vec;
+
+use ringcat_wire::address::{RegisterAddress, StationAddress};
+use ringcat_wire::register::{DlControl, LoopControl, map};
+
+use super::ServiceError;
+use crate::procedures::fleet::SharedFleet;
+use crate::ring::RingState;
+use crate::supervisor::Bus;
+
+/// The byte of DL_CONTROL that holds the loops of all ports.
+const LOOPS: RegisterAddress = map::DL_CONTROL.offset(1);
+
+/// A port that was closed to cut a SubDevice off.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct BlockedPort {
+    /// Station address of the neighbour whose port it is.
+    pub station: StationAddress,
+    /// Port 0..3.
+    pub port: u8,
+}
+
+/// What a port does about its loop.
+pub async fn read(bus: &Bus, station: StationAddress, port: u8) -> Result<LoopControl, ServiceError> {
+    check(port)?;
+    let control = DlControl::decode(&bus.fprd_array(station, map::DL_CONTROL).await?);
+    Ok(control.loops[usize::from(port)])
+}
+
+/// Opens or closes a port. Who is behind a port that is closed is gone for everybody.
+pub async fn set(bus: &Bus, station: StationAddress, port: u8, control: LoopControl) -> Result<(), ServiceError> {
+    check(port)?;
+    let [before] = bus.fprd_array(station, LOOPS).await?;
+    let shift = 2 * port;
+    let loops = before & !(3 << shift) | control.code() << shift;
+    bus.fpwr(station, LOOPS, &[loops]).await?;
+    Ok(())
+}
+
+const fn check(port: u8) -> Result<(), ServiceError> {
+    if port < 4 { Ok(()) } else { Err(ServiceError::Port { port }) }
+}
+
+/// Cuts a declared SubDevice off by closing the port of its neighbour before it. In a closed ring those behind it stay,
+/// for the port of the neighbour behind it is closed too; in a line they go with it.
+pub(crate) async fn block(bus: &Bus, fleet: &SharedFleet, subdevice: usize) -> Result<Vec<BlockedPort>, ServiceError> {
+    let ports = neighbours(bus, fleet, subdevice)?;
+    if let Err(error) = set_all(bus, &ports, LoopControl::Closed).await {
+        // One end that is closed alone swallows the frames of the other side.
+        let _ = set_all(bus, &ports, LoopControl::Auto).await;
+        return Err(error);
+    }
+    fleet.access().blocked.extend(&ports);
+    Ok(ports)
+}
+
+/// Opens all ports that were closed to cut somebody off; returns how many there were. Where one cannot be reached now, all
+/// are kept for the next try.
+pub(crate) async fn open_blocked(bus: &Bus, fleet: &SharedFleet) -> Result<usize, ServiceError> {
+    let blocked = core::mem::take(&mut fleet.access().blocked);
+    let opened = set_all(bus, &blocked, LoopControl::Auto).await;
+    if opened.is_err() {
+        fleet.access().blocked.extend(&blocked);
+    }
+    fleet.note_news();
+    opened.map(|()| blocked.len())
+}
+
+/// Sets ports of several SubDevices with one frame: a cable of which one end is closed swallows frames.
+async fn set_all(bus: &Bus, ports: &[BlockedPort], control: LoopControl) -> Result<(), ServiceError> {
+    let mut stations: Vec<StationAddress> = ports.iter().map(|port| port.station).collect();
+    stations.sort_unstable();
+    stations.dedup();
+    let before = bus.gather(stations.clone(), |bus, station| async move { bus.fprd_array(station, LOOPS).await }).await;
+    let mut writes = Vec::new();
+    for (station, before) in stations.into_iter().zip(before) {
+        let [mut loops]: [u8; 1] = before?;
+        for BlockedPort { port, .. } in ports.iter().filter(|port| port.station == station) {
+            let shift = 2 * port;
+            loops = loops & !(3 << shift) | control.code() << shift;
+        }
+        writes.push((station, loops));
+    }
+    let write = |bus: Bus, (station, loops)| async move { bus.fpwr(station, LOOPS, &[loops]).await };
+    for written in bus.gather(writes, write).await {
+        written?;
+    }
+    Ok(())
+}
+
+/// The ports of its neighbours that lead to a SubDevice.
+fn neighbours(bus: &Bus, fleet: &SharedFleet, subdevice: usize) -> Result<Vec<BlockedPort>, ServiceError> {
+    let access = fleet.access();
+    let missing = ServiceError::NoSubDevice { subdevice };
+    let node = access.members.get(subdevice).and_then(|member| member.node).ok_or(missing)?;
+    let here = access.topology.nodes.get(node).ok_or(missing)?;
+    let station = |node: usize| access.members.iter().find(|m| m.node == Some(node)).map(|member| member.station);
+    let port = |node: usize, port: u8| station(node).map(|station| BlockedPort { station, port });
+    let parent = here.parent.and_then(|(parent, at)| port(parent, at)).ok_or(ServiceError::OnTheLink { subdevice })?;
+    let mut ports = Vec::new();
+    if bus.ring() == RingState::Closed && bus.links() == crate::link::LinkSet::Ring {
+        let behind = here.children.iter().flatten();
+        ports.extend(behind.filter_map(|child| port(*child, access.topology.nodes.get(*child)?.entry_port)));
+    }
+    ports.push(parent);
+    Ok(ports)
+}

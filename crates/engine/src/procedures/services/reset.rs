@@ -1,0 +1,46 @@
+//! Resetting a SubDevice controller (facts 3.2): R, E, S in three frames to ESC_RESET_ECAT.
+
+use ringcat_wire::address::{StationAddress, Wkc};
+use ringcat_wire::command::Command;
+use ringcat_wire::datagram::Target;
+use ringcat_wire::register::map;
+
+use super::ServiceError;
+use crate::supervisor::{Bus, BusError};
+
+const SEQUENCE: [u8; 3] = *b"RES";
+/// The sequence is begun anew so often when a frame of it is lost.
+const TRIES: u32 = 4;
+
+/// Has a controller start anew, as after power-on. It loses its station address and is found again like one that was
+/// switched off.
+pub async fn reset_controller(bus: &Bus, station: StationAddress) -> Result<(), ServiceError> {
+    let mut tries = 0;
+    loop {
+        tries += 1;
+        match sequence(bus, station).await {
+            Ok(()) => return Ok(()),
+            Err(error @ BusError::Lost { .. }) if tries < TRIES => {
+                // The answer may have been lost alone, to the last letter even.
+                match bus.fprd_array::<1>(station, map::ESC_RESET_ECAT).await {
+                    Ok(_) => {}
+                    Err(BusError::Wkc { .. }) => return Ok(()),
+                    Err(_) => return Err(error.into()),
+                }
+            }
+            Err(error) => return Err(error.into()),
+        }
+    }
+}
+
+/// Each letter leaves when the one before has come back: a frame can bring one only.
+async fn sequence(bus: &Bus, station: StationAddress) -> Result<(), BusError> {
+    let (target, expected) = (Target::Station(station, map::ESC_RESET_ECAT), Wkc(1));
+    for letter in SEQUENCE {
+        let reply = bus.transfer_once(Command::Fpwr, target, alloc::vec![letter]).await?;
+        if reply.wkc() != expected {
+            return Err(BusError::Wkc { target, expected, got: reply.wkc() });
+        }
+    }
+    Ok(())
+}

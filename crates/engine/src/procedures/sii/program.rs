@@ -1,0 +1,368 @@
+//! Writing an EEPROM: word by word, each read back (facts 3.8, 4.7); the alias; loading what was written.
+//!
+//! Words that are right already are left alone. The configuration area goes last, so that a write that is cut off leaves
+//! the one that was there. Afterwards the EEPROM belongs to whom it belonged before.
+
+use alloc::vec::Vec;
+use core::fmt;
+use core::ops::Range;
+use core::time::Duration;
+
+use ringcat_wire::address::{StationAddress, Wkc};
+use ringcat_wire::command::Command;
+use ringcat_wire::datagram::Target;
+use ringcat_wire::register::{SiiCommand, SiiConfiguration, SiiControl, map};
+use ringcat_wire::sii::{CHECKSUM_DISABLED, Sii, SiiError, checksum};
+
+use super::eeprom::Eeprom;
+use super::pace::Pace;
+use super::{MAX_WORDS, SiiReadError, claim};
+use crate::supervisor::{Bus, BusError};
+
+/// How long an EEPROM may take for a word.
+const WRITE_LIMIT: Duration = Duration::from_millis(100);
+/// How long a controller may take to load its configuration.
+const LOAD_LIMIT: Duration = Duration::from_millis(500);
+/// A word is written so often before it is given up: an EEPROM that is still busy inside does not acknowledge.
+const TRIES: u32 = 4;
+/// Pause before another try.
+const TRY_PAUSE: Duration = Duration::from_millis(5);
+/// Words that the controller loads, with their checksum.
+const CONFIGURATION: Range<usize> = 0..8;
+/// Word of the alias.
+const ALIAS_WORD: usize = 4;
+/// Word of the checksum.
+const CHECKSUM_WORD: usize = 7;
+
+/// Why an EEPROM was not written, or not loaded.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum SiiProgramError {
+    /// The bus failed.
+    Bus(BusError),
+    /// It cannot be read.
+    Read(SiiReadError),
+    /// It stayed busy with a word.
+    Busy {
+        /// Word address.
+        word: u32,
+    },
+    /// The controller does not take the command, again and again: does the PDI hold the EEPROM?
+    Refused {
+        /// Word address.
+        word: u32,
+    },
+    /// The EEPROM did not acknowledge a word, or there is none there.
+    Command {
+        /// Word address.
+        word: u32,
+        /// What the control register said.
+        control: SiiControl,
+    },
+    /// What was read back is not what was written.
+    Mismatch {
+        /// Word address.
+        word: u32,
+        /// Written.
+        expected: u16,
+        /// Read back.
+        got: u16,
+    },
+    /// The controller refuses the configuration area that it loaded: its checksum is wrong.
+    NotLoaded {
+        /// What the control register said.
+        control: SiiControl,
+    },
+    /// These bytes are no SII image.
+    Image(SiiError),
+    /// The image does not end with an end marker.
+    EndMarker,
+    /// Not a number of whole words, none, or more than an EEPROM has.
+    Length {
+        /// Bytes.
+        bytes: usize,
+    },
+    /// The configuration area that is there has a wrong checksum.
+    Checksum {
+        /// The checksum that belongs to it.
+        expected: u8,
+        /// Word 7.
+        got: u16,
+    },
+}
+
+impl fmt::Display for SiiProgramError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            SiiProgramError::Bus(error) => error.fmt(f),
+            SiiProgramError::Read(error) => error.fmt(f),
+            SiiProgramError::Busy { word } => {
+                write!(f, "EEPROM still busy with word {word:#06x} after {} ms", WRITE_LIMIT.as_millis())
+            }
+            SiiProgramError::Refused { word } => write!(
+                f,
+                "the controller does not take the command for EEPROM word {word:#06x}: does the PDI hold the EEPROM?"
+            ),
+            SiiProgramError::Command { word, control } => {
+                write!(f, "EEPROM error at word {word:#06x}: control register 0x0502 is {:#06x}", control.bits())
+            }
+            SiiProgramError::Mismatch { word, expected, got } => {
+                write!(f, "EEPROM word {word:#06x}: expected {expected:#06x} as written, read back {got:#06x}")
+            }
+            SiiProgramError::NotLoaded { control } => write!(
+                f,
+                "the controller refuses its configuration area, checksum error: control register 0x0502 is {:#06x}",
+                control.bits()
+            ),
+            SiiProgramError::Image(error) => error.fmt(f),
+            SiiProgramError::EndMarker => f.write_str("SII: the categories do not end with an end marker"),
+            SiiProgramError::Length { bytes } => {
+                write!(f, "SII: expected whole words, at least one and at most 64 KiB, got {bytes} bytes")
+            }
+            SiiProgramError::Checksum { expected, got } => {
+                write!(f, "the EEPROM has a wrong checksum: expected {expected:#04x}, word 7 is {got:#06x}")
+            }
+        }
+    }
+}
+
+impl core::error::Error for SiiProgramError {}
+
+impl From<BusError> for SiiProgramError {
+    fn from(error: BusError) -> SiiProgramError {
+        SiiProgramError::Bus(error)
+    }
+}
+
+impl From<SiiReadError> for SiiProgramError {
+    fn from(error: SiiReadError) -> SiiProgramError {
+        SiiProgramError::Read(error)
+    }
+}
+
+/// What a write did.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct SiiWritten {
+    /// Words that were written and read back.
+    pub written: usize,
+    /// Words that were right already.
+    pub unchanged: usize,
+}
+
+/// Whether bytes may be written as an SII: an image with checksum, categories and end marker; with `force` any words.
+pub fn check(image: &[u8], force: bool) -> Result<(), SiiProgramError> {
+    let bytes = image.len();
+    if bytes == 0 || !bytes.is_multiple_of(2) || bytes / 2 > MAX_WORDS as usize {
+        return Err(SiiProgramError::Length { bytes });
+    }
+    if force {
+        return Ok(());
+    }
+    let sii = Sii::parse(image).map_err(SiiProgramError::Image)?;
+    if sii.end_marker { Ok(()) } else { Err(SiiProgramError::EndMarker) }
+}
+
+/// Reads words from the EEPROM of one SubDevice.
+pub async fn read_words(
+    bus: &Bus,
+    station: StationAddress,
+    first: u32,
+    count: u32,
+) -> Result<Vec<u8>, SiiProgramError> {
+    let access = Access::begin(bus, station).await?;
+    let bytes = access.read(first, count).await;
+    access.end().await?;
+    bytes
+}
+
+/// Reads the whole EEPROM of one SubDevice, as large as it says that it is.
+pub async fn read_all(bus: &Bus, station: StationAddress) -> Result<Vec<u8>, SiiProgramError> {
+    const SIZE_WORD: u32 = 0x3E;
+    let access = Access::begin(bus, station).await?;
+    let work = async {
+        let size = access.read(SIZE_WORD, 1).await?;
+        let words = (u32::from(u16::from_le_bytes([size[0], size[1]])) + 1) * 64;
+        access.read(0, words.min(MAX_WORDS)).await
+    };
+    let bytes = work.await;
+    access.end().await?;
+    bytes
+}
+
+/// Writes an image; see [`check`].
+pub async fn write(
+    bus: &Bus,
+    station: StationAddress,
+    image: &[u8],
+    force: bool,
+) -> Result<SiiWritten, SiiProgramError> {
+    check(image, force)?;
+    let words: Vec<u16> = image.as_chunks::<2>().0.iter().map(|pair| u16::from_le_bytes(*pair)).collect();
+    let access = Access::begin(bus, station).await?;
+    let written = access.write_words(&words).await;
+    access.end().await?;
+    written
+}
+
+/// Writes the alias, with the checksum that the configuration area then has; one that is wrong now is not made right
+/// unless `force` says so. The controller takes over an alias when it starts, not when it loads again (facts 4.7).
+pub async fn write_alias(
+    bus: &Bus,
+    station: StationAddress,
+    alias: u16,
+    force: bool,
+) -> Result<SiiWritten, SiiProgramError> {
+    let access = Access::begin(bus, station).await?;
+    let work = async {
+        let bytes = access.read(0, CONFIGURATION.len() as u32).await?;
+        let mut words: Vec<u16> = bytes.as_chunks::<2>().0.iter().map(|pair| u16::from_le_bytes(*pair)).collect();
+        let (expected, got) = (checksum_of(&words), words[CHECKSUM_WORD]);
+        let disabled = got == CHECKSUM_DISABLED;
+        if !force && !disabled && got as u8 != expected {
+            return Err(SiiProgramError::Checksum { expected, got });
+        }
+        words[ALIAS_WORD] = alias;
+        if !disabled {
+            words[CHECKSUM_WORD] = checksum_of(&words).into();
+        }
+        access.write_words(&words).await
+    };
+    let written = work.await;
+    access.end().await?;
+    written
+}
+
+/// Has the controller load its configuration from the EEPROM again (command 0x0400).
+pub async fn reload(bus: &Bus, station: StationAddress) -> Result<(), SiiProgramError> {
+    let access = Access::begin(bus, station).await?;
+    let loaded = access.reload().await;
+    access.end().await?;
+    loaded
+}
+
+fn checksum_of(words: &[u16]) -> u8 {
+    let mut bytes = [0; 14];
+    for (pair, word) in bytes.as_chunks_mut::<2>().0.iter_mut().zip(words) {
+        *pair = word.to_le_bytes();
+    }
+    checksum(&bytes)
+}
+
+/// The EEPROM while it is EtherCAT's.
+struct Access<'a> {
+    bus: &'a Bus,
+    station: StationAddress,
+    /// It was offered to the PDI before.
+    offered: bool,
+}
+
+impl<'a> Access<'a> {
+    async fn begin(bus: &'a Bus, station: StationAddress) -> Result<Access<'a>, BusError> {
+        let before = SiiConfiguration::from_bits(bus.fprd_array::<1>(station, map::SII_CONFIGURATION).await?[0]);
+        claim(bus, station).await?;
+        Ok(Access { bus, station, offered: before.offer_pdi })
+    }
+
+    async fn end(self) -> Result<(), BusError> {
+        if self.offered {
+            self.bus.fpwr(self.station, map::SII_CONFIGURATION, &[1]).await?;
+        }
+        Ok(())
+    }
+
+    async fn read(&self, first: u32, count: u32) -> Result<Vec<u8>, SiiProgramError> {
+        let mut eeprom = Eeprom::open(self.bus, self.station, Pace::default()).await?;
+        Ok(eeprom.bytes(first, count, None).await?)
+    }
+
+    async fn write_words(&self, words: &[u16]) -> Result<SiiWritten, SiiProgramError> {
+        let mut done = SiiWritten::default();
+        let area = CONFIGURATION.end.min(words.len());
+        for at in (area..words.len()).chain(0..area) {
+            let (word, value) = (at as u32, words[at]);
+            if self.word(word).await? == value {
+                done.unchanged += 1;
+            } else {
+                self.write_word(word, value).await?;
+                done.written += 1;
+            }
+        }
+        Ok(done)
+    }
+
+    async fn word(&self, word: u32) -> Result<u16, SiiProgramError> {
+        let bytes = self.read(word, 1).await?;
+        Ok(u16::from_le_bytes([bytes[0], bytes[1]]))
+    }
+
+    /// Writes a word until it reads back as it was written.
+    async fn write_word(&self, word: u32, value: u16) -> Result<(), SiiProgramError> {
+        let mut tries = 0;
+        loop {
+            tries += 1;
+            let error = match self.try_word(word, value).await {
+                Err(error @ (SiiProgramError::Command { .. } | SiiProgramError::Refused { .. })) => error,
+                Err(error) => return Err(error),
+                Ok(()) => {
+                    let got = self.word(word).await?;
+                    if got == value {
+                        return Ok(());
+                    }
+                    SiiProgramError::Mismatch { word, expected: value, got }
+                }
+            };
+            if tries >= TRIES {
+                return Err(error);
+            }
+            self.bus.sleep(TRY_PAUSE).await;
+        }
+    }
+
+    async fn try_word(&self, word: u32, value: u16) -> Result<(), SiiProgramError> {
+        self.wait(WRITE_LIMIT, word).await?;
+        let [low, high] = SiiControl::request(SiiCommand::Write).encode();
+        let [a, b, c, d] = word.to_le_bytes();
+        let [first, second] = value.to_le_bytes();
+        self.command(word, alloc::vec![low, high, a, b, c, d, first, second]).await?;
+        let control = self.wait(WRITE_LIMIT, word).await?;
+        if control.command_error || control.write_enable_error {
+            return Err(SiiProgramError::Command { word, control });
+        }
+        Ok(())
+    }
+
+    async fn reload(&self) -> Result<(), SiiProgramError> {
+        self.wait(LOAD_LIMIT, 0).await?;
+        self.command(0, SiiControl::request(SiiCommand::Reload).encode().to_vec()).await?;
+        let control = self.wait(LOAD_LIMIT, 0).await?;
+        let failed = control.checksum_error || control.device_info_not_loaded;
+        if failed { Err(SiiProgramError::NotLoaded { control }) } else { Ok(()) }
+    }
+
+    /// Writes from SII_CONTROL on. A command that comes twice because its answer was lost finds the controller busy, or
+    /// does the same once more.
+    async fn command(&self, word: u32, data: Vec<u8>) -> Result<(), SiiProgramError> {
+        let target = Target::Station(self.station, map::SII_CONTROL);
+        let reply = self.bus.transfer(Command::Fpwr, target, data, Some(Wkc(1))).await?;
+        if reply.wkc() == Wkc(1) {
+            return Ok(());
+        }
+        let control = SiiControl::decode(&self.bus.fprd_array(self.station, map::SII_CONTROL).await?);
+        if control.busy { Ok(()) } else { Err(SiiProgramError::Refused { word }) }
+    }
+
+    /// Waits until no command is under way.
+    async fn wait(&self, limit: Duration, word: u32) -> Result<SiiControl, SiiProgramError> {
+        let begin = self.bus.now();
+        loop {
+            let control = SiiControl::decode(&self.bus.fprd_array(self.station, map::SII_CONTROL).await?);
+            if !control.busy {
+                return Ok(control);
+            }
+            let elapsed = self.bus.now().since(begin);
+            if elapsed >= limit {
+                return Err(SiiProgramError::Busy { word });
+            }
+            self.bus.sleep(Pace::next(elapsed)).await;
+        }
+    }
+}

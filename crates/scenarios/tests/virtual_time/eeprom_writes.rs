@@ -1,0 +1,149 @@
+//! EEPROMs are written word by word, read back, with every failure named; aliases; loading again (facts 3.8, 4).
+
+use std::time::Duration;
+
+use ringcat::ServiceError;
+use ringcat_engine::procedures::sii::program::{SiiProgramError, SiiWritten};
+use ringcat_sim::cable::DeviceIndex;
+use ringcat_sim::fault::{Fault, SpoiltWrite};
+use ringcat_sim::network::NetworkOptions;
+use ringcat_wire::register::map;
+use ringcat_wire::sii::SiiError;
+use scenarios::segments::{descriptions, line};
+use scenarios::world::World;
+
+const KINDS: [&str; 3] = ["coupler", "digital-input-8", "analog-input-4"];
+const DEVICE: DeviceIndex = DeviceIndex(2);
+const LIMIT: Duration = Duration::from_secs(20);
+
+fn world(seed: u64) -> World {
+    World::in_op(seed, line(descriptions(&KINDS), NetworkOptions::default()))
+}
+
+fn image(world: &World) -> Vec<u8> {
+    world.network().device(DEVICE).controller.sii_image().to_vec()
+}
+
+fn write(world: &mut World, image: &[u8], force: bool) -> Result<SiiWritten, SiiProgramError> {
+    let work = world.application_mut().engine_mut().start_sii_write(DEVICE.0, image.to_vec(), force);
+    world.finish(LIMIT, work).map_err(sii)
+}
+
+fn sii(error: ServiceError) -> SiiProgramError {
+    match error {
+        ServiceError::Sii(error) => error,
+        other => panic!("{other}"),
+    }
+}
+
+#[test]
+fn an_image_is_written_while_process_data_goes_on_and_reads_back() {
+    let mut world = world(1);
+    let mark = world.mark();
+    let mut new = image(&world);
+    let read = world.application_mut().engine_mut().start_sii_read(DEVICE.0);
+    assert_eq!(world.finish(LIMIT, read), Ok(new.clone()));
+    let words = new.len() / 2;
+    assert_eq!(write(&mut world, &new, false), Ok(SiiWritten { written: 0, unchanged: words }));
+    // The serial number, and a word of a category.
+    new[0x1C..0x20].copy_from_slice(&0x1234_5678u32.to_le_bytes());
+    new[0x90] ^= 0x20;
+    let result = write(&mut world, &new, false);
+    assert_eq!(result, Ok(SiiWritten { written: 3, unchanged: words - 3 }));
+    assert_eq!(image(&world), new);
+    assert_eq!((world.incomplete(mark), world.left_op(mark)), (0, Vec::new()));
+}
+
+#[test]
+fn what_is_no_image_is_refused_and_written_with_force() {
+    let mut world = world(2);
+    let before = image(&world);
+    let mut wrong = before.clone();
+    wrong[4] ^= 1;
+    assert!(matches!(write(&mut world, &wrong, false), Err(SiiProgramError::Image(SiiError::Checksum { .. }))));
+    assert!(matches!(write(&mut world, &before[..100], false), Err(SiiProgramError::Image(SiiError::Short { .. }))));
+    let mut endless = before.clone();
+    endless.truncate(0x80);
+    assert_eq!(write(&mut world, &endless, false), Err(SiiProgramError::EndMarker));
+    assert_eq!(write(&mut world, &before[..101], true), Err(SiiProgramError::Length { bytes: 101 }));
+    assert_eq!(write(&mut world, &[], true), Err(SiiProgramError::Length { bytes: 0 }));
+    assert_eq!(write(&mut world, &vec![0; 1 << 17], true), Err(SiiProgramError::Length { bytes: 1 << 17 }));
+    assert_eq!(image(&world), before, "nothing was written");
+    assert_eq!(write(&mut world, &wrong, true).map(|done| done.written), Ok(1));
+    assert_eq!(image(&world), wrong);
+    // The controller refuses to load that, and says why.
+    let reload = world.application_mut().engine_mut().start_sii_reload(DEVICE.0);
+    let error = sii(world.finish(LIMIT, reload).expect_err("the checksum is wrong"));
+    assert!(matches!(error, SiiProgramError::NotLoaded { .. }), "{error}");
+    assert!(error.to_string().contains("checksum"), "{error}");
+    assert!(write(&mut world, &before, false).is_ok());
+    let reload = world.application_mut().engine_mut().start_sii_reload(DEVICE.0);
+    assert_eq!(world.finish(LIMIT, reload), Ok(()));
+}
+
+#[test]
+fn an_eeprom_that_is_slow_busy_or_protected_is_waited_for_or_named() {
+    let mut world = world(3);
+    let mut new = image(&world);
+    let word = new.len() / 2 - 1;
+    let mut change = |byte: u8| {
+        new[2 * word] = byte;
+        new.clone()
+    };
+    let spoil = |how, times| Fault::SpoilSiiWrites { device: DEVICE, how, times };
+    world.fault(spoil(SpoiltWrite::NotAcknowledged, 2));
+    assert_eq!(write(&mut world, &change(1), false).map(|done| done.written), Ok(1));
+    world.fault(spoil(SpoiltWrite::NotAcknowledged, 100));
+    let error = write(&mut world, &change(2), false).expect_err("it never acknowledges");
+    assert!(matches!(error, SiiProgramError::Command { .. }), "{error}");
+    world.fault(spoil(SpoiltWrite::NotStored, 1));
+    assert_eq!(write(&mut world, &change(3), false).map(|done| done.written), Ok(1));
+    world.fault(spoil(SpoiltWrite::NotStored, 100));
+    let error = write(&mut world, &change(4), false).expect_err("it is protected");
+    let is_last = |error: &SiiProgramError| match *error {
+        SiiProgramError::Mismatch { word: at, .. } => at as usize == word,
+        _ => false,
+    };
+    assert!(is_last(&error), "{error}");
+    world.fault(spoil(SpoiltWrite::NotStored, 0));
+    world.fault(Fault::SlowSii { device: DEVICE, busy: Duration::from_millis(20), times: 30 });
+    assert_eq!(write(&mut world, &change(5), false).map(|done| done.written), Ok(1));
+    world.fault(Fault::SlowSii { device: DEVICE, busy: Duration::from_millis(500), times: 1 });
+    let error = write(&mut world, &change(6), false).expect_err("it is busy for too long");
+    assert!(matches!(error, SiiProgramError::Busy { .. } | SiiProgramError::Read(_)), "{error}");
+}
+
+#[test]
+fn an_alias_has_its_checksum_and_counts_from_the_next_start_facts_4_7() {
+    let mut world = world(4);
+    let alias = |world: &mut World, force| {
+        let work = world.application_mut().engine_mut().start_alias_write(DEVICE.0, 0x0ABC, force);
+        world.finish(LIMIT, work)
+    };
+    // The PDI has it, and gets it back.
+    let to_pdi = world.application_mut().engine_mut().start_register_write(DEVICE.0, map::SII_CONFIGURATION, vec![1]);
+    assert_eq!(world.finish(LIMIT, to_pdi), Ok(()));
+    assert_eq!(alias(&mut world, false), Ok(SiiWritten { written: 2, unchanged: 6 }));
+    let register = |world: &World, at| world.network().device(DEVICE).controller.register(at, 2).to_vec();
+    assert_eq!(register(&world, map::SII_CONFIGURATION)[0], 1);
+    let of_image = image(&world);
+    assert_eq!(of_image[8..10], [0xBC, 0x0A]);
+    assert!(ringcat_wire::sii::Sii::parse(&of_image).is_ok(), "the checksum is right");
+    let from_pdi = world.application_mut().engine_mut().start_register_write(DEVICE.0, map::SII_CONFIGURATION, vec![0]);
+    assert_eq!(world.finish(LIMIT, from_pdi), Ok(()));
+    let reload = world.application_mut().engine_mut().start_sii_reload(DEVICE.0);
+    assert_eq!(world.finish(LIMIT, reload), Ok(()));
+    assert_eq!(register(&world, map::STATION_ALIAS), [0, 0], "a reload does not bring it");
+    world.power_off(DEVICE);
+    world.run_cycles(50);
+    world.power_on(DEVICE);
+    world.run_cycles(50);
+    assert_eq!(register(&world, map::STATION_ALIAS), [0xBC, 0x0A]);
+    world.settle();
+    // One that is wrong is not made right by accident.
+    world.fault(Fault::CorruptSii { device: DEVICE, offset: 0x0E, mask: 0x55 });
+    let error = sii(alias(&mut world, false).expect_err("the checksum was wrong before"));
+    assert!(matches!(error, SiiProgramError::Checksum { .. }), "{error}");
+    assert!(alias(&mut world, true).is_ok());
+    assert!(ringcat_wire::sii::Sii::parse(&image(&world)).is_ok());
+}
