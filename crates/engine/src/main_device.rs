@@ -272,6 +272,7 @@ impl MainDevice {
         let (producer, consumer) = queue(CYCLIC_EVENTS);
         let mut exchange = Exchange::new(self.identity, self.options.links(), &layout, board.clone(), producer);
         let cables = cables(&topology, self.options.links());
+        let book = Book::new(&bus, members.len(), self.statistics_period);
         let fleet = Fleet {
             members,
             strangers,
@@ -282,8 +283,8 @@ impl MainDevice {
             cables: cables.into_iter().map(|cable| (cable, CableErrors::default())).collect(),
             cache: self.cache.clone(),
             blocked: Vec::new(),
+            statistics: book.clone(),
         };
-        let book = Book::new(&bus, fleet.members.len(), self.statistics_period);
         let fleet = SharedFleet::new(fleet, board.clone(), clocks);
         self.supervisor.attach(board);
         let start = if self.has_visited() { Start::Doubtful } else { Start::Cleared };

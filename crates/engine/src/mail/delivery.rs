@@ -91,7 +91,7 @@ fn coe(room: &Rc<Room>, state: &mut State, message: &Message<'_>) -> bool {
             answer(state, Lane::Coe, message, Unsolicited::Other)
         }
         CoeService::TxPdo | CoeService::RxPdo if state.lanes[Lane::Coe as usize].pdo == Some(*header) => {
-            answer(room, state, Lane::Coe, message, Unsolicited::Other);
+            answer(state, Lane::Coe, message, Unsolicited::Other)
         }
         CoeService::TxPdo
         | CoeService::RxPdo

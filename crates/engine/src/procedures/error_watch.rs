@@ -38,6 +38,7 @@ pub(super) async fn watch_errors(bus: Bus, fleet: SharedFleet) {
         bus.sleep(PAUSE).await;
         for (index, counters) in bus.gather_in_turns(present(&fleet), read).await.into_iter().flatten() {
             let before = last[index].replace(counters);
+            fleet.access().statistics.heard(index, &counters);
             let Some(node) = fleet.access().members.get(index).and_then(|member| member.node) else { continue };
             for at in at_node.get(node).into_iter().flatten() {
                 watched[*at].take(node, before.as_ref(), &counters);
@@ -90,7 +91,9 @@ fn is_full(counters: &ErrorCounters) -> bool {
 async fn clear(bus: &Bus, fleet: &SharedFleet, index: usize) -> Result<(), BusError> {
     let Some(station) = fleet.access().members.get(index).map(|member| member.station) else { return Ok(()) };
     bus.fpwr(station, map::RX_ERROR_COUNTER, &[0]).await?;
-    bus.fpwr(station, map::LOST_LINK_COUNTER, &[0]).await
+    bus.fpwr(station, map::LOST_LINK_COUNTER, &[0]).await?;
+    fleet.access().statistics.cleared(index);
+    Ok(())
 }
 
 /// A cable and what its ends have counted lately.

@@ -12,6 +12,7 @@ use ringcat_wire::register::Fmmu;
 use super::clocks::SharedClocks;
 use super::mail_watch;
 use super::services::ports::BlockedPort;
+use super::services::statistics::Book;
 use super::sii::SiiCache;
 use super::strangers::Stranger;
 use crate::board::Board;
@@ -214,6 +215,8 @@ pub struct Fleet {
     pub cache: SiiCache,
     /// Ports that were closed to cut SubDevices off.
     pub blocked: Vec<BlockedPort>,
+    /// Error counters.
+    pub(crate) statistics: Book,
 }
 
 /// Shared by all procedures of one MainDevice.

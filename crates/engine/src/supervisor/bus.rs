@@ -211,7 +211,17 @@ impl Bus {
         data: Vec<u8>,
         resend: bool,
     ) -> impl Future<Output = Result<Reply, BusError>> {
-        self.submit(Request { command, target, data, redundant: None, expected: None, resend, lead: None, mail: None })
+        self.submit(Request {
+            command,
+            target,
+            data,
+            redundant: None,
+            expected: None,
+            resend,
+            lead: None,
+            mail: None,
+            redundant_station: None,
+        })
     }
 
     /// Exchanges a register for other data: each SubDevice with this station address hands its old value on with the

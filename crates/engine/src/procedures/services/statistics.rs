@@ -1,7 +1,7 @@
 //! Error counters of all SubDevices: read on a period, on demand, cleared (facts 2.5).
 //!
 //! The registers stop at 255. What is kept here goes on: each reading adds what was counted since the last one, and a
-//! register that is half full is cleared.
+//! register that is nearly full is cleared. Whoever else reads or clears them says so here (`error_watch`).
 
 use alloc::rc::Rc;
 use alloc::vec::Vec;
@@ -18,7 +18,7 @@ use crate::supervisor::{Bus, Signal};
 use crate::time::Instant;
 
 /// A counter that has come so far is cleared.
-const HALF_FULL: u8 = 0x80;
+const NEARLY_FULL: u8 = 0xC0;
 /// Counters of the process data watchdog and of the PDI watchdog.
 const WATCHDOGS: usize = 2;
 
@@ -59,11 +59,17 @@ pub struct Statistics {
 }
 
 impl Statistics {
-    /// Takes in a reading. A register that shows less than before was cleared meanwhile.
+    /// Takes in a reading.
     fn take(&mut self, now: Instant, counters: ErrorCounters, watchdogs: [u8; WATCHDOGS]) {
-        let add = |total: &mut u64, before: u8, now: u8| {
-            *total += u64::from(if now >= before { now - before } else { now });
-        };
+        self.count(counters);
+        add(&mut self.watchdog_process_data, self.watchdog_registers[0], watchdogs[0]);
+        add(&mut self.watchdog_pdi, self.watchdog_registers[1], watchdogs[1]);
+        self.watchdog_registers = watchdogs;
+        self.readings += 1;
+        self.read_at = Some(now);
+    }
+
+    fn count(&mut self, counters: ErrorCounters) {
         let before = self.registers;
         for (number, port) in self.ports.iter_mut().enumerate() {
             let (was, is) = (before.rx[number], counters.rx[number]);
@@ -74,11 +80,7 @@ impl Statistics {
         }
         add(&mut self.processing_unit, before.epu, counters.epu);
         add(&mut self.pdi, before.pdi, counters.pdi);
-        add(&mut self.watchdog_process_data, self.watchdog_registers[0], watchdogs[0]);
-        add(&mut self.watchdog_pdi, self.watchdog_registers[1], watchdogs[1]);
-        (self.registers, self.watchdog_registers) = (counters, watchdogs);
-        self.readings += 1;
-        self.read_at = Some(now);
+        self.registers = counters;
     }
 
     /// Whether there was any error.
@@ -86,6 +88,11 @@ impl Statistics {
         let ports = self.ports.iter().all(|port| *port == PortErrors::default());
         ports && self.processing_unit + self.pdi + self.watchdog_process_data + self.watchdog_pdi == 0
     }
+}
+
+/// A register that shows less than before was cleared meanwhile.
+fn add(total: &mut u64, before: u8, now: u8) {
+    *total += u64::from(if now >= before { now - before } else { now });
 }
 
 /// The statistics of all declared SubDevices, and how often they are brought up to date.
@@ -115,6 +122,19 @@ impl Book {
 
     pub(crate) fn find(&self, subdevice: usize) -> Option<Statistics> {
         self.all.borrow().get(subdevice).copied()
+    }
+
+    /// Somebody else has read the error counters.
+    pub(crate) fn heard(&self, subdevice: usize, counters: &ErrorCounters) {
+        self.with(subdevice, |statistics| statistics.count(*counters));
+    }
+
+    /// Somebody else has cleared the counters of frames and links.
+    pub(crate) fn cleared(&self, subdevice: usize) {
+        self.with(subdevice, |statistics| {
+            let ErrorCounters { epu, pdi, pdi_code, .. } = statistics.registers;
+            statistics.registers = ErrorCounters { epu, pdi, pdi_code, ..ErrorCounters::default() };
+        });
     }
 
     fn with(&self, subdevice: usize, work: impl FnOnce(&mut Statistics)) {
@@ -164,7 +184,7 @@ pub(crate) async fn read(
     let (counters, watchdogs) = bus.both(counters, watchdogs).await;
     let (bytes, watchdogs) = (counters?, watchdogs?);
     book.with(subdevice, |statistics| statistics.take(bus.now(), ErrorCounters::decode(&bytes), watchdogs));
-    if bytes.iter().chain(&watchdogs).any(|counter| *counter >= HALF_FULL) {
+    if bytes.iter().chain(&watchdogs).any(|counter| *counter >= NEARLY_FULL) {
         clear_registers(bus, book, subdevice, station).await?;
     }
     book.find(subdevice).ok_or(ServiceError::NoSubDevice { subdevice })
