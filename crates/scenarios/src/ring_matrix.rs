@@ -1,27 +1,34 @@
 //! The matrix of rings: any cable of a ring of any length cut and healed at any phase of its life, with everything that
 //! must hold checked ([`Bed::run`]). Scenarios run a part of it, the bench of the ring all of it.
 
+use std::cell::Cell;
 use std::time::Duration;
 
 use ringcat::{DomainId, Event, Options, Redundancy, RingState, automatic};
 use ringcat_engine::mail::coe::{self, SdoAddress};
+use ringcat_engine::mail::eoe::EthernetPort;
 use ringcat_engine::mail::foe::{self, FoeOptions};
 use ringcat_engine::mail::stream::{Bounded, Bytes};
 use ringcat_engine::mail::{Limits, Mailbox};
 use ringcat_engine::main_device::Pending;
 use ringcat_sim::application::behaviours::{Behaviour, InputSource};
 use ringcat_sim::cable::{CableId, DeviceIndex};
-use ringcat_sim::description::DeviceDescription;
+use ringcat_sim::description::{DeviceDescription, EoeEnd};
 use ringcat_sim::fault::Fault;
 use ringcat_sim::network::{Network, NetworkOptions};
 use ringcat_sim::time::SimTime;
+use ringcat_wire::al::{AlState, AlStatus};
 
 use crate::check::{Delivery, ring_events, troubles};
+use crate::ethernet_host::{Addresses, download};
 use crate::phases::{End, Phase as StartPhase, start_up};
 use crate::segments::{cable_of_ring, descriptions, ring};
 use crate::world::{CYCLE, World};
 
 const LIMITS: Limits = (Duration::from_millis(500), Duration::from_secs(2));
+const ADDRESSES: Addresses = Addresses { mac: [2, 0, 0, 0, 0, 9], host: [10, 0, 0, 1], device: [10, 0, 0, 2] };
+/// Bytes of a download over TCP.
+const STREAM: usize = 60_000;
 const OBJECT: SdoAddress = SdoAddress::new(0x2002, 0);
 /// Some segments of an SDO, and some packets of a file.
 const BYTES: usize = 12_000;
@@ -54,13 +61,17 @@ pub enum Phase {
     Sdo,
     /// A file is written by FoE and read back.
     Foe,
+    /// A stream of Ethernet frames by EoE: a download over TCP.
+    Eoe,
     /// One SubDevice fell to SAFEOP and is on its way back.
     StateChange,
+    /// One SubDevice is asked to go to PREOP, and back to OP when the cable is healed.
+    StateRequest,
 }
 
 impl Phase {
     /// In the order of a life.
-    pub const ALL: [Phase; 9] = [
+    pub const ALL: [Phase; 11] = [
         Phase::PowerOn,
         Phase::Scan,
         Phase::ToPreOp,
@@ -69,7 +80,9 @@ impl Phase {
         Phase::Idle,
         Phase::Sdo,
         Phase::Foe,
+        Phase::Eoe,
         Phase::StateChange,
+        Phase::StateRequest,
     ];
 
     /// Before all are in OP.
@@ -109,9 +122,15 @@ pub const fn speaker(count: usize) -> usize {
     count / 2
 }
 
+thread_local! {
+    /// When the cycles of the world in this thread begin, in nanoseconds after a whole one: on its own stub a frame may meet a
+    /// SubDevice some hundred microseconds later than in the twin, and that must not be the next cycle.
+    static GRID: Cell<u64> = const { Cell::new(0) };
+}
+
 /// Inputs from the number of the cycle and the outputs that were latched last.
 fn echo(now: SimTime, outputs: &[u8], inputs: &mut [u8]) {
-    let cycle = (now.0 / CYCLE.as_nanos() as u64) as u8;
+    let cycle = (now.0.wrapping_sub(GRID.get()) / CYCLE.as_nanos() as u64) as u8;
     for (at, input) in inputs.iter_mut().enumerate() {
         let output = if outputs.is_empty() { 0 } else { outputs[at % outputs.len()] };
         *input = output.rotate_left(3) ^ cycle.wrapping_mul(29).wrapping_add(at as u8);
@@ -125,6 +144,9 @@ pub fn segment(count: usize, detection: Duration) -> Network {
     let mut kinds: Vec<&str> = KINDS.into_iter().cycle().take(count).collect();
     kinds[speaker(count)] = "all-protocols";
     let mut described: Vec<DeviceDescription> = descriptions(&kinds);
+    let ethernet = &mut described[speaker(count)].services.eoe;
+    (ethernet.address, ethernet.mask) = (Some(ADDRESSES.device.into()), Some([255, 255, 255, 0].into()));
+    ethernet.end = EoeEnd::Stack;
     for it in &mut described {
         if let Behaviour::Terminal(source) = &mut it.behaviour {
             *source = InputSource::Function(echo);
@@ -136,17 +158,23 @@ pub fn segment(count: usize, detection: Duration) -> Network {
 /// The moment of a case in a start-up.
 fn moment(case: &Case, phases: &[StartPhase]) -> SimTime {
     let end = |wanted: End| phases.iter().find(|phase| phase.end == wanted).map_or(Duration::ZERO, |phase| phase.at);
-    use ringcat_wire::al::AlState::{Op, PreOp, SafeOp};
+    use AlState::{Op, PreOp, SafeOp};
     let (from, to) = match case.phase {
         Phase::PowerOn => (Duration::ZERO, end(End::Addressed)),
         Phase::Scan => (end(End::Addressed), end(End::Scanned)),
         Phase::ToPreOp => (end(End::Scanned), end(End::State(PreOp))),
         Phase::ToSafeOp => (end(End::State(PreOp)), end(End::State(SafeOp))),
-        Phase::ToOp | Phase::Idle | Phase::Sdo | Phase::Foe | Phase::StateChange => {
-            (end(End::State(SafeOp)), end(End::State(Op)))
-        }
+        _ => (end(End::State(SafeOp)), end(End::State(Op))),
     };
     SimTime::from_micros(((from + (to - from) * case.moment / 1000).as_nanos() / 1000) as u64)
+}
+
+/// A ring in OP.
+fn in_op(count: usize, detection: Duration) -> World {
+    GRID.set(0);
+    let world = World::in_op(0, segment(count, detection));
+    GRID.set(world.application().now().0 % CYCLE.as_nanos() as u64);
+    world
 }
 
 /// What the runs of one length have in common: when the phases of its start end, and the twin that nobody cuts.
@@ -165,7 +193,7 @@ impl Bed {
         let phases = start_up(segment(count, detection), &Options::default(), CYCLE).expect("it starts");
         let cycles = 2 * wait(detection) + FALL + 40;
         let twins = [false, true].map(|falls| {
-            let mut world = World::in_op(0, segment(count, detection));
+            let mut world = in_op(count, detection);
             let mut images = Vec::new();
             for cycle in 0..cycles {
                 if falls && (cycle == BEFORE || cycle == BEFORE + FALL) {
@@ -195,6 +223,7 @@ fn falls(phase: Phase) -> usize {
 
 /// A break that comes and goes while the ring starts.
 fn start(case: &Case, phases: &[StartPhase]) -> Outcome {
+    GRID.set(0);
     let mut network = segment(case.count, case.detection);
     let at = moment(case, phases);
     network.schedule(at, Fault::Cut(CableId(case.cable)));
@@ -279,12 +308,20 @@ async fn write_and_read_file(mailbox: Mailbox) -> Vec<u8> {
     sink.into_bytes()
 }
 
+async fn stream(mailbox: Mailbox) -> Vec<u8> {
+    let port = EthernetPort::open(&mailbox).expect("nobody else has it");
+    let bus = mailbox.bus().clone();
+    download(bus, &port, ADDRESSES, STREAM, Duration::from_secs(10)).await.expect("TCP heals what a break has lost");
+    pattern()
+}
+
 /// Something begins that goes on over both edges.
 fn begin(world: &mut World, case: &Case) -> Option<Pending<Vec<u8>>> {
     let mailbox = world.mailbox(speaker(case.count));
     match case.phase {
         Phase::Sdo => Some(world.start(write_and_read_object(mailbox))),
         Phase::Foe => Some(world.start(write_and_read_file(mailbox))),
+        Phase::Eoe => Some(world.start(stream(mailbox))),
         _ => None,
     }
 }
@@ -301,11 +338,19 @@ fn wait(detection: Duration) -> u64 {
 }
 
 fn operate(case: &Case, twin: &[Vec<u8>]) -> Outcome {
-    let cut = World::in_op(0, segment(case.count, case.detection));
+    let cut = in_op(case.count, case.detection);
     let mut pair = Pair { cut, twin: twin.iter(), calm: 0, compared: 0 };
     pair.cut.application_mut().links_mut().measure_flights();
     pair.cycles(case, BEFORE);
-    let fallen = (case.phase == Phase::StateChange).then(|| fall(&mut pair, case));
+    let fallen = match case.phase {
+        Phase::StateChange => Some(fall(&mut pair, case)),
+        Phase::StateRequest => Some(speaker(case.count)),
+        _ => None,
+    };
+    if case.phase == Phase::StateRequest {
+        // Its inputs are not the twin's while it is in another state.
+        pair.twin = [].iter();
+    }
     let work = begin(&mut pair.cut, case);
     pair.cycles(case, if work.is_some() { 8 } else { 0 });
     let flight = Duration::from_nanos(pair.cut.application().links().flight_ns());
@@ -317,8 +362,17 @@ fn operate(case: &Case, twin: &[Vec<u8>]) -> Outcome {
     let mut outcome = Outcome::default();
     for (at, fault) in [Fault::Cut(CableId(case.cable)), Fault::Heal(CableId(case.cable))].into_iter().enumerate() {
         let mark = pair.cut.mark();
+        let state = [AlState::PreOp, AlState::Op][at];
+        let who = speaker(case.count);
+        let asked = (case.phase == Phase::StateRequest)
+            .then(|| pair.cut.application_mut().engine_mut().start_state_request(who, state));
         pair.cut.fault_in(CYCLE * case.moment / 1000, fault);
         pair.cycles(case, wait(case.detection));
+        if let Some(asked) = asked {
+            let reached = pair.cut.finish(Duration::from_secs(2), asked);
+            reached.unwrap_or_else(|error| panic!("{case:?}: {state}: {error}"));
+            assert_eq!(pair.cut.network().device(DeviceIndex(who)).al_status(), AlStatus::new(state));
+        }
         let world = &pair.cut;
         let expected: Vec<&Event> = if at == 0 { opened.iter().collect() } else { closed.iter().collect() };
         assert_eq!(ring_events(world.events(mark)), expected, "{case:?}");

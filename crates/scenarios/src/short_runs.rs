@@ -78,8 +78,9 @@ pub fn run(seed: u64) {
         let settled = world.all_in_op() && world.application().all_settled();
         settled && complete && world.application().ring() == RingState::Closed && redundancy == Redundancy::Ready
     });
+    // What was delayed has come, and what changed twice has held.
+    world.run_cycles(40);
     world.set_strict(true);
-    world.run_cycles(5);
     let mark = world.mark();
     world.run_cycles(15);
     assert_eq!((world.incomplete(mark), world.left_op(mark)), (0, Vec::new()));

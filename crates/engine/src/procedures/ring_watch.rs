@@ -81,7 +81,7 @@ impl RingWatch {
         for link in Link::ALL {
             let at = link.index();
             if carriers[at] != self.carriers[at] {
-                self.cables[at].changed(now, 1);
+                self.cables[at].changed(now);
                 self.carriers[at] = carriers[at];
             }
             if carriers[at] == self.told_carriers[at] || !self.cables[at].may_tell(now) {
@@ -106,11 +106,11 @@ impl RingWatch {
             return;
         }
         if word.changes != self.changes {
-            self.ring.changed(now, word.changes.wrapping_sub(self.changes));
+            self.ring.changed(now);
             self.changes = word.changes;
         }
         if word.dead_way != self.dead_way {
-            self.ways.changed(now, 1);
+            self.ways.changed(now);
             self.dead_way = word.dead_way;
         }
         self.tell_ring(word);

@@ -105,7 +105,7 @@ fn check_words(edge: &Edge, device: usize, is_cut: bool) {
 }
 
 /// How many cycles were not complete, by the times of the judgements; `None` where the last one was not.
-fn incomplete_cycles(lines: &[String]) -> Option<usize> {
+pub fn incomplete_cycles(lines: &[String]) -> Option<usize> {
     let (mut since, mut cycles) = (None, 0);
     for line in lines {
         let Some((ms, judgement)) = line.split_once(" ms  domain 0: ") else { continue };
@@ -123,7 +123,7 @@ fn incomplete_cycles(lines: &[String]) -> Option<usize> {
 }
 
 /// Cycles that our MainDevice tells to have left out.
-fn left_out(lines: &[String]) -> usize {
+pub fn left_out(lines: &[String]) -> usize {
     let counts = lines.iter().filter_map(|line| line.split_once(" ms  this machine: "));
     counts.map(|(_, rest)| rest.split(' ').next().and_then(|count| count.parse::<usize>().ok()).expect("a count")).sum()
 }

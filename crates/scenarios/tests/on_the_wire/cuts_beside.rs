@@ -2,9 +2,10 @@
 //! simulated ring: incomplete cycles of both, side by side.
 
 use std::io::{BufRead, BufReader};
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use crate::bench::{Bench, await_op, is_asked_for};
+use crate::cables::{incomplete_cycles, left_out};
 use crate::foreign::{FOREIGN, python, start};
 use crate::{RING_OF_16, states};
 
@@ -44,20 +45,23 @@ fn pysoem_and_ours_meet_the_same_cuts_of_a_ring() {
             schedule(&bench);
         }
         let said = lines.next().and_then(Result::ok).unwrap_or_else(|| "it ended early".to_owned());
-        println!("pysoem:  {said}; in OP by the simulator: {}", states(&bench, "OP"));
+        println!("pysoem:  {said}");
         bench.show_simulator_lateness();
         let _ = child.wait();
     }
     bench.simulate(&RING_OF_16.segment(), true);
     let run = bench.run_ringcat(&["run", "--main", "main0", "--redundant", "main1"]);
     await_op(&bench, 16);
+    let begin = Instant::now();
     schedule(&bench);
+    let end = Instant::now();
     let in_op = states(&bench, "OP");
+    let lines: Vec<String> = run.said().between(begin, end).into_iter().map(|(_, line)| line).collect();
+    let (wrong, late) = (incomplete_cycles(&lines), left_out(&lines));
+    let wrong = wrong.map_or_else(|| "?".to_owned(), |cycles| cycles.to_string());
+    let cycles = end.duration_since(begin).as_millis();
+    println!("RingCAT: cycles {cycles} wrong {wrong} left out {late} op {in_op}");
     let (output, errors) = run.interrupt();
-    let summary = output.find("\nsummary").map_or("", |at| &output[at + 1..]);
-    let line = |words: &str| summary.lines().find(|line| line.contains(words)).unwrap_or_default().trim().to_owned();
-    println!("RingCAT: {}; {}; in OP by the simulator: {in_op}", line("cycles:"), line("this machine:"));
-    println!("RingCAT: {}", line("the wire:"));
     bench.show_simulator_lateness();
     assert_eq!(in_op, 16, "{output}{errors}");
     for (words, count) in [("ring open:", CUT.len()), ("Line is fixed", CUT.len()), ("no longer answers", 0)] {

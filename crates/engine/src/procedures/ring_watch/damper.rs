@@ -7,8 +7,10 @@ use core::time::Duration;
 
 use crate::time::Instant;
 
-/// A change that comes so long after the one before is told at once; one that comes earlier when it has held so long.
+/// A change that comes so long after the one before is told at once.
 const QUIET: Duration = Duration::from_millis(20);
+/// One that comes earlier is told when it has held for so long.
+const HOLD: Duration = Duration::from_millis(3);
 /// A state that changes too often is told when it has held for so long.
 const STEADY: Duration = Duration::from_secs(1);
 /// Changes that may be told in a row.
@@ -39,9 +41,10 @@ impl Default for Damper {
 }
 
 impl Damper {
-    /// The state changed since the last look, so many times.
-    pub(crate) fn changed(&mut self, now: Instant, times: u32) {
-        self.is_prompt = times == 1 && self.changed_at.is_none_or(|at| now.since(at) >= QUIET);
+    /// The state changed since the last look. At the edge of a cut frames of one cycle may show both states: that is one
+    /// change.
+    pub(crate) fn changed(&mut self, now: Instant) {
+        self.is_prompt = self.changed_at.is_none_or(|at| now.since(at) >= QUIET);
         self.changed_at = Some(now);
     }
 
@@ -51,7 +54,7 @@ impl Damper {
         if self.is_unsteady {
             return held >= STEADY;
         }
-        self.is_prompt || held >= QUIET
+        self.is_prompt || held >= HOLD
     }
 
     /// It is told. True where from now on it changes too often to be told each time.
@@ -85,7 +88,7 @@ mod tests {
             now += Duration::from_micros(500);
             let due = u32::try_from(now.0 / half_period.as_nanos() as u64).unwrap();
             if due != flips {
-                damper.changed(now, due - flips);
+                damper.changed(now);
                 flips = due;
             }
             if told_state != flips % 2 && damper.may_tell(now) {
@@ -101,7 +104,7 @@ mod tests {
     fn changes_that_are_rare_are_told_each_and_at_once() {
         assert_eq!(flap(Duration::from_millis(300), Duration::from_secs(60)), (200, 0));
         let mut damper = Damper::default();
-        damper.changed(Instant(5), 1);
+        damper.changed(Instant(5));
         assert!(damper.may_tell(Instant(5)));
     }
 
@@ -125,7 +128,7 @@ mod tests {
         let mut became = 0;
         for _ in 0..1000 {
             now += Duration::from_millis(30);
-            damper.changed(now, 1);
+            damper.changed(now);
             if damper.may_tell(now) {
                 became += u32::from(damper.tell(now));
             }
@@ -135,7 +138,7 @@ mod tests {
         now += STEADY;
         assert!(!damper.is_unsteady(now) && damper.may_tell(now));
         assert!(!damper.tell(now), "some are told again");
-        damper.changed(now + STEADY, 1);
+        damper.changed(now + STEADY);
         assert!(damper.may_tell(now + STEADY));
     }
 }
