@@ -49,7 +49,8 @@ pub fn port_errors(counters: &ErrorCounters, port: u8) -> CableErrors {
     CableErrors { invalid_frames: counters.rx[at].invalid_frames.into(), lost_links: counters.lost_link[at].into() }
 }
 
-/// All cables, in the order in which frames of MAIN pass them; a broken one too, as far as both ends are known.
+/// All cables: those that lead to the SubDevices, in their order, then those that close rings behind junctions, that of the
+/// redundant link last. A broken one is among them.
 pub fn cables(topology: &Topology, links: LinkSet) -> Vec<Cable> {
     let port = |node: usize| PortOf { node, port: topology.nodes[node].entry_port };
     let mut cables = Vec::with_capacity(topology.nodes.len() + 1);
@@ -62,6 +63,8 @@ pub fn cables(topology: &Topology, links: LinkSet) -> Vec<Cable> {
         };
         cables.push(Cable { near, far: Some(port(node)) });
     }
+    let closings = topology.local_rings.iter().map(|ring| ring.closing);
+    cables.extend(closings.map(|closing| Cable { near: Some(closing.tail), far: Some(closing.head) }));
     let Some(last) = topology.nodes.len().checked_sub(1).filter(|_| links == LinkSet::Ring) else { return cables };
     let open = topology.open_ports.first().copied();
     cables.push(Cable { near: Some(open.unwrap_or_else(|| loose_end(topology, last))), far: None });

@@ -244,6 +244,40 @@ fn a_cable_that_flaps_at_any_rate_floods_nobody_and_changes_no_state() {
 }
 
 #[test]
+fn a_cable_that_flaps_in_one_direction_floods_nobody_and_changes_no_state_while_the_watchdog_is_fed() {
+    println!("direction, half period us | cycles incomplete of all | events about ring and redundancy");
+    for (number, direction) in [Direction::AToB, Direction::BToA].into_iter().enumerate() {
+        // Away from MAIN nobody behind the cable gets outputs meanwhile: for less than the watchdog of 100 ms.
+        for micros in [3u64, 40, 700, 2_300, 30_000, 80_000, 1_000_000] {
+            if direction == Direction::AToB && micros > 80_000 {
+                continue;
+            }
+            let mut world = small(50 + number as u64);
+            let mark = world.mark();
+            let (half_period, begin) = (Duration::from_micros(micros), world.now());
+            let changes = if micros < 1_000 { 400 } else { 20 };
+            for change in 0..changes {
+                let fault = Fault::OneWay { cable: CableId(2), direction, blocked: change % 2 == 0 };
+                world.network_mut().schedule(begin + half_period * change, fault);
+            }
+            while world.now() < begin + half_period * changes {
+                world.cycle();
+            }
+            world.run_cycles(1_200);
+            let told = ring_events(world.events(mark)).len() + others(world.events(mark)).len();
+            let (incomplete, cycles) = (world.incomplete(mark), world.judged(mark).len());
+            println!("{direction:?} {micros:>14} | {incomplete:>8} of {cycles:>6} | {told}");
+            assert_eq!(world.left_op(mark), [], "{direction:?}, {micros} us");
+            assert!(told <= 2 * changes as usize && told <= 80, "{direction:?}, {micros} us: {told}");
+            assert_eq!(world.application().ring_status().redundancy, Redundancy::Ready);
+            if direction == Direction::BToA {
+                assert_eq!(incomplete, 0, "the copies of MAIN are enough");
+            }
+        }
+    }
+}
+
+#[test]
 fn an_unsteady_ring_is_told_once_and_then_when_it_holds() {
     let mut world = small(30);
     let mark = world.mark();
