@@ -103,6 +103,11 @@ pub enum Event {
         /// True when it begins, false when frames come back.
         blocked: bool,
     },
+    /// The link layer cannot take a link down, so crossed lines in a closed ring have no place (LC-03).
+    CannotDisconnect {
+        /// The link.
+        link: Link,
+    },
     /// Something else that is odd about a SubDevice's ports.
     CablingOddity {
         /// Where.

@@ -91,6 +91,8 @@ pub struct Options {
     pub patience: Duration,
     /// What becomes of rings behind junctions. A connection that is added makes it strict.
     pub junctions: JunctionMode,
+    /// Whether the redundant link may be taken down for a moment to find out where a line is crossed.
+    pub enhanced_line_crossed: bool,
 }
 
 impl Options {
@@ -106,6 +108,7 @@ impl Options {
             settle: Duration::from_millis(5),
             patience: Duration::from_secs(5),
             junctions: JunctionMode::Disabled,
+            enhanced_line_crossed: false,
         }
     }
 
@@ -172,6 +175,8 @@ pub struct MainDevice {
     ports: Vec<Option<EthernetPort>>,
     /// Messages of a gateway's clients.
     desk: Option<Desk>,
+    /// A link that was taken down on order.
+    disconnected: Option<Link>,
 }
 
 impl MainDevice {
@@ -196,6 +201,7 @@ impl MainDevice {
             loaded: None,
             ports: Vec::new(),
             desk: None,
+            disconnected: None,
             options,
         }
     }
@@ -217,6 +223,7 @@ impl MainDevice {
             cache: self.cache.clone(),
             junctions: self.options.junctions,
             pdos: self.options.pdos,
+            enhanced_line_crossed: self.options.enhanced_line_crossed,
         };
         self.supervisor.spawn(async move {
             let result = scan(&bus, &options).await;
@@ -307,7 +314,7 @@ impl MainDevice {
             None => start_all(&bus, &fleet, start),
         }
         if self.options.supervision {
-            self.supervisor.spawn(supervise(bus.clone(), fleet.clone()));
+            self.supervisor.spawn(supervise(bus.clone(), fleet.clone(), self.options.enhanced_line_crossed));
         }
         self.supervisor.spawn(watch_groups(bus.clone(), fleet.clone()));
         self.supervisor.spawn(watch_mail(bus.clone(), fleet.clone()));
@@ -325,6 +332,8 @@ impl MainDevice {
     pub fn start_stop(&mut self, state: AlState, limit: Duration, now: Instant) {
         self.counted = self.counters();
         self.supervisor = Supervisor::new(self.identity, self.options.links(), now);
+        // Whoever would have brought it back is gone.
+        self.supervisor.order_link(self.disconnected.take());
         self.scanning.set(false);
         self.requests.end();
         self.visited.clear();
@@ -427,6 +436,19 @@ impl MainDevice {
     /// When [`MainDevice::poll`] has something to do at the latest.
     pub fn next_deadline(&self) -> Option<Instant> {
         self.supervisor.next_deadline()
+    }
+
+    /// What is asked of the link layer; see [`Supervisor::take_link_order`].
+    pub fn take_link_order(&mut self) -> Option<(Link, bool)> {
+        let order = self.supervisor.take_link_order()?;
+        let (link, disconnect) = order;
+        self.disconnected = disconnect.then_some(link);
+        Some(order)
+    }
+
+    /// Whether it was done; see [`Supervisor::answer_link_order`].
+    pub fn answer_link_order(&mut self, done: bool) {
+        self.supervisor.answer_link_order(done);
     }
 
     /// Whether acyclic datagrams wait to be sent.

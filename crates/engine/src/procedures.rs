@@ -3,6 +3,7 @@
 //! They see the bus through [`crate::supervisor::Bus`] and time through nothing else.
 
 pub mod al_state;
+mod cabling;
 pub mod clocks;
 pub mod configure;
 pub mod dictionary;

@@ -8,6 +8,7 @@ pub mod bus;
 mod executor;
 mod flights;
 mod group;
+mod link_order;
 mod outbox;
 mod round_trip;
 mod shared;
@@ -33,6 +34,7 @@ use crate::event::{Event, TimedEvent};
 use crate::link::{Link, LinkSet};
 use crate::ring::{Class, Classified, Identity, RingState};
 use crate::time::Instant;
+use link_order::LinkOrder;
 use shared::Shared;
 
 /// The acyclic half of the MainDevice.
@@ -123,6 +125,30 @@ impl Supervisor {
     /// When [`Supervisor::poll`] has something to do at the latest, frames received meanwhile aside.
     pub fn next_deadline(&self) -> Option<Instant> {
         self.shared.borrow().next_deadline()
+    }
+
+    /// What a procedure asks of the link layer: a link, and whether it is to be disconnected. To be answered with
+    /// [`Supervisor::answer_link_order`].
+    pub fn take_link_order(&mut self) -> Option<(Link, bool)> {
+        let shared = &mut *self.shared.borrow_mut();
+        let LinkOrder::Given { link, disconnect } = shared.link_order else { return None };
+        shared.link_order = LinkOrder::Fetched;
+        Some((link, disconnect))
+    }
+
+    /// Has a link brought back that was taken down for a procedure of another supervisor.
+    pub(crate) fn order_link(&mut self, disconnected: Option<Link>) {
+        if let Some(link) = disconnected {
+            self.shared.borrow_mut().link_order = LinkOrder::Given { link, disconnect: false };
+        }
+    }
+
+    /// Whether an order was carried out.
+    pub fn answer_link_order(&mut self, done: bool) {
+        let order = &mut self.shared.borrow_mut().link_order;
+        if *order == LinkOrder::Fetched {
+            *order = LinkOrder::Answered(done);
+        }
     }
 
     /// Whether procedures have asked for datagrams that were not sent yet.

@@ -45,6 +45,12 @@ pub fn carrier(name: &str) -> Option<bool> {
     kernel::link_up(questions.as_raw_fd(), name).ok()
 }
 
+/// Switches an interface on or off, as `ip link set NAME up` does. False where that is not permitted (CAP_NET_ADMIN) or
+/// there is no such interface. Waits for a lock of the kernel, and longer for some drivers.
+pub fn switch(name: &str, up: bool) -> bool {
+    kernel::question_socket().is_ok_and(|questions| kernel::switch(questions.as_raw_fd(), name, up).is_ok())
+}
+
 /// Names of all interfaces.
 pub(crate) fn names() -> Vec<String> {
     indexed_names().into_iter().map(|(_, name)| name).collect()
@@ -116,6 +122,7 @@ mod tests {
     fn an_interface_that_is_not_there_has_no_carrier_to_tell_of() {
         for name in ["", "no-such", "a-name-that-is-longer-than-the-kernel-allows", "with\0end"] {
             assert_eq!(carrier(name), None, "{name:?}");
+            assert!(!switch(name, false), "{name:?}");
         }
     }
 }

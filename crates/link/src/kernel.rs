@@ -125,6 +125,17 @@ pub fn ask(fd: RawFd, name: &str, request: libc::c_ulong) -> Result<libc::ifreq,
     if unsafe { libc::ioctl(fd, request as _, &mut ifreq) } < 0 { Err(errno()) } else { Ok(ifreq) }
 }
 
+/// Switches an interface on or off (`SIOCSIFFLAGS`), as `ip link set NAME up` does; needs CAP_NET_ADMIN.
+pub fn switch(fd: RawFd, name: &str, up: bool) -> Result<(), i32> {
+    let mut ifreq = ask(fd, name, libc::SIOCGIFFLAGS as _)?;
+    let bit = libc::IFF_UP as libc::c_short;
+    // SAFETY: the kernel has answered the question by filling this member.
+    let flags = unsafe { ifreq.ifr_ifru.ifru_flags };
+    ifreq.ifr_ifru.ifru_flags = if up { flags | bit } else { flags & !bit };
+    // SAFETY: the pointer is to a live ifreq, which the request reads.
+    if unsafe { libc::ioctl(fd, libc::SIOCSIFFLAGS as _, &mut ifreq) } < 0 { Err(errno()) } else { Ok(()) }
+}
+
 /// Whether the interface has a carrier (`ETHTOOL_GLINK`); an interface that is down has none.
 pub fn link_up(fd: RawFd, name: &str) -> Result<bool, i32> {
     let mut value = EthtoolValue { command: ETHTOOL_GLINK, data: 0 };

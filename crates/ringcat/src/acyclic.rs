@@ -80,11 +80,20 @@ impl AcyclicHalf for Inline {
     }
 }
 
+/// Does to a link what procedures ask for, if they do.
+pub(crate) fn carry_out_link_order(engine: &mut Engine, links: &mut impl Links) {
+    if let Some((link, disconnect)) = engine.take_link_order() {
+        let done = links.force_disconnect(link, disconnect);
+        engine.answer_link_order(done);
+    }
+}
+
 /// Lets procedures go on and sends what they ask for, as far as the window allows. True where something has to wait for
 /// the next window.
 pub(crate) fn work(engine: &mut Engine, links: &mut impl Links, window: &Window) -> bool {
     engine.set_carriers(Link::ALL.map(|link| links.carrier(link)));
     engine.poll(links.now());
+    carry_out_link_order(engine, links);
     if !engine.wants_to_send() {
         return false;
     }

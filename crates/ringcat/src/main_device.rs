@@ -20,7 +20,7 @@ use ringcat_engine::supervisor::AcyclicCounters;
 use ringcat_wire::al::AlState;
 use ringcat_wire::source_address::MacCodec;
 
-use crate::acyclic::Inline;
+use crate::acyclic::{Inline, carry_out_link_order};
 use crate::application::Application;
 use crate::error::Error;
 use crate::links::Links;
@@ -42,6 +42,9 @@ pub struct Options {
     pub patience: Duration,
     /// What becomes of rings behind junctions. A connection that is added makes it strict.
     pub junctions: JunctionMode,
+    /// Whether the redundant link may be taken down for a moment, when ports have changed, to find out where a line is
+    /// crossed ([`Links::force_disconnect`]). Without, a closed ring shows only that there is a crossing.
+    pub enhanced_line_crossed: bool,
 }
 
 impl Default for Options {
@@ -54,6 +57,7 @@ impl Default for Options {
             settle: Duration::from_millis(5),
             patience: Duration::from_secs(5),
             junctions: JunctionMode::Disabled,
+            enhanced_line_crossed: false,
         }
     }
 }
@@ -70,6 +74,7 @@ impl Options {
             settle: self.settle,
             patience: self.patience,
             junctions: self.junctions,
+            enhanced_line_crossed: self.enhanced_line_crossed,
             ..Engineering::new(main, redundant)
         };
         Engine::new(options, links.now())
@@ -133,6 +138,7 @@ impl<L: Links> MainDevice<L> {
             engine.receive(link, frame, now);
         }) {}
         engine.poll(now);
+        carry_out_link_order(engine, links);
         engine.transmit(now, usize::MAX, &mut |link, frame| links.send(link, frame));
     }
 

@@ -5,6 +5,7 @@
 
 use ringcat_engine::link::Link;
 use ringcat_engine::time::Instant;
+use ringcat_link::interface;
 use ringcat_link::{
     CarrierWatch, ClassFilter, LinkCounters, LinkError, PacketOptions, PacketSocket, ReceiveMode, monotonic,
 };
@@ -20,6 +21,20 @@ pub struct PacketLinks {
     mode: ReceiveMode,
     /// Polls the carriers; not for the cyclic half, which goes by what comes back.
     carriers: Option<CarrierWatch>,
+    /// Names of both interfaces.
+    names: [Option<String>; 2],
+    /// Interfaces that were switched off to be disconnected.
+    disconnected: [bool; 2],
+}
+
+impl Drop for PacketLinks {
+    fn drop(&mut self) {
+        for link in Link::ALL {
+            if self.disconnected[link.index()] {
+                self.force_disconnect(link, false);
+            }
+        }
+    }
 }
 
 impl PacketLinks {
@@ -55,8 +70,10 @@ impl PacketLinks {
         filter: ClassFilter,
     ) -> Result<PacketLinks, LinkError> {
         let options = PacketOptions { receive: mode, filter, ..PacketOptions::default() };
+        let names = [Some(main.to_owned()), redundant.map(str::to_owned)];
         let redundant = redundant.map(|name| PacketSocket::open(name, &options)).transpose()?;
-        Ok(PacketLinks { main: PacketSocket::open(main, &options)?, redundant, mode, carriers: None })
+        let main = PacketSocket::open(main, &options)?;
+        Ok(PacketLinks { main, redundant, mode, carriers: None, names, disconnected: [false; 2] })
     }
 
     fn watch_carriers(mut self, main: &str, redundant: Option<&str>) -> Result<PacketLinks, LinkError> {
@@ -114,5 +131,15 @@ impl Links for PacketLinks {
             ReceiveMode::BusyPoll => self.wait(until),
             ReceiveMode::Blocking | ReceiveMode::Hybrid { .. } => monotonic::sleep_until_ns(until.0),
         }
+    }
+
+    /// Switches the interface off or on, which needs CAP_NET_ADMIN.
+    fn force_disconnect(&mut self, link: Link, disconnect: bool) -> bool {
+        let Some(name) = &self.names[link.index()] else { return false };
+        let done = interface::switch(name, !disconnect);
+        if done {
+            self.disconnected[link.index()] = disconnect;
+        }
+        done
     }
 }

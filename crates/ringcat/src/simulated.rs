@@ -129,4 +129,9 @@ impl Links for SimulatedSegment {
         }
         self.keep_pace();
     }
+
+    fn force_disconnect(&mut self, link: Link, disconnect: bool) -> bool {
+        self.network.disconnect(host_link(link), disconnect);
+        true
+    }
 }

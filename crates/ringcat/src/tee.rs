@@ -76,4 +76,8 @@ impl<L: Links> Links for Tee<L> {
     fn sleep(&mut self, until: Instant) {
         self.links.sleep(until);
     }
+
+    fn force_disconnect(&mut self, link: Link, disconnect: bool) -> bool {
+        self.links.force_disconnect(link, disconnect)
+    }
 }

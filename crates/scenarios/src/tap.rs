@@ -60,6 +60,8 @@ pub struct Tap {
     out: Vec<Out>,
     /// Copies that came back when newer frames had been sent, or twice.
     outdated: u64,
+    /// Whether links can be taken down.
+    can_disconnect: bool,
     /// Frames that are to be lost.
     losses: Vec<Loss>,
     /// Longest time from there to a frame of the exchange that came back before it sent again, in nanoseconds.
@@ -78,6 +80,7 @@ impl Tap {
             cyclic_sent: Instant::default(),
             out: Vec::new(),
             outdated: 0,
+            can_disconnect: true,
             losses: Vec::new(),
             flight_ns: 0,
         }
@@ -106,6 +109,11 @@ impl Tap {
     /// Losses that have not come about yet.
     pub fn losses_left(&self) -> u32 {
         self.losses.iter().map(|loss| loss.count).sum()
+    }
+
+    /// From now on links are like those that cannot be taken down.
+    pub fn forbid_disconnecting(&mut self) {
+        self.can_disconnect = false;
     }
 
     fn is_lost(&mut self, outward: bool, bytes: &[u8]) -> bool {
@@ -209,6 +217,10 @@ impl Links for Tap {
 
     fn carrier(&self, link: Link) -> Option<bool> {
         self.segment.carrier(link)
+    }
+
+    fn force_disconnect(&mut self, link: Link, disconnect: bool) -> bool {
+        self.can_disconnect && self.segment.force_disconnect(link, disconnect)
     }
 
     fn wait(&mut self, until: Instant) {

@@ -25,6 +25,8 @@ pub(crate) struct HostInterface {
     pub(crate) out: Option<LegId>,
     /// Frames that wait to be fetched.
     pub(crate) received: VecDeque<Received>,
+    /// It was taken down.
+    pub(crate) disconnected: bool,
     free_at: SimTime,
     ends: VecDeque<SimTime>,
     transmit_limit: usize,
@@ -46,6 +48,7 @@ impl HostInterface {
         HostInterface {
             out,
             received: VecDeque::with_capacity(receive_limit),
+            disconnected: false,
             free_at: SimTime(0),
             ends: VecDeque::with_capacity(transmit_limit),
             transmit_limit,

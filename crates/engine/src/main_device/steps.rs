@@ -96,7 +96,7 @@ impl Loaded {
         let topology = Topology::with_local_rings(&nodes, scan.main_count, &closings);
         if mode == JunctionMode::Strict {
             // The scan has kept it back.
-            report_cabling(bus, &Scan { topology: topology.clone(), ..scan.clone() });
+            report_cabling(bus, &Scan { topology: topology.clone(), ..scan.clone() }, false);
         }
         Ok(topology)
     }

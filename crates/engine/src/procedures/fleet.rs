@@ -225,6 +225,8 @@ pub struct SharedFleet {
     fleet: Rc<RefCell<Fleet>>,
     /// How often something became known that whoever supervises has to act on.
     news: Rc<Cell<u32>>,
+    /// The redundant link is down on our own order.
+    controlled_break: Rc<Cell<bool>>,
     /// Who takes part in process data.
     pub board: Arc<Board>,
     /// Distributed clocks.
@@ -234,12 +236,22 @@ pub struct SharedFleet {
 impl SharedFleet {
     /// Shares a fleet.
     pub fn new(fleet: Fleet, board: Arc<Board>, clocks: SharedClocks) -> SharedFleet {
-        SharedFleet { fleet: Rc::new(RefCell::new(fleet)), news: Rc::default(), board, clocks }
+        SharedFleet { fleet: Rc::new(RefCell::new(fleet)), news: Rc::default(), controlled_break: Rc::default(), board, clocks }
     }
 
     /// Access between two points at which a procedure waits.
     pub fn access(&self) -> RefMut<'_, Fleet> {
         self.fleet.borrow_mut()
+    }
+
+    /// Says whether a ring that opens does so on our own order: that is no break to be told.
+    pub(super) fn set_controlled_break(&self, controlled: bool) {
+        self.controlled_break.set(controlled);
+    }
+
+    /// Whether a ring that opens does so on our own order.
+    pub(super) fn is_controlled_break(&self) -> bool {
+        self.controlled_break.get()
     }
 
     /// Tells whoever supervises that there is something to act on.

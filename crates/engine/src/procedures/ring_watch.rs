@@ -45,6 +45,10 @@ pub(super) async fn watch_ring(bus: Bus, fleet: SharedFleet, reported: Rc<Cell<R
     };
     loop {
         watch.bus.sleep(PAUSE).await;
+        if watch.fleet.is_controlled_break() {
+            watch.look_away();
+            continue;
+        }
         watch.look_at_carriers();
         // One link is a ring of one, which is no news.
         if watch.bus.links() == LinkSet::Ring {
@@ -75,6 +79,13 @@ struct RingWatch {
 }
 
 impl RingWatch {
+    /// The redundant link is down on our own order: that is nothing to tell.
+    fn look_away(&mut self) {
+        let word = self.fleet.board.ring();
+        (self.changes, self.dead_way) = (word.changes, word.dead_way);
+        self.carriers = self.bus.carriers();
+    }
+
     fn look_at_carriers(&mut self) {
         let now = self.bus.now();
         let carriers = self.bus.carriers();

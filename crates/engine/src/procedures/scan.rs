@@ -20,10 +20,11 @@ use ringcat_wire::address::{Position, RegisterAddress, StationAddress, Wkc};
 use ringcat_wire::al::{AlControl, AlState, AlStatus};
 use ringcat_wire::command::Command;
 use ringcat_wire::datagram::Target;
-use ringcat_wire::register::{DcReceiveTimes, DlStatus, EcatEvent, Fmmu, Information, SyncManager, map};
+use ringcat_wire::register::{DcReceiveTimes, DlStatus, EcatEvent, Fmmu, Information, PortKind, SyncManager, map};
 
 use self::count::Count;
 pub use self::error::ScanError;
+use super::cabling::{Known, crossings};
 use super::dictionary::{ReadPdos, complete};
 use super::junction::learn;
 use super::sii::{self, SiiCache, SiiContents};
@@ -34,7 +35,7 @@ use crate::junction::JunctionMode;
 use crate::link::LinkSet;
 use crate::ring::RingState;
 use crate::supervisor::{Bus, BusError, Reply};
-use crate::topology::{Finding, NodeStatus, Topology};
+use crate::topology::{Finding, NodeStatus, PortOf, Topology};
 
 /// Station address of the SubDevice at position 0; the others follow.
 pub const FIRST_STATION: u16 = 0x1001;
@@ -62,6 +63,8 @@ pub struct ScanOptions {
     pub cache: SiiCache,
     /// What becomes of rings behind junctions.
     pub junctions: JunctionMode,
+    /// Whether the redundant link may be taken down for a moment to find out where a line is crossed.
+    pub enhanced_line_crossed: bool,
     /// Whose dictionaries are asked for PDOs.
     pub pdos: ReadPdos,
 }
@@ -177,11 +180,12 @@ async fn attempt(bus: &Bus, options: &ScanOptions, expected: Count) -> Result<Sc
         JunctionMode::Disabled | JunctionMode::Strict => Vec::new(),
     };
     let topology = Topology::with_local_rings(&statuses, main_count, &closings);
-    let scan = Scan { subdevices, topology, main_count, redundant_count };
+    let mut scan = Scan { subdevices, topology, main_count, redundant_count };
     report_findings(bus, &scan);
     // Connections that are declared are not known yet.
     if options.junctions != JunctionMode::Strict {
-        report_cabling(bus, &scan);
+        let exact = options.enhanced_line_crossed && locate_crossings(bus, &mut scan).await;
+        report_cabling(bus, &scan, exact);
     }
     for closing in closings {
         bus.report(Event::JunctionLearned { closing });
@@ -357,8 +361,43 @@ fn report_findings(bus: &Bus, scan: &Scan) {
     }
 }
 
-/// What is odd about the cabling.
-pub(crate) fn report_cabling(bus: &Bus, scan: &Scan) {
+/// Finds out who is crossed while the redundant link is down; false where the ring is not closed or changes meanwhile.
+async fn locate_crossings(bus: &Bus, scan: &mut Scan) -> bool {
+    if bus.links() != LinkSet::Ring || bus.ring() != RingState::Closed {
+        return false;
+    }
+    let Some(found) = crossings(bus, scan, true).await else { return false };
+    let node = |station: StationAddress| scan.subdevices.iter().position(|info| info.station == station);
+    let exact = found.iter().filter_map(|crossing| {
+        Some(Finding::CrossedLine { node: node(crossing.who?.0)?, entry_port: crossing.entry_port? })
+    });
+    let mut exact: Vec<Finding> = exact.collect();
+    if exact.len() < found.len() {
+        // It could not be disconnected, and only the ring shows that there is something.
+        return false;
+    }
+    let others = scan.topology.findings.iter().filter(|finding| !matches!(finding, Finding::CrossedLine { .. }));
+    exact.extend(others);
+    exact.sort_by_key(Finding::node);
+    scan.topology.findings = exact;
+    true
+}
+
+impl Known for Scan {
+    fn ports(&self, station: StationAddress) -> [PortKind; 4] {
+        let info = self.subdevices.iter().find(|info| info.station == station);
+        info.map(|info| info.controller.ports).unwrap_or_default()
+    }
+
+    fn closings(&self) -> Vec<[(StationAddress, u8); 2]> {
+        let end = |at: PortOf| Some((self.subdevices.get(at.node)?.station, at.port));
+        let rings = self.topology.local_rings.iter();
+        rings.filter_map(|ring| Some([end(ring.closing.head)?, end(ring.closing.tail)?])).collect()
+    }
+}
+
+/// What is odd about the cabling. `exact`: where lines are crossed is known, also in a closed ring.
+pub(crate) fn report_cabling(bus: &Bus, scan: &Scan, exact: bool) {
     let position = |node: usize| scan.subdevices.get(node).map_or(Position(node as u16), |info| info.position);
     for finding in &scan.topology.findings {
         match *finding {
@@ -376,7 +415,12 @@ pub(crate) fn report_cabling(bus: &Bus, scan: &Scan) {
     }
     // In a closed ring only branches on port 2 and crossed SubDevices work on the redundant copy (facts LC-04).
     let crossed_known = scan.topology.findings.iter().any(|finding| matches!(finding, Finding::CrossedLine { .. }));
-    if bus.links() == LinkSet::Ring && bus.ring() == RingState::Closed && scan.redundant_count > 0 && !crossed_known {
+    if bus.links() == LinkSet::Ring
+        && bus.ring() == RingState::Closed
+        && scan.redundant_count > 0
+        && !crossed_known
+        && !exact
+    {
         bus.report(Event::LineCrossed { position: None, entry_port: None });
     }
 }

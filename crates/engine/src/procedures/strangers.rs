@@ -18,7 +18,8 @@ use ringcat_wire::address::{Position, StationAddress};
 use ringcat_wire::register::map;
 
 pub(super) use self::address::take_away;
-use self::address::{View, give, view};
+pub(super) use self::address::view;
+use self::address::{View, give};
 use self::matching::{Fit, assign};
 pub(crate) use self::owners::Owners;
 use self::owners::{owners_of, ranks};

@@ -15,6 +15,7 @@ use ringcat_wire::address::StationAddress;
 use ringcat_wire::al::{AlStatus, AlStatusCode};
 use ringcat_wire::register::{DlStatus, map};
 
+use super::cabling::CablingWatch;
 use super::configure::Start;
 use super::error_watch::watch_errors;
 use super::fleet::{Phase, SharedFleet};
@@ -51,7 +52,7 @@ const FIRST_BREAK_LOOK_PAUSE: Duration = Duration::from_millis(1);
 const STRANGER_PAUSE: Duration = Duration::from_millis(10);
 
 /// Runs for ever.
-pub(crate) async fn supervise(bus: Bus, fleet: SharedFleet) {
+pub(crate) async fn supervise(bus: Bus, fleet: SharedFleet, enhanced_line_crossed: bool) {
     let members = fleet.access().members.len();
     let reported = Rc::new(Cell::new(RingState::Unknown));
     bus.spawn(watch_ring(bus.clone(), fleet.clone(), reported.clone()));
@@ -61,6 +62,7 @@ pub(crate) async fn supervise(bus: Bus, fleet: SharedFleet) {
         bus.spawn(watch_blocked(bus.clone(), fleet.clone(), junctions.broken()));
     }
     bus.spawn(watch_errors(bus.clone(), fleet.clone()));
+    let cabling = CablingWatch::new(&fleet, enhanced_line_crossed);
     let mut watch = Watch {
         bus,
         fleet,
@@ -77,6 +79,7 @@ pub(crate) async fn supervise(bus: Bus, fleet: SharedFleet) {
         search: Search::default(),
         news: 0,
         junctions,
+        cabling,
     };
     loop {
         watch.bus.sleep(PAUSE).await;
@@ -111,6 +114,7 @@ struct Watch {
     /// What had become known at the last check.
     news: u32,
     junctions: JunctionWatch,
+    cabling: CablingWatch,
 }
 
 impl Watch {
@@ -168,6 +172,7 @@ impl Watch {
         }
         self.report_break(&looks);
         self.report_junctions(&looks);
+        self.cabling.note(&self.bus, &self.fleet, &looks);
         // Who else is there must be known before anybody's place is.
         let mut complete = count <= answering;
         if !complete && !looks.contains(&Look::Unknown) {

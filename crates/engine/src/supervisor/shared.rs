@@ -9,6 +9,7 @@ use ringcat_wire::datagram::{MAX_DATA, OVERHEAD};
 use super::bus::BusError;
 use super::executor::{Task, TaskId};
 use super::flights::{AcyclicCounters, Flights};
+use super::link_order::LinkOrder;
 use super::outbox::{Outbox, Rank};
 use super::round_trip::RoundTrip;
 use super::silence::Silence;
@@ -40,6 +41,7 @@ pub(crate) struct Shared {
     pub(crate) main_count: u16,
     /// The first datagram of the outbox where it was too long for the send window, and since when.
     pub(crate) blocked: Option<(TransferId, Instant)>,
+    pub(crate) link_order: LinkOrder,
     pub(crate) current: TaskId,
     pub(crate) spawned: VecDeque<Task>,
     ready: VecDeque<TaskId>,
@@ -65,6 +67,7 @@ impl Shared {
             round_trip: RoundTrip::default(),
             main_count: 0,
             blocked: None,
+            link_order: LinkOrder::default(),
             current: TaskId(0),
             spawned: VecDeque::new(),
             ready: VecDeque::new(),

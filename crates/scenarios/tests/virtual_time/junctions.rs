@@ -276,3 +276,20 @@ fn a_cut_in_the_line_loses_what_is_behind_it_and_is_no_matter_of_the_ring() {
     world.until(Duration::from_secs(3), "all in OP", |world| world.all_in_op() && world.application().all_settled());
     assert!(world.left_op(mark).iter().all(|device| device.0 >= 5));
 }
+
+#[test]
+fn without_junction_redundancy_a_ring_that_breaks_reads_as_a_crossed_line_jr_04() {
+    for cable in [2, 3, 4] {
+        let mut world = in_op(7, one_ring(), (JunctionMode::Disabled, &[]));
+        assert_eq!(crossed(&world, world.beginning()), 0);
+        let mark = edge(&mut world, "cut", |world| world.cut(CableId(cable)));
+        assert_eq!(told(&world, mark), []);
+        let reversed = |event: &Event| matches!(event, Event::LineCrossed { position: Some(at), entry_port: Some(1) } if usize::from(at.0) == cable);
+        assert!(world.saw(mark, reversed), "cable {cable}: the one behind the break is entered at port 1");
+        let mark = edge(&mut world, "heal", |world| world.heal(CableId(cable)));
+        assert_eq!(crossed(&world, mark), 0);
+        // It is told again when it comes again.
+        let mark = edge(&mut world, "cut again", |world| world.cut(CableId(cable)));
+        assert!(world.saw(mark, reversed));
+    }
+}

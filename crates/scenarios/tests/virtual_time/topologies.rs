@@ -2,14 +2,15 @@
 
 use std::time::Duration;
 
-use ringcat::{Event, TimedEvent};
+use ringcat::{Event, Options, TimedEvent, automatic};
 use ringcat_sim::cable::{CableId, DeviceIndex, Endpoint, HostLink};
 use ringcat_sim::frame::Port;
 use ringcat_sim::network::builder::SegmentBuilder;
 use ringcat_sim::network::{Network, NetworkOptions};
+use ringcat_wire::register::map;
 use scenarios::check::{Delivery, ring_events};
 use scenarios::segments::{descriptions, devices};
-use scenarios::world::World;
+use scenarios::world::{CYCLE, World};
 
 const MAIN: Endpoint = Endpoint::Host(HostLink::Main);
 const REDUNDANT: Endpoint = Endpoint::Host(HostLink::Redundant);
@@ -177,4 +178,82 @@ fn a_tree_comes_to_op_and_its_branches_do_not_depend_on_each_other() {
         assert!(world.left_op(mark).iter().all(|device| behind.contains(&device.0)));
         assert_eq!(world.judged(mark).last().map(|judged| judged.delivery), Some(Delivery::Complete));
     }
+}
+
+/// A ring of four, the third of which is plugged in the wrong way round, and a second branch that only the redundant
+/// copy meets: a closed ring cannot tell who of the two is crossed.
+fn crossed_ring() -> Network {
+    use Port::{A, B, C};
+    let kinds = ["junction", "digital-output-8", "servo", "digital-input-8", "coupler"];
+    let cables = [
+        (MAIN, at(0, A)),
+        (at(0, B), at(1, A)),
+        (at(1, B), at(2, B)),
+        (at(2, A), at(3, A)),
+        (at(3, B), REDUNDANT),
+        (at(0, C), at(4, A)),
+    ];
+    wired(&kinds, &cables)
+}
+
+fn enhanced(network: Network) -> World {
+    let options = Options { enhanced_line_crossed: true, ..Options::default() };
+    let declare = |scan: &ringcat::Scan| automatic(&scan.subdevices, CYCLE);
+    let mut world = World::with(0, network, &options, declare).expect("scan and activation");
+    world.settle();
+    world
+}
+
+#[test]
+fn enhanced_detection_locates_crossings_at_the_scan_and_the_ring_is_closed_afterwards_lc_03() {
+    let world = enhanced(crossed_ring());
+    let found = crossed(world.events(world.beginning()));
+    let positions: Vec<Option<usize>> =
+        found.iter().map(|(position, _)| world.device_of(usize::from(position.unwrap())).map(|it| it.0)).collect();
+    assert_eq!((positions, found[0].1), (vec![Some(2)], Some(1)));
+    assert_eq!(world.application().ring(), ringcat::RingState::Closed);
+}
+
+#[test]
+fn a_branch_on_port_2_of_a_closed_ring_is_suspicious_until_the_ring_is_opened_lc_04() {
+    let suspicious = in_op(ring_with_branch(Port::C));
+    assert_eq!(crossed(suspicious.events(suspicious.beginning())), [(None, None)]);
+    let known = enhanced(ring_with_branch(Port::C));
+    assert_eq!(crossed(known.events(known.beginning())), []);
+}
+
+/// How often the device at the redundant link has lost it.
+fn lost_links(world: &World) -> u8 {
+    world.network().device(DeviceIndex(4)).controller.register(map::LOST_LINK_COUNTER, 4)[1]
+}
+
+#[test]
+fn enhanced_detection_looks_again_when_ports_change_and_costs_two_edges_lc_03() {
+    let mut world = enhanced(ring_with_branch(Port::D));
+    world.run_cycles(100);
+    // The branch is pulled: ports change, the ring stays closed.
+    let (mark, before) = (world.mark(), lost_links(&world));
+    world.cut(CableId(7));
+    world.run_cycles(60);
+    world.heal(CableId(7));
+    world.until(Duration::from_secs(3), "all in OP", |world| world.all_in_op() && world.application().all_settled());
+    world.run_cycles(200);
+    assert_eq!(crossed(world.events(mark)), []);
+    assert_eq!(ring_events(world.events(mark)), Vec::<&Event>::new(), "a controlled break is not told");
+    assert_eq!(world.application().ring(), ringcat::RingState::Closed);
+    assert!(world.left_op(mark).iter().all(|device| device.0 == 6));
+    assert!(lost_links(&world) > before, "the redundant link was down in between");
+}
+
+#[test]
+fn links_that_cannot_be_taken_down_say_so_and_the_ring_is_looked_at_as_it_is_lc_02() {
+    let options = Options { enhanced_line_crossed: true, ..Options::default() };
+    let mut tap = scenarios::tap::Tap::new(ring_with_branch(Port::C));
+    tap.forbid_disconnecting();
+    let mut main_device = ringcat::MainDevice::request(tap, &options);
+    let mut events = Vec::new();
+    main_device.scan_with(|event| events.push(event.clone())).expect("the segment answers");
+    assert_eq!(crossed(&events), [(None, None)]);
+    let told = |timed: &TimedEvent| timed.event == Event::CannotDisconnect { link: ringcat::Link::Redundant };
+    assert_eq!(events.iter().filter(|timed| told(timed)).count(), 1);
 }

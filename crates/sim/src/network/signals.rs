@@ -3,7 +3,7 @@
 use core::time::Duration;
 
 use super::{Event, Network, Node};
-use crate::cable::{CableId, DeviceIndex, Direction, Endpoint, LegId};
+use crate::cable::{CableId, DeviceIndex, Direction, Endpoint, HostLink, LegId};
 use crate::device::Device;
 use crate::frame::Port;
 use crate::queue::Lane;
@@ -202,10 +202,18 @@ impl Network {
         self.settle(device.0);
     }
 
+    /// Takes an interface of the MainDevice down, or brings it back: the cable carries no signal meanwhile.
+    pub fn disconnect(&mut self, link: HostLink, disconnect: bool) {
+        self.hosts[link as usize].disconnected = disconnect;
+        if let Some(cable) = self.host_cable(link) {
+            self.refresh_signal(cable);
+        }
+    }
+
     fn has_power(&self, endpoint: Endpoint) -> bool {
         match endpoint {
             Endpoint::Device(device, _) => self.nodes[device.0].device.controller.is_powered(),
-            Endpoint::Host(_) => true,
+            Endpoint::Host(link) => !self.hosts[link as usize].disconnected,
         }
     }
 

@@ -27,7 +27,7 @@ const EXCHANGED: u16 = 3;
 
 /// The station addresses of all positions.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub(super) struct View {
+pub(in super::super) struct View {
     /// SubDevices on the main and on the redundant link.
     pub counts: (Wkc, Wkc),
     ring: RingWord,
@@ -42,7 +42,7 @@ impl View {
     }
 
     /// The position of a station address that only one SubDevice has.
-    pub(super) fn position(&self, station: StationAddress) -> Option<usize> {
+    pub(in super::super) fn position(&self, station: StationAddress) -> Option<usize> {
         let mut positions = self.positions(station);
         let first = positions.next()?;
         positions.next().is_none().then_some(first)
@@ -72,7 +72,7 @@ async fn read(bus: &Bus) -> Result<Option<View>, BusError> {
 }
 
 /// Reads all station addresses twice; `None` where that is not the same.
-pub(super) async fn view(bus: &Bus) -> Result<Option<View>, BusError> {
+pub(in super::super) async fn view(bus: &Bus) -> Result<Option<View>, BusError> {
     let Some(first) = read(bus).await? else { return Ok(None) };
     Ok(read(bus).await?.filter(|second| *second == first))
 }

@@ -1,0 +1,238 @@
+//! Crossed lines in operation (facts 9.5): whenever ports of SubDevices have changed, the segment is looked at anew and
+//! who is entered at another port than 0 is told, once.
+//!
+//! In a closed ring that shows only that something is crossed (LC-02). In *enhanced* mode the redundant link is
+//! disconnected under control meanwhile: the segment is an open line then, and each crossing has its place (LC-03). That
+//! costs what a cut of that cable costs, and what mending it does; it is not told as a break.
+
+use alloc::rc::Rc;
+use alloc::vec::Vec;
+use core::cell::Cell;
+use core::time::Duration;
+
+use ringcat_wire::address::{Position, StationAddress};
+use ringcat_wire::register::{DcReceiveTimes, DlStatus, PortKind, map};
+
+use super::fleet::{Phase, SharedFleet};
+use super::inspect::Look;
+use super::strangers::view;
+use crate::event::Event;
+use crate::link::{Link, LinkSet};
+use crate::ring::RingState;
+use crate::supervisor::{Bus, BusError};
+use crate::topology::{Closing, Finding, NodeStatus, PortOf, Topology};
+
+/// From a change of ports until the segment is looked at: a plug that is pushed in bounces.
+const SETTLE: Duration = Duration::from_millis(5);
+/// Looks at a segment that changes meanwhile.
+const ATTEMPTS: u8 = 3;
+/// Pause between two of them.
+const PAUSE: Duration = Duration::from_millis(10);
+/// Until both ends of a link have noticed that it went or came, and frames have shown it. Interfaces take seconds to
+/// find their partner again.
+const LINK_LIMIT: Duration = Duration::from_secs(5);
+/// Pause between two looks for that.
+const LINK_PAUSE: Duration = Duration::from_millis(1);
+
+/// A SubDevice that frames enter at another port than 0.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Crossing {
+    /// Who, by the station address, and by the position now; `None` where only the ring shows that there is one.
+    pub who: Option<(StationAddress, Position)>,
+    /// The port of entry, where known.
+    pub entry_port: Option<u8>,
+}
+
+/// What is known about SubDevices by their station addresses.
+pub(super) trait Known {
+    /// Kinds of the ports.
+    fn ports(&self, station: StationAddress) -> [PortKind; 4];
+    /// Closing cables of local rings, by the station addresses of both ends.
+    fn closings(&self) -> Vec<[(StationAddress, u8); 2]>;
+}
+
+/// Who is crossed; `None` where the segment changes too much to tell. With `enhanced` and a closed ring the redundant
+/// link is taken down meanwhile; where it cannot be, that is reported, and the ring is looked at as it is.
+pub(super) async fn crossings(bus: &Bus, known: &impl Known, enhanced: bool) -> Option<Vec<Crossing>> {
+    let in_control = enhanced && bus.links() == LinkSet::Ring && bus.ring() == RingState::Closed;
+    if in_control && !bus.force_disconnect(Link::Redundant, true).await {
+        bus.report(Event::CannotDisconnect { link: Link::Redundant });
+        return look_often(bus, known).await;
+    }
+    if !in_control {
+        return look_often(bus, known).await;
+    }
+    wait_for(bus, RingState::Open).await;
+    let found = look_often(bus, known).await;
+    bus.force_disconnect(Link::Redundant, false).await;
+    wait_for(bus, RingState::Closed).await;
+    // Carriers are looked at less often than frames come.
+    let until = bus.now() + LINK_LIMIT;
+    while bus.carriers().contains(&Some(false)) && bus.now() < until {
+        bus.sleep(LINK_PAUSE).await;
+    }
+    found
+}
+
+async fn wait_for(bus: &Bus, state: RingState) {
+    let until = bus.now() + LINK_LIMIT;
+    while bus.ring() != state && bus.now() < until {
+        bus.sleep(LINK_PAUSE).await;
+        // Before activation nothing else shows it.
+        let _ = bus.brd(map::TYPE, 1).await;
+    }
+}
+
+async fn look_often(bus: &Bus, known: &impl Known) -> Option<Vec<Crossing>> {
+    for attempt in 0..ATTEMPTS {
+        if attempt > 0 {
+            bus.sleep(PAUSE).await;
+        }
+        if let Ok(Some(found)) = look(bus, known).await {
+            return Some(found);
+        }
+    }
+    None
+}
+
+async fn look(bus: &Bus, known: &impl Known) -> Result<Option<Vec<Crossing>>, BusError> {
+    let Some(before) = view(bus).await? else { return Ok(None) };
+    bus.bwr(map::DC_RECEIVE_TIME, &[0; 4]).await?;
+    let read = bus.gather(before.stations.clone(), |bus, station| async move {
+        let dl_status = DlStatus::decode(&bus.fprd_array(station, map::DL_STATUS).await?);
+        // Without a clock nobody answers.
+        let receive_times = match bus.fprd_array(station, map::DC_RECEIVE_TIME).await {
+            Ok(bytes) => Some(DcReceiveTimes::decode(&bytes).ports.map(|time| time.0)),
+            Err(BusError::Wkc { .. }) => None,
+            Err(error) => return Err(error),
+        };
+        Ok((station, dl_status, receive_times))
+    });
+    let read = match read.await.into_iter().collect::<Result<Vec<_>, BusError>>() {
+        Ok(read) => read,
+        Err(BusError::Wkc { .. }) => return Ok(None),
+        Err(error) => return Err(error),
+    };
+    let nodes = read.into_iter().map(|(station, dl_status, receive_times)| NodeStatus {
+        dl_status,
+        receive_times,
+        ports: known.ports(station),
+    });
+    let place = |(station, port): (StationAddress, u8)| Some(PortOf { node: before.position(station)?, port });
+    let closings = known
+        .closings()
+        .into_iter()
+        .filter_map(|[head, tail]| Some(Closing { head: place(head)?, tail: place(tail)? }));
+    let nodes: Vec<NodeStatus> = nodes.collect();
+    let closings: Vec<Closing> = closings.collect();
+    let topology = Topology::with_local_rings(&nodes, usize::from(before.counts.0.0), &closings);
+    let mut found: Vec<Crossing> = topology
+        .findings
+        .iter()
+        .filter_map(|finding| match *finding {
+            Finding::CrossedLine { node, entry_port } => Some(Crossing {
+                who: Some((before.stations[node], Position(node as u16))),
+                entry_port: Some(entry_port),
+            }),
+            _ => None,
+        })
+        .collect();
+    // In a closed ring only branches on port 2 and crossed SubDevices work on the redundant copy (LC-04).
+    let on_redundant = before.counts.1.0 > 0;
+    if found.is_empty() && bus.links() == LinkSet::Ring && bus.ring() == RingState::Closed && on_redundant {
+        found.push(Crossing { who: None, entry_port: None });
+    }
+    Ok(Some(found))
+}
+
+/// Looks out for changes of ports, and has crossings told once each.
+#[derive(Debug)]
+pub(super) struct CablingWatch {
+    enhanced: bool,
+    /// What members said about their ports when the segment was looked at last.
+    ports: Vec<Option<u16>>,
+    busy: Rc<Cell<bool>>,
+    told: Rc<core::cell::RefCell<Vec<Crossing>>>,
+}
+
+impl CablingWatch {
+    /// Watches a fleet; what the scan told is not told again.
+    pub fn new(fleet: &SharedFleet, enhanced: bool) -> CablingWatch {
+        let access = fleet.access();
+        let told = access.topology.findings.iter().filter_map(|finding| match *finding {
+            Finding::CrossedLine { node, entry_port } => {
+                let member = access.members.iter().find(|member| member.node == Some(node))?;
+                Some(Crossing { who: Some((member.station, Position(node as u16))), entry_port: Some(entry_port) })
+            }
+            _ => None,
+        });
+        let told: Vec<Crossing> = told.collect();
+        CablingWatch { enhanced, ports: Vec::new(), busy: Rc::default(), told: Rc::new(told.into()) }
+    }
+
+    /// Takes in looks at all members; where ports have changed, the segment is looked at.
+    pub fn note(&mut self, bus: &Bus, fleet: &SharedFleet, looks: &[Look]) {
+        let ports = |look: &Look| match look {
+            Look::Answer { dl_status, .. } => Some(dl_status.bits() & PORT_BITS),
+            Look::Unknown | Look::Silent | Look::Doubled => None,
+        };
+        let now: Vec<Option<u16>> = looks.iter().map(ports).collect();
+        // Who is silent and not lost yet will be one or the other.
+        let is_open = |(index, ports): (usize, &Option<u16>)| ports.is_none() && fleet.phase(index) != Phase::Absent;
+        if self.busy.get() || now == self.ports || now.iter().enumerate().any(is_open) {
+            return;
+        }
+        let first = self.ports.is_empty();
+        self.ports = now;
+        if first {
+            return;
+        }
+        self.busy.set(true);
+        let (bus, fleet) = (bus.clone(), fleet.clone());
+        let (busy, told, enhanced) = (self.busy.clone(), self.told.clone(), self.enhanced);
+        bus.clone().spawn(async move {
+            bus.sleep(SETTLE).await;
+            fleet.set_controlled_break(true);
+            let found = crossings(&bus, &fleet, enhanced).await;
+            fleet.set_controlled_break(false);
+            if let Some(found) = found {
+                tell(&bus, &fleet, &found, &told.borrow());
+                *told.borrow_mut() = found;
+            }
+            busy.set(false);
+        });
+    }
+}
+
+/// Bits of DL_STATUS that are about ports.
+const PORT_BITS: u16 = 0xFFF0;
+
+fn tell(bus: &Bus, fleet: &SharedFleet, found: &[Crossing], told: &[Crossing]) {
+    let who = |crossing: &Crossing| crossing.who.map(|(station, _)| station);
+    for crossing in found.iter().filter(|new| !told.iter().any(|old| who(old) == who(new))) {
+        let position = crossing.who.map(|(station, now)| {
+            let access = fleet.access();
+            let member = access.members.iter().find(|member| member.station == station);
+            member.and_then(|member| member.node).map_or(now, |node| Position(node as u16))
+        });
+        bus.report(Event::LineCrossed { position, entry_port: crossing.entry_port });
+    }
+}
+
+impl Known for SharedFleet {
+    fn ports(&self, station: StationAddress) -> [PortKind; 4] {
+        let access = self.access();
+        let member = access.members.iter().find(|member| member.station == station);
+        member.and_then(|member| member.info.as_ref()).map(|info| info.controller.ports).unwrap_or_default()
+    }
+
+    fn closings(&self) -> Vec<[(StationAddress, u8); 2]> {
+        let access = self.access();
+        let end = |at: PortOf| {
+            let member = access.members.iter().find(|member| member.node == Some(at.node))?;
+            Some((member.station, at.port))
+        };
+        let rings = access.topology.local_rings.iter();
+        rings.filter_map(|ring| Some([end(ring.closing.head)?, end(ring.closing.tail)?])).collect()
+    }
+}
