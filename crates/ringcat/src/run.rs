@@ -5,6 +5,7 @@
 //! that came late and cycles that were left out are this machine's, lost frames are the wire's.
 
 mod beside;
+mod junction;
 mod live;
 mod stalls;
 mod summary;
@@ -27,6 +28,7 @@ use crate::recording::RecordingArguments;
 use crate::surroundings::Surroundings;
 use crate::times::time;
 use beside::{Beside, BesideArguments};
+use junction::{Junctions, junctions};
 use live::Live;
 use stalls::Stalls;
 use summary::{final_account, summary};
@@ -70,6 +72,12 @@ pub struct RunArguments {
     /// How long to exchange process data once all are in OP, such as 10s or 5min; until Ctrl-C by default.
     #[arg(long = "for", value_name = "TIME", value_parser = time)]
     lasts: Option<Duration>,
+    #[arg(long, value_name = "MODE", default_value = "disabled", value_parser = junctions, help = junction::HELP)]
+    junction: Junctions,
+    /// Take the redundant interface down for a moment, when cables have changed, to find out where IN and OUT of a
+    /// SubDevice are swapped. Needs the permission to configure interfaces (CAP_NET_ADMIN).
+    #[arg(long)]
+    enhanced_line_crossed: bool,
 }
 
 /// Runs cycles; true where all SubDevices reached OP and no frame was lost afterwards.
@@ -82,8 +90,12 @@ pub fn run(arguments: &RunArguments) -> Result<bool, Failure> {
     let (mut cyclic, acyclic) = (recording.tee(cyclic), recording.tee(acyclic));
     let _awake = thread.prepare_process();
     let begin = now();
-    let supervisor =
-        SupervisorThread::start(acyclic, &arguments.interfaces.options(), move || thread.prepare_supervisor())?;
+    let options = Options {
+        junctions: arguments.junction.mode,
+        enhanced_line_crossed: arguments.enhanced_line_crossed,
+        ..arguments.interfaces.options()
+    };
+    let supervisor = SupervisorThread::start(acyclic, &options, move || thread.prepare_supervisor())?;
     let beside = arguments.beside.start(&supervisor, &arguments.interfaces)?;
     let mut others = 0;
     let result = supervisor.scan_while(|| {
@@ -94,7 +106,10 @@ pub fn run(arguments: &RunArguments) -> Result<bool, Failure> {
     say!("{} SubDevices; cycle {} us", scan.subdevices.len(), arguments.cycle.as_micros());
     let names = Names(scan.subdevices.iter().map(|info| info.name.clone()).collect());
     let declaration = automatic(&scan.subdevices, arguments.cycle);
-    let application = supervisor.activate(declaration, cyclic).map_err(ringcat::Error::from)?;
+    supervisor.load(declaration)?;
+    let connections = arguments.junction.connections.iter();
+    connections.copied().try_for_each(|connection| supervisor.add_junction_connection(connection))?;
+    let application = supervisor.apply(cyclic).map_err(ringcat::Error::from)?;
     let cycles = application.start_cycles(move || thread.prepare_cycles(), |_| ControlFlow::Continue(()))?;
     let live = Live::new(arguments.interfaces.redundant.is_some());
     let mut run =
@@ -130,9 +145,16 @@ struct Run {
     beside: Beside,
 }
 
-/// Tells of other MainDevices among the events of a scan.
+/// Tells of other MainDevices and of the cabling among the events of a scan.
 fn tell_events(supervisor: &SupervisorThread, surroundings: &mut Surroundings) {
     while let Some(event) = supervisor.pop_event() {
+        if let Event::JunctionLearned { .. }
+        | Event::LineCrossed { .. }
+        | Event::UnconnectedPort0 { .. }
+        | Event::CannotDisconnect { .. } = event.event
+        {
+            say!("{}", describe(&event.event, &Names::default()));
+        }
         surroundings.note(&event.event).iter().flatten().for_each(|words| eprintln!("ringcat: {words}"));
     }
 }

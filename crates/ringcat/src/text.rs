@@ -72,6 +72,11 @@ pub fn describe(event: &Event, names: &Names) -> String {
         Event::LineCrossed { position: Some(position), entry_port: Some(port) } => {
             format!("{}: line crossed, frames enter at port {port}", names.at(*position))
         }
+        Event::CannotDisconnect { link } => {
+            format!(
+                "{link} cannot be taken down (CAP_NET_ADMIN): where a line is crossed stays unknown in a closed ring"
+            )
+        }
         Event::LineCrossed { .. } => "line crossed: the redundant copy is processed in a closed ring".to_owned(),
         Event::DuplicateAlias { alias, first, second } => {
             format!("alias {alias} is used twice: {} and {}", names.at(*first), names.at(*second))
