@@ -19,7 +19,7 @@ use clap::Args;
 use ringcat::packet::PacketLinks;
 use ringcat::tee::Tee;
 use ringcat::text::{Names, address_of_sender, describe};
-use ringcat::{CyclicThread, Event, Instant, LastOutputs, Links, SupervisorThread, automatic};
+use ringcat::{CyclicThread, Event, Instant, LastOutputs, Links, Options, SupervisorThread, automatic};
 use ringcat_wire::al::AlState;
 
 use crate::interfaces::{Failure, InterfaceArguments, ThreadArguments, end_request, is_asked};
