@@ -179,7 +179,9 @@ impl CablingWatch {
         let now: Vec<Option<u16>> = looks.iter().map(ports).collect();
         // Who is silent and not lost yet will be one or the other.
         let is_open = |(index, ports): (usize, &Option<u16>)| ports.is_none() && fleet.phase(index) != Phase::Absent;
-        if self.busy.get() || now == self.ports || now.iter().enumerate().any(is_open) {
+        // Clocks that are being measured need the receive times of their own frame.
+        let waits = self.busy.get() || fleet.clocks.are_measuring();
+        if waits || now == self.ports || now.iter().enumerate().any(is_open) {
             return;
         }
         let first = self.ports.is_empty();

@@ -236,7 +236,13 @@ pub struct SharedFleet {
 impl SharedFleet {
     /// Shares a fleet.
     pub fn new(fleet: Fleet, board: Arc<Board>, clocks: SharedClocks) -> SharedFleet {
-        SharedFleet { fleet: Rc::new(RefCell::new(fleet)), news: Rc::default(), controlled_break: Rc::default(), board, clocks }
+        SharedFleet {
+            fleet: Rc::new(RefCell::new(fleet)),
+            news: Rc::default(),
+            controlled_break: Rc::default(),
+            board,
+            clocks,
+        }
     }
 
     /// Access between two points at which a procedure waits.
