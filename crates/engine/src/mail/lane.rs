@@ -120,6 +120,10 @@ impl LaneState {
         *self = LaneState { turns, answer_time, ..LaneState::default() };
     }
 
+    pub(super) fn is_idle(&self) -> bool {
+        self.turns.is_empty() && self.outbox.is_empty() && self.inbox.is_empty() && self.asked.is_none()
+    }
+
     pub(super) fn has_room(&self) -> bool {
         self.outbox.len() < OUTBOX
     }

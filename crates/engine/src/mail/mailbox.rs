@@ -9,7 +9,7 @@ use ringcat_wire::sii::MailboxLayout;
 
 use super::counters::MailCounters;
 use super::error::MailboxError;
-use super::lane::Lane;
+use super::lane::{Lane, LaneState};
 use super::room::{Room, Session};
 use super::talk::Talk;
 use super::unsolicited::{Unclaimed, Unsolicited};
@@ -73,6 +73,14 @@ impl Mailbox {
     /// Whether it may be used.
     pub fn is_open(&self) -> bool {
         self.room.look().open
+    }
+
+    /// Whether nothing is under way in it: nobody talks or waits to, nothing waits to be written or to be fetched by whoever
+    /// talks, and nobody writes or reads.
+    pub fn is_idle(&self) -> bool {
+        let state = self.room.look();
+        let at_work = |time: Option<u32>| time == Some(state.time);
+        state.lanes.iter().all(LaneState::is_idle) && !at_work(state.writer) && !at_work(state.reader)
     }
 
     /// Station address of the SubDevice, while the mailbox may be used.

@@ -20,6 +20,7 @@ mod hot_connect;
 mod junctions;
 mod mail;
 mod mail_extras;
+mod mail_matrix;
 mod mail_protocols;
 mod mail_services;
 mod mail_startup;

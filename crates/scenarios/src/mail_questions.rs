@@ -1,0 +1,238 @@
+//! Questions to a device that speaks all mailbox protocols, whose answers show whose they are.
+//!
+//! An [`Asker`] writes a value that nobody else writes, reads it back, and knows what it may find: what it wrote last, and
+//! where a write failed what that may have left. Anything else is the answer to somebody else's question, or to an old
+//! one, and panics.
+
+use ringcat::Limits;
+use ringcat_engine::mail::aoe::{self, AoeRoute};
+use ringcat_engine::mail::coe::{self, SdoAddress, information};
+use ringcat_engine::mail::eoe::{self, IpSettings};
+use ringcat_engine::mail::foe::{self, FoeOptions};
+use ringcat_engine::mail::soe::{self, SoeAddress};
+use ringcat_engine::mail::stream::{Bounded, Bytes};
+use ringcat_engine::mail::voe::{self, Voe};
+use ringcat_engine::mail::{Lane, Mailbox};
+use ringcat_sim::application::aoe::MEMORY;
+use ringcat_wire::mailbox::aoe::{AmsAddress, NetId};
+use ringcat_wire::mailbox::coe::ValueInfo;
+use ringcat_wire::mailbox::soe::Idn;
+
+/// Kinds of questions.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Kind {
+    /// CoE: an object, expedited.
+    Object,
+    /// CoE: an object in segments.
+    LargeObject,
+    /// CoE: the description of an object's entry.
+    Description,
+    /// FoE: a file of several packets.
+    File,
+    /// SoE: a number.
+    Idn,
+    /// SoE: a list in fragments.
+    IdnList,
+    /// AoE: memory.
+    Memory,
+    /// VoE: an echo.
+    Vendor,
+    /// EoE: an IP address.
+    Address,
+}
+
+/// All of them.
+pub const KINDS: [Kind; 9] = [
+    Kind::Object,
+    Kind::LargeObject,
+    Kind::Description,
+    Kind::File,
+    Kind::Idn,
+    Kind::IdnList,
+    Kind::Memory,
+    Kind::Vendor,
+    Kind::Address,
+];
+
+impl Kind {
+    /// The lane in which it is asked.
+    pub const fn lane(self) -> Lane {
+        match self {
+            Kind::Object | Kind::LargeObject | Kind::Description => Lane::Coe,
+            Kind::File => Lane::Foe,
+            Kind::Idn | Kind::IdnList => Lane::Soe,
+            Kind::Memory => Lane::Aoe,
+            Kind::Vendor => Lane::Voe,
+            Kind::Address => Lane::Eoe,
+        }
+    }
+
+    /// Bytes of a value.
+    const fn length(self) -> usize {
+        match self {
+            Kind::Object => 2,
+            Kind::Idn | Kind::Address => 4,
+            Kind::LargeObject => 2500,
+            Kind::File | Kind::IdnList => 3000,
+            Kind::Description => 1,
+            Kind::Memory => 300,
+            Kind::Vendor => 200,
+        }
+    }
+}
+
+/// Who asks one kind of question, with values of its own.
+#[derive(Debug)]
+pub struct Asker {
+    kind: Kind,
+    mailbox: Mailbox,
+    limits: Limits,
+    /// What is there when nobody wrote anything, once it was read.
+    initial: Option<Vec<u8>>,
+    /// What may be there, the last last.
+    known: Vec<Vec<u8>>,
+    /// The device may lose its power, and with it what was written.
+    forgets: bool,
+}
+
+/// Words about an error.
+fn said(error: impl std::fmt::Display) -> String {
+    error.to_string()
+}
+
+impl Asker {
+    /// An asker; of each kind only one may ask a device at a time.
+    pub fn new(kind: Kind, mailbox: Mailbox, limits: Limits, forgets: bool) -> Asker {
+        Asker { kind, mailbox, limits, initial: None, known: Vec::new(), forgets }
+    }
+
+    /// Writes a value of this number and reads it back.
+    ///
+    /// # Errors
+    /// What the service said.
+    ///
+    /// # Panics
+    /// When an answer belongs to another question.
+    pub async fn ask(&mut self, number: u32) -> Result<(), String> {
+        match self.kind {
+            Kind::Description => return self.describe(number).await,
+            Kind::Vendor => return self.echo(number).await,
+            _ => {}
+        }
+        if self.initial.is_none() && self.kind != Kind::File {
+            self.initial = Some(self.read().await?);
+        }
+        let value = self.value(number);
+        self.known.push(value.clone());
+        self.write(&value).await?;
+        let initial = self.initial.clone().filter(|_| self.forgets);
+        self.known = vec![value];
+        self.known.extend(initial);
+        let found = self.read().await?;
+        let own = self.known.iter().position(|value| *value == found);
+        assert!(own.is_some(), "{:?} {number}: {} bytes {:02x?}", self.kind, found.len(), &found[..found.len().min(8)]);
+        Ok(())
+    }
+
+    /// A value that no other number has.
+    fn value(&self, number: u32) -> Vec<u8> {
+        let mut value: Vec<u8> = (0..self.kind.length()).map(|at| (at as u32 * 31 + number * 7 % 251) as u8).collect();
+        let tag = (number << 8 | self.kind as u32).to_le_bytes();
+        let length = value.len().min(4);
+        value[..length].copy_from_slice(&tag[4 - length..]);
+        if length == 4 {
+            value[..4].copy_from_slice(&tag);
+        } else {
+            value[..2].copy_from_slice(&(number as u16).to_le_bytes());
+        }
+        value
+    }
+
+    fn object(&self) -> SdoAddress {
+        if self.kind == Kind::Object { SdoAddress::new(0x2001, 7) } else { SdoAddress::new(0x2002, 0) }
+    }
+
+    fn idn(&self) -> SoeAddress {
+        if self.kind == Kind::Idn {
+            SoeAddress::value(1, Idn::standard(0, 47))
+        } else {
+            SoeAddress::value(0, Idn::product(0, 1))
+        }
+    }
+
+    fn route() -> AoeRoute {
+        let address = |port| AmsAddress { net_id: NetId([5, 18, 2, 3, 2, 1]), port };
+        AoeRoute { target: address(1000), source: address(0x8000) }
+    }
+
+    async fn write(&self, value: &[u8]) -> Result<(), String> {
+        let (mailbox, limits) = (&self.mailbox, self.limits);
+        match self.kind {
+            Kind::Object | Kind::LargeObject => coe::write(mailbox, self.object(), value, limits).await.map_err(said),
+            Kind::File => {
+                let options = FoeOptions { limits, ..FoeOptions::default() };
+                foe::write(mailbox, "question", options, &mut Bytes::new(value), |_| ()).await.map(drop).map_err(said)
+            }
+            Kind::Idn => soe::write(mailbox, self.idn(), value, limits).await.map_err(said),
+            Kind::IdnList => {
+                // A list begins with its length and its longest length.
+                let length = (value.len() as u16).to_le_bytes();
+                let list = [&length, &20_000u16.to_le_bytes(), value].concat();
+                soe::write(mailbox, self.idn(), &list, limits).await.map_err(said)
+            }
+            Kind::Memory => aoe::write(mailbox, Self::route(), (MEMORY, 16), value, limits).await.map_err(said),
+            Kind::Address => {
+                let address = <[u8; 4]>::try_from(value).ok().map(Into::into);
+                let settings = IpSettings { address, mask: Some([255, 0, 0, 0].into()), ..IpSettings::default() };
+                eoe::set_ip(mailbox, 0, &settings, limits).await.map_err(said)
+            }
+            Kind::Description | Kind::Vendor => Ok(()),
+        }
+    }
+
+    async fn read(&self) -> Result<Vec<u8>, String> {
+        let (mailbox, limits, room) = (&self.mailbox, self.limits, 120_000);
+        match self.kind {
+            Kind::Object | Kind::LargeObject => coe::read(mailbox, self.object(), limits, room).await.map_err(said),
+            Kind::File => {
+                let options = FoeOptions { limits, ..FoeOptions::default() };
+                let mut sink = Bounded::new(room);
+                foe::read(mailbox, "question", options, &mut sink, |_| ()).await.map_err(said)?;
+                Ok(sink.into_bytes())
+            }
+            Kind::Idn => soe::read(mailbox, self.idn(), limits, room).await.map_err(said),
+            Kind::IdnList => {
+                let list = soe::read(mailbox, self.idn(), limits, room).await.map_err(said)?;
+                // Of fragments that the device itself loses, only the length of the list tells.
+                let value = list.get(4..).unwrap_or_default();
+                let length = list.first_chunk().map(|length| usize::from(u16::from_le_bytes(*length)));
+                if length == Some(value.len()) { Ok(value.to_vec()) } else { Err("a part of a list".to_owned()) }
+            }
+            Kind::Memory => {
+                let length = self.kind.length() as u32;
+                aoe::read(mailbox, Self::route(), (MEMORY, 16), length, limits).await.map_err(said)
+            }
+            Kind::Address => {
+                let settings = eoe::ask_ip(mailbox, 0, limits).await.map_err(said)?;
+                Ok(settings.address.map_or(Vec::new(), |address| address.octets().to_vec()))
+            }
+            Kind::Description | Kind::Vendor => Ok(Vec::new()),
+        }
+    }
+
+    /// An entry of the array: which one is in the answer.
+    async fn describe(&self, number: u32) -> Result<(), String> {
+        let address = (0x2001, (number % 200) as u8 + 1);
+        let entry = information::entry(&self.mailbox, address, ValueInfo::ALL, self.limits).await.map_err(said)?;
+        assert_eq!((entry.index, entry.sub_index), address);
+        Ok(())
+    }
+
+    async fn echo(&self, number: u32) -> Result<(), String> {
+        let message = Voe { vendor_id: 0x0C47, vendor_type: number as u16, data: self.value(number) };
+        let answer = voe::exchange(&self.mailbox, &message, self.limits).await.map_err(said)?;
+        // A message of the vendor may be unasked, too; what was asked last may be answered late.
+        assert!(self.known.is_empty() && answer.vendor_type == number as u16 && answer == message, "VoE {number}");
+        Ok(())
+    }
+}
