@@ -14,6 +14,7 @@
 use std::sync::Arc;
 use std::time::Duration;
 
+use ringcat_engine::clocks::Follower;
 use ringcat_engine::domain::{DomainId, DomainStatus};
 use ringcat_engine::event::{Event, TimedEvent};
 use ringcat_engine::exchange::{CopyError, CopyRule, CyclicCounters, Entry, Exchange};
@@ -144,6 +145,17 @@ impl<L: Links, H: AcyclicHalf> Application<L, H> {
     /// Sources that are no inputs, targets that are no outputs or have two sources, different lengths.
     pub fn set_copies(&mut self, rules: &[CopyRule]) -> Result<(), CopyError> {
         self.cyclic.set_copies(rules)
+    }
+
+    /// How cycles follow the reference clock, with [`Trigger::ReferenceClock`]: the last phase error, and whether it is
+    /// small.
+    pub fn follower(&self) -> Option<&Follower> {
+        self.cyclic.follower()
+    }
+
+    /// When the last cycle began.
+    pub fn begun_at(&self) -> Instant {
+        self.cyclic.begun_at()
     }
 
     /// A few more cycles, with all outputs zero where `outputs` says so. Afterwards the wire belongs to the acyclic half.

@@ -5,6 +5,7 @@
 use std::sync::Arc;
 use std::time::Duration;
 
+use ringcat_engine::clocks::Follower;
 use ringcat_engine::domain::{DomainId, DomainStatus};
 use ringcat_engine::exchange::{CopyError, CopyRule, Exchange, Received};
 use ringcat_engine::link::Link;
@@ -31,6 +32,12 @@ pub(crate) struct Cyclic {
     rates: Vec<Rate>,
     period: Duration,
     trigger: Trigger,
+    /// Moves the grid after the reference clock, with [`Trigger::ReferenceClock`].
+    follower: Option<Follower>,
+    /// The reading of that clock that was used last.
+    followed: Instant,
+    /// When the last cycle began.
+    begun_at: Instant,
     /// The next cycle begins now at the latest.
     next_cycle: Instant,
     /// With [`Trigger::FramesReturned`] it may begin from now on.
@@ -59,6 +66,9 @@ impl Cyclic {
             rates: periods.iter().map(rate).collect(),
             period,
             trigger: Trigger::default(),
+            follower: None,
+            followed: Instant::NEVER,
+            begun_at: now,
             next_cycle,
             earliest: next_cycle,
             cycle: 0,
@@ -69,6 +79,10 @@ impl Cyclic {
 
     pub fn set_trigger(&mut self, trigger: Trigger) {
         self.trigger = trigger;
+        self.follower = match trigger {
+            Trigger::ReferenceClock { phase_ns } => Some(Follower::new(self.period.as_nanos() as u64, phase_ns)),
+            Trigger::Time | Trigger::FramesReturned { .. } => None,
+        };
     }
 
     /// Sets what is copied in every cycle; the ages that rules tolerate count from the period of the source's domain.
@@ -104,6 +118,7 @@ impl Cyclic {
 
     /// A cycle begins: notes how late it is, judges what is due.
     pub fn begin(&mut self, now: Instant) {
+        self.begun_at = now;
         self.keep_pace(now);
         for (number, rate) in self.rates.iter_mut().enumerate() {
             if self.cycle.is_multiple_of(rate.divider) {
@@ -126,15 +141,37 @@ impl Cyclic {
             self.pace.skipped += passed_over;
         }
         match self.trigger {
-            Trigger::Time => {
+            Trigger::Time | Trigger::ReferenceClock { .. } => {
                 let periods = (self.period.as_nanos() as u64).saturating_mul(passed_over + 1);
                 self.next_cycle += Duration::from_nanos(periods);
+                self.follow_reference();
             }
             Trigger::FramesReturned { at_least } => {
                 self.earliest = now + at_least;
                 self.next_cycle = now + self.period;
             }
         }
+    }
+
+    /// Moves the next cycle after the reference clock, once for each reading of it.
+    fn follow_reference(&mut self) {
+        let Some(follower) = &mut self.follower else { return };
+        let Some(reading) = self.exchange.reference_time().filter(|reading| reading.sent_at != self.followed) else {
+            return;
+        };
+        self.followed = reading.sent_at;
+        let correction = follower.correction(reading.at(self.next_cycle));
+        self.next_cycle = Instant(self.next_cycle.0.saturating_add_signed(correction));
+    }
+
+    /// How far the next cycle was from its phase in system time, in nanoseconds.
+    pub fn follower(&self) -> Option<&Follower> {
+        self.follower.as_ref()
+    }
+
+    /// When the last cycle began.
+    pub const fn begun_at(&self) -> Instant {
+        self.begun_at
     }
 
     /// What the application works on.
@@ -155,8 +192,10 @@ impl Cyclic {
                 self.exchange.queue(DomainId(number), now);
             }
         }
+        // Readings of the reference clock count from the time at which the frame leaves, not from the beginning of the work.
+        let now = if self.follower.is_some() { links.now() } else { now };
         let next = match self.trigger {
-            Trigger::Time => self.next_cycle,
+            Trigger::Time | Trigger::ReferenceClock { .. } => self.next_cycle,
             Trigger::FramesReturned { at_least } if at_least >= SHORTEST => self.earliest,
             Trigger::FramesReturned { .. } => Instant::NEVER,
         };

@@ -50,6 +50,7 @@ pub mod shared_segment;
 pub mod simulated;
 mod states;
 pub mod supervisor_thread;
+pub mod system_time;
 pub mod tee;
 pub mod text;
 pub mod window;
@@ -65,6 +66,7 @@ pub use pace::{Pace, Trigger};
 pub use process_data::ProcessData;
 pub use supervisor_thread::SupervisorThread;
 
+pub use ringcat_engine::clocks::{Follower, phase_error};
 pub use ringcat_engine::config::{
     ClockConfig, ConfigAddress, Expected, Group, IdentityField, IdnWrite, IpSettings, PdoAssignment, PdoEntry,
     PdoMapping, ReferenceClock, SdoDownload, StartupAction, StartupCommand, StateTimeout, SubDeviceConfig, SyncSignals,
@@ -72,6 +74,7 @@ pub use ringcat_engine::config::{
 };
 pub use ringcat_engine::domain::{DomainId, DomainState, DomainStatus, Freshness};
 pub use ringcat_engine::event::{Event, TimedEvent};
+pub use ringcat_engine::exchange::ReferenceTime;
 pub use ringcat_engine::exchange::{CopyError, CopyRule, CyclicCounters, Entry, WhenStale};
 pub use ringcat_engine::info::{Direction, SubDeviceInfo};
 pub use ringcat_engine::junction::{JunctionConnection, JunctionError, JunctionMode};
@@ -82,6 +85,7 @@ pub use ringcat_engine::mail::{Limits, Mailbox};
 pub use ringcat_engine::main_device::{
     ActivateError, Declaration, DomainConfig, DomainMember, GroupState, RawDatagram, Required, SubDeviceState,
 };
+pub use ringcat_engine::procedures::clocks::ClockStatus;
 pub use ringcat_engine::procedures::dictionary::ReadPdos;
 pub use ringcat_engine::procedures::look_at_ring::RingLook;
 pub use ringcat_engine::procedures::scan::{Scan, ScanError};

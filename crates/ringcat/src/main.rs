@@ -2,6 +2,7 @@
 
 mod bench;
 mod capture;
+mod clocks;
 mod demo;
 mod interfaces;
 mod output;
@@ -54,6 +55,8 @@ enum Command {
     Run(run::RunArguments),
     /// Shows how a ring is: who answers on which interface, where it is broken, errors of each cable. It only reads.
     Ring(ring::RingArguments),
+    /// Brings the distributed clocks of a segment together and shows how well they keep.
+    Clocks(clocks::ClocksArguments),
     /// Records what passes on network interfaces into a file for Wireshark, without taking part.
     Capture(capture::CaptureArguments),
     /// Puts a simulated segment on network interfaces, for any EtherCAT MainDevice at their other end.
@@ -69,6 +72,7 @@ fn main() -> ExitCode {
         Command::Scan(arguments) => scan::run(&arguments).map(|()| true),
         Command::Run(arguments) => run::run(&arguments),
         Command::Ring(arguments) => ring::run(&arguments),
+        Command::Clocks(arguments) => clocks::run(&arguments),
         Command::Capture(arguments) => capture::run(&arguments).map(|()| true),
         Command::Sim(arguments) => sim::run(&arguments).map(|()| true),
         Command::Bench(arguments) => bench::run(&arguments),

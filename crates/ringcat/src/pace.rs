@@ -8,6 +8,13 @@ pub enum Trigger {
     /// The time: cycles have a fixed grid of one period.
     #[default]
     Time,
+    /// The time, on a grid that follows the reference clock (master shift): a cycle begins when the system time of the
+    /// segment is `phase_ns` modulo the period. Needs distributed clocks; until the reference was read, as
+    /// [`Trigger::Time`].
+    ReferenceClock {
+        /// From the multiples of the period in system time to the beginning of cycles, in nanoseconds; may be negative.
+        phase_ns: i64,
+    },
     /// The return of the last cycle's frames. Where they do not return, a cycle begins a period after the last one.
     FramesReturned {
         /// From the beginning of the last cycle to that of the next at the least; zero for cycles back to back.

@@ -64,6 +64,9 @@ pub struct Tap {
     can_disconnect: bool,
     /// Frames that are to be lost.
     losses: Vec<Loss>,
+    /// Waits end by up to so much too late, at random.
+    oversleep_ns: u64,
+    random: u64,
     /// Longest time from there to a frame of the exchange that came back before it sent again, in nanoseconds.
     flight_ns: u64,
 }
@@ -82,6 +85,8 @@ impl Tap {
             outdated: 0,
             can_disconnect: true,
             losses: Vec::new(),
+            oversleep_ns: 0,
+            random: FNV_OFFSET,
             flight_ns: 0,
         }
     }
@@ -133,6 +138,11 @@ impl Tap {
     /// Longest time from the beginning of a cycle to the return of one of its frames, since [`Tap::measure_flights`].
     pub fn flight_ns(&self) -> u64 {
         self.flight_ns
+    }
+
+    /// Waits end by up to so much too late from now on, at random, as those of a host that is no real-time system.
+    pub fn oversleep(&mut self, most: std::time::Duration) {
+        self.oversleep_ns = most.as_nanos() as u64;
     }
 
     /// Copies of frames of the exchange that came back when newer ones had been sent, or twice: those that nobody may
@@ -225,7 +235,14 @@ impl Links for Tap {
 
     fn wait(&mut self, until: Instant) {
         let before = self.segment.now();
-        let until = until.min(self.limit);
+        let mut until = until.min(self.limit);
+        if self.oversleep_ns > 0 && until > before {
+            // xorshift64.
+            self.random ^= self.random << 13;
+            self.random ^= self.random >> 7;
+            self.random ^= self.random << 17;
+            until = Instant(until.0.saturating_add(self.random % (self.oversleep_ns + 1)));
+        }
         self.segment.wait(until);
         let now = self.segment.now();
         assert!(now < self.limit, "virtual time reached its limit of {} ms", self.limit.0 / 1_000_000);

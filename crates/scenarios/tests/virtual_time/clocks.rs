@@ -2,9 +2,10 @@
 
 use std::time::Duration;
 
-use ringcat::{ClockConfig, Event, Options, ReferenceClock, SyncSignals};
+use ringcat::{ClockConfig, Event, Follower, Options, ReferenceClock, SyncSignals, Trigger, phase_error};
 use ringcat_sim::cable::{CableId, DeviceIndex};
 use ringcat_sim::network::NetworkOptions;
+use ringcat_sim::time::SimTime;
 use ringcat_wire::al::AlStatusCode;
 use scenarios::clocks::{EPOCH, clocked, config, delay, differences, largest_spread, lock, spread, with_clocks, world};
 use scenarios::segments::{line, ring};
@@ -224,4 +225,23 @@ fn a_cut_and_a_heal_at_any_cable_leave_no_clock_behind_facts_7_5() {
         let after = largest_spread(&mut world, &all(COUNT), 200);
         assert!(after <= 100, "cable {cable}: {after} ns after the repair");
     }
+}
+
+#[test]
+fn cycles_follow_the_reference_clock_though_the_host_wakes_late_facts_7_4() {
+    let mut world = world(10, line(clocked(4, 80), NetworkOptions::default()), config());
+    world.application_mut().set_trigger(Trigger::ReferenceClock { phase_ns: -250_000 });
+    world.application_mut().links_mut().oversleep(Duration::from_micros(50));
+    lock(&mut world, Duration::from_secs(8));
+    world.run_cycles(3_000);
+    for _ in 0..500 {
+        world.cycle();
+        let application = world.application();
+        let late = application.pace().last_delay.as_nanos() as u64;
+        let scheduled = SimTime(application.begun_at().0 - late);
+        let time = world.network().device(DeviceIndex(0)).controller.system_time(scheduled);
+        let error = phase_error(time, 1_000_000, -250_000);
+        assert!(error.abs() <= 1_000, "{error} ns");
+    }
+    assert!(world.application().follower().is_some_and(Follower::is_locked));
 }

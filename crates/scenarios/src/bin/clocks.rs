@@ -1,0 +1,197 @@
+//! Distributed clocks (issue 6): how exact delays are, how closely clocks stay together, how well the host follows them.
+//!
+//! Everything runs in virtual time on clocks that are not ideal ([`scenarios::clocks`]): drift up to 50 or 100 ppm, slow
+//! wander, 40 ns of jitter on every receive time, a fourth of them with 32 bits. What the MainDevice cannot see, the truth
+//! about the clocks, comes from the simulator.
+
+use std::process::ExitCode;
+use std::time::Duration;
+
+use ringcat::{SyncSignals, Trigger};
+use ringcat_sim::cable::{CableId, CableSpec, DeviceIndex, Endpoint, HostLink};
+use ringcat_sim::controller::Wander;
+use ringcat_sim::description::DeviceDescription;
+use ringcat_sim::device::Device;
+use ringcat_sim::frame::Port;
+use ringcat_sim::network::{Network, NetworkOptions};
+use ringcat_sim::time::SimTime;
+use ringcat_wire::register::{PortKind, map};
+use scenarios::clocks::{clocked, config, delay, largest_spread, lock, spread, with_clocks, world};
+use scenarios::figures::{Figures, verdict};
+use scenarios::segments::{devices, line, ring};
+use scenarios::world::World;
+
+/// Most error of a delay per hop, in nanoseconds.
+const HOP_BAR: f64 = 20.0;
+/// Most spread of all clocks in the steady state.
+const SPREAD_BAR: f64 = 100.0;
+/// Most spread over a cut and its repair, inside of a part and across both.
+const INSIDE_BAR: f64 = 1_000.0;
+const ACROSS_BAR: f64 = 5_000.0;
+/// Most of the mean of a second from where SYNC0 should be, seen from the scheduled wake-up.
+const PHASE_BAR: f64 = 5_000.0;
+/// Most virtual time from power-on to the lock of a hundred clocks.
+const LOCK_BAR: f64 = 3.0;
+const HOST_JITTER: Duration = Duration::from_micros(50);
+
+fn main() -> ExitCode {
+    let mut figures = Figures::new("distributed clocks, in virtual time");
+    let options = NetworkOptions::default;
+    delays(&mut figures, "line of 200", |ideal| line(descriptions(200, ideal), options()));
+    delays(&mut figures, "tree of 100, three branches each", |ideal| tree(descriptions(100, ideal)));
+    hundred(&mut figures);
+    cuts(&mut figures);
+    phase(&mut figures);
+    verdict(figures.print())
+}
+
+/// Devices with clocks, or the same ones with clocks that tell the truth.
+fn descriptions(count: usize, ideal: bool) -> Vec<DeviceDescription> {
+    let mut all = clocked(count, 100);
+    for device in all.iter_mut().filter(|_| ideal) {
+        (device.clock_drift_ppb, device.clock_start_ns) = (0, 0);
+        (device.clock_wander, device.receive_jitter) = (Wander::default(), Duration::ZERO);
+    }
+    all
+}
+
+/// Device `n` hangs on device `(n - 1) / 3`, with cables of different lengths.
+fn tree(mut descriptions: Vec<DeviceDescription>) -> Network {
+    for description in &mut descriptions {
+        description.ports = [PortKind::Mii; 4];
+    }
+    let count = descriptions.len();
+    let port = |number: usize| [Port::D, Port::B, Port::C][number % 3];
+    let mut cables = vec![CableSpec {
+        a: Endpoint::Host(HostLink::Main),
+        b: Endpoint::Device(DeviceIndex(0), Port::A),
+        delay: Duration::from_nanos(50),
+    }];
+    cables.extend((1..count).map(|number| CableSpec {
+        a: Endpoint::Device(DeviceIndex((number - 1) / 3), port(number - 1)),
+        b: Endpoint::Device(DeviceIndex(number), Port::A),
+        delay: Duration::from_nanos(50 + 10 * (number as u64 % 50)),
+    }));
+    Network::new(devices(descriptions), cables, NetworkOptions::default()).expect("the tree can be built")
+}
+
+/// Written delays against those that ideal clocks show.
+fn delays(figures: &mut Figures, name: &str, network: impl Fn(bool) -> Network) {
+    let written = |ideal: bool| -> (Vec<f64>, Vec<u64>) {
+        let mut world = world(1, network(ideal), config());
+        let count = world.network().devices().len();
+        let is_set_up = |world: &World| delay(world.network(), count - 1) != 0;
+        world.until(Duration::from_secs(2), "set up", is_set_up);
+        world.run_cycles(5);
+        let unit = |device: &Device| {
+            let bytes = device.controller.register(map::DC_RECEIVE_TIME_EPU, 8);
+            bytes.first_chunk().map_or(0, |bytes| u64::from_le_bytes(*bytes)) & 0xFFFF_FFFF
+        };
+        let units = world.network().devices().map(unit).collect();
+        ((0..count).map(|device| f64::from(delay(world.network(), device))).collect(), units)
+    };
+    let (_, truth) = written(true);
+    let (measured, _) = written(false);
+    let truth: Vec<f64> = truth.iter().map(|unit| unit.wrapping_sub(truth[0]) as u32 as f64).collect();
+    let errors: Vec<f64> = measured.iter().zip(&truth).map(|(measured, truth)| measured - truth).collect();
+    let is_line = name.starts_with("line");
+    let parent = |device: usize| if is_line { device - 1 } else { (device - 1) / 3 };
+    let mut hops = vec![0u32; errors.len()];
+    let (mut per_hop, mut share) = (0.0f64, 0.0f64);
+    for device in 1..errors.len() {
+        hops[device] = hops[parent(device)] + 1;
+        per_hop = per_hop.max((errors[device] - errors[parent(device)]).abs());
+        share = share.max(errors[device].abs() / (10.0 + 10.0 * f64::from(hops[device]).sqrt()));
+    }
+    let worst = errors.iter().fold(0.0f64, |worst, error| worst.max(error.abs()));
+    figures.at_most(&format!("{name}: delay error of a hop"), per_hop, HOP_BAR, "ns");
+    figures.at_most(&format!("{name}: sum ({worst:.0} ns at most) against 10 + 10 sqrt(hops) ns"), share, 1.0, "x");
+}
+
+fn hundred(figures: &mut Figures) {
+    let network = line(clocked(100, 50), NetworkOptions::default());
+    let mut world = World::with(2, network, &ringcat::Options::default(), |scan| {
+        let mut declaration = with_clocks(scan, config());
+        for subdevice in &mut declaration.subdevices {
+            subdevice.sync = Some(SyncSignals::sync0(1_000_000, 0));
+        }
+        declaration
+    })
+    .expect("it can be activated");
+    lock(&mut world, Duration::from_secs(20));
+    let locked = world.now().0 as f64 / 1e9;
+    figures.at_most("100 clocks, +-50 ppm: from power-on to the lock", locked, LOCK_BAR, "s");
+    world.until(Duration::from_secs(5), "all in OP", World::all_in_op);
+    let op = world.now().0 as f64 / 1e9;
+    figures.show("the same, to OP with SYNC0 everywhere", format!("{op:.3} s"));
+    let all: Vec<usize> = (0..100).collect();
+    let largest = largest_spread(&mut world, &all, 10_000);
+    figures.at_most("the same: spread in 10 s of 1 ms cycles", largest as f64, SPREAD_BAR, "ns");
+}
+
+fn cuts(figures: &mut Figures) {
+    const COUNT: usize = 10;
+    let (mut inside, mut across, mut after) = (0, 0, 0);
+    for cable in 0..=COUNT {
+        let mut world = world(3, ring(clocked(COUNT, 50), NetworkOptions::default()), config());
+        lock(&mut world, Duration::from_secs(20));
+        world.run_cycles(500);
+        let (front, behind): (Vec<usize>, Vec<usize>) = ((0..cable).collect(), (cable..COUNT).collect());
+        let all: Vec<usize> = (0..COUNT).collect();
+        let mut watch = |world: &mut World| {
+            for _ in 0..2_000 {
+                world.cycle();
+                let network = world.network();
+                inside = inside.max(spread(network, &front)).max(spread(network, &behind));
+                across = across.max(spread(network, &all));
+            }
+        };
+        world.cut(CableId(cable));
+        watch(&mut world);
+        world.heal(CableId(cable));
+        watch(&mut world);
+        after = after.max(largest_spread(&mut world, &all, 100));
+    }
+    figures.at_most("ring of 10, each cable cut and healed: spread inside a part", inside as f64, INSIDE_BAR, "ns");
+    figures.at_most("the same, across both parts", across as f64, ACROSS_BAR, "ns");
+    figures.at_most("the same, 2 s after the repair", after as f64, SPREAD_BAR, "ns");
+}
+
+/// The host follows: where SYNC0 comes, seen from the scheduled wake-ups.
+fn phase(figures: &mut Figures) {
+    const PHASE_NS: i64 = 300_000;
+    let mut world =
+        World::with(4, line(clocked(10, 50), NetworkOptions::default()), &ringcat::Options::default(), |scan| {
+            let mut declaration = with_clocks(scan, config());
+            for subdevice in &mut declaration.subdevices {
+                subdevice.sync = Some(SyncSignals::sync0(1_000_000, 0));
+            }
+            declaration
+        })
+        .expect("it can be activated");
+    world.application_mut().set_trigger(Trigger::ReferenceClock { phase_ns: PHASE_NS });
+    world.application_mut().links_mut().oversleep(HOST_JITTER);
+    world.until(Duration::from_secs(20), "all in OP", World::all_in_op);
+    world.run_cycles(3_000);
+    let (mut sum, mut worst) = (0.0, 0.0f64);
+    for _ in 0..1_000 {
+        world.cycle();
+        let application = world.application();
+        let began = application.begun_at();
+        let scheduled = SimTime(began.0 - application.pace().last_delay.as_nanos() as u64);
+        let network = world.network();
+        let next = network.device(DeviceIndex(5)).controller.next_sync0(scheduled).expect("SYNC0 runs");
+        // SYNC0 is at 0 modulo 1 ms, wake-ups are scheduled 0.3 ms behind it.
+        let error = next.0 as f64 - scheduled.0 as f64 - (1_000_000.0 - PHASE_NS as f64);
+        sum += error;
+        worst = worst.max(error.abs());
+    }
+    let mean: f64 = sum / 1_000.0;
+    figures.at_most(
+        "SYNC0 against scheduled wake-ups, host 50 us late at random, mean of 1 s",
+        mean.abs(),
+        PHASE_BAR,
+        "ns",
+    );
+    figures.show("the same, worst of 1,000", format!("{worst:.0} ns"));
+}
