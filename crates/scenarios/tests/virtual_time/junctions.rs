@@ -2,17 +2,20 @@
 
 use std::time::Duration;
 
-use ringcat::{Event, JunctionConnection, JunctionMode, Options, automatic};
+use ringcat::{Event, JunctionConnection, JunctionMode, Limits, Options, SdoAddress, automatic};
+use ringcat_engine::mail::coe;
 use ringcat_engine::topology::PortOf;
 use ringcat_sim::cable::{CableId, DeviceIndex, Endpoint, HostLink};
 use ringcat_sim::frame::Port::{self, A, B, C, D};
 use ringcat_sim::network::builder::SegmentBuilder;
 use ringcat_sim::network::{Network, NetworkOptions};
 use scenarios::check::{Delivery, troubles};
+use scenarios::dice::Dice;
 use scenarios::segments::{descriptions, devices};
 use scenarios::world::{CYCLE, Mark, World};
 
 const MAIN: Endpoint = Endpoint::Host(HostLink::Main);
+const REDUNDANT: Endpoint = Endpoint::Host(HostLink::Redundant);
 /// What a mode and its connections make of a segment.
 type Setting<'a> = (JunctionMode, &'a [JunctionConnection]);
 
@@ -291,5 +294,153 @@ fn without_junction_redundancy_a_ring_that_breaks_reads_as_a_crossed_line_jr_04(
         // It is told again when it comes again.
         let mark = edge(&mut world, "cut again", |world| world.cut(CableId(cable)));
         assert!(world.saw(mark, reversed));
+    }
+}
+
+/// A ring of two links, with a local ring behind the junction in its middle: an output, the junction, and an input; the
+/// local ring's two members are 2 and 3.
+fn ring_in_ring() -> Network {
+    let kinds = ["digital-output-8", "junction", "servo", "digital-input-8", "analog-input-4"];
+    let cables = [
+        (MAIN, at(0, A)),
+        (at(0, B), at(1, A)),
+        (at(1, D), at(2, A)),
+        (at(2, B), at(3, A)),
+        (at(3, B), at(1, B)),
+        (at(1, C), at(4, A)),
+        (at(4, B), REDUNDANT),
+    ];
+    wired(&kinds, &cables)
+}
+
+#[test]
+fn a_local_ring_in_a_ring_of_two_links_goes_on_with_one_break_anywhere_jr_02() {
+    let strict = JunctionConnection { head: 1, head_port: 1, tail: 3, tail_port: 1 };
+    for setting in [(JunctionMode::Automatic, &[][..]), (JunctionMode::Strict, &[strict])] {
+        let mut world = in_op(8, ring_in_ring(), setting);
+        for cable in 0..7 {
+            let local = (2..5).contains(&cable);
+            let what = format!("{setting:?}, cable {cable}");
+            for heal in [false, true] {
+                let act = |world: &mut World| if heal { world.heal(CableId(cable)) } else { world.cut(CableId(cable)) };
+                let mark = edge(&mut world, &what, act);
+                assert_eq!(told(&world, mark).len(), usize::from(local), "{what}");
+                let opened = world.saw(mark, |event| matches!(event, Event::RingOpened { .. }));
+                assert_eq!(opened, !local && !heal, "{what}: the main ring has its own events");
+            }
+        }
+        assert_eq!(crossed(&world, world.beginning()), 0);
+        // Both in the half of the main interface: its frames meet one unconnected port 0, those of the other one too.
+        edge(&mut world, "main ring behind the junction", |world| world.cut(CableId(5)));
+        let mark = edge(&mut world, "local ring", |world| world.cut(CableId(3)));
+        assert_eq!(told(&world, mark).len(), 1);
+        edge(&mut world, "local ring whole", |world| world.heal(CableId(3)));
+        edge(&mut world, "main ring whole", |world| world.heal(CableId(5)));
+        // In the half of the redundant interface its frames are destroyed; the other half goes on.
+        edge(&mut world, "main ring before the junction", |world| world.cut(CableId(1)));
+        let mark = world.mark();
+        world.cut(CableId(3));
+        world.run_cycles(200);
+        assert!(world.judged(mark).last().is_some_and(|judged| !judged.stale.is_empty()));
+        assert!(!world.left_op(mark).contains(&DeviceIndex(0)));
+        world.heal(CableId(3));
+        world.until(Duration::from_secs(5), "all in OP", |w| w.all_in_op() && w.application().all_settled());
+        edge(&mut world, "the last one", |world| world.heal(CableId(1)));
+    }
+}
+
+/// A random segment with a local ring: a line of terminals and junctions, one of which has the ring, with branches and
+/// members. Returns it with the numbers of the ring's cables, and whether it ends at the redundant link.
+fn random_segment(dice: &mut Dice) -> (Network, Vec<usize>, bool) {
+    let pick =
+        |dice: &mut Dice| *dice.pick(&["digital-output-8", "digital-input-8", "servo", "analog-input-4", "block"]);
+    let (mut kinds, mut cables) = (Vec::new(), Vec::new());
+    let mut end = MAIN;
+    let hang = |kinds: &mut Vec<&str>, cables: &mut Vec<(Endpoint, Endpoint)>, kind, from| {
+        cables.push((from, at(kinds.len(), A)));
+        kinds.push(kind);
+        kinds.len() - 1
+    };
+    for _ in 0..dice.below(3) {
+        let kind = pick(dice);
+        end = at(hang(&mut kinds, &mut cables, kind, end), B);
+    }
+    let junction = hang(&mut kinds, &mut cables, "junction", end);
+    let (start, back) = *dice.pick(&[(D, B), (D, C), (B, C)]);
+    let mut ring = vec![cables.len()];
+    let mut last = at(junction, start);
+    for _ in 0..1 + dice.below(4) {
+        ring.push(cables.len());
+        if dice.one_in(3) {
+            // A member with a branch on port 3.
+            let member = hang(&mut kinds, &mut cables, "junction", last);
+            let kind = pick(dice);
+            hang(&mut kinds, &mut cables, kind, at(member, D));
+            last = at(member, B);
+        } else {
+            let kind = pick(dice);
+            last = at(hang(&mut kinds, &mut cables, kind, last), B);
+        }
+    }
+    ring.push(cables.len());
+    ring.dedup();
+    cables.push((last, at(junction, back)));
+    let mut end = at(junction, C);
+    let goes_on = back == B;
+    for _ in 0..if goes_on { 1 + dice.below(3) } else { 0 } {
+        let kind = pick(dice);
+        end = at(hang(&mut kinds, &mut cables, kind, end), B);
+    }
+    let two_links = goes_on && dice.one_in(2);
+    if two_links {
+        cables.push((end, REDUNDANT));
+    }
+    (wired(&kinds, &cables), ring, two_links)
+}
+
+#[test]
+fn random_segments_with_a_local_ring_deliver_the_same_with_and_without_one_break() {
+    for seed in 0..12 {
+        let dice = &mut Dice::new(seed);
+        let (network, ring, two_links) = random_segment(dice);
+        let cables = network.cables().len();
+        let mut world = in_op(seed, network, (JunctionMode::Automatic, &[]));
+        assert_eq!(world.application().ring() == ringcat::RingState::Closed, two_links);
+        let learned = |event: &Event| matches!(event, Event::JunctionLearned { .. });
+        assert!(world.saw(world.beginning(), learned), "seed {seed}");
+        let before = world.compared();
+        for cable in (0..cables).filter(|cable| ring.contains(cable)) {
+            let what = format!("seed {seed}, cable {cable}");
+            let mark = edge(&mut world, &what, |world| world.cut(CableId(cable)));
+            assert_eq!(told(&world, mark).len(), 1, "{what}");
+            edge(&mut world, &what, |world| world.heal(CableId(cable)));
+        }
+        assert!(world.compared() > before);
+    }
+}
+
+#[test]
+fn transfers_go_on_through_cuts_and_repairs_of_a_local_ring() {
+    let mut world = in_op(9, one_ring(), (JunctionMode::Strict, &[STRICT]));
+    let limits: Limits = (Duration::from_millis(100), Duration::from_secs(1));
+    let object = SdoAddress::new(0x8000, 3);
+    // One in the ring, one behind it.
+    for (subdevice, round) in [(6, 0), (6, 1), (6, 2), (6, 3)] {
+        let cable = CableId(RING[round]);
+        let mark = world.mark();
+        world.fault_in(CYCLE * 2 / 3, ringcat_sim::fault::Fault::Cut(cable));
+        world.fault_in(CYCLE * 15, ringcat_sim::fault::Fault::Heal(cable));
+        for number in 0..12u8 {
+            let data = [number; 16];
+            let mailbox = world.mailbox(subdevice);
+            world
+                .run(async move { coe::write(&mailbox, object, &data, limits).await })
+                .expect("a break loses no request");
+            let device = world.network().device(DeviceIndex(subdevice));
+            assert_eq!(device.application.dictionary().read(0x8000, 3), Ok(data.as_slice()));
+        }
+        world.run_cycles(100);
+        assert_eq!(world.left_op(mark), []);
+        assert_eq!(told(&world, mark).len(), 2, "{cable:?}");
     }
 }
