@@ -136,6 +136,12 @@ pub fn describe(event: &Event, names: &Names) -> String {
             identity.vendor_id,
             identity.product_code
         ),
+        Event::Mismatch { subdevice, position, field, expected, got } => {
+            let (name, place) = (names.of(*subdevice), names.at(*position));
+            format!("{name}: expected {field} {expected:#010x}, {place} has {got:#010x}: it is left alone")
+        }
+        Event::GroupJoined { group } => format!("group {group}: all of it is there and in its state"),
+        Event::GroupLeft { group } => format!("group {group}: not all of it is there and in its state"),
         Event::Missing { subdevice, optional } => {
             let what = if *optional { "optional, not there" } else { "missing" };
             format!("{}: {what}", names.of(*subdevice))

@@ -171,6 +171,8 @@ pub struct DeviceDescription {
     pub alias: u16,
     /// Value of the identification switch; `None` = the request is not supported (facts 5.3).
     pub identification: Option<u16>,
+    /// Physical address at which the identification switch is read; `None` = it is not in memory (facts 4.3).
+    pub id_switch_address: Option<u16>,
     /// Kind of each port.
     pub ports: [PortKind; 4],
     /// Usage of the FMMUs, also their number in the SII.
@@ -238,6 +240,7 @@ impl DeviceDescription {
             identity,
             alias: 0,
             identification: None,
+            id_switch_address: None,
             ports: [PortKind::Mii, PortKind::Mii, PortKind::NotImplemented, PortKind::NotImplemented],
             fmmus: Vec::new(),
             sync_managers: Vec::new(),

@@ -180,6 +180,9 @@ fn general<'a>(description: &'a DeviceDescription, strings: &mut StringTable<'a>
     if description.identification.is_some() {
         flags |= GeneralFlags::IDENTIFICATION_AL_STATUS_CODE;
     }
+    if description.id_switch_address.is_some() {
+        flags |= GeneralFlags::IDENTIFICATION_MEMORY;
+    }
     General {
         group,
         order,
@@ -190,6 +193,7 @@ fn general<'a>(description: &'a DeviceDescription, strings: &mut StringTable<'a>
         soe_channels: if protocols.soe() { drives } else { 0 },
         flags: GeneralFlags(flags),
         ebus_current_ma: description.ebus_current_ma,
+        id_switch_address: description.id_switch_address.unwrap_or(0),
         group_again: group,
         physical_ports: physical_ports(&description.ports),
         ..General::default()

@@ -294,6 +294,11 @@ impl SharedFleet {
         self.access().members.get_mut(index).map(|member| core::mem::replace(&mut member.target, target))
     }
 
+    /// The state to which a SubDevice is to be brought.
+    pub fn target(&self, index: usize) -> AlState {
+        self.access().members.get(index).map_or(AlState::Init, |member| member.target)
+    }
+
     /// Number of the attempt under way.
     pub fn attempt(&self, index: usize) -> u32 {
         self.access().members.get(index).map_or(0, |member| member.attempt)

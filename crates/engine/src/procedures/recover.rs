@@ -12,6 +12,7 @@ use ringcat_wire::al::AlState;
 use super::al_state;
 use super::configure::{BringUp, ConfigureError, Start, StartupError};
 use super::fleet::{Phase, SharedFleet};
+use super::request_state::exchanges;
 use super::sii;
 use super::strangers::take_away;
 use crate::event::Event;
@@ -42,6 +43,7 @@ pub(super) async fn keep_up(bus: Bus, fleet: SharedFleet, index: usize, start: S
         match result {
             Ok(state) => {
                 fleet.set_phase(index, Phase::Settled(state));
+                fleet.board.set_excused(index, !exchanges(state));
                 bus.report(Event::StateReached { subdevice: index, state });
                 return;
             }
@@ -107,6 +109,8 @@ pub(super) fn lose(bus: &Bus, fleet: &SharedFleet, index: usize) {
         bus.report(Event::Lost { subdevice: index });
     }
     fleet.board.set_taking_part(index, false);
+    // One that was on its way to process data is missed from now on.
+    fleet.board.set_excused(index, !exchanges(fleet.target(index)));
     if let Some(mailbox) = fleet.mailbox(index) {
         mailbox.suspend();
     }

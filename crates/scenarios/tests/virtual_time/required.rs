@@ -7,6 +7,7 @@ use ringcat_sim::cable::DeviceIndex;
 use ringcat_sim::description::DeviceDescription;
 use ringcat_sim::network::NetworkOptions;
 use ringcat_wire::al::{AlState, AlStatus};
+use ringcat_wire::register::map;
 use scenarios::segments::{descriptions, line};
 use scenarios::world::{CYCLE, World};
 
@@ -75,6 +76,24 @@ fn an_identification_that_is_right_is_no_mismatch_facts_5_3() {
     assert_eq!(world.scan.subdevices[1].identification, None);
     let error = activate(|devices| devices[2].identification = Some(0x1235), declare).expect_err("another one");
     assert!(error.to_string().contains("SubDevice 2: expected identification 0x00001234, got 0x00001235"), "{error}");
+}
+
+#[test]
+fn an_identification_in_memory_is_read_there_facts_4_3() {
+    // Where the alias is loaded to, which some devices set by switches.
+    let change = |devices: &mut Vec<DeviceDescription>| {
+        devices[1].id_switch_address = Some(map::STATION_ALIAS.0);
+        devices[1].alias = 77;
+        // There is no such memory.
+        devices[3].id_switch_address = Some(0xFFF0);
+    };
+    let declare = |declaration: &mut Declaration| {
+        declaration.subdevices[1] = SubDeviceConfig::at_identification(77);
+    };
+    let mut world = activate(change, declare).expect("activation");
+    world.settle();
+    let identifications: Vec<_> = world.scan.subdevices.iter().map(|info| info.identification).collect();
+    assert_eq!(identifications, [None, Some(77), Some(0), None]);
 }
 
 #[test]

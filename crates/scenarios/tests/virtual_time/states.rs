@@ -181,6 +181,30 @@ fn the_state_that_was_requested_is_kept_over_a_loss_of_power() {
 }
 
 #[test]
+fn one_that_is_lost_on_its_way_up_is_missed_as_before() {
+    let mut world = World::in_op(8, line(descriptions(&KINDS), NetworkOptions::default()));
+    let last = KINDS.len() - 1;
+    let is_missed = |world: &World| {
+        let judged = world.judged(world.beginning()).last().expect("cycles went by");
+        judged.status.state != ringcat::DomainState::Complete
+    };
+    assert_eq!(request(&mut world, last, AlState::PreOp), Ok(()));
+    world.run_cycles(5);
+    assert!(!is_missed(&world));
+    let work = world.application_mut().request_state(last, AlState::Op);
+    world.run_cycles(1);
+    world.power_off(DeviceIndex(last));
+    assert!(world.finish(LIMIT, work).is_err());
+    world.run_cycles(20);
+    assert!(is_missed(&world), "while it is gone");
+    world.power_on(DeviceIndex(last));
+    world.settle();
+    world.power_off(DeviceIndex(last));
+    world.run_cycles(20);
+    assert!(is_missed(&world), "when it goes again");
+}
+
+#[test]
 fn a_later_request_ends_an_earlier_one() {
     let mut world = World::in_op(7, line(descriptions(&KINDS), NetworkOptions::default()));
     let first = world.application_mut().request_state(DRIVE, AlState::Init);

@@ -45,6 +45,9 @@ impl DeviceDescription {
             identification: general
                 .filter(|general| general.flags.identification_al_status_code())
                 .map(|_| header.alias),
+            id_switch_address: general
+                .filter(|general| general.flags.identification_memory())
+                .map(|general| general.id_switch_address),
             sii_size_bytes: image.len(),
             ..DeviceDescription::plain(name, header.identity)
         };
