@@ -1,8 +1,8 @@
 //! Distributed clocks: set up, brought together, watched (facts 7).
 //!
-//! * [`set_up`]: propagation delays, offsets, filters;
-//! * [`signals`]: SYNC signals of one SubDevice;
-//! * [`watch`]: the static drift phase, who is locked, whose time each link distributes.
+//! * `set_up`: propagation delays, offsets, filters;
+//! * `signals`: SYNC signals of one SubDevice;
+//! * `watch`: the static drift phase, who is locked, whose time each link distributes.
 //!
 //! What they know about the clocks is in [`SharedClocks`], which the bring-up of SubDevices looks at too.
 

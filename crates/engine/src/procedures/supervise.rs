@@ -3,7 +3,7 @@
 //! The exchange posts one word per cycle: how many SubDevices answered on each link, the OR of their AL status, the OR
 //! of their event requests. As long as it does not change, nothing is asked of the bus but one look per second.
 //!
-//! Changes of the ring are told by a procedure of their own ([`super::ring_watch`]): a look waits for lost frames.
+//! Changes of the ring are told by a procedure of their own (`ring_watch`): a look waits for lost frames.
 
 use alloc::rc::Rc;
 use alloc::vec;
