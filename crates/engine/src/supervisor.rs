@@ -16,6 +16,7 @@ mod signal;
 mod silence;
 mod stray;
 mod transfer;
+mod turns;
 
 use alloc::rc::Rc;
 use alloc::sync::Arc;

@@ -2,7 +2,8 @@
 //!
 //! The cyclic half says when its next frames leave, both halves say when what they sent will have left the interface. Each
 //! word has one writer, so the halves may live in threads of their own. Both links carry the same frames; one account
-//! serves both.
+//! serves both. Besides, the acyclic half has a budget per cycle, so that a long cycle does not fill the queues of the
+//! interface at once.
 
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Duration;
@@ -29,9 +30,16 @@ pub enum Half {
     Acyclic,
 }
 
+/// Bytes that the acyclic half may send in a cycle where nothing else was said: the wire time of about 10 ms.
+pub const DEFAULT_BUDGET: usize = 128 * 1024;
+
 /// What both halves know of the wire.
 #[derive(Debug)]
 pub struct Window {
+    /// Bytes that the acyclic half may send in a cycle.
+    budget: usize,
+    /// The end of the cycle in which it sent last, and what it has sent in it.
+    spent: [AtomicU64; 2],
     /// When frames of the cyclic half leave next; never without a cyclic half.
     next_cycle: AtomicU64,
     /// When what each half sent will have left.
@@ -40,11 +48,22 @@ pub struct Window {
 
 impl Default for Window {
     fn default() -> Window {
-        Window { next_cycle: AtomicU64::new(Instant::NEVER.0), free: [AtomicU64::new(0), AtomicU64::new(0)] }
+        Window::new(DEFAULT_BUDGET)
     }
 }
 
 impl Window {
+    /// Windows in which the acyclic half may send so many bytes per cycle, and a longest frame at least.
+    pub fn new(budget: usize) -> Window {
+        let zero = || AtomicU64::new(0);
+        Window {
+            budget: budget.max(MAX_FRAME),
+            spent: [zero(), zero()],
+            next_cycle: AtomicU64::new(Instant::NEVER.0),
+            free: [zero(), zero()],
+        }
+    }
+
     /// Says when cyclic frames leave next.
     pub fn expect_cycle(&self, at: Instant) {
         self.next_cycle.store(at.0, Ordering::Relaxed);
@@ -54,6 +73,18 @@ impl Window {
     pub fn occupy(&self, half: Half, now: Instant, length: usize) {
         let until = self.free_at(now).0.saturating_add(wire_time_ns(length));
         self.free[half as usize].store(until, Ordering::Relaxed);
+        if half == Half::Acyclic {
+            let next = self.next_cycle.load(Ordering::Relaxed);
+            let spent = self.spent_before(next) + length as u64;
+            self.spent[0].store(next, Ordering::Relaxed);
+            self.spent[1].store(spent, Ordering::Relaxed);
+        }
+    }
+
+    /// What the acyclic half has sent in the cycle that ends then.
+    fn spent_before(&self, next: u64) -> u64 {
+        let [of, spent] = &self.spent;
+        if of.load(Ordering::Relaxed) == next { spent.load(Ordering::Relaxed) } else { 0 }
     }
 
     fn free_at(&self, now: Instant) -> Instant {
@@ -61,14 +92,16 @@ impl Window {
         Instant(now.0.max(cyclic.load(Ordering::Relaxed)).max(acyclic.load(Ordering::Relaxed)))
     }
 
-    /// Bytes that may still leave before the next cycle's frames.
+    /// Bytes that the acyclic half may still send before the next cycle's frames.
     pub fn bytes(&self, now: Instant) -> usize {
         let next = self.next_cycle.load(Ordering::Relaxed);
         if next == Instant::NEVER.0 || now.0.saturating_sub(next) > SILENCE_NS {
             return usize::MAX;
         }
         let bytes = Instant(next).since(self.free_at(now) + GUARD).as_nanos() / u128::from(BYTE_TIME_NS);
-        usize::try_from(bytes).unwrap_or(usize::MAX).saturating_sub(WIRE_OVERHEAD)
+        let room = usize::try_from(bytes).unwrap_or(usize::MAX).saturating_sub(WIRE_OVERHEAD);
+        let spent = usize::try_from(self.spent_before(next)).unwrap_or(usize::MAX);
+        room.min(self.budget.saturating_sub(spent))
     }
 
     /// When to look again for room that there is not now.
@@ -98,6 +131,26 @@ mod tests {
         assert_eq!(window.bytes(Instant(MS - 10_000)), 0);
         assert_eq!(window.bytes(Instant(MS + 10_000)), 0, "the cycle is due");
         assert!(window.look_again(Instant(MS - 10_000)) > Instant(MS));
+    }
+
+    #[test]
+    fn a_budget_is_for_a_cycle_and_never_less_than_a_frame() {
+        let window = Window::new(4_000);
+        window.occupy(Half::Acyclic, Instant(0), 9_000);
+        window.expect_cycle(Instant(10 * MS));
+        assert_eq!(window.bytes(Instant(MS)), 4_000, "what was sent before the cycles is not counted");
+        window.occupy(Half::Acyclic, Instant(MS), 1_514);
+        window.occupy(Half::Acyclic, Instant(MS), 1_514);
+        assert_eq!(window.bytes(Instant(MS)), 972);
+        window.occupy(Half::Cyclic, Instant(MS), 1_514);
+        assert_eq!(window.bytes(Instant(MS)), 972, "process data has no budget");
+        window.occupy(Half::Acyclic, Instant(MS), 1_514);
+        assert_eq!(window.bytes(Instant(2 * MS)), 0);
+        window.expect_cycle(Instant(20 * MS));
+        assert_eq!(window.bytes(Instant(10 * MS)), 4_000);
+        let least = Window::new(0);
+        least.expect_cycle(Instant(10 * MS));
+        assert_eq!(least.bytes(Instant(0)), MAX_FRAME);
     }
 
     #[test]

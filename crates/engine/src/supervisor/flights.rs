@@ -457,7 +457,8 @@ impl Shared {
             transfer.retries += 1;
             transfer.stage = Stage::Queued;
             self.counters.resent += 1;
-            self.outbox.push(id, Rank::First, 0, self.now);
+            let target = transfer.request.target;
+            self.outbox.push(id, Rank::First, target, 0, self.now);
             return;
         }
         let error = BusError::Lost { target: transfer.request.target, retries: transfer.retries };

@@ -8,9 +8,11 @@
 use alloc::collections::VecDeque;
 use core::time::Duration;
 
+use ringcat_wire::datagram::Target;
 use ringcat_wire::frame::{BYTE_TIME_NS, MAX_FRAME, wire_time_ns};
 
 use super::transfer::TransferId;
+use super::turns::Turns;
 use crate::time::Instant;
 
 /// Bytes of reads under way besides those that fill the wire for the time of a round trip.
@@ -29,12 +31,21 @@ pub(crate) enum Rank {
     Read,
 }
 
+/// A read that waits.
+#[derive(Clone, Copy, Debug)]
+struct Read {
+    id: TransferId,
+    bytes: usize,
+    since: Instant,
+    /// The round of everything else in which it came.
+    round: u64,
+}
+
 /// The queues.
 #[derive(Debug, Default)]
 pub(crate) struct Outbox {
-    first: VecDeque<TransferId>,
-    /// With their bytes, and since when they wait.
-    reads: VecDeque<(TransferId, usize, Instant)>,
+    first: Turns,
+    reads: VecDeque<Read>,
     /// Bytes of these.
     waiting: usize,
     /// Bytes of reads that were packed and are not back.
@@ -47,23 +58,26 @@ pub(crate) struct Outbox {
 
 impl Outbox {
     /// Queues a datagram that takes so many bytes of a frame.
-    pub(crate) fn push(&mut self, id: TransferId, rank: Rank, bytes: usize, now: Instant) {
+    pub(crate) fn push(&mut self, id: TransferId, rank: Rank, target: Target, bytes: usize, now: Instant) {
         match rank {
-            Rank::First => self.first.push_back(id),
+            Rank::First => self.first.push(id, target, bytes),
             Rank::Read => {
                 self.waiting += bytes;
-                self.reads.push_back((id, bytes, now));
+                self.reads.push_back(Read { id, bytes, since: now, round: self.first.round() });
             }
         }
     }
 
     /// What goes next, into a frame that may hold reads or not.
     pub(crate) fn front(&self, reads: bool, now: Instant) -> Option<(TransferId, Rank)> {
+        self.first.settle();
         let read = self.reads.front().filter(|_| reads);
         match (self.first.front(), read) {
-            (Some(_), Some((id, _, since))) if now.since(*since) >= PATIENCE => Some((*id, Rank::Read)),
-            (Some(id), _) => Some((*id, Rank::First)),
-            (None, Some((id, _, _))) => Some((*id, Rank::Read)),
+            (Some((_, round)), Some(read)) if round > read.round || now.since(read.since) >= PATIENCE => {
+                Some((read.id, Rank::Read))
+            }
+            (Some((id, _)), _) => Some((id, Rank::First)),
+            (None, Some(read)) => Some((read.id, Rank::Read)),
             (None, None) => None,
         }
     }
@@ -71,8 +85,8 @@ impl Outbox {
     /// It is packed, or nobody wants it any more.
     pub(crate) fn pop(&mut self, rank: Rank) {
         match rank {
-            Rank::First => drop(self.first.pop_front()),
-            Rank::Read => self.waiting -= self.reads.pop_front().map_or(0, |(_, bytes, _)| bytes),
+            Rank::First => self.first.pop(),
+            Rank::Read => self.waiting -= self.reads.pop_front().map_or(0, |read| read.bytes),
         }
     }
 
@@ -138,21 +152,21 @@ mod tests {
     fn requests_go_before_reads_unless_these_have_waited_for_long() {
         let [a, b, c] = ids();
         let mut outbox = Outbox::default();
-        outbox.push(a, Rank::Read, READ, Instant(0));
-        outbox.push(b, Rank::First, 40, Instant(10));
+        outbox.push(a, Rank::Read, Target::None, READ, Instant(0));
+        outbox.push(b, Rank::First, Target::None, 40, Instant(10));
         assert_eq!(outbox.front(true, Instant(10)), Some((b, Rank::First)));
         assert_eq!(outbox.front(true, Instant(0) + PATIENCE), Some((a, Rank::Read)));
         outbox.pop(Rank::Read);
         outbox.pop(Rank::First);
         assert_eq!(outbox.front(true, Instant(10)), None);
-        outbox.push(c, Rank::Read, READ, Instant(20));
+        outbox.push(c, Rank::Read, Target::None, READ, Instant(20));
         assert_eq!(outbox.front(false, Instant(20)), None, "this frame holds no reads");
     }
 
     #[test]
     fn reads_under_way_are_those_of_two_frames_and_of_the_way_through_the_segment() {
         let mut outbox = Outbox::default();
-        ids::<64>().into_iter().for_each(|id| outbox.push(id, Rank::Read, READ, Instant(0)));
+        ids::<64>().into_iter().for_each(|id| outbox.push(id, Rank::Read, Target::None, READ, Instant(0)));
         assert!(outbox.is_ready(Instant(0)));
         outbox.set_out(MAX_FRAME);
         assert!(outbox.is_ready(Instant(0)), "a second frame may go");
@@ -173,7 +187,7 @@ mod tests {
         let (begins, left) = outbox.hand_over(MAX_FRAME, Instant(100));
         assert_eq!((begins, left), (Instant(100), Instant(100 + wire_time_ns(MAX_FRAME))));
         assert_eq!(outbox.hand_over(60, Instant(100)).0, left, "one frame leaves after the other");
-        outbox.push(a, Rank::Read, READ, Instant(100));
+        outbox.push(a, Rank::Read, Target::None, READ, Instant(100));
         assert!(!outbox.is_ready(Instant(100)));
         let until = outbox.next_deadline(Instant(100)).unwrap();
         assert!(outbox.is_ready(until) && outbox.next_deadline(until).is_none());

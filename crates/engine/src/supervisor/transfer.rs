@@ -65,7 +65,7 @@ impl Transfer {
 }
 
 /// A transfer in the table; the generation tells re-used places apart.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) struct TransferId {
     index: u32,
     generation: u32,
