@@ -194,7 +194,9 @@ impl CablingWatch {
         let (busy, told, enhanced) = (self.busy.clone(), self.told.clone(), self.enhanced);
         bus.clone().spawn(async move {
             bus.sleep(SETTLE).await;
-            fleet.set_controlled_break(true);
+            // Only where the link is really taken down: a ring that breaks or closes meanwhile has to be told.
+            let in_control = enhanced && bus.links() == LinkSet::Ring && bus.ring() == RingState::Closed;
+            fleet.set_controlled_break(in_control);
             let found = crossings(&bus, &fleet, enhanced).await;
             fleet.set_controlled_break(false);
             if let Some(found) = found {
