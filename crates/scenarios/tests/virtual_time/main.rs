@@ -24,6 +24,7 @@ mod mail_matrix;
 mod mail_protocols;
 mod mail_services;
 mod mail_startup;
+mod mail_storm;
 mod mailbox_decoders;
 mod odd_sii;
 mod power_cycles;

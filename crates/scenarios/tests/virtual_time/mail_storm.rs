@@ -1,0 +1,160 @@
+//! Any interleaving of protocols, losses, faults of mail, cut cables and power cycles, by seed: no answer reaches another
+//! question, everything ends in bounded time, and nothing stays behind in mailboxes. Lists of drives in fragments are only
+//! asked afterwards: of fragments that a device itself loses or refuses, nothing tells in what is left.
+
+use std::cell::Cell;
+use std::rc::Rc;
+use std::time::Duration;
+
+use ringcat::Limits;
+use ringcat_engine::main_device::Pending;
+use ringcat_sim::application::mailbox::faults::MailFault;
+use ringcat_sim::cable::{CableId, DeviceIndex};
+use ringcat_sim::fault::Fault;
+use ringcat_sim::network::NetworkOptions;
+use ringcat_wire::mailbox::ErrorReply;
+use ringcat_wire::mailbox::foe::FoeErrorCode;
+use ringcat_wire::mailbox::sdo::AbortCode;
+use scenarios::dice::Dice;
+use scenarios::loss::Loss;
+use scenarios::mail_questions::{Asker, KINDS, Kind};
+use scenarios::segments::{descriptions, ring};
+use scenarios::world::World;
+
+/// Answers that are later than twice this are not told from those to the next question, where a protocol has nothing to
+/// tell them by (SoE, FoE, EoE; decision 0007): what happens here delays none for so long.
+const LIMITS: Limits = (Duration::from_millis(100), Duration::from_millis(250));
+const PLANT: [&str; 3] = ["all-protocols", "digital-input-8", "all-protocols"];
+/// The devices with all protocols, and where their mailboxes lie.
+const ALL: [usize; 2] = [0, 2];
+const RECEIVE: u16 = 0x1000;
+const SEND: u16 = 0x1400;
+/// Things that happen in a run.
+const HAPPENINGS: u32 = 12;
+/// Longest time that all questions under way may take when nothing happens any more: three limits each, some times.
+const END: Duration = Duration::from_secs(5);
+
+/// What all runs together came to.
+#[derive(Default)]
+struct Tally {
+    answered: Cell<u32>,
+    failed: Cell<u32>,
+}
+
+/// Something that goes wrong with the mail of a device.
+fn mail_fault(dice: &mut Dice) -> MailFault {
+    let count = 1 + dice.below(3) as u32;
+    match dice.below(10) {
+        0 => MailFault::LoseAnswers { count },
+        1 => MailFault::LoseRequests { count },
+        2 => MailFault::RepeatAnswers { count },
+        3 => MailFault::DelayAnswers { count, by: Duration::from_millis(dice.below(90)) },
+        4 => MailFault::WrongCounter { count: 1, counter: dice.below(8) as u8 },
+        5 => MailFault::EmergencyBefore { count, code: dice.roll() as u16 },
+        6 => MailFault::Refuse { count, detail: *dice.pick(&[ErrorReply::NO_MORE_MEMORY, 0x08]) },
+        7 => MailFault::AbortSdo { count, code: AbortCode::GENERAL },
+        8 => MailFault::BusyFoe { count },
+        _ => *dice.pick(&[
+            MailFault::FailFoe { code: FoeErrorCode::DISK_FULL },
+            MailFault::Full { during: Duration::from_millis(60) },
+        ]),
+    }
+}
+
+/// Something that happens; cables and power are back after a while.
+fn happen(world: &mut World, dice: &mut Dice) {
+    let device = *dice.pick(&ALL);
+    let station = world.station_of(device);
+    match dice.below(8) {
+        0..=2 => world.fault(Fault::Mail(DeviceIndex(device), mail_fault(dice))),
+        3 | 4 => {
+            let loss = if dice.one_in(2) { Loss::of_read(station, SEND) } else { Loss::of_write(station, RECEIVE) };
+            let loss = if dice.one_in(2) { loss.on_the_way_back() } else { loss };
+            world.lose(loss.times(1 + dice.below(4) as u32, dice.below(4) as u32));
+        }
+        5 | 6 => {
+            let cable = CableId(dice.below(PLANT.len() as u64 + 1) as usize);
+            world.cut(cable);
+            world.run_cycles(1 + dice.below(20));
+            world.heal(cable);
+        }
+        _ => {
+            world.power_off(DeviceIndex(device));
+            world.run_cycles(2 + dice.below(40));
+            world.power_on(DeviceIndex(device));
+        }
+    }
+}
+
+/// Questions of one kind, one after the other, until it is time to stop; those that were given up in the middle are gone.
+fn start(world: &mut World, device: usize, at: usize, stop: &Rc<Cell<bool>>, tally: &Rc<Tally>) -> Pending<()> {
+    let mailbox = world.mailbox(device);
+    let bus = mailbox.bus().clone();
+    let mut asker = Asker::new(KINDS[at], mailbox, LIMITS, true);
+    let (stop, tally) = (stop.clone(), tally.clone());
+    world.start(async move {
+        // Numbers differ between devices, kinds and questions.
+        let mut number = (device * 16 + at) as u32;
+        while !stop.get() {
+            number += 64;
+            let count = if asker.ask(number).await.is_ok() { &tally.answered } else { &tally.failed };
+            count.set(count.get() + 1);
+            bus.sleep(Duration::from_micros(300)).await;
+        }
+    })
+}
+
+fn run(seed: u64, tally: &Rc<Tally>) {
+    let mut dice = Dice::new(seed);
+    let options = NetworkOptions::default().with_detection_delay(Duration::from_micros(10 + dice.below(2000)));
+    let mut world = World::in_op(seed, ring(descriptions(&PLANT), options));
+    world.set_strict(false);
+    let stop = Rc::new(Cell::new(false));
+    let mut works = Vec::new();
+    for device in ALL {
+        // Five or so of the nine kinds, none twice.
+        for at in (0..KINDS.len()).filter(|at| KINDS[*at] != Kind::IdnList && !dice.one_in(3)) {
+            works.push(start(&mut world, device, at, &stop, tally));
+        }
+    }
+    for _ in 0..HAPPENINGS {
+        world.run_cycles(2 + dice.below(12));
+        happen(&mut world, &mut dice);
+        // Somebody loses patience: whatever it was in the middle of.
+        if dice.one_in(4) && works.len() > 2 {
+            drop(works.swap_remove(dice.below(works.len() as u64) as usize));
+        }
+    }
+    for device in ALL {
+        world.fault(Fault::Mail(DeviceIndex(device), MailFault::Heal));
+    }
+    stop.set(true);
+    for work in works {
+        world.finish(END, work);
+    }
+    world.settle();
+    // What was lost on purpose and never met its frame would meet the next one.
+    for (device, kind) in ALL.into_iter().flat_map(|device| KINDS.map(|kind| (device, kind))) {
+        let mut asker = Asker::new(kind, world.mailbox(device), (END, END), true);
+        let result = world.run(async move { asker.ask(0xFFFF).await });
+        assert_eq!(result, Ok(()), "seed {seed}, device {device}, {kind:?}");
+    }
+    world.run_cycles(150);
+    for device in ALL {
+        let mailbox = world.mailbox(device);
+        let counters = mailbox.counters();
+        assert!(mailbox.is_idle(), "seed {seed}, device {device}: {counters:?}");
+        assert_eq!((counters.malformed, counters.refused), (0, 0), "seed {seed}, device {device}");
+    }
+    assert_eq!(world.mailbox(ALL[0]).bus().stray_mails_dropped(), 0, "seed {seed}");
+}
+
+#[test]
+fn whatever_happens_to_mail_each_answer_finds_its_question_and_nothing_stays_seeds_0_to_29() {
+    let tally = Rc::new(Tally::default());
+    let seeds = std::env::var("RINGCAT_SEEDS").ok().and_then(|seeds| seeds.parse().ok()).unwrap_or(30);
+    (0..seeds).for_each(|seed| run(seed, &tally));
+    let (answered, failed) = (tally.answered.get(), tally.failed.get());
+    println!("{seeds} runs: {answered} questions answered, {failed} failed");
+    assert!(answered > 20 * seeds as u32 && failed > seeds as u32, "{answered} answered, {failed} failed");
+}
