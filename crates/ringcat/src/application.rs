@@ -272,7 +272,7 @@ impl<L: Links> Application<L, Inline> {
     pub fn stop(mut self, outputs: LastOutputs, state: AlState, limit: Duration) -> Result<MainDevice<L>, Error> {
         self.last_cycles(outputs);
         self.acyclic.0.start_stop(state, limit, self.links.now());
-        let mut main_device = MainDevice::from_parts(self.links, self.acyclic.0);
+        let mut main_device = MainDevice::from_parts(self.links, self.acyclic.0, self.window.budget());
         main_device.finish_stop()?;
         Ok(main_device)
     }

@@ -24,6 +24,7 @@ use crate::acyclic::{Inline, carry_out_link_order};
 use crate::application::Application;
 use crate::error::Error;
 use crate::links::Links;
+use crate::window::{DEFAULT_BUDGET, Window};
 
 /// How a MainDevice works. The addresses come from the links.
 #[derive(Clone, Debug)]
@@ -45,6 +46,9 @@ pub struct Options {
     /// Whether the redundant link may be taken down for a moment, when ports have changed, to find out where a line is
     /// crossed ([`Links::force_disconnect`]). Without, a closed ring shows only that there is a crossing.
     pub enhanced_line_crossed: bool,
+    /// Bytes that everything but process data may send in a cycle, on each link; never more than what is left of the
+    /// cycle's time on the wire, and a longest frame at least. SubDevices share it fairly.
+    pub acyclic_bytes: usize,
 }
 
 impl Default for Options {
@@ -58,6 +62,7 @@ impl Default for Options {
             patience: Duration::from_secs(5),
             junctions: JunctionMode::Disabled,
             enhanced_line_crossed: false,
+            acyclic_bytes: DEFAULT_BUDGET,
         }
     }
 }
@@ -86,13 +91,14 @@ impl Options {
 pub struct MainDevice<L> {
     links: L,
     engine: Engine,
+    acyclic_bytes: usize,
 }
 
 impl<L: Links> MainDevice<L> {
     /// A MainDevice on these links.
     pub fn request(links: L, options: &Options) -> MainDevice<L> {
         let engine = options.engine(&links);
-        MainDevice { links, engine }
+        MainDevice { links, engine, acyclic_bytes: options.acyclic_bytes }
     }
 
     /// Scans the segment; all SubDevices are in INIT afterwards.
@@ -132,7 +138,7 @@ impl<L: Links> MainDevice<L> {
 
     /// Receives, lets procedures go on, sends.
     fn work(&mut self) {
-        let MainDevice { links, engine } = self;
+        let MainDevice { links, engine, .. } = self;
         let now = links.now();
         while links.receive(&mut |link, frame| {
             engine.receive(link, frame, now);
@@ -255,14 +261,15 @@ impl<L: Links> MainDevice<L> {
     /// Nothing is loaded, or it does not fit what was scanned. The MainDevice comes back with the error, and what was
     /// loaded with it.
     pub fn apply(mut self) -> Result<Application<L>, Box<Refused<MainDevice<L>>>> {
+        let window = Arc::new(Window::new(self.acyclic_bytes));
         match self.engine.apply() {
-            Ok(active) => Ok(Application::new(self.links, Inline(self.engine), active, Arc::default())),
+            Ok(active) => Ok(Application::new(self.links, Inline(self.engine), active, window)),
             Err(error) => Err(Box::new(Refused { error: error.into(), main_device: self })),
         }
     }
 
-    pub(crate) fn from_parts(links: L, engine: Engine) -> MainDevice<L> {
-        MainDevice { links, engine }
+    pub(crate) fn from_parts(links: L, engine: Engine, acyclic_bytes: usize) -> MainDevice<L> {
+        MainDevice { links, engine, acyclic_bytes }
     }
 
     /// Waits for the end of a stop that the engine has begun.

@@ -82,7 +82,7 @@ impl SupervisorThread {
         let (requests, incoming) = channel();
         let (outgoing, events) = sync_channel(EVENTS);
         let published = Arc::new(Published::default());
-        let window = Arc::new(Window::default());
+        let window = Arc::new(Window::new(options.acyclic_bytes));
         let options = options.clone();
         let (shared, windows) = (published.clone(), window.clone());
         let body = move || {

@@ -9,7 +9,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Duration;
 
 use ringcat_engine::time::Instant;
-use ringcat_wire::frame::{BYTE_TIME_NS, MAX_FRAME, WIRE_OVERHEAD, wire_time_ns};
+use ringcat_wire::frame::{BYTE_TIME_NS, MAX_FRAME, MIN_FRAME, WIRE_OVERHEAD, wire_time_ns};
 
 /// Before a cycle begins, the wire is left to itself for so long: an acyclic frame that is under way then has passed
 /// the interface.
@@ -64,6 +64,11 @@ impl Window {
         }
     }
 
+    /// Bytes that the acyclic half may send in a cycle.
+    pub const fn budget(&self) -> usize {
+        self.budget
+    }
+
     /// Says when cyclic frames leave next.
     pub fn expect_cycle(&self, at: Instant) {
         self.next_cycle.store(at.0, Ordering::Relaxed);
@@ -101,7 +106,9 @@ impl Window {
         let bytes = Instant(next).since(self.free_at(now) + GUARD).as_nanos() / u128::from(BYTE_TIME_NS);
         let room = usize::try_from(bytes).unwrap_or(usize::MAX).saturating_sub(WIRE_OVERHEAD);
         let spent = usize::try_from(self.spent_before(next)).unwrap_or(usize::MAX);
-        room.min(self.budget.saturating_sub(spent))
+        let left = room.min(self.budget.saturating_sub(spent));
+        // No frame is shorter on the wire.
+        if left < MIN_FRAME { 0 } else { left }
     }
 
     /// When to look again for room that there is not now.

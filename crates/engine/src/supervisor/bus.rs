@@ -164,17 +164,7 @@ impl Bus {
         expected: Option<Wkc>,
     ) -> impl Future<Output = Result<Reply, BusError>> {
         let resend = !matches!(command, Command::Aprw | Command::Fprw | Command::Brw | Command::Lrw);
-        self.submit(Request {
-            command,
-            target,
-            data,
-            redundant: None,
-            redundant_station: None,
-            expected,
-            resend,
-            lead: None,
-            mail: None,
-        })
+        self.submit(Request { expected, resend, ..Request::once(command, target, data) })
     }
 
     /// Positions from here on live behind the redundant link (facts CR-09). Broadcasts show it, too.
@@ -189,17 +179,7 @@ impl Bus {
         target: Target,
         data: Vec<u8>,
     ) -> impl Future<Output = Result<Reply, BusError>> {
-        self.submit(Request {
-            command,
-            target,
-            data,
-            redundant: None,
-            redundant_station: None,
-            expected: Some(Wkc(1)),
-            resend: false,
-            lead: None,
-            mail: None,
-        })
+        self.submit(Request { expected: Some(Wkc(1)), ..Request::once(command, target, data) })
     }
 
     /// A datagram of the application's own: its answer is that of all copies, whatever its working counter. Where it may
@@ -211,17 +191,7 @@ impl Bus {
         data: Vec<u8>,
         resend: bool,
     ) -> impl Future<Output = Result<Reply, BusError>> {
-        self.submit(Request {
-            command,
-            target,
-            data,
-            redundant: None,
-            expected: None,
-            resend,
-            lead: None,
-            mail: None,
-            redundant_station: None,
-        })
+        self.submit(Request { resend, ..Request::once(command, target, data) })
     }
 
     /// Exchanges a register for other data: each SubDevice with this station address hands its old value on with the
@@ -236,17 +206,7 @@ impl Bus {
         let target = Target::Station(station, register);
         let redundant = Some(redundant).filter(|data| data.len() == main.len());
         let (command, data) = (Command::Fprw, main);
-        self.submit(Request {
-            command,
-            target,
-            data,
-            redundant,
-            redundant_station: None,
-            expected: None,
-            resend: false,
-            lead: None,
-            mail: None,
-        })
+        self.submit(Request { redundant, ..Request::once(command, target, data) })
     }
 
     /// Hands the time of one SubDevice's clock to all others, once: on each link that of a station of its own. Where nobody
@@ -260,15 +220,9 @@ impl Bus {
     ) -> impl Future<Output = Result<Reply, BusError>> {
         let [main, redundant] = stations;
         self.submit(Request {
-            command: Command::Frmw,
-            target: Target::Station(main, register),
-            data: time.to_le_bytes().to_vec(),
-            redundant: None,
             redundant_station: Some(redundant),
             expected: Some(expected),
-            resend: false,
-            lead: None,
-            mail: None,
+            ..Request::once(Command::Frmw, Target::Station(main, register), time.to_le_bytes().to_vec())
         })
     }
 
@@ -291,17 +245,7 @@ impl Bus {
             whole.resize(usize::from(size), 0);
             (None, at(0), whole)
         };
-        self.submit(Request {
-            command,
-            target,
-            data,
-            redundant: None,
-            redundant_station: None,
-            expected,
-            resend: false,
-            lead,
-            mail: None,
-        })
+        self.submit(Request { expected, lead, ..Request::once(command, target, data) })
     }
 
     /// Reads a mailbox, once. What a second copy reads, and what comes back late, is kept for [`Bus::stray_mail`].
@@ -313,17 +257,7 @@ impl Bus {
     ) -> impl Future<Output = Result<Reply, BusError>> {
         let (target, data) = (Target::Station(station, register), vec![0; length]);
         let (command, expected, mail) = (Command::Fprd, Some(Wkc(1)), Some(station));
-        self.submit(Request {
-            command,
-            target,
-            data,
-            redundant: None,
-            redundant_station: None,
-            expected,
-            resend: false,
-            lead: None,
-            mail,
-        })
+        self.submit(Request { expected, mail, ..Request::once(command, target, data) })
     }
 
     /// The oldest mail of a SubDevice that came back when nobody waited for it any more.
@@ -483,17 +417,7 @@ impl Bus {
     ) -> Result<Vec<Reply>, BusError> {
         let mut waiting: Vec<TransferFuture> = Vec::new();
         for (command, target, data) in datagrams {
-            waiting.push(self.submit(Request {
-                command,
-                target,
-                data,
-                redundant: None,
-                redundant_station: None,
-                expected,
-                resend: true,
-                lead: None,
-                mail: None,
-            }));
+            waiting.push(self.submit(Request { expected, resend: true, ..Request::once(command, target, data) }));
         }
         let mut results: Vec<Option<Result<Reply, BusError>>> = waiting.iter().map(|_| None).collect();
         poll_fn(|context| {

@@ -30,6 +30,23 @@ pub(crate) struct Request {
     pub mail: Option<StationAddress>,
 }
 
+impl Request {
+    /// A datagram that is sent once, both copies alike, and waits for both.
+    pub(crate) const fn once(command: Command, target: Target, data: Vec<u8>) -> Request {
+        Request {
+            command,
+            target,
+            data,
+            redundant: None,
+            redundant_station: None,
+            expected: None,
+            resend: false,
+            lead: None,
+            mail: None,
+        }
+    }
+}
+
 /// How far a transfer is.
 #[derive(Debug)]
 pub(crate) enum Stage {

@@ -15,7 +15,8 @@ use super::transfer::TransferId;
 
 /// Bytes that everybody may send in a round: the longest datagram, so that a SubDevice's mail is never more than a round.
 const SHARE: u64 = 1536;
-/// Accounts that are kept while others wait; beyond, those that owe nothing are forgotten.
+/// Accounts that are kept while others wait; beyond, those that owe nothing are looked for and forgotten. Where most of
+/// them owe something, the next look waits until there are twice as many, so that looking costs each datagram little.
 const ACCOUNTS: usize = 4096;
 
 /// Who is addressed.
@@ -51,6 +52,8 @@ pub(super) struct Turns {
     waiting: BinaryHeap<Reverse<Waiting>>,
     /// Bytes up to which each account is used, on a scale on which a round has [`SHARE`] bytes.
     used: BTreeMap<Account, u64>,
+    /// Accounts at which those that owe nothing are forgotten; at least [`ACCOUNTS`].
+    limit: usize,
     /// The round that is under way.
     round: Cell<u64>,
     order: u64,
@@ -69,8 +72,9 @@ impl Turns {
     /// Queues a datagram that takes so many bytes of a frame.
     pub(super) fn push(&mut self, id: TransferId, target: Target, bytes: usize) {
         let begin = self.round.get() * SHARE;
-        if self.used.len() >= ACCOUNTS {
+        if self.used.len() >= self.limit.max(ACCOUNTS) {
             self.used.retain(|_, used| *used > begin);
+            self.limit = 2 * self.used.len();
         }
         let used = self.used.entry(Account::of(target)).or_default();
         let from = begin.max(*used);
@@ -98,6 +102,7 @@ impl Turns {
         if self.waiting.is_empty() {
             // Nobody owes anybody anything.
             self.used.clear();
+            self.limit = 0;
             self.round.set(0);
         }
     }
@@ -142,6 +147,18 @@ mod tests {
         let served: Vec<u16> = core::iter::from_fn(|| bench.next()).collect();
         assert_eq!(served, asked);
         assert!(bench.turns.is_empty() && bench.turns.used.is_empty());
+    }
+
+    #[test]
+    fn accounts_are_looked_through_seldom_however_many_owe_something() {
+        let mut turns = Turns::default();
+        let mut transfers = Transfers::default();
+        for station in 0..=u16::MAX {
+            let id = transfers.insert(Transfer::for_test());
+            turns.push(id, Target::Station(StationAddress(station), RegisterAddress(0)), 16);
+        }
+        // From 4,096 on, each look leaves all of them: 8,192, 16,384, and so on.
+        assert_eq!((turns.used.len(), turns.limit), (1 << 16, 1 << 16));
     }
 
     #[test]

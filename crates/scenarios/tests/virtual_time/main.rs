@@ -16,6 +16,7 @@ mod eeprom_writes;
 mod ethernet;
 mod explorer;
 mod failures;
+mod fairness;
 mod hot_connect;
 mod junctions;
 mod mail;

@@ -1,0 +1,98 @@
+//! The wire is shared fairly between SubDevices, and the byte budget of the acyclic half holds in every cycle.
+
+use std::cell::Cell;
+use std::rc::Rc;
+use std::time::Duration;
+
+use ringcat::{Options, RawDatagram, automatic};
+use ringcat_engine::mail::coe::{self, SdoAddress};
+use ringcat_engine::mail::foe::{self, FoeOptions};
+use ringcat_engine::mail::stream::Bytes;
+use ringcat_engine::mail::{Limits, Mailbox};
+use ringcat_sim::network::NetworkOptions;
+use ringcat_wire::address::{RegisterAddress, StationAddress};
+use ringcat_wire::command::Command;
+use ringcat_wire::datagram::Target;
+use scenarios::segments::{descriptions, line};
+use scenarios::world::{CYCLE, World};
+
+const LIMITS: Limits = (Duration::from_secs(5), Duration::from_secs(5));
+const BUDGET: usize = 4_000;
+/// SubDevices with objects; behind them one with files.
+const DRIVES: usize = 50;
+const FILES: usize = DRIVES + 1;
+const CYCLES: u64 = 250;
+
+fn world(seed: u64) -> World {
+    let mut kinds = vec!["coupler"];
+    kinds.extend(["servo"; DRIVES]);
+    kinds.push("all-protocols");
+    let options = Options { acyclic_bytes: BUDGET, ..Options::default() };
+    let network = line(descriptions(&kinds), NetworkOptions::default());
+    let declare = |scan: &ringcat::Scan| automatic(&scan.subdevices, CYCLE);
+    let mut world = World::with(seed, network, &options, declare).expect("activation");
+    world.settle();
+    world
+}
+
+/// Reads objects one after the other, and counts.
+async fn read_on(mailbox: Mailbox, count: Rc<Cell<u32>>) {
+    let object = SdoAddress::new(0x1018, 1);
+    while coe::read(&mailbox, object, LIMITS, 4).await.is_ok() {
+        count.set(count.get() + 1);
+    }
+}
+
+/// Answered SDOs per drive, each asking without end, and the most bytes of the acyclic half in a cycle.
+fn answered(world: &mut World) -> (Vec<u32>, u64) {
+    let counts: Vec<Rc<Cell<u32>>> = (0..DRIVES).map(|_| Rc::default()).collect();
+    let drives: Vec<_> = (1..=DRIVES).map(|drive| world.mailbox(drive)).collect();
+    let work: Vec<_> =
+        drives.into_iter().zip(&counts).map(|(mailbox, count)| world.start(read_on(mailbox, count.clone()))).collect();
+    // Everybody has begun.
+    world.run_cycles(30);
+    counts.iter().for_each(|count| count.set(0));
+    let mut most = 0;
+    for _ in 0..CYCLES {
+        let before = world.application().acyclic_counters().bytes;
+        world.cycle();
+        most = most.max(world.application().acyclic_counters().bytes - before);
+    }
+    drop(work);
+    (counts.iter().map(|count| count.get()).collect(), most)
+}
+
+#[test]
+fn a_long_file_and_a_flood_of_datagrams_leave_fifty_others_their_share_and_the_budget_holds() {
+    let mut world = world(1);
+    let (alone, most) = answered(&mut world);
+    assert!(most <= BUDGET as u64, "{most} bytes in a cycle");
+    let least = *alone.iter().min().expect("fifty");
+    // More is asked for than the budget has room for.
+    assert!(least >= 20 && most > BUDGET as u64 * 9 / 10, "{least} answers, {most} bytes in a cycle");
+    let mailbox = world.mailbox(FILES);
+    let file = world.start(async move {
+        let options = FoeOptions { limits: LIMITS, ..FoeOptions::default() };
+        let mut packets = 0;
+        foe::write(&mailbox, "recipe", options, &mut Bytes::new(&[7; 1 << 20]), |_| packets += 1).await.map(drop)
+    });
+    // 1,024 datagrams of 400 bytes to the first one.
+    let station = StationAddress(world.station_of(0));
+    let read = RawDatagram {
+        command: Command::Fprd,
+        target: Target::Station(station, RegisterAddress(0)),
+        data: vec![0; 388],
+        resend: true,
+    };
+    let flood = world.application_mut().engine_mut().start_datagrams(vec![read; 1024]);
+    let (beside, most) = answered(&mut world);
+    assert!(most <= BUDGET as u64, "{most} bytes in a cycle");
+    assert!(flood.is_running(), "it takes longer than that");
+    let [fewest, all, all_alone] =
+        [*beside.iter().min().expect("fifty"), beside.iter().sum(), alone.iter().sum::<u32>()];
+    println!("{all_alone} SDOs alone, {all} beside a file and a flood; at least {least} and {fewest} per drive");
+    // Turns are fair, not bytes: in each of them the two that are new send a full frame, the others what an SDO takes.
+    assert!(fewest * 10 >= least * 6 && all * 10 >= all_alone * 6, "{alone:?} {beside:?}");
+    drop((file, flood));
+    assert!(world.all_in_op());
+}
