@@ -12,8 +12,29 @@ mod voe;
 
 pub use register::RegisterRequest;
 pub use sdo::SdoRequest;
-pub use slot::{RequestFailure, RequestRefused, RequestState};
+pub use slot::{Request, RequestFailure, RequestRefused, RequestState};
 pub use soe::SoeRequest;
 pub use voe::VoeHandler;
 
 pub(crate) use slot::{Access, Order, Served, Subject};
+
+/// Gives a kind of request what all have in common.
+macro_rules! requests {
+    ($($kind:ty),*) => {$(
+        impl core::ops::Deref for $kind {
+            type Target = Request;
+
+            fn deref(&self) -> &Request {
+                &self.request
+            }
+        }
+
+        impl core::ops::DerefMut for $kind {
+            fn deref_mut(&mut self) -> &mut Request {
+                &mut self.request
+            }
+        }
+    )*};
+}
+
+requests!(RegisterRequest, SdoRequest, SoeRequest, VoeHandler);

@@ -93,7 +93,7 @@ pub use ringcat_engine::procedures::services::ServiceError;
 pub use ringcat_engine::procedures::services::statistics::{PortErrors, Statistics};
 pub use ringcat_engine::procedures::stop::StopError;
 pub use ringcat_engine::request::{
-    RegisterRequest, RequestFailure, RequestRefused, RequestState, SdoRequest, SoeRequest, VoeHandler,
+    RegisterRequest, Request, RequestFailure, RequestRefused, RequestState, SdoRequest, SoeRequest, VoeHandler,
 };
 pub use ringcat_engine::ring::RingState;
 pub use ringcat_engine::ring_status::{Cable, CableErrors, LinkStatus, Redundancy, RedundancyLoss, RingStatus};

@@ -56,10 +56,23 @@ pub fn is_installed() -> bool {
 /// # Errors
 /// Valgrind or the program fails, or the output cannot be read.
 pub fn profile_self(arguments: &[String]) -> io::Result<Profile> {
+    profile(&[], arguments)
+}
+
+/// As [`profile_self`], and counts within functions of this name alone; `*` stands for anything.
+///
+/// # Errors
+/// As [`profile_self`].
+pub fn profile_self_within(function: &str, arguments: &[String]) -> io::Result<Profile> {
+    profile(&[format!("--toggle-collect={function}")], arguments)
+}
+
+fn profile(options: &[String], arguments: &[String]) -> io::Result<Profile> {
     let directory = Directory::new(&arguments.join("-"))?;
     let out = directory.0.join("callgrind.out");
     let status = Command::new("valgrind")
         .args(["--tool=callgrind", "--quiet", "--compress-strings=no"])
+        .args(options)
         .arg(format!("--callgrind-out-file={}", out.display()))
         .arg(env::current_exe()?)
         .args(arguments)

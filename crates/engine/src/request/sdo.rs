@@ -1,82 +1,46 @@
 //! SDO requests of a cyclic thread.
 
-use core::time::Duration;
-
-use super::slot::{Owned, RequestFailure, RequestRefused, RequestState, Served, Subject, pair};
+use super::slot::{Request, RequestRefused, Served, Subject, pair};
 
 /// A request for objects of one SubDevice. It may be moved to the cyclic thread.
 #[derive(Debug)]
 pub struct SdoRequest {
-    owned: Owned,
+    pub(super) request: Request,
 }
 
 impl SdoRequest {
     /// A request of `size` bytes for an object of a declared SubDevice, and its other side.
     pub(crate) fn new(subdevice: usize, size: usize) -> (SdoRequest, Served) {
         let subject = Subject::Object { index: 0, sub_index: 0, complete_access: false };
-        let (owned, served) = pair(subdevice, size, subject);
-        (SdoRequest { owned }, served)
+        let (request, served) = pair(subdevice, size, subject);
+        (SdoRequest { request }, served)
     }
 
     /// Turns to another object of the same SubDevice.
     pub fn set_object(&mut self, index: u16, sub_index: u8, complete_access: bool) -> Result<(), RequestRefused> {
-        self.owned.set_subject(Subject::Object { index, sub_index, complete_access })
+        self.request.set_subject(Subject::Object { index, sub_index, complete_access })
     }
 
     /// Starts to read.
     pub fn read(&mut self) -> Result<(), RequestRefused> {
-        self.owned.read()
+        self.request.start_read()
     }
 
     /// Starts to write.
     pub fn write(&mut self, data: &[u8]) -> Result<(), RequestRefused> {
-        self.owned.write(data)
-    }
-
-    /// How far it is.
-    pub fn state(&self) -> RequestState {
-        self.owned.state()
-    }
-
-    /// Sets the time that the request may take in all, for all later uses, up to an hour.
-    pub fn set_timeout(&mut self, timeout: Duration) -> Result<(), RequestRefused> {
-        self.owned.set_timeout(timeout)
-    }
-
-    /// Has a request that is under way end as soon as the acyclic half looks, with [`RequestFailure::Cancelled`].
-    pub fn cancel(&self) {
-        self.owned.cancel();
-    }
-
-    /// Bytes that were read or written last.
-    pub fn len(&self) -> usize {
-        self.owned.len()
-    }
-
-    /// Whether nothing was read or written.
-    pub fn is_empty(&self) -> bool {
-        self.len() == 0
-    }
-
-    /// Copies the data out, as much as fits, and returns how much that is. Nothing while the request is busy.
-    pub fn data(&self, out: &mut [u8]) -> usize {
-        self.owned.data(out)
-    }
-
-    /// Why it failed, where it did.
-    pub fn failure(&self) -> Option<RequestFailure> {
-        self.owned.failure()
+        self.request.start_write(data)
     }
 }
 
 #[cfg(test)]
 mod tests {
     use alloc::vec;
+    use core::time::Duration;
 
     use ringcat_wire::mailbox::sdo::AbortCode;
 
     use super::*;
-    use crate::request::Access;
+    use crate::request::{Access, RequestFailure, RequestState};
 
     #[test]
     fn a_request_goes_to_the_other_side_and_comes_back_with_what_was_read() {

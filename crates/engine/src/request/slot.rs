@@ -140,9 +140,9 @@ struct Slot {
     data: Box<[AtomicU8]>,
 }
 
-/// The side of the application, in the request of some kind.
+/// What requests of all kinds have in common, on the side of the application.
 #[derive(Debug)]
-pub(super) struct Owned {
+pub struct Request {
     slot: Arc<Slot>,
 }
 
@@ -156,7 +156,7 @@ pub(crate) struct Served {
 const DEFAULT_TIMEOUT: Duration = Duration::from_secs(1);
 
 /// A request with `size` bytes of memory to a declared SubDevice, and its other side.
-pub(super) fn pair(subdevice: usize, size: usize, subject: Subject) -> (Owned, Served) {
+pub(super) fn pair(subdevice: usize, size: usize, subject: Subject) -> (Request, Served) {
     let slot = Arc::new(Slot {
         subdevice,
         state: AtomicU8::new(UNUSED),
@@ -168,11 +168,12 @@ pub(super) fn pair(subdevice: usize, size: usize, subject: Subject) -> (Owned, S
         failure: AtomicU64::new(0),
         data: (0..size).map(|_| AtomicU8::new(0)).collect(),
     });
-    (Owned { slot: slot.clone() }, Served { slot })
+    (Request { slot: slot.clone() }, Served { slot })
 }
 
-impl Owned {
-    pub(super) fn state(&self) -> RequestState {
+impl Request {
+    /// How far it is.
+    pub fn state(&self) -> RequestState {
         match self.slot.state.load(Ordering::Acquire) {
             UNUSED => RequestState::Unused,
             SUCCESS => RequestState::Success,
@@ -192,7 +193,11 @@ impl Owned {
         Ok(())
     }
 
-    pub(super) fn set_timeout(&mut self, timeout: Duration) -> Result<(), RequestRefused> {
+    /// Sets the time that the request may take in all, for all later uses, up to an hour.
+    ///
+    /// # Errors
+    /// It is under way.
+    pub fn set_timeout(&mut self, timeout: Duration) -> Result<(), RequestRefused> {
         self.check()?;
         let micros = timeout.as_micros().clamp(1, 3_600_000_000) as u32;
         self.slot.timeout_us.store(micros, Ordering::Relaxed);
@@ -204,26 +209,27 @@ impl Owned {
         self.slot.state.store(asked, Ordering::Release);
     }
 
-    pub(super) fn read(&mut self) -> Result<(), RequestRefused> {
+    pub(super) fn start_read(&mut self) -> Result<(), RequestRefused> {
         self.check()?;
         self.start(READ_ASKED);
         Ok(())
     }
 
-    pub(super) fn read_directly(&mut self) -> Result<(), RequestRefused> {
+    pub(super) fn start_read_directly(&mut self) -> Result<(), RequestRefused> {
         self.check()?;
         self.start(DIRECT_READ_ASKED);
         Ok(())
     }
 
-    pub(super) fn write(&mut self, data: &[u8]) -> Result<(), RequestRefused> {
+    pub(super) fn start_write(&mut self, data: &[u8]) -> Result<(), RequestRefused> {
         self.check()?;
         self.slot.put(data)?;
         self.start(WRITE_ASKED);
         Ok(())
     }
 
-    pub(super) fn cancel(&self) {
+    /// Has a request that is under way end as soon as the acyclic half looks, with [`RequestFailure::Cancelled`].
+    pub fn cancel(&self) {
         if self.state() == RequestState::Busy {
             self.slot.cancelled.store(true, Ordering::Release);
         }
@@ -233,11 +239,18 @@ impl Owned {
         self.slot.data.len()
     }
 
-    pub(super) fn len(&self) -> usize {
+    /// Bytes that were read or written last.
+    pub fn len(&self) -> usize {
         self.slot.length.load(Ordering::Relaxed) as usize
     }
 
-    pub(super) fn data(&self, out: &mut [u8]) -> usize {
+    /// Whether nothing was read or written.
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+
+    /// Copies the data out, as much as fits, and returns how much that is. Nothing while the request is busy.
+    pub fn data(&self, out: &mut [u8]) -> usize {
         if self.state() == RequestState::Busy {
             return 0;
         }
@@ -253,7 +266,8 @@ impl Owned {
         (word != 0 && self.state() == RequestState::Success).then_some(Subject::unpack(word))
     }
 
-    pub(super) fn failure(&self) -> Option<RequestFailure> {
+    /// Why it failed, where it did.
+    pub fn failure(&self) -> Option<RequestFailure> {
         if self.state() != RequestState::Error {
             return None;
         }

@@ -1,20 +1,18 @@
 //! VoE handlers of a cyclic thread (seed 004: VoE handlers).
 
-use core::time::Duration;
-
-use super::slot::{Owned, RequestFailure, RequestRefused, RequestState, Served, Subject, pair};
+use super::slot::{Request, RequestRefused, RequestState, Served, Subject, pair};
 
 /// Vendor messages to and from one SubDevice. It may be moved to the cyclic thread.
 #[derive(Debug)]
 pub struct VoeHandler {
-    owned: Owned,
+    pub(super) request: Request,
 }
 
 impl VoeHandler {
     /// A handler of messages of up to `size` bytes, their header not counted, and its other side.
     pub(crate) fn new(subdevice: usize, size: usize) -> (VoeHandler, Served) {
-        let (owned, served) = pair(subdevice, size, Subject::Vendor { id: 0, kind: 0 });
-        (VoeHandler { owned }, served)
+        let (request, served) = pair(subdevice, size, Subject::Vendor { id: 0, kind: 0 });
+        (VoeHandler { request }, served)
     }
 
     /// Sets the header of all messages that are written from now on.
@@ -22,12 +20,12 @@ impl VoeHandler {
     /// # Errors
     /// It is under way.
     pub fn set_send_header(&mut self, vendor_id: u32, vendor_type: u16) -> Result<(), RequestRefused> {
-        self.owned.set_subject(Subject::Vendor { id: vendor_id, kind: vendor_type })
+        self.request.set_subject(Subject::Vendor { id: vendor_id, kind: vendor_type })
     }
 
     /// Vendor and type of the message that was read.
     pub fn received_header(&self) -> Option<(u32, u16)> {
-        match self.owned.answered() {
+        match self.request.answered() {
             Some(Subject::Vendor { id, kind }) => Some((id, kind)),
             Some(Subject::Object { .. } | Subject::Register { .. } | Subject::Idn { .. }) | None => None,
         }
@@ -39,7 +37,7 @@ impl VoeHandler {
     /// # Errors
     /// It is under way.
     pub fn read(&mut self) -> Result<(), RequestRefused> {
-        self.owned.read()
+        self.request.start_read()
     }
 
     /// As [`VoeHandler::read`], but the mailbox is read at once, and again and again, without a look at its status: for
@@ -49,7 +47,7 @@ impl VoeHandler {
     /// It is under way.
     #[doc(alias = "read_nosync")]
     pub fn read_directly(&mut self) -> Result<(), RequestRefused> {
-        self.owned.read_directly()
+        self.request.start_read_directly()
     }
 
     /// Starts to send a message with the header that was set.
@@ -57,46 +55,11 @@ impl VoeHandler {
     /// # Errors
     /// It is under way, or its memory is shorter than the data.
     pub fn write(&mut self, data: &[u8]) -> Result<(), RequestRefused> {
-        self.owned.write(data)
+        self.request.start_write(data)
     }
 
     /// To be called once per cycle while it says busy. The work is done by the acyclic half.
     pub fn execute(&mut self) -> RequestState {
         self.state()
-    }
-
-    /// How far it is.
-    pub fn state(&self) -> RequestState {
-        self.owned.state()
-    }
-
-    /// Sets the time that the request may take in all, for all later uses, up to an hour.
-    pub fn set_timeout(&mut self, timeout: Duration) -> Result<(), RequestRefused> {
-        self.owned.set_timeout(timeout)
-    }
-
-    /// Has a request that is under way end as soon as the acyclic half looks, with [`RequestFailure::Cancelled`].
-    pub fn cancel(&self) {
-        self.owned.cancel();
-    }
-
-    /// Bytes that were read or written last.
-    pub fn len(&self) -> usize {
-        self.owned.len()
-    }
-
-    /// Whether nothing was read or written.
-    pub fn is_empty(&self) -> bool {
-        self.len() == 0
-    }
-
-    /// Copies the data out, as much as fits, and returns how much that is. Nothing while the request is busy.
-    pub fn data(&self, out: &mut [u8]) -> usize {
-        self.owned.data(out)
-    }
-
-    /// Why it failed, where it did.
-    pub fn failure(&self) -> Option<RequestFailure> {
-        self.owned.failure()
     }
 }

@@ -6,6 +6,7 @@ mod ethernet;
 mod gateway;
 mod junctions;
 mod services;
+mod states;
 mod stop;
 mod threads;
 mod triggers;

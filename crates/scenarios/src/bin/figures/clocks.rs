@@ -34,7 +34,7 @@ const PHASE_BAR: f64 = 5_000.0;
 const LOCK_BAR: f64 = 3.0;
 const HOST_JITTER: Duration = Duration::from_micros(50);
 
-fn main() -> ExitCode {
+pub fn main() -> ExitCode {
     let mut figures = Figures::new("distributed clocks, in virtual time");
     let options = NetworkOptions::default;
     delays(&mut figures, "line of 200", |ideal| line(descriptions(200, ideal), options()));

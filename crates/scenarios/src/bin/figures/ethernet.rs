@@ -24,7 +24,7 @@ const LIMIT: Duration = Duration::from_secs(60);
 const BAR: f64 = 300.0;
 const ADDRESSES: Addresses = Addresses { mac: [2, 0, 0, 0, 0, 9], host: [10, 0, 0, 1], device: [10, 0, 0, 2] };
 
-fn main() -> ExitCode {
+pub fn main() -> ExitCode {
     let mut figures = Figures::new("EoE: TCP through the mailbox of one SubDevice, virtual time");
     for (mailbox, bar) in [(1486, Some(BAR)), (256, None)] {
         for cycle in [1, 10] {

@@ -26,8 +26,8 @@ const RANDOM_RUNS: u64 = 10_000;
 /// Workers of this bench.
 const THREADS: u64 = 2;
 
-fn main() -> ExitCode {
-    if let Some(seed) = std::env::args().nth(1).and_then(|text| text.parse().ok()) {
+pub fn main() -> ExitCode {
+    if let Some(seed) = std::env::args().nth(2).and_then(|text| text.parse().ok()) {
         short_runs::run(seed);
         println!("seed {seed} holds");
         return ExitCode::SUCCESS;

@@ -13,7 +13,7 @@ const BAR: f64 = 1.5;
 /// Bytes of a mailbox, ms of a cycle. With 1 ms, process data takes more than a fifth of the wire, with 4 ms a twentieth.
 const CASES: [(u16, u64); 4] = [(128, 1), (128, 4), (1024, 1), (1024, 4)];
 
-fn main() -> ExitCode {
+pub fn main() -> ExitCode {
     let mut met = true;
     for (mailbox, period_ms) in CASES {
         let title = format!("{DRIVES} drives, {OBJECTS} objects each, {mailbox}-byte mailboxes, {period_ms} ms cycle");

@@ -15,7 +15,7 @@ use scenarios::segments::plant;
 /// Most milliseconds to OP, by SubDevices.
 const BARS: [(usize, f64); 3] = [(1, 60.0), (10, 60.0), (50, 60.0)];
 
-fn main() -> ExitCode {
+pub fn main() -> ExitCode {
     match measure() {
         Ok(met) => verdict(met),
         Err(error) => {

@@ -56,7 +56,7 @@ impl Start {
     }
 }
 
-fn main() -> ExitCode {
+pub fn main() -> ExitCode {
     match measure() {
         Ok(met) => verdict(met),
         Err(error) => {

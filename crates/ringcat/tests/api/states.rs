@@ -1,0 +1,55 @@
+//! A state for one SubDevice, and a hot connect group, with both halves in threads of their own.
+
+use std::ops::ControlFlow;
+use std::path::Path;
+use std::thread::sleep;
+use std::time::{Duration, Instant};
+
+use ringcat::shared_segment::SharedSegment;
+use ringcat::{
+    DomainMember, Error, Event, Group, GroupState, LastOutputs, Options, SubDeviceConfig, SubDeviceState,
+    SupervisorThread, automatic,
+};
+use ringcat_sim::network::Network;
+use ringcat_sim::segment::Segment;
+use ringcat_wire::al::AlState;
+
+const SEGMENT: &str = "[segment]\n[[device]]\ntype = \"coupler\"\n[[device]]\ntype = \"digital-output-8\"\n\
+                       [[device]]\ntype = \"digital-input-8\"\nalias = 5\n";
+const PERIOD: Duration = Duration::from_millis(2);
+const LIMIT: Duration = Duration::from_secs(30);
+
+#[test]
+fn states_and_groups_are_asked_for_from_any_thread() -> Result<(), Error> {
+    let segment = Segment::from_toml(SEGMENT, Path::new(".")).expect("a good segment");
+    let (cyclic, acyclic) = SharedSegment::halves(Network::from_description(segment).expect("it can be built"));
+    let supervisor = SupervisorThread::start(acyclic, &Options::default(), || ())?;
+    let scan = supervisor.scan()?;
+    let mut declaration = automatic(&scan.subdevices[..2], PERIOD);
+    let head = SubDeviceConfig::at_alias(5, 0).pdos_of(&scan.subdevices[2]);
+    let (group, members) = declaration.add_group(Group::new(head));
+    assert_eq!((group, members.clone()), (0, 2..3));
+    declaration.domains[0].members.extend(members.map(|subdevice| DomainMember { subdevice, sync_managers: None }));
+    let application = supervisor.activate(declaration, cyclic)?;
+    let cycles = application.start_cycles(|| (), |_| ControlFlow::Continue(()))?;
+    let end = Instant::now() + LIMIT;
+    while !(cycles.supervisor().mandatory_settled()? && cycles.supervisor().groups()?[0].has_joined()) {
+        assert!(Instant::now() < end, "all are in OP");
+        sleep(Duration::from_millis(1));
+    }
+    cycles.supervisor().request_state(1, AlState::PreOp)?;
+    cycles.supervisor().request_state(2, AlState::Init)?;
+    while cycles.supervisor().states()[1..] != [AlState::PreOp, AlState::Init].map(SubDeviceState::Settled) {
+        assert!(Instant::now() < end, "the states are published");
+        sleep(Duration::from_millis(1));
+    }
+    assert_eq!(cycles.supervisor().groups()?, [GroupState { present: 1, settled: 0, members: 1 }]);
+    let refused = cycles.supervisor().request_state(1, AlState::Boot);
+    assert!(matches!(refused, Err(Error::Configure(_))), "it has no boot loader");
+    cycles.supervisor().request_state(1, AlState::Op)?;
+    cycles.supervisor().request_state(2, AlState::Op)?;
+    let events: Vec<Event> = std::iter::from_fn(|| cycles.supervisor().pop_event()).map(|timed| timed.event).collect();
+    assert!(events.contains(&Event::GroupJoined { group: 0 }));
+    cycles.end()?.stop(LastOutputs::Zero, AlState::Init, LIMIT)?;
+    Ok(())
+}
