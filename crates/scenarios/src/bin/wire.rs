@@ -200,13 +200,16 @@ impl Wire {
             drop(simulator);
             others.push(self.others(TERMINALS, pace, "per_second", [CYCLES[1], CYCLES[2]])?);
         }
-        // What else runs on the machine only takes cycles away: the best block of each is what it can do.
+        // What else runs on the machine only takes cycles away: the best block of each is shown too, the medians count.
         let most = |values: &mut dyn Iterator<Item = f64>| values.fold(0.0, f64::max);
         let best = most(&mut others.iter().flatten().map(|(_, value)| *value));
         let ratio = most(&mut ours.iter().copied()) / best;
-        beside(figures, "cycles per second", "ours, one under way, supervision included", &mut ours, &others);
+        let rows =
+            beside(figures, "cycles per second", "ours, one under way, supervision included", &mut ours, &others);
+        let (ours, others) = (rows[0], rows[1..].iter().copied().fold(0.0, f64::max));
         // The simulator's own time per frame, which all share, is still most of a cycle (docs/FEATURES.md).
-        figures.goal_at_least("our best block against the best of them", ratio, CYCLES_BAR, "x");
+        figures.goal_at_least("ours against the better of them", ours / others, CYCLES_BAR, "x");
+        figures.show("our best block against the best of them", format!("{ratio:.2} x"));
         Ok(())
     }
 
