@@ -229,6 +229,15 @@ pub enum Event {
         /// Who.
         identity: Identity,
     },
+    /// A rescan found a declared SubDevice at another place among the others than the scan.
+    Moved {
+        /// Index in the declaration.
+        subdevice: usize,
+        /// Its place at the scan.
+        from: Position,
+        /// Its place now.
+        to: Position,
+    },
     /// Another SubDevice is where a declared one is expected. It is left alone.
     Mismatch {
         /// Index in the declaration.

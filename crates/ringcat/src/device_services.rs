@@ -9,6 +9,7 @@ use ringcat_engine::main_device::RawDatagram;
 use ringcat_engine::procedures::services::ports::BlockedPort;
 use ringcat_engine::procedures::services::statistics::Statistics;
 use ringcat_engine::procedures::sii::program::SiiWritten;
+use ringcat_engine::procedures::strangers::rescan::Rescan;
 use ringcat_engine::supervisor::{BusError, Reply};
 use ringcat_wire::address::RegisterAddress;
 use ringcat_wire::register::LoopControl;
@@ -90,6 +91,17 @@ impl SupervisorThread {
     /// The thread is gone.
     pub fn force_topology_change(&self) -> Result<bool, Error> {
         self.with(|engine| engine.force_topology_change())
+    }
+
+    /// Looks at the whole segment again while process data goes on: who is at which place now, who is new, has moved or is
+    /// gone. New ones are read, but left alone; those that have moved are events, too. Waits until the segment holds still
+    /// and it is known of everybody who it is, for so long at most.
+    ///
+    /// # Errors
+    /// Nothing is declared yet, the segment does not hold still or the bus fails at the end of the time, or as
+    /// [`SupervisorThread::run`].
+    pub fn rescan(&self, limit: Duration) -> Result<Rescan, Error> {
+        Ok(self.wait_for(move |engine| engine.start_rescan(limit))??)
     }
 
     /// Reads an EEPROM, as large as it says that it is.

@@ -92,6 +92,7 @@ pub use ringcat_engine::procedures::scan::{Scan, ScanError};
 pub use ringcat_engine::procedures::services::ServiceError;
 pub use ringcat_engine::procedures::services::statistics::{PortErrors, Statistics};
 pub use ringcat_engine::procedures::stop::StopError;
+pub use ringcat_engine::procedures::strangers::rescan::{Found, Rescan, Who};
 pub use ringcat_engine::request::{
     RegisterRequest, Request, RequestFailure, RequestRefused, RequestState, SdoRequest, SoeRequest, VoeHandler,
 };

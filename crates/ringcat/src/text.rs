@@ -136,6 +136,9 @@ pub fn describe(event: &Event, names: &Names) -> String {
             identity.vendor_id,
             identity.product_code
         ),
+        Event::Moved { subdevice, from, to } => {
+            format!("{}: moved from position {} to {}", names.of(*subdevice), from.0, to.0)
+        }
         Event::Mismatch { subdevice, position, field, expected, got } => {
             let (name, place) = (names.of(*subdevice), names.at(*position));
             format!("{name}: expected {field} {expected:#010x}, {place} has {got:#010x}: it is left alone")

@@ -17,6 +17,7 @@ use crate::procedures::services::ports::BlockedPort;
 use crate::procedures::services::statistics::{self, Statistics};
 use crate::procedures::services::{ServiceError, ports, registers, reset};
 use crate::procedures::sii::program::{self, SiiWritten};
+use crate::procedures::strangers::rescan::{Rescan, rescan};
 use crate::supervisor::{Bus, BusError, Reply};
 
 /// Datagrams of the application that are taken at once.
@@ -156,6 +157,15 @@ impl MainDevice {
             fleet.note_news();
         }
         self.fleet.is_some()
+    }
+
+    /// Starts to look at the whole segment again while process data goes on: who is at which place now, who is new, has
+    /// moved or is gone. New ones are read, but left alone. Until the segment holds still and it is known of everybody
+    /// who it is, for so long at most; then the result is what is known. Declared SubDevices and the places of breaks go by
+    /// the cabling of the scan as before.
+    pub fn start_rescan(&mut self, limit: Duration) -> Pending<Result<Rescan, ServiceError>> {
+        let (bus, fleet) = (self.bus(), self.fleet.clone());
+        self.start(async move { rescan(&bus, &fleet.ok_or(ServiceError::NotActive)?, limit).await })
     }
 
     /// Starts to read an EEPROM, as large as it says that it is.

@@ -41,6 +41,8 @@ pub enum ServiceError {
     },
     /// Nothing is declared yet.
     NotActive,
+    /// The segment did not hold still for long enough.
+    Unsteady,
     /// More than are taken at once.
     TooMany {
         /// How many.
@@ -61,6 +63,7 @@ impl fmt::Display for ServiceError {
                 write!(f, "SubDevice {subdevice} hangs on the main link: there is no port before it")
             }
             ServiceError::NotActive => f.write_str("nothing is declared yet"),
+            ServiceError::Unsteady => f.write_str("the segment changes all the time"),
             ServiceError::TooMany { got, limit } => write!(f, "{got} at once, at most {limit} are taken"),
             ServiceError::Range { address, length } => {
                 write!(f, "{length} bytes from {address:#06x} on: the memory ends at 0xffff")

@@ -8,6 +8,7 @@ mod groups;
 mod matching;
 mod owners;
 mod quiet;
+pub mod rescan;
 
 use alloc::rc::Rc;
 use alloc::string::{String, ToString};

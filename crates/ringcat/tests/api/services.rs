@@ -108,6 +108,7 @@ fn services_on_single_subdevices_and_jobs_work_from_any_thread() -> Result<(), E
     assert_eq!(supervisor.sii_write(1, image, false)?.written, 0);
     assert_eq!(supervisor.statistics(1)?, None);
     assert!(!supervisor.force_topology_change()?);
+    assert!(supervisor.rescan(LIMIT).is_err(), "nothing is declared");
     let application = supervisor.activate(automatic(&scan.subdevices, PERIOD), cyclic)?;
     let cycles = application.start_cycles(|| (), |_| ControlFlow::Continue(()))?;
     let end = Instant::now() + LIMIT;
@@ -119,6 +120,8 @@ fn services_on_single_subdevices_and_jobs_work_from_any_thread() -> Result<(), E
     assert_eq!(handle.read_statistics(1)?.readings, 1);
     handle.clear_statistics(1)?;
     assert_eq!(handle.port(1, 0)?, LoopControl::Auto);
+    let rescan = handle.rescan(LIMIT)?;
+    assert!(rescan.is_complete() && rescan.subdevices.len() == 2 && rescan.missing.is_empty(), "{rescan:?}");
     let read = RawDatagram { command: Command::Brd, target: Target::Broadcast(map::TYPE), data: vec![0], resend: true };
     let replies = handle.datagrams(vec![read.clone(), read])?;
     assert!(replies.iter().all(|reply| reply.as_ref().is_ok_and(|reply| reply.wkc().0 == 2)), "{replies:?}");

@@ -60,7 +60,7 @@ pub struct Bench {
     main: String,
     /// Namespace of the simulator, with interfaces `sim0` and `sim1`.
     sim: String,
-    /// Namespace of another MainDevice, where a test wants one.
+    /// Namespace of another MainDevice or of a computer elsewhere, where a test wants one.
     other: Option<String>,
     simulator: Option<Simulator>,
     _alone: MutexGuard<'static, ()>,
@@ -136,18 +136,40 @@ impl Bench {
 
     /// Takes the interface `main1` into the namespace of another MainDevice.
     pub fn give_away_main1(&mut self) {
-        let other = format!("{}other", self.main);
-        ip(&format!("netns add {other}")).expect("a third namespace");
+        let other = self.add_namespace();
         ip(&format!("-n {} link set main1 netns {other}", self.main)).expect("the interface is there");
         let _ = ip(&format!("-n {other} link set main1 addrgenmode none"));
         ip(&format!("-n {other} link set main1 up")).expect("the interface is there");
-        self.other = Some(other);
+    }
+
+    /// A computer in a network of its own, to which the MainDevice's host is the router: 10.1.0.2 behind 10.1.0.1.
+    pub fn add_routed_computer(&mut self) {
+        let other = self.add_namespace();
+        self.ip_main(&format!("link add far0 type veth peer name far1 netns {other}"));
+        self.ip_main("addr add 10.1.0.1/24 dev far0");
+        self.ip_main("link set far0 up");
+        for words in ["addr add 10.1.0.2/24 dev far1", "link set far1 up", "route add default via 10.1.0.1"] {
+            ip(&format!("-n {other} {words}")).expect("the interface is there");
+        }
+        let forward = ["-c", "echo 1 > /proc/sys/net/ipv4/ip_forward"];
+        assert!(finish(self.start(Path::new("sh"), &forward)).status.success(), "the namespace is ours");
+    }
+
+    fn add_namespace(&mut self) -> String {
+        let other = format!("{}other", self.main);
+        ip(&format!("netns add {other}")).expect("a third namespace");
+        self.other = Some(other.clone());
+        other
+    }
+
+    /// Starts a program in the third namespace.
+    pub fn start_elsewhere(&self, path: &Path, arguments: &[&str]) -> Child {
+        start(self.command(self.other.as_ref().expect("there is one"), path).args(arguments))
     }
 
     /// Starts `ringcat` in the namespace of the other MainDevice.
     pub fn start_other_ringcat(&self, arguments: &[&str]) -> Child {
-        let namespace = self.other.as_ref().expect("there is one");
-        start(self.command(namespace, &program("ringcat")).args(arguments).args(THREAD))
+        self.start_elsewhere(&program("ringcat"), &[arguments, &THREAD].concat())
     }
 
     /// Changes the network of the MainDevice.

@@ -28,7 +28,8 @@ s.bind(('sim0', 0))
 for _ in range(5):
     s.send(b'\\xff' * 6 + b'\\x00\\x30\\x64\\x11\\x22\\x33' + b'\\x08\\x00' + bytes(46))
 ";
-const PAUSE: Duration = Duration::from_millis(300);
+/// An onlooker is there after so long.
+pub const PAUSE: Duration = Duration::from_millis(300);
 
 /// A file that is removed when it is dropped, unless the test failed: then somebody wants to look at it.
 pub struct CaptureFile(PathBuf);
@@ -56,6 +57,13 @@ impl CaptureFile {
         assert_eq!(verdict.broken, 0, "{title}");
         check_with_tshark(&self.0, verdict.sent.iter().sum::<u64>() + verdict.received.iter().sum::<u64>(), unread);
         verdict
+    }
+
+    /// What tshark says of the frames, whoever sent them; how many there are.
+    pub fn check_with_tshark(&self) -> usize {
+        let frames = Capture::parse(&self.bytes()).expect("a capture").packets.len();
+        check_with_tshark(&self.0, frames as u64, &[]);
+        frames
     }
 
     /// Everything there is to check of a capture of ours; what the judge saw.
@@ -107,7 +115,7 @@ fn check_with_tshark(path: &Path, frames: u64, unread: &[&str]) {
 }
 
 /// Ends a program as Ctrl-C does.
-fn interrupt(child: Child) -> Output {
+pub fn interrupt(child: Child) -> Output {
     let sent = Command::new("kill").args(["-INT", &child.id().to_string()]).status();
     assert!(sent.expect("there is a kill").success());
     finish(child)

@@ -6,7 +6,7 @@ use std::time::{Duration, Instant};
 
 use crate::bench::{Bench, await_op, is_asked_for};
 use crate::cables::{incomplete_cycles, left_out};
-use crate::foreign::{FOREIGN, python, start};
+use crate::foreign::{FOREIGN, NO_CACHE, python, start};
 use crate::{RING_OF_16, states};
 
 /// Inner cables, by the SubDevice before them.
@@ -38,7 +38,7 @@ fn pysoem_and_ours_meet_the_same_cuts_of_a_ring() {
     if let Some(python) = python() {
         bench.simulate(&RING_OF_16.segment(), true);
         let script = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/on_the_wire/pysoem_cuts.py");
-        let arguments = [script, "main0,main1", "16", &SECONDS.to_string()].map(str::to_owned);
+        let arguments = [NO_CACHE, script, "main0,main1", "16", &SECONDS.to_string()].map(str::to_owned);
         let mut child = start(&bench, &python, &arguments);
         let mut lines = BufReader::new(child.stdout.take().expect("it is piped")).lines();
         if lines.next().is_some_and(|line| line.is_ok_and(|line| line == "in OP")) {

@@ -2,6 +2,7 @@
 
 use std::fs::OpenOptions;
 use std::path::Path;
+use std::process::Child;
 use std::time::{Duration, Instant};
 
 use crate::bench::{Bench, await_op, finish, program};
@@ -22,6 +23,7 @@ type = \"ethernet-terminal\"
 mailbox_bytes = 512
 alias = 7
 ip = \"10.0.0.3/24\"
+gateway = \"10.0.0.1\"
 ";
 const INTERFACES: [&str; 2] = ["eoe0s1", "eoe0a7"];
 const LIMIT: Duration = Duration::from_secs(10);
@@ -117,14 +119,18 @@ fn line<'a>(links: &'a str, interface: &str) -> Option<&'a str> {
 }
 
 fn client(bench: &Bench, tasks: &[&str]) {
-    let output = finish(bench.start(Path::new("python3"), &[&["-c", CLIENT], tasks].concat()));
+    ask(tasks, |arguments| bench.start(Path::new("python3"), arguments));
+}
+
+fn ask(tasks: &[&str], start: impl FnOnce(&[&str]) -> Child) {
+    let output = finish(start(&[&["-c", CLIENT], tasks].concat()));
     let (told, errors) = said(&output);
     assert!(output.status.success(), "{told}{errors}");
     print!("{told}");
 }
 
 #[test]
-fn two_eoe_devices_are_pinged_and_downloaded_from_through_a_bridge_and_without() {
+fn two_eoe_devices_are_pinged_and_downloaded_from_through_a_bridge_without_and_from_beyond_a_router() {
     let Some(mut bench) = Bench::new(1).filter(|_| has_taps()) else { return };
     bench.simulate(SEGMENT, false);
     let capture = CaptureFile::new("eoe");
@@ -140,7 +146,7 @@ fn two_eoe_devices_are_pinged_and_downloaded_from_through_a_bridge_and_without()
     let has_carrier =
         |links: &str| INTERFACES.iter().all(|name| line(links, name).is_some_and(|is| is.contains("LOWER_UP")));
     wait(&bench, "both have a carrier", has_carrier);
-    client(&bench, &["10.0.0.2/20", "10.0.0.3/20", "10.0.0.2/1000000", "10.0.0.3/200000", "10.0.0.3/echo200000"]);
+    client(&bench, &["10.0.0.2/20", "10.0.0.3/20", "10.0.0.2/1000000", "10.0.0.3/1000000", "10.0.0.3/echo200000"]);
 
     // A SubDevice that goes takes its carrier along and nothing else, and comes back into the bridge.
     bench.order("power off 2");
@@ -156,6 +162,10 @@ fn two_eoe_devices_are_pinged_and_downloaded_from_through_a_bridge_and_without()
     bench.ip_main("addr del 10.0.0.1/24 dev br0");
     bench.ip_main("addr add 10.0.0.1/24 dev eoe0a7");
     client(&bench, &["10.0.0.3/5", "10.0.0.3/50000"]);
+
+    // And from a network beyond that host.
+    bench.add_routed_computer();
+    ask(&["10.0.0.3/5", "10.0.0.3/50000"], |arguments| bench.start_elsewhere(Path::new("python3"), arguments));
 
     let (output, errors) = run.interrupt();
     let figures: Vec<&str> = output.lines().filter(|line| line.contains("eoe0")).collect();

@@ -7,10 +7,13 @@ use std::path::{Path, PathBuf};
 use std::process::{Child, Command};
 
 use crate::bench::{Bench, Client, finish, is_asked_for, program, target_directory};
+use crate::captures::{CaptureFile, PAUSE, interrupt};
 use crate::{PLANTS, Plant, RING_OF_16, input, states};
 
 /// What asks for these tests.
 pub const FOREIGN: &str = "RINGCAT_FOREIGN";
+/// What Python compiles stays in memory.
+pub const NO_CACHE: &str = "-B";
 /// Cycles of process data.
 const CYCLES: usize = 500;
 /// A stall of this machine that is longer than the other's patience is no fault of the simulator: so many cycles may have
@@ -116,13 +119,20 @@ fn pysoem_moves_objects_files_and_firmware_of_a_simulated_subdevice() {
     let Some(mut bench) = Bench::new(1) else { return };
     let Some(python) = python() else { return };
     let script = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/on_the_wire/pysoem_mailbox.py");
+    let arguments = [NO_CACHE, script, "main0"].map(str::to_owned);
     let mut failures = Vec::new();
     while failures.len() < TRIES {
         bench.simulate("[[device]]\ntype = \"all-protocols\"\n", false);
-        let output = finish(start(&bench, &python, &[script.to_owned(), "main0".to_owned()]));
+        let capture = CaptureFile::new("mailbox");
+        let onlooker = bench.start(&program("ringcat"), &["capture", "--main", "main0", "--out", capture.path()]);
+        std::thread::sleep(PAUSE);
+        let output = finish(start(&bench, &python, &arguments));
         let said = String::from_utf8_lossy(&output.stdout).into_owned();
         println!("{said}");
+        let (seen, errors) = crate::said(&interrupt(onlooker));
         if output.status.success() {
+            assert!(seen.contains(" 0 not recorded"), "{seen}{errors}");
+            assert!(capture.check_with_tshark() > 1000, "{seen}");
             for step in ["objects ok", "dictionary ok", "files ok", "firmware ok"] {
                 assert!(said.contains(step), "{step}");
             }
@@ -142,7 +152,8 @@ pub fn start(bench: &Bench, client: &Path, arguments: &[String]) -> Child {
 
 fn start_pysoem(bench: &Bench, python: &Path, interfaces: &str, count: usize) -> Child {
     let script = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/on_the_wire/pysoem_client.py");
-    start(bench, python, &[script.to_owned(), interfaces.to_owned(), count.to_string(), CYCLES.to_string()])
+    let arguments = [NO_CACHE, script, interfaces, &count.to_string(), &CYCLES.to_string()];
+    start(bench, python, &arguments.map(str::to_owned))
 }
 
 /// A Python with pysoem in an environment below the target directory. Only CI makes one by itself.

@@ -10,27 +10,16 @@ import time
 
 import pysoem
 
+from pysoem_bus import end, exchange, find, to_op
+
 CYCLE = 0.001
+PATIENCE_US = 900
 
 
 def main():
-    interfaces, count, seconds = sys.argv[1].split(","), int(sys.argv[2]), float(sys.argv[3])
-    main_device = pysoem.Master()
-    main_device.open(*interfaces)
-    found = main_device.config_init()
-    if found != count:
-        sys.exit(f"expected {count} SubDevices, found {found}")
-    main_device.config_map()
-    if main_device.state_check(pysoem.SAFEOP_STATE, 5_000_000) != pysoem.SAFEOP_STATE:
-        sys.exit("not all SubDevices are in SAFEOP")
-    exchange(main_device)
-    main_device.state = pysoem.OP_STATE
-    main_device.write_state()
-    begin = time.monotonic()
-    while main_device.state_check(pysoem.OP_STATE, 2_000) != pysoem.OP_STATE:
-        exchange(main_device)
-        if time.monotonic() - begin > 20:
-            sys.exit("not all SubDevices are in OP")
+    interfaces, count, seconds = sys.argv[1], int(sys.argv[2]), float(sys.argv[3])
+    main_device = find(interfaces, count)
+    to_op(main_device, PATIENCE_US)
     print("in OP", flush=True)
     cycles, wrong, late = 0, 0, 0
     begin = time.monotonic()
@@ -42,18 +31,11 @@ def main():
             time.sleep(rest)
         late += rest < -CYCLE
         cycles += 1
-        wrong += exchange(main_device) != main_device.expected_wkc
+        wrong += exchange(main_device, PATIENCE_US) != main_device.expected_wkc
     main_device.read_state()
     in_op = sum(subdevice.state == pysoem.OP_STATE for subdevice in main_device.slaves)
     print(f"cycles {cycles} wrong {wrong} late {late} op {in_op}", flush=True)
-    main_device.state = pysoem.INIT_STATE
-    main_device.write_state()
-    main_device.close()
-
-
-def exchange(main_device):
-    main_device.send_processdata()
-    return main_device.receive_processdata(900)
+    end(main_device)
 
 
 main()

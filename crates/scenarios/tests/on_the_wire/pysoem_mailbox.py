@@ -11,6 +11,8 @@ import time
 
 import pysoem
 
+from pysoem_bus import find
+
 LARGE, SETTINGS, ARRAY = 0x2002, 0x2003, 0x2001
 PACKET = 1012
 
@@ -97,9 +99,7 @@ def firmware(main_device, device):
 
 
 def main():
-    main_device = pysoem.Master()
-    main_device.open(sys.argv[1])
-    check("SubDevices", main_device.config_init(), 1)
+    main_device = find(sys.argv[1], 1)
     device = main_device.slaves[0]
     objects(device)
     dictionary(device)

@@ -32,6 +32,7 @@ mod power_cycles;
 mod real_images;
 mod requests;
 mod required;
+mod rescans;
 mod ring_events;
 mod ring_matrix;
 mod ring_merge;

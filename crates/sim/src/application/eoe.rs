@@ -71,7 +71,7 @@ impl EoeServer {
             mac: description.mac,
             address: description.address.unwrap_or(unset),
             mask: description.mask.unwrap_or(unset),
-            gateway: unset,
+            gateway: description.gateway.unwrap_or(unset),
             dns: unset,
             name: Vec::new(),
         };

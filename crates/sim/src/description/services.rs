@@ -70,6 +70,8 @@ pub struct EoeDescription {
     pub address: Option<Ipv4Addr>,
     /// Subnet mask until another one is set.
     pub mask: Option<Ipv4Addr>,
+    /// Default gateway until another one is set.
+    pub gateway: Option<Ipv4Addr>,
     /// Addresses can be set and asked for.
     pub ip_support: bool,
     /// The address filter can be set and asked for.
@@ -83,6 +85,7 @@ impl Default for EoeDescription {
             mac: [0x02, 0x0C, 0x47, 0, 0, 1],
             address: None,
             mask: None,
+            gateway: None,
             ip_support: true,
             filter_support: true,
         }

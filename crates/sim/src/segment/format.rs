@@ -70,6 +70,7 @@ pub(super) struct DeviceEntry {
     pub(super) erase_ms: Option<Spanned<f64>>,
     pub(super) ethernet: Option<Spanned<String>>,
     pub(super) ip: Option<Spanned<String>>,
+    pub(super) gateway: Option<Spanned<String>>,
     pub(super) attach: Option<Spanned<String>>,
     pub(super) port: Option<Spanned<usize>>,
     pub(super) cable_ns: Option<u64>,

@@ -69,6 +69,13 @@ pub(super) fn services(
         })?;
         (eoe.address, eoe.mask) = (Some(address), Some(mask));
     }
+    if let Some(gateway) = &entry.gateway {
+        let address = gateway.get_ref().parse().ok().filter(|address| is_usable(*address)).ok_or_else(|| {
+            let message = format!("gateway: expected an address as in 10.0.0.1, got \"{}\"", gateway.get_ref());
+            (message, Some(gateway.span()))
+        })?;
+        eoe.gateway = Some(address);
+    }
     Ok(())
 }
 
@@ -77,7 +84,11 @@ fn network(text: &str) -> Option<(Ipv4Addr, Ipv4Addr)> {
     let (address, prefix) = text.split_once('/')?;
     let address: Ipv4Addr = address.parse().ok()?;
     let prefix: u32 = prefix.parse().ok().filter(|prefix| *prefix <= 32)?;
-    let usable = !address.is_multicast() && !address.is_broadcast() && !address.is_unspecified();
     let mask = u32::MAX.checked_shl(32 - prefix).unwrap_or(0);
-    usable.then_some((address, mask.into()))
+    is_usable(address).then_some((address, mask.into()))
+}
+
+/// Whether a device can have an address.
+const fn is_usable(address: Ipv4Addr) -> bool {
+    !address.is_multicast() && !address.is_broadcast() && !address.is_unspecified()
 }

@@ -281,6 +281,7 @@ fn mailbox_keys_change_sizes_times_and_what_stands_behind() {
         erase_ms = 100
         ethernet = "loop"
         ip = "10.0.0.2/24"
+        gateway = "10.0.0.1"
 
         [[device]]
         type = "servo"
@@ -296,6 +297,7 @@ fn mailbox_keys_change_sizes_times_and_what_stands_behind() {
     assert_eq!((device.services.foe.password, device.services.foe.erase_time.as_millis()), (7, 100));
     let ethernet = &device.services.eoe;
     assert_eq!((ethernet.end, ethernet.mask.unwrap().to_string()), (EoeEnd::Loop, "255.255.255.0".into()));
+    assert_eq!(ethernet.gateway.unwrap().to_string(), "10.0.0.1");
     assert_ne!(ethernet.mac, segment.devices[1].services.eoe.mac);
     let servo: Vec<u16> = segment.devices[2].sync_managers.iter().map(|entry| entry.start).collect();
     assert_eq!(servo, [0x1000, 0x1040, 0x1080, 0x1180]);
@@ -309,6 +311,7 @@ fn mailbox_keys_that_make_no_sense_are_refused_with_what_would() {
         ("ethernet = \"hub\"", "ethernet: expected stack, loop or nothing, got \"hub\""),
         ("ip = \"10.0.0.2\"", "ip: expected an address with its prefix as in 10.0.0.2/24, got \"10.0.0.2\""),
         ("ip = \"224.0.0.1/24\"", "expected an address"),
+        ("gateway = \"10.0.0.1/24\"", "gateway: expected an address as in 10.0.0.1, got \"10.0.0.1/24\""),
         ("answer_us = -1.0", "answer_us: expected a time"),
         ("files = [\"missing.txt\"]", "files: nowhere/missing.txt"),
     ] {

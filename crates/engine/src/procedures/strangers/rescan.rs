@@ -1,0 +1,204 @@
+//! A look at the whole segment while process data goes on: who is at which place now, who has moved, who is not there
+//! (000 10.8).
+//!
+//! Places are only read, and no process data: nobody's working counter changes. Those without a station address of ours
+//! are found and read by the search of whoever supervises, for which this waits.
+
+use alloc::vec;
+use alloc::vec::Vec;
+use core::time::Duration;
+
+use ringcat_wire::address::{Position, StationAddress, Wkc};
+use ringcat_wire::register::{DlStatus, PortKind, map};
+use ringcat_wire::sii::Identity;
+
+use super::owners::owners_of;
+use super::{Knowledge, view};
+use crate::event::Event;
+use crate::procedures::fleet::SharedFleet;
+use crate::procedures::services::ServiceError;
+use crate::supervisor::{Bus, BusError};
+use crate::topology::{NodeStatus, Topology};
+
+/// Pause between two looks.
+const PAUSE: Duration = Duration::from_millis(10);
+
+/// Who a SubDevice is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Who {
+    /// A declared one, by its index in the declaration.
+    Declared(usize),
+    /// Nobody has declared it. It is left alone.
+    Undeclared(Identity),
+    /// It was not found out in time.
+    Unknown,
+}
+
+/// A SubDevice at its place.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Found {
+    /// Its place now.
+    pub position: Position,
+    /// Its station address.
+    pub station: StationAddress,
+    /// Who it is.
+    pub who: Who,
+    /// Its place at the scan, where the order of the declared SubDevices is another one since because of it.
+    pub moved_from: Option<Position>,
+}
+
+/// What a look at the whole segment has brought.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Rescan {
+    /// SubDevices met by the main copy and by the redundant one.
+    pub counts: (Wkc, Wkc),
+    /// All that answer, by position.
+    pub subdevices: Vec<Found>,
+    /// Declared ones that do not, by their index in the declaration.
+    pub missing: Vec<usize>,
+    /// Cabling as the ports tell it now.
+    pub topology: Topology,
+}
+
+impl Rescan {
+    /// Of everybody it is known who it is.
+    pub fn is_complete(&self) -> bool {
+        self.subdevices.iter().all(|found| found.who != Who::Unknown)
+    }
+
+    /// Declared SubDevices with the places that they have moved from and to.
+    pub fn moved(&self) -> impl Iterator<Item = (usize, Position, Position)> + '_ {
+        self.subdevices.iter().filter_map(|found| match found.who {
+            Who::Declared(index) => Some((index, found.moved_from?, found.position)),
+            Who::Undeclared(_) | Who::Unknown => None,
+        })
+    }
+}
+
+/// Looks until the segment holds still and it is known of everybody who it is, for so long at most. Then what is known is
+/// the result. Those that have moved are reported.
+pub(crate) async fn rescan(bus: &Bus, fleet: &SharedFleet, limit: Duration) -> Result<Rescan, ServiceError> {
+    let until = bus.now() + limit;
+    fleet.note_news();
+    loop {
+        let looked = look(bus, fleet).await;
+        let is_last = bus.now() >= until;
+        match looked {
+            Ok(Some(rescan)) if is_last || rescan.is_complete() => {
+                for (subdevice, from, to) in rescan.moved() {
+                    bus.report(Event::Moved { subdevice, from, to });
+                }
+                return Ok(rescan);
+            }
+            Ok(None) if is_last => return Err(ServiceError::Unsteady),
+            Err(error) if is_last => return Err(error.into()),
+            Ok(_) | Err(_) => bus.sleep(PAUSE).await,
+        }
+    }
+}
+
+/// One look; `None` while the segment changes.
+async fn look(bus: &Bus, fleet: &SharedFleet) -> Result<Option<Rescan>, BusError> {
+    let Some(seen) = view(bus).await? else { return Ok(None) };
+    let ports = bus.gather((0..seen.stations.len() as u16).map(Position), |bus, position| async move {
+        let bytes = bus.aprd(position, map::DL_STATUS, DlStatus::LEN).await?;
+        Ok::<_, BusError>(DlStatus::decode(&[bytes[0], bytes[1]]))
+    });
+    let ports: Vec<DlStatus> = match ports.await.into_iter().collect() {
+        Ok(ports) => ports,
+        Err(BusError::Wkc { .. }) => return Ok(None),
+        Err(error) => return Err(error),
+    };
+    // Places that have changed meanwhile would mix ports of one with those of another.
+    if view(bus).await?.as_ref() != Some(&seen) {
+        return Ok(None);
+    }
+    let owners = owners_of(fleet, &seen.stations);
+    let access = fleet.access();
+    let mut subdevices = Vec::new();
+    let mut nodes = Vec::new();
+    for (at, (station, dl_status)) in seen.stations.iter().zip(ports).enumerate() {
+        let stranger = access.strangers.iter().find(|it| it.station == *station);
+        let known = match (owners.at(at), stranger.map(|stranger| &stranger.knowledge)) {
+            (Some(index), _) => access.members[index].info.as_ref(),
+            (None, Some(Knowledge::Known(info))) => Some(&**info),
+            (None, _) => None,
+        };
+        let who = match (owners.at(at), known) {
+            (Some(index), _) => Who::Declared(index),
+            // Until it was reported it may be one that is missed.
+            (None, Some(info)) if stranger.is_some_and(|it| it.reported) => Who::Undeclared(info.identity),
+            (None, _) => Who::Unknown,
+        };
+        let kinds: [PortKind; 4] = known.map(|info| info.controller.ports).unwrap_or_default();
+        nodes.push(NodeStatus { dl_status, receive_times: None, ports: kinds });
+        subdevices.push(Found { position: Position(at as u16), station: *station, who, moved_from: None });
+    }
+    let place_at_scan = |index: usize| access.members[index].node;
+    mark_moved(&mut subdevices, place_at_scan);
+    let is_found = |index: &usize| subdevices.iter().any(|found| found.who == Who::Declared(*index));
+    let missing = (0..access.members.len()).filter(|index| !is_found(index)).collect();
+    let topology = Topology::build(&nodes, usize::from(seen.counts.0.0));
+    Ok(Some(Rescan { counts: seen.counts, subdevices, missing, topology }))
+}
+
+/// Who has to be taken out, as few as possible, for the others to be in the order of the scan: these have moved.
+fn mark_moved(subdevices: &mut [Found], place_at_scan: impl Fn(usize) -> Option<usize>) {
+    let mut placed = Vec::new();
+    for (at, found) in subdevices.iter().enumerate() {
+        if let Who::Declared(index) = found.who
+            && let Some(place) = place_at_scan(index)
+        {
+            placed.push((at, place));
+        }
+    }
+    let places: Vec<usize> = placed.iter().map(|(_, place)| *place).collect();
+    for ((at, place), stays) in placed.into_iter().zip(longest_ascent(&places)) {
+        if !stays {
+            subdevices[at].moved_from = Some(Position(place as u16));
+        }
+    }
+}
+
+/// Of numbers that are all different, those of a longest ascending row.
+fn longest_ascent(numbers: &[usize]) -> Vec<bool> {
+    // By length of a row the place of its last number, the smallest there is; by place the one before in its row.
+    let mut ends: Vec<usize> = Vec::new();
+    let mut before: Vec<Option<usize>> = Vec::new();
+    for (at, number) in numbers.iter().enumerate() {
+        let length = ends.partition_point(|end| numbers[*end] < *number);
+        before.push(length.checked_sub(1).map(|shorter| ends[shorter]));
+        if length < ends.len() {
+            ends[length] = at;
+        } else {
+            ends.push(at);
+        }
+    }
+    let mut stays = vec![false; numbers.len()];
+    let mut at = ends.last().copied();
+    while let Some(place) = at {
+        stays[place] = true;
+        at = before[place];
+    }
+    stays
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn moved(places: &[usize]) -> Vec<usize> {
+        let stays = longest_ascent(places);
+        places.iter().zip(stays).filter(|(_, stays)| !stays).map(|(place, _)| *place).collect()
+    }
+
+    #[test]
+    fn as_few_as_possible_have_moved() {
+        assert_eq!(moved(&[]), []);
+        assert_eq!(moved(&[0, 2, 3, 7]), [], "gaps and what was put in between move nobody");
+        assert_eq!(moved(&[0, 1, 3, 4, 2]), [2]);
+        assert_eq!(moved(&[4, 0, 1, 2, 3]), [4]);
+        assert_eq!(moved(&[0, 3, 4, 1, 2, 5]).len(), 2);
+        assert_eq!(moved(&[3, 2, 1, 0]).len(), 3);
+    }
+}

@@ -1,0 +1,136 @@
+//! The whole segment is looked at again while process data goes on: who is where, who is new, has moved, is gone.
+
+use std::time::Duration;
+
+use ringcat::{Event, Options, Rescan, SubDeviceState, Who, automatic};
+use ringcat_sim::cable::{CableId, DeviceIndex, Endpoint};
+use ringcat_sim::frame::Port;
+use ringcat_sim::network::builder::SegmentBuilder;
+use ringcat_sim::network::{Network, NetworkOptions};
+use ringcat_wire::address::Position;
+use ringcat_wire::al::AlState;
+use scenarios::segments::{descriptions, devices, ring};
+use scenarios::world::{CYCLE, World};
+
+const LIMIT: Duration = Duration::from_secs(2);
+const OP: SubDeviceState = SubDeviceState::Settled(AlState::Op);
+/// Devices of [`workshop`] by the order in which they were built, and cables by that of plugging.
+const MOVABLE: DeviceIndex = DeviceIndex(6);
+const NEW: DeviceIndex = DeviceIndex(5);
+const LEAVING: DeviceIndex = DeviceIndex(7);
+const AT_THE_JUNCTION: CableId = CableId(6);
+const AT_THE_END: CableId = CableId(8);
+
+/// A junction with a line of three behind it, the last of which has no power at first, and two branches of one device: the
+/// first of them can be plugged in at the end of the line instead. All that is plugged in works.
+fn workshop() -> Network {
+    let kinds = ["coupler", "digital-input-8", "junction", "digital-output-8", "digital-input-16", "analog-input-4"];
+    let branch = |kind: &str| devices(descriptions(&[kind]));
+    let network = SegmentBuilder::line(devices(descriptions(&kinds)))
+        .branch(DeviceIndex(2), Port::D, branch("digital-output-16"))
+        .branch(DeviceIndex(2), Port::C, branch("digital-input-4"))
+        .cable(Endpoint::Device(NEW, Port::B), Endpoint::Device(MOVABLE, Port::B))
+        .options(NetworkOptions::default().with_detection_delay(Duration::from_micros(10)))
+        .build();
+    let mut network = network.expect("a segment can be built");
+    network.power_off(NEW);
+    network.cut(AT_THE_END);
+    network
+}
+
+fn rescan(world: &mut World) -> Rescan {
+    let mark = world.mark();
+    let pending = world.application_mut().engine_mut().start_rescan(LIMIT);
+    let rescan = world.finish(LIMIT, pending).expect("the segment holds still");
+    assert_eq!(world.incomplete(mark), 0, "nobody's working counter changes");
+    assert_eq!(world.left_op(mark), []);
+    rescan
+}
+
+/// Who is where, by the index in the declaration.
+fn declared(rescan: &Rescan) -> Vec<Option<usize>> {
+    let index = |who| if let Who::Declared(index) = who { Some(index) } else { None };
+    rescan.subdevices.iter().map(|found| index(found.who)).collect()
+}
+
+#[test]
+fn a_rescan_finds_who_is_new_has_moved_or_is_gone_and_costs_no_working_counter() {
+    let declare = |scan: &ringcat::Scan| {
+        let mut declaration = automatic(&scan.subdevices, CYCLE);
+        // In the order of frames: coupler, input, junction, movable, output, input, leaving.
+        declaration.subdevices[3].optional = true;
+        declaration.subdevices[6].optional = true;
+        declaration
+    };
+    let mut world = World::with(1, workshop(), &Options::default(), declare).expect("scan and activation");
+    world.settle();
+    world.set_strict(false);
+    let calm = rescan(&mut world);
+    assert_eq!(declared(&calm), (0..7).map(Some).collect::<Vec<_>>());
+    assert_eq!((calm.moved().count(), calm.missing.len(), calm.topology.nodes.len()), (0, 0, 7));
+
+    let before = world.mark();
+    world.power_on(NEW);
+    world.run_cycles(50);
+    let with_new = rescan(&mut world);
+    assert_eq!(declared(&with_new)[4..], [Some(4), Some(5), None, Some(6)]);
+    let Who::Undeclared(identity) = with_new.subdevices[6].who else { panic!("{with_new:?}") };
+    assert_eq!(identity.product_code, world.network().device(NEW).description.identity.product_code);
+    assert_eq!((with_new.moved().count(), with_new.missing.len()), (0, 0), "who comes in between moves nobody");
+    assert_eq!(world.network().device(NEW).al_status().al_state(), Some(AlState::Init), "it is left alone");
+    assert_eq!(world.incomplete(before), 0);
+
+    // The cable is plugged in elsewhere. It keeps its power and its address.
+    world.cut(AT_THE_JUNCTION);
+    world.until(LIMIT, "gone", |world| world.application().states()[3] == SubDeviceState::Absent);
+    world.heal(AT_THE_END);
+    world.until(LIMIT, "back", |world| world.application().states()[3] == OP);
+    world.run_cycles(50);
+    let mark = world.mark();
+    let moved = rescan(&mut world);
+    assert_eq!(moved.moved().collect::<Vec<_>>(), [(3, Position(3), Position(6))]);
+    let last = moved.topology.nodes[6];
+    assert_eq!((last.parent, last.entry_port), (Some((5, 1)), 1), "behind the new one, the wrong way round");
+    let told = Event::Moved { subdevice: 3, from: Position(3), to: Position(6) };
+    assert!(world.saw(mark, |event| *event == told));
+
+    world.power_off(LEAVING);
+    world.until(LIMIT, "gone", |world| world.application().states()[6] == SubDeviceState::Absent);
+    world.run_cycles(50);
+    let gone = rescan(&mut world);
+    assert_eq!((gone.missing.as_slice(), gone.subdevices.len()), ([6].as_slice(), 7));
+}
+
+#[test]
+fn a_rescan_of_a_ring_tells_the_places_whole_and_broken_and_ends_in_time_while_it_changes() {
+    let kinds = ["coupler", "digital-input-8", "digital-output-8", "digital-input-16", "digital-output-16"];
+    let options = NetworkOptions::default().with_detection_delay(Duration::from_micros(10));
+    let mut world = World::in_op(2, ring(descriptions(&kinds), options));
+    let whole = rescan(&mut world);
+    world.cut(CableId(2));
+    world.run_cycles(50);
+    let broken = rescan(&mut world);
+    assert_eq!((whole.counts.0.0, broken.counts.0.0, broken.counts.1.0), (5, 2, 3));
+    for rescan in [&whole, &broken] {
+        assert_eq!(declared(rescan), (0..5).map(Some).collect::<Vec<_>>());
+        assert_eq!((rescan.moved().count(), rescan.missing.len()), (0, 0));
+    }
+    // A plug with bad contact, faster than two looks.
+    let limit = Duration::from_millis(200);
+    let mut pending = world.application_mut().engine_mut().start_rescan(limit);
+    let begin = world.application().now();
+    let result = loop {
+        world.heal(CableId(2));
+        world.run_cycles(1);
+        world.cut(CableId(2));
+        world.run_cycles(1);
+        if let Some(result) = pending.take() {
+            break result;
+        }
+        assert!(world.application().now().since(begin) < 2 * limit, "it ends in time");
+    };
+    // Between two edges it may have been looked at as a whole.
+    assert!(matches!(&result, Ok(rescan) if rescan.is_complete()) || result.is_err(), "{result:?}");
+    world.heal(CableId(2));
+    world.settle();
+}
