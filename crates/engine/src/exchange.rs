@@ -69,6 +69,8 @@ pub struct Exchange {
     sequence: Sequence,
     by_id: [u16; 256],
     frames: Vec<CyclicFrame>,
+    /// For each of the frames the one that takes its place when a SubDevice of it has its FMMUs, or that it has replaced.
+    others: Vec<CyclicFrame>,
     domains: Vec<Domain>,
     to_send: Vec<u16>,
     monitor: RingMonitor,
@@ -76,18 +78,21 @@ pub struct Exchange {
     foreign: ForeignFrames,
     copies: Copies,
     clocks: Clocks,
-    taking_part_changes: u32,
     cycle: u64,
 }
 
 impl Exchange {
     /// Builds the images and frames of a layout. This is the last time that memory is allocated.
     pub fn new(identity: Identity, links: LinkSet, layout: &Layout, board: Arc<Board>, events: Producer) -> Exchange {
-        let mut frames = Vec::new();
+        let (mut frames, mut others) = (Vec::new(), Vec::new());
         let mut domains = Vec::new();
         for (index, planned) in layout.domains.iter().enumerate() {
             let first = frames.len();
-            frames.extend(planned.frames.iter().map(|frame| CyclicFrame::new(&identity, index, frame)));
+            for frame in &planned.frames {
+                let whole = CyclicFrame::new(&identity, index, frame);
+                frames.push(whole.vacant(&identity, frame));
+                others.push(whole);
+            }
             domains.push(Domain::new(planned, first..frames.len()));
         }
         Exchange {
@@ -99,13 +104,13 @@ impl Exchange {
             by_id: [NO_FRAME; 256],
             to_send: Vec::with_capacity(frames.len()),
             frames,
+            others,
             domains,
             monitor: RingMonitor::default(),
             counters: CyclicCounters::default(),
             foreign: ForeignFrames::new(),
             copies: Copies::default(),
             clocks: Clocks::default(),
-            taking_part_changes: 0,
             cycle: 0,
         }
     }
@@ -157,9 +162,6 @@ impl Exchange {
 
     /// Judges a domain: gives up its overdue frames and sums its working counters.
     pub fn process(&mut self, id: DomainId, now: Instant) -> DomainStatus {
-        if self.board.taking_part_changes() != self.taking_part_changes {
-            self.follow_board();
-        }
         let Some(domain) = self.domains.get_mut(id.0) else { return DomainStatus::default() };
         let frames = &mut self.frames[domain.frames()];
         let (mut wkc, mut waiting, mut complete) = (0, false, true);
@@ -196,6 +198,9 @@ impl Exchange {
             return false;
         }
         let is_new = domain.note_queued();
+        if domain.followed() != self.board.taking_part_changes() {
+            self.follow_board(id);
+        }
         if !self.copies.is_empty() {
             self.counters.stale_copies += self.copies.run(id.0, &mut self.domains, &self.frames, self.cycle);
         }
@@ -248,17 +253,26 @@ impl Exchange {
         self.board.post_cycle();
     }
 
-    /// Takes over who takes part in process data, which the supervisor has changed.
+    /// Takes over who takes part in process data, which the supervisor has changed. A frame gets its process data with the
+    /// first SubDevice, and keeps it: whoever comes back with its FMMUs is served at once.
     #[cold]
-    fn follow_board(&mut self) {
-        self.taking_part_changes = self.board.taking_part_changes();
-        for frame in &mut self.frames {
-            frame.recount(|s| self.board.takes_part(s), |s| self.board.is_optional(s));
+    fn follow_board(&mut self, id: DomainId) {
+        let Some(domain) = self.domains.get_mut(id.0) else { return };
+        let changes = self.board.taking_part_changes();
+        let board = &self.board;
+        for index in domain.frames() {
+            let (frame, other) = (&mut self.frames[index], &mut self.others[index]);
+            if frame.is_vacant() && frame.concerns(|s| board.takes_part(s)) {
+                if frame.is_open() {
+                    self.counters.copies_lost += 1;
+                    close(frame, &mut self.monitor, &mut self.clocks, board, &mut self.events);
+                }
+                core::mem::swap(frame, other);
+            }
+            frame.recount(|s| board.takes_part(s), |s| board.is_optional(s));
         }
-        for domain in &mut self.domains {
-            let frames = &self.frames[domain.frames()];
-            domain.follow(self.cycle, |subdevice| self.board.takes_part(subdevice), frames);
-        }
+        let frames = &self.frames[domain.frames()];
+        domain.follow(self.cycle, changes, |subdevice| board.takes_part(subdevice), frames);
     }
 
     /// Number of domains.

@@ -5,8 +5,8 @@
 //!
 //! Two things bound it. One drive alone takes its time, however many there are beside it. And the mail of all has to pass
 //! the wire: for each object a request, written as header, data and last byte, and a read of the whole send mailbox, with
-//! nothing else in as few frames as hold them. Neither states nor looks whether there is mail are in it. The frames of
-//! process data take their part of each cycle from the first one on; what they leave is what there is for mail.
+//! nothing else in as few frames as hold them. Neither states nor looks whether there is mail are in it, nor the
+//! cyclic frames, which carry process data from the first SubDevice on that can exchange some.
 
 use std::time::Duration;
 
@@ -50,13 +50,6 @@ pub struct Cost {
     pub cyclic: Duration,
     /// Counters of all mailboxes.
     pub mail: MailCounters,
-}
-
-impl Cost {
-    /// As long as this takes on a wire of its own, it takes beside the process data.
-    pub fn beside_process_data(&self, alone: Duration) -> Duration {
-        alone.div_f64(1.0 - self.cyclic.as_secs_f64() / self.time.as_secs_f64())
-    }
 }
 
 impl Lists {

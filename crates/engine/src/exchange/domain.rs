@@ -38,6 +38,8 @@ pub struct Domain {
     waiting: bool,
     /// Cycle, plus one, of the last judgement.
     judged: u64,
+    /// Changes on the board that were taken over.
+    followed: u32,
 }
 
 impl Domain {
@@ -59,6 +61,7 @@ impl Domain {
             queued: false,
             waiting: false,
             judged: 0,
+            followed: 0,
         }
     }
 
@@ -123,8 +126,20 @@ impl Domain {
         self.status
     }
 
-    /// Takes over who takes part.
-    pub(crate) fn follow(&mut self, cycle: u64, takes_part: impl Fn(usize) -> bool, frames: &[CyclicFrame]) {
+    /// How many changes on the board were taken over.
+    pub(crate) fn followed(&self) -> u32 {
+        self.followed
+    }
+
+    /// Takes over who takes part, after so many `changes` on the board.
+    pub(crate) fn follow(
+        &mut self,
+        cycle: u64,
+        changes: u32,
+        takes_part: impl Fn(usize) -> bool,
+        frames: &[CyclicFrame],
+    ) {
+        self.followed = changes;
         for member in &mut self.members {
             let now = takes_part(member.subdevice);
             if now == member.takes_part {

@@ -2,13 +2,14 @@
 //!
 //! A domain's frame is out at most once, so its bytes are built once: a flight changes the frame id, the Idx bytes and
 //! the outputs. Reads leave as zeros and working counters as zero, because what comes back is never written here.
+//! While no SubDevice could answer its process data, a frame leaves without it: see [`CyclicFrame::vacant`].
 
 use alloc::boxed::Box;
 use alloc::vec;
 use alloc::vec::Vec;
 use core::ops::Range;
 
-use ringcat_wire::address::{RegisterAddress, StationAddress, Wkc};
+use ringcat_wire::address::{LogicalAddress, RegisterAddress, StationAddress, Wkc};
 use ringcat_wire::command::Command;
 use ringcat_wire::datagram::{CIRCULATING, HEADER_LEN, OVERHEAD, Target};
 use ringcat_wire::frame::{FrameBuilder, MAX_FRAME, MacAddress};
@@ -90,6 +91,11 @@ struct Header {
 /// Address and C bit are left out of [`Header`].
 const HEADER_MASK: u64 = 0x0000_0000_0000_FFFF | !(CIRCULATING as u64) << 48;
 
+/// Data of the datagram of a frame that has nothing else to carry.
+const NOTHING_LEN: usize = 2;
+/// Offsets of what is in no frame lie behind this.
+const OUTSIDE: usize = 2 * MAX_FRAME;
+
 /// How far a flight is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Stage {
@@ -159,6 +165,12 @@ impl CyclicFrame {
                     supervision_at = Some(data_at - HEADER_LEN);
                 }
             }
+            if headers_at.is_empty()
+                && let Some(data_at) =
+                    builder.datagram(Command::Nop, 0, Target::Logical(LogicalAddress(0)), NOTHING_LEN)
+            {
+                headers_at.push(data_at - HEADER_LEN);
+            }
             length = builder.finish();
         }
         buffer.truncate(length);
@@ -180,6 +192,24 @@ impl CyclicFrame {
             merged: vec![0; length].into_boxed_slice(),
             tx: buffer.into_boxed_slice(),
         }
+    }
+
+    /// A frame that takes the place of this one while no SubDevice of it has its FMMUs: without process data, which
+    /// nobody could answer. Its working counters are zero, and it answers for the same inputs and outputs.
+    pub(crate) fn vacant(&self, identity: &Identity, planned: &PlannedFrame) -> CyclicFrame {
+        let bare = PlannedFrame { datagrams: Vec::new(), ..*planned };
+        let places = self.places.iter().map(Place::outside).collect();
+        CyclicFrame { places, ..CyclicFrame::new(identity, self.domain, &bare) }
+    }
+
+    /// Whether it leaves without its process data.
+    pub(crate) fn is_vacant(&self) -> bool {
+        self.places.iter().any(|place| place.wkc_at >= OUTSIDE)
+    }
+
+    /// Whether process data of a SubDevice that takes part belongs into the frame.
+    pub(crate) fn concerns(&self, takes_part: impl Fn(usize) -> bool) -> bool {
+        self.places.iter().flat_map(|place| &place.contributions).any(|(subdevice, _)| takes_part(*subdevice))
     }
 
     pub(crate) fn domain(&self) -> usize {
@@ -356,7 +386,9 @@ impl CyclicFrame {
     fn merge(&mut self, bytes: &[u8]) {
         for place in &self.places {
             let inputs = place.inputs.frame_at..place.inputs.frame_at + place.inputs.length;
-            or_into(&mut self.merged[inputs.clone()], &bytes[inputs]);
+            if let (Some(merged), Some(bytes)) = (self.merged.get_mut(inputs.clone()), bytes.get(inputs)) {
+                or_into(merged, bytes);
+            }
         }
     }
 
@@ -437,6 +469,21 @@ impl Place {
             segments: datagram.input_areas.iter().map(segment).collect(),
             delivered_all: 0,
             delivered_part: 0,
+        }
+    }
+
+    /// The same place in a frame that does not carry it: nothing is copied from or to there, the working counter is zero.
+    fn outside(&self) -> Place {
+        let span = |span: Span| Span { frame_at: span.frame_at + OUTSIDE, ..span };
+        let segment = |segment: &Segment| Segment { span: span(segment.span), ..*segment };
+        Place {
+            wkc_at: self.wkc_at + OUTSIDE,
+            outputs: span(self.outputs),
+            inputs: span(self.inputs),
+            contributions: self.contributions.clone(),
+            part: Vec::with_capacity(self.part.capacity()),
+            segments: self.segments.iter().map(segment).collect(),
+            ..*self
         }
     }
 

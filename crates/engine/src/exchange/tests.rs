@@ -179,10 +179,9 @@ fn inputs_of_those_that_take_part_are_new_and_the_missing_one_keeps_its_last() {
         let mut ring = Ring::new();
         let there: Vec<usize> = (0..3).filter(|subdevice| *subdevice != missing).collect();
         for (who, base) in [(&[0, 1, 2][..], 0x10), (&there, 0x20)] {
+            ring.board.set_taking_part(missing, who.len() == 3);
             let [mut main, redundant] = ring.send();
             meet(&mut main, who, base);
-            ring.board.set_taking_part(missing, who.len() == 3);
-            ring.exchange.process(DOMAIN, ring.now);
             ring.receive(Link::Redundant, &main);
             ring.receive(Link::Main, &redundant);
             ring.judge();
@@ -337,7 +336,9 @@ fn a_domain_that_is_queued_twice_leaves_once_with_its_last_outputs_and_keeps_no_
     let layout = Layout::new(&[spec(0), spec(1)], LinkSet::Single, false).unwrap();
     let identity = Identity::new(MacCodec::FlagsFirst, MacAddress([0, 1, 2, 3, 4, 5]), None);
     let (producer, _events) = queue(16);
-    let mut exchange = Exchange::new(identity, LinkSet::Single, &layout, Arc::new(Board::new(2)), producer);
+    let board = Arc::new(Board::new(2));
+    (0..2).for_each(|subdevice| board.set_taking_part(subdevice, true));
+    let mut exchange = Exchange::new(identity, LinkSet::Single, &layout, board, producer);
     for round in 0..3 {
         let now = Instant(0) + PERIOD * round;
         for (domain, value) in [(0, 1), (0, 2), (1, 3), (1, 4), (0, 5)] {
@@ -356,4 +357,69 @@ fn a_domain_that_is_queued_twice_leaves_once_with_its_last_outputs_and_keeps_no_
     }
     let counters = exchange.counters();
     assert_eq!((counters.sent, counters.received, counters.late, counters.lost), (6, 6, 0, 0));
+}
+
+/// Two domains with one byte in of one SubDevice each, and one with two frames: lengths of the frames that leave.
+struct Starting {
+    exchange: Exchange,
+    board: Arc<Board>,
+    now: Instant,
+}
+
+impl Starting {
+    fn new() -> Starting {
+        let spec = |subdevices: core::ops::Range<usize>, length| {
+            let area = |subdevice| AreaSpec { subdevice, sync_manager: 3, direction: Direction::Inputs, length };
+            DomainSpec { period: PERIOD, lrw: true, areas: subdevices.map(area).collect() }
+        };
+        let layout = Layout::new(&[spec(0..1, 4), spec(1..3, 1000)], LinkSet::Single, true).unwrap();
+        let board = Arc::new(Board::new(3));
+        let identity = Identity::new(MacCodec::FlagsFirst, MacAddress([0, 1, 2, 3, 4, 5]), None);
+        let exchange = Exchange::new(identity, LinkSet::Single, &layout, board.clone(), queue(16).0);
+        Starting { exchange, board, now: Instant(0) }
+    }
+
+    /// A cycle in which `wkc` comes back in the last datagram of each frame, behind which another may pad it; lengths of
+    /// the frames.
+    fn cycle(&mut self, wkc: u16) -> Vec<usize> {
+        self.now += PERIOD;
+        let domains = [DomainId(0), DomainId(1)];
+        assert_eq!(domains.map(|domain| self.exchange.queue(domain, self.now)), [true; 2]);
+        let mut frames = vec![];
+        self.exchange.send(self.now, &mut |_, bytes| frames.push(bytes.to_vec()));
+        for mut frame in frames.clone() {
+            frame[6] |= 0x02;
+            let end = 16 + usize::from(u16::from_le_bytes([frame[14], frame[15]]) & 0x07FF);
+            frame[end - 2..end].copy_from_slice(&wkc.to_le_bytes());
+            frame.resize(frame.len() + 1500, 0xEE);
+            assert_eq!(self.exchange.receive(Link::Main, &frame, self.now), Received::Taken);
+        }
+        for domain in domains {
+            self.exchange.process(domain, self.now);
+        }
+        frames.iter().map(Vec::len).collect()
+    }
+
+    fn states(&self) -> [DomainState; 2] {
+        [0, 1].map(|domain| self.exchange.status(DomainId(domain)).state)
+    }
+}
+
+#[test]
+fn a_frame_carries_process_data_from_its_first_subdevice_with_fmmus_on() {
+    let mut start = Starting::new();
+    assert_eq!(start.cycle(3), [60, 60, 60]);
+    let (count, seen) = start.board.supervision().unwrap();
+    assert_eq!((count, seen.main, start.states()), (1, Wkc(3), [DomainState::Zero; 2]));
+    start.board.set_taking_part(2, true);
+    assert_eq!(start.cycle(1), [60, 60, 1028]);
+    assert_eq!(start.states(), [DomainState::Zero, DomainState::Incomplete]);
+    let freshness = [1, 2].map(|subdevice| start.exchange.freshness(DomainId(1), subdevice));
+    assert_eq!(freshness, [Freshness::Never, Freshness::Fresh]);
+    start.board.set_taking_part(2, false);
+    assert_eq!(start.cycle(0), [60, 60, 1028], "what has its FMMUs may come back with them");
+    (0..3).for_each(|subdevice| start.board.set_taking_part(subdevice, true));
+    assert_eq!(start.cycle(1), [60, 1028, 1028]);
+    assert_eq!(start.states(), [DomainState::Zero, DomainState::Complete], "its last datagram is supervision");
+    assert_eq!(start.exchange.counters().corrupt, 0);
 }

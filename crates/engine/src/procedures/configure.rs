@@ -24,7 +24,8 @@ use crate::supervisor::{Bus, BusError};
 
 pub use error::{ConfigureError, StartupError};
 
-/// Cycles of the exchange that must have gone by before OP is requested, so that valid outputs are there (facts 5.2).
+/// Cycles of the exchange that must have gone by before OP is requested, so that valid outputs are there (facts 5.2). The
+/// first of them may have been queued without process data.
 const CYCLES_BEFORE_OP: u64 = 2;
 /// Pause between two looks at the cycle counter.
 const CYCLE_PAUSE: Duration = Duration::from_micros(200);

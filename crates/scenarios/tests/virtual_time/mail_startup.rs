@@ -8,7 +8,7 @@ use scenarios::start_lists::Lists;
 fn a_hundred_drives_with_fifty_objects_each_start_in_little_more_than_one_of_them() {
     let all = Lists { drives: 100, objects: 50, mailbox: 128, period: Duration::from_millis(1) };
     let (one, cost) = (Lists { drives: 1, ..all }.start(), all.start());
-    let floor = one.time.max(cost.beside_process_data(all.mail_alone()));
+    let floor = one.time.max(all.mail_alone());
     let ratio = cost.time.as_secs_f64() / floor.as_secs_f64();
     println!("one drive {:?}, all {cost:?}, ratio to the larger of one drive and the wire time {ratio:.2}", one.time);
     assert!(ratio < 1.5, "{ratio}");
