@@ -97,11 +97,20 @@ pub enum Event {
         /// off, or no frame comes back where they are in two rings (JR-02).
         breaks: usize,
     },
+    /// The ports show more rings behind junctions than are known: one was closed that was open when the segment was
+    /// scanned (JR-03), or is not declared. Its breaks read as crossed lines (JR-04) until it is.
+    JunctionUnknown {
+        /// How many are not known.
+        rings: usize,
+    },
     /// No frame comes back while a ring behind a junction is open: with a second unconnected port 0 in one path, frames are
-    /// destroyed (JR-02). Or the cable of the only link is broken too.
+    /// destroyed (JR-02). Or the cable of the only link is broken too. Where two rings break at the same moment nobody
+    /// can tell where until one of them is whole again; then the other is told with its place.
     JunctionsBlocked {
         /// True when it begins, false when frames come back.
         blocked: bool,
+        /// Cables of such rings that are known to be broken.
+        breaks: usize,
     },
     /// The link layer cannot take a link down, so crossed lines in a closed ring have no place (LC-03).
     CannotDisconnect {

@@ -314,7 +314,8 @@ impl MainDevice {
             None => start_all(&bus, &fleet, start),
         }
         if self.options.supervision {
-            self.supervisor.spawn(supervise(bus.clone(), fleet.clone(), self.options.enhanced_line_crossed));
+            let (enhanced, rings) = (self.options.enhanced_line_crossed, self.options.junctions);
+            self.supervisor.spawn(supervise(bus.clone(), fleet.clone(), enhanced, rings));
         }
         self.supervisor.spawn(watch_groups(bus.clone(), fleet.clone()));
         self.supervisor.spawn(watch_mail(bus.clone(), fleet.clone()));

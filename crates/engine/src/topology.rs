@@ -20,6 +20,7 @@ use ringcat_wire::register::{DlStatus, PortKind};
 
 use crate::info::SubDeviceInfo;
 use local_ring::Rings;
+pub(crate) use local_ring::rings_shown;
 pub use local_ring::{Closing, LocalRing, RingCable, candidates};
 
 /// What a SubDevice reported about its ports.

@@ -107,11 +107,19 @@ pub fn describe(event: &Event, names: &Names) -> String {
                 (false, _) => format!("Line is fixed {place}: broken cables left: {breaks}"),
             }
         }
-        Event::JunctionsBlocked { blocked: true } => {
+        Event::JunctionUnknown { rings } => {
+            let what = "rings behind junctions closed that are not known";
+            format!("{rings} {what}: their breaks read as crossed lines until the segment is scanned anew")
+        }
+        Event::JunctionsBlocked { blocked: true, breaks: 0 } => {
+            let why = "two rings behind junctions broke at once, or the first SubDevice is dead";
+            format!("no frame comes back: {why}. Where is known when one of them is whole")
+        }
+        Event::JunctionsBlocked { blocked: true, .. } => {
             let why = "a second one is open too, or the cable of the interface";
             format!("no frame comes back while a ring behind a junction is open: {why}")
         }
-        Event::JunctionsBlocked { blocked: false } => "frames come back again".to_owned(),
+        Event::JunctionsBlocked { blocked: false, .. } => "frames come back again".to_owned(),
         Event::RedundancyLost { cause } => format!("redundancy lost: {cause}"),
         Event::RedundancyRegained => "redundancy regained: the ring stands a break".to_owned(),
         Event::CableErrors { cable, errors } => format!("CRC errors rise {}: {errors}", names.cable(*cable)),

@@ -14,6 +14,7 @@ use ringcat_engine::main_device::Pending;
 use ringcat_sim::application::behaviours::{Behaviour, InputSource};
 use ringcat_sim::cable::{CableId, DeviceIndex};
 use ringcat_sim::description::{DeviceDescription, EoeEnd};
+use ringcat_sim::device::Device;
 use ringcat_sim::fault::Fault;
 use ringcat_sim::network::{Network, NetworkOptions};
 use ringcat_sim::time::SimTime;
@@ -111,10 +112,14 @@ pub struct Case {
 pub struct Outcome {
     /// Incomplete cycles at the cut and at the repair; none are counted in a start-up.
     pub incomplete: [usize; 2],
+    /// How many were allowed each time, with the flight that was measured.
+    pub allowed: usize,
     /// From the first frames that went the original way to the event.
     pub fixed_after: Duration,
     /// Bytes of inputs that were compared with the uncut twin.
     pub compared: u64,
+    /// Times that a SubDevice was found to have taken over its outputs just once in a cycle.
+    pub taken: u64,
 }
 
 /// The device that has mailboxes with all protocols.
@@ -207,6 +212,11 @@ impl Bed {
         Bed { count, detection, phases, twins }
     }
 
+    /// SubDevices of its rings.
+    pub const fn count(&self) -> usize {
+        self.count
+    }
+
     /// Cuts and heals a cable in a phase, at a moment of the cycle (or of the phase of the start-up) in thousandths.
     ///
     /// # Panics
@@ -270,19 +280,46 @@ struct Pair<'a> {
     /// Complete cycles in a row.
     calm: usize,
     compared: u64,
+    /// How often each device took over outputs so far.
+    latched: Vec<u64>,
+    /// Who is not watched for that: it leaves OP in this phase.
+    apart: Option<usize>,
+    taken: u64,
 }
 
 impl Pair<'_> {
-    /// One cycle. Outside the edges the inputs are the twin's.
+    /// One cycle. Outside the edges the inputs are the twin's, and outputs come once.
     fn cycle(&mut self, case: &Case) {
         self.cut.cycle();
         let world = &self.cut;
         let last = world.judged(world.beginning()).last();
         self.calm = if last.is_some_and(|it| it.delivery == Delivery::Complete) { self.calm + 1 } else { 0 };
+        self.taken += self.count_latches(case);
+        let world = &self.cut;
         let Some(twin) = self.twin.next().filter(|_| self.calm > ECHO) else { return };
         let image = world.application().exchange().image(DomainId(0));
         assert_eq!(image, twin, "{case:?}: other inputs than the twin's, {}", world.now());
         self.compared += image.len() as u64;
+    }
+
+    /// Outputs reach each SubDevice once per cycle; at an edge not at all, once or twice. Returns how many they reached.
+    fn count_latches(&mut self, case: &Case) -> u64 {
+        let now: Vec<u64> = self.cut.network().devices().map(Device::outputs_latched).collect();
+        let before = std::mem::replace(&mut self.latched, now);
+        // What was sent last is on its way; the cycle that was judged is the one before.
+        let is_calm = self.calm > ECHO;
+        let mut taken = 0;
+        for (number, (before, now)) in before.iter().zip(&self.latched).enumerate() {
+            let has_outputs = !self.cut.network().device(DeviceIndex(number)).outputs().is_empty();
+            if !has_outputs || self.apart == Some(number) {
+                continue;
+            }
+            let times = now - before;
+            let (least, most) = if is_calm { (1, 1) } else { (0, 2) };
+            assert!((least..=most).contains(&times), "{case:?}: device {number} took outputs {times} times");
+            taken += u64::from(is_calm);
+        }
+        taken
     }
 
     fn cycles(&mut self, case: &Case, count: u64) {
@@ -339,7 +376,9 @@ fn wait(detection: Duration) -> u64 {
 
 fn operate(case: &Case, twin: &[Vec<u8>]) -> Outcome {
     let cut = in_op(case.count, case.detection);
-    let mut pair = Pair { cut, twin: twin.iter(), calm: 0, compared: 0 };
+    let apart = matches!(case.phase, Phase::StateChange | Phase::StateRequest).then(|| speaker(case.count));
+    let latched = cut.network().devices().map(Device::outputs_latched).collect();
+    let mut pair = Pair { cut, twin: twin.iter(), calm: 0, compared: 0, latched, apart, taken: 0 };
     pair.cut.application_mut().links_mut().measure_flights();
     pair.cycles(case, BEFORE);
     let fallen = match case.phase {
@@ -359,7 +398,7 @@ fn operate(case: &Case, twin: &[Vec<u8>]) -> Outcome {
     let cable = cable_of_ring(case.cable, case.count);
     let opened = [Event::RingOpened { main, redundant }, Event::BreakLocated { cable }];
     let closed = [Event::RingClosed { main: case.count as u16, redundant: 0 }];
-    let mut outcome = Outcome::default();
+    let mut outcome = Outcome { allowed: bound, ..Outcome::default() };
     for (at, fault) in [Fault::Cut(CableId(case.cable)), Fault::Heal(CableId(case.cable))].into_iter().enumerate() {
         let mark = pair.cut.mark();
         let state = [AlState::PreOp, AlState::Op][at];
@@ -396,7 +435,7 @@ fn operate(case: &Case, twin: &[Vec<u8>]) -> Outcome {
     pair.cut.until(limit, "all in OP", |world| world.all_in_op() && world.application().all_settled());
     pair.cut.run_cycles(5);
     is_whole(&pair.cut, case);
-    outcome.compared = pair.compared;
+    (outcome.compared, outcome.taken) = (pair.compared, pair.taken);
     outcome
 }
 

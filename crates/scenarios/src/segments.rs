@@ -3,11 +3,18 @@
 use std::time::Duration;
 
 use ringcat::{Cable, PortOf};
+use ringcat_sim::cable::{DeviceIndex, Endpoint, HostLink};
 use ringcat_sim::catalogue;
 use ringcat_sim::description::DeviceDescription;
 use ringcat_sim::device::Device;
+use ringcat_sim::frame::Port;
 use ringcat_sim::network::builder::SegmentBuilder;
 use ringcat_sim::network::{Network, NetworkOptions};
+
+/// Where the cable to the main interface is plugged in.
+pub const MAIN: Endpoint = Endpoint::Host(HostLink::Main);
+/// Where that to the redundant one is.
+pub const REDUNDANT: Endpoint = Endpoint::Host(HostLink::Redundant);
 
 /// Sixteen SubDevices of all kinds, as in the demonstration.
 pub const SIXTEEN: [&str; 16] = [
@@ -54,6 +61,29 @@ pub fn descriptions(kinds: &[&str]) -> Vec<DeviceDescription> {
 /// Devices from descriptions.
 pub fn devices(descriptions: Vec<DeviceDescription>) -> Vec<Device> {
     descriptions.into_iter().map(Device::new).collect()
+}
+
+/// A port of a device.
+pub const fn at(device: usize, port: Port) -> Endpoint {
+    Endpoint::Device(DeviceIndex(device), port)
+}
+
+/// Devices of these kinds with these cables, in the order of their numbers.
+///
+/// # Panics
+/// When the cables do not fit.
+pub fn wired(kinds: &[&str], cables: &[(Endpoint, Endpoint)]) -> Network {
+    wired_with(descriptions(kinds), cables)
+}
+
+/// As [`wired`], from descriptions.
+///
+/// # Panics
+/// When the cables do not fit.
+pub fn wired_with(descriptions: Vec<DeviceDescription>, cables: &[(Endpoint, Endpoint)]) -> Network {
+    let builder = devices(descriptions).into_iter().fold(SegmentBuilder::new(), SegmentBuilder::device);
+    let builder = cables.iter().fold(builder, |builder, (a, b)| builder.cable(*a, *b));
+    builder.options(NetworkOptions::default()).build().expect("the cables fit")
 }
 
 /// A closed ring: cable 0 from the main link, cable `n` between devices `n - 1` and `n`, the last to the redundant link.

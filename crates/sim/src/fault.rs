@@ -26,6 +26,15 @@ pub enum Fault {
     Cut(CableId),
     /// The cable is whole again; both ends notice after their detection delay.
     Heal(CableId),
+    /// The cable is whole again; the end that receives in one direction notices later than the other by so much.
+    HealUnevenly {
+        /// Which cable.
+        cable: CableId,
+        /// Towards the end that is later.
+        direction: Direction,
+        /// How much later.
+        by: Duration,
+    },
     /// The next frames on the cable disappear.
     Drop {
         /// Which cable.

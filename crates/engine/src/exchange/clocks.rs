@@ -1,7 +1,7 @@
 //! Distributed clocks in the cyclic frames (facts 7.2, 7.4, 7.5).
 //!
 //! Three datagrams ride in one frame: an FRMW of 0x0910 that hands the reference's time to all others, an FPWR of 0x0910
-//! that steers one clock (the reference towards the host, or a second reference towards the first), a BRD of 0x092C.
+//! that steers a clock (the reference towards the host, on the other copy a second one towards the first), a BRD of 0x092C.
 //! What the supervisor posts on the board says whose time each copy distributes. The FRMW leaves with the predicted time
 //! of the reference: whoever the frame meets before the reference, or without one, takes what was sent.
 
@@ -222,7 +222,7 @@ impl Clocks {
         let steer = self.steering(now);
         for link in Link::ALL {
             let sync = self.references.on(link).map(|station| (station, self.predicted(link, now) as u32));
-            payloads[link.index()] = Payload { sync, steer };
+            payloads[link.index()] = Payload { sync, steer: steer[link.index()] };
         }
         self.cycle = self.cycle.wrapping_add(1);
         payloads
@@ -242,16 +242,32 @@ impl Clocks {
         (self.references, self.changes, self.held) = (references, changes, false);
     }
 
-    /// Who is told another time than its own, and which.
-    fn steering(&mut self, now: Instant) -> Option<(StationAddress, u32)> {
+    /// Who is told another time than its own, and which, by the link of the copy: in an open ring each copy meets its own
+    /// reference, and the one that leads may follow the host while the other one follows it.
+    fn steering(&mut self, now: Instant) -> [Option<(StationAddress, u32)>; 2] {
         let (leader, steered) = self.references.leader();
-        if let Some(leader) = leader
-            && (self.wanted.is_some() || (self.setup.bus_shift && steered.is_none()))
-        {
-            let time = self.wanted.take().unwrap_or_else(|| self.application_time(now));
-            return Some((self.references.on(leader)?, time as u32));
+        let to_host = self.leading(leader, now);
+        match (leader, steered) {
+            (Some(Link::Main), Some(_)) => [to_host, self.following(Link::Redundant, now)],
+            (Some(Link::Redundant), Some(_)) => [self.following(Link::Main, now), to_host],
+            _ => [to_host; 2],
         }
-        let (steered, own) = (steered?, self.times[steered?.index()]?);
+    }
+
+    /// What the segment's reference is told: the time of the host or of the application.
+    fn leading(&mut self, leader: Option<Link>, now: Instant) -> Option<(StationAddress, u32)> {
+        let station = self.references.on(leader?)?;
+        let time = match self.wanted.take() {
+            Some(time) => time,
+            None if self.setup.bus_shift => self.application_time(now),
+            None => return None,
+        };
+        Some((station, time as u32))
+    }
+
+    /// What a second reference is told, so that it follows the first one.
+    fn following(&self, steered: Link, now: Instant) -> Option<(StationAddress, u32)> {
+        let own = self.times[steered.index()]?;
         let Lead { ahead, change_ppb, .. } = self.lead?;
         let expected = ahead + change_ppb * (FORESIGHT_NS / 1_000) / 1_000_000;
         if expected.abs() <= NEAR_NS && !self.cycle.is_multiple_of(STEERING_INTERVAL) {

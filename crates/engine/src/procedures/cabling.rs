@@ -1,13 +1,16 @@
 //! Crossed lines in operation (facts 9.5): whenever ports of SubDevices have changed, the segment is looked at anew and
 //! who is entered at another port than 0 is told, once.
 //!
+//! More rings behind junctions than are known are told too: whoever asked for junction redundancy must know that one of
+//! them is not watched.
+//!
 //! In a closed ring that shows only that something is crossed (LC-02). In *enhanced* mode the redundant link is
 //! disconnected under control meanwhile: the segment is an open line then, and each crossing has its place (LC-03). That
 //! costs what a cut of that cable costs, and what mending it does; it is not told as a break.
 
 use alloc::rc::Rc;
 use alloc::vec::Vec;
-use core::cell::Cell;
+use core::cell::{Cell, RefCell};
 use core::time::Duration;
 
 use ringcat_wire::address::{Position, StationAddress};
@@ -17,10 +20,11 @@ use super::fleet::{Phase, SharedFleet};
 use super::inspect::Look;
 use super::strangers::view;
 use crate::event::Event;
+use crate::junction::JunctionMode;
 use crate::link::{Link, LinkSet};
 use crate::ring::RingState;
 use crate::supervisor::{Bus, BusError};
-use crate::topology::{Closing, Finding, NodeStatus, PortOf, Topology};
+use crate::topology::{Closing, Finding, NodeStatus, PortOf, Topology, rings_shown};
 
 /// From a change of ports until the segment is looked at: a plug that is pushed in bounces.
 const SETTLE: Duration = Duration::from_millis(5);
@@ -51,9 +55,18 @@ pub(super) trait Known {
     fn closings(&self) -> Vec<[(StationAddress, u8); 2]>;
 }
 
-/// Who is crossed; `None` where the segment changes too much to tell. With `enhanced` and a closed ring the redundant
+/// What a look at the segment shows.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub(super) struct Cabling {
+    /// Who is crossed.
+    pub crossings: Vec<Crossing>,
+    /// Rings behind junctions that are whole and not known.
+    pub unknown_rings: usize,
+}
+
+/// Who is crossed, and which rings are not known; `None` where the segment changes too much to tell. With `enhanced` and a closed ring the redundant
 /// link is taken down meanwhile; where it cannot be, that is reported, and the ring is looked at as it is.
-pub(super) async fn crossings(bus: &Bus, known: &impl Known, enhanced: bool) -> Option<Vec<Crossing>> {
+pub(super) async fn cabling(bus: &Bus, known: &impl Known, enhanced: bool) -> Option<Cabling> {
     let in_control = enhanced && bus.links() == LinkSet::Ring && bus.ring() == RingState::Closed;
     if in_control && !bus.force_disconnect(Link::Redundant, true).await {
         bus.report(Event::CannotDisconnect { link: Link::Redundant });
@@ -83,7 +96,7 @@ async fn wait_for(bus: &Bus, state: RingState) {
     }
 }
 
-async fn look_often(bus: &Bus, known: &impl Known) -> Option<Vec<Crossing>> {
+async fn look_often(bus: &Bus, known: &impl Known) -> Option<Cabling> {
     for attempt in 0..ATTEMPTS {
         if attempt > 0 {
             bus.sleep(PAUSE).await;
@@ -95,7 +108,7 @@ async fn look_often(bus: &Bus, known: &impl Known) -> Option<Vec<Crossing>> {
     None
 }
 
-async fn look(bus: &Bus, known: &impl Known) -> Result<Option<Vec<Crossing>>, BusError> {
+async fn look(bus: &Bus, known: &impl Known) -> Result<Option<Cabling>, BusError> {
     let Some(before) = view(bus).await? else { return Ok(None) };
     bus.bwr(map::DC_RECEIVE_TIME, &[0; 4]).await?;
     let read = bus.gather(before.stations.clone(), |bus, station| async move {
@@ -139,25 +152,31 @@ async fn look(bus: &Bus, known: &impl Known) -> Result<Option<Vec<Crossing>>, Bu
         .collect();
     // In a closed ring only branches on port 2 and crossed SubDevices work on the redundant copy (LC-04).
     let on_redundant = before.counts.1.0 > 0;
-    if found.is_empty() && bus.links() == LinkSet::Ring && bus.ring() == RingState::Closed && on_redundant {
+    let is_closed = bus.links() == LinkSet::Ring && bus.ring() == RingState::Closed;
+    if found.is_empty() && is_closed && on_redundant {
         found.push(Crossing { who: None, entry_port: None });
     }
-    Ok(Some(found))
+    // Odd ports and stubs of a broken ring would be counted wrongly.
+    let is_plain = topology.findings.is_empty() && !on_redundant;
+    let shown = if is_plain { rings_shown(&nodes, is_closed) } else { 0 };
+    Ok(Some(Cabling { crossings: found, unknown_rings: shown.saturating_sub(closings.len()) }))
 }
 
 /// Looks out for changes of ports, and has crossings told once each.
 #[derive(Debug)]
 pub(super) struct CablingWatch {
     enhanced: bool,
+    /// Rings behind junctions are watched.
+    junctions: bool,
     /// What members said about their ports when the segment was looked at last.
     ports: Vec<Option<u16>>,
     busy: Rc<Cell<bool>>,
-    told: Rc<core::cell::RefCell<Vec<Crossing>>>,
+    told: Rc<RefCell<Cabling>>,
 }
 
 impl CablingWatch {
     /// Watches a fleet; what the scan told is not told again.
-    pub fn new(fleet: &SharedFleet, enhanced: bool) -> CablingWatch {
+    pub fn new(fleet: &SharedFleet, enhanced: bool, junctions: JunctionMode) -> CablingWatch {
         let access = fleet.access();
         let told = access.topology.findings.iter().filter_map(|finding| match *finding {
             Finding::CrossedLine { node, entry_port } => {
@@ -166,8 +185,9 @@ impl CablingWatch {
             }
             _ => None,
         });
-        let told: Vec<Crossing> = told.collect();
-        CablingWatch { enhanced, ports: Vec::new(), busy: Rc::default(), told: Rc::new(told.into()) }
+        let told = Cabling { crossings: told.collect(), unknown_rings: 0 };
+        let junctions = junctions != JunctionMode::Disabled || !access.topology.local_rings.is_empty();
+        CablingWatch { enhanced, junctions, ports: Vec::new(), busy: Rc::default(), told: Rc::new(told.into()) }
     }
 
     /// Takes in looks at all members; where ports have changed, the segment is looked at.
@@ -192,16 +212,21 @@ impl CablingWatch {
         self.busy.set(true);
         let (bus, fleet) = (bus.clone(), fleet.clone());
         let (busy, told, enhanced) = (self.busy.clone(), self.told.clone(), self.enhanced);
+        let junctions = self.junctions;
         bus.clone().spawn(async move {
             bus.sleep(SETTLE).await;
             // Only where the link is really taken down: a ring that breaks or closes meanwhile has to be told.
             let in_control = enhanced && bus.links() == LinkSet::Ring && bus.ring() == RingState::Closed;
             fleet.set_controlled_break(in_control);
-            let found = crossings(&bus, &fleet, enhanced).await;
+            let found = cabling(&bus, &fleet, enhanced).await;
             fleet.set_controlled_break(false);
             if let Some(found) = found {
-                tell(&bus, &fleet, &found, &told.borrow());
-                *told.borrow_mut() = found;
+                tell(&bus, &fleet, &found.crossings, &told.borrow().crossings);
+                if junctions && found.unknown_rings > told.borrow().unknown_rings {
+                    bus.report(Event::JunctionUnknown { rings: found.unknown_rings });
+                }
+                let unknown_rings = found.unknown_rings.max(told.borrow().unknown_rings);
+                *told.borrow_mut() = Cabling { unknown_rings, ..found };
             }
             busy.set(false);
         });

@@ -24,7 +24,7 @@ use ringcat_wire::register::{DcReceiveTimes, DlStatus, EcatEvent, Fmmu, Informat
 
 use self::count::Count;
 pub use self::error::ScanError;
-use super::cabling::{Known, crossings};
+use super::cabling::{Known, cabling};
 use super::dictionary::{ReadPdos, complete};
 use super::junction::learn;
 use super::sii::{self, SiiCache, SiiContents};
@@ -366,7 +366,7 @@ async fn locate_crossings(bus: &Bus, scan: &mut Scan) -> bool {
     if bus.links() != LinkSet::Ring || bus.ring() != RingState::Closed {
         return false;
     }
-    let Some(found) = crossings(bus, scan, true).await else { return false };
+    let Some(found) = cabling(bus, scan, true).await.map(|seen| seen.crossings) else { return false };
     let node = |station: StationAddress| scan.subdevices.iter().position(|info| info.station == station);
     let exact = found.iter().filter_map(|crossing| {
         Some(Finding::CrossedLine { node: node(crossing.who?.0)?, entry_port: crossing.entry_port? })

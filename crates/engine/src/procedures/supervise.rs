@@ -27,6 +27,7 @@ use super::strangers::{self, Search};
 use super::verify::verify;
 use crate::board::{RingWord, Supervision};
 use crate::event::Event;
+use crate::junction::JunctionMode;
 use crate::ring::RingState;
 use crate::ring_status::Cable;
 use crate::supervisor::Bus;
@@ -52,7 +53,7 @@ const FIRST_BREAK_LOOK_PAUSE: Duration = Duration::from_millis(1);
 const STRANGER_PAUSE: Duration = Duration::from_millis(10);
 
 /// Runs for ever.
-pub(crate) async fn supervise(bus: Bus, fleet: SharedFleet, enhanced_line_crossed: bool) {
+pub(crate) async fn supervise(bus: Bus, fleet: SharedFleet, enhanced_line_crossed: bool, rings: JunctionMode) {
     let members = fleet.access().members.len();
     let reported = Rc::new(Cell::new(RingState::Unknown));
     bus.spawn(watch_ring(bus.clone(), fleet.clone(), reported.clone()));
@@ -62,7 +63,7 @@ pub(crate) async fn supervise(bus: Bus, fleet: SharedFleet, enhanced_line_crosse
         bus.spawn(watch_blocked(bus.clone(), fleet.clone(), junctions.broken()));
     }
     bus.spawn(watch_errors(bus.clone(), fleet.clone()));
-    let cabling = CablingWatch::new(&fleet, enhanced_line_crossed);
+    let cabling = CablingWatch::new(&fleet, enhanced_line_crossed, rings);
     let mut watch = Watch {
         bus,
         fleet,
@@ -246,7 +247,8 @@ impl Watch {
 
     /// One event per break, when its neighbours have noticed it.
     fn report_break(&mut self, looks: &[Look]) {
-        if self.seen_reported != RingState::Open {
+        // While everybody was looked at, the ring may have closed.
+        if self.seen_reported != RingState::Open || self.reported.get() != RingState::Open {
             return;
         }
         let reported = self.fleet.access().ring.place;

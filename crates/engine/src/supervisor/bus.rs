@@ -239,7 +239,7 @@ impl Bus {
         let (command, expected) = (Command::Fpwr, Some(Wkc(1)));
         // A second datagram has a cost of its own.
         let (lead, target, data) = if mail.len() + OVERHEAD < usize::from(size) {
-            (Some((at(0), mail)), at(size - 1), vec![0; 1])
+            (Some((command, at(0), mail)), at(size - 1), vec![0; 1])
         } else {
             let mut whole = mail;
             whole.resize(usize::from(size), 0);
@@ -280,7 +280,11 @@ impl Bus {
         Signal::new(self.shared.clone())
     }
 
-    fn submit(&self, request: Request) -> TransferFuture {
+    fn submit(&self, mut request: Request) -> TransferFuture {
+        // Clocks of both stubs are distributed on purpose: neither copy is the right one.
+        if self.links() == LinkSet::Ring && request.redundant_station.is_none() && request.lead.is_none() {
+            request.lead = request.witness();
+        }
         TransferFuture { shared: self.shared.clone(), request: Some(request), id: None }
     }
 

@@ -15,7 +15,7 @@ use super::bus::{BusError, Reply};
 use super::outbox::Rank;
 use super::shared::Shared;
 use super::stray::{Overdue, Stray};
-use super::transfer::{Stage, TransferId};
+use super::transfer::{Request, Stage, TransferId, WITNESS_BYTES};
 use crate::link::{Link, LinkSet};
 use crate::ring::identity::DATAGRAMS_AT;
 use crate::ring::{Arrivals, Class, FrameCopy, Identity, MAX_IN_FLIGHT, MergeRule, Sequence};
@@ -89,6 +89,10 @@ struct Place {
     command: Command,
     expected: Option<Wkc>,
     mail: Option<StationAddress>,
+    /// The datagram before it tells which copy meets the addressed SubDevice.
+    witness: bool,
+    /// The link whose copy met it.
+    visible: Link,
     wkc: [Wkc; 2],
     /// Its procedure has the reply.
     answered: bool,
@@ -261,7 +265,7 @@ impl Shared {
                     continue;
                 }
                 let request = &transfer.request;
-                let lead = request.lead.as_ref().map_or(0, |(_, data)| OVERHEAD + data.len());
+                let lead = request.lead.as_ref().map_or(0, |(_, _, data)| OVERHEAD + data.len());
                 let bytes = lead + OVERHEAD + request.data.len();
                 // Only the first datagram of a frame may be longer than the window.
                 if total + bytes > limit
@@ -270,8 +274,8 @@ impl Shared {
                     break;
                 }
                 let index = sequence.index(Class::Acyclic);
-                if let Some((target, lead)) = &request.lead {
-                    let Some(at) = builder.datagram(request.command, index, *target, lead.len()) else { break };
+                if let Some((command, target, lead)) = &request.lead {
+                    let Some(at) = builder.datagram(*command, index, *target, lead.len()) else { break };
                     if let Some(data) = builder.data_mut(at, lead.len()) {
                         data.copy_from_slice(lead);
                     }
@@ -291,6 +295,8 @@ impl Shared {
                     command: request.command,
                     expected: request.expected,
                     mail: request.mail,
+                    witness: witnesses(request),
+                    visible: Link::Main,
                     wkc: [Wkc(0); 2],
                     answered: false,
                 });
@@ -474,10 +480,18 @@ fn adjust_auto_increment(frame: &mut [u8], places: &[Place], main_count: u16) {
         if !matches!(place.command, Command::Aprd | Command::Apwr | Command::Aprw | Command::Armw) {
             continue;
         }
-        let at = place.header_at + 2;
-        let adp = u16::from_le_bytes([frame[at], frame[at + 1]]).wrapping_add(main_count);
-        frame[at..at + 2].copy_from_slice(&adp.to_le_bytes());
+        let witness = place.witness.then(|| place.header_at - WITNESS_BYTES);
+        for at in [Some(place.header_at), witness].into_iter().flatten() {
+            let adp = at + 2;
+            let shifted = u16::from_le_bytes([frame[adp], frame[adp + 1]]).wrapping_add(main_count);
+            frame[adp..adp + 2].copy_from_slice(&shifted.to_le_bytes());
+        }
     }
+}
+
+/// Whether the datagram before a request's is its witness.
+fn witnesses(request: &Request) -> bool {
+    request.lead.is_some() && matches!(request.command, Command::Armw | Command::Frmw)
 }
 
 impl Flight {
@@ -519,13 +533,17 @@ impl Flight {
             let wkc = Wkc(u16::from_le_bytes([bytes[data.end], bytes[data.end + 1]]));
             let before = place.total();
             place.wkc[sent_on.index()] = wkc;
+            let witnessed = place.witness && bytes[place.header_at - WKC_LEN..place.header_at] != [0; WKC_LEN];
+            if witnessed {
+                place.visible = sent_on;
+            }
             // OR of the event requests (facts 9.3); both copies have them behind the length.
             let irq = place.header_at + 8;
             if first {
                 self.bytes[data.clone()].copy_from_slice(&bytes[data]);
                 self.bytes[irq..irq + WKC_LEN].copy_from_slice(&bytes[irq..irq + WKC_LEN]);
             } else {
-                let rule = MergeRule::of(place.command, Link::Main);
+                let rule = MergeRule::of(place.command, place.visible);
                 rule.merge(&mut self.bytes[data.clone()], before, &bytes[data], wkc, sent_on);
                 self.bytes[irq] |= bytes[irq];
                 self.bytes[irq + 1] |= bytes[irq + 1];

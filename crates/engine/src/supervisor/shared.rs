@@ -122,7 +122,7 @@ impl Shared {
             if fits { Stage::Queued } else { Stage::Done(Err(BusError::TooLong { target: request.target, length })) };
         let rank = if request.mail.is_some() { Rank::Read } else { Rank::First };
         let target = request.target;
-        let bytes = OVERHEAD + length + request.lead.as_ref().map_or(0, |(_, data)| OVERHEAD + data.len());
+        let bytes = OVERHEAD + length + request.lead.as_ref().map_or(0, |(_, _, data)| OVERHEAD + data.len());
         let id = self.transfers.insert(Transfer { request, stage, task: self.current, retries: 0, abandoned: false });
         if fits {
             self.outbox.push(id, rank, target, bytes, self.now);

@@ -4,7 +4,8 @@ use alloc::vec::Vec;
 
 use ringcat_wire::address::{StationAddress, Wkc};
 use ringcat_wire::command::Command;
-use ringcat_wire::datagram::Target;
+use ringcat_wire::datagram::{MAX_DATA, OVERHEAD, Target};
+use ringcat_wire::register::map;
 
 use super::bus::{BusError, Reply};
 use super::executor::TaskId;
@@ -24,8 +25,8 @@ pub(crate) struct Request {
     pub expected: Option<Wkc>,
     /// Whether a lost datagram may be sent again: false where reading or writing twice is not the same as once.
     pub resend: bool,
-    /// A datagram that goes before it in the same frame, and whose own working counter does not matter.
-    pub lead: Option<(Target, Vec<u8>)>,
+    /// A datagram that goes before it in the same frame: a part of the same mail, or its [`Request::witness`].
+    pub lead: Option<(Command, Target, Vec<u8>)>,
     /// A read of this SubDevice's mailbox: what each copy reads matters, also when it comes late.
     pub mail: Option<StationAddress>,
 }
@@ -45,7 +46,22 @@ impl Request {
             mail: None,
         }
     }
+
+    /// A read of the SubDevice that ARMW and FRMW address: which copy meets it, their own working counters do not tell,
+    /// because all others count too (facts 9.3).
+    pub(crate) fn witness(&self) -> Option<(Command, Target, Vec<u8>)> {
+        let (command, target) = match (self.command, self.target) {
+            (Command::Armw, Target::Position(position, _)) => (Command::Aprd, Target::Position(position, map::TYPE)),
+            (Command::Frmw, Target::Station(station, _)) => (Command::Fprd, Target::Station(station, map::TYPE)),
+            _ => return None,
+        };
+        let fits = self.data.len() + WITNESS_BYTES <= MAX_DATA;
+        fits.then(|| (command, target, Vec::from([0])))
+    }
 }
+
+/// What a [`Request::witness`] takes in a frame: a datagram of one byte.
+pub(super) const WITNESS_BYTES: usize = OVERHEAD + 1;
 
 /// How far a transfer is.
 #[derive(Debug)]

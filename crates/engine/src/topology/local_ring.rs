@@ -115,16 +115,21 @@ pub fn candidates(nodes: &[NodeStatus], main_count: usize, ring_closed: bool, mo
     }
     // One open port leads to the redundant link.
     let spare = usize::from(ring_closed);
-    let further = |node: &NodeStatus| (1..4).filter(|port| open(node, *port)).count();
-    let open_ports: usize = nodes.iter().map(further).sum();
-    let hanging = nodes.iter().skip(1).filter(|node| !unconnected(node)).count();
-    let rings = open_ports.saturating_sub(spare + hanging) / 2;
+    let rings = rings_shown(nodes, ring_closed);
     if rings == 0 || rings > MOST_RINGS {
         return Vec::new();
     }
     let mut search = Search { nodes, spare, rings, most, steps: STEPS, found: Vec::new() };
     search.go(0, Vec::new(), Vec::new());
     search.found
+}
+
+/// How many rings behind junctions the open ports show: each has two more than its members need.
+pub(crate) fn rings_shown(nodes: &[NodeStatus], ring_closed: bool) -> usize {
+    let further = |node: &NodeStatus| (1..4).filter(|port| open(node, *port)).count();
+    let open_ports: usize = nodes.iter().map(further).sum();
+    let hanging = nodes.iter().skip(1).filter(|node| !unconnected(node)).count();
+    open_ports.saturating_sub(usize::from(ring_closed) + hanging) / 2
 }
 
 /// Steps of a search: enough for all places where a ring of a thousand SubDevices may close.

@@ -39,7 +39,7 @@ fn refused<T: std::fmt::Debug>(
 }
 
 #[test]
-fn load_add_apply_and_each_misuse_is_an_error_of_its_own_jr_05_jr_06() {
+fn load_add_apply_and_each_misuse_is_an_error_of_its_own_jr_05_jr_06_jr_08() {
     let mut main_device = requested(JunctionMode::Strict);
     assert_eq!(junction_error(main_device.add_junction_connection(GOOD)), JunctionError::NotLoaded);
     let (error, mut main_device) = refused(main_device.apply());
@@ -104,5 +104,8 @@ fn breaks_of_rings_behind_junctions_are_told_in_the_words_of_seed_001() {
         describe(&learned, &names)
             .contains("from SubDevice 3 \"second\" port 1 back to SubDevice 1 \"junction\" port 1")
     );
-    assert!(describe(&Event::JunctionsBlocked { blocked: true }, &names).contains("no frame comes back"));
+    let blocked = |breaks| describe(&Event::JunctionsBlocked { blocked: true, breaks }, &names);
+    assert!(blocked(1).contains("no frame comes back while a ring behind a junction is open"));
+    assert!(blocked(0).contains("no frame comes back: two rings behind junctions broke at once"));
+    assert!(describe(&Event::JunctionUnknown { rings: 1 }, &names).starts_with("1 rings behind junctions closed"));
 }

@@ -12,6 +12,7 @@ mod cuts_beside;
 mod ethernet;
 mod foreign;
 mod frames;
+mod junctions;
 mod mail_captures;
 mod messages;
 mod said;

@@ -227,6 +227,59 @@ fn a_cut_and_a_heal_at_any_cable_leave_no_clock_behind_facts_7_5() {
     }
 }
 
+/// Where the host says what time it is, the reference follows it through a break; where the reference does, cycles follow
+/// it, also when all frames meet it from the other side.
+#[test]
+fn bus_shift_and_master_shift_go_on_through_a_cut_and_a_repair_cr_26_facts_7_5() {
+    for cable in [0, 2] {
+        let shift = ClockConfig { bus_shift: true, ..config() };
+        let mut world = world(11, ring(clocked(4, 50), NetworkOptions::default()), shift);
+        world.run_cycles(4_000);
+        for heal in [false, true] {
+            if heal {
+                world.heal(CableId(cable))
+            } else {
+                world.cut(CableId(cable))
+            }
+            let mut worst = 0;
+            for _ in 0..1_000 {
+                world.cycle();
+                let host = world.application().now().0.wrapping_add(EPOCH);
+                let network = world.network();
+                let truth = network.device(DeviceIndex(0)).controller.system_time(network.now());
+                worst = worst.max((truth.wrapping_sub(host) as i64).abs());
+            }
+            println!("bus shift, cable {cable}, healed {heal}: {worst} ns from the host's time");
+            assert!(worst <= 20_000, "cable {cable}, healed {heal}: {worst} ns");
+        }
+        assert!(world.all_in_op());
+    }
+    for cable in [0, 2] {
+        let mut world = world(12, ring(clocked(4, 80), NetworkOptions::default()), config());
+        world.application_mut().set_trigger(Trigger::ReferenceClock { phase_ns: -250_000 });
+        lock(&mut world, Duration::from_secs(8));
+        world.run_cycles(3_000);
+        for heal in [false, true] {
+            if heal {
+                world.heal(CableId(cable))
+            } else {
+                world.cut(CableId(cable))
+            }
+            let mut worst = 0;
+            for _ in 0..1_000 {
+                world.cycle();
+                let scheduled =
+                    SimTime(world.application().begun_at().0 - world.application().pace().last_delay.as_nanos() as u64);
+                let time = world.network().device(DeviceIndex(0)).controller.system_time(scheduled);
+                worst = worst.max(phase_error(time, 1_000_000, -250_000).abs());
+            }
+            println!("master shift, cable {cable}, healed {heal}: {worst} ns from the phase");
+            assert!(worst <= 5_000, "cable {cable}, healed {heal}: {worst} ns");
+        }
+        assert!(world.application().follower().is_some_and(Follower::is_locked));
+    }
+}
+
 #[test]
 fn cycles_follow_the_reference_clock_though_the_host_wakes_late_facts_7_4() {
     let mut world = world(10, line(clocked(4, 80), NetworkOptions::default()), config());

@@ -258,3 +258,47 @@ fn a_group_that_breaks_off_is_told_and_its_rest_is_taken() {
     world.run_cycles(200);
     assert_eq!(world.network().device(DeviceIndex(5)).al_status(), AlStatus::new(AlState::Init), "it is left alone");
 }
+
+/// Two groups beside each other, the break between them: each goes on in its half, and one that comes anew joins from the
+/// side that is left to it.
+#[test]
+fn groups_side_by_side_that_a_break_separates_go_on_and_join_from_their_own_side_cr_21() {
+    let mut second = tool();
+    second[0].alias = TOOL + 1;
+    let mut all = descriptions(&BASE);
+    let tail = all.split_off(2);
+    let all: Vec<_> = all.into_iter().chain(tool()).chain(second).chain(tail).collect();
+    let declare = |_: &Scan| {
+        let mut declaration = automatic(&infos(&BASE), CYCLE);
+        for alias in [TOOL, TOOL + 1] {
+            let (_, members) = declaration.add_group(group(SubDeviceConfig::at_alias(alias, 0)));
+            let joined = members.map(|subdevice| DomainMember { subdevice, sync_managers: None });
+            declaration.domains[0].members.extend(joined);
+        }
+        declaration
+    };
+    let network = ring(all, NetworkOptions::default());
+    let mut world = World::with(6, network, &Options::default(), declare).expect("scan and activation");
+    let both = |world: &World| world.application().groups().iter().all(|group| group.has_joined());
+    world.until(LIMIT, "both groups have joined", both);
+    world.settle();
+    let mark = world.mark();
+    // Between the second one of the first group and the head of the second.
+    world.fault_in(BETWEEN, Fault::Cut(CableId(4)));
+    world.run_cycles(100);
+    assert!(both(&world) && world.left_op(mark).is_empty() && world.incomplete(mark) <= 1);
+    for group in [[2, 3], [4, 5]].map(|group| group.map(DeviceIndex)) {
+        let mark = world.mark();
+        group.iter().for_each(|device| world.power_off(*device));
+        world.until(LIMIT, "it has left", |world| world.application().groups().iter().any(|group| group.present == 0));
+        group.iter().for_each(|device| world.power_on(*device));
+        world.until(LIMIT, "both groups have joined", both);
+        world.run_cycles(50);
+        assert!(world.all_in_op() && world.left_op(mark).iter().all(|device| group.contains(device)), "{group:?}");
+    }
+    let mark = world.mark();
+    world.fault_in(BETWEEN, Fault::Heal(CableId(4)));
+    world.run_cycles(100);
+    assert_eq!(world.application().ring(), ringcat::RingState::Closed);
+    assert!(both(&world) && world.left_op(mark).is_empty() && world.incomplete(mark) <= 1);
+}

@@ -1,33 +1,22 @@
 //! Rings behind junctions on one link (facts 9.4): every cable cut and healed, in every mode.
 
+mod second_breaks;
+
 use std::time::Duration;
 
 use ringcat::{Event, JunctionConnection, JunctionMode, Limits, Options, SdoAddress, automatic};
 use ringcat_engine::mail::coe;
 use ringcat_engine::topology::PortOf;
-use ringcat_sim::cable::{CableId, DeviceIndex, Endpoint, HostLink};
-use ringcat_sim::frame::Port::{self, A, B, C, D};
-use ringcat_sim::network::builder::SegmentBuilder;
-use ringcat_sim::network::{Network, NetworkOptions};
+use ringcat_sim::cable::{CableId, DeviceIndex, Endpoint};
+use ringcat_sim::frame::Port::{A, B, C, D};
+use ringcat_sim::network::Network;
 use scenarios::check::{Delivery, troubles};
 use scenarios::dice::Dice;
-use scenarios::segments::{descriptions, devices};
+use scenarios::segments::{MAIN, REDUNDANT, at, wired};
 use scenarios::world::{CYCLE, Mark, World};
 
-const MAIN: Endpoint = Endpoint::Host(HostLink::Main);
-const REDUNDANT: Endpoint = Endpoint::Host(HostLink::Redundant);
 /// What a mode and its connections make of a segment.
 type Setting<'a> = (JunctionMode, &'a [JunctionConnection]);
-
-fn at(device: usize, port: Port) -> Endpoint {
-    Endpoint::Device(DeviceIndex(device), port)
-}
-
-fn wired(kinds: &[&str], cables: &[(Endpoint, Endpoint)]) -> Network {
-    let builder = devices(descriptions(kinds)).into_iter().fold(SegmentBuilder::new(), SegmentBuilder::device);
-    let builder = cables.iter().fold(builder, |builder, (a, b)| builder.cable(*a, *b));
-    builder.options(NetworkOptions::default()).build().expect("the cables fit")
-}
 
 /// An output, a junction with a ring of three on port 3 that comes back to port 1, and two more on its port 2. The ring's
 /// cables are [`RING`], its last one closes it. Only some of them have clocks.
@@ -140,8 +129,7 @@ fn a_ring_behind_a_junction_that_is_broken_from_the_start_is_told_jr_03() {
             assert_eq!(troubles(world.events(world.beginning())), Vec::<&Event>::new(), "{what}");
             assert_eq!(crossed(&world, world.beginning()), 0, "{what}");
             if cable == 5 && setting.0 == JunctionMode::Automatic {
-                // Nothing shows that there could be a ring.
-                assert_eq!(told_then, []);
+                assert_eq!(told_then, [], "nothing shows that there could be a ring");
                 continue;
             }
             let (near, far) = ends(cable);
@@ -157,6 +145,38 @@ fn a_ring_behind_a_junction_that_is_broken_from_the_start_is_told_jr_03() {
                 edge(&mut world, &what, |world| world.heal(CableId(cable)));
             }
         }
+    }
+}
+
+/// Events about rings that are not known, since a point.
+fn unknown(world: &World, mark: Mark) -> Vec<usize> {
+    let rings = |timed: &ringcat::TimedEvent| match timed.event {
+        Event::JunctionUnknown { rings } => Some(rings),
+        _ => None,
+    };
+    world.events(mark).iter().filter_map(rings).collect()
+}
+
+#[test]
+fn a_ring_that_closes_after_the_scan_is_told_as_unknown_unless_it_was_declared_jr_03_jr_09() {
+    for (setting, expected) in [
+        ((JunctionMode::Automatic, &[][..]), vec![1]),
+        ((JunctionMode::Strict, &[STRICT]), vec![]),
+        ((JunctionMode::Disabled, &[]), vec![]),
+    ] {
+        let mut network = one_ring();
+        network.cut(CableId(5));
+        let mut world = in_op(10, network, setting);
+        world.run_cycles(60);
+        let what = format!("{setting:?}");
+        let mark = edge(&mut world, &what, |world| world.heal(CableId(5)));
+        assert_eq!(unknown(&world, mark), expected, "{what}");
+        // Its breaks cost what those of a known ring cost, and are told as JR-04 says, or by their place.
+        let mark = edge(&mut world, &what, |world| world.cut(CableId(3)));
+        let is_known = setting.0 == JunctionMode::Strict;
+        assert_eq!((told(&world, mark).len(), crossed(&world, mark)), if is_known { (1, 0) } else { (0, 1) }, "{what}");
+        let mark = edge(&mut world, &what, |world| world.heal(CableId(3)));
+        assert_eq!(unknown(&world, mark), [], "{what}: it was told");
     }
 }
 
@@ -177,92 +197,6 @@ fn a_ring_behind_a_junction_that_breaks_during_start_up_comes_to_op() {
             assert!(!lost, "cut at {at_us} us, cable {cable}");
         }
     }
-}
-
-/// Two junctions in a row, each with a ring of two, and an input behind them.
-fn two_rings() -> Network {
-    let kinds = ["junction", "digital-output-8", "servo", "junction", "digital-input-8", "servo", "digital-input-8"];
-    let cables = [
-        (MAIN, at(0, A)),
-        (at(0, D), at(1, A)),
-        (at(1, B), at(2, A)),
-        (at(2, B), at(0, B)),
-        (at(0, C), at(3, A)),
-        (at(3, D), at(4, A)),
-        (at(4, B), at(5, A)),
-        (at(5, B), at(3, B)),
-        (at(3, C), at(6, A)),
-    ];
-    wired(&kinds, &cables)
-}
-
-const TWO_STRICT: [JunctionConnection; 2] = [
-    JunctionConnection { head: 0, head_port: 1, tail: 2, tail_port: 1 },
-    JunctionConnection { head: 3, head_port: 1, tail: 5, tail_port: 1 },
-];
-
-#[test]
-fn of_two_rings_either_may_break_and_a_second_break_is_told_for_what_it_is_jr_02() {
-    for setting in [(JunctionMode::Automatic, &[][..]), (JunctionMode::Strict, &TWO_STRICT)] {
-        let mut world = in_op(3, two_rings(), setting);
-        for cable in [1, 2, 3, 5, 6, 7] {
-            let what = format!("{setting:?}, cable {cable}");
-            let mark = edge(&mut world, &what, |world| world.cut(CableId(cable)));
-            assert_eq!(told(&world, mark).len(), 1, "{what}");
-            let mark = edge(&mut world, &what, |world| world.heal(CableId(cable)));
-            assert_eq!(told(&world, mark).len(), 1, "{what}");
-        }
-        // The second ring breaks too: frames are destroyed at the second unconnected port 0.
-        edge(&mut world, "first break", |world| world.cut(CableId(2)));
-        let mark = world.mark();
-        world.cut(CableId(6));
-        world.run_cycles(300);
-        assert_eq!(told(&world, mark), [Event::JunctionsBlocked { blocked: true }]);
-        assert_eq!(world.judged(mark).last().map(|judged| judged.delivery), Some(Delivery::Zero));
-        assert!(!world.saw(mark, |event| matches!(event, Event::Lost { .. })), "nobody knows who is there");
-        // One of them is mended: everybody comes back, the other one is still broken.
-        world.heal(CableId(6));
-        world.until(Duration::from_secs(3), "all in OP", |w| w.all_in_op() && w.application().all_settled());
-        world.run_cycles(100);
-        assert_eq!(told(&world, mark)[1..], [Event::JunctionsBlocked { blocked: false }]);
-        let mark = edge(&mut world, "first break healed", |world| world.heal(CableId(2)));
-        assert!(matches!(told(&world, mark)[..], [Event::JunctionChanged { broken: false, breaks: 0, .. }]));
-    }
-}
-
-#[test]
-fn two_breaks_in_one_ring_cut_off_what_is_between_them_and_nobody_else() {
-    let mut world = in_op(4, one_ring(), (JunctionMode::Automatic, &[]));
-    edge(&mut world, "first break", |world| world.cut(CableId(3)));
-    let mark = world.mark();
-    world.cut(CableId(4));
-    world.until(Duration::from_millis(60), "3 is lost", |world| {
-        world.saw(mark, |event| *event == Event::Lost { subdevice: 3 })
-    });
-    world.run_cycles(200);
-    let (near, far) = ends(4);
-    assert_eq!(told(&world, mark), [Event::JunctionChanged { near: Some(near), far, broken: true, breaks: 2 }]);
-    assert_eq!(world.judged(mark).last().map(|judged| judged.stale.clone()), Some(vec![3]));
-    world.heal(CableId(3));
-    world.until(Duration::from_secs(3), "all in OP", |world| world.all_in_op() && world.application().all_settled());
-    edge(&mut world, "second repair", |world| world.heal(CableId(4)));
-    let left: Vec<usize> = world.left_op(mark).iter().map(|device| device.0).collect();
-    assert!(left.iter().all(|device| *device == 3), "{left:?}: the others go on");
-    assert!(matches!(told(&world, mark).last(), Some(Event::JunctionChanged { broken: false, breaks: 0, .. })));
-}
-
-#[test]
-fn a_member_that_loses_its_power_breaks_the_ring_at_both_its_ports_and_comes_back() {
-    let mut world = in_op(5, one_ring(), (JunctionMode::Strict, &[STRICT]));
-    let mark = world.mark();
-    world.power_off(DeviceIndex(3));
-    world.run_cycles(100);
-    assert_eq!(told(&world, mark).len(), 2);
-    world.power_on(DeviceIndex(3));
-    world.until(Duration::from_secs(5), "all in OP", |world| world.all_in_op() && world.application().all_settled());
-    world.run_cycles(100);
-    assert_eq!(told(&world, mark).len(), 4);
-    assert!(world.left_op(mark).iter().all(|device| device.0 == 3));
 }
 
 #[test]
@@ -294,58 +228,6 @@ fn without_junction_redundancy_a_ring_that_breaks_reads_as_a_crossed_line_jr_04(
         // It is told again when it comes again.
         let mark = edge(&mut world, "cut again", |world| world.cut(CableId(cable)));
         assert!(world.saw(mark, reversed));
-    }
-}
-
-/// A ring of two links, with a local ring behind the junction in its middle: an output, the junction, and an input; the
-/// local ring's two members are 2 and 3.
-fn ring_in_ring() -> Network {
-    let kinds = ["digital-output-8", "junction", "servo", "digital-input-8", "analog-input-4"];
-    let cables = [
-        (MAIN, at(0, A)),
-        (at(0, B), at(1, A)),
-        (at(1, D), at(2, A)),
-        (at(2, B), at(3, A)),
-        (at(3, B), at(1, B)),
-        (at(1, C), at(4, A)),
-        (at(4, B), REDUNDANT),
-    ];
-    wired(&kinds, &cables)
-}
-
-#[test]
-fn a_local_ring_in_a_ring_of_two_links_goes_on_with_one_break_anywhere_jr_02() {
-    let strict = JunctionConnection { head: 1, head_port: 1, tail: 3, tail_port: 1 };
-    for setting in [(JunctionMode::Automatic, &[][..]), (JunctionMode::Strict, &[strict])] {
-        let mut world = in_op(8, ring_in_ring(), setting);
-        for cable in 0..7 {
-            let local = (2..5).contains(&cable);
-            let what = format!("{setting:?}, cable {cable}");
-            for heal in [false, true] {
-                let act = |world: &mut World| if heal { world.heal(CableId(cable)) } else { world.cut(CableId(cable)) };
-                let mark = edge(&mut world, &what, act);
-                assert_eq!(told(&world, mark).len(), usize::from(local), "{what}");
-                let opened = world.saw(mark, |event| matches!(event, Event::RingOpened { .. }));
-                assert_eq!(opened, !local && !heal, "{what}: the main ring has its own events");
-            }
-        }
-        assert_eq!(crossed(&world, world.beginning()), 0);
-        // Both in the half of the main interface: its frames meet one unconnected port 0, those of the other one too.
-        edge(&mut world, "main ring behind the junction", |world| world.cut(CableId(5)));
-        let mark = edge(&mut world, "local ring", |world| world.cut(CableId(3)));
-        assert_eq!(told(&world, mark).len(), 1);
-        edge(&mut world, "local ring whole", |world| world.heal(CableId(3)));
-        edge(&mut world, "main ring whole", |world| world.heal(CableId(5)));
-        // In the half of the redundant interface its frames are destroyed; the other half goes on.
-        edge(&mut world, "main ring before the junction", |world| world.cut(CableId(1)));
-        let mark = world.mark();
-        world.cut(CableId(3));
-        world.run_cycles(200);
-        assert!(world.judged(mark).last().is_some_and(|judged| !judged.stale.is_empty()));
-        assert!(!world.left_op(mark).contains(&DeviceIndex(0)));
-        world.heal(CableId(3));
-        world.until(Duration::from_secs(5), "all in OP", |w| w.all_in_op() && w.application().all_settled());
-        edge(&mut world, "the last one", |world| world.heal(CableId(1)));
     }
 }
 

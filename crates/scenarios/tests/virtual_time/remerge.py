@@ -1,8 +1,10 @@
-"""Merges the copies of process data in a capture anew, by the rules of the ring alone, to be compared with what a
+"""Merges the copies of process data in a capture anew, by the rules of the ring alone, and compares that with what a
 MainDevice made of them.
 
-remerge.py CAPTURE.pcapng: the capture has interface 0 for MAIN and 1 for REDUNDANT, both directions. Prints JSON: for each
-cycle whether every logical read had the working counter that is usual for it, and the inputs as hexadecimal text.
+remerge.py CAPTURE.pcapng IMAGES.json: the capture has interface 0 for MAIN and 1 for REDUNDANT, both directions. The images
+are what the MainDevice printed: {"first": the first cycle that counts, "cycles": [{"complete": whether every logical read
+had the working counter that is usual for it, "inputs": hexadecimal text}, ...]}. Prints how many cycles were compared and
+how many of them were incomplete, or the first difference, and ends with status 1 then.
 
 Nothing here comes from the MainDevice: frames are told apart by their source address and Idx, copies by the bit of the
 redundant link, a copy counts if it came back before the next cycle was sent. Working counters of both copies are added,
@@ -121,7 +123,24 @@ def main():
                 complete = False
         text = b"".join(inputs[address] for address in sorted(inputs)).hex()
         result.append({"complete": complete, "inputs": text})
-    print(json.dumps(result))
+    with open(sys.argv[2]) as file:
+        printed = json.load(file)
+    compare(printed["cycles"], result, printed["first"])
+
+
+def compare(printed, merged, first):
+    """Ends with status 1 at the first difference. Inputs of an incomplete cycle are those of whoever answered."""
+    if len(merged) < len(printed):
+        sys.exit(f"{len(merged)} cycles in the capture, {len(printed)} printed")
+    incomplete = 0
+    for number, (theirs, ours) in enumerate(zip(printed, merged)):
+        if number < first:
+            continue
+        same = theirs["complete"] == ours["complete"]
+        if not same or (ours["complete"] and theirs["inputs"] != ours["inputs"]):
+            sys.exit(f"cycle {number}: printed {theirs}, merged {ours}")
+        incomplete += not ours["complete"]
+    print(len(printed) - first, incomplete)
 
 
 main()

@@ -4,7 +4,7 @@
 use std::time::Duration;
 
 use ringcat::Event;
-use ringcat_sim::cable::CableId;
+use ringcat_sim::cable::{CableId, Direction};
 use ringcat_sim::fault::Fault;
 use scenarios::check::{ring_events, troubles};
 use scenarios::segments::{SIXTEEN, cable_of_ring, ring_of_16};
@@ -116,5 +116,35 @@ fn cutting_and_healing_any_cable_of_a_ring_of_16_costs_no_more_cycles_than_its_d
             row.slowest_place.as_millis(),
             row.compared
         );
+    }
+}
+
+/// The ends of a cable that is healed open their ports one after the other: until the later one does, frames that are sent
+/// into the cable are lost. It costs the difference, not more, and is told as one repair.
+#[test]
+fn ends_that_open_one_after_the_other_cost_no_more_cycles_than_the_difference_cr_15() {
+    println!("later end, by us | cycles incomplete of allowed, worst of 5 cables");
+    for direction in Direction::ALL {
+        for by_us in [50, 700, 2_600, 9_300] {
+            let by = Duration::from_micros(by_us);
+            let (mut worst, mut allowed) = (0, 0);
+            for cable in [0, 1, 7, 15, 16] {
+                let mut world = World::in_op(0, ring_of_16(Duration::from_micros(10)));
+                world.application_mut().links_mut().measure_flights();
+                world.run_cycles(20);
+                let flight = Duration::from_nanos(world.application().links().flight_ns());
+                allowed = bound(by, flight);
+                world.cut(CableId(cable));
+                world.run_cycles(60);
+                let mark = world.mark();
+                let fault = Fault::HealUnevenly { cable: CableId(cable), direction, by };
+                let incomplete = edge(&mut world, fault, 430, by);
+                let closed = Event::RingClosed { main: COUNT, redundant: 0 };
+                assert_eq!(ring_events(world.events(mark)), [&closed], "cable {cable}, {direction:?}, {by_us} us");
+                assert!(incomplete <= allowed, "cable {cable}, {direction:?}, {by_us} us: {incomplete} of {allowed}");
+                worst = worst.max(incomplete);
+            }
+            println!("{direction:?} {by_us:>8} | {worst} of {allowed}");
+        }
     }
 }

@@ -1,55 +1,66 @@
 //! The merged result of a split ring is that of the unsplit one (facts 9.3): random trees with a ring through them,
-//! junctions and branches on any port, random breaks of the ring, random commands. CR-05.
-
-use std::time::Duration;
+//! junctions and branches on any port, random breaks of the ring, all commands. CR-05, CR-09.
 
 use ringcat_engine::supervisor::Reply;
-use ringcat_sim::cable::{CableId, DeviceIndex, Endpoint, HostLink};
+use ringcat_sim::cable::CableId;
+use ringcat_sim::device::Device;
 use ringcat_sim::frame::Port;
-use ringcat_sim::network::builder::SegmentBuilder;
-use ringcat_sim::network::{Network, NetworkOptions};
-use ringcat_wire::address::{LogicalAddress, RegisterAddress, StationAddress, Wkc};
+use ringcat_sim::network::Network;
+use ringcat_wire::address::{LogicalAddress, Position, RegisterAddress, StationAddress, Wkc};
 use ringcat_wire::command::Command;
 use ringcat_wire::datagram::Target;
 use ringcat_wire::register::{Fmmu, map};
 use scenarios::dice::Dice;
-use scenarios::segments::{descriptions, devices};
+use scenarios::segments::{MAIN, REDUNDANT, at, wired};
 use scenarios::world::World;
 
 /// RAM of the controller that nobody uses.
 const USER_RAM: u16 = 0x0F80;
+/// Bytes of it.
+const RAM: usize = 80;
 /// Where random logical commands go: far from process data.
 const LOGICAL: u32 = 0x7000_0000;
 /// Bytes that each SubDevice maps there.
 const MAPPED: u16 = 4;
 
-/// A tree with a way through it from MAIN to RED: first the trunk, then branches on free ports. Returns the cables of the
-/// trunk.
-fn segment(dice: &mut Dice) -> (Network, Vec<CableId>) {
+/// A tree with a way through it from MAIN to RED.
+struct Segment {
+    network: Network,
+    /// The cables of the way.
+    trunk: Vec<CableId>,
+    /// No branch hangs behind the port through which the way goes on: a break changes nobody's position (CR-09).
+    positions_hold: bool,
+}
+
+/// First the trunk, then branches on free ports.
+fn segment(dice: &mut Dice) -> Segment {
     let trunk = 2 + dice.below(6) as usize;
     let total = trunk + dice.below(6) as usize;
-    let mut free: Vec<Vec<Port>> = vec![vec![Port::B, Port::C, Port::D]; total];
+    // In the order in which frames pass them.
+    let mut free: Vec<Vec<Port>> = vec![vec![Port::D, Port::B, Port::C]; total];
+    let mut behind: Vec<Vec<Port>> = vec![Vec::new(); total];
     let mut cables = Vec::new();
-    let at = |device: usize, port: Port| Endpoint::Device(DeviceIndex(device), port);
-    let mut end = Endpoint::Host(HostLink::Main);
+    let mut end = MAIN;
+    let in_order = dice.one_in(2);
     for (device, ports) in free.iter_mut().enumerate().take(trunk) {
         cables.push((end, at(device, Port::A)));
         // The ring goes on through any port of a junction.
-        let way_on = dice.below(ports.len() as u64) as usize;
-        end = at(device, ports.swap_remove(way_on));
+        let way_on = if in_order { ports.len() - 1 } else { dice.below(ports.len() as u64) as usize };
+        behind[device] = ports[way_on + 1..].to_vec();
+        end = at(device, ports.remove(way_on));
     }
-    cables.push((end, Endpoint::Host(HostLink::Redundant)));
+    cables.push((end, REDUNDANT));
+    let mut positions_hold = true;
     for device in trunk..total {
         let parents: Vec<usize> = (0..device).filter(|parent| !free[*parent].is_empty()).collect();
         let parent = *dice.pick(&parents);
         let port = dice.below(free[parent].len() as u64) as usize;
-        cables.push((at(parent, free[parent].swap_remove(port)), at(device, Port::A)));
+        let port = free[parent].swap_remove(port);
+        positions_hold &= !behind[parent].contains(&port);
+        cables.push((at(parent, port), at(device, Port::A)));
     }
-    let kinds = vec!["junction"; total];
-    let builder = devices(descriptions(&kinds)).into_iter().fold(SegmentBuilder::new(), SegmentBuilder::device);
-    let builder = cables.iter().fold(builder, |builder, (a, b)| builder.cable(*a, *b));
-    let options = NetworkOptions::default().with_detection_delay(Duration::from_micros(10));
-    (builder.options(options).build().expect("a tree can be built"), (0..=trunk).map(CableId).collect())
+    let network = wired(&vec!["junction"; total], &cables);
+    Segment { network, trunk: (0..=trunk).map(CableId).collect(), positions_hold }
 }
 
 /// A datagram to be sent.
@@ -60,25 +71,44 @@ struct Random {
     data: Vec<u8>,
 }
 
-fn random(dice: &mut Dice, stations: &[u16]) -> Random {
+impl Random {
+    /// Everybody writes what the datagram holds when it comes: that depends on who was met before.
+    fn depends_on_the_way(&self) -> bool {
+        matches!(self.command, Command::Brw | Command::Armw | Command::Frmw)
+    }
+}
+
+fn random(dice: &mut Dice, stations: &[u16], positions_hold: bool) -> Random {
     let station = StationAddress(*dice.pick(stations));
-    let length = 1 + dice.below(16) as u16;
+    let position = Position(dice.below(stations.len() as u64) as u16);
     let ram = RegisterAddress(USER_RAM + dice.below(64) as u16);
     // Registers that say the same wherever a break is.
     let constant = RegisterAddress(*dice.pick(&[0x0000, 0x0010, 0x0130, 0x0600, 0x0800, USER_RAM]));
     let logical = Target::Logical(LogicalAddress(LOGICAL + dice.below(40) as u32));
-    let (command, target) = *dice.pick(&[
+    // Of one SubDevice (facts 9.2.2).
+    let area = Target::Logical(LogicalAddress(LOGICAL + u32::from(MAPPED) * dice.below(stations.len() as u64) as u32));
+    let commands = [
         (Command::Brd, Target::Broadcast(constant)),
         (Command::Bwr, Target::Broadcast(ram)),
+        (Command::Brw, Target::Broadcast(ram)),
         (Command::Fprd, Target::Station(station, constant)),
         (Command::Fpwr, Target::Station(station, ram)),
         (Command::Fprw, Target::Station(station, ram)),
+        (Command::Frmw, Target::Station(station, ram)),
         (Command::Lrd, logical),
         (Command::Lwr, logical),
+        (Command::Lrw, area),
         (Command::Nop, Target::None),
-    ]);
+        (Command::Aprd, Target::Position(position, constant)),
+        (Command::Apwr, Target::Position(position, ram)),
+        (Command::Aprw, Target::Position(position, ram)),
+        (Command::Armw, Target::Position(position, ram)),
+    ];
+    let (command, target) = *dice.pick(if positions_hold { &commands } else { &commands[..11] });
+    let longest = if command == Command::Lrw { MAPPED.into() } else { 16 };
+    let length = 1 + dice.below(longest) as u16;
     // Reads leave as zeros (facts 9.3).
-    let reads = matches!(command, Command::Brd | Command::Fprd | Command::Lrd | Command::Nop);
+    let reads = matches!(command, Command::Aprd | Command::Brd | Command::Fprd | Command::Lrd | Command::Nop);
     let data = (0..length).map(|_| if reads { 0 } else { dice.below(256) as u8 }).collect();
     Random { command, target, data }
 }
@@ -86,8 +116,14 @@ fn random(dice: &mut Dice, stations: &[u16]) -> Random {
 fn send(world: &mut World, datagram: Random) -> Reply {
     let bus = world.application().engine().bus();
     let Random { command, target, data } = datagram;
-    // One copy is enough for what must not travel twice: read 1, write 2.
-    let expected = (command == Command::Fprw).then_some(Wkc(3));
+    // One copy is enough for what must not travel twice: read 1, write 2. Of ARMW and FRMW everybody counts 1.
+    let all = world.network().devices().len() as u16;
+    let expected = match command {
+        Command::Aprw | Command::Fprw | Command::Lrw => Some(Wkc(3)),
+        Command::Brw => Some(Wkc(3 * all)),
+        Command::Armw | Command::Frmw => Some(Wkc(all)),
+        _ => None,
+    };
     world.run(async move { bus.transfer(command, target, data, expected).await.expect("it comes back") })
 }
 
@@ -114,45 +150,77 @@ fn map_ram(world: &mut World, stations: &[u16]) {
     });
 }
 
-fn run(seed: u64) -> usize {
+/// What the RAM of all devices holds.
+fn memories(world: &World) -> Vec<Vec<u8>> {
+    let ram = |device: &Device| device.controller.register(RegisterAddress(USER_RAM), RAM).to_vec();
+    world.network().devices().map(ram).collect()
+}
+
+/// Sends a datagram in both worlds; both answers and both segments must be the same afterwards.
+fn compare(worlds: &mut [World; 2], datagram: Random, what: &str) {
+    let [got, expected] = worlds.each_mut().map(|world| send(world, datagram.clone()));
+    assert_eq!((&got.data, got.wkc()), (&expected.data, expected.wkc()), "{what}: {datagram:?}");
+    if datagram.depends_on_the_way() {
+        let target = Target::Broadcast(RegisterAddress(USER_RAM));
+        for world in worlds.iter_mut() {
+            send(world, Random { command: Command::Bwr, target, data: vec![0x5A; RAM] });
+        }
+    }
+    let [split, whole] = worlds.each_ref().map(memories);
+    assert_eq!(split, whole, "{what}: what they hold after {datagram:?}");
+}
+
+/// What the addressed SubDevice has is sent to it with FRMW or ARMW: everybody gets it then, also on the other side of a
+/// break.
+fn distribute(worlds: &mut [World; 2], dice: &mut Dice, stations: &[u16], what: &str) {
+    let (station, ram) = (StationAddress(*dice.pick(stations)), RegisterAddress(USER_RAM + dice.below(64) as u16));
+    let own: Vec<u8> = (0..4).map(|_| dice.below(256) as u8).collect();
+    let target = Target::Station(station, ram);
+    compare(worlds, Random { command: Command::Fpwr, target, data: own.clone() }, what);
+    let replies =
+        worlds.each_mut().map(|world| send(world, Random { command: Command::Frmw, target, data: own.clone() }));
+    assert!(replies.iter().all(|reply| reply.data == own && usize::from(reply.wkc().0) == stations.len()), "{what}");
+    let [split, whole] = worlds.each_ref().map(memories);
+    assert_eq!(split, whole, "{what}: FRMW of what {station} has");
+}
+
+/// Returns how many datagrams were compared, and how many of them were addressed by position.
+fn run(seed: u64) -> (usize, usize) {
     let mut dice = Dice::new(seed);
-    let (network, trunk) = segment(&mut dice);
-    let (twin, _) = segment(&mut Dice::new(seed));
-    let [mut split, mut whole] = [network, twin].map(|network| World::in_op(seed, network));
-    let count = split.network().devices().len();
-    let stations: Vec<u16> = (0..count).map(|device| split.station_of(device)).collect();
-    for world in [&mut split, &mut whole] {
+    let Segment { network, trunk, positions_hold } = segment(&mut dice);
+    let twin = segment(&mut Dice::new(seed)).network;
+    let mut worlds = [network, twin].map(|network| World::in_op(seed, network));
+    let count = worlds[0].network().devices().len();
+    let stations: Vec<u16> = (0..count).map(|device| worlds[0].station_of(device)).collect();
+    for world in &mut worlds {
         map_ram(world, &stations);
     }
-    let mut compared = 0;
+    let (mut compared, mut by_position) = (0, 0);
     for _ in 0..3 {
         let cable = *dice.pick(&trunk);
-        split.cut(cable);
-        split.run_cycles(8);
+        worlds[0].cut(cable);
+        worlds[0].run_cycles(8);
+        let what = format!("seed {seed}, {cable:?}");
         for _ in 0..25 {
-            let datagram = random(&mut dice, &stations);
-            let [got, expected] = [&mut split, &mut whole].map(|world| send(world, datagram.clone()));
-            assert_eq!(
-                (&got.data, got.wkc()),
-                (&expected.data, expected.wkc()),
-                "seed {seed}, {cable:?}: {datagram:?}"
-            );
+            let datagram = random(&mut dice, &stations, positions_hold);
+            by_position += usize::from(matches!(datagram.target, Target::Position(..)));
+            compare(&mut worlds, datagram, &what);
             compared += 1;
         }
-        for device in (0..count).map(DeviceIndex) {
-            let ram = |world: &World| {
-                world.network().device(device).controller.register(RegisterAddress(USER_RAM), 64).to_vec()
-            };
-            assert_eq!(ram(&split), ram(&whole), "seed {seed}: what {device:?} holds");
-        }
-        split.heal(cable);
-        split.run_cycles(30);
+        distribute(&mut worlds, &mut dice, &stations, &what);
+        worlds[0].heal(cable);
+        worlds[0].run_cycles(30);
     }
-    compared
+    (compared, by_position)
 }
 
 #[test]
-fn a_split_ring_answers_like_the_whole_one_seeds_0_to_59_cr_05_facts_9_3() {
-    let compared: usize = (0..60).map(run).sum();
-    assert_eq!(compared, 60 * 75);
+fn a_split_ring_answers_like_the_whole_one_seeds_0_to_59_cr_05_cr_09_facts_9_3() {
+    let [mut compared, mut by_position] = [0; 2];
+    for seed in 0..60 {
+        let (all, positions) = run(seed);
+        (compared, by_position) = (compared + all, by_position + positions);
+    }
+    println!("{compared} datagrams of all commands answered alike, {by_position} of them addressed by position");
+    assert!(compared == 60 * 75 && by_position > 300, "{by_position}");
 }

@@ -9,20 +9,20 @@ use scenarios::ring_matrix::{Bed, Phase};
 fn cables(count: usize, cables: impl Iterator<Item = usize> + Clone) -> usize {
     let bed = Bed::new(count, Duration::from_micros(10));
     let mut runs = 0;
-    let (mut worst, mut compared) = ([0; 2], 0);
+    let (mut worst, mut compared, mut taken) = ([0; 2], 0, 0);
     for (number, phase) in Phase::ALL.into_iter().enumerate() {
         for cable in cables.clone() {
             let outcome = bed.run(cable, phase, ((cable * 37 + number * 131) % 1000) as u32);
             worst = [0, 1].map(|at| worst[at].max(outcome.incomplete[at]));
-            compared += outcome.compared;
+            (compared, taken) = (compared + outcome.compared, taken + outcome.taken);
             runs += 1;
         }
     }
     println!(
         "ring of {count}: {runs} runs, at cut and repair {worst:?} incomplete cycles at the most, {compared} bytes as in \
-         the twin"
+         the twin, outputs taken over once per cycle {taken} times"
     );
-    assert!(compared > 0);
+    assert!(compared > 0 && taken > 0);
     runs
 }
 
@@ -34,4 +34,24 @@ fn any_cable_of_rings_of_2_and_5_is_cut_and_healed_in_every_phase_cr_02_cr_03_cr
 #[test]
 fn some_cables_of_rings_of_16_and_64_are_cut_and_healed_in_every_phase_cr_02_cr_03_cr_14_cr_15_cr_19_cr_20() {
     assert_eq!(cables(16, [0, 8, 9, 16].into_iter()) + cables(64, [33].into_iter()), 55);
+}
+
+/// Ports that notice late: the cut costs what their delay takes, and nothing else.
+#[test]
+fn ports_that_notice_late_cost_rings_of_2_5_and_64_no_more_than_their_delay_cr_14_cr_15() {
+    for (count, detection_us, chosen) in
+        [(2, 1_700, &[0, 1, 2][..]), (5, 1_700, &[0, 2, 5]), (5, 20_000, &[3]), (64, 1_700, &[33])]
+    {
+        let detection = Duration::from_micros(detection_us);
+        let bed = Bed::new(count, detection);
+        let mut worst = [0; 2];
+        for cable in chosen {
+            for phase in [Phase::Idle, Phase::Foe] {
+                let outcome = bed.run(*cable, phase, (cable * 137 % 1000) as u32);
+                worst = [0, 1].map(|at| worst[at].max(outcome.incomplete[at]));
+            }
+        }
+        println!("ring of {count}, {detection_us} us: at cut and repair {worst:?} incomplete cycles at the most");
+        assert!(worst[0] > 1, "a cut that is noticed late costs more than one cycle");
+    }
 }

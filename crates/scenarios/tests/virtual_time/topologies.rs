@@ -2,29 +2,14 @@
 
 use std::time::Duration;
 
-use ringcat::{Event, Options, TimedEvent, automatic};
-use ringcat_sim::cable::{CableId, DeviceIndex, Endpoint, HostLink};
+use ringcat::{Event, Link, Options, Redundancy, RedundancyLoss, RingState, TimedEvent, automatic};
+use ringcat_sim::cable::{CableId, DeviceIndex};
 use ringcat_sim::frame::Port;
-use ringcat_sim::network::builder::SegmentBuilder;
-use ringcat_sim::network::{Network, NetworkOptions};
-use ringcat_wire::register::map;
+use ringcat_sim::network::Network;
+use ringcat_wire::register::{PortKind, map};
 use scenarios::check::{Delivery, ring_events};
-use scenarios::segments::{descriptions, devices};
+use scenarios::segments::{MAIN, REDUNDANT, at, descriptions, wired, wired_with};
 use scenarios::world::{CYCLE, World};
-
-const MAIN: Endpoint = Endpoint::Host(HostLink::Main);
-const REDUNDANT: Endpoint = Endpoint::Host(HostLink::Redundant);
-
-fn at(device: usize, port: Port) -> Endpoint {
-    Endpoint::Device(DeviceIndex(device), port)
-}
-
-/// Devices of these kinds, with these cables.
-fn wired(kinds: &[&str], cables: &[(Endpoint, Endpoint)]) -> Network {
-    let builder = devices(descriptions(kinds)).into_iter().fold(SegmentBuilder::new(), SegmentBuilder::device);
-    let builder = cables.iter().fold(builder, |builder, (a, b)| builder.cable(*a, *b));
-    builder.options(NetworkOptions::default()).build().expect("the cables fit")
-}
 
 /// Comes to OP and exchanges process data; inputs and outputs are compared.
 fn in_op(network: Network) -> World {
@@ -45,7 +30,7 @@ fn crossed(events: &[TimedEvent]) -> Vec<(Option<u16>, Option<u8>)> {
 }
 
 #[test]
-fn a_crossed_subdevice_in_a_line_is_located() {
+fn a_crossed_subdevice_in_a_line_is_located_lc_01_lc_05() {
     use Port::{A, B};
     let kinds = ["junction", "digital-output-8", "junction", "servo"];
     let cables = [(MAIN, at(0, A)), (at(0, B), at(1, A)), (at(1, B), at(2, B)), (at(2, A), at(3, A))];
@@ -67,7 +52,7 @@ fn a_subdevice_without_a_cable_in_port_0_is_told_and_works() {
 }
 
 #[test]
-fn a_crossed_subdevice_in_a_closed_ring_is_located_and_works() {
+fn a_crossed_subdevice_in_a_closed_ring_is_located_and_works_lc_07() {
     use Port::{A, B};
     let kinds = ["junction", "digital-output-8", "servo", "digital-input-8"];
     let cables =
@@ -87,6 +72,32 @@ fn a_crossed_subdevice_in_a_closed_ring_is_located_and_works() {
         assert!(world.incomplete(mark) <= 2, "cable {cable}: {}", world.incomplete(mark));
         assert!(ring_events(world.events(mark)).len() >= 2);
     }
+}
+
+/// Who has one port cannot pass the ring on (CR-22): everybody behind it is a stub of the redundant link, from the start and
+/// for good, and a break of that stub costs whoever is behind it.
+#[test]
+fn a_subdevice_with_one_port_leaves_the_ring_open_and_that_is_told_cr_22() {
+    use Port::{A, B};
+    let mut descriptions = descriptions(&["digital-output-8", "digital-input-8", "servo", "digital-input-16"]);
+    descriptions[1].ports[1..].fill(PortKind::NotImplemented);
+    let cables = [(MAIN, at(0, A)), (at(0, B), at(1, A)), (at(2, B), at(3, A)), (at(3, B), REDUNDANT)];
+    let mut world = in_op(wired_with(descriptions, &cables));
+    let status = world.application().ring_status();
+    assert_eq!(
+        (status.state, status.link(Link::Main).answering, status.link(Link::Redundant).answering),
+        (RingState::Open, 2, 2)
+    );
+    assert!(matches!(status.redundancy, Redundancy::Lost { cause: RedundancyLoss::Open, .. }));
+    let told = |event: &Event| matches!(event, Event::RingOpened { main: 2, redundant: 2 });
+    assert!(world.saw(world.beginning(), told));
+    let mark = world.mark();
+    world.cut(CableId(2));
+    world.run_cycles(100);
+    assert!(world.saw(mark, |event| *event == Event::Lost { subdevice: 2 }), "there is no second way to it");
+    world.heal(CableId(2));
+    world.until(Duration::from_secs(3), "all in OP", |world| world.all_in_op() && world.application().all_settled());
+    assert_eq!(world.left_op(mark).iter().filter(|device| device.0 != 2).count(), 0);
 }
 
 /// A ring of five with a branch on a port of its second device.
@@ -211,7 +222,7 @@ fn enhanced_detection_locates_crossings_at_the_scan_and_the_ring_is_closed_after
     let positions: Vec<Option<usize>> =
         found.iter().map(|(position, _)| world.device_of(usize::from(position.unwrap())).map(|it| it.0)).collect();
     assert_eq!((positions, found[0].1), (vec![Some(2)], Some(1)));
-    assert_eq!(world.application().ring(), ringcat::RingState::Closed);
+    assert_eq!(world.application().ring(), RingState::Closed);
 }
 
 #[test]
@@ -240,7 +251,7 @@ fn enhanced_detection_looks_again_when_ports_change_and_costs_two_edges_lc_03() 
     world.run_cycles(200);
     assert_eq!(crossed(world.events(mark)), []);
     assert_eq!(ring_events(world.events(mark)), Vec::<&Event>::new(), "a controlled break is not told");
-    assert_eq!(world.application().ring(), ringcat::RingState::Closed);
+    assert_eq!(world.application().ring(), RingState::Closed);
     assert!(world.left_op(mark).iter().all(|device| device.0 == 6));
     assert!(lost_links(&world) > before, "the redundant link was down in between");
 }
@@ -254,6 +265,6 @@ fn links_that_cannot_be_taken_down_say_so_and_the_ring_is_looked_at_as_it_is_lc_
     let mut events = Vec::new();
     main_device.scan_with(|event| events.push(event.clone())).expect("the segment answers");
     assert_eq!(crossed(&events), [(None, None)]);
-    let told = |timed: &TimedEvent| timed.event == Event::CannotDisconnect { link: ringcat::Link::Redundant };
+    let told = |timed: &TimedEvent| timed.event == Event::CannotDisconnect { link: Link::Redundant };
     assert_eq!(events.iter().filter(|timed| told(timed)).count(), 1);
 }

@@ -30,6 +30,7 @@ impl Network {
         match fault {
             Fault::Cut(cable) => self.cut(cable),
             Fault::Heal(cable) => self.heal(cable),
+            Fault::HealUnevenly { cable, direction, by } => self.heal_unevenly(cable, direction, by),
             Fault::Drop { cable, direction, count } => self.set_faults(cable, direction, |faults| faults.drop = count),
             Fault::Duplicate { cable, direction, count } => {
                 self.set_faults(cable, direction, |faults| faults.duplicate = count);
@@ -90,6 +91,7 @@ impl Network {
         match *fault {
             Fault::Cut(cable)
             | Fault::Heal(cable)
+            | Fault::HealUnevenly { cable, .. }
             | Fault::Drop { cable, .. }
             | Fault::Duplicate { cable, .. }
             | Fault::Corrupt { cable, .. }

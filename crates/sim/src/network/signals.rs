@@ -168,6 +168,12 @@ impl Network {
         self.refresh_signal(cable);
     }
 
+    /// Makes a cable whole again, one end of which notices later than the other.
+    pub(super) fn heal_unevenly(&mut self, cable: CableId, later: Direction, by: Duration) {
+        self.cables[cable.0].cut = false;
+        self.refresh_signal_unevenly(cable, |direction| if direction == later { by } else { Duration::ZERO });
+    }
+
     /// Takes the power from a device. Its ports are dead at once; its neighbours notice.
     ///
     /// # Panics
@@ -219,6 +225,11 @@ impl Network {
 
     /// Finds out whether a cable carries a signal; if that changed, its ends notice later.
     fn refresh_signal(&mut self, id: CableId) {
+        self.refresh_signal_unevenly(id, |_| Duration::ZERO);
+    }
+
+    /// The same, where the receiving ends of both directions take longer than usual.
+    fn refresh_signal_unevenly(&mut self, id: CableId, longer: impl Fn(Direction) -> Duration) {
         let cable = &self.cables[id.0];
         let up = !cable.cut && self.has_power(cable.spec.a) && self.has_power(cable.spec.b);
         if up == self.leg_mut(id, Direction::AToB).signal() {
@@ -232,6 +243,7 @@ impl Network {
         for direction in Direction::ALL {
             let now = self.now;
             self.leg_mut(id, direction).set_signal(up, now);
+            let delay = delay + longer(direction);
             self.queue.push(Lane::Any, now + delay, Event::Detection { leg: LegId::new(id, direction), epoch });
         }
     }

@@ -8,6 +8,7 @@ use core::time::Duration;
 
 use super::super::fleet::SharedFleet;
 use crate::event::Event;
+use crate::link::{Link, LinkSet};
 use crate::supervisor::Bus;
 use crate::time::Instant;
 use crate::topology::{Closing, LocalRing, NodeStatus, PortOf, RingCable, Topology};
@@ -133,9 +134,11 @@ fn changed(cable: &RingCable, broken: bool, breaks: usize) -> Event {
     Event::JunctionChanged { near: cable.near, far: cable.far, broken, breaks }
 }
 
-/// Reports when no frame comes back while a local ring is open, and when they do again. Runs for ever.
+/// Reports when no frame comes back while a local ring is open, or all of a sudden where there are two that may have
+/// broken at once; and when frames come back again. Runs for ever.
 pub(in super::super) async fn watch_blocked(bus: Bus, fleet: SharedFleet, broken: Rc<Cell<usize>>) {
     let number = |fleet: &SharedFleet| fleet.board.supervision().map(|(number, _)| number);
+    let several = fleet.access().topology.local_rings.len() > 1;
     let mut last = (number(&fleet), bus.now(), fleet.board.cycles());
     let mut blocked = false;
     loop {
@@ -144,7 +147,7 @@ pub(in super::super) async fn watch_blocked(bus: Bus, fleet: SharedFleet, broken
         if seen != last.0 {
             last = (seen, bus.now(), fleet.board.cycles());
             if core::mem::take(&mut blocked) {
-                bus.report(Event::JunctionsBlocked { blocked: false });
+                bus.report(Event::JunctionsBlocked { blocked: false, breaks: broken.get() });
                 // Who is where has to be looked at anew.
                 fleet.note_news();
             }
@@ -152,11 +155,18 @@ pub(in super::super) async fn watch_blocked(bus: Bus, fleet: SharedFleet, broken
         }
         let sent = fleet.board.cycles().wrapping_sub(last.2);
         let is_long = bus.now().since(last.1) >= BLOCKED && sent >= BLOCKED_CYCLES;
-        if is_long && broken.get() > 0 && !blocked {
+        // Without a carrier it is the cable of the interface.
+        let at_once = several && Link::ALL.iter().all(|link| !has_no_carrier(&bus, *link));
+        if is_long && (broken.get() > 0 || at_once) && !blocked {
             blocked = true;
-            bus.report(Event::JunctionsBlocked { blocked: true });
+            bus.report(Event::JunctionsBlocked { blocked: true, breaks: broken.get() });
         }
     }
+}
+
+/// Whether a link that there is has lost its carrier.
+fn has_no_carrier(bus: &Bus, link: Link) -> bool {
+    (link == Link::Main || bus.links() == LinkSet::Ring) && bus.carriers()[link.index()] == Some(false)
 }
 
 #[cfg(test)]

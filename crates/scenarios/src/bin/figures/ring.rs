@@ -22,6 +22,8 @@ use scenarios::world::{CYCLE, World};
 /// Lengths of rings, and how many moments of the cycle each cable is cut at.
 const RINGS: [(usize, &[u32]); 4] = [(2, &[0, 40, 300, 900]), (5, &[0, 40, 300, 900]), (16, &[20, 500]), (64, &[30])];
 const FAST: Duration = Duration::from_micros(10);
+/// Rings whose ports notice late, and after how many microseconds.
+const LATE_RINGS: [(usize, &[u64]); 4] = [(2, &[1_700, 20_000]), (5, &[1_700, 20_000]), (16, &[1_700]), (64, &[1_700])];
 const RANDOM_RUNS: u64 = 10_000;
 /// Workers of this bench.
 const THREADS: u64 = 2;
@@ -34,15 +36,16 @@ pub fn main() -> ExitCode {
     }
     // Failures print what happened; a panic's own words are in it.
     let matrix = matrix();
+    let late = late();
     let edges = edges();
     let random = random();
-    verdict(matrix && edges && random)
+    verdict(matrix && late && edges && random)
 }
 
 /// A part of the matrix, or the words of what does not hold.
-fn part(bed: &Bed, cables: &[usize], moments: &[u32]) -> (Vec<Outcome>, usize) {
+fn part(bed: &Bed, phases: &[Phase], cables: &[usize], moments: &[u32]) -> (Vec<Outcome>, usize) {
     let (mut outcomes, mut failed) = (Vec::new(), 0);
-    for (number, phase) in Phase::ALL.into_iter().enumerate() {
+    for (number, phase) in phases.iter().copied().enumerate() {
         for cable in cables {
             for moment in moments {
                 let moment = (moment + (cable * 37 + number * 131) as u32) % 1000;
@@ -56,19 +59,42 @@ fn part(bed: &Bed, cables: &[usize], moments: &[u32]) -> (Vec<Outcome>, usize) {
     (outcomes, failed)
 }
 
+/// All cables, shared among the workers.
+fn parts(bed: &Bed, phases: &[Phase], moments: &[u32]) -> (Vec<Outcome>, usize) {
+    let (even, odd): (Vec<usize>, Vec<usize>) = (0..=bed.count()).partition(|cable| cable % 2 == 0);
+    let (left, right) = thread::scope(|scope| {
+        let other = scope.spawn(|| part(bed, phases, &odd, moments));
+        (part(bed, phases, &even, moments), other.join().expect("failures are counted"))
+    });
+    (left.0.into_iter().chain(right.0).collect(), left.1 + right.1)
+}
+
+/// Every cable again, with ports that notice late.
+fn late() -> bool {
+    let mut figures = Figures::new("every cable cut and healed in OP and during a file, 1 ms, ports that notice late");
+    let begin = Instant::now();
+    for (count, delays) in LATE_RINGS {
+        for detection in delays.iter().copied().map(Duration::from_micros) {
+            let (outcomes, failed) = parts(&Bed::new(count, detection), &[Phase::Idle, Phase::Foe], &[130]);
+            let name = format!("ring of {count}, after {} us", detection.as_micros());
+            let worst = |at: usize| outcomes.iter().map(|outcome| outcome.incomplete[at]).max().unwrap_or_default();
+            let bar = outcomes.iter().map(|outcome| outcome.allowed).min().unwrap_or_default() as f64;
+            figures.at_most(&format!("{name}: runs in which something did not hold"), failed as f64, 0.0, "runs");
+            figures.at_most(&format!("{name}: incomplete cycles at a cut"), worst(0) as f64, bar, "cycles");
+            figures.at_most(&format!("{name}: incomplete cycles at a repair"), worst(1) as f64, bar, "cycles");
+        }
+    }
+    figures.show("all of it", format!("in {:.0} s", begin.elapsed().as_secs_f64()));
+    figures.print()
+}
+
 fn matrix() -> bool {
     let mut figures =
         Figures::new("every cable of a ring cut and healed in every phase of its life, 1 ms, detection 10 us");
     for (count, moments) in RINGS {
         let begin = Instant::now();
         let bed = Bed::new(count, FAST);
-        let (even, odd): (Vec<usize>, Vec<usize>) = (0..=count).partition(|cable| cable % 2 == 0);
-        let (left, right) = thread::scope(|scope| {
-            let other = scope.spawn(|| part(&bed, &odd, moments));
-            (part(&bed, &even, moments), other.join().expect("failures are counted"))
-        });
-        let outcomes: Vec<Outcome> = left.0.into_iter().chain(right.0).collect();
-        let failed = left.1 + right.1;
+        let (outcomes, failed) = parts(&bed, &Phase::ALL, moments);
         let worst = |at: usize| outcomes.iter().map(|outcome| outcome.incomplete[at]).max().unwrap_or_default();
         let compared: u64 = outcomes.iter().map(|outcome| outcome.compared).sum();
         let fixed = outcomes.iter().map(|outcome| outcome.fixed_after).max().unwrap_or_default();
@@ -79,6 +105,9 @@ fn matrix() -> bool {
             format!("{} in {seconds:.0} s, {compared} bytes as in the twin", outcomes.len()),
         );
         figures.at_most(&format!("{name}: runs in which something did not hold"), failed as f64, 0.0, "runs");
+        let once = outcomes.iter().map(|outcome| outcome.taken).sum::<u64>();
+        figures
+            .show(&format!("{name}: outputs taken over once in a cycle"), format!("{once} times, and never otherwise"));
         let bar = allowed(FAST, Duration::ZERO) as f64;
         figures.at_most(&format!("{name}: incomplete cycles at a cut"), worst(0) as f64, bar, "cycles");
         figures.at_most(&format!("{name}: incomplete cycles at a repair"), worst(1) as f64, bar, "cycles");

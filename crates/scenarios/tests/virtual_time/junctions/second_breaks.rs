@@ -1,0 +1,194 @@
+//! More than one break: in one local ring, in two of them, in a local ring and in that of two links (JR-02).
+
+use std::time::Duration;
+
+use ringcat::{Event, JunctionConnection, JunctionMode};
+use ringcat_sim::cable::{CableId, DeviceIndex};
+use ringcat_sim::fault::Fault;
+use ringcat_sim::frame::Port::{A, B, C, D};
+use ringcat_sim::network::Network;
+use scenarios::check::{Delivery, troubles};
+use scenarios::segments::{MAIN, REDUNDANT, at, wired};
+use scenarios::world::{CYCLE, World};
+
+use super::{STRICT, crossed, edge, ends, in_op, one_ring, told};
+
+/// Two junctions in a row, each with a ring of two, and an input behind them.
+fn two_rings() -> Network {
+    let kinds = ["junction", "digital-output-8", "servo", "junction", "digital-input-8", "servo", "digital-input-8"];
+    let cables = [
+        (MAIN, at(0, A)),
+        (at(0, D), at(1, A)),
+        (at(1, B), at(2, A)),
+        (at(2, B), at(0, B)),
+        (at(0, C), at(3, A)),
+        (at(3, D), at(4, A)),
+        (at(4, B), at(5, A)),
+        (at(5, B), at(3, B)),
+        (at(3, C), at(6, A)),
+    ];
+    wired(&kinds, &cables)
+}
+
+const TWO_STRICT: [JunctionConnection; 2] = [
+    JunctionConnection { head: 0, head_port: 1, tail: 2, tail_port: 1 },
+    JunctionConnection { head: 3, head_port: 1, tail: 5, tail_port: 1 },
+];
+
+#[test]
+fn of_two_rings_either_may_break_and_a_second_break_is_told_for_what_it_is_jr_02() {
+    for setting in [(JunctionMode::Automatic, &[][..]), (JunctionMode::Strict, &TWO_STRICT)] {
+        let mut world = in_op(3, two_rings(), setting);
+        for cable in [1, 2, 3, 5, 6, 7] {
+            let what = format!("{setting:?}, cable {cable}");
+            let mark = edge(&mut world, &what, |world| world.cut(CableId(cable)));
+            assert_eq!(told(&world, mark).len(), 1, "{what}");
+            let mark = edge(&mut world, &what, |world| world.heal(CableId(cable)));
+            assert_eq!(told(&world, mark).len(), 1, "{what}");
+        }
+        // The second ring breaks too: frames are destroyed at the second unconnected port 0.
+        edge(&mut world, "first break", |world| world.cut(CableId(2)));
+        let mark = world.mark();
+        world.cut(CableId(6));
+        world.run_cycles(300);
+        assert_eq!(told(&world, mark), [Event::JunctionsBlocked { blocked: true, breaks: 1 }]);
+        assert_eq!(world.judged(mark).last().map(|judged| judged.delivery), Some(Delivery::Zero));
+        assert!(!world.saw(mark, |event| matches!(event, Event::Lost { .. })), "nobody knows who is there");
+        // One of them is mended: everybody comes back, the other one is still broken.
+        world.heal(CableId(6));
+        world.until(Duration::from_secs(3), "all in OP", |w| w.all_in_op() && w.application().all_settled());
+        world.run_cycles(100);
+        assert_eq!(told(&world, mark)[1..], [Event::JunctionsBlocked { blocked: false, breaks: 1 }]);
+        let mark = edge(&mut world, "first break healed", |world| world.heal(CableId(2)));
+        assert!(matches!(told(&world, mark)[..], [Event::JunctionChanged { broken: false, breaks: 0, .. }]));
+    }
+}
+
+/// Both breaks of two rings come within one cycle, so that no frame can tell where. Nothing comes back, and that is said;
+/// when either is mended, the other one has its place.
+#[test]
+fn two_rings_that_break_at_once_are_told_as_blocked_and_placed_when_one_is_mended_jr_02() {
+    let apart = [Duration::ZERO, Duration::from_micros(3), Duration::from_micros(400)];
+    for (number, (first, second)) in [(2, 6), (1, 5), (3, 7), (2, 5)].into_iter().enumerate() {
+        let mut world = in_op(30 + number as u64, two_rings(), (JunctionMode::Automatic, &[]));
+        let mark = world.mark();
+        world.fault_in(CYCLE / 2, Fault::Cut(CableId(first)));
+        world.fault_in(CYCLE / 2 + apart[number % apart.len()], Fault::Cut(CableId(second)));
+        world.run_cycles(300);
+        let what = format!("cables {first} and {second}: {:?}", told(&world, mark));
+        // The closing cable leaves no port 0 unconnected: nothing is blocked by it.
+        let closing = [first, second].iter().filter(|cable| [3, 7].contains(*cable)).count();
+        if closing == 0 {
+            assert_eq!(told(&world, mark), [Event::JunctionsBlocked { blocked: true, breaks: 0 }], "{what}");
+            assert_eq!(world.judged(mark).last().map(|judged| judged.delivery), Some(Delivery::Zero), "{what}");
+        } else {
+            let broken = |event: &Event| matches!(event, Event::JunctionChanged { broken: true, .. });
+            assert!(told(&world, mark).iter().filter(|event| broken(event)).count() == 2, "{what}");
+            assert_eq!(troubles(world.events(mark)), Vec::<&Event>::new(), "{what}");
+        }
+        let mending = world.mark();
+        world.heal(CableId(first));
+        world.until(Duration::from_secs(3), "all in OP", |w| w.all_in_op() && w.application().all_settled());
+        world.run_cycles(100);
+        let told_then = told(&world, mending);
+        if closing == 0 {
+            // Cable 5 reaches device 4, cable 6 device 5.
+            let placed = told_then.iter().filter_map(|event| match event {
+                Event::JunctionChanged { far, broken: true, breaks: 1, .. } => Some((far.node, far.port)),
+                _ => None,
+            });
+            assert_eq!(placed.collect::<Vec<_>>(), [(second - 1, 0)], "{what}, then {told_then:?}");
+            let free = |event: &&Event| matches!(event, Event::JunctionsBlocked { blocked: false, .. });
+            assert_eq!((told_then.iter().filter(free).count(), told_then.len()), (1, 2), "{what}, then {told_then:?}");
+        }
+        let mark = edge(&mut world, &what, |world| world.heal(CableId(second)));
+        assert!(matches!(told(&world, mark)[..], [Event::JunctionChanged { broken: false, breaks: 0, .. }]), "{what}");
+    }
+}
+
+#[test]
+fn two_breaks_in_one_ring_cut_off_what_is_between_them_and_nobody_else() {
+    let mut world = in_op(4, one_ring(), (JunctionMode::Automatic, &[]));
+    edge(&mut world, "first break", |world| world.cut(CableId(3)));
+    let mark = world.mark();
+    world.cut(CableId(4));
+    world.until(Duration::from_millis(60), "3 is lost", |world| {
+        world.saw(mark, |event| *event == Event::Lost { subdevice: 3 })
+    });
+    world.run_cycles(200);
+    let (near, far) = ends(4);
+    assert_eq!(told(&world, mark), [Event::JunctionChanged { near: Some(near), far, broken: true, breaks: 2 }]);
+    assert_eq!(world.judged(mark).last().map(|judged| judged.stale.clone()), Some(vec![3]));
+    world.heal(CableId(3));
+    world.until(Duration::from_secs(3), "all in OP", |world| world.all_in_op() && world.application().all_settled());
+    edge(&mut world, "second repair", |world| world.heal(CableId(4)));
+    let left: Vec<usize> = world.left_op(mark).iter().map(|device| device.0).collect();
+    assert!(left.iter().all(|device| *device == 3), "{left:?}: the others go on");
+    assert!(matches!(told(&world, mark).last(), Some(Event::JunctionChanged { broken: false, breaks: 0, .. })));
+}
+
+#[test]
+fn a_member_that_loses_its_power_breaks_the_ring_at_both_its_ports_and_comes_back() {
+    let mut world = in_op(5, one_ring(), (JunctionMode::Strict, &[STRICT]));
+    let mark = world.mark();
+    world.power_off(DeviceIndex(3));
+    world.run_cycles(100);
+    assert_eq!(told(&world, mark).len(), 2);
+    world.power_on(DeviceIndex(3));
+    world.until(Duration::from_secs(5), "all in OP", |world| world.all_in_op() && world.application().all_settled());
+    world.run_cycles(100);
+    assert_eq!(told(&world, mark).len(), 4);
+    assert!(world.left_op(mark).iter().all(|device| device.0 == 3));
+}
+
+/// A ring of two links, with a local ring behind the junction in its middle: an output, the junction, and an input; the
+/// local ring's two members are 2 and 3.
+fn ring_in_ring() -> Network {
+    let kinds = ["digital-output-8", "junction", "servo", "digital-input-8", "analog-input-4"];
+    let cables = [
+        (MAIN, at(0, A)),
+        (at(0, B), at(1, A)),
+        (at(1, D), at(2, A)),
+        (at(2, B), at(3, A)),
+        (at(3, B), at(1, B)),
+        (at(1, C), at(4, A)),
+        (at(4, B), REDUNDANT),
+    ];
+    wired(&kinds, &cables)
+}
+
+#[test]
+fn a_local_ring_in_a_ring_of_two_links_goes_on_with_one_break_anywhere_jr_02() {
+    let strict = JunctionConnection { head: 1, head_port: 1, tail: 3, tail_port: 1 };
+    for setting in [(JunctionMode::Automatic, &[][..]), (JunctionMode::Strict, &[strict])] {
+        let mut world = in_op(8, ring_in_ring(), setting);
+        for cable in 0..7 {
+            let local = (2..5).contains(&cable);
+            let what = format!("{setting:?}, cable {cable}");
+            for heal in [false, true] {
+                let act = |world: &mut World| if heal { world.heal(CableId(cable)) } else { world.cut(CableId(cable)) };
+                let mark = edge(&mut world, &what, act);
+                assert_eq!(told(&world, mark).len(), usize::from(local), "{what}");
+                let opened = world.saw(mark, |event| matches!(event, Event::RingOpened { .. }));
+                assert_eq!(opened, !local && !heal, "{what}: the main ring has its own events");
+            }
+        }
+        assert_eq!(crossed(&world, world.beginning()), 0);
+        // Both in the half of the main interface: its frames meet one unconnected port 0, those of the other one too.
+        edge(&mut world, "main ring behind the junction", |world| world.cut(CableId(5)));
+        let mark = edge(&mut world, "local ring", |world| world.cut(CableId(3)));
+        assert_eq!(told(&world, mark).len(), 1);
+        edge(&mut world, "local ring whole", |world| world.heal(CableId(3)));
+        edge(&mut world, "main ring whole", |world| world.heal(CableId(5)));
+        // In the half of the redundant interface its frames are destroyed; the other half goes on.
+        edge(&mut world, "main ring before the junction", |world| world.cut(CableId(1)));
+        let mark = world.mark();
+        world.cut(CableId(3));
+        world.run_cycles(200);
+        assert!(world.judged(mark).last().is_some_and(|judged| !judged.stale.is_empty()));
+        assert!(!world.left_op(mark).contains(&DeviceIndex(0)));
+        world.heal(CableId(3));
+        world.until(Duration::from_secs(5), "all in OP", |w| w.all_in_op() && w.application().all_settled());
+        edge(&mut world, "the last one", |world| world.heal(CableId(1)));
+    }
+}
