@@ -107,6 +107,15 @@ impl RingWord {
     }
 }
 
+/// Frames of the cyclic half since activation.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct CyclicFrames {
+    /// Sent.
+    pub sent: u64,
+    /// Of these, frames of which no copy came back in time.
+    pub lost: u64,
+}
+
 /// The shared words.
 #[derive(Debug)]
 pub struct Board {
@@ -115,6 +124,7 @@ pub struct Board {
     supervision_count: AtomicU32,
     ring: AtomicU64,
     cycles: AtomicU64,
+    frames: [AtomicU64; 2],
     /// One bit per SubDevice: takes part in process data.
     taking_part: Vec<AtomicU64>,
     taking_part_changes: AtomicU32,
@@ -134,6 +144,7 @@ impl Board {
             supervision_count: AtomicU32::new(0),
             ring: AtomicU64::new(0),
             cycles: AtomicU64::new(0),
+            frames: [AtomicU64::new(0), AtomicU64::new(0)],
             taking_part: (0..subdevices.div_ceil(64)).map(|_| AtomicU64::new(0)).collect(),
             excused: (0..subdevices.div_ceil(64)).map(|_| AtomicU64::new(0)).collect(),
             taking_part_changes: AtomicU32::new(0),
@@ -184,7 +195,10 @@ impl Board {
         RingWord::unpack(self.ring.load(Ordering::Acquire))
     }
 
-    pub(crate) fn post_cycle(&self) {
+    /// A cycle was sent; the frames so far.
+    pub(crate) fn post_cycle(&self, frames: CyclicFrames) {
+        self.frames[0].store(frames.sent, Ordering::Relaxed);
+        self.frames[1].store(frames.lost, Ordering::Relaxed);
         let cycles = self.cycles.load(Ordering::Relaxed);
         self.cycles.store(cycles + 1, Ordering::Release);
     }
@@ -192,6 +206,11 @@ impl Board {
     /// Cycles that the exchange has sent: 0 until the application runs it.
     pub fn cycles(&self) -> u64 {
         self.cycles.load(Ordering::Acquire)
+    }
+
+    /// Frames of the cyclic half, up to the latest cycle.
+    pub fn frames(&self) -> CyclicFrames {
+        CyclicFrames { sent: self.frames[0].load(Ordering::Relaxed), lost: self.frames[1].load(Ordering::Relaxed) }
     }
 
     /// Says whether a SubDevice takes part in process data. Indices beyond the board are ignored.

@@ -26,7 +26,7 @@ pub use domain::Domain;
 pub use entry::Entry;
 pub use foreign::ForeignFrame;
 
-use crate::board::{Board, RingWord};
+use crate::board::{Board, CyclicFrames, RingWord};
 use crate::domain::{DomainId, DomainState, DomainStatus, Freshness};
 use crate::event::CyclicEvent;
 use crate::layout::Layout;
@@ -250,7 +250,7 @@ impl Exchange {
         }
         self.to_send.clear();
         self.cycle += 1;
-        self.board.post_cycle();
+        self.board.post_cycle(CyclicFrames { sent: self.counters.sent, lost: self.counters.lost });
     }
 
     /// Takes over who takes part in process data, which the supervisor has changed. A frame gets its process data with the

@@ -49,6 +49,7 @@ use crate::procedures::configure::Start;
 use crate::procedures::dictionary::ReadPdos;
 use crate::procedures::fleet::{Fleet, Member, Phase, SharedFleet};
 use crate::procedures::mail_watch::watch_mail;
+use crate::procedures::own_objects::OwnObjects;
 use crate::procedures::recover::start_all;
 use crate::procedures::scan::{Scan, ScanError, ScanOptions, scan};
 use crate::procedures::serve_requests::{Requests, serve_requests};
@@ -175,6 +176,8 @@ pub struct MainDevice {
     ports: Vec<Option<EthernetPort>>,
     /// Messages of a gateway's clients.
     desk: Option<Desk>,
+    /// What such a client finds at address 0.
+    own_objects: OwnObjects,
     /// A link that was taken down on order.
     disconnected: Option<Link>,
 }
@@ -201,6 +204,7 @@ impl MainDevice {
             loaded: None,
             ports: Vec::new(),
             desk: None,
+            own_objects: OwnObjects::default(),
             disconnected: None,
             options,
         }
@@ -340,6 +344,7 @@ impl MainDevice {
         self.visited.clear();
         self.ports.clear();
         self.desk = None;
+        self.own_objects = OwnObjects::default();
         self.fleet = None;
         self.statistics = None;
         self.cyclic_events = None;

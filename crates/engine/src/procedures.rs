@@ -13,6 +13,7 @@ pub mod inspect;
 mod junction;
 pub mod look_at_ring;
 pub mod mail_watch;
+pub(crate) mod own_objects;
 pub mod recover;
 pub(crate) mod request_state;
 mod ring_watch;

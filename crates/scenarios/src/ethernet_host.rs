@@ -2,19 +2,16 @@
 //!
 //! It runs as a procedure of the acyclic half, as a network interface would beside it: nothing of it waits for a cycle.
 
-use std::collections::VecDeque;
 use std::time::Duration;
 
 use ringcat::Instant;
 use ringcat_engine::mail::eoe::EthernetPort;
 use ringcat_engine::supervisor::Bus;
+use ringcat_sim::application::eoe::frames::Frames;
 use smoltcp::iface::{Config, Interface, PollResult, SocketHandle, SocketSet};
-use smoltcp::phy::{Device, DeviceCapabilities, Medium, RxToken, TxToken};
 use smoltcp::socket::tcp;
 use smoltcp::wire::{EthernetAddress, HardwareAddress, IpCidr, Ipv4Address};
 
-/// Longest frame without check sequence.
-const MAX_FRAME: usize = 1514;
 /// As much as Linux begins with.
 const BUFFER: usize = 64 * 1024;
 const LOCAL_PORT: u16 = 49_152;
@@ -135,7 +132,7 @@ fn take(socket: &mut tcp::Socket<'_>, head: &mut Vec<u8>) -> Result<usize, Strin
 
 impl Host {
     fn new(addresses: Addresses, now: Instant) -> Host {
-        let mut frames = Frames::default();
+        let mut frames = Frames::new(READY);
         let config = Config::new(HardwareAddress::Ethernet(EthernetAddress(addresses.mac)));
         let mut interface = Interface::new(config, &mut frames, instant(now));
         let [a, b, c, d] = addresses.host;
@@ -167,50 +164,4 @@ impl Host {
 
 fn instant(now: Instant) -> smoltcp::time::Instant {
     smoltcp::time::Instant::from_micros(i64::try_from(now.0 / 1000).unwrap_or(i64::MAX))
-}
-
-#[derive(Default)]
-struct Frames {
-    received: VecDeque<Vec<u8>>,
-    sent: VecDeque<Vec<u8>>,
-}
-
-struct Received(Vec<u8>);
-
-struct Sending<'a>(&'a mut VecDeque<Vec<u8>>);
-
-impl RxToken for Received {
-    fn consume<R, F: FnOnce(&[u8]) -> R>(self, f: F) -> R {
-        f(&self.0)
-    }
-}
-
-impl TxToken for Sending<'_> {
-    fn consume<R, F: FnOnce(&mut [u8]) -> R>(self, length: usize, f: F) -> R {
-        let mut frame = vec![0; length];
-        let result = f(&mut frame);
-        self.0.push_back(frame);
-        result
-    }
-}
-
-impl Device for Frames {
-    type RxToken<'a> = Received;
-    type TxToken<'a> = Sending<'a>;
-
-    fn receive(&mut self, _: smoltcp::time::Instant) -> Option<(Received, Sending<'_>)> {
-        let frame = self.received.pop_front()?;
-        Some((Received(frame), Sending(&mut self.sent)))
-    }
-
-    fn transmit(&mut self, _: smoltcp::time::Instant) -> Option<Sending<'_>> {
-        (self.sent.len() < READY).then_some(Sending(&mut self.sent))
-    }
-
-    fn capabilities(&self) -> DeviceCapabilities {
-        let mut capabilities = DeviceCapabilities::default();
-        capabilities.medium = Medium::Ethernet;
-        capabilities.max_transmission_unit = MAX_FRAME;
-        capabilities
-    }
 }

@@ -9,4 +9,4 @@
 mod desk;
 mod dialogue;
 
-pub use desk::{Desk, RelayCounters, Relayed};
+pub use desk::{Asked, Desk, OwnAnswer, RelayCounters, Relayed};

@@ -1,21 +1,42 @@
-//! Messages of a gateway's clients to declared SubDevices (facts 10.1).
+//! Messages of a gateway's clients to declared SubDevices and to the MainDevice itself (facts 10.1).
 
-use ringcat_wire::mailbox::{ErrorReply, Protocol};
+use alloc::boxed::Box;
+use alloc::vec::Vec;
+
+use ringcat_wire::mailbox::{ErrorReply, Message, Protocol};
 use ringcat_wire::sii::MailboxProtocols;
 
 use super::MainDevice;
-use crate::mail::relay::{Desk, RelayCounters, Relayed};
+use crate::mail::relay::{Asked, Desk, RelayCounters, Relayed};
 use crate::procedures::fleet::SharedFleet;
+use crate::procedures::own_objects::Seen;
+
+/// The address of the MainDevice itself.
+const OWN_ADDRESS: u16 = 0;
 
 impl MainDevice {
     /// Takes a message of a client, EtherCAT header of type 5 included; its answers come out of
-    /// [`MainDevice::pop_relayed`]. Any bytes are allowed. The address is the station address of a declared SubDevice;
-    /// 0, the MainDevice itself, is answered with an error, since it has no dictionary.
+    /// [`MainDevice::pop_relayed`]. Any bytes are allowed. The address is the station address of a declared SubDevice, or 0
+    /// for the objects of the MainDevice itself (docs/mailbox-gateway.md).
     pub fn relay(&mut self, client: u64, message: &[u8]) {
         let bus = self.supervisor.bus();
+        let (fleet, scan, acyclic) = (self.fleet.clone(), self.scan.clone(), self.counters());
+        let own_objects = self.own_objects.clone();
         let desk = self.desk.get_or_insert_with(|| Desk::new(&bus));
-        let fleet = self.fleet.as_ref();
-        desk.take(client, message, |address, protocol| find(fleet, address, protocol));
+        desk.take(client, message, |message| {
+            if message.header.address != OWN_ADDRESS {
+                return find(fleet.as_ref(), message);
+            }
+            if message.header.protocol != Protocol::Coe {
+                return Err(ErrorReply::UNSUPPORTED_PROTOCOL);
+            }
+            let scanned = match &*scan.borrow() {
+                Some(Ok(scan)) => scan.subdevices.iter().map(|info| info.station).collect(),
+                Some(Err(_)) | None => Vec::new(),
+            };
+            let (seen, payload) = (Seen { bus, fleet, scanned, acyclic }, message.payload.to_vec());
+            Ok(Asked::Own(Box::pin(async move { own_objects.answer(&seen, client, &payload).await })))
+        });
     }
 
     /// Takes the oldest answer for a client.
@@ -25,6 +46,7 @@ impl MainDevice {
 
     /// A client has gone: what it asked for is forgotten, and a transfer of it is ended.
     pub fn forget_client(&mut self, client: u64) {
+        self.own_objects.forget(client);
         if let Some(desk) = &self.desk {
             desk.forget(client);
         }
@@ -36,17 +58,14 @@ impl MainDevice {
     }
 }
 
-fn find(fleet: Option<&SharedFleet>, address: u16, protocol: Protocol) -> Result<crate::mail::Mailbox, u16> {
-    if address == 0 {
-        return Err(ErrorReply::UNSUPPORTED_PROTOCOL);
-    }
+fn find(fleet: Option<&SharedFleet>, message: &Message<'_>) -> Result<Asked, u16> {
     let Some(fleet) = fleet else { return Err(ErrorReply::INVALID_HEADER) };
     let access = fleet.access();
-    let member = access.members.iter().find(|member| member.station.0 == address);
+    let member = access.members.iter().find(|member| member.station.0 == message.header.address);
     let Some((member, info)) = member.and_then(|member| Some((member, member.info.as_ref()?))) else {
         return Err(ErrorReply::INVALID_HEADER);
     };
-    let bit = match protocol {
+    let bit = match message.header.protocol {
         Protocol::Aoe => MailboxProtocols::AOE,
         Protocol::Eoe => MailboxProtocols::EOE,
         Protocol::Coe => MailboxProtocols::COE,
@@ -58,5 +77,5 @@ fn find(fleet: Option<&SharedFleet>, address: u16, protocol: Protocol) -> Result
     if info.protocols.0 & bit == 0 {
         return Err(ErrorReply::UNSUPPORTED_PROTOCOL);
     }
-    Ok(member.mailbox.clone())
+    Ok(Asked::SubDevice(member.mailbox.clone()))
 }

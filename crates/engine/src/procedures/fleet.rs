@@ -58,6 +58,17 @@ pub struct Member {
     pub setup: Option<Rc<Setup>>,
     /// Its mailbox, in use from PREOP on.
     pub mailbox: Mailbox,
+    /// What has happened to it since activation.
+    pub incidents: Incidents,
+}
+
+/// What has happened to a SubDevice.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Incidents {
+    /// How often it was no longer there.
+    pub absences: u32,
+    /// How often it left its state by itself.
+    pub state_changes: u32,
 }
 
 impl Member {
@@ -81,6 +92,7 @@ impl Member {
             node,
             setup,
             mailbox,
+            incidents: Incidents::default(),
         }
     }
 }
@@ -274,6 +286,14 @@ impl SharedFleet {
     pub fn set_phase(&self, index: usize, phase: Phase) {
         if let Some(member) = self.access().members.get_mut(index) {
             member.phase = phase;
+        }
+    }
+
+    /// Counts what has happened to a SubDevice.
+    pub(super) fn count(&self, index: usize, incident: impl FnOnce(&mut Incidents) -> &mut u32) {
+        if let Some(member) = self.access().members.get_mut(index) {
+            let counter = incident(&mut member.incidents);
+            *counter = counter.saturating_add(1);
         }
     }
 

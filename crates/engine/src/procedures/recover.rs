@@ -106,6 +106,7 @@ pub(super) fn lose(bus: &Bus, fleet: &SharedFleet, index: usize) {
     fleet.next_attempt(index);
     if fleet.phase(index) != Phase::Absent {
         fleet.set_phase(index, Phase::Absent);
+        fleet.count(index, |incidents| &mut incidents.absences);
         bus.report(Event::Lost { subdevice: index });
     }
     fleet.board.set_taking_part(index, false);

@@ -229,7 +229,10 @@ impl Watch {
                 }
                 return;
             }
-            Phase::Settled(_) => Event::StateError { subdevice: index, requested: None, status, code },
+            Phase::Settled(_) => {
+                self.fleet.count(index, |incidents| &mut incidents.state_changes);
+                Event::StateError { subdevice: index, requested: None, status, code }
+            }
             Phase::Absent => {
                 self.suspended[index] = false;
                 return welcome(&self.bus, &self.fleet, index);

@@ -13,7 +13,7 @@ use ringcat::{CyclicThread, Error, Limits, Options, SdoAddress, SupervisorThread
 use ringcat_sim::network::Network;
 use ringcat_sim::segment::Segment;
 use ringcat_wire::mailbox::foe::FoeMessage;
-use ringcat_wire::mailbox::sdo::{SdoRequest, SdoResponse};
+use ringcat_wire::mailbox::sdo::{AbortCode, SdoRequest, SdoResponse};
 use ringcat_wire::mailbox::{ErrorReply, Header, Message, Protocol, gateway};
 
 const SEGMENT: &str = "[segment]\nring = true\n[[device]]\ntype = \"coupler\"\n[[device]]\ntype = \"all-protocols\"\n\
@@ -279,15 +279,52 @@ fn several_clients_and_our_own_traffic_share_a_mailbox_and_none_disturbs_another
 }
 
 #[test]
+fn at_address_0_are_the_objects_of_the_main_device_facts_10_1() {
+    let bench = Bench::new(8);
+    for mut client in [bench.tcp(), bench.udp()] {
+        client.station = 0;
+        let name = SdoRequest::Upload { index: 0x1008, sub_index: 0, complete_access: false };
+        client.sdo(name, |response| {
+            assert!(matches!(response, SdoResponse::UploadNormal { data: b"RingCAT", total: 7, .. }), "{response:?}");
+        });
+        // The AL status of the SubDevice with all protocols.
+        let status = SdoRequest::Upload { index: 0xA000 + ALL as u16, sub_index: 1, complete_access: false };
+        client.sdo(status, |response| {
+            assert!(matches!(response, SdoResponse::UploadExpedited { data: [8, 0], .. }), "{response:?}");
+        });
+    }
+}
+
+#[test]
+fn before_activation_address_0_has_the_objects_that_need_no_declaration_facts_10_1() {
+    let segment = Segment::from_toml(SEGMENT, Path::new(".")).expect("a good segment");
+    let (_, acyclic) = SharedSegment::halves(Network::from_description(segment).expect("it can be built"));
+    let supervisor = SupervisorThread::start(acyclic, &Options::default(), || ()).expect("a thread");
+    let address = SocketAddr::from(([127, 0, 0, 1], 0));
+    let gateway = supervisor.start_gateway(GatewayOptions { address, connections: 1 }).expect("a free port");
+    let stream = TcpStream::connect(gateway.address()).expect("it listens");
+    stream.set_read_timeout(Some(LIMIT)).expect("a timeout");
+    let mut client = Client { socket: Socket::Tcp(stream), station: 0, counter: 0 };
+    let upload = |index| SdoRequest::Upload { index, sub_index: 0, complete_access: false };
+    client.sdo(upload(0xF020), |response| {
+        assert!(matches!(response, SdoResponse::UploadExpedited { data: [0], .. }), "{response:?}");
+    });
+    client.sdo(upload(0x8000), |response| {
+        let code = AbortCode::OBJECT_DOES_NOT_EXIST;
+        assert_eq!(response, SdoResponse::Abort { index: 0x8000, sub_index: 0, code });
+    });
+}
+
+#[test]
 fn what_cannot_be_passed_on_is_answered_with_an_error_reply_facts_10_1() {
     let bench = Bench::new(8);
     let mut client = bench.udp();
     let upload = [0x00, 0x20, 0x40, 0x01, 0x20, 0x01, 0, 0, 0, 0];
     let station = bench.station;
     assert_eq!(
-        client.refused(&message(0, 1, Protocol::Coe, &upload)),
+        client.refused(&message(0, 1, Protocol::Foe, &upload)),
         ErrorReply::UNSUPPORTED_PROTOCOL,
-        "no dictionary"
+        "objects only"
     );
     assert_eq!(client.refused(&message(0x4711, 1, Protocol::Coe, &upload)), ErrorReply::INVALID_HEADER, "nobody");
     assert_eq!(client.refused(&message(bench.terminal, 1, Protocol::Coe, &upload)), ErrorReply::UNSUPPORTED_PROTOCOL);

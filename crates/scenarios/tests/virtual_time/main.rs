@@ -28,6 +28,7 @@ mod mail_startup;
 mod mail_storm;
 mod mailbox_decoders;
 mod odd_sii;
+mod own_objects;
 mod power_cycles;
 mod real_images;
 mod requests;

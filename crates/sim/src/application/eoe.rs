@@ -4,6 +4,7 @@
 //! [`reassembly`] puts fragments together, [`stack`] is an IP stack that answers ping and serves TCP. Time stamps are
 //! those of virtual time.
 
+pub mod frames;
 pub mod reassembly;
 pub mod stack;
 

@@ -1,10 +1,13 @@
 //! Where clients' messages wait, and the tasks that carry them to the mailboxes.
 
+use alloc::boxed::Box;
 use alloc::collections::{BTreeMap, VecDeque};
 use alloc::rc::Rc;
 use alloc::vec;
 use alloc::vec::Vec;
 use core::cell::RefCell;
+use core::future::Future;
+use core::pin::Pin;
 use core::time::Duration;
 
 use ringcat_wire::mailbox::{ErrorReply, Header, Message, Protocol, gateway};
@@ -59,11 +62,23 @@ pub struct RelayCounters {
     pub malformed: u64,
 }
 
+/// What the MainDevice itself will answer: payloads of the same protocol, or the detail of an error reply.
+pub type OwnAnswer = Pin<Box<dyn Future<Output = Result<Vec<Vec<u8>>, u16>>>>;
+
+/// Who is asked.
+pub enum Asked {
+    /// A SubDevice, through its mailbox.
+    SubDevice(Mailbox),
+    /// The MainDevice itself. Its answer is worked on when it is the message's turn.
+    Own(OwnAnswer),
+}
+
 struct Job {
     client: u64,
     header: Header,
     payload: Vec<u8>,
     at: Instant,
+    own: Option<OwnAnswer>,
 }
 
 #[derive(Default)]
@@ -106,23 +121,28 @@ impl Desk {
         Desk { shared: Rc::new(Shared { bus: bus.clone(), state: RefCell::default(), news: bus.signal() }) }
     }
 
-    /// Takes a client's message, EtherCAT header included. `find` knows the mailbox of a station address, and whether the
-    /// SubDevice speaks a protocol. What cannot be passed on is answered with an error reply.
-    pub fn take(&self, client: u64, bytes: &[u8], find: impl FnOnce(u16, Protocol) -> Result<Mailbox, u16>) {
+    /// Takes a client's message, EtherCAT header included. `find` knows who has its address, and whether he speaks its
+    /// protocol. What cannot be passed on is answered with an error reply.
+    pub fn take(&self, client: u64, bytes: &[u8], find: impl FnOnce(&Message<'_>) -> Result<Asked, u16>) {
         self.shared.state.borrow_mut().counters.messages += 1;
-        let Ok(Message { header, payload }) = gateway::decode(bytes) else {
+        let Ok(message) = gateway::decode(bytes) else {
             self.shared.state.borrow_mut().counters.malformed += 1;
             return;
         };
-        let job = Job { client, header, payload: payload.to_vec(), at: self.shared.bus.now() };
-        let found = lane(header.protocol, payload).and_then(|lane| Ok((find(header.address, header.protocol)?, lane)));
+        let Message { header, payload } = message;
+        let mut job = Job { client, header, payload: payload.to_vec(), at: self.shared.bus.now(), own: None };
+        let found = lane(header.protocol, payload).and_then(|lane| Ok((find(&message)?, lane)));
         match found {
-            Ok((mailbox, lane)) => self.queue(job, mailbox, lane),
+            Ok((Asked::SubDevice(mailbox), lane)) => self.queue(job, Some(mailbox), lane),
+            Ok((Asked::Own(answer), lane)) => {
+                job.own = Some(answer);
+                self.queue(job, None, lane);
+            }
             Err(detail) => self.shared.refuse(&job, detail),
         }
     }
 
-    fn queue(&self, job: Job, mailbox: Mailbox, lane: Lane) {
+    fn queue(&self, job: Job, mailbox: Option<Mailbox>, lane: Lane) {
         let key = (job.header.address, lane as u8);
         let state = &mut *self.shared.state.borrow_mut();
         let queue = state.queues.entry(key).or_default();
@@ -134,7 +154,12 @@ impl Desk {
         queue.jobs.push_back(job);
         if !core::mem::replace(&mut queue.served, true) {
             let shared = self.shared.clone();
-            self.shared.bus.spawn(async move { serve(shared, key, mailbox, lane).await });
+            self.shared.bus.spawn(async move {
+                match mailbox {
+                    Some(mailbox) => serve(shared, key, mailbox, lane).await,
+                    None => serve_own(shared, key).await,
+                }
+            });
         }
         self.shared.news.notify();
     }
@@ -245,6 +270,20 @@ async fn serve(shared: Rc<Shared>, key: (u16, u8), mailbox: Mailbox, lane: Lane)
         match talk.await {
             Ok(talk) => converse(&shared, key, talk, lane, job).await,
             Err(_) => shared.state.borrow_mut().counters.unanswered += 1,
+        }
+    }
+}
+
+/// Answers the messages for the MainDevice itself, until there are none.
+async fn serve_own(shared: Rc<Shared>, key: (u16, u8)) {
+    while let Some(mut job) = shared.next(key) {
+        let Some(answer) = job.own.take() else { continue };
+        match answer.await {
+            Ok(payloads) => {
+                let mut state = shared.state.borrow_mut();
+                payloads.iter().for_each(|payload| state.answer(&job, job.header.protocol, payload));
+            }
+            Err(detail) => shared.refuse(&job, detail),
         }
     }
 }

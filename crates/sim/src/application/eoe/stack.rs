@@ -8,20 +8,18 @@ use core::fmt::Write as _;
 use core::time::Duration;
 
 use smoltcp::iface::{Config, Interface, PollResult, SocketHandle, SocketSet};
-use smoltcp::phy::{Device, DeviceCapabilities, Medium, RxToken, TxToken};
 use smoltcp::socket::tcp;
 use smoltcp::time::Instant;
 use smoltcp::wire::{EthernetAddress, HardwareAddress, IpCidr};
 
-use std::collections::VecDeque;
-
 use super::Addresses;
+use super::frames::Frames;
 use crate::time::SimTime;
 
-/// Longest frame without check sequence.
-const MAX_FRAME: usize = 1514;
 /// Frames that wait for the stack; more are dropped, as a network does.
 const MAX_RECEIVED: usize = 16;
+/// Frames that it may have ready.
+const MAX_READY: usize = 16;
 /// Connections at a time, of each service.
 const CONNECTIONS: usize = 4;
 const BUFFER: usize = 16 * 1024;
@@ -70,7 +68,7 @@ impl fmt::Debug for Stack {
 impl Stack {
     /// A stack that listens.
     pub fn new(addresses: &Addresses) -> Stack {
-        let mut frames = Frames::default();
+        let mut frames = Frames::new(MAX_READY);
         let mut config = Config::new(HardwareAddress::Ethernet(EthernetAddress(addresses.mac)));
         config.random_seed = addresses.mac.iter().fold(0, |seed, byte| seed << 8 | u64::from(*byte));
         let interface = Interface::new(config, &mut frames, Instant::ZERO);
@@ -236,51 +234,4 @@ fn answer(request: &[u8], addresses: &Addresses) -> (Vec<u8>, usize) {
 
 fn instant(now: SimTime) -> Instant {
     Instant::from_micros(i64::try_from(now.0 / 1000).unwrap_or(i64::MAX))
-}
-
-/// Frames on their way into the stack and out of it.
-#[derive(Default)]
-pub(crate) struct Frames {
-    pub(crate) received: VecDeque<Vec<u8>>,
-    pub(crate) sent: VecDeque<Vec<u8>>,
-}
-
-pub(crate) struct Received(Vec<u8>);
-
-pub(crate) struct Sending<'a>(&'a mut VecDeque<Vec<u8>>);
-
-impl RxToken for Received {
-    fn consume<R, F: FnOnce(&[u8]) -> R>(self, f: F) -> R {
-        f(&self.0)
-    }
-}
-
-impl TxToken for Sending<'_> {
-    fn consume<R, F: FnOnce(&mut [u8]) -> R>(self, length: usize, f: F) -> R {
-        let mut frame = vec![0; length];
-        let result = f(&mut frame);
-        self.0.push_back(frame);
-        result
-    }
-}
-
-impl Device for Frames {
-    type RxToken<'a> = Received;
-    type TxToken<'a> = Sending<'a>;
-
-    fn receive(&mut self, _: Instant) -> Option<(Received, Sending<'_>)> {
-        let frame = self.received.pop_front()?;
-        Some((Received(frame), Sending(&mut self.sent)))
-    }
-
-    fn transmit(&mut self, _: Instant) -> Option<Sending<'_>> {
-        (self.sent.len() < MAX_RECEIVED).then_some(Sending(&mut self.sent))
-    }
-
-    fn capabilities(&self) -> DeviceCapabilities {
-        let mut capabilities = DeviceCapabilities::default();
-        capabilities.medium = Medium::Ethernet;
-        capabilities.max_transmission_unit = MAX_FRAME;
-        capabilities
-    }
 }

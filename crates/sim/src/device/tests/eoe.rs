@@ -12,8 +12,8 @@ use smoltcp::time::Instant;
 use smoltcp::wire::{EthernetAddress, HardwareAddress, IpAddress, IpCidr};
 
 use super::client::{ANSWER, Client};
+use crate::application::eoe::frames::Frames;
 use crate::application::eoe::reassembly::Reassembly;
-use crate::application::eoe::stack::Frames;
 use crate::catalogue;
 use crate::description::{DeviceDescription, EoeEnd};
 
@@ -83,7 +83,7 @@ struct Host {
 
 impl Host {
     fn new() -> Host {
-        let mut frames = Frames::default();
+        let mut frames = Frames::new(16);
         let config = Config::new(HardwareAddress::Ethernet(EthernetAddress(HOST_MAC)));
         let mut interface = Interface::new(config, &mut frames, Instant::ZERO);
         interface.update_ip_addrs(|known| known.push(IpCidr::new(HOST.into(), 24)).unwrap());

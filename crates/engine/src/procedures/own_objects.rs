@@ -1,0 +1,218 @@
+//! Objects of the MainDevice itself: what a client of the mailbox gateway reads at address 0 (facts 10.1, 10.2).
+//!
+//! In go CoE messages of clients, out come the answers: SDOs and SDO information. Values are those of the moment: what a
+//! SubDevice has to say is asked of it when a client asks. Nothing of it is on the cyclic path.
+
+mod catalogue;
+mod detection;
+mod information;
+mod rates;
+mod upload;
+mod values;
+
+use alloc::collections::BTreeMap;
+use alloc::rc::Rc;
+use alloc::vec;
+use alloc::vec::Vec;
+use core::cell::{Cell, RefCell};
+
+use ringcat_wire::address::StationAddress;
+use ringcat_wire::mailbox::coe::{CoeHeader, CoeService, ObjectCode};
+use ringcat_wire::mailbox::sdo::{AbortCode, SdoError, SdoRequest, SdoResponse};
+use ringcat_wire::mailbox::{ErrorReply, Header};
+
+use self::catalogue::Object;
+use self::detection::Detection;
+use self::rates::Rates;
+use self::upload::{Upload, abort, begin, encode};
+use super::fleet::SharedFleet;
+use super::services::statistics;
+use crate::mail::coe::SdoAddress;
+use crate::supervisor::{AcyclicCounters, Bus};
+
+/// Bytes of a message to or from address 0, mailbox header included: a long list goes in segments.
+const MAILBOX: usize = 512;
+const ROOM: usize = MAILBOX - Header::LEN;
+/// Clients that may have an upload in segments under way.
+const UPLOADS: usize = 64;
+
+/// What the objects are about, at the moment of a request.
+#[derive(Clone, Debug)]
+pub(crate) struct Seen {
+    pub bus: Bus,
+    /// Once active.
+    pub fleet: Option<SharedFleet>,
+    /// Station addresses of the last scan, by position.
+    pub scanned: Vec<StationAddress>,
+    pub acyclic: AcyclicCounters,
+}
+
+impl Seen {
+    fn declared(&self) -> usize {
+        self.fleet.as_ref().map_or(0, |fleet| fleet.access().members.len())
+    }
+}
+
+/// Answers clients, and remembers what goes beyond one message.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct OwnObjects {
+    shared: Rc<Shared>,
+}
+
+#[derive(Debug, Default)]
+struct Shared {
+    /// By client.
+    uploads: RefCell<BTreeMap<u64, Upload>>,
+    detection: Rc<Detection>,
+    rates: RefCell<Rates>,
+    /// Frames that were lost when the diagnosis was reset, cyclic and acyclic ones.
+    forgotten: Cell<[u64; 2]>,
+}
+
+impl OwnObjects {
+    /// A client has gone.
+    pub(crate) fn forget(&self, client: u64) {
+        self.shared.uploads.borrow_mut().remove(&client);
+    }
+
+    /// The payloads that answer the payload of a client's CoE message. The error is that of a mailbox error reply.
+    pub(crate) async fn answer(&self, seen: &Seen, client: u64, payload: &[u8]) -> Result<Vec<Vec<u8>>, u16> {
+        if payload.len() > ROOM {
+            return Err(ErrorReply::INVALID_SIZE);
+        }
+        let head = payload.first_chunk().ok_or(ErrorReply::SIZE_TOO_SHORT)?;
+        match CoeHeader::decode(head).service {
+            CoeService::SdoInformation => information::answer(payload, ROOM, seen.declared()),
+            CoeService::SdoRequest => match SdoRequest::decode(payload) {
+                Ok(request) => Ok(self.sdo(seen, client, &request).await.into_iter().collect()),
+                Err(SdoError::Short { .. }) => Err(ErrorReply::SIZE_TOO_SHORT),
+                Err(SdoError::Service { .. }) => Err(ErrorReply::SERVICE_NOT_SUPPORTED),
+                Err(SdoError::Command { .. }) => Ok(vec![abort(SdoAddress::new(0, 0), AbortCode::UNKNOWN_COMMAND)]),
+            },
+            _ => Err(ErrorReply::SERVICE_NOT_SUPPORTED),
+        }
+    }
+
+    /// The answer to an SDO request; none to an abort. A new transfer ends the one before.
+    async fn sdo(&self, seen: &Seen, client: u64, request: &SdoRequest<'_>) -> Option<Vec<u8>> {
+        let upload = self.shared.uploads.borrow_mut().remove(&client);
+        let (address, result) = match *request {
+            SdoRequest::Abort { .. } => return None,
+            SdoRequest::UploadSegment { toggle } => return Some(self.segment(client, upload, toggle)),
+            SdoRequest::DownloadSegment { .. } => (SdoAddress::new(0, 0), Err(AbortCode::UNKNOWN_COMMAND)),
+            SdoRequest::Upload { index, sub_index, complete_access } => {
+                let address = SdoAddress { index, sub_index, complete_access };
+                let data = self.read(seen, address).await;
+                (address, data.map(|data| self.begin(client, address, data)))
+            }
+            SdoRequest::DownloadExpedited { index, sub_index, complete_access, data } => {
+                let address = SdoAddress { index, sub_index, complete_access };
+                (address, self.write(seen, address, data, data.len()).await)
+            }
+            SdoRequest::DownloadNormal { index, sub_index, complete_access, total, data } => {
+                let address = SdoAddress { index, sub_index, complete_access };
+                (address, self.write(seen, address, data, total as usize).await)
+            }
+        };
+        Some(result.unwrap_or_else(|code| abort(address, code)))
+    }
+
+    fn begin(&self, client: u64, address: SdoAddress, data: Vec<u8>) -> Vec<u8> {
+        let (first, upload) = begin(address, data, ROOM);
+        self.keep(client, upload);
+        first
+    }
+
+    fn keep(&self, client: u64, upload: Option<Upload>) {
+        let Some(upload) = upload else { return };
+        let mut uploads = self.shared.uploads.borrow_mut();
+        if uploads.len() >= UPLOADS {
+            // The client that came first has forgotten it, or asks again.
+            uploads.pop_first();
+        }
+        uploads.insert(client, upload);
+    }
+
+    fn segment(&self, client: u64, upload: Option<Upload>, toggle: bool) -> Vec<u8> {
+        let Some(mut upload) = upload else { return abort(SdoAddress::new(0, 0), AbortCode::UNKNOWN_COMMAND) };
+        match upload.segment(toggle, ROOM) {
+            Ok((answer, last)) => {
+                self.keep(client, (!last).then_some(upload));
+                answer
+            }
+            Err(code) => abort(upload.address(), code),
+        }
+    }
+
+    async fn read(&self, seen: &Seen, address: SdoAddress) -> Result<Vec<u8>, AbortCode> {
+        let SdoAddress { index, sub_index, complete_access } = address;
+        let object = Object::at(index, seen.declared()).ok_or(AbortCode::OBJECT_DOES_NOT_EXIST)?;
+        if complete_access && !object.has_complete_access() {
+            return Err(AbortCode::COMPLETE_ACCESS_NOT_SUPPORTED);
+        }
+        if object.entry(sub_index).is_none() || (complete_access && sub_index > 1) {
+            return Err(AbortCode::SUB_INDEX_DOES_NOT_EXIST);
+        }
+        let values = values::read(seen, &self.shared, object).await;
+        let count = values.last().map_or(0, |(last, _)| *last);
+        if complete_access {
+            // Subindex 0 takes 16 bits.
+            let head: &[u8] = if sub_index == 0 { &[count, 0] } else { &[] };
+            return Ok([head]
+                .into_iter()
+                .chain(values.iter().map(|(_, value)| value.as_slice()))
+                .flatten()
+                .copied()
+                .collect());
+        }
+        if sub_index == 0 && object.code() != ObjectCode::Variable {
+            return Ok(vec![count]);
+        }
+        let value = values.into_iter().find(|(number, _)| *number == sub_index);
+        value.map(|(_, value)| value).ok_or(AbortCode::SUB_INDEX_DOES_NOT_EXIST)
+    }
+
+    async fn write(&self, seen: &Seen, address: SdoAddress, data: &[u8], total: usize) -> Result<Vec<u8>, AbortCode> {
+        let SdoAddress { index, sub_index, complete_access } = address;
+        let object = Object::at(index, seen.declared()).ok_or(AbortCode::OBJECT_DOES_NOT_EXIST)?;
+        let entry = object.entry(sub_index).ok_or(AbortCode::SUB_INDEX_DOES_NOT_EXIST)?;
+        if complete_access {
+            return Err(AbortCode::COMPLETE_ACCESS_NOT_SUPPORTED);
+        }
+        if !entry.writable {
+            return Err(AbortCode::READ_ONLY);
+        }
+        let expected = usize::from(entry.bits.div_ceil(8));
+        match total.cmp(&expected) {
+            core::cmp::Ordering::Less => return Err(AbortCode::LENGTH_TOO_SHORT),
+            core::cmp::Ordering::Greater => return Err(AbortCode::LENGTH_TOO_LONG),
+            core::cmp::Ordering::Equal => {}
+        }
+        match object {
+            Object::DetectModules => Detection::start(&self.shared.detection, seen)?,
+            Object::DiagnosisControl if data.first().is_some_and(|reset| *reset != 0) => self.reset(seen).await,
+            _ => {}
+        }
+        Ok(encode(&SdoResponse::DownloadDone { index, sub_index }))
+    }
+
+    /// Clears what 0xAnnn and 0xF120 count.
+    async fn reset(&self, seen: &Seen) {
+        self.shared.forgotten.set(rates::lost(seen));
+        let Some(fleet) = &seen.fleet else { return };
+        let (book, stations) = {
+            let mut access = fleet.access();
+            access.members.iter_mut().for_each(|member| member.incidents = Default::default());
+            let stations: Vec<_> = access.members.iter().map(|member| member.station).enumerate().collect();
+            (access.statistics.clone(), stations)
+        };
+        let clear = move |bus: Bus, (subdevice, station)| {
+            let book = book.clone();
+            async move {
+                // One that is not there counts nothing.
+                let _ = statistics::clear(&bus, &book, subdevice, station).await;
+            }
+        };
+        seen.bus.gather_in_turns(stations, clear).await;
+    }
+}

@@ -1,0 +1,70 @@
+//! Frames on their way into an IP stack (smoltcp) and out of it.
+
+use std::collections::VecDeque;
+
+use smoltcp::phy::{Device, DeviceCapabilities, Medium, RxToken, TxToken};
+use smoltcp::time::Instant;
+
+/// Longest frame without check sequence.
+const MAX_FRAME: usize = 1514;
+
+/// Two queues that are an interface to a stack. Who fills the one into the stack bounds it.
+#[derive(Debug)]
+pub struct Frames {
+    /// Into the stack.
+    pub received: VecDeque<Vec<u8>>,
+    /// Out of it.
+    pub sent: VecDeque<Vec<u8>>,
+    ready: usize,
+}
+
+impl Frames {
+    /// Empty queues. While so many frames wait to be taken the stack begins none by itself.
+    pub const fn new(ready: usize) -> Frames {
+        Frames { received: VecDeque::new(), sent: VecDeque::new(), ready }
+    }
+}
+
+/// A frame that the stack takes.
+#[derive(Debug)]
+pub struct Received(Vec<u8>);
+
+/// Where the stack puts a frame.
+#[derive(Debug)]
+pub struct Sending<'a>(&'a mut VecDeque<Vec<u8>>);
+
+impl RxToken for Received {
+    fn consume<R, F: FnOnce(&[u8]) -> R>(self, f: F) -> R {
+        f(&self.0)
+    }
+}
+
+impl TxToken for Sending<'_> {
+    fn consume<R, F: FnOnce(&mut [u8]) -> R>(self, length: usize, f: F) -> R {
+        let mut frame = vec![0; length];
+        let result = f(&mut frame);
+        self.0.push_back(frame);
+        result
+    }
+}
+
+impl Device for Frames {
+    type RxToken<'a> = Received;
+    type TxToken<'a> = Sending<'a>;
+
+    fn receive(&mut self, _: Instant) -> Option<(Received, Sending<'_>)> {
+        let frame = self.received.pop_front()?;
+        Some((Received(frame), Sending(&mut self.sent)))
+    }
+
+    fn transmit(&mut self, _: Instant) -> Option<Sending<'_>> {
+        (self.sent.len() < self.ready).then_some(Sending(&mut self.sent))
+    }
+
+    fn capabilities(&self) -> DeviceCapabilities {
+        let mut capabilities = DeviceCapabilities::default();
+        capabilities.medium = Medium::Ethernet;
+        capabilities.max_transmission_unit = MAX_FRAME;
+        capabilities
+    }
+}
