@@ -11,6 +11,7 @@ mod groups;
 mod ip;
 mod resolve;
 mod startup;
+mod sync_modes;
 mod timeouts;
 
 use alloc::vec::Vec;
@@ -31,6 +32,7 @@ pub use timeouts::{StateTimeout, Timeouts};
 
 pub use clocks::{ClockConfig, ReferenceClock, SyncSignals};
 pub use resolve::{ConfigError, DuplicateAlias, Resolution, duplicate_aliases, resolve};
+pub use sync_modes::ModeError;
 
 /// Who is expected; `None` matches any value.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]

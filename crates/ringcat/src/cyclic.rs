@@ -162,6 +162,7 @@ impl Cyclic {
         self.followed = reading.sent_at;
         let correction = follower.correction(reading.at(self.next_cycle));
         self.next_cycle = Instant(self.next_cycle.0.saturating_add_signed(correction));
+        self.news.publish_phase(follower.error_ns(), follower.is_locked());
     }
 
     /// How far the next cycle was from its phase in system time, in nanoseconds.
@@ -239,6 +240,7 @@ impl Cyclic {
     }
 
     fn publish(&self) {
+        self.news.publish_spread(self.exchange.clock_spread_ns());
         self.news.publish(&self.pace, self.exchange.counters(), self.exchange.ring(), &self.rates);
     }
 

@@ -255,6 +255,11 @@ pub fn describe_down(name: &str) -> String {
     }
 }
 
+/// Monotonic time, as the links have it.
+pub fn now() -> ringcat::Instant {
+    ringcat::Instant(ringcat_link::monotonic::now_ns())
+}
+
 /// Becomes true when the user or the system asks this program to end.
 pub fn end_request() -> Arc<AtomicBool> {
     let asked = Arc::new(AtomicBool::new(false));

@@ -2,6 +2,7 @@
 
 mod bench;
 mod capture;
+mod clock_options;
 mod clocks;
 mod demo;
 mod interfaces;

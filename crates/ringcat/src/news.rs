@@ -24,6 +24,11 @@ pub struct News {
     domains: Box<[[AtomicU64; 2]]>,
     round_trips: Histogram,
     wake_ups: Histogram,
+    phase_errors: Histogram,
+    /// Last phase error, and whether errors have been small, in the lowest bit.
+    phase: AtomicU64,
+    /// Spread of the clocks plus one; zero before it was read.
+    spread: AtomicU64,
     restart: AtomicBool,
     /// Source address of the last frame of another MainDevice, and the link it arrived on, plus one.
     foreign: AtomicU64,
@@ -55,6 +60,9 @@ impl News {
             domains: (0..domains).map(|_| zeros()).collect(),
             round_trips: Histogram::default(),
             wake_ups: Histogram::default(),
+            phase_errors: Histogram::default(),
+            phase: AtomicU64::new(0),
+            spread: AtomicU64::new(0),
             restart: AtomicBool::new(false),
             foreign: AtomicU64::new(0),
             ring: AtomicU64::new(0),
@@ -127,6 +135,23 @@ impl News {
         &self.wake_ups
     }
 
+    /// How far cycles were from their phase in the system time of the segment, with
+    /// [`Trigger::ReferenceClock`](crate::Trigger::ReferenceClock), to either side: once per reading of the reference clock.
+    pub fn phase_errors(&self) -> &Histogram {
+        &self.phase_errors
+    }
+
+    /// The last of these errors in nanoseconds (positive: the host is late), and whether they have been small for a while.
+    pub fn phase(&self) -> (i64, bool) {
+        let word = self.phase.load(Ordering::Relaxed);
+        (word as i64 >> 1, word & 1 != 0)
+    }
+
+    /// OR of all |0x092C| in nanoseconds, as the last cyclic frame saw it: at most twice the largest.
+    pub fn clock_spread_ns(&self) -> Option<u32> {
+        self.spread.load(Ordering::Relaxed).checked_sub(1).map(|ns| ns as u32)
+    }
+
     /// Has the histograms begin anew with the next cycle.
     pub fn restart_histograms(&self) {
         self.restart.store(true, Ordering::Relaxed);
@@ -159,6 +184,15 @@ impl News {
             Link::Redundant => 2,
         };
         self.foreign.store(u64::from_be_bytes([link, 0, a, b, c, d, e, f]), Ordering::Relaxed);
+    }
+
+    pub(crate) fn publish_phase(&self, error_ns: i64, is_locked: bool) {
+        self.phase_errors.record(Duration::from_nanos(error_ns.unsigned_abs()));
+        self.phase.store((error_ns << 1) as u64 | u64::from(is_locked), Ordering::Relaxed);
+    }
+
+    pub(crate) fn publish_spread(&self, spread_ns: Option<u32>) {
+        self.spread.store(spread_ns.map_or(0, |ns| u64::from(ns) + 1), Ordering::Relaxed);
     }
 
     pub(crate) fn publish(&self, pace: &Pace, counters: &CyclicCounters, ring: RingState, rates: &[Rate]) {
@@ -215,6 +249,7 @@ impl News {
             self.restart.store(false, Ordering::Relaxed);
             self.round_trips.clear();
             self.wake_ups.clear();
+            self.phase_errors.clear();
         }
     }
 }

@@ -22,7 +22,8 @@ use ringcat::text::{Names, address_of_sender, describe};
 use ringcat::{CyclicThread, Event, Instant, LastOutputs, Links, Options, SupervisorThread, automatic};
 use ringcat_wire::al::AlState;
 
-use crate::interfaces::{Failure, InterfaceArguments, ThreadArguments, end_request, is_asked};
+use crate::clock_options::ClockOptions;
+use crate::interfaces::{Failure, InterfaceArguments, ThreadArguments, end_request, is_asked, now};
 use crate::output::say;
 use crate::recording::RecordingArguments;
 use crate::surroundings::Surroundings;
@@ -31,7 +32,7 @@ use beside::{Beside, BesideArguments};
 use junction::{Junctions, junctions};
 use live::Live;
 use stalls::Stalls;
-use summary::{final_account, summary};
+use summary::{clock_account, final_account, summary};
 
 /// From activation to OP of the last SubDevice at the most.
 const OP_LIMIT: Duration = Duration::from_secs(60);
@@ -46,7 +47,11 @@ const JUDGEMENTS_TOLD: u32 = 200;
 const SUMMARY_HELP: &str = "\
 All outputs stay zero. Watchdogs, process data and mailboxes are set up as each SubDevice's EEPROM (SII) says.
 
-Ctrl-C ends it in order: outputs zero, all SubDevices to INIT. Exit status 0: all reached OP and no frame was lost.
+Ctrl-C ends it in order: outputs zero, all SubDevices to INIT. Exit status 0: all reached OP, no frame was lost, and all
+clocks are locked where there are any.
+
+Distributed clocks are brought together with --clocks, or with any of --phase, --bus-shift, --reference and --sync; --for
+then counts from their lock. SubDevices with SYNC signals wait for it before OP. `ringcat clocks` tells more about them.
 
 The summary tells three things apart:
   this machine   wake-ups that came late and cycles that were left out for that. Nothing on the cable is wrong: try
@@ -72,6 +77,11 @@ pub struct RunArguments {
     /// How long to exchange process data once all are in OP, such as 10s or 5min; until Ctrl-C by default.
     #[arg(long = "for", value_name = "TIME", value_parser = time)]
     lasts: Option<Duration>,
+    /// Bring the distributed clocks together.
+    #[arg(long)]
+    clocks: bool,
+    #[command(flatten)]
+    clock_options: ClockOptions,
     #[arg(long, value_name = "MODE", default_value = "disabled", value_parser = junctions, help = junction::HELP)]
     junction: Junctions,
     /// Take the redundant interface down for a moment, when cables have changed, to find out where IN and OUT of a
@@ -105,33 +115,41 @@ pub fn run(arguments: &RunArguments) -> Result<bool, Failure> {
     let scan = result.map_err(|error| surroundings.explain(error, others + supervisor.counters().foreign))?;
     say!("{} SubDevices; cycle {} us", scan.subdevices.len(), arguments.cycle.as_micros());
     let names = Names(scan.subdevices.iter().map(|info| info.name.clone()).collect());
-    let declaration = automatic(&scan.subdevices, arguments.cycle);
+    let mut declaration = automatic(&scan.subdevices, arguments.cycle);
+    let clocks = arguments.clocks || arguments.clock_options.are_given();
+    if clocks {
+        arguments.clock_options.declare(&mut declaration, &scan.subdevices)?;
+    }
     supervisor.load(declaration)?;
     let connections = arguments.junction.connections.iter();
     connections.copied().try_for_each(|connection| supervisor.add_junction_connection(connection))?;
-    let application = supervisor.apply(cyclic).map_err(ringcat::Error::from)?;
+    let mut application = supervisor.apply(cyclic).map_err(ringcat::Error::from)?;
+    if clocks {
+        application.set_trigger(arguments.clock_options.trigger());
+    }
     let cycles = application.start_cycles(move || thread.prepare_cycles(), |_| ControlFlow::Continue(()))?;
-    let live = Live::new(arguments.interfaces.redundant.is_some());
-    let mut run =
-        Run { cycles, names, begin, live, judgements_told: 0, stalls: Stalls::default(), surroundings, beside };
+    let live = Live::new(arguments.interfaces.redundant.is_some(), clocks);
+    let stalls = Stalls::default();
+    let mut run = Run { cycles, names, begin, live, clocks, judgements_told: 0, stalls, surroundings, beside };
     let in_op = run.reach_op(&end);
     let before = run.cycles.news().counters();
     if in_op {
         let until = arguments.lasts.map_or(Instant::NEVER, |lasts| now() + lasts);
         run.exchange(until, &end);
     }
+    let status = if clocks { run.cycles.supervisor().with(|engine| engine.clocks())? } else { Vec::new() };
+    let locked = status.iter().all(|clock| clock.is_locked || clock.is_reference);
     let application = run.cycles.end()?;
     summary(&application, &run.surroundings);
+    if clocks {
+        clock_account(&status, application.news(), &run.names);
+    }
     run.beside.account();
     let lost = application.cyclic_counters().lost - before.lost;
     let (supervisor, mut links) = application.stop(LastOutputs::Zero, AlState::Init, STOP_LIMIT)?;
     final_account(&mut links, &supervisor);
     say!("  stopped: outputs zero, all SubDevices in INIT");
-    Ok(in_op && lost == 0)
-}
-
-fn now() -> Instant {
-    Instant(ringcat_link::monotonic::now_ns())
+    Ok(in_op && lost == 0 && locked)
 }
 
 struct Run {
@@ -139,6 +157,8 @@ struct Run {
     names: Names,
     begin: Instant,
     live: Live,
+    /// Distributed clocks are in use.
+    clocks: bool,
     judgements_told: u32,
     stalls: Stalls,
     surroundings: Surroundings,
@@ -207,10 +227,15 @@ impl Run {
         at.since(self.begin).as_secs_f64() * 1e3
     }
 
-    /// Until all SubDevices are in OP; false where somebody does not get there, or the user does not want it.
+    fn clocks_locked(&self) -> bool {
+        !self.clocks || self.cycles.supervisor().with(|engine| engine.clocks_locked()).unwrap_or(false)
+    }
+
+    /// Until all SubDevices are in OP and all clocks are locked; false where that does not come, or the user does not want
+    /// it.
     fn reach_op(&mut self, end: &AtomicBool) -> bool {
         let until = now() + OP_LIMIT;
-        while !self.cycles.supervisor().all_settled() {
+        while !self.cycles.supervisor().all_settled() || !self.clocks_locked() {
             if is_asked(end) || self.cycles.has_ended() {
                 return false;
             }
@@ -232,11 +257,17 @@ impl Run {
     }
 
     fn tell_states(&self) {
-        say!("not all SubDevices reached OP within {} s:", OP_LIMIT.as_secs());
+        let what = if self.clocks_locked() { "reached OP" } else { "reached OP with all clocks locked" };
+        say!("not all SubDevices {what} within {} s:", OP_LIMIT.as_secs());
         for (subdevice, state) in self.cycles.supervisor().states().iter().enumerate() {
             let state = live::word(*state);
             let name = self.names.0.get(subdevice).map_or("", String::as_str);
             say!("  SubDevice {subdevice} \"{name}\": {state}");
+        }
+        let clocks = self.cycles.supervisor().with(|engine| engine.clocks()).unwrap_or_default();
+        for clock in clocks.iter().filter(|clock| !clock.is_locked && !clock.is_reference) {
+            let difference = clock.difference_ns.map_or_else(|| "unknown".to_owned(), |ns| format!("{ns} ns"));
+            say!("  the clock of position {} is not locked: its difference is {difference}", clock.position);
         }
     }
 

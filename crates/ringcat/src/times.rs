@@ -17,9 +17,29 @@ pub fn time(text: &str) -> Result<Duration, String> {
     ns.map(Duration::from_nanos).ok_or_else(|| "expected a number with us, ms, s or min behind it, as in 500us".into())
 }
 
+/// A time with its unit, in nanoseconds, that may have a sign; zero too.
+pub fn shift(text: &str) -> Result<i64, String> {
+    let magnitude = text.trim_start_matches(['+', '-']);
+    if text.len() - magnitude.len() > 1 {
+        return Err(format!("expected one sign, got \"{text}\""));
+    }
+    let ns = if matches!(magnitude, "0" | "0us" | "0ms" | "0s") { 0 } else { time(magnitude)?.as_nanos() };
+    let ns = i64::try_from(ns).map_err(|_| format!("expected a shorter time, got \"{text}\""))?;
+    Ok(if text.starts_with('-') { -ns } else { ns })
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn shifts_may_have_a_sign() {
+        assert_eq!((shift("250us"), shift("+1ms"), shift("-10us")), (Ok(250_000), Ok(1_000_000), Ok(-10_000)));
+        assert_eq!((shift("0us"), shift("-0")), (Ok(0), Ok(0)));
+        for wrong in ["", "-", "--1ms", "1", "+5", "-18446744073s"] {
+            assert!(shift(wrong).is_err(), "{wrong}");
+        }
+    }
 
     #[test]
     fn times_have_a_unit() {

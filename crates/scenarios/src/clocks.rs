@@ -3,11 +3,13 @@
 use std::time::Duration;
 
 use ringcat::{ClockConfig, Declaration, Options, Scan, automatic};
-use ringcat_sim::cable::DeviceIndex;
+use ringcat_sim::cable::{CableSpec, DeviceIndex, Endpoint, HostLink};
 use ringcat_sim::controller::Wander;
 use ringcat_sim::description::{DcDescription, DeviceDescription};
-use ringcat_sim::network::Network;
-use ringcat_wire::register::map;
+use ringcat_sim::device::Device;
+use ringcat_sim::frame::Port;
+use ringcat_sim::network::{Network, NetworkOptions};
+use ringcat_wire::register::{PortKind, map};
 use ringcat_wire::sii::DcMode;
 
 use crate::segments::describe;
@@ -36,6 +38,30 @@ fn one(number: usize, ppm: i64) -> DeviceDescription {
     let wraps_soon = 0xFFFF_FFFF - 1_000_000 * (number as u64 % 3_000);
     device.clock_start_ns = if number % 5 == 1 { wraps_soon } else { 0x0123_4567_89AB * (number as u64 + 1) };
     device
+}
+
+/// Device `n` hangs on device `(n - 1) / 3`, with cables of different lengths.
+///
+/// # Panics
+/// When the tree cannot be built.
+pub fn clock_tree(mut descriptions: Vec<DeviceDescription>) -> Network {
+    for description in &mut descriptions {
+        description.ports = [PortKind::Mii; 4];
+    }
+    let count = descriptions.len();
+    let port = |number: usize| [Port::D, Port::B, Port::C][number % 3];
+    let mut cables = vec![CableSpec {
+        a: Endpoint::Host(HostLink::Main),
+        b: Endpoint::Device(DeviceIndex(0), Port::A),
+        delay: Duration::from_nanos(50),
+    }];
+    cables.extend((1..count).map(|number| CableSpec {
+        a: Endpoint::Device(DeviceIndex((number - 1) / 3), port(number - 1)),
+        b: Endpoint::Device(DeviceIndex(number), Port::A),
+        delay: Duration::from_nanos(50 + 10 * (number as u64 % 50)),
+    }));
+    Network::new(descriptions.into_iter().map(Device::new).collect(), cables, NetworkOptions::default())
+        .expect("the tree can be built")
 }
 
 /// Everything that was scanned in one domain, with clocks.

@@ -80,7 +80,7 @@ pub struct SharedClocks {
 }
 
 /// What is known about the clock of one SubDevice.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct ClockStatus {
     /// Position in the scan.
     pub position: u16,

@@ -9,11 +9,12 @@ use std::time::Duration;
 use ringcat::news::News;
 use ringcat::text::Names;
 use ringcat::{
-    DomainId, DomainState, Instant, Link, Redundancy, RedundancyLoss, RingState, RingStatus, SubDeviceState,
-    SupervisorThread,
+    ClockStatus, DomainId, DomainState, Instant, Link, Redundancy, RedundancyLoss, RingState, RingStatus,
+    SubDeviceState, SupervisorThread,
 };
 use ringcat_wire::al::AlState;
 
+use crate::clock_options::us;
 use crate::output::write;
 
 /// It is drawn anew so often.
@@ -29,15 +30,18 @@ pub struct Live {
     terminal: bool,
     /// Whether there is a ring whose state is worth a word.
     ring: bool,
+    /// Whether there are distributed clocks.
+    clocks: bool,
     next: Instant,
     /// Lines on the terminal that will be drawn over.
     drawn: usize,
 }
 
 impl Live {
-    /// A table on the standard output, if that is a terminal, of a MainDevice with two links or one.
-    pub fn new(ring: bool) -> Live {
-        Live { terminal: stdout().is_terminal(), ring, next: Instant(0), drawn: 0 }
+    /// A table on the standard output, if that is a terminal, of a MainDevice with two links or one, with distributed
+    /// clocks or without.
+    pub fn new(ring: bool, clocks: bool) -> Live {
+        Live { terminal: stdout().is_terminal(), ring, clocks, next: Instant(0), drawn: 0 }
     }
 
     /// Draws it where it is time to.
@@ -48,7 +52,9 @@ impl Live {
         self.next = now + PERIOD;
         self.clear();
         let ring = self.ring.then(|| supervisor.ring_status());
-        let lines = table(news, ring.as_ref(), &supervisor.states(), names);
+        let clocks = if self.clocks { supervisor.with(|engine| engine.clocks()).ok() } else { None };
+        let clocks = clocks.map(|clocks| clock_line(&clocks, news.clock_spread_ns(), news.phase()));
+        let lines = table(news, ring.as_ref(), clocks, &supervisor.states(), names);
         self.drawn = lines.len();
         write(format_args!("{}\n", lines.join("\n")));
     }
@@ -63,7 +69,13 @@ impl Live {
     }
 }
 
-fn table(news: &News, ring: Option<&RingStatus>, states: &[SubDeviceState], names: &Names) -> Vec<String> {
+fn table(
+    news: &News,
+    ring: Option<&RingStatus>,
+    clocks: Option<String>,
+    states: &[SubDeviceState],
+    names: &Names,
+) -> Vec<String> {
     let (pace, counters, status) = (news.pace(), news.counters(), news.status(DomainId(0)));
     let us = |time: Duration| time.as_nanos() as f64 / 1e3;
     let judgement = match status.state {
@@ -82,6 +94,7 @@ fn table(news: &News, ring: Option<&RingStatus>, states: &[SubDeviceState], name
         lines.push(format!("{title:<13} 50 % {:.1}, 99 % {:.1}, longest {:.1} us", us(half), us(most), us(longest)));
     }
     lines.extend(ring.into_iter().flat_map(|ring| ring_lines(ring, names)));
+    lines.extend(clocks);
     lines.push(count(states));
     lines.extend(list(states, names));
     for line in &mut lines {
@@ -90,6 +103,16 @@ fn table(news: &News, ring: Option<&RingStatus>, states: &[SubDeviceState], name
         }
     }
     lines
+}
+
+/// The clocks: how many are locked, how far they are apart, how far cycles are from their phase.
+fn clock_line(clocks: &[ClockStatus], spread_ns: Option<u32>, (phase_ns, follows): (i64, bool)) -> String {
+    let locked = clocks.iter().filter(|clock| clock.is_locked || clock.is_reference).count();
+    let reference = clocks.iter().find(|clock| clock.is_reference);
+    let reference = reference.map_or_else(String::new, |clock| format!(", reference {}", clock.position));
+    let spread = spread_ns.map_or_else(String::new, |ns| format!(", spread {ns} ns"));
+    let phase = if follows { format!(", cycles {} us from their phase", us(phase_ns)) } else { String::new() };
+    format!("{:<13} {locked} of {} locked{spread}{reference}{phase}", "clocks", clocks.len())
 }
 
 /// The ring and both links.
@@ -175,6 +198,15 @@ mod tests {
         status.place = Some(Cable { near: Some(PortOf { node: 2, port: 1 }), far: None });
         let expected = "ring          OPEN, break between SubDevice 2 port 1 and the REDUNDANT interface";
         assert_eq!(ring_lines(&status, &names)[0], expected);
+    }
+
+    #[test]
+    fn clocks_have_a_line() {
+        let clock = ClockStatus { position: 3, is_reference: true, ..ClockStatus::default() };
+        let clocks = [clock, ClockStatus { is_reference: false, ..clock }];
+        let expected = "clocks        1 of 2 locked, spread 31 ns, reference 3, cycles -1.5 us from their phase";
+        assert_eq!(clock_line(&clocks, Some(31), (-1_500, true)), expected);
+        assert_eq!(clock_line(&[], None, (7, false)), "clocks        0 of 0 locked");
     }
 
     #[test]

@@ -2,11 +2,14 @@
 
 use std::time::Duration;
 
+use ringcat::news::News;
 use ringcat::packet::PacketLinks;
 use ringcat::tee::Tee;
-use ringcat::{Application, Link, Links, SupervisorThread};
+use ringcat::text::Names;
+use ringcat::{Application, ClockStatus, Link, Links, SupervisorThread};
 
-use super::now;
+use crate::clock_options::farthest;
+use crate::interfaces::now;
 use crate::output::say;
 use crate::surroundings::Surroundings;
 
@@ -38,6 +41,23 @@ pub fn summary(application: &Application<Tee<PacketLinks>, SupervisorThread>, su
     }
     say!("  round trips of process data: {}", application.round_trips());
     say!("  wake-ups after their time: {}", application.news().wake_ups());
+}
+
+/// How the clocks kept together.
+pub fn clock_account(clocks: &[ClockStatus], news: &News, names: &Names) {
+    let locked = clocks.iter().filter(|clock| clock.is_locked || clock.is_reference).count();
+    say!("  clocks: {locked} of {} locked", clocks.len());
+    if let Some(clock) = farthest(clocks).filter(|_| locked > 0) {
+        let name = clock.subdevice.and_then(|subdevice| names.0.get(subdevice)).map_or("", String::as_str);
+        say!(
+            "  farthest from the reference since its lock: position {} \"{name}\", {} ns",
+            clock.position,
+            clock.worst_ns
+        );
+    }
+    if news.phase_errors().count() > 0 {
+        say!("  cycles from their phase, by the reference clock: {}", news.phase_errors());
+    }
 }
 
 /// What the interfaces have carried from the first frame to the last, the stop included.

@@ -7,9 +7,13 @@ use std::fmt::Write as _;
 use ringcat_sim::cable::{CableId, DeviceIndex, Endpoint, HostLink};
 use ringcat_sim::fault::Fault;
 use ringcat_sim::network::Network;
+use ringcat_wire::address::RegisterAddress;
 
 use super::mail_orders;
 use super::plant::Plant;
+
+/// Most bytes of registers in one answer.
+const MOST_BYTES: usize = 256;
 
 /// What `help` says.
 pub const HELP: &str = "\
@@ -23,6 +27,7 @@ hang A           the application of device A hangs, its controller works
 wake A           it goes on
 outputs A        the process data outputs of device A, in hexadecimal
 inputs A HEX     its process data inputs, as far as its application leaves them alone
+register A R N   N bytes of its controller from register R on, as in `register 2 0x0928 4`, in hexadecimal
 mail             orders about mailboxes: `help mail` lists them
 status           devices and their states, cut cables, counters
 quit             end the simulator";
@@ -89,6 +94,11 @@ fn answer(words: &[&str], plant: &mut Plant) -> Result<String, String> {
             let device = find_device(device, plant.network())?;
             Ok(hex(plant.network().device(device).outputs()))
         }
+        ["register", device, address, count] => {
+            let device = find_device(device, plant.network())?;
+            let (address, count) = area(address, count)?;
+            Ok(hex(plant.network().device(device).controller.register(RegisterAddress(address), count)))
+        }
         ["inputs", device, bytes] => {
             let device = find_device(device, plant.network())?;
             let length = plant.network().device(device).inputs().len();
@@ -101,6 +111,15 @@ fn answer(words: &[&str], plant: &mut Plant) -> Result<String, String> {
         }
         _ => Err(format!("\"{}\" is no order; `help` lists them", words.join(" "))),
     }
+}
+
+/// A register and a number of bytes behind it that a controller has.
+fn area(address: &str, count: &str) -> Result<(u16, usize), String> {
+    let start = address.strip_prefix("0x").and_then(|digits| u16::from_str_radix(digits, 16).ok());
+    let start = start.ok_or_else(|| format!("expected a register such as 0x0928, got \"{address}\""))?;
+    let room = (usize::from(u16::MAX) + 1 - usize::from(start)).min(MOST_BYTES);
+    let count = count.parse().ok().filter(|count| (1..=room).contains(count));
+    count.map(|count| (start, count)).ok_or_else(|| format!("expected 1 to {room} bytes"))
 }
 
 fn hex(bytes: &[u8]) -> String {
@@ -211,6 +230,7 @@ mod tests {
         assert_eq!(say(&mut plant, "power off head"), "0 \"head\": without power\nok\n");
         assert!(!plant.network().device(DeviceIndex(0)).controller.is_powered());
         assert_eq!(say(&mut plant, "power on 0"), "0 \"head\": has power\nok\n");
+        assert_eq!(say(&mut plant, "register left-axis 0x0000 1"), "11\nok\n");
         assert!(say(&mut plant, "drop main 3").ends_with("ok\n"));
         assert_eq!(say(&mut plant, "mail left-axis lose 1"), "1 \"left-axis\": its mail\nok\n");
         assert!(say(&mut plant, "help mail").contains("emergency A CODE"));
@@ -225,6 +245,8 @@ mod tests {
             ("cut 7-8", "expected main, redundant, or two devices as in 3-4"),
             ("power off 3", "names and the numbers 0 to 2"),
             ("drop main many", "expected a number of frames, got \"many\""),
+            ("register 0 928 4", "expected a register such as 0x0928, got \"928\""),
+            ("register 0 0xffff 2", "expected 1 to 1 bytes"),
             ("inputs 0 123", "expected bytes in hexadecimal, got \"123\""),
             ("mail 1 eat 3", "\"mail A eat 3\" is no order"),
             ("emergency 1 8130", "its mailbox is not in use"),

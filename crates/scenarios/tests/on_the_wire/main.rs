@@ -8,6 +8,7 @@
 mod bench;
 mod cables;
 mod captures;
+mod clocks;
 mod cuts_beside;
 mod ethernet;
 mod foreign;

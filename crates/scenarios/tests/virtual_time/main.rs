@@ -5,6 +5,7 @@
 mod broken_ring;
 mod calm;
 mod captures;
+mod clock_captures;
 mod clocks;
 mod configuration;
 mod copies;

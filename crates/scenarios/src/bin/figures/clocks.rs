@@ -8,17 +8,16 @@ use std::process::ExitCode;
 use std::time::Duration;
 
 use ringcat::{SyncSignals, Trigger};
-use ringcat_sim::cable::{CableId, CableSpec, DeviceIndex, Endpoint, HostLink};
+use ringcat_sim::cable::{CableId, DeviceIndex};
 use ringcat_sim::controller::Wander;
 use ringcat_sim::description::DeviceDescription;
 use ringcat_sim::device::Device;
-use ringcat_sim::frame::Port;
 use ringcat_sim::network::{Network, NetworkOptions};
 use ringcat_sim::time::SimTime;
-use ringcat_wire::register::{PortKind, map};
-use scenarios::clocks::{clocked, config, delay, largest_spread, lock, spread, with_clocks, world};
+use ringcat_wire::register::map;
+use scenarios::clocks::{clock_tree, clocked, config, delay, largest_spread, lock, spread, with_clocks, world};
 use scenarios::figures::{Figures, verdict};
-use scenarios::segments::{devices, line, ring};
+use scenarios::segments::{line, ring};
 use scenarios::world::World;
 
 /// Most error of a delay per hop, in nanoseconds.
@@ -38,7 +37,7 @@ pub fn main() -> ExitCode {
     let mut figures = Figures::new("distributed clocks, in virtual time");
     let options = NetworkOptions::default;
     delays(&mut figures, "line of 200", |ideal| line(descriptions(200, ideal), options()));
-    delays(&mut figures, "tree of 100, three branches each", |ideal| tree(descriptions(100, ideal)));
+    delays(&mut figures, "tree of 100, three branches each", |ideal| clock_tree(descriptions(100, ideal)));
     hundred(&mut figures);
     cuts(&mut figures);
     phase(&mut figures);
@@ -53,26 +52,6 @@ fn descriptions(count: usize, ideal: bool) -> Vec<DeviceDescription> {
         (device.clock_wander, device.receive_jitter) = (Wander::default(), Duration::ZERO);
     }
     all
-}
-
-/// Device `n` hangs on device `(n - 1) / 3`, with cables of different lengths.
-fn tree(mut descriptions: Vec<DeviceDescription>) -> Network {
-    for description in &mut descriptions {
-        description.ports = [PortKind::Mii; 4];
-    }
-    let count = descriptions.len();
-    let port = |number: usize| [Port::D, Port::B, Port::C][number % 3];
-    let mut cables = vec![CableSpec {
-        a: Endpoint::Host(HostLink::Main),
-        b: Endpoint::Device(DeviceIndex(0), Port::A),
-        delay: Duration::from_nanos(50),
-    }];
-    cables.extend((1..count).map(|number| CableSpec {
-        a: Endpoint::Device(DeviceIndex((number - 1) / 3), port(number - 1)),
-        b: Endpoint::Device(DeviceIndex(number), Port::A),
-        delay: Duration::from_nanos(50 + 10 * (number as u64 % 50)),
-    }));
-    Network::new(devices(descriptions), cables, NetworkOptions::default()).expect("the tree can be built")
 }
 
 /// Written delays against those that ideal clocks show.

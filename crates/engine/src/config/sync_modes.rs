@@ -1,0 +1,140 @@
+//! SYNC signals as an operation mode in the SII wants them (facts 4.6, 7.3).
+
+use core::fmt;
+use core::time::Duration;
+
+use ringcat_wire::sii::DcMode;
+
+use super::SyncSignals;
+
+/// Bits of the activation register 0x0981: the unit works, SYNC0, SYNC1.
+const UNIT: u16 = 0x0100;
+const SYNC0: u16 = 0x0200;
+const SYNC1: u16 = 0x0400;
+
+/// Why no SYNC signals follow from an operation mode.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum ModeError {
+    /// It activates none.
+    NoSignals {
+        /// Its AssignActivate word.
+        assign_activate: u16,
+    },
+    /// The cycle of SYNC0 is no whole number of nanoseconds, or none of 32 bits.
+    Sync0Cycle {
+        /// Cycles of the MainDevice for one of SYNC0; negative: cycles of SYNC0 in one of the MainDevice.
+        factor: i16,
+    },
+    /// SYNC1 would come more often than SYNC0, which controllers cannot do, or less often than 32 bits can say.
+    Sync1Cycle {
+        /// Cycles of SYNC0 for one of SYNC1.
+        factor: i16,
+    },
+}
+
+impl fmt::Display for ModeError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            ModeError::NoSignals { assign_activate } => {
+                write!(f, "AssignActivate {assign_activate:#06x} activates no SYNC signal")
+            }
+            ModeError::Sync0Cycle { factor } => {
+                write!(f, "SYNC0 cannot have a cycle of {factor} of the MainDevice's in nanoseconds")
+            }
+            ModeError::Sync1Cycle { factor } => write!(f, "SYNC1 cannot have a cycle of {factor} of SYNC0's"),
+        }
+    }
+}
+
+impl core::error::Error for ModeError {}
+
+impl SyncSignals {
+    /// Whether a mode's AssignActivate word activates SYNC0 or SYNC1.
+    pub const fn are_in(mode: &DcMode) -> bool {
+        mode.assign_activate & UNIT != 0 && mode.assign_activate & (SYNC0 | SYNC1) != 0
+    }
+
+    /// The signals of an operation mode of the SII, for a MainDevice with this cycle.
+    ///
+    /// The cycle of SYNC0 is that of the mode, or the MainDevice's times the factor; a negative factor divides, 0 counts as
+    /// 1. That of SYNC1 is that of SYNC0 times its factor. Shifts are signed.
+    ///
+    /// # Errors
+    /// A mode without signals, or with cycles that do not exist.
+    pub fn from_mode(mode: &DcMode, cycle: Duration) -> Result<SyncSignals, ModeError> {
+        if !SyncSignals::are_in(mode) {
+            return Err(ModeError::NoSignals { assign_activate: mode.assign_activate });
+        }
+        let has_sync1 = mode.assign_activate & SYNC1 != 0;
+        let sync0_cycle_ns =
+            sync0_cycle(mode, cycle).ok_or(ModeError::Sync0Cycle { factor: mode.sync0_cycle_factor })?;
+        let sync1_cycle = u32::try_from(mode.sync1_cycle_factor).ok().and_then(|f| f.checked_mul(sync0_cycle_ns));
+        let sync1_cycle_ns = match sync1_cycle {
+            Some(cycle_ns) if has_sync1 => cycle_ns,
+            None if has_sync1 => return Err(ModeError::Sync1Cycle { factor: mode.sync1_cycle_factor }),
+            Some(_) | None => 0,
+        };
+        Ok(SyncSignals {
+            assign_activate: mode.assign_activate,
+            sync0_cycle_ns,
+            sync0_shift_ns: mode.sync0_shift_ns as i32,
+            sync1_cycle_ns,
+            sync1_shift_ns: if has_sync1 { mode.sync1_shift_ns as i32 } else { 0 },
+        })
+    }
+}
+
+fn sync0_cycle(mode: &DcMode, cycle: Duration) -> Option<u32> {
+    if mode.sync0_cycle_ns != 0 {
+        return Some(mode.sync0_cycle_ns);
+    }
+    let (cycle, factor) = (cycle.as_nanos(), u128::from(mode.sync0_cycle_factor.unsigned_abs()));
+    let wanted = match mode.sync0_cycle_factor {
+        0 => cycle,
+        1.. => cycle * factor,
+        ..0 if cycle.is_multiple_of(factor) => cycle / factor,
+        ..0 => return None,
+    };
+    u32::try_from(wanted).ok().filter(|ns| *ns > 0)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const CYCLE: Duration = Duration::from_millis(1);
+
+    fn mode(assign_activate: u16, factors: (i16, i16)) -> DcMode {
+        DcMode { assign_activate, sync0_cycle_factor: factors.0, sync1_cycle_factor: factors.1, ..DcMode::default() }
+    }
+
+    #[test]
+    fn factors_and_shifts_of_a_mode_become_signals_facts_4_6() {
+        let cycles = |mode: &DcMode| {
+            SyncSignals::from_mode(mode, CYCLE).map(|signals| (signals.sync0_cycle_ns, signals.sync1_cycle_ns))
+        };
+        assert_eq!(cycles(&mode(0x0300, (1, 0))), Ok((1_000_000, 0)));
+        assert_eq!(cycles(&mode(0x0300, (0, 7))), Ok((1_000_000, 0)));
+        assert_eq!(cycles(&mode(0x0730, (-4, 4))), Ok((250_000, 1_000_000)));
+        assert_eq!(cycles(&mode(0x0700, (2, 0))), Ok((2_000_000, 0)));
+        assert_eq!(cycles(&DcMode { sync0_cycle_ns: 62_500, ..mode(0x0700, (3, 2)) }), Ok((62_500, 125_000)));
+        let shifted = DcMode { sync0_shift_ns: -10_000_i32 as u32, sync1_shift_ns: 20_000, ..mode(0x0720, (1, 1)) };
+        let signals = SyncSignals::from_mode(&shifted, CYCLE).expect("it has signals");
+        assert_eq!(
+            (signals.sync0_shift_ns, signals.sync1_shift_ns, signals.assign_activate),
+            (-10_000, 20_000, 0x0720)
+        );
+    }
+
+    #[test]
+    fn modes_without_signals_or_with_cycles_that_do_not_exist_are_refused() {
+        let error = |mode: &DcMode| SyncSignals::from_mode(mode, CYCLE).expect_err("it must be refused");
+        for none in [0x0000, 0x0100, 0x0600, 0x0001] {
+            assert_eq!(error(&mode(none, (1, 0))), ModeError::NoSignals { assign_activate: none });
+        }
+        assert_eq!(error(&mode(0x0300, (-3, 0))), ModeError::Sync0Cycle { factor: -3 });
+        assert_eq!(error(&mode(0x0300, (i16::MAX, 0))), ModeError::Sync0Cycle { factor: i16::MAX });
+        assert_eq!(error(&mode(0x0700, (1, -2))), ModeError::Sync1Cycle { factor: -2 });
+        assert_eq!(error(&mode(0x0700, (1, i16::MAX))), ModeError::Sync1Cycle { factor: i16::MAX });
+    }
+}

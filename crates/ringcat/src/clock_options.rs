@@ -1,0 +1,206 @@
+//! What `ringcat run` and `ringcat clocks` are told about distributed clocks: who follows whom, and SYNC signals.
+//!
+//! In go options and what a scan found, out come declarations; what does not fit together is an error that says what would.
+
+mod sync;
+
+use clap::Args;
+use ringcat::{
+    ClockConfig, ClockStatus, Declaration, ReferenceClock, SubDeviceInfo, SyncSignals, Trigger, system_time,
+};
+
+use crate::interfaces::{Failure, now};
+use crate::times::shift;
+use sync::{Sync, choose, sync};
+
+/// How `--sync` is explained.
+const SYNC_HELP: &str = "SYNC signals: auto (as the EEPROMs say, where they do), or POSITION:SYNC0[:SYNC1] with cycles and \
+    shifts, as in 3:1ms, 3:1ms+250us, 3:500us:1ms-100us; POSITION may be all, SYNC0 may be auto. Can be given more than \
+    once, what names a position counts";
+
+/// Options about clocks.
+#[derive(Args, Clone, Debug, Default)]
+pub struct ClockOptions {
+    /// When cycles begin: so long after the multiples of the cycle time in the system time of the segment, at which SYNC0
+    /// comes too unless it is shifted. Such as 300us or -300us; 0us by default. Cycles follow the reference clock for that
+    /// (master shift).
+    #[arg(long, value_name = "TIME", allow_hyphen_values = true, value_parser = shift, conflicts_with = "bus_shift")]
+    phase: Option<i64>,
+    /// The reference clock follows this host (bus shift); otherwise the cycles follow the reference clock (master shift).
+    #[arg(long)]
+    pub bus_shift: bool,
+    /// Whose clock all others follow: first (the first one with a clock), sync (the first one with SYNC signals), or a
+    /// position.
+    #[arg(long, value_name = "WHO", default_value = "first", value_parser = reference)]
+    reference: ReferenceClock,
+    #[arg(long, value_name = "SIGNALS", value_parser = sync, help = SYNC_HELP)]
+    sync: Vec<Sync>,
+}
+
+/// `first`, `sync` or a position.
+fn reference(text: &str) -> Result<ReferenceClock, String> {
+    match text {
+        "first" => Ok(ReferenceClock::FirstWithClock),
+        "sync" => Ok(ReferenceClock::FirstConfigured),
+        text => {
+            let position = text.parse().map(ReferenceClock::Declared);
+            position.map_err(|_| format!("expected first, sync or a position, got \"{text}\""))
+        }
+    }
+}
+
+impl ClockOptions {
+    /// Whether one of them was given: clocks are wanted.
+    pub fn are_given(&self) -> bool {
+        let given = self.phase.is_some() || self.bus_shift || !self.sync.is_empty();
+        given || self.reference != ReferenceClock::default()
+    }
+
+    /// Declares the clocks of a segment whose SubDevices are declared in the order of the scan.
+    pub fn declare(&self, declaration: &mut Declaration, found: &[SubDeviceInfo]) -> Result<(), Failure> {
+        let cycle = declaration.domains.iter().map(|domain| domain.period).min().unwrap_or_default();
+        if !found.iter().any(|info| info.controller.features.dc) {
+            return Err(Failure::new("no SubDevice of this segment has a distributed clock"));
+        }
+        let signals = choose(&self.sync, found, cycle).map_err(Failure::new)?;
+        self.check(found, &signals, cycle.as_nanos() as u64).map_err(Failure::new)?;
+        for (config, signals) in declaration.subdevices.iter_mut().zip(signals) {
+            config.sync = signals;
+        }
+        let epoch = system_time::epoch(now());
+        let config =
+            ClockConfig { reference: self.reference, bus_shift: self.bus_shift, epoch, ..ClockConfig::default() };
+        if let Some(words) = in_front(self.reference, found, declaration) {
+            eprintln!("ringcat: {words}");
+        }
+        declaration.clocks = Some(config);
+        Ok(())
+    }
+
+    fn check(&self, found: &[SubDeviceInfo], signals: &[Option<SyncSignals>], cycle_ns: u64) -> Result<(), String> {
+        if let Some(phase) = self.phase.filter(|phase| phase.unsigned_abs() >= cycle_ns) {
+            return Err(format!(
+                "--phase: expected less than the cycle of {} us, got {} us",
+                us(cycle_ns as i64),
+                us(phase)
+            ));
+        }
+        match self.reference {
+            ReferenceClock::FirstWithClock => Ok(()),
+            ReferenceClock::FirstConfigured if signals.iter().any(Option::is_some) => Ok(()),
+            ReferenceClock::FirstConfigured => Err("--reference sync: nobody has SYNC signals; add --sync".into()),
+            ReferenceClock::Declared(position) => match found.get(position) {
+                None => Err(format!("--reference {position}: there are SubDevices 0 to {}", found.len() - 1)),
+                Some(info) if info.controller.features.dc => Ok(()),
+                Some(info) => Err(format!(
+                    "--reference {position}: SubDevice {position} \"{}\" has no distributed clock; `ringcat clocks` lists \
+                     who has",
+                    info.name
+                )),
+            },
+        }
+    }
+
+    /// What makes cycles begin.
+    pub fn trigger(&self) -> Trigger {
+        if self.bus_shift { Trigger::Time } else { Trigger::ReferenceClock { phase_ns: self.phase.unwrap_or(0) } }
+    }
+}
+
+/// A warning where frames meet other clocks before the reference: these do not see its time but this host's idea of it.
+fn in_front(reference: ReferenceClock, found: &[SubDeviceInfo], declaration: &Declaration) -> Option<String> {
+    let position = match reference {
+        ReferenceClock::FirstWithClock => return None,
+        ReferenceClock::FirstConfigured => declaration.subdevices.iter().position(|config| config.sync.is_some())?,
+        ReferenceClock::Declared(position) => position,
+    };
+    let first = found[..position].iter().position(|info| info.controller.features.dc)?;
+    Some(format!(
+        "the clock of position {first} is in front of the reference clock, position {position}: it follows what this host \
+         believes of that, and locks only as exactly as this host sends"
+    ))
+}
+
+/// Nanoseconds in microseconds, without zeros behind the point that say nothing.
+pub fn us(ns: i64) -> String {
+    let text = format!("{:.3}", ns as f64 / 1e3);
+    text.trim_end_matches('0').trim_end_matches('.').to_owned()
+}
+
+/// SYNC signals in words, in microseconds.
+pub fn signals_in_words(signals: &SyncSignals) -> String {
+    let signal = |name: &str, cycle: u32, shift: i32| {
+        let shift = if shift == 0 {
+            String::new()
+        } else {
+            format!("{}{}", if shift > 0 { "+" } else { "" }, us(shift.into()))
+        };
+        format!("{name} {}{shift}", us(cycle.into()))
+    };
+    let sync0 = signal("SYNC0", signals.sync0_cycle_ns, signals.sync0_shift_ns);
+    if signals.assign_activate & 0x0400 == 0 {
+        return sync0;
+    }
+    let cycle = if signals.sync1_cycle_ns == 0 { signals.sync0_cycle_ns } else { signals.sync1_cycle_ns };
+    format!("{sync0}, {}", signal("SYNC1", cycle, signals.sync1_shift_ns))
+}
+
+/// The clock that is farthest from the reference, of those that were locked.
+pub fn farthest(clocks: &[ClockStatus]) -> Option<&ClockStatus> {
+    clocks.iter().max_by_key(|clock| clock.worst_ns)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_reference_is_a_rule_or_a_position() {
+        assert_eq!(reference("first"), Ok(ReferenceClock::FirstWithClock));
+        assert_eq!(reference("sync"), Ok(ReferenceClock::FirstConfigured));
+        assert_eq!(reference("12"), Ok(ReferenceClock::Declared(12)));
+        assert!(reference("-1").is_err() && reference("last").is_err());
+    }
+
+    #[test]
+    fn what_does_not_fit_is_told_with_what_would() {
+        let mut found = vec![SubDeviceInfo::default(), SubDeviceInfo::default()];
+        found[1].controller.features.dc = true;
+        found[0].name = "coupler".to_owned();
+        let error =
+            |options: ClockOptions| options.check(&found, &[None, None], 1_000_000).expect_err("it must be refused");
+        let with = |reference| ClockOptions { reference, ..ClockOptions::default() };
+        assert!(error(with(ReferenceClock::Declared(0))).contains("\"coupler\" has no distributed clock"));
+        assert!(error(with(ReferenceClock::Declared(2))).contains("SubDevices 0 to 1"));
+        assert!(error(with(ReferenceClock::FirstConfigured)).contains("add --sync"));
+        let far = ClockOptions { phase: Some(-1_000_000), ..ClockOptions::default() };
+        assert!(error(far).contains("less than the cycle of 1000 us, got -1000 us"));
+        let good =
+            ClockOptions { phase: Some(-999_999), reference: ReferenceClock::Declared(1), ..ClockOptions::default() };
+        assert!(good.are_given() && good.check(&found, &[None, None], 1_000_000).is_ok());
+        assert!(!ClockOptions::default().are_given());
+    }
+
+    #[test]
+    fn clocks_in_front_of_the_reference_are_told() {
+        let mut found = vec![SubDeviceInfo::default(); 3];
+        found[1].controller.features.dc = true;
+        let mut declaration = ringcat::automatic(&found, std::time::Duration::from_millis(1));
+        declaration.subdevices[2].sync = Some(SyncSignals::sync0(1_000_000, 0));
+        let warned = |reference| in_front(reference, &found, &declaration).is_some();
+        assert!(warned(ReferenceClock::Declared(2)) && warned(ReferenceClock::FirstConfigured));
+        assert!(!warned(ReferenceClock::Declared(1)) && !warned(ReferenceClock::FirstWithClock));
+    }
+
+    #[test]
+    fn signals_are_told_in_microseconds() {
+        assert_eq!(signals_in_words(&SyncSignals::sync0(62_500, -100_000)), "SYNC0 62.5-100");
+        let both = SyncSignals {
+            assign_activate: 0x0700,
+            sync1_cycle_ns: 2_000_000,
+            sync1_shift_ns: 5_000,
+            ..SyncSignals::sync0(1_000_000, 0)
+        };
+        assert_eq!(signals_in_words(&both), "SYNC0 1000, SYNC1 2000+5");
+    }
+}
