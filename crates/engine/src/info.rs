@@ -16,7 +16,7 @@ use ringcat_wire::address::{Position, StationAddress};
 use ringcat_wire::register::{DlStatus, Features, Information, PortKind};
 use ringcat_wire::sii::{
     CategoryKind, CoeDetails, DcMode, FmmuUsage, GeneralFlags, Identity, MailboxLayout, MailboxProtocols, SiiHeader,
-    SiiSyncManager,
+    SiiSyncManager, SyncManagerKind,
 };
 
 pub use crate::direction::Direction;
@@ -200,6 +200,13 @@ impl SubDeviceInfo {
     /// PDOs that the SII assigns to a SyncManager, in its order.
     pub fn assigned_pdos(&self, sync_manager: u8) -> impl Iterator<Item = &PdoInfo> {
         self.pdos.iter().filter(move |pdo| pdo.sync_manager == Some(sync_manager))
+    }
+
+    /// SyncManagers of the mailboxes: that of the one which the MainDevice writes, that of the one which it reads. As the
+    /// SII says where it names both, else 0 and 1 (facts 3.11).
+    pub fn mailbox_sync_managers(&self) -> (u8, u8) {
+        let of = |kind| (0u8..).zip(&self.sync_managers).find(|(_, sm)| sm.kind == kind).map(|(index, _)| index);
+        of(SyncManagerKind::MailboxOut).zip(of(SyncManagerKind::MailboxIn)).unwrap_or((0, 1))
     }
 
     /// Whether LRW reaches it: neither controller nor SII says no.

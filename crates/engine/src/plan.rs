@@ -154,20 +154,24 @@ pub fn fmmu(area: &AreaPlan, logical: LogicalAddress) -> Fmmu {
     }
 }
 
-/// SM 0 and 1 belong to the mailbox unless the SII gives one of them to process data.
+/// Without others that the SII names, SM 0 and 1 belong to the mailbox unless the SII gives one of them to process data.
 fn mailbox_wanted(info: &SubDeviceInfo) -> bool {
-    !info.sync_managers.iter().take(2).any(|sm| matches!(sm.kind, SyncManagerKind::Outputs | SyncManagerKind::Inputs))
+    let (out, inward) = info.mailbox_sync_managers();
+    let managers = [out, inward].into_iter().filter_map(|index| info.sync_managers.get(usize::from(index)));
+    !managers.into_iter().any(|sm| matches!(sm.kind, SyncManagerKind::Outputs | SyncManagerKind::Inputs))
 }
 
 fn mailbox_pair(info: &SubDeviceInfo, layout: &MailboxLayout) -> Vec<SmPlan> {
-    let control = |index: usize, kind, default| {
-        info.sync_managers.get(index).filter(|sm| sm.kind == kind && sm.control != 0).map_or(default, |sm| sm.control)
+    let (out, inward) = info.mailbox_sync_managers();
+    let control = |index: u8, kind, default| {
+        let described = info.sync_managers.get(usize::from(index));
+        described.filter(|sm| sm.kind == kind && sm.control != 0).map_or(default, |sm| sm.control)
     };
-    let out = control(0, SyncManagerKind::MailboxOut, MAILBOX_OUT_CONTROL);
-    let inward = control(1, SyncManagerKind::MailboxIn, MAILBOX_IN_CONTROL);
+    let out_control = control(out, SyncManagerKind::MailboxOut, MAILBOX_OUT_CONTROL);
+    let in_control = control(inward, SyncManagerKind::MailboxIn, MAILBOX_IN_CONTROL);
     Vec::from([
-        SmPlan { index: 0, register: sync_manager(layout.receive_offset, layout.receive_size, out) },
-        SmPlan { index: 1, register: sync_manager(layout.send_offset, layout.send_size, inward) },
+        SmPlan { index: out, register: sync_manager(layout.receive_offset, layout.receive_size, out_control) },
+        SmPlan { index: inward, register: sync_manager(layout.send_offset, layout.send_size, in_control) },
     ])
 }
 

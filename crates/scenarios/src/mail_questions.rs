@@ -95,6 +95,17 @@ pub struct Asker {
     forgets: bool,
 }
 
+/// Bytes of a list before its check sum.
+const fn length_without_sum(value: &[u8]) -> usize {
+    value.len().saturating_sub(4)
+}
+
+/// FNV-1a of the bytes of a list: whether they belong together.
+fn check_sum(bytes: &[u8]) -> [u8; 4] {
+    let hash = bytes.iter().fold(0x811C_9DC5u32, |hash, byte| (hash ^ u32::from(*byte)).wrapping_mul(0x0100_0193));
+    hash.to_le_bytes()
+}
+
 /// Words about an error.
 fn said(error: impl std::fmt::Display) -> String {
     error.to_string()
@@ -144,6 +155,11 @@ impl Asker {
             value[..4].copy_from_slice(&tag);
         } else {
             value[..2].copy_from_slice(&(number as u16).to_le_bytes());
+        }
+        if self.kind == Kind::IdnList {
+            let end = length_without_sum(&value);
+            let sum = check_sum(&value[..end]);
+            value[end..].copy_from_slice(&sum);
         }
         value
     }
@@ -203,10 +219,16 @@ impl Asker {
             Kind::Idn => soe::read(mailbox, self.idn(), limits, room).await.map_err(said),
             Kind::IdnList => {
                 let list = soe::read(mailbox, self.idn(), limits, room).await.map_err(said)?;
-                // Of fragments that the device itself loses, only the length of the list tells.
+                // Of fragments that the device itself forgets, only what is in the list tells.
                 let value = list.get(4..).unwrap_or_default();
                 let length = list.first_chunk().map(|length| usize::from(u16::from_le_bytes(*length)));
-                if length == Some(value.len()) { Ok(value.to_vec()) } else { Err("a part of a list".to_owned()) }
+                let end = length_without_sum(value);
+                let whole = value.len() != self.kind.length() || check_sum(&value[..end]) == value[end..];
+                if length == Some(value.len()) && whole {
+                    Ok(value.to_vec())
+                } else {
+                    Err("a part of a list".to_owned())
+                }
             }
             Kind::Memory => {
                 let length = self.kind.length() as u32;

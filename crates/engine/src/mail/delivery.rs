@@ -50,7 +50,7 @@ fn sort(room: &Rc<Room>, state: &mut State, message: &Message<'_>) -> bool {
     let payload = message.payload;
     let first = payload.first().copied().unwrap_or(0);
     match message.header.protocol {
-        Protocol::Error => refused(state, payload),
+        Protocol::Error => refused(state, payload, room.bus.now()),
         Protocol::Coe => coe(room, state, message),
         Protocol::Foe => answer(state, Lane::Foe, message, Unsolicited::Other),
         Protocol::Soe if SOE_ANSWERS.contains(&(first & 0x07)) => answer(state, Lane::Soe, message, Unsolicited::Other),
@@ -120,18 +120,25 @@ fn shelve(state: &mut State, message: &Message<'_>, kind: Unsolicited) -> bool {
 }
 
 /// An error reply does not say to what. It goes to the request that waits; of several, first to one whose protocol the
-/// SubDevice has not shown to know, then to the oldest.
-fn refused(state: &mut State, payload: &[u8]) -> bool {
+/// SubDevice has not shown to know, then to the oldest. Whoever writes a message in parts is told, too.
+fn refused(state: &mut State, payload: &[u8], now: Instant) -> bool {
     let Some(bytes) = payload.first_chunk() else {
         state.counters.malformed += 1;
         return false;
     };
-    let waiting = state.lanes.iter_mut().filter(|lane| lane.waiting().is_some());
-    let whose = waiting.min_by_key(|lane| (lane.proven, lane.asked.map(|asked| asked.at)));
-    match whose {
-        Some(lane) => lane.arrive(Arrival::Refused(ErrorReply::decode(bytes)), state.seen),
+    let reply = ErrorReply::decode(bytes);
+    let mut in_parts = false;
+    for lane in state.lanes.iter_mut().filter(|lane| lane.parts_until.is_some_and(|until| now < until)) {
+        lane.refusal = Some(reply);
+        in_parts = true;
+    }
+    let waiting = |proven| state.lanes.iter().filter(|l| l.waiting().is_some() && l.proven == proven).count();
+    let doubtful = in_parts || if waiting(false) > 0 { waiting(false) > 1 } else { waiting(true) > 1 };
+    let candidates = state.lanes.iter_mut().filter(|lane| lane.waiting().is_some());
+    match candidates.min_by_key(|lane| (lane.proven, lane.asked.map(|asked| asked.at))) {
+        Some(lane) => lane.arrive(Arrival::Refused(reply, doubtful), state.seen),
         None => {
-            state.counters.unclaimed += 1;
+            state.counters.unclaimed += u64::from(!in_parts);
             false
         }
     }

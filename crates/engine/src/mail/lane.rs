@@ -88,8 +88,8 @@ impl Asked {
 pub(super) enum Arrival {
     /// Payload of a message of its protocol.
     Payload(Vec<u8>),
-    /// The SubDevice refused a message.
-    Refused(ErrorReply),
+    /// The SubDevice refused a message; whether it may have been another one, so that an answer may still come.
+    Refused(ErrorReply, bool),
 }
 
 /// State of one lane.
@@ -109,6 +109,11 @@ pub(super) struct LaneState {
     /// CoE header of the PDO that was asked for by mailbox.
     pub pdo: Option<[u8; 2]>,
     pub answer_time: AnswerTime,
+    /// A message is written in parts, of which only the last one is answered, or was until lately: until then an error
+    /// reply may be to one of them.
+    pub parts_until: Option<Instant>,
+    /// An error reply that came meanwhile.
+    pub refusal: Option<ErrorReply>,
     /// The SubDevice has answered in this lane: it knows the protocol.
     pub proven: bool,
 }

@@ -3,7 +3,7 @@
 use alloc::rc::Rc;
 use core::time::Duration;
 
-use ringcat_wire::address::StationAddress;
+use ringcat_wire::address::{RegisterAddress, StationAddress};
 use ringcat_wire::mailbox::coe::Emergency;
 use ringcat_wire::sii::MailboxLayout;
 
@@ -29,10 +29,11 @@ impl Mailbox {
         Mailbox { room: Room::new(bus, subdevice) }
     }
 
-    /// The SubDevice has entered PREOP or BOOT with this mailbox: counters begin anew.
-    pub(crate) fn open(&self, station: StationAddress, layout: MailboxLayout) {
+    /// The SubDevice has entered PREOP or BOOT with this mailbox: counters begin anew. `send_manager` is the SyncManager of
+    /// the mailbox that is read.
+    pub(crate) fn open(&self, station: StationAddress, layout: MailboxLayout, send_manager: u8) {
         self.room.close(true);
-        self.room.open(Session::new(station, layout));
+        self.room.open(Session::new(station, layout, send_manager));
     }
 
     /// The SubDevice goes to INIT.
@@ -87,6 +88,12 @@ impl Mailbox {
     pub fn station(&self) -> Option<StationAddress> {
         let state = self.room.look();
         state.session.filter(|_| state.open).map(|session| session.station)
+    }
+
+    /// Station address of the SubDevice and the register that says whether it has mail, while the mailbox may be used.
+    pub(crate) fn send_status(&self) -> Option<(StationAddress, RegisterAddress)> {
+        let state = self.room.look();
+        state.session.filter(|_| state.open).map(|session| (session.station, session.send_status()))
     }
 
     /// Waits for a lane to be free, and takes it.

@@ -16,8 +16,6 @@ use super::room::{Room, Session};
 use crate::supervisor::{Bus, BusError};
 use crate::time::Instant;
 
-/// SyncManager of the send mailbox (SubDevice to MainDevice).
-const SEND_SYNC_MANAGER: u8 = 1;
 /// How long a SubDevice may take to repeat its last mail.
 const REPEAT_LIMIT: Duration = Duration::from_millis(100);
 /// Pause between two looks whether it did.
@@ -171,9 +169,8 @@ fn asked_at(bus: &Bus, begun: Instant, trip: &mut ShortestTrip) -> Instant {
 /// Looks at the status of the send mailbox; notes where it is full.
 async fn look(room: &Rc<Room>, session: &Session) -> Result<bool, MailboxError> {
     room.state().counters.looks += 1;
-    let at = map::sync_manager(SEND_SYNC_MANAGER).offset(SyncManager::STATUS);
     let begun = room.bus.now();
-    let [status] = room.bus.fprd_array(session.station, at).await?;
+    let [status] = room.bus.fprd_array(session.station, session.send_status()).await?;
     let full = SyncManagerStatus::from_bits(status).mailbox_full;
     let state = &mut *room.state();
     let seen = asked_at(&room.bus, begun, &mut state.trips[LOOK]);
@@ -240,7 +237,7 @@ async fn repeat(room: &Rc<Room>, session: &Session) -> Result<bool, MailboxError
 /// Asks for the last mail again: toggles the repeat request and waits for its acknowledgement (facts 6.2). One that does
 /// not come in time is no matter: what is read next is then what would have come next.
 async fn request_repeat(bus: &Bus, session: &Session) -> Result<(), BusError> {
-    let register = map::sync_manager(SEND_SYNC_MANAGER);
+    let register = map::sync_manager(session.send_manager);
     let at = register.offset(SyncManager::ACTIVATE);
     let [activate] = bus.fprd_array(session.station, at).await?;
     let before = SyncManagerActivate::from_bits(activate);

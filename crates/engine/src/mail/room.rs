@@ -5,8 +5,9 @@ use alloc::vec::Vec;
 use core::cell::{Ref, RefCell, RefMut};
 use core::time::Duration;
 
-use ringcat_wire::address::StationAddress;
+use ringcat_wire::address::{RegisterAddress, StationAddress};
 use ringcat_wire::mailbox::Header;
+use ringcat_wire::register::{SyncManager, map};
 use ringcat_wire::sii::MailboxLayout;
 
 use super::answer_time::ShortestTrip;
@@ -25,6 +26,8 @@ use crate::time::Instant;
 pub(super) struct Session {
     pub station: StationAddress,
     pub layout: MailboxLayout,
+    /// SyncManager of the send mailbox (SubDevice to MainDevice).
+    pub send_manager: u8,
     /// Counter of the last message sent.
     pub counter: u8,
 }
@@ -218,7 +221,12 @@ impl State {
 
 impl Session {
     /// A session with a SubDevice that has just entered PREOP or BOOT.
-    pub(super) fn new(station: StationAddress, layout: MailboxLayout) -> Session {
-        Session { station, layout, counter: 0 }
+    pub(super) fn new(station: StationAddress, layout: MailboxLayout, send_manager: u8) -> Session {
+        Session { station, layout, send_manager, counter: 0 }
+    }
+
+    /// Status of the send mailbox.
+    pub(super) const fn send_status(&self) -> RegisterAddress {
+        map::sync_manager(self.send_manager).offset(SyncManager::STATUS)
     }
 }

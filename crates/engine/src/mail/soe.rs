@@ -97,7 +97,8 @@ pub async fn read(mailbox: &Mailbox, address: SoeAddress, limits: Limits, limit:
     read_inner(mailbox, address, limits, limit).await.map_err(|cause| SoeError { address, cause })
 }
 
-/// Writes an element.
+/// Writes an element. Fragments are not answered, only the last one is: where an error reply comes meanwhile, whatever it
+/// is to, the write has failed, and what the SubDevice has then is not known.
 pub async fn write(mailbox: &Mailbox, address: SoeAddress, data: &[u8], limits: Limits) -> Result<(), SoeError> {
     write_inner(mailbox, address, data, limits).await.map_err(|cause| SoeError { address, cause })
 }
@@ -154,17 +155,26 @@ async fn write_inner(mailbox: &Mailbox, address: SoeAddress, data: &[u8], limits
     };
     let whole = |data| SoeMessage::whole(SoeOperation::WriteRequest, drive, elements, idn, data);
     let mut rest = data;
+    let in_parts = left > 0;
+    if in_parts {
+        talk.begin_parts();
+    }
     while left > 0 {
         let (data, tail) = rest.split_at(piece);
         rest = tail;
         let message = SoeMessage { incomplete: true, number: left, ..whole(data) };
         let length = encode(&message, &mut payload)?;
         talk.send(&payload[..length], limits.0).await?;
+        talk.check_parts()?;
         left -= 1;
     }
     let length = encode(&whole(rest), &mut payload)?;
     let answer = |payload: &[u8]| answer(payload, SoeOperation::WriteResponse, address);
-    talk.ask(&payload[..length], limits, answer).await?.map(drop)
+    talk.ask(&payload[..length], limits, answer).await??;
+    if in_parts {
+        talk.end_parts()?;
+    }
+    Ok(())
 }
 
 fn encode(message: &SoeMessage<'_>, payload: &mut [u8]) -> Result<usize, SoeFailure> {

@@ -17,6 +17,9 @@ pub type Limits = (Duration, Duration);
 /// Messages without an answer may stay in the mailbox for so long.
 const POST_LIMIT: Duration = Duration::from_millis(100);
 
+/// How long after the end of a conversation an error reply may still be to one of its parts.
+const PARTS_LIMIT: Duration = Duration::from_secs(1);
+
 /// A lane of a mailbox, held by one conversation. Dropped, it is free for the next; what was asked and not answered is
 /// remembered, so that its answer is not taken for another's.
 #[derive(Debug)]
@@ -166,6 +169,25 @@ impl Talk {
         Ok(())
     }
 
+    /// Begins a message in parts, of which only the last one is answered: what is refused meanwhile may be one of them.
+    pub(super) fn begin_parts(&mut self) {
+        let _ = self.with(|lane| (lane.parts_until, lane.refusal) = (Some(Instant::NEVER), None));
+    }
+
+    /// Ends a message in parts.
+    ///
+    /// # Errors
+    /// An error reply came meanwhile: a part may be missing.
+    pub(super) fn end_parts(&mut self) -> Result<(), MailboxError> {
+        self.check_parts()?;
+        self.with(|lane| lane.parts_until = None)
+    }
+
+    /// Whether all parts so far were taken, for all one knows.
+    pub(super) fn check_parts(&self) -> Result<(), MailboxError> {
+        self.with(|lane| lane.refusal)?.map_or(Ok(()), |reply| Err(MailboxError::Error(reply)))
+    }
+
     /// The answer is there, all of it.
     pub fn complete(&mut self) {
         self.open = false;
@@ -263,8 +285,12 @@ impl Talk {
         loop {
             let left = until.since(self.room.bus.now());
             match self.arrival(left).await {
-                Ok(Arrival::Refused(reply)) => {
-                    self.complete();
+                Ok(Arrival::Refused(reply, doubtful)) => {
+                    if doubtful {
+                        self.give_up();
+                    } else {
+                        self.complete();
+                    }
                     return Err(MailboxError::Error(reply));
                 }
                 Ok(Arrival::Payload(payload)) => {
@@ -295,6 +321,16 @@ impl Talk {
         });
     }
 
+    /// Parts that were written may still be refused.
+    fn leave_parts(&mut self) {
+        let now = self.room.bus.now();
+        let _ = self.with(|lane| {
+            if lane.parts_until.take().is_some() {
+                lane.parts_until = Some(now + PARTS_LIMIT);
+            }
+        });
+    }
+
     /// A message that was queued and not written yet when the talk ends is taken back, unless nobody waits for it.
     fn withdraw(&mut self) {
         let _ = self.with(|lane| lane.outbox.retain(|message| message.asks.is_none()));
@@ -305,6 +341,7 @@ impl Drop for Talk {
     fn drop(&mut self) {
         self.withdraw();
         self.give_up();
+        self.leave_parts();
         self.expect_pdo(None);
         leave(&self.room, self.lane, self.turn);
     }

@@ -58,7 +58,7 @@ impl Bench {
         let server = Everything::new(usize::from(size) - 6);
         let device = Device::new(size, server);
         let mailbox = Mailbox::new(&supervisor.bus(), 0);
-        mailbox.open(StationAddress(STATION), device.layout);
+        mailbox.open(StationAddress(STATION), device.layout, 1);
         Bench { supervisor, mailbox, device, now: Instant(1_000), under_way: Vec::new() }
     }
 

@@ -118,9 +118,9 @@ impl BringUp<'_> {
         }
         self.request(AlState::Init, AlState::PreOp).await?;
         let layout = self.fleet.access().members.get(self.index).and_then(|member| member.info.as_ref()?.mailbox);
-        if let Some(layout) = layout.filter(|_| has_application) {
+        if let (Some(layout), [_, send]) = (layout, &self.setup.plan.mailbox[..]) {
             self.show_mail().await?;
-            self.mailbox.open(self.station, layout);
+            self.mailbox.open(self.station, layout, send.index);
         }
         if has_application && !self.config.sii_to_pdi {
             sii::assign(self.bus, self.station, false).await?;
@@ -131,7 +131,7 @@ impl BringUp<'_> {
     /// Mailboxes of the boot loader, which keeps the EEPROM, BOOT.
     async fn boot(&self) -> Result<(), ConfigureError> {
         let layout = self.fleet.access().members.get(self.index).and_then(|member| member.info.as_ref()?.bootstrap);
-        let Some(layout) = layout.filter(|_| !self.setup.plan.bootstrap.is_empty()) else {
+        let (Some(layout), [_, send]) = (layout, &self.setup.plan.bootstrap[..]) else {
             return Err(ConfigureError::NoBoot);
         };
         for sync_manager in &self.setup.plan.bootstrap {
@@ -140,7 +140,7 @@ impl BringUp<'_> {
         sii::assign(self.bus, self.station, true).await?;
         self.request(AlState::Init, AlState::Boot).await?;
         self.show_mail().await?;
-        self.mailbox.open(self.station, layout);
+        self.mailbox.open(self.station, layout, send.index);
         Ok(())
     }
 

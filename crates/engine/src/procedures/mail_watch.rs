@@ -8,7 +8,7 @@ use alloc::vec;
 use alloc::vec::Vec;
 use core::time::Duration;
 
-use ringcat_wire::address::{LogicalAddress, StationAddress, Wkc};
+use ringcat_wire::address::{LogicalAddress, RegisterAddress, StationAddress, Wkc};
 use ringcat_wire::command::Command;
 use ringcat_wire::datagram::{MAX_DATA, Target};
 use ringcat_wire::register::{Fmmu, SyncManager, SyncManagerStatus, map};
@@ -24,8 +24,6 @@ use crate::supervisor::Bus;
 const PAUSE: Duration = Duration::from_millis(5);
 /// Time on the wire that one question may take on average; with its overhead one takes about 3 us.
 const TIME_EACH: Duration = Duration::from_micros(60);
-/// SyncManager of the send mailbox (SubDevice to MainDevice).
-const SEND_SYNC_MANAGER: u8 = 1;
 /// Where the bits lie: beyond all process data, which ends at 2 GiB.
 const BITS_AT: LogicalAddress = LogicalAddress(0xF000_0000);
 /// Bit of the status register that says "full".
@@ -47,7 +45,7 @@ pub(super) fn fmmu(index: usize, plan: &SubDevicePlan, info: &SubDeviceInfo) -> 
         length: 1,
         logical_start_bit: bit,
         logical_stop_bit: bit,
-        physical_start: status_register().0,
+        physical_start: map::sync_manager(info.mailbox_sync_managers().1).offset(SyncManager::STATUS).0,
         physical_start_bit: FULL_BIT,
         read: true,
         active: true,
@@ -56,14 +54,12 @@ pub(super) fn fmmu(index: usize, plan: &SubDevicePlan, info: &SubDeviceInfo) -> 
     Some((number, register))
 }
 
-const fn status_register() -> ringcat_wire::address::RegisterAddress {
-    map::sync_manager(SEND_SYNC_MANAGER).offset(SyncManager::STATUS)
-}
-
 /// A mailbox that may be used.
 struct Open {
     index: usize,
     station: StationAddress,
+    /// Says whether there is mail.
+    status: RegisterAddress,
     mailbox: Mailbox,
     mapped: bool,
 }
@@ -95,7 +91,8 @@ fn open_mailboxes(fleet: &SharedFleet) -> Vec<Open> {
     members
         .filter_map(|(index, member)| {
             let mapped = member.setup.as_ref().is_some_and(|setup| setup.mail_fmmu.is_some());
-            Some(Open { index, station: member.mailbox.station()?, mailbox: member.mailbox.clone(), mapped })
+            let (station, status) = member.mailbox.send_status()?;
+            Some(Open { index, station, status, mailbox: member.mailbox.clone(), mapped })
         })
         .collect()
 }
@@ -120,7 +117,7 @@ async fn look(bus: Bus, open: Open) {
         open.mailbox.is_full();
         return;
     }
-    if let Ok([status]) = bus.fprd_array(open.station, status_register()).await
+    if let Ok([status]) = bus.fprd_array(open.station, open.status).await
         && SyncManagerStatus::from_bits(status).mailbox_full
     {
         open.mailbox.is_full();

@@ -45,9 +45,7 @@ pub(crate) async fn visit(
     let (Some(layout), false) = (layout, state == AlState::Init) else { return Ok(()) };
     let Ok(plan) = plan(&SubDeviceConfig::from_info(info), info) else { return Err(ConfigureError::NoSetup) };
     let managers = if state == AlState::Boot { &plan.bootstrap } else { &plan.mailbox };
-    if managers.is_empty() {
-        return Err(ConfigureError::NoSetup);
-    }
+    let [_, send] = &managers[..] else { return Err(ConfigureError::NoSetup) };
     for manager in managers {
         bus.fpwr(station, map::sync_manager(manager.index), &manager.register.encode()).await?;
     }
@@ -58,6 +56,6 @@ pub(crate) async fn visit(
         sii::claim(bus, station).await?;
     }
     result?;
-    mailbox.open(station, layout);
+    mailbox.open(station, layout, send.index);
     Ok(())
 }

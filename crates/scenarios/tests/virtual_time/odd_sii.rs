@@ -4,14 +4,16 @@
 use std::time::Duration;
 
 use ringcat::{Event, MainDevice, Options, PdoMapping, ReadPdos, SubDeviceInfo, automatic};
-use ringcat_engine::mail::coe::pdo;
+use ringcat_engine::mail::coe::{self, SdoAddress, pdo};
 use ringcat_sim::cable::DeviceIndex;
 use ringcat_sim::description::DeviceDescription;
 use ringcat_sim::network::NetworkOptions;
 use ringcat_sim::sii_image;
 use ringcat_wire::al::{AlState, AlStatus};
-use ringcat_wire::sii::SyncManagerKind;
+use ringcat_wire::mailbox::coe::Emergency;
+use ringcat_wire::sii::{FmmuUsage, SyncManagerKind};
 use scenarios::check::troubles;
+use scenarios::loss::Loss;
 use scenarios::segments::{descriptions, line};
 use scenarios::tap::Tap;
 use scenarios::world::{CYCLE, World};
@@ -139,6 +141,48 @@ fn sync_managers_in_another_order_are_taken_as_the_sii_says_facts_4_4() {
     world.run_cycles(50);
     assert_eq!(world.incomplete(mark), 0);
     assert!(world.compared() > 0);
+}
+
+#[test]
+fn mailboxes_on_other_sync_managers_work_as_the_sii_says_facts_3_11() {
+    for shows_mail in [true, false] {
+        let mut devices = descriptions(&KINDS);
+        let device = &mut devices[ODD];
+        // Process data on 0 and 1, the mailboxes behind it, the one that is read first.
+        device.sync_managers.rotate_left(2);
+        device.sync_managers.swap(2, 3);
+        for pdo in &mut device.pdos {
+            pdo.sync_manager = pdo.sync_manager.map(|number| number - 2);
+        }
+        if !shows_mail {
+            device.fmmus.retain(|usage| *usage != FmmuUsage::MailboxStatus);
+        }
+        let kinds = device.sync_managers.iter().map(|manager| manager.kind);
+        let (inward, out) = (SyncManagerKind::MailboxIn, SyncManagerKind::MailboxOut);
+        assert!(kinds.eq([SyncManagerKind::Outputs, SyncManagerKind::Inputs, inward, out]));
+        let send = device.mailbox.as_ref().expect("it has one").standard.send_offset;
+        let mut world = world(devices, ReadPdos::Missing);
+        world.settle();
+        let mark = world.mark();
+        let mailbox = world.mailbox(ODD);
+        assert_eq!(world.scan.subdevices[ODD].mailbox_sync_managers(), (3, 2));
+        // A lost answer is asked for again, mail that nobody asked for is found.
+        world.lose(Loss::of_read(world.station_of(ODD), send).on_the_way_back());
+        let limits = (Duration::from_millis(100), Duration::from_secs(1));
+        let own = mailbox.clone();
+        let vendor = world.run(async move { coe::read(&own, SdoAddress::new(0x1018, 1), limits, 4).await });
+        assert_eq!(vendor.map(|vendor| vendor.len()), Ok(4));
+        assert_eq!((mailbox.counters().repeats, world.application().links().losses_left()), (1, 0));
+        let emergency = Emergency { error_code: 0x8130, error_register: 1, data: [0; 5] };
+        assert!(world.network_mut().device_mut(DeviceIndex(ODD)).application.emergency(&emergency));
+        world.run_cycles(50);
+        assert_eq!(mailbox.pop_emergency().map(|(_, kept)| kept), Some(emergency), "shows mail: {shows_mail}");
+        world.power_off(DeviceIndex(ODD));
+        world.run_cycles(20);
+        world.power_on(DeviceIndex(ODD));
+        world.settle();
+        assert!(world.compared() > 0 && world.incomplete(mark) > 0);
+    }
 }
 
 #[test]

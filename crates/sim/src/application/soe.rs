@@ -38,6 +38,8 @@ struct Fragments {
     drive: u8,
     elements: SoeElements,
     data: Vec<u8>,
+    /// How many follow.
+    left: u16,
 }
 
 impl SoeServer {
@@ -92,9 +94,11 @@ impl SoeServer {
 
     fn write(&mut self, message: &SoeMessage<'_>, room: usize, state: AlState, now: SimTime) -> Answer {
         let SoeMessage { drive, elements, data, .. } = *message;
-        // Only fragments of one element follow each other.
-        let mut whole = match self.written.take() {
-            Some(begun) if begun.drive == drive && begun.elements == elements => begun.data,
+        let left = if message.incomplete { message.number } else { 0 };
+        // Only fragments of one element follow each other, each with one less to follow than the one before.
+        let begun = self.written.take().filter(|begun| begun.drive == drive && begun.elements == elements);
+        let mut whole = match begun {
+            Some(begun) if begun.left.checked_sub(1) == Some(left) => begun.data,
             _ => Vec::new(),
         };
         if whole.len() + data.len() > MAX_ELEMENT {
@@ -108,7 +112,7 @@ impl SoeServer {
         }
         whole.extend_from_slice(data);
         let Some(idn) = message.idn() else {
-            self.written = Some(Fragments { drive, elements, data: whole });
+            self.written = Some(Fragments { drive, elements, data: whole, left });
             return Answer::Silence;
         };
         let result = self.find(drive, idn).and_then(|object| object.write(elements, &whole, state, now));

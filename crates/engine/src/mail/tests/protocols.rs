@@ -5,15 +5,15 @@ use alloc::vec;
 use alloc::vec::Vec;
 use core::time::Duration;
 
-use ringcat_wire::mailbox::Protocol;
 use ringcat_wire::mailbox::aoe::{AmsAddress, NetId};
 use ringcat_wire::mailbox::coe::{DataType, Emergency, ListType, ValueInfo};
 use ringcat_wire::mailbox::foe::FoeErrorCode;
 use ringcat_wire::mailbox::sdo::AbortCode;
 use ringcat_wire::mailbox::soe::Idn;
+use ringcat_wire::mailbox::{ErrorReply, Protocol};
 
 use super::device::pattern;
-use super::{Bench, LIMITS};
+use super::{Bench, Fate, LIMITS};
 use crate::config::{PdoEntry, PdoMapping};
 use crate::link::LinkSet;
 use crate::mail::aoe::{AoeError, AoeRoute};
@@ -22,7 +22,7 @@ use crate::mail::foe::{FoeFailure, FoeOptions, FoeProgress};
 use crate::mail::soe::{SoeAddress, SoeFailure};
 use crate::mail::stream::{Bounded, Bytes};
 use crate::mail::voe::Voe;
-use crate::mail::{Lane, MailboxError, aoe, foe, soe, voe};
+use crate::mail::{Lane, MailboxError, aoe, foe, raw, soe, voe};
 
 #[test]
 fn objects_of_any_size_are_written_and_read_in_segments_facts_6_3() {
@@ -297,4 +297,26 @@ fn an_error_reply_goes_to_the_request_whose_protocol_is_unknown_to_the_subdevice
     assert!(matches!(refused, Err(MailboxError::Error(reply)) if reply.detail == 2), "{refused:?}");
     bench.pass(Duration::from_millis(100));
     assert_eq!(object.borrow_mut().take(), Some(Ok(pattern(1, 2000))));
+}
+
+// Only the last fragment is answered: an error reply before that may be to any of them, or to what somebody else asked.
+#[test]
+fn an_error_reply_while_fragments_are_written_fails_the_write_whoever_else_waits_facts_6_6() {
+    let mut bench = Bench::new(LinkSet::Single, 64);
+    let address = SoeAddress::value(1, Idn::standard(0, 7));
+    let mailbox = bench.mailbox.clone();
+    // Nobody answers a CoE message of this kind.
+    let other = bench.start(async move { raw::exchange(&mailbox, Lane::Coe, &[0, 0x60, 0, 0], LIMITS).await });
+    let mailbox = bench.mailbox.clone();
+    let write = bench.start(async move { soe::write(&mailbox, address, &pattern(1, 900), LIMITS).await });
+    while bench.device.served.len() < 4 {
+        bench.step(|| Fate::Passes);
+    }
+    let reply = ErrorReply::new(ErrorReply::NO_MORE_MEMORY);
+    bench.device.say(Protocol::Error, &reply.encode(), bench.now);
+    bench.pass(Duration::from_millis(100));
+    assert_eq!(other.borrow_mut().take(), Some(Err(MailboxError::Error(reply))));
+    let cause = SoeFailure::Mailbox(MailboxError::Error(reply));
+    assert_eq!(write.borrow_mut().take(), Some(Err(soe::SoeError { address, cause })));
+    assert_eq!(bench.mailbox.counters().unclaimed, 0);
 }

@@ -1,0 +1,119 @@
+//! Transfers of clients, message by message.
+
+use super::*;
+
+const SIZE: usize = 128;
+
+fn sdo(request: SdoRequest<'_>) -> Vec<u8> {
+    let mut out = vec![0; SIZE];
+    let length = request.encode(&mut out).unwrap();
+    out.truncate(length);
+    out
+}
+
+fn reply(response: SdoResponse<'_>) -> Vec<u8> {
+    let mut out = vec![0; SIZE];
+    let length = response.encode(&mut out).unwrap();
+    out.truncate(length);
+    out
+}
+
+fn foe(message: FoeMessage<'_>) -> Vec<u8> {
+    let mut out = vec![0; SIZE];
+    let length = message.encode(&mut out).unwrap();
+    out.truncate(length);
+    out
+}
+
+fn question(dialogue: &mut Dialogue, lane: Lane, payload: &[u8]) -> Question {
+    match dialogue.ask(lane, payload, SIZE) {
+        Ok(Asks::Answer(question)) => question,
+        other => panic!("{other:?}"),
+    }
+}
+
+#[test]
+fn an_upload_in_segments_is_open_until_its_last_segment() {
+    let mut dialogue = Dialogue::default();
+    let upload = sdo(SdoRequest::Upload { index: 0x2000, sub_index: 1, complete_access: false });
+    let asked = question(&mut dialogue, Lane::Coe, &upload);
+    let normal = |index| {
+        reply(SdoResponse::UploadNormal { index, sub_index: 1, complete_access: false, total: 200, data: &[1; 100] })
+    };
+    assert!(asked.knows(&normal(0x2000)) && !asked.knows(&normal(0x2001)));
+    dialogue.answered(&asked, &normal(0x2000), SIZE);
+    assert!(dialogue.is_open());
+    for (last, open) in [(false, true), (true, false)] {
+        let asked = question(&mut dialogue, Lane::Coe, &sdo(SdoRequest::UploadSegment { toggle: false }));
+        let part = reply(SdoResponse::UploadSegment { toggle: false, last, data: &[2; 50] });
+        assert!(asked.knows(&part));
+        dialogue.answered(&asked, &part, SIZE);
+        assert_eq!(dialogue.is_open(), open);
+    }
+    assert_eq!(dialogue.end(), None);
+}
+
+#[test]
+fn a_download_that_ends_in_the_middle_is_aborted_for_its_object() {
+    let mut dialogue = Dialogue::default();
+    let begin =
+        SdoRequest::DownloadNormal { index: 0x2002, sub_index: 3, complete_access: false, total: 500, data: &[0; 90] };
+    let asked = question(&mut dialogue, Lane::Coe, &sdo(begin));
+    dialogue.answered(&asked, &reply(SdoResponse::DownloadDone { index: 0x2002, sub_index: 3 }), SIZE);
+    assert!(dialogue.is_open());
+    let code = AbortCode::PROTOCOL_TIMEOUT;
+    assert_eq!(dialogue.end(), Some(sdo(SdoRequest::Abort { index: 0x2002, sub_index: 3, code })));
+    assert!(!dialogue.is_open());
+    // All in one, and refused ones, leave nothing behind.
+    let small = SdoRequest::DownloadExpedited { index: 1, sub_index: 0, complete_access: false, data: &[1] };
+    let asked = question(&mut dialogue, Lane::Coe, &sdo(small));
+    dialogue.answered(&asked, &reply(SdoResponse::DownloadDone { index: 1, sub_index: 0 }), SIZE);
+    assert!(!dialogue.is_open());
+    let asked = question(&mut dialogue, Lane::Coe, &sdo(begin));
+    dialogue.answered(&asked, &reply(SdoResponse::Abort { index: 0x2002, sub_index: 3, code }), SIZE);
+    assert!(!dialogue.is_open());
+}
+
+#[test]
+fn a_file_is_open_from_its_request_to_its_last_packet() {
+    let mut dialogue = Dialogue::default();
+    let asked = question(&mut dialogue, Lane::Foe, &foe(FoeMessage::Read { password: 0, name: b"a" }));
+    let (full, rest) = ([1; 116], [2; 5]);
+    dialogue.answered(&asked, &foe(FoeMessage::Data { packet: 1, data: &full }), SIZE);
+    assert!(dialogue.is_open());
+    let asked = question(&mut dialogue, Lane::Foe, &foe(FoeMessage::Acknowledge { packet: 1 }));
+    let last = foe(FoeMessage::Data { packet: 2, data: &rest });
+    assert!(asked.knows(&last) && !asked.knows(&foe(FoeMessage::Data { packet: 1, data: &full })));
+    dialogue.answered(&asked, &last, SIZE);
+    assert!(dialogue.is_open());
+    let end = dialogue.ask(Lane::Foe, &foe(FoeMessage::Acknowledge { packet: 2 }), SIZE);
+    assert_eq!((end, dialogue.is_open()), (Ok(Asks::Nothing), false));
+
+    let asked = question(&mut dialogue, Lane::Foe, &foe(FoeMessage::Write { password: 0, name: b"a" }));
+    dialogue.answered(&asked, &foe(FoeMessage::Acknowledge { packet: 0 }), SIZE);
+    let asked = question(&mut dialogue, Lane::Foe, &foe(FoeMessage::Data { packet: 1, data: &full }));
+    dialogue.answered(&asked, &foe(FoeMessage::Busy { done: 1, entire: 2, text: b"" }), SIZE);
+    assert!(dialogue.is_open());
+    let error = dialogue.end().unwrap();
+    assert!(matches!(FoeMessage::decode(&error), Ok(FoeMessage::Error { .. })));
+}
+
+#[test]
+fn what_must_not_pass_is_refused_with_its_code() {
+    let mut dialogue = Dialogue::default();
+    assert_eq!(lane(Protocol::Eoe, &[0, 1, 0, 0]), Err(ErrorReply::SERVICE_NOT_SUPPORTED));
+    assert_eq!(lane(Protocol::Eoe, &[6, 1, 0, 0]), Ok(Lane::Eoe));
+    assert_eq!(lane(Protocol::Other(9), &[]), Err(ErrorReply::UNSUPPORTED_PROTOCOL));
+    assert_eq!(dialogue.ask(Lane::Coe, &[0], SIZE), Err(ErrorReply::SIZE_TOO_SHORT));
+    assert_eq!(dialogue.ask(Lane::Coe, &[0, 0x10, 0, 0], SIZE), Err(ErrorReply::SERVICE_NOT_SUPPORTED));
+    assert_eq!(dialogue.ask(Lane::Voe, &[0, 0x10, 0], SIZE), Err(ErrorReply::SIZE_TOO_SHORT));
+    for lane in Lane::ALL {
+        for length in 0..40 {
+            for byte in [0, 1, 2, 3, 4, 5, 6, 0x20, 0xFF] {
+                // Any bytes.
+                let _ = dialogue.ask(lane, &vec![byte; length], SIZE);
+                let _ = dialogue.end();
+            }
+        }
+    }
+}
