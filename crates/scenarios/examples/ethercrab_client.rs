@@ -1,9 +1,10 @@
 //! The MainDevice of another project (ethercrab, from the registry) on a network interface, as a check of our simulator.
 //!
-//! `ethercrab_client INTERFACE SUBDEVICES CYCLES`: brings everything to OP and exchanges process data. In cycle i byte j
-//! of the outputs of SubDevice k is i + k + j. As many cycles follow without any work but the exchange, to tell
-//! how many there are in a second. Prints one line of figures, then keeps exchanging the last outputs until
-//! its standard input ends. Anything unexpected ends it with an error.
+//! `ethercrab_client INTERFACE SUBDEVICES CYCLES [TIMES]`: brings everything to OP and exchanges process data. In cycle i
+//! byte j of the outputs of SubDevice k is i + k + j. As many cycles follow without any work but the exchange, to tell
+//! how many there are in a second. Prints one line of figures, with the propagation delays that it has measured, then keeps
+//! exchanging the last outputs until its standard input ends. Anything unexpected ends it with an error. TIMES is how often
+//! it hands out the reference time before OP, unless it is to be as it likes.
 
 use std::io;
 use std::process::ExitCode;
@@ -32,15 +33,23 @@ static STORAGE: PduStorage<FRAMES, DATAGRAM> = PduStorage::new();
 
 fn main() -> ExitCode {
     let arguments: Vec<String> = std::env::args().collect();
-    let [_, interface, count, cycles] = arguments.as_slice() else {
-        eprintln!("usage: ethercrab_client INTERFACE SUBDEVICES CYCLES");
+    let [_, interface, numbers @ ..] = arguments.as_slice() else {
+        eprintln!("usage: ethercrab_client INTERFACE SUBDEVICES CYCLES [TIMES]");
         return ExitCode::from(2);
     };
-    let (Ok(count), Ok(cycles)) = (count.parse(), cycles.parse()) else {
-        eprintln!("SUBDEVICES and CYCLES are numbers");
-        return ExitCode::from(2);
+    let numbers: Result<Vec<usize>, _> = numbers.iter().map(|number| number.parse()).collect();
+    let (count, cycles, config) = match numbers.as_deref() {
+        Ok([count, cycles]) => (*count, *cycles, MainDeviceConfig::default()),
+        Ok([count, cycles, times]) => {
+            let config = MainDeviceConfig { dc_static_sync_iterations: *times as u32, ..MainDeviceConfig::default() };
+            (*count, *cycles, config)
+        }
+        _ => {
+            eprintln!("expected two or three numbers behind the interface");
+            return ExitCode::from(2);
+        }
     };
-    match smol::block_on(run(interface, count, cycles)) {
+    match smol::block_on(run(interface, count, cycles, config)) {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
             eprintln!("{error}");
@@ -49,10 +58,10 @@ fn main() -> ExitCode {
     }
 }
 
-async fn run(interface: &str, count: usize, cycles: usize) -> Result<(), String> {
+async fn run(interface: &str, count: usize, cycles: usize, config: MainDeviceConfig) -> Result<(), String> {
     let (sender, receiver, pdu_loop) = STORAGE.try_split().map_err(|()| "the storage is in use".to_owned())?;
     let timeouts = Timeouts { pdu: PATIENCE, eeprom: PATIENCE, ..Timeouts::default() };
-    let main_device = Arc::new(MainDevice::new(pdu_loop, timeouts, MainDeviceConfig::default()));
+    let main_device = Arc::new(MainDevice::new(pdu_loop, timeouts, config));
     let task = tx_rx_task(interface, sender, receiver).map_err(|error| format!("{interface}: {error}"))?;
     thread::spawn(move || smol::block_on(task));
 
@@ -98,12 +107,15 @@ async fn run(interface: &str, count: usize, cycles: usize) -> Result<(), String>
         .iter(&main_device)
         .map(|subdevice| subdevice.inputs_raw().iter().map(|byte| format!("{byte:02x}")).collect())
         .collect();
+    let delays: Vec<String> =
+        group.iter(&main_device).map(|subdevice| subdevice.propagation_delay().to_string()).collect();
     round_trips.sort();
     let median = round_trips.get(cycles / 2).copied().unwrap_or_default();
     println!(
-        "op_ms {} median_us {:.1} per_second {per_second:.0} wkc {wkc} wrong {wrong} inputs {}",
+        "op_ms {} median_us {:.1} per_second {per_second:.0} wkc {wkc} wrong {wrong} delays {} inputs {}",
         to_op.as_millis(),
         median.as_secs_f64() * 1e6,
+        delays.join(","),
         inputs.join(",")
     );
     let ended = Arc::new(AtomicBool::new(false));

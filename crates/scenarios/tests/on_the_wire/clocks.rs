@@ -1,11 +1,19 @@
 //! Distributed clocks on interfaces. The simulator's clocks run in the segment's own time, which follows this machine's, so
-//! what they latch is exact however late this machine is: that clocks lock is judged. How far cycles are from their
-//! phase depends on this machine, and is printed.
+//! what they latch is exact however late this machine is: delays are judged, and that clocks lock. How far cycles are from
+//! their phase depends on this machine, and is printed.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
+use std::process::Command;
 use std::time::{Duration, Instant};
 
-use crate::bench::{Bench, finish};
+use ringcat_sim::cable::{DeviceIndex, HostLink};
+use ringcat_sim::controller::Wander;
+use ringcat_sim::network::Network;
+use ringcat_sim::segment::Segment;
+use ringcat_wire::register::map;
+
+use crate::bench::{Bench, Client, finish, is_asked_for, program};
+use crate::foreign::{FOREIGN, start};
 use crate::said;
 
 /// A line with clocks of both widths that drift, one SubDevice without a clock, and cables of different lengths.
@@ -32,10 +40,165 @@ type = "servo"
 drift_ppm = 50
 cable_ns = 80
 "#;
+/// Two forks of three cables, one behind the other; SubDevices in the order in which frames meet them.
+const TREE: &str = r#"
+[[device]]
+type = "junction"
+name = "fork"
+clock_bits = 64
+[[device]]
+type = "digital-input-8"
+attach = "fork.3"
+clock_bits = 64
+drift_ppm = -25
+cable_ns = 200
+[[device]]
+type = "servo"
+drift_ppm = 45
+[[device]]
+type = "digital-input-8"
+attach = "fork.1"
+clock_bits = 64
+cable_ns = 70
+[[device]]
+type = "junction"
+name = "fork-2"
+clock_bits = 64
+drift_ppm = 10
+[[device]]
+type = "digital-input-8"
+attach = "fork-2.3"
+clock_bits = 64
+drift_ppm = -50
+cable_ns = 400
+[[device]]
+type = "servo"
+attach = "fork-2.1"
+"#;
+/// A fourth cable for the first fork, with a SubDevice without a clock on the way.
+const FOURTH: &str = r#"
+[[device]]
+type = "digital-output-8"
+attach = "fork.2"
+clock_bits = 0
+cable_ns = 1000
+[[device]]
+type = "servo"
+drift_ppm = 15
+cable_ns = 90
+"#;
+/// So far delays may be from the truth without jitter: rounding, and drift in one measurement.
+const WITHIN_NS: i64 = 2;
+/// Cycles of the other MainDevice, and how often it hands out the reference time before.
+const CYCLES: &str = "20";
+const HANDED_OUT: &str = "200";
 /// SubDevices have to be in OP, and programs to end, within.
 const LIMIT: Duration = Duration::from_secs(20);
+/// Times that are handed out are as exact as both ends are punctual.
+const TIMES_NS: &str = "100000000";
+/// BWR of the receive times.
+const LATCH: [u8; 16] = [0x10, 0x10, 8, 0, 0, 0, 0x00, 0x09, 4, 0, 0, 0, 0, 0, 0, 0];
+
+/// What every clock is away from the first, in nanoseconds: when one frame passes clocks that tell the truth.
+fn truth(segment: &str) -> Vec<Option<i64>> {
+    let mut segment = Segment::from_toml(segment, Path::new(".")).expect("a good segment");
+    for device in &mut segment.devices {
+        (device.clock_start_ns, device.clock_drift_ppb) = (0, 0);
+        (device.clock_wander, device.receive_jitter) = (Wander::default(), Duration::ZERO);
+    }
+    let clocks: Vec<bool> = segment.devices.iter().map(|device| device.dc.is_some()).collect();
+    let mut network = Network::from_description(segment).expect("it can be plugged");
+    let mut frame = [&[0xFF; 6][..], &[0x02, 0, 0, 0, 0, 1], &[0x88, 0xA4], &LATCH].concat();
+    frame.resize(60, 0);
+    network.send(HostLink::Main, &frame);
+    network.advance_by(Duration::from_millis(1));
+    let unit = |device: usize| {
+        let bytes = network.device(DeviceIndex(device)).controller.register(map::DC_RECEIVE_TIME_EPU, 4);
+        bytes.first_chunk().map_or(0, |bytes| i64::from(u32::from_le_bytes(*bytes)))
+    };
+    let clocks = clocks.into_iter().enumerate();
+    clocks.map(|(device, has_clock)| has_clock.then(|| unit(device) - unit(0))).collect()
+}
+
+/// The delay of each device, as its register has it.
+fn written(bench: &Bench, count: usize) -> Vec<i64> {
+    let delay = |device: usize| {
+        let bytes = bench.order(&format!("register {device} 0x0928 4"));
+        let byte = |at: usize| u8::from_str_radix(&bytes[at..at + 2], 16).expect("hexadecimal");
+        i64::from(u32::from_le_bytes([byte(0), byte(2), byte(4), byte(6)]))
+    };
+    (0..count).map(delay).collect()
+}
+
 fn file(name: &str) -> PathBuf {
     std::env::temp_dir().join(format!("ringcat-wire-clocks-{}-{name}", std::process::id()))
+}
+
+/// Those of SubDevices with a clock, all near the truth.
+fn judge(who: &str, delays: &[i64], truth: &[Option<i64>]) {
+    let pairs: Vec<(i64, i64)> =
+        delays.iter().zip(truth).filter_map(|(delay, truth)| Some((*delay, (*truth)?))).collect();
+    println!("{who}: {:?} ns", pairs.iter().map(|(delay, _)| delay).collect::<Vec<_>>());
+    assert!(pairs.iter().all(|(delay, truth)| (delay - truth).abs() <= WITHIN_NS), "{who}: expected {truth:?}");
+}
+
+#[test]
+fn ethercrab_measures_the_delays_that_we_measure_and_both_are_true_facts_7_1() {
+    if !is_asked_for(FOREIGN) {
+        return;
+    }
+    let Some(mut bench) = Bench::new(1) else { return };
+    let client = program("examples/ethercrab_client");
+    // Where the two differ, ours are true: ethercrab leaves out cables to SubDevices without a clock, and the last branch of a
+    // fork of four cables with another fork behind it.
+    let (everywhere, larger) = (LINE.replace("clock_bits = 0", "clock_bits = 64"), format!("{TREE}{FOURTH}"));
+    for (name, segment, with_foreign) in
+        [("line", everywhere.as_str(), true), ("tree", TREE, true), ("tree with a fourth branch", &larger, false)]
+    {
+        let truth = truth(segment);
+        println!("{name}, truth: {truth:?} ns");
+        let count = truth.len();
+        bench.simulate(segment, false);
+        if with_foreign {
+            foreign_delays(&bench, &client, &truth);
+        }
+        let capture = file("capture.pcapng");
+        let path = capture.display().to_string();
+        let arguments = ["clocks", "--main", "main0", "--for", "100ms", "--json", "--capture", &path];
+        let (json, errors) = said(&bench.ringcat(&arguments));
+        assert!(json.contains("\"locked\": true"), "{json}{errors}");
+        let figures = json.lines().filter_map(|line| line.trim().strip_prefix("\"delay_ns\": "));
+        let mut told = figures.map(|figure| figure.trim_end_matches(',').parse().expect("a number"));
+        let told: Vec<i64> =
+            truth.iter().map(|has_clock| has_clock.map_or(0, |_| told.next().expect("a clock"))).collect();
+        judge("ringcat reports", &told, &truth);
+        judge("ringcat wrote", &written(&bench, count), &truth);
+        check_capture(&capture, truth.iter().flatten().count());
+        bench.show_simulator_lateness();
+    }
+}
+
+/// What ethercrab reports and writes.
+fn foreign_delays(bench: &Bench, client: &Path, truth: &[Option<i64>]) {
+    let count = truth.len();
+    let arguments = ["main0".to_owned(), count.to_string(), CYCLES.to_owned(), HANDED_OUT.to_owned()];
+    let client = Client::new(start(bench, client, &arguments));
+    let reported: Vec<i64> = client.figure("delays").split(',').filter_map(|delay| delay.parse().ok()).collect();
+    if reported.len() != count {
+        panic!("{}", client.end().1);
+    }
+    judge("ethercrab reports", &reported, truth);
+    judge("ethercrab wrote", &written(bench, count), truth);
+}
+
+/// The capture gives the same delays and offsets.
+fn check_capture(path: &Path, clocks: usize) {
+    let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../ci/check-clocks");
+    let output = Command::new(script).arg(path).args(["--times", TIMES_NS]).output().expect("python3");
+    std::fs::remove_file(path).expect("it was written");
+    let (text, errors) = said(&output);
+    println!("{text}{errors}");
+    assert!(output.status.success() && text.contains(&format!("judged: {clocks} delays")), "{text}{errors}");
 }
 
 #[test]
