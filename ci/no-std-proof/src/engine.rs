@@ -57,7 +57,7 @@ fn procedure_works(identity: Identity) -> Option<()> {
 fn cycle_works(identity: Identity) -> Option<()> {
     let area = |sync_manager, flow| AreaSpec { subdevice: 0, sync_manager, direction: flow, length: 2 };
     let areas = vec![area(2, Direction::Outputs), area(3, Direction::Inputs)];
-    let spec = DomainSpec { period: Duration::from_millis(1), lrw: false, areas };
+    let spec = DomainSpec { period: Duration::from_millis(1), under_way: 1, lrw: false, areas };
     let layout = Layout::new(&[spec], LinkSet::Single, true).ok()?;
     let (_, inputs) = layout.area(0, 3)?;
     let board = Arc::new(Board::new(1));

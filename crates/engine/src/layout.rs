@@ -48,6 +48,8 @@ pub enum LrwPolicy {
 pub struct DomainSpec {
     /// How often the application exchanges it.
     pub period: Duration,
+    /// How many of its cycles may be under way at once.
+    pub under_way: u8,
     /// Whether every SubDevice of the domain knows LRW (facts 3.1, features bit 9).
     pub lrw: bool,
     /// Areas in the order in which they lie in the image; those of a SubDevice stand together.
@@ -100,6 +102,8 @@ pub struct PlannedFrame {
 pub struct PlannedDomain {
     /// From the specification.
     pub period: Duration,
+    /// From the specification: each frame may be out so many times.
+    pub under_way: u8,
     /// Bytes of the image.
     pub image_len: u32,
     /// All areas with their places.
@@ -188,11 +192,14 @@ impl Layout {
         if supervision {
             layout.add_supervision();
         }
-        let frames = layout.domains.iter().map(|domain| domain.frames.len()).sum();
-        if frames > crate::ring::MAX_IN_FLIGHT {
-            return Err(LayoutError::TooManyFrames { frames });
-        }
+        layout.check_in_flight()?;
         Ok(layout)
+    }
+
+    fn check_in_flight(&self) -> Result<(), LayoutError> {
+        let of_domain = |domain: &PlannedDomain| domain.frames.len() * usize::from(domain.under_way.max(1));
+        let frames = self.domains.iter().map(of_domain).sum();
+        if frames > crate::ring::MAX_IN_FLIGHT { Err(LayoutError::TooManyFrames { frames }) } else { Ok(()) }
     }
 
     fn add_supervision(&mut self) {
@@ -213,11 +220,7 @@ impl Layout {
             Some(frame) => frame.clocks = true,
             None => domain.frames.push(PlannedFrame { clocks: true, ..PlannedFrame::default() }),
         }
-        let frames = self.domains.iter().map(|domain| domain.frames.len()).sum();
-        if frames > crate::ring::MAX_IN_FLIGHT {
-            return Err(LayoutError::TooManyFrames { frames });
-        }
-        Ok(())
+        self.check_in_flight()
     }
 
     /// Where an area of a SubDevice lies, with its domain.
@@ -264,7 +267,13 @@ impl Chunk {
 
 /// `each`: every SubDevice has datagrams of its own.
 fn lay_out(spec: &DomainSpec, lrw: bool, each: bool, base: LogicalAddress) -> Result<PlannedDomain, LayoutError> {
-    let mut domain = PlannedDomain { period: spec.period, image_len: 0, areas: Vec::new(), frames: Vec::new() };
+    let mut domain = PlannedDomain {
+        period: spec.period,
+        under_way: spec.under_way,
+        image_len: 0,
+        areas: Vec::new(),
+        frames: Vec::new(),
+    };
     for chunk in chunks(spec, lrw, each)? {
         let frame = domain.place(&chunk, lrw, base)?;
         match domain.frames.last_mut() {

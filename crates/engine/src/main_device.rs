@@ -27,7 +27,7 @@ use ringcat_wire::frame::MacAddress;
 use ringcat_wire::source_address::MacCodec;
 
 pub use areas::{AreaEntries, Directory};
-pub use declaration::{ActivateError, Declaration, DomainConfig, DomainMember, Required};
+pub use declaration::{ActivateError, Declaration, DomainConfig, DomainMember, MAX_UNDER_WAY, Required};
 pub use ethernet::EthernetSubDevice;
 pub use pending::Pending;
 pub use services::{MAX_DATAGRAMS, RawDatagram};
@@ -329,7 +329,8 @@ impl MainDevice {
         self.fleet = Some(fleet);
         self.cyclic_events = Some(consumer);
         let periods = specs.iter().map(|spec| spec.period).collect();
-        Ok(Active { exchange, directory, periods })
+        let under_way = specs.iter().map(|spec| spec.under_way).max().unwrap_or(1);
+        Ok(Active { exchange, directory, periods, under_way })
     }
 
     /// Ends supervision and all other procedures, and takes all SubDevices down to a state. The exchange must not send
@@ -546,4 +547,6 @@ pub struct Active {
     pub directory: Directory,
     /// Periods of the domains. There is at least one domain, if only for supervision.
     pub periods: Vec<Duration>,
+    /// Most cycles of a domain that may be under way at once.
+    pub under_way: u8,
 }

@@ -42,7 +42,7 @@ fn main() -> Result<(), ringcat::Error> {
         SubDeviceConfig::at_position(2).expect_product(catalogue, 0x03F0_0008),
     ];
     let members = [LAMPS, BUTTONS].map(|subdevice| DomainMember { subdevice, sync_managers: None });
-    let domains = vec![DomainConfig { period: Duration::from_millis(1), members: members.into() }];
+    let domains = vec![DomainConfig::new(Duration::from_millis(1), members.into())];
     let mut application = main_device.activate(Declaration { subdevices, domains, ..Declaration::default() })?;
 
     // Places of PDO entries: object index and subindex, as in the SubDevice's documentation.

@@ -113,7 +113,7 @@ impl<L: Links, H: AcyclicHalf> Application<L, H> {
         self.cyclic.process(domain, self.links.now())
     }
 
-    /// Puts a domain's outputs into its frames. False where those of the last cycle are still out. A step of a cycle
+    /// Puts a domain's outputs into its frames. False where all its cycles are still under way. A step of a cycle
     /// that the application runs itself.
     pub fn queue(&mut self, domain: DomainId) -> bool {
         self.cyclic.exchange.queue(domain, self.links.now())
@@ -176,8 +176,7 @@ impl<L: Links, H: AcyclicHalf> Application<L, H> {
         self.cyclic.pace
     }
 
-    /// Times from the sending of a cycle's frames to the arrival of their copies. (A copy that arrives after other frames
-    /// were sent counts from those.)
+    /// Times from the sending of a cycle's frames to the arrival of their copies.
     pub fn round_trips(&self) -> &Histogram {
         self.cyclic.news.round_trips()
     }

@@ -43,8 +43,8 @@ pub(crate) struct Cyclic {
     /// With [`Trigger::FramesReturned`] it may begin from now on.
     earliest: Instant,
     cycle: u64,
-    /// When process data was sent last.
-    sent_at: Instant,
+    /// Most cycles of a domain that may be under way at once.
+    under_way: u32,
     window: Arc<Window>,
 }
 
@@ -72,7 +72,7 @@ impl Cyclic {
             next_cycle,
             earliest: next_cycle,
             cycle: 0,
-            sent_at: Instant::NEVER,
+            under_way: active.under_way.into(),
             window,
         }
     }
@@ -98,7 +98,7 @@ impl Cyclic {
     /// Takes in a frame of the cyclic class or of nobody known.
     pub fn receive(&mut self, link: Link, frame: &[u8], now: Instant) {
         if self.exchange.receive(link, frame, now) == Received::Taken {
-            self.news.round_trips().record(now.since(self.sent_at));
+            self.news.round_trips().record(now.since(self.exchange.taken_left_at()));
         }
     }
 
@@ -113,7 +113,7 @@ impl Cyclic {
     }
 
     fn may_begin_early(&self) -> bool {
-        matches!(self.trigger, Trigger::FramesReturned { .. }) && !self.exchange.in_flight()
+        matches!(self.trigger, Trigger::FramesReturned { .. }) && !self.exchange.is_full()
     }
 
     /// A cycle begins: notes how late it is, judges what is due.
@@ -148,7 +148,7 @@ impl Cyclic {
             }
             Trigger::FramesReturned { at_least } => {
                 self.earliest = now + at_least;
-                self.next_cycle = now + self.period;
+                self.next_cycle = now + self.period * self.under_way;
             }
         }
     }
@@ -207,16 +207,12 @@ impl Cyclic {
     /// Sends what was queued; the next cycle's frames leave at `next`.
     fn send(&mut self, now: Instant, next: Instant, links: &mut impl Links) {
         let Cyclic { exchange, window, .. } = self;
-        let before = exchange.counters().sent;
         exchange.send(now, &mut |link, frame| {
             if link == Link::Main {
                 window.occupy(Half::Cyclic, now, frame.len());
             }
             links.send(link, frame);
         });
-        if exchange.counters().sent != before {
-            self.sent_at = now;
-        }
         self.cycle += 1;
         self.window.expect_cycle(next);
     }

@@ -83,7 +83,8 @@ pub use ringcat_engine::link::Link;
 pub use ringcat_engine::mail::coe::{SdoAddress, SdoError, SdoFailure};
 pub use ringcat_engine::mail::{Limits, Mailbox};
 pub use ringcat_engine::main_device::{
-    ActivateError, Declaration, DomainConfig, DomainMember, GroupState, RawDatagram, Required, SubDeviceState,
+    ActivateError, Declaration, DomainConfig, DomainMember, GroupState, MAX_UNDER_WAY, RawDatagram, Required,
+    SubDeviceState,
 };
 pub use ringcat_engine::procedures::clocks::ClockStatus;
 pub use ringcat_engine::procedures::dictionary::ReadPdos;

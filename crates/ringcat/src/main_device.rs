@@ -314,7 +314,7 @@ pub fn automatic(subdevices: &[SubDeviceInfo], period: Duration) -> Declaration 
     let members = (0..subdevices.len()).map(|subdevice| DomainMember { subdevice, sync_managers: None });
     Declaration {
         lrw: LrwPolicy::default(),
-        domains: vec![DomainConfig { period, members: members.collect() }],
+        domains: vec![DomainConfig::new(period, members.collect())],
         subdevices: subdevices.iter().map(SubDeviceConfig::from_info).collect(),
         ..Declaration::default()
     }

@@ -36,7 +36,7 @@ pub struct News {
 }
 
 /// Fields of [`CyclicCounters`].
-const COUNTERS: usize = 13;
+const COUNTERS: usize = 14;
 
 fn zeros<const N: usize>() -> [AtomicU64; N] {
     [const { AtomicU64::new(0) }; N]
@@ -85,6 +85,7 @@ impl News {
             lost,
             half,
             copies_lost,
+            overtaken,
             late,
             corrupt,
             foreign,
@@ -100,6 +101,7 @@ impl News {
             lost,
             half,
             copies_lost,
+            overtaken,
             late,
             corrupt,
             foreign,
@@ -124,8 +126,7 @@ impl News {
         }
     }
 
-    /// Times from the sending of a cycle's frames to the arrival of their copies. (A copy that arrives after other frames
-    /// were sent counts from those.)
+    /// Times from the sending of a cycle's frames to the arrival of their copies.
     pub fn round_trips(&self) -> &Histogram {
         &self.round_trips
     }
@@ -212,6 +213,7 @@ impl News {
             lost,
             half,
             copies_lost,
+            overtaken,
             late,
             corrupt,
             foreign,
@@ -227,6 +229,7 @@ impl News {
             lost,
             half,
             copies_lost,
+            overtaken,
             late,
             corrupt,
             foreign,

@@ -15,7 +15,8 @@ pub enum Trigger {
         /// From the multiples of the period in system time to the beginning of cycles, in nanoseconds; may be negative.
         phase_ns: i64,
     },
-    /// The return of the last cycle's frames. Where they do not return, a cycle begins a period after the last one.
+    /// The return of the last cycle's frames; where several cycles may be under way, of the oldest one's. Where they do
+    /// not return, a cycle begins as many periods after the last one as cycles may be under way.
     FramesReturned {
         /// From the beginning of the last cycle to that of the next at the least; zero for cycles back to back.
         at_least: Duration,

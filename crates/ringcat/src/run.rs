@@ -19,7 +19,7 @@ use clap::Args;
 use ringcat::packet::PacketLinks;
 use ringcat::tee::Tee;
 use ringcat::text::{Names, address_of_sender, describe};
-use ringcat::{CyclicThread, Event, Instant, LastOutputs, Links, Options, SupervisorThread, automatic};
+use ringcat::{CyclicThread, Event, Instant, LastOutputs, Links, MAX_UNDER_WAY, Options, SupervisorThread, automatic};
 use ringcat_wire::al::AlState;
 
 use crate::clock_options::ClockOptions;
@@ -74,6 +74,10 @@ pub struct RunArguments {
     /// Cycle time, with its unit: 250us, 1ms.
     #[arg(long, value_name = "TIME", default_value = "1ms", value_parser = time)]
     cycle: Duration,
+    /// Cycles that may be under way at once, for a cycle time that is shorter than the way of a frame through segment and
+    /// host. Inputs are then as many cycles old as their way takes.
+    #[arg(long, value_name = "CYCLES", default_value = "1", value_parser = clap::value_parser!(u8).range(1..=i64::from(MAX_UNDER_WAY)))]
+    under_way: u8,
     /// How long to exchange process data once all are in OP, such as 10s or 5min; until Ctrl-C by default.
     #[arg(long = "for", value_name = "TIME", value_parser = time)]
     lasts: Option<Duration>,
@@ -115,7 +119,7 @@ pub fn run(arguments: &RunArguments) -> Result<bool, Failure> {
     let scan = result.map_err(|error| surroundings.explain(error, others + supervisor.counters().foreign))?;
     say!("{} SubDevices; cycle {} us", scan.subdevices.len(), arguments.cycle.as_micros());
     let names = Names(scan.subdevices.iter().map(|info| info.name.clone()).collect());
-    let mut declaration = automatic(&scan.subdevices, arguments.cycle);
+    let mut declaration = automatic(&scan.subdevices, arguments.cycle).with_under_way(arguments.under_way);
     let clocks = arguments.clocks || arguments.clock_options.are_given();
     if clocks {
         arguments.clock_options.declare(&mut declaration, &scan.subdevices)?;

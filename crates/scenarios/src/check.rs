@@ -9,6 +9,7 @@ use ringcat_engine::main_device::Directory;
 use ringcat_sim::cable::DeviceIndex;
 use ringcat_sim::device::Device;
 use ringcat_sim::network::Network;
+use ringcat_sim::time::SimTime;
 use ringcat_wire::al::{AlState, AlStatus};
 use ringcat_wire::register::map;
 
@@ -54,6 +55,7 @@ pub struct Judged {
 /// What was true when a domain's frames left.
 #[derive(Debug)]
 struct Flight {
+    left_at: SimTime,
     /// The domain's image, for its outputs.
     image: Vec<u8>,
     /// Inputs of all devices.
@@ -188,7 +190,7 @@ impl Mirror {
 
     /// Devices changed by something else than frames, while the frames have not left yet.
     pub fn look_again(&mut self, network: &Network) {
-        for flight in self.flights.iter_mut().flatten() {
+        for flight in self.flights.iter_mut().flatten().filter(|flight| flight.left_at == network.now()) {
             flight.inputs = network.devices().map(|device| device.inputs().to_vec()).collect();
         }
     }
@@ -199,7 +201,7 @@ impl Mirror {
         let inputs = network.devices().map(|device| device.inputs().to_vec()).collect();
         let operating = network.devices().map(uses_outputs).collect();
         if let Some(flight) = self.flights.get_mut(domain.0) {
-            *flight = Some(Flight { image, inputs, operating });
+            *flight = Some(Flight { left_at: network.now(), image, inputs, operating });
         }
     }
 }

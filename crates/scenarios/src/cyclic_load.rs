@@ -41,6 +41,8 @@ pub struct LoadSpec {
     pub bytes: u16,
     /// Number of domains; each holds part of the SubDevices.
     pub domains: usize,
+    /// How many cycles of a domain may be under way.
+    pub under_way: u8,
     /// Whether the SubDevices know LRW.
     pub lrw: bool,
     /// Whether the supervision datagram rides along.
@@ -130,7 +132,9 @@ impl CyclicLoad {
 }
 
 fn domains(spec: &LoadSpec) -> Vec<DomainSpec> {
-    let mut domains = vec![DomainSpec { period: PERIOD, lrw: spec.lrw, areas: Vec::new() }; spec.domains.max(1)];
+    let (under_way, lrw) = (spec.under_way, spec.lrw);
+    let domain = DomainSpec { period: PERIOD, under_way, lrw, areas: Vec::new() };
+    let mut domains = vec![domain; spec.domains.max(1)];
     let count = domains.len();
     for subdevice in 0..spec.subdevices {
         let area = |sync_manager, direction| AreaSpec { subdevice, sync_manager, direction, length: spec.bytes };

@@ -28,8 +28,12 @@ const SUBDEVICES: usize = 60;
 
 /// Three domains, two frames each.
 fn load(cabling: Cabling) -> CyclicLoad {
+    load_under_way(cabling, 1)
+}
+
+fn load_under_way(cabling: Cabling, under_way: u8) -> CyclicLoad {
     let lrw = cabling == Cabling::Line;
-    let spec = LoadSpec { subdevices: SUBDEVICES, bytes: 60, domains: 3, lrw, supervision: true, cabling };
+    let spec = LoadSpec { subdevices: SUBDEVICES, bytes: 60, domains: 3, under_way, lrw, supervision: true, cabling };
     CyclicLoad::new(&spec).expect("fits")
 }
 
@@ -62,6 +66,25 @@ fn undisturbed_cycles_take_no_memory() {
         let counters = load.exchange.counters();
         assert_eq!((counters.sent, counters.received), (CYCLES * 6, (CYCLES - 1) * 6), "{cabling:?}");
         assert_eq!(counters.incomplete, 0, "{cabling:?}");
+    }
+}
+
+#[test]
+fn several_cycles_under_way_take_no_memory_and_lose_nothing() {
+    for (cabling, under_way) in CABLINGS.into_iter().zip(2..=4) {
+        let mut load = load_under_way(cabling, under_way);
+        let used = counted(|| {
+            for cycle in 0..CYCLES {
+                load.exchange_once();
+                // Answers come in bursts, one cycle's after the other.
+                if (cycle + 1) % u64::from(under_way) == 0 {
+                    load.answer();
+                }
+            }
+        });
+        assert_eq!(used, (0, 0), "{cabling:?}");
+        let counters = load.exchange.counters();
+        assert_eq!((counters.sent, counters.incomplete, counters.skipped), (CYCLES * 6, 0, 0), "{cabling:?}");
     }
 }
 

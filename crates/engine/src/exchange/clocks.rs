@@ -80,6 +80,8 @@ pub(crate) struct Payload {
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Seen {
     pub sent_at: Instant,
+    /// Which references it distributed, by how often they had been posted.
+    pub references: u32,
     /// Low half of the distributed time and working counter, by the link the copy was sent on.
     sync: [(u32, Wkc); 2],
     spread: u32,
@@ -277,8 +279,23 @@ impl Clocks {
         Some((self.references.on(steered)?, wanted as u32))
     }
 
+    /// Which references frames that leave now distribute, by how often they were posted.
+    pub(crate) fn changes(&self) -> u32 {
+        self.changes
+    }
+
     /// A flight is over.
     pub(crate) fn observe(&mut self, seen: &Seen, arrivals: Arrivals, board: &Board, events: &mut Producer) {
+        // One that left before others were posted has read clocks that are references no more.
+        if seen.references == self.changes {
+            self.observe_references(seen, arrivals);
+        }
+        if seen.spread_wkc > 0 {
+            self.judge_spread(seen.spread, board, events);
+        }
+    }
+
+    fn observe_references(&mut self, seen: &Seen, arrivals: Arrivals) {
         let (_, steered) = self.references.leader();
         let mut fresh = 0;
         for link in Link::ALL {
@@ -290,20 +307,16 @@ impl Clocks {
             self.times[link.index()] = Some(ReferenceTime { time, sent_at: seen.sent_at });
             fresh += 1;
         }
-        if let Some(steered) = steered {
-            if fresh == 2 {
-                let leader = if steered == Link::Main { Link::Redundant } else { Link::Main };
-                let time = |link: Link| self.times[link.index()].map_or(0, |time| time.time);
-                let difference = time(steered).wrapping_sub(time(leader)) as i64;
-                let begin = Lead::begin(difference, seen.sent_at);
-                self.lead = Some(self.lead.map_or(begin, |lead| lead.go_on(difference, seen.sent_at)));
-            }
-            // The ring is closed again: one reference is enough, and delays are not what they were.
-            self.held |= arrivals.verdict() == Some(RingState::Closed);
+        let Some(steered) = steered else { return };
+        if fresh == 2 {
+            let leader = if steered == Link::Main { Link::Redundant } else { Link::Main };
+            let time = |link: Link| self.times[link.index()].map_or(0, |time| time.time);
+            let difference = time(steered).wrapping_sub(time(leader)) as i64;
+            let begin = Lead::begin(difference, seen.sent_at);
+            self.lead = Some(self.lead.map_or(begin, |lead| lead.go_on(difference, seen.sent_at)));
         }
-        if seen.spread_wkc > 0 {
-            self.judge_spread(seen.spread, board, events);
-        }
+        // The ring is closed again: one reference is enough, and delays are not what they were.
+        self.held |= arrivals.verdict() == Some(RingState::Closed);
     }
 
     fn judge_spread(&mut self, spread_ns: u32, board: &Board, events: &mut Producer) {

@@ -96,8 +96,8 @@ struct Source {
     subdevice: usize,
     /// The member of the domain.
     member: usize,
-    /// Frames, and datagrams in them, that bring inputs of the SubDevice.
-    places: Box<[(usize, usize)]>,
+    /// The deliveries of datagrams that bring inputs of the SubDevice.
+    deliveries: Box<[usize]>,
     /// Cycles since the oldest of these deliveries, as of the copying that is under way.
     age: u64,
 }
@@ -187,10 +187,10 @@ impl Copies {
     }
 
     /// Copies everything whose target is in a domain. Returns how many words had a stale source.
-    pub(super) fn run(&mut self, target: usize, domains: &mut [Domain], frames: &[CyclicFrame], cycle: u64) -> u64 {
+    pub(super) fn run(&mut self, target: usize, domains: &mut [Domain], cycle: u64) -> u64 {
         let Some(range) = self.by_domain.get(target).cloned().filter(|range| !range.is_empty()) else { return 0 };
         for source in &mut self.sources {
-            source.look(domains, frames, cycle);
+            source.look(domains, cycle);
         }
         let mut refused = 0;
         for piece in &mut self.pieces[range] {
@@ -209,12 +209,9 @@ impl Copies {
 }
 
 impl Source {
-    fn look(&mut self, domains: &[Domain], frames: &[CyclicFrame], cycle: u64) {
-        let part_since = domains[self.domain].part_since(self.member);
-        let delivered = self.places.iter().map(|(frame, place)| {
-            let (all, part) = frames[*frame].delivered_at(*place);
-            if part >= part_since { all.max(part) } else { all }
-        });
+    fn look(&mut self, domains: &[Domain], cycle: u64) {
+        let domain = &domains[self.domain];
+        let delivered = self.deliveries.iter().map(|delivery| domain.came(self.member, *delivery));
         // Deliveries are counted from 1; 0 is none.
         let oldest = delivered.min().unwrap_or(0);
         self.age = if oldest == 0 { u64::MAX } else { (cycle + 1).saturating_sub(oldest) };
@@ -223,9 +220,11 @@ impl Source {
 
 fn find(domain: usize, subdevice: usize, domains: &[Domain], frames: &[CyclicFrame]) -> Option<Source> {
     let of = domains.get(domain)?;
-    let in_domain = of.frames().flat_map(|frame| frames[frame].places_of(subdevice).map(move |place| (frame, place)));
-    let member = of.member(subdevice)?;
-    Some(Source { domain, subdevice, member, places: in_domain.collect(), age: u64::MAX })
+    let mut deliveries: Vec<usize> = of.frames().flat_map(|frame| frames[frame].deliveries_of(subdevice)).collect();
+    // Each is there once per cycle that may be under way.
+    deliveries.sort_unstable();
+    deliveries.dedup();
+    Some(Source { domain, subdevice, member: of.member(subdevice)?, deliveries: deliveries.into(), age: u64::MAX })
 }
 
 /// Bytes of an image that an entry touches.

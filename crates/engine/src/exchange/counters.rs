@@ -13,8 +13,10 @@ pub struct CyclicCounters {
     pub lost: u64,
     /// Frames of which one copy of two came back in time, and not complete.
     pub half: u64,
-    /// Frames that were complete without their second copy, which did not come before the next cycle.
+    /// Frames that were complete without their second copy, which did not come before the frame was to leave again.
     pub copies_lost: u64,
+    /// Frames that came back behind a newer one of their domain: what it brought in was not overwritten.
+    pub overtaken: u64,
     /// Copies that came too late or twice.
     pub late: u64,
     /// Frames of ours that came back with other datagrams than were sent.
@@ -23,7 +25,7 @@ pub struct CyclicCounters {
     pub foreign: u64,
     /// Frames that are not EtherCAT.
     pub other: u64,
-    /// Domains that were due while their frames were still out.
+    /// Domains that were due while all their cycles were still under way.
     pub skipped: u64,
     /// Judgements that were not complete, summed over domains.
     pub incomplete: u64,

@@ -1,15 +1,14 @@
-//! A domain: image, judgement of its working counters, freshness of its SubDevices.
+//! A domain: image, judgement of its working counters, freshness of its SubDevices, and which of its cycles are under way.
 //!
 //! When all SubDevices answered, all inputs are new. When just those answered that are known to take part, theirs are
 //! new and those of the missing ones keep their last value. While it is not known who is missing, nothing is new.
 
-use alloc::boxed::Box;
-use alloc::vec;
 use alloc::vec::Vec;
 use core::ops::Range;
 use core::time::Duration;
 
 use super::flight::CyclicFrame;
+use super::image::Image;
 use crate::domain::{DomainState, DomainStatus, Freshness};
 use crate::layout::PlannedDomain;
 
@@ -18,63 +17,123 @@ use crate::layout::PlannedDomain;
 struct Member {
     subdevice: usize,
     takes_part: bool,
-    /// Cycle, plus one, before which deliveries to those taking part did not include this one.
+    /// Number of the delivery of the first datagram with inputs of it.
+    delivery: Option<usize>,
+    /// Flights that left earlier, by the cycle plus one, brought those taking part without this one.
     part_since: u64,
-    /// Cycle, plus one, of the last delivery before it last stopped taking part.
+    /// When, as a cycle plus one, what was delivered last before it stopped taking part had left.
     delivered_before: u64,
 }
 
 /// A domain of the exchange.
+///
+/// Its frames lie in sets, one per cycle that may be under way, each with all frames of a cycle. They take turns.
 #[derive(Debug)]
 pub struct Domain {
-    image: Box<[u8]>,
+    image: Image,
+    /// All sets.
     frames: Range<usize>,
-    expected: u32,
+    /// Frames of a set.
+    set: usize,
+    /// First frame of the oldest set that was queued and not judged.
+    oldest: usize,
+    /// First frame of the set that was queued last.
+    newest: usize,
+    /// Sets that were queued and not judged.
+    out: usize,
+    /// The newest set has not left since it was queued.
+    unsent: bool,
     timeout_ns: u64,
     members: Vec<Member>,
     status: DomainStatus,
-    queued: bool,
-    /// Its frames have not left since it was queued.
-    waiting: bool,
-    /// Cycle, plus one, of the last judgement.
+    /// When, as a cycle plus one, the flight that was judged last had left.
     judged: u64,
-    /// Changes on the board that were taken over.
-    followed: u32,
 }
 
 impl Domain {
-    pub(crate) fn new(planned: &PlannedDomain, frames: Range<usize>) -> Domain {
+    /// `first` is the place of the domain's frames among `frames`, which ends with them.
+    pub(crate) fn new(planned: &PlannedDomain, first: usize, frames: &[CyclicFrame]) -> Domain {
         let contributions =
             planned.frames.iter().flat_map(|frame| &frame.datagrams).flat_map(|datagram| &datagram.contributions);
         let expected = contributions.map(|(_, wkc)| u32::from(wkc.0)).sum();
         let mut subdevices: Vec<usize> = planned.areas.iter().map(|placed| placed.area.subdevice).collect();
         subdevices.sort_unstable();
         subdevices.dedup();
-        let member = |subdevice| Member { subdevice, takes_part: false, part_since: u64::MAX, delivered_before: 0 };
+        let set = planned.frames.len();
+        let one = &frames[first..first + set];
+        let member = |subdevice| Member {
+            subdevice,
+            takes_part: false,
+            delivery: one.iter().find_map(|frame| frame.deliveries_of(subdevice).next()),
+            part_since: u64::MAX,
+            delivered_before: 0,
+        };
         Domain {
-            image: vec![0; planned.image_len as usize].into_boxed_slice(),
-            frames,
-            expected,
-            timeout_ns: whole_ns(planned.period * 3 / 4),
+            image: Image::new(planned.image_len as usize, one.iter().map(CyclicFrame::datagrams).sum()),
+            frames: first..frames.len(),
+            set,
+            oldest: first,
+            newest: frames.len() - set,
+            out: 0,
+            unsent: false,
+            // Until shortly before its turn comes again.
+            timeout_ns: whole_ns(planned.period.saturating_mul(planned.under_way.into()) - planned.period / 4),
             members: subdevices.into_iter().map(member).collect(),
             status: DomainStatus { expected, ..DomainStatus::default() },
-            queued: false,
-            waiting: false,
             judged: 0,
-            followed: 0,
         }
     }
 
     pub(crate) fn image(&self) -> &[u8] {
-        &self.image
+        &self.image.bytes
     }
 
     pub(crate) fn image_mut(&mut self) -> &mut [u8] {
+        &mut self.image.bytes
+    }
+
+    /// Where inputs are delivered.
+    pub(crate) fn inputs_mut(&mut self) -> &mut Image {
         &mut self.image
     }
 
+    /// Places of the frames of all sets.
     pub(crate) fn frames(&self) -> Range<usize> {
         self.frames.clone()
+    }
+
+    /// Places of the frames that are to be judged next; `None` where all were judged.
+    pub(crate) fn oldest(&self) -> Option<Range<usize>> {
+        (self.out > 0).then(|| self.oldest..self.oldest + self.set)
+    }
+
+    /// Places of the frames that are to be queued next.
+    pub(crate) fn next(&self) -> Range<usize> {
+        let at = if self.unsent { self.newest } else { self.after(self.newest) };
+        at..at + self.set
+    }
+
+    /// The set after one, by their first frames.
+    fn after(&self, at: usize) -> usize {
+        let next = at + self.set;
+        if next == self.frames.end { self.frames.start } else { next }
+    }
+
+    /// Whether the frames of a cycle that left after the oldest one have all come back: on each link frames come in the
+    /// order in which they left.
+    pub(crate) fn is_overtaken(&self, frames: &[CyclicFrame]) -> bool {
+        let mut at = self.oldest;
+        (1..self.out).any(|_| {
+            at = self.after(at);
+            let left = !(self.unsent && at == self.newest);
+            left && !frames[at..at + self.set].iter().any(CyclicFrame::is_waiting)
+        })
+    }
+
+    /// Whether every set is out, and none has come back.
+    pub(crate) fn is_full(&self, frames: &[CyclicFrame]) -> bool {
+        let mut sets = frames[self.frames()].chunks(self.set.max(1));
+        self.set > 0 && sets.all(|set| set.iter().any(CyclicFrame::is_waiting))
     }
 
     pub(crate) fn timeout_ns(&self) -> u64 {
@@ -85,18 +144,31 @@ impl Domain {
         self.timeout_ns = whole_ns(timeout);
     }
 
-    pub(crate) fn was_queued(&self) -> bool {
-        self.queued
+    /// Puts the outputs into the frames of the next set, which begins there and is ready, to leave in this cycle.
+    #[inline(always)]
+    pub(crate) fn load(&mut self, next: usize, frames: &mut [CyclicFrame], cycle: u64) {
+        for frame in frames {
+            frame.load(&self.image.bytes, cycle);
+        }
+        if self.unsent {
+            if self.out == 0 {
+                (self.oldest, self.out) = (self.newest, 1);
+            }
+            return;
+        }
+        self.newest = next;
+        if self.out > 0 && next == self.oldest {
+            // Nobody judged it.
+            self.oldest = self.after(self.oldest);
+        } else {
+            self.out += 1;
+        }
+        self.unsent = true;
     }
 
-    /// Notes that it is queued; false where it was already, and its frames have not left.
-    pub(crate) fn note_queued(&mut self) -> bool {
-        self.queued = true;
-        !core::mem::replace(&mut self.waiting, true)
-    }
-
-    pub(crate) fn note_sent(&mut self) {
-        self.waiting = false;
+    /// Places of the frames that leave now; `None` where nothing was queued.
+    pub(crate) fn leave(&mut self) -> Option<Range<usize>> {
+        core::mem::take(&mut self.unsent).then(|| self.newest..self.newest + self.set)
     }
 
     pub(crate) fn count_skip(&mut self) {
@@ -112,44 +184,39 @@ impl Domain {
         DomainStatus { pending, ..self.status }
     }
 
-    /// Judges the flights since the last judgement: the sum of their working counters, and whether each datagram had
-    /// just what it should.
-    pub(crate) fn judge(&mut self, wkc: u32, complete: bool, cycle: u64) -> DomainStatus {
+    /// Judges the oldest cycle under way, which left in cycle `left` minus one: the sum of its working counters, and
+    /// whether each datagram had just what it should. True where it was complete like the one before; else
+    /// [`Domain::change_state`] is to follow.
+    pub(crate) fn judge(&mut self, wkc: u32, complete: bool, left: u64) -> bool {
+        self.status.wkc = wkc;
+        self.oldest = self.after(self.oldest);
+        self.out -= 1;
+        self.judged = left;
+        complete && wkc > 0 && self.status.state == DomainState::Complete
+    }
+
+    /// The state of what was judged. True where it is another one than before.
+    pub(crate) fn change_state(&mut self, wkc: u32, complete: bool) -> bool {
         let state = match (wkc, complete) {
-            (0, _) if self.expected > 0 => DomainState::Zero,
+            (0, _) if self.status.expected > 0 => DomainState::Zero,
             (_, true) => DomainState::Complete,
             (_, false) => DomainState::Incomplete,
         };
-        self.status = DomainStatus { wkc, expected: self.expected, state, ..self.status };
-        self.queued = false;
-        self.judged = cycle + 1;
-        self.status
+        core::mem::replace(&mut self.status.state, state) != state
     }
 
-    /// How many changes on the board were taken over.
-    pub(crate) fn followed(&self) -> u32 {
-        self.followed
-    }
-
-    /// Takes over who takes part, after so many `changes` on the board.
-    pub(crate) fn follow(
-        &mut self,
-        cycle: u64,
-        changes: u32,
-        takes_part: impl Fn(usize) -> bool,
-        frames: &[CyclicFrame],
-    ) {
-        self.followed = changes;
+    /// Takes over who takes part in what leaves from this cycle on.
+    pub(crate) fn follow(&mut self, cycle: u64, takes_part: impl Fn(usize) -> bool) {
         for member in &mut self.members {
             let now = takes_part(member.subdevice);
             if now == member.takes_part {
                 continue;
             }
             if now {
-                // A partial delivery of this very cycle came before the change.
-                member.part_since = cycle + 2;
+                // Flights that are under way do not bring it with those that take part.
+                member.part_since = cycle + 1;
             } else {
-                member.delivered_before = member.delivered(frames);
+                member.delivered_before = member.delivered(&self.image);
                 member.part_since = u64::MAX;
             }
             member.takes_part = now;
@@ -161,16 +228,18 @@ impl Domain {
         self.members.binary_search_by_key(&subdevice, |member| member.subdevice).ok()
     }
 
-    /// From when on deliveries to those that take part include a member: a cycle, plus one.
-    pub(crate) fn part_since(&self, member: usize) -> u64 {
-        self.members.get(member).map_or(u64::MAX, |member| member.part_since)
+    /// When inputs of a member came last in a datagram, by the number of its delivery: a cycle, plus one.
+    pub(crate) fn came(&self, member: usize, delivery: usize) -> u64 {
+        let (Some(member), Some(delivery)) = (self.members.get(member), self.image.deliveries.get(delivery)) else {
+            return 0;
+        };
+        let (all, part) = (delivery.all, delivery.part);
+        if part.left >= member.part_since { all.came.max(part.came) } else { all.came }
     }
 
-    pub(crate) fn freshness(&self, subdevice: usize, frames: &[CyclicFrame]) -> Freshness {
-        let Ok(at) = self.members.binary_search_by_key(&subdevice, |member| member.subdevice) else {
-            return Freshness::Never;
-        };
-        match self.members[at].delivered(frames) {
+    pub(crate) fn freshness(&self, subdevice: usize) -> Freshness {
+        let Some(member) = self.member(subdevice) else { return Freshness::Never };
+        match self.members[member].delivered(&self.image) {
             0 => Freshness::Never,
             delivered if delivered >= self.judged => Freshness::Fresh,
             delivered => Freshness::Stale { cycles: self.judged - delivered },
@@ -179,9 +248,10 @@ impl Domain {
 }
 
 impl Member {
-    /// Cycle, plus one, of the last delivery of this SubDevice's inputs.
-    fn delivered(&self, frames: &[CyclicFrame]) -> u64 {
-        let Some((all, part)) = frames.iter().find_map(|frame| frame.delivered(self.subdevice)) else { return 0 };
+    /// When, as a cycle plus one, what brought this SubDevice's inputs last had left.
+    fn delivered(&self, image: &Image) -> u64 {
+        let Some(delivery) = self.delivery.and_then(|number| image.deliveries.get(number)) else { return 0 };
+        let (all, part) = (delivery.all.left, delivery.part.left);
         let part = if part >= self.part_since { part } else { 0 };
         all.max(part).max(self.delivered_before)
     }

@@ -1,7 +1,8 @@
 //! A frame of a domain and its flights: load, depart, receive the copies, judge, deliver or give up.
 //!
-//! A domain's frame is out at most once, so its bytes are built once: a flight changes the frame id, the Idx bytes and
-//! the outputs. Reads leave as zeros and working counters as zero, because what comes back is never written here.
+//! What is here is out at most once, so its bytes are built once: a flight changes the frame id, the Idx bytes and the
+//! outputs. Reads leave as zeros and working counters as zero, because what comes back is never written here. A domain
+//! with several cycles under way has each of its frames as many times; they share image and deliveries.
 //! While no SubDevice could answer its process data, a frame leaves without it: see [`CyclicFrame::vacant`].
 
 use alloc::boxed::Box;
@@ -16,8 +17,11 @@ use ringcat_wire::frame::{FrameBuilder, MAX_FRAME, MacAddress};
 use ringcat_wire::register::map;
 
 use super::clocks::{CLOCK_DATA, Places, Seen};
+use super::counters::CyclicCounters;
+use super::image::{Image, Moment};
+use super::place::Place;
 use crate::board::Supervision;
-use crate::layout::{PlacedArea, PlannedDatagram, PlannedFrame, SUPERVISION_LEN};
+use crate::layout::{PlannedFrame, SUPERVISION_LEN};
 use crate::link::Link;
 use crate::ring::merge::or_into;
 use crate::ring::{Arrivals, Class, FrameCopy, Identity, Sequence};
@@ -36,51 +40,6 @@ pub(crate) enum Step {
     Corrupt,
 }
 
-/// Bytes that are copied between frame and image.
-#[derive(Clone, Copy, Debug)]
-struct Span {
-    frame_at: usize,
-    image_at: usize,
-    length: usize,
-}
-
-impl Span {
-    fn holds(&self, image: &Range<usize>) -> bool {
-        self.image_at <= image.start && image.end <= self.image_at + self.length
-    }
-}
-
-/// Inputs of one SubDevice within a datagram.
-#[derive(Debug)]
-struct Segment {
-    subdevice: usize,
-    span: Span,
-}
-
-/// A process data datagram.
-#[derive(Debug)]
-struct Place {
-    wkc_at: usize,
-    /// Sum over the copies received so far.
-    wkc: Wkc,
-    /// Working counter with all SubDevices.
-    expected: Wkc,
-    /// Working counter with those that take part now.
-    expected_part: Wkc,
-    /// All others are optional: their part is enough.
-    part_suffices: bool,
-    outputs: Span,
-    inputs: Span,
-    contributions: Box<[(usize, Wkc)]>,
-    segments: Box<[Segment]>,
-    /// Segments of those that take part, neighbours joined. Room for all of them is there from the beginning.
-    part: Vec<Span>,
-    /// Cycle of the last delivery of all inputs, plus one.
-    delivered_all: u64,
-    /// Cycle of the last delivery of those that took part, plus one.
-    delivered_part: u64,
-}
-
 /// A datagram's first eight bytes, as far as no controller changes them (facts 1.5): command, Idx, length, M bit.
 #[derive(Debug)]
 struct Header {
@@ -93,8 +52,6 @@ const HEADER_MASK: u64 = 0x0000_0000_0000_FFFF | !(CIRCULATING as u64) << 48;
 
 /// Data of the datagram of a frame that has nothing else to carry.
 const NOTHING_LEN: usize = 2;
-/// Offsets of what is in no frame lie behind this.
-const OUTSIDE: usize = 2 * MAX_FRAME;
 
 /// How far a flight is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -105,10 +62,14 @@ enum Stage {
     Waiting,
     /// Complete and delivered, the second copy is not in.
     Delivered,
+    /// Not complete at its deadline; what comes now is late.
+    GivenUp,
 }
 
 #[derive(Debug)]
 pub(crate) struct CyclicFrame {
+    /// Bits of the links on which copies leave.
+    all_links: u8,
     domain: usize,
     stage: Stage,
     sequence: Sequence,
@@ -116,6 +77,10 @@ pub(crate) struct CyclicFrame {
     index: u8,
     arrivals: Arrivals,
     deadline: Instant,
+    /// Cycle, plus one, in which it left.
+    left: u64,
+    /// Changes on the board that were taken over.
+    followed: u32,
     /// Sum of the working counters of process data over the copies received so far.
     wkc: u32,
     /// Every process data datagram has just what it should.
@@ -128,13 +93,22 @@ pub(crate) struct CyclicFrame {
     clocks_seen: Seen,
     headers: Box<[Header]>,
     places: Box<[Place]>,
+    /// Number of the first of them among the domain's deliveries.
+    first_delivery: usize,
     tx: Box<[u8]>,
     /// First copy of a flight that was not complete by itself.
     merged: Box<[u8]>,
 }
 
 impl CyclicFrame {
-    pub(crate) fn new(identity: &Identity, domain: usize, planned: &PlannedFrame) -> CyclicFrame {
+    /// `first_delivery`: number of process data datagrams in the frames of the domain before this one.
+    pub(crate) fn new(
+        identity: &Identity,
+        all_links: u8,
+        domain: usize,
+        planned: &PlannedFrame,
+        first_delivery: usize,
+    ) -> CyclicFrame {
         let mut buffer = vec![0; MAX_FRAME];
         let (mut places, mut headers_at, mut supervision_at, mut clocks) = (Vec::new(), Vec::new(), None, None);
         let mut length = 0;
@@ -175,12 +149,15 @@ impl CyclicFrame {
         }
         buffer.truncate(length);
         CyclicFrame {
+            all_links,
             domain,
             stage: Stage::Idle,
             sequence: Sequence::default(),
             index: 0,
             arrivals: Arrivals::default(),
             deadline: Instant::NEVER,
+            left: 0,
+            followed: 0,
             wkc: 0,
             complete: false,
             seen: Supervision::default(),
@@ -189,6 +166,7 @@ impl CyclicFrame {
             clocks_seen: Seen::default(),
             headers: headers_at.into_iter().map(|at| Header { at, sent: header_at(&buffer, at) }).collect(),
             places: places.into_boxed_slice(),
+            first_delivery,
             merged: vec![0; length].into_boxed_slice(),
             tx: buffer.into_boxed_slice(),
         }
@@ -199,17 +177,17 @@ impl CyclicFrame {
     pub(crate) fn vacant(&self, identity: &Identity, planned: &PlannedFrame) -> CyclicFrame {
         let bare = PlannedFrame { datagrams: Vec::new(), ..*planned };
         let places = self.places.iter().map(Place::outside).collect();
-        CyclicFrame { places, ..CyclicFrame::new(identity, self.domain, &bare) }
+        CyclicFrame { places, ..CyclicFrame::new(identity, self.all_links, self.domain, &bare, self.first_delivery) }
     }
 
     /// Whether it leaves without its process data.
     pub(crate) fn is_vacant(&self) -> bool {
-        self.places.iter().any(|place| place.wkc_at >= OUTSIDE)
+        self.places.iter().any(Place::is_outside)
     }
 
     /// Whether process data of a SubDevice that takes part belongs into the frame.
     pub(crate) fn concerns(&self, takes_part: impl Fn(usize) -> bool) -> bool {
-        self.places.iter().flat_map(|place| &place.contributions).any(|(subdevice, _)| takes_part(*subdevice))
+        self.places.iter().any(|place| place.concerns(&takes_part))
     }
 
     pub(crate) fn domain(&self) -> usize {
@@ -220,12 +198,32 @@ impl CyclicFrame {
         self.stage == Stage::Waiting
     }
 
+    /// Delivered without its second copy.
+    pub(crate) fn is_delivered(&self) -> bool {
+        self.stage == Stage::Delivered
+    }
+
     pub(crate) fn is_open(&self) -> bool {
         self.stage != Stage::Idle
     }
 
     pub(crate) fn overdue(&self, now: Instant) -> bool {
         now >= self.deadline
+    }
+
+    /// Until when it is waited for.
+    pub(crate) fn deadline(&self) -> Instant {
+        self.deadline
+    }
+
+    /// Whether it may be loaded: nothing is out, and so many changes to who takes part were taken over.
+    pub(crate) fn is_ready(&self, changes: u32) -> bool {
+        self.stage == Stage::Idle && self.followed == changes
+    }
+
+    /// Cycle, plus one, in which it left or is to leave.
+    pub(crate) fn left(&self) -> u64 {
+        self.left
     }
 
     pub(crate) fn arrivals(&self) -> Arrivals {
@@ -253,8 +251,9 @@ impl CyclicFrame {
         (self.supervision_at.is_some() && self.arrivals.arrived != 0).then_some(seen)
     }
 
-    /// Copies the outputs in and forgets the flight before.
-    pub(crate) fn load(&mut self, image: &[u8]) {
+    /// Copies the outputs in, to leave in this cycle, and forgets the flight before.
+    pub(crate) fn load(&mut self, image: &[u8], cycle: u64) {
+        self.left = cycle + 1;
         for place in &mut self.places {
             place.outputs.load(image, &mut self.tx);
             place.wkc = Wkc(0);
@@ -263,13 +262,20 @@ impl CyclicFrame {
         self.complete = self.places.is_empty();
         self.arrivals = Arrivals::default();
         self.seen = Supervision::default();
-        self.clocks_seen = Seen::default();
+        if self.clocks.is_some() {
+            self.clocks_seen = Seen::default();
+        }
     }
 
-    /// Where the datagrams of distributed clocks are, if there are any; the frame leaves now.
-    pub(crate) fn clocks_leave(&mut self, now: Instant) -> Option<Places> {
-        self.clocks_seen.sent_at = now;
+    /// Where the datagrams of distributed clocks are, if there are any.
+    pub(crate) fn clocks(&self) -> Option<Places> {
         self.clocks
+    }
+
+    /// The frame leaves now with these references.
+    pub(crate) fn clocks_leave(&mut self, now: Instant, references: u32) {
+        self.clocks_seen.sent_at = now;
+        self.clocks_seen.references = references;
     }
 
     /// What they brought back, if there are any.
@@ -305,11 +311,11 @@ impl CyclicFrame {
         copy: FrameCopy,
         arrived_on: Link,
         bytes: &[u8],
-        all_links: u8,
-        image: &mut [u8],
+        image: &mut Image,
         cycle: u64,
+        counters: &mut CyclicCounters,
     ) -> Step {
-        if self.stage == Stage::Idle || self.sequence != copy.sequence {
+        if matches!(self.stage, Stage::Idle | Stage::GivenUp) || self.sequence != copy.sequence {
             return Step::Late;
         }
         if !self.is_what_was_sent(bytes) {
@@ -319,22 +325,26 @@ impl CyclicFrame {
             return Step::Late;
         }
         let first = self.arrivals.arrived == copy.sent_on.bit();
-        let finished = self.arrivals.arrived & all_links == all_links;
+        let finished = self.arrivals.arrived & self.all_links == self.all_links;
         let complete = self.count(copy.sent_on, bytes);
         if self.stage == Stage::Waiting {
             if first && !(complete || finished) {
                 self.merged.copy_from_slice(&bytes[..self.tx.len()]);
                 return Step::Waiting;
             }
-            if first {
-                deliver(&mut self.places, bytes, image, cycle);
-            } else {
+            if !first {
                 self.merge(bytes);
-                deliver(&mut self.places, &self.merged, image, cycle);
+            }
+            let merged = if first { bytes } else { &self.merged };
+            let moment = Moment { left: self.left, came: cycle + 1 };
+            if moment.left >= image.newest {
+                self.deliver(merged, image, moment);
+            } else if !self.deliver_behind(merged, image, moment) {
+                counters.overtaken += 1;
             }
             self.stage = Stage::Delivered;
         } else if !complete {
-            self.withdraw(cycle);
+            self.withdraw(image, cycle);
         }
         if finished { Step::Finished } else { Step::Waiting }
     }
@@ -342,12 +352,41 @@ impl CyclicFrame {
     /// The second copy met somebody whom the first one had met: the ring closed meanwhile. What was delivered is not new
     /// any more.
     #[cold]
-    fn withdraw(&mut self, cycle: u64) {
-        for place in self.places.iter_mut().filter(|place| place.wkc.0 > place.expected.0) {
-            for delivered in [&mut place.delivered_all, &mut place.delivered_part] {
-                *delivered = (*delivered).min(cycle);
+    fn withdraw(&self, image: &mut Image, cycle: u64) {
+        for (place, delivery) in self.places.iter().zip(&mut image.deliveries[self.first_delivery..]) {
+            if place.wkc.0 > place.expected.0 {
+                delivery.withdraw(self.left, cycle);
             }
         }
+    }
+
+    /// Puts inputs into the image, of the newest flight of which anything came.
+    fn deliver(&self, bytes: &[u8], image: &mut Image, moment: Moment) {
+        image.newest = moment.left;
+        let Some(deliveries) = image.deliveries.get_mut(self.first_delivery..) else { return };
+        for (place, delivery) in self.places.iter().zip(deliveries) {
+            if place.inputs.length > 0 {
+                place.deliver(bytes, &mut image.bytes, delivery, moment);
+            }
+        }
+    }
+
+    /// The same of any flight: a newer one has perhaps not brought everything. False where newer inputs were there.
+    #[cold]
+    fn deliver_behind(&self, bytes: &[u8], image: &mut Image, moment: Moment) -> bool {
+        image.newest = image.newest.max(moment.left);
+        let mut newest = true;
+        for (place, delivery) in self.places.iter().zip(&mut image.deliveries[self.first_delivery..]) {
+            if place.inputs.length == 0 {
+                continue;
+            }
+            if delivery.is_newer_than(moment) {
+                newest = false;
+            } else {
+                place.deliver(bytes, &mut image.bytes, delivery, moment);
+            }
+        }
+        newest
     }
 
     fn is_what_was_sent(&self, bytes: &[u8]) -> bool {
@@ -356,13 +395,14 @@ impl CyclicFrame {
 
     /// Adds the working counters of a copy; true where every process data datagram has just what it should.
     fn count(&mut self, sent_on: Link, bytes: &[u8]) -> bool {
-        let mut complete = true;
+        let (mut complete, mut sum) = (true, self.wkc);
         for place in &mut self.places {
             let wkc = u16_at(bytes, place.wkc_at);
             place.wkc = place.wkc.plus(Wkc(wkc));
-            self.wkc += u32::from(wkc);
-            complete &= place.wkc == place.expected || (place.part_suffices && place.wkc == place.expected_part);
+            sum += u32::from(wkc);
+            complete &= place.is_complete();
         }
+        self.wkc = sum;
         self.complete = complete;
         if let Some(clocks) = self.clocks {
             clocks.read(&mut self.clocks_seen, sent_on, bytes);
@@ -393,145 +433,47 @@ impl CyclicFrame {
     }
 
     /// The deadline is over: delivers what is there. True where nothing at all came back.
-    pub(crate) fn give_up(&mut self, image: &mut [u8], cycle: u64) -> bool {
+    pub(crate) fn give_up(&mut self, image: &mut Image, cycle: u64) -> bool {
         if self.arrivals.arrived != 0 {
-            deliver(&mut self.places, &self.merged, image, cycle);
+            let moment = Moment { left: self.left, came: cycle + 1 };
+            self.deliver_behind(&self.merged, image, moment);
         }
-        self.stage = Stage::Delivered;
+        self.stage = Stage::GivenUp;
         self.arrivals.arrived == 0
     }
 
     /// Counts anew what those that take part add. Those that are optional may be missing.
-    pub(crate) fn recount(&mut self, takes_part: impl Fn(usize) -> bool, optional: impl Fn(usize) -> bool) {
+    pub(crate) fn recount(
+        &mut self,
+        changes: u32,
+        takes_part: impl Fn(usize) -> bool,
+        optional: impl Fn(usize) -> bool,
+    ) {
+        self.followed = changes;
         for place in &mut self.places {
-            let part = place.contributions.iter().filter(|(subdevice, _)| takes_part(*subdevice));
-            place.expected_part = part.fold(Wkc(0), |sum, (_, wkc)| sum.plus(*wkc));
-            place.part_suffices = place.contributions.iter().all(|(s, _)| takes_part(*s) || optional(*s));
-            place.part.clear();
-            for segment in place.segments.iter().filter(|segment| takes_part(segment.subdevice)) {
-                match place.part.last_mut() {
-                    Some(run) if run.reaches(&segment.span) => run.length += segment.span.length,
-                    _ => place.part.push(segment.span),
-                }
-            }
+            place.recount(&takes_part, &optional);
         }
     }
 
-    /// The datagrams with inputs of a SubDevice.
-    pub(crate) fn places_of(&self, subdevice: usize) -> impl Iterator<Item = usize> {
-        let has = move |place: &Place| place.segments.iter().any(|segment| segment.subdevice == subdevice);
-        self.places.iter().enumerate().filter(move |(_, place)| has(place)).map(|(number, _)| number)
+    /// The datagrams with inputs of a SubDevice, by their numbers among the domain's deliveries.
+    pub(crate) fn deliveries_of(&self, subdevice: usize) -> impl Iterator<Item = usize> {
+        let numbered = (self.first_delivery..).zip(&self.places);
+        numbered.filter(move |(_, place)| place.has_inputs_of(subdevice)).map(|(number, _)| number)
     }
 
-    /// As [`CyclicFrame::delivered`], of a datagram.
-    pub(crate) fn delivered_at(&self, place: usize) -> (u64, u64) {
-        self.places.get(place).map_or((0, 0), |place| (place.delivered_all, place.delivered_part))
+    /// Number of process data datagrams.
+    pub(crate) fn datagrams(&self) -> usize {
+        self.places.len()
     }
 
     /// The SubDevice in whose inputs bytes of the image lie, all of them.
     pub(crate) fn whose_inputs(&self, bytes: Range<usize>) -> Option<usize> {
-        let mut segments = self.places.iter().flat_map(|place| &place.segments);
-        segments.find(|segment| segment.span.holds(&bytes)).map(|segment| segment.subdevice)
+        self.places.iter().find_map(|place| place.whose_inputs(&bytes))
     }
 
     /// Whether bytes of the image lie in outputs, all of them.
     pub(crate) fn has_outputs(&self, bytes: Range<usize>) -> bool {
         self.places.iter().any(|place| place.outputs.holds(&bytes))
-    }
-
-    /// Cycles (plus one) in which all inputs that include this SubDevice's, and those of the ones taking part, were
-    /// last delivered; `None` where the SubDevice has no inputs in this frame.
-    pub(crate) fn delivered(&self, subdevice: usize) -> Option<(u64, u64)> {
-        let here = |place: &&Place| place.segments.iter().any(|segment| segment.subdevice == subdevice);
-        self.places.iter().find(here).map(|place| (place.delivered_all, place.delivered_part))
-    }
-}
-
-impl Place {
-    fn new(datagram: &PlannedDatagram, data_at: usize) -> Place {
-        let (outputs, inputs) = (usize::from(datagram.outputs), usize::from(datagram.inputs));
-        let start = datagram.image_offset as usize;
-        let span = |image_at: usize, length| Span { frame_at: data_at + image_at - start, image_at, length };
-        let segment = |placed: &PlacedArea| Segment {
-            subdevice: placed.area.subdevice,
-            span: span(placed.image_offset as usize, usize::from(placed.area.length)),
-        };
-        Place {
-            wkc_at: data_at + outputs + inputs,
-            wkc: Wkc(0),
-            expected: datagram.contributions.iter().fold(Wkc(0), |sum, (_, wkc)| sum.plus(*wkc)),
-            expected_part: Wkc(0),
-            part_suffices: false,
-            outputs: span(start, outputs),
-            inputs: span(start + outputs, inputs),
-            contributions: datagram.contributions.iter().copied().collect(),
-            part: Vec::with_capacity(datagram.input_areas.len()),
-            segments: datagram.input_areas.iter().map(segment).collect(),
-            delivered_all: 0,
-            delivered_part: 0,
-        }
-    }
-
-    /// The same place in a frame that does not carry it: nothing is copied from or to there, the working counter is zero.
-    fn outside(&self) -> Place {
-        let span = |span: Span| Span { frame_at: span.frame_at + OUTSIDE, ..span };
-        let segment = |segment: &Segment| Segment { span: span(segment.span), ..*segment };
-        Place {
-            wkc_at: self.wkc_at + OUTSIDE,
-            outputs: span(self.outputs),
-            inputs: span(self.inputs),
-            contributions: self.contributions.clone(),
-            part: Vec::with_capacity(self.part.capacity()),
-            segments: self.segments.iter().map(segment).collect(),
-            ..*self
-        }
-    }
-
-    /// All inputs where everybody answered; those of the ones that take part where just they answered; else nothing,
-    /// because it is not known whose bytes are zeros.
-    fn deliver(&mut self, bytes: &[u8], image: &mut [u8], cycle: u64) {
-        if self.inputs.length == 0 {
-            return;
-        }
-        if self.wkc == self.expected {
-            self.inputs.deliver(bytes, image);
-            self.delivered_all = cycle + 1;
-        } else if self.wkc == self.expected_part && self.wkc.0 > 0 {
-            for run in &self.part {
-                run.deliver(bytes, image);
-            }
-            self.delivered_part = cycle + 1;
-        }
-    }
-}
-
-impl Span {
-    /// Whether another one begins where this one ends.
-    fn reaches(&self, next: &Span) -> bool {
-        self.frame_at + self.length == next.frame_at && self.image_at + self.length == next.image_at
-    }
-
-    fn load(&self, image: &[u8], frame: &mut [u8]) {
-        copy(image, self.image_at, frame, self.frame_at, self.length);
-    }
-
-    fn deliver(&self, frame: &[u8], image: &mut [u8]) {
-        copy(frame, self.frame_at, image, self.image_at, self.length);
-    }
-}
-
-fn deliver(places: &mut [Place], bytes: &[u8], image: &mut [u8], cycle: u64) {
-    for place in places {
-        place.deliver(bytes, image, cycle);
-    }
-}
-
-fn copy(from: &[u8], from_at: usize, to: &mut [u8], to_at: usize, length: usize) {
-    if length > 0
-        && let Some(to) = to.get_mut(to_at..to_at + length)
-        && let Some(from) = from.get(from_at..from_at + length)
-    {
-        to.copy_from_slice(from);
     }
 }
 

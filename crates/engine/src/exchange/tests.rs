@@ -1,5 +1,8 @@
 //! Flights of a domain of three SubDevices with one byte out and one byte in each, on a ring.
 
+mod under_way;
+
+use core::time::Duration;
 use std::vec;
 
 use ringcat_wire::frame::MacAddress;
@@ -8,8 +11,10 @@ use ringcat_wire::source_address::MacCodec;
 use super::*;
 use crate::board::Supervision;
 use crate::direction::Direction;
+use crate::domain::Freshness;
 use crate::layout::{AreaSpec, DomainSpec};
 use crate::queue::{Consumer, queue};
+use crate::ring::RingState;
 use ringcat_wire::address::Wkc;
 
 const DOMAIN: DomainId = DomainId(0);
@@ -37,9 +42,13 @@ impl Ring {
     }
 
     fn with_optional(optional: Vec<bool>) -> Ring {
+        Ring::with(optional, 1)
+    }
+
+    fn with(optional: Vec<bool>, under_way: u8) -> Ring {
         let area = |subdevice, direction| AreaSpec { subdevice, sync_manager: direction as u8, direction, length: 1 };
         let areas = (0..3).flat_map(|s| [area(s, Direction::Outputs), area(s, Direction::Inputs)]).collect();
-        let spec = DomainSpec { period: PERIOD, lrw: true, areas };
+        let spec = DomainSpec { period: PERIOD, under_way, lrw: true, areas };
         let layout = Layout::new(&[spec], LinkSet::Ring, true).unwrap();
         let board = Arc::new(Board::new(3).with_optional(optional));
         (0..3).for_each(|subdevice| board.set_taking_part(subdevice, true));
@@ -331,7 +340,7 @@ fn without_its_optional_subdevice_a_domain_is_complete_and_without_another_it_is
 fn a_domain_that_is_queued_twice_leaves_once_with_its_last_outputs_and_keeps_no_other_from_leaving() {
     let spec = |subdevice| {
         let areas = vec![AreaSpec { subdevice, sync_manager: 0, direction: Direction::Outputs, length: 1 }];
-        DomainSpec { period: PERIOD, lrw: false, areas }
+        DomainSpec { period: PERIOD, under_way: 1, lrw: false, areas }
     };
     let layout = Layout::new(&[spec(0), spec(1)], LinkSet::Single, false).unwrap();
     let identity = Identity::new(MacCodec::FlagsFirst, MacAddress([0, 1, 2, 3, 4, 5]), None);
@@ -370,7 +379,7 @@ impl Starting {
     fn new() -> Starting {
         let spec = |subdevices: core::ops::Range<usize>, length| {
             let area = |subdevice| AreaSpec { subdevice, sync_manager: 3, direction: Direction::Inputs, length };
-            DomainSpec { period: PERIOD, lrw: true, areas: subdevices.map(area).collect() }
+            DomainSpec { period: PERIOD, under_way: 1, lrw: true, areas: subdevices.map(area).collect() }
         };
         let layout = Layout::new(&[spec(0..1, 4), spec(1..3, 1000)], LinkSet::Single, true).unwrap();
         let board = Arc::new(Board::new(3));

@@ -30,13 +30,28 @@ use crate::procedures::scan::{Scan, station_at};
 use crate::procedures::strangers::{Owners, Stranger};
 use crate::supervisor::Bus;
 
+/// Cycles of a domain that may be under way at once, at the most.
+pub const MAX_UNDER_WAY: u8 = 4;
+
 /// A domain as the application declares it.
 #[derive(Clone, Debug)]
 pub struct DomainConfig {
     /// How often the application will exchange it.
     pub period: Duration,
+    /// How many of its cycles may be under way at once, 1 to [`MAX_UNDER_WAY`]: 1 where frames come back within a period,
+    /// more where their way through segment and host takes longer. What it costs: inputs are as old as that way, so up to
+    /// as many periods, the answer to an input leaves as many cycles later, a lost cycle is noticed as much later (or
+    /// when the next one comes back), and each cycle under way has buffers of its own.
+    pub under_way: u8,
     /// What belongs to it.
     pub members: Vec<DomainMember>,
+}
+
+impl DomainConfig {
+    /// A domain with one cycle under way.
+    pub const fn new(period: Duration, members: Vec<DomainMember>) -> DomainConfig {
+        DomainConfig { period, under_way: 1, members }
+    }
 }
 
 /// A SubDevice's part in a domain.
@@ -77,6 +92,15 @@ pub enum Required {
 }
 
 impl Declaration {
+    /// The same, with so many cycles of every domain under way at once (see [`DomainConfig::under_way`]).
+    #[must_use]
+    pub fn with_under_way(mut self, cycles: u8) -> Declaration {
+        for domain in &mut self.domains {
+            domain.under_way = cycles;
+        }
+        self
+    }
+
     /// Declares a hot connect group. Returns its number, and the indices of its members, head first.
     pub fn add_group(&mut self, group: Group) -> (usize, Range<usize>) {
         let numbers = self.subdevices.iter().filter_map(|config| config.group);
@@ -144,6 +168,13 @@ pub enum ActivateError {
         /// The shortest period.
         shortest: Duration,
     },
+    /// No cycle of a domain may be under way, or more than [`MAX_UNDER_WAY`].
+    UnderWay {
+        /// Number of the domain.
+        domain: usize,
+        /// What was declared.
+        under_way: u8,
+    },
     /// LRW was asked for on two links. When the ring breaks, half of its SubDevices would be met by one copy and half by the
     /// other (facts CR-16, 9.2.2).
     LrwOnTwoLinks {
@@ -208,6 +239,9 @@ impl fmt::Display for ActivateError {
                 shortest.as_micros(),
                 period.as_micros()
             ),
+            ActivateError::UnderWay { domain, under_way } => {
+                write!(f, "domain {domain}: expected 1 to {MAX_UNDER_WAY} cycles under way, got {under_way}")
+            }
             ActivateError::LrwOnTwoLinks { domain, logical, length, subdevices } => write!(
                 f,
                 "domain {domain}: an LRW at logical address {logical} of {length} bytes for declarations {subdevices:?} \
@@ -323,6 +357,9 @@ pub(super) fn check(declaration: &Declaration) -> Result<(), ActivateError> {
         if period.is_zero() || period.as_nanos() % shortest.as_nanos() != 0 {
             return Err(ActivateError::Period { domain, period, shortest });
         }
+        if !(1..=MAX_UNDER_WAY).contains(&config.under_way) {
+            return Err(ActivateError::UnderWay { domain, under_way: config.under_way });
+        }
     }
     Ok(())
 }
@@ -330,7 +367,7 @@ pub(super) fn check(declaration: &Declaration) -> Result<(), ActivateError> {
 pub(super) fn domain_specs(declaration: &Declaration, plans: &[Areas]) -> Result<Vec<DomainSpec>, ActivateError> {
     let mut specs: Vec<DomainSpec> = Vec::new();
     for (domain, config) in declaration.domains.iter().enumerate() {
-        let mut spec = DomainSpec { period: config.period, lrw: true, areas: Vec::new() };
+        let mut spec = DomainSpec { period: config.period, under_way: config.under_way, lrw: true, areas: Vec::new() };
         for member in &config.members {
             let subdevice = member.subdevice;
             let Some(areas) = plans.get(subdevice) else {
@@ -384,7 +421,7 @@ const SUPERVISION_PERIOD: Duration = Duration::from_millis(10);
 /// An application without domains still has one for the supervision datagram.
 pub(super) fn with_domain(mut declaration: Declaration) -> Declaration {
     if declaration.domains.is_empty() {
-        declaration.domains.push(DomainConfig { period: SUPERVISION_PERIOD, members: Vec::new() });
+        declaration.domains.push(DomainConfig::new(SUPERVISION_PERIOD, Vec::new()));
     }
     declaration
 }

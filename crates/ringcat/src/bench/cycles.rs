@@ -1,14 +1,14 @@
 //! All SubDevices to OP, and process data as fast as the frames come back.
 //!
-//! A cycle is receive, judge, work, queue, send; it begins when all frames of the last one are back. The halves run as
-//! in `ringcat run`, the cycles in the thread that measures.
+//! A cycle is receive, judge, work, queue, send; it begins when all frames of the last one are back, or, with several
+//! cycles under way, those of the oldest one. The halves run as in `ringcat run`, the cycles in the thread that measures.
 
 use std::time::Duration;
 
 use clap::Args;
 use ringcat::packet::PacketLinks;
 use ringcat::{
-    AcyclicHalf, Application, Declaration, DomainId, DomainState, LastOutputs, MainDevice, Options, Scan,
+    AcyclicHalf, Application, Declaration, DomainId, LastOutputs, MAX_UNDER_WAY, MainDevice, Options, Scan,
     SupervisorThread, Trigger, automatic,
 };
 use ringcat_link::monotonic;
@@ -39,6 +39,9 @@ pub struct CyclesArguments {
     /// Cycles to be measured; 0 for the start-up alone.
     #[arg(long, value_name = "CYCLES", default_value = "20000", value_parser = clap::value_parser!(u32).range(0..=10_000_000))]
     count: u32,
+    /// Cycles that may be under way at once: one begins when the oldest is back.
+    #[arg(long, value_name = "CYCLES", default_value = "1", value_parser = clap::value_parser!(u8).range(1..=i64::from(MAX_UNDER_WAY)))]
+    under_way: u8,
     /// Leaves the supervision datagram out, for a comparison with those that send process data alone.
     #[arg(long)]
     unsupervised: bool,
@@ -57,7 +60,7 @@ pub fn run(arguments: &CyclesArguments) -> Result<bool, Failure> {
         let begin = monotonic::now_ns();
         let mut main_device = MainDevice::request(links, &options);
         let scan = main_device.scan()?;
-        let declaration = declare(&scan, begin);
+        let declaration = declare(&scan, begin).with_under_way(arguments.under_way);
         let mut application = main_device.activate(declaration).map_err(ringcat::Error::from)?;
         let incomplete = exchange(&mut application, arguments.count, begin)?;
         application.stop(LastOutputs::Zero, AlState::Init, STOP_LIMIT)?;
@@ -68,7 +71,7 @@ pub fn run(arguments: &CyclesArguments) -> Result<bool, Failure> {
         let supervisor = SupervisorThread::start(acyclic, &options, move || thread.prepare_supervisor())?;
         let _awake = thread.apply();
         let scan = supervisor.scan()?;
-        let declaration = declare(&scan, begin);
+        let declaration = declare(&scan, begin).with_under_way(arguments.under_way);
         let mut application = supervisor.activate(declaration, cyclic).map_err(ringcat::Error::from)?;
         let incomplete = exchange(&mut application, arguments.count, begin)?;
         application.stop(LastOutputs::Zero, AlState::Init, STOP_LIMIT)?;
@@ -101,38 +104,42 @@ fn exchange<H: AcyclicHalf>(
     application: &mut Application<PacketLinks, H>,
     count: u32,
     begin: u64,
-) -> Result<usize, Failure> {
+) -> Result<u64, Failure> {
     reach_op(application, begin)?;
     if count == 0 {
         return Ok(0);
     }
     application.set_trigger(Trigger::FramesReturned { at_least: Duration::ZERO });
-    let mut cycle = || {
-        application.cycle(|data| {
-            // The application's part: an output changes, and answers to an input.
-            if let [first, second, .., last] = data.image_mut(DOMAIN) {
-                *first = first.wrapping_add(1);
-                *second = *last;
-            }
-            (data.now().0, data.status(DOMAIN).state == DomainState::Complete)
-        })
-    };
     for _ in 0..WARM_UP {
-        cycle();
+        one_cycle(application);
     }
     let mut times_ns = Vec::with_capacity(count as usize);
-    let (first, _) = cycle();
-    let (mut last, mut incomplete) = (first, 0);
+    let before = application.cyclic_counters();
+    let first = one_cycle(application);
+    let mut last = first;
     for _ in 0..count {
-        let (now, complete) = cycle();
+        let now = one_cycle(application);
         times_ns.push(now - last);
-        incomplete += usize::from(!complete);
         last = now;
     }
+    let after = application.cyclic_counters();
+    // A cycle that was skipped sent nothing.
+    let incomplete = after.incomplete - before.incomplete + after.skipped - before.skipped;
     times_ns.sort_unstable();
     say!("cycles per second: {:.0}", f64::from(count) * 1e9 / (last - first) as f64);
     say!("cycle median: {:.2} us", quantile_us(&times_ns, 50));
     say!("cycle minimum: {:.2} us", quantile_us(&times_ns, 0));
     say!("incomplete: {incomplete} of {count}");
     Ok(incomplete)
+}
+
+/// A cycle with an application's part: an output changes, and answers to an input. Returns when it began, in nanoseconds.
+fn one_cycle<H: AcyclicHalf>(application: &mut Application<PacketLinks, H>) -> u64 {
+    application.cycle(|data| {
+        if let [first, second, .., last] = data.image_mut(DOMAIN) {
+            *first = first.wrapping_add(1);
+            *second = *last;
+        }
+        data.now().0
+    })
 }

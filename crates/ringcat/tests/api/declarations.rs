@@ -52,19 +52,24 @@ fn what_is_wrong_is_named_and_the_main_device_is_there_for_another_try() -> Resu
     let (main_device, good) = scanned(SEGMENT);
 
     let mut twice = good.clone();
-    twice
-        .domains
-        .push(DomainConfig { period: MILLISECOND, members: vec![DomainMember { subdevice: 1, sync_managers: None }] });
+    let again = vec![DomainMember { subdevice: 1, sync_managers: None }];
+    twice.domains.push(DomainConfig::new(MILLISECOND, again));
     let (text, main_device) = refusal(main_device, twice);
     assert_eq!(text, "activation: declaration 1: process data of SyncManager 0 is in domain 0 and in domain 1");
 
     let mut never = good.clone();
     never.domains[0].period = Duration::ZERO;
-    let (text, main_device) = refusal(main_device, never);
+    let (text, mut main_device) = refusal(main_device, never);
     assert!(text.contains("domain 0: expected a period that is a multiple of 0 us and not zero, got 0 us"), "{text}");
 
+    for under_way in [0, 5] {
+        let (text, again) = refusal(main_device, good.clone().with_under_way(under_way));
+        main_device = again;
+        assert_eq!(text, format!("activation: domain 0: expected 1 to 4 cycles under way, got {under_way}"));
+    }
+
     let mut odd = good.clone();
-    odd.domains.push(DomainConfig { period: Duration::from_micros(2500), members: Vec::new() });
+    odd.domains.push(DomainConfig::new(Duration::from_micros(2500), Vec::new()));
     let (text, main_device) = refusal(main_device, odd);
     assert!(text.contains("domain 1: expected a period that is a multiple of 1000 us"), "{text}");
 

@@ -31,7 +31,7 @@ struct Case {
 }
 
 const fn case(name: &'static str, subdevices: usize, bytes: u16, lrw: bool, cabling: Cabling) -> Case {
-    Case { name, spec: LoadSpec { subdevices, bytes, domains: 1, lrw, supervision: true, cabling } }
+    Case { name, spec: LoadSpec { subdevices, bytes, domains: 1, under_way: 1, lrw, supervision: true, cabling } }
 }
 
 const fn unsupervised(mut case: Case, name: &'static str) -> Case {

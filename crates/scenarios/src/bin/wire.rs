@@ -21,6 +21,8 @@ const TRIES: usize = 3;
 const BLOCKS: usize = 3;
 /// A cycle on the wire against a bare client, by the bytes of the frame.
 const ROUND_TRIP_BARS: [(&str, f64); 2] = [("60", 1.3), ("1500", 1.2)];
+/// How many cycles of ours may be under way. The others have one; so has the first of these.
+const UNDER_WAY: [&str; 3] = ["1", "2", "3"];
 /// Cycles of ours, of pysoem, and of ethercrab in a block.
 const CYCLES: [&str; 3] = ["50000", "20000", "3000"];
 /// Cycles for start-up alone.
@@ -193,23 +195,38 @@ impl Wire {
 
     fn cycles(&self, figures: &mut Figures) -> Tried<()> {
         let pace = "as-fast-as-possible";
-        let (mut ours, mut others) = (Vec::new(), Vec::new());
+        let (mut ours, mut others) = (UNDER_WAY.map(|_| Vec::new()), Vec::new());
         for _ in 0..BLOCKS {
-            let simulator = self.simulate(TERMINALS, pace)?;
-            ours.push(after(&self.bench(&["cycles", "--count", CYCLES[0]])?, "cycles per second")?);
-            drop(simulator);
+            for (under_way, ours) in UNDER_WAY.iter().zip(&mut ours) {
+                let _simulator = self.simulate(TERMINALS, pace)?;
+                let said = self.bench(&["cycles", "--count", CYCLES[0], "--under-way", under_way])?;
+                ours.push(after(&said, "cycles per second")?);
+                let incomplete = after(&said, "incomplete")?;
+                if incomplete > 0.0 {
+                    println!("  {under_way} under way: {incomplete} of {} cycles incomplete or skipped", CYCLES[0]);
+                }
+            }
             others.push(self.others(TERMINALS, pace, "per_second", [CYCLES[1], CYCLES[2]])?);
         }
-        // What else runs on the machine only takes cycles away: the best block of each is shown too, the medians count.
-        let most = |values: &mut dyn Iterator<Item = f64>| values.fold(0.0, f64::max);
-        let best = most(&mut others.iter().flatten().map(|(_, value)| *value));
-        let ratio = most(&mut ours.iter().copied()) / best;
-        let rows =
-            beside(figures, "cycles per second", "ours, one under way, supervision included", &mut ours, &others);
-        let (ours, others) = (rows[0], rows[1..].iter().copied().fold(0.0, f64::max));
-        // The simulator's own time per frame, which all share, is still most of a cycle (docs/FEATURES.md).
-        figures.goal_at_least("ours against the better of them", ours / others, CYCLES_BAR, "x");
-        figures.show("our best block against the best of them", format!("{ratio:.2} x"));
+        let title = |under_way: &str| format!("ours, {under_way} under way, supervision included");
+        let [serial, several @ ..] = &mut ours;
+        let rows = beside(figures, "cycles per second", &title(UNDER_WAY[0]), serial, &others);
+        let (serial, others) = (rows[0], rows[1..].iter().copied().fold(0.0, f64::max));
+        // What else runs on the machine only takes cycles away, from each alike in the long run: medians count.
+        figures.show("one under way against the better of them", format!("{:.2} x", serial / others));
+        let mut best = (serial, UNDER_WAY[0]);
+        for (under_way, ours) in UNDER_WAY[1..].iter().zip(several) {
+            let median = beside(figures, "cycles per second", &title(under_way), ours, &[])[0];
+            figures.show(
+                &format!("{under_way} under way against the better of them"),
+                format!("{:.2} x", median / others),
+            );
+            if median > best.0 {
+                best = (median, under_way);
+            }
+        }
+        let name = format!("ours with {} under way against the better of them", best.1);
+        figures.goal_at_least(&name, best.0 / others, CYCLES_BAR, "x");
         Ok(())
     }
 

@@ -22,8 +22,8 @@ fn world(seed: u64) -> World {
         let mut declaration = automatic(&scan.subdevices, CYCLE);
         let member = |subdevice| DomainMember { subdevice, sync_managers: None };
         declaration.domains = vec![
-            DomainConfig { period: CYCLE, members: vec![member(FAST_IN), member(FAST_OUT), member(OUT_16)] },
-            DomainConfig { period: 4 * CYCLE, members: vec![member(SLOW_IN)] },
+            DomainConfig::new(CYCLE, vec![member(FAST_IN), member(FAST_OUT), member(OUT_16)]),
+            DomainConfig::new(4 * CYCLE, vec![member(SLOW_IN)]),
         ];
         declaration
     };

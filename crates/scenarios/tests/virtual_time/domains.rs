@@ -47,12 +47,10 @@ fn in_turn(scan: &Scan, periods: &[u32]) -> Declaration {
     declaration.domains = periods
         .iter()
         .enumerate()
-        .map(|(number, period)| DomainConfig {
-            period: *period * CYCLE,
-            members: (number..scan.subdevices.len())
-                .step_by(periods.len())
-                .map(|subdevice| DomainMember { subdevice, sync_managers: None })
-                .collect(),
+        .map(|(number, period)| {
+            let members = (number..scan.subdevices.len()).step_by(periods.len());
+            let members = members.map(|subdevice| DomainMember { subdevice, sync_managers: None });
+            DomainConfig::new(*period * CYCLE, members.collect())
         })
         .collect();
     declaration
@@ -91,8 +89,8 @@ fn outputs_and_inputs_of_one_subdevice_may_be_in_different_domains() {
             sync_managers: (!sync_managers.is_empty()).then(|| sync_managers.to_vec()),
         };
         declaration.domains = vec![
-            DomainConfig { period: CYCLE, members: vec![member(0, &[0]), member(1, &[2])] },
-            DomainConfig { period: 2 * CYCLE, members: vec![member(0, &[1]), member(1, &[3]), member(2, &[])] },
+            DomainConfig::new(CYCLE, vec![member(0, &[0]), member(1, &[2])]),
+            DomainConfig::new(2 * CYCLE, vec![member(0, &[1]), member(1, &[3]), member(2, &[])]),
         ];
         declaration
     };

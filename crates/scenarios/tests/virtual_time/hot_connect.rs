@@ -137,7 +137,7 @@ fn a_group_that_is_torn_off_costs_the_others_nothing_where_it_has_a_domain_of_it
     let declare = |scan: &Scan| {
         let mut declaration = declare(scan);
         let members = declaration.domains[0].members.split_off(BASE.len());
-        declaration.domains.push(DomainConfig { period: CYCLE, members });
+        declaration.domains.push(DomainConfig::new(CYCLE, members));
         declaration
     };
     let mut world = World::with(4, network, &Options::default(), declare).expect("scan and activation");

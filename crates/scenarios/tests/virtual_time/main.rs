@@ -48,3 +48,4 @@ mod startup_commands;
 mod states;
 mod strangers;
 mod topologies;
+mod under_way;
