@@ -1,6 +1,7 @@
 //! Distributed clocks as arithmetic: what follows from latched times, and what to do about it (facts 7).
 //!
-//! * [`delay`]: propagation delays of any tree;
+//! * [`wiring`]: the way of a frame through the segment;
+//! * [`delay`]: propagation delays along it, with what is known about [`cables`];
 //! * [`measurement`]: the mean of several measurements, corrected for the drift of each clock;
 //! * [`start`]: when SYNC signals begin;
 //! * [`follow`]: making a cycle of the host follow the reference clock.
@@ -8,15 +9,19 @@
 //! Nothing here talks to the bus: [`crate::procedures::clocks`] does, and the cyclic datagrams are in
 //! [`crate::exchange`].
 
+pub mod cables;
 pub mod delay;
 pub mod follow;
 pub mod measurement;
 pub mod start;
+pub mod wiring;
 
-pub use delay::{Delays, PortTimes, TREES, propagation};
+pub use cables::Cables;
+pub use delay::{Delays, PortTimes, Segment};
 pub use follow::{Follower, phase_error};
 pub use measurement::{Latched, Measurements};
 pub use start::first_pulse;
+pub use wiring::Wiring;
 
 /// Fractional bits of times in nanoseconds here: halves add up over hundreds of hops.
 pub const FRACTION: u32 = 8;

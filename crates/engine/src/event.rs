@@ -306,7 +306,14 @@ pub enum Event {
         /// Where in the scan; `None` where nobody is left.
         position: Option<Position>,
     },
-    /// Distributed clocks could not be set up; it is tried again.
+    /// The segment has changed, and propagation delays with it (facts 7.1).
+    DelaysChanged {
+        /// Clocks with another delay.
+        clocks: usize,
+        /// Largest change in nanoseconds.
+        largest_ns: u32,
+    },
+    /// Distributed clocks could not be set up or measured; it is tried again.
     ClocksFailed {
         /// What and why.
         reason: String,

@@ -63,6 +63,7 @@ use crate::ring::Identity;
 use crate::ring_status::{Cable, CableErrors, LinkStatus, Redundancy, RingStatus, cables};
 use crate::supervisor::{AcyclicCounters, Bus, Received, Supervisor};
 use crate::time::Instant;
+use crate::topology::Topology;
 use declaration::{
     check_clocks, check_lrw, domain_specs, match_declaration, members, plan_all, report_oddities, with_domain,
 };
@@ -275,7 +276,7 @@ impl MainDevice {
             layout.add_clocks().map_err(ActivateError::Layout)?;
         }
         let members = members(&bus, declaration, found, &layout)?;
-        let clocks = clocks_of(clock_config.clone(), &scan, &members);
+        let clocks = clocks_of(clock_config.clone(), &scan, &topology, &members);
         let directory = Directory::new(&plans, &layout);
         report_oddities(&bus, &members, &layout);
         let optional = members.iter().map(|member| member.config.optional).collect();
@@ -307,6 +308,10 @@ impl MainDevice {
                     bus_shift: config.bus_shift,
                     sync_window_ns: config.sync_window_ns,
                 });
+                // Whoever answers while clocks are measured has not come back: its configuration begins afterwards.
+                for member in fleet.access().members.iter_mut().filter(|member| member.setup.is_some()) {
+                    member.phase = Phase::Configuring;
+                }
                 let (bus, fleet) = (bus.clone(), fleet.clone());
                 // Receive times are latched before other frames are on the way (facts 7.1).
                 self.supervisor.spawn(async move {
@@ -519,13 +524,13 @@ impl MainDevice {
 }
 
 /// Clocks of everybody that was scanned.
-fn clocks_of(config: Option<ClockConfig>, scan: &Scan, members: &[Member]) -> SharedClocks {
+fn clocks_of(config: Option<ClockConfig>, scan: &Scan, topology: &Topology, members: &[Member]) -> SharedClocks {
     let member = |info: &SubDeviceInfo| {
         let index = members.iter().position(|member| member.station == info.station)?;
         Some((index, members[index].config.sync.is_some()))
     };
     let scanned: &[SubDeviceInfo] = if config.is_some() { &scan.subdevices } else { &[] };
-    SharedClocks::new(config, scanned, member)
+    SharedClocks::new(config, scanned, topology, member)
 }
 
 impl From<Phase> for SubDeviceState {

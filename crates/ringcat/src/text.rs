@@ -175,6 +175,9 @@ pub fn describe(event: &Event, names: &Names) -> String {
             format!("the clock of position {position} is the reference")
         }
         Event::ReferenceClock { position: None } => "no clock is left that could be the reference".into(),
+        Event::DelaysChanged { clocks, largest_ns } => {
+            format!("propagation delays of {clocks} clocks have changed, by {largest_ns} ns at most")
+        }
         Event::ClocksFailed { reason } => format!("distributed clocks: {reason}"),
         Event::SyncWindow { inside: true, spread_ns } => format!("clocks came into their window: {spread_ns} ns"),
         Event::SyncWindow { inside: false, spread_ns } => format!("clocks left their window: {spread_ns} ns"),

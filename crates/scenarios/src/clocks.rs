@@ -12,7 +12,7 @@ use ringcat_sim::network::{Network, NetworkOptions};
 use ringcat_wire::register::{PortKind, map};
 use ringcat_wire::sii::DcMode;
 
-use crate::segments::describe;
+use crate::segments::{describe, devices};
 use crate::world::{CYCLE, World};
 
 /// System time at the start of scenarios: not a round number, and more than 32 bits.
@@ -119,4 +119,30 @@ pub fn largest_spread(world: &mut World, devices: &[usize], cycles: u64) -> i64 
 pub fn delay(network: &Network, device: usize) -> u32 {
     let bytes = network.device(DeviceIndex(device)).controller.register(map::DC_SYSTEM_TIME_DELAY, 4);
     bytes.first_chunk().map_or(0, |bytes| u32::from_le_bytes(*bytes))
+}
+
+/// Devices with clocks and four ports each, on cables of different lengths.
+///
+/// # Panics
+/// When the cables do not fit.
+pub fn wired(mut descriptions: Vec<DeviceDescription>, cables: &[(Endpoint, Endpoint)]) -> Network {
+    for description in &mut descriptions {
+        description.ports = [PortKind::Mii; 4];
+    }
+    let delay = |number: usize| Duration::from_nanos(50 + 70 * (number as u64 * 5 % 11));
+    let cable = |(number, (a, b)): (usize, &(Endpoint, Endpoint))| CableSpec { a: *a, b: *b, delay: delay(number) };
+    let cables = cables.iter().enumerate().map(cable).collect();
+    Network::new(devices(descriptions), cables, NetworkOptions::default()).expect("the cables fit")
+}
+
+/// Runs so many cycles; the largest spread of each of these groups meanwhile.
+pub fn watch<const N: usize>(world: &mut World, groups: [&[usize]; N], cycles: u64) -> [i64; N] {
+    let mut worst = [0; N];
+    for _ in 0..cycles {
+        world.cycle();
+        for (worst, group) in worst.iter_mut().zip(groups) {
+            *worst = (*worst).max(spread(world.network(), group));
+        }
+    }
+    worst
 }

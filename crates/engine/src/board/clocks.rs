@@ -49,6 +49,10 @@ pub struct ClockWords {
     spread: AtomicU32,
     is_window_watched: AtomicBool,
     spread_count: AtomicU32,
+    are_ports_guarded: AtomicBool,
+    /// How often the exchange stopped handing out a time, and how many of these times the supervisor has answered.
+    holds: AtomicU32,
+    answered: AtomicU32,
 }
 
 const LEADER: u64 = 1 << 32;
@@ -71,6 +75,36 @@ impl ClockWords {
         let references =
             References { main: station(word), redundant: station(word >> 16), redundant_leads: word & LEADER != 0 };
         (references, (word >> CHANGE) as u32)
+    }
+
+    /// From now on the exchange stops handing out a time when ports have changed.
+    pub(crate) fn guard_ports(&self) {
+        self.are_ports_guarded.store(true, Ordering::Relaxed);
+    }
+
+    pub(crate) fn are_ports_guarded(&self) -> bool {
+        self.are_ports_guarded.load(Ordering::Relaxed)
+    }
+
+    /// No time is handed out until the supervisor has answered that.
+    pub(crate) fn hold(&self) {
+        let holds = self.holds.load(Ordering::Relaxed);
+        self.holds.store(holds.wrapping_add(1), Ordering::Release);
+    }
+
+    /// How often that was.
+    pub(crate) fn holds(&self) -> u32 {
+        self.holds.load(Ordering::Acquire)
+    }
+
+    /// What has changed up to the hold of that number is known.
+    pub(crate) fn answer(&self, holds: u32) {
+        self.answered.store(holds, Ordering::Release);
+    }
+
+    /// Whether nobody is to be told a time.
+    pub(crate) fn is_held(&self) -> bool {
+        self.holds() != self.answered.load(Ordering::Acquire)
     }
 
     /// From now on the exchange reports when the differences come into their window and leave it.

@@ -1,38 +1,43 @@
-//! Propagation delays of any tree, from the times at which one frame came in at each port (facts 7.1).
+//! Propagation delays of any segment, from the times at which one frame came in at each port (facts 7.1).
 //!
-//! The frame's way through the tree is followed port by port. Between two arrivals at a SubDevice with a clock lies a
+//! The frame's way is followed port by port ([`Wiring::way`]). Between two arrivals at a SubDevice with a clock lies a
 //! branch: what its clock says the branch took, less what the SubDevices in the branch say that they took, is the time
-//! on cables, and that is shared evenly among them. SubDevices without a clock are part of the cable.
+//! on cables. What is known about cables ([`Cables`]) counts, and the rest is shared evenly among the others. SubDevices
+//! without a clock are part of the cable.
 
 use alloc::vec;
 use alloc::vec::Vec;
 
-use super::round;
-use crate::topology::{PortOf, Topology};
+use ringcat_wire::address::StationAddress;
 
-/// Order in which a frame passes the ports; the processing unit is behind port 0 (facts 2.1).
-const TRAVEL: [u8; 4] = [0, 3, 1, 2];
-/// So many open ports are looked at for the one that leads to the redundant link; it is the last one.
-const OPEN_PORTS: usize = 16;
-/// Frames of the main and of the redundant link: in a broken ring each has a tree of its own.
-pub const TREES: usize = 2;
+use super::cables::{Cables, End};
+use super::wiring::{Arrival, TREES, Wiring, processed_in};
+use super::{FRACTION, round};
+use crate::topology::PortOf;
+
+/// Longer than this no frame is on its way: a thousand SubDevices take 2 ms.
+const MOST_NS: i64 = 20_000_000;
 
 /// Times at which the frame came in at port 0..3 after it came in at the port of entry, with fraction
 /// ([`super::FRACTION`]). Those of ports that it did not come in at say nothing.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct PortTimes(pub [i64; 4]);
 
-/// What each SubDevice is away from where the frame came into its tree.
+/// What each SubDevice is away from where the frame came in.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Delays {
     /// By position, to the processing unit, with fraction; `None` without a clock or without times.
     pub units: Vec<Option<i64>>,
-    /// By position, the tree: 0 for the main link, 1 for the redundant one.
+    /// By position, whose frame it processes: 0 for the main link, 1 for the redundant one.
     pub trees: Vec<usize>,
+    /// Some way between two clocks is neither measured nor remembered.
+    pub is_guessed: bool,
+    /// Some time between two arrivals cannot be: the frame has taken another way.
+    pub is_implausible: bool,
 }
 
 impl Delays {
-    /// Nanoseconds from the reference's processing unit to that of a SubDevice of the same tree; negative where the
+    /// Nanoseconds from the reference's processing unit to that of a SubDevice of the same link; negative where the
     /// frame meets that one first.
     pub fn between(&self, reference: usize, node: usize) -> Option<i64> {
         let of = |node: usize| self.units.get(node).copied().flatten();
@@ -41,94 +46,51 @@ impl Delays {
     }
 }
 
-/// Where frames come in: the SubDevice and its port, by tree.
-pub fn entries(topology: &Topology) -> [Option<(usize, u8)>; TREES] {
-    let root = |mut range: core::ops::Range<usize>| range.find(|node| topology.nodes[*node].parent.is_none());
-    let (count, main) = (topology.nodes.len(), topology.main_count.min(topology.nodes.len()));
-    let first = root(0..main).or_else(|| root(0..count).filter(|_| main == 0 && topology.redundant_head.is_none()));
-    let at_main = first.map(|node| (node, topology.nodes[node].entry_port));
-    // Frames of the redundant link come in where the trunk of its tree leads out of it.
-    let at_redundant = topology.redundant_head.and_then(|head| {
-        let leads_out = |at: &&PortOf| at.node >= main && tree_root(topology, at.node) == head;
-        topology.open_ports.iter().rev().take(OPEN_PORTS).find(leads_out).map(|at| (at.node, at.port))
-    });
-    [at_main, at_redundant]
+/// What a measurement is about.
+#[derive(Clone, Copy, Debug)]
+pub struct Segment<'a> {
+    /// Who is connected to whom.
+    pub wiring: &'a Wiring,
+    /// Station addresses by position.
+    pub stations: &'a [StationAddress],
+    /// What a passage through a processing unit takes longer than one that only forwards (tDiff of facts 7.1), with
+    /// fraction.
+    pub unit_takes: i64,
 }
 
-fn tree_root(topology: &Topology, mut node: usize) -> usize {
-    for _ in 0..topology.nodes.len() {
-        match topology.nodes[node].parent {
-            Some((parent, _)) => node = parent,
-            None => break,
+impl Segment<'_> {
+    fn end(&self, at: PortOf) -> Option<End> {
+        Some((*self.stations.get(at.node)?, at.port))
+    }
+
+    /// Notes which cables are there.
+    pub fn see(&self, cables: &mut Cables) {
+        cables.see(self.wiring.cables().filter_map(|(near, far)| Some((self.end(near)?, self.end(far)?))));
+    }
+
+    /// Propagation delays. `times` by position, on one clock (see [`super::Measurements::mean`]); `None` without a clock.
+    /// What was measured of cables is learned.
+    pub fn propagation(&self, times: &[Option<PortTimes>], cables: &mut Cables) -> Delays {
+        let count = self.wiring.count();
+        let mut delays =
+            Delays { units: vec![None; count], trees: vec![0; count], is_guessed: false, is_implausible: false };
+        for tree in 0..TREES {
+            let way = self.wiring.way(tree);
+            let processed = processed_in(&way, count);
+            let is_here = |node: &usize| processed[*node] && delays.units[*node].is_none();
+            let here: Vec<bool> = (0..count).map(|node| is_here(&node)).collect();
+            here.iter().zip(&mut delays.trees).filter(|(is, _)| **is).for_each(|(_, of)| *of = tree);
+            let clock = |node: usize| times.get(node).copied().flatten().filter(|_| here[node]);
+            Walk::new(self, &way, &clock).run(&mut delays, cables);
         }
+        delays
     }
-    node
-}
-
-/// The port at which frames come in, by position.
-pub fn entry_ports(topology: &Topology) -> Vec<u8> {
-    let mut ports: Vec<Option<u8>> = vec![None; topology.nodes.len()];
-    for (node, entry) in entries(topology).into_iter().flatten() {
-        for (node, port) in way(topology, node, entry) {
-            ports[node].get_or_insert(port);
-        }
-    }
-    ports.iter().zip(&topology.nodes).map(|(port, node)| port.unwrap_or(node.entry_port)).collect()
-}
-
-/// Arrivals of a frame in order: SubDevice and port.
-fn way(topology: &Topology, node: usize, entry: u8) -> Vec<(usize, u8)> {
-    let limit = 4 * topology.nodes.len() + 4;
-    let mut arrivals = vec![(node, entry)];
-    let (mut node, mut port) = (node, entry);
-    while arrivals.len() < limit {
-        let at = TRAVEL.iter().position(|p| *p == port).unwrap_or(0);
-        let onwards = (1..=4).map(|step| TRAVEL[(at + step) % 4]);
-        let back_out = |p: u8| arrivals[0] == (node, p);
-        let mut next = None;
-        for out in onwards {
-            if back_out(out) {
-                return arrivals;
-            }
-            if let Some(far) = neighbour(topology, node, out) {
-                next = Some(far);
-                break;
-            }
-        }
-        let Some(far) = next else { break };
-        (node, port) = far;
-        arrivals.push(far);
-    }
-    arrivals
-}
-
-/// Who is at the other end of a port's cable.
-fn neighbour(topology: &Topology, node: usize, port: u8) -> Option<(usize, u8)> {
-    let here = topology.nodes.get(node)?;
-    if port == here.entry_port {
-        return here.parent;
-    }
-    let child = (*here.children.get(usize::from(port))?)?;
-    Some((child, topology.nodes.get(child)?.entry_port))
-}
-
-/// Propagation delays. `times` by position, on one clock (see [`super::Measurements::mean`]); `None` without a clock.
-pub fn propagation(topology: &Topology, times: &[Option<PortTimes>]) -> Delays {
-    let count = topology.nodes.len();
-    let mut delays = Delays { units: vec![None; count], trees: vec![0; count] };
-    for (tree, entry) in entries(topology).into_iter().enumerate() {
-        let Some((node, port)) = entry else { continue };
-        let way = way(topology, node, port);
-        way.iter().for_each(|(node, _)| delays.trees[*node] = tree);
-        let clock = |node: usize| times.get(node).copied().flatten();
-        Walk::new(&way, count, &clock).run(&mut delays.units);
-    }
-    delays
 }
 
 /// The arrivals of one frame, with what clocks say about them.
 struct Walk<'a, C: Fn(usize) -> Option<PortTimes>> {
-    way: &'a [(usize, u8)],
+    segment: &'a Segment<'a>,
+    way: &'a [Arrival],
     clock: &'a C,
     /// Place of each SubDevice's last arrival.
     last: Vec<usize>,
@@ -136,98 +98,164 @@ struct Walk<'a, C: Fn(usize) -> Option<PortTimes>> {
     next: Vec<Option<usize>>,
 }
 
+/// From one arrival at a clock to the next, with nothing but cables and SubDevices without a clock in between.
+#[derive(Clone, Copy, Debug)]
+struct Gap {
+    from: usize,
+    to: usize,
+    /// What its cables are known to take.
+    known: Option<i64>,
+    /// What the SubDevice at its end takes for what lies behind it.
+    span: i64,
+}
+
+impl Gap {
+    const fn hops(&self) -> i64 {
+        (self.to - self.from) as i64
+    }
+}
+
 impl<'a, C: Fn(usize) -> Option<PortTimes>> Walk<'a, C> {
-    fn new(way: &'a [(usize, u8)], count: usize, clock: &'a C) -> Walk<'a, C> {
+    fn new(segment: &'a Segment<'a>, way: &'a [Arrival], clock: &'a C) -> Walk<'a, C> {
+        let count = segment.wiring.count();
         let mut last = vec![0; count];
         let mut seen: Vec<Option<usize>> = vec![None; count];
         let mut next = vec![None; way.len()];
-        for (place, (node, _)) in way.iter().enumerate() {
-            if let Some(before) = seen[*node].replace(place) {
+        for (place, arrival) in way.iter().enumerate() {
+            if let Some(before) = seen[arrival.at.node].replace(place) {
                 next[before] = Some(place);
             }
-            last[*node] = place;
+            last[arrival.at.node] = place;
         }
-        Walk { way, clock, last, next }
+        Walk { segment, way, clock, last, next }
     }
 
-    fn run(&self, units: &mut [Option<i64>]) {
-        let mut entered = vec![None; units.len()];
+    fn run(&self, delays: &mut Delays, cables: &mut Cables) {
+        let mut entered = vec![None; delays.units.len()];
         // What comes before the first clock, and between the branches in front of it, nobody measures.
-        self.branch(0, self.way.len(), None, 0, &mut entered);
+        delays.is_guessed |= self.trunk(cables, &mut entered);
         for place in 0..self.way.len() {
-            let (node, port) = self.way[place];
+            let PortOf { node, port } = self.way[place].at;
             let (Some(delay), Some(times)) = (entered[node], (self.clock)(node)) else { continue };
-            let is_first = units[node].is_none();
+            let is_first = delays.units[node].is_none();
             if is_first {
-                units[node] = Some(delay + self.to_unit(place, &times));
+                delays.units[node] = Some(delay + self.to_unit(place, &times));
             }
             if let Some(next) = self.next[place] {
                 let at = |port: u8| times.0[usize::from(port & 3)];
                 let from = if is_first { 0 } else { at(port) };
-                let took = at(self.way[next].1) - from;
-                self.branch(place + 1, next, Some(took), delay + from, &mut entered);
+                let took = at(self.way[next].at.port) - from;
+                delays.is_implausible |= !(0..=MOST_NS << FRACTION).contains(&took);
+                self.branch(place, next, took, delay + from, cables, &mut entered);
             }
         }
     }
 
-    /// From the port of entry to the processing unit: it is behind the arrival at port 0, or where port 0 is closed,
-    /// behind the last arrival before the frame is looped there.
+    /// From the port of entry to the processing unit.
     fn to_unit(&self, first: usize, times: &PortTimes) -> i64 {
-        let (_, entry) = self.way[first];
-        if entry == 0 {
-            return 0;
+        let mut place = first;
+        while !self.way[place].processed {
+            let Some(next) = self.next[place] else { break };
+            place = next;
         }
-        let order = |port: u8| TRAVEL.iter().position(|p| *p == port).unwrap_or(0);
-        let (mut place, mut port) = (first, entry);
-        while let Some(next) = self.next[place] {
-            let (_, to) = self.way[next];
-            // Having gone round past port 0 without an arrival there, the frame was looped.
-            if to != 0 && order(to) <= order(port) {
-                break;
-            }
-            (place, port) = (next, to);
-            if to == 0 {
-                break;
-            }
-        }
-        if port == entry { 0 } else { times.0[usize::from(port & 3)] }
+        if place == first { 0 } else { times.0[usize::from(self.way[place].at.port & 3)] }
     }
 
-    /// Shares the time of a branch, which arrivals `from..to` belong to, among its cables. `begin` is the delay at the
-    /// arrival before it.
-    fn branch(&self, from: usize, to: usize, took: Option<i64>, begin: i64, entered: &mut [Option<i64>]) {
-        let (mut inside, mut cables) = (0, to.saturating_sub(from) as i64 + 1);
-        self.in_branch(from, to, |_, span, length| {
-            inside += span;
-            cables -= length;
-        });
-        let on_cables = took.map_or(0, |took| (took - inside).max(0));
-        let (mut done, mut spent) = (0, 0);
-        let mut before = from;
-        self.in_branch(from, to, |place, span, length| {
-            done += (place - before) as i64 + 1;
-            before = place + length as usize + 1;
-            entered[self.way[place].0] = Some(begin + spent + on_cables * done / cables.max(1));
-            spent += span;
-        });
+    /// The way that nobody measures as a whole. Returns whether something in it is not known.
+    fn trunk(&self, cables: &Cables, entered: &mut [Option<i64>]) -> bool {
+        let (mut at, mut is_guessed) = (0, false);
+        for gap in self.gaps(0, self.way.len(), &|_, _| None) {
+            let first_clock = gap.from == 0 && (self.clock)(self.way[0].at.node).is_none();
+            for hop in gap.from..gap.to {
+                let time = self.cable(hop).and_then(|(one, other)| cables.remembered(one, other));
+                is_guessed |= time.is_none() && !first_clock;
+                at += time.unwrap_or(0) + self.in_unit(hop);
+            }
+            if let Some(arrival) = self.way.get(gap.to) {
+                entered[arrival.at.node] = Some(at);
+            }
+            at += gap.span;
+        }
+        is_guessed
     }
 
-    /// SubDevices with a clock in a branch, those behind them left out: place of the first arrival, time from there to
-    /// the last one, arrivals between.
-    fn in_branch(&self, from: usize, to: usize, mut found: impl FnMut(usize, i64, i64)) {
-        let mut place = from;
-        while place < to {
-            let (node, _) = self.way[place];
-            match (self.clock)(node) {
-                Some(times) => {
-                    let last = self.last[node].min(to.saturating_sub(1)).max(place);
-                    let span = if last == place { 0 } else { times.0[usize::from(self.way[last].1 & 3)] };
-                    found(place, span, (last - place) as i64);
-                    place = last + 1;
+    /// Shares the time from one arrival at a SubDevice to its next one among the cables of the branch. `begin` is the
+    /// delay at the first one.
+    fn branch(&self, from: usize, to: usize, took: i64, begin: i64, cables: &mut Cables, entered: &mut [Option<i64>]) {
+        let mut gaps = self.gaps(from, to, &|one, other| cables.measured(one, other));
+        let in_units: i64 = gaps.iter().flat_map(|gap| gap.from..gap.to).map(|hop| self.in_unit(hop)).sum();
+        let total = (took - in_units - gaps.iter().map(|gap| gap.span).sum::<i64>()).max(0);
+        let known = |gaps: &[Gap]| gaps.iter().filter_map(|gap| gap.known).sum::<i64>();
+        if known(&gaps) > total && gaps.iter().any(|gap| gap.known.is_none()) {
+            // What is known cannot be right.
+            gaps.iter_mut().for_each(|gap| gap.known = None);
+        }
+        // Where all is known, the difference to what was measured now is shared by all.
+        let all_known = gaps.iter().all(|gap| gap.known.is_some());
+        let takes_rest = |gap: &Gap| all_known || gap.known.is_none();
+        let rest = total - known(&gaps);
+        let sharing: i64 = gaps.iter().filter(|gap| takes_rest(gap)).map(Gap::hops).sum();
+        let is_one_cable = gaps.len() == 2 && gaps.iter().all(|gap| gap.hops() == 1);
+        let (mut spent, mut shared, mut done) = (begin, 0, 0);
+        for gap in &gaps {
+            let mut on_cables = gap.known.unwrap_or(0);
+            if takes_rest(gap) {
+                done += gap.hops();
+                let until = rest * done / sharing.max(1);
+                on_cables += until - shared;
+                shared = until;
+            }
+            spent += on_cables + (gap.from..gap.to).map(|hop| self.in_unit(hop)).sum::<i64>();
+            if gap.to < to {
+                entered[self.way[gap.to].at.node] = Some(spent);
+            }
+            spent += gap.span;
+            if gap.known.is_none() || is_one_cable {
+                for (one, other) in (gap.from..gap.to).filter_map(|hop| self.cable(hop)) {
+                    cables.learn(one, other, on_cables / gap.hops().max(1));
                 }
-                None => place += 1,
             }
         }
+    }
+
+    /// What a frame waits for in the processing unit behind an arrival, beyond what it waits for elsewhere.
+    fn in_unit(&self, place: usize) -> i64 {
+        if self.way[place].processed { self.segment.unit_takes } else { 0 }
+    }
+
+    /// Both ends of the cable behind an arrival.
+    fn cable(&self, place: usize) -> Option<(End, End)> {
+        let far = self.way.get(place + 1)?.at;
+        let near = self.segment.wiring.far(far)?;
+        Some((self.segment.end(near)?, self.segment.end(far)?))
+    }
+
+    /// The gaps between two places of which the first one counts only where it is the beginning of the way or a SubDevice
+    /// with a clock.
+    fn gaps(&self, from: usize, to: usize, known: &dyn Fn(End, End) -> Option<i64>) -> Vec<Gap> {
+        let mut gaps = Vec::new();
+        let mut begin = from;
+        // The SubDevice at the beginning of a branch is not part of it; one at the beginning of the way is.
+        let mut place = if from == 0 && to == self.way.len() { from } else { from + 1 };
+        let gap = |from: usize, to: usize, span: i64| {
+            let cable = |hop: usize| self.cable(hop).and_then(|(one, other)| known(one, other));
+            Gap { from, to, known: (from..to).map(cable).sum(), span }
+        };
+        while place < to {
+            let node = self.way[place].at.node;
+            let Some(times) = (self.clock)(node) else {
+                place += 1;
+                continue;
+            };
+            let last = self.last[node].min(to.saturating_sub(1)).max(place);
+            let span = if last == place { 0 } else { times.0[usize::from(self.way[last].at.port & 3)] };
+            gaps.push(gap(begin, place, span));
+            (begin, place) = (last, last + 1);
+        }
+        if to < self.way.len() {
+            gaps.push(gap(begin, to, 0));
+        }
+        gaps
     }
 }
 

@@ -3,11 +3,12 @@
 //! Three datagrams ride in one frame: an FRMW of 0x0910 that hands the reference's time to all others, an FPWR of 0x0910
 //! that steers a clock (the reference towards the host, on the other copy a second one towards the first), a BRD of 0x092C.
 //! What the supervisor posts on the board says whose time each copy distributes. The FRMW leaves with the predicted time
-//! of the reference: whoever the frame meets before the reference, or without one, takes what was sent.
+//! of the reference: whoever the frame meets before the reference, or without one, takes what was sent. When ports have
+//! changed, or a ring has closed, nothing is handed out until the supervisor knows what delays are now.
 
 use ringcat_wire::address::{RegisterAddress, StationAddress, Wkc};
 use ringcat_wire::datagram::HEADER_LEN;
-use ringcat_wire::register::map;
+use ringcat_wire::register::{EcatEvent, map};
 
 use crate::board::Board;
 use crate::board::clocks::References;
@@ -20,6 +21,8 @@ use crate::time::Instant;
 
 /// Data of each datagram: the low half of a time.
 pub(crate) const CLOCK_DATA: usize = 4;
+/// Event requests in the header of a datagram.
+const IRQ_AT: usize = HEADER_LEN - 2;
 /// A second reference is steered once in so many cycles: what little the host's sending jitters stays small.
 const STEERING_INTERVAL: u32 = 8;
 /// It is steered in each cycle while it differs by more than this.
@@ -86,6 +89,8 @@ pub(crate) struct Seen {
     sync: [(u32, Wkc); 2],
     spread: u32,
     spread_wkc: u16,
+    /// What SubDevices ask for, as far as they are let (facts 3.5).
+    events: u16,
 }
 
 impl Places {
@@ -102,6 +107,9 @@ impl Places {
         let (spread, wkc) = data_at(bytes, self.spread_at);
         seen.spread |= spread & 0x7FFF_FFFF;
         seen.spread_wkc = seen.spread_wkc.saturating_add(wkc);
+        if let Some([low, high]) = bytes.get(self.spread_at + IRQ_AT..).and_then(<[u8]>::first_chunk) {
+            seen.events |= u16::from_le_bytes([*low, *high]);
+        }
     }
 }
 
@@ -160,10 +168,12 @@ pub(crate) struct Clocks {
     setup: ClockSetup,
     references: References,
     changes: u32,
-    /// Nothing is distributed until other references are posted: these are out of date.
-    held: bool,
+    /// The last frame said that ports have changed.
+    ports_changed: bool,
     /// The reference on each copy.
     times: [Option<ReferenceTime>; 2],
+    /// What the last one showed, for the time without any.
+    last: Option<ReferenceTime>,
     /// How the steered reference differs from the other one.
     lead: Option<Lead>,
     /// The application's time, and when it said so.
@@ -208,7 +218,7 @@ impl Clocks {
     fn predicted(&self, link: Link, now: Instant) -> u64 {
         let [main, redundant] = self.times;
         let (own, other) = if link == Link::Main { (main, redundant) } else { (redundant, main) };
-        own.or(other).map_or_else(|| self.application_time(now), |time| time.at(now))
+        own.or(other).or(self.last).map_or_else(|| self.application_time(now), |time| time.at(now))
     }
 
     /// What the copies of a frame that leaves now carry.
@@ -218,7 +228,7 @@ impl Clocks {
             self.follow(references, changes, now);
         }
         let mut payloads = [Payload::default(); 2];
-        if self.held {
+        if board.clocks.is_held() {
             return payloads;
         }
         let steer = self.steering(now);
@@ -233,6 +243,7 @@ impl Clocks {
     /// Other references were posted.
     #[cold]
     fn follow(&mut self, references: References, changes: u32, now: Instant) {
+        self.last = self.reference_time().or(self.last);
         for link in Link::ALL {
             if references.on(link) != self.references.on(link) {
                 // The clock of another reference shows the same time, as far as is known.
@@ -241,7 +252,7 @@ impl Clocks {
             }
         }
         self.lead = None;
-        (self.references, self.changes, self.held) = (references, changes, false);
+        (self.references, self.changes) = (references, changes);
     }
 
     /// Who is told another time than its own, and which, by the link of the copy: in an open ring each copy meets its own
@@ -286,16 +297,26 @@ impl Clocks {
 
     /// A flight is over.
     pub(crate) fn observe(&mut self, seen: &Seen, arrivals: Arrivals, board: &Board, events: &mut Producer) {
+        let mut is_closed = false;
         // One that left before others were posted has read clocks that are references no more.
         if seen.references == self.changes {
-            self.observe_references(seen, arrivals);
+            let steered = self.observe_references(seen);
+            is_closed = steered && arrivals.verdict() == Some(RingState::Closed);
         }
+        let ports_changed = EcatEvent::from_bits(seen.events).dl_status;
+        // With a ring that is closed again, and with other cables in use, delays are not what they were.
+        let is_told = board.clocks.is_held() || board.clocks.references().1 != self.changes;
+        if (is_closed && !is_told) || (ports_changed && !self.ports_changed && board.clocks.are_ports_guarded()) {
+            board.clocks.hold();
+        }
+        self.ports_changed = ports_changed;
         if seen.spread_wkc > 0 {
             self.judge_spread(seen.spread, board, events);
         }
     }
 
-    fn observe_references(&mut self, seen: &Seen, arrivals: Arrivals) {
+    /// What the references showed; whether one of them is steered towards the other.
+    fn observe_references(&mut self, seen: &Seen) -> bool {
         let (_, steered) = self.references.leader();
         let mut fresh = 0;
         for link in Link::ALL {
@@ -307,7 +328,7 @@ impl Clocks {
             self.times[link.index()] = Some(ReferenceTime { time, sent_at: seen.sent_at });
             fresh += 1;
         }
-        let Some(steered) = steered else { return };
+        let Some(steered) = steered else { return false };
         if fresh == 2 {
             let leader = if steered == Link::Main { Link::Redundant } else { Link::Main };
             let time = |link: Link| self.times[link.index()].map_or(0, |time| time.time);
@@ -315,8 +336,7 @@ impl Clocks {
             let begin = Lead::begin(difference, seen.sent_at);
             self.lead = Some(self.lead.map_or(begin, |lead| lead.go_on(difference, seen.sent_at)));
         }
-        // The ring is closed again: one reference is enough, and delays are not what they were.
-        self.held |= arrivals.verdict() == Some(RingState::Closed);
+        true
     }
 
     fn judge_spread(&mut self, spread_ns: u32, board: &Board, events: &mut Producer) {

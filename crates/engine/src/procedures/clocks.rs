@@ -1,11 +1,13 @@
 //! Distributed clocks: set up, brought together, watched (facts 7).
 //!
+//! * `measure`: who is connected to whom now, and what frames take from clock to clock;
 //! * `set_up`: propagation delays, offsets, filters;
 //! * `signals`: SYNC signals of one SubDevice;
 //! * `watch`: the static drift phase, who is locked, whose time each link distributes.
 //!
 //! What they know about the clocks is in [`SharedClocks`], which the bring-up of SubDevices looks at too.
 
+mod measure;
 mod set_up;
 mod signals;
 mod watch;
@@ -15,27 +17,41 @@ use alloc::vec::Vec;
 use core::cell::{RefCell, RefMut};
 
 use ringcat_wire::address::StationAddress;
+use ringcat_wire::register::PortKind;
 
+use crate::clocks::Cables;
+use crate::clocks::cables::End;
 use crate::config::{ClockConfig, ReferenceClock};
 use crate::info::SubDeviceInfo;
 use crate::link::Link;
+use crate::time::Instant;
+use crate::topology::{PortOf, Topology};
 
 pub use signals::NotLocked;
 pub(super) use signals::{SignalsError, restore, start_signals, wait_for_lock};
 pub(crate) use watch::{begin, keep};
 
-/// A SubDevice of the scan, as far as clocks are concerned.
+/// A SubDevice of the scan, or a declared one that came later, as far as clocks are concerned.
 #[derive(Clone, Debug)]
 pub(super) struct Node {
     pub station: StationAddress,
+    /// Where it was found.
+    pub position: u16,
+    pub ports: [PortKind; 4],
     /// Index in the declaration.
     pub member: Option<usize>,
     /// It has a clock.
     pub has_clock: bool,
     /// SYNC signals are declared for it.
     pub is_configured: bool,
-    /// From where frames come into its tree to its processing unit, with fraction.
+    /// From where frames come in to its processing unit, with fraction.
     pub unit: Option<i64>,
+    /// Where that counts from: measurements and links number these places.
+    pub origin: u32,
+    /// DC_LATCH_MODE says that frames enter it from behind.
+    pub latches_backwards: bool,
+    /// It has lost its offset and has not got one since.
+    pub is_unset: bool,
     /// What was written to DC_SYSTEM_TIME_DELAY.
     pub delay_ns: i64,
     /// What was written to DC_SYSTEM_TIME_OFFSET.
@@ -57,10 +73,18 @@ pub(super) struct Node {
 pub(super) struct Clocks {
     /// `None`: distributed clocks were not declared.
     pub config: Option<ClockConfig>,
-    /// By position of the scan.
+    /// By position of the scan, then those that came later.
     pub nodes: Vec<Node>,
-    /// Position of the reference.
+    /// Which of them is the reference.
     pub reference: Option<usize>,
+    /// Both ends of the closing cables of local rings.
+    pub closings: Vec<[End; 2]>,
+    /// What was measured of cables.
+    pub cables: Cables,
+    /// Measurements so far.
+    pub measured: u32,
+    /// Since when delays may not be what they were.
+    pub is_doubtful: Option<Instant>,
     /// Delays and offsets are written.
     pub is_set_up: bool,
     /// The ring is kept open on purpose.
@@ -82,7 +106,7 @@ pub struct SharedClocks {
 /// What is known about the clock of one SubDevice.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct ClockStatus {
-    /// Position in the scan.
+    /// Position in the scan, or where it was found later.
     pub position: u16,
     /// Its station address.
     pub station: StationAddress,
@@ -109,28 +133,19 @@ impl SharedClocks {
     pub fn new(
         config: Option<ClockConfig>,
         scanned: &[SubDeviceInfo],
+        topology: &Topology,
         members: impl Fn(&SubDeviceInfo) -> Option<(usize, bool)>,
     ) -> SharedClocks {
         let node = |info: &SubDeviceInfo| {
             let member = members(info);
-            Node {
-                station: info.station,
-                member: member.map(|(index, _)| index),
-                has_clock: info.controller.features.dc,
-                is_configured: member.is_some_and(|(_, configured)| configured),
-                unit: None,
-                delay_ns: 0,
-                offset_ns: 0,
-                drift_ppb: 0,
-                difference_ns: None,
-                worst_ns: 0,
-                good: 0,
-                link: None,
-            }
+            Node::new(info, member)
         };
         let epoch = config.as_ref().map_or(0, |config| config.epoch);
-        let nodes = scanned.iter().map(node).collect();
-        SharedClocks { clocks: Rc::new(RefCell::new(Clocks { config, nodes, epoch, ..Clocks::default() })) }
+        let nodes: Vec<Node> = scanned.iter().map(node).collect();
+        let end = |at: PortOf| Some((nodes.get(at.node)?.station, at.port));
+        let rings = topology.local_rings.iter().map(|ring| ring.closing);
+        let closings = rings.filter_map(|closing| Some([end(closing.head)?, end(closing.tail)?])).collect();
+        SharedClocks { clocks: Rc::new(RefCell::new(Clocks { config, nodes, epoch, closings, ..Clocks::default() })) }
     }
 
     pub(super) fn access(&self) -> RefMut<'_, Clocks> {
@@ -152,16 +167,16 @@ impl SharedClocks {
         self.access().is_locked
     }
 
-    /// Each clock of the segment, by position.
+    /// Each clock of the segment, by position of the scan; then those that came later.
     pub fn status(&self) -> Vec<ClockStatus> {
         let clocks = self.access();
         let samples = clocks.config.as_ref().map_or(u32::MAX, |config| config.lock_samples);
         let with_clock = clocks.nodes.iter().enumerate().filter(|(_, node)| node.has_clock);
-        let status = |(position, node): (usize, &Node)| ClockStatus {
-            position: position as u16,
+        let status = |(index, node): (usize, &Node)| ClockStatus {
+            position: node.position,
             station: node.station,
             subdevice: node.member,
-            is_reference: clocks.reference == Some(position),
+            is_reference: clocks.reference == Some(index),
             delay_ns: node.delay_ns,
             offset_ns: node.offset_ns,
             drift_ppb: node.drift_ppb,
@@ -173,11 +188,36 @@ impl SharedClocks {
     }
 }
 
+impl Node {
+    /// What a scan or somebody who came later is, and which member: its index, and whether SYNC signals are declared.
+    fn new(info: &SubDeviceInfo, member: Option<(usize, bool)>) -> Node {
+        Node {
+            station: info.station,
+            position: info.position.0,
+            ports: info.controller.ports,
+            member: member.map(|(index, _)| index),
+            has_clock: info.controller.features.dc,
+            is_configured: member.is_some_and(|(_, configured)| configured),
+            unit: None,
+            origin: 0,
+            latches_backwards: false,
+            is_unset: false,
+            delay_ns: 0,
+            offset_ns: 0,
+            drift_ppb: 0,
+            difference_ns: None,
+            worst_ns: 0,
+            good: 0,
+            link: None,
+        }
+    }
+}
+
 impl Clocks {
     /// The reference among those that `can` be it: the chosen one, or the first as the configuration wants it.
     pub fn elect(&self, can: impl Fn(usize, &Node) -> bool) -> Option<usize> {
         let choice = self.config.as_ref()?.reference;
-        let able = |(position, node): &(usize, &Node)| node.has_clock && can(*position, node);
+        let able = |(position, node): &(usize, &Node)| node.has_clock && !node.is_unset && can(*position, node);
         let candidates = || self.nodes.iter().enumerate().filter(able).map(|(position, _)| position);
         let preferred = match choice {
             ReferenceClock::FirstWithClock => None,

@@ -6,6 +6,7 @@ mod broken_ring;
 mod calm;
 mod captures;
 mod clock_captures;
+mod clock_changes;
 mod clocks;
 mod configuration;
 mod copies;

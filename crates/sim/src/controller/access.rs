@@ -169,6 +169,12 @@ impl Controller {
                 if completion.triggers_watchdog {
                     self.trigger_process_data_watchdog(self.pass.start);
                 }
+                if grant.opened {
+                    self.note_buffer_event(map::DC_PDI_BUFFER_START, self.pass.start);
+                }
+                if completion.is_complete {
+                    self.note_buffer_event(map::DC_PDI_BUFFER_CHANGE, self.pass.start);
+                }
                 self.refresh_sync_manager(n);
             }
         }

@@ -34,17 +34,34 @@ impl Controller {
             self.memory.set_u32(map::DC_SYSTEM_TIME_DIFFERENCE, 0);
             self.memory.set_u16(map::DC_SPEED_COUNTER_DIFFERENCE, 0);
         }
-        if is(map::DC_ACTIVATION, 1) {
-            let settings = SyncSettings {
-                start: self.memory.u64(map::DC_START_TIME),
-                sync0_cycle_ns: self.memory.u32(map::DC_SYNC0_CYCLE),
-                sync1_cycle_ns: self.memory.u32(map::DC_SYNC1_CYCLE),
-                wide: self.config.features.dc_64bit,
-            };
+        let start_len = if self.starts_by_half() { 4 } else { 8 };
+        if is(map::DC_START_TIME.offset(start_len - 1), 1) && self.sync_unit.awaits_start_time() {
             let activation = DcActivation::from_bits(self.memory.u8(map::DC_ACTIVATION));
-            self.sync_unit.activate(activation, settings, self.unbounded_time(now));
-            self.memory.set_u8(map::DC_ACTIVATION_STATUS, self.sync_unit.status().bits());
+            self.memory.set_u8(map::DC_ACTIVATION, DcActivation { cyclic_unit: true, ..activation }.bits());
+            self.activate_sync_unit(now);
+        } else if is(map::DC_ACTIVATION, 1) {
+            self.activate_sync_unit(now);
         }
+    }
+
+    /// Whether the lower half of the start time is all of it.
+    fn starts_by_half(&self) -> bool {
+        let activation = DcActivation::from_bits(self.memory.u8(map::DC_ACTIVATION));
+        activation.extend_start_time || !self.config.features.dc_64bit
+    }
+
+    /// The SYNC unit takes over its registers.
+    fn activate_sync_unit(&mut self, now: SimTime) {
+        let settings = SyncSettings {
+            start: self.memory.u64(map::DC_START_TIME),
+            sync0_cycle_ns: self.memory.u32(map::DC_SYNC0_CYCLE),
+            sync1_cycle_ns: self.memory.u32(map::DC_SYNC1_CYCLE),
+            wide: self.config.features.dc_64bit,
+            acknowledged: self.memory.u16(map::DC_PULSE_LENGTH) == 0,
+        };
+        let activation = DcActivation::from_bits(self.memory.u8(map::DC_ACTIVATION));
+        self.sync_unit.activate(activation, settings, self.unbounded_time(now));
+        self.memory.set_u8(map::DC_ACTIVATION_STATUS, self.sync_unit.status().bits());
     }
 
     /// The control loop takes a sample.
@@ -83,6 +100,16 @@ impl Controller {
             && let Some(next) = self.sync_unit.next_sync1(self.unbounded_time(start))
         {
             self.memory.set_u64(map::DC_NEXT_SYNC1, self.in_width(next));
+        }
+        for signal in 0..2u16 {
+            let status = map::DC_SYNC0_STATUS.offset(signal);
+            if is(status, 1) {
+                let time = self.unbounded_time(start);
+                self.memory.set_u8(status, u8::from(self.sync_unit.is_active(signal.into(), time)));
+                if side == Side::Pdi {
+                    self.sync_unit.acknowledge(signal.into(), time);
+                }
+            }
         }
         for (pin, base) in [(0, map::DC_LATCH0_POSITIVE_EDGE), (1, map::DC_LATCH1_POSITIVE_EDGE)] {
             for (edge, positive) in [(0, true), (8, false)] {
@@ -130,6 +157,13 @@ impl Controller {
     /// Whether SYNC0 is asked for and has not come yet.
     pub fn waits_for_sync0(&self, now: SimTime) -> bool {
         self.sync_unit.wants_sync0() && self.sync0_pulses(now) == 0
+    }
+
+    /// A buffer of a SyncManager was opened or handed over: the register keeps local time (facts 3.12).
+    pub(super) fn note_buffer_event(&mut self, register: RegisterAddress, at: SimTime) {
+        if self.config.features.dc {
+            self.memory.set_u32(register, self.clock.local(at) as u32);
+        }
     }
 
     /// An edge at a pin of the LATCH units.

@@ -226,8 +226,12 @@ impl Controller {
         while left != 0 {
             let n = left.trailing_zeros() as usize;
             left &= left - 1;
-            if self.sync_managers.finish_frame(n, good).triggers_watchdog {
+            let completion = self.sync_managers.finish_frame(n, good);
+            if completion.triggers_watchdog {
                 self.trigger_process_data_watchdog(now);
+            }
+            if completion.is_complete {
+                self.note_buffer_event(map::DC_ECAT_BUFFER_CHANGE, self.pass.start);
             }
             self.refresh_sync_manager(n);
         }

@@ -60,6 +60,8 @@ pub(super) struct Grant {
 pub(super) struct Completion {
     /// A complete write that triggers the process data watchdog.
     pub triggers_watchdog: bool,
+    /// A buffer was handed over.
+    pub is_complete: bool,
 }
 
 #[derive(Clone, Copy, Debug, Default)]
@@ -328,12 +330,12 @@ impl Unit {
                 if self.buffering == Buffering::Three {
                     self.write_buffer = self.spare_buffer();
                 }
-                Completion { triggers_watchdog: self.watchdog }
+                Completion { triggers_watchdog: self.watchdog, is_complete: true }
             }
             Role::Reader => {
                 self.read_event = true;
                 self.full = false;
-                Completion::default()
+                Completion { is_complete: true, ..Completion::default() }
             }
         }
     }

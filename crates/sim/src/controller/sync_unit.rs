@@ -19,6 +19,8 @@ pub(super) struct SyncSettings {
     pub sync1_cycle_ns: u32,
     /// The clock has 64 bits.
     pub wide: bool,
+    /// DC_PULSE_LENGTH is 0: a signal stays until it is acknowledged.
+    pub acknowledged: bool,
 }
 
 /// The SYNC unit.
@@ -29,6 +31,8 @@ pub(super) struct SyncUnit {
     /// System time of the first pulse, in 64 bits; `None` while it stands still or the time will not come.
     first: Option<u64>,
     implausible: bool,
+    /// Pulses of SYNC0 and SYNC1 that were acknowledged.
+    seen: [u64; 2],
 }
 
 impl SyncUnit {
@@ -39,7 +43,7 @@ impl SyncUnit {
         if runs {
             return;
         }
-        (self.first, self.implausible) = (None, false);
+        (self.first, self.implausible, self.seen) = (None, false, [0; 2]);
         if !activation.cyclic_unit {
             return;
         }
@@ -59,15 +63,36 @@ impl SyncUnit {
         self.first = (!self.implausible && comes).then(|| now.wrapping_add(ahead));
     }
 
+    /// Whether writing the start time activates the unit now.
+    pub fn awaits_start_time(&self) -> bool {
+        self.activation.auto_activation && !self.activation.cyclic_unit
+    }
+
     /// Pulses of SYNC0 up to a system time.
     pub fn pulses(&self, now: u64) -> u64 {
-        let Some(first) = self.first.filter(|_| self.activation.sync0) else { return 0 };
-        let since = now.wrapping_sub(first);
-        match (since < 1 << 63, u64::from(self.settings.sync0_cycle_ns)) {
-            (false, _) => 0,
-            (true, 0) => 1,
-            (true, cycle) => since / cycle + 1,
-        }
+        self.first.filter(|_| self.activation.sync0).map_or(0, |first| pulses(first, self.settings.sync0_cycle_ns, now))
+    }
+
+    /// Pulses of SYNC1 up to a system time.
+    fn sync1_pulses(&self, now: u64) -> u64 {
+        let SyncSettings { sync0_cycle_ns: sync0, sync1_cycle_ns: sync1, .. } = self.settings;
+        let Some(first) = self.first.filter(|_| self.activation.sync1) else { return 0 };
+        let cycle = sync1.checked_div(sync0).map_or(0, |times| sync0.saturating_mul(times + 1));
+        pulses(first.wrapping_add(sync1.into()), cycle, now)
+    }
+
+    /// Whether SYNC0 (0) or SYNC1 (1) waits to be acknowledged: DC_SYNC0_STATUS, DC_SYNC1_STATUS.
+    pub fn is_active(&self, signal: usize, now: u64) -> bool {
+        self.settings.acknowledged && self.signal_pulses(signal, now) > self.seen[signal]
+    }
+
+    /// The PDI has read the status of a signal.
+    pub fn acknowledge(&mut self, signal: usize, now: u64) {
+        self.seen[signal] = self.signal_pulses(signal, now);
+    }
+
+    fn signal_pulses(&self, signal: usize, now: u64) -> u64 {
+        if signal == 0 { self.pulses(now) } else { self.sync1_pulses(now) }
     }
 
     /// System time of the first SYNC0 pulse at `now` or later; `None` when there will be none.
@@ -118,6 +143,16 @@ impl SyncUnit {
     }
 }
 
+/// Pulses from the first one up to a time; a cycle of zero is a single one.
+fn pulses(first: u64, cycle_ns: u32, now: u64) -> u64 {
+    let since = now.wrapping_sub(first);
+    match (since < 1 << 63, u64::from(cycle_ns)) {
+        (false, _) => 0,
+        (true, 0) => 1,
+        (true, cycle) => since / cycle + 1,
+    }
+}
+
 /// Which edges a LATCH unit has seen.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct LatchUnit {
@@ -159,7 +194,7 @@ mod tests {
 
     fn started(start: u64, now: u64, wide: bool, activation: DcActivation) -> SyncUnit {
         let mut unit = SyncUnit::default();
-        let settings = SyncSettings { start, sync0_cycle_ns: 1_000, sync1_cycle_ns: 300, wide };
+        let settings = SyncSettings { start, sync0_cycle_ns: 1_000, sync1_cycle_ns: 300, wide, acknowledged: true };
         unit.activate(activation, settings, now);
         unit
     }
@@ -170,6 +205,21 @@ mod tests {
         assert_eq!((unit.pulses(9_999), unit.pulses(10_000), unit.pulses(12_500)), (0, 1, 3));
         assert_eq!((unit.next_sync0(5_000), unit.next_sync0(10_001)), (Some(10_000), Some(11_000)));
         assert_eq!((unit.next_sync1(5_000), unit.next_sync1(10_301)), (Some(10_300), Some(11_300)));
+    }
+
+    #[test]
+    fn a_signal_stays_until_it_is_acknowledged_facts_3_12() {
+        let mut unit = started(10_000, 5_000, true, BOTH);
+        assert!(!unit.is_active(0, 9_999) && unit.is_active(0, 10_000) && !unit.is_active(1, 10_299));
+        unit.acknowledge(0, 10_200);
+        assert!(!unit.is_active(0, 10_999) && unit.is_active(1, 10_300));
+        // Pulses that nobody has acknowledged are one.
+        unit.acknowledge(0, 14_500);
+        assert!(!unit.is_active(0, 14_999) && unit.is_active(0, 15_000));
+        let settings = SyncSettings { start: 10_000, sync0_cycle_ns: 1_000, wide: true, ..SyncSettings::default() };
+        let mut pulsing = SyncUnit::default();
+        pulsing.activate(BOTH, settings, 5_000);
+        assert!(pulsing.pulses(12_000) == 3 && !pulsing.is_active(0, 12_000));
     }
 
     #[test]
@@ -192,7 +242,13 @@ mod tests {
     #[test]
     fn sync1_with_a_longer_time_divides_sync0_facts_7_3() {
         let mut unit = SyncUnit::default();
-        let settings = SyncSettings { start: 10_000, sync0_cycle_ns: 1_000, sync1_cycle_ns: 3_000, wide: true };
+        let settings = SyncSettings {
+            start: 10_000,
+            sync0_cycle_ns: 1_000,
+            sync1_cycle_ns: 3_000,
+            wide: true,
+            acknowledged: true,
+        };
         unit.activate(BOTH, settings, 0);
         assert_eq!((unit.next_sync1(0), unit.next_sync1(13_001)), (Some(13_000), Some(17_000)));
     }

@@ -2,7 +2,24 @@
 
 use super::*;
 use crate::clocks::FRACTION;
-use crate::topology::Node;
+use crate::topology::{Closing, LocalRing, Node, Topology};
+
+fn stations(count: usize) -> Vec<StationAddress> {
+    (0..count).map(|node| StationAddress(node as u16 + 1)).collect()
+}
+
+fn wiring(topology: &Topology) -> Wiring {
+    Wiring::new(topology, false, |_| true)
+}
+
+fn propagation(topology: &Topology, times: &[Option<PortTimes>]) -> Delays {
+    let (wiring, stations) = (wiring(topology), stations(topology.nodes.len()));
+    Segment { wiring: &wiring, stations: &stations, unit_takes: 0 }.propagation(times, &mut Cables::default())
+}
+
+fn entry_ports(topology: &Topology) -> Vec<u8> {
+    wiring(topology).entry_ports()
+}
 
 /// A tree from (parent, port, child), all entered at port 0; the child is named by its number.
 fn tree(count: usize, links: &[(usize, u8, usize)]) -> Topology {
@@ -97,31 +114,105 @@ fn nonsense_neither_panics_nor_hangs() {
     assert_eq!(propagation(&Topology::default(), &[]), Delays::default());
 }
 
-/// A frame through a random tree with what each port's clock notes, and the truth at each unit.
-fn walk(topology: &Topology, entry: (usize, u8), cable: impl Fn(usize, u8) -> i64) -> (Vec<PortTimes>, Vec<i64>) {
-    let count = topology.nodes.len();
+/// A frame on its way with what each port's clock notes, and the truth at each unit. A cable is named by its far end.
+fn walk(wiring: &Wiring, unit_takes: i64, cable: impl Fn(PortOf) -> i64) -> (Vec<Option<PortTimes>>, Vec<i64>) {
+    let count = wiring.count();
     let (mut at, mut arrivals, mut units) = (0, vec![[0; 4]; count], vec![0; count]);
     let mut first: Vec<Option<i64>> = vec![None; count];
-    let all = way(topology, entry.0, entry.1);
-    for (step, (node, port)) in all.iter().enumerate() {
+    let way = wiring.way(0);
+    for (step, arrival) in way.iter().enumerate() {
+        let PortOf { node, port } = arrival.at;
         if step > 0 {
-            let (from, _) = all[step - 1];
-            let child = if topology.nodes[*node].parent.map(|p| p.0) == Some(from) { *node } else { from };
-            at += (300 + cable(child, 0)) << FRACTION;
+            let near = wiring.far(arrival.at).expect("it came from somewhere");
+            let unit = if way[step - 1].processed { unit_takes } else { 0 };
+            at += (300 + unit + cable(near.max(arrival.at))) << FRACTION;
         }
-        let begin = *first[*node].get_or_insert(at);
-        arrivals[*node][usize::from(*port)] = at - begin;
-        if *port == 0 {
-            units[*node] = at;
+        let begin = *first[node].get_or_insert(at);
+        arrivals[node][usize::from(port)] = at - begin;
+        if arrival.processed && units[node] == 0 {
+            units[node] = at;
         }
     }
-    (arrivals.into_iter().map(PortTimes).collect(), units)
+    (arrivals.into_iter().map(|ports| Some(PortTimes(ports))).collect(), units)
+}
+
+/// A line of seven with a ring from port 3 of 1 over 2, 3, 4 back to port 1, 5 and 6 behind port 2.
+fn local_ring(broken: Option<usize>) -> Wiring {
+    let links = [(0, 1, 1), (1, 3, 2), (2, 1, 3), (3, 1, 4), (1, 2, 5), (5, 1, 6)];
+    let there: Vec<_> = links.into_iter().filter(|(_, _, child)| broken != Some(*child)).collect();
+    let mut topology = tree(7, &there);
+    let closing = Closing { head: PortOf { node: 1, port: 1 }, tail: PortOf { node: 4, port: 1 } };
+    topology.local_rings = vec![LocalRing { closing, cables: Vec::new() }];
+    Wiring::new(&topology, false, |_| broken != Some(7))
+}
+
+/// Errors of delays with this break, in nanoseconds; what is learned of cables is kept.
+fn errors(broken: Option<usize>, unit_takes: i64, cables: &mut Cables) -> Vec<i64> {
+    let wiring = local_ring(broken);
+    // Each cable has a length of its own.
+    let (times, truth) = walk(&wiring, unit_takes, |at| 20 * (3 * at.node as i64 + i64::from(at.port)));
+    let stations = stations(7);
+    let segment = Segment { wiring: &wiring, stations: &stations, unit_takes: unit_takes << FRACTION };
+    segment.see(cables);
+    let delays = segment.propagation(&times, cables);
+    let unit = |node: usize| delays.units[node].expect("all have clocks");
+    (0..7).map(|node| (unit(node) - truth[node]) >> FRACTION).collect()
+}
+
+#[test]
+fn a_local_ring_is_known_whole_from_what_it_was_open_and_broken_by_itself_facts_7_5_9_4() {
+    for unit_takes in [0, 40] {
+        let mut cables = Cables::default();
+        // Nothing is known of a ring that is whole: what is on its cables is shared, behind it nothing is wrong.
+        let guessed = errors(None, unit_takes, &mut cables);
+        assert_eq!((guessed[1], guessed[5], guessed[6]), (0, 0, 0));
+        assert!(guessed[2..5].iter().any(|error| *error != 0));
+        let mut cables = Cables::default();
+        // Open at its closing cable, as set-up makes it; then whole, and broken anywhere.
+        for broken in [Some(7), None, Some(3), None, Some(2), Some(4), None, Some(7), None] {
+            assert_eq!(errors(broken, unit_takes, &mut cables), [0; 7], "{broken:?}");
+        }
+    }
+}
+
+#[test]
+fn a_closed_ring_is_what_was_measured_of_it_as_a_line_and_says_where_it_was_not() {
+    let mut topology = tree(4, &[(0, 1, 1), (1, 1, 2), (2, 1, 3)]);
+    let (mut cables, stations) = (Cables::default(), stations(4));
+    let mut run = |wiring: &Wiring, times: &[Option<PortTimes>]| {
+        let delays = Segment { wiring, stations: &stations, unit_takes: 0 }.propagation(times, &mut cables);
+        (rounded(&delays, 0), delays.is_guessed)
+    };
+    topology.open_ports = vec![PortOf { node: 3, port: 1 }];
+    let closed = Wiring::new(&topology, true, |_| true);
+    let once = [times([0; 4]); 4];
+    assert!(run(&closed, &once).1);
+    let line = wiring(&Topology { open_ports: Vec::new(), ..topology });
+    let (times, truth) = walk(&line, 0, |at| 10 * at.node as i64);
+    let truth: Vec<Option<i64>> = truth.into_iter().map(|unit| Some(unit >> FRACTION)).collect();
+    assert_eq!(run(&line, &times), (truth.clone(), false));
+    assert_eq!(run(&closed, &once), (truth, false));
+}
+
+#[test]
+fn what_processing_takes_longer_than_forwarding_is_a_half_per_hop_unless_it_is_known_facts_7_1() {
+    let wiring =
+        wiring(&tree(9, &[(0, 1, 1), (1, 1, 2), (2, 1, 3), (3, 1, 4), (4, 1, 5), (5, 1, 6), (6, 1, 7), (7, 1, 8)]));
+    let (times, truth) = walk(&wiring, 40, |_| 50);
+    let stations = stations(9);
+    for (known, error) in [(0, -20), (40, 0)] {
+        let segment = Segment { wiring: &wiring, stations: &stations, unit_takes: known << FRACTION };
+        let delays = segment.propagation(&times, &mut Cables::default());
+        // The last one processes before the frame turns round: that is no passage of the way out.
+        assert_eq!((delays.units[8].unwrap() - truth[8]) >> FRACTION, 8 * error + if known == 0 { 20 } else { 0 });
+    }
 }
 
 proptest::proptest! {
     #[test]
     fn any_tree_with_clocks_everywhere_has_exact_delays(
         parents in proptest::collection::vec((0usize..1000, 0usize..3, 0i64..400), 1..40),
+        unit_takes in 0i64..100,
     ) {
         let mut topology = tree(1, &[]);
         let mut cables = vec![0];
@@ -137,9 +228,11 @@ proptest::proptest! {
             cables.push(cable);
         }
         topology.main_count = topology.nodes.len();
-        let (times, truth) = walk(&topology, (0, 0), |child, _| cables[child]);
-        let times: Vec<_> = times.into_iter().map(Some).collect();
-        let delays = propagation(&topology, &times);
+        let wiring = wiring(&topology);
+        let (times, truth) = walk(&wiring, unit_takes, |at| cables[at.node]);
+        let stations = stations(topology.nodes.len());
+        let segment = Segment { wiring: &wiring, stations: &stations, unit_takes: unit_takes << FRACTION };
+        let delays = segment.propagation(&times, &mut Cables::default());
         for (node, truth) in truth.iter().enumerate() {
             proptest::prop_assert_eq!(delays.units[node], Some(*truth));
         }

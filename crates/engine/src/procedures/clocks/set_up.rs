@@ -1,141 +1,97 @@
-//! Propagation delays, offsets and filters of all clocks (facts 7.1, 7.2).
-//!
-//! A closed ring is measured as a line: frames of the main link would not come back to where they went out. Its last port
-//! is closed meanwhile, with the bit that opens it again by itself.
+//! Delays, offsets and filters of all clocks (facts 7.1, 7.2): at the beginning, after each change of the segment, and of
+//! one clock that has lost its registers.
 
 use alloc::string::{String, ToString};
-use alloc::vec;
 use alloc::vec::Vec;
 
-use ringcat_wire::address::{StationAddress, Wkc};
-use ringcat_wire::command::Command;
-use ringcat_wire::datagram::Target;
+use ringcat_wire::address::StationAddress;
 use ringcat_wire::register::map;
 
-use super::{Clocks, SharedClocks};
-use crate::clocks::delay::entry_ports;
-use crate::clocks::{Delays, Latched, Measurements, propagation, round};
-use crate::link::{Link, LinkSet};
-use crate::procedures::fleet::SharedFleet;
-use crate::ring::RingState;
+use super::measure::{Measured, latch, measure};
+use super::{Clocks, Node, SharedClocks};
+use crate::clocks::{Latched, round};
+use crate::link::Link;
 use crate::supervisor::{Bus, BusError};
-use crate::topology::{PortOf, Topology};
 
-/// Bytes from DC_RECEIVE_TIME to the end of DC_RECEIVE_TIME_EPU.
-const LATCHED_LEN: usize = 32;
-/// A measurement whose frames were lost is taken again so often in all.
-const MOST_FAILURES: u32 = 16;
-/// Low byte of DL_CONTROL: forwarding rule, and the bit for settings that hold for about a second.
-const LASTING: u8 = 0x01;
-const TEMPORARY: u8 = 0x03;
 /// Reset value of DC_SPEED_COUNTER_START; writing it restarts the filters.
 const SPEED_COUNTER_START: u16 = 0x1000;
+/// Delays that differ by no more than this from what is written are what the same way gives when it is measured again.
+const SAME_NS: i64 = 30;
 
 /// Measures all delays and writes delays and offsets.
-pub(super) async fn set_up(bus: &Bus, fleet: &SharedFleet) -> Result<(), String> {
-    let topology = fleet.access().topology.clone();
-    let closed = close_ring(bus, &fleet.clocks, &topology).await;
-    let result = match &closed {
-        Ok(_) => measure_and_write(bus, &fleet.clocks, &topology).await,
-        Err(error) => Err(error.to_string()),
-    };
-    if let Ok(Some((station, port))) = closed {
-        open_ring(bus, station, port).await;
-    }
-    fleet.clocks.access().is_measuring = false;
-    result
-}
-
-/// Makes a line of a closed ring. Returns where.
-async fn close_ring(
-    bus: &Bus,
-    clocks: &SharedClocks,
-    topology: &Topology,
-) -> Result<Option<(StationAddress, u8)>, BusError> {
-    let is_closed = bus.links() == LinkSet::Ring && bus.ring() == RingState::Closed;
-    let last = topology.open_ports.last().filter(|_| is_closed && topology.redundant_head.is_none());
-    let Some(PortOf { node, port }) = last.copied() else { return Ok(None) };
-    let Some(station) = clocks.access().nodes.get(node).map(|node| node.station) else { return Ok(None) };
-    clocks.access().is_measuring = true;
-    bus.fpwr(station, map::DL_CONTROL, &[TEMPORARY, 0b11 << (2 * port)]).await?;
-    Ok(Some((station, port)))
-}
-
-async fn open_ring(bus: &Bus, station: StationAddress, _port: u8) {
-    // Where this is lost, too, the port opens by itself.
-    let _ = bus.fpwr(station, map::DL_CONTROL, &[LASTING, 0]).await;
-}
-
-async fn measure_and_write(bus: &Bus, clocks: &SharedClocks, topology: &Topology) -> Result<(), String> {
-    let count = clocks.access().config.as_ref().map_or(1, |config| config.measurements.clamp(1, 64));
-    let entries = entry_ports(topology);
-    enter_backwards(bus, clocks, &entries).await;
-    let mut measurements = Measurements::new(entries);
-    let mut failures = 0;
-    while measurements.count() < count {
-        match latch(bus, clocks).await {
-            Ok(latched) => measurements.add(&latched),
-            Err(error) if failures >= MOST_FAILURES => return Err(error.to_string()),
-            Err(_) => failures += 1,
-        }
-    }
+pub(super) async fn set_up(bus: &Bus, clocks: &SharedClocks) -> Result<(), String> {
+    let text = |error: BusError| error.to_string();
     let reference = {
         let mut clocks = clocks.access();
         let now = clocks.elect(|_, _| true);
         clocks.reference = now;
         now
     };
-    let Some(reference) = reference else { return Err("no SubDevice has a clock".to_string()) };
-    let delays = propagation(topology, &measurements.mean(reference));
-    take_over(&mut clocks.access(), &delays, &measurements.drift_ppb(reference));
+    if reference.is_none() {
+        return Err("no SubDevice has a clock".to_string());
+    }
+    let measured = measure(bus, clocks, true).await?;
+    take_over(&mut clocks.access(), &measured);
+    let stations = clocks.access().stations();
     let wanted = bus.now().0.wrapping_add(clocks.access().epoch);
-    let latched = latch(bus, clocks).await.map_err(|error| error.to_string())?;
+    let latched = latch(bus, clocks, &stations).await.map_err(text)?;
     set_offsets(&mut clocks.access(), &latched, wanted);
-    write_all(bus, clocks).await.map_err(|error| error.to_string())?;
+    write_all(bus, clocks).await.map_err(text)?;
     clocks.access().is_set_up = true;
     Ok(())
 }
 
-/// Controllers that latch in one direction only are told in which the frame comes (facts 3.12, 7.5).
-async fn enter_backwards(bus: &Bus, clocks: &SharedClocks, entries: &[u8]) {
-    let stations: Vec<StationAddress> = {
-        let clocks = clocks.access();
-        let backwards = clocks.nodes.iter().zip(entries).filter(|(node, entry)| node.has_clock && **entry != 0);
-        backwards.map(|(node, _)| node.station).collect()
+/// Measures all delays anew. Where some on a link are not what they were, those of that link are written, after `hold`:
+/// nobody must be told a time meanwhile. Returns how many were written with another value, and the largest change.
+pub(super) async fn measure_again(bus: &Bus, clocks: &SharedClocks, hold: impl Fn()) -> Result<(usize, u32), String> {
+    let measured = measure(bus, clocks, false).await?;
+    let before: Vec<Node> = clocks.access().nodes.clone();
+    let changed: Vec<Link> = {
+        let mut clocks = clocks.access();
+        take_over(&mut clocks, &measured);
+        Link::ALL.into_iter().filter(|link| !keep_same(&mut clocks, &before, *link)).collect()
     };
-    // Those without the register do not answer.
-    let _ = bus.gather(stations, |bus, station| async move { bus.fpwr(station, map::DC_LATCH_MODE, &[1]).await }).await;
+    for link in changed {
+        hold();
+        write_delays(bus, clocks, link).await.map_err(|error| error.to_string())?;
+    }
+    let clocks = clocks.access();
+    let change = |(node, before): (&Node, &Node)| (node.delay_ns - before.delay_ns).unsigned_abs();
+    let changes = clocks.nodes.iter().zip(&before).map(change).filter(|change| *change > 0);
+    Ok((changes.clone().count(), changes.max().unwrap_or(0).min(u32::MAX.into()) as u32))
 }
 
-/// Lets all clocks latch one frame and reads what they have.
-pub(super) async fn latch(bus: &Bus, clocks: &SharedClocks) -> Result<Vec<Option<Latched>>, BusError> {
-    let stations: Vec<(StationAddress, bool)> =
-        clocks.access().nodes.iter().map(|node| (node.station, node.has_clock)).collect();
-    let with_clock = stations.iter().filter(|(_, has_clock)| *has_clock).count() as u16;
-    let target = Target::Broadcast(map::DC_RECEIVE_TIME);
-    bus.transfer(Command::Bwr, target, vec![0; 4], Some(Wkc(with_clock))).await?;
-    let read = bus.gather(stations, |bus, (station, has_clock)| async move {
-        if !has_clock {
-            return Ok(None);
-        }
-        let bytes: [u8; LATCHED_LEN] = match bus.fprd_array(station, map::DC_RECEIVE_TIME).await {
-            Ok(bytes) => bytes,
-            // One that is gone is one without a clock.
-            Err(BusError::Wkc { .. }) => return Ok(None),
-            Err(error) => return Err(error),
-        };
-        let word = |at: usize| u32::from_le_bytes([bytes[at], bytes[at + 1], bytes[at + 2], bytes[at + 3]]);
-        let unit = u64::from(word(24)) | u64::from(word(28)) << 32;
-        Ok(Some(Latched { ports: [word(0), word(4), word(8), word(12)], unit }))
-    });
-    read.await.into_iter().collect()
+/// Where all delays on a link are what they were, what is known stays as it was: it may count from one place on both
+/// links, which what is measured in a broken ring does not. Returns whether it is so.
+fn keep_same(clocks: &mut Clocks, before: &[Node], link: Link) -> bool {
+    let here: Vec<usize> = (0..before.len())
+        .filter(|index| clocks.nodes[*index].has_clock && clocks.nodes[*index].link == Some(link))
+        .collect();
+    let origin = here.first().map(|index| before[*index].origin);
+    let is_same = |index: &usize| {
+        let (now, before) = (&clocks.nodes[*index], &before[*index]);
+        let is_known = before.link == Some(link) && before.unit.is_some() && Some(before.origin) == origin;
+        is_known && (now.delay_ns - before.delay_ns).abs() <= SAME_NS
+    };
+    if !here.iter().all(is_same) {
+        return false;
+    }
+    for index in here {
+        let (node, before) = (&mut clocks.nodes[index], &before[index]);
+        (node.unit, node.origin, node.delay_ns) = (before.unit, before.origin, before.delay_ns);
+    }
+    true
 }
 
-fn take_over(clocks: &mut Clocks, delays: &Delays, drift: &[Option<i64>]) {
-    for (position, node) in clocks.nodes.iter_mut().enumerate() {
-        node.unit = delays.units.get(position).copied().flatten();
-        node.drift_ppb = drift.get(position).copied().flatten().unwrap_or(0);
-        let tree = delays.trees.get(position).copied().unwrap_or(0);
+/// Takes over what was measured, on whose link everybody is, and from whom delays count there.
+fn take_over(clocks: &mut Clocks, measured: &Measured) {
+    clocks.measured = clocks.measured.wrapping_add(1);
+    for node in &mut clocks.nodes {
+        let Some(at) = measured.stations.iter().position(|station| *station == node.station) else { continue };
+        let tree = measured.delays.trees.get(at).copied().unwrap_or(0);
+        node.unit = measured.delays.units.get(at).copied().flatten();
+        node.origin = 2 * clocks.measured + tree as u32;
+        node.drift_ppb = measured.drift_ppb.get(at).copied().flatten().unwrap_or(node.drift_ppb);
         node.link = Some(if tree == 0 { Link::Main } else { Link::Redundant });
     }
     for link in Link::ALL {
@@ -144,26 +100,43 @@ fn take_over(clocks: &mut Clocks, delays: &Delays, drift: &[Option<i64>]) {
 }
 
 impl Clocks {
-    /// Position of the clock that the others on a link follow: the reference of the segment where it is there, else the
-    /// first that frames meet.
+    /// Station addresses of all clocks and those without one.
+    fn stations(&self) -> Vec<StationAddress> {
+        self.nodes.iter().map(|node| node.station).collect()
+    }
+
+    /// Index of the clock that the others on a link follow: the reference of the segment where it is there, else the
+    /// first that frames meet. Nobody where it is not known what is between them.
     pub fn reference_on(&self, link: Link) -> Option<usize> {
-        let here = |position: &usize| {
-            let node = &self.nodes[*position];
-            node.has_clock && node.link == Some(link) && node.unit.is_some()
+        if self.is_mixed(link) {
+            return None;
+        }
+        let here = |index: &usize| {
+            let node = &self.nodes[*index];
+            node.has_clock && !node.is_unset && node.link == Some(link) && node.unit.is_some()
         };
         let all = || (0..self.nodes.len()).filter(here);
-        let first = || all().min_by_key(|position| self.nodes[*position].unit);
+        let first = || all().min_by_key(|index| self.nodes[*index].unit);
         self.reference.filter(here).or_else(first)
+    }
+
+    /// Whether delays on a link count from different places.
+    pub fn is_mixed(&self, link: Link) -> bool {
+        let mut here =
+            self.nodes.iter().filter(|node| node.has_clock && node.link == Some(link) && node.unit.is_some());
+        let first = here.next().map(|node| node.origin);
+        here.any(|node| Some(node.origin) != first)
     }
 
     /// Delays on a link count from the clock that is followed there. Returns whether any changed.
     pub fn refer(&mut self, link: Link) -> bool {
-        let Some(reference) = self.reference_on(link).and_then(|position| self.nodes[position].unit) else {
+        let Some(reference) = self.reference_on(link).and_then(|index| self.nodes[index].unit) else {
             return false;
         };
         let mut changed = false;
         for node in self.nodes.iter_mut().filter(|node| node.link == Some(link)) {
-            let delay = node.unit.map_or(0, |unit| round(unit - reference));
+            let Some(unit) = node.unit else { continue };
+            let delay = round(unit - reference);
             changed |= node.delay_ns != delay;
             node.delay_ns = delay;
         }
@@ -192,7 +165,7 @@ async fn write_all(bus: &Bus, clocks: &SharedClocks) -> Result<(), BusError> {
 }
 
 /// DC_SYSTEM_TIME_OFFSET and DC_SYSTEM_TIME_DELAY.
-fn registers(node: &super::Node) -> [u8; 12] {
+fn registers(node: &Node) -> [u8; 12] {
     let mut bytes = [0; 12];
     bytes[..8].copy_from_slice(&node.offset_ns.to_le_bytes());
     bytes[8..].copy_from_slice(&(node.delay_ns as u32).to_le_bytes());
@@ -217,21 +190,28 @@ pub(super) async fn write_delays(bus: &Bus, clocks: &SharedClocks, link: Link) -
     written.await.into_iter().filter(|result| !matches!(result, Err(BusError::Wkc { .. }))).collect()
 }
 
-/// Sets up one clock that has lost its registers: offset by a frame that it and its reference latch.
-pub(super) async fn set_up_one(bus: &Bus, clocks: &SharedClocks, position: usize) -> Result<(), BusError> {
-    let latched = latch(bus, clocks).await?;
+/// Sets up one clock that has lost its registers: offset by a frame that it and its reference latch. Where nobody else has
+/// the time, the host has.
+pub(super) async fn set_up_one(bus: &Bus, clocks: &SharedClocks, index: usize) -> Result<(), BusError> {
+    let host = bus.now().0;
+    let stations = clocks.access().stations();
+    let latched = latch(bus, clocks, &stations).await?;
     let (station, registers) = {
         let mut clocks = clocks.access();
-        let link = clocks.nodes[position].link.unwrap_or(Link::Main);
-        let reference = clocks.reference_on(link).filter(|reference| *reference != position);
-        let time = |position: usize| latched.get(position).copied().flatten().map(|latched| latched.unit);
-        let (Some(reference), Some(own)) = (reference, time(position)) else { return Ok(()) };
-        let Some(local) = time(reference) else { return Ok(()) };
-        let system = local.wrapping_add_signed(clocks.nodes[reference].offset_ns);
-        let node = &mut clocks.nodes[position];
+        let link = clocks.nodes[index].link.unwrap_or(Link::Main);
+        let time = |index: usize| latched.get(index).copied().flatten().map(|latched| latched.unit);
+        let Some(own) = time(index) else { return Ok(()) };
+        let reference = clocks.reference_on(link).filter(|reference| *reference != index);
+        let system = match reference.and_then(|reference| Some((reference, time(reference)?))) {
+            Some((reference, local)) => local.wrapping_add_signed(clocks.nodes[reference].offset_ns),
+            None => host.wrapping_add(clocks.epoch),
+        };
+        let node = &mut clocks.nodes[index];
         node.offset_ns = system.wrapping_add_signed(node.delay_ns).wrapping_sub(own) as i64;
         (node.good, node.difference_ns, node.worst_ns) = (0, None, 0);
         (node.station, registers(node))
     };
-    write(bus, station, registers).await
+    write(bus, station, registers).await?;
+    clocks.access().nodes[index].is_unset = false;
+    Ok(())
 }

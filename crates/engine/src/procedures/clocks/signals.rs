@@ -6,7 +6,7 @@ use core::time::Duration;
 use ringcat_wire::address::StationAddress;
 use ringcat_wire::register::{DcSystemTimeDifference, map};
 
-use super::SharedClocks;
+use super::Node;
 use super::set_up::set_up_one;
 use super::watch::drift_phase;
 use crate::clocks::{extend, first_pulse, start::whole_cycle};
@@ -18,6 +18,8 @@ use crate::supervisor::{Bus, BusError};
 const AHEAD_NS: u64 = 100_000_000;
 /// Signals are started when the clock differs by at most this (facts 7.2: as IgH does).
 const GOOD_ENOUGH_NS: u32 = 10_000;
+/// A segment that changes all the time is not waited for any longer.
+const MEASURING_LIMIT: Duration = Duration::from_secs(1);
 /// Pause between two looks.
 const PAUSE: Duration = Duration::from_millis(1);
 
@@ -48,26 +50,53 @@ impl fmt::Display for NotLocked {
     }
 }
 
-/// Sets up anew what a clock has lost with its power.
+/// Sets up anew what a clock has lost with its power, or what one that came later has never had.
 pub(in crate::procedures) async fn restore(bus: &Bus, fleet: &SharedFleet, member: usize) -> Result<(), BusError> {
-    let Some(position) = position(&fleet.clocks, member) else { return Ok(()) };
-    let (station, expected) = {
+    let Some(index) = index_of(fleet, member) else { return Ok(()) };
+    let (station, expected, is_new) = {
         let clocks = fleet.clocks.access();
-        (clocks.nodes[position].station, clocks.nodes[position].offset_ns)
+        let node = &clocks.nodes[index];
+        (node.station, node.offset_ns, node.unit.is_none())
     };
     let offset: [u8; 4] = bus.fprd_array(station, map::DC_SYSTEM_TIME_OFFSET).await?;
-    if u32::from_le_bytes(offset) == expected as u32 {
+    if u32::from_le_bytes(offset) == expected as u32 && !is_new {
         return Ok(());
     }
-    set_up_one(bus, &fleet.clocks, position).await?;
+    {
+        let mut clocks = fleet.clocks.access();
+        let node = &mut clocks.nodes[index];
+        (node.is_unset, node.latches_backwards) = (true, false);
+        if clocks.reference == Some(index) {
+            clocks.reference = None;
+        }
+        clocks.is_doubtful.get_or_insert(bus.now());
+    }
+    // Its place is known when the segment has been measured with it.
+    let until = bus.now() + MEASURING_LIMIT;
+    while fleet.clocks.access().is_doubtful.is_some() && bus.now() < until {
+        bus.sleep(PAUSE).await;
+    }
+    set_up_one(bus, &fleet.clocks, index).await?;
     bus.spawn(drift_phase(bus.clone(), fleet.clone()));
     Ok(())
 }
 
-fn position(clocks: &SharedClocks, member: usize) -> Option<usize> {
-    let clocks = clocks.access();
-    let position = clocks.position_of(member)?;
-    (clocks.is_set_up && clocks.nodes[position].has_clock).then_some(position)
+/// The clock of a member. One that was not there at the scan is added.
+fn index_of(fleet: &SharedFleet, member: usize) -> Option<usize> {
+    let (info, is_configured) = {
+        let access = fleet.access();
+        let member = access.members.get(member)?;
+        (member.info.clone()?, member.config.sync.is_some())
+    };
+    let mut clocks = fleet.clocks.access();
+    if !clocks.is_set_up || !info.controller.features.dc {
+        return None;
+    }
+    if let Some(index) = clocks.position_of(member) {
+        return Some(index);
+    }
+    clocks.nodes.push(Node::new(&info, Some((member, is_configured))));
+    Some(clocks.nodes.len() - 1)
 }
 
 /// Programs the SYNC unit and starts it. The clock must be about right by then.
@@ -146,7 +175,7 @@ pub(in crate::procedures) async fn wait_for_lock(
         // Its own clock first: if that is right, another one keeps all waiting.
         let to_blame = own.filter(open).or_else(|| (0..clocks.nodes.len()).find(open));
         let difference = to_blame.or(own).and_then(|position| clocks.nodes[position].difference_ns);
-        let other = to_blame.filter(|position| Some(*position) != own).map(|position| position as u16);
+        let other = to_blame.filter(|index| Some(*index) != own).map(|index| clocks.nodes[index].position);
         (clocks.is_set_up && to_blame.is_none(), difference, other)
     };
     wait(bus, fleet, limit, window, is_locked).await

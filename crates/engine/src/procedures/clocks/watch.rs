@@ -3,7 +3,9 @@
 //! Two procedures run side by side: one hands the reference time to all clocks many times, as fast as the segment allows,
 //! the other reads their differences, every millisecond until all are locked and now and again afterwards. When the
 //! ring opens or closes, or a SubDevice is lost, the second one finds out who answers on which link, lets the delays
-//! there count from the clock that is followed there, and posts the references for the cyclic frames.
+//! there count from the clock that is followed there, and posts the references for the cyclic frames. When ports have
+//! changed, or somebody came or went, it has all delays measured again; from the cycle on in which ports have changed
+//! nobody is told a time until that is done.
 
 use core::time::Duration;
 
@@ -16,7 +18,7 @@ use ringcat_wire::command::Command;
 use ringcat_wire::datagram::Target;
 use ringcat_wire::register::map;
 
-use super::set_up::{set_up, write_delays};
+use super::set_up::{measure_again, set_up, write_delays};
 use super::signals::difference;
 use crate::board::clocks::References;
 use crate::clocks::extend;
@@ -32,6 +34,15 @@ const PAUSE: Duration = Duration::from_millis(1);
 const ROUTINE: Duration = Duration::from_millis(100);
 /// Between two tries to set the clocks up.
 const RETRY: Duration = Duration::from_millis(100);
+/// From the last change of the segment until it is measured again: a plug that is pushed in bounces.
+const SETTLE: Duration = Duration::from_millis(5);
+/// A ring that opened or closed explains ports that change within so long: in each part the way from clock to clock is what
+/// it was (facts 7.5), so that nobody has to wait for the measurement.
+const EXPLAINED: Duration = Duration::from_millis(20);
+/// Between two tries to measure it.
+const AGAIN: Duration = Duration::from_millis(20);
+/// A segment that cannot be measured for so long has its clocks followed as they were.
+const PATIENCE: Duration = Duration::from_secs(1);
 /// Distributions in a row; then the bus belongs to others for [`BURST_PAUSE`].
 const BURST: u32 = 8;
 const BURST_PAUSE: Duration = Duration::from_micros(100);
@@ -45,13 +56,12 @@ pub(crate) async fn begin(bus: &Bus, fleet: &SharedFleet) {
 }
 
 async fn try_set_up(bus: &Bus, fleet: &SharedFleet) {
-    if let Err(reason) = set_up(bus, fleet).await {
+    if let Err(reason) = set_up(bus, &fleet.clocks).await {
         bus.report(Event::ClocksFailed { reason });
         return;
     }
-    post(bus, fleet);
-    let reference = fleet.clocks.access().reference;
-    bus.report(Event::ReferenceClock { position: reference.map(|position| Position(position as u16)) });
+    post(fleet);
+    tell_reference(bus, fleet);
     bus.spawn(drift_phase(bus.clone(), fleet.clone()));
 }
 
@@ -66,17 +76,49 @@ pub(crate) async fn keep(bus: Bus, fleet: SharedFleet) {
     }
     let mut next_look = Instant::default();
     let mut seen = (fleet.board.ring().changes, answering(&fleet));
+    let mut next_measurement = Instant::default();
+    let mut explained_until = Instant::default();
+    fleet.board.clocks.guard_ports();
     loop {
         bus.sleep(PAUSE).await;
         let now = (fleet.board.ring().changes, answering(&fleet));
         let changed = now != seen;
+        if now.0 != seen.0 {
+            explained_until = bus.now() + EXPLAINED;
+        }
         seen = now;
+        if changed || (fleet.board.clocks.is_held() && fleet.clocks.access().is_doubtful.is_none()) {
+            fleet.clocks.access().is_doubtful.get_or_insert(bus.now());
+            next_measurement = bus.now() + SETTLE;
+        }
         let is_locked = fleet.clocks.are_locked();
-        if changed || bus.now() >= next_look {
-            look(&bus, &fleet).await;
+        let is_explained = bus.now() < explained_until;
+        if changed || bus.now() >= next_look || (is_explained && fleet.board.clocks.is_held()) {
+            look(&bus, &fleet, is_explained).await;
             next_look = if is_locked && !is_anybody_open(&fleet) { bus.now() + ROUTINE } else { bus.now() };
         }
+        let doubtful = fleet.clocks.access().is_doubtful;
+        if let Some(since) = doubtful.filter(|since| bus.now() >= next_measurement.max(*since + SETTLE)) {
+            measure_once(&bus, &fleet, since).await;
+            next_measurement = bus.now() + AGAIN;
+        }
     }
+}
+
+/// Measures the segment after a change.
+async fn measure_once(bus: &Bus, fleet: &SharedFleet, since: Instant) {
+    let hold = || fleet.board.clocks.post_references(References::default());
+    let holds = fleet.board.clocks.holds();
+    match measure_again(bus, &fleet.clocks, hold).await {
+        Ok((0, _)) => {}
+        Ok((clocks, largest_ns)) => bus.report(Event::DelaysChanged { clocks, largest_ns }),
+        Err(_) if bus.now() < since + PATIENCE => return,
+        Err(reason) => bus.report(Event::ClocksFailed { reason }),
+    }
+    elect(bus, fleet);
+    fleet.clocks.access().is_doubtful = None;
+    post(fleet);
+    fleet.board.clocks.answer(holds);
 }
 
 /// Whether a clock that is there is not locked, or not again.
@@ -105,7 +147,7 @@ pub(super) async fn drift_phase(bus: Bus, fleet: SharedFleet) {
     for number in 0..count {
         let (references, _) = fleet.board.clocks.references();
         // With a ring that opens or closes right now, the wrong clocks would follow.
-        let is_certain = references == wanted(&fleet);
+        let is_certain = references == wanted(&fleet) && !fleet.board.clocks.is_held();
         let nobody = StationAddress(0);
         let stations = Link::ALL.map(|link| references.on(link).unwrap_or(nobody));
         if !is_certain || stations == [nobody; 2] {
@@ -133,7 +175,8 @@ struct Answer {
 }
 
 /// Reads all differences and draws conclusions.
-async fn look(bus: &Bus, fleet: &SharedFleet) {
+async fn look(bus: &Bus, fleet: &SharedFleet, is_explained: bool) {
+    let holds = fleet.board.clocks.holds();
     let stations: Vec<Option<StationAddress>> = {
         let clocks = fleet.clocks.access();
         clocks.nodes.iter().map(|node| node.has_clock.then_some(node.station)).collect()
@@ -153,7 +196,9 @@ async fn look(bus: &Bus, fleet: &SharedFleet) {
     });
     let answers: Vec<Option<Answer>> = answers.await;
     judge(bus, fleet, &answers);
-    follow_links(bus, fleet, &answers).await;
+    if follow_links(bus, fleet, &answers, is_explained).await {
+        fleet.board.clocks.answer(holds);
+    }
     follow_reference(bus, fleet).await;
 }
 
@@ -187,9 +232,10 @@ fn judge(bus: &Bus, fleet: &SharedFleet, answers: &[Option<Answer>]) {
     }
 }
 
-/// Follows SubDevices from link to link, and replaces a reference that is gone.
-async fn follow_links(bus: &Bus, fleet: &SharedFleet, answers: &[Option<Answer>]) {
-    let (moved, elected) = {
+/// Follows SubDevices from link to link, and replaces a reference that is gone. Returns whether references were posted with
+/// which clocks may be told a time; `is_explained` is for changes of ports that come of a ring that opened or closed.
+async fn follow_links(bus: &Bus, fleet: &SharedFleet, answers: &[Option<Answer>], is_explained: bool) -> bool {
+    let moved = {
         let mut clocks = fleet.clocks.access();
         let mut moved = false;
         for (node, answer) in clocks.nodes.iter_mut().zip(answers) {
@@ -197,22 +243,23 @@ async fn follow_links(bus: &Bus, fleet: &SharedFleet, answers: &[Option<Answer>]
             moved |= answer.link != node.link;
             node.link = answer.link;
         }
-        let before = clocks.reference;
-        let is_there = before.is_some_and(|position| clocks.nodes[position].link.is_some());
-        if !is_there {
-            clocks.reference = clocks.elect(|_, node| node.link.is_some() && node.unit.is_some());
-        }
-        (moved, (clocks.reference != before).then_some(clocks.reference))
+        moved
     };
-    if let Some(reference) = elected {
-        bus.report(Event::ReferenceClock { position: reference.map(|position| Position(position as u16)) });
+    let elected = elect(bus, fleet);
+    let is_other = fleet.board.clocks.references().0 != wanted(fleet);
+    if fleet.clocks.access().is_doubtful.is_some() && !is_explained {
+        return false;
     }
-    let held = fleet.board.clocks.references().0 != wanted(fleet);
-    if !moved && !held && elected.is_none() {
-        return;
+    if !(moved || is_other || elected || fleet.board.clocks.is_held()) {
+        return false;
     }
     let changed: Vec<Link> = {
         let mut clocks = fleet.clocks.access();
+        if Link::ALL.iter().any(|link| clocks.is_mixed(*link)) {
+            // What is between them is not known before the segment has been measured.
+            clocks.is_doubtful.get_or_insert(bus.now());
+            return false;
+        }
         Link::ALL.into_iter().filter(|link| clocks.refer(*link)).collect()
     };
     if !changed.is_empty() {
@@ -224,7 +271,33 @@ async fn follow_links(bus: &Bus, fleet: &SharedFleet, answers: &[Option<Answer>]
             }
         }
     }
-    post(bus, fleet);
+    post(fleet);
+    true
+}
+
+/// Replaces a reference that is gone. Returns whether there is another one.
+fn elect(bus: &Bus, fleet: &SharedFleet) -> bool {
+    {
+        let mut clocks = fleet.clocks.access();
+        let before = clocks.reference;
+        let is_there = |index: &usize| clocks.nodes[*index].link.is_some() && !clocks.nodes[*index].is_unset;
+        if before.as_ref().is_none_or(|index| !is_there(index)) {
+            clocks.reference = clocks.elect(|_, node| node.link.is_some() && node.unit.is_some());
+        }
+        if clocks.reference == before {
+            return false;
+        }
+    }
+    tell_reference(bus, fleet);
+    true
+}
+
+fn tell_reference(bus: &Bus, fleet: &SharedFleet) {
+    let position = {
+        let clocks = fleet.clocks.access();
+        clocks.reference.map(|index| Position(clocks.nodes[index].position))
+    };
+    bus.report(Event::ReferenceClock { position });
 }
 
 /// Whose time the copies are to distribute.
@@ -235,7 +308,7 @@ fn wanted(fleet: &SharedFleet) -> References {
     References { main: station(Link::Main), redundant: station(Link::Redundant), redundant_leads: leads }
 }
 
-fn post(_bus: &Bus, fleet: &SharedFleet) {
+fn post(fleet: &SharedFleet) {
     fleet.board.clocks.post_references(wanted(fleet));
 }
 

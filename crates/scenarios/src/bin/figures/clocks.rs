@@ -7,15 +7,16 @@
 use std::process::ExitCode;
 use std::time::Duration;
 
-use ringcat::{SyncSignals, Trigger};
-use ringcat_sim::cable::{CableId, DeviceIndex};
+use ringcat::{JunctionMode, SyncSignals, Trigger};
+use ringcat_sim::cable::{CableId, DeviceIndex, Endpoint, HostLink};
 use ringcat_sim::controller::Wander;
 use ringcat_sim::description::DeviceDescription;
 use ringcat_sim::device::Device;
+use ringcat_sim::frame::Port;
 use ringcat_sim::network::{Network, NetworkOptions};
 use ringcat_sim::time::SimTime;
 use ringcat_wire::register::map;
-use scenarios::clocks::{clock_tree, clocked, config, delay, largest_spread, lock, spread, with_clocks, world};
+use scenarios::clocks::{clock_tree, clocked, config, delay, largest_spread, lock, spread, wired, with_clocks, world};
 use scenarios::figures::{Figures, verdict};
 use scenarios::segments::{line, ring};
 use scenarios::world::World;
@@ -40,6 +41,7 @@ pub fn main() -> ExitCode {
     delays(&mut figures, "tree of 100, three branches each", |ideal| clock_tree(descriptions(100, ideal)));
     hundred(&mut figures);
     cuts(&mut figures);
+    junction(&mut figures);
     phase(&mut figures);
     verdict(figures.print())
 }
@@ -102,10 +104,45 @@ fn hundred(figures: &mut Figures) {
     figures.at_most("100 clocks, +-50 ppm: from power-on to the lock", locked, LOCK_BAR, "s");
     world.until(Duration::from_secs(5), "all in OP", World::all_in_op);
     let op = world.now().0 as f64 / 1e9;
-    figures.show("the same, to OP with SYNC0 everywhere", format!("{op:.3} s"));
+    let without = without_clocks();
+    figures.show("the same, to OP with SYNC0 everywhere; without clocks", format!("{op:.3} s; {without:.3} s"));
     let all: Vec<usize> = (0..100).collect();
     let largest = largest_spread(&mut world, &all, 10_000);
     figures.at_most("the same: spread in 10 s of 1 ms cycles", largest as f64, SPREAD_BAR, "ns");
+}
+
+/// From power-on to OP of the same devices when nobody asks for clocks.
+fn without_clocks() -> f64 {
+    let network = line(clocked(100, 50), NetworkOptions::default());
+    let mut world = World::new(2, network);
+    world.until(Duration::from_secs(20), "all in OP", World::all_in_op);
+    world.now().0 as f64 / 1e9
+}
+
+/// A ring behind a junction: each of its cables cut and healed.
+fn junction(figures: &mut Figures) {
+    let at = |device: usize, port| Endpoint::Device(DeviceIndex(device), port);
+    let (a, b, c, d) = (Port::A, Port::B, Port::C, Port::D);
+    let mut cables = vec![(Endpoint::Host(HostLink::Main), at(0, a)), (at(0, b), at(1, a)), (at(1, d), at(2, a))];
+    cables.extend((3..8).map(|device| (at(device - 1, b), at(device, a))));
+    cables.extend([(at(7, b), at(1, b)), (at(1, c), at(8, a)), (at(8, b), at(9, a))]);
+    let options = ringcat::Options { junctions: JunctionMode::Automatic, ..ringcat::Options::default() };
+    let network = wired(clocked(10, 50), &cables);
+    let mut world = World::with(5, network, &options, |scan| with_clocks(scan, config())).expect("it can be activated");
+    lock(&mut world, Duration::from_secs(20));
+    world.run_cycles(500);
+    let all: Vec<usize> = (0..10).collect();
+    let (mut over, mut after) = (0, 0);
+    for cable in 2..9 {
+        for heal in [false, true] {
+            let fault = if heal { World::heal } else { World::cut };
+            fault(&mut world, CableId(cable));
+            over = over.max(largest_spread(&mut world, &all, 500));
+            after = after.max(largest_spread(&mut world, &all, 100));
+        }
+    }
+    figures.at_most("ring behind a junction, each cable cut and healed: spread", over as f64, INSIDE_BAR, "ns");
+    figures.at_most("the same, 0.5 s after each", after as f64, SPREAD_BAR, "ns");
 }
 
 fn cuts(figures: &mut Figures) {

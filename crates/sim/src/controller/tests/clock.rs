@@ -200,3 +200,61 @@ fn edges_at_latch_pins_leave_their_time_facts_3_12() {
     assert_eq!(bench.read(0x09AE, 2).0, [0x02, 0x04]);
     assert_eq!(bench.read(0x09B8, 8).0, second.to_le_bytes());
 }
+
+#[test]
+fn a_sync_signal_without_a_pulse_length_stays_until_the_pdi_has_read_its_status_facts_3_12() {
+    let mut bench = Bench::new();
+    bench.controller.memory.set_u16(RegisterAddress(0x0982), 0);
+    let start = bench.controller.system_time(bench.now) + 5_000_000;
+    bench.write(0x0990, &start.to_le_bytes());
+    bench.write(0x09A0, &[1_000_000u32.to_le_bytes(), 200_000u32.to_le_bytes()].concat());
+    bench.write(0x0981, &[0x07]);
+    assert_eq!(bench.read(0x098E, 2).0, [0, 0]);
+    bench.wait(Duration::from_micros(5_100));
+    assert_eq!(bench.read(0x098E, 2).0, [1, 0], "EtherCAT reads it and changes nothing");
+    assert_eq!(bench.pdi_read(0x098E, 1), Some(vec![1]));
+    assert_eq!(bench.pdi_read(0x098E, 1), Some(vec![0]));
+    bench.wait(Duration::from_millis(1));
+    assert_eq!(bench.read(0x098E, 2).0, [1, 1]);
+}
+
+#[test]
+fn the_start_time_activates_a_sync_unit_that_waits_for_it_facts_3_12() {
+    for (bits64, activation) in [(true, 0x0A), (true, 0x1A), (false, 0x0A)] {
+        let mut config = config();
+        config.features.dc_64bit = bits64;
+        let mut bench = Bench::with(config);
+        bench.write(0x09A0, &1_000_000u32.to_le_bytes());
+        bench.write(0x0981, &[activation]);
+        assert_eq!((bench.register(0x0984), bench.register(0x0981)), ([0], [activation]));
+        let start = bench.controller.system_time(bench.now) + 5_000_000;
+        bench.write(0x0990, &start.to_le_bytes()[..4]);
+        let whole = bits64 && activation & 0x10 == 0;
+        assert_eq!(bench.register(0x0984), [u8::from(!whole)], "half of the start time");
+        if whole {
+            bench.write(0x0990, &start.to_le_bytes());
+        }
+        assert_eq!((bench.register(0x0984), bench.register(0x0981)), ([1], [activation | 1]));
+        let first = bench.controller.next_sync0(bench.now).expect("it comes");
+        assert_eq!(bench.controller.system_time(first), start);
+    }
+}
+
+#[test]
+fn buffer_changes_of_sync_managers_leave_their_time_facts_3_12() {
+    let mut bench = Bench::with(ControllerConfig { clock_start: 77, ..config() });
+    bench.write(0x0810, &[0x00, 0x11, 4, 0, 0x24, 0, 1, 0]);
+    let time = |bench: &Bench, at: u16| u32::from_le_bytes(bench.register(at));
+    bench.write(0x1100, &[1; 3]);
+    assert_eq!(time(&bench, 0x09F0), 0, "not handed over yet");
+    bench.write(0x1100, &[1; 4]);
+    assert_eq!(time(&bench, 0x09F0), local_first_bit(&bench) as u32);
+    bench.wait(Duration::from_micros(3));
+    let opened = bench.controller.local_time(bench.now) as u32;
+    assert!(bench.pdi_read(0x1100, 2).is_some());
+    assert_eq!((time(&bench, 0x09F8), time(&bench, 0x09FC)), (opened, 0));
+    bench.wait(Duration::from_micros(3));
+    let closed = bench.controller.local_time(bench.now) as u32;
+    assert!(bench.pdi_read(0x1102, 2).is_some());
+    assert_eq!((time(&bench, 0x09F8), time(&bench, 0x09FC)), (opened, closed));
+}

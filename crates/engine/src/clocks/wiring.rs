@@ -1,0 +1,231 @@
+//! Which port is connected to which, and the way of a frame through that (facts 2.1, 7.1).
+//!
+//! In: a [`Topology`] and which ports are open now. A topology has local rings as branches; here their closing cables are
+//! what they are, cables. Out: the arrivals of a frame of either link, in order, and whether a processing unit meets it
+//! after each.
+
+use alloc::vec;
+use alloc::vec::Vec;
+
+use crate::topology::{PortOf, Topology};
+
+/// Order in which a frame passes the ports; the processing unit is behind port 0 (facts 2.1).
+const TRAVEL: [u8; 4] = [0, 3, 1, 2];
+/// So many open ports are looked at for the one that leads to the redundant link; it is the last one.
+const OPEN_PORTS: usize = 16;
+/// Frames of the main and of the redundant link.
+pub const TREES: usize = 2;
+
+/// The cables on which frames run.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Wiring {
+    /// By position and port, what is at the other end.
+    far: Vec<[Option<PortOf>; 4]>,
+    /// Where frames of the main and of the redundant link come in, and go out.
+    pub entries: [Option<PortOf>; TREES],
+}
+
+/// A frame comes in at a port.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Arrival {
+    /// Where.
+    pub at: PortOf,
+    /// The processing unit meets it before it goes on.
+    pub processed: bool,
+}
+
+impl Wiring {
+    /// Of a topology whose ring is closed or not. `is_open` says which ports are open: closing cables of local rings with
+    /// both ends open are in use.
+    pub fn new(topology: &Topology, ring_closed: bool, is_open: impl Fn(PortOf) -> bool) -> Wiring {
+        let mut wiring = Wiring { far: vec![[None; 4]; topology.nodes.len()], entries: entries(topology, ring_closed) };
+        for (node, here) in topology.nodes.iter().enumerate() {
+            if let Some((parent, port)) = here.parent {
+                wiring.connect(PortOf { node: parent, port }, PortOf { node, port: here.entry_port });
+            }
+        }
+        for ring in &topology.local_rings {
+            let (head, tail) = (ring.closing.head, ring.closing.tail);
+            if is_open(head) && is_open(tail) {
+                wiring.connect(head, tail);
+            }
+        }
+        wiring
+    }
+
+    fn connect(&mut self, one: PortOf, other: PortOf) {
+        if one.node.max(other.node) >= self.far.len() || one.port.max(other.port) > 3 {
+            return;
+        }
+        for (here, there) in [(one, other), (other, one)] {
+            if let Some(port) = self.far.get_mut(here.node).and_then(|ports| ports.get_mut(usize::from(here.port))) {
+                *port = Some(there);
+            }
+        }
+    }
+
+    /// Closes ports. Without its last port a ring of two links is a line.
+    pub fn open(&mut self, rings: &[PortOf]) {
+        for at in rings {
+            if let Some(far) = self.far(*at) {
+                self.far[at.node][usize::from(at.port)] = None;
+                self.far[far.node][usize::from(far.port)] = None;
+            }
+            if self.entries[1] == Some(*at) {
+                self.entries[1] = None;
+            }
+        }
+    }
+
+    /// SubDevices.
+    pub fn count(&self) -> usize {
+        self.far.len()
+    }
+
+    /// The other end of the cable on a port.
+    pub fn far(&self, at: PortOf) -> Option<PortOf> {
+        self.far.get(at.node)?.get(usize::from(at.port)).copied().flatten()
+    }
+
+    /// Both ends of each cable.
+    pub fn cables(&self) -> impl Iterator<Item = (PortOf, PortOf)> + '_ {
+        let ports = (0..self.far.len()).flat_map(|node| (0..4).map(move |port| PortOf { node, port }));
+        ports.filter_map(|near| Some((near, self.far(near)?))).filter(|(near, far)| near < far)
+    }
+
+    /// Arrivals of a frame of a link, in order.
+    pub fn way(&self, tree: usize) -> Vec<Arrival> {
+        let limit = 4 * self.far.len() + 4;
+        let mut arrivals = Vec::new();
+        let mut next = self.entries[tree];
+        while let Some(at) = next.take().filter(|_| arrivals.len() < limit) {
+            let mut processed = at.port == 0;
+            let place = TRAVEL.iter().position(|port| *port == at.port).unwrap_or(0);
+            for step in 1..=4 {
+                let out = PortOf { node: at.node, port: TRAVEL[(place + step) % 4] };
+                if self.entries.contains(&Some(out)) {
+                    break;
+                }
+                next = self.far(out);
+                if next.is_some() {
+                    break;
+                }
+                // A closed port 0 loops the frame to the processing unit.
+                processed |= out.port == 0;
+            }
+            arrivals.push(Arrival { at, processed });
+        }
+        arrivals
+    }
+
+    /// The port at which the frame that a SubDevice processes comes in first, by position.
+    pub fn entry_ports(&self) -> Vec<u8> {
+        let mut ports: Vec<Option<u8>> = vec![None; self.far.len()];
+        for tree in 0..TREES {
+            let way = self.way(tree);
+            let processed = processed_in(&way, self.far.len());
+            for Arrival { at, .. } in way.iter().filter(|arrival| processed[arrival.at.node]) {
+                ports[at.node].get_or_insert(at.port);
+            }
+        }
+        ports.into_iter().map(Option::unwrap_or_default).collect()
+    }
+}
+
+/// Which SubDevices process the frame, by position.
+pub(super) fn processed_in(way: &[Arrival], count: usize) -> Vec<bool> {
+    let mut processed = vec![false; count];
+    way.iter().filter(|arrival| arrival.processed).for_each(|arrival| processed[arrival.at.node] = true);
+    processed
+}
+
+/// Where frames come in.
+fn entries(topology: &Topology, ring_closed: bool) -> [Option<PortOf>; TREES] {
+    let root = |mut range: core::ops::Range<usize>| range.find(|node| topology.nodes[*node].parent.is_none());
+    let (count, main) = (topology.nodes.len(), topology.main_count.min(topology.nodes.len()));
+    let first = root(0..main).or_else(|| root(0..count).filter(|_| main == 0 && topology.redundant_head.is_none()));
+    let at_main = first.map(|node| PortOf { node, port: topology.nodes[node].entry_port });
+    // Frames of the redundant link come in where the trunk of its tree leads out of it.
+    let at_redundant = match topology.redundant_head {
+        Some(head) => {
+            let leads_out = |at: &&PortOf| at.node >= main && tree_root(topology, at.node) == head;
+            topology.open_ports.iter().rev().take(OPEN_PORTS).find(leads_out)
+        }
+        None => topology.open_ports.last().filter(|_| ring_closed),
+    };
+    [at_main, at_redundant.copied()]
+}
+
+fn tree_root(topology: &Topology, mut node: usize) -> usize {
+    for _ in 0..topology.nodes.len() {
+        match topology.nodes[node].parent {
+            Some((parent, _)) => node = parent,
+            None => break,
+        }
+    }
+    node
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::topology::{Closing, LocalRing, Node};
+
+    /// A junction with three behind its port 3 and one behind its port 2; where the ring closes.
+    fn junction() -> Topology {
+        let mut nodes = vec![Node::default(); 5];
+        for (parent, port, child) in [(0, 3, 1), (1, 1, 2), (2, 1, 3), (0, 2, 4)] {
+            nodes[parent].children[usize::from(port)] = Some(child);
+            nodes[child].parent = Some((parent, port));
+        }
+        let closing = Closing { head: PortOf { node: 0, port: 1 }, tail: PortOf { node: 3, port: 1 } };
+        let local_rings = vec![LocalRing { closing, cables: Vec::new() }];
+        Topology { nodes, main_count: 5, local_rings, ..Topology::default() }
+    }
+
+    fn ways(wiring: &Wiring, tree: usize) -> Vec<(usize, u8, bool)> {
+        wiring.way(tree).iter().map(|arrival| (arrival.at.node, arrival.at.port, arrival.processed)).collect()
+    }
+
+    #[test]
+    fn a_frame_goes_round_a_local_ring_once_and_back_and_forth_through_a_broken_one_facts_9_4() {
+        let whole = Wiring::new(&junction(), false, |_| true);
+        let round =
+            [(0, 0, true), (1, 0, true), (2, 0, true), (3, 0, true), (0, 1, false), (4, 0, true), (0, 2, false)];
+        assert_eq!(ways(&whole, 0), round);
+        assert_eq!(whole.cables().count(), 5);
+        let open = Wiring::new(&junction(), false, |at| at.node != 3);
+        assert_eq!(ways(&open, 0).len(), 9);
+        // Broken between 1 and 2: the second half is entered from behind.
+        let mut topology = junction();
+        (topology.nodes[2].parent, topology.nodes[1].children[1]) = (None, None);
+        let broken = Wiring::new(&topology, false, |_| true);
+        let parts = [
+            (0, 0, true),
+            (1, 0, true),
+            (0, 3, false),
+            (3, 1, false),
+            (2, 1, true),
+            (3, 0, true),
+            (0, 1, false),
+            (4, 0, true),
+            (0, 2, false),
+        ];
+        assert_eq!(ways(&broken, 0), parts);
+        assert_eq!(broken.entry_ports(), [0, 0, 1, 1, 0]);
+    }
+
+    #[test]
+    fn frames_of_both_links_pass_a_closed_ring_and_a_branch_on_port_2_is_met_by_one_facts_2_9() {
+        // S1, S2 with S5 on port 2, S3.
+        let mut topology = Topology { nodes: vec![Node::default(); 4], main_count: 3, ..Topology::default() };
+        for (parent, port, child) in [(0, 1, 1), (1, 1, 2), (1, 2, 3)] {
+            topology.nodes[parent].children[usize::from(port)] = Some(child);
+            topology.nodes[child].parent = Some((parent, port));
+        }
+        topology.open_ports = vec![PortOf { node: 2, port: 1 }];
+        let wiring = Wiring::new(&topology, true, |_| true);
+        assert_eq!(ways(&wiring, 0), [(0, 0, true), (1, 0, true), (2, 0, true)]);
+        assert_eq!(ways(&wiring, 1), [(2, 1, false), (1, 1, false), (3, 0, true), (1, 2, false), (0, 1, false)]);
+    }
+}

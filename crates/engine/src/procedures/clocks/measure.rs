@@ -1,0 +1,298 @@
+//! Who is connected to whom now, and what frames take from clock to clock (facts 7.1).
+//!
+//! Nothing here disturbs process data, so a measurement may be taken at any time. But a frame meets those in a whole ring
+//! only once, which measures nothing: at the set-up every ring is opened for a moment, with the bit that closes it again
+//! by itself. Of the ring of two links the last port is closed, of one behind a junction both ends of its closing cable.
+//! What was measured of cables then holds afterwards, whatever is plugged where.
+
+use alloc::string::{String, ToString};
+use alloc::vec;
+use alloc::vec::Vec;
+use core::time::Duration;
+
+use ringcat_wire::address::{StationAddress, Wkc};
+use ringcat_wire::command::Command;
+use ringcat_wire::datagram::Target;
+use ringcat_wire::register::{DlControl, DlStatus, LoopControl, map};
+
+use super::SharedClocks;
+use crate::clocks::wiring::Wiring;
+use crate::clocks::{Delays, FRACTION, Latched, Measurements, Segment};
+use crate::link::LinkSet;
+use crate::procedures::strangers::view;
+use crate::ring::RingState;
+use crate::supervisor::{Bus, BusError};
+use crate::topology::{Closing, NodeStatus, PortOf, Topology};
+
+/// Bytes from DC_RECEIVE_TIME to the end of DC_RECEIVE_TIME_EPU.
+const LATCHED_LEN: usize = 32;
+/// A measurement whose frames were lost is taken again so often in all.
+const MOST_FAILURES: u32 = 16;
+/// Looks at a segment that changes meanwhile.
+const LOOKS: u32 = 3;
+/// Until a ring that was opened must be closed again: loop settings end by themselves within a second.
+const CLOSING_LIMIT: Duration = Duration::from_millis(1_200);
+/// Pause between two looks for that.
+const CLOSING_PAUSE: Duration = Duration::from_millis(1);
+/// Bytes of DL_CONTROL that are written: forwarding rule and temporary bit, loops.
+const WRITTEN: usize = 2;
+
+/// Who is there, in the order in which frames meet them.
+#[derive(Clone, Debug)]
+struct Survey {
+    stations: Vec<StationAddress>,
+    dl_status: Vec<DlStatus>,
+    topology: Topology,
+    wiring: Wiring,
+    is_closed: bool,
+}
+
+/// What was measured.
+#[derive(Clone, Debug)]
+pub(super) struct Measured {
+    /// Station addresses by position.
+    pub stations: Vec<StationAddress>,
+    pub delays: Delays,
+    /// How much faster than the reference each clock runs, by position.
+    pub drift_ppb: Vec<Option<i64>>,
+}
+
+/// Measures; `opening` says that rings are opened for it.
+pub(super) async fn measure(bus: &Bus, clocks: &SharedClocks, opening: bool) -> Result<Measured, String> {
+    let survey = look(bus, clocks).await?;
+    let rings = survey.whole_rings();
+    if opening && !rings.is_empty() {
+        measure_open(bus, clocks, &survey, &rings).await?;
+    }
+    let measured = take(bus, clocks, &survey).await?;
+    if !(measured.delays.is_guessed && survey.is_closed && !opening) {
+        return Ok(measured);
+    }
+    // A ring of two links that was broken until now has a cable that nobody has measured.
+    measure_open(bus, clocks, &survey, &rings).await?;
+    take(bus, clocks, &survey).await
+}
+
+/// Opens rings, measures what cables take, closes the rings again.
+async fn measure_open(bus: &Bus, clocks: &SharedClocks, survey: &Survey, rings: &[PortOf]) -> Result<(), String> {
+    let ports: Vec<(StationAddress, u8)> = rings.iter().map(|at| (survey.stations[at.node], at.port)).collect();
+    let text = |error: BusError| error.to_string();
+    let before = controls(bus, &ports).await.map_err(text)?;
+    let closed = before.iter().map(|(station, control)| (*station, closed(*control, *station, &ports)));
+    clocks.access().is_measuring = true;
+    let result = match write(bus, closed.collect()).await {
+        Ok(()) => {
+            let mut open = survey.clone();
+            open.wiring.open(rings);
+            take(bus, clocks, &open).await.map(drop)
+        }
+        Err(error) => Err(text(error)),
+    };
+    // Where this is lost, too, the ports open by themselves.
+    let _ = write(bus, before).await;
+    if survey.is_closed {
+        wait_for_ring(bus).await;
+    }
+    clocks.access().is_measuring = false;
+    result
+}
+
+/// Until frames of both halves have shown that the ring is closed.
+async fn wait_for_ring(bus: &Bus) {
+    let until = bus.now() + CLOSING_LIMIT;
+    while bus.now() < until {
+        bus.sleep(CLOSING_PAUSE).await;
+        let _ = bus.brd(map::TYPE, 1).await;
+        let in_cycles = bus.board().map(|board| board.ring().state);
+        if bus.ring() == RingState::Closed && in_cycles != Some(RingState::Open) {
+            break;
+        }
+    }
+}
+
+impl Survey {
+    /// The ports to close so that no ring is whole.
+    fn whole_rings(&self) -> Vec<PortOf> {
+        let mut ports = Vec::new();
+        for ring in &self.topology.local_rings {
+            if self.wiring.far(ring.closing.head).is_some() && self.cables_are_whole(ring.closing) {
+                ports.extend([ring.closing.head, ring.closing.tail]);
+            }
+        }
+        if self.is_closed {
+            ports.extend(self.wiring.entries[1]);
+        }
+        ports
+    }
+
+    /// Whether all members of a local ring are entered at port 0.
+    fn cables_are_whole(&self, closing: Closing) -> bool {
+        let mut members = closing.head.node + 1..=closing.tail.node;
+        members.all(|node| self.dl_status[node].ports[0].communication)
+    }
+}
+
+async fn look(bus: &Bus, clocks: &SharedClocks) -> Result<Survey, String> {
+    for _ in 0..LOOKS {
+        match look_once(bus, clocks).await {
+            Ok(Some(survey)) => return Ok(survey),
+            Ok(None) => {}
+            Err(error) => return Err(error.to_string()),
+        }
+    }
+    Err("SubDevices come and go".to_string())
+}
+
+/// `None` while the segment changes.
+async fn look_once(bus: &Bus, clocks: &SharedClocks) -> Result<Option<Survey>, BusError> {
+    let Some(before) = view(bus).await? else { return Ok(None) };
+    let is_closed = bus.links() == LinkSet::Ring && bus.ring() == RingState::Closed;
+    // Receive times say who is entered at which port.
+    let latched = match latch(bus, clocks, &before.stations).await {
+        Err(BusError::Wkc { .. }) => return Ok(None),
+        other => other?,
+    };
+    let read = bus.gather(before.stations.clone(), |bus, station| async move {
+        Ok::<_, BusError>(DlStatus::decode(&bus.fprd_array(station, map::DL_STATUS).await?))
+    });
+    let dl_status = match read.await.into_iter().collect::<Result<Vec<_>, BusError>>() {
+        Err(BusError::Wkc { .. }) => return Ok(None),
+        other => other?,
+    };
+    let access = clocks.access();
+    let ports = |station: StationAddress| access.nodes.iter().find(|node| node.station == station).map(|n| n.ports);
+    let node = |position: usize| NodeStatus {
+        dl_status: dl_status[position],
+        receive_times: latched[position].map(|latched| latched.ports),
+        ports: ports(before.stations[position]).unwrap_or_default(),
+    };
+    let place = |end: &(StationAddress, u8)| Some(PortOf { node: before.position(end.0)?, port: end.1 });
+    let closings = access.closings.iter().filter_map(|[head, tail]| {
+        let closing = Closing { head: place(head)?, tail: place(tail)? };
+        (closing.head.node < closing.tail.node).then_some(closing)
+    });
+    let closings: Vec<Closing> = closings.collect();
+    let nodes: Vec<NodeStatus> = (0..before.stations.len()).map(node).collect();
+    let topology = Topology::with_local_rings(&nodes, usize::from(before.counts.0.0), &closings);
+    let is_open = |at: PortOf| {
+        let port = dl_status[at.node].ports[usize::from(at.port & 3)];
+        port.communication && !port.loop_closed
+    };
+    let wiring = Wiring::new(&topology, is_closed, is_open);
+    Ok(Some(Survey { stations: before.stations, dl_status, topology, wiring, is_closed }))
+}
+
+/// Several latches of a segment as it is.
+async fn take(bus: &Bus, clocks: &SharedClocks, survey: &Survey) -> Result<Measured, String> {
+    let (count, unit_takes) = {
+        let access = clocks.access();
+        let config = access.config.as_ref();
+        let unit = config.map_or(0, |config| i64::from(config.processing_difference_ns) << FRACTION);
+        (config.map_or(1, |config| config.measurements.clamp(1, 64)), unit)
+    };
+    let entries = survey.wiring.entry_ports();
+    enter_backwards(bus, clocks, &survey.stations, &entries).await;
+    let mut measurements = Measurements::new(entries);
+    let mut failures = 0;
+    while measurements.count() < count {
+        match latch(bus, clocks, &survey.stations).await {
+            Ok(latched) => measurements.add(&latched),
+            Err(error) if failures >= MOST_FAILURES => return Err(error.to_string()),
+            Err(_) => failures += 1,
+        }
+    }
+    let mut access = clocks.access();
+    let access = &mut *access;
+    let at = |station: StationAddress| survey.stations.iter().position(|at| *at == station);
+    let is_there = |node: &super::Node| at(node.station).is_some();
+    let reference = access.reference.filter(|index| is_there(&access.nodes[*index]));
+    let reference = reference.or_else(|| access.elect(|_, node| is_there(node)));
+    let on_clock = reference.and_then(|index| at(access.nodes[index].station)).unwrap_or(0);
+    let segment = Segment { wiring: &survey.wiring, stations: &survey.stations, unit_takes };
+    segment.see(&mut access.cables);
+    let delays = segment.propagation(&measurements.mean(on_clock), &mut access.cables);
+    if delays.is_implausible {
+        return Err("receive times do not fit the cabling: a ring behind a junction may be unknown".to_string());
+    }
+    Ok(Measured { stations: survey.stations.clone(), delays, drift_ppb: measurements.drift_ppb(on_clock) })
+}
+
+/// Controllers that latch in one direction only are told in which the frame comes (facts 3.12, 7.5).
+async fn enter_backwards(bus: &Bus, clocks: &SharedClocks, stations: &[StationAddress], entries: &[u8]) {
+    let modes: Vec<(StationAddress, u8)> = {
+        let mut clocks = clocks.access();
+        let mut mode = |station: &StationAddress, entry: &u8| {
+            let node = clocks.nodes.iter_mut().find(|node| node.station == *station && node.has_clock)?;
+            let backwards = *entry != 0;
+            (core::mem::replace(&mut node.latches_backwards, backwards) != backwards)
+                .then_some((*station, u8::from(backwards)))
+        };
+        stations.iter().zip(entries).filter_map(|(station, entry)| mode(station, entry)).collect()
+    };
+    let write = |bus: Bus, (station, mode): (StationAddress, u8)| async move {
+        bus.fpwr(station, map::DC_LATCH_MODE, &[mode]).await
+    };
+    // Those without the register do not answer.
+    let _ = bus.gather(modes, write).await;
+}
+
+/// Lets all clocks latch one frame and reads what these SubDevices have.
+pub(super) async fn latch(
+    bus: &Bus,
+    clocks: &SharedClocks,
+    stations: &[StationAddress],
+) -> Result<Vec<Option<Latched>>, BusError> {
+    let asked: Vec<(StationAddress, bool)> = {
+        let clocks = clocks.access();
+        let lacks = |station| clocks.nodes.iter().any(|node| node.station == station && !node.has_clock);
+        stations.iter().map(|station| (*station, !lacks(*station))).collect()
+    };
+    let with_clock = asked.iter().filter(|(_, asked)| *asked).count() as u16;
+    let target = Target::Broadcast(map::DC_RECEIVE_TIME);
+    bus.transfer(Command::Bwr, target, vec![0; 4], Some(Wkc(with_clock))).await?;
+    let read = bus.gather(asked, |bus, (station, asked)| async move {
+        if !asked {
+            return Ok(None);
+        }
+        let bytes: [u8; LATCHED_LEN] = match bus.fprd_array(station, map::DC_RECEIVE_TIME).await {
+            Ok(bytes) => bytes,
+            // One that is gone is one without a clock.
+            Err(BusError::Wkc { .. }) => return Ok(None),
+            Err(error) => return Err(error),
+        };
+        let word = |at: usize| u32::from_le_bytes([bytes[at], bytes[at + 1], bytes[at + 2], bytes[at + 3]]);
+        let unit = u64::from(word(24)) | u64::from(word(28)) << 32;
+        Ok(Some(Latched { ports: [word(0), word(4), word(8), word(12)], unit }))
+    });
+    read.await.into_iter().collect()
+}
+
+/// The present loop settings of the SubDevices that have these ports.
+async fn controls(bus: &Bus, ports: &[(StationAddress, u8)]) -> Result<Vec<(StationAddress, DlControl)>, BusError> {
+    let mut stations: Vec<StationAddress> = ports.iter().map(|(station, _)| *station).collect();
+    stations.sort_unstable();
+    stations.dedup();
+    let mut controls = Vec::new();
+    for station in stations {
+        let control = DlControl::decode(&bus.fprd_array(station, map::DL_CONTROL).await?);
+        controls.push((station, DlControl { temporary: false, ..control }));
+    }
+    Ok(controls)
+}
+
+fn closed(control: DlControl, station: StationAddress, ports: &[(StationAddress, u8)]) -> DlControl {
+    let mut loops = control.loops;
+    for (_, port) in ports.iter().filter(|(of, _)| *of == station) {
+        loops[usize::from(port & 3)] = LoopControl::Closed;
+    }
+    DlControl { temporary: true, loops, ..control }
+}
+
+/// All in one frame: in between, frames would be sent into a closed port.
+async fn write(bus: &Bus, controls: Vec<(StationAddress, DlControl)>) -> Result<(), BusError> {
+    let target = |station: StationAddress| Target::Station(station, map::DL_CONTROL);
+    let writes = controls
+        .iter()
+        .map(|(station, control)| (Command::Fpwr, target(*station), control.encode()[..WRITTEN].to_vec()));
+    bus.transfer_all(writes, Some(Wkc(1))).await.map(drop)
+}

@@ -1,0 +1,324 @@
+//! Distributed clocks while the segment changes: rings behind junctions, groups that come and go, trees, clocks that lose
+//! their power (facts 7.1, 7.5, 9.4).
+
+use std::time::Duration;
+
+use ringcat::{
+    ClockConfig, DomainMember, Event, Group, JunctionMode, MainDevice, Options, SubDeviceConfig, SubDeviceInfo,
+    SyncSignals, automatic,
+};
+use ringcat_sim::cable::{CableId, DeviceIndex, Endpoint, HostLink};
+use ringcat_sim::frame::Port::{self, A, B, C, D};
+use ringcat_sim::network::{Network, NetworkOptions};
+use scenarios::clocks::{clocked, config, differences, largest_spread, lock, watch, wired, with_clocks};
+use scenarios::dice::Dice;
+use scenarios::segments::line;
+use scenarios::tap::Tap;
+use scenarios::world::{CYCLE, World};
+
+const MAIN: Endpoint = Endpoint::Host(HostLink::Main);
+const REDUNDANT: Endpoint = Endpoint::Host(HostLink::Redundant);
+
+fn at(device: usize, port: Port) -> Endpoint {
+    Endpoint::Device(DeviceIndex(device), port)
+}
+
+fn all(network: &Network) -> Vec<usize> {
+    (0..network.devices().len()).collect()
+}
+
+fn begun(seed: u64, network: Network, config: ClockConfig) -> World {
+    let options = Options { junctions: JunctionMode::Automatic, ..Options::default() };
+    World::with(seed, network, &options, |scan| with_clocks(scan, config))
+        .unwrap_or_else(|error| panic!("seed {seed}: {error}"))
+}
+
+fn world(seed: u64, network: Network) -> World {
+    let mut world = begun(seed, network, config());
+    lock(&mut world, Duration::from_secs(5));
+    world
+}
+
+/// A clock, a junction with a ring of three, and two clocks behind the junction. The ring's cables are [`RING`].
+fn junction_ring() -> Network {
+    let cables = [
+        (MAIN, at(0, A)),
+        (at(0, B), at(1, A)),
+        (at(1, D), at(2, A)),
+        (at(2, B), at(3, A)),
+        (at(3, B), at(4, A)),
+        (at(4, B), at(1, B)),
+        (at(1, C), at(5, A)),
+        (at(5, B), at(6, A)),
+    ];
+    wired(clocked(7, 50), &cables)
+}
+
+const RING: [usize; 4] = [2, 3, 4, 5];
+
+/// A change of the segment: nobody strays on the way, and soon all are together as before.
+fn change(world: &mut World, what: &str, act: impl FnOnce(&mut World)) -> usize {
+    let everybody = all(world.network());
+    let mark = world.mark();
+    act(world);
+    let [over] = watch(world, [&everybody], 400);
+    let [after] = watch(world, [&everybody], 100);
+    let failed = |event: &Event| matches!(event, Event::ClocksFailed { .. } | Event::SyncWindow { inside: false, .. });
+    assert!(!world.saw(mark, failed), "{what}");
+    assert!(over <= 1_000 && after <= 100, "{what}: {over} ns, then {after} ns");
+    world.events(mark).iter().filter(|timed| matches!(timed.event, Event::DelaysChanged { .. })).count()
+}
+
+#[test]
+fn clocks_of_a_ring_behind_a_junction_stay_together_whole_and_broken_anywhere_facts_7_5_9_4() {
+    let mut world = world(1, junction_ring());
+    let everybody = all(world.network());
+    assert!(largest_spread(&mut world, &everybody, 300) <= 100, "{:?}", differences(world.network(), &everybody));
+    for cable in RING {
+        let cut = change(&mut world, &format!("cut of cable {cable}"), |world| world.cut(CableId(cable)));
+        let heal = change(&mut world, &format!("repair of cable {cable}"), |world| world.heal(CableId(cable)));
+        assert_eq!((cut, heal), (1, 1), "cable {cable}");
+    }
+}
+
+#[test]
+fn a_ring_behind_a_junction_that_is_broken_from_the_start_has_its_delays_and_those_of_the_repaired_one() {
+    for cable in [3, 2] {
+        let mut network = junction_ring();
+        network.cut(CableId(cable));
+        network.advance_by(Duration::from_millis(1));
+        let mut world = world(2, network);
+        let everybody = all(world.network());
+        assert!(largest_spread(&mut world, &everybody, 200) <= 100, "cable {cable}");
+        change(&mut world, &format!("first repair of cable {cable}"), |world| world.heal(CableId(cable)));
+        change(&mut world, "another break", |world| world.cut(CableId(4)));
+    }
+}
+
+#[test]
+fn a_local_ring_in_a_ring_of_two_links_keeps_its_clocks_through_breaks_of_either() {
+    let cables = [
+        (MAIN, at(0, A)),
+        (at(0, B), at(1, A)),
+        (at(1, D), at(2, A)),
+        (at(2, B), at(3, A)),
+        (at(3, B), at(1, B)),
+        (at(1, C), at(4, A)),
+        (at(4, B), REDUNDANT),
+    ];
+    let mut world = world(3, wired(clocked(5, 50), &cables));
+    let everybody = all(world.network());
+    for cable in [3, 5, 1, 4] {
+        let what = format!("cable {cable}");
+        let (front, behind): (Vec<usize>, Vec<usize>) = match cable {
+            5 => (vec![0, 1, 2, 3], vec![4]),
+            1 => (vec![0], vec![1, 2, 3, 4]),
+            _ => (everybody.clone(), Vec::new()),
+        };
+        world.cut(CableId(cable));
+        let [inside, other, across] = watch(&mut world, [&front, &behind, &everybody], 500);
+        assert!(inside <= 1_000 && other <= 1_000 && across <= 5_000, "{what}: {inside}, {other}, {across} ns");
+        let [inside, other] = watch(&mut world, [&front, &behind], 50);
+        assert!(inside <= 100 && other <= 100, "{what} cut: {inside}, {other} ns");
+        world.heal(CableId(cable));
+        let [over] = watch(&mut world, [&everybody], 1_500);
+        let [after] = watch(&mut world, [&everybody], 100);
+        assert!(over <= 5_000 && after <= 100, "{what} healed: {over}, then {after} ns");
+    }
+}
+
+#[test]
+fn a_ring_that_was_broken_from_the_start_has_the_delay_of_its_missing_cable_after_the_repair() {
+    let count = 6;
+    let mut cables: Vec<(Endpoint, Endpoint)> = (1..count).map(|device| (at(device - 1, B), at(device, A))).collect();
+    cables.insert(0, (MAIN, at(0, A)));
+    cables.push((at(count - 1, B), REDUNDANT));
+    let mut descriptions = clocked(count, 50);
+    // Entered from behind, and latching only what its processing unit has seen unless it is told.
+    descriptions[4].latches_processing_only = true;
+    let mut network = wired(descriptions, &cables);
+    network.cut(CableId(3));
+    network.advance_by(Duration::from_millis(1));
+    let mut world = world(4, network);
+    let everybody = all(world.network());
+    let mark = world.mark();
+    world.heal(CableId(3));
+    let [over] = watch(&mut world, [&everybody], 2_000);
+    let [after] = watch(&mut world, [&everybody], 200);
+    assert!(over <= 5_000 && after <= 100, "{over}, then {after} ns");
+    // The ring is opened for a moment to measure the cable: nobody is told that, and nothing is lost.
+    assert!(!world.saw(mark, |event| matches!(event, Event::RingOpened { .. })));
+    assert!(world.incomplete(mark) <= 1 && world.left_op(mark).is_empty());
+}
+
+/// A trunk of three junctions with branches on ports 3 and 2, six clocks in branches, up to 100 ppm from the reference.
+fn tree() -> Network {
+    let cables = [
+        (MAIN, at(0, A)),
+        (at(0, B), at(1, A)),
+        (at(1, B), at(2, A)),
+        (at(0, D), at(3, A)),
+        (at(3, B), at(4, A)),
+        (at(1, D), at(5, A)),
+        (at(1, C), at(6, A)),
+        (at(6, B), at(7, A)),
+        (at(2, D), at(8, A)),
+    ];
+    let mut descriptions = clocked(9, 100);
+    descriptions[0].clock_drift_ppb = 0;
+    // One in between has no clock, one latches only what its processing unit has seen.
+    descriptions[6].dc = None;
+    descriptions[4].latches_processing_only = true;
+    wired(descriptions, &cables)
+}
+
+#[test]
+fn clocks_lock_though_frames_get_lost_at_random_from_the_start() {
+    let mut world = begun(8, tree(), ClockConfig { drift_distributions: 20_000, ..config() });
+    let mut dice = Dice::new(8);
+    for _ in 0..150 {
+        world.drop(CableId(dice.below(9) as usize), 1);
+        world.run_cycles(1 + dice.below(8));
+    }
+    lock(&mut world, Duration::from_secs(5));
+    let clocks: Vec<usize> = (0..9).filter(|device| *device != 6).collect();
+    assert!(largest_spread(&mut world, &clocks, 200) <= 100, "{:?}", differences(world.network(), &clocks));
+}
+
+#[test]
+fn every_cable_of_a_tree_may_go_and_come_though_one_has_no_clock_and_frames_get_lost_at_random() {
+    let mut world = begun(5, tree(), config());
+    lock(&mut world, Duration::from_secs(5));
+    let mut dice = Dice::new(5);
+    let clocks: Vec<usize> = (0..9).filter(|device| *device != 6).collect();
+    assert!(largest_spread(&mut world, &clocks, 200) <= 100);
+    for cable in 1..9 {
+        // Behind it.
+        let lost: &[usize] = match cable {
+            1 => &[1, 2, 5, 7, 8],
+            2 => &[2, 8],
+            3 => &[3, 4],
+            4 => &[4],
+            5 => &[5],
+            6 | 7 => &[7],
+            _ => &[8],
+        };
+        let left: Vec<usize> = clocks.iter().copied().filter(|device| !lost.contains(device)).collect();
+        world.cut(CableId(cable));
+        let [apart] = watch(&mut world, [&left], 150);
+        world.heal(CableId(cable));
+        for _ in 0..8 {
+            world.drop(CableId(dice.below(9) as usize), 1);
+            world.run_cycles(1 + dice.below(20));
+        }
+        let [together] = watch(&mut world, [&clocks], 100);
+        world.until(Duration::from_secs(4), "all in OP", World::all_in_op);
+        let [after] = watch(&mut world, [&clocks], 100);
+        assert!(apart <= 200 && together <= 1_000 && after <= 120, "cable {cable}: {apart}, {together}, {after} ns");
+    }
+}
+
+#[test]
+fn a_reference_that_loses_its_power_is_replaced_and_comes_back_without_a_jump_facts_7_5() {
+    let count = 6;
+    let mut cables: Vec<(Endpoint, Endpoint)> = (1..count).map(|device| (at(device - 1, B), at(device, A))).collect();
+    cables.insert(0, (MAIN, at(0, A)));
+    cables.push((at(count - 1, B), REDUNDANT));
+    let options = Options::default();
+    let mut world = World::with(6, wired(clocked(count, 50), &cables), &options, |scan| {
+        let mut declaration = with_clocks(scan, config());
+        for subdevice in &mut declaration.subdevices {
+            subdevice.sync = Some(SyncSignals::sync0(1_000_000, 0));
+        }
+        declaration
+    })
+    .expect("it can be activated");
+    world.until(Duration::from_secs(4), "all in OP", World::all_in_op);
+    let others: Vec<usize> = (1..count).collect();
+    let mark = world.mark();
+    let time = |world: &World| {
+        let network = world.network();
+        let time = network.device(DeviceIndex(3)).controller.system_time(network.now());
+        time.wrapping_sub(network.now().0) as u32
+    };
+    world.run_cycles(300);
+    let before = time(&world);
+    world.power_off(DeviceIndex(0));
+    let [without] = watch(&mut world, [&others], 400);
+    world.power_on(DeviceIndex(0));
+    let [back] = watch(&mut world, [&others], 400);
+    world.until(Duration::from_secs(8), "all in OP again", World::all_in_op);
+    let everybody = all(world.network());
+    let [together] = watch(&mut world, [&everybody], 200);
+    assert!(without <= 1_000 && back <= 1_000 && together <= 200, "{without}, {back}, {together} ns");
+    let elected =
+        |event: &Event| matches!(event, Event::ReferenceClock { position: Some(position) } if position.0 == 1);
+    assert!(world.saw(mark, elected));
+    let took_over =
+        |event: &Event| matches!(event, Event::ReferenceClock { position: Some(position) } if position.0 == 0);
+    assert!(!world.saw(mark, took_over), "the one that came back follows");
+    let drifted = i64::from(time(&world).wrapping_sub(before) as i32);
+    // Seconds with clocks that differ by less than 100 ppm: no jump.
+    let passed = 8_000_000_000_i64;
+    assert!(drifted.abs() < passed / 10_000, "{drifted} ns");
+    assert!(world.left_op(mark).iter().all(|device| device.0 == 0));
+}
+
+/// Four in a line; a group of two has a place behind port 3 of device 1 (devices 4 and 5) and one at the end (6 and 7).
+fn two_places() -> Network {
+    let cables = [
+        (MAIN, at(0, A)),
+        (at(0, B), at(1, A)),
+        (at(1, B), at(2, A)),
+        (at(2, B), at(3, A)),
+        (at(1, D), at(4, A)),
+        (at(4, B), at(5, A)),
+        (at(3, B), at(6, A)),
+        (at(6, B), at(7, A)),
+    ];
+    let mut descriptions = clocked(8, 50);
+    [4, 6].into_iter().for_each(|head: usize| descriptions[head].alias = TOOL);
+    let mut network = wired(descriptions, &cables);
+    (4..8).for_each(|device| network.power_off(DeviceIndex(device)));
+    network
+}
+
+const TOOL: u16 = 5;
+
+#[test]
+fn a_group_that_joins_late_and_then_elsewhere_has_the_delays_and_sync_signals_of_its_place() {
+    let links = Tap::new(line(clocked(4, 50), NetworkOptions::default()));
+    let infos = MainDevice::request(links, &Options::default()).scan().expect("a scan").subdevices;
+    let expect = |config: SubDeviceConfig, info: &SubDeviceInfo| {
+        config.expect_product(info.identity.vendor_id, info.identity.product_code).pdos_of(info)
+    };
+    let group = Group::new(expect(SubDeviceConfig::at_alias(TOOL, 0), &infos[0]));
+    let group = group.then(expect(SubDeviceConfig::default(), &infos[0]));
+    let mut world = World::with(7, two_places(), &Options::default(), |_| {
+        let mut declaration = automatic(&infos, CYCLE);
+        let (_, members) = declaration.add_group(group);
+        declaration.domains[0].members.extend(members.map(|subdevice| DomainMember { subdevice, sync_managers: None }));
+        declaration.clocks = Some(config());
+        declaration.subdevices.iter_mut().for_each(|config| config.sync = Some(SyncSignals::sync0(1_000_000, 0)));
+        declaration
+    })
+    .expect("it can be activated");
+    world.until(Duration::from_secs(4), "the others settled", |world| world.application().all_settled());
+    for place in [[6, 7], [4, 5], [6, 7]] {
+        let base = [0, 1, 2, 3];
+        let mark = world.mark();
+        place.iter().for_each(|device| world.power_on(DeviceIndex(*device)));
+        world.until(Duration::from_secs(8), "the group has joined", |world| {
+            world.application().groups()[0].has_joined()
+        });
+        let together: Vec<usize> = base.into_iter().chain(place).collect();
+        let [others, spread] = watch(&mut world, [&base, &together], 200);
+        assert!(others <= 100 && spread <= 150, "{place:?}: {others}, {spread} ns");
+        assert!(world.saw(mark, |event| matches!(event, Event::DelaysChanged { .. })), "{place:?}");
+        assert_eq!(world.application().engine().clocks().len(), 6);
+        place.iter().rev().for_each(|device| world.power_off(DeviceIndex(*device)));
+        world.until(Duration::from_secs(2), "the group has left", |world| world.application().groups()[0].present == 0);
+        let [others] = watch(&mut world, [&base], 100);
+        assert!(others <= 200 && world.left_op(mark).iter().all(|device| device.0 > 3), "{others} ns");
+    }
+}
