@@ -86,6 +86,33 @@ pub fn wired_with(descriptions: Vec<DeviceDescription>, cables: &[(Endpoint, End
     builder.options(NetworkOptions::default()).build().expect("the cables fit")
 }
 
+/// One, a junction with a ring of three on port 3 that comes back to port 1, and two more on its port 2. The ring's cables
+/// are [`RING_OF_THREE`], its last one closes it.
+pub const RING_BEHIND_JUNCTION: [(Endpoint, Endpoint); 8] = [
+    (MAIN, at(0, Port::A)),
+    (at(0, Port::B), at(1, Port::A)),
+    (at(1, Port::D), at(2, Port::A)),
+    (at(2, Port::B), at(3, Port::A)),
+    (at(3, Port::B), at(4, Port::A)),
+    (at(4, Port::B), at(1, Port::B)),
+    (at(1, Port::C), at(5, Port::A)),
+    (at(5, Port::B), at(6, Port::A)),
+];
+/// Cables of the ring in [`RING_BEHIND_JUNCTION`].
+pub const RING_OF_THREE: [usize; 4] = [2, 3, 4, 5];
+
+/// A ring of two links, with a local ring behind the junction in its middle, device 1. The local ring's two members are
+/// 2 and 3, its cables 2 to 4.
+pub const RING_IN_RING: [(Endpoint, Endpoint); 7] = [
+    (MAIN, at(0, Port::A)),
+    (at(0, Port::B), at(1, Port::A)),
+    (at(1, Port::D), at(2, Port::A)),
+    (at(2, Port::B), at(3, Port::A)),
+    (at(3, Port::B), at(1, Port::B)),
+    (at(1, Port::C), at(4, Port::A)),
+    (at(4, Port::B), REDUNDANT),
+];
+
 /// A closed ring: cable 0 from the main link, cable `n` between devices `n - 1` and `n`, the last to the redundant link.
 ///
 /// # Panics

@@ -145,6 +145,7 @@ impl Domain {
     }
 
     /// Puts the outputs into the frames of the next set, which begins there and is ready, to leave in this cycle.
+    // Inlined on purpose: a cycle has few instructions to spare (bin `cycle`).
     #[inline(always)]
     pub(crate) fn load(&mut self, next: usize, frames: &mut [CyclicFrame], cycle: u64) {
         for frame in frames {

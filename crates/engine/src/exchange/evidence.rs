@@ -35,6 +35,7 @@ impl Evidence {
     }
 
     /// A flight is over: what it proves about the ring and what its supervision datagram saw go on the board.
+    // Inlined on purpose: a cycle has few instructions to spare (bin `cycle`).
     #[inline(always)]
     pub fn close(&mut self, frame: &mut CyclicFrame, board: &Board, events: &mut Producer) {
         if frame.left() >= self.newest {

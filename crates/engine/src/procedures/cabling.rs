@@ -64,8 +64,9 @@ pub(super) struct Cabling {
     pub unknown_rings: usize,
 }
 
-/// Who is crossed, and which rings are not known; `None` where the segment changes too much to tell. With `enhanced` and a closed ring the redundant
-/// link is taken down meanwhile; where it cannot be, that is reported, and the ring is looked at as it is.
+/// Who is crossed, and which rings are not known; `None` where the segment changes too much to tell. With `enhanced` and
+/// a closed ring the redundant link is taken down meanwhile; where it cannot be, that is reported, and the ring is looked
+/// at as it is.
 pub(super) async fn cabling(bus: &Bus, known: &impl Known, enhanced: bool) -> Option<Cabling> {
     let in_control = enhanced && bus.links() == LinkSet::Ring && bus.ring() == RingState::Closed;
     if in_control && !bus.force_disconnect(Link::Redundant, true).await {

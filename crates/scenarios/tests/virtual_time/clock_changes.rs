@@ -7,21 +7,14 @@ use ringcat::{
     ClockConfig, DomainMember, Event, Group, JunctionMode, MainDevice, Options, SubDeviceConfig, SubDeviceInfo,
     SyncSignals, automatic,
 };
-use ringcat_sim::cable::{CableId, DeviceIndex, Endpoint, HostLink};
-use ringcat_sim::frame::Port::{self, A, B, C, D};
+use ringcat_sim::cable::{CableId, DeviceIndex, Endpoint};
+use ringcat_sim::frame::Port::{A, B, C, D};
 use ringcat_sim::network::{Network, NetworkOptions};
 use scenarios::clocks::{clocked, config, differences, largest_spread, lock, watch, wired, with_clocks};
 use scenarios::dice::Dice;
-use scenarios::segments::line;
+use scenarios::segments::{MAIN, REDUNDANT, RING_BEHIND_JUNCTION, RING_IN_RING, RING_OF_THREE, at, line};
 use scenarios::tap::Tap;
 use scenarios::world::{CYCLE, World};
-
-const MAIN: Endpoint = Endpoint::Host(HostLink::Main);
-const REDUNDANT: Endpoint = Endpoint::Host(HostLink::Redundant);
-
-fn at(device: usize, port: Port) -> Endpoint {
-    Endpoint::Device(DeviceIndex(device), port)
-}
 
 fn all(network: &Network) -> Vec<usize> {
     (0..network.devices().len()).collect()
@@ -39,22 +32,10 @@ fn world(seed: u64, network: Network) -> World {
     world
 }
 
-/// A clock, a junction with a ring of three, and two clocks behind the junction. The ring's cables are [`RING`].
+/// Clocks everywhere in [`RING_BEHIND_JUNCTION`].
 fn junction_ring() -> Network {
-    let cables = [
-        (MAIN, at(0, A)),
-        (at(0, B), at(1, A)),
-        (at(1, D), at(2, A)),
-        (at(2, B), at(3, A)),
-        (at(3, B), at(4, A)),
-        (at(4, B), at(1, B)),
-        (at(1, C), at(5, A)),
-        (at(5, B), at(6, A)),
-    ];
-    wired(clocked(7, 50), &cables)
+    wired(clocked(7, 50), &RING_BEHIND_JUNCTION)
 }
-
-const RING: [usize; 4] = [2, 3, 4, 5];
 
 /// A change of the segment: nobody strays on the way, and soon all are together as before.
 fn change(world: &mut World, what: &str, act: impl FnOnce(&mut World)) -> usize {
@@ -74,7 +55,7 @@ fn clocks_of_a_ring_behind_a_junction_stay_together_whole_and_broken_anywhere_fa
     let mut world = world(1, junction_ring());
     let everybody = all(world.network());
     assert!(largest_spread(&mut world, &everybody, 300) <= 100, "{:?}", differences(world.network(), &everybody));
-    for cable in RING {
+    for cable in RING_OF_THREE {
         let cut = change(&mut world, &format!("cut of cable {cable}"), |world| world.cut(CableId(cable)));
         let heal = change(&mut world, &format!("repair of cable {cable}"), |world| world.heal(CableId(cable)));
         assert_eq!((cut, heal), (1, 1), "cable {cable}");
@@ -97,16 +78,7 @@ fn a_ring_behind_a_junction_that_is_broken_from_the_start_has_its_delays_and_tho
 
 #[test]
 fn a_local_ring_in_a_ring_of_two_links_keeps_its_clocks_through_breaks_of_either() {
-    let cables = [
-        (MAIN, at(0, A)),
-        (at(0, B), at(1, A)),
-        (at(1, D), at(2, A)),
-        (at(2, B), at(3, A)),
-        (at(3, B), at(1, B)),
-        (at(1, C), at(4, A)),
-        (at(4, B), REDUNDANT),
-    ];
-    let mut world = world(3, wired(clocked(5, 50), &cables));
+    let mut world = world(3, wired(clocked(5, 50), &RING_IN_RING));
     let everybody = all(world.network());
     for cable in [3, 5, 1, 4] {
         let what = format!("cable {cable}");

@@ -12,31 +12,19 @@ use ringcat_sim::frame::Port::{A, B, C, D};
 use ringcat_sim::network::Network;
 use scenarios::check::{Delivery, troubles};
 use scenarios::dice::Dice;
-use scenarios::segments::{MAIN, REDUNDANT, at, wired};
+use scenarios::segments::{MAIN, REDUNDANT, RING_BEHIND_JUNCTION, RING_OF_THREE as RING, at, wired};
 use scenarios::world::{CYCLE, Mark, World};
 
 /// What a mode and its connections make of a segment.
 type Setting<'a> = (JunctionMode, &'a [JunctionConnection]);
 
-/// An output, a junction with a ring of three on port 3 that comes back to port 1, and two more on its port 2. The ring's
-/// cables are [`RING`], its last one closes it. Only some of them have clocks.
+/// Those of [`RING_BEHIND_JUNCTION`]: an output, the junction. Only some of them have clocks.
 const ONE: [&str; 7] =
     ["digital-output-8", "junction", "servo", "digital-input-8", "block", "coupler", "analog-input-4"];
-const RING: [usize; 4] = [2, 3, 4, 5];
 const STRICT: JunctionConnection = JunctionConnection { head: 1, head_port: 1, tail: 4, tail_port: 1 };
 
 fn one_ring() -> Network {
-    let cables = [
-        (MAIN, at(0, A)),
-        (at(0, B), at(1, A)),
-        (at(1, D), at(2, A)),
-        (at(2, B), at(3, A)),
-        (at(3, B), at(4, A)),
-        (at(4, B), at(1, B)),
-        (at(1, C), at(5, A)),
-        (at(5, B), at(6, A)),
-    ];
-    wired(&ONE, &cables)
+    wired(&ONE, &RING_BEHIND_JUNCTION)
 }
 
 /// Both ends of a cable of [`one_ring`]'s ring, as events name them.

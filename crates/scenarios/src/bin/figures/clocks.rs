@@ -8,7 +8,7 @@ use std::process::ExitCode;
 use std::time::Duration;
 
 use ringcat::{JunctionMode, SyncSignals, Trigger};
-use ringcat_sim::cable::{CableId, DeviceIndex, Endpoint, HostLink};
+use ringcat_sim::cable::{CableId, DeviceIndex};
 use ringcat_sim::controller::Wander;
 use ringcat_sim::description::DeviceDescription;
 use ringcat_sim::device::Device;
@@ -18,7 +18,7 @@ use ringcat_sim::time::SimTime;
 use ringcat_wire::register::map;
 use scenarios::clocks::{clock_tree, clocked, config, delay, largest_spread, lock, spread, wired, with_clocks, world};
 use scenarios::figures::{Figures, verdict};
-use scenarios::segments::{line, ring};
+use scenarios::segments::{MAIN, at, line, ring};
 use scenarios::world::World;
 
 /// Most error of a delay per hop, in nanoseconds.
@@ -121,9 +121,8 @@ fn without_clocks() -> f64 {
 
 /// A ring behind a junction: each of its cables cut and healed.
 fn junction(figures: &mut Figures) {
-    let at = |device: usize, port| Endpoint::Device(DeviceIndex(device), port);
     let (a, b, c, d) = (Port::A, Port::B, Port::C, Port::D);
-    let mut cables = vec![(Endpoint::Host(HostLink::Main), at(0, a)), (at(0, b), at(1, a)), (at(1, d), at(2, a))];
+    let mut cables = vec![(MAIN, at(0, a)), (at(0, b), at(1, a)), (at(1, d), at(2, a))];
     cables.extend((3..8).map(|device| (at(device - 1, b), at(device, a))));
     cables.extend([(at(7, b), at(1, b)), (at(1, c), at(8, a)), (at(8, b), at(9, a))]);
     let options = ringcat::Options { junctions: JunctionMode::Automatic, ..ringcat::Options::default() };

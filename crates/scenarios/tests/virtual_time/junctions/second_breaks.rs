@@ -8,7 +8,7 @@ use ringcat_sim::fault::Fault;
 use ringcat_sim::frame::Port::{A, B, C, D};
 use ringcat_sim::network::Network;
 use scenarios::check::{Delivery, troubles};
-use scenarios::segments::{MAIN, REDUNDANT, at, wired};
+use scenarios::segments::{MAIN, RING_IN_RING, at, wired};
 use scenarios::world::{CYCLE, World};
 
 use super::{STRICT, crossed, edge, ends, in_op, one_ring, told};
@@ -141,20 +141,10 @@ fn a_member_that_loses_its_power_breaks_the_ring_at_both_its_ports_and_comes_bac
     assert!(world.left_op(mark).iter().all(|device| device.0 == 3));
 }
 
-/// A ring of two links, with a local ring behind the junction in its middle: an output, the junction, and an input; the
-/// local ring's two members are 2 and 3.
+/// Those of [`RING_IN_RING`]: an output, the junction, and an input.
 fn ring_in_ring() -> Network {
     let kinds = ["digital-output-8", "junction", "servo", "digital-input-8", "analog-input-4"];
-    let cables = [
-        (MAIN, at(0, A)),
-        (at(0, B), at(1, A)),
-        (at(1, D), at(2, A)),
-        (at(2, B), at(3, A)),
-        (at(3, B), at(1, B)),
-        (at(1, C), at(4, A)),
-        (at(4, B), REDUNDANT),
-    ];
-    wired(&kinds, &cables)
+    wired(&kinds, &RING_IN_RING)
 }
 
 #[test]
