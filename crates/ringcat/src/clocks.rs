@@ -13,14 +13,18 @@ use std::thread::sleep;
 use std::time::Duration;
 
 use clap::Args;
-use ringcat::text::{Names, describe};
-use ringcat::{ClockConfig, Instant, LastOutputs, Options, SupervisorThread, SyncSignals, TimedEvent, automatic};
+use ringcat::packet::PacketLinks;
+use ringcat::tee::Tee;
+use ringcat::text::Names;
+use ringcat::{ClockConfig, CyclicThread, Instant, LastOutputs, Options, SupervisorThread, SyncSignals, automatic};
 use ringcat_wire::al::AlState;
 
 use crate::clock_options::ClockOptions;
 use crate::interfaces::{Failure, InterfaceArguments, ThreadArguments, end_request, is_asked, now};
 use crate::output::say;
 use crate::recording::RecordingArguments;
+use crate::surroundings::Surroundings;
+use crate::telling::{Telling, Told};
 use crate::times::time;
 use plot::{Course, plot};
 use table::{json, lines};
@@ -73,12 +77,13 @@ pub fn run(arguments: &ClocksArguments) -> Result<bool, Failure> {
     let end = end_request();
     let thread = arguments.thread;
     let (cyclic, acyclic) = arguments.interfaces.open_halves(thread)?;
+    let surroundings = Surroundings::watch(&arguments.interfaces, &cyclic);
     let recording = arguments.recording.start(&arguments.interfaces)?;
     let (cyclic, acyclic) = (recording.tee(cyclic), recording.tee(acyclic));
     let _awake = thread.prepare_process();
     let begin = now();
     let supervisor = SupervisorThread::start(acyclic, &Options::default(), move || thread.prepare_supervisor())?;
-    let scan = supervisor.scan()?;
+    let scan = supervisor.scan().map_err(|error| surroundings.explain(error, supervisor.counters().foreign))?;
     let names = Names(scan.subdevices.iter().map(|info| info.name.clone()).collect());
     let mut declaration = automatic(&scan.subdevices, arguments.cycle);
     arguments.options.declare(&mut declaration, &scan.subdevices)?;
@@ -86,20 +91,21 @@ pub fn run(arguments: &ClocksArguments) -> Result<bool, Failure> {
     let mut application = supervisor.activate(declaration, cyclic).map_err(ringcat::Error::from)?;
     application.set_trigger(arguments.options.trigger());
     let cycles = application.start_cycles(move || thread.prepare_cycles(), |_| ControlFlow::Continue(()))?;
-    let watch = Watch { begin, names: &names, end: &end, json: arguments.json };
+    let telling = Telling::new(begin, names, surroundings);
+    let mut watch = Watch { begin, telling, end: &end, json: arguments.json };
     let mut course = Course::default();
-    let locked = watch.until(cycles.supervisor(), &mut course, now() + LOCK_LIMIT, true)?;
+    let locked = watch.until(&cycles, &mut course, now() + LOCK_LIMIT, true)?;
     cycles.news().restart_histograms();
     if locked {
-        watch.until(cycles.supervisor(), &mut course, now() + arguments.lasts, false)?;
+        watch.until(&cycles, &mut course, now() + arguments.lasts, false)?;
     }
     let clocks = cycles.supervisor().with(|engine| engine.clocks())?;
     let settled = cycles.supervisor().all_settled();
     let phase_errors = cycles.news().phase_errors();
     if arguments.json {
-        say!("{:#}", json(&clocks, &names, &signals, locked, phase_errors));
+        say!("{:#}", json(&clocks, watch.telling.names(), &signals, locked, phase_errors));
     } else {
-        lines(&clocks, &names, &signals).iter().for_each(|line| say!("{line}"));
+        lines(&clocks, watch.telling.names(), &signals).iter().for_each(|line| say!("{line}"));
         if phase_errors.count() > 0 {
             say!("cycles from their phase, by the reference clock: {phase_errors}");
         }
@@ -107,7 +113,7 @@ pub fn run(arguments: &ClocksArguments) -> Result<bool, Failure> {
     if let Some(path) = &arguments.plot {
         std::fs::write(path, plot(&course, &clocks))
             .map_err(|error| Failure::new(format!("{} cannot be written: {error}", path.display())))?;
-        watch.tell(&format!("differences over time: {}", path.display()));
+        tell(arguments.json, &format!("differences over time: {}", path.display()));
     }
     let application = cycles.end()?;
     application.stop(LastOutputs::Zero, AlState::Init, STOP_LIMIT)?;
@@ -117,35 +123,33 @@ pub fn run(arguments: &ClocksArguments) -> Result<bool, Failure> {
 
 struct Watch<'a> {
     begin: Instant,
-    names: &'a Names,
+    telling: Telling,
     end: &'a AtomicBool,
     /// The standard output belongs to the JSON.
     json: bool,
 }
 
+/// Says it, beside the JSON where the standard output is for that.
+fn tell(json: bool, line: &str) {
+    if json { eprintln!("{line}") } else { say!("{line}") }
+}
+
 impl Watch<'_> {
-    fn tell(&self, line: &str) {
-        if self.json { eprintln!("{line}") } else { say!("{line}") }
-    }
-
-    fn tell_event(&self, event: &TimedEvent) {
-        let at = event.at.since(self.begin).as_secs_f64() * 1e3;
-        self.tell(&format!("{at:>12.3} ms  {}", describe(&event.event, self.names)));
-    }
-
     /// Tells events and notes differences until a time, or until all clocks are locked and all SubDevices, which may wait
     /// for that, are where they belong; whether clocks are locked.
     fn until(
-        &self,
-        supervisor: &SupervisorThread,
+        &mut self,
+        cycles: &CyclicThread<Tee<PacketLinks>>,
         course: &mut Course,
         until: Instant,
         ends_with_lock: bool,
     ) -> Result<bool, Failure> {
         loop {
-            while let Some(event) = supervisor.pop_event() {
-                self.tell_event(&event);
-            }
+            self.telling.news(cycles, now(), |told| match told {
+                Told::Line(line) => tell(self.json, &line),
+                Told::Warning(words) => eprintln!("ringcat: {words}"),
+            });
+            let supervisor = cycles.supervisor();
             let (locked, clocks) = supervisor.with(|engine| (engine.clocks_locked(), engine.clocks()))?;
             course.note(now().since(self.begin), &clocks);
             if (locked && ends_with_lock && supervisor.all_settled()) || now() >= until || is_asked(self.end) {

@@ -14,6 +14,7 @@ mod scan;
 mod sim;
 mod surroundings;
 mod table;
+mod telling;
 mod times;
 
 use std::process::ExitCode;

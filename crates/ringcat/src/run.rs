@@ -7,7 +7,6 @@
 mod beside;
 mod junction;
 mod live;
-mod stalls;
 mod summary;
 
 use std::ops::ControlFlow;
@@ -27,11 +26,11 @@ use crate::interfaces::{Failure, InterfaceArguments, ThreadArguments, end_reques
 use crate::output::say;
 use crate::recording::RecordingArguments;
 use crate::surroundings::Surroundings;
+use crate::telling::{Telling, Told};
 use crate::times::time;
 use beside::{Beside, BesideArguments};
 use junction::{Junctions, junctions};
 use live::Live;
-use stalls::Stalls;
 use summary::{clock_account, final_account, summary};
 
 /// From activation to OP of the last SubDevice at the most.
@@ -40,8 +39,6 @@ const OP_LIMIT: Duration = Duration::from_secs(60);
 const STOP_LIMIT: Duration = Duration::from_secs(5);
 /// Pause between two looks at what the threads do.
 const LOOK: Duration = Duration::from_millis(1);
-/// Changes of the process data's judgement are told so often; all are counted.
-const JUDGEMENTS_TOLD: u32 = 200;
 
 /// How to read what it prints.
 const SUMMARY_HELP: &str = "\
@@ -133,8 +130,8 @@ pub fn run(arguments: &RunArguments) -> Result<bool, Failure> {
     }
     let cycles = application.start_cycles(move || thread.prepare_cycles(), |_| ControlFlow::Continue(()))?;
     let live = Live::new(arguments.interfaces.redundant.is_some(), clocks);
-    let stalls = Stalls::default();
-    let mut run = Run { cycles, names, begin, live, clocks, judgements_told: 0, stalls, surroundings, beside };
+    let telling = Telling::new(begin, names, surroundings);
+    let mut run = Run { cycles, telling, live, clocks, beside };
     let in_op = run.reach_op(&end);
     let before = run.cycles.news().counters();
     if in_op {
@@ -144,9 +141,9 @@ pub fn run(arguments: &RunArguments) -> Result<bool, Failure> {
     let status = if clocks { run.cycles.supervisor().with(|engine| engine.clocks())? } else { Vec::new() };
     let locked = status.iter().all(|clock| clock.is_locked || clock.is_reference);
     let application = run.cycles.end()?;
-    summary(&application, &run.surroundings);
+    summary(&application, run.telling.surroundings());
     if clocks {
-        clock_account(&status, application.news(), &run.names);
+        clock_account(&status, application.news(), run.telling.names());
     }
     run.beside.account();
     let lost = application.cyclic_counters().lost - before.lost;
@@ -158,14 +155,10 @@ pub fn run(arguments: &RunArguments) -> Result<bool, Failure> {
 
 struct Run {
     cycles: CyclicThread<Tee<PacketLinks>>,
-    names: Names,
-    begin: Instant,
+    telling: Telling,
     live: Live,
     /// Distributed clocks are in use.
     clocks: bool,
-    judgements_told: u32,
-    stalls: Stalls,
-    surroundings: Surroundings,
     beside: Beside,
 }
 
@@ -198,37 +191,17 @@ fn tell_of_others(links: &mut impl Links, surroundings: &mut Surroundings) -> u6
 impl Run {
     /// Tells what has happened since the last look.
     fn look(&mut self) {
-        if let Some((link, source)) = self.cycles.news().foreign() {
-            self.surroundings.tell_sender(link, source);
-        }
-        while let Some(event) = self.cycles.supervisor().pop_event() {
-            match event.event {
-                Event::Skipped { .. } => continue,
-                Event::ForeignFrame { arrived_on, bytes } => {
-                    if let Some(source) = address_of_sender(&bytes) {
-                        self.surroundings.tell_sender(arrived_on, source);
-                    }
-                    continue;
-                }
-                Event::Domain { .. } if self.judgements_told == JUDGEMENTS_TOLD => continue,
-                Event::Domain { .. } => self.judgements_told += 1,
-                _ => {}
-            }
+        self.telling.news(&self.cycles, now(), |told| {
             self.live.clear();
-            say!("{:>12.3} ms  {}", self.since_begin(event.at), describe(&event.event, &self.names));
-        }
+            match told {
+                Told::Line(line) => say!("{line}"),
+                Told::Warning(words) => eprintln!("ringcat: {words}"),
+            }
+        });
         for words in self.beside.news() {
             self.live.clear();
             eprintln!("ringcat: {words}");
         }
-        if let Some(left_out) = self.stalls.news(self.cycles.news().pace().skipped, now()) {
-            self.live.clear();
-            say!("{:>12.3} ms  this machine: {left_out} cycles left out", self.since_begin(now()));
-        }
-    }
-
-    fn since_begin(&self, at: Instant) -> f64 {
-        at.since(self.begin).as_secs_f64() * 1e3
     }
 
     fn clocks_locked(&self) -> bool {
@@ -249,13 +222,13 @@ impl Run {
                 return false;
             }
             self.look();
-            self.live.show(now(), self.cycles.news(), self.cycles.supervisor(), &self.names);
+            self.live.show(now(), self.cycles.news(), self.cycles.supervisor(), self.telling.names());
             sleep(LOOK);
         }
         let reached = now();
         self.look();
         self.live.clear();
-        say!("{:>12.3} ms  all SubDevices are in OP", self.since_begin(reached));
+        say!("{}", self.telling.line(reached, "all SubDevices are in OP"));
         self.cycles.news().restart_histograms();
         true
     }
@@ -265,7 +238,7 @@ impl Run {
         say!("not all SubDevices {what} within {} s:", OP_LIMIT.as_secs());
         for (subdevice, state) in self.cycles.supervisor().states().iter().enumerate() {
             let state = live::word(*state);
-            let name = self.names.0.get(subdevice).map_or("", String::as_str);
+            let name = self.telling.names().0.get(subdevice).map_or("", String::as_str);
             say!("  SubDevice {subdevice} \"{name}\": {state}");
         }
         let clocks = self.cycles.supervisor().with(|engine| engine.clocks()).unwrap_or_default();
@@ -278,7 +251,7 @@ impl Run {
     fn exchange(&mut self, until: Instant, end: &AtomicBool) {
         while now() < until && !is_asked(end) && !self.cycles.has_ended() {
             self.look();
-            self.live.show(now(), self.cycles.news(), self.cycles.supervisor(), &self.names);
+            self.live.show(now(), self.cycles.news(), self.cycles.supervisor(), self.telling.names());
             sleep(LOOK.min(until.since(now())));
         }
         self.look();

@@ -151,9 +151,17 @@ fn line(course: &Course, number: usize, scale: Scale) -> String {
     path
 }
 
-/// Neighbours far apart on the colour wheel: by the golden angle.
+/// Neighbours far apart on the colour wheel: by the golden angle. As red, green and blue, which every viewer knows.
 fn colour(number: usize) -> String {
-    format!("hsl({},65%,42%)", (number * 137 + 210) % 360)
+    let hue = ((number * 137 + 210) % 360) as f64 / 60.0;
+    // Saturation 65 %, lightness 42 %.
+    let (low, high) = (0.147, 0.693);
+    let channel = |at: f64| {
+        let from_peak = ((hue - at + 9.0).rem_euclid(6.0) - 3.0).abs();
+        let share = (2.0 - from_peak).clamp(0.0, 1.0);
+        ((low + (high - low) * share) * 255.0).round() as u8
+    };
+    format!("#{:02x}{:02x}{:02x}", channel(0.0), channel(2.0), channel(4.0))
 }
 
 /// Which colour is whose, as far as there is room.
@@ -182,6 +190,15 @@ fn legend(svg: &mut String, clocks: &[ClockStatus]) {
 mod tests {
     use super::*;
     use ringcat_wire::address::StationAddress;
+
+    #[test]
+    fn colours_are_written_as_every_viewer_reads_them() {
+        assert_eq!(colour(0), "#256bb1");
+        let mut all: Vec<String> = (0..200).map(colour).collect();
+        assert!(all.iter().all(|it| it.len() == 7 && u32::from_str_radix(&it[1..], 16).is_ok()));
+        all.dedup();
+        assert_eq!(all.len(), 200);
+    }
 
     fn clock(difference_ns: Option<i32>) -> ClockStatus {
         ClockStatus {
