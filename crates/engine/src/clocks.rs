@@ -17,7 +17,7 @@ pub mod start;
 pub mod wiring;
 
 pub use cables::Cables;
-pub use delay::{Delays, PortTimes, Segment};
+pub use delay::{Delays, Passage, PortTimes, Segment};
 pub use follow::{Follower, phase_error};
 pub use measurement::{Latched, Measurements};
 pub use start::first_pulse;

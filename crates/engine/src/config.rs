@@ -30,7 +30,7 @@ pub use ip::IpSettings;
 pub use startup::{IdnWrite, SdoDownload, StartupAction, StartupCommand, Transition};
 pub use timeouts::{StateTimeout, Timeouts};
 
-pub use clocks::{ClockConfig, ReferenceClock, SyncSignals};
+pub use clocks::{ClockConfig, Passage, ReferenceClock, SyncSignals};
 pub use resolve::{ConfigError, DuplicateAlias, Resolution, duplicate_aliases, resolve};
 pub use sync_modes::ModeError;
 
@@ -154,6 +154,8 @@ pub struct SubDeviceConfig {
     pub wait_before_safeop: Duration,
     /// SYNC signals of its distributed clock; `None` runs it without them.
     pub sync: Option<SyncSignals>,
+    /// What frames take through it; `None`: as [`ClockConfig::passage`] says.
+    pub passage: Option<Passage>,
     /// Time limits.
     pub timeouts: Timeouts,
     /// Time limits of single state changes, which count before `timeouts`.
@@ -178,6 +180,7 @@ impl Default for SubDeviceConfig {
             sii_to_pdi: false,
             wait_before_safeop: Duration::ZERO,
             sync: None,
+            passage: None,
             timeouts: Timeouts::default(),
             state_timeouts: Vec::new(),
             target: AlState::Op,

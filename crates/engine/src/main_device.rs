@@ -527,7 +527,7 @@ impl MainDevice {
 fn clocks_of(config: Option<ClockConfig>, scan: &Scan, topology: &Topology, members: &[Member]) -> SharedClocks {
     let member = |info: &SubDeviceInfo| {
         let index = members.iter().position(|member| member.station == info.station)?;
-        Some((index, members[index].config.sync.is_some()))
+        Some((index, &*members[index].config))
     };
     let scanned: &[SubDeviceInfo] = if config.is_some() { &scan.subdevices } else { &[] };
     SharedClocks::new(config, scanned, topology, member)

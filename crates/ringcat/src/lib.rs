@@ -68,9 +68,9 @@ pub use supervisor_thread::SupervisorThread;
 
 pub use ringcat_engine::clocks::{Follower, phase_error};
 pub use ringcat_engine::config::{
-    ClockConfig, ConfigAddress, Expected, Group, IdentityField, IdnWrite, IpSettings, ModeError, PdoAssignment,
-    PdoEntry, PdoMapping, ReferenceClock, SdoDownload, StartupAction, StartupCommand, StateTimeout, SubDeviceConfig,
-    SyncSignals, Timeouts, Transition, Watchdog,
+    ClockConfig, ConfigAddress, Expected, Group, IdentityField, IdnWrite, IpSettings, ModeError, Passage,
+    PdoAssignment, PdoEntry, PdoMapping, ReferenceClock, SdoDownload, StartupAction, StartupCommand, StateTimeout,
+    SubDeviceConfig, SyncSignals, Timeouts, Transition, Watchdog,
 };
 pub use ringcat_engine::domain::{DomainId, DomainState, DomainStatus, Freshness};
 pub use ringcat_engine::event::{Event, TimedEvent};

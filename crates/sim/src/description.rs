@@ -209,6 +209,10 @@ pub struct DeviceDescription {
     pub sii_busy: Duration,
     /// The controller reads eight bytes of SII at a time.
     pub eight_byte_sii: bool,
+    /// Delay of a passage with its processing unit, where it is not that of the segment.
+    pub processing_delay: Option<Duration>,
+    /// Delay of a passage without it, where it is not that of the segment.
+    pub forwarding_delay: Option<Duration>,
     /// Error of the local clock.
     pub clock_drift_ppb: i64,
     /// How this changes in the course of time.
@@ -259,6 +263,8 @@ impl DeviceDescription {
             sii_size_bytes: 512,
             sii_busy: Duration::from_micros(500),
             eight_byte_sii: true,
+            processing_delay: None,
+            forwarding_delay: None,
             clock_drift_ppb: 0,
             clock_wander: Wander::default(),
             receive_jitter: Duration::ZERO,

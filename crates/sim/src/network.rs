@@ -49,9 +49,9 @@ pub struct NetworkOptions {
     pub link_down_delay: Duration,
     /// From the return of a signal to the moment the ends notice. Default 10 us.
     pub link_up_delay: Duration,
-    /// Delay of a passage through a device with its processing unit. Default 300 ns.
+    /// Delay of a passage through a device with its processing unit, for devices that say nothing. Default 300 ns.
     pub processing_delay: Duration,
-    /// Delay of a passage through a device without its processing unit. Default 300 ns.
+    /// Delay of a passage through a device without its processing unit, for devices that say nothing. Default 300 ns.
     pub forwarding_delay: Duration,
     /// Frames that an interface of the MainDevice queues for sending. Default 256.
     pub transmit_queue: usize,
@@ -92,6 +92,15 @@ impl NetworkOptions {
         self.link_down_delay = delay;
         self.link_up_delay = delay;
         self
+    }
+
+    /// Delay of a passage through a device, with its processing unit or without.
+    fn passage(&self, device: &Device, processed: bool) -> Duration {
+        if processed {
+            device.description.processing_delay.unwrap_or(self.processing_delay)
+        } else {
+            device.description.forwarding_delay.unwrap_or(self.forwarding_delay)
+        }
     }
 }
 

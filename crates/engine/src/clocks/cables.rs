@@ -19,7 +19,7 @@ struct Known {
     is_old: bool,
 }
 
-/// Times on cables, with the passage of the SubDevice from which a frame comes.
+/// Times on cables, with what all passages take ([`Passage`](super::delay::Passage)).
 #[derive(Clone, Debug, Default)]
 pub struct Cables {
     known: BTreeMap<Ends, Known>,

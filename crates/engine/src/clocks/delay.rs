@@ -53,9 +53,18 @@ pub struct Segment<'a> {
     pub wiring: &'a Wiring,
     /// Station addresses by position.
     pub stations: &'a [StationAddress],
-    /// What a passage through a processing unit takes longer than one that only forwards (tDiff of facts 7.1), with
-    /// fraction.
-    pub unit_takes: i64,
+    /// What is known of passages by position, see [`Passage`]; those without one take nothing beyond what all do.
+    pub passages: &'a [Passage],
+}
+
+/// What a frame takes through a SubDevice from port to port, with fraction, less what it takes through all (facts 7.1:
+/// there, tDiff is the difference of both).
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Passage {
+    /// Where its processing unit meets the frame.
+    pub processed: i64,
+    /// Where it does not.
+    pub forwarded: i64,
 }
 
 impl Segment<'_> {
@@ -169,7 +178,7 @@ impl<'a, C: Fn(usize) -> Option<PortTimes>> Walk<'a, C> {
             for hop in gap.from..gap.to {
                 let time = self.cable(hop).and_then(|(one, other)| cables.remembered(one, other));
                 is_guessed |= time.is_none() && !first_clock;
-                at += time.unwrap_or(0) + self.in_unit(hop);
+                at += time.unwrap_or(0) + self.passage(hop);
             }
             if let Some(arrival) = self.way.get(gap.to) {
                 entered[arrival.at.node] = Some(at);
@@ -183,8 +192,8 @@ impl<'a, C: Fn(usize) -> Option<PortTimes>> Walk<'a, C> {
     /// delay at the first one.
     fn branch(&self, from: usize, to: usize, took: i64, begin: i64, cables: &mut Cables, entered: &mut [Option<i64>]) {
         let mut gaps = self.gaps(from, to, &|one, other| cables.measured(one, other));
-        let in_units: i64 = gaps.iter().flat_map(|gap| gap.from..gap.to).map(|hop| self.in_unit(hop)).sum();
-        let total = (took - in_units - gaps.iter().map(|gap| gap.span).sum::<i64>()).max(0);
+        let in_passages: i64 = gaps.iter().flat_map(|gap| gap.from..gap.to).map(|hop| self.passage(hop)).sum();
+        let total = (took - in_passages - gaps.iter().map(|gap| gap.span).sum::<i64>()).max(0);
         let known = |gaps: &[Gap]| gaps.iter().filter_map(|gap| gap.known).sum::<i64>();
         if known(&gaps) > total && gaps.iter().any(|gap| gap.known.is_none()) {
             // What is known cannot be right.
@@ -205,7 +214,7 @@ impl<'a, C: Fn(usize) -> Option<PortTimes>> Walk<'a, C> {
                 on_cables += until - shared;
                 shared = until;
             }
-            spent += on_cables + (gap.from..gap.to).map(|hop| self.in_unit(hop)).sum::<i64>();
+            spent += on_cables + (gap.from..gap.to).map(|hop| self.passage(hop)).sum::<i64>();
             if gap.to < to {
                 entered[self.way[gap.to].at.node] = Some(spent);
             }
@@ -218,9 +227,11 @@ impl<'a, C: Fn(usize) -> Option<PortTimes>> Walk<'a, C> {
         }
     }
 
-    /// What a frame waits for in the processing unit behind an arrival, beyond what it waits for elsewhere.
-    fn in_unit(&self, place: usize) -> i64 {
-        if self.way[place].processed { self.segment.unit_takes } else { 0 }
+    /// What is known of the passage behind an arrival.
+    fn passage(&self, place: usize) -> i64 {
+        let Arrival { at, processed } = self.way[place];
+        let passage = self.segment.passages.get(at.node).copied().unwrap_or_default();
+        if processed { passage.processed } else { passage.forwarded }
     }
 
     /// Both ends of the cable behind an arrival.

@@ -15,6 +15,18 @@ pub enum ReferenceClock {
     Declared(usize),
 }
 
+/// What a frame takes through a SubDevice's controller from port to port (facts 7.1). No register tells it, and receive
+/// times show only there and back together. Only differences count, between both ways and between SubDevices: what is
+/// left out of all of them is measured with the cables. By half of what is left out of some the delay to the next one is
+/// wrong.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+pub struct Passage {
+    /// Nanoseconds of a passage on which its processing unit meets the frame.
+    pub processing_ns: u16,
+    /// Nanoseconds of one on which the frame is only forwarded: back, or through a part that is entered from behind.
+    pub forwarding_ns: u16,
+}
+
 /// Distributed clocks of the segment.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct ClockConfig {
@@ -26,10 +38,9 @@ pub struct ClockConfig {
     pub bus_shift: bool,
     /// Measurements of propagation delays, of which the mean is taken.
     pub measurements: u32,
-    /// What a frame takes longer through a controller's processing unit than through one that only forwards it (tDiff of
-    /// facts 7.1: about 40 ns for some types). Nobody reports it; where it is not known, each hop's delay is wrong by half
-    /// of it.
-    pub processing_difference_ns: u16,
+    /// What frames take through SubDevices for which [`SubDeviceConfig::passage`](crate::config::SubDeviceConfig) says
+    /// nothing.
+    pub passage: Passage,
     /// Distributions of the reference time that the static drift phase sends as fast as the segment allows, beside the
     /// cyclic ones (facts 7.2: about 15,000).
     pub drift_distributions: u32,
@@ -51,7 +62,7 @@ impl Default for ClockConfig {
             epoch: 0,
             bus_shift: false,
             measurements: 16,
-            processing_difference_ns: 0,
+            passage: Passage::default(),
             drift_distributions: 15_000,
             lock_window_ns: 100,
             lock_samples: 100,

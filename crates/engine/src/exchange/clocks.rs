@@ -305,12 +305,15 @@ impl Clocks {
         }
         let ports_changed = EcatEvent::from_bits(seen.events).dl_status;
         // With a ring that is closed again, and with other cables in use, delays are not what they were.
-        let is_told = board.clocks.is_held() || board.clocks.references().1 != self.changes;
+        let mut is_held = board.clocks.is_held();
+        let is_told = is_held || board.clocks.references().1 != self.changes;
         if (is_closed && !is_told) || (ports_changed && !self.ports_changed && board.clocks.are_ports_guarded()) {
             board.clocks.hold();
+            is_held = true;
         }
         self.ports_changed = ports_changed;
-        if seen.spread_wkc > 0 {
+        // While nobody is told a time, differences are those of a frame that came another way.
+        if seen.spread_wkc > 0 && !is_held {
             self.judge_spread(seen.spread, board, events);
         }
     }

@@ -13,6 +13,7 @@ mod signals;
 mod watch;
 
 use alloc::rc::Rc;
+use alloc::string::String;
 use alloc::vec::Vec;
 use core::cell::{RefCell, RefMut};
 
@@ -21,7 +22,7 @@ use ringcat_wire::register::PortKind;
 
 use crate::clocks::Cables;
 use crate::clocks::cables::End;
-use crate::config::{ClockConfig, ReferenceClock};
+use crate::config::{ClockConfig, Passage, ReferenceClock, SubDeviceConfig};
 use crate::info::SubDeviceInfo;
 use crate::link::Link;
 use crate::time::Instant;
@@ -44,12 +45,16 @@ pub(super) struct Node {
     pub has_clock: bool,
     /// SYNC signals are declared for it.
     pub is_configured: bool,
+    /// What is declared of passages through it.
+    pub passage: Option<Passage>,
     /// From where frames come in to its processing unit, with fraction.
     pub unit: Option<i64>,
     /// Where that counts from: measurements and links number these places.
     pub origin: u32,
     /// DC_LATCH_MODE says that frames enter it from behind.
     pub latches_backwards: bool,
+    /// What was written to DC_FILTER_DIFFERENCE.
+    pub filter_depth: Option<u8>,
     /// It has lost its offset and has not got one since.
     pub is_unset: bool,
     /// What was written to DC_SYSTEM_TIME_DELAY.
@@ -87,6 +92,8 @@ pub(super) struct Clocks {
     pub is_doubtful: Option<Instant>,
     /// Delays and offsets are written.
     pub is_set_up: bool,
+    /// Why that failed, as it was told.
+    pub trouble: Option<String>,
     /// The ring is kept open on purpose.
     pub is_measuring: bool,
     /// The static drift phase runs: what differences show then does not hold for the pace of cycles.
@@ -129,12 +136,12 @@ pub struct ClockStatus {
 }
 
 impl SharedClocks {
-    /// Clocks of a scan. `members` by position: index in the declaration, and whether SYNC signals are declared.
-    pub fn new(
+    /// Clocks of a scan, and what is declared of whom: index in the declaration, and what it says.
+    pub fn new<'a>(
         config: Option<ClockConfig>,
         scanned: &[SubDeviceInfo],
         topology: &Topology,
-        members: impl Fn(&SubDeviceInfo) -> Option<(usize, bool)>,
+        members: impl Fn(&SubDeviceInfo) -> Option<(usize, &'a SubDeviceConfig)>,
     ) -> SharedClocks {
         let node = |info: &SubDeviceInfo| {
             let member = members(info);
@@ -189,18 +196,20 @@ impl SharedClocks {
 }
 
 impl Node {
-    /// What a scan or somebody who came later is, and which member: its index, and whether SYNC signals are declared.
-    fn new(info: &SubDeviceInfo, member: Option<(usize, bool)>) -> Node {
+    /// What a scan or somebody who came later is, and which member: its index, and what is declared.
+    fn new(info: &SubDeviceInfo, member: Option<(usize, &SubDeviceConfig)>) -> Node {
         Node {
             station: info.station,
             position: info.position.0,
             ports: info.controller.ports,
             member: member.map(|(index, _)| index),
             has_clock: info.controller.features.dc,
-            is_configured: member.is_some_and(|(_, configured)| configured),
+            is_configured: member.is_some_and(|(_, config)| config.sync.is_some()),
+            passage: member.and_then(|(_, config)| config.passage),
             unit: None,
             origin: 0,
             latches_backwards: false,
+            filter_depth: None,
             is_unset: false,
             delay_ns: 0,
             offset_ns: 0,

@@ -9,16 +9,17 @@ use std::time::Duration;
 
 use ringcat::simulated::SimulatedSegment;
 use ringcat::tee::Tee;
-use ringcat::{Application, ClockConfig, MainDevice, Options};
+use ringcat::{Application, ClockConfig, JunctionMode, MainDevice, Options};
 use ringcat_link::Recorder;
 use ringcat_link::pcapng::{Direction, Writer};
 use ringcat_sim::cable::{CableId, DeviceIndex};
 use ringcat_sim::description::DeviceDescription;
 use ringcat_sim::fault::Fault;
+use ringcat_sim::frame::Port::{A, B, C, D};
 use ringcat_sim::network::{Network, NetworkOptions};
 use scenarios::capture::pcapng::Capture;
-use scenarios::clocks::{clock_tree, clocked, config, with_clocks};
-use scenarios::segments::{line, ring};
+use scenarios::clocks::{clock_tree, clocked, config, wired, with_clocks};
+use scenarios::segments::{MAIN, RING_BEHIND_JUNCTION, RING_OF_THREE, at, line, ring};
 
 const LIMIT: Duration = Duration::from_secs(5);
 const LINKS: [(&str, &str); 2] = [("sim-main", "main link"), ("sim-redundant", "redundant link")];
@@ -35,10 +36,10 @@ fn file() -> PathBuf {
 }
 
 /// Scan, OP, `work`, all of it recorded. The static drift phase is short: nobody waits for a lock here.
-fn recorded(network: Network, path: &Path, work: impl FnOnce(&mut Recorded)) {
+fn recorded(options: &Options, network: Network, path: &Path, work: impl FnOnce(&mut Recorded)) {
     let recorder = Recorder::start(path, &LINKS).expect("a file");
     let links = Tee::new(SimulatedSegment::new(network), recorder.tap());
-    let mut main_device = MainDevice::request(links, &Options::default());
+    let mut main_device = MainDevice::request(links, options);
     let scan = main_device.scan().expect("a segment");
     let config = ClockConfig { drift_distributions: 100, ..config() };
     let mut application = main_device.activate(with_clocks(&scan, config)).expect("it fits");
@@ -79,7 +80,8 @@ fn check(path: &Path) -> Option<(bool, String)> {
 /// The script must find nothing wrong, and say that it has judged so much.
 fn expect(name: &str, network: Network, judged: &str, work: impl FnOnce(&mut Recorded)) {
     let path = file();
-    recorded(network, &path, work);
+    let options = Options { junctions: JunctionMode::Automatic, ..Options::default() };
+    recorded(&options, network, &path, work);
     let result = check(&path);
     std::fs::remove_file(&path).expect("it was written");
     let Some((fine, said)) = result else { return };
@@ -111,22 +113,82 @@ fn written_delays_and_offsets_are_those_that_a_capture_gives_facts_7_1_facts_7_2
 
 #[test]
 fn clocks_of_a_ring_that_breaks_and_of_a_subdevice_that_returns_keep_their_delays_facts_7_5() {
-    let fault = |run: &mut Recorded, fault| run.links_mut().links_mut().network_mut().apply(fault);
     let network = ring(clocked(8, 100), NetworkOptions::default());
     expect("ring that breaks", network, "judged: 21 delays", |run| {
         cycles(run, 20);
-        fault(run, Fault::Cut(CableId(3)));
+        apply(run, Fault::Cut(CableId(3)));
         cycles(run, 100);
-        fault(run, Fault::Heal(CableId(3)));
+        apply(run, Fault::Heal(CableId(3)));
         cycles(run, 100);
     });
     expect("SubDevice that returns", line(clocked(6, 100), NetworkOptions::default()), "7 offsets", |run| {
-        fault(run, Fault::PowerOff(DeviceIndex(5)));
+        apply(run, Fault::PowerOff(DeviceIndex(5)));
         cycles(run, 50);
-        fault(run, Fault::PowerOn(DeviceIndex(5)));
+        apply(run, Fault::PowerOn(DeviceIndex(5)));
         cycles(run, 100);
         settle(run);
         cycles(run, 50);
+    });
+}
+
+fn apply(run: &mut Recorded, fault: Fault) {
+    run.links_mut().links_mut().network_mut().apply(fault);
+}
+
+/// A line whose device 1 is plugged in the wrong way round, and device 4 behind a branch too.
+fn crossed() -> Network {
+    let cables = [
+        (MAIN, at(0, A)),
+        (at(0, B), at(1, B)),
+        (at(1, A), at(2, A)),
+        (at(2, D), at(3, A)),
+        (at(2, B), at(4, B)),
+        (at(4, A), at(5, A)),
+    ];
+    wired(clocked(6, 100), &cables)
+}
+
+/// A fork without a clock, device 1, with two branches of two clocks and one more behind it.
+fn fork() -> Network {
+    let cables = [
+        (MAIN, at(0, A)),
+        (at(0, B), at(1, A)),
+        (at(1, D), at(2, A)),
+        (at(2, B), at(3, A)),
+        (at(1, B), at(4, A)),
+        (at(4, B), at(5, A)),
+        (at(1, C), at(6, A)),
+    ];
+    let mut descriptions = clocked(7, 100);
+    descriptions[1].dc = None;
+    wired(descriptions, &cables)
+}
+
+#[test]
+fn crossed_subdevices_and_branches_of_a_fork_without_a_clock_are_judged_facts_7_1() {
+    expect("crossed", crossed(), "judged: 6 delays", |_| ());
+    expect("fork without a clock", fork(), "judged: 6 delays", |_| ());
+}
+
+#[test]
+fn rings_behind_junctions_are_judged_whole_and_broken_facts_7_5_9_4() {
+    let network = || wired(clocked(7, 100), &RING_BEHIND_JUNCTION);
+    expect("ring behind a junction", network(), "judged: 63 delays", |run| {
+        cycles(run, 20);
+        for cable in RING_OF_THREE {
+            apply(run, Fault::Cut(CableId(cable)));
+            cycles(run, 100);
+            apply(run, Fault::Heal(CableId(cable)));
+            cycles(run, 100);
+        }
+    });
+    let mut broken = network();
+    broken.cut(CableId(3));
+    broken.advance_by(Duration::from_millis(1));
+    expect("ring that is whole later", broken, "judged: 14 delays", |run| {
+        cycles(run, 20);
+        apply(run, Fault::Heal(CableId(3)));
+        cycles(run, 100);
     });
 }
 
@@ -165,24 +227,81 @@ const FRMW: u8 = 14;
 /// Of the third SubDevice.
 const STATION: [u8; 2] = 0x1003_u16.to_le_bytes();
 
+/// A capture, judged as it is and with changes.
+struct Tampering {
+    path: PathBuf,
+    original: Capture,
+}
+
+impl Tampering {
+    /// Of a run.
+    fn with(network: Network, work: impl FnOnce(&mut Recorded)) -> Tampering {
+        let path = file();
+        let options = Options { junctions: JunctionMode::Automatic, ..Options::default() };
+        recorded(&options, network, &path, work);
+        let original = Capture::parse(&std::fs::read(&path).expect("a capture")).expect("a capture");
+        Tampering { path, original }
+    }
+
+    fn judged(&self, tamper: &mut Tamper<'_>) -> Option<(bool, String)> {
+        let mut capture = self.original.clone();
+        visit(&mut capture, tamper);
+        write(&capture, &self.path);
+        check(&self.path)
+    }
+
+    fn expect(&self, finding: &str, tamper: &mut Tamper<'_>) {
+        let Some((fine, said)) = self.judged(tamper) else { return };
+        assert!(!fine && said.contains(finding), "expected \"{finding}\": {said}");
+    }
+
+    /// The delays of these stations are told to be longer by so much: those written with their offsets, or those written by
+    /// themselves later.
+    fn expect_longer(&self, finding: &str, stations: &[u16], from: u16, by: i32) {
+        self.expect(finding, &mut |_, command, register, bytes| {
+            let station = u16::from_le_bytes([bytes[2], bytes[3]]);
+            if (command, register) == (FPWR, from) && stations.contains(&station) {
+                let delay = bytes[usize::from(10 + 0x0928 - from)..].first_chunk_mut().expect("a delay");
+                *delay = (i32::from_le_bytes(*delay) + by).to_le_bytes();
+            }
+        });
+    }
+}
+
+impl Drop for Tampering {
+    fn drop(&mut self) {
+        let _ = std::fs::remove_file(&self.path);
+    }
+}
+
+#[test]
+fn delays_that_were_tampered_with_are_found_when_crossed_behind_forks_without_a_clock_and_in_rings() {
+    // Stations are numbered in the order in which the frame is processed: device 1 is the last.
+    let tampering = Tampering::with(crossed(), |_| ());
+    tampering.expect_longer("ns is what was measured", &[0x1006], 0x0920, 4);
+    let tampering = Tampering::with(fork(), |_| ());
+    // The second of a branch against its first; a branch as a whole between what is in front of it and behind it.
+    tampering.expect_longer("ns is what was measured", &[0x1004], 0x0920, 4);
+    tampering.expect_longer("before what is in front of it has ended", &[0x1005, 0x1006], 0x0920, -2_000);
+    tampering.expect_longer("after the frame was back", &[0x1007], 0x0920, 2_000);
+    // Of a ring that was broken from the start and is whole later.
+    let mut network = wired(clocked(7, 100), &RING_BEHIND_JUNCTION);
+    network.cut(CableId(3));
+    network.advance_by(Duration::from_millis(1));
+    let tampering = Tampering::with(network, |run| {
+        apply(run, Fault::Heal(CableId(3)));
+        cycles(run, 100);
+    });
+    tampering.expect_longer("ns is what was measured", &[0x1004], 0x0928, 30);
+}
+
 #[test]
 fn clocks_that_were_tampered_with_are_found() {
-    let path = file();
-    recorded(line(clocked(6, 100), NetworkOptions::default()), &path, |run| cycles(run, 20));
-    let original = Capture::parse(&std::fs::read(&path).expect("a capture")).expect("a capture");
-    let judged = |tamper: &mut Tamper<'_>| {
-        let mut capture = original.clone();
-        visit(&mut capture, tamper);
-        write(&capture, &path);
-        check(&path)
-    };
-    let Some((fine, said)) = judged(&mut |_, _, _, _| ()) else { return };
+    let tampering = Tampering::with(line(clocked(6, 100), NetworkOptions::default()), |run| cycles(run, 20));
+    let Some((fine, said)) = tampering.judged(&mut |_, _, _, _| ()) else { return };
     assert!(fine, "written anew, nothing is wrong with it: {said}");
     let is_own = |bytes: &[u8]| bytes[2..4] == STATION;
-    let expect = |finding: &str, tamper: &mut Tamper<'_>| {
-        let (fine, said) = judged(tamper).expect("python3");
-        assert!(!fine && said.contains(finding), "expected \"{finding}\": {said}");
-    };
+    let expect = |finding: &str, tamper: &mut Tamper<'_>| tampering.expect(finding, tamper);
     // The delay is 4 ns too long, then the offset.
     expect("ns is what was measured", &mut |_, command, register, bytes| {
         if (command, register) == (FPWR, 0x0920) && is_own(bytes) {
@@ -216,5 +335,4 @@ fn clocks_that_were_tampered_with_are_found() {
             bytes[10..14].fill(0);
         }
     });
-    std::fs::remove_file(&path).expect("it was written");
 }

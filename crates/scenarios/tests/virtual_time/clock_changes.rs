@@ -123,6 +123,34 @@ fn a_ring_that_was_broken_from_the_start_has_the_delay_of_its_missing_cable_afte
     assert!(world.incomplete(mark) <= 1 && world.left_op(mark).is_empty());
 }
 
+/// Nobody looks for rings behind junctions, and there is one: delays cannot be measured. That is told once, and once more
+/// when the segment has changed; with the ring broken all is well.
+#[test]
+fn a_ring_that_nobody_looks_for_is_told_once_for_each_change_and_clocks_begin_when_it_is_open_facts_7_1_9_4() {
+    let mut world = World::with(9, junction_ring(), &Options::default(), |scan| with_clocks(scan, config()))
+        .expect("it can be activated");
+    let mark = world.beginning();
+    let failures = |world: &World, mark| {
+        let failed = |timed: &&ringcat::TimedEvent| matches!(timed.event, Event::ClocksFailed { .. });
+        world.events(mark).iter().filter(failed).count()
+    };
+    world.run_cycles(3_000);
+    assert!(world.all_in_op());
+    assert_eq!(failures(&world, mark), 1);
+    // A branch that has nothing to do with it.
+    world.cut(CableId(7));
+    world.run_cycles(2_000);
+    assert_eq!(failures(&world, mark), 2);
+    world.heal(CableId(7));
+    world.run_cycles(100);
+    let mark = world.mark();
+    world.cut(CableId(5));
+    lock(&mut world, Duration::from_secs(4));
+    assert_eq!(failures(&world, mark), 0);
+    let everybody = all(world.network());
+    assert!(largest_spread(&mut world, &everybody, 200) <= 100, "{:?}", differences(world.network(), &everybody));
+}
+
 /// A trunk of three junctions with branches on ports 3 and 2, six clocks in branches, up to 100 ppm from the reference.
 fn tree() -> Network {
     let cables = [

@@ -19,48 +19,6 @@ fn all(count: usize) -> Vec<usize> {
 }
 
 #[test]
-fn delays_of_a_line_are_those_of_its_cables_facts_7_1() {
-    for count in [2, 7, 30] {
-        let mut world = world(1, line(clocked(count, 100), NetworkOptions::default()), config());
-        world.until(Duration::from_secs(1), "set up", |world| {
-            world
-                .network()
-                .device(DeviceIndex(1))
-                .controller
-                .register(ringcat_wire::register::map::DC_SYSTEM_TIME_DELAY, 1)
-                != [0]
-        });
-        world.run_cycles(10);
-        for device in 0..count {
-            let error = i64::from(delay(world.network(), device)) - HOP_NS * device as i64;
-            let limit = 10 + (100.0 * device as f64).sqrt() as i64;
-            assert!(error.abs() <= limit, "device {device} of {count}: {error} ns");
-        }
-    }
-}
-
-#[test]
-fn what_processing_takes_longer_than_forwarding_is_an_error_of_delays_unless_it_is_told_facts_7_1() {
-    const COUNT: usize = 6;
-    const LONGER: u64 = 40;
-    let mut options = NetworkOptions::default();
-    options.processing_delay = options.forwarding_delay + Duration::from_nanos(LONGER);
-    let hop = HOP_NS - 300 + options.processing_delay.as_nanos() as i64;
-    for (told, systematic) in [(0, 20), (LONGER as u16, 0)] {
-        let config = ClockConfig { processing_difference_ns: told, ..config() };
-        let mut world = world(1, line(clocked(COUNT, 50), options.clone()), config);
-        world.until(Duration::from_secs(1), "set up", |world| delay(world.network(), COUNT - 1) != 0);
-        world.run_cycles(10);
-        for device in 0..COUNT {
-            // Frames turn round behind the processing unit of the last one: its cable is right in any case.
-            let missed = systematic * device.min(COUNT - 2) as i64;
-            let error = i64::from(delay(world.network(), device)) - hop * device as i64 + missed;
-            assert!(error.abs() <= 10 + (100.0 * device as f64).sqrt() as i64, "device {device}, {told}: {error} ns");
-        }
-    }
-}
-
-#[test]
 fn clocks_of_a_line_lock_and_stay_together_facts_7_2() {
     let mut world = world(2, line(clocked(20, 50), NetworkOptions::default()), config());
     let mark = world.beginning();
@@ -87,6 +45,22 @@ fn clocks_of_a_line_lock_and_stay_together_facts_7_2() {
     assert!(error.abs() <= 30_000, "{error} ns");
     let host = now.0.wrapping_add(EPOCH);
     assert!((truth.wrapping_sub(host) as i64).abs() < 2_000_000, "the reference began with the host's time");
+}
+
+/// The reference runs as fast as a clock may, others as slowly, and the other way round.
+#[test]
+fn clocks_anywhere_within_100_ppm_lock_and_stay_together_facts_7_2_1() {
+    const COUNT: usize = 6;
+    for reference in [100_000, -100_000] {
+        let mut descriptions = clocked(COUNT, 100);
+        for (device, share) in descriptions.iter_mut().zip([1, -1, 0, 1, -1, -1]) {
+            device.clock_drift_ppb = reference * share;
+        }
+        let mut world = world(14, line(descriptions, NetworkOptions::default()), config());
+        lock(&mut world, Duration::from_secs(2));
+        let largest = largest_spread(&mut world, &all(COUNT), 2_000);
+        assert!(largest <= 100, "reference at {reference} ppb: {largest} ns");
+    }
 }
 
 #[test]

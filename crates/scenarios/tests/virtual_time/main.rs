@@ -7,6 +7,7 @@ mod calm;
 mod captures;
 mod clock_captures;
 mod clock_changes;
+mod clock_delays;
 mod clocks;
 mod configuration;
 mod copies;

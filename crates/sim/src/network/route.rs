@@ -201,8 +201,7 @@ impl Network {
                 route.stops.push(Stop { hop, device, port_changes, processed });
             }
             leg_id = node.out[exit.index()]?;
-            let delay = if processed { self.options.processing_delay } else { self.options.forwarding_delay };
-            let delay_ns = u64::try_from(delay.as_nanos()).ok()?;
+            let delay_ns = u64::try_from(self.options.passage(&node.device, processed).as_nanos()).ok()?;
             after_ns = after_ns.checked_add(delay_ns)?.checked_add(self.legs[leg_id.index()].delay_ns)?;
         }
         None

@@ -106,8 +106,9 @@ impl Network {
         let Some(leg) = node.out[port.index()] else {
             return self.lose_hop(slot, LossCause::OpenPort);
         };
-        let delay = if processed { self.options.processing_delay } else { self.options.forwarding_delay };
-        let at = self.now + delay + Duration::from_nanos(self.legs[leg.index()].delay_ns);
+        let at = self.now
+            + self.options.passage(&node.device, processed)
+            + Duration::from_nanos(self.legs[leg.index()].delay_ns);
         Some((at, Event::Arrival { slot, leg, meddled: false }))
     }
 

@@ -130,6 +130,8 @@ fn settings(entry: &DeviceEntry, description: &mut DeviceDescription) -> Result<
         description.identity.serial = serial;
     }
     clock(entry, description)?;
+    description.processing_delay = entry.processing_ns.map(Duration::from_nanos);
+    description.forwarding_delay = entry.forwarding_ns.map(Duration::from_nanos);
     if let Some(eight) = entry.eight_byte_sii {
         description.eight_byte_sii = eight;
     }

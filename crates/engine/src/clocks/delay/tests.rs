@@ -14,7 +14,7 @@ fn wiring(topology: &Topology) -> Wiring {
 
 fn propagation(topology: &Topology, times: &[Option<PortTimes>]) -> Delays {
     let (wiring, stations) = (wiring(topology), stations(topology.nodes.len()));
-    Segment { wiring: &wiring, stations: &stations, unit_takes: 0 }.propagation(times, &mut Cables::default())
+    Segment { wiring: &wiring, stations: &stations, passages: &[] }.propagation(times, &mut Cables::default())
 }
 
 fn entry_ports(topology: &Topology) -> Vec<u8> {
@@ -115,7 +115,7 @@ fn nonsense_neither_panics_nor_hangs() {
 }
 
 /// A frame on its way with what each port's clock notes, and the truth at each unit. A cable is named by its far end.
-fn walk(wiring: &Wiring, unit_takes: i64, cable: impl Fn(PortOf) -> i64) -> (Vec<Option<PortTimes>>, Vec<i64>) {
+fn walk(wiring: &Wiring, passages: &[Passage], cable: impl Fn(PortOf) -> i64) -> (Vec<Option<PortTimes>>, Vec<i64>) {
     let count = wiring.count();
     let (mut at, mut arrivals, mut units) = (0, vec![[0; 4]; count], vec![0; count]);
     let mut first: Vec<Option<i64>> = vec![None; count];
@@ -124,8 +124,9 @@ fn walk(wiring: &Wiring, unit_takes: i64, cable: impl Fn(PortOf) -> i64) -> (Vec
         let PortOf { node, port } = arrival.at;
         if step > 0 {
             let near = wiring.far(arrival.at).expect("it came from somewhere");
-            let unit = if way[step - 1].processed { unit_takes } else { 0 };
-            at += (300 + unit + cable(near.max(arrival.at))) << FRACTION;
+            let passage = passages.get(near.node).copied().unwrap_or_default();
+            at += if way[step - 1].processed { passage.processed } else { passage.forwarded };
+            at += (300 + cable(near.max(arrival.at))) << FRACTION;
         }
         let begin = *first[node].get_or_insert(at);
         arrivals[node][usize::from(port)] = at - begin;
@@ -147,12 +148,12 @@ fn local_ring(broken: Option<usize>) -> Wiring {
 }
 
 /// Errors of delays with this break, in nanoseconds; what is learned of cables is kept.
-fn errors(broken: Option<usize>, unit_takes: i64, cables: &mut Cables) -> Vec<i64> {
+fn errors(broken: Option<usize>, passages: &[Passage], cables: &mut Cables) -> Vec<i64> {
     let wiring = local_ring(broken);
     // Each cable has a length of its own.
-    let (times, truth) = walk(&wiring, unit_takes, |at| 20 * (3 * at.node as i64 + i64::from(at.port)));
+    let (times, truth) = walk(&wiring, passages, |at| 20 * (3 * at.node as i64 + i64::from(at.port)));
     let stations = stations(7);
-    let segment = Segment { wiring: &wiring, stations: &stations, unit_takes: unit_takes << FRACTION };
+    let segment = Segment { wiring: &wiring, stations: &stations, passages };
     segment.see(cables);
     let delays = segment.propagation(&times, cables);
     let unit = |node: usize| delays.units[node].expect("all have clocks");
@@ -161,16 +162,18 @@ fn errors(broken: Option<usize>, unit_takes: i64, cables: &mut Cables) -> Vec<i6
 
 #[test]
 fn a_local_ring_is_known_whole_from_what_it_was_open_and_broken_by_itself_facts_7_5_9_4() {
-    for unit_takes in [0, 40] {
+    let mixed: Vec<Passage> = (0..7).map(|node| passage(150 * (node % 3) + 40, 140 * (node % 3))).collect();
+    for passages in [vec![], vec![passage(40, 0); 7], mixed] {
+        let is_mixed = passages.iter().any(|other| *other != passages[0]);
         let mut cables = Cables::default();
         // Nothing is known of a ring that is whole: what is on its cables is shared, behind it nothing is wrong.
-        let guessed = errors(None, unit_takes, &mut cables);
+        let guessed = errors(None, &passages, &mut cables);
         assert_eq!((guessed[1], guessed[5], guessed[6]), (0, 0, 0));
         assert!(guessed[2..5].iter().any(|error| *error != 0));
         let mut cables = Cables::default();
         // Open at its closing cable, as set-up makes it; then whole, and broken anywhere.
         for broken in [Some(7), None, Some(3), None, Some(2), Some(4), None, Some(7), None] {
-            assert_eq!(errors(broken, unit_takes, &mut cables), [0; 7], "{broken:?}");
+            assert_eq!(errors(broken, &passages, &mut cables), [0; 7], "{broken:?}, mixed {is_mixed}");
         }
     }
 }
@@ -180,7 +183,7 @@ fn a_closed_ring_is_what_was_measured_of_it_as_a_line_and_says_where_it_was_not(
     let mut topology = tree(4, &[(0, 1, 1), (1, 1, 2), (2, 1, 3)]);
     let (mut cables, stations) = (Cables::default(), stations(4));
     let mut run = |wiring: &Wiring, times: &[Option<PortTimes>]| {
-        let delays = Segment { wiring, stations: &stations, unit_takes: 0 }.propagation(times, &mut cables);
+        let delays = Segment { wiring, stations: &stations, passages: &[] }.propagation(times, &mut cables);
         (rounded(&delays, 0), delays.is_guessed)
     };
     topology.open_ports = vec![PortOf { node: 3, port: 1 }];
@@ -188,31 +191,60 @@ fn a_closed_ring_is_what_was_measured_of_it_as_a_line_and_says_where_it_was_not(
     let once = [times([0; 4]); 4];
     assert!(run(&closed, &once).1);
     let line = wiring(&Topology { open_ports: Vec::new(), ..topology });
-    let (times, truth) = walk(&line, 0, |at| 10 * at.node as i64);
+    let (times, truth) = walk(&line, &[], |at| 10 * at.node as i64);
     let truth: Vec<Option<i64>> = truth.into_iter().map(|unit| Some(unit >> FRACTION)).collect();
     assert_eq!(run(&line, &times), (truth.clone(), false));
     assert_eq!(run(&closed, &once), (truth, false));
 }
 
+/// Of so many nanoseconds.
+fn passage(processed: i64, forwarded: i64) -> Passage {
+    Passage { processed: processed << FRACTION, forwarded: forwarded << FRACTION }
+}
+
+/// Errors in a line of nine of such passages when these are known.
+fn errors_of_line(passages: &[Passage], known: &[Passage]) -> Vec<i64> {
+    let links: Vec<(usize, u8, usize)> = (1..9).map(|node| (node - 1, 1, node)).collect();
+    let wiring = wiring(&tree(9, &links));
+    let (times, truth) = walk(&wiring, passages, |_| 50);
+    let segment = Segment { wiring: &wiring, stations: &stations(9), passages: known };
+    let delays = segment.propagation(&times, &mut Cables::default());
+    delays.units.iter().zip(&truth).map(|(unit, truth)| (unit.unwrap() - truth) >> FRACTION).collect()
+}
+
 #[test]
 fn what_processing_takes_longer_than_forwarding_is_a_half_per_hop_unless_it_is_known_facts_7_1() {
-    let wiring =
-        wiring(&tree(9, &[(0, 1, 1), (1, 1, 2), (2, 1, 3), (3, 1, 4), (4, 1, 5), (5, 1, 6), (6, 1, 7), (7, 1, 8)]));
-    let (times, truth) = walk(&wiring, 40, |_| 50);
-    let stations = stations(9);
-    for (known, error) in [(0, -20), (40, 0)] {
-        let segment = Segment { wiring: &wiring, stations: &stations, unit_takes: known << FRACTION };
-        let delays = segment.propagation(&times, &mut Cables::default());
-        // The last one processes before the frame turns round: that is no passage of the way out.
-        assert_eq!((delays.units[8].unwrap() - truth[8]) >> FRACTION, 8 * error + if known == 0 { 20 } else { 0 });
-    }
+    let passages = [passage(40, 0); 9];
+    // The last one processes before the frame turns round: that is no passage of the way out.
+    assert_eq!(errors_of_line(&passages, &[]), [0, -20, -40, -60, -80, -100, -120, -140, -140]);
+    assert_eq!(errors_of_line(&passages, &passages), [0; 9]);
+}
+
+#[test]
+fn types_side_by_side_are_off_by_half_their_difference_unless_it_is_known_facts_7_1() {
+    // As coupler, terminals and drives may be.
+    let passages: Vec<Passage> = [(550, 540), (150, 150), (150, 150), (750, 700), (750, 700), (150, 150), (150, 150)]
+        .map(|(processed, forwarded)| passage(processed, forwarded))
+        .to_vec();
+    let passages = [passages, vec![passage(0, 0); 2]].concat();
+    assert_eq!(errors_of_line(&passages, &[])[..4], [0, -200, -200, 75]);
+    assert_eq!(errors_of_line(&passages, &passages), [0; 9]);
+    // What all have in common may be left out.
+    let less: Vec<Passage> = passages
+        .iter()
+        .map(|known| Passage {
+            processed: known.processed - (100 << FRACTION),
+            forwarded: known.forwarded - (100 << FRACTION),
+        })
+        .collect();
+    assert_eq!(errors_of_line(&passages, &less), [0; 9]);
 }
 
 proptest::proptest! {
     #[test]
     fn any_tree_with_clocks_everywhere_has_exact_delays(
         parents in proptest::collection::vec((0usize..1000, 0usize..3, 0i64..400), 1..40),
-        unit_takes in 0i64..100,
+        passages in proptest::collection::vec((0i64..800, 0i64..800), 40),
     ) {
         let mut topology = tree(1, &[]);
         let mut cables = vec![0];
@@ -229,9 +261,11 @@ proptest::proptest! {
         }
         topology.main_count = topology.nodes.len();
         let wiring = wiring(&topology);
-        let (times, truth) = walk(&wiring, unit_takes, |at| cables[at.node]);
+        let passages: Vec<Passage> =
+            passages.into_iter().map(|(processed, forwarded)| passage(processed, forwarded)).collect();
+        let (times, truth) = walk(&wiring, &passages, |at| cables[at.node]);
         let stations = stations(topology.nodes.len());
-        let segment = Segment { wiring: &wiring, stations: &stations, unit_takes: unit_takes << FRACTION };
+        let segment = Segment { wiring: &wiring, stations: &stations, passages: &passages };
         let delays = segment.propagation(&times, &mut Cables::default());
         for (node, truth) in truth.iter().enumerate() {
             proptest::prop_assert_eq!(delays.units[node], Some(*truth));

@@ -15,9 +15,9 @@ use ringcat_wire::command::Command;
 use ringcat_wire::datagram::Target;
 use ringcat_wire::register::{DlControl, DlStatus, LoopControl, map};
 
-use super::SharedClocks;
+use super::{Clocks, SharedClocks};
 use crate::clocks::wiring::Wiring;
-use crate::clocks::{Delays, FRACTION, Latched, Measurements, Segment};
+use crate::clocks::{Delays, FRACTION, Latched, Measurements, Passage, Segment};
 use crate::link::LinkSet;
 use crate::procedures::strangers::view;
 use crate::ring::RingState;
@@ -184,12 +184,7 @@ async fn look_once(bus: &Bus, clocks: &SharedClocks) -> Result<Option<Survey>, B
 
 /// Several latches of a segment as it is.
 async fn take(bus: &Bus, clocks: &SharedClocks, survey: &Survey) -> Result<Measured, String> {
-    let (count, unit_takes) = {
-        let access = clocks.access();
-        let config = access.config.as_ref();
-        let unit = config.map_or(0, |config| i64::from(config.processing_difference_ns) << FRACTION);
-        (config.map_or(1, |config| config.measurements.clamp(1, 64)), unit)
-    };
+    let count = clocks.access().config.as_ref().map_or(1, |config| config.measurements.clamp(1, 64));
     let entries = survey.wiring.entry_ports();
     enter_backwards(bus, clocks, &survey.stations, &entries).await;
     let mut measurements = Measurements::new(entries);
@@ -208,13 +203,25 @@ async fn take(bus: &Bus, clocks: &SharedClocks, survey: &Survey) -> Result<Measu
     let reference = access.reference.filter(|index| is_there(&access.nodes[*index]));
     let reference = reference.or_else(|| access.elect(|_, node| is_there(node)));
     let on_clock = reference.and_then(|index| at(access.nodes[index].station)).unwrap_or(0);
-    let segment = Segment { wiring: &survey.wiring, stations: &survey.stations, unit_takes };
+    let passages: Vec<Passage> = survey.stations.iter().map(|station| access.passage_of(*station)).collect();
+    let segment = Segment { wiring: &survey.wiring, stations: &survey.stations, passages: &passages };
     segment.see(&mut access.cables);
     let delays = segment.propagation(&measurements.mean(on_clock), &mut access.cables);
     if delays.is_implausible {
         return Err("receive times do not fit the cabling: a ring behind a junction may be unknown".to_string());
     }
     Ok(Measured { stations: survey.stations.clone(), delays, drift_ppb: measurements.drift_ppb(on_clock) })
+}
+
+impl Clocks {
+    /// What is declared about passages through a SubDevice.
+    fn passage_of(&self, station: StationAddress) -> Passage {
+        let own = self.nodes.iter().find(|node| node.station == station).and_then(|node| node.passage);
+        let usual = self.config.as_ref().map(|config| config.passage);
+        let declared = own.or(usual).unwrap_or_default();
+        let exact = |ns: u16| i64::from(ns) << FRACTION;
+        Passage { processed: exact(declared.processing_ns), forwarded: exact(declared.forwarding_ns) }
+    }
 }
 
 /// Controllers that latch in one direction only are told in which the frame comes (facts 3.12, 7.5).

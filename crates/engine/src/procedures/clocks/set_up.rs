@@ -15,6 +15,13 @@ use crate::supervisor::{Bus, BusError};
 
 /// Reset value of DC_SPEED_COUNTER_START; writing it restarts the filters.
 const SPEED_COUNTER_START: u16 = 0x1000;
+/// DC_FILTER_DIFFERENCE of clocks that follow one that frames meet before: what they are told is exact, and a mean that lags
+/// behind the samples makes the loop swing where drift is large.
+const EXACT_DEPTH: u8 = 0;
+/// Of clocks that are told what the host believes: its reset value, which takes most of the host's jitter out.
+const HOST_DEPTH: u8 = 4;
+/// DC_FILTER_SPEED: its reset value.
+const SPEED_DEPTH: u8 = 12;
 /// Delays that differ by no more than this from what is written are what the same way gives when it is measured again.
 const SAME_NS: i64 = 30;
 
@@ -36,6 +43,7 @@ pub(super) async fn set_up(bus: &Bus, clocks: &SharedClocks) -> Result<(), Strin
     let wanted = bus.now().0.wrapping_add(clocks.access().epoch);
     let latched = latch(bus, clocks, &stations).await.map_err(text)?;
     set_offsets(&mut clocks.access(), &latched, wanted);
+    set_filters(bus, clocks).await;
     write_all(bus, clocks).await.map_err(text)?;
     clocks.access().is_set_up = true;
     Ok(())
@@ -120,6 +128,15 @@ impl Clocks {
         self.reference.filter(here).or_else(first)
     }
 
+    /// DC_FILTER_DIFFERENCE as it should be.
+    fn filter_depth(&self, index: usize) -> u8 {
+        let link = self.nodes[index].link.unwrap_or(Link::Main);
+        let reference = self.reference_on(link).map(|reference| self.nodes[reference].unit);
+        // A SubDevice is behind its reference where frames meet it later.
+        let is_behind = reference.is_some_and(|unit| self.nodes[index].unit > unit);
+        if is_behind { EXACT_DEPTH } else { HOST_DEPTH }
+    }
+
     /// Whether delays on a link count from different places.
     pub fn is_mixed(&self, link: Link) -> bool {
         let mut here =
@@ -162,6 +179,25 @@ async fn write_all(bus: &Bus, clocks: &SharedClocks) -> Result<(), BusError> {
     let written = bus.gather(all, |bus, (station, registers)| async move { write(&bus, station, registers).await });
     // Who is gone is set up when it comes back.
     written.await.into_iter().filter(|result| !matches!(result, Err(BusError::Wkc { .. }))).collect()
+}
+
+/// Writes the filter depths of those for whom they are others than before: references and clocks in front of them are told
+/// what the host believes, all others what a reference shows.
+pub(super) async fn set_filters(bus: &Bus, clocks: &SharedClocks) {
+    let all: Vec<(usize, StationAddress, u8)> = {
+        let clocks = clocks.access();
+        let nodes = || clocks.nodes.iter().enumerate().filter(|(_, node)| node.has_clock && node.link.is_some());
+        let depth = |(index, node): (usize, &Node)| (index, node.station, clocks.filter_depth(index));
+        nodes().map(depth).filter(|(index, _, depth)| clocks.nodes[*index].filter_depth != Some(*depth)).collect()
+    };
+    let written = bus.gather(all, |bus, (index, station, depth)| async move {
+        let depths = [depth, SPEED_DEPTH];
+        bus.fpwr(station, map::DC_FILTER_DIFFERENCE, &depths).await.ok().map(|()| (index, depth))
+    });
+    // Who has no such registers, or is gone, stays as it is.
+    for (index, depth) in written.await.into_iter().flatten() {
+        clocks.access().nodes[index].filter_depth = Some(depth);
+    }
 }
 
 /// DC_SYSTEM_TIME_OFFSET and DC_SYSTEM_TIME_DELAY.
@@ -213,5 +249,6 @@ pub(super) async fn set_up_one(bus: &Bus, clocks: &SharedClocks, index: usize) -
     };
     write(bus, station, registers).await?;
     clocks.access().nodes[index].is_unset = false;
+    set_filters(bus, clocks).await;
     Ok(())
 }

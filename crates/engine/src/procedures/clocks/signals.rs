@@ -65,7 +65,7 @@ pub(in crate::procedures) async fn restore(bus: &Bus, fleet: &SharedFleet, membe
     {
         let mut clocks = fleet.clocks.access();
         let node = &mut clocks.nodes[index];
-        (node.is_unset, node.latches_backwards) = (true, false);
+        (node.is_unset, node.latches_backwards, node.filter_depth) = (true, false, None);
         if clocks.reference == Some(index) {
             clocks.reference = None;
         }
@@ -83,11 +83,9 @@ pub(in crate::procedures) async fn restore(bus: &Bus, fleet: &SharedFleet, membe
 
 /// The clock of a member. One that was not there at the scan is added.
 fn index_of(fleet: &SharedFleet, member: usize) -> Option<usize> {
-    let (info, is_configured) = {
-        let access = fleet.access();
-        let member = access.members.get(member)?;
-        (member.info.clone()?, member.config.sync.is_some())
-    };
+    let access = fleet.access();
+    let declared = access.members.get(member)?;
+    let info = declared.info.as_ref()?;
     let mut clocks = fleet.clocks.access();
     if !clocks.is_set_up || !info.controller.features.dc {
         return None;
@@ -95,7 +93,7 @@ fn index_of(fleet: &SharedFleet, member: usize) -> Option<usize> {
     if let Some(index) = clocks.position_of(member) {
         return Some(index);
     }
-    clocks.nodes.push(Node::new(&info, Some((member, is_configured))));
+    clocks.nodes.push(Node::new(info, Some((member, &*declared.config))));
     Some(clocks.nodes.len() - 1)
 }
 

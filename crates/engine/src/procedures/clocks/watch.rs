@@ -18,7 +18,7 @@ use ringcat_wire::command::Command;
 use ringcat_wire::datagram::Target;
 use ringcat_wire::register::map;
 
-use super::set_up::{measure_again, set_up, write_delays};
+use super::set_up::{measure_again, set_filters, set_up, write_delays};
 use super::signals::difference;
 use crate::board::clocks::References;
 use crate::clocks::extend;
@@ -32,8 +32,10 @@ use crate::time::Instant;
 const PAUSE: Duration = Duration::from_millis(1);
 /// Between two looks at the differences afterwards.
 const ROUTINE: Duration = Duration::from_millis(100);
-/// Between two tries to set the clocks up.
+/// Between the first two tries to set the clocks up. Each further one comes after twice the time, until the segment changes.
 const RETRY: Duration = Duration::from_millis(100);
+/// The longest time between two of them.
+const LONGEST_RETRY: Duration = Duration::from_secs(10);
 /// From the last change of the segment until it is measured again: a plug that is pushed in bounces.
 const SETTLE: Duration = Duration::from_millis(5);
 /// A ring that opened or closed explains ports that change within so long: in each part the way from clock to clock is what
@@ -57,7 +59,10 @@ pub(crate) async fn begin(bus: &Bus, fleet: &SharedFleet) {
 
 async fn try_set_up(bus: &Bus, fleet: &SharedFleet) {
     if let Err(reason) = set_up(bus, &fleet.clocks).await {
-        bus.report(Event::ClocksFailed { reason });
+        // What has been told is not told again.
+        if fleet.clocks.access().trouble.replace(reason.clone()).as_ref() != Some(&reason) {
+            bus.report(Event::ClocksFailed { reason });
+        }
         return;
     }
     post(fleet);
@@ -67,11 +72,19 @@ async fn try_set_up(bus: &Bus, fleet: &SharedFleet) {
 
 /// Runs for ever.
 pub(crate) async fn keep(bus: Bus, fleet: SharedFleet) {
+    if !fleet.clocks.access().nodes.iter().any(|node| node.has_clock) {
+        return;
+    }
+    let mut pause = RETRY;
     while !fleet.clocks.access().is_set_up {
-        if !fleet.clocks.access().nodes.iter().any(|node| node.has_clock) {
-            return;
-        }
-        bus.sleep(RETRY).await;
+        pause = match wait_for_change(&bus, &fleet, pause).await {
+            Change::None => (2 * pause).min(LONGEST_RETRY),
+            Change::FirstAnswer => RETRY,
+            Change::Segment => {
+                fleet.clocks.access().trouble = None;
+                RETRY
+            }
+        };
         try_set_up(&bus, &fleet).await;
     }
     let mut next_look = Instant::default();
@@ -105,6 +118,33 @@ pub(crate) async fn keep(bus: Bus, fleet: SharedFleet) {
     }
 }
 
+/// What became of a segment meanwhile.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Change {
+    None,
+    /// Somebody answers where nobody did: so it is when cycles begin, which is nothing new.
+    FirstAnswer,
+    Segment,
+}
+
+/// Waits, until the segment has changed and is at rest again at the longest.
+async fn wait_for_change(bus: &Bus, fleet: &SharedFleet, limit: Duration) -> Change {
+    fleet.board.clocks.guard_ports();
+    let state = || (fleet.board.ring().changes, fleet.board.clocks.holds(), answering(fleet));
+    let (until, mut seen) = (bus.now() + limit, state());
+    let (mut change, mut changed_at) = (Change::None, bus.now());
+    while bus.now() < until && (change == Change::None || bus.now() < changed_at + SETTLE) {
+        bus.sleep(PAUSE).await;
+        let now = state();
+        if now != seen {
+            let is_first = seen.2 == (0, 0) && change != Change::Segment;
+            change = if is_first { Change::FirstAnswer } else { Change::Segment };
+            (seen, changed_at) = (now, bus.now());
+        }
+    }
+    change
+}
+
 /// Measures the segment after a change.
 async fn measure_once(bus: &Bus, fleet: &SharedFleet, since: Instant) {
     let hold = || fleet.board.clocks.post_references(References::default());
@@ -119,6 +159,7 @@ async fn measure_once(bus: &Bus, fleet: &SharedFleet, since: Instant) {
     fleet.clocks.access().is_doubtful = None;
     post(fleet);
     fleet.board.clocks.answer(holds);
+    set_filters(bus, &fleet.clocks).await;
 }
 
 /// Whether a clock that is there is not locked, or not again.
@@ -195,9 +236,13 @@ async fn look(bus: &Bus, fleet: &SharedFleet, is_explained: bool) {
         Some(Answer { link: Some(link), difference_ns })
     });
     let answers: Vec<Option<Answer>> = answers.await;
-    judge(bus, fleet, &answers);
+    // While nobody is told a time, differences are those of a frame that came another way.
+    if !fleet.board.clocks.is_held() {
+        judge(bus, fleet, &answers);
+    }
     if follow_links(bus, fleet, &answers, is_explained).await {
         fleet.board.clocks.answer(holds);
+        set_filters(bus, &fleet.clocks).await;
     }
     follow_reference(bus, fleet).await;
 }

@@ -40,6 +40,7 @@ pub fn main() -> ExitCode {
     delays(&mut figures, "line of 200", |ideal| line(descriptions(200, ideal), options()));
     delays(&mut figures, "tree of 100, three branches each", |ideal| clock_tree(descriptions(100, ideal)));
     hundred(&mut figures);
+    two_hundred(&mut figures);
     cuts(&mut figures);
     junction(&mut figures);
     phase(&mut figures);
@@ -109,6 +110,17 @@ fn hundred(figures: &mut Figures) {
     let all: Vec<usize> = (0..100).collect();
     let largest = largest_spread(&mut world, &all, 10_000);
     figures.at_most("the same: spread in 10 s of 1 ms cycles", largest as f64, SPREAD_BAR, "ns");
+}
+
+/// Twice as many, with drift to either side that is twice as large.
+fn two_hundred(figures: &mut Figures) {
+    let mut world = world(2, line(clocked(200, 100), NetworkOptions::default()), config());
+    lock(&mut world, Duration::from_secs(20));
+    let locked = world.now().0 as f64 / 1e9;
+    figures.show("200 clocks, +-100 ppm: from power-on to the lock", format!("{locked:.2} s"));
+    let all: Vec<usize> = (0..200).collect();
+    let largest = largest_spread(&mut world, &all, 2_000);
+    figures.at_most("the same: spread in 2 s of 1 ms cycles", largest as f64, SPREAD_BAR, "ns");
 }
 
 /// From power-on to OP of the same devices when nobody asks for clocks.

@@ -1,0 +1,111 @@
+//! Propagation delays of lines, against those of their cables (facts 7.1).
+
+use std::time::Duration;
+
+use ringcat::{ClockConfig, Options, Passage};
+use ringcat_sim::cable::DeviceIndex;
+use ringcat_sim::network::NetworkOptions;
+use scenarios::clocks::{clocked, config, delay, with_clocks, world};
+use scenarios::segments::line;
+use scenarios::world::World;
+
+/// Time of a passage and of a cable.
+const HOP_NS: i64 = 300 + 50;
+
+#[test]
+fn delays_of_a_line_are_those_of_its_cables_facts_7_1() {
+    for count in [2, 7, 30] {
+        let mut world = world(1, line(clocked(count, 100), NetworkOptions::default()), config());
+        world.until(Duration::from_secs(1), "set up", |world| {
+            world
+                .network()
+                .device(DeviceIndex(1))
+                .controller
+                .register(ringcat_wire::register::map::DC_SYSTEM_TIME_DELAY, 1)
+                != [0]
+        });
+        world.run_cycles(10);
+        for device in 0..count {
+            let error = i64::from(delay(world.network(), device)) - HOP_NS * device as i64;
+            let limit = 10 + (100.0 * device as f64).sqrt() as i64;
+            assert!(error.abs() <= limit, "device {device} of {count}: {error} ns");
+        }
+    }
+}
+
+#[test]
+fn what_processing_takes_longer_than_forwarding_is_an_error_of_delays_unless_it_is_told_facts_7_1() {
+    const COUNT: usize = 6;
+    const LONGER: u64 = 40;
+    let mut options = NetworkOptions::default();
+    options.processing_delay = options.forwarding_delay + Duration::from_nanos(LONGER);
+    let hop = HOP_NS - 300 + options.processing_delay.as_nanos() as i64;
+    for (told, systematic) in [(0, 20), (LONGER as u16, 0)] {
+        let config = ClockConfig { passage: Passage { processing_ns: told, forwarding_ns: 0 }, ..config() };
+        let mut world = world(1, line(clocked(COUNT, 50), options.clone()), config);
+        world.until(Duration::from_secs(1), "set up", |world| delay(world.network(), COUNT - 1) != 0);
+        world.run_cycles(10);
+        for device in 0..COUNT {
+            // Frames turn round behind the processing unit of the last one: its cable is right in any case.
+            let missed = systematic * device.min(COUNT - 2) as i64;
+            let error = i64::from(delay(world.network(), device)) - hop * device as i64 + missed;
+            assert!(error.abs() <= 10 + (100.0 * device as f64).sqrt() as i64, "device {device}, {told}: {error} ns");
+        }
+    }
+}
+
+/// A coupler, terminals and drives, each with passages of its own: what each is told of is exact.
+#[test]
+fn types_whose_passages_differ_have_exact_delays_where_each_is_told_facts_7_1() {
+    const PASSAGES: [(u64, u64); 7] =
+        [(550, 540), (150, 150), (150, 150), (750, 700), (750, 700), (150, 150), (300, 300)];
+    let descriptions = || {
+        let mut all = clocked(PASSAGES.len(), 50);
+        for (device, (processing, forwarding)) in all.iter_mut().zip(PASSAGES) {
+            device.processing_delay = Some(Duration::from_nanos(processing));
+            device.forwarding_delay = Some(Duration::from_nanos(forwarding));
+            device.receive_jitter = Duration::ZERO;
+        }
+        all
+    };
+    let errors = |told: &[(u64, u64)]| -> Vec<i64> {
+        let network = line(descriptions(), NetworkOptions::default());
+        let mut world = World::with(1, network, &Options::default(), |scan| {
+            let mut declaration = with_clocks(scan, config());
+            for (subdevice, (processing, forwarding)) in declaration.subdevices.iter_mut().zip(told) {
+                let passage = Passage { processing_ns: *processing as u16, forwarding_ns: *forwarding as u16 };
+                subdevice.passage = Some(passage);
+            }
+            declaration
+        })
+        .expect("it can be activated");
+        world.until(Duration::from_secs(1), "set up", |world| delay(world.network(), PASSAGES.len() - 1) != 0);
+        world.run_cycles(10);
+        let mut truth = 0;
+        let error = |(device, (processing, _)): (usize, &(u64, u64))| {
+            let error = i64::from(delay(world.network(), device)) - truth;
+            truth += *processing as i64 + HOP_NS - 300;
+            error
+        };
+        PASSAGES.iter().enumerate().map(error).collect()
+    };
+    let (untold, told) = (errors(&[]), errors(&PASSAGES));
+    assert!(untold[1] <= -195 && untold.iter().map(|error| error.abs()).max() > Some(200), "{untold:?}");
+    assert!(told.iter().all(|error| error.abs() <= 2), "{told:?}");
+}
+
+/// The longest line. That 200 clocks lock and stay together is among the figures (bin `figures`, clocks).
+#[test]
+fn two_hundred_clocks_in_a_line_have_their_delays_facts_7_1() {
+    const COUNT: usize = 200;
+    let short = ClockConfig { drift_distributions: 0, ..config() };
+    let mut world = world(15, line(clocked(COUNT, 100), NetworkOptions::default()), short);
+    world.until(Duration::from_secs(2), "set up", |world| delay(world.network(), COUNT - 1) != 0);
+    world.run_cycles(5);
+    let errors: Vec<i64> =
+        (0..COUNT).map(|device| i64::from(delay(world.network(), device)) - HOP_NS * device as i64).collect();
+    for (device, error) in errors.iter().enumerate() {
+        assert!(error.abs() <= 10 + (100.0 * device as f64).sqrt() as i64, "device {device}: {error} ns");
+    }
+    assert!(errors.windows(2).all(|pair| (pair[1] - pair[0]).abs() <= 20), "{errors:?}");
+}
