@@ -5,6 +5,7 @@
 //! supervision, and hands out the [`Exchange`] for the application's cyclic thread.
 
 mod areas;
+mod datagrams;
 mod declaration;
 mod ethernet;
 mod gateway;
@@ -27,10 +28,10 @@ use ringcat_wire::frame::MacAddress;
 use ringcat_wire::source_address::MacCodec;
 
 pub use areas::{AreaEntries, Directory};
+pub use datagrams::{MAX_DATAGRAMS, RawDatagram};
 pub use declaration::{ActivateError, Declaration, DomainConfig, DomainMember, MAX_UNDER_WAY, Required};
 pub use ethernet::EthernetSubDevice;
 pub use pending::Pending;
-pub use services::{MAX_DATAGRAMS, RawDatagram};
 pub use ticket::Ticket;
 
 use crate::board::Board;
@@ -267,8 +268,8 @@ impl MainDevice {
         check_clocks(&declaration, &found)?;
         let clock_config = declaration.clocks.clone();
         let plans = plan_all(&declaration, &found)?;
-        let specs = domain_specs(&declaration, &plans)?;
         let (links, lrw) = (self.options.links(), declaration.lrw);
+        let specs = domain_specs(&declaration, &plans, links)?;
         check_lrw(lrw, &specs, links)?;
         let mut layout =
             Layout::with_lrw(&specs, links, self.options.supervision, lrw).map_err(ActivateError::Layout)?;

@@ -280,8 +280,6 @@ struct Pair<'a> {
     /// Complete cycles in a row.
     calm: usize,
     compared: u64,
-    /// Cycles in which the last edge may still show.
-    edge: u64,
     /// How often each device took over outputs so far.
     latched: Vec<u64>,
     /// Who is not watched for that: it leaves OP in this phase.
@@ -308,10 +306,8 @@ impl Pair<'_> {
     fn count_latches(&mut self, case: &Case) -> u64 {
         let now: Vec<u64> = self.cut.network().devices().map(Device::outputs_latched).collect();
         let before = std::mem::replace(&mut self.latched, now);
-        // What was sent last is on its way; the cycle that was judged is the one before. That of an edge may be judged
-        // complete and have met a SubDevice twice all the same.
-        let is_calm = self.calm > ECHO && self.edge == 0;
-        self.edge = self.edge.saturating_sub(1);
+        // A copy that met somebody again came back and made its cycle incomplete.
+        let is_calm = self.calm > ECHO;
         let mut taken = 0;
         for (number, (before, now)) in before.iter().zip(&self.latched).enumerate() {
             let has_outputs = !self.cut.network().device(DeviceIndex(number)).outputs().is_empty();
@@ -382,7 +378,7 @@ fn operate(case: &Case, twin: &[Vec<u8>]) -> Outcome {
     let cut = in_op(case.count, case.detection);
     let apart = matches!(case.phase, Phase::StateChange | Phase::StateRequest).then(|| speaker(case.count));
     let latched = cut.network().devices().map(Device::outputs_latched).collect();
-    let mut pair = Pair { cut, twin: twin.iter(), calm: 0, compared: 0, edge: 0, latched, apart, taken: 0 };
+    let mut pair = Pair { cut, twin: twin.iter(), calm: 0, compared: 0, latched, apart, taken: 0 };
     pair.cut.application_mut().links_mut().measure_flights();
     pair.cycles(case, BEFORE);
     let fallen = match case.phase {
@@ -410,7 +406,6 @@ fn operate(case: &Case, twin: &[Vec<u8>]) -> Outcome {
         let asked = (case.phase == Phase::StateRequest)
             .then(|| pair.cut.application_mut().engine_mut().start_state_request(who, state));
         pair.cut.fault_in(CYCLE * case.moment / 1000, fault);
-        pair.edge = case.detection.as_nanos().div_ceil(CYCLE.as_nanos()) as u64 + 2;
         pair.cycles(case, wait(case.detection));
         if let Some(asked) = asked {
             let reached = pair.cut.finish(Duration::from_secs(2), asked);

@@ -244,6 +244,19 @@ impl Controller {
         entry == Port::A || !self.ports.passes(Port::A)
     }
 
+    /// Whether a frame that comes in at a port gets to the processing unit without leaving first: all loops on its way
+    /// there are closed.
+    pub(crate) fn turns_round(&self, entry: Port) -> bool {
+        let mut at = entry;
+        while at != Port::A {
+            at = ports::next(at);
+            if self.ports.passes(at) {
+                return false;
+            }
+        }
+        entry != Port::A
+    }
+
     /// Whether ports and everything else stay as they are up to and including a time, unless somebody changes them.
     #[inline]
     pub(crate) fn stays(&self, port_changes: u32, until: SimTime) -> bool {

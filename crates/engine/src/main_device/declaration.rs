@@ -364,7 +364,13 @@ pub(super) fn check(declaration: &Declaration) -> Result<(), ActivateError> {
     Ok(())
 }
 
-pub(super) fn domain_specs(declaration: &Declaration, plans: &[Areas]) -> Result<Vec<DomainSpec>, ActivateError> {
+pub(super) fn domain_specs(
+    declaration: &Declaration,
+    plans: &[Areas],
+    links: LinkSet,
+) -> Result<Vec<DomainSpec>, ActivateError> {
+    // With two links it is refused whoever knows it ([`check_lrw`]).
+    let is_asked_for = declaration.lrw == LrwPolicy::Explicit && links == LinkSet::Single;
     let mut specs: Vec<DomainSpec> = Vec::new();
     for (domain, config) in declaration.domains.iter().enumerate() {
         let mut spec = DomainSpec { period: config.period, under_way: config.under_way, lrw: true, areas: Vec::new() };
@@ -373,7 +379,7 @@ pub(super) fn domain_specs(declaration: &Declaration, plans: &[Areas]) -> Result
             let Some(areas) = plans.get(subdevice) else {
                 return Err(ActivateError::UnknownMember { domain, subdevice });
             };
-            if declaration.lrw == LrwPolicy::Explicit && !areas.lrw() {
+            if is_asked_for && !areas.lrw() {
                 return Err(ActivateError::LrwUnknown { domain, subdevice });
             }
             spec.lrw &= areas.lrw();
@@ -400,7 +406,8 @@ pub(super) fn check_lrw(lrw: LrwPolicy, specs: &[DomainSpec], links: LinkSet) ->
     if lrw != LrwPolicy::Explicit || links == LinkSet::Single {
         return Ok(());
     }
-    let asked = Layout::with_lrw(specs, LinkSet::Single, false, lrw).map_err(ActivateError::Layout)?;
+    let specs: Vec<DomainSpec> = specs.iter().map(|spec| DomainSpec { lrw: true, ..spec.clone() }).collect();
+    let asked = Layout::with_lrw(&specs, LinkSet::Single, false, lrw).map_err(ActivateError::Layout)?;
     for (domain, planned) in asked.domains.iter().enumerate() {
         let datagrams = planned.frames.iter().flat_map(|frame| &frame.datagrams);
         if let Some(datagram) = datagrams.clone().find(|datagram| datagram.command == Command::Lrw) {

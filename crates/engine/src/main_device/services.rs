@@ -7,8 +7,6 @@ use core::future::Future;
 use core::time::Duration;
 
 use ringcat_wire::address::{RegisterAddress, StationAddress};
-use ringcat_wire::command::Command;
-use ringcat_wire::datagram::Target;
 use ringcat_wire::register::LoopControl;
 
 use super::MainDevice;
@@ -18,23 +16,7 @@ use crate::procedures::services::statistics::{self, Statistics};
 use crate::procedures::services::{ServiceError, ports, registers, reset};
 use crate::procedures::sii::program::{self, SiiWritten};
 use crate::procedures::strangers::rescan::{Rescan, rescan};
-use crate::supervisor::{Bus, BusError, Reply};
-
-/// Datagrams of the application that are taken at once.
-pub const MAX_DATAGRAMS: usize = 1024;
-
-/// A datagram of the application's own.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct RawDatagram {
-    /// The command.
-    pub command: Command,
-    /// Whom it addresses, as the command wants it.
-    pub target: Target,
-    /// What is sent; for reads, zeros.
-    pub data: Vec<u8>,
-    /// Whether it may be sent again when its frame is lost.
-    pub resend: bool,
-}
+use crate::supervisor::Bus;
 
 impl MainDevice {
     /// Station address of a SubDevice, by which it is reached on the bus.
@@ -91,25 +73,6 @@ impl MainDevice {
             subdevice,
             move |bus, station| async move { registers::write(&bus, station, address, &data).await },
         )
-    }
-
-    /// Starts to send datagrams of the application's own, at once, in one frame where they fit. Each brings its answer,
-    /// whatever its working counter.
-    pub fn start_datagrams(
-        &mut self,
-        datagrams: Vec<RawDatagram>,
-    ) -> Pending<Result<Vec<Result<Reply, BusError>>, ServiceError>> {
-        let bus = self.bus();
-        self.start(async move {
-            if datagrams.len() > MAX_DATAGRAMS {
-                return Err(ServiceError::TooMany { got: datagrams.len(), limit: MAX_DATAGRAMS });
-            }
-            let send = |bus: Bus, datagram: RawDatagram| async move {
-                let RawDatagram { command, target, data, resend } = datagram;
-                bus.datagram(command, target, data, resend).await
-            };
-            Ok(bus.gather(datagrams, send).await)
-        })
     }
 
     /// Starts to ask what a port does about its loop.

@@ -7,6 +7,8 @@ pub mod statistics;
 
 use core::fmt;
 
+use ringcat_wire::address::LogicalAddress;
+
 use super::sii::program::SiiProgramError;
 use crate::supervisor::BusError;
 
@@ -50,6 +52,16 @@ pub enum ServiceError {
         /// At most.
         limit: usize,
     },
+    /// An LRW of the application's own over process data of several SubDevices, with two links: a break would leave half of
+    /// them to each copy (facts 9.2.2).
+    LrwOnTwoLinks {
+        /// Its logical address.
+        logical: LogicalAddress,
+        /// Its bytes.
+        length: usize,
+        /// Two of those whose process data it covers, by their indices in the declaration.
+        subdevices: [usize; 2],
+    },
 }
 
 impl fmt::Display for ServiceError {
@@ -65,6 +77,11 @@ impl fmt::Display for ServiceError {
             ServiceError::NotActive => f.write_str("nothing is declared yet"),
             ServiceError::Unsteady => f.write_str("the segment changes all the time"),
             ServiceError::TooMany { got, limit } => write!(f, "{got} at once, at most {limit} are taken"),
+            ServiceError::LrwOnTwoLinks { logical, length, subdevices: [one, other] } => write!(
+                f,
+                "an LRW at logical address {logical} of {length} bytes covers process data of SubDevices {one} and \
+                 {other}: with two links an LRW may address one SubDevice, use LWR and LRD"
+            ),
             ServiceError::Range { address, length } => {
                 write!(f, "{length} bytes from {address:#06x} on: the memory ends at 0xffff")
             }

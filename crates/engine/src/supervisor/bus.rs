@@ -71,6 +71,24 @@ pub enum BusError {
         /// Came.
         got: Wkc,
     },
+    /// An LRW of which both copies met somebody: neither has what the other one read (facts 9.2.2).
+    Split {
+        /// Whom it addressed.
+        target: Target,
+    },
+}
+
+impl BusError {
+    /// The same of a datagram that was asked for with another target.
+    #[must_use]
+    pub(crate) fn asked_of(mut self, asked: Target) -> BusError {
+        let (BusError::Lost { target, .. }
+        | BusError::TooLong { target, .. }
+        | BusError::Wkc { target, .. }
+        | BusError::Split { target }) = &mut self;
+        *target = asked;
+        self
+    }
 }
 
 impl fmt::Display for BusError {
@@ -96,6 +114,12 @@ impl fmt::Display for BusError {
             BusError::Wkc { target: whom, expected, got } => {
                 target(f, *whom)?;
                 write!(f, ": expected working counter {expected}, got {got}")
+            }
+            BusError::Split { target: whom } => {
+                target(f, *whom)?;
+                f.write_str(
+                    ": an LRW on two links met SubDevices with both copies, so that half of them is missing in each",
+                )
             }
         }
     }

@@ -428,8 +428,8 @@ impl Shared {
         }
     }
 
-    /// Datagrams that one copy answered as expected are done; the others count as lost: the copy that is missing may
-    /// have been the one that reached the SubDevice.
+    /// Datagrams that one copy answered as expected are done, and those to one SubDevice that has answered (CR-06); the
+    /// others count as lost: the copy that is missing may have been the one that reached the SubDevice.
     fn expire(&mut self, slot: usize) {
         let Some(flight) = self.flights.take(slot) else { return };
         self.monitor.observe(flight.arrivals);
@@ -446,7 +446,7 @@ impl Shared {
                 self.learn_main_count(&flight);
             }
             for place in flight.places.iter().filter(|place| !place.answered) {
-                if enough {
+                if enough || (place.is_answered_by_one() && !self.is_apart(place.transfer)) {
                     let reply = place.reply(&flight.bytes);
                     self.finish(place.transfer, Ok(reply));
                 } else {
@@ -455,6 +455,12 @@ impl Shared {
             }
         }
         self.flights.spare.push(flight);
+    }
+
+    /// Whether the copies of a datagram say different things, so that none can stand for the other.
+    fn is_apart(&mut self, id: TransferId) -> bool {
+        let transfer = self.transfers.find(id);
+        transfer.is_some_and(|it| it.request.redundant.is_some() || it.request.redundant_station.is_some())
     }
 
     fn lost(&mut self, id: TransferId) {
@@ -572,6 +578,15 @@ impl Flight {
 impl Place {
     fn total(&self) -> Wkc {
         self.wkc[0].plus(self.wkc[1])
+    }
+
+    /// One SubDevice is addressed, and it has done what the command says.
+    fn is_answered_by_one(&self) -> bool {
+        match self.command {
+            Command::Aprd | Command::Apwr | Command::Fprd | Command::Fpwr => self.total() == Wkc(1),
+            Command::Aprw | Command::Fprw => self.total() == Wkc(3),
+            _ => false,
+        }
     }
 
     fn satisfied(&self) -> bool {

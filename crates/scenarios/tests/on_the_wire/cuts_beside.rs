@@ -48,6 +48,8 @@ fn pysoem_and_ours_meet_the_same_cuts_of_a_ring() {
         println!("pysoem:  {said}");
         bench.show_simulator_lateness();
         let _ = child.wait();
+    } else {
+        println!("pysoem:  not measured, it is not installed");
     }
     bench.simulate(&RING_OF_16.segment(), true);
     let run = bench.run_ringcat(&["run", "--main", "main0", "--redundant", "main1"]);

@@ -3,6 +3,7 @@
 //! They have time limits of their own, which a stall of this machine breaks whatever the simulator does. So each has three
 //! tries, and each try that fails is shown with what it said and how late the simulator was.
 
+use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command};
 
@@ -174,6 +175,8 @@ pub fn python() -> Option<PathBuf> {
     {
         return Some(python);
     }
-    println!("skipped: pysoem is not installed; only CI does that by itself. By hand: {commands}");
+    // Past what the test harness keeps to itself: a test that passes must not look as if pysoem had taken part.
+    let words = format!("skipped: pysoem is not installed; only CI does that by itself. By hand: {commands}\n");
+    let _ = std::io::stderr().write_all(words.as_bytes());
     None
 }

@@ -1,6 +1,9 @@
 //! The merged result of a split ring is that of the unsplit one (facts 9.3): random trees with a ring through them,
-//! junctions and branches on any port, random breaks of the ring, all commands. CR-05, CR-09.
+//! junctions and branches on any port, crossed SubDevices, random breaks of the ring, all commands. CR-05, CR-09.
 
+use std::time::Duration;
+
+use ringcat::RawDatagram;
 use ringcat_engine::supervisor::Reply;
 use ringcat_sim::cable::CableId;
 use ringcat_sim::device::Device;
@@ -28,8 +31,9 @@ struct Segment {
     network: Network,
     /// The cables of the way.
     trunk: Vec<CableId>,
-    /// No branch hangs behind the port through which the way goes on: a break changes nobody's position (CR-09).
-    positions_hold: bool,
+    /// A branch hangs behind the port through which the way goes on, or a SubDevice is crossed: a break changes the order
+    /// in which frames meet them (CR-09).
+    reordered: bool,
 }
 
 /// First the trunk, then branches on free ports.
@@ -41,26 +45,31 @@ fn segment(dice: &mut Dice) -> Segment {
     let mut behind: Vec<Vec<Port>> = vec![Vec::new(); total];
     let mut cables = Vec::new();
     let mut end = MAIN;
-    let in_order = dice.one_in(2);
+    let in_order = dice.one_in(3);
+    let mut reordered = false;
     for (device, ports) in free.iter_mut().enumerate().take(trunk) {
-        cables.push((end, at(device, Port::A)));
         // The ring goes on through any port of a junction.
         let way_on = if in_order { ports.len() - 1 } else { dice.below(ports.len() as u64) as usize };
         behind[device] = ports[way_on + 1..].to_vec();
-        end = at(device, ports.remove(way_on));
+        let mut ends = [at(device, Port::A), at(device, ports.remove(way_on))];
+        if !in_order && dice.one_in(4) {
+            ends.reverse();
+            reordered = true;
+        }
+        cables.push((end, ends[0]));
+        end = ends[1];
     }
     cables.push((end, REDUNDANT));
-    let mut positions_hold = true;
     for device in trunk..total {
         let parents: Vec<usize> = (0..device).filter(|parent| !free[*parent].is_empty()).collect();
         let parent = *dice.pick(&parents);
         let port = dice.below(free[parent].len() as u64) as usize;
         let port = free[parent].swap_remove(port);
-        positions_hold &= !behind[parent].contains(&port);
+        reordered |= behind[parent].contains(&port);
         cables.push((at(parent, port), at(device, Port::A)));
     }
     let network = wired(&vec!["junction"; total], &cables);
-    Segment { network, trunk: (0..=trunk).map(CableId).collect(), positions_hold }
+    Segment { network, trunk: (0..=trunk).map(CableId).collect(), reordered }
 }
 
 /// A datagram to be sent.
@@ -78,7 +87,7 @@ impl Random {
     }
 }
 
-fn random(dice: &mut Dice, stations: &[u16], positions_hold: bool) -> Random {
+fn random(dice: &mut Dice, stations: &[u16]) -> Random {
     let station = StationAddress(*dice.pick(stations));
     let position = Position(dice.below(stations.len() as u64) as u16);
     let ram = RegisterAddress(USER_RAM + dice.below(64) as u16);
@@ -104,7 +113,7 @@ fn random(dice: &mut Dice, stations: &[u16], positions_hold: bool) -> Random {
         (Command::Aprw, Target::Position(position, ram)),
         (Command::Armw, Target::Position(position, ram)),
     ];
-    let (command, target) = *dice.pick(if positions_hold { &commands } else { &commands[..11] });
+    let (command, target) = *dice.pick(&commands);
     let longest = if command == Command::Lrw { MAPPED.into() } else { 16 };
     let length = 1 + dice.below(longest) as u16;
     // Reads leave as zeros (facts 9.3).
@@ -116,12 +125,20 @@ fn random(dice: &mut Dice, stations: &[u16], positions_hold: bool) -> Random {
 fn send(world: &mut World, datagram: Random) -> Reply {
     let bus = world.application().engine().bus();
     let Random { command, target, data } = datagram;
+    if matches!(target, Target::Position(..)) {
+        // Only the application's own are addressed as the scan found everybody.
+        let resend = command == Command::Armw;
+        let datagram = RawDatagram { command, target, data, resend };
+        let work = world.application_mut().engine_mut().start_datagrams(vec![datagram]);
+        let replies = world.finish(Duration::from_secs(1), work).expect("one is not too many");
+        return replies.into_iter().next().expect("one answer").expect("it comes back");
+    }
     // One copy is enough for what must not travel twice: read 1, write 2. Of ARMW and FRMW everybody counts 1.
     let all = world.network().devices().len() as u16;
     let expected = match command {
-        Command::Aprw | Command::Fprw | Command::Lrw => Some(Wkc(3)),
+        Command::Fprw | Command::Lrw => Some(Wkc(3)),
         Command::Brw => Some(Wkc(3 * all)),
-        Command::Armw | Command::Frmw => Some(Wkc(all)),
+        Command::Frmw => Some(Wkc(all)),
         _ => None,
     };
     world.run(async move { bus.transfer(command, target, data, expected).await.expect("it comes back") })
@@ -184,10 +201,11 @@ fn distribute(worlds: &mut [World; 2], dice: &mut Dice, stations: &[u16], what: 
     assert_eq!(split, whole, "{what}: FRMW of what {station} has");
 }
 
-/// Returns how many datagrams were compared, and how many of them were addressed by position.
-fn run(seed: u64) -> (usize, usize) {
+/// Returns how many datagrams were compared, and how many of them were addressed by position, of these how many where a
+/// break changes the order of the SubDevices.
+fn run(seed: u64) -> [usize; 3] {
     let mut dice = Dice::new(seed);
-    let Segment { network, trunk, positions_hold } = segment(&mut dice);
+    let Segment { network, trunk, reordered } = segment(&mut dice);
     let twin = segment(&mut Dice::new(seed)).network;
     let mut worlds = [network, twin].map(|network| World::in_op(seed, network));
     let count = worlds[0].network().devices().len();
@@ -195,14 +213,14 @@ fn run(seed: u64) -> (usize, usize) {
     for world in &mut worlds {
         map_ram(world, &stations);
     }
-    let (mut compared, mut by_position) = (0, 0);
+    let [mut compared, mut by_position] = [0; 2];
     for _ in 0..3 {
         let cable = *dice.pick(&trunk);
         worlds[0].cut(cable);
         worlds[0].run_cycles(8);
         let what = format!("seed {seed}, {cable:?}");
         for _ in 0..25 {
-            let datagram = random(&mut dice, &stations, positions_hold);
+            let datagram = random(&mut dice, &stations);
             by_position += usize::from(matches!(datagram.target, Target::Position(..)));
             compare(&mut worlds, datagram, &what);
             compared += 1;
@@ -211,16 +229,17 @@ fn run(seed: u64) -> (usize, usize) {
         worlds[0].heal(cable);
         worlds[0].run_cycles(30);
     }
-    (compared, by_position)
+    [compared, by_position, if reordered { by_position } else { 0 }]
 }
 
 #[test]
 fn a_split_ring_answers_like_the_whole_one_seeds_0_to_59_cr_05_cr_09_facts_9_3() {
-    let [mut compared, mut by_position] = [0; 2];
+    let mut counts = [0; 3];
     for seed in 0..60 {
-        let (all, positions) = run(seed);
-        (compared, by_position) = (compared + all, by_position + positions);
+        counts.iter_mut().zip(run(seed)).for_each(|(count, more)| *count += more);
     }
-    println!("{compared} datagrams of all commands answered alike, {by_position} of them addressed by position");
-    assert!(compared == 60 * 75 && by_position > 300, "{by_position}");
+    let [compared, by_position, reordered] = counts;
+    println!("{compared} datagrams of all commands answered alike, {by_position} of them addressed by position,");
+    println!("{reordered} of these where a break changes the order in which SubDevices are met");
+    assert!(compared == 60 * 75 && by_position > 1000 && reordered > 500, "{counts:?}");
 }

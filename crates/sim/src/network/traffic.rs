@@ -83,6 +83,11 @@ impl Network {
         self.statistics.hops += 1;
         let id = self.frames.frame(slot).id;
         if self.nodes[index].device.controller.may_process(from) {
+            // Turned round by a loop that closed meanwhile, the processing unit has seen no beginning of it.
+            let node = &self.nodes[index];
+            if node.device.controller.turns_round(from) && node.interrupted(from, Port::A, first_bit) {
+                return self.lose_hop(slot, LossCause::LoopChanged);
+            }
             self.settle_before(index, id);
         }
         let frame = self.frames.frame_mut(slot);

@@ -206,6 +206,41 @@ fn a_port_that_opens_cuts_the_frame_that_runs_through_it() {
 }
 
 #[test]
+fn a_loop_that_closes_under_a_frame_turns_no_beginning_of_it_round() {
+    const SENT: u64 = 5_000;
+    let (mut met, mut interrupted) = (0, 0);
+    for cut_at in (0..20_000).step_by(100) {
+        let mut network = segment_with(&ring(4), options().with_detection_delay(ns(1_000)));
+        let cable = network.cable_at(endpoint("1.1")).unwrap();
+        let write = command(Command::Bwr, Target::Broadcast(map::USER_RAM), &[0xA5]);
+        let first = SENT.min(cut_at);
+        network.advance_by(ns(first));
+        if cut_at <= SENT {
+            network.cut(cable);
+            network.advance_by(ns(SENT - first));
+        }
+        network.send(Redundant, &write);
+        if cut_at > SENT {
+            network.advance_by(ns(cut_at - first));
+            network.cut(cable);
+        }
+        network.advance_by(SETTLE);
+        let has_it =
+            |device: &usize| network.device(DeviceIndex(*device)).controller.register(map::USER_RAM, 1) == [0xA5];
+        let who: Vec<usize> = (0..4).filter(has_it).collect();
+        if network.statistics().lost(LossCause::LoopChanged) == 1 {
+            interrupted += 1;
+            assert_eq!(who, [], "cut at {cut_at} ns: device 2 has seen the rest of a frame");
+        } else if network.receive(Redundant).is_some() {
+            met += 1;
+            assert_eq!(who, [1, 2, 3], "cut at {cut_at} ns: the frame came after the loop had closed");
+        }
+    }
+    // As long as the frame takes, and until its first bit is there.
+    assert!(interrupted > 40 && met > 0, "{interrupted} interrupted, {met} turned round");
+}
+
+#[test]
 fn an_interface_without_carrier_sends_nothing() {
     let mut network = segment("main-1.0");
     network.send(Redundant, &shortest());

@@ -1,0 +1,154 @@
+//! Datagrams of the application's own on two links: positions are those of the scan whatever becomes of the ring, and LRW
+//! over several SubDevices is refused, declared or sent by hand.
+
+use std::time::Duration;
+
+use ringcat::{
+    ActivateError, Declaration, DomainMember, Error, Group, JunctionConnection, JunctionMode, LrwPolicy, Options,
+    RawDatagram, Scan, SubDeviceConfig, automatic,
+};
+use ringcat_engine::procedures::services::ServiceError;
+use ringcat_engine::supervisor::{BusError, Reply};
+use ringcat_sim::cable::{CableId, DeviceIndex};
+use ringcat_sim::network::{Network, NetworkOptions};
+use ringcat_wire::address::{LogicalAddress, Position, RegisterAddress, StationAddress, Wkc};
+use ringcat_wire::command::Command;
+use ringcat_wire::datagram::Target;
+use ringcat_wire::register::{Fmmu, map};
+use scenarios::segments::{RING_IN_RING, descriptions, line, ring, wired};
+use scenarios::world::{CYCLE, World};
+
+const LIMIT: Duration = Duration::from_secs(1);
+const KINDS: [&str; 5] = ["coupler", "digital-input-8", "servo", "digital-output-8", "digital-input-16"];
+/// RAM of the controller that nobody uses.
+const USER_RAM: RegisterAddress = RegisterAddress(0x0F80);
+
+fn segment() -> Network {
+    ring(descriptions(&KINDS), NetworkOptions::default())
+}
+
+fn send(world: &mut World, command: Command, target: Target, data: Vec<u8>) -> Result<Reply, BusError> {
+    let datagram = RawDatagram { command, target, data, resend: true };
+    let work = world.application_mut().engine_mut().start_datagrams(vec![datagram]);
+    world.finish(LIMIT, work).expect("it is taken").pop().expect("one answer")
+}
+
+/// Who answers at a position, by the station address that it reads there.
+fn who(world: &mut World, position: u16) -> Option<u16> {
+    let target = Target::Position(Position(position), map::STATION_ADDRESS);
+    let reply = send(world, Command::Aprd, target, vec![0; 2]).expect("it comes back");
+    assert!(reply.wkc().0 <= 1);
+    (reply.wkc() == Wkc(1)).then(|| u16::from_le_bytes([reply.data[0], reply.data[1]]))
+}
+
+#[test]
+fn positions_of_an_application_are_those_of_the_scan_whoever_is_missing_cr_09() {
+    let mut world = World::in_op(1, segment());
+    let stations: Vec<u16> = (0..KINDS.len()).map(|device| world.station_of(device)).collect();
+    let all = |world: &mut World, missing: Option<usize>, what: &str| {
+        for (position, station) in stations.iter().enumerate() {
+            let expected = Some(*station).filter(|_| missing != Some(position));
+            assert_eq!(who(world, position as u16), expected, "{what}, position {position}");
+        }
+    };
+    all(&mut world, None, "closed");
+    // No cycle goes by between a cut and the datagram: it must hit nobody else, and travels again until it arrives.
+    for (cut, heal) in [(2, 2), (4, 1), (1, 4), (5, 0), (0, 5)] {
+        world.cut(CableId(cut));
+        all(&mut world, None, "cut");
+        world.heal(CableId(cut));
+        world.cut(CableId(heal));
+        all(&mut world, None, "healed and cut elsewhere");
+        world.heal(CableId(heal));
+        world.run_cycles(40);
+    }
+    world.power_off(DeviceIndex(2));
+    world.run_cycles(50);
+    all(&mut world, Some(2), "one without power");
+    world.power_on(DeviceIndex(2));
+    world.until(Duration::from_secs(5), "all in OP", |world| world.all_in_op() && world.application().all_settled());
+    all(&mut world, None, "back again");
+    assert_eq!(who(&mut world, 5), None, "nobody was found there");
+}
+
+fn with_lrw(scan: &Scan) -> Declaration {
+    Declaration { lrw: LrwPolicy::Explicit, ..automatic(&scan.subdevices, CYCLE) }
+}
+
+fn refused(result: Result<World, Error>) -> (Vec<usize>, String) {
+    let Err(Error::Activate(error)) = result else { panic!("it was taken: {result:?}") };
+    let text = error.to_string();
+    let ActivateError::LrwOnTwoLinks { domain: 0, subdevices, .. } = error else { panic!("{text}") };
+    assert!(text.starts_with("domain 0: an LRW at logical address 0x00000000"), "{text}");
+    (subdevices, text)
+}
+
+/// Whatever a declaration was read from, it has to be applied: there it is refused.
+#[test]
+fn declared_lrw_is_refused_with_rings_behind_junctions_and_hot_connect_groups_too_cr_16() {
+    let kinds = ["digital-output-8", "junction", "servo", "digital-input-8", "analog-input-4"];
+    let connection = JunctionConnection { head: 1, head_port: 1, tail: 3, tail_port: 1 };
+    for (junctions, connections) in [(JunctionMode::Strict, &[connection][..]), (JunctionMode::Automatic, &[])] {
+        let options = Options { junctions, ..Options::default() };
+        let network = wired(&kinds, &RING_IN_RING);
+        let result = World::with_junctions(2, network, &options, with_lrw, connections);
+        assert_eq!(refused(result).0, [0, 2, 3, 4], "{junctions:?}");
+    }
+    // A group that is not there yet, and has a place in the process image all the same.
+    let scan = World::new(3, line(descriptions(&["digital-output-8"]), NetworkOptions::default()));
+    let info = scan.application().engine().subdevices().remove(0);
+    let with_group = |scan: &Scan| {
+        let mut declaration = with_lrw(scan);
+        let head = SubDeviceConfig::at_alias(7, 0);
+        let head = head.expect_product(info.identity.vendor_id, info.identity.product_code).pdos_of(&info);
+        let (_, members) = declaration.add_group(Group::new(head));
+        declaration.domains[0].members.extend(members.map(|subdevice| DomainMember { subdevice, sync_managers: None }));
+        declaration
+    };
+    let (subdevices, text) = refused(World::with(4, segment(), &Options::default(), with_group));
+    assert!(subdevices == [1, 2, 3, 4, 5] && text.contains("[1, 2, 3, 4, 5]"), "{text}");
+}
+
+#[test]
+fn an_lrw_of_the_applications_own_addresses_one_subdevice_on_two_links_cr_16_facts_9_2_2() {
+    let mut world = World::in_op(5, segment());
+    let lrw = |logical: u32, length: usize| RawDatagram {
+        command: Command::Lrw,
+        target: Target::Logical(LogicalAddress(logical)),
+        data: vec![0; length],
+        resend: false,
+    };
+    let work = world.application_mut().engine_mut().start_datagrams(vec![lrw(0, 32)]);
+    let error = world.finish(LIMIT, work).expect_err("it covers process data of several");
+    let ServiceError::LrwOnTwoLinks { logical: LogicalAddress(0), length: 32, subdevices } = error else {
+        panic!("{error}")
+    };
+    assert!(subdevices[0] != subdevices[1], "{error}");
+    // FMMUs that the application wrote by itself: one on either side of the break.
+    let bus = world.application().engine().bus();
+    let stations = [1, 4].map(|device| world.station_of(device));
+    world.run(async move {
+        for (number, station) in (0..).zip(stations) {
+            let fmmu = Fmmu {
+                logical_start: LogicalAddress(0x7000_0000 + 4 * number),
+                length: 4,
+                logical_stop_bit: 7,
+                physical_start: USER_RAM.0,
+                read: true,
+                write: true,
+                active: true,
+                ..Fmmu::default()
+            };
+            bus.fpwr(StationAddress(station), map::fmmu(7), &fmmu.encode()).await.expect("it has eight FMMUs");
+        }
+    });
+    world.cut(CableId(3));
+    world.run_cycles(20);
+    let target = |logical: u32| Target::Logical(LogicalAddress(logical));
+    let both = send(&mut world, Command::Lrw, target(0x7000_0000), vec![0; 8]);
+    assert_eq!(both, Err(BusError::Split { target: target(0x7000_0000) }));
+    for logical in [0x7000_0000, 0x7000_0004] {
+        let one = send(&mut world, Command::Lrw, target(logical), vec![0; 4]).expect("it comes back");
+        assert_eq!(one.wkc(), Wkc(3));
+    }
+}

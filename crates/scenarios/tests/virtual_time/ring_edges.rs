@@ -1,0 +1,84 @@
+//! A copy that is turned round at a cut behind the other one: outputs come twice, with the same bytes. Whether that shows
+//! depends on whether the copy comes back (issue 5: a working counter above the expected one is an incomplete cycle).
+
+use std::time::Duration;
+
+use ringcat_sim::cable::{CableId, Direction};
+use ringcat_sim::device::Device;
+use ringcat_sim::fault::Fault;
+use ringcat_sim::network::{Network, NetworkOptions};
+use scenarios::check::Delivery;
+use scenarios::segments::{descriptions, ring};
+use scenarios::world::World;
+
+/// SubDevices: so many that the redundant copy is still on its way when the main one has passed [`CUT`].
+const COUNT: usize = 64;
+/// The cable that is cut.
+const CUT: usize = 5;
+/// Outputs: next to the cut, and far behind it.
+const OUTPUTS: [usize; 2] = [CUT, 50];
+
+/// Few process data, so that frames are short: couplers, two outputs and an input before the cut and one behind it.
+fn segment() -> Network {
+    let mut kinds = ["coupler"; COUNT];
+    OUTPUTS.into_iter().for_each(|at| kinds[at] = "digital-output-8");
+    [2, 60].into_iter().for_each(|at| kinds[at] = "digital-input-8");
+    ring(descriptions(&kinds), NetworkOptions::default().with_detection_delay(Duration::from_micros(1)))
+}
+
+fn latched(world: &World) -> [u64; 2] {
+    let counts: Vec<u64> = world.network().devices().map(Device::outputs_latched).collect();
+    OUTPUTS.map(|at| counts[at])
+}
+
+/// How often outputs behind the cut came in the cycle of a cut at this moment, and how that cycle was judged.
+fn cut_after(world: &mut World, moment: Duration) -> ([u64; 2], Delivery, Vec<usize>) {
+    let (before, mark) = (latched(world), world.mark());
+    world.fault_in(moment, Fault::Cut(CableId(CUT)));
+    world.cycle();
+    let now = latched(world);
+    let judged = world.judged(mark).last().expect("a cycle is judged before the next one");
+    let result = ([now[0] - before[0], now[1] - before[1]], judged.delivery, judged.stale.clone());
+    world.run_cycles(4);
+    world.heal(CableId(CUT));
+    world.run_cycles(20);
+    result
+}
+
+#[test]
+fn outputs_that_came_twice_at_a_cut_make_their_cycle_incomplete_when_the_second_copy_is_back() {
+    let mut world = World::in_op(0, segment());
+    let mut twice = Vec::new();
+    for moment in (0..40_000).step_by(500).map(Duration::from_nanos) {
+        let (times, delivery, stale) = cut_after(&mut world, moment);
+        match times {
+            [1, 1] => {}
+            // The copy that turned round passes all that are behind the cut.
+            [2, 2] => {
+                assert_eq!(delivery, Delivery::Incomplete, "cut after {moment:?}");
+                assert!(!stale.is_empty(), "cut after {moment:?}: its inputs are not new");
+                twice.push(moment);
+            }
+            _ => assert_ne!(delivery, Delivery::Complete, "cut after {moment:?}: {times:?}"),
+        }
+    }
+    assert!(twice.len() >= 5, "{twice:?}");
+}
+
+/// The other one has met everybody and brought all inputs. Nothing shows what the one did that was lost.
+#[test]
+fn outputs_that_came_twice_at_a_cut_leave_their_cycle_complete_when_the_second_copy_is_lost() {
+    let mut world = World::in_op(0, segment());
+    let mut twice = 0;
+    for moment in (0..40_000).step_by(500).map(Duration::from_nanos) {
+        // It is lost behind device 5, where the main copy has passed long before.
+        let drop = Fault::Drop { cable: CableId(CUT + 1), direction: Some(Direction::AToB), count: 1 };
+        world.fault_in(moment + Duration::from_micros(2), drop);
+        let (times, delivery, _) = cut_after(&mut world, moment);
+        if times == [2, 1] {
+            assert_eq!(delivery, Delivery::Complete, "cut after {moment:?}");
+            twice += 1;
+        }
+    }
+    assert!(twice >= 5, "{twice}");
+}
