@@ -121,6 +121,8 @@ pub(crate) struct LegFaults {
     pub(crate) duplicate: u32,
     /// Frames still to be corrupted.
     pub(crate) corrupt: u32,
+    /// Frames still to be damaged by a symbol that is none.
+    pub(crate) symbol_errors: u32,
     /// Frames still to be delayed.
     pub(crate) delay: u32,
     /// By how much they are delayed.
@@ -197,8 +199,8 @@ impl Leg {
 
     /// Looks whether any fault is left.
     pub(crate) fn refresh_faulty(&mut self) {
-        let LegFaults { drop, duplicate, corrupt, delay, delay_by: _, blocked } = self.faults;
-        self.faulty = blocked || drop > 0 || duplicate > 0 || corrupt > 0 || delay > 0;
+        let LegFaults { drop, duplicate, corrupt, symbol_errors, delay, delay_by: _, blocked } = self.faults;
+        self.faulty = blocked || [drop, duplicate, corrupt, symbol_errors, delay].iter().any(|left| *left > 0);
     }
 
     /// Frames whose first bit arrives at this time or later arrive whole, as long as nothing changes. `None` where there

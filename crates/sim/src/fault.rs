@@ -62,6 +62,25 @@ pub enum Fault {
         /// How many frames.
         count: u32,
     },
+    /// The next frames on the cable have something within them that is no symbol (RX_ER): they are damaged, and the port
+    /// that receives them counts that, too.
+    SymbolErrors {
+        /// Which cable.
+        cable: CableId,
+        /// Which direction; `None`: both, counted apart.
+        direction: Option<Direction>,
+        /// How many frames.
+        count: u32,
+    },
+    /// Between frames comes what is no symbol: ports that have link count it, and no frame is hurt.
+    IdleSymbolErrors {
+        /// Which cable.
+        cable: CableId,
+        /// Towards which end; `None`: both.
+        direction: Option<Direction>,
+        /// How many symbols.
+        count: u32,
+    },
     /// The next frames on the cable arrive later than they should; frames behind them may overtake them.
     Delay {
         /// Which cable.

@@ -89,6 +89,8 @@ pub struct SimFrame {
     pub malformed: bool,
     /// State of the check sequence.
     pub fcs: Fcs,
+    /// There is something in it that is no symbol, and the port that receives it has not counted that yet.
+    pub symbol_error: bool,
     /// Unique number: for logs, and to tell the frame when it comes back to a controller.
     pub id: u64,
 }
@@ -96,8 +98,8 @@ pub struct SimFrame {
 impl SimFrame {
     /// Takes the bytes of a frame and finds its datagrams. Any bytes will do.
     pub fn new(id: u64, bytes: Vec<u8>) -> SimFrame {
-        let mut frame =
-            SimFrame { bytes, datagrams: Vec::new(), kind: FrameKind::Foreign, malformed: false, fcs: Fcs::Good, id };
+        let (kind, malformed, fcs, symbol_error) = (FrameKind::Foreign, false, Fcs::Good, false);
+        let mut frame = SimFrame { bytes, datagrams: Vec::new(), kind, malformed, fcs, symbol_error, id };
         frame.parse();
         frame
     }
@@ -105,7 +107,7 @@ impl SimFrame {
     /// Becomes another frame with these bytes, keeping the buffers: for pools.
     pub fn refill(&mut self, id: u64, bytes: &[u8]) {
         self.id = id;
-        self.fcs = Fcs::Good;
+        (self.fcs, self.symbol_error) = (Fcs::Good, false);
         self.bytes.clear();
         self.bytes.extend_from_slice(bytes);
         self.parse();
@@ -118,6 +120,7 @@ impl SimFrame {
         self.datagrams.clear();
         self.datagrams.extend_from_slice(&other.datagrams);
         (self.kind, self.malformed, self.fcs, self.id) = (other.kind, other.malformed, other.fcs, other.id);
+        self.symbol_error = other.symbol_error;
     }
 
     /// Keeps the first `len` bytes only, as a cable leaves them that is cut while the frame passes.

@@ -6,6 +6,7 @@ use std::time::Duration;
 use ringcat::{Event, RawDatagram, SubDeviceState};
 use ringcat_engine::main_device::MAX_DATAGRAMS;
 use ringcat_sim::cable::{CableId, DeviceIndex};
+use ringcat_sim::fault::Fault;
 use ringcat_sim::network::NetworkOptions;
 use ringcat_wire::address::{LogicalAddress, StationAddress, Wkc};
 use ringcat_wire::al::AlState;
@@ -63,6 +64,10 @@ fn error_counters_are_kept_beyond_255_on_a_period_and_read_and_cleared_on_demand
     assert_eq!(world.finish(LIMIT, clear), Ok(()));
     assert!(world.application().engine().statistics(2).expect("declared").is_clean());
     assert_eq!(world.network().device(DeviceIndex(2)).controller.register(map::RX_ERROR_COUNTER, 20), [0; 20]);
+    world.fault(Fault::IdleSymbolErrors { cable: CableId(2), direction: None, count: 7 });
+    let read = world.application_mut().engine_mut().start_statistics_read(2);
+    let ports = world.finish(LIMIT, read).expect("it answers").ports;
+    assert_eq!(ports.map(|port| (port.rx_errors, port.invalid_frames)), [(7, 0), (0, 0), (0, 0), (0, 0)]);
     let read = world.application_mut().engine_mut().start_statistics_read(99);
     assert!(world.finish(LIMIT, read).is_err() && world.application().engine().statistics(99).is_none());
 }

@@ -28,7 +28,13 @@ impl Controller {
     /// Counts a damaged frame at a port, and marks it for the controllers behind: only the first one sees an invalid
     /// frame, the others a forwarded error.
     pub(super) fn count_damage(&mut self, frame: &mut SimFrame, port: Port) {
+        if frame.fcs == Fcs::Good {
+            return;
+        }
         let p = port.index() as u16;
+        if core::mem::take(&mut frame.symbol_error) {
+            self.count_symbol_error(port);
+        }
         match frame.fcs {
             Fcs::Good => {}
             Fcs::Bad => {
@@ -37,6 +43,11 @@ impl Controller {
             }
             Fcs::Marked => self.memory.count(map::FORWARDED_RX_ERROR_COUNTER.offset(p)),
         }
+    }
+
+    /// Counts what is no symbol, within a frame or between two.
+    pub fn count_symbol_error(&mut self, port: Port) {
+        self.memory.count(map::RX_ERROR_COUNTER.offset(2 * port.index() as u16 + 1));
     }
 
     /// Clears the groups that a write to `address..end` touches.

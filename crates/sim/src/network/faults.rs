@@ -1,7 +1,7 @@
 //! Faults: at once, or at a time.
 
 use super::{Event, Network};
-use crate::cable::{CableId, DeviceIndex, Direction, LegFaults};
+use crate::cable::{CableId, DeviceIndex, Direction, Endpoint, LegFaults};
 use crate::fault::Fault;
 use crate::queue::Lane;
 use crate::time::SimTime;
@@ -38,6 +38,10 @@ impl Network {
             Fault::Corrupt { cable, direction, count } => {
                 self.set_faults(cable, direction, |faults| faults.corrupt = count);
             }
+            Fault::SymbolErrors { cable, direction, count } => {
+                self.set_faults(cable, direction, |faults| faults.symbol_errors = count);
+            }
+            Fault::IdleSymbolErrors { cable, direction, count } => self.disturb_idle(cable, direction, count),
             Fault::Delay { cable, direction, count, by } => self.set_faults(cable, direction, |faults| {
                 faults.delay = count;
                 faults.delay_by = by;
@@ -86,6 +90,18 @@ impl Network {
         }
     }
 
+    /// The ends of a cable that receive a signal see what is no symbol.
+    fn disturb_idle(&mut self, cable: CableId, direction: Option<Direction>, count: u32) {
+        for candidate in Direction::ALL {
+            let leg = self.leg_mut(cable, candidate);
+            let hears = leg.signal() && leg.detected && direction.is_none_or(|wanted| wanted == candidate);
+            let Endpoint::Device(device, port) = leg.to else { continue };
+            if hears {
+                (0..count).for_each(|_| self.device_mut(device).controller.count_symbol_error(port));
+            }
+        }
+    }
+
     /// A fault on something that does not exist is a mistake of the test, which must not pass unseen.
     fn check(&self, fault: &Fault) {
         match *fault {
@@ -95,6 +111,8 @@ impl Network {
             | Fault::Drop { cable, .. }
             | Fault::Duplicate { cable, .. }
             | Fault::Corrupt { cable, .. }
+            | Fault::SymbolErrors { cable, .. }
+            | Fault::IdleSymbolErrors { cable, .. }
             | Fault::Delay { cable, .. }
             | Fault::OneWay { cable, .. } => {
                 assert!(cable.0 < self.cables.len(), "no cable {} among {}", cable.0, self.cables.len());

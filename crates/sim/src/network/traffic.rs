@@ -141,6 +141,7 @@ impl Network {
         }
         let dropped = LegFaults::take(&mut leg.faults.drop);
         let corrupted = !dropped && LegFaults::take(&mut leg.faults.corrupt);
+        let symbol_error = !dropped && LegFaults::take(&mut leg.faults.symbol_errors);
         let doubled = !dropped && LegFaults::take(&mut leg.faults.duplicate);
         let late =
             if !dropped && LegFaults::take(&mut leg.faults.delay) { leg.faults.delay_by } else { Duration::ZERO };
@@ -148,9 +149,10 @@ impl Network {
         if dropped {
             return self.lose_hop(slot, LossCause::Dropped);
         }
-        if corrupted {
+        if corrupted || symbol_error {
             self.corrupt(slot);
         }
+        self.frames.frame_mut(slot).symbol_error |= symbol_error;
         let at = self.now + late;
         if doubled {
             let copy = self.frames.put_copy(slot);

@@ -70,6 +70,33 @@ fn a_corrupted_frame_is_counted_by_the_controllers_and_refused_by_the_interface(
 }
 
 #[test]
+fn symbol_errors_are_counted_where_they_arrive_and_hurt_only_the_frames_they_are_in_facts_2_5() {
+    let mut network = segment(&ring(3));
+    let cable = first_cable(&network);
+    let counted = |network: &Network, device: usize| {
+        network.device(DeviceIndex(device)).controller.register(map::RX_ERROR_COUNTER, 8).to_vec()
+    };
+    network.apply(Fault::IdleSymbolErrors { cable, direction: None, count: 300 });
+    assert_eq!(counted(&network, 0), [0, 0, 0, 0xFF, 0, 0, 0, 0]);
+    assert_eq!(counted(&network, 1), [0, 0xFF, 0, 0, 0, 0, 0, 0]);
+    assert_eq!(met(&mut network, Main), Some(vec![1, 2, 3]));
+    network.apply(Fault::SymbolErrors { cable, direction: Some(Direction::AToB), count: 1 });
+    assert_eq!(met(&mut network, Main), None);
+    assert_eq!(network.statistics().lost(LossCause::BadCheckSequence), 1);
+    assert_eq!(counted(&network, 1), [1, 0xFF, 0, 0, 0, 0, 0, 0]);
+    assert_eq!(counted(&network, 2), [0; 8]);
+    // Nobody hears anything on a cable that is cut.
+    network.apply(Fault::Cut(cable));
+    network.advance_by(SETTLE);
+    let clear = command(Command::Bwr, Target::Broadcast(map::RX_ERROR_COUNTER), &[0]);
+    network.send(Main, &clear);
+    network.send(Redundant, &clear);
+    network.advance_by(SETTLE);
+    network.apply(Fault::IdleSymbolErrors { cable, direction: None, count: 1 });
+    assert_eq!((counted(&network, 0), counted(&network, 1)), (vec![0; 8], vec![0; 8]));
+}
+
+#[test]
 fn a_corrupted_write_changes_no_register() {
     let mut network = segment("main-1.0");
     let cable = network.host_cable(Main).unwrap();

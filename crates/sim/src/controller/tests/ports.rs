@@ -213,6 +213,20 @@ fn forwarding_rule_0_passes_everything_unmarked_facts_2_6() {
 }
 
 #[test]
+fn a_symbol_error_in_a_frame_is_counted_once_beside_the_frame_facts_2_5() {
+    let (mut first, mut second) = (with_links(&[Port::A, Port::B]), with_links(&[Port::A, Port::B]));
+    let mut frame = first.frame(&[(Command::Nop, 0, 0, &[0])]);
+    (frame.fcs, frame.symbol_error) = (Fcs::Bad, true);
+    first.receive(&mut frame, Port::A);
+    second.receive(&mut frame, Port::A);
+    // On the cable back, another one in a frame that is damaged already.
+    frame.symbol_error = true;
+    first.receive(&mut frame, Port::B);
+    assert_eq!(first.register(0x0300), [1, 1, 0, 1, 0, 0, 0, 0, 0, 1, 0, 0]);
+    assert_eq!(second.register(0x0300), [0, 0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 0]);
+}
+
+#[test]
 fn the_first_controller_counts_an_invalid_frame_the_next_a_forwarded_error_facts_2_5() {
     let (mut first, mut second) = (with_links(&[Port::A, Port::B]), with_links(&[Port::A, Port::B]));
     let mut frame = first.frame(&[(Command::Nop, 0, 0, &[0])]);

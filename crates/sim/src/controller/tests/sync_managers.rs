@@ -97,6 +97,23 @@ fn the_reader_always_gets_the_last_complete_buffer_facts_3_11() {
 }
 
 #[test]
+fn sequential_mode_is_not_announced_and_its_bit_changes_nothing_facts_3_1_facts_3_11() {
+    let mut bench = buffers();
+    let [features] = bench.register(0x0009);
+    assert_eq!(features & 0x10, 0, "controllers may have it and say so; this one does not");
+    bench.write(0x0814, &[0xA4]);
+    bench.write(0x081C, &[0xA0]);
+    assert_eq!((bench.register(0x0814), bench.register(0x081C)), ([0xA4], [0xA0]));
+    for value in 1..=5 {
+        assert_eq!(bench.write(0x1100, &[value; 4]), 1);
+        assert_eq!(bench.write(0x1100, &[value + 10; 4]), 1);
+        assert_eq!(bench.pdi_read(0x1100, 4), Some(vec![value + 10; 4]), "the last one, whatever was read");
+        assert!(bench.pdi_write(0x1180, &[value; 4]) && bench.pdi_write(0x1180, &[value + 20; 4]));
+        assert_eq!(bench.read(0x1180, 4), (vec![value + 20; 4], 1));
+    }
+}
+
+#[test]
 fn inputs_that_were_never_written_are_not_there_facts_3_11() {
     let mut bench = buffers();
     assert_eq!(bench.register(0x081D), [0x30]);
