@@ -125,6 +125,8 @@ pub struct Board {
     ring: AtomicU64,
     cycles: AtomicU64,
     frames: [AtomicU64; 2],
+    /// Wrong working counters, by SubDevice.
+    wkc_errors: Vec<AtomicU32>,
     /// One bit per SubDevice: takes part in process data.
     taking_part: Vec<AtomicU64>,
     taking_part_changes: AtomicU32,
@@ -145,6 +147,7 @@ impl Board {
             ring: AtomicU64::new(0),
             cycles: AtomicU64::new(0),
             frames: [AtomicU64::new(0), AtomicU64::new(0)],
+            wkc_errors: (0..subdevices).map(|_| AtomicU32::new(0)).collect(),
             taking_part: (0..subdevices.div_ceil(64)).map(|_| AtomicU64::new(0)).collect(),
             excused: (0..subdevices.div_ceil(64)).map(|_| AtomicU64::new(0)).collect(),
             taking_part_changes: AtomicU32::new(0),
@@ -211,6 +214,20 @@ impl Board {
     /// Frames of the cyclic half, up to the latest cycle.
     pub fn frames(&self) -> CyclicFrames {
         CyclicFrames { sent: self.frames[0].load(Ordering::Relaxed), lost: self.frames[1].load(Ordering::Relaxed) }
+    }
+
+    /// A datagram with process data of a SubDevice that takes part came back with a wrong working counter, or not at all.
+    pub(crate) fn count_wkc_error(&self, subdevice: usize) {
+        if let Some(counter) = self.wkc_errors.get(subdevice) {
+            // Single writer.
+            counter.store(counter.load(Ordering::Relaxed).wrapping_add(1), Ordering::Relaxed);
+        }
+    }
+
+    /// How many datagrams with process data of a SubDevice, while it took part, came back with a working counter that is
+    /// not that of all who take part, or did not come back; goes on at 0 behind the largest number.
+    pub fn wkc_errors(&self, subdevice: usize) -> u32 {
+        self.wkc_errors.get(subdevice).map_or(0, |counter| counter.load(Ordering::Relaxed))
     }
 
     /// Says whether a SubDevice takes part in process data. Indices beyond the board are ignored.

@@ -1,5 +1,7 @@
 //! What happened: the events of both halves.
 
+pub mod history;
+
 use alloc::collections::VecDeque;
 use alloc::string::String;
 use alloc::vec::Vec;
@@ -9,6 +11,7 @@ use ringcat_wire::al::{AlState, AlStatus, AlStatusCode};
 use ringcat_wire::mailbox::coe::Emergency;
 use ringcat_wire::sii::Identity;
 
+use self::history::History;
 use crate::domain::{DomainState, DomainStatus};
 use crate::info::IdentityField;
 use crate::link::Link;
@@ -333,11 +336,13 @@ pub struct EventLog {
     events: VecDeque<TimedEvent>,
     foreign: usize,
     dropped: u64,
+    history: History,
 }
 
 impl EventLog {
     /// Appends an event.
     pub fn push(&mut self, at: Instant, event: Event) {
+        self.history.note(at, &event);
         if matches!(event, Event::ForeignFrame { .. }) {
             if self.foreign >= FOREIGN_KEPT {
                 self.dropped += 1;
@@ -350,6 +355,11 @@ impl EventLog {
             self.dropped += 1;
         }
         self.events.push_back(TimedEvent { at, event });
+    }
+
+    /// What is remembered of them, whoever takes them.
+    pub fn history(&mut self) -> &mut History {
+        &mut self.history
     }
 
     /// Takes the oldest.

@@ -179,12 +179,15 @@ impl Exchange {
                 wkc += frame.wkc();
                 left = frame.left();
             }
-            if waiting && give_up_overdue(domain, &mut self.frames, set, now, self.cycle, &mut self.counters) {
+            if waiting && give_up_overdue(domain, &mut self.frames, set.clone(), now, self.cycle, &mut self.counters) {
                 return domain.status(!judged);
             }
             judged = true;
             if !domain.judge(wkc, complete, left) {
                 note_change(id, domain, wkc, complete, &mut self.counters, &mut self.events);
+                if !complete {
+                    count_errors(&self.frames[set], &self.board);
+                }
             }
         }
         domain.status(false)
@@ -300,6 +303,12 @@ fn note_change(
     if changed {
         events.push(CyclicEvent::Domain { domain: id.0 as u16, status: domain.status(false) }.pack());
     }
+}
+
+/// Counts wrong working counters of a judged cycle.
+#[cold]
+fn count_errors(frames: &[CyclicFrame], board: &Board) {
+    frames.iter().for_each(|frame| frame.count_errors(board));
 }
 
 /// Gives up those frames of a domain's oldest cycle that are overdue. True where others are still waited for.

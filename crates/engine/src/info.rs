@@ -156,6 +156,8 @@ pub struct SubDeviceInfo {
     pub flags: GeneralFlags,
     /// Physical address of the ID switch, meant where the flags name identification in memory.
     pub id_switch_address: u16,
+    /// Kind of port 0..3 as the SII says, a nibble per port, raw (facts 4.3).
+    pub physical_ports: u16,
     /// Current from the EBUS in milliamperes; negative where it feeds.
     pub ebus_current_ma: i16,
     /// SyncManagers, SM 0 first.

@@ -20,6 +20,7 @@ mod error;
 pub mod foe;
 mod lane;
 mod mailbox;
+mod protocol_error;
 pub mod raw;
 mod reader;
 mod recent;

@@ -20,7 +20,7 @@ use super::clocks::{CLOCK_DATA, Places, Seen};
 use super::counters::CyclicCounters;
 use super::image::{Image, Moment};
 use super::place::Place;
-use crate::board::Supervision;
+use crate::board::{Board, Supervision};
 use crate::layout::{PlannedFrame, SUPERVISION_LEN};
 use crate::link::Link;
 use crate::ring::merge::or_into;
@@ -243,6 +243,11 @@ impl CyclicFrame {
     /// datagrams could hide one that is short behind one that is over.
     pub(crate) fn is_complete(&self) -> bool {
         self.complete
+    }
+
+    /// Counts the wrong working counters of this flight.
+    pub(crate) fn count_errors(&self, board: &Board) {
+        self.places.iter().for_each(|place| place.count_errors(board));
     }
 
     /// What the supervision datagram of this flight saw, if it has one and anything came back.

@@ -9,6 +9,7 @@ use ringcat_wire::address::Wkc;
 use ringcat_wire::frame::MAX_FRAME;
 
 use super::image::{Delivery, Moment};
+use crate::board::Board;
 use crate::layout::{PlacedArea, PlannedDatagram};
 
 /// Offsets of what is in no frame lie behind this.
@@ -100,6 +101,16 @@ impl Place {
     /// Whether the working counter is just what it should be.
     pub fn is_complete(&self) -> bool {
         self.wkc == self.expected || (self.part_suffices && self.wkc == self.expected_part)
+    }
+
+    /// Counts a wrong working counter for each SubDevice that takes part: which of them has not answered is not known.
+    pub fn count_errors(&self, board: &Board) {
+        if self.wkc == self.expected || self.wkc == self.expected_part {
+            return;
+        }
+        for (subdevice, _) in self.contributions.iter().filter(|(subdevice, _)| board.takes_part(*subdevice)) {
+            board.count_wkc_error(*subdevice);
+        }
     }
 
     /// All inputs where everybody answered; those of the ones that take part where just they answered; else nothing,

@@ -144,6 +144,7 @@ fn collect_general(info: &mut SubDeviceInfo, parts: &Parts<'_, '_>, strings: &St
     info.coe = general.coe;
     info.flags = general.flags;
     info.id_switch_address = general.id_switch_address;
+    info.physical_ports = general.physical_ports;
     info.ebus_current_ma = general.ebus_current_ma;
 }
 

@@ -6,6 +6,7 @@ use ringcat_wire::mailbox::coe::{CoeHeader, CoeService, Emergency};
 use ringcat_wire::mailbox::{ErrorReply, Message, Protocol};
 
 use super::lane::{Arrival, Lane};
+use super::protocol_error;
 use super::recent::Way;
 use super::room::{Room, State};
 use super::unsolicited::{Unclaimed, Unsolicited};
@@ -31,6 +32,9 @@ pub(super) fn deliver(room: &Rc<Room>, mail: &[u8], way: Way) -> bool {
         if is_double(state, &message, way, room.bus.now()) {
             state.counters.duplicates += 1;
             return false;
+        }
+        if let Some(error) = protocol_error::told_by(&message) {
+            state.last_error = error;
         }
         sort(room, state, &message)
     };

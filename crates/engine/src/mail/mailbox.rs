@@ -111,6 +111,17 @@ impl Mailbox {
         self.room.look().counters
     }
 
+    /// Code of the last error that the SubDevice has told in any protocol, in the protocol's own numbers: an SDO abort, the
+    /// detail of an error reply, an error of FoE, SoE or AoE; 0 for none.
+    pub fn last_protocol_error(&self) -> u32 {
+        self.room.look().last_error
+    }
+
+    /// Forgets that error; `before` is the one before it.
+    pub(crate) fn forget_protocol_error(&self, before: u32) {
+        self.room.state().last_error = before;
+    }
+
     /// Takes the oldest emergency that is kept, with the time at which it was read. Each was an event, too.
     pub fn pop_emergency(&self) -> Option<(Instant, Emergency)> {
         self.room.state().shelves.emergencies().pop()

@@ -68,6 +68,8 @@ pub(super) struct State {
     pub shelves: Shelves,
     pub ethernet: Traffic,
     pub counters: MailCounters,
+    /// Code of the last error that the SubDevice has told; 0 for none.
+    pub last_error: u32,
 }
 
 /// One mailbox.
@@ -106,6 +108,7 @@ impl Room {
             shelves: Shelves::new(),
             ethernet: Traffic::new(),
             counters: MailCounters::default(),
+            last_error: 0,
         };
         let (news, work) = (bus.signal(), bus.signal());
         Rc::new(Room { bus: bus.clone(), subdevice, state: RefCell::new(state), news, work })

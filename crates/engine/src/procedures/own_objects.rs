@@ -5,7 +5,9 @@
 
 mod catalogue;
 mod detection;
+mod in_its_dictionary;
 mod information;
+mod messages;
 mod rates;
 mod upload;
 mod values;
@@ -53,6 +55,22 @@ impl Seen {
     }
 }
 
+/// All entries of an object one after the other, behind their number in 16 bits where it is asked for. Texts have their
+/// full length, and what is longer than a byte begins at an even offset: one that reads the descriptions knows where.
+fn whole(object: Object, values: &[(u8, Vec<u8>)], count: Option<u8>) -> Vec<u8> {
+    let mut bytes: Vec<u8> = count.into_iter().flat_map(|count| [count, 0]).collect();
+    for (sub_index, value) in values {
+        let length = object.entry(*sub_index).map_or(0, |entry| usize::from(entry.bits.div_ceil(8)));
+        if length > 1 && bytes.len() % 2 == 1 {
+            bytes.push(0);
+        }
+        let end = bytes.len() + length;
+        bytes.extend_from_slice(value);
+        bytes.resize(end, 0);
+    }
+    bytes
+}
+
 /// Answers clients, and remembers what goes beyond one message.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct OwnObjects {
@@ -67,6 +85,8 @@ struct Shared {
     rates: RefCell<Rates>,
     /// Frames that were lost when the diagnosis was reset, cyclic and acyclic ones.
     forgotten: Cell<[u64; 2]>,
+    /// Wrong working counters at that time, by SubDevice.
+    forgotten_wkc: RefCell<Vec<u32>>,
 }
 
 impl OwnObjects {
@@ -153,17 +173,14 @@ impl OwnObjects {
         if object.entry(sub_index).is_none() || (complete_access && sub_index > 1) {
             return Err(AbortCode::SUB_INDEX_DOES_NOT_EXIST);
         }
-        let values = values::read(seen, &self.shared, object).await;
-        let count = values.last().map_or(0, |(last, _)| *last);
+        let values = values::read(seen, &self.shared, object, (!complete_access).then_some(sub_index)).await;
+        // An array has as many entries as there are values.
+        let count = match object.code() {
+            ObjectCode::Array => values.last().map_or(0, |(last, _)| *last),
+            _ => object.max_sub_index(),
+        };
         if complete_access {
-            // Subindex 0 takes 16 bits.
-            let head: &[u8] = if sub_index == 0 { &[count, 0] } else { &[] };
-            return Ok([head]
-                .into_iter()
-                .chain(values.iter().map(|(_, value)| value.as_slice()))
-                .flatten()
-                .copied()
-                .collect());
+            return Ok(whole(object, &values, (sub_index == 0).then_some(count)));
         }
         if sub_index == 0 && object.code() != ObjectCode::Variable {
             return Ok(vec![count]);
@@ -189,6 +206,7 @@ impl OwnObjects {
             core::cmp::Ordering::Equal => {}
         }
         match object {
+            Object::DiagnosisHistory => messages::write(&seen.bus, sub_index, data)?,
             Object::DetectModules => Detection::start(&self.shared.detection, seen)?,
             Object::DiagnosisControl if data.first().is_some_and(|reset| *reset != 0) => self.reset(seen).await,
             _ => {}
@@ -202,7 +220,12 @@ impl OwnObjects {
         let Some(fleet) = &seen.fleet else { return };
         let (book, stations) = {
             let mut access = fleet.access();
-            access.members.iter_mut().for_each(|member| member.incidents = Default::default());
+            for member in &mut access.members {
+                member.incidents = Default::default();
+                member.mailbox.forget_protocol_error(0);
+            }
+            let wrong = (0..access.members.len()).map(|subdevice| fleet.board.wkc_errors(subdevice));
+            *self.shared.forgotten_wkc.borrow_mut() = wrong.collect();
             let stations: Vec<_> = access.members.iter().map(|member| member.station).enumerate().collect();
             (access.statistics.clone(), stations)
         };

@@ -21,6 +21,7 @@ use super::stray::Stray;
 use super::transfer::{Request, Stage, TransferId};
 use crate::board::Board;
 use crate::event::Event;
+use crate::event::history::History;
 use crate::link::LinkSet;
 use crate::ring::RingState;
 use crate::time::Instant;
@@ -175,6 +176,11 @@ impl Bus {
     pub fn report(&self, event: Event) {
         let shared = &mut *self.shared.borrow_mut();
         shared.events.push(shared.now, event);
+    }
+
+    /// What is remembered of the events.
+    pub(crate) fn history<T>(&self, work: impl FnOnce(&mut History) -> T) -> T {
+        work(self.shared.borrow_mut().events.history())
     }
 
     /// Sends a datagram as often as needed and returns what came back, whatever its working counter. `expected` is the

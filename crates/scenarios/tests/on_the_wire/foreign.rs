@@ -22,8 +22,8 @@ const CYCLES: usize = 500;
 const WRONG_ALLOWED: usize = CYCLES / 10;
 /// Tries for each MainDevice and segment.
 const TRIES: usize = 3;
-/// The version of pysoem that is installed.
-const PYSOEM: &str = "pysoem==1.1.13";
+/// What is installed: a MainDevice, and a client of mailbox gateways.
+const PACKAGES: [&str; 2] = ["pysoem==1.1.13", "pyetg1510==0.1.3"];
 
 /// Compares what a foreign MainDevice saw and sent with the devices, and prints its figures.
 fn check(plant: &Plant, bench: &Bench, client: Client, who: &str) -> Result<(), String> {
@@ -157,26 +157,27 @@ fn start_pysoem(bench: &Bench, python: &Path, interfaces: &str, count: usize) ->
     start(bench, python, &arguments.map(str::to_owned))
 }
 
-/// A Python with pysoem in an environment below the target directory. Only CI makes one by itself.
+/// A Python with these packages in an environment below the target directory. Only CI makes one by itself.
 pub fn python() -> Option<PathBuf> {
     let environment = target_directory().parent()?.join("pysoem");
     let python = environment.join("bin/python");
     let succeeds = |program: &Path, arguments: &[&str]| {
         Command::new(program).args(arguments).output().is_ok_and(|output| output.status.success())
     };
-    if succeeds(&python, &["-c", "import pysoem"]) {
+    if succeeds(&python, &["-c", "import pysoem, pyetg1510"]) {
         return Some(python);
     }
     let path = environment.display().to_string();
-    let commands = format!("python3 -m venv {path} && {path}/bin/pip install {PYSOEM}");
+    let commands = format!("python3 -m venv {path} && {path}/bin/pip install {}", PACKAGES.join(" "));
     if std::env::var("CI").is_ok_and(|ci| ci == "true")
         && succeeds(Path::new("python3"), &["-m", "venv", &path])
-        && succeeds(&python, &["-m", "pip", "install", "--quiet", PYSOEM])
+        && succeeds(&python, &["-m", "pip", "install", "--quiet", PACKAGES[0], PACKAGES[1]])
     {
         return Some(python);
     }
-    // Past what the test harness keeps to itself: a test that passes must not look as if pysoem had taken part.
-    let words = format!("skipped: pysoem is not installed; only CI does that by itself. By hand: {commands}\n");
+    // Past what the test harness keeps to itself: a test that passes must not look as if others had taken part.
+    let words =
+        format!("skipped: clients of others are not installed; only CI does that by itself. By hand: {commands}\n");
     let _ = std::io::stderr().write_all(words.as_bytes());
     None
 }

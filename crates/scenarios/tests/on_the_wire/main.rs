@@ -13,6 +13,7 @@ mod cuts_beside;
 mod ethernet;
 mod foreign;
 mod frames;
+mod gateway;
 mod junctions;
 mod mail_captures;
 mod messages;

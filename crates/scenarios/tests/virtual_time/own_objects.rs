@@ -3,8 +3,10 @@
 use std::time::Duration;
 
 use ringcat::SubDeviceState;
+use ringcat_engine::mail::coe::{self, SdoAddress};
 use ringcat_sim::cable::{CableId, DeviceIndex};
 use ringcat_sim::network::NetworkOptions;
+use ringcat_wire::mailbox::coe::{DiagnosisKind, DiagnosisMessage, DiagnosisParameter};
 use ringcat_wire::mailbox::coe::{Indices, InformationOpcode, ListType, SdoInformation};
 use ringcat_wire::mailbox::sdo::{AbortCode, SdoRequest, SdoResponse};
 use ringcat_wire::mailbox::{Header, Message, Protocol, gateway};
@@ -12,7 +14,7 @@ use scenarios::dice::Dice;
 use scenarios::segments::{descriptions, ring};
 use scenarios::world::World;
 
-const KINDS: [&str; 5] = ["coupler", "digital-input-8", "all-protocols", "digital-output-8", "digital-input-16"];
+const KINDS: [&str; 5] = ["coupler", "digital-input-8", "all-protocols", "digital-output-8", "ethernet-terminal"];
 const CLIENT: u64 = 7;
 const LIMIT: Duration = Duration::from_secs(5);
 /// A long segment, and its end.
@@ -103,13 +105,23 @@ fn the_main_device_tells_what_was_declared_found_and_how_each_is_facts_10_2() {
     let (station, identity) = (info.station.0, info.identity);
     for (index, sub_index, expected) in [
         (0x8002, 1, u32::from(station)),
-        (0x8002, 0, 39),
+        (0x8002, 0, 40),
+        (0x8002, 4, 0x1389),
         (0x8002, 33, 1024),
         (0x8002, 34, 1024),
         (0x8002, 35, 0),
         (0x8002, 36, 0x11),
         (0x8002, 37, 0),
+        (0x8002, 38, 0x11),
         (0x8002, 39, u32::from(info.protocols.0)),
+        (0x8002, 40, 1),
+        // No mailbox.
+        (0x8001, 4, 0),
+        (0x8001, 40, 0),
+        // A mailbox and no history: that is asked of it, and no error.
+        (0x8004, 40, 0),
+        (0xA004, 19, 0),
+        (0xA004, 18, 0),
         (0x8004, 37, 1),
         (0x9002, 5, identity.vendor_id),
         (0x9002, 6, identity.product_code),
@@ -118,7 +130,11 @@ fn the_main_device_tells_what_was_declared_found_and_how_each_is_facts_10_2() {
         (0xA002, 4, 0x33),
         (0xA002, 6, u32::from(station) - 1),
         (0xA002, 7, u32::from(station) + 1),
+        (0xA002, 14, 0),
         (0xA002, 15, 0),
+        (0xA002, 17, 0),
+        (0xA002, 18, 0),
+        (0xA002, 19, 0),
         (0xF000, 1, 1),
         (0xF020, 0, 5),
         (0xF020, 3, u32::from(station)),
@@ -129,6 +145,10 @@ fn the_main_device_tells_what_was_declared_found_and_how_each_is_facts_10_2() {
         assert_eq!(number(&mut world, index, sub_index), expected, "{index:#06x}:{sub_index}");
     }
     assert_eq!(read(&mut world, 0x8002, 3, false), Ok(info.name.into_bytes()));
+    let complete = read(&mut world, 0x8002, 0, true).expect("texts are filled up");
+    let name = &complete[2 + 2 + 64..][..64];
+    assert_eq!((complete.len(), complete.last()), (2 + 2 + 2 * 64 + 5 * 4 + 2 * 2 + 3 + 1 + 2 * 2 + 1, Some(&1)));
+    assert_eq!((name.starts_with(b"all-protocols"), &name[20..]), (true, &[0; 44][..]));
     let complete = read(&mut world, 0x9002, 0, true).expect("its entries have one length each");
     assert_eq!((complete[..4].to_vec(), complete.len()), ([vec![32, 0], station.to_le_bytes().to_vec()].concat(), 22));
     assert_eq!((world.incomplete(mark), world.left_op(mark)), (0, vec![]), "process data goes on");
@@ -168,6 +188,57 @@ fn what_the_objects_say_follows_a_break_damaged_frames_and_a_loss_until_it_is_re
 }
 
 #[test]
+fn what_goes_wrong_with_a_subdevice_is_counted_and_kept_in_the_history_facts_10_2() {
+    let mut world = world();
+    world.set_strict(false);
+    let seen = |world: &mut World| [14, 17, 18, 19].map(|sub_index| number(world, 0xA002, sub_index));
+    let mailbox = world.mailbox(2);
+    let limits = (LIMIT, LIMIT);
+    let refused = world.run(async move { coe::read(&mailbox, SdoAddress::new(0x7777, 0), limits, 8).await });
+    assert!(refused.is_err());
+    assert!(world.network_mut().device_mut(DeviceIndex(2)).application.diagnose(&message(), &[]));
+    assert_eq!(seen(&mut world), [0, 0, 0x0602_0000, 1], "an abort of its, and news in its own history");
+    // Two frames that nobody sees again: of all who take part.
+    world.drop(CableId(0), 2);
+    world.drop(CableId(5), 2);
+    world.run_cycles(10);
+    let wrong = number(&mut world, 0xA002, 14);
+    assert!((1..=8).contains(&wrong), "{wrong} datagrams");
+    assert_eq!(number(&mut world, 0xA000, 14), 0, "no process data");
+    assert_eq!(number(&mut world, 0x10F3, 4), 0, "all that is no incident");
+
+    world.power_off(DeviceIndex(4));
+    world.until(LIMIT, "gone", |world| world.application().states()[4] == SubDeviceState::Absent);
+    world.power_on(DeviceIndex(4));
+    world.until(LIMIT, "back", |world| world.application().all_settled());
+    let (first, newest) = (6, number(&mut world, 0x10F3, 2) as u8);
+    let kept: Vec<(u16, u8, u16)> = (first..=newest)
+        .map(|sub_index| {
+            let bytes = read(&mut world, 0x10F3, sub_index, false).expect("a message");
+            let kept = DiagnosisMessage::decode(&bytes).expect("a message");
+            let station = kept.parameters().next().expect("a station address");
+            let DiagnosisParameter::Value(_, station) = station else { panic!("{station:?}") };
+            assert_eq!((kept.code, kept.parameter_count), (0xE800 | u32::from(kept.text) << 16, 2));
+            assert!(kept.time_ns > 0 && kept.local_time);
+            (kept.text, kept.kind.code(), u16::from_le_bytes(station.try_into().expect("two bytes")))
+        })
+        .collect();
+    let station = world.station_of(4);
+    assert_eq!(kept.iter().filter(|message| message.0 == 1).collect::<Vec<_>>(), [&(1, 2, station)], "lost: {kept:?}");
+    assert_eq!(kept.iter().filter(|message| message.0 == 2).collect::<Vec<_>>(), [&(2, 0, station)], "back: {kept:?}");
+    assert_eq!(read(&mut world, 0x10F3, newest + 1, false), Ok(vec![]), "no message");
+    assert_eq!(number(&mut world, 0x10F3, 4), 1);
+    assert_eq!(write(&mut world, 0x10F3, 3, &[newest]), Ok(()));
+    assert_eq!((number(&mut world, 0x10F3, 4), number(&mut world, 0x10F3, 3)), (0, u32::from(newest)));
+    assert_eq!(write(&mut world, 0x10F3, 3, &[0]), Ok(()));
+    assert_eq!((number(&mut world, 0x10F3, 2), read(&mut world, 0x10F3, first, false)), (0, Ok(vec![])));
+    assert_eq!(write(&mut world, 0xF200, 16, &[1]), Ok(()));
+    assert_eq!(seen(&mut world), [0, 0, 0, 1], "its own history is its own matter");
+    let complete = read(&mut world, 0xA002, 0, true).expect("its entries have one length each");
+    assert_eq!((complete[0], complete.len(), complete.last()), (19, 2 + 16 + 8 * 4 + 2 + 1, Some(&1)));
+}
+
+#[test]
 fn detection_looks_at_the_whole_segment_and_lists_go_in_segments_and_fragments_facts_6_3() {
     // So many that their addresses need two lists.
     let inputs = descriptions(&["digital-input-8"; COUNT]);
@@ -183,7 +254,7 @@ fn detection_looks_at_the_whole_segment_and_lists_go_in_segments_and_fragments_f
     let parts = ask(&mut world, CLIENT, &list, |got| got.last().is_some_and(is_last));
     let data: Vec<u8> =
         parts.iter().flat_map(|part| SdoInformation::decode(part).expect("a part").data.to_vec()).collect();
-    assert_eq!((parts.len(), Indices(&data[2..]).iter().count()), (4, 41 + 3 * COUNT));
+    assert_eq!((parts.len(), Indices(&data[2..]).iter().count()), (4, 42 + 3 * COUNT));
     assert!(Indices(&data[2..]).iter().any(|index| index == 0xA000 + LAST as u16));
 
     world.power_off(DeviceIndex(LAST));
@@ -202,10 +273,12 @@ fn what_makes_no_sense_at_address_0_is_aborted_with_its_code_facts_6_3() {
     for (index, sub_index, complete, code) in [
         (0x2000, 0, false, AbortCode::OBJECT_DOES_NOT_EXIST),
         (0x8005, 1, false, AbortCode::OBJECT_DOES_NOT_EXIST),
-        (0xA000, 14, false, AbortCode::SUB_INDEX_DOES_NOT_EXIST),
+        (0xA000, 20, false, AbortCode::SUB_INDEX_DOES_NOT_EXIST),
         (0xF020, 6, false, AbortCode::SUB_INDEX_DOES_NOT_EXIST),
         (0x9000, 5, true, AbortCode::SUB_INDEX_DOES_NOT_EXIST),
-        (0x8000, 0, true, AbortCode::COMPLETE_ACCESS_NOT_SUPPORTED),
+        (0x1008, 0, true, AbortCode::COMPLETE_ACCESS_NOT_SUPPORTED),
+        (0x10F3, 0, true, AbortCode::COMPLETE_ACCESS_NOT_SUPPORTED),
+        (0x10F3, 56, false, AbortCode::SUB_INDEX_DOES_NOT_EXIST),
     ] {
         assert_eq!(read(&mut world, index, sub_index, complete), Err(code), "{index:#06x}:{sub_index}");
     }
@@ -213,6 +286,9 @@ fn what_makes_no_sense_at_address_0_is_aborted_with_its_code_facts_6_3() {
         (0xF020, 1, &[1, 0][..], AbortCode::READ_ONLY),
         (0xF200, 16, &[1, 0][..], AbortCode::LENGTH_TOO_LONG),
         (0xF002, 1, &[1][..], AbortCode::LENGTH_TOO_SHORT),
+        (0x10F3, 1, &[1][..], AbortCode::READ_ONLY),
+        (0x10F3, 3, &[6][..], AbortCode::VALUE_TOO_HIGH),
+        (0x10F3, 5, &[1, 0][..], AbortCode::VALUE_RANGE),
         (0x2000, 0, &[1][..], AbortCode::OBJECT_DOES_NOT_EXIST),
     ] {
         assert_eq!(write(&mut world, index, sub_index, data), Err(code), "{index:#06x}:{sub_index}");
@@ -225,10 +301,17 @@ fn what_makes_no_sense_at_address_0_is_aborted_with_its_code_facts_6_3() {
     assert_eq!(sdo(&mut world, CLIENT, next, aborted), AbortCode::UNKNOWN_COMMAND, "nothing is under way");
 }
 
+/// A warning for the history of a SubDevice.
+fn message() -> DiagnosisMessage<'static> {
+    let kind = DiagnosisKind::Warning;
+    let (code, parameters) = (0xE800, &[][..]);
+    DiagnosisMessage { code, kind, local_time: true, reserved: 0, text: 1, time_ns: 1, parameter_count: 0, parameters }
+}
+
 /// A CoE message that may be anything, mostly one that is nearly right.
 fn anything(dice: &mut Dice) -> Vec<u8> {
     let index =
-        *dice.pick(&[0x1000, 0x1008, 0x1018, 0x8001, 0x9004, 0xA002, 0xF002, 0xF020, 0xF040, 0xF120, 0xF200, 0xFFFF]);
+        *dice.pick(&[0x1000, 0x1008, 0x10F3, 0x8001, 0x9004, 0xA002, 0xF002, 0xF020, 0xF040, 0xF120, 0xF200, 0xFFFF]);
     let [low, high] = u16::to_le_bytes(index);
     let sub_index = *dice.pick(&[0, 1, 2, 16, 255]);
     let mut payload = match dice.below(3) {

@@ -1,8 +1,9 @@
 //! Which objects the MainDevice itself has (facts 10.2, ETG.1510), and what is told of their entries.
-//!
-//! What this MainDevice does not know has no entry: 0x8nnn:4, 38 and 40, 0xAnnn:14 and 17 to 19, the history 0x10F3.
 
-use ringcat_wire::mailbox::coe::{DataType, ObjectCode};
+use ringcat_wire::mailbox::coe::{DataType, DiagnosisHistory, DiagnosisMessage, ObjectCode};
+
+use super::messages::PARAMETERS;
+use crate::event::history::MESSAGES;
 
 /// SubDevices in one list of addresses.
 pub(super) const LIST: usize = 255;
@@ -11,8 +12,8 @@ const LISTS: u16 = 16;
 /// SubDevices that have objects: the lists have room for no more.
 pub(super) const MAX_MODULES: usize = LIST * LISTS as usize;
 
-/// Bits of a name in an SII at most.
-const NAME_BITS: u16 = 255 * 8;
+/// Bytes of a text: so much is told of a longer one, and a shorter one is filled with zeros where a whole object is read.
+pub(super) const TEXT_BYTES: usize = 64;
 
 const CONFIGURATION: u16 = 0x8000;
 const INFORMATION: u16 = 0x9000;
@@ -32,6 +33,7 @@ pub(super) enum Object {
     HardwareVersion,
     SoftwareVersion,
     Identity,
+    DiagnosisHistory,
     /// What was declared of a SubDevice.
     Configuration(usize),
     /// What was found of it.
@@ -61,7 +63,7 @@ pub(super) struct Entry {
 const fn entry(sub_index: u8, data_type: DataType, name: &'static str) -> Entry {
     let bits = match data_type.bits() {
         Some(bits) => bits,
-        None => NAME_BITS,
+        None => TEXT_BYTES as u16 * 8,
     };
     Entry { sub_index, name, data_type, bits, writable: false }
 }
@@ -74,6 +76,7 @@ const fn writable(entry: Entry) -> Entry {
     Entry { writable: true, ..entry }
 }
 
+const BOOL: DataType = DataType::BOOLEAN;
 const U8: DataType = DataType::UNSIGNED8;
 const U16: DataType = DataType::UNSIGNED16;
 const U32: DataType = DataType::UNSIGNED32;
@@ -89,10 +92,21 @@ const IDENTITY: &[Entry] = &[
     entry(3, U32, "Revision number"),
     entry(4, U32, "Serial number"),
 ];
+/// Those before the messages.
+const HISTORY: &[Entry] = &[
+    entry(DiagnosisHistory::MAXIMUM_MESSAGES, U8, "Maximum messages"),
+    entry(DiagnosisHistory::NEWEST_MESSAGE, U8, "Newest message"),
+    writable(entry(DiagnosisHistory::NEWEST_ACKNOWLEDGED, U8, "Newest acknowledged message")),
+    entry(DiagnosisHistory::NEW_AVAILABLE, BOOL, "New messages available"),
+    writable(entry(DiagnosisHistory::FLAGS, U16, "Flags")),
+];
+/// Subindex of the last message.
+const LAST_MESSAGE: u8 = DiagnosisHistory::FIRST_MESSAGE + MESSAGES - 1;
 const OF_CONFIGURATION: &[Entry] = &[
     entry(1, U16, "Fixed station address"),
     entry(2, TEXT, "Type"),
     entry(3, TEXT, "Name"),
+    entry(4, U32, "Device type"),
     entry(5, U32, "Vendor ID"),
     entry(6, U32, "Product code"),
     entry(7, U32, "Revision number"),
@@ -102,7 +116,9 @@ const OF_CONFIGURATION: &[Entry] = &[
     entry(35, U8, "Link status"),
     entry(36, U8, "Link preset"),
     entry(37, U8, "Flags"),
+    entry(38, U16, "Port physics"),
     entry(39, U16, "Mailbox protocols supported"),
+    entry(40, BOOL, "Diagnosis history supported"),
 ];
 const OF_INFORMATION: &[Entry] = &[
     entry(1, U16, "Fixed station address"),
@@ -126,8 +142,12 @@ const OF_DIAGNOSIS: &[Entry] = &[
     entry(11, U32, "Frame error counter port 1"),
     entry(12, U32, "Frame error counter port 2"),
     entry(13, U32, "Frame error counter port 3"),
+    entry(14, U32, "Cyclic working counter errors"),
     entry(15, U32, "Not present counter"),
     entry(16, U32, "Abnormal state change counter"),
+    entry(17, BOOL, "Automatic link control disabled"),
+    entry(18, U32, "Last protocol error"),
+    entry(19, BOOL, "New diagnosis message"),
 ];
 const MODULAR: &[Entry] = &[entry(1, U16, "Index distance"), entry(2, U16, "Maximum number of modules")];
 const DETECT: &[Entry] = &[writable(octets(1, 2, "Request")), entry(2, U8, "Status"), octets(3, 6, "Response")];
@@ -139,7 +159,7 @@ const OF_MAIN_DEVICE: &[Entry] = &[
     entry(4, U32, "Acyclic frames per second"),
     entry(16, U16, "State"),
 ];
-const CONTROL: &[Entry] = &[writable(entry(16, DataType::BOOLEAN, "Reset diagnosis information"))];
+const CONTROL: &[Entry] = &[writable(entry(16, BOOL, "Reset diagnosis information"))];
 
 impl Object {
     /// The object with an index, where so many SubDevices are declared.
@@ -153,6 +173,7 @@ impl Object {
             0x1009 => Object::HardwareVersion,
             0x100A => Object::SoftwareVersion,
             0x1018 => Object::Identity,
+            DiagnosisHistory::INDEX => Object::DiagnosisHistory,
             0xF000 => Object::ModularProfile,
             0xF002 => Object::DetectModules,
             0xF120 => Object::MainDeviceDiagnosis,
@@ -171,7 +192,7 @@ impl Object {
         let modules = declared.min(MAX_MODULES) as u16;
         let of_each = [CONFIGURATION, INFORMATION, DIAGNOSIS].into_iter().flat_map(move |first| first..first + modules);
         let lists = [CONFIGURED, DETECTED].into_iter().flat_map(|first| first..first + LISTS);
-        [0x1000, 0x1008, 0x1009, 0x100A, 0x1018]
+        [0x1000, 0x1008, 0x1009, 0x100A, 0x1018, DiagnosisHistory::INDEX]
             .into_iter()
             .chain(of_each)
             .chain([0xF000, 0xF002])
@@ -179,7 +200,8 @@ impl Object {
             .chain([0xF120, 0xF200])
     }
 
-    /// Its entries but subindex 0 of arrays and records. Of the lists of addresses the first stands for all.
+    /// Its entries but subindex 0 of arrays and records, and the messages of the history. Of the lists of addresses the
+    /// first stands for all.
     pub(super) const fn entries(self) -> &'static [Entry] {
         match self {
             Object::DeviceType => DEVICE_TYPE,
@@ -187,6 +209,7 @@ impl Object {
             Object::HardwareVersion => HARDWARE,
             Object::SoftwareVersion => SOFTWARE,
             Object::Identity => IDENTITY,
+            Object::DiagnosisHistory => HISTORY,
             Object::Configuration(_) => OF_CONFIGURATION,
             Object::Information(_) => OF_INFORMATION,
             Object::Diagnosis(_) => OF_DIAGNOSIS,
@@ -204,6 +227,9 @@ impl Object {
         if sub_index == 0 && self.code() != ObjectCode::Variable {
             return Some(entry(0, U8, "Number of entries"));
         }
+        if self == Object::DiagnosisHistory && (DiagnosisHistory::FIRST_MESSAGE..=LAST_MESSAGE).contains(&sub_index) {
+            return Some(octets(sub_index, (DiagnosisMessage::OVERHEAD + PARAMETERS) as u16, "Diagnosis message"));
+        }
         if self.code() == ObjectCode::Array {
             return entries.first().map(|first| Entry { sub_index, ..*first });
         }
@@ -212,8 +238,9 @@ impl Object {
 
     /// Its largest subindex.
     pub(super) fn max_sub_index(self) -> u8 {
-        match self.code() {
-            ObjectCode::Array => LIST as u8,
+        match (self, self.code()) {
+            (Object::DiagnosisHistory, _) => LAST_MESSAGE,
+            (_, ObjectCode::Array) => LIST as u8,
             _ => self.entries().last().map_or(0, |last| last.sub_index),
         }
     }
@@ -226,6 +253,7 @@ impl Object {
             }
             Object::ConfiguredAddresses(_) | Object::DetectedAddresses(_) => ObjectCode::Array,
             Object::Identity
+            | Object::DiagnosisHistory
             | Object::Configuration(_)
             | Object::Information(_)
             | Object::Diagnosis(_)
@@ -250,6 +278,7 @@ impl Object {
             Object::HardwareVersion => "Hardware version",
             Object::SoftwareVersion => "Software version",
             Object::Identity => "Identity",
+            Object::DiagnosisHistory => "Diagnosis history",
             Object::Configuration(_) => "Configuration data",
             Object::Information(_) => "Information data",
             Object::Diagnosis(_) => "Diagnosis data",
@@ -262,9 +291,9 @@ impl Object {
         }
     }
 
-    /// Whether all entries may be read at once: where each has one length.
+    /// Whether all entries may be read at once.
     pub(super) const fn has_complete_access(self) -> bool {
-        !matches!(self, Object::Configuration(_)) && !matches!(self.code(), ObjectCode::Variable)
+        !matches!(self, Object::DiagnosisHistory) && !matches!(self.code(), ObjectCode::Variable)
     }
 }
 
@@ -281,11 +310,11 @@ mod tests {
             let there: Vec<u16> = (0..=u16::MAX).filter(|index| Object::at(*index, declared).is_some()).collect();
             assert_eq!(listed, there, "{declared} declared");
         }
-        assert_eq!(Object::indices(3).count(), 5 + 9 + 2 + 32 + 2);
+        assert_eq!(Object::indices(3).count(), 6 + 9 + 2 + 32 + 2);
     }
 
     #[test]
-    fn subindices_ascend_and_only_two_entries_are_written_facts_10_2() {
+    fn subindices_ascend_and_only_four_entries_are_written_facts_10_2() {
         let mut written = Vec::new();
         for index in Object::indices(1) {
             let object = Object::at(index, 1).unwrap();
@@ -294,8 +323,9 @@ mod tests {
             let writable = object.entries().iter().filter(|entry| entry.writable);
             written.extend(writable.map(|entry| (index, entry.sub_index)));
         }
-        assert_eq!(written, [(0xF002, 1), (0xF200, 16)]);
-        assert!(Object::Diagnosis(0).entry(14).is_none());
+        assert_eq!(written, [(0x10F3, 3), (0x10F3, 5), (0xF002, 1), (0xF200, 16)]);
+        assert!(Object::Diagnosis(0).entry(20).is_none());
+        assert!(Object::DiagnosisHistory.entry(55).is_some() && Object::DiagnosisHistory.entry(56).is_none());
         assert_eq!(Object::ConfiguredAddresses(0).entry(200).map(|entry| entry.sub_index), Some(200));
     }
 }

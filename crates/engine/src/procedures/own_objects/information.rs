@@ -146,7 +146,7 @@ mod tests {
         let described = ObjectDescription::decode(part.data).unwrap();
         assert_eq!(
             (described.max_sub_index, described.code, described.name),
-            (16, ObjectCode::Record, &b"Diagnosis data"[..])
+            (19, ObjectCode::Record, &b"Diagnosis data"[..])
         );
         let request = EntryRequest { index: 0xF002, sub_index: 1, value_info: ValueInfo::ALL };
         let messages = ask(InformationOpcode::EntryRequest, &request.encode(), 506);
@@ -158,7 +158,7 @@ mod tests {
         );
         assert!(described.access.has(AccessRights::WRITE));
         for (index, sub_index, code) in
-            [(0xA028, 1, AbortCode::OBJECT_DOES_NOT_EXIST), (0xA000, 14, AbortCode::SUB_INDEX_DOES_NOT_EXIST)]
+            [(0xA028, 1, AbortCode::OBJECT_DOES_NOT_EXIST), (0xA000, 20, AbortCode::SUB_INDEX_DOES_NOT_EXIST)]
         {
             let request = EntryRequest { index, sub_index, value_info: ValueInfo::ALL };
             let messages = ask(InformationOpcode::EntryRequest, &request.encode(), 506);

@@ -6,8 +6,9 @@ use alloc::vec::Vec;
 use ringcat_wire::address::StationAddress;
 use ringcat_wire::register::{DlStatus, map};
 
-use super::catalogue::{LIST, MAX_MODULES, Object};
-use super::{Seen, Shared, rates};
+use super::catalogue::{LIST, MAX_MODULES, Object, TEXT_BYTES};
+use super::in_its_dictionary::Asked;
+use super::{Seen, Shared, messages, rates};
 use crate::config::groups;
 use crate::info::SubDeviceInfo;
 use crate::procedures::fleet::{Fleet, Member, Phase, SharedFleet};
@@ -52,11 +53,12 @@ fn counter(sub_index: u8, value: u64) -> (u8, Vec<u8>) {
 }
 
 fn text(sub_index: u8, value: &[u8]) -> (u8, Vec<u8>) {
-    (sub_index, value.to_vec())
+    (sub_index, value[..value.len().min(TEXT_BYTES)].to_vec())
 }
 
-/// All values of an object.
-pub(super) async fn read(seen: &Seen, shared: &Shared, object: Object) -> Values {
+/// All values of an object. Where only one entry is `wanted`, SubDevices are not asked by mailbox for others: these are
+/// zeros.
+pub(super) async fn read(seen: &Seen, shared: &Shared, object: Object, wanted: Option<u8>) -> Values {
     match (object, &seen.fleet) {
         (Object::DeviceType, _) => vec![u32_(0, DEVICE_TYPE)],
         (Object::Name, _) => vec![text(0, NAME)],
@@ -64,6 +66,7 @@ pub(super) async fn read(seen: &Seen, shared: &Shared, object: Object) -> Values
         (Object::SoftwareVersion, _) => vec![text(0, SOFTWARE_VERSION)],
         // There is no vendor id of ours.
         (Object::Identity, _) => (1..=4).map(|sub_index| u32_(sub_index, 0)).collect(),
+        (Object::DiagnosisHistory, fleet) => messages::read(&seen.bus, fleet.as_ref()),
         (Object::ModularProfile, _) => vec![u16_(1, INDEX_DISTANCE), u16_(2, MAX_MODULES as u16)],
         (Object::DetectModules, _) => {
             let status = shared.detection.status() as u8;
@@ -76,9 +79,9 @@ pub(super) async fn read(seen: &Seen, shared: &Shared, object: Object) -> Values
         }
         (Object::MainDeviceDiagnosis, _) => main_device(seen, shared),
         (Object::DiagnosisControl, _) => vec![u8_(16, 0)],
-        (Object::Configuration(index), Some(fleet)) => configuration(&seen.bus, fleet, index).await,
+        (Object::Configuration(index), Some(fleet)) => configuration(&seen.bus, fleet, index, wanted).await,
         (Object::Information(index), Some(fleet)) => information(&seen.bus, fleet, index).await,
-        (Object::Diagnosis(index), Some(fleet)) => diagnosis(&seen.bus, fleet, index).await,
+        (Object::Diagnosis(index), Some(fleet)) => diagnosis(seen, shared, fleet, index, wanted).await,
         (Object::Configuration(_) | Object::Information(_) | Object::Diagnosis(_), None) => Vec::new(),
     }
 }
@@ -116,8 +119,11 @@ async fn dl_status(bus: &Bus, fleet: &SharedFleet, index: usize) -> Option<[u8; 
     bus.fprd_array(station, map::DL_STATUS).await.ok()
 }
 
-async fn configuration(bus: &Bus, fleet: &SharedFleet, index: usize) -> Values {
+async fn configuration(bus: &Bus, fleet: &SharedFleet, index: usize, wanted: Option<u8>) -> Values {
     let status = dl_status(bus, fleet, index).await.map(|bytes| DlStatus::decode(&bytes));
+    let asked = Asked::of(fleet, index, |sub_index| wanted.is_none_or(|wanted| wanted == sub_index));
+    let device_type = asked.device_type(4).await;
+    let has_history = asked.has_history(40).await;
     let access = fleet.access();
     let Some(member) = access.members.get(index) else { return Vec::new() };
     let (expected, info) = (&member.config.expected, member.info.as_ref());
@@ -127,6 +133,7 @@ async fn configuration(bus: &Bus, fleet: &SharedFleet, index: usize) -> Values {
         u16_(1, member.station.0),
         text(2, string(|info| &info.order_code)),
         text(3, string(|info| &info.name)),
+        u32_(4, device_type),
         u32_(5, expected.vendor_id.unwrap_or(0)),
         u32_(6, expected.product_code.unwrap_or(0)),
         u32_(7, expected.revision.or(expected.minimum_revision).unwrap_or(0)),
@@ -136,7 +143,9 @@ async fn configuration(bus: &Bus, fleet: &SharedFleet, index: usize) -> Values {
         u8_(35, link_status(&access, member, status)),
         u8_(36, link_preset(&access, member)),
         u8_(37, flags(&access, index, member)),
+        u16_(38, info.map_or(0, |info| info.physical_ports)),
         u16_(39, info.map_or(0, |info| info.protocols.0)),
+        u8_(40, u8::from(has_history)),
     ]
 }
 
@@ -218,7 +227,8 @@ async fn registers(bus: &Bus, station: StationAddress) -> Result<Registers, BusE
     Ok(Registers { al_control: al_control?, al_status: al_status?, dl_control: dl_control?, dl_status })
 }
 
-async fn diagnosis(bus: &Bus, fleet: &SharedFleet, index: usize) -> Values {
+async fn diagnosis(seen: &Seen, shared: &Shared, fleet: &SharedFleet, index: usize, wanted: Option<u8>) -> Values {
+    let bus = &seen.bus;
     let Some((station, book)) = ({
         let access = fleet.access();
         access.members.get(index).map(|member| (member.station, access.statistics.clone()))
@@ -227,6 +237,8 @@ async fn diagnosis(bus: &Bus, fleet: &SharedFleet, index: usize) -> Values {
     };
     let (registers, counted) = bus.both(registers(bus, station), statistics::read(bus, &book, index, station)).await;
     let registers = registers.unwrap_or_default();
+    let asked = Asked::of(fleet, index, |sub_index| wanted.is_none_or(|wanted| wanted == sub_index));
+    let has_news = asked.has_news(19).await;
     let counted = counted.ok().or_else(|| book.find(index)).unwrap_or_default();
     let access = fleet.access();
     let Some(member) = access.members.get(index) else { return Vec::new() };
@@ -246,8 +258,15 @@ async fn diagnosis(bus: &Bus, fleet: &SharedFleet, index: usize) -> Values {
         values.push(u16_(6 + port, station.map_or(0, |station| station.0)));
     }
     values.extend((10..).zip(&counted.ports).map(|(sub_index, port)| counter(sub_index, port.invalid_frames)));
-    values.push(u32_(15, member.incidents.absences));
-    values.push(u32_(16, member.incidents.state_changes));
+    let forgotten = shared.forgotten_wkc.borrow().get(index).copied().unwrap_or(0);
+    values.extend([
+        u32_(14, fleet.board.wkc_errors(index).wrapping_sub(forgotten)),
+        u32_(15, member.incidents.absences),
+        u32_(16, member.incidents.state_changes),
+        u8_(17, u8::from(registers.dl_control[1] != 0)),
+        u32_(18, member.mailbox.last_protocol_error()),
+        u8_(19, u8::from(has_news)),
+    ]);
     values
 }
 

@@ -1,0 +1,215 @@
+//! The history of what happened to SubDevices and cables: what object 0x10F3 of the MainDevice holds (facts 6.3, 10.2).
+//!
+//! In go the events of the acyclic half, out come messages in places that are used in turns, oldest first. Like that of a
+//! SubDevice it is bounded, and says when something was lost.
+
+use alloc::vec::Vec;
+
+use ringcat_wire::mailbox::coe::{DiagnosisFlags, DiagnosisHistory, DiagnosisKind};
+use ringcat_wire::mailbox::sdo::AbortCode;
+
+use super::Event;
+use crate::time::Instant;
+
+/// Messages that are kept: an incident tells a handful.
+pub const MESSAGES: u8 = 50;
+/// What may be set of the flags. The MainDevice sends no emergencies.
+const SETTINGS: u16 = DiagnosisFlags::NO_INFORMATION
+    | DiagnosisFlags::NO_WARNINGS
+    | DiagnosisFlags::NO_ERRORS
+    | DiagnosisFlags::ACKNOWLEDGE;
+
+/// One message.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Incident {
+    /// When.
+    pub at: Instant,
+    /// How grave.
+    pub kind: DiagnosisKind,
+    /// Number of what happened (docs/mailbox-gateway.md).
+    pub number: u16,
+    /// Index in the declaration of the SubDevice that it happened to.
+    pub subdevice: Option<usize>,
+    /// A code that belongs to it; 0 where there is none.
+    pub detail: u32,
+}
+
+impl Incident {
+    /// What is kept of an event; `None` for one that is not.
+    fn new(at: Instant, event: &Event) -> Option<Incident> {
+        use DiagnosisKind::{Error, Information, Warning};
+        let (number, kind, subdevice, detail) = match *event {
+            Event::Lost { subdevice } => (1, Error, Some(subdevice), 0),
+            Event::Returned { subdevice } => (2, Information, Some(subdevice), 0),
+            Event::StateError { subdevice, code, .. } => (3, Error, Some(subdevice), u32::from(code.0)),
+            Event::ConfigurationFailed { subdevice, .. } => (4, Error, Some(subdevice), 0),
+            Event::Mismatch { subdevice, got, .. } => (5, Error, Some(subdevice), got),
+            Event::Missing { subdevice, optional } => {
+                (6, if optional { Information } else { Error }, Some(subdevice), 0)
+            }
+            Event::RingOpened { .. } => (7, Warning, None, 0),
+            Event::RingClosed { .. } => (8, Information, None, 0),
+            Event::LinkDown { link } => (9, Warning, None, link.index() as u32),
+            Event::LinkUp { link } => (10, Information, None, link.index() as u32),
+            Event::CableErrors { .. } => (11, Warning, None, 0),
+            Event::Emergency { subdevice, emergency } => {
+                (12, Warning, Some(subdevice), u32::from(emergency.error_code))
+            }
+            Event::JunctionChanged { broken, .. } => {
+                (13, if broken { Warning } else { Information }, None, broken.into())
+            }
+            _ => return None,
+        };
+        Some(Incident { at, kind, number, subdevice, detail })
+    }
+}
+
+/// The messages, where the next one goes, and what was acknowledged.
+#[derive(Clone, Debug, Default)]
+pub struct History {
+    /// By place; grows up to [`MESSAGES`].
+    incidents: Vec<Incident>,
+    /// Place of the newest.
+    newest: Option<u8>,
+    /// Subindex that was acknowledged last; 0 for none.
+    acknowledged: u8,
+    /// The newest ones that were not acknowledged.
+    unacknowledged: u8,
+    flags: u16,
+}
+
+impl History {
+    /// Takes in an event, if it is one that is kept.
+    pub(super) fn note(&mut self, at: Instant, event: &Event) {
+        if let Some(incident) = Incident::new(at, event) {
+            self.keep(incident);
+        }
+    }
+
+    fn keep(&mut self, incident: Incident) {
+        let unwanted = match incident.kind {
+            DiagnosisKind::Information => DiagnosisFlags::NO_INFORMATION,
+            DiagnosisKind::Warning => DiagnosisFlags::NO_WARNINGS,
+            DiagnosisKind::Error | DiagnosisKind::Other(_) => DiagnosisFlags::NO_ERRORS,
+        };
+        if self.flags & unwanted != 0 {
+            return;
+        }
+        if self.unacknowledged >= MESSAGES {
+            self.flags |= DiagnosisFlags::LOST;
+            if self.flags & DiagnosisFlags::ACKNOWLEDGE != 0 {
+                return;
+            }
+        }
+        let place = self.newest.map_or(0, |newest| (newest + 1) % MESSAGES);
+        match self.incidents.get_mut(usize::from(place)) {
+            Some(oldest) => *oldest = incident,
+            None => self.incidents.push(incident),
+        }
+        if self.acknowledged == place + DiagnosisHistory::FIRST_MESSAGE {
+            // That message is there no more.
+            self.acknowledged = 0;
+        }
+        self.newest = Some(place);
+        self.unacknowledged = (self.unacknowledged + 1).min(MESSAGES);
+    }
+
+    /// The message at a subindex.
+    pub fn incident(&self, sub_index: u8) -> Option<Incident> {
+        let place = sub_index.checked_sub(DiagnosisHistory::FIRST_MESSAGE)?;
+        self.incidents.get(usize::from(place)).copied()
+    }
+
+    /// Subindex of the newest message; 0 where there is none.
+    pub fn newest(&self) -> u8 {
+        self.newest.map_or(0, |place| place + DiagnosisHistory::FIRST_MESSAGE)
+    }
+
+    /// Subindex of the message that was acknowledged last; 0 where none was, or it is there no more.
+    pub fn acknowledged(&self) -> u8 {
+        self.acknowledged
+    }
+
+    /// Whether there are messages that were not acknowledged.
+    pub fn has_news(&self) -> bool {
+        self.unacknowledged > 0
+    }
+
+    /// Settings, and whether something was lost.
+    pub fn flags(&self) -> DiagnosisFlags {
+        DiagnosisFlags(self.flags)
+    }
+
+    /// Acknowledges the message at a subindex and those before it; 0 forgets all.
+    pub fn acknowledge(&mut self, sub_index: u8) -> Result<(), AbortCode> {
+        if sub_index == 0 {
+            *self = History { flags: self.flags & SETTINGS, ..History::default() };
+            return Ok(());
+        }
+        let place = sub_index.checked_sub(DiagnosisHistory::FIRST_MESSAGE).ok_or(AbortCode::VALUE_TOO_LOW)?;
+        let newest = self.newest.filter(|_| usize::from(place) < self.incidents.len());
+        let newest = newest.ok_or(AbortCode::VALUE_TOO_HIGH)?;
+        // The ring goes on behind its end.
+        let behind = (newest + MESSAGES - place) % MESSAGES;
+        self.unacknowledged = self.unacknowledged.min(behind);
+        self.acknowledged = sub_index;
+        self.flags &= SETTINGS;
+        Ok(())
+    }
+
+    /// Sets what may be set.
+    pub fn set_flags(&mut self, flags: u16) -> Result<(), AbortCode> {
+        if flags & !(SETTINGS | DiagnosisFlags::LOST) != 0 {
+            return Err(AbortCode::VALUE_RANGE);
+        }
+        self.flags = flags & SETTINGS | self.flags & DiagnosisFlags::LOST;
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn history(incidents: usize) -> History {
+        let mut history = History::default();
+        (0..incidents).for_each(|subdevice| history.note(Instant(subdevice as u64), &Event::Lost { subdevice }));
+        history
+    }
+
+    #[test]
+    fn places_are_used_in_turns_and_what_is_lost_is_told_facts_6_3() {
+        let mut history = history(50);
+        assert_eq!((history.newest(), history.flags().0, history.has_news()), (55, 0, true));
+        history.note(Instant(50), &Event::Returned { subdevice: 50 });
+        assert_eq!((history.newest(), history.flags().0), (6, DiagnosisFlags::LOST));
+        assert_eq!(history.incident(6).map(|incident| incident.subdevice), Some(Some(50)));
+        assert_eq!(history.incident(7).map(|incident| incident.subdevice), Some(Some(1)), "the oldest");
+        assert_eq!((history.incident(5), history.incident(56)), (None, None));
+    }
+
+    #[test]
+    fn acknowledged_messages_make_room_and_zero_forgets_all_facts_6_3() {
+        let mut history = history(10);
+        assert_eq!(history.acknowledge(16), Err(AbortCode::VALUE_TOO_HIGH), "there is none");
+        assert_eq!(history.acknowledge(5), Err(AbortCode::VALUE_TOO_LOW));
+        assert_eq!((history.acknowledge(14), history.acknowledged(), history.has_news()), (Ok(()), 14, true));
+        assert_eq!((history.acknowledge(15), history.has_news()), (Ok(()), false));
+        assert_eq!((history.acknowledge(0), history.newest(), history.incident(6)), (Ok(()), 0, None));
+    }
+
+    #[test]
+    fn flags_keep_kinds_out_and_a_full_history_may_keep_what_it_has_facts_6_3() {
+        let mut history = History::default();
+        assert_eq!(history.set_flags(DiagnosisFlags::EMERGENCY), Err(AbortCode::VALUE_RANGE));
+        assert_eq!(history.set_flags(DiagnosisFlags::NO_INFORMATION | DiagnosisFlags::ACKNOWLEDGE), Ok(()));
+        history.note(Instant(0), &Event::Returned { subdevice: 0 });
+        assert_eq!(history.newest(), 0);
+        (0..60).for_each(|subdevice| history.note(Instant(1), &Event::Lost { subdevice }));
+        assert_eq!(history.incident(6).map(|incident| incident.subdevice), Some(Some(0)), "not overwritten");
+        assert!(history.flags().has(DiagnosisFlags::LOST | DiagnosisFlags::ACKNOWLEDGE));
+        assert_eq!((history.acknowledge(55), history.flags().has(DiagnosisFlags::LOST)), (Ok(()), false));
+        history.note(Instant(2), &Event::Lost { subdevice: 99 });
+        assert_eq!(history.incident(6).map(|incident| incident.subdevice), Some(Some(99)));
+    }
+}

@@ -1,0 +1,65 @@
+//! Entries about a SubDevice that its own dictionary answers, by mailbox, when a client asks (facts 6.3, 10.2).
+
+use core::time::Duration;
+
+use ringcat_wire::mailbox::coe::DiagnosisHistory;
+use ringcat_wire::sii::MailboxProtocols;
+
+use crate::mail::coe::{SdoAddress, SdoFailure, read};
+use crate::mail::{Limits, Mailbox};
+use crate::procedures::fleet::SharedFleet;
+
+/// Other clients of address 0 wait meanwhile.
+const LIMITS: Limits = (Duration::from_millis(100), Duration::from_millis(300));
+const DEVICE_TYPE: SdoAddress = SdoAddress::new(0x1000, 0);
+/// Bytes that any of these entries may have.
+const ROOM: usize = 4;
+
+/// A SubDevice, and which entries are wanted.
+pub(super) struct Asked<W> {
+    /// That of one that speaks CoE.
+    mailbox: Option<Mailbox>,
+    wants: W,
+}
+
+impl<W: Fn(u8) -> bool> Asked<W> {
+    /// `wants` says whether a subindex is wanted; of others it is not asked.
+    pub fn of(fleet: &SharedFleet, index: usize, wants: W) -> Asked<W> {
+        let access = fleet.access();
+        let speaks = |protocols: MailboxProtocols| protocols.0 & MailboxProtocols::COE != 0;
+        let member = access.members.get(index);
+        let member = member.filter(|member| member.info.as_ref().is_some_and(|info| speaks(info.protocols)));
+        Asked { mailbox: member.map(|member| member.mailbox.clone()).filter(Mailbox::is_open), wants }
+    }
+
+    /// What it answers; `None` also where it does not.
+    async fn value(&self, sub_index: u8, object: SdoAddress) -> Option<u32> {
+        let mailbox = self.mailbox.as_ref().filter(|_| (self.wants)(sub_index))?;
+        let before = mailbox.last_protocol_error();
+        let answer = read(mailbox, object, LIMITS, ROOM).await;
+        if answer.as_ref().is_err_and(|error| matches!(error.cause, SdoFailure::Aborted(_))) {
+            // That it lacks the object is no error of anybody.
+            mailbox.forget_protocol_error(before);
+        }
+        let mut bytes = answer.ok()?;
+        bytes.resize(ROOM, 0);
+        bytes.first_chunk().map(|bytes| u32::from_le_bytes(*bytes))
+    }
+
+    /// Its device type (0x1000); 0 where it has none.
+    pub async fn device_type(&self, sub_index: u8) -> u32 {
+        self.value(sub_index, DEVICE_TYPE).await.unwrap_or(0)
+    }
+
+    /// Whether it has a diagnosis history.
+    pub async fn has_history(&self, sub_index: u8) -> bool {
+        let maximum = SdoAddress::new(DiagnosisHistory::INDEX, DiagnosisHistory::MAXIMUM_MESSAGES);
+        self.value(sub_index, maximum).await.is_some()
+    }
+
+    /// Whether there are messages in it that nobody has acknowledged.
+    pub async fn has_news(&self, sub_index: u8) -> bool {
+        let news = SdoAddress::new(DiagnosisHistory::INDEX, DiagnosisHistory::NEW_AVAILABLE);
+        self.value(sub_index, news).await.is_some_and(|news| news != 0)
+    }
+}
