@@ -106,6 +106,11 @@ fn check_sum(bytes: &[u8]) -> [u8; 4] {
     hash.to_le_bytes()
 }
 
+/// Whether bytes lie within others, one after the other.
+fn contains(all: &[u8], part: &[u8]) -> bool {
+    all.windows(part.len().max(1)).any(|window| window == part)
+}
+
 /// Words about an error.
 fn said(error: impl std::fmt::Display) -> String {
     error.to_string()
@@ -223,7 +228,10 @@ impl Asker {
                 let value = list.get(4..).unwrap_or_default();
                 let length = list.first_chunk().map(|length| usize::from(u16::from_le_bytes(*length)));
                 let end = length_without_sum(value);
-                let whole = value.len() != self.kind.length() || check_sum(&value[..end]) == value[end..];
+                let sum_fits = value.len() != self.kind.length() || check_sum(&value[..end]) == value[end..];
+                // Where the first ones were forgotten, the last one is a list by itself, whatever is in it.
+                let is_rest = |known: &Vec<u8>| known.len() > value.len() && contains(known, value);
+                let whole = sum_fits && !self.known.iter().any(is_rest);
                 if length == Some(value.len()) && whole {
                     Ok(value.to_vec())
                 } else {

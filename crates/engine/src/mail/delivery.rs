@@ -5,7 +5,7 @@ use alloc::rc::Rc;
 use ringcat_wire::mailbox::coe::{CoeHeader, CoeService, Emergency};
 use ringcat_wire::mailbox::{ErrorReply, Message, Protocol};
 
-use super::lane::{Arrival, Lane};
+use super::lane::{Arrival, Lane, LaneState};
 use super::protocol_error;
 use super::recent::Way;
 use super::room::{Room, State};
@@ -124,7 +124,8 @@ fn shelve(state: &mut State, message: &Message<'_>, kind: Unsolicited) -> bool {
 }
 
 /// An error reply does not say to what. It goes to the request that waits; of several, first to one whose protocol the
-/// SubDevice has not shown to know, then to the oldest. Whoever writes a message in parts is told, too.
+/// SubDevice has not shown to know, then to the oldest. Whoever writes a message in parts is told, too. It is certain only
+/// where it can be to nothing else; else the answer to the request that it ends may still come.
 fn refused(state: &mut State, payload: &[u8], now: Instant) -> bool {
     let Some(bytes) = payload.first_chunk() else {
         state.counters.malformed += 1;
@@ -137,7 +138,12 @@ fn refused(state: &mut State, payload: &[u8], now: Instant) -> bool {
         in_parts = true;
     }
     let waiting = |proven| state.lanes.iter().filter(|l| l.waiting().is_some() && l.proven == proven).count();
-    let doubtful = in_parts || if waiting(false) > 0 { waiting(false) > 1 } else { waiting(true) > 1 };
+    let is_late = |lane: &LaneState| lane.late_until.is_some_and(|until| now < until);
+    // Only a protocol that is not known is refused for itself.
+    let unknown = reply.detail == ErrorReply::UNSUPPORTED_PROTOCOL && waiting(false) > 0;
+    let others = if unknown { waiting(false) } else { waiting(false) + waiting(true) };
+    let late = state.lanes.iter().any(|lane| is_late(lane) && !(unknown && lane.proven));
+    let doubtful = in_parts || late || others > 1;
     let candidates = state.lanes.iter_mut().filter(|lane| lane.waiting().is_some());
     match candidates.min_by_key(|lane| (lane.proven, lane.asked.map(|asked| asked.at))) {
         Some(lane) => lane.arrive(Arrival::Refused(reply, doubtful), state.seen),

@@ -21,6 +21,7 @@ use ringcat_wire::mailbox::foe::FoeErrorCode;
 use ringcat_wire::mailbox::soe::Idn;
 use ringcat_wire::register::{Fmmu, map};
 use scenarios::loss::Loss;
+use scenarios::mail_questions::{Asker, Kind};
 use scenarios::segments::{descriptions, ring};
 use scenarios::world::World;
 
@@ -195,6 +196,42 @@ fn an_error_reply_ends_the_request_that_it_belongs_to_facts_6_1() {
     assert!(result.unwrap_err().to_string().ends_with("mailbox error 0x0007: no memory"));
     let mailbox = world.mailbox(ALL);
     world.run(objects(mailbox));
+}
+
+/// Of two requests the first is refused, late enough that both wait; the second one's asker then asks again at once.
+fn refused_beside_another(world: &mut World, first_is_dropped: bool) -> [Result<(), String>; 2] {
+    let by = Duration::from_millis(8);
+    world.fault(Fault::Mail(DeviceIndex(ALL), MailFault::DelayAnswers { count: 3, by }));
+    world.fault(Fault::Mail(DeviceIndex(ALL), MailFault::Refuse { count: 1, detail: ErrorReply::NO_MORE_MEMORY }));
+    let mut idn = Asker::new(Kind::Idn, world.mailbox(ALL), LIMITS, true);
+    let first = world.start(async move { idn.ask(1).await });
+    world.run_cycles(2);
+    let mut vendor = Asker::new(Kind::Vendor, world.mailbox(ALL), LIMITS, true);
+    let second = world.start(async move { [vendor.ask(2).await, vendor.ask(3).await] });
+    if first_is_dropped {
+        drop(first);
+        world.finish(Duration::from_secs(5), second)
+    } else {
+        let both = world.finish(Duration::from_secs(5), second);
+        assert!(world.finish(Duration::from_secs(5), first).is_err(), "nobody answered it");
+        both
+    }
+}
+
+// The error reply goes to the one that waits, and the answer to that one is still on its way.
+#[test]
+fn an_error_reply_that_may_be_anothers_confuses_no_later_answer_facts_6_1() {
+    for first_is_dropped in [false, true] {
+        let mut world = world(5);
+        // The drive has answered before, the vendor's protocol has not.
+        let mut idn = Asker::new(Kind::Idn, world.mailbox(ALL), LIMITS, true);
+        assert_eq!(world.run(async move { idn.ask(7).await }), Ok(()));
+        let [second, third] = refused_beside_another(&mut world, first_is_dropped);
+        assert!(second.is_err_and(|error| error.contains("no memory")), "dropped: {first_is_dropped}");
+        assert_eq!(third, Ok(()), "dropped: {first_is_dropped}");
+        let mailbox = world.mailbox(ALL);
+        world.run(objects(mailbox));
+    }
 }
 
 #[test]
