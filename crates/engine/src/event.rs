@@ -107,8 +107,9 @@ pub enum Event {
         rings: usize,
     },
     /// No frame comes back while a ring behind a junction is open: with a second unconnected port 0 in one path, frames are
-    /// destroyed (JR-02). Or the cable of the only link is broken too. Where two rings break at the same moment nobody
-    /// can tell where until one of them is whole again; then the other is told with its place.
+    /// destroyed (JR-02). Or the cable of the only link is broken too. Where there are several such rings, each is looked
+    /// into then while its junctions leave the others out for a moment, and what is broken is told by
+    /// [`Event::JunctionChanged`].
     JunctionsBlocked {
         /// True when it begins, false when frames come back.
         blocked: bool,

@@ -113,7 +113,7 @@ pub fn describe(event: &Event, names: &Names) -> String {
         }
         Event::JunctionsBlocked { blocked: true, breaks: 0 } => {
             let why = "two rings behind junctions broke at once, or the first SubDevice is dead";
-            format!("no frame comes back: {why}. Where is known when one of them is whole")
+            format!("no frame comes back: {why}. Each ring is looked into while the others are left out")
         }
         Event::JunctionsBlocked { blocked: true, .. } => {
             let why = "a second one is open too, or the cable of the interface";

@@ -22,7 +22,7 @@ use crate::layout::Layout;
 use crate::mail::Mailbox;
 use crate::plan::{self, AreaPlan, PlanError, SubDevicePlan};
 use crate::ring_status::{Cable, CableErrors, RingStatus};
-use crate::topology::Topology;
+use crate::topology::{NodeStatus, Topology};
 
 /// How far a SubDevice is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -239,10 +239,23 @@ pub struct SharedFleet {
     news: Rc<Cell<u32>>,
     /// The redundant link is down on our own order.
     controlled_break: Rc<Cell<bool>>,
+    /// Looks into rings behind junctions.
+    inside: Rc<Inside>,
     /// Who takes part in process data.
     pub board: Arc<Board>,
     /// Distributed clocks.
     pub clocks: SharedClocks,
+}
+
+/// Looks into rings behind junctions that are broken.
+#[derive(Debug, Default)]
+struct Inside {
+    /// One is under way.
+    is_looking: Cell<bool>,
+    /// How many there were.
+    looks: Cell<u32>,
+    /// What the last one found, by position, until somebody takes it.
+    found: RefCell<Option<Vec<Option<NodeStatus>>>>,
 }
 
 impl SharedFleet {
@@ -252,6 +265,7 @@ impl SharedFleet {
             fleet: Rc::new(RefCell::new(fleet)),
             news: Rc::default(),
             controlled_break: Rc::default(),
+            inside: Rc::default(),
             board,
             clocks,
         }
@@ -270,6 +284,33 @@ impl SharedFleet {
     /// Whether a ring that opens does so on our own order.
     pub(super) fn is_controlled_break(&self) -> bool {
         self.controlled_break.get()
+    }
+
+    /// From now on SubDevices are put out of reach on purpose.
+    pub(super) fn begin_to_look_inside(&self) {
+        self.inside.is_looking.set(true);
+        self.inside.looks.set(self.inside.looks.get().wrapping_add(1));
+    }
+
+    /// That is over; what SubDevices said about their ports, by position.
+    pub(super) fn end_to_look_inside(&self, found: Vec<Option<NodeStatus>>) {
+        self.inside.is_looking.set(false);
+        *self.inside.found.borrow_mut() = Some(found);
+    }
+
+    /// Whether SubDevices are out of reach on purpose, so that silence tells nothing.
+    pub(super) fn is_looking_inside(&self) -> bool {
+        self.inside.is_looking.get()
+    }
+
+    /// How often that was so.
+    pub(super) fn looks_inside(&self) -> u32 {
+        self.inside.looks.get()
+    }
+
+    /// What was found, once.
+    pub(super) fn take_found_inside(&self) -> Option<Vec<Option<NodeStatus>>> {
+        self.inside.found.borrow_mut().take()
     }
 
     /// Tells whoever supervises that there is something to act on.

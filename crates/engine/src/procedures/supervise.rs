@@ -84,7 +84,8 @@ pub(crate) async fn supervise(bus: Bus, fleet: SharedFleet, enhanced_line_crosse
     };
     loop {
         watch.bus.sleep(PAUSE).await;
-        if watch.is_called_for() {
+        watch.take_found_inside();
+        if !watch.fleet.is_looking_inside() && watch.is_called_for() {
             watch.check().await;
         }
     }
@@ -151,14 +152,23 @@ impl Watch {
     }
 
     async fn check(&mut self) {
+        let inside = self.fleet.looks_inside();
         let phases: Vec<Phase> = self.fleet.access().members.iter().map(|member| member.phase).collect();
         let strangers = look_at_strangers(&self.bus, &self.fleet).await;
         let stranger_answers = strangers.iter().filter(|(_, look)| matches!(look, Look::Answer { .. })).count();
         let mut suspended = core::mem::take(&mut self.suspended);
         let is_calm = || self.is_routine && !self.has_changed();
-        let so_far = |looks: &[Look]| suspend(&self.fleet, &mut suspended, looks, stranger_answers);
+        let so_far = |looks: &[Look]| {
+            if !self.fleet.is_looking_inside() {
+                suspend(&self.fleet, &mut suspended, looks, stranger_answers);
+            }
+        };
         let looks = look_at_all(&self.bus, &self.fleet, is_calm, so_far).await;
         self.suspended = suspended;
+        if self.fleet.looks_inside() != inside {
+            // Some were out of reach on purpose meanwhile.
+            return self.again_in(SECOND_LOOK_PAUSE);
+        }
         let Some((_, seen)) = self.fleet.board.supervision() else { return };
         let (count, answering) = (usize::from(seen.total().0), answers(&looks) + stranger_answers);
         // When the count and the answers agree, a silent SubDevice is certainly not there.
@@ -290,13 +300,22 @@ impl Watch {
 
     /// Events of rings behind junctions.
     fn report_junctions(&mut self, looks: &[Look]) {
-        if self.junctions.is_empty() {
-            return;
+        if !self.junctions.is_empty() {
+            self.observe_junctions(&self.by_position(looks));
         }
-        let status = self.by_position(looks);
+    }
+
+    fn observe_junctions(&mut self, status: &[Option<NodeStatus>]) {
         let bus = self.bus.clone();
-        if let Some(pause) = self.junctions.observe(bus.now(), &status, |event| bus.report(event)) {
+        if let Some(pause) = self.junctions.observe(bus.now(), status, |event| bus.report(event)) {
             self.again_in(pause);
+        }
+    }
+
+    /// What was seen in rings of which no frame comes back.
+    fn take_found_inside(&mut self) {
+        if let Some(status) = self.fleet.take_found_inside() {
+            self.observe_junctions(&status);
         }
     }
 

@@ -7,6 +7,7 @@ use core::cell::Cell;
 use core::time::Duration;
 
 use super::super::fleet::SharedFleet;
+use super::look_inside::look_inside;
 use crate::event::Event;
 use crate::link::{Link, LinkSet};
 use crate::supervisor::Bus;
@@ -135,15 +136,19 @@ fn changed(cable: &RingCable, broken: bool, breaks: usize) -> Event {
 }
 
 /// Reports when no frame comes back while a local ring is open, or all of a sudden where there are two that may have
-/// broken at once; and when frames come back again. Runs for ever.
+/// broken at once, and looks into them then; and when frames come back again. Runs for ever.
 pub(in super::super) async fn watch_blocked(bus: Bus, fleet: SharedFleet, broken: Rc<Cell<usize>>) {
-    let number = |fleet: &SharedFleet| fleet.board.supervision().map(|(number, _)| number);
+    // A frame that has met nobody has not come back from them: in a closed ring of two links the other copies do.
+    let number = |fleet: &SharedFleet| {
+        let seen = fleet.board.supervision().filter(|(_, seen)| seen.total().0 > 0);
+        seen.map(|(number, _)| number)
+    };
     let several = fleet.access().topology.local_rings.len() > 1;
     let mut last = (number(&fleet), bus.now(), fleet.board.cycles());
     let mut blocked = false;
     loop {
         bus.sleep(PAUSE).await;
-        let seen = number(&fleet);
+        let seen = number(&fleet).or(last.0);
         if seen != last.0 {
             last = (seen, bus.now(), fleet.board.cycles());
             if core::mem::take(&mut blocked) {
@@ -160,6 +165,12 @@ pub(in super::super) async fn watch_blocked(bus: Bus, fleet: SharedFleet, broken
         if is_long && (broken.get() > 0 || at_once) && !blocked {
             blocked = true;
             bus.report(Event::JunctionsBlocked { blocked: true, breaks: broken.get() });
+            fleet.begin_to_look_inside();
+            let found = look_inside(&bus, &fleet).await;
+            // Frames that left before the last loop opened may still be on their way.
+            bus.sleep(PAUSE).await;
+            last = (number(&fleet).or(last.0), bus.now(), fleet.board.cycles());
+            fleet.end_to_look_inside(found);
         }
     }
 }

@@ -3,20 +3,27 @@
 use std::time::Duration;
 
 use ringcat::{Event, JunctionConnection, JunctionMode};
-use ringcat_sim::cable::{CableId, DeviceIndex};
+use ringcat_engine::topology::PortOf;
+use ringcat_sim::cable::{CableId, DeviceIndex, Endpoint};
 use ringcat_sim::fault::Fault;
 use ringcat_sim::frame::Port::{A, B, C, D};
 use ringcat_sim::network::Network;
 use scenarios::check::{Delivery, troubles};
-use scenarios::segments::{MAIN, RING_IN_RING, at, wired};
+use scenarios::segments::{MAIN, REDUNDANT, RING_IN_RING, at, wired};
 use scenarios::world::{CYCLE, World};
 
 use super::{STRICT, crossed, edge, ends, in_op, one_ring, told};
 
 /// Two junctions in a row, each with a ring of two, and an input behind them.
+const TWO_RINGS: [&str; 7] =
+    ["junction", "digital-output-8", "servo", "junction", "digital-input-8", "servo", "digital-input-8"];
+
 fn two_rings() -> Network {
-    let kinds = ["junction", "digital-output-8", "servo", "junction", "digital-input-8", "servo", "digital-input-8"];
-    let cables = [
+    wired(&TWO_RINGS, &two_rings_cables())
+}
+
+fn two_rings_cables() -> Vec<(Endpoint, Endpoint)> {
+    vec![
         (MAIN, at(0, A)),
         (at(0, D), at(1, A)),
         (at(1, B), at(2, A)),
@@ -26,8 +33,7 @@ fn two_rings() -> Network {
         (at(4, B), at(5, A)),
         (at(5, B), at(3, B)),
         (at(3, C), at(6, A)),
-    ];
-    wired(&kinds, &cables)
+    ]
 }
 
 const TWO_STRICT: [JunctionConnection; 2] = [
@@ -51,26 +57,44 @@ fn of_two_rings_either_may_break_and_a_second_break_is_told_for_what_it_is_jr_02
         let mark = world.mark();
         world.cut(CableId(6));
         world.run_cycles(300);
-        assert_eq!(told(&world, mark), [Event::JunctionsBlocked { blocked: true, breaks: 1 }]);
+        let second = |broken, breaks| {
+            let (near, far) = (Some(PortOf { node: 4, port: 1 }), PortOf { node: 5, port: 0 });
+            Event::JunctionChanged { near, far, broken, breaks }
+        };
+        assert_eq!(told(&world, mark), [Event::JunctionsBlocked { blocked: true, breaks: 1 }, second(true, 2)]);
         assert_eq!(world.judged(mark).last().map(|judged| judged.delivery), Some(Delivery::Zero));
         assert!(!world.saw(mark, |event| matches!(event, Event::Lost { .. })), "nobody knows who is there");
         // One of them is mended: everybody comes back, the other one is still broken.
         world.heal(CableId(6));
         world.until(Duration::from_secs(3), "all in OP", |w| w.all_in_op() && w.application().all_settled());
         world.run_cycles(100);
-        assert_eq!(told(&world, mark)[1..], [Event::JunctionsBlocked { blocked: false, breaks: 1 }]);
+        let free = Event::JunctionsBlocked { blocked: false, breaks: 2 };
+        assert_eq!(told(&world, mark)[2..], [free, second(false, 1)]);
         let mark = edge(&mut world, "first break healed", |world| world.heal(CableId(2)));
         assert!(matches!(told(&world, mark)[..], [Event::JunctionChanged { broken: false, breaks: 0, .. }]));
     }
 }
 
+/// Both ends of a cable of [`two_rings`], where it is none of those that close.
+fn ends_of_two(cable: usize) -> (PortOf, PortOf) {
+    let (near, port) = match cable {
+        1 => (0, 3),
+        2 => (1, 1),
+        5 => (3, 3),
+        _ => (4, 1),
+    };
+    let far = if cable > 4 { cable - 1 } else { cable };
+    (PortOf { node: near, port }, PortOf { node: far, port: 0 })
+}
+
 /// Both breaks of two rings come within one cycle, so that no frame can tell where. Nothing comes back, and that is said;
-/// when either is mended, the other one has its place.
+/// then each ring is looked into while the other one is left out.
 #[test]
-fn two_rings_that_break_at_once_are_told_as_blocked_and_placed_when_one_is_mended_jr_02() {
+fn two_rings_that_break_at_once_are_told_as_blocked_and_both_with_their_places_jr_02() {
     let apart = [Duration::ZERO, Duration::from_micros(3), Duration::from_micros(400)];
-    for (number, (first, second)) in [(2, 6), (1, 5), (3, 7), (2, 5)].into_iter().enumerate() {
-        let mut world = in_op(30 + number as u64, two_rings(), (JunctionMode::Automatic, &[]));
+    let settings = [(JunctionMode::Automatic, &[][..]), (JunctionMode::Strict, &TWO_STRICT)];
+    for (number, (first, second)) in [(2, 6), (1, 5), (3, 7), (6, 1), (2, 5), (5, 2)].into_iter().enumerate() {
+        let mut world = in_op(30 + number as u64, two_rings(), settings[number % 2]);
         let mark = world.mark();
         world.fault_in(CYCLE / 2, Fault::Cut(CableId(first)));
         world.fault_in(CYCLE / 2 + apart[number % apart.len()], Fault::Cut(CableId(second)));
@@ -78,32 +102,106 @@ fn two_rings_that_break_at_once_are_told_as_blocked_and_placed_when_one_is_mende
         let what = format!("cables {first} and {second}: {:?}", told(&world, mark));
         // The closing cable leaves no port 0 unconnected: nothing is blocked by it.
         let closing = [first, second].iter().filter(|cable| [3, 7].contains(*cable)).count();
-        if closing == 0 {
-            assert_eq!(told(&world, mark), [Event::JunctionsBlocked { blocked: true, breaks: 0 }], "{what}");
-            assert_eq!(world.judged(mark).last().map(|judged| judged.delivery), Some(Delivery::Zero), "{what}");
-        } else {
+        if closing > 0 {
             let broken = |event: &Event| matches!(event, Event::JunctionChanged { broken: true, .. });
             assert!(told(&world, mark).iter().filter(|event| broken(event)).count() == 2, "{what}");
             assert_eq!(troubles(world.events(mark)), Vec::<&Event>::new(), "{what}");
+        } else {
+            let place = |cable: usize, broken, breaks| {
+                let (near, far) = ends_of_two(cable);
+                Event::JunctionChanged { near: Some(near), far, broken, breaks }
+            };
+            let (one, other) = (first.min(second), first.max(second));
+            let blocked = |blocked, breaks| Event::JunctionsBlocked { blocked, breaks };
+            assert_eq!(told(&world, mark), [blocked(true, 0), place(one, true, 1), place(other, true, 2)], "{what}");
+            assert_eq!(world.judged(mark).last().map(|judged| judged.delivery), Some(Delivery::Zero), "{what}");
+            let lost = |event: &Event| matches!(event, Event::Lost { .. } | Event::LineCrossed { .. });
+            assert!(!world.saw(mark, lost), "{what}: who is out of reach on purpose is not lost");
+            // Within the time that outputs have until their watchdogs (100 ms) it is known where.
+            let told_at = world.events(mark).iter().filter(|timed| timed.event == place(other, true, 2));
+            let at = told_at.map(|timed| timed.at).next().expect("it was told");
+            let begin = world.events(mark)[0].at;
+            println!("{first} and {second}: both placed {:?} after the first event", at.since(begin));
+            assert!(at.since(begin) < Duration::from_millis(100), "{what}");
+            let mending = world.mark();
+            world.heal(CableId(first));
+            world.until(Duration::from_secs(3), "all in OP", |w| w.all_in_op() && w.application().all_settled());
+            world.run_cycles(100);
+            assert_eq!(told(&world, mending), [blocked(false, 2), place(first, false, 1)], "{what}");
         }
-        let mending = world.mark();
-        world.heal(CableId(first));
-        world.until(Duration::from_secs(3), "all in OP", |w| w.all_in_op() && w.application().all_settled());
-        world.run_cycles(100);
-        let told_then = told(&world, mending);
-        if closing == 0 {
-            // Cable 5 reaches device 4, cable 6 device 5.
-            let placed = told_then.iter().filter_map(|event| match event {
-                Event::JunctionChanged { far, broken: true, breaks: 1, .. } => Some((far.node, far.port)),
-                _ => None,
-            });
-            assert_eq!(placed.collect::<Vec<_>>(), [(second - 1, 0)], "{what}, then {told_then:?}");
-            let free = |event: &&Event| matches!(event, Event::JunctionsBlocked { blocked: false, .. });
-            assert_eq!((told_then.iter().filter(free).count(), told_then.len()), (1, 2), "{what}, then {told_then:?}");
+        if closing > 0 {
+            edge(&mut world, &what, |world| world.heal(CableId(first)));
         }
         let mark = edge(&mut world, &what, |world| world.heal(CableId(second)));
         assert!(matches!(told(&world, mark)[..], [Event::JunctionChanged { broken: false, breaks: 0, .. }]), "{what}");
     }
+}
+
+/// The same in a closed ring of two links, in which copies of the redundant link come back and have met nobody.
+#[test]
+fn two_local_rings_that_break_in_a_ring_of_two_links_are_told_with_their_places_too_jr_02() {
+    let mut network = two_rings_cables();
+    network.push((at(6, B), REDUNDANT));
+    let mut world = in_op(40, wired(&TWO_RINGS, &network), (JunctionMode::Automatic, &[]));
+    let mark = world.mark();
+    world.cut(CableId(2));
+    world.cut(CableId(6));
+    world.run_cycles(300);
+    let place = |cable, broken, breaks| {
+        let (near, far) = ends_of_two(cable);
+        Event::JunctionChanged { near: Some(near), far, broken, breaks }
+    };
+    let blocked = |blocked, breaks| Event::JunctionsBlocked { blocked, breaks };
+    assert_eq!(told(&world, mark), [blocked(true, 0), place(2, true, 1), place(6, true, 2)]);
+    assert!(!world.saw(mark, |event| matches!(event, Event::Lost { .. })));
+    world.heal(CableId(6));
+    world.until(Duration::from_secs(3), "all in OP", |w| w.all_in_op() && w.application().all_settled());
+    world.run_cycles(100);
+    assert_eq!(told(&world, mark)[3..], [blocked(false, 2), place(6, false, 1)]);
+    edge(&mut world, "the other one", |world| world.heal(CableId(2)));
+}
+
+/// A ring behind a member of another one: while both are broken, frames that reach the inner one never come back.
+#[test]
+fn of_a_ring_in_a_ring_that_break_at_once_the_outer_one_is_placed_and_the_inner_one_when_that_is_mended() {
+    let kinds = ["junction", "junction", "digital-output-8", "servo", "digital-input-8", "digital-input-8"];
+    let cables = [
+        (MAIN, at(0, A)),
+        (at(0, D), at(1, A)),
+        (at(1, D), at(2, A)),
+        (at(2, B), at(3, A)),
+        (at(3, B), at(1, B)),
+        (at(1, C), at(4, A)),
+        (at(4, B), at(0, B)),
+        (at(0, C), at(5, A)),
+    ];
+    let strict = [
+        JunctionConnection { head: 0, head_port: 1, tail: 4, tail_port: 1 },
+        JunctionConnection { head: 1, head_port: 1, tail: 3, tail_port: 1 },
+    ];
+    let mut world = in_op(41, wired(&kinds, &cables), (JunctionMode::Strict, &strict));
+    let place = |near: (usize, u8), far, broken, breaks| {
+        let (near, far) = (Some(PortOf { node: near.0, port: near.1 }), PortOf { node: far, port: 0 });
+        Event::JunctionChanged { near, far, broken, breaks }
+    };
+    let (inner, outer) = (3, 5);
+    let mark = world.mark();
+    world.cut(CableId(inner));
+    world.cut(CableId(outer));
+    world.run_cycles(1_500);
+    let blocked = |blocked, breaks| Event::JunctionsBlocked { blocked, breaks };
+    assert_eq!(told(&world, mark), [blocked(true, 0), place((1, 2), 4, true, 1)]);
+    let mark = world.mark();
+    world.heal(CableId(outer));
+    world.until(Duration::from_secs(3), "all in OP", |w| w.all_in_op() && w.application().all_settled());
+    world.run_cycles(100);
+    // That frames come back may be told before or after what they bring.
+    let told_then = told(&world, mark);
+    let free = |event: &&Event| matches!(event, Event::JunctionsBlocked { blocked: false, .. });
+    assert_eq!(told_then.iter().filter(free).count(), 1, "{told_then:?}");
+    let places: Vec<&Event> = told_then.iter().filter(|event| !free(event)).collect();
+    assert_eq!(places, [&place((2, 1), 3, true, 2), &place((1, 2), 4, false, 1)]);
+    edge(&mut world, "the inner one", |world| world.heal(CableId(inner)));
 }
 
 #[test]

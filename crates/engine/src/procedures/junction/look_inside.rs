@@ -1,0 +1,129 @@
+//! Where rings behind junctions are broken when no frame comes back: two of them broke (JR-02).
+//!
+//! The second SubDevice with nothing on its port 0 destroys every frame, but all that are passed before it take part in
+//! it, among them the junction at which its ring begins. So a junction can be told blindly to leave its ring out, by closing
+//! both ports of the ring. One ring after the other is looked into while all others are left out; then the others are
+//! reached again, too. The settings are temporary (facts 2.2, DL control bit 1): what becomes of frames meanwhile, the
+//! loops return to what they were within about a second.
+//!
+//! While it goes on, most SubDevices are out of reach at one time or another, which must tell nobody that they are lost
+//! ([`super::super::fleet::SharedFleet::is_looking_inside`]).
+
+use alloc::vec;
+use alloc::vec::Vec;
+
+use ringcat_wire::address::{StationAddress, Wkc};
+use ringcat_wire::command::Command;
+use ringcat_wire::datagram::Target;
+use ringcat_wire::register::{DlControl, DlStatus, LoopControl, map};
+
+use super::super::fleet::{Fleet, SharedFleet};
+use crate::supervisor::{Bus, BusError};
+use crate::topology::{LocalRing, NodeStatus};
+
+/// Bytes of DL_CONTROL that are written: forwarding rule and temporary bit, loops.
+const WRITTEN: usize = 2;
+/// Rings that are looked into; each takes some frames, and what the settings last for is about a second.
+const MOST: usize = 16;
+
+/// A ring, as far as it has to be known here.
+#[derive(Clone, Debug)]
+struct Ring {
+    /// Its junction, by position and by station address.
+    head: usize,
+    junction: StationAddress,
+    /// The last of its members.
+    tail: usize,
+    /// Ports of the junction that belong to it.
+    ports: Vec<u8>,
+}
+
+impl Ring {
+    /// `None` where its junction is not declared.
+    fn new(fleet: &Fleet, ring: &LocalRing) -> Option<Ring> {
+        let (head, tail) = (ring.closing.head.node, ring.closing.tail.node);
+        let junction = station_of(fleet, head)?;
+        let children = fleet.topology.nodes.get(head)?.children;
+        let begins = (0..4).filter(|port| {
+            let child = children[usize::from(*port)];
+            child.is_some_and(|child| head < child && child <= tail)
+        });
+        let mut ports: Vec<u8> = begins.collect();
+        ports.push(ring.closing.head.port);
+        Some(Ring { head, junction, tail, ports })
+    }
+
+    fn holds(&self, node: usize) -> bool {
+        self.head < node && node <= self.tail
+    }
+}
+
+fn station_of(fleet: &Fleet, node: usize) -> Option<StationAddress> {
+    fleet.members.iter().find(|member| member.node == Some(node)).map(|member| member.station)
+}
+
+/// Looks into all local rings; returns what members said about their ports, by position. Empty where that cannot be
+/// done: there is one ring only, a junction is not declared, or ports were closed on order.
+pub(super) async fn look_inside(bus: &Bus, fleet: &SharedFleet) -> Vec<Option<NodeStatus>> {
+    let (rings, count) = {
+        let access = fleet.access();
+        let rings = access.topology.local_rings.iter().map(|ring| Ring::new(&access, ring));
+        let rings: Vec<Ring> = rings.collect::<Option<_>>().unwrap_or_default();
+        let is_possible = (2..=MOST).contains(&rings.len()) && access.blocked.is_empty();
+        (if is_possible { rings } else { Vec::new() }, access.topology.nodes.len())
+    };
+    let mut found = vec![None; if rings.is_empty() { 0 } else { count }];
+    for ring in &rings {
+        // Rings around it lead there. Where one of these is broken too nothing comes back, and this one keeps its secret.
+        let is_left_out = |other: &Ring| other.head != ring.head && !other.holds(ring.head);
+        if set_loops(bus, &rings, is_left_out).await.is_ok() {
+            read(bus, fleet, ring, &mut found).await;
+        }
+    }
+    if !rings.is_empty() {
+        // Nobody may be able to answer this.
+        let _ = set_loops(bus, &rings, |_| false).await;
+    }
+    found
+}
+
+/// Has junctions leave their rings out or not, for a moment. Frames that do not come back have done it all the same, so it
+/// is done when one does: each that is lost may have been the one that makes the next one return.
+async fn set_loops(bus: &Bus, rings: &[Ring], is_left_out: impl Fn(&Ring) -> bool) -> Result<(), BusError> {
+    let mut writes: Vec<(StationAddress, [LoopControl; 4])> = Vec::new();
+    for ring in rings {
+        let mut loops = [LoopControl::Auto; 4];
+        if is_left_out(ring) {
+            ring.ports.iter().for_each(|port| loops[usize::from(port & 3)] = LoopControl::Closed);
+        }
+        writes.push((ring.junction, loops));
+    }
+    let writes = writes.into_iter().map(|(station, loops)| {
+        let control = DlControl { temporary: true, loops, ..DlControl::default() };
+        (Command::Fpwr, Target::Station(station, map::DL_CONTROL), control.encode()[..WRITTEN].to_vec())
+    });
+    bus.transfer_all(writes, Some(Wkc(1))).await.map(drop)
+}
+
+/// Reads the ports of a ring's junction and members.
+async fn read(bus: &Bus, fleet: &SharedFleet, ring: &Ring, found: &mut [Option<NodeStatus>]) {
+    let members: Vec<_> = {
+        let access = fleet.access();
+        let of_ring = access.members.iter().filter_map(|member| {
+            let node = member.node.filter(|node| *node == ring.head || ring.holds(*node))?;
+            let ports = member.info.as_ref().map(|info| info.controller.ports).unwrap_or_default();
+            Some((node, member.station, ports))
+        });
+        of_ring.collect()
+    };
+    let read = bus.gather(members, |bus, (node, station, ports)| async move {
+        let bytes = bus.fprd(station, map::DL_STATUS, DlStatus::LEN).await.ok()?;
+        let dl_status = DlStatus::decode(bytes.first_chunk()?);
+        Some((node, NodeStatus { dl_status, receive_times: None, ports }))
+    });
+    for (node, status) in read.await.into_iter().flatten() {
+        if let Some(slot) = found.get_mut(node) {
+            *slot = Some(status);
+        }
+    }
+}
