@@ -22,14 +22,14 @@ const AOE_RESPONSE: u8 = 0x01;
 const EOE_ANSWERS: [u8; 4] = [3, 5, 7, 9];
 
 /// Takes in the content of the send mailbox. Any bytes are allowed. True where somebody waited for it.
-pub(super) fn deliver(room: &Rc<Room>, mail: &[u8], way: Way) -> bool {
+pub(super) fn deliver(room: &Rc<Room>, mail: &[u8], way: Way, sent: Instant) -> bool {
     let wanted = {
         let state = &mut *room.state();
         let Ok(message) = Message::decode(mail) else {
             state.counters.malformed += 1;
             return false;
         };
-        if is_double(state, &message, way, room.bus.now()) {
+        if is_double(state, &message, way, sent) {
             state.counters.duplicates += 1;
             return false;
         }
@@ -42,10 +42,10 @@ pub(super) fn deliver(room: &Rc<Room>, mail: &[u8], way: Way) -> bool {
     wanted
 }
 
-fn is_double(state: &mut State, message: &Message<'_>, way: Way, now: Instant) -> bool {
+fn is_double(state: &mut State, message: &Message<'_>, way: Way, sent: Instant) -> bool {
     // What a repeat brings may be the mail before the one that was lost.
     let way = if state.repeated && way == Way::Usual { Way::Repeat } else { way };
-    let double = state.recent.is_double(message.header.counter, message.payload, way, now);
+    let double = state.recent.is_double(message.header.counter, message.payload, way, sent);
     state.repeated &= double || way != Way::Repeat;
     double
 }
@@ -54,22 +54,25 @@ fn sort(room: &Rc<Room>, state: &mut State, message: &Message<'_>) -> bool {
     let payload = message.payload;
     let first = payload.first().copied().unwrap_or(0);
     match message.header.protocol {
-        Protocol::Error => refused(state, payload, room.bus.now()),
+        Protocol::Error => refused(state, message, room.bus.now()),
         Protocol::Coe => coe(room, state, message),
-        Protocol::Foe => answer(state, Lane::Foe, message, Unsolicited::Other),
-        Protocol::Soe if SOE_ANSWERS.contains(&(first & 0x07)) => answer(state, Lane::Soe, message, Unsolicited::Other),
+        Protocol::Foe => answer(state, Lane::Foe, message),
+        Protocol::Soe if SOE_ANSWERS.contains(&(first & 0x07)) => answer(state, Lane::Soe, message),
         Protocol::Soe => shelve(state, message, Unsolicited::Soe),
         Protocol::Aoe if payload.get(AOE_FLAGS_AT).is_some_and(|flags| flags & AOE_RESPONSE != 0) => {
-            answer(state, Lane::Aoe, message, Unsolicited::Other)
+            answer(state, Lane::Aoe, message)
         }
         Protocol::Aoe => shelve(state, message, Unsolicited::Aoe),
-        Protocol::Voe => answer(state, Lane::Voe, message, Unsolicited::Voe),
-        Protocol::Eoe if EOE_ANSWERS.contains(&(first & 0x0F)) => answer(state, Lane::Eoe, message, Unsolicited::Other),
+        Protocol::Voe => answer(state, Lane::Voe, message),
+        Protocol::Eoe if EOE_ANSWERS.contains(&(first & 0x0F)) => answer(state, Lane::Eoe, message),
         Protocol::Eoe if state.ethernet.attached => {
             state.ethernet.take(payload, room.bus.now());
             false
         }
         Protocol::Eoe => shelve(state, message, Unsolicited::Ethernet),
+        protocol @ Protocol::Other(code) if state.lanes[Lane::Other(code).place()].expected == Some(protocol) => {
+            answer(state, Lane::Other(code), message)
+        }
         Protocol::Other(_) => shelve(state, message, Unsolicited::Other),
     }
 }
@@ -92,11 +95,12 @@ fn coe(room: &Rc<Room>, state: &mut State, message: &Message<'_>) -> bool {
         }
         // An abort has the service of a request, whoever sends it.
         CoeService::SdoRequest | CoeService::SdoResponse | CoeService::SdoInformation => {
-            answer(state, Lane::Coe, message, Unsolicited::Other)
+            answer(state, Lane::Coe, message)
         }
-        CoeService::TxPdo | CoeService::RxPdo if state.lanes[Lane::Coe as usize].pdo == Some(*header) => {
-            answer(state, Lane::Coe, message, Unsolicited::Other)
+        CoeService::TxPdo | CoeService::RxPdo if state.lanes[Lane::Coe.place()].pdo == Some(*header) => {
+            answer(state, Lane::Coe, message)
         }
+        CoeService::Other(_) if state.lanes[Lane::Coe.place()].any => answer(state, Lane::Coe, message),
         CoeService::TxPdo
         | CoeService::RxPdo
         | CoeService::TxPdoRemote
@@ -106,15 +110,28 @@ fn coe(room: &Rc<Room>, state: &mut State, message: &Message<'_>) -> bool {
 }
 
 /// To whoever waits in a lane; without one, onto a shelf.
-fn answer(state: &mut State, lane: Lane, message: &Message<'_>, else_to: Unsolicited) -> bool {
+fn answer(state: &mut State, lane: Lane, message: &Message<'_>) -> bool {
     let arrival = Arrival::Payload(message.payload.to_vec());
-    if state.lanes[lane as usize].arrive(arrival, state.seen) {
-        return true;
+    let own = &mut state.lanes[lane.place()];
+    // Whoever talks takes one after the other; the oldest is not what is waited for.
+    let oldest = if own.is_full() { own.take() } else { None };
+    let wanted = own.arrive(arrival, state.seen);
+    if let Some(oldest) = oldest {
+        put_aside(state, lane, oldest);
     }
-    if else_to == Unsolicited::Other {
+    if !wanted {
+        put_aside(state, lane, Arrival::Payload(message.payload.to_vec()));
+    }
+    wanted
+}
+
+/// What came for a lane and was not what somebody waited for: mail that nobody asked for, or a late answer.
+pub(super) fn put_aside(state: &mut State, lane: Lane, arrival: Arrival) {
+    let Arrival::Payload(payload) = arrival else { return };
+    if lane.shelf() == Unsolicited::Other {
         state.counters.unclaimed += 1;
     }
-    shelve(state, message, else_to)
+    state.shelves.ring(lane.shelf()).push(Unclaimed { protocol: lane.protocol(), payload });
 }
 
 fn shelve(state: &mut State, message: &Message<'_>, kind: Unsolicited) -> bool {
@@ -126,8 +143,8 @@ fn shelve(state: &mut State, message: &Message<'_>, kind: Unsolicited) -> bool {
 /// An error reply does not say to what. It goes to the request that waits; of several, first to one whose protocol the
 /// SubDevice has not shown to know, then to the oldest. Whoever writes a message in parts is told, too. It is certain only
 /// where it can be to nothing else; else the answer to the request that it ends may still come.
-fn refused(state: &mut State, payload: &[u8], now: Instant) -> bool {
-    let Some(bytes) = payload.first_chunk() else {
+fn refused(state: &mut State, message: &Message<'_>, now: Instant) -> bool {
+    let Some(bytes) = message.payload.first_chunk() else {
         state.counters.malformed += 1;
         return false;
     };
@@ -147,9 +164,10 @@ fn refused(state: &mut State, payload: &[u8], now: Instant) -> bool {
     let candidates = state.lanes.iter_mut().filter(|lane| lane.waiting().is_some());
     match candidates.min_by_key(|lane| (lane.proven, lane.asked.map(|asked| asked.at))) {
         Some(lane) => lane.arrive(Arrival::Refused(reply, doubtful), state.seen),
+        None if in_parts => false,
         None => {
-            state.counters.unclaimed += u64::from(!in_parts);
-            false
+            state.counters.unclaimed += 1;
+            shelve(state, message, Unsolicited::Other)
         }
     }
 }

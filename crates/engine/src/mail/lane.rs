@@ -8,6 +8,7 @@ use ringcat_wire::mailbox::{ErrorReply, Protocol};
 
 use super::answer_time::AnswerTime;
 use super::error::MailboxError;
+use super::unsolicited::Unsolicited;
 use crate::time::Instant;
 
 /// Answers that may wait in a lane; whoever talks takes one after the other.
@@ -32,11 +33,30 @@ pub enum Lane {
     Eoe,
     /// Ethernet: its frames. Nobody answers them.
     Frames,
+    /// Mail of a type that no other lane knows: the lower four bits of the type byte. All such types have one lane.
+    Other(u8),
 }
 
 impl Lane {
-    /// All lanes.
+    /// How many there are.
+    pub(super) const COUNT: usize = 8;
+
+    /// The lanes of the protocols.
     pub const ALL: [Lane; 7] = [Lane::Coe, Lane::Foe, Lane::Soe, Lane::Aoe, Lane::Voe, Lane::Eoe, Lane::Frames];
+
+    /// The lane for mail of a type: the lower four bits of the type byte (facts 6.1).
+    pub const fn of(code: u8) -> Lane {
+        match Protocol::from_code(code & 0x0F) {
+            Protocol::Aoe => Lane::Aoe,
+            Protocol::Eoe => Lane::Eoe,
+            Protocol::Coe => Lane::Coe,
+            Protocol::Foe => Lane::Foe,
+            Protocol::Soe => Lane::Soe,
+            Protocol::Voe => Lane::Voe,
+            Protocol::Error => Lane::Other(0),
+            Protocol::Other(code) => Lane::Other(code),
+        }
+    }
 
     /// The protocol of its messages.
     pub const fn protocol(self) -> Protocol {
@@ -47,6 +67,31 @@ impl Lane {
             Lane::Aoe => Protocol::Aoe,
             Lane::Voe => Protocol::Voe,
             Lane::Eoe | Lane::Frames => Protocol::Eoe,
+            Lane::Other(code) => Protocol::from_code(code & 0x0F),
+        }
+    }
+
+    /// Its place among all.
+    pub(super) const fn place(self) -> usize {
+        match self {
+            Lane::Coe => 0,
+            Lane::Foe => 1,
+            Lane::Soe => 2,
+            Lane::Aoe => 3,
+            Lane::Voe => 4,
+            Lane::Eoe => 5,
+            Lane::Frames => 6,
+            Lane::Other(_) => 7,
+        }
+    }
+
+    /// Where mail of it goes for which nobody waits.
+    pub(super) const fn shelf(self) -> Unsolicited {
+        match self {
+            Lane::Voe => Unsolicited::Voe,
+            Lane::Coe | Lane::Foe | Lane::Soe | Lane::Aoe | Lane::Eoe | Lane::Frames | Lane::Other(_) => {
+                Unsolicited::Other
+            }
         }
     }
 }
@@ -55,6 +100,7 @@ impl Lane {
 #[derive(Debug)]
 pub(super) struct Outgoing {
     pub id: u32,
+    pub lane: Lane,
     pub payload: Vec<u8>,
     /// How long the SubDevice may refuse it.
     pub limit: Duration,
@@ -69,6 +115,8 @@ pub(super) struct Outgoing {
 pub(super) struct Asked {
     /// When it was written, or when the last part of its answer came.
     pub at: Instant,
+    /// How long the answer, or its next part, is waited for.
+    pub limit: Duration,
     /// Whether it was looked for.
     pub looked: bool,
     /// How long after that the last look found nothing.
@@ -78,8 +126,8 @@ pub(super) struct Asked {
 }
 
 impl Asked {
-    pub(super) const fn at(at: Instant) -> Asked {
-        Asked { at, looked: false, vain: None, answered: false }
+    pub(super) const fn at(at: Instant, limit: Duration) -> Asked {
+        Asked { at, limit, looked: false, vain: None, answered: false }
     }
 }
 
@@ -104,10 +152,16 @@ pub(super) struct LaneState {
     pub asked: Option<Asked>,
     /// Until when the answer to a request that was given up may still come.
     pub late_until: Option<Instant>,
+    /// How long it may take, while nothing can be read.
+    late_for: Option<Duration>,
     /// What the last request was about, so that its answer can be told from that to another one.
     pub mark: u16,
     /// CoE header of the PDO that was asked for by mailbox.
     pub pdo: Option<[u8; 2]>,
+    /// The message that was written last has mail of this type as its answer.
+    pub expected: Option<Protocol>,
+    /// Whatever comes in the protocol of the lane is taken for the answer, unless it surely comes unasked.
+    pub any: bool,
     pub answer_time: AnswerTime,
     /// A message is written in parts, of which only the last one is answered, or was until lately: until then an error
     /// reply may be to one of them.
@@ -125,6 +179,20 @@ impl LaneState {
         *self = LaneState { turns, answer_time, ..LaneState::default() };
     }
 
+    /// As [`LaneState::reset`], but the SubDevice still has what it was given: an answer may come when it is back.
+    pub(super) fn suspend(&mut self, now: Instant) {
+        let late = self.late_until.filter(|until| *until > now).map(|until| until.since(now));
+        let late_for = self.asked.map(|asked| asked.limit).into_iter().chain(late).chain(self.late_for).max();
+        let (mark, proven, expected) = (self.mark, self.proven, self.expected);
+        self.reset();
+        (self.mark, self.proven, self.late_for, self.expected) = (mark, proven, late_for, expected);
+    }
+
+    /// The SubDevice is back.
+    pub(super) fn resume(&mut self, now: Instant) {
+        self.late_until = self.late_for.take().map(|limit| now + limit);
+    }
+
     pub(super) fn is_idle(&self) -> bool {
         self.turns.is_empty() && self.outbox.is_empty() && self.inbox.is_empty() && self.asked.is_none()
     }
@@ -135,8 +203,9 @@ impl LaneState {
 
     /// A message of a talk is about to be written. Its answer may come before it is known that it was.
     pub(super) fn writing(&mut self, message: &Outgoing, now: Instant) {
-        if message.asks.is_some() && self.turns.front() == Some(&message.turn) {
-            self.asked = Some(Asked::at(now));
+        if let Some(limit) = message.asks.filter(|_| self.turns.front() == Some(&message.turn)) {
+            self.asked = Some(Asked::at(now, limit));
+            self.expected = Some(message.lane.protocol());
         }
     }
 
@@ -152,7 +221,7 @@ impl LaneState {
             let held = self.turns.front() == Some(&message.turn);
             if held && result.is_ok() {
                 if let Some(asked) = self.asked.as_mut().filter(|asked| !asked.answered) {
-                    *asked = Asked::at(now);
+                    *asked = Asked::at(now, limit);
                 }
             } else {
                 if held {
@@ -196,9 +265,6 @@ impl LaneState {
             asked.answered = true;
             self.answer_time.took(seen.since(asked.at), asked.vain);
         }
-        if self.inbox.len() >= INBOX {
-            self.inbox.pop_front();
-        }
         self.inbox.push_back(arrival);
         true
     }
@@ -211,7 +277,7 @@ impl LaneState {
         !self.inbox.is_empty()
     }
 
-    pub(super) fn forget_arrivals(&mut self) {
-        self.inbox.clear();
+    pub(super) fn is_full(&self) -> bool {
+        self.inbox.len() >= INBOX
     }
 }

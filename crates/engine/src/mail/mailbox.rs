@@ -32,29 +32,23 @@ impl Mailbox {
     /// The SubDevice has entered PREOP or BOOT with this mailbox: counters begin anew. `send_manager` is the SyncManager of
     /// the mailbox that is read.
     pub(crate) fn open(&self, station: StationAddress, layout: MailboxLayout, send_manager: u8) {
-        self.room.close(true);
-        self.room.open(Session::new(station, layout, send_manager));
+        self.room.close();
+        self.room.open(Session::new(station, layout, send_manager, self.room.bus.now()));
     }
 
     /// The SubDevice goes to INIT.
     pub(crate) fn close(&self) {
-        self.room.close(true);
+        self.room.close();
     }
 
     /// The SubDevice does not answer; it may come back with the mailbox as it is.
     pub(crate) fn suspend(&self) {
-        self.room.close(false);
+        self.room.suspend();
     }
 
     /// The SubDevice answers again and never was in INIT.
     pub(crate) fn resume(&self) {
-        let session = {
-            let state = self.room.look();
-            if state.open { None } else { state.session }
-        };
-        if let Some(session) = session {
-            self.room.open(session);
-        }
+        self.room.resume();
     }
 
     /// The SubDevice has mail, or may have.
@@ -98,6 +92,8 @@ impl Mailbox {
 
     /// Waits for a lane to be free, and takes it.
     pub async fn talk(&self, lane: Lane) -> Result<Talk, MailboxError> {
+        // Types that have a lane of their own have no other.
+        let lane = if let Lane::Other(code) = lane { Lane::of(code) } else { lane };
         Talk::take(&self.room, lane).await
     }
 

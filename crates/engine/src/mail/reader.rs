@@ -71,8 +71,10 @@ async fn run(room: Rc<Room>, time: u32) {
                 state.counters.strays += 1;
                 state.seen = room.bus.now();
             }
-            let way = stray.late_since.map_or(Way::Usual, Way::Late);
-            delivery::deliver(&room, &stray.mail, way);
+            // What was read from a mailbox of before, and comes back in the time of this one, is nobody's.
+            if stray.sent_at >= session.since {
+                delivery::deliver(&room, &stray.mail, Way::Stray, stray.sent_at);
+            }
         }
         let found = match step(&room, next_look, hold) {
             Step::End => return,
@@ -187,10 +189,20 @@ async fn look(room: &Rc<Room>, session: &Session) -> Result<bool, MailboxError> 
 async fn read(room: &Rc<Room>, time: u32, session: &Session) -> Result<bool, MailboxError> {
     let register = RegisterAddress(session.layout.send_offset);
     let begun = room.bus.now();
+    room.state().reading = true;
     let reply = room.bus.read_mail(session.station, register, usize::from(session.layout.send_size)).await;
     if room.session(time).is_none() {
+        // The mailbox may be the same after a while in which it could not be used.
+        let lasts = room.look().session.is_some_and(|now| now.since == session.since);
+        if let Ok(reply) = reply
+            && lasts
+            && reply.wkc() != Wkc(0)
+        {
+            delivery::deliver(room, &reply.data, Way::Stray, begun);
+        }
         return Err(MailboxError::Closed);
     }
+    room.state().reading = false;
     match reply {
         Ok(reply) if reply.wkc() == Wkc(0) => {
             let state = &mut *room.state();
@@ -209,7 +221,7 @@ async fn read(room: &Rc<Room>, time: u32, session: &Session) -> Result<bool, Mai
                 }
                 state.counters.read += 1;
             }
-            let wanted = delivery::deliver(room, &reply.data, Way::Usual);
+            let wanted = delivery::deliver(room, &reply.data, Way::Usual, begun);
             // What comes unasked seldom comes alone.
             if !wanted && !room.look().waiting() && room.look().ethernet.lively(room.bus.now()).is_none() {
                 look(room, session).await?;

@@ -9,13 +9,14 @@ use core::time::Duration;
 
 use crate::time::Instant;
 
-/// How far back a mail may have been there before. Where there was no disturbance, only a SubDevice that sends its mail
-/// twice brings doubles.
+/// Where there was no disturbance, only a SubDevice that sends its mail twice brings doubles: the last mail again.
 const USUAL: usize = 1;
 /// A repeat brings the last mail or the one before; late ones may have come in between. Less than a turn of the counter.
 const AFTER_REPEAT: usize = 5;
-/// What a late read brings was accepted after it was sent, or before: it may have followed repeats, one after the other.
-const BEFORE_LATE: Duration = Duration::from_millis(200);
+/// A late read brings what the mailbox held when it was sent: a mail that was accepted by one of so many reads that were
+/// sent before it, after repeats, or after it, by the repeat that healed it. A turn of the counter brings others; a
+/// place or two is uncertain.
+const AROUND_LATE: usize = 4;
 /// How long mails are remembered for those that come late; frames come back 100 ms late at most, or count as lost.
 const KEPT_FOR: Duration = Duration::from_millis(400);
 /// Mails that are remembered at most: a mailbox that is read every 100 us fills no more in the time of the longest delay.
@@ -30,40 +31,52 @@ pub(super) enum Way {
     Usual,
     /// After a repeat request.
     Repeat,
-    /// With a read that was sent then and given up before it came back. It may have been healed meanwhile.
-    Late(Instant),
+    /// Beside the read that was waited for: by one that was given up before it came back, and may have been healed
+    /// meanwhile, or by the second copy of one.
+    Stray,
 }
 
-/// The mails that were accepted last.
+/// A mail that was accepted.
+#[derive(Clone, Copy, Debug)]
+struct Known {
+    counter: u8,
+    /// Hash of the content.
+    content: u64,
+    /// When the read that brought it was sent.
+    sent: Instant,
+}
+
+/// The mails that were accepted last, in the order in which their reads were sent: that in which the SubDevice gave them
+/// away, but for those that were repeated.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Recent {
-    /// Newest first: counter, hash of the content, when it was accepted.
-    mails: VecDeque<(u8, u64, Instant)>,
+    /// Newest first.
+    mails: VecDeque<Known>,
 }
 
 impl Recent {
-    /// Whether a mail was there before; one that was not is noted.
-    pub(super) fn is_double(&mut self, counter: u8, content: &[u8], way: Way, now: Instant) -> bool {
+    /// Whether a mail was there before; one that was not is noted. `sent` is when the read was sent that brought it, or
+    /// any time between that and the end of the read before.
+    pub(super) fn is_double(&mut self, counter: u8, content: &[u8], way: Way, sent: Instant) -> bool {
         if counter == 0 {
             return false;
         }
-        let hash = hash(content);
-        let depth = match way {
-            Way::Usual => USUAL,
-            Way::Repeat => AFTER_REPEAT,
-            Way::Late(sent) => {
-                self.mails.iter().take_while(|(_, _, at)| *at + BEFORE_LATE >= sent).count().max(AFTER_REPEAT)
-            }
+        let content = hash(content);
+        let place = self.mails.iter().position(|known| known.sent <= sent).unwrap_or(self.mails.len());
+        let candidates = match way {
+            Way::Usual => place..place + USUAL,
+            Way::Repeat => place..place + AFTER_REPEAT,
+            Way::Stray => place.saturating_sub(AROUND_LATE)..place + AROUND_LATE,
         };
-        let mut candidates = self.mails.iter().take(depth);
-        if candidates.any(|(other, content, _)| (*other, *content) == (counter, hash)) {
+        let mut candidates = self.mails.range(candidates.start..candidates.end.min(self.mails.len()));
+        if candidates.any(|known| (known.counter, known.content) == (counter, content)) {
             return true;
         }
-        let outdated = |(_, _, at): &(u8, u64, Instant)| now.since(*at) > KEPT_FOR;
+        let outdated = |known: &Known| sent.since(known.sent) > KEPT_FOR;
         while self.mails.len() > AFTER_REPEAT && (self.mails.len() >= KEPT || self.mails.back().is_some_and(outdated)) {
             self.mails.pop_back();
         }
-        self.mails.push_front((counter, hash, now));
+        self.mails.insert(place.min(self.mails.len()), Known { counter, content, sent });
         false
     }
 }
@@ -89,7 +102,7 @@ mod tests {
     }
 
     #[test]
-    fn after_a_disturbance_older_mails_are_doubles_too() {
+    fn after_a_repeat_older_mails_are_doubles_too() {
         let mut recent = Recent::default();
         let at = |ms: u64| Instant(ms * 1_000_000);
         let mut is_double = |counter, way, ms| recent.is_double(counter, b"x", way, at(ms));
@@ -98,11 +111,23 @@ mod tests {
         }
         assert!(is_double(1, Way::Repeat, 4));
         assert!(!is_double(4, Way::Repeat, 4));
-        assert!(is_double(1, Way::Late(at(1)), 5), "healed after its read was sent");
-        for counter in 5..=7 {
-            assert!(!is_double(counter, Way::Usual, counter.into()));
+    }
+
+    #[test]
+    fn what_comes_late_is_compared_with_what_was_read_about_the_time_when_it_left() {
+        let mut recent = Recent::default();
+        let at = |ms: u64| Instant(ms * 1_000_000);
+        let mut is_double = |counter, way, ms| recent.is_double(counter, b"x", way, at(ms));
+        // Each counter, then a pause of 300 ms in which one mail is repeated again and again, then each counter again.
+        for turn in 0..2 {
+            for counter in 1..=7 {
+                assert!(!is_double(counter, Way::Usual, 310 * turn + u64::from(counter)));
+            }
         }
-        assert!(is_double(1, Way::Late(at(190)), 199));
-        assert!(!is_double(1, Way::Late(at(290)), 291), "long after, it is another one");
+        assert!(is_double(7, Way::Stray, 300), "a repeat brought it long after it was accepted");
+        assert!(is_double(1, Way::Stray, 300), "healed by a read that was sent later");
+        assert!(is_double(3, Way::Stray, 312), "healed");
+        assert!(!is_double(2, Way::Stray, 316), "that with this counter before is a turn away: this one is new");
+        assert!(is_double(2, Way::Stray, 316));
     }
 }

@@ -30,6 +30,8 @@ pub(super) struct Session {
     pub send_manager: u8,
     /// Counter of the last message sent.
     pub counter: u8,
+    /// When it began.
+    pub since: Instant,
 }
 
 /// The part that changes.
@@ -42,7 +44,7 @@ pub(super) struct State {
     pub open: bool,
     /// Counts openings and closings, so that tasks of an earlier time end.
     pub time: u32,
-    pub lanes: [LaneState; Lane::ALL.len()],
+    pub lanes: [LaneState; Lane::COUNT],
     /// Lane whose turn it is to write.
     pub next_lane: usize,
     pub next_id: u32,
@@ -61,6 +63,8 @@ pub(super) struct State {
     pub blocked: bool,
     /// A read was lost: its mail has to be asked for again.
     pub repeat: bool,
+    /// A read is under way.
+    pub reading: bool,
     /// How often there was something new for the reader.
     pub tasks: u32,
     /// A repeat may bring mail that was there before.
@@ -103,6 +107,7 @@ impl Room {
             trips: Default::default(),
             blocked: false,
             repeat: false,
+            reading: false,
             tasks: 0,
             repeated: false,
             shelves: Shelves::new(),
@@ -143,20 +148,20 @@ impl Room {
             if payload.len() > room {
                 return Err(MailboxError::TooLong { bytes: payload.len(), limit: room });
             }
-            let lane = &mut state.lanes[lane as usize];
-            if !lane.has_room() {
+            let queue = &mut state.lanes[lane.place()];
+            if !queue.has_room() {
                 state.counters.refused += 1;
                 return Err(MailboxError::Full { limit });
             }
             state.next_id = state.next_id.wrapping_add(1);
-            lane.outbox.push_back(Outgoing { id: state.next_id, payload, limit, turn, asks });
+            queue.outbox.push_back(Outgoing { id: state.next_id, lane, payload, limit, turn, asks });
             state.next_id
         };
         writer::start(self);
         Ok(id)
     }
 
-    /// The mailbox may be used, with a new session or the one that there was.
+    /// The mailbox may be used, with a new session.
     pub(super) fn open(&self, session: Session) {
         {
             let state = &mut *self.state();
@@ -166,20 +171,52 @@ impl Room {
         self.tell();
     }
 
-    /// The mailbox cannot be used; everything under way ends.
-    pub(super) fn close(&self, forget: bool) {
+    /// The mailbox cannot be used, and what it held is gone; everything under way ends.
+    pub(super) fn close(&self) {
         {
             let state = &mut *self.state();
-            if forget {
-                state.session = None;
-                state.recent = Recent::default();
-            }
+            state.session = None;
+            state.recent = Recent::default();
             if !state.open {
                 return;
             }
             state.begin(false);
         }
         self.tell();
+    }
+
+    /// The mailbox cannot be used for now; everything under way ends. What was read from it, perhaps in vain, has to be
+    /// asked for again.
+    pub(super) fn suspend(&self) {
+        {
+            let state = &mut *self.state();
+            if !state.open {
+                return;
+            }
+            let repeat = state.repeat || state.reading;
+            let now = self.bus.now();
+            state.end_time(false);
+            state.repeat = repeat;
+            state.lanes.iter_mut().for_each(|lane| lane.suspend(now));
+        }
+        self.tell();
+    }
+
+    /// The mailbox may be used as before.
+    pub(super) fn resume(self: &Rc<Room>) {
+        {
+            let state = &mut *self.state();
+            if state.open || state.session.is_none() {
+                return;
+            }
+            let repeat = state.repeat;
+            let now = self.bus.now();
+            state.end_time(true);
+            state.repeat = repeat;
+            state.lanes.iter_mut().for_each(|lane| lane.resume(now));
+        }
+        self.tell();
+        reader::start(self);
     }
 
     /// There may be mail.
@@ -206,13 +243,18 @@ impl Room {
 
 impl State {
     fn begin(&mut self, open: bool) {
+        self.end_time(open);
+        self.lanes.iter_mut().for_each(LaneState::reset);
+    }
+
+    fn end_time(&mut self, open: bool) {
         self.time = self.time.wrapping_add(1);
         self.open = open;
         self.full = false;
         self.curious = false;
         self.blocked = false;
         self.repeat = false;
-        self.lanes.iter_mut().for_each(LaneState::reset);
+        self.reading = false;
         self.ethernet.reset();
     }
 
@@ -224,8 +266,8 @@ impl State {
 
 impl Session {
     /// A session with a SubDevice that has just entered PREOP or BOOT.
-    pub(super) fn new(station: StationAddress, layout: MailboxLayout, send_manager: u8) -> Session {
-        Session { station, layout, send_manager, counter: 0 }
+    pub(super) fn new(station: StationAddress, layout: MailboxLayout, send_manager: u8, since: Instant) -> Session {
+        Session { station, layout, send_manager, counter: 0, since }
     }
 
     /// Status of the send mailbox.

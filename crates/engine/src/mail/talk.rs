@@ -5,6 +5,7 @@ use core::time::Duration;
 
 use ringcat_wire::mailbox::Header;
 
+use super::delivery;
 use super::error::MailboxError;
 use super::lane::{Arrival, Asked, Lane, LaneState};
 use super::reader;
@@ -51,7 +52,7 @@ impl Drop for Turn {
 }
 
 fn leave(room: &Rc<Room>, lane: Lane, turn: u32) {
-    room.state().lanes[lane as usize].turns.retain(|other| *other != turn);
+    room.state().lanes[lane.place()].turns.retain(|other| *other != turn);
     room.news.notify();
 }
 
@@ -64,7 +65,7 @@ impl Talk {
                 return Err(MailboxError::Closed);
             }
             state.next_id = state.next_id.wrapping_add(1);
-            state.lanes[lane as usize].turns.push_back(state.next_id);
+            state.lanes[lane.place()].turns.push_back(state.next_id);
             (Turn { room: room.clone(), lane, turn: state.next_id, kept: false }, state.time)
         };
         let ready = || {
@@ -72,7 +73,7 @@ impl Talk {
             if state.time != time {
                 return Some(Err(MailboxError::Closed));
             }
-            (state.lanes[lane as usize].turns.front() == Some(&turn.turn)).then_some(Ok(()))
+            (state.lanes[lane.place()].turns.front() == Some(&turn.turn)).then_some(Ok(()))
         };
         room.news.until(ready).await?;
         turn.kept = true;
@@ -81,7 +82,7 @@ impl Talk {
 
     fn with<T>(&self, work: impl FnOnce(&mut LaneState) -> T) -> Result<T, MailboxError> {
         let state = &mut *self.room.state();
-        if state.time != self.time { Err(MailboxError::Closed) } else { Ok(work(&mut state.lanes[self.lane as usize])) }
+        if state.time != self.time { Err(MailboxError::Closed) } else { Ok(work(&mut state.lanes[self.lane.place()])) }
     }
 
     /// Bytes of payload that a message may have in both directions.
@@ -140,6 +141,12 @@ impl Talk {
         let _ = self.with(|lane| lane.pdo = header);
     }
 
+    /// Whatever comes in the protocol of the lane is taken for the answer to the next request, but for what surely comes
+    /// unasked.
+    pub(super) fn expect_any(&mut self, any: bool) {
+        let _ = self.with(|lane| lane.any = any);
+    }
+
     /// The mark of a request that was given up and whose answer may still come.
     pub fn late_mark(&self) -> Option<u16> {
         self.with(|lane| lane.late_until.map(|_| lane.mark)).ok().flatten()
@@ -160,8 +167,14 @@ impl Talk {
         loop {
             self.look_on()?;
             match self.arrival(until.since(self.room.bus.now())).await {
-                Ok(Arrival::Payload(payload)) if !is_last(&payload) => {}
-                Ok(_) | Err(MailboxError::NoAnswer { .. }) => break,
+                Ok(Arrival::Payload(payload)) => {
+                    let is_last = is_last(&payload);
+                    delivery::put_aside(&mut self.room.state(), self.lane, Arrival::Payload(payload));
+                    if is_last {
+                        break;
+                    }
+                }
+                Ok(Arrival::Refused(..)) | Err(MailboxError::NoAnswer { .. }) => break,
                 Err(error) => return Err(error),
             }
         }
@@ -191,10 +204,8 @@ impl Talk {
     /// The answer is there, all of it.
     pub fn complete(&mut self) {
         self.open = false;
-        let _ = self.with(|lane| {
-            lane.asked = None;
-            lane.forget_arrivals();
-        });
+        let _ = self.with(|lane| lane.asked = None);
+        self.put_aside();
     }
 
     /// Sends a message to which no answer is waited for. It is written even when the talk ends.
@@ -229,7 +240,7 @@ impl Talk {
         accept: impl FnMut(&[u8]) -> Option<T>,
     ) -> Result<T, MailboxError> {
         self.limit = limits.1;
-        self.with(LaneState::forget_arrivals)?;
+        self.put_aside();
         self.write(payload, limits.0, Some(limits.1)).await?;
         self.open = true;
         self.answer(limits.1, accept).await
@@ -248,10 +259,10 @@ impl Talk {
 
     /// Lets the reader look for more.
     fn look_on(&mut self) -> Result<(), MailboxError> {
-        let now = self.room.bus.now();
+        let (now, limit) = (self.room.bus.now(), self.limit);
         self.with(|lane| {
             if !lane.has_arrivals() {
-                lane.asked = Some(Asked::at(now));
+                lane.asked = Some(Asked::at(now, limit));
             }
         })?;
         reader::start(&self.room);
@@ -297,7 +308,7 @@ impl Talk {
                     if let Some(answer) = accept(&payload) {
                         return Ok(answer);
                     }
-                    self.room.state().counters.unclaimed += 1;
+                    delivery::put_aside(&mut self.room.state(), self.lane, Arrival::Payload(payload));
                     self.look_on()?;
                 }
                 Err(MailboxError::NoAnswer { .. }) => {
@@ -317,8 +328,19 @@ impl Talk {
             if lane.asked.take().is_some_and(|asked| !asked.answered) || open {
                 lane.late_until = Some(late_until);
             }
-            lane.forget_arrivals();
         });
+        self.put_aside();
+    }
+
+    /// What came and was not taken is mail that nobody asked for.
+    fn put_aside(&self) {
+        let state = &mut *self.room.state();
+        if state.time != self.time {
+            return;
+        }
+        while let Some(arrival) = state.lanes[self.lane.place()].take() {
+            delivery::put_aside(state, self.lane, arrival);
+        }
     }
 
     /// Parts that were written may still be refused.
@@ -343,6 +365,7 @@ impl Drop for Talk {
         self.give_up();
         self.leave_parts();
         self.expect_pdo(None);
+        self.expect_any(false);
         leave(&self.room, self.lane, self.turn);
     }
 }

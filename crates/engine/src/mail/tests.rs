@@ -2,7 +2,9 @@
 //! late and doubled. Time is virtual, chance comes from a seed.
 
 mod device;
+mod interrupted;
 mod protocols;
+mod raw_mail;
 mod server;
 mod storm;
 

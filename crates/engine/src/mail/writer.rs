@@ -37,9 +37,10 @@ pub(super) fn start(room: &Rc<Room>) {
 }
 
 async fn run(room: Rc<Room>, time: u32) {
-    while let Some((lane, message, session)) = next(&room, time) {
-        room.state().lanes[lane as usize].writing(&message, room.bus.now());
-        let result = write(&room, time, &session, lane, &message).await;
+    while let Some((message, session)) = next(&room, time) {
+        let lane = message.lane;
+        room.state().lanes[lane.place()].writing(&message, room.bus.now());
+        let result = write(&room, time, &session, &message).await;
         {
             let state = &mut *room.state();
             if state.time != time {
@@ -51,7 +52,7 @@ async fn run(room: Rc<Room>, time: u32) {
             if lane == Lane::Frames {
                 state.ethernet.note_fragment(now);
             }
-            state.lanes[lane as usize].wrote(&message, result, now);
+            state.lanes[lane.place()].wrote(&message, result, now);
         }
         room.tell();
         reader::start(&room);
@@ -59,34 +60,28 @@ async fn run(room: Rc<Room>, time: u32) {
 }
 
 /// The next message, with the lanes in turn; `None` ends the writer.
-fn next(room: &Rc<Room>, time: u32) -> Option<(Lane, Outgoing, Session)> {
+fn next(room: &Rc<Room>, time: u32) -> Option<(Outgoing, Session)> {
     let state = &mut *room.state();
     if state.time != time {
         return None;
     }
-    let count = Lane::ALL.len();
+    let count = Lane::COUNT;
     for step in 0..count {
         let at = (state.next_lane + step) % count;
         let Some(session) = state.session.as_mut().filter(|_| state.open) else { break };
         if let Some(message) = state.lanes[at].outbox.pop_front() {
             state.next_lane = (at + 1) % count;
             session.counter = next_counter(session.counter);
-            return Some((Lane::ALL[at], message, *session));
+            return Some((message, *session));
         }
     }
     state.writer = None;
     None
 }
 
-async fn write(
-    room: &Rc<Room>,
-    time: u32,
-    session: &Session,
-    lane: Lane,
-    message: &Outgoing,
-) -> Result<(), MailboxError> {
+async fn write(room: &Rc<Room>, time: u32, session: &Session, message: &Outgoing) -> Result<(), MailboxError> {
     let bus = &room.bus;
-    let mail = encode(session, lane, &message.payload);
+    let mail = encode(session, message.lane, &message.payload);
     let register = RegisterAddress(session.layout.receive_offset);
     let until = bus.now() + message.limit;
     let (mut losses, mut pause) = (0, FIRST_PAUSE);
@@ -108,6 +103,9 @@ async fn write(
         }
         if bus.now() >= until {
             return Err(MailboxError::Full { limit: message.limit });
+        }
+        if room.session(time).is_none() {
+            return Err(MailboxError::Closed);
         }
         // A SubDevice that cannot get rid of its own mail takes no other.
         room.state().blocked = true;

@@ -8,7 +8,7 @@ use core::time::Duration;
 use ringcat_wire::address::{StationAddress, Wkc};
 use ringcat_wire::command::Command;
 use ringcat_wire::datagram::{CIRCULATING, HEADER_LEN, OVERHEAD, WKC_LEN};
-use ringcat_wire::frame::{FrameBuilder, MAX_FRAME, MacAddress};
+use ringcat_wire::frame::{FrameBuilder, MAX_FRAME, MIN_FRAME, MacAddress};
 
 use super::Received;
 use super::bus::{BusError, Reply};
@@ -268,7 +268,7 @@ impl Shared {
                 let lead = request.lead.as_ref().map_or(0, |(_, _, data)| OVERHEAD + data.len());
                 let bytes = lead + OVERHEAD + request.data.len();
                 // Only the first datagram of a frame may be longer than the window.
-                if total + bytes > limit
+                if (total + bytes).max(MIN_FRAME) > limit
                     && (!flight.places.is_empty() || !Shared::is_starved(&mut self.blocked, id, self.now))
                 {
                     break;
@@ -346,7 +346,7 @@ impl Shared {
         self.outbox.took(self.now.since(flight.left_at));
         for read in flight.second_reads() {
             if let Some(mail) = read.mail(bytes) {
-                self.strays.keep(read.station, Stray { mail, late_since: None });
+                self.strays.keep(read.station, Stray { mail, sent_at: read.sent_at });
             }
         }
         flight.take(copy.sent_on, bytes, first);

@@ -37,8 +37,8 @@ pub(crate) struct Overdue {
 pub struct Stray {
     /// The content of the mailbox.
     pub mail: Vec<u8>,
-    /// When its read was sent, where it was given up before it came back.
-    pub late_since: Option<Instant>,
+    /// When its read was sent.
+    pub sent_at: Instant,
 }
 
 impl Overdue {
@@ -77,7 +77,7 @@ impl Strays {
                 && let Some(mail) = read.mail(bytes)
             {
                 self.overdue.remove(at);
-                self.keep(read.station, Stray { mail, late_since: Some(read.sent_at) });
+                self.keep(read.station, Stray { mail, sent_at: read.sent_at });
             }
         }
     }

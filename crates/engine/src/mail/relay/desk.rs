@@ -93,7 +93,7 @@ struct Queue {
 
 #[derive(Default)]
 struct State {
-    queues: BTreeMap<(u16, u8), Queue>,
+    queues: BTreeMap<(u16, usize), Queue>,
     answers: VecDeque<Relayed>,
     counters: RelayCounters,
 }
@@ -143,7 +143,7 @@ impl Desk {
     }
 
     fn queue(&self, job: Job, mailbox: Option<Mailbox>, lane: Lane) {
-        let key = (job.header.address, lane as u8);
+        let key = (job.header.address, lane.place());
         let state = &mut *self.shared.state.borrow_mut();
         let queue = state.queues.entry(key).or_default();
         let of_client = queue.jobs.iter().filter(|other| other.client == job.client).count();
@@ -219,7 +219,7 @@ impl Shared {
     }
 
     /// The next message: of the client whose last turn is the longest ago. `None` where there is none.
-    fn next(&self, key: (u16, u8)) -> Option<Job> {
+    fn next(&self, key: (u16, usize)) -> Option<Job> {
         let now = self.bus.now();
         let state = &mut *self.state.borrow_mut();
         let queue = state.queues.get_mut(&key)?;
@@ -242,7 +242,7 @@ impl Shared {
     }
 
     /// The next message of a client, `None` in it where the client has left.
-    fn next_of(&self, key: (u16, u8), client: u64) -> Option<Option<Job>> {
+    fn next_of(&self, key: (u16, usize), client: u64) -> Option<Option<Job>> {
         let state = &mut *self.state.borrow_mut();
         let queue = state.queues.get_mut(&key)?;
         if !queue.turns.contains_key(&client) {
@@ -253,14 +253,14 @@ impl Shared {
     }
 
     /// Whether other clients wait.
-    fn others_wait(&self, key: (u16, u8), client: u64) -> bool {
+    fn others_wait(&self, key: (u16, usize), client: u64) -> bool {
         let state = self.state.borrow();
         state.queues.get(&key).is_some_and(|queue| queue.jobs.iter().any(|job| job.client != client))
     }
 }
 
 /// Carries the messages for one SubDevice and lane, until there are none.
-async fn serve(shared: Rc<Shared>, key: (u16, u8), mailbox: Mailbox, lane: Lane) {
+async fn serve(shared: Rc<Shared>, key: (u16, usize), mailbox: Mailbox, lane: Lane) {
     while let Some(job) = shared.next(key) {
         let talk = async {
             let mut talk = mailbox.talk(lane).await?;
@@ -275,7 +275,7 @@ async fn serve(shared: Rc<Shared>, key: (u16, u8), mailbox: Mailbox, lane: Lane)
 }
 
 /// Answers the messages for the MainDevice itself, until there are none.
-async fn serve_own(shared: Rc<Shared>, key: (u16, u8)) {
+async fn serve_own(shared: Rc<Shared>, key: (u16, usize)) {
     while let Some(mut job) = shared.next(key) {
         let Some(answer) = job.own.take() else { continue };
         match answer.await {
@@ -296,7 +296,7 @@ async fn settle(talk: &mut Talk, lane: Lane) -> Result<(), MailboxError> {
 }
 
 /// One message and its answers, and what belongs to the same transfer.
-async fn converse(shared: &Rc<Shared>, key: (u16, u8), mut talk: Talk, lane: Lane, first: Job) {
+async fn converse(shared: &Rc<Shared>, key: (u16, usize), mut talk: Talk, lane: Lane, first: Job) {
     let (client, begin) = (first.client, shared.bus.now());
     let mut dialogue = Dialogue::default();
     let mut job = first;

@@ -119,7 +119,7 @@ impl Dialogue {
                 let vendor = payload.first_chunk().ok_or(ErrorReply::SIZE_TOO_SHORT)?;
                 Ok(Asks::Answer(Question::Voe(*vendor)))
             }
-            Lane::Eoe | Lane::Frames => {
+            Lane::Eoe | Lane::Frames | Lane::Other(_) => {
                 let kind = payload.first().ok_or(ErrorReply::SIZE_TOO_SHORT)? & EOE_TYPE;
                 Ok(Asks::Answer(Question::Eoe(kind + 1)))
             }

@@ -55,6 +55,8 @@ impl Server for Everything {
                 match service {
                     Some(CoeService::SdoRequest) => self.sdo(payload),
                     Some(CoeService::SdoInformation) => self.information(payload),
+                    // A service of the vendor's own.
+                    Some(CoeService::Other(9)) => vec![(Protocol::Coe, payload.to_vec())],
                     _ => Vec::new(),
                 }
             }
@@ -62,6 +64,9 @@ impl Server for Everything {
             Protocol::Soe => self.soe(payload),
             Protocol::Aoe => self.aoe(payload),
             Protocol::Voe => vec![(Protocol::Voe, payload.to_vec())],
+            // A protocol of the vendor's own: nothing for a first byte of 0.
+            Protocol::Other(9) if payload.first() == Some(&0) => Vec::new(),
+            Protocol::Other(9) => vec![(Protocol::Other(9), payload.to_vec())],
             _ => vec![(Protocol::Error, ErrorReply::new(ErrorReply::UNSUPPORTED_PROTOCOL).encode().to_vec())],
         }
     }

@@ -1,0 +1,119 @@
+//! A SubDevice that does not answer for a while, and comes back with its mailbox as it was or anew.
+
+use alloc::vec;
+use alloc::vec::Vec;
+use core::time::Duration;
+
+use ringcat_wire::address::StationAddress;
+use ringcat_wire::mailbox::Protocol;
+use ringcat_wire::mailbox::coe::Emergency;
+use ringcat_wire::mailbox::soe::Idn;
+
+use super::device::{STATION, pattern};
+use super::{Bench, Fate, LIMITS};
+use crate::link::LinkSet;
+use crate::mail::coe::{SdoAddress, read};
+use crate::mail::soe::{self, SoeAddress};
+use crate::mail::voe::{self, Voe};
+use crate::mail::{MailboxError, soe::SoeFailure};
+
+fn emergency(code: u16) -> Vec<u8> {
+    let mut mail = vec![0x00, 0x10];
+    mail.extend(Emergency { error_code: code, error_register: 0, data: [0; 5] }.encode());
+    mail
+}
+
+impl Bench {
+    /// Does not answer for 200 ms, which is noticed after `noticed`.
+    fn is_away(&mut self, noticed: Duration) {
+        let (until, end) = (self.now + noticed, self.now + Duration::from_millis(200));
+        while self.now < until {
+            self.step(|| Fate::LostOut);
+        }
+        self.mailbox.suspend();
+        while self.now < end {
+            self.step(|| Fate::LostOut);
+        }
+        self.mailbox.resume();
+    }
+
+    fn codes(&self) -> Vec<u16> {
+        core::iter::from_fn(|| self.mailbox.pop_emergency()).map(|(_, emergency)| emergency.error_code).collect()
+    }
+}
+
+#[test]
+fn a_mail_whose_read_was_lost_when_a_subdevice_stopped_answering_is_there_when_it_is_back_facts_6_2() {
+    for noticed in (0..4000).step_by(50) {
+        let mut bench = Bench::new(LinkSet::Single, 64);
+        for code in 1..=3 {
+            bench.device.say(Protocol::Coe, &emergency(code), bench.now);
+        }
+        bench.mailbox.is_full();
+        // The first read reaches the SubDevice; neither its answer nor anything after it is seen.
+        bench.step(|| Fate::LostBack);
+        bench.is_away(Duration::from_micros(noticed));
+        bench.mailbox.is_full();
+        bench.pass(Duration::from_millis(50));
+        assert_eq!(bench.codes(), [1, 2, 3], "noticed after {noticed} us: {:?}", bench.mailbox.counters());
+    }
+}
+
+#[test]
+fn an_answer_that_waited_while_a_subdevice_was_away_is_not_taken_for_that_to_another_question_facts_6_1() {
+    let message = |text: &[u8]| Voe { vendor_id: 1, vendor_type: 1, data: text.to_vec() };
+    let address = |idn| SoeAddress::value(1, Idn::standard(0, idn));
+    let object = SdoAddress::new(0x2000, 1);
+    for noticed in [0, 100, 300, 700] {
+        let mut bench = Bench::new(LinkSet::Single, 128);
+        let (old, new) = (pattern(1, 20), pattern(2, 20));
+        bench.device.server.idns.insert((1, 7), old.clone());
+        bench.device.server.objects.insert((0x2000, 1), old);
+        // One question per protocol; all reach the SubDevice, and no answer is fetched.
+        bench.device.delay = Duration::from_millis(2);
+        let [a, b, c] = core::array::from_fn(|_| bench.mailbox.clone());
+        let lost = (
+            bench.start(async move { voe::exchange(&a, &message(b"before"), LIMITS).await }),
+            bench.start(async move { soe::read(&b, address(7), LIMITS, 100).await }),
+            bench.start(async move { read(&c, object, LIMITS, 100).await }),
+        );
+        while bench.device.served.len() < 3 {
+            bench.step(|| Fate::Passes);
+        }
+        bench.is_away(Duration::from_micros(noticed));
+        assert_eq!(lost.0.take(), Some(Err(MailboxError::Closed)), "noticed after {noticed} us");
+        assert!(matches!(lost.1.take(), Some(Err(error)) if error.cause == SoeFailure::Mailbox(MailboxError::Closed)));
+        assert!(lost.2.take().is_some_and(|result| result.is_err()));
+        // The values are others now.
+        bench.device.server.idns.insert((1, 7), new.clone());
+        bench.device.server.objects.insert((0x2000, 1), new.clone());
+        let [a, b, c] = core::array::from_fn(|_| bench.mailbox.clone());
+        let asked = (
+            bench.start(async move { voe::exchange(&a, &message(b"after"), LIMITS).await }),
+            bench.start(async move { soe::read(&b, address(7), LIMITS, 100).await }),
+        );
+        assert_eq!(bench.run(async move { read(&c, object, LIMITS, 100).await }), Ok(new.clone()));
+        bench.pass(Duration::from_secs(2));
+        assert_eq!(asked.0.take(), Some(Ok(message(b"after"))), "noticed after {noticed} us");
+        assert_eq!(asked.1.take(), Some(Ok(new)), "noticed after {noticed} us");
+    }
+}
+
+#[test]
+fn what_was_read_before_a_restart_and_comes_back_after_it_is_nobodys() {
+    let mut bench = Bench::new(LinkSet::Single, 64);
+    bench.device.say(Protocol::Coe, &emergency(1), bench.now);
+    bench.mailbox.is_full();
+    bench.step(|| Fate::Late(Duration::from_millis(60)));
+    bench.pass(Duration::from_millis(10));
+    // It lost its power and is in PREOP again; the first mail of the new time is another one.
+    bench.mailbox.suspend();
+    let layout = bench.device.layout;
+    bench.mailbox.open(StationAddress(STATION), layout, 1);
+    bench.device.say(Protocol::Coe, &emergency(2), bench.now);
+    for _ in 0..10 {
+        bench.mailbox.is_full();
+        bench.pass(Duration::from_millis(10));
+    }
+    assert_eq!(bench.codes(), [2], "{:?}", bench.mailbox.counters());
+}

@@ -1,0 +1,115 @@
+//! Mail of the application's own making, and what comes while somebody else's answer is waited for.
+
+use alloc::vec;
+use alloc::vec::Vec;
+use core::time::Duration;
+
+use ringcat_wire::mailbox::voe::VoeMessage;
+use ringcat_wire::mailbox::{ErrorReply, Protocol};
+
+use super::{Bench, LIMITS};
+use crate::link::LinkSet;
+use crate::mail::voe::{self, Voe};
+use crate::mail::{Lane, MailboxError, Unsolicited, raw};
+
+/// The only type that the SubDevice knows besides those of the lanes.
+const OWN: u8 = 9;
+
+impl Bench {
+    fn unasked(&self, kind: Unsolicited) -> Vec<(Protocol, Vec<u8>)> {
+        core::iter::from_fn(|| self.mailbox.pop_unsolicited(kind)).map(|mail| (mail.protocol, mail.payload)).collect()
+    }
+
+    fn exchange(&mut self, code: u8, payload: &'static [u8]) -> Result<Vec<u8>, MailboxError> {
+        let mailbox = self.mailbox.clone();
+        self.run(async move { raw::exchange(&mailbox, Lane::of(code), payload, LIMITS).await })
+    }
+}
+
+#[test]
+fn mail_of_any_type_is_exchanged_refused_and_received_unasked_facts_6_1() {
+    let mut bench = Bench::new(LinkSet::Single, 64);
+    let own = Protocol::Other(OWN);
+    assert_eq!(bench.exchange(OWN, b"question"), Ok(b"question".to_vec()));
+    // A lane number beside its own lane is that lane.
+    let mailbox = bench.mailbox.clone();
+    let coe = bench.run(async move { raw::exchange(&mailbox, Lane::Other(3), &[0, 0x90, 7, 7], LIMITS).await });
+    assert_eq!(coe, Ok(vec![0, 0x90, 7, 7]), "a service of CoE that nobody knows");
+    for code in 6..15 {
+        if code != OWN {
+            let refused = bench.exchange(code, b"?");
+            let reply = ErrorReply::new(ErrorReply::UNSUPPORTED_PROTOCOL);
+            assert_eq!(refused, Err(MailboxError::Error(reply)), "type {code}");
+        }
+    }
+    assert_eq!(bench.unasked(Unsolicited::Other), []);
+    // Unasked, and an answer that nobody waits for.
+    bench.device.say(own, b"news", bench.now);
+    bench.device.say(Protocol::Other(12), b"more", bench.now);
+    let mailbox = bench.mailbox.clone();
+    let sent = bench.run(async move { raw::send(&mailbox, Lane::of(OWN), b"echo", LIMITS.0).await });
+    assert_eq!(sent, Ok(()));
+    bench.pass(Duration::from_millis(5));
+    bench.mailbox.is_full();
+    bench.pass(Duration::from_millis(5));
+    let more = (Protocol::Other(12), b"more".to_vec());
+    assert_eq!(bench.unasked(Unsolicited::Other), [(own, b"news".to_vec()), more, (own, b"echo".to_vec())]);
+    // Another type is no answer.
+    bench.device.say(Protocol::Other(12), b"more", bench.now);
+    assert_eq!(bench.exchange(OWN, &[0]), Err(MailboxError::NoAnswer { limit: LIMITS.1 }));
+    assert_eq!(bench.unasked(Unsolicited::Other), [(Protocol::Other(12), b"more".to_vec())]);
+    assert_eq!(bench.exchange(OWN, b"again"), Ok(b"again".to_vec()));
+    assert!(bench.mailbox.is_idle());
+}
+
+#[test]
+fn an_error_reply_that_nobody_waits_for_is_kept_as_unasked_mail() {
+    let mut bench = Bench::new(LinkSet::Single, 64);
+    let mailbox = bench.mailbox.clone();
+    bench.run(async move { raw::send(&mailbox, Lane::of(7), b"?", LIMITS.0).await }).unwrap();
+    bench.pass(Duration::from_millis(5));
+    bench.mailbox.is_full();
+    bench.pass(Duration::from_millis(5));
+    let reply = ErrorReply::new(ErrorReply::UNSUPPORTED_PROTOCOL).encode().to_vec();
+    assert_eq!(bench.unasked(Unsolicited::Other), [(Protocol::Error, reply)]);
+}
+
+#[test]
+fn vendor_messages_that_are_no_answer_are_kept_whenever_they_come_facts_6_8() {
+    let message = |vendor_id, data: &[u8]| Voe { vendor_id, vendor_type: 1, data: data.to_vec() };
+    let payload = |message: &Voe| {
+        let mut bytes = vec![0; 58];
+        let Voe { vendor_id, vendor_type, ref data } = *message;
+        let length = VoeMessage { vendor_id, vendor_type, data }.encode(&mut bytes).unwrap();
+        bytes.truncate(length);
+        bytes
+    };
+    // Before the answer, and right behind it.
+    for behind in [false, true] {
+        for other in [message(1, b"a"), message(2, b"b")] {
+            let mut bench = Bench::new(LinkSet::Single, 64);
+            let asked = message(1, b"question");
+            if !behind && other.vendor_id == asked.vendor_id {
+                // Nothing tells it from the answer.
+                continue;
+            }
+            if !behind {
+                bench.device.say(Protocol::Voe, &payload(&other), bench.now);
+            }
+            let (mailbox, sent) = (bench.mailbox.clone(), asked.clone());
+            let answer = bench.start(async move { voe::exchange(&mailbox, &sent, LIMITS).await });
+            while bench.device.served.is_empty() {
+                bench.step(|| super::Fate::Passes);
+            }
+            if behind {
+                bench.device.say(Protocol::Voe, &payload(&other), bench.now);
+            }
+            for _ in 0..20 {
+                bench.pass(Duration::from_millis(1));
+                bench.mailbox.is_full();
+            }
+            assert_eq!(answer.take(), Some(Ok(asked)));
+            assert_eq!(bench.unasked(Unsolicited::Voe), [(Protocol::Voe, payload(&other))], "behind: {behind}");
+        }
+    }
+}
