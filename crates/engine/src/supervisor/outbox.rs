@@ -4,15 +4,17 @@
 //! reads, which are long: those of a hundred SubDevices would keep the wire busy for a millisecond, in which nobody had
 //! anything to do. What was handed to the interface cannot be overtaken, so only as many reads are under way as keep the
 //! wire busy until the first of them is back.
+//!
+//! Requests go first as long as whoever makes them has not had more than his part of the wire ([`super::turns`]):
+//! otherwise those who send without pause would keep the answers of all others waiting.
 
-use alloc::collections::VecDeque;
 use core::time::Duration;
 
 use ringcat_wire::datagram::Target;
 use ringcat_wire::frame::{BYTE_TIME_NS, MAX_FRAME, wire_time_ns};
 
 use super::transfer::TransferId;
-use super::turns::Turns;
+use super::turns::{Accounts, Turn, Turns};
 use crate::time::Instant;
 
 /// Bytes of reads under way besides those that fill the wire for the time of a round trip.
@@ -32,20 +34,19 @@ pub(crate) enum Rank {
 }
 
 /// A read that waits.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 struct Read {
     id: TransferId,
     bytes: usize,
     since: Instant,
-    /// The round of everything else in which it came.
-    round: u64,
 }
 
 /// The queues.
 #[derive(Debug, Default)]
 pub(crate) struct Outbox {
-    first: Turns,
-    reads: VecDeque<Read>,
+    accounts: Accounts,
+    first: Turns<TransferId>,
+    reads: Turns<Read>,
     /// Bytes of these.
     waiting: usize,
     /// Bytes of reads that were packed and are not back.
@@ -59,25 +60,36 @@ pub(crate) struct Outbox {
 impl Outbox {
     /// Queues a datagram that takes so many bytes of a frame.
     pub(crate) fn push(&mut self, id: TransferId, rank: Rank, target: Target, bytes: usize, now: Instant) {
+        let waiting = [self.first.front().map(|(turn, _)| turn), self.reads.front().map(|(turn, _)| turn)];
+        let now_is = waiting.iter().flatten().map(|turn| turn.round).min().unwrap_or(0);
+        let turn = self.accounts.turn(target, bytes, now_is);
         match rank {
-            Rank::First => self.first.push(id, target, bytes),
+            Rank::First => self.first.push(turn, id),
             Rank::Read => {
                 self.waiting += bytes;
-                self.reads.push_back(Read { id, bytes, since: now, round: self.first.round() });
+                self.reads.push(turn, Read { id, bytes, since: now });
             }
         }
     }
 
-    /// What goes next, into a frame that may hold reads or not.
+    /// What goes next, into a frame that may hold reads or not. It is not overtaken by what comes later.
     pub(crate) fn front(&self, reads: bool, now: Instant) -> Option<(TransferId, Rank)> {
-        self.first.settle();
         let read = self.reads.front().filter(|_| reads);
         match (self.first.front(), read) {
-            (Some((_, round)), Some(read)) if round > read.round || now.since(read.since) >= PATIENCE => {
+            (Some((turn, id)), waiting) => {
+                let passes =
+                    |(other, read): &(Turn, &Read)| turn.round > other.round || now.since(read.since) >= PATIENCE;
+                if let Some((turn, read)) = waiting.filter(passes) {
+                    self.reads.settle(turn);
+                    return Some((read.id, Rank::Read));
+                }
+                self.first.settle(turn);
+                Some((*id, Rank::First))
+            }
+            (None, Some((turn, read))) => {
+                self.reads.settle(turn);
                 Some((read.id, Rank::Read))
             }
-            (Some((id, _)), _) => Some((id, Rank::First)),
-            (None, Some(read)) => Some((read.id, Rank::Read)),
             (None, None) => None,
         }
     }
@@ -85,8 +97,11 @@ impl Outbox {
     /// It is packed, or nobody wants it any more.
     pub(crate) fn pop(&mut self, rank: Rank) {
         match rank {
-            Rank::First => self.first.pop(),
-            Rank::Read => self.waiting -= self.reads.pop_front().map_or(0, |read| read.bytes),
+            Rank::First => _ = self.first.pop(),
+            Rank::Read => self.waiting -= self.reads.pop().map_or(0, |read| read.bytes),
+        }
+        if self.first.is_empty() && self.reads.is_empty() {
+            self.accounts.forget();
         }
     }
 
@@ -138,7 +153,12 @@ impl Outbox {
 
 #[cfg(test)]
 mod tests {
+    use alloc::collections::BTreeMap;
+
+    use ringcat_wire::address::{RegisterAddress, StationAddress};
+
     use super::super::transfer::{Transfer, Transfers};
+    use super::super::turns::SHARE;
     use super::*;
 
     const READ: usize = 140;
@@ -161,6 +181,66 @@ mod tests {
         assert_eq!(outbox.front(true, Instant(10)), None);
         outbox.push(c, Rank::Read, Target::None, READ, Instant(20));
         assert_eq!(outbox.front(false, Instant(20)), None, "this frame holds no reads");
+    }
+
+    /// What somebody has waiting all the time: datagrams of so many bytes, or a question and then its answer.
+    #[derive(Clone, Copy, Debug)]
+    enum Wish {
+        Datagrams(usize),
+        Mail { write: usize, read: usize },
+    }
+
+    #[test]
+    fn who_always_has_something_waiting_gets_as_many_bytes_as_any_other_to_a_datagram_of_each_and_two_shares() {
+        const MAIL: Wish = Wish::Mail { write: 40, read: READ };
+        let wishes =
+            [MAIL, Wish::Datagrams(1490), MAIL, Wish::Datagrams(28), Wish::Datagrams(400), MAIL, Wish::Datagrams(800)];
+        let mut transfers = Transfers::default();
+        let mut outbox = Outbox::default();
+        let mut owners: BTreeMap<TransferId, (usize, usize)> = BTreeMap::new();
+        let ask = |outbox: &mut Outbox, owners: &mut BTreeMap<_, _>, transfers: &mut Transfers, owner: usize, rank| {
+            let bytes = match (wishes[owner], rank) {
+                (Wish::Datagrams(bytes), _) => bytes,
+                (Wish::Mail { write, .. }, Rank::First) => write,
+                (Wish::Mail { read, .. }, Rank::Read) => read,
+            };
+            let id = transfers.insert(Transfer::for_test());
+            let target = Target::Station(StationAddress(owner as u16), RegisterAddress(0));
+            outbox.push(id, rank, target, bytes, Instant(0));
+            owners.insert(id, (owner, bytes));
+        };
+        for (owner, wish) in wishes.iter().enumerate() {
+            // Who sends datagrams has asked for a thousand at once.
+            let count = if matches!(wish, Wish::Datagrams(_)) { 1000 } else { 1 };
+            (0..count).for_each(|_| ask(&mut outbox, &mut owners, &mut transfers, owner, Rank::First));
+        }
+        let mut had = [0i64; 7];
+        // How far one has been ahead of another at any time, at least and at most.
+        let mut ahead = [[(0, 0); 7]; 7];
+        for _ in 0..20_000 {
+            let (id, rank) = outbox.front(true, Instant(0)).expect("plenty");
+            outbox.pop(rank);
+            let (owner, bytes) = owners.remove(&id).expect("it was asked for");
+            had[owner] += bytes as i64;
+            let asks = matches!(wishes[owner], Wish::Mail { .. }) && rank == Rank::First;
+            let next = if asks { Rank::Read } else { Rank::First };
+            ask(&mut outbox, &mut owners, &mut transfers, owner, next);
+            for (one, other) in (0..7).flat_map(|one| (0..7).map(move |other| (one, other))) {
+                let (least, most) = &mut ahead[one][other];
+                let by = had[one] - had[other];
+                (*least, *most) = ((*least).min(by), (*most).max(by));
+            }
+        }
+        // In any window of time, the difference is at most that between two such times.
+        let longest = wishes.map(|wish| match wish {
+            Wish::Datagrams(bytes) => bytes as i64,
+            Wish::Mail { write, read } => (write + read) as i64,
+        });
+        for (one, other) in (0..7).flat_map(|one| (0..7).map(move |other| (one, other))) {
+            let (least, most) = ahead[one][other];
+            let limit = longest[one] + longest[other] + 2 * SHARE as i64;
+            assert!(most - least <= limit, "{} bytes between {one} and {other}, {had:?}", most - least);
+        }
     }
 
     #[test]

@@ -323,6 +323,19 @@ fn a_request_abandoned_before_it_was_sent_is_never_sent() {
 }
 
 #[test]
+fn a_frame_that_is_filled_up_to_the_shortest_one_fits_the_budget_too() {
+    let mut bench = Bench::new(LinkSet::Single);
+    let bus = bench.supervisor.bus();
+    bench.start(async move { bus.fprd(STATION, map::AL_STATUS, 2).await });
+    bench.supervisor.poll(bench.now);
+    let mut sizes = Vec::new();
+    bench.supervisor.transmit(bench.now, 59, &mut |_, frame| sizes.push(frame.len()));
+    assert_eq!(sizes, []);
+    bench.supervisor.transmit(bench.now, 60, &mut |_, frame| sizes.push(frame.len()));
+    assert_eq!(sizes, [60]);
+}
+
+#[test]
 fn the_byte_budget_and_the_window_are_kept() {
     let mut bench = Bench::new(LinkSet::Single);
     let bus = bench.supervisor.bus();
