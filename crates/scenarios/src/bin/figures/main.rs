@@ -3,6 +3,7 @@
 
 mod clocks;
 mod ethernet;
+mod files;
 mod phases;
 mod ring;
 mod start_lists;
@@ -13,12 +14,13 @@ use std::process::ExitCode;
 /// A subject and what shows its figures.
 type Subject = (&'static str, fn() -> ExitCode);
 
-const SUBJECTS: [Subject; 6] = [
+const SUBJECTS: [Subject; 7] = [
     ("ring", ring::main),
     ("startup", startup::main),
     ("phases", phases::main),
     ("start_lists", start_lists::main),
     ("ethernet", ethernet::main),
+    ("files", files::main),
     ("clocks", clocks::main),
 ];
 
