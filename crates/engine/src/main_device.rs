@@ -62,7 +62,7 @@ use crate::procedures::watch_groups::{counts, watch_groups};
 use crate::queue::{Consumer, queue};
 use crate::ring::Identity;
 use crate::ring_status::{Cable, CableErrors, LinkStatus, Redundancy, RingStatus, cables};
-use crate::supervisor::{AcyclicCounters, Bus, Received, Supervisor};
+use crate::supervisor::{AcyclicCounters, Bus, Received, Supervisor, UnderWay};
 use crate::time::Instant;
 use crate::topology::Topology;
 use declaration::{
@@ -472,6 +472,11 @@ impl MainDevice {
     /// Counters of the acyclic half, from the first scan on.
     pub fn counters(&self) -> AcyclicCounters {
         self.counted.plus(self.supervisor.counters())
+    }
+
+    /// What is under way in the acyclic half.
+    pub fn under_way(&self) -> UnderWay {
+        self.supervisor.under_way()
     }
 
     /// The handle for procedures of the application's own.

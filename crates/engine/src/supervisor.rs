@@ -172,10 +172,24 @@ impl Supervisor {
         self.shared.borrow().monitor.state()
     }
 
+    /// What is under way.
+    pub fn under_way(&self) -> UnderWay {
+        UnderWay { procedures: self.executor.count(), datagrams: self.shared.borrow().transfers.count() }
+    }
+
     /// Counters since the beginning.
     pub fn counters(&self) -> AcyclicCounters {
         self.shared.borrow().counters
     }
+}
+
+/// What is under way in the acyclic half. All of it ends: what grows from one quiet moment to another was forgotten.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct UnderWay {
+    /// Procedures, those that run for ever among them.
+    pub procedures: usize,
+    /// Datagrams that somebody waits for, or that were given up while they are in a frame.
+    pub datagrams: usize,
 }
 
 impl core::fmt::Debug for Supervisor {

@@ -18,6 +18,7 @@ pub mod ethernet_host;
 pub mod figures;
 pub mod fuzz_targets;
 pub mod loss;
+pub mod mail_beside;
 pub mod mail_questions;
 pub mod meddler;
 pub mod namespaces;

@@ -32,6 +32,11 @@ impl Executor {
         Executor { shared, tasks: Vec::new(), free: Vec::new() }
     }
 
+    /// How many tasks there are.
+    pub(crate) fn count(&self) -> usize {
+        self.tasks.len() - self.free.len()
+    }
+
     /// Polls tasks that were woken, and new ones, until all wait.
     pub(crate) fn run(&mut self) {
         let mut context = Context::from_waker(Waker::noop());

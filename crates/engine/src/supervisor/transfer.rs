@@ -123,6 +123,11 @@ impl Transfers {
         TransferId { index, generation: entry.0 }
     }
 
+    /// How many there are.
+    pub(crate) fn count(&self) -> usize {
+        self.entries.len() - self.free.len()
+    }
+
     pub(crate) fn find(&mut self, id: TransferId) -> Option<&mut Transfer> {
         let (generation, transfer) = self.entries.get_mut(id.index as usize)?;
         if *generation == id.generation { transfer.as_mut() } else { None }

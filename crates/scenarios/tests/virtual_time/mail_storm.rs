@@ -1,14 +1,19 @@
 //! Any interleaving of protocols, losses, faults of mail, cut cables and power cycles, by seed: no answer reaches another
-//! question, everything ends in bounded time, and nothing stays behind in mailboxes. A list of a drive has a check sum in
-//! it: of fragments that a device takes and forgets, nothing else tells.
+//! question, everything ends in bounded time, and nothing stays behind, neither in mailboxes nor among procedures and
+//! datagrams. Beside the procedures a request of the cyclic thread, a client of the gateway and a host that downloads through
+//! the Ethernet port use each device. A list of a drive has a check sum in it: of fragments that a device takes and
+//! forgets, nothing else tells.
 
 use std::cell::Cell;
+use std::collections::BTreeMap;
 use std::ops::Range;
 use std::rc::Rc;
 use std::time::Duration;
 
-use ringcat::Limits;
+use ringcat::{Event, Limits};
+use ringcat_engine::mail::eoe::EthernetPort;
 use ringcat_engine::main_device::Pending;
+use ringcat_engine::supervisor::UnderWay;
 use ringcat_sim::application::mailbox::faults::MailFault;
 use ringcat_sim::cable::{CableId, DeviceIndex};
 use ringcat_sim::fault::Fault;
@@ -17,8 +22,10 @@ use ringcat_wire::mailbox::ErrorReply;
 use ringcat_wire::mailbox::foe::FoeErrorCode;
 use ringcat_wire::mailbox::sdo::AbortCode;
 use scenarios::dice::Dice;
+use scenarios::ethernet_host::{Addresses, download};
 use scenarios::loss::Loss;
-use scenarios::mail_questions::{Asker, KINDS};
+use scenarios::mail_beside::Beside;
+use scenarios::mail_questions::{Asker, KINDS, Kind};
 use scenarios::segments::{descriptions, ring};
 use scenarios::world::World;
 
@@ -26,12 +33,18 @@ use scenarios::world::World;
 /// tell them by (SoE, FoE, EoE; decision 0007): what happens here delays none for so long.
 const LIMITS: Limits = (Duration::from_millis(100), Duration::from_millis(250));
 const PLANT: [&str; 3] = ["all-protocols", "digital-input-8", "all-protocols"];
+/// IP address of the first one; that of the other one is written by those who ask.
+const DEVICE: [u8; 4] = [10, 0, 0, 2];
 /// The devices with all protocols, and where their mailboxes lie.
 const ALL: [usize; 2] = [0, 2];
 const RECEIVE: u16 = 0x1000;
 const SEND: u16 = 0x1400;
 /// Things that happen in a run.
 const HAPPENINGS: u32 = 12;
+/// A download through the Ethernet port of a device, and how long it may take.
+const DOWNLOAD: (usize, Duration) = (5_000, Duration::from_millis(120));
+/// Cycles within which there is a quiet moment.
+const QUIET: usize = 60;
 /// Longest time that all questions under way may take when nothing happens any more: three limits each, some times.
 const END: Duration = Duration::from_secs(5);
 
@@ -40,6 +53,10 @@ const END: Duration = Duration::from_secs(5);
 struct Tally {
     answered: Cell<u32>,
     failed: Cell<u32>,
+    downloads: Cell<u32>,
+    emergencies: Cell<u32>,
+    /// Of the answered and failed ones, those of the cyclic thread and of the gateway.
+    beside: Cell<u32>,
 }
 
 /// Something that goes wrong with the mail of a device.
@@ -63,11 +80,17 @@ fn mail_fault(dice: &mut Dice) -> MailFault {
 }
 
 /// Something that happens; cables and power are back after a while.
-fn happen(world: &mut World, dice: &mut Dice) {
+fn happen(world: &mut World, beside: &mut Beside, dice: &mut Dice, emergencies: &mut BTreeMap<u16, u32>) {
     let device = *dice.pick(&ALL);
     let station = world.station_of(device);
     match dice.below(8) {
-        0..=2 => world.fault(Fault::Mail(DeviceIndex(device), mail_fault(dice))),
+        0..=2 => {
+            let fault = mail_fault(dice);
+            if let MailFault::EmergencyBefore { count, code } = fault {
+                *emergencies.entry(code).or_default() += count;
+            }
+            world.fault(Fault::Mail(DeviceIndex(device), fault));
+        }
         3 | 4 => {
             let loss = if dice.one_in(2) { Loss::of_read(station, SEND) } else { Loss::of_write(station, RECEIVE) };
             let loss = if dice.one_in(2) { loss.on_the_way_back() } else { loss };
@@ -76,12 +99,12 @@ fn happen(world: &mut World, dice: &mut Dice) {
         5 | 6 => {
             let cable = CableId(dice.below(PLANT.len() as u64 + 1) as usize);
             world.cut(cable);
-            world.run_cycles(1 + dice.below(20));
+            beside.run_cycles(world, 1 + dice.below(20));
             world.heal(cable);
         }
         _ => {
             world.power_off(DeviceIndex(device));
-            world.run_cycles(2 + dice.below(40));
+            beside.run_cycles(world, 2 + dice.below(40));
             world.power_on(DeviceIndex(device));
         }
     }
@@ -105,6 +128,31 @@ fn start(world: &mut World, device: usize, at: usize, stop: &Rc<Cell<bool>>, tal
     })
 }
 
+/// Downloads through the Ethernet port of a device, one after the other. What breaks off is no failure, other bytes are.
+fn start_downloads(world: &mut World, device: usize, stop: &Rc<Cell<bool>>, tally: &Rc<Tally>) -> Pending<()> {
+    let (mailbox, stop, tally) = (world.mailbox(device), stop.clone(), tally.clone());
+    let addresses = Addresses { mac: [2, 0, 0, 0, 0, 9], host: [10, 0, 0, 1], device: DEVICE };
+    world.start(async move {
+        let port = EthernetPort::open(&mailbox).expect("nobody has it");
+        while !stop.get() {
+            match download(mailbox.bus().clone(), &port, addresses, DOWNLOAD.0, DOWNLOAD.1).await {
+                Ok(_) => tally.downloads.set(tally.downloads.get() + 1),
+                Err(error) => assert!(!error.contains("not what was sent"), "{error}"),
+            }
+            mailbox.bus().sleep(Duration::from_millis(1)).await;
+        }
+    })
+}
+
+/// The least that is under way within some cycles.
+fn quiet_moment(world: &mut World) -> UnderWay {
+    let loads = (0..QUIET).map(|_| {
+        world.cycle();
+        world.application().engine().under_way()
+    });
+    loads.min_by_key(|load| (load.procedures, load.datagrams)).expect("some cycles")
+}
+
 /// 30 of them, or as RINGCAT_SEEDS says: how many, or from which to before which (`3217..3218`).
 fn seeds() -> Range<u64> {
     let asked = std::env::var("RINGCAT_SEEDS").unwrap_or_default();
@@ -115,19 +163,29 @@ fn seeds() -> Range<u64> {
 fn run(seed: u64, tally: &Rc<Tally>) {
     let mut dice = Dice::new(seed);
     let options = NetworkOptions::default().with_detection_delay(Duration::from_micros(10 + dice.below(2000)));
-    let mut world = World::in_op(seed, ring(descriptions(&PLANT), options));
+    let mut plant = descriptions(&PLANT);
+    plant[ALL[0]].services.eoe.address = Some(DEVICE.into());
+    plant[ALL[0]].services.eoe.mask = Some([255, 255, 255, 0].into());
+    let mut world = World::in_op(seed, ring(plant, options));
     world.set_strict(false);
+    let before = quiet_moment(&mut world);
     let stop = Rc::new(Cell::new(false));
     let mut works = Vec::new();
+    let mut beside = Beside::new(&mut world, &ALL);
+    let mut emergencies = BTreeMap::new();
     for device in ALL {
         // Five or so of the nine kinds, none twice.
         for at in (0..KINDS.len()).filter(|_| !dice.one_in(3)) {
-            works.push(start(&mut world, device, at, &stop, tally));
+            // Who downloads from it needs its address.
+            if device != ALL[0] || KINDS[at] != Kind::Address {
+                works.push(start(&mut world, device, at, &stop, tally));
+            }
         }
     }
+    works.push(start_downloads(&mut world, ALL[0], &stop, tally));
     for _ in 0..HAPPENINGS {
-        world.run_cycles(2 + dice.below(12));
-        happen(&mut world, &mut dice);
+        beside.run_cycles(&mut world, 2 + dice.below(12));
+        happen(&mut world, &mut beside, &mut dice, &mut emergencies);
         // Somebody loses patience: whatever it was in the middle of.
         if dice.one_in(4) && works.len() > 2 {
             drop(works.swap_remove(dice.below(works.len() as u64) as usize));
@@ -141,16 +199,40 @@ fn run(seed: u64, tally: &Rc<Tally>) {
         world.finish(END, work);
     }
     world.settle();
+    let until = world.application().now() + END;
+    while !beside.stop(&mut world) {
+        assert!(world.application().now() < until, "seed {seed}: {beside:?}");
+        world.cycle();
+    }
+    tally.answered.set(tally.answered.get() + beside.answered);
+    tally.failed.set(tally.failed.get() + beside.failed);
+    tally.beside.set(tally.beside.get() + beside.answered + beside.failed);
     // An error reply does not say to what it belongs (decision 0007): one that is late on purpose would refuse the first
     // question of whoever asks now.
     world.run_cycles(100);
     // What was lost on purpose and never met its frame would meet the next one.
     for (device, kind) in ALL.into_iter().flat_map(|device| KINDS.map(|kind| (device, kind))) {
+        if (device, kind) == (ALL[0], Kind::Address) {
+            continue;
+        }
         let mut asker = Asker::new(kind, world.mailbox(device), (END, END), true);
         let result = world.run(async move { asker.ask(0xFFFF).await });
         assert_eq!(result, Ok(()), "seed {seed}, device {device}, {kind:?}");
     }
-    world.run_cycles(150);
+    world.run_cycles(90);
+    let after = quiet_moment(&mut world);
+    assert!(
+        after.procedures <= before.procedures && after.datagrams <= before.datagrams,
+        "seed {seed}: {before:?} {after:?}"
+    );
+    for event in world.events(world.beginning()) {
+        if let Event::Emergency { emergency, .. } = event.event {
+            tally.emergencies.set(tally.emergencies.get() + 1);
+            let left = emergencies.get_mut(&emergency.error_code).expect("sent on purpose");
+            assert!(*left > 0, "seed {seed}: {:#06x} came twice", emergency.error_code);
+            *left -= 1;
+        }
+    }
     for device in ALL {
         let mailbox = world.mailbox(device);
         let counters = mailbox.counters();
@@ -166,7 +248,10 @@ fn whatever_happens_to_mail_each_answer_finds_its_question_and_nothing_stays_see
     let seeds = seeds();
     let runs = (seeds.end - seeds.start) as u32;
     seeds.for_each(|seed| run(seed, &tally));
-    let (answered, failed) = (tally.answered.get(), tally.failed.get());
-    println!("{runs} runs: {answered} questions answered, {failed} failed");
-    assert!(answered > 20 * runs && failed > runs, "{answered} answered, {failed} failed");
+    let (answered, failed, downloads) = (tally.answered.get(), tally.failed.get(), tally.downloads.get());
+    let (beside, emergencies) = (tally.beside.get(), tally.emergencies.get());
+    println!("{runs} runs: {answered} questions answered, {failed} failed, {beside} of them beside procedures");
+    println!("{downloads} downloads, {emergencies} emergencies");
+    assert!(answered > 20 * runs && failed > runs && beside > 20 * runs, "{answered} answered, {failed} failed");
+    assert!(downloads > runs / 3 && emergencies > runs / 10, "{downloads} downloads, {emergencies} emergencies");
 }

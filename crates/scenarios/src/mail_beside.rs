@@ -1,0 +1,157 @@
+//! Who uses the mailboxes of devices beside procedures: a request of the cyclic thread and a client of the gateway each.
+//! Both read elements of an array, whose values show which one was asked for; anything else panics.
+
+use std::collections::BTreeMap;
+
+use ringcat::{RequestState, SdoRequest};
+use ringcat_wire::mailbox::sdo::{SdoRequest as Request, SdoResponse};
+use ringcat_wire::mailbox::{Header, Message, Protocol, gateway};
+
+use crate::world::World;
+
+/// The array, and its elements that nobody writes: each has its subindex as value.
+const ARRAY: u16 = 0x2001;
+const FIRST: u8 = 20;
+const LAST: u8 = 200;
+/// Cycles after which a client asks again when no answer came.
+const PATIENCE: u32 = 40;
+
+/// A device and who asks it.
+#[derive(Debug)]
+struct Users {
+    station: u16,
+    request: SdoRequest,
+    /// What the request asks for.
+    asked: u8,
+    client: u64,
+    counter: u8,
+    /// What the client has asked for under a counter.
+    sent: BTreeMap<u8, u8>,
+    /// For so many cycles it has waited.
+    waited: Option<u32>,
+}
+
+/// The users of some devices, and what they have come to.
+#[derive(Debug)]
+pub struct Beside {
+    users: Vec<Users>,
+    stopped: bool,
+    next: u8,
+    /// Values that were right.
+    pub answered: u32,
+    /// Requests that were told to have failed.
+    pub failed: u32,
+}
+
+impl Beside {
+    /// Users of these devices, which are declared under the same numbers.
+    pub fn new(world: &mut World, devices: &[usize]) -> Beside {
+        let users = devices.iter().map(|device| Users {
+            station: world.station_of(*device),
+            request: world.application_mut().engine_mut().create_sdo_request(*device, 8),
+            asked: FIRST,
+            client: 100 + *device as u64,
+            counter: 0,
+            sent: BTreeMap::new(),
+            waited: None,
+        });
+        let users = users.collect();
+        Beside { users, stopped: false, next: FIRST, answered: 0, failed: 0 }
+    }
+
+    /// So many cycles, with a look at everybody after each.
+    pub fn run_cycles(&mut self, world: &mut World, cycles: u64) {
+        for _ in 0..cycles {
+            world.cycle();
+            self.look(world);
+        }
+    }
+
+    /// Nobody asks any more. True when all have what they asked for, or were told that there is nothing.
+    pub fn stop(&mut self, world: &mut World) -> bool {
+        self.stopped = true;
+        for users in &mut self.users {
+            world.application_mut().engine_mut().forget_client(users.client);
+            users.sent.clear();
+        }
+        self.users.iter().all(|users| users.request.state() != RequestState::Busy)
+    }
+
+    fn element(&mut self) -> u8 {
+        self.next = if self.next == LAST { FIRST } else { self.next + 1 };
+        self.next
+    }
+
+    fn look(&mut self, world: &mut World) {
+        self.take_answers(world);
+        for at in 0..self.users.len() {
+            self.look_at_request(at);
+            let waited = &mut self.users[at].waited;
+            *waited = waited.map(|waited| waited + 1).filter(|waited| *waited < PATIENCE);
+            if waited.is_none() && !self.stopped {
+                self.ask(world, at);
+            }
+        }
+    }
+
+    fn look_at_request(&mut self, at: usize) {
+        let users = &self.users[at];
+        match users.request.state() {
+            RequestState::Busy => return,
+            RequestState::Success => {
+                let mut data = [0; 8];
+                let length = users.request.data(&mut data);
+                assert_eq!(data[..length], [users.asked, 0], "a request of the cyclic thread, device {at}");
+                self.answered += 1;
+            }
+            RequestState::Error => self.failed += 1,
+            RequestState::Unused => {}
+        }
+        if self.stopped {
+            return;
+        }
+        let element = self.element();
+        let users = &mut self.users[at];
+        users.asked = element;
+        users.request.set_object(ARRAY, element, false).expect("it is not busy");
+        users.request.read().expect("it is not busy");
+    }
+
+    fn ask(&mut self, world: &mut World, at: usize) {
+        let element = self.element();
+        let users = &mut self.users[at];
+        users.counter = users.counter % 7 + 1;
+        users.sent.insert(users.counter, element);
+        users.waited = Some(0);
+        let request = Request::Upload { index: ARRAY, sub_index: element, complete_access: false };
+        let mut payload = [0; 16];
+        let length = request.encode(&mut payload).expect("it fits");
+        let header = Header { address: users.station, ..Header::new(Protocol::Coe, users.counter, length as u16) };
+        let mut bytes = [0; 32];
+        let message = Message { header, payload: &payload[..length] };
+        let length = gateway::encode(&message, &mut bytes).expect("it fits");
+        world.application_mut().engine_mut().relay(users.client, &bytes[..length]);
+    }
+
+    fn take_answers(&mut self, world: &mut World) {
+        while let Some(relayed) = world.application_mut().engine_mut().pop_relayed() {
+            let users = self.users.iter_mut().find(|users| users.client == relayed.client).expect("a client of ours");
+            let Message { header, payload } = gateway::decode(&relayed.bytes).expect("a message");
+            let asked = users.sent.get(&header.counter).copied();
+            assert!(header.address == users.station && asked.is_some(), "to nobody's question: {header:?}");
+            users.waited = None;
+            if header.protocol != Protocol::Coe {
+                self.failed += 1;
+                continue;
+            }
+            match SdoResponse::decode(payload).expect("an SDO") {
+                SdoResponse::UploadExpedited { index, sub_index, data, .. } => {
+                    assert_eq!((index, Some(sub_index), data.first()), (ARRAY, asked, asked.as_ref()), "a client");
+                    self.answered += 1;
+                }
+                SdoResponse::Abort { .. } => self.failed += 1,
+                other => panic!("to a client that uploads: {other:?}"),
+            }
+        }
+    }
+}
