@@ -207,8 +207,22 @@ impl SubDeviceInfo {
     /// SyncManagers of the mailboxes: that of the one which the MainDevice writes, that of the one which it reads. As the
     /// SII says where it names both, else 0 and 1 (facts 3.11).
     pub fn mailbox_sync_managers(&self) -> (u8, u8) {
-        let of = |kind| (0u8..).zip(&self.sync_managers).find(|(_, sm)| sm.kind == kind).map(|(index, _)| index);
-        of(SyncManagerKind::MailboxOut).zip(of(SyncManagerKind::MailboxIn)).unwrap_or((0, 1))
+        self.sync_managers_of(self.mailbox.as_ref())
+    }
+
+    /// SyncManagers of the mailboxes in BOOT: to the SubDevice, and from it. Those at their places where the SII names some,
+    /// else the same as otherwise.
+    pub fn boot_sync_managers(&self) -> (u8, u8) {
+        self.sync_managers_of(self.bootstrap.as_ref())
+    }
+
+    fn sync_managers_of(&self, layout: Option<&MailboxLayout>) -> (u8, u8) {
+        let of = |kind, start: Option<u16>| {
+            let all = || (0u8..).zip(&self.sync_managers).filter(move |(_, sm)| sm.kind == kind);
+            all().find(|(_, sm)| Some(sm.start) == start).or_else(|| all().next()).map(|(index, _)| index)
+        };
+        let out = of(SyncManagerKind::MailboxOut, layout.map(|layout| layout.receive_offset));
+        out.zip(of(SyncManagerKind::MailboxIn, layout.map(|layout| layout.send_offset))).unwrap_or((0, 1))
     }
 
     /// Whether LRW reaches it: neither controller nor SII says no.

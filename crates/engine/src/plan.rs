@@ -114,9 +114,11 @@ pub fn plan(config: &SubDeviceConfig, info: &SubDeviceInfo) -> Result<SubDeviceP
 }
 
 fn plan_inner(config: &SubDeviceConfig, info: &SubDeviceInfo) -> Result<SubDevicePlan, PlanProblem> {
-    let mailbox =
-        info.mailbox.filter(|_| mailbox_wanted(info)).map_or(Vec::new(), |layout| mailbox_pair(info, &layout));
-    let bootstrap = info.bootstrap.map_or(Vec::new(), |layout| mailbox_pair(info, &layout));
+    let mailbox = info
+        .mailbox
+        .filter(|_| mailbox_wanted(info))
+        .map_or(Vec::new(), |layout| mailbox_pair(info, &layout, info.mailbox_sync_managers()));
+    let bootstrap = info.bootstrap.map_or(Vec::new(), |layout| mailbox_pair(info, &layout, info.boot_sync_managers()));
     let process_data = areas::areas(config, info, &mailbox)?;
     check::check(info, &mailbox, &process_data)?;
     let mut warnings = Vec::new();
@@ -161,8 +163,7 @@ fn mailbox_wanted(info: &SubDeviceInfo) -> bool {
     !managers.into_iter().any(|sm| matches!(sm.kind, SyncManagerKind::Outputs | SyncManagerKind::Inputs))
 }
 
-fn mailbox_pair(info: &SubDeviceInfo, layout: &MailboxLayout) -> Vec<SmPlan> {
-    let (out, inward) = info.mailbox_sync_managers();
+fn mailbox_pair(info: &SubDeviceInfo, layout: &MailboxLayout, (out, inward): (u8, u8)) -> Vec<SmPlan> {
     let control = |index: u8, kind, default| {
         let described = info.sync_managers.get(usize::from(index));
         described.filter(|sm| sm.kind == kind && sm.control != 0).map_or(default, |sm| sm.control)

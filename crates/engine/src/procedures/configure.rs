@@ -119,7 +119,7 @@ impl BringUp<'_> {
         self.request(AlState::Init, AlState::PreOp).await?;
         let layout = self.fleet.access().members.get(self.index).and_then(|member| member.info.as_ref()?.mailbox);
         if let (Some(layout), [_, send]) = (layout, &self.setup.plan.mailbox[..]) {
-            self.show_mail().await?;
+            self.show_mail(send.index).await?;
             self.mailbox.open(self.station, layout, send.index);
         }
         if has_application && !self.config.sii_to_pdi {
@@ -139,15 +139,17 @@ impl BringUp<'_> {
         }
         sii::assign(self.bus, self.station, true).await?;
         self.request(AlState::Init, AlState::Boot).await?;
-        self.show_mail().await?;
+        self.show_mail(send.index).await?;
         self.mailbox.open(self.station, layout, send.index);
         Ok(())
     }
 
-    /// Maps the bit that says whether there is mail; the other FMMUs follow in SAFEOP.
-    async fn show_mail(&self) -> Result<(), BusError> {
+    /// Maps the bit of a SyncManager that says whether there is mail; the other FMMUs follow in SAFEOP.
+    async fn show_mail(&self, sync_manager: u8) -> Result<(), BusError> {
         let mail = self.setup.fmmus.iter().find(|(number, _)| Some(*number) == self.setup.mail_fmmu);
         let Some((number, register)) = mail else { return Ok(()) };
+        let physical_start = map::sync_manager(sync_manager).offset(SyncManager::STATUS).0;
+        let register = Fmmu { physical_start, ..*register };
         self.bus.fpwr(self.station, map::fmmu(*number), &register.encode()).await
     }
 

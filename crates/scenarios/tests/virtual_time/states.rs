@@ -9,11 +9,15 @@ use ringcat_engine::mail::stream::Bytes;
 use ringcat_engine::procedures::configure::ConfigureError;
 use ringcat_sim::application::foe::firmware;
 use ringcat_sim::cable::DeviceIndex;
+use ringcat_sim::description::{DeviceDescription, SyncManagerDescription};
 use ringcat_sim::fault::Fault;
 use ringcat_sim::network::NetworkOptions;
 use ringcat_wire::al::{AlState, AlStatus, AlStatusCode};
 use ringcat_wire::mailbox::Protocol;
-use ringcat_wire::register::map;
+use ringcat_wire::mailbox::coe::Emergency;
+use ringcat_wire::register::{SyncManager, map};
+use ringcat_wire::sii::{MailboxLayout, SyncManagerKind};
+use scenarios::loss::Loss;
 use scenarios::segments::{descriptions, line, ring_of_16};
 use scenarios::world::{CYCLE, Mark, World};
 
@@ -42,7 +46,7 @@ fn assert_undisturbed(world: &World, since: Mark, but: usize) {
 
 fn registers(world: &World, device: usize) -> Vec<u8> {
     let controller = &world.network().device(DeviceIndex(device)).controller;
-    let sync_managers = (0..4).flat_map(|number| controller.register(map::sync_manager(number), 5).to_vec());
+    let sync_managers = (0..8).flat_map(|number| controller.register(map::sync_manager(number), 5).to_vec());
     controller.register(map::FMMU_BASE, 64).iter().copied().chain(sync_managers).collect()
 }
 
@@ -107,6 +111,75 @@ fn firmware_is_updated_through_boot_while_the_others_stay_in_op_facts_6_4() {
     world.run_cycles(20);
     assert!(world.all_in_op());
     assert_undisturbed(&world, mark, DRIVE);
+}
+
+#[test]
+fn firmware_goes_through_boot_with_mailboxes_on_the_sync_managers_that_the_sii_names_facts_3_11() {
+    for own in [false, true] {
+        let mut devices = descriptions(&KINDS);
+        let device = &mut devices[DRIVE];
+        let mailbox = device.mailbox.as_mut().expect("it has one");
+        let (receive, send) = if own {
+            // Behind all others, at places of their own, the one that is read first.
+            mailbox.bootstrap.receive_offset = 0x2000;
+            mailbox.bootstrap.send_offset = 0x2400;
+            let of = |start, kind| {
+                let like = device.sync_managers.iter().find(|manager| manager.kind == kind).expect("it has one");
+                SyncManagerDescription { start, length: mailbox.bootstrap.receive_size, ..*like }
+            };
+            let more = [of(0x2400, SyncManagerKind::MailboxIn), of(0x2000, SyncManagerKind::MailboxOut)];
+            device.sync_managers.extend(more);
+            (5, 4)
+        } else {
+            // Process data on 0 and 1, the mailboxes of all states behind it.
+            device.sync_managers.rotate_left(2);
+            for pdo in &mut device.pdos {
+                pdo.sync_manager = pdo.sync_manager.map(|number| number - 2);
+            }
+            (2, 3)
+        };
+        let boot = mailbox_of(device);
+        let mut world = World::in_op(6, line(devices, NetworkOptions::default()));
+        let mark = world.mark();
+        let before = registers(&world, DRIVE);
+        assert_eq!(world.scan.subdevices[DRIVE].boot_sync_managers(), (receive, send));
+        assert_eq!(request(&mut world, DRIVE, AlState::Boot), Ok(()));
+        let manager = |world: &World, number| {
+            let controller = &world.network().device(DeviceIndex(DRIVE)).controller;
+            let bytes = controller.register(map::sync_manager(number), 8);
+            let register = SyncManager::decode(bytes.first_chunk().expect("eight bytes"));
+            (register.start, register.length, register.activate.enable)
+        };
+        assert_eq!(manager(&world, receive), (boot.receive_offset, boot.receive_size, true), "own: {own}");
+        assert_eq!(manager(&world, send), (boot.send_offset, boot.send_size, true), "own: {own}");
+        // A lost answer is asked for again at the right one.
+        world.lose(Loss::of_read(world.station_of(DRIVE), boot.send_offset).on_the_way_back());
+        let image = firmware::image("3.1", &[0x5A; 20_000]);
+        let mailbox = world.mailbox(DRIVE);
+        let own_mailbox = mailbox.clone();
+        let written = world.run(async move {
+            foe::write(&own_mailbox, "firmware.bin", FoeOptions::default(), &mut Bytes::new(&image), |_| ()).await
+        });
+        assert!(written.is_ok(), "own: {own}: {written:?}");
+        assert_eq!((mailbox.counters().repeats, world.application().links().losses_left()), (1, 0));
+        assert_eq!(request(&mut world, DRIVE, AlState::Op), Ok(()));
+        let own_mailbox = world.mailbox(DRIVE);
+        let version = world.run(async move { coe::read(&own_mailbox, SdoAddress::new(0x100A, 0), LIMITS, 50).await });
+        assert_eq!(version, Ok(b"3.1".to_vec()));
+        world.run_cycles(20);
+        assert!(world.all_in_op());
+        assert_eq!(registers(&world, DRIVE), before, "own: {own}: all is as before");
+        assert_undisturbed(&world, mark, DRIVE);
+        // Unasked mail is found again at the SyncManager of the other states.
+        let emergency = Emergency { error_code: 0x8130, error_register: 1, data: [0; 5] };
+        assert!(world.network_mut().device_mut(DeviceIndex(DRIVE)).application.emergency(&emergency));
+        world.run_cycles(50);
+        assert_eq!(mailbox.pop_emergency().map(|(_, kept)| kept), Some(emergency), "own: {own}");
+    }
+}
+
+fn mailbox_of(device: &DeviceDescription) -> MailboxLayout {
+    device.mailbox.as_ref().expect("it has one").bootstrap
 }
 
 #[test]

@@ -55,7 +55,7 @@ pub fn sync_managers(controller: &mut Controller, now: SimTime) -> Vec<SyncManag
 
 /// The mailbox SyncManagers are as the layout (standard or bootstrap) says.
 pub fn mailbox_matches(description: &DeviceDescription, layout: &MailboxLayout, actual: &[SyncManager]) -> bool {
-    let (out, back) = mailbox_numbers(description);
+    let (out, back) = mailbox_numbers(description, layout);
     let place = |number: u8| actual.get(usize::from(number));
     let matches = |number, start, length, direction| {
         place(number).is_some_and(|manager: &SyncManager| {
@@ -70,10 +70,15 @@ pub fn mailbox_matches(description: &DeviceDescription, layout: &MailboxLayout, 
         && matches(back, layout.send_offset, layout.send_size, SyncManagerDirection::Read)
 }
 
-/// Numbers of the mailbox SyncManagers: to the device, from the device.
-pub fn mailbox_numbers(description: &DeviceDescription) -> (u8, u8) {
-    let out = description.sync_manager_of(SyncManagerKind::MailboxOut).unwrap_or(0);
-    let back = description.sync_manager_of(SyncManagerKind::MailboxIn).unwrap_or(1);
+/// Numbers of the SyncManagers of mailboxes with this layout: to the device, from the device. Those at its places where
+/// there are some, as for BOOT, else the first ones.
+pub fn mailbox_numbers(description: &DeviceDescription, layout: &MailboxLayout) -> (u8, u8) {
+    let of = |kind, start| {
+        let at_place = description.sync_managers.iter().position(|entry| (entry.kind, entry.start) == (kind, start));
+        at_place.and_then(|place| u8::try_from(place).ok()).or_else(|| description.sync_manager_of(kind))
+    };
+    let out = of(SyncManagerKind::MailboxOut, layout.receive_offset).unwrap_or(0);
+    let back = of(SyncManagerKind::MailboxIn, layout.send_offset).unwrap_or(1);
     (out, back)
 }
 

@@ -103,7 +103,7 @@ impl Application {
         if !settings::mailbox_matches(description, layout, &actual) {
             return Err(wrong);
         }
-        let numbers = settings::mailbox_numbers(description);
+        let numbers = settings::mailbox_numbers(description, layout);
         self.mailbox = Some(Mailbox::open(*layout, numbers, controller, now));
         self.servers = Servers::new(description);
         if let Some(version) = self.files.version() {
