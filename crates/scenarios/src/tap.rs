@@ -66,6 +66,8 @@ pub struct Tap {
     losses: Vec<Loss>,
     /// Waits end by up to so much too late, at random.
     oversleep_ns: u64,
+    /// Each frame leaves up to so much after it was handed over, at random.
+    late_sending_ns: u64,
     random: u64,
     /// Longest time from there to a frame of the exchange that came back before it sent again, in nanoseconds.
     flight_ns: u64,
@@ -86,6 +88,7 @@ impl Tap {
             can_disconnect: true,
             losses: Vec::new(),
             oversleep_ns: 0,
+            late_sending_ns: 0,
             random: FNV_OFFSET,
             flight_ns: 0,
         }
@@ -145,6 +148,20 @@ impl Tap {
         self.oversleep_ns = most.as_nanos() as u64;
     }
 
+    /// Each frame leaves up to so much after it was handed over from now on, at random, copies of one frame too.
+    pub fn send_late(&mut self, most: std::time::Duration) {
+        self.late_sending_ns = most.as_nanos() as u64;
+    }
+
+    /// A number up to `most`.
+    fn random(&mut self, most: u64) -> u64 {
+        // xorshift64.
+        self.random ^= self.random << 13;
+        self.random ^= self.random >> 7;
+        self.random ^= self.random << 17;
+        self.random % (most + 1)
+    }
+
     /// Copies of frames of the exchange that came back when newer ones had been sent, or twice: those that nobody may
     /// take for new.
     pub fn outdated(&self) -> u64 {
@@ -200,6 +217,10 @@ impl Links for Tap {
     }
 
     fn send(&mut self, link: Link, frame: &[u8]) {
+        if self.late_sending_ns > 0 {
+            let late = self.random(self.late_sending_ns);
+            self.segment.network_mut().advance_by(std::time::Duration::from_nanos(late));
+        }
         self.note(true, link, frame);
         if !self.is_lost(true, frame) {
             self.segment.send(link, frame);
@@ -237,11 +258,7 @@ impl Links for Tap {
         let before = self.segment.now();
         let mut until = until.min(self.limit);
         if self.oversleep_ns > 0 && until > before {
-            // xorshift64.
-            self.random ^= self.random << 13;
-            self.random ^= self.random >> 7;
-            self.random ^= self.random << 17;
-            until = Instant(until.0.saturating_add(self.random % (self.oversleep_ns + 1)));
+            until = Instant(until.0.saturating_add(self.random(self.oversleep_ns)));
         }
         self.segment.wait(until);
         let now = self.segment.now();

@@ -10,6 +10,8 @@ use ringcat_wire::address::{RegisterAddress, StationAddress, Wkc};
 use ringcat_wire::datagram::HEADER_LEN;
 use ringcat_wire::register::{EcatEvent, map};
 
+mod lead;
+
 use crate::board::Board;
 use crate::board::clocks::References;
 use crate::clocks::extend;
@@ -18,22 +20,12 @@ use crate::link::Link;
 use crate::queue::Producer;
 use crate::ring::{Arrivals, RingState};
 use crate::time::Instant;
+use lead::Lead;
 
 /// Data of each datagram: the low half of a time.
 pub(crate) const CLOCK_DATA: usize = 4;
 /// Event requests in the header of a datagram.
 const IRQ_AT: usize = HEADER_LEN - 2;
-/// A second reference is steered once in so many cycles: what little the host's sending jitters stays small.
-const STEERING_INTERVAL: u32 = 8;
-/// It is steered in each cycle while it differs by more than this.
-const NEAR_NS: i64 = 300;
-/// A second reference is told of at most this difference at a time.
-const MOST_STEERING_NS: i64 = 50_000;
-/// A change of the difference counts like the difference that it would lead to within this time: without that, the loop
-/// in the controller swings for seconds at the pace of cycles.
-const FORESIGHT_NS: i64 = 150_000_000;
-/// Filter depth of that change, as a shift.
-const CHANGE_DEPTH: u32 = 5;
 /// Results in a row inside or outside of the window until that is reported.
 const WINDOW_RESULTS: u8 = 3;
 
@@ -131,34 +123,6 @@ fn data_at(bytes: &[u8], at: usize) -> (u32, u16) {
     match bytes.get(at + HEADER_LEN..).and_then(<[u8]>::first_chunk::<{ CLOCK_DATA + 2 }>) {
         Some([a, b, c, d, low, high]) => (u32::from_le_bytes([*a, *b, *c, *d]), u16::from_le_bytes([*low, *high])),
         None => (0, 0),
-    }
-}
-
-/// How the time of a steered reference differs from that of the segment's, when frames that left together pass them.
-#[derive(Clone, Copy, Debug)]
-struct Lead {
-    /// What it differs when both show the same: their ways from the host are not equally long.
-    gap: i64,
-    /// Nanoseconds that it is ahead.
-    ahead: i64,
-    /// How fast this changes, filtered.
-    change_ppb: i64,
-    seen_at: Instant,
-}
-
-impl Lead {
-    fn begin(difference: i64, seen_at: Instant) -> Lead {
-        Lead { gap: difference, ahead: 0, change_ppb: 0, seen_at }
-    }
-
-    fn go_on(self, difference: i64, seen_at: Instant) -> Lead {
-        let ahead = difference - self.gap;
-        let passed = seen_at.0.saturating_sub(self.seen_at.0).max(1) as i64;
-        // Clocks are never further apart than what their loops can take out.
-        let change =
-            ((ahead - self.ahead).clamp(-1_000_000, 1_000_000) * 1_000_000_000 / passed).clamp(-800_000, 800_000);
-        let change_ppb = self.change_ppb + ((change - self.change_ppb) >> CHANGE_DEPTH);
-        Lead { ahead, change_ppb, seen_at, ..self }
     }
 }
 
@@ -281,13 +245,8 @@ impl Clocks {
     /// What a second reference is told, so that it follows the first one.
     fn following(&self, steered: Link, now: Instant) -> Option<(StationAddress, u32)> {
         let own = self.times[steered.index()]?;
-        let Lead { ahead, change_ppb, .. } = self.lead?;
-        let expected = ahead + change_ppb * (FORESIGHT_NS / 1_000) / 1_000_000;
-        if expected.abs() <= NEAR_NS && !self.cycle.is_multiple_of(STEERING_INTERVAL) {
-            return None;
-        }
-        let wanted = own.at(now).wrapping_sub(expected.clamp(-MOST_STEERING_NS, MOST_STEERING_NS) as u64);
-        Some((self.references.on(steered)?, wanted as u32))
+        let too_much = self.lead?.steering_ns(self.cycle)?;
+        Some((self.references.on(steered)?, own.at(now).wrapping_sub(too_much as u64) as u32))
     }
 
     /// Which references frames that leave now distribute, by how often they were posted.
@@ -312,9 +271,11 @@ impl Clocks {
             is_held = true;
         }
         self.ports_changed = ports_changed;
-        // While nobody is told a time, differences are those of a frame that came another way.
-        if seen.spread_wkc > 0 && !is_held {
-            self.judge_spread(seen.spread, board, events);
+        if seen.spread_wkc > 0 {
+            // While nobody is told a time, differences are those of a frame that came another way. A reference that is steered
+            // shows how punctual the host is; there the supervisor looks at each of the others.
+            let is_meant = !is_held && self.references.leader().1.is_none();
+            self.judge_spread(seen.spread, is_meant, board, events);
         }
     }
 
@@ -342,12 +303,12 @@ impl Clocks {
         true
     }
 
-    fn judge_spread(&mut self, spread_ns: u32, board: &Board, events: &mut Producer) {
+    fn judge_spread(&mut self, spread_ns: u32, is_meant: bool, board: &Board, events: &mut Producer) {
         self.spread_ns = Some(spread_ns);
         board.clocks.post_spread(spread_ns);
         let inside = spread_ns <= self.setup.sync_window_ns;
         // Before they have been inside there is nothing to leave.
-        if self.inside.unwrap_or(false) == inside || !board.clocks.is_window_watched() {
+        if self.inside.unwrap_or(false) == inside || !is_meant || !board.clocks.is_window_watched() {
             self.contrary = 0;
             return;
         }

@@ -53,8 +53,10 @@ pub(super) struct Node {
     pub origin: u32,
     /// DC_LATCH_MODE says that frames enter it from behind.
     pub latches_backwards: bool,
-    /// What was written to DC_FILTER_DIFFERENCE.
-    pub filter_depth: Option<u8>,
+    /// What was written to DC_FILTER_DIFFERENCE and DC_FILTER_SPEED.
+    pub filter_depths: Option<[u8; 2]>,
+    /// It has followed another clock and was locked, so that it knows its speed.
+    pub has_followed: bool,
     /// It has lost its offset and has not got one since.
     pub is_unset: bool,
     /// What was written to DC_SYSTEM_TIME_DELAY.
@@ -100,6 +102,9 @@ pub(super) struct Clocks {
     pub is_drifting: bool,
     /// All clocks were within the window for long enough.
     pub is_locked: bool,
+    /// While a reference is steered: differences have left their window, and looks in a row that contradict that.
+    pub is_outside: bool,
+    pub contrary: u8,
     /// System time when host time is zero, as the reference clock has it.
     pub epoch: u64,
 }
@@ -209,7 +214,8 @@ impl Node {
             unit: None,
             origin: 0,
             latches_backwards: false,
-            filter_depth: None,
+            filter_depths: None,
+            has_followed: false,
             is_unset: false,
             delay_ns: 0,
             offset_ns: 0,

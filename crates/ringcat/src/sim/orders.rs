@@ -5,6 +5,7 @@
 use std::fmt::Write as _;
 
 use ringcat_sim::cable::{CableId, DeviceIndex, Endpoint, HostLink};
+use ringcat_sim::device::Device;
 use ringcat_sim::fault::Fault;
 use ringcat_sim::network::Network;
 use ringcat_wire::address::RegisterAddress;
@@ -28,6 +29,7 @@ wake A           it goes on
 outputs A        the process data outputs of device A, in hexadecimal
 inputs A HEX     its process data inputs, as far as its application leaves them alone
 register A R N   N bytes of its controller from register R on, as in `register 2 0x0928 4`, in hexadecimal
+clocks           what all clocks show at this moment less what the first one shows, in nanoseconds; - has none
 mail             orders about mailboxes: `help mail` lists them
 status           devices and their states, cut cables, counters
 quit             end the simulator";
@@ -99,6 +101,7 @@ fn answer(words: &[&str], plant: &mut Plant) -> Result<String, String> {
             let (address, count) = area(address, count)?;
             Ok(hex(plant.network().device(device).controller.register(RegisterAddress(address), count)))
         }
+        ["clocks"] => Ok(clocks(plant.network())),
         ["inputs", device, bytes] => {
             let device = find_device(device, plant.network())?;
             let length = plant.network().device(device).inputs().len();
@@ -111,6 +114,18 @@ fn answer(words: &[&str], plant: &mut Plant) -> Result<String, String> {
         }
         _ => Err(format!("\"{}\" is no order; `help` lists them", words.join(" "))),
     }
+}
+
+/// The truth about the clocks, which no MainDevice sees. Those of 32 bits are compared in 32 bits.
+fn clocks(network: &Network) -> String {
+    let time = |device: &Device| {
+        let has_clock = device.description.dc.is_some();
+        has_clock.then(|| device.controller.system_time(network.now()) as u32)
+    };
+    let first = network.devices().find_map(time).unwrap_or(0);
+    let difference = |time: u32| (time.wrapping_sub(first) as i32).to_string();
+    let shown = network.devices().map(|device| time(device).map_or("-".to_owned(), difference));
+    shown.collect::<Vec<_>>().join(" ")
 }
 
 /// A register and a number of bytes behind it that a controller has.

@@ -9,6 +9,7 @@ mod bench;
 mod cables;
 mod captures;
 mod clocks;
+mod clocks_in_a_ring;
 mod cuts_beside;
 mod ethernet;
 mod foreign;

@@ -7,7 +7,9 @@ use ringcat_sim::cable::{CableId, DeviceIndex};
 use ringcat_sim::network::NetworkOptions;
 use ringcat_sim::time::SimTime;
 use ringcat_wire::al::AlStatusCode;
-use scenarios::clocks::{EPOCH, clocked, config, delay, differences, largest_spread, lock, spread, with_clocks, world};
+use scenarios::clocks::{
+    EPOCH, clocked, config, delay, differences, largest_spread, lock, spread, watch, with_clocks, world,
+};
 use scenarios::segments::{line, ring};
 use scenarios::world::World;
 
@@ -266,6 +268,34 @@ fn a_cut_and_a_heal_at_any_cable_leave_no_clock_behind_facts_7_5() {
         world.run_cycles(1_000);
         let after = largest_spread(&mut world, &all(COUNT), 200);
         assert!(after <= 100, "cable {cable}: {after} ns after the repair");
+    }
+}
+
+/// Both copies of a frame leave at times of their own: between clocks of a part no host is in between, and across both
+/// parts only as far as the mean of what it does.
+#[test]
+fn clocks_of_an_open_ring_stay_together_though_copies_leave_up_to_5_us_apart_facts_7_5() {
+    const COUNT: usize = 6;
+    for ppm in [20, 100] {
+        let mut world = world(16, ring(clocked(COUNT, ppm), NetworkOptions::default()), config());
+        world.application_mut().links_mut().send_late(Duration::from_micros(5));
+        lock(&mut world, Duration::from_secs(8));
+        world.run_cycles(300);
+        let (front, behind) = ([0, 1, 2], [3, 4, 5]);
+        let mark = world.mark();
+        for (heal, cycles) in [(false, 3_000), (true, 1_000)] {
+            if heal {
+                world.heal(CableId(3))
+            } else {
+                world.cut(CableId(3))
+            }
+            let [front, behind, across] = watch(&mut world, [&front, &behind, &all(COUNT)], cycles);
+            let text = format!("{ppm} ppm, healed {heal}: {front}, {behind} ns inside, {across} ns across");
+            println!("{text}");
+            assert!(front <= 150 && behind <= 150 && across <= 2_000, "{text}");
+        }
+        assert!(largest_spread(&mut world, &all(COUNT), 200) <= 100);
+        assert!(!world.saw(mark, |event| matches!(event, Event::SyncWindow { inside: false, .. })));
     }
 }
 

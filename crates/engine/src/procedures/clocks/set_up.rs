@@ -22,6 +22,8 @@ const EXACT_DEPTH: u8 = 0;
 const HOST_DEPTH: u8 = 4;
 /// DC_FILTER_SPEED: its reset value.
 const SPEED_DEPTH: u8 = 12;
+/// Of a second reference that knows its speed: the host's jitter must not move it.
+const STEADY_DEPTH: u8 = 15;
 /// Delays that differ by no more than this from what is written are what the same way gives when it is measured again.
 const SAME_NS: i64 = 30;
 
@@ -128,13 +130,15 @@ impl Clocks {
         self.reference.filter(here).or_else(first)
     }
 
-    /// DC_FILTER_DIFFERENCE as it should be.
-    fn filter_depth(&self, index: usize) -> u8 {
-        let link = self.nodes[index].link.unwrap_or(Link::Main);
-        let reference = self.reference_on(link).map(|reference| self.nodes[reference].unit);
+    /// DC_FILTER_DIFFERENCE and DC_FILTER_SPEED as they should be.
+    fn filter_depths(&self, index: usize) -> [u8; 2] {
+        let node = &self.nodes[index];
+        let reference = self.reference_on(node.link.unwrap_or(Link::Main));
         // A SubDevice is behind its reference where frames meet it later.
-        let is_behind = reference.is_some_and(|unit| self.nodes[index].unit > unit);
-        if is_behind { EXACT_DEPTH } else { HOST_DEPTH }
+        let is_behind = reference.is_some_and(|reference| node.unit > self.nodes[reference].unit);
+        let is_second = reference == Some(index) && self.reference != Some(index);
+        let difference = if is_behind { EXACT_DEPTH } else { HOST_DEPTH };
+        [difference, if is_second && node.has_followed { STEADY_DEPTH } else { SPEED_DEPTH }]
     }
 
     /// Whether delays on a link count from different places.
@@ -184,19 +188,18 @@ async fn write_all(bus: &Bus, clocks: &SharedClocks) -> Result<(), BusError> {
 /// Writes the filter depths of those for whom they are others than before: references and clocks in front of them are told
 /// what the host believes, all others what a reference shows.
 pub(super) async fn set_filters(bus: &Bus, clocks: &SharedClocks) {
-    let all: Vec<(usize, StationAddress, u8)> = {
+    let all: Vec<(usize, StationAddress, [u8; 2])> = {
         let clocks = clocks.access();
         let nodes = || clocks.nodes.iter().enumerate().filter(|(_, node)| node.has_clock && node.link.is_some());
-        let depth = |(index, node): (usize, &Node)| (index, node.station, clocks.filter_depth(index));
-        nodes().map(depth).filter(|(index, _, depth)| clocks.nodes[*index].filter_depth != Some(*depth)).collect()
+        let depths = |(index, node): (usize, &Node)| (index, node.station, clocks.filter_depths(index));
+        nodes().map(depths).filter(|(index, _, depths)| clocks.nodes[*index].filter_depths != Some(*depths)).collect()
     };
-    let written = bus.gather(all, |bus, (index, station, depth)| async move {
-        let depths = [depth, SPEED_DEPTH];
-        bus.fpwr(station, map::DC_FILTER_DIFFERENCE, &depths).await.ok().map(|()| (index, depth))
+    let written = bus.gather(all, |bus, (index, station, depths)| async move {
+        bus.fpwr(station, map::DC_FILTER_DIFFERENCE, &depths).await.ok().map(|()| (index, depths))
     });
     // Who has no such registers, or is gone, stays as it is.
-    for (index, depth) in written.await.into_iter().flatten() {
-        clocks.access().nodes[index].filter_depth = Some(depth);
+    for (index, depths) in written.await.into_iter().flatten() {
+        clocks.access().nodes[index].filter_depths = Some(depths);
     }
 }
 

@@ -45,6 +45,8 @@ const EXPLAINED: Duration = Duration::from_millis(20);
 const AGAIN: Duration = Duration::from_millis(20);
 /// A segment that cannot be measured for so long has its clocks followed as they were.
 const PATIENCE: Duration = Duration::from_secs(1);
+/// Looks in a row inside or outside of the window until that is reported.
+const WINDOW_LOOKS: u8 = 3;
 /// Distributions in a row; then the bus belongs to others for [`BURST_PAUSE`].
 const BURST: u32 = 8;
 const BURST_PAUSE: Duration = Duration::from_micros(100);
@@ -268,7 +270,17 @@ fn judge(bus: &Bus, fleet: &SharedFleet, answers: &[Option<Answer>]) {
             node.worst_ns = node.worst_ns.max(magnitude);
         }
         all &= node.good >= config.lock_samples;
+        node.has_followed |= node.good >= config.lock_samples && !references.contains(&Some(position));
         largest = largest.max(magnitude);
+    }
+    // Where a reference is steered, the exchange does not see how far the others are from theirs.
+    let is_steered = references.iter().all(Option::is_some);
+    let is_outside = largest > config.sync_window_ns;
+    let is_contrary = clocks.is_locked && is_outside != clocks.is_outside && (is_steered || clocks.is_outside);
+    clocks.contrary = if is_contrary { clocks.contrary + 1 } else { 0 };
+    if clocks.contrary >= WINDOW_LOOKS {
+        (clocks.is_outside, clocks.contrary) = (is_outside, 0);
+        bus.report(Event::SyncWindow { inside: !is_outside, spread_ns: largest });
     }
     if all && !clocks.is_locked {
         clocks.is_locked = true;

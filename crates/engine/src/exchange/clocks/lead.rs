@@ -1,0 +1,173 @@
+//! How a second reference follows the first one, in a ring that is open (facts 7.5).
+//!
+//! In: how both times differ when frames that left together pass them. Out: what to tell the second one. Every telling has
+//! the jitter of the host's sending in it, and so has each difference, while two clocks that have followed one before differ
+//! by nanoseconds for seconds. So a clock that is near is left alone; it is told something when its mean has strayed, and
+//! then of a mean, in every cycle. One that is far away, since it has never followed the other, is taken there as fast as
+//! its loop can.
+
+use crate::time::Instant;
+
+/// Cycles of which the mean says by how much the ways from the host to both references differ.
+const GAP_CYCLES: u32 = 16;
+/// Filter depth of the difference that is told, as a shift.
+const QUICK_DEPTH: u32 = 3;
+/// Filter depth of the difference that decides what to do.
+const SLOW_DEPTH: u32 = 6;
+/// A difference is at most so far from the mean: a stall of the host between both copies says nothing about clocks.
+const OUTLIER_NS: i64 = 3_000;
+/// From here on a clock that was left alone is steered.
+const FREE_NS: i64 = 1_000;
+/// It is left alone again when it has been as near as this for so many cycles.
+const CALM_NS: i64 = 300;
+const CALM_CYCLES: u32 = 1_000;
+/// From here on it is far away.
+const FAR_NS: i64 = 5_000;
+/// One that is far away is steered once in so many cycles,
+const INTERVAL: u32 = 8;
+/// and in each cycle while it differs by more than this.
+const NEAR_NS: i64 = 300;
+/// It is told of at most this difference at a time.
+const MOST_NS: i64 = 50_000;
+/// A change of the difference counts like the difference that it would lead to within this time: without that, the loop
+/// in the controller swings for seconds at the pace of cycles.
+const FORESIGHT_NS: i64 = 150_000_000;
+/// Filter depth of that change, as a shift.
+const CHANGE_DEPTH: u32 = 5;
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Mode {
+    Free,
+    Near,
+    Far,
+}
+
+/// How the time of a steered reference differs from that of the segment's, when frames that left together pass them.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Lead {
+    /// What it differs when both show the same: their ways from the host are not equally long.
+    gap: i64,
+    /// Differences so far, up to [`GAP_CYCLES`].
+    cycles: u32,
+    /// Nanoseconds that it is ahead, and means of that, with as many fractional bits as their depth.
+    ahead: i64,
+    quick: i64,
+    slow: i64,
+    /// How fast this changes, filtered.
+    change_ppb: i64,
+    seen_at: Instant,
+    mode: Mode,
+    /// Cycles in a row that were near.
+    calm: u32,
+}
+
+impl Lead {
+    /// Both show the same.
+    pub fn begin(difference: i64, seen_at: Instant) -> Lead {
+        Lead {
+            gap: difference,
+            cycles: 1,
+            ahead: 0,
+            quick: 0,
+            slow: 0,
+            change_ppb: 0,
+            seen_at,
+            mode: Mode::Free,
+            calm: 0,
+        }
+    }
+
+    /// Another difference was seen.
+    pub fn go_on(self, difference: i64, seen_at: Instant) -> Lead {
+        if self.cycles < GAP_CYCLES {
+            let cycles = self.cycles + 1;
+            let gap = self.gap + (difference - self.gap) / i64::from(cycles);
+            return Lead { gap, cycles, seen_at, ..self };
+        }
+        let ahead = difference - self.gap;
+        let passed = seen_at.0.saturating_sub(self.seen_at.0).max(1) as i64;
+        // Clocks are never further apart than what their loops can take out.
+        let change =
+            ((ahead - self.ahead).clamp(-1_000_000, 1_000_000) * 1_000_000_000 / passed).clamp(-800_000, 800_000);
+        let change_ppb = self.change_ppb + ((change - self.change_ppb) >> CHANGE_DEPTH);
+        let mean = self.slow >> SLOW_DEPTH;
+        let told = ahead.clamp(mean - OUTLIER_NS, mean + OUTLIER_NS);
+        let quick = self.quick + told - (self.quick >> QUICK_DEPTH);
+        let slow = self.slow + told - (self.slow >> SLOW_DEPTH);
+        let far = (slow >> SLOW_DEPTH).abs();
+        let calm = if far < CALM_NS { self.calm.saturating_add(1) } else { 0 };
+        let mode = match self.mode {
+            _ if far > FAR_NS => Mode::Far,
+            _ if calm >= CALM_CYCLES => Mode::Free,
+            Mode::Free if far > FREE_NS => Mode::Near,
+            mode => mode,
+        };
+        Lead { ahead, quick, slow, change_ppb, seen_at, mode, calm, ..self }
+    }
+
+    /// By how much it is to be told that it is ahead, in a cycle with this number; `None`: nothing.
+    pub fn steering_ns(&self, cycle: u32) -> Option<i64> {
+        match self.mode {
+            Mode::Free => None,
+            Mode::Near => Some(self.quick >> QUICK_DEPTH),
+            Mode::Far => {
+                let expected = self.ahead + self.change_ppb * (FORESIGHT_NS / 1_000) / 1_000_000;
+                let is_due = expected.abs() > NEAR_NS || cycle.is_multiple_of(INTERVAL);
+                is_due.then(|| expected.clamp(-MOST_NS, MOST_NS))
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const CYCLE_NS: u64 = 1_000_000;
+
+    fn after(lead: Lead, differences: impl IntoIterator<Item = i64>) -> Lead {
+        differences.into_iter().fold(lead, |lead, difference| {
+            let seen_at = Instant(lead.seen_at.0 + CYCLE_NS);
+            lead.go_on(difference, seen_at)
+        })
+    }
+
+    /// Up to 5 us, from a difference that means that both show the same.
+    fn jitter(count: i64) -> impl Iterator<Item = i64> {
+        (0..count).map(|number| 7_000 + (number * 7_919) % 5_001)
+    }
+
+    #[test]
+    fn jitter_of_the_host_is_no_reason_to_steer_facts_7_5() {
+        let lead = after(Lead::begin(7_100, Instant(0)), jitter(5_000));
+        assert_eq!((lead.mode, lead.steering_ns(0)), (Mode::Free, None));
+        assert!((lead.gap - 9_500).abs() < 800, "{lead:?}");
+    }
+
+    #[test]
+    fn a_stall_between_both_copies_is_no_reason_to_steer() {
+        let stalls = jitter(5_000).enumerate();
+        let stalled = stalls.map(|(number, late)| if number % 50 == 49 { late + 1_000_000 } else { late });
+        let lead = after(Lead::begin(9_500, Instant(0)), stalled);
+        assert_eq!((lead.mode, lead.steering_ns(0)), (Mode::Free, None));
+    }
+
+    #[test]
+    fn one_that_strays_is_told_of_a_mean_and_left_alone_when_it_is_back() {
+        let strayed = after(Lead::begin(0, Instant(0)), [0; 20].into_iter().chain([1_500; 200]));
+        assert_eq!(strayed.mode, Mode::Near);
+        let told = strayed.steering_ns(1).expect("it strayed");
+        assert!((1_400..=1_500).contains(&told), "{told}");
+        let back = after(strayed, [0; 1_500]);
+        assert_eq!(back.steering_ns(8), None);
+    }
+
+    #[test]
+    fn one_that_is_far_away_is_told_where_it_will_be() {
+        // 100 ppm fast, seen from the beginning.
+        let lead = after(Lead::begin(0, Instant(0)), (1..400).map(|cycle| cycle * 100));
+        assert_eq!(lead.mode, Mode::Far);
+        let told = lead.steering_ns(1).expect("it is far away");
+        assert!(told > 39_000, "{told}");
+    }
+}
