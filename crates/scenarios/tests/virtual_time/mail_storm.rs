@@ -252,6 +252,10 @@ fn whatever_happens_to_mail_each_answer_finds_its_question_and_nothing_stays_see
     let (beside, emergencies) = (tally.beside.get(), tally.emergencies.get());
     println!("{runs} runs: {answered} questions answered, {failed} failed, {beside} of them beside procedures");
     println!("{downloads} downloads, {emergencies} emergencies");
+    if runs < 30 {
+        // A few that somebody asked for say nothing about how often something happens.
+        return;
+    }
     assert!(answered > 20 * runs && failed > runs && beside > 20 * runs, "{answered} answered, {failed} failed");
     assert!(downloads > runs / 3 && emergencies > runs / 10, "{downloads} downloads, {emergencies} emergencies");
 }

@@ -375,6 +375,7 @@ async fn answers(
             talk.complete();
             return Ok(());
         }
+        let accept = |payload: &[u8]| question.goes_on(payload).then(|| payload.to_vec());
         answer = talk.more(limits.1, accept).await?;
     }
 }

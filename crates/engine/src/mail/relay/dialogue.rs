@@ -4,10 +4,10 @@ use alloc::vec;
 use alloc::vec::Vec;
 
 use ringcat_wire::mailbox::aoe::AmsHeader;
-use ringcat_wire::mailbox::coe::{CoeHeader, CoeService, SdoInformation};
+use ringcat_wire::mailbox::coe::{CoeHeader, CoeService, InformationOpcode, SdoInformation};
 use ringcat_wire::mailbox::foe::{FoeErrorCode, FoeMessage};
 use ringcat_wire::mailbox::sdo::{AbortCode, INITIATE_LEN, SdoRequest, SdoResponse};
-use ringcat_wire::mailbox::soe::{SoeMessage, SoeOperation};
+use ringcat_wire::mailbox::soe::{Idn, SoeMessage, SoeOperation};
 use ringcat_wire::mailbox::{ErrorReply, Protocol};
 
 use crate::mail::lane::Lane;
@@ -32,12 +32,12 @@ pub(super) enum Asks {
 /// By what an answer is known.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) enum Question {
-    /// Beginning of an SDO transfer, with the index.
-    Initiate(u16),
+    /// Beginning of an SDO transfer, with index and subindex.
+    Initiate(u16, u8),
     /// Part of an SDO transfer.
     Segment,
-    /// SDO information.
-    Information,
+    /// SDO information: the answer, and what it begins with.
+    Information(InformationOpcode, Vec<u8>),
     /// A packet of a file, or its acknowledgement.
     File {
         /// The number of the packet that has to come.
@@ -45,8 +45,8 @@ pub(super) enum Question {
         /// The number that has to be acknowledged.
         acknowledge: Option<u32>,
     },
-    /// SoE of a drive.
-    Soe(SoeOperation, u8),
+    /// SoE of an IDN of a drive.
+    Soe(SoeOperation, u8, Idn),
     /// AoE, with the invoke id.
     Aoe(u32),
     /// A message of the same vendor.
@@ -129,7 +129,7 @@ impl Dialogue {
     fn ask_coe(&mut self, payload: &[u8]) -> Result<Asks, u16> {
         let bytes = payload.first_chunk().ok_or(ErrorReply::SIZE_TOO_SHORT)?;
         match CoeHeader::decode(bytes).service {
-            CoeService::SdoInformation => return Ok(Asks::Answer(Question::Information)),
+            CoeService::SdoInformation => return ask_information(payload),
             CoeService::SdoRequest => {}
             _ => return Err(ErrorReply::SERVICE_NOT_SUPPORTED),
         }
@@ -157,7 +157,7 @@ impl Dialogue {
     fn initiate(&mut self, index: u16, sub_index: u8, may_go_on: bool) -> Asks {
         self.transfer = Transfer::None;
         self.pending = if may_go_on { Transfer::Object(index, sub_index) } else { Transfer::None };
-        Asks::Answer(Question::Initiate(index))
+        Asks::Answer(Question::Initiate(index, sub_index))
     }
 
     fn ask_foe(&mut self, payload: &[u8], mailbox_size: usize) -> Result<Asks, u16> {
@@ -193,14 +193,15 @@ impl Dialogue {
 
     fn ask_soe(&mut self, payload: &[u8]) -> Result<Asks, u16> {
         let message = SoeMessage::decode(payload).map_err(|_| ErrorReply::SIZE_TOO_SHORT)?;
+        let idn = Idn(message.number);
         self.pending = Transfer::None;
         Ok(match message.operation {
             SoeOperation::WriteRequest if message.incomplete => {
                 self.transfer = Transfer::Fragments;
                 Asks::Nothing
             }
-            SoeOperation::ReadRequest => Asks::Answer(Question::Soe(SoeOperation::ReadResponse, message.drive)),
-            SoeOperation::WriteRequest => Asks::Answer(Question::Soe(SoeOperation::WriteResponse, message.drive)),
+            SoeOperation::ReadRequest => Asks::Answer(Question::Soe(SoeOperation::ReadResponse, message.drive, idn)),
+            SoeOperation::WriteRequest => Asks::Answer(Question::Soe(SoeOperation::WriteResponse, message.drive, idn)),
             _ => return Err(ErrorReply::SERVICE_NOT_SUPPORTED),
         })
     }
@@ -210,7 +211,7 @@ impl Dialogue {
         let pending = core::mem::take(&mut self.pending);
         let mut more = false;
         self.transfer = match question {
-            Question::Initiate(_) | Question::Segment => match SdoResponse::decode(payload) {
+            Question::Initiate(..) | Question::Segment => match SdoResponse::decode(payload) {
                 Ok(SdoResponse::UploadNormal { total, data, .. }) if (data.len() as u64) < u64::from(total) => pending,
                 Ok(SdoResponse::UploadSegment { last: false, .. }) => pending,
                 Ok(SdoResponse::DownloadDone { .. } | SdoResponse::DownloadSegmentDone { .. }) => pending,
@@ -226,7 +227,7 @@ impl Dialogue {
                 Ok(FoeMessage::Busy { .. }) => Transfer::File,
                 _ => Transfer::None,
             },
-            Question::Information => {
+            Question::Information(..) => {
                 more = SdoInformation::decode(payload).is_ok_and(|part| part.incomplete || part.fragments_left > 0);
                 Transfer::None
             }
@@ -270,21 +271,30 @@ impl Question {
     /// The object that is asked for, where that is known.
     pub(super) fn index(&self) -> Option<u16> {
         match self {
-            Question::Initiate(index) => Some(*index),
+            Question::Initiate(index, _) => Some(*index),
             _ => None,
         }
     }
 
-    /// Whether a mail is an answer.
+    /// Whether a mail is a further part of the answer. Of the dictionary, only the first part says what it is about.
+    pub(super) fn goes_on(&self, payload: &[u8]) -> bool {
+        match self {
+            Question::Information(answer, _) => SdoInformation::decode(payload)
+                .is_ok_and(|part| part.opcode == *answer || part.opcode == InformationOpcode::Error),
+            _ => self.knows(payload),
+        }
+    }
+
+    /// Whether a mail is an answer, or the first part of it.
     pub(super) fn knows(&self, payload: &[u8]) -> bool {
         match self {
-            Question::Initiate(asked) => match SdoResponse::decode(payload) {
+            Question::Initiate(asked, asked_sub) => match SdoResponse::decode(payload) {
                 Ok(
-                    SdoResponse::DownloadDone { index, .. }
-                    | SdoResponse::UploadExpedited { index, .. }
-                    | SdoResponse::UploadNormal { index, .. }
-                    | SdoResponse::Abort { index, .. },
-                ) => index == *asked,
+                    SdoResponse::DownloadDone { index, sub_index, .. }
+                    | SdoResponse::UploadExpedited { index, sub_index, .. }
+                    | SdoResponse::UploadNormal { index, sub_index, .. }
+                    | SdoResponse::Abort { index, sub_index, .. },
+                ) => (index, sub_index) == (*asked, *asked_sub),
                 _ => false,
             },
             Question::Segment => matches!(
@@ -293,7 +303,9 @@ impl Question {
                     | SdoResponse::UploadSegment { .. }
                     | SdoResponse::Abort { .. })
             ),
-            Question::Information => SdoInformation::decode(payload).is_ok(),
+            Question::Information(answer, key) => SdoInformation::decode(payload).is_ok_and(|part| {
+                part.opcode == InformationOpcode::Error || (part.opcode == *answer && part.data.starts_with(key))
+            }),
             Question::File { data, acknowledge } => match FoeMessage::decode(payload) {
                 Ok(FoeMessage::Data { packet, .. }) => {
                     *data == Some(packet) || (data.is_none() && acknowledge.is_none())
@@ -302,8 +314,10 @@ impl Question {
                 Ok(FoeMessage::Error { .. } | FoeMessage::Busy { .. }) => true,
                 _ => false,
             },
-            Question::Soe(operation, drive) => SoeMessage::decode(payload)
-                .is_ok_and(|message| message.operation == *operation && message.drive == *drive),
+            Question::Soe(operation, drive, idn) => SoeMessage::decode(payload).is_ok_and(|message| {
+                let ours = message.idn().is_none_or(|answered| answered == *idn);
+                message.operation == *operation && message.drive == *drive && ours
+            }),
             Question::Aoe(invoke_id) => {
                 AmsHeader::decode(payload).is_ok_and(|(header, _)| header.invoke_id == *invoke_id)
             }
@@ -311,6 +325,23 @@ impl Question {
             Question::Eoe(kind) => payload.first().is_some_and(|first| first & EOE_TYPE == *kind),
         }
     }
+}
+
+/// A question about the dictionary. Answers begin with what was asked for: the kind of a list, an index, a subindex.
+fn ask_information(payload: &[u8]) -> Result<Asks, u16> {
+    let request = SdoInformation::decode(payload).map_err(|_| ErrorReply::SIZE_TOO_SHORT)?;
+    let (answer, length) = match request.opcode {
+        InformationOpcode::ListRequest => (InformationOpcode::ListResponse, 2),
+        InformationOpcode::ObjectRequest => (InformationOpcode::ObjectResponse, 2),
+        InformationOpcode::EntryRequest => (InformationOpcode::EntryResponse, 3),
+        InformationOpcode::ListResponse
+        | InformationOpcode::ObjectResponse
+        | InformationOpcode::EntryResponse
+        | InformationOpcode::Error
+        | InformationOpcode::Other(_) => return Err(ErrorReply::SERVICE_NOT_SUPPORTED),
+    };
+    let key = request.data.get(..length).ok_or(ErrorReply::SIZE_TOO_SHORT)?;
+    Ok(Asks::Answer(Question::Information(answer, key.to_vec())))
 }
 
 #[cfg(test)]

@@ -1,6 +1,7 @@
 //! Transfers of clients, message by message.
 
 use super::*;
+use ringcat_wire::mailbox::soe::SoeElements;
 
 const SIZE: usize = 128;
 
@@ -51,6 +52,47 @@ fn an_upload_in_segments_is_open_until_its_last_segment() {
         assert_eq!(dialogue.is_open(), open);
     }
     assert_eq!(dialogue.end(), None);
+}
+
+// Answers that are late are those to other questions of the same kind.
+#[test]
+fn answers_are_known_by_what_was_asked_for_facts_6_3_facts_6_6() {
+    let mut dialogue = Dialogue::default();
+    let upload = sdo(SdoRequest::Upload { index: 0x2001, sub_index: 110, complete_access: false });
+    let asked = question(&mut dialogue, Lane::Coe, &upload);
+    let expedited =
+        |index, sub_index| reply(SdoResponse::UploadExpedited { index, sub_index, complete_access: false, data: &[1] });
+    assert!(asked.knows(&expedited(0x2001, 110)));
+    assert!(!asked.knows(&expedited(0x2001, 73)) && !asked.knows(&expedited(0x2000, 110)));
+
+    let information = |opcode, data: &[u8], fragments_left| {
+        let mut out = vec![0; SdoInformation::OVERHEAD + data.len()];
+        SdoInformation { opcode, fragments_left, data, incomplete: fragments_left > 0 }.encode(&mut out).unwrap();
+        out
+    };
+    let entry = information(InformationOpcode::EntryRequest, &[0x01, 0x20, 7, 1], 0);
+    let asked = question(&mut dialogue, Lane::Coe, &entry);
+    let answer = |key: [u8; 3]| information(InformationOpcode::EntryResponse, &[&key[..], &[1, 7, 0]].concat(), 1);
+    assert!(asked.knows(&answer([0x01, 0x20, 7])) && !asked.knows(&answer([0x01, 0x20, 8])));
+    assert!(!asked.knows(&information(InformationOpcode::ObjectResponse, &[0x01, 0x20, 7], 0)));
+    assert!(asked.knows(&information(InformationOpcode::Error, &[0, 0, 2, 6], 0)));
+    assert!(asked.goes_on(&information(InformationOpcode::EntryResponse, b"name", 0)));
+    assert!(!asked.goes_on(&information(InformationOpcode::ListResponse, b"name", 0)));
+
+    let soe = |operation, idn| {
+        let message = SoeMessage::whole(operation, 1, SoeElements::VALUE, Idn::standard(0, idn), &[1, 2]);
+        let mut out = vec![0; SIZE];
+        let length = message.encode(&mut out).unwrap();
+        out.truncate(length);
+        out
+    };
+    let asked = question(&mut dialogue, Lane::Soe, &soe(SoeOperation::ReadRequest, 47));
+    assert!(asked.knows(&soe(SoeOperation::ReadResponse, 47)) && !asked.knows(&soe(SoeOperation::ReadResponse, 48)));
+    for nothing in [vec![0, 0x80], information(InformationOpcode::EntryRequest, &[1, 2], 0)] {
+        assert_eq!(dialogue.ask(Lane::Coe, &nothing, SIZE), Err(ErrorReply::SIZE_TOO_SHORT));
+    }
+    let answer = information(InformationOpcode::EntryResponse, &[1, 2, 3], 0);
+    assert_eq!(dialogue.ask(Lane::Coe, &answer, SIZE), Err(ErrorReply::SERVICE_NOT_SUPPORTED));
 }
 
 #[test]
