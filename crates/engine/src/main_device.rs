@@ -294,6 +294,7 @@ impl MainDevice {
             topology,
             ring: self.first_ring_status(),
             cables: cables.into_iter().map(|cable| (cable, CableErrors::default())).collect(),
+            recablings: 0,
             cache: self.cache.clone(),
             blocked: Vec::new(),
             statistics: book.clone(),

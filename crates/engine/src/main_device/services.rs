@@ -124,8 +124,11 @@ impl MainDevice {
 
     /// Starts to look at the whole segment again while process data goes on: who is at which place now, who is new, has
     /// moved or is gone. New ones are read, but left alone. Until the segment holds still and it is known of everybody
-    /// who it is, for so long at most; then the result is what is known. Declared SubDevices and the places of breaks go by
-    /// the cabling of the scan as before.
+    /// who it is, for so long at most; then the result is what is known.
+    ///
+    /// Places of breaks, errors of cables and positions in events go by the new cabling from then on, unless it is not
+    /// whole: while a ring is open, or a mandatory SubDevice does not answer, and where rings behind junctions are known,
+    /// they go by the cabling of before.
     pub fn start_rescan(&mut self, limit: Duration) -> Pending<Result<Rescan, ServiceError>> {
         let (bus, fleet) = (self.bus(), self.fleet.clone());
         self.start(async move { rescan(&bus, &fleet.ok_or(ServiceError::NotActive)?, limit).await })

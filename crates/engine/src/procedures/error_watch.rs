@@ -30,13 +30,19 @@ const FULL: u8 = 128;
 pub(super) async fn watch_errors(bus: Bus, fleet: SharedFleet) {
     let count = fleet.access().members.len();
     let mut last = vec![None; count];
-    let mut watched: Vec<Watched> = fleet.access().cables.iter().map(|(cable, _)| Watched::new(*cable)).collect();
-    let at_node = by_node(&watched);
+    let mut recablings = fleet.access().recablings;
+    let mut watched = watch_all(&fleet);
+    let mut at_node = by_node(&watched);
     // Others look once a second, too: not all at once.
     bus.sleep(PAUSE / 2).await;
     loop {
         bus.sleep(PAUSE).await;
         for (index, counters) in bus.gather_in_turns(present(&fleet), read).await.into_iter().flatten() {
+            if fleet.access().recablings != recablings {
+                recablings = fleet.access().recablings;
+                watched = watch_all(&fleet);
+                at_node = by_node(&watched);
+            }
             let before = last[index].replace(counters);
             fleet.access().statistics.heard(index, &counters);
             let Some(node) = fleet.access().members.get(index).and_then(|member| member.node) else { continue };
@@ -47,6 +53,10 @@ pub(super) async fn watch_errors(bus: Bus, fleet: SharedFleet) {
                 last[index] = Some(ErrorCounters::default());
             }
         }
+        // Where it was cabled anew just now, the next look begins anew.
+        if fleet.access().recablings != recablings {
+            continue;
+        }
         let now = bus.now();
         for (at, watched) in watched.iter_mut().enumerate() {
             let (fresh, event) = watched.close(now);
@@ -56,6 +66,10 @@ pub(super) async fn watch_errors(bus: Bus, fleet: SharedFleet) {
             event.into_iter().for_each(|event| bus.report(event));
         }
     }
+}
+
+fn watch_all(fleet: &SharedFleet) -> Vec<Watched> {
+    fleet.access().cables.iter().map(|(cable, _)| Watched::new(*cable)).collect()
 }
 
 /// Cables at each SubDevice, by its position.

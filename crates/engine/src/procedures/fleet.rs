@@ -52,7 +52,7 @@ pub struct Member {
     pub attempt: u32,
     /// Its registers hold its configuration, FMMUs included, until it loses power or is sent back to INIT.
     pub configured: bool,
-    /// Its place in the topology of the scan.
+    /// Its place in the topology.
     pub node: Option<usize>,
     /// Its configuration, shared with the procedure that applies it.
     pub setup: Option<Rc<Setup>>,
@@ -217,12 +217,14 @@ pub struct Fleet {
     pub next_temporary: u16,
     /// Where process data lies.
     pub layout: Layout,
-    /// Connections as the scan found them.
+    /// Connections as the scan found them, or a rescan after it.
     pub topology: Topology,
     /// What was told of the ring; counts and carriers are added where it is asked for.
     pub ring: RingStatus,
     /// All cables with what their ends have counted.
     pub cables: Vec<(Cable, CableErrors)>,
+    /// How often other cables were found since.
+    pub recablings: u32,
     /// SII contents read before.
     pub cache: SiiCache,
     /// Ports that were closed to cut SubDevices off.

@@ -8,6 +8,7 @@ mod groups;
 mod matching;
 mod owners;
 mod quiet;
+mod recabling;
 pub mod rescan;
 
 use alloc::rc::Rc;

@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use ringcat::{Event, Options, Rescan, SubDeviceState, Who, automatic};
+use ringcat::{Event, Options, PortOf, Rescan, RingState, SubDeviceState, Who, automatic};
 use ringcat_sim::cable::{CableId, DeviceIndex, Endpoint};
 use ringcat_sim::frame::Port;
 use ringcat_sim::network::builder::SegmentBuilder;
@@ -133,4 +133,79 @@ fn a_rescan_of_a_ring_tells_the_places_whole_and_broken_and_ends_in_time_while_i
     assert!(matches!(&result, Ok(rescan) if rescan.is_complete()) || result.is_err(), "{result:?}");
     world.heal(CableId(2));
     world.settle();
+}
+
+/// Damaged frames by cable, where there were some: the positions of its ends.
+fn damaged(world: &World) -> Vec<(Option<usize>, Option<usize>, u64)> {
+    let counted = world.application().engine().cable_errors();
+    let damaged = counted.iter().filter(|(_, errors)| errors.invalid_frames > 0);
+    let node = |end: Option<PortOf>| end.map(|end| end.node);
+    damaged.map(|(cable, errors)| (node(cable.near), node(cable.far), errors.invalid_frames)).collect()
+}
+
+fn place(world: &World) -> Option<(Option<usize>, Option<usize>)> {
+    let node = |end: Option<PortOf>| end.map(|end| end.node);
+    world.application().ring_status().place.map(|cable| (node(cable.near), node(cable.far)))
+}
+
+#[test]
+fn after_a_rescan_breaks_and_errors_of_cables_are_told_by_the_cabling_as_it_is() {
+    const BRANCH: DeviceIndex = DeviceIndex(5);
+    const BETWEEN: CableId = CableId(3);
+    let kinds = ["coupler", "junction", "digital-input-8", "digital-output-8", "digital-input-16"];
+    let network = SegmentBuilder::ring(devices(descriptions(&kinds)))
+        .branch(DeviceIndex(1), Port::D, devices(descriptions(&["digital-output-16"])))
+        .options(NetworkOptions::default().with_detection_delay(Duration::from_micros(10)))
+        .build()
+        .expect("a segment can be built");
+    let declare = |scan: &ringcat::Scan| {
+        let mut declaration = automatic(&scan.subdevices, CYCLE);
+        // In the order of frames: coupler, junction, what is behind it, and the rest of the ring.
+        declaration.subdevices[2].optional = true;
+        declaration
+    };
+    let mut world = World::with(3, network, &Options::default(), declare).expect("scan and activation");
+    world.settle();
+    world.set_strict(false);
+    let damage = |world: &mut World| {
+        for _ in 0..3 {
+            world.corrupt(BETWEEN, 1);
+            world.run_cycles(20);
+        }
+        // Counters are read once a second.
+        world.run_cycles(1_600);
+    };
+    damage(&mut world);
+    let first = damaged(&world);
+    let [(Some(3), Some(4), before)] = first[..] else { panic!("{first:?}") };
+    // The branch is unplugged: who is behind it comes one place sooner.
+    world.power_off(BRANCH);
+    world.until(LIMIT, "gone", |world| world.application().states()[2] == SubDeviceState::Absent);
+    world.run_cycles(50);
+    let gone = rescan(&mut world);
+    assert_eq!((gone.missing.as_slice(), gone.moved().count()), ([2].as_slice(), 0));
+    assert_eq!(damaged(&world), [(Some(2), Some(3), before)], "the same cable keeps its count");
+    damage(&mut world);
+    let again = damaged(&world);
+    assert!(matches!(again[..], [(Some(2), Some(3), now)] if now > before), "{again:?}");
+    let located = |world: &mut World, at| {
+        world.cut(BETWEEN);
+        world.run_cycles(100);
+        assert_eq!(place(world), Some(at));
+        // While it is broken, the cabling of before is the better one.
+        rescan(world);
+        world.run_cycles(100);
+        assert_eq!(place(world), Some(at));
+        world.heal(BETWEEN);
+        world.until(LIMIT, "closed", |world| world.application().ring_status().state == RingState::Closed);
+        world.run_cycles(200);
+        assert_eq!(place(world), None);
+    };
+    located(&mut world, (Some(2), Some(3)));
+    // It is back, and so are the places.
+    world.power_on(BRANCH);
+    world.until(LIMIT, "back", |world| world.application().states()[2] == OP);
+    world.run_cycles(100);
+    assert_eq!(declared(&rescan(&mut world)), (0..6).map(Some).collect::<Vec<_>>());
+    located(&mut world, (Some(3), Some(4)));
 }

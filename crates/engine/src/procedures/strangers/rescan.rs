@@ -13,6 +13,7 @@ use ringcat_wire::register::{DlStatus, PortKind, map};
 use ringcat_wire::sii::Identity;
 
 use super::owners::owners_of;
+use super::recabling;
 use super::{Knowledge, view};
 use crate::event::Event;
 use crate::procedures::fleet::SharedFleet;
@@ -43,7 +44,8 @@ pub struct Found {
     pub station: StationAddress,
     /// Who it is.
     pub who: Who,
-    /// Its place at the scan, where the order of the declared SubDevices is another one since because of it.
+    /// Its place in the cabling that was known before, where the order of the declared SubDevices is another one since
+    /// because of it.
     pub moved_from: Option<Position>,
 }
 
@@ -85,6 +87,9 @@ pub(crate) async fn rescan(bus: &Bus, fleet: &SharedFleet, limit: Duration) -> R
         let is_last = bus.now() >= until;
         match looked {
             Ok(Some(rescan)) if is_last || rescan.is_complete() => {
+                if rescan.is_complete() {
+                    recabling::adopt(bus, fleet, &rescan);
+                }
                 for (subdevice, from, to) in rescan.moved() {
                     bus.report(Event::Moved { subdevice, from, to });
                 }
