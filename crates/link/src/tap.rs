@@ -18,6 +18,7 @@ use crate::kernel::{self, errno};
 const DEVICE: &CStr = c"/dev/net/tun";
 const TUNSETIFF: libc::c_ulong = 0x4004_54CA;
 const TUNSETCARRIER: libc::c_ulong = 0x4004_54E2;
+const TUNGETIFF: libc::c_ulong = 0x8004_54D2;
 /// Where the bytes of an address begin in `sockaddr`, and what kind it is.
 const MAC_LEN: usize = 6;
 /// Frames that the host keeps for us; what is more it drops, so that its connections notice in time.
@@ -136,6 +137,11 @@ impl TapInterface {
         ioctl(&self.fd, TUNSETCARRIER, &mut value).is_ok()
     }
 
+    /// Whether it is still there: somebody else may have removed it (`ip link del`).
+    pub fn exists(&self) -> bool {
+        kernel::named(&self.name).is_ok_and(|mut request| ioctl(&self.fd, TUNGETIFF, &mut request).is_ok())
+    }
+
     fn set_mac(&self, mac: [u8; MAC_LEN]) -> Result<(), i32> {
         let mut request = kernel::named(&self.name)?;
         let mut address = libc::sockaddr { sa_family: libc::ARPHRD_ETHER, sa_data: [0; 14] };
@@ -175,7 +181,7 @@ impl TapInterface {
 /// # Safety
 /// Only for what the kernel reads and writes by its full size.
 unsafe trait Argument {}
-// SAFETY: what TUNSETIFF, SIOCSIFHWADDR and SIOCSIFTXQLEN take.
+// SAFETY: what TUNSETIFF, TUNGETIFF, SIOCSIFHWADDR and SIOCSIFTXQLEN take.
 unsafe impl Argument for libc::ifreq {}
 // SAFETY: what TUNSETCARRIER takes.
 unsafe impl Argument for libc::c_int {}

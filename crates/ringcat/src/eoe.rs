@@ -37,6 +37,11 @@ pub trait HostInterface: Send {
 
     /// Whether frames can pass.
     fn set_carrier(&mut self, carrier: bool);
+
+    /// Whether the host still has it.
+    fn exists(&self) -> bool {
+        true
+    }
 }
 
 impl HostInterface for TapInterface {
@@ -51,6 +56,10 @@ impl HostInterface for TapInterface {
     fn set_carrier(&mut self, carrier: bool) {
         // A kernel that cannot shows a carrier all the time; frames are dropped then.
         TapInterface::set_carrier(self, carrier);
+    }
+
+    fn exists(&self) -> bool {
+        TapInterface::exists(self)
     }
 }
 
@@ -98,6 +107,11 @@ pub enum EthernetNews {
         /// The SubDevice, by its index in the declaration.
         subdevice: usize,
     },
+    /// Somebody removed it. It is made anew.
+    Removed {
+        /// Its name.
+        name: String,
+    },
     /// It cannot be made. Frames of that SubDevice do not pass.
     Refused(TapError),
     /// Its SubDevice can be reached, or no longer.
@@ -115,6 +129,7 @@ impl fmt::Display for EthernetNews {
             EthernetNews::Made { name, subdevice } => {
                 write!(f, "network interface {name} leads to SubDevice {subdevice}")
             }
+            EthernetNews::Removed { name } => write!(f, "{name}: somebody removed it; it is made anew"),
             EthernetNews::Refused(error) => write!(f, "EoE: {error}"),
             EthernetNews::Carrier { name, carrier: true } => write!(f, "{name}: frames can pass"),
             EthernetNews::Carrier { name, carrier: false } => write!(f, "{name}: no carrier, its SubDevice is away"),
@@ -251,7 +266,13 @@ impl Switch {
     /// Interfaces for those that have appeared, none for those of a MainDevice that has stopped.
     fn look(&mut self, engine: &mut Engine) {
         let found = engine.ethernet_subdevices();
-        self.ends.retain(|end| found.contains(&end.subdevice));
+        self.ends.retain(|end| {
+            let removed = !end.interface.exists();
+            if removed {
+                tell(&self.shared, EthernetNews::Removed { name: end.name.clone() });
+            }
+            !removed && found.contains(&end.subdevice)
+        });
         if found.is_empty() {
             self.refused.clear();
         }

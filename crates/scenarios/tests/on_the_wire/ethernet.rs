@@ -167,6 +167,12 @@ fn two_eoe_devices_are_pinged_and_downloaded_from_through_a_bridge_without_and_f
     bench.add_routed_computer();
     ask(&["10.0.0.3/5", "10.0.0.3/50000"], |arguments| bench.start_elsewhere(Path::new("python3"), arguments));
 
+    // Somebody removes an interface: it is made anew.
+    let index = |links: &str| line(links, "eoe0s1").and_then(|line| line.split(':').next().map(str::to_owned));
+    let before = index(&bench.links_main());
+    bench.ip_main("link del eoe0s1");
+    wait(&bench, "it is there again", |links| index(links).is_some_and(|index| Some(index) != before));
+
     let (output, errors) = run.interrupt();
     let figures: Vec<&str> = output.lines().filter(|line| line.contains("eoe0")).collect();
     println!("{}", figures.join("\n"));
@@ -177,6 +183,7 @@ fn two_eoe_devices_are_pinged_and_downloaded_from_through_a_bridge_without_and_f
     );
     assert!(errors.contains("network interface eoe0s1 leads to SubDevice 1"), "{errors}");
     assert!(errors.contains("eoe0a7: no carrier, its SubDevice is away"), "{errors}");
+    assert_eq!(errors.matches("eoe0s1: somebody removed it; it is made anew").count(), 1, "{errors}");
     assert!(output.contains("stopped: outputs zero"), "{output}{errors}");
     let links = bench.links_main();
     assert!(INTERFACES.iter().all(|name| line(&links, name).is_none()), "{links}");
