@@ -29,6 +29,10 @@ use crate::window::Window;
 
 /// A request waits for so long at most until the thread looks.
 const LONGEST_SLEEP: Duration = Duration::from_millis(1);
+/// And for so long when there was one of late: who asks one thing after the other is not to wait for each.
+const SHORT_SLEEP: Duration = Duration::from_micros(50);
+/// How long that is.
+const ATTENTIVE: Duration = Duration::from_millis(2);
 /// What others may see is brought up to date this often where no event does it earlier.
 const PUBLISH: Duration = Duration::from_millis(10);
 /// Events that may wait to be fetched; further ones are dropped and counted.
@@ -98,6 +102,7 @@ impl SupervisorThread {
                 events_dropped: 0,
                 published: shared,
                 publish_at: Instant(0),
+                attentive_until: Instant(0),
             };
             worker.run(&incoming);
         };
@@ -328,6 +333,8 @@ struct Worker<L> {
     events_dropped: u64,
     published: Arc<Published>,
     publish_at: Instant,
+    /// Until when the next request is expected soon.
+    attentive_until: Instant,
 }
 
 impl<L: Links> Worker<L> {
@@ -339,28 +346,38 @@ impl<L: Links> Worker<L> {
                 engine.receive(link, frame, now);
             }) {}
             let blocked = work(engine, links, window);
+            let mut asked = false;
             loop {
                 match incoming.try_recv() {
-                    Ok(request) => self.pending.push(request),
+                    Ok(request) => {
+                        self.pending.push(request);
+                        asked = true;
+                    }
                     Err(TryRecvError::Empty) => break,
                     Err(TryRecvError::Disconnected) => return,
                 }
             }
             let news = self.pass_on_events();
             self.publish(news);
-            self.answer();
+            asked |= self.answer();
             let now = self.links.now();
+            if asked {
+                self.attentive_until = now + ATTENTIVE;
+            }
+            let longest = if now < self.attentive_until { SHORT_SLEEP } else { LONGEST_SLEEP };
             let wake = self.engine.next_deadline().unwrap_or(Instant::NEVER);
             let wake = if blocked { wake.min(self.window.look_again(now)) } else { wake };
-            self.links.wait(wake.max(now).min(now + LONGEST_SLEEP));
+            self.links.wait(wake.max(now).min(now + longest));
         }
     }
 
-    /// Answers those whose question has an answer by now.
-    fn answer(&mut self) {
+    /// Answers those whose question has an answer by now; true where there were any.
+    fn answer(&mut self) -> bool {
         let now = self.links.now();
         let Worker { pending, engine, .. } = self;
+        let before = pending.len();
         pending.retain_mut(|request| !request(engine, now));
+        pending.len() < before
     }
 
     /// True where there were any.
