@@ -75,6 +75,9 @@ pub struct RunArguments {
     /// host. Inputs are then as many cycles old as their way takes.
     #[arg(long, value_name = "CYCLES", default_value = "1", value_parser = clap::value_parser!(u8).range(1..=i64::from(MAX_UNDER_WAY)))]
     under_way: u8,
+    /// Tell everything one by one, however often it comes. Otherwise what a bad time makes many of is counted.
+    #[arg(long)]
+    tell_all: bool,
     /// How long to exchange process data once all are in OP, such as 10s or 5min; until Ctrl-C by default.
     #[arg(long = "for", value_name = "TIME", value_parser = time)]
     lasts: Option<Duration>,
@@ -130,7 +133,7 @@ pub fn run(arguments: &RunArguments) -> Result<bool, Failure> {
     }
     let cycles = application.start_cycles(move || thread.prepare_cycles(), |_| ControlFlow::Continue(()))?;
     let live = Live::new(arguments.interfaces.redundant.is_some(), clocks);
-    let telling = Telling::new(begin, names, surroundings);
+    let telling = Telling::new(begin, names, surroundings).one_by_one(arguments.tell_all);
     let mut run = Run { cycles, telling, live, clocks, beside };
     let in_op = run.reach_op(&end);
     let before = run.cycles.news().counters();

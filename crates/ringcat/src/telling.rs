@@ -43,6 +43,8 @@ pub struct Telling {
     left_out: Crowd,
     /// How many of these are accounted for.
     left_out_before: u64,
+    /// Nothing is counted instead of being told.
+    one_by_one: bool,
 }
 
 impl Telling {
@@ -58,7 +60,13 @@ impl Telling {
             still_out,
             left_out,
             left_out_before: 0,
+            one_by_one: false,
         }
+    }
+
+    /// The same, with everything told one by one, however often it comes, or not.
+    pub fn one_by_one(self, one_by_one: bool) -> Telling {
+        Telling { one_by_one, ..self }
     }
 
     /// Names of the SubDevices.
@@ -81,6 +89,7 @@ impl Telling {
         if let Some((link, source)) = cycles.news().foreign() {
             self.surroundings.note_sender(link, source).map(Told::Warning).into_iter().for_each(&mut tell);
         }
+        let all = self.one_by_one;
         while let Some(event) = cycles.supervisor().pop_event() {
             let words = describe(&event.event, &self.names);
             let is_told = match &event.event {
@@ -91,9 +100,9 @@ impl Telling {
                 }
                 Event::Domain { .. } => {
                     self.judged.clone_from(&words);
-                    self.judgements.note(1, event.at)
+                    all || self.judgements.note(1, event.at)
                 }
-                Event::Skipped { .. } => self.still_out.note(1, event.at),
+                Event::Skipped { .. } => all || self.still_out.note(1, event.at),
                 _ => true,
             };
             if is_told {
@@ -102,7 +111,7 @@ impl Telling {
         }
         let left_out = cycles.news().pace().skipped;
         let more = left_out - std::mem::replace(&mut self.left_out_before, left_out);
-        if more > 0 && self.left_out.note(more, now) {
+        if more > 0 && (all || self.left_out.note(more, now)) {
             tell(Told::Line(self.line(now, &format!("this machine: {more} cycles left out"))));
         }
         if let Some((count, within)) = self.left_out.count(now) {
