@@ -144,7 +144,6 @@ pub(crate) struct Clocks {
     application: Option<ReferenceTime>,
     /// The reference is to have this time when the next frame passes it.
     wanted: Option<u64>,
-    cycle: u32,
     spread_ns: Option<u32>,
     inside: Option<bool>,
     /// Results in a row that contradict `inside`.
@@ -200,7 +199,6 @@ impl Clocks {
             let sync = self.references.on(link).map(|station| (station, self.predicted(link, now) as u32));
             payloads[link.index()] = Payload { sync, steer: steer[link.index()] };
         }
-        self.cycle = self.cycle.wrapping_add(1);
         payloads
     }
 
@@ -245,7 +243,7 @@ impl Clocks {
     /// What a second reference is told, so that it follows the first one.
     fn following(&self, steered: Link, now: Instant) -> Option<(StationAddress, u32)> {
         let own = self.times[steered.index()]?;
-        let too_much = self.lead?.steering_ns(self.cycle)?;
+        let too_much = self.lead?.steering_ns()?;
         Some((self.references.on(steered)?, own.at(now).wrapping_sub(too_much as u64) as u32))
     }
 

@@ -55,8 +55,6 @@ pub(super) struct Node {
     pub latches_backwards: bool,
     /// What was written to DC_FILTER_DIFFERENCE and DC_FILTER_SPEED.
     pub filter_depths: Option<[u8; 2]>,
-    /// It has followed another clock and was locked, so that it knows its speed.
-    pub has_followed: bool,
     /// It has lost its offset and has not got one since.
     pub is_unset: bool,
     /// What was written to DC_SYSTEM_TIME_DELAY.
@@ -215,7 +213,6 @@ impl Node {
             origin: 0,
             latches_backwards: false,
             filter_depths: None,
-            has_followed: false,
             is_unset: false,
             delay_ns: 0,
             offset_ns: 0,

@@ -370,3 +370,23 @@ fn cycles_follow_the_reference_clock_though_the_host_wakes_late_facts_7_4() {
     }
     assert!(world.application().follower().is_some_and(Follower::is_locked));
 }
+
+/// Nobody has ever told the second part how fast the first one runs, and they are as far apart as clocks can be.
+#[test]
+fn a_ring_that_is_open_from_the_start_locks_though_copies_leave_up_to_5_us_apart_facts_7_5() {
+    let mut descriptions = clocked(6, 100);
+    (descriptions[0].clock_drift_ppb, descriptions[3].clock_drift_ppb) = (-100_000, 100_000);
+    let mut network = ring(descriptions, NetworkOptions::default());
+    network.cut(CableId(3));
+    network.advance_by(Duration::from_millis(1));
+    let mut world = world(17, network, config());
+    world.application_mut().links_mut().send_late(Duration::from_micros(5));
+    lock(&mut world, Duration::from_secs(5));
+    world.run_cycles(1_500);
+    let [front, behind, across] = watch(&mut world, [&[0, 1, 2], &[3, 4, 5], &all(6)], 1_000);
+    assert!(front <= 500 && behind <= 500 && across <= 5_000, "{front}, {behind} ns inside, {across} ns across");
+    world.heal(CableId(3));
+    world.run_cycles(2_000);
+    let after = largest_spread(&mut world, &all(6), 200);
+    assert!(after <= 100, "{after} ns after the repair");
+}

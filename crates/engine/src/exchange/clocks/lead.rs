@@ -10,30 +10,35 @@ use crate::time::Instant;
 
 /// Cycles of which the mean says by how much the ways from the host to both references differ.
 const GAP_CYCLES: u32 = 16;
-/// Filter depth of the difference that is told, as a shift.
-const QUICK_DEPTH: u32 = 3;
+/// Fractional bits of nanoseconds.
+const FRACTION: u32 = 8;
+/// Parts of what was not expected by which the difference and its change are corrected, as shifts.
+const DIFFERENCE_DEPTH: u32 = 3;
+const CHANGE_DEPTH: u32 = 8;
+/// What is not expected counts for at most so much.
+const UNEXPECTED_NS: i64 = 20_000;
+/// A difference is at most this: it may come of nonsense on the wire.
+const ABSURD_NS: i64 = 1 << 40;
+/// A time between two differences counts for at most so much.
+const LONGEST_NS: u64 = 10_000_000;
 /// Filter depth of the difference that decides what to do.
 const SLOW_DEPTH: u32 = 6;
-/// A difference is at most so far from the mean: a stall of the host between both copies says nothing about clocks.
+/// There a difference is at most so far from the mean: a stall of the host between both copies says nothing about clocks.
 const OUTLIER_NS: i64 = 3_000;
 /// From here on a clock that was left alone is steered.
 const FREE_NS: i64 = 1_000;
 /// It is left alone again when it has been as near as this for so many cycles.
-const CALM_NS: i64 = 300;
+const CALM_NS: i64 = 500;
 const CALM_CYCLES: u32 = 1_000;
-/// From here on it is far away.
+/// From here on it is far away, until it has been nearer than [`FREE_NS`] for as many.
 const FAR_NS: i64 = 5_000;
-/// One that is far away is steered once in so many cycles,
-const INTERVAL: u32 = 8;
-/// and in each cycle while it differs by more than this.
-const NEAR_NS: i64 = 300;
 /// It is told of at most this difference at a time.
 const MOST_NS: i64 = 50_000;
-/// A change of the difference counts like the difference that it would lead to within this time: without that, the loop
-/// in the controller swings for seconds at the pace of cycles.
+/// Far away, a change of the difference counts like the difference that it would lead to within this time: without that, the
+/// loop in the controller swings for seconds at the pace of cycles.
 const FORESIGHT_NS: i64 = 150_000_000;
-/// Filter depth of that change, as a shift.
-const CHANGE_DEPTH: u32 = 5;
+/// Clocks never differ by more than what their loops can take out.
+const MOST_PPB: i64 = 800_000;
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Mode {
@@ -49,12 +54,11 @@ pub(super) struct Lead {
     gap: i64,
     /// Differences so far, up to [`GAP_CYCLES`].
     cycles: u32,
-    /// Nanoseconds that it is ahead, and means of that, with as many fractional bits as their depth.
+    /// Nanoseconds that it is ahead, with fraction, and how fast this changes.
     ahead: i64,
-    quick: i64,
-    slow: i64,
-    /// How fast this changes, filtered.
     change_ppb: i64,
+    /// A longer mean, with as many fractional bits as its depth.
+    slow: i64,
     seen_at: Instant,
     mode: Mode,
     /// Cycles in a row that were near.
@@ -64,58 +68,50 @@ pub(super) struct Lead {
 impl Lead {
     /// Both show the same.
     pub fn begin(difference: i64, seen_at: Instant) -> Lead {
-        Lead {
-            gap: difference,
-            cycles: 1,
-            ahead: 0,
-            quick: 0,
-            slow: 0,
-            change_ppb: 0,
-            seen_at,
-            mode: Mode::Free,
-            calm: 0,
-        }
+        let cycles = 1;
+        Lead { gap: difference, cycles, ahead: 0, change_ppb: 0, slow: 0, seen_at, mode: Mode::Free, calm: 0 }
     }
 
     /// Another difference was seen.
     pub fn go_on(self, difference: i64, seen_at: Instant) -> Lead {
         if self.cycles < GAP_CYCLES {
             let cycles = self.cycles + 1;
-            let gap = self.gap + (difference - self.gap) / i64::from(cycles);
+            let gap = self.gap.saturating_add(difference.saturating_sub(self.gap) / i64::from(cycles));
             return Lead { gap, cycles, seen_at, ..self };
         }
-        let ahead = difference - self.gap;
-        let passed = seen_at.0.saturating_sub(self.seen_at.0).max(1) as i64;
-        // Clocks are never further apart than what their loops can take out.
-        let change =
-            ((ahead - self.ahead).clamp(-1_000_000, 1_000_000) * 1_000_000_000 / passed).clamp(-800_000, 800_000);
-        let change_ppb = self.change_ppb + ((change - self.change_ppb) >> CHANGE_DEPTH);
+        let passed = seen_at.0.saturating_sub(self.seen_at.0).clamp(1, LONGEST_NS) as i64;
+        let expected = self.ahead + ((self.change_ppb * passed) << FRACTION) / 1_000_000_000;
+        let limit = UNEXPECTED_NS << FRACTION;
+        let seen = difference.saturating_sub(self.gap).clamp(-ABSURD_NS, ABSURD_NS);
+        let unexpected = ((seen << FRACTION) - expected).clamp(-limit, limit);
+        let ahead = expected + (unexpected >> DIFFERENCE_DEPTH);
+        let change = (unexpected * 1_000_000_000 / passed) >> (CHANGE_DEPTH + FRACTION);
+        let change_ppb = (self.change_ppb + change).clamp(-MOST_PPB, MOST_PPB);
         let mean = self.slow >> SLOW_DEPTH;
-        let told = ahead.clamp(mean - OUTLIER_NS, mean + OUTLIER_NS);
-        let quick = self.quick + told - (self.quick >> QUICK_DEPTH);
+        let told = seen.clamp(mean - OUTLIER_NS, mean + OUTLIER_NS);
         let slow = self.slow + told - (self.slow >> SLOW_DEPTH);
         let far = (slow >> SLOW_DEPTH).abs();
-        let calm = if far < CALM_NS { self.calm.saturating_add(1) } else { 0 };
-        let mode = match self.mode {
-            _ if far > FAR_NS => Mode::Far,
-            _ if calm >= CALM_CYCLES => Mode::Free,
-            Mode::Free if far > FREE_NS => Mode::Near,
-            mode => mode,
+        let enough = if self.mode == Mode::Far { FREE_NS } else { CALM_NS };
+        let calm = if far < enough { self.calm.saturating_add(1) } else { 0 };
+        let (mode, calm) = match self.mode {
+            _ if far > FAR_NS => (Mode::Far, 0),
+            Mode::Far if calm >= CALM_CYCLES => (Mode::Near, 0),
+            Mode::Near if calm >= CALM_CYCLES => (Mode::Free, 0),
+            Mode::Free if far > FREE_NS => (Mode::Near, 0),
+            mode => (mode, calm),
         };
-        Lead { ahead, quick, slow, change_ppb, seen_at, mode, calm, ..self }
+        Lead { ahead, change_ppb, slow, seen_at, mode, calm, ..self }
     }
 
-    /// By how much it is to be told that it is ahead, in a cycle with this number; `None`: nothing.
-    pub fn steering_ns(&self, cycle: u32) -> Option<i64> {
-        match self.mode {
-            Mode::Free => None,
-            Mode::Near => Some(self.quick >> QUICK_DEPTH),
-            Mode::Far => {
-                let expected = self.ahead + self.change_ppb * (FORESIGHT_NS / 1_000) / 1_000_000;
-                let is_due = expected.abs() > NEAR_NS || cycle.is_multiple_of(INTERVAL);
-                is_due.then(|| expected.clamp(-MOST_NS, MOST_NS))
-            }
-        }
+    /// By how much it is to be told that it is ahead; `None`: nothing.
+    pub fn steering_ns(&self) -> Option<i64> {
+        let ahead = self.ahead >> FRACTION;
+        let told = match self.mode {
+            Mode::Free => return None,
+            Mode::Near => ahead,
+            Mode::Far => ahead + self.change_ppb * (FORESIGHT_NS / 1_000) / 1_000_000,
+        };
+        Some(told.clamp(-MOST_NS, MOST_NS))
     }
 }
 
@@ -140,7 +136,7 @@ mod tests {
     #[test]
     fn jitter_of_the_host_is_no_reason_to_steer_facts_7_5() {
         let lead = after(Lead::begin(7_100, Instant(0)), jitter(5_000));
-        assert_eq!((lead.mode, lead.steering_ns(0)), (Mode::Free, None));
+        assert_eq!((lead.mode, lead.steering_ns()), (Mode::Free, None));
         assert!((lead.gap - 9_500).abs() < 800, "{lead:?}");
     }
 
@@ -149,17 +145,17 @@ mod tests {
         let stalls = jitter(5_000).enumerate();
         let stalled = stalls.map(|(number, late)| if number % 50 == 49 { late + 1_000_000 } else { late });
         let lead = after(Lead::begin(9_500, Instant(0)), stalled);
-        assert_eq!((lead.mode, lead.steering_ns(0)), (Mode::Free, None));
+        assert_eq!((lead.mode, lead.steering_ns()), (Mode::Free, None));
     }
 
     #[test]
     fn one_that_strays_is_told_of_a_mean_and_left_alone_when_it_is_back() {
         let strayed = after(Lead::begin(0, Instant(0)), [0; 20].into_iter().chain([1_500; 200]));
         assert_eq!(strayed.mode, Mode::Near);
-        let told = strayed.steering_ns(1).expect("it strayed");
+        let told = strayed.steering_ns().expect("it strayed");
         assert!((1_400..=1_500).contains(&told), "{told}");
         let back = after(strayed, [0; 1_500]);
-        assert_eq!(back.steering_ns(8), None);
+        assert_eq!(back.steering_ns(), None);
     }
 
     #[test]
@@ -167,7 +163,7 @@ mod tests {
         // 100 ppm fast, seen from the beginning.
         let lead = after(Lead::begin(0, Instant(0)), (1..400).map(|cycle| cycle * 100));
         assert_eq!(lead.mode, Mode::Far);
-        let told = lead.steering_ns(1).expect("it is far away");
+        let told = lead.steering_ns().expect("it is far away");
         assert!(told > 39_000, "{told}");
     }
 }

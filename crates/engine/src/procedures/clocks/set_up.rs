@@ -22,7 +22,7 @@ const EXACT_DEPTH: u8 = 0;
 const HOST_DEPTH: u8 = 4;
 /// DC_FILTER_SPEED: its reset value.
 const SPEED_DEPTH: u8 = 12;
-/// Of a second reference that knows its speed: the host's jitter must not move it.
+/// Of a second reference: the host's jitter must not change its speed.
 const STEADY_DEPTH: u8 = 15;
 /// Delays that differ by no more than this from what is written are what the same way gives when it is measured again.
 const SAME_NS: i64 = 30;
@@ -138,7 +138,7 @@ impl Clocks {
         let is_behind = reference.is_some_and(|reference| node.unit > self.nodes[reference].unit);
         let is_second = reference == Some(index) && self.reference != Some(index);
         let difference = if is_behind { EXACT_DEPTH } else { HOST_DEPTH };
-        [difference, if is_second && node.has_followed { STEADY_DEPTH } else { SPEED_DEPTH }]
+        [difference, if is_second { STEADY_DEPTH } else { SPEED_DEPTH }]
     }
 
     /// Whether delays on a link count from different places.

@@ -65,7 +65,7 @@ pub(in crate::procedures) async fn restore(bus: &Bus, fleet: &SharedFleet, membe
     {
         let mut clocks = fleet.clocks.access();
         let node = &mut clocks.nodes[index];
-        (node.is_unset, node.latches_backwards, node.filter_depths, node.has_followed) = (true, false, None, false);
+        (node.is_unset, node.latches_backwards, node.filter_depths) = (true, false, None);
         if clocks.reference == Some(index) {
             clocks.reference = None;
         }

@@ -270,7 +270,6 @@ fn judge(bus: &Bus, fleet: &SharedFleet, answers: &[Option<Answer>]) {
             node.worst_ns = node.worst_ns.max(magnitude);
         }
         all &= node.good >= config.lock_samples;
-        node.has_followed |= node.good >= config.lock_samples && !references.contains(&Some(position));
         largest = largest.max(magnitude);
     }
     // Where a reference is steered, the exchange does not see how far the others are from theirs.
