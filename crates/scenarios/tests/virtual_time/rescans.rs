@@ -209,3 +209,26 @@ fn after_a_rescan_breaks_and_errors_of_cables_are_told_by_the_cabling_as_it_is()
     assert_eq!(declared(&rescan(&mut world)), (0..6).map(Some).collect::<Vec<_>>());
     located(&mut world, (Some(3), Some(4)));
 }
+
+/// Frames meet the branch behind the port on which the ring goes on in another order while the ring is open (CR-09).
+#[test]
+fn a_break_that_changes_the_order_of_a_ring_with_a_branch_has_moved_nobody_cr_09_cr_17() {
+    use ringcat_sim::frame::Port::{A, B, D};
+    use scenarios::segments::{MAIN, REDUNDANT, at, wired};
+    let cables =
+        [(MAIN, at(0, A)), (at(0, D), at(1, A)), (at(1, B), at(2, A)), (at(2, B), REDUNDANT), (at(0, B), at(3, A))];
+    let kinds = ["junction", "digital-input-8", "digital-output-8", "digital-input-16"];
+    let mut world = World::in_op(0, wired(&kinds, &cables));
+    for cable in (0..4).map(ringcat_sim::cable::CableId) {
+        world.cut(cable);
+        world.run_cycles(50);
+        let mark = world.mark();
+        let work = world.application_mut().engine_mut().start_rescan(LIMIT);
+        let rescan = world.finish(2 * LIMIT, work).expect("it holds still");
+        assert!(rescan.is_complete() && rescan.subdevices.len() == 4, "{cable:?}");
+        assert_eq!(rescan.moved().count(), 0, "{cable:?}: {:?}", rescan.subdevices);
+        assert!(!world.saw(mark, |event| matches!(event, Event::Moved { .. })), "{cable:?}");
+        world.heal(cable);
+        world.run_cycles(50);
+    }
+}

@@ -18,6 +18,7 @@ use super::{Knowledge, view};
 use crate::event::Event;
 use crate::procedures::fleet::SharedFleet;
 use crate::procedures::services::ServiceError;
+use crate::ring::RingState;
 use crate::supervisor::{Bus, BusError};
 use crate::topology::{NodeStatus, Topology};
 
@@ -140,7 +141,13 @@ async fn look(bus: &Bus, fleet: &SharedFleet) -> Result<Option<Rescan>, BusError
         subdevices.push(Found { position: Position(at as u16), station: *station, who, moved_from: None });
     }
     let place_at_scan = |index: usize| access.members[index].node;
-    mark_moved(&mut subdevices, place_at_scan);
+    // In a ring that is open elsewhere than at the scan frames meet branches in another order (CR-09): that moves nobody.
+    let scanned = &access.topology;
+    let is_as_scanned = scanned.redundant_head.is_some() && usize::from(seen.counts.0.0) == scanned.main_count;
+    let is_one_line = seen.counts.1 == Wkc(0);
+    if bus.ring() != RingState::Open || is_one_line || is_as_scanned {
+        mark_moved(&mut subdevices, place_at_scan);
+    }
     let is_found = |index: &usize| subdevices.iter().any(|found| found.who == Who::Declared(*index));
     let missing = (0..access.members.len()).filter(|index| !is_found(index)).collect();
     let topology = Topology::build(&nodes, usize::from(seen.counts.0.0));
