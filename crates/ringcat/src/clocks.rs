@@ -40,7 +40,7 @@ const LOOK: Duration = Duration::from_millis(10);
 const TABLE_HELP: &str = "\
   delay       nanoseconds from the reference clock, as measured (register 0x0928)
   offset      from the clock's own time to system time (0x0920)
-  drift       how much faster than the reference it ran while it was free
+  drift       how much faster than the reference it would run by itself (0x0932)
   now, worst  its difference to the reference (0x092C): when it was read last, and the largest since it was locked
   SYNC        signals in microseconds: cycle, and shift with its sign
 

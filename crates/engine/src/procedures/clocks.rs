@@ -61,7 +61,7 @@ pub(super) struct Node {
     pub delay_ns: i64,
     /// What was written to DC_SYSTEM_TIME_OFFSET.
     pub offset_ns: i64,
-    /// How much faster than the reference it ran when it was measured.
+    /// How much faster than the reference it would run by itself.
     pub drift_ppb: i64,
     /// DC_SYSTEM_TIME_DIFFERENCE, when it answered last.
     pub difference_ns: Option<i32>,
@@ -128,7 +128,8 @@ pub struct ClockStatus {
     pub delay_ns: i64,
     /// System time less local time when it was set up (0x0920).
     pub offset_ns: i64,
-    /// How much faster than the reference it ran while it was free, in parts per billion.
+    /// How much faster than the reference it would run by itself, in parts per billion: as it ran within the milliseconds of
+    /// the first measurement, to some tens of thousands; once it was locked, what its control loop makes up for (0x0932).
     pub drift_ppb: i64,
     /// Its time less that of the reference in nanoseconds (0x092C); `None` before it was read.
     pub difference_ns: Option<i32>,

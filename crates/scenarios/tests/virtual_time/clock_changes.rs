@@ -63,6 +63,24 @@ fn clocks_of_a_ring_behind_a_junction_stay_together_whole_and_broken_anywhere_fa
 }
 
 #[test]
+fn how_much_faster_a_clock_would_run_by_itself_is_known_after_the_lock_and_after_changes_facts_7_2_1() {
+    let free: Vec<i64> = clocked(7, 50).iter().map(|description| description.clock_drift_ppb).collect();
+    let mut world = world(1, junction_ring());
+    let is_right = |world: &World| {
+        let clocks = world.application().engine().clocks();
+        let off = |clock: &ringcat::ClockStatus| {
+            let expected = free[usize::from(clock.position)] - free[0];
+            (clock.drift_ppb - expected).abs()
+        };
+        let largest = clocks.iter().map(off).max();
+        assert!(largest.is_some_and(|ppb| ppb <= 2_000), "{clocks:?}, expected {free:?}");
+    };
+    is_right(&world);
+    assert_eq!(change(&mut world, "cut", |world| world.cut(CableId(3))), 1);
+    is_right(&world);
+}
+
+#[test]
 fn a_ring_behind_a_junction_that_is_broken_from_the_start_has_its_delays_and_those_of_the_repaired_one() {
     for cable in [3, 2] {
         let mut network = junction_ring();

@@ -81,6 +81,16 @@ number_register! {
     DcSpeedCounterDifference(i16, reset 0)
 }
 
+impl DcSpeedCounterDifference {
+    /// How much faster than by itself the clock runs because of it, in parts per billion: Diff / (5 (Start + Diff + 2)
+    /// (Start - Diff + 2)), see facts 7.2.1. 0 where Diff is beyond what Start allows.
+    pub const fn deviation_ppb(self, start: DcSpeedCounterStart) -> i64 {
+        let (diff, start) = (self.0 as i64, start.0 as i64);
+        let product = 5 * (start + diff + 2) * (start - diff + 2);
+        if product > 0 { diff * 1_000_000_000 / product } else { 0 }
+    }
+}
+
 number_register! {
     /// Register DC_FILTER_DIFFERENCE (0x0934).
     DcFilterDifference(u8, reset 4)

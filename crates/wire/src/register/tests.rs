@@ -387,3 +387,12 @@ mod any_bytes_round_trip {
         DcLatchControl DcLatchStatus ProductId DigitalOutputs Gpo Gpi
     }
 }
+
+#[test]
+fn the_speed_counter_says_how_fast_its_clock_is_made_to_run_facts_7_2_1() {
+    let ppb = |diff: i16, start: u16| DcSpeedCounterDifference(diff).deviation_ppb(DcSpeedCounterStart(start));
+    assert_eq!((ppb(0, 0x1000), ppb(1, 0x1000), ppb(-100, 0x1000)), (0, 11, -1_191));
+    // 3969 / (5 * 8067 * 129)
+    assert_eq!(ppb(3_969, 0x1000), 762_797);
+    assert_eq!((ppb(i16::MAX, 0x1000), ppb(i16::MIN, 0x80), ppb(1, 0)), (0, 0, 66_666_666));
+}

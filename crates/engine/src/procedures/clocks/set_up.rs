@@ -99,9 +99,13 @@ fn take_over(clocks: &mut Clocks, measured: &Measured) {
     for node in &mut clocks.nodes {
         let Some(at) = measured.stations.iter().position(|station| *station == node.station) else { continue };
         let tree = measured.delays.trees.get(at).copied().unwrap_or(0);
+        // Later it runs as fast as the reference, because its loop makes it.
+        let is_free = node.unit.is_none() || node.is_unset;
+        if let Some(drift_ppb) = measured.drift_ppb.get(at).copied().flatten().filter(|_| is_free) {
+            node.drift_ppb = drift_ppb;
+        }
         node.unit = measured.delays.units.get(at).copied().flatten();
         node.origin = 2 * clocks.measured + tree as u32;
-        node.drift_ppb = measured.drift_ppb.get(at).copied().flatten().unwrap_or(node.drift_ppb);
         node.link = Some(if tree == 0 { Link::Main } else { Link::Redundant });
     }
     for link in Link::ALL {

@@ -16,7 +16,7 @@ use alloc::vec::Vec;
 use ringcat_wire::address::{Position, StationAddress, Wkc};
 use ringcat_wire::command::Command;
 use ringcat_wire::datagram::Target;
-use ringcat_wire::register::map;
+use ringcat_wire::register::{DcSpeedCounterDifference, DcSpeedCounterStart, map};
 
 use super::set_up::{measure_again, set_filters, set_up, write_delays};
 use super::signals::difference;
@@ -215,6 +215,8 @@ pub(super) async fn drift_phase(bus: Bus, fleet: SharedFleet) {
 struct Answer {
     link: Option<Link>,
     difference_ns: Option<i32>,
+    /// How much faster its loop makes it run.
+    deviation_ppb: i64,
 }
 
 /// Reads all differences and draws conclusions.
@@ -228,14 +230,19 @@ async fn look(bus: &Bus, fleet: &SharedFleet, is_explained: bool) {
         let Some(station) = station else { return Some(Answer::default()) };
         let target = Target::Station(station, map::DC_SYSTEM_TIME_DIFFERENCE);
         // A lost frame says nothing about anybody.
-        let reply = bus.transfer(Command::Fprd, target, vec![0; 4], Some(Wkc(1))).await.ok()?;
+        // With DC_SPEED_COUNTER_START and DC_SPEED_COUNTER_DIFFERENCE behind it.
+        let reply = bus.transfer(Command::Fprd, target, vec![0; 8], Some(Wkc(1))).await.ok()?;
         let link = match (reply.main.0, reply.redundant.0) {
             (0, 0) => return Some(Answer::default()),
             (0, _) => Link::Redundant,
             _ => Link::Main,
         };
-        let difference_ns = reply.data.first_chunk().map(|bytes| difference(*bytes));
-        Some(Answer { link: Some(link), difference_ns })
+        let Some([a, b, c, d, start @ .., e, f]) = reply.data.first_chunk::<8>() else {
+            return Some(Answer { link: Some(link), ..Answer::default() });
+        };
+        let start = DcSpeedCounterStart(u16::from_le_bytes(*start));
+        let deviation_ppb = DcSpeedCounterDifference(i16::from_le_bytes([*e, *f])).deviation_ppb(start);
+        Some(Answer { link: Some(link), difference_ns: Some(difference([*a, *b, *c, *d])), deviation_ppb })
     });
     let answers: Vec<Option<Answer>> = answers.await;
     // While nobody is told a time, differences are those of a frame that came another way.
@@ -256,7 +263,7 @@ fn judge(bus: &Bus, fleet: &SharedFleet, answers: &[Option<Answer>]) {
     let references = Link::ALL.map(|link| clocks.reference_on(link));
     let (mut all, mut largest) = (clocks.reference.is_some(), 0);
     for (position, (node, answer)) in clocks.nodes.iter_mut().zip(answers).enumerate() {
-        let Some(Answer { difference_ns: Some(difference), .. }) = answer else {
+        let Some(Answer { difference_ns: Some(difference), deviation_ppb, .. }) = answer else {
             all &= !node.has_clock || node.link.is_none();
             continue;
         };
@@ -270,6 +277,10 @@ fn judge(bus: &Bus, fleet: &SharedFleet, answers: &[Option<Answer>]) {
             node.worst_ns = node.worst_ns.max(magnitude);
         }
         all &= node.good >= config.lock_samples;
+        if node.good >= config.lock_samples && !references.contains(&Some(position)) {
+            // What the loop makes up for, now that it has settled (facts 7.2.1).
+            node.drift_ppb = -deviation_ppb;
+        }
         largest = largest.max(magnitude);
     }
     // Where a reference is steered, the exchange does not see how far the others are from theirs.
