@@ -5,7 +5,9 @@
 //! Procedures see time only through the `now` of these calls.
 
 pub mod bus;
+mod counters;
 mod executor;
+mod flight;
 mod flights;
 mod group;
 mod link_order;
@@ -24,7 +26,7 @@ use core::cell::RefCell;
 use core::future::Future;
 
 pub use bus::{Bus, BusError, Elapsed, Reply};
-pub use flights::AcyclicCounters;
+pub use counters::AcyclicCounters;
 pub use group::Group;
 pub(crate) use group::{TURN, TURN_PAUSE};
 pub use signal::Signal;

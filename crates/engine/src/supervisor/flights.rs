@@ -5,20 +5,20 @@ use alloc::vec;
 use alloc::vec::Vec;
 use core::time::Duration;
 
-use ringcat_wire::address::{StationAddress, Wkc};
 use ringcat_wire::command::Command;
-use ringcat_wire::datagram::{CIRCULATING, HEADER_LEN, OVERHEAD, WKC_LEN};
+use ringcat_wire::datagram::{HEADER_LEN, OVERHEAD};
 use ringcat_wire::frame::{FrameBuilder, MAX_FRAME, MIN_FRAME, MacAddress};
 
 use super::Received;
 use super::bus::{BusError, Reply};
+use super::flight::{Flight, Place};
 use super::outbox::Rank;
 use super::shared::Shared;
-use super::stray::{Overdue, Stray};
-use super::transfer::{Request, Stage, TransferId, WITNESS_BYTES};
+use super::stray::Stray;
+use super::transfer::{Stage, TransferId, WITNESS_BYTES};
 use crate::link::{Link, LinkSet};
 use crate::ring::identity::DATAGRAMS_AT;
-use crate::ring::{Arrivals, Class, FrameCopy, Identity, MAX_IN_FLIGHT, MergeRule, Sequence};
+use crate::ring::{Class, FrameCopy, Identity, MAX_IN_FLIGHT, Sequence};
 use crate::time::Instant;
 
 /// Frames in flight at once: enough to fill the wire over the round trip of a thousand SubDevices (2 ms at 123 us a
@@ -32,90 +32,6 @@ const STARVED: Duration = Duration::from_millis(10);
 const SLOTS: usize = 128;
 
 const _: () = assert!(WINDOW <= MAX_IN_FLIGHT && MAX_IN_FLIGHT <= SLOTS);
-
-/// Counters of the acyclic half.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct AcyclicCounters {
-    /// Frames sent.
-    pub sent: u64,
-    /// Bytes sent, one copy of each frame, without FCS.
-    pub bytes: u64,
-    /// Frames answered.
-    pub received: u64,
-    /// Frames of which no copy came back in time.
-    pub lost: u64,
-    /// Frames of which one copy of two came back in time.
-    pub half: u64,
-    /// Copies that came too late or twice.
-    pub late: u64,
-    /// Frames of ours that came back with other datagrams than were sent.
-    pub corrupt: u64,
-    /// Frames of other MainDevices.
-    pub foreign: u64,
-    /// Datagrams sent.
-    pub datagrams: u64,
-    /// Datagrams that were sent again because their frame was lost.
-    pub resent: u64,
-    /// Datagrams that were given up because their frame was lost.
-    pub timed_out: u64,
-}
-
-impl AcyclicCounters {
-    /// Both together.
-    #[must_use]
-    pub const fn plus(self, other: AcyclicCounters) -> AcyclicCounters {
-        AcyclicCounters {
-            sent: self.sent + other.sent,
-            bytes: self.bytes + other.bytes,
-            received: self.received + other.received,
-            lost: self.lost + other.lost,
-            half: self.half + other.half,
-            late: self.late + other.late,
-            corrupt: self.corrupt + other.corrupt,
-            foreign: self.foreign + other.foreign,
-            datagrams: self.datagrams + other.datagrams,
-            resent: self.resent + other.resent,
-            timed_out: self.timed_out + other.timed_out,
-        }
-    }
-}
-
-/// A datagram in a frame.
-#[derive(Debug)]
-struct Place {
-    transfer: TransferId,
-    header_at: usize,
-    length: usize,
-    command: Command,
-    expected: Option<Wkc>,
-    mail: Option<StationAddress>,
-    /// The datagram before it tells which copy meets the addressed SubDevice.
-    witness: bool,
-    /// The link whose copy met it.
-    visible: Link,
-    wkc: [Wkc; 2],
-    /// Its procedure has the reply.
-    answered: bool,
-}
-
-#[derive(Debug)]
-struct Flight {
-    sequence: Sequence,
-    places: Vec<Place>,
-    /// The first copy, with later ones merged in; before the first, what was sent.
-    bytes: Vec<u8>,
-    arrivals: Arrivals,
-    sent_at: Instant,
-    /// When the interface has sent it, if it sends nothing else meanwhile.
-    left_at: Instant,
-    deadline: Instant,
-    /// Bytes of its reads of mailboxes, while they are under way.
-    reads: usize,
-    /// Answered already; kept so that the second copy is recognised.
-    answered: bool,
-    /// No copy is waited for, because the link is silent on which the missing one was sent; no room is kept for it.
-    released: bool,
-}
 
 pub(crate) struct Flights {
     slots: Vec<Option<Flight>>,
@@ -173,25 +89,8 @@ impl Flights {
     }
 
     fn fresh(&mut self, sequence: Sequence) -> Flight {
-        let mut flight = self.spare.pop().unwrap_or_else(|| Flight {
-            sequence,
-            places: Vec::new(),
-            bytes: Vec::with_capacity(MAX_FRAME),
-            arrivals: Arrivals::default(),
-            sent_at: Instant::NEVER,
-            left_at: Instant::NEVER,
-            deadline: Instant::NEVER,
-            reads: 0,
-            answered: false,
-            released: false,
-        });
-        flight.sequence = sequence;
-        flight.places.clear();
-        flight.bytes.clear();
-        flight.arrivals = Arrivals::default();
-        flight.reads = 0;
-        flight.answered = false;
-        flight.released = false;
+        let mut flight = self.spare.pop().unwrap_or_default();
+        flight.begin(sequence);
         flight
     }
 }
@@ -288,18 +187,7 @@ impl Shared {
                 }
                 total += bytes;
                 retry = retry.max(transfer.retries);
-                flight.places.push(Place {
-                    transfer: id,
-                    header_at: data_at - HEADER_LEN,
-                    length: request.data.len(),
-                    command: request.command,
-                    expected: request.expected,
-                    mail: request.mail,
-                    witness: witnesses(request),
-                    visible: Link::Main,
-                    wkc: [Wkc(0); 2],
-                    answered: false,
-                });
+                flight.places.push(Place::new(id, request, data_at));
                 transfer.stage = Stage::InFlight;
                 self.outbox.pop(rank);
                 if rank == Rank::Read {
@@ -491,115 +379,6 @@ fn adjust_auto_increment(frame: &mut [u8], places: &[Place], main_count: u16) {
             let adp = at + 2;
             let shifted = u16::from_le_bytes([frame[adp], frame[adp + 1]]).wrapping_add(main_count);
             frame[adp..adp + 2].copy_from_slice(&shifted.to_le_bytes());
-        }
-    }
-}
-
-/// Whether the datagram before a request's is its witness.
-fn witnesses(request: &Request) -> bool {
-    request.lead.is_some() && matches!(request.command, Command::Armw | Command::Frmw)
-}
-
-impl Flight {
-    /// Everything controllers never change is as sent (facts 1.5): command, Idx, length, M bit of every datagram.
-    fn is_what_was_sent(&self, bytes: &[u8]) -> bool {
-        if bytes.len() < self.bytes.len() {
-            return false;
-        }
-        self.places.iter().all(|place| {
-            let at = place.header_at;
-            let (sent, got) = (&self.bytes[at..at + 8], &bytes[at..at + 8]);
-            let circulating = (CIRCULATING >> 8) as u8;
-            sent[..2] == got[..2] && sent[6] == got[6] && (sent[7] ^ got[7]) & !circulating == 0
-        })
-    }
-
-    /// The reads of mailboxes in it.
-    fn mail_reads(&self) -> impl Iterator<Item = Overdue> {
-        let Flight { sequence, sent_at, .. } = *self;
-        self.places.iter().filter_map(move |place| {
-            let Place { header_at, length, mail, .. } = *place;
-            Some(Overdue { sequence, header_at, length, station: mail?, sent_at })
-        })
-    }
-
-    /// The reads of mailboxes that a copy has answered before: a second one brings another mail.
-    fn second_reads(&self) -> Vec<Overdue> {
-        let answered = |read: &Overdue| {
-            self.places.iter().any(|place| place.header_at == read.header_at && place.total() != Wkc(0))
-        };
-        self.mail_reads().filter(answered).collect()
-    }
-
-    /// Takes in a copy that was found to be ours.
-    fn take(&mut self, sent_on: Link, bytes: &[u8], first: bool) {
-        for place in &mut self.places {
-            let data_at = place.header_at + HEADER_LEN;
-            let data = data_at..data_at + place.length;
-            let wkc = Wkc(u16::from_le_bytes([bytes[data.end], bytes[data.end + 1]]));
-            let before = place.total();
-            place.wkc[sent_on.index()] = wkc;
-            let witnessed = place.witness && bytes[place.header_at - WKC_LEN..place.header_at] != [0; WKC_LEN];
-            if witnessed {
-                place.visible = sent_on;
-            }
-            // OR of the event requests (facts 9.3); both copies have them behind the length.
-            let irq = place.header_at + 8;
-            if first {
-                self.bytes[data.clone()].copy_from_slice(&bytes[data]);
-                self.bytes[irq..irq + WKC_LEN].copy_from_slice(&bytes[irq..irq + WKC_LEN]);
-            } else {
-                let rule = MergeRule::of(place.command, place.visible);
-                rule.merge(&mut self.bytes[data.clone()], before, &bytes[data], wkc, sent_on);
-                self.bytes[irq] |= bytes[irq];
-                self.bytes[irq + 1] |= bytes[irq + 1];
-            }
-        }
-    }
-
-    /// All copies are in.
-    fn has_all(&self, links: LinkSet) -> bool {
-        self.arrivals.arrived & links.mask() == links.mask()
-    }
-
-    /// One copy crossed the ring and one returned: it opened or closed meanwhile, and SubDevices were met twice or not
-    /// at all.
-    fn straddled_a_change(&self) -> bool {
-        self.arrivals.arrived == LinkSet::Ring.mask() && self.arrivals.returned.count_ones() == 1
-    }
-
-    /// A copy came back on its own link, so that it met all whom it can meet, and those that are missing were sent on
-    /// links that are silent.
-    fn has_all_but(&self, silent: u8, links: LinkSet) -> bool {
-        self.arrivals.returned != 0 && (self.arrivals.arrived | silent) & links.mask() == links.mask()
-    }
-}
-
-impl Place {
-    fn total(&self) -> Wkc {
-        self.wkc[0].plus(self.wkc[1])
-    }
-
-    /// One SubDevice is addressed, and it has done what the command says.
-    fn is_answered_by_one(&self) -> bool {
-        match self.command {
-            Command::Aprd | Command::Apwr | Command::Fprd | Command::Fpwr => self.total() == Wkc(1),
-            Command::Aprw | Command::Fprw => self.total() == Wkc(3),
-            _ => false,
-        }
-    }
-
-    fn satisfied(&self) -> bool {
-        self.expected.is_some_and(|expected| self.total() == expected)
-    }
-
-    fn reply(&self, bytes: &[u8]) -> Reply {
-        let data_at = self.header_at + HEADER_LEN;
-        Reply {
-            data: bytes[data_at..data_at + self.length].to_vec(),
-            main: self.wkc[0],
-            redundant: self.wkc[1],
-            irq: u16::from_le_bytes([bytes[data_at - 2], bytes[data_at - 1]]),
         }
     }
 }

@@ -7,8 +7,9 @@ use core::cmp::Reverse;
 use ringcat_wire::datagram::{MAX_DATA, OVERHEAD};
 
 use super::bus::BusError;
+use super::counters::AcyclicCounters;
 use super::executor::{Task, TaskId};
-use super::flights::{AcyclicCounters, Flights};
+use super::flights::Flights;
 use super::link_order::LinkOrder;
 use super::outbox::{Outbox, Rank};
 use super::round_trip::RoundTrip;

@@ -1,0 +1,48 @@
+//! What the acyclic half counts.
+
+/// Counters of the acyclic half.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct AcyclicCounters {
+    /// Frames sent.
+    pub sent: u64,
+    /// Bytes sent, one copy of each frame, without FCS.
+    pub bytes: u64,
+    /// Frames answered.
+    pub received: u64,
+    /// Frames of which no copy came back in time.
+    pub lost: u64,
+    /// Frames of which one copy of two came back in time.
+    pub half: u64,
+    /// Copies that came too late or twice.
+    pub late: u64,
+    /// Frames of ours that came back with other datagrams than were sent.
+    pub corrupt: u64,
+    /// Frames of other MainDevices.
+    pub foreign: u64,
+    /// Datagrams sent.
+    pub datagrams: u64,
+    /// Datagrams that were sent again because their frame was lost.
+    pub resent: u64,
+    /// Datagrams that were given up because their frame was lost.
+    pub timed_out: u64,
+}
+
+impl AcyclicCounters {
+    /// Both together.
+    #[must_use]
+    pub const fn plus(self, other: AcyclicCounters) -> AcyclicCounters {
+        AcyclicCounters {
+            sent: self.sent + other.sent,
+            bytes: self.bytes + other.bytes,
+            received: self.received + other.received,
+            lost: self.lost + other.lost,
+            half: self.half + other.half,
+            late: self.late + other.late,
+            corrupt: self.corrupt + other.corrupt,
+            foreign: self.foreign + other.foreign,
+            datagrams: self.datagrams + other.datagrams,
+            resent: self.resent + other.resent,
+            timed_out: self.timed_out + other.timed_out,
+        }
+    }
+}

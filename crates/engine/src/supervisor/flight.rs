@@ -1,0 +1,206 @@
+//! An acyclic frame under way, and the datagrams in it: what its copies have brought so far.
+
+use alloc::vec::Vec;
+
+use ringcat_wire::address::{StationAddress, Wkc};
+use ringcat_wire::command::Command;
+use ringcat_wire::datagram::{CIRCULATING, HEADER_LEN, WKC_LEN};
+use ringcat_wire::frame::MAX_FRAME;
+
+use super::bus::Reply;
+use super::stray::Overdue;
+use super::transfer::{Request, TransferId};
+use crate::link::{Link, LinkSet};
+use crate::ring::{Arrivals, MergeRule, Sequence};
+use crate::time::Instant;
+
+/// A datagram in a frame.
+#[derive(Debug)]
+pub(super) struct Place {
+    pub transfer: TransferId,
+    pub header_at: usize,
+    pub length: usize,
+    pub command: Command,
+    pub expected: Option<Wkc>,
+    pub mail: Option<StationAddress>,
+    /// The datagram before it tells which copy meets the addressed SubDevice.
+    pub witness: bool,
+    /// The link whose copy met it.
+    pub visible: Link,
+    pub wkc: [Wkc; 2],
+    /// Its procedure has the reply.
+    pub answered: bool,
+}
+
+/// A frame under way.
+#[derive(Debug)]
+pub(super) struct Flight {
+    pub sequence: Sequence,
+    pub places: Vec<Place>,
+    /// The first copy, with later ones merged in; before the first, what was sent.
+    pub bytes: Vec<u8>,
+    pub arrivals: Arrivals,
+    pub sent_at: Instant,
+    /// When the interface has sent it, if it sends nothing else meanwhile.
+    pub left_at: Instant,
+    pub deadline: Instant,
+    /// Bytes of its reads of mailboxes, while they are under way.
+    pub reads: usize,
+    /// Answered already; kept so that the second copy is recognised.
+    pub answered: bool,
+    /// No copy is waited for, because the link is silent on which the missing one was sent; no room is kept for it.
+    pub released: bool,
+}
+
+impl Default for Flight {
+    fn default() -> Flight {
+        Flight {
+            sequence: Sequence::default(),
+            places: Vec::new(),
+            bytes: Vec::with_capacity(MAX_FRAME),
+            arrivals: Arrivals::default(),
+            sent_at: Instant::NEVER,
+            left_at: Instant::NEVER,
+            deadline: Instant::NEVER,
+            reads: 0,
+            answered: false,
+            released: false,
+        }
+    }
+}
+
+impl Flight {
+    /// Another one in the same memory, with nothing in it.
+    pub fn begin(&mut self, sequence: Sequence) {
+        self.sequence = sequence;
+        self.places.clear();
+        self.bytes.clear();
+        self.arrivals = Arrivals::default();
+        self.reads = 0;
+        self.answered = false;
+        self.released = false;
+    }
+
+    /// Everything controllers never change is as sent (facts 1.5): command, Idx, length, M bit of every datagram.
+    pub fn is_what_was_sent(&self, bytes: &[u8]) -> bool {
+        if bytes.len() < self.bytes.len() {
+            return false;
+        }
+        self.places.iter().all(|place| {
+            let at = place.header_at;
+            let (sent, got) = (&self.bytes[at..at + 8], &bytes[at..at + 8]);
+            let circulating = (CIRCULATING >> 8) as u8;
+            sent[..2] == got[..2] && sent[6] == got[6] && (sent[7] ^ got[7]) & !circulating == 0
+        })
+    }
+
+    /// The reads of mailboxes in it.
+    pub fn mail_reads(&self) -> impl Iterator<Item = Overdue> {
+        let Flight { sequence, sent_at, .. } = *self;
+        self.places.iter().filter_map(move |place| {
+            let Place { header_at, length, mail, .. } = *place;
+            Some(Overdue { sequence, header_at, length, station: mail?, sent_at })
+        })
+    }
+
+    /// The reads of mailboxes that a copy has answered before: a second one brings another mail.
+    pub fn second_reads(&self) -> Vec<Overdue> {
+        let answered = |read: &Overdue| {
+            self.places.iter().any(|place| place.header_at == read.header_at && place.total() != Wkc(0))
+        };
+        self.mail_reads().filter(answered).collect()
+    }
+
+    /// Takes in a copy that was found to be ours.
+    pub fn take(&mut self, sent_on: Link, bytes: &[u8], first: bool) {
+        for place in &mut self.places {
+            let data_at = place.header_at + HEADER_LEN;
+            let data = data_at..data_at + place.length;
+            let wkc = Wkc(u16::from_le_bytes([bytes[data.end], bytes[data.end + 1]]));
+            let before = place.total();
+            place.wkc[sent_on.index()] = wkc;
+            let witnessed = place.witness && bytes[place.header_at - WKC_LEN..place.header_at] != [0; WKC_LEN];
+            if witnessed {
+                place.visible = sent_on;
+            }
+            // OR of the event requests (facts 9.3); both copies have them behind the length.
+            let irq = place.header_at + 8;
+            if first {
+                self.bytes[data.clone()].copy_from_slice(&bytes[data]);
+                self.bytes[irq..irq + WKC_LEN].copy_from_slice(&bytes[irq..irq + WKC_LEN]);
+            } else {
+                let rule = MergeRule::of(place.command, place.visible);
+                rule.merge(&mut self.bytes[data.clone()], before, &bytes[data], wkc, sent_on);
+                self.bytes[irq] |= bytes[irq];
+                self.bytes[irq + 1] |= bytes[irq + 1];
+            }
+        }
+    }
+
+    /// All copies are in.
+    pub fn has_all(&self, links: LinkSet) -> bool {
+        self.arrivals.arrived & links.mask() == links.mask()
+    }
+
+    /// One copy crossed the ring and one returned: it opened or closed meanwhile, and SubDevices were met twice or not
+    /// at all.
+    pub fn straddled_a_change(&self) -> bool {
+        self.arrivals.arrived == LinkSet::Ring.mask() && self.arrivals.returned.count_ones() == 1
+    }
+
+    /// A copy came back on its own link, so that it met all whom it can meet, and those that are missing were sent on
+    /// links that are silent.
+    pub fn has_all_but(&self, silent: u8, links: LinkSet) -> bool {
+        self.arrivals.returned != 0 && (self.arrivals.arrived | silent) & links.mask() == links.mask()
+    }
+}
+
+impl Place {
+    /// A request whose data is at a place in the frame.
+    pub fn new(transfer: TransferId, request: &Request, data_at: usize) -> Place {
+        Place {
+            transfer,
+            header_at: data_at - HEADER_LEN,
+            length: request.data.len(),
+            command: request.command,
+            expected: request.expected,
+            mail: request.mail,
+            witness: witnesses(request),
+            visible: Link::Main,
+            wkc: [Wkc(0); 2],
+            answered: false,
+        }
+    }
+
+    pub fn total(&self) -> Wkc {
+        self.wkc[0].plus(self.wkc[1])
+    }
+
+    /// One SubDevice is addressed, and it has done what the command says.
+    pub fn is_answered_by_one(&self) -> bool {
+        match self.command {
+            Command::Aprd | Command::Apwr | Command::Fprd | Command::Fpwr => self.total() == Wkc(1),
+            Command::Aprw | Command::Fprw => self.total() == Wkc(3),
+            _ => false,
+        }
+    }
+
+    pub fn satisfied(&self) -> bool {
+        self.expected.is_some_and(|expected| self.total() == expected)
+    }
+
+    pub fn reply(&self, bytes: &[u8]) -> Reply {
+        let data_at = self.header_at + HEADER_LEN;
+        Reply {
+            data: bytes[data_at..data_at + self.length].to_vec(),
+            main: self.wkc[0],
+            redundant: self.wkc[1],
+            irq: u16::from_le_bytes([bytes[data_at - 2], bytes[data_at - 1]]),
+        }
+    }
+}
+
+/// Whether the datagram before a request's is its witness.
+fn witnesses(request: &Request) -> bool {
+    request.lead.is_some() && matches!(request.command, Command::Armw | Command::Frmw)
+}
