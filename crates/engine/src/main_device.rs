@@ -48,7 +48,7 @@ use crate::mail::relay::Desk;
 use crate::procedures::clocks::{self, ClockStatus, SharedClocks};
 use crate::procedures::configure::Start;
 use crate::procedures::dictionary::ReadPdos;
-use crate::procedures::fleet::{Fleet, Member, Phase, SharedFleet};
+use crate::procedures::fleet::{Fleet, Member, Phase, SharedFleet, stations_by_position};
 use crate::procedures::mail_watch::watch_mail;
 use crate::procedures::own_objects::OwnObjects;
 use crate::procedures::recover::start_all;
@@ -284,6 +284,7 @@ impl MainDevice {
         let board = Arc::new(Board::new(members.len()).with_optional(optional));
         let (producer, consumer) = queue(CYCLIC_EVENTS);
         let mut exchange = Exchange::new(self.identity, self.options.links(), &layout, board.clone(), producer);
+        let stations = stations_by_position(&members, scan.subdevices.iter().map(|info| info.station));
         let cables = cables(&topology, self.options.links());
         let book = Book::new(&bus, members.len(), self.statistics_period);
         let fleet = Fleet {
@@ -292,11 +293,13 @@ impl MainDevice {
             next_temporary: 0,
             layout,
             topology,
+            stations,
             ring: self.first_ring_status(),
             cables: cables.into_iter().map(|cable| (cable, CableErrors::default())).collect(),
             recablings: 0,
             cache: self.cache.clone(),
             blocked: Vec::new(),
+            junction_controls: Vec::new(),
             statistics: book.clone(),
         };
         let fleet = SharedFleet::new(fleet, board.clone(), clocks);

@@ -101,6 +101,20 @@ pub const RING_BEHIND_JUNCTION: [(Endpoint, Endpoint); 8] = [
 /// Cables of the ring in [`RING_BEHIND_JUNCTION`].
 pub const RING_OF_THREE: [usize; 4] = [2, 3, 4, 5];
 
+/// Two junctions in a row, 0 and 3, each with a ring of two behind it, and one more behind both. Cables 1 to 3 are those of
+/// the first ring, 5 to 7 those of the second one.
+pub const TWO_RINGS: [(Endpoint, Endpoint); 9] = [
+    (MAIN, at(0, Port::A)),
+    (at(0, Port::D), at(1, Port::A)),
+    (at(1, Port::B), at(2, Port::A)),
+    (at(2, Port::B), at(0, Port::B)),
+    (at(0, Port::C), at(3, Port::A)),
+    (at(3, Port::D), at(4, Port::A)),
+    (at(4, Port::B), at(5, Port::A)),
+    (at(5, Port::B), at(3, Port::B)),
+    (at(3, Port::C), at(6, Port::A)),
+];
+
 /// A ring of two links, with a local ring behind the junction in its middle, device 1. The local ring's two members are
 /// 2 and 3, its cables 2 to 4.
 pub const RING_IN_RING: [(Endpoint, Endpoint); 7] = [

@@ -25,10 +25,11 @@ pub const MAX_DATAGRAMS: usize = 1024;
 pub struct RawDatagram {
     /// The command.
     pub command: Command,
-    /// Whom it addresses, as the command wants it. With two links a position is that of the last scan, wherever a break is
-    /// and whoever is missing or came in between: it leaves with the station address of the SubDevice that was found there.
-    /// A SubDevice that lost its power answers to it again when it was given its address back, one that is not declared only
-    /// after another scan. Other positions, and all with one link, count SubDevices as frames meet them.
+    /// Whom it addresses, as the command wants it. With two links a position is that of the last scan, or of a rescan since
+    /// then of which the cabling was taken over, wherever a break is and whoever is missing or came in between: it leaves
+    /// with the station address of the SubDevice that was found there. A SubDevice that lost its power answers to it again
+    /// when it was given its address back, one that is not declared only after another look of this kind. Other positions,
+    /// and all with one link, count SubDevices as frames meet them.
     pub target: Target,
     /// What is sent; for reads, zeros.
     pub data: Vec<u8>,
@@ -69,19 +70,14 @@ impl MainDevice {
         Ok(datagrams.into_iter().map(by_station).collect())
     }
 
-    /// The station addresses of those that the last scan found, by position.
+    /// The station addresses of those that the last scan found, or the rescan of which the cabling was taken over, by
+    /// position.
     fn stations_by_position(&self) -> Vec<StationAddress> {
-        let mut stations: Vec<StationAddress> = match &*self.scan.borrow() {
-            Some(Ok(scan)) => scan.subdevices.iter().map(|info| info.station).collect(),
-            Some(Err(_)) | None => Vec::new(),
-        };
-        let access = self.fleet.as_ref().map(|fleet| fleet.access());
-        for member in access.iter().flat_map(|fleet| &fleet.members) {
-            if let Some(station) = member.node.and_then(|node| stations.get_mut(node)) {
-                *station = member.station;
-            }
+        match (&self.fleet, &*self.scan.borrow()) {
+            (Some(fleet), _) => fleet.access().stations.clone(),
+            (None, Some(Ok(scan))) => scan.subdevices.iter().map(|info| info.station).collect(),
+            (None, Some(Err(_)) | None) => Vec::new(),
         }
-        stations
     }
 
     fn check_lrw_of(&self, datagram: &RawDatagram) -> Result<(), ServiceError> {

@@ -7,7 +7,7 @@ use core::cell::{Cell, RefCell, RefMut};
 
 use ringcat_wire::address::StationAddress;
 use ringcat_wire::al::AlState;
-use ringcat_wire::register::Fmmu;
+use ringcat_wire::register::{DlControl, Fmmu};
 
 use super::clocks::SharedClocks;
 use super::mail_watch;
@@ -206,6 +206,17 @@ pub fn planned_areas(plan: &SubDevicePlan) -> Vec<(u8, Direction, u16)> {
     plan.process_data.iter().map(|area: &AreaPlan| (area.sync_manager, area.direction, area.length)).collect()
 }
 
+/// Station addresses by position: those of members, and at other places what was found there.
+pub fn stations_by_position(members: &[Member], found: impl Iterator<Item = StationAddress>) -> Vec<StationAddress> {
+    let mut stations: Vec<StationAddress> = found.collect();
+    for member in members {
+        if let Some(station) = member.node.and_then(|node| stations.get_mut(node)) {
+            *station = member.station;
+        }
+    }
+    stations
+}
+
 /// Everything that procedures share after activation.
 #[derive(Debug)]
 pub struct Fleet {
@@ -219,6 +230,8 @@ pub struct Fleet {
     pub layout: Layout,
     /// Connections as the scan found them, or a rescan after it.
     pub topology: Topology,
+    /// Station addresses by position, as found together with these.
+    pub stations: Vec<StationAddress>,
     /// What was told of the ring; counts and carriers are added where it is asked for.
     pub ring: RingStatus,
     /// All cables with what their ends have counted.
@@ -229,6 +242,8 @@ pub struct Fleet {
     pub cache: SiiCache,
     /// Ports that were closed to cut SubDevices off.
     pub blocked: Vec<BlockedPort>,
+    /// What junctions of local rings were told to do about their ports, by station address.
+    pub junction_controls: Vec<(StationAddress, DlControl)>,
     /// Error counters.
     pub(crate) statistics: Book,
 }

@@ -9,4 +9,5 @@ mod look_inside;
 mod watch;
 
 pub(super) use self::learn::learn;
+pub(super) use self::look_inside::note_controls;
 pub(super) use self::watch::{JunctionWatch, watch_blocked};

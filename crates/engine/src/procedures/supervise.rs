@@ -20,7 +20,7 @@ use super::configure::Start;
 use super::error_watch::watch_errors;
 use super::fleet::{Phase, SharedFleet};
 use super::inspect::{Look, locate_break, look_at_all, look_at_strangers};
-use super::junction::{JunctionWatch, watch_blocked};
+use super::junction::{JunctionWatch, note_controls, watch_blocked};
 use super::recover::{lose, start, welcome};
 use super::ring_watch::watch_ring;
 use super::strangers::{self, Search};
@@ -184,6 +184,9 @@ impl Watch {
         self.report_break(&looks);
         self.report_junctions(&looks);
         self.cabling.note(&self.bus, &self.fleet, &looks);
+        if certain && !self.junctions.is_empty() {
+            note_controls(&self.bus, &self.fleet).await;
+        }
         // Who else is there must be known before anybody's place is.
         let mut complete = count <= answering;
         if !complete && !looks.contains(&Look::Unknown) {

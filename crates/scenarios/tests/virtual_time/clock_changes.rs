@@ -12,7 +12,7 @@ use ringcat_sim::frame::Port::{A, B, C, D};
 use ringcat_sim::network::{Network, NetworkOptions};
 use scenarios::clocks::{clocked, config, differences, largest_spread, lock, watch, wired, with_clocks};
 use scenarios::dice::Dice;
-use scenarios::segments::{MAIN, REDUNDANT, RING_BEHIND_JUNCTION, RING_IN_RING, RING_OF_THREE, at, line};
+use scenarios::segments::{MAIN, REDUNDANT, RING_BEHIND_JUNCTION, RING_IN_RING, RING_OF_THREE, TWO_RINGS, at, line};
 use scenarios::tap::Tap;
 use scenarios::world::{CYCLE, World};
 
@@ -114,6 +114,29 @@ fn a_local_ring_in_a_ring_of_two_links_keeps_its_clocks_through_breaks_of_either
         let [over] = watch(&mut world, [&everybody], 1_500);
         let [after] = watch(&mut world, [&everybody], 100);
         assert!(over <= 5_000 && after <= 100, "{what} healed: {over}, then {after} ns");
+    }
+}
+
+/// No frame comes back meanwhile, and rings are looked into one after the other.
+#[test]
+fn clocks_come_back_together_when_two_rings_behind_junctions_broke_at_once_jr_02_facts_7_5() {
+    let mut world = world(10, wired(clocked(7, 50), &TWO_RINGS));
+    let everybody = all(world.network());
+    for (first, second, gap) in [(2, 6, 100), (5, 1, 800)] {
+        let what = format!("cables {first} and {second}");
+        let mark = world.mark();
+        world.cut(CableId(first));
+        world.cut(CableId(second));
+        let [blocked] = watch(&mut world, [&everybody], gap);
+        world.heal(CableId(first));
+        world.until(Duration::from_secs(5), "all in OP", |w| w.all_in_op() && w.application().all_settled());
+        lock(&mut world, Duration::from_secs(5));
+        let [over] = watch(&mut world, [&everybody], 600);
+        let [after] = watch(&mut world, [&everybody], 100);
+        println!("{what}: {blocked} ns while blocked, then {over} and {after} ns");
+        assert_eq!(world.left_op(mark), [], "{what}");
+        assert!(over <= 10_000 && after <= 100, "{what}: {over}, then {after} ns");
+        change(&mut world, &what, |world| world.heal(CableId(second)));
     }
 }
 

@@ -17,27 +17,27 @@ use scenarios::segments::{descriptions, devices, line, ring};
 use scenarios::tap::Tap;
 use scenarios::world::{CYCLE, Mark, World};
 
-const LIMIT: Duration = Duration::from_secs(5);
+pub const LIMIT: Duration = Duration::from_secs(5);
 /// Alias of the group's head.
-const TOOL: u16 = 5;
+pub const TOOL: u16 = 5;
 /// Those that are always there, and those of the group.
 const BASE: [&str; 4] = ["coupler", "digital-input-8", "digital-output-8", "digital-input-16"];
 const GROUP: [&str; 2] = ["analog-input-4", "digital-output-16"];
 
 /// What a scan says about devices of these kinds.
-fn infos(kinds: &[&str]) -> Vec<SubDeviceInfo> {
+pub fn infos(kinds: &[&str]) -> Vec<SubDeviceInfo> {
     let links = Tap::new(line(descriptions(kinds), NetworkOptions::default()));
     MainDevice::request(links, &Options::default()).scan().expect("a scan").subdevices
 }
 
 /// The two of the group, the head with an alias.
-fn tool() -> Vec<DeviceDescription> {
+pub fn tool() -> Vec<DeviceDescription> {
     let mut devices = descriptions(&GROUP);
     devices[0].alias = TOOL;
     devices
 }
 
-fn group(head: SubDeviceConfig) -> Group {
+pub fn group(head: SubDeviceConfig) -> Group {
     let infos = infos(&GROUP);
     let expect = |config: SubDeviceConfig, info: &SubDeviceInfo| {
         config.expect_product(info.identity.vendor_id, info.identity.product_code).pdos_of(info)

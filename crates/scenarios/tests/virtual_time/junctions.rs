@@ -1,5 +1,6 @@
 //! Rings behind junctions on one link (facts 9.4): every cable cut and healed, in every mode.
 
+mod groups;
 mod second_breaks;
 
 use std::time::Duration;
@@ -166,6 +167,16 @@ fn a_ring_that_closes_after_the_scan_is_told_as_unknown_unless_it_was_declared_j
         let mark = edge(&mut world, &what, |world| world.heal(CableId(3)));
         assert_eq!(unknown(&world, mark), [], "{what}: it was told");
     }
+}
+
+#[test]
+fn a_declared_connection_makes_junction_redundancy_of_mode_disabled_which_is_the_default_jr_03_jr_05() {
+    assert_eq!(Options::default().junctions, JunctionMode::Disabled);
+    let mut world = in_op(11, one_ring(), (JunctionMode::Disabled, &[STRICT]));
+    let mark = edge(&mut world, "cut", |world| world.cut(CableId(3)));
+    assert_eq!((told(&world, mark), crossed(&world, mark)), (vec![changed(3, true)], 0));
+    let mark = edge(&mut world, "heal", |world| world.heal(CableId(3)));
+    assert_eq!((told(&world, mark), crossed(&world, mark)), (vec![changed(3, false)], 0));
 }
 
 #[test]

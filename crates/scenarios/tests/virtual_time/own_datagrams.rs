@@ -15,7 +15,7 @@ use ringcat_wire::address::{LogicalAddress, Position, RegisterAddress, StationAd
 use ringcat_wire::command::Command;
 use ringcat_wire::datagram::Target;
 use ringcat_wire::register::{Fmmu, map};
-use scenarios::segments::{RING_IN_RING, descriptions, line, ring, wired};
+use scenarios::segments::{MAIN, REDUNDANT, RING_IN_RING, at, descriptions, line, ring, wired};
 use scenarios::world::{CYCLE, World};
 
 const LIMIT: Duration = Duration::from_secs(1);
@@ -69,6 +69,73 @@ fn positions_of_an_application_are_those_of_the_scan_whoever_is_missing_cr_09() 
     world.until(Duration::from_secs(5), "all in OP", |world| world.all_in_op() && world.application().all_settled());
     all(&mut world, None, "back again");
     assert_eq!(who(&mut world, 5), None, "nobody was found there");
+}
+
+/// A ring of three junctions and an output. A SubDevice hangs on the first junction, or with its other end on the third
+/// one; another one, without power, on the second one.
+fn movable() -> Network {
+    use ringcat_sim::frame::Port::{A, B, D};
+    let kinds = ["junction", "junction", "junction", "digital-output-8", "digital-input-16", "digital-output-16"];
+    let cables = [
+        (MAIN, at(0, A)),
+        (at(0, B), at(1, A)),
+        (at(1, B), at(2, A)),
+        (at(2, B), at(3, A)),
+        (at(3, B), REDUNDANT),
+        (at(0, D), at(4, A)),
+        (at(2, D), at(4, B)),
+        (at(1, D), at(5, A)),
+    ];
+    let mut network = wired(&kinds, &cables);
+    network.cut(CableId(6));
+    network.power_off(DeviceIndex(5));
+    network
+}
+
+/// Whoever was unplugged, plugged in elsewhere or is new has the position that a rescan has shown, and nobody another one.
+#[test]
+fn positions_of_an_application_are_those_of_a_rescan_that_took_over_the_cabling_cr_09_cr_17() {
+    let declare = |scan: &Scan| {
+        let mut declaration = automatic(&scan.subdevices, CYCLE);
+        declaration.subdevices[1].optional = true;
+        declaration
+    };
+    let mut world = World::with(6, movable(), &Options::default(), declare).expect("scan and activation");
+    world.settle();
+    world.set_strict(false);
+    let are = |world: &mut World, devices: &[usize], what: &str| {
+        // Not before the second junction: whoever is plugged in the wrong way round uses the one turn that a frame has.
+        for broken in [None, Some(CableId(3)), Some(CableId(4))] {
+            broken.iter().for_each(|cable| world.cut(*cable));
+            for (position, device) in devices.iter().enumerate() {
+                let expected = Some(world.station_of(*device));
+                assert_eq!(who(world, position as u16), expected, "{what}, {broken:?}, position {position}");
+            }
+            assert_eq!(who(world, devices.len() as u16), None, "{what}, {broken:?}");
+            broken.iter().for_each(|cable| world.heal(*cable));
+            world.run_cycles(60);
+        }
+    };
+    let rescan = |world: &mut World| {
+        let work = world.application_mut().engine_mut().start_rescan(LIMIT);
+        let rescan = world.finish(2 * LIMIT, work).expect("it holds still");
+        assert!(rescan.is_complete());
+        world.run_cycles(20);
+    };
+    are(&mut world, &[0, 4, 1, 2, 3], "as scanned");
+    world.cut(CableId(5));
+    world.run_cycles(100);
+    rescan(&mut world);
+    are(&mut world, &[0, 1, 2, 3], "unplugged");
+    world.heal(CableId(6));
+    world.until(Duration::from_secs(5), "back", |world| world.application().all_settled());
+    world.run_cycles(50);
+    rescan(&mut world);
+    are(&mut world, &[0, 1, 2, 4, 3], "plugged in elsewhere");
+    world.power_on(DeviceIndex(5));
+    world.run_cycles(200);
+    rescan(&mut world);
+    are(&mut world, &[0, 1, 5, 2, 4, 3], "somebody new");
 }
 
 fn with_lrw(scan: &Scan) -> Declaration {

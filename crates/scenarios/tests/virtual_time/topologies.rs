@@ -216,6 +216,13 @@ fn enhanced(network: Network) -> World {
 }
 
 #[test]
+fn without_enhanced_detection_a_closed_ring_tells_that_something_is_crossed_and_not_where_lc_02() {
+    let world = in_op(crossed_ring());
+    assert_eq!(world.application().ring(), RingState::Closed);
+    assert_eq!(crossed(world.events(world.beginning())), [(None, None)]);
+}
+
+#[test]
 fn enhanced_detection_locates_crossings_at_the_scan_and_the_ring_is_closed_afterwards_lc_03() {
     let world = enhanced(crossed_ring());
     let found = crossed(world.events(world.beginning()));

@@ -2,15 +2,20 @@
 
 use std::time::Duration;
 
-use ringcat::{DomainId, DomainState, Event, Options, RingState, automatic};
+use ringcat::Direction::Inputs;
+use ringcat::{DomainId, DomainState, Event, Freshness, JunctionMode, Options, RingState, automatic};
+use ringcat_engine::main_device::AreaEntries;
 use ringcat_sim::application::behaviours::{Behaviour, InputSource};
 use ringcat_sim::cable::{CableId, Direction};
+use ringcat_sim::description::DeviceDescription;
 use ringcat_sim::fault::Fault;
 use ringcat_sim::network::{Network, NetworkOptions};
 use ringcat_sim::time::SimTime;
 use scenarios::check::troubles;
 use scenarios::dice::Dice;
-use scenarios::segments::{descriptions, line, ring};
+use scenarios::segments::{
+    RING_BEHIND_JUNCTION, RING_IN_RING, RING_OF_THREE, TWO_RINGS, descriptions, line, ring, wired_with,
+};
 use scenarios::world::{CYCLE, World};
 
 const DOMAIN: DomainId = DomainId(0);
@@ -19,20 +24,28 @@ const KINDS: [&str; 5] =
 /// A way through segment and host that takes three cycles.
 const LONG: Duration = Duration::from_micros(2_600);
 
+/// Cycles in which frames that found somebody again may still bring what it had before.
+const AGAIN: u64 = 4;
+
 /// Inputs are the number of the cycle in which they were read, without its upper bits.
 fn stamp(now: SimTime, _outputs: &[u8], inputs: &mut [u8]) {
     inputs.fill((now.0 / CYCLE.as_nanos() as u64) as u8);
 }
 
-/// Its terminals stamp their inputs.
-fn segment(closed: bool) -> Network {
-    let mut described = descriptions(&KINDS);
+/// Terminals of these kinds stamp their inputs.
+fn stamping(kinds: &[&str]) -> Vec<DeviceDescription> {
+    let mut described = descriptions(kinds);
     for it in &mut described {
         if let Behaviour::Terminal(source) = &mut it.behaviour {
             *source = InputSource::Function(stamp);
         }
     }
+    described
+}
+
+fn segment(closed: bool) -> Network {
     let options = NetworkOptions::default().with_detection_delay(Duration::from_micros(10));
+    let described = stamping(&KINDS);
     if closed { ring(described, options) } else { line(described, options) }
 }
 
@@ -44,20 +57,58 @@ struct Stamped {
     /// Cycles that they are older than the cycle in which they are seen.
     age: u8,
     oldest: u8,
+    /// Inputs of all SubDevices, and how old those were at most that counted as fresh.
+    inputs: Vec<Input>,
+    oldest_fresh: u8,
+}
+
+/// Inputs of a SubDevice.
+struct Input {
+    subdevice: usize,
+    /// Where they are in the image.
+    at: usize,
+    /// Cycles in a row that they count as fresh.
+    fresh_for: u64,
 }
 
 impl Stamped {
     fn new(seed: u64, closed: bool, under_way: u8) -> Stamped {
+        Stamped::on(seed, segment(closed), under_way)
+    }
+
+    fn on(seed: u64, network: Network, under_way: u8) -> Stamped {
+        let options = Options { junctions: JunctionMode::Automatic, ..Options::default() };
         let declare = |scan: &ringcat::Scan| automatic(&scan.subdevices, CYCLE).with_under_way(under_way);
-        let mut world = World::with(seed, segment(closed), &Options::default(), declare).expect("it fits");
+        let mut world = World::with(seed, network, &options, declare).expect("it fits");
         world.settle();
         // Its checks know of one cycle under way.
         world.set_strict(false);
-        let inputs = world.application().directory().areas(0).iter().find(|area| area.placed.area.length > 0);
-        let at = inputs.expect("it has inputs").placed.image_offset as usize;
-        let mut stamped = Stamped { world, at, stamp: 0, age: 0, oldest: 0 };
+        let directory = world.application().directory();
+        let all = (0..world.scan.subdevices.len()).flat_map(|subdevice| directory.areas(subdevice));
+        let inputs = all.filter(|area| area.direction == Inputs && area.placed.area.length > 0);
+        let input = |area: &AreaEntries| Input {
+            subdevice: area.placed.area.subdevice,
+            at: area.placed.image_offset as usize,
+            fresh_for: 0,
+        };
+        let inputs: Vec<Input> = inputs.map(input).collect();
+        let at = inputs.first().expect("somebody has inputs").at;
+        let mut stamped = Stamped { world, at, stamp: 0, age: 0, oldest: 0, inputs, oldest_fresh: 0 };
         stamped.stamp = stamped.look();
         stamped
+    }
+
+    /// How old inputs are that count as fresh. Devices compute theirs after each exchange, so whoever was out of reach has
+    /// old ones for the frames that find it again.
+    fn look_at_all(&mut self, now: u8) {
+        let exchange = self.world.application().exchange();
+        for input in &mut self.inputs {
+            let is_fresh = exchange.freshness(DOMAIN, input.subdevice) == Freshness::Fresh;
+            input.fresh_for = if is_fresh { input.fresh_for + 1 } else { 0 };
+            if input.fresh_for > AGAIN {
+                self.oldest_fresh = self.oldest_fresh.max(now.wrapping_sub(exchange.image(DOMAIN)[input.at]));
+            }
+        }
     }
 
     fn look(&self) -> u8 {
@@ -72,6 +123,7 @@ impl Stamped {
             self.stamp = stamp;
             self.age = (now as u8).wrapping_sub(stamp);
             self.oldest = self.oldest.max(self.age);
+            self.look_at_all(now as u8);
         }
     }
 
@@ -174,5 +226,70 @@ fn whatever_is_lost_or_broken_inputs_never_become_older_and_afterwards_all_is_co
         assert_eq!((stamped.incomplete() - before, status.state), (0, DomainState::Complete), "seed {seed}");
         assert_eq!(stamped.world.left_op(mark), [], "seed {seed}");
         assert!(stamped.world.application().cyclic_counters().incomplete > 0, "seed {seed}: nothing was lost");
+    }
+}
+
+/// Rings behind junctions break and are mended, one cable or two at once, on one link and on two: at most what is under way
+/// is lost, and inputs that count as fresh are no older than that.
+#[test]
+fn breaks_behind_junctions_cost_at_most_the_cycles_that_are_under_way_and_no_old_input_counts_as_fresh_jr_02() {
+    let kinds = ["digital-input-8", "junction", "digital-input-8", "digital-input-16", "digital-input-8"];
+    let one = [
+        "digital-input-8",
+        "junction",
+        "digital-input-8",
+        "digital-input-16",
+        "digital-input-8",
+        "coupler",
+        "digital-input-8",
+    ];
+    let two = [
+        "junction",
+        "digital-input-8",
+        "digital-input-16",
+        "junction",
+        "digital-input-8",
+        "digital-input-16",
+        "digital-input-8",
+    ];
+    for (under_way, way) in [(2, CYCLE * 3 / 4), (3, CYCLE * 7 / 4)] {
+        for (number, network, cables, pairs) in [
+            (0, wired_with(stamping(&one), &RING_BEHIND_JUNCTION), RING_OF_THREE.to_vec(), vec![(3, 4), (2, 5)]),
+            (1, wired_with(stamping(&kinds), &RING_IN_RING), (0..7).collect(), vec![(5, 3), (1, 3), (3, 1), (2, 4)]),
+            (2, wired_with(stamping(&two), &TWO_RINGS), vec![1, 2, 3, 5, 6, 7], vec![(2, 6), (6, 2), (1, 7)]),
+        ] {
+            let mut stamped = Stamped::on(number, network, under_way);
+            stamped.lengthen(way);
+            stamped.run(20);
+            let mark = stamped.world.mark();
+            for cable in cables.into_iter().map(CableId) {
+                for fault in [Fault::Cut(cable), Fault::Heal(cable)] {
+                    let before = stamped.incomplete();
+                    stamped.world.fault(fault.clone());
+                    stamped.run(60);
+                    let cost = stamped.incomplete() - before;
+                    assert!(
+                        cost <= u64::from(under_way),
+                        "{number}, {under_way} under way, {way:?}, {fault:?}: {cost}"
+                    );
+                }
+            }
+            assert_eq!(stamped.world.left_op(mark), []);
+            for (first, second) in pairs {
+                stamped.world.cut(CableId(first));
+                stamped.world.cut(CableId(second));
+                stamped.run(100);
+                stamped.world.heal(CableId(first));
+                stamped.run(100);
+                stamped.world.heal(CableId(second));
+                stamped.run(100);
+                let before = stamped.incomplete();
+                stamped.run(50);
+                let oldest = stamped.oldest_fresh;
+                println!("{number}, {under_way}, {way:?}, {first} and {second}: {oldest}");
+                assert!(oldest <= under_way + 1, "{number}, {first} and {second}: {oldest} cycles old");
+                assert_eq!(stamped.incomplete() - before, 0, "{number}, {first} and {second}");
+            }
+        }
     }
 }

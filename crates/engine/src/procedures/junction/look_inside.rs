@@ -4,7 +4,9 @@
 //! it, among them the junction at which its ring begins. So a junction can be told blindly to leave its ring out, by closing
 //! both ports of the ring. One ring after the other is looked into while all others are left out; then the others are
 //! reached again, too. The settings are temporary (facts 2.2, DL control bit 1): what becomes of frames meanwhile, the
-//! loops return to what they were within about a second.
+//! loops return to what they were within about a second. All loops of a junction are written at once, and nobody can be
+//! asked for them any more: those that somebody had closed on purpose are known from before ([`note_controls`]), and stay
+//! closed.
 //!
 //! While it goes on, most SubDevices are out of reach at one time or another, which must tell nobody that they are lost
 //! ([`super::super::fleet::SharedFleet::is_looking_inside`]).
@@ -29,6 +31,8 @@ const MOST: usize = 16;
 /// A ring, as far as it has to be known here.
 #[derive(Clone, Debug)]
 struct Ring {
+    /// What its junction had been told to do.
+    control: DlControl,
     /// Its junction, by position and by station address.
     head: usize,
     junction: StationAddress,
@@ -43,6 +47,8 @@ impl Ring {
     fn new(fleet: &Fleet, ring: &LocalRing) -> Option<Ring> {
         let (head, tail) = (ring.closing.head.node, ring.closing.tail.node);
         let junction = station_of(fleet, head)?;
+        let known = fleet.junction_controls.iter().find(|(station, _)| *station == junction);
+        let control = known.map_or_else(DlControl::default, |(_, control)| *control);
         let children = fleet.topology.nodes.get(head)?.children;
         let begins = (0..4).filter(|port| {
             let child = children[usize::from(*port)];
@@ -50,7 +56,7 @@ impl Ring {
         });
         let mut ports: Vec<u8> = begins.collect();
         ports.push(ring.closing.head.port);
-        Some(Ring { head, junction, tail, ports })
+        Some(Ring { control, head, junction, tail, ports })
     }
 
     fn holds(&self, node: usize) -> bool {
@@ -63,13 +69,13 @@ fn station_of(fleet: &Fleet, node: usize) -> Option<StationAddress> {
 }
 
 /// Looks into all local rings; returns what members said about their ports, by position. Empty where that cannot be
-/// done: there is one ring only, a junction is not declared, or ports were closed on order.
+/// done: there is one ring only, or a junction is not declared.
 pub(super) async fn look_inside(bus: &Bus, fleet: &SharedFleet) -> Vec<Option<NodeStatus>> {
     let (rings, count) = {
         let access = fleet.access();
         let rings = access.topology.local_rings.iter().map(|ring| Ring::new(&access, ring));
         let rings: Vec<Ring> = rings.collect::<Option<_>>().unwrap_or_default();
-        let is_possible = (2..=MOST).contains(&rings.len()) && access.blocked.is_empty();
+        let is_possible = (2..=MOST).contains(&rings.len());
         (if is_possible { rings } else { Vec::new() }, access.topology.nodes.len())
     };
     let mut found = vec![None; if rings.is_empty() { 0 } else { count }];
@@ -87,19 +93,43 @@ pub(super) async fn look_inside(bus: &Bus, fleet: &SharedFleet) -> Vec<Option<No
     found
 }
 
+/// Reads what the junctions of all local rings were told to do about their ports, while they can be asked. Where there is
+/// one ring only it never has to be known.
+pub(in super::super) async fn note_controls(bus: &Bus, fleet: &SharedFleet) {
+    let junctions: Vec<StationAddress> = {
+        let access = fleet.access();
+        let heads = access.topology.local_rings.iter().map(|ring| ring.closing.head.node);
+        if access.topology.local_rings.len() > 1 {
+            heads.filter_map(|head| station_of(&access, head)).collect()
+        } else {
+            Vec::new()
+        }
+    };
+    let read = bus.gather(junctions, |bus, station| async move {
+        let control = DlControl::decode(&bus.fprd_array(station, map::DL_CONTROL).await.ok()?);
+        // What holds for a moment is our own order.
+        (!control.temporary).then_some((station, control))
+    });
+    for (station, control) in read.await.into_iter().flatten() {
+        let known = &mut fleet.access().junction_controls;
+        match known.iter_mut().find(|(junction, _)| *junction == station) {
+            Some((_, before)) => *before = control,
+            None => known.push((station, control)),
+        }
+    }
+}
+
 /// Has junctions leave their rings out or not, for a moment. Frames that do not come back have done it all the same, so it
 /// is done when one does: each that is lost may have been the one that makes the next one return.
 async fn set_loops(bus: &Bus, rings: &[Ring], is_left_out: impl Fn(&Ring) -> bool) -> Result<(), BusError> {
-    let mut writes: Vec<(StationAddress, [LoopControl; 4])> = Vec::new();
-    for ring in rings {
-        let mut loops = [LoopControl::Auto; 4];
+    let controls = rings.iter().map(|ring| {
+        let mut control = DlControl { temporary: true, ..ring.control };
         if is_left_out(ring) {
-            ring.ports.iter().for_each(|port| loops[usize::from(port & 3)] = LoopControl::Closed);
+            ring.ports.iter().for_each(|port| control.loops[usize::from(port & 3)] = LoopControl::Closed);
         }
-        writes.push((ring.junction, loops));
-    }
-    let writes = writes.into_iter().map(|(station, loops)| {
-        let control = DlControl { temporary: true, loops, ..DlControl::default() };
+        (ring.junction, control)
+    });
+    let writes = controls.map(|(station, control)| {
         (Command::Fpwr, Target::Station(station, map::DL_CONTROL), control.encode()[..WRITTEN].to_vec())
     });
     bus.transfer_all(writes, Some(Wkc(1))).await.map(drop)

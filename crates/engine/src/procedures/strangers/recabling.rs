@@ -7,7 +7,7 @@ use ringcat_wire::address::{StationAddress, Wkc};
 
 use super::rescan::{Rescan, Who};
 use crate::link::LinkSet;
-use crate::procedures::fleet::{Fleet, SharedFleet};
+use crate::procedures::fleet::{Fleet, SharedFleet, stations_by_position};
 use crate::ring::RingState;
 use crate::ring_status::{Cable, CableErrors, cables};
 use crate::supervisor::Bus;
@@ -46,6 +46,7 @@ pub(super) fn adopt(bus: &Bus, fleet: &SharedFleet, rescan: &Rescan) -> bool {
     }
     fleet.cables = cables;
     fleet.topology = rescan.topology.clone();
+    fleet.stations = stations_by_position(&fleet.members, rescan.subdevices.iter().map(|found| found.station));
     true
 }
 

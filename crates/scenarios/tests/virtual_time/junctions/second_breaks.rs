@@ -2,38 +2,25 @@
 
 use std::time::Duration;
 
-use ringcat::{Event, JunctionConnection, JunctionMode};
+use ringcat::{Event, JunctionConnection, JunctionMode, SubDeviceState};
 use ringcat_engine::topology::PortOf;
-use ringcat_sim::cable::{CableId, DeviceIndex, Endpoint};
+use ringcat_sim::cable::{CableId, DeviceIndex};
 use ringcat_sim::fault::Fault;
 use ringcat_sim::frame::Port::{A, B, C, D};
 use ringcat_sim::network::Network;
+use ringcat_wire::register::{DlStatus, LoopControl, map};
 use scenarios::check::{Delivery, troubles};
-use scenarios::segments::{MAIN, REDUNDANT, RING_IN_RING, at, wired};
+use scenarios::segments::{MAIN, REDUNDANT, RING_IN_RING, TWO_RINGS, at, wired};
 use scenarios::world::{CYCLE, World};
 
 use super::{STRICT, crossed, edge, ends, in_op, one_ring, told};
 
-/// Two junctions in a row, each with a ring of two, and an input behind them.
-const TWO_RINGS: [&str; 7] =
+/// Those of [`TWO_RINGS`].
+const KINDS: [&str; 7] =
     ["junction", "digital-output-8", "servo", "junction", "digital-input-8", "servo", "digital-input-8"];
 
 fn two_rings() -> Network {
-    wired(&TWO_RINGS, &two_rings_cables())
-}
-
-fn two_rings_cables() -> Vec<(Endpoint, Endpoint)> {
-    vec![
-        (MAIN, at(0, A)),
-        (at(0, D), at(1, A)),
-        (at(1, B), at(2, A)),
-        (at(2, B), at(0, B)),
-        (at(0, C), at(3, A)),
-        (at(3, D), at(4, A)),
-        (at(4, B), at(5, A)),
-        (at(5, B), at(3, B)),
-        (at(3, C), at(6, A)),
-    ]
+    wired(&KINDS, &TWO_RINGS)
 }
 
 const TWO_STRICT: [JunctionConnection; 2] = [
@@ -140,9 +127,9 @@ fn two_rings_that_break_at_once_are_told_as_blocked_and_both_with_their_places_j
 /// The same in a closed ring of two links, in which copies of the redundant link come back and have met nobody.
 #[test]
 fn two_local_rings_that_break_in_a_ring_of_two_links_are_told_with_their_places_too_jr_02() {
-    let mut network = two_rings_cables();
-    network.push((at(6, B), REDUNDANT));
-    let mut world = in_op(40, wired(&TWO_RINGS, &network), (JunctionMode::Automatic, &[]));
+    let mut cables = TWO_RINGS.to_vec();
+    cables.push((at(6, B), REDUNDANT));
+    let mut world = in_op(40, wired(&KINDS, &cables), (JunctionMode::Automatic, &[]));
     let mark = world.mark();
     world.cut(CableId(2));
     world.cut(CableId(6));
@@ -159,6 +146,57 @@ fn two_local_rings_that_break_in_a_ring_of_two_links_are_told_with_their_places_
     world.run_cycles(100);
     assert_eq!(told(&world, mark)[3..], [blocked(false, 2), place(6, false, 1)]);
     edge(&mut world, "the other one", |world| world.heal(CableId(2)));
+}
+
+/// Junctions are told with one order what to do about all of their ports: one that the application had closed stays so.
+#[test]
+fn a_port_that_is_closed_on_purpose_stays_closed_while_rings_are_looked_into_facts_2_2() {
+    for by_name in [false, true] {
+        let mut world = in_op(43, two_rings(), (JunctionMode::Automatic, &[]));
+        let engine = world.application_mut().engine_mut();
+        if by_name {
+            let block = engine.start_block(6);
+            assert_eq!(world.finish(CYCLE * 1_000, block).map(|ports| ports.len()), Ok(1));
+        } else {
+            let set = engine.start_port_set(3, 2, LoopControl::Closed);
+            assert_eq!(world.finish(CYCLE * 1_000, set), Ok(()));
+        }
+        let is_gone = |world: &World| world.application().states()[6] == SubDeviceState::Absent;
+        world.until(Duration::from_secs(1), "6 is gone", is_gone);
+        world.run_cycles(20);
+        let stays_closed = |world: &mut World, cycles| {
+            for _ in 0..cycles {
+                world.cycle();
+                let bytes = world.network().device(DeviceIndex(3)).controller.register(map::DL_STATUS, 2);
+                let port = DlStatus::decode(&[bytes[0], bytes[1]]).ports[2];
+                assert!(port.loop_closed, "by name: {by_name}");
+            }
+        };
+        let mark = world.mark();
+        world.cut(CableId(2));
+        world.cut(CableId(6));
+        stays_closed(&mut world, 1_500);
+        let place = |cable, broken, breaks| {
+            let (near, far) = ends_of_two(cable);
+            Event::JunctionChanged { near: Some(near), far, broken, breaks }
+        };
+        let blocked = |blocked, breaks| Event::JunctionsBlocked { blocked, breaks };
+        assert_eq!(told(&world, mark), [blocked(true, 0), place(2, true, 1), place(6, true, 2)]);
+        world.heal(CableId(6));
+        stays_closed(&mut world, 1_500);
+        world.heal(CableId(2));
+        stays_closed(&mut world, 200);
+        assert!(is_gone(&world));
+        let engine = world.application_mut().engine_mut();
+        if by_name {
+            let open = engine.start_open_blocked();
+            assert_eq!(world.finish(CYCLE * 1_000, open), Ok(1));
+        } else {
+            let set = engine.start_port_set(3, 2, LoopControl::Auto);
+            assert_eq!(world.finish(CYCLE * 1_000, set), Ok(()));
+        }
+        world.until(Duration::from_secs(3), "all in OP", |w| w.all_in_op() && w.application().all_settled());
+    }
 }
 
 /// A ring behind a member of another one: while both are broken, frames that reach the inner one never come back.

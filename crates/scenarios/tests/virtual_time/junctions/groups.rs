@@ -1,0 +1,184 @@
+//! Hot connect groups in rings behind junctions and behind their members, on one link and on two, whole and broken.
+
+use ringcat::{
+    Declaration, DomainMember, Event, JunctionConnection, JunctionMode, Options, Scan, SubDeviceConfig, automatic,
+};
+use ringcat_engine::topology::PortOf;
+use ringcat_sim::cable::{CableId, DeviceIndex, Endpoint};
+use ringcat_sim::fault::Fault;
+use ringcat_sim::frame::Port::{A, B, C, D};
+use ringcat_sim::network::Network;
+use scenarios::segments::{MAIN, REDUNDANT, at, descriptions, wired_with};
+use scenarios::world::{CYCLE, World};
+
+use super::{Setting, crossed, edge, told};
+use crate::hot_connect::{LIMIT, TOOL, group, infos, tool};
+
+/// Those that are always there: the junction is the second one, the tail of its ring the fourth one.
+const BASE: [&str; 5] = ["digital-output-8", "junction", "junction", "digital-input-8", "coupler"];
+const STRICT: JunctionConnection = JunctionConnection { head: 1, head_port: 1, tail: 3, tail_port: 1 };
+/// The group's devices.
+const GROUP: [DeviceIndex; 2] = [DeviceIndex(5), DeviceIndex(6)];
+
+fn network(cables: &[(Endpoint, Endpoint)], two_links: bool) -> Network {
+    let mut all = cables.to_vec();
+    if two_links {
+        all.push((at(4, B), REDUNDANT));
+    }
+    wired_with(descriptions(&BASE).into_iter().chain(tool()).collect(), &all)
+}
+
+fn declare(_: &Scan) -> Declaration {
+    let mut declaration = automatic(&infos(&BASE), CYCLE);
+    let (_, members) = declaration.add_group(group(SubDeviceConfig::at_alias(TOOL, 0)));
+    declaration.domains[0].members.extend(members.map(|subdevice| DomainMember { subdevice, sync_managers: None }));
+    declaration
+}
+
+fn world(seed: u64, network: Network, (mode, connections): Setting<'_>) -> World {
+    let options = Options { junctions: mode, ..Options::default() };
+    let mut world = World::with_junctions(seed, network, &options, declare, connections).expect("it fits");
+    world.until(LIMIT, "all that are there settled", |world| world.application().all_settled());
+    world.run_cycles(60);
+    world
+}
+
+fn has_joined(world: &World) -> bool {
+    world.application().groups()[0].has_joined()
+}
+
+fn until_joined(world: &mut World) {
+    world.until(LIMIT, "the group has joined", has_joined);
+    world.recognise();
+    world.run_cycles(80);
+    assert!(world.all_in_op() && has_joined(world));
+}
+
+fn until_left(world: &mut World) {
+    world.until(LIMIT, "the group has left", |world| world.application().groups()[0].present == 0);
+    // Its outputs fall to their watchdogs.
+    world.run_cycles(150);
+}
+
+/// Nobody but the group leaves OP since the beginning.
+fn others_stay(world: &World, what: &str) {
+    let left = world.left_op(world.beginning());
+    assert!(left.iter().all(|device| GROUP.contains(device)), "{what}: {left:?}");
+}
+
+const SETTINGS: [(bool, Setting<'static>); 4] = [
+    (false, (JunctionMode::Automatic, &[])),
+    (false, (JunctionMode::Strict, &[STRICT])),
+    (true, (JunctionMode::Automatic, &[])),
+    (true, (JunctionMode::Strict, &[STRICT])),
+];
+
+#[test]
+fn a_group_behind_a_member_of_a_local_ring_joins_and_leaves_whole_and_broken() {
+    let cables = [
+        (MAIN, at(0, A)),
+        (at(0, B), at(1, A)),
+        (at(1, D), at(2, A)),
+        (at(2, B), at(3, A)),
+        (at(3, B), at(1, B)),
+        (at(1, C), at(4, A)),
+        (at(2, D), at(5, A)),
+        (at(5, B), at(6, A)),
+    ];
+    const PLUG: CableId = CableId(6);
+    for (seed, (two_links, setting)) in (0..).zip([SETTINGS[0], SETTINGS[3]]) {
+        let mut network = network(&cables, two_links);
+        network.cut(PLUG);
+        let mut world = world(seed, network, setting);
+        let mut breaks: Vec<Vec<usize>> = vec![vec![], vec![2], vec![3], vec![4]];
+        if two_links {
+            breaks.extend([vec![0], vec![1], vec![5], vec![8], vec![5, 3], vec![8, 2]]);
+        }
+        for broken in breaks {
+            let what = format!("{setting:?}, two links: {two_links}, broken: {broken:?}");
+            for cable in &broken {
+                edge(&mut world, &what, |world| world.cut(CableId(*cable)));
+            }
+            let mark = world.mark();
+            world.heal(PLUG);
+            until_joined(&mut world);
+            assert_eq!(told(&world, mark), [], "{what}");
+            world.cut(PLUG);
+            until_left(&mut world);
+            assert_eq!((told(&world, mark), crossed(&world, mark)), (vec![], 0), "{what}");
+            // It stays while the ring breaks and is mended, too.
+            world.heal(PLUG);
+            until_joined(&mut world);
+            for cable in &broken {
+                edge(&mut world, &what, |world| world.heal(CableId(*cable)));
+            }
+            for cable in &broken {
+                edge(&mut world, &what, |world| world.cut(CableId(*cable)));
+            }
+            for cable in &broken {
+                edge(&mut world, &what, |world| world.heal(CableId(*cable)));
+            }
+            others_stay(&world, &what);
+            world.cut(PLUG);
+            until_left(&mut world);
+        }
+    }
+}
+
+#[test]
+fn a_group_that_is_a_piece_of_a_local_ring_joins_and_leaves() {
+    let cables = [
+        (MAIN, at(0, A)),
+        (at(0, B), at(1, A)),
+        (at(1, D), at(2, A)),
+        (at(2, B), at(5, A)),
+        (at(5, B), at(6, A)),
+        (at(6, B), at(3, A)),
+        (at(3, B), at(1, B)),
+        (at(1, C), at(4, A)),
+    ];
+    for (seed, (two_links, setting)) in (10..).zip(SETTINGS) {
+        let mut network = network(&cables, two_links);
+        GROUP.iter().for_each(|device| network.power_off(*device));
+        let mut world = world(seed, network, setting);
+        let what = format!("{setting:?}, two links: {two_links}");
+        let own = |near: (usize, u8), far: (usize, u8), broken| {
+            let port = |(node, port)| PortOf { node, port };
+            Event::JunctionChanged { near: Some(port(near)), far: port(far), broken, breaks: usize::from(broken) }
+        };
+        let changes = |world: &World, mark| -> Vec<bool> {
+            let is = |event: &Event| matches!(event, Event::JunctionChanged { broken: true, .. });
+            told(world, mark).iter().map(is).collect()
+        };
+        assert_eq!(changes(&world, world.beginning()), [true], "{what}");
+        for _ in 0..2 {
+            let mark = world.mark();
+            for device in GROUP {
+                world.power_on(device);
+                world.run_cycles(3);
+            }
+            until_joined(&mut world);
+            assert_eq!(changes(&world, mark), [false], "{what}");
+            for cable in [2, 3, 4, 5, 6] {
+                for broken in [true, false] {
+                    let fault = if broken { Fault::Cut } else { Fault::Heal };
+                    let mark = edge(&mut world, &what, |world| world.fault(fault(CableId(cable))));
+                    assert_eq!(crossed(&world, mark), 0, "{what}");
+                    let expected = match cable {
+                        2 => vec![own((1, 3), (2, 0), broken)],
+                        // The group is not part of the cabling that was scanned: both of its ends are between these.
+                        3 | 5 => vec![own((2, 1), (3, 0), broken)],
+                        4 => vec![],
+                        _ => vec![own((3, 1), (1, 1), broken)],
+                    };
+                    assert_eq!(told(&world, mark), expected, "{what}, cable {cable}");
+                }
+            }
+            let mark = world.mark();
+            GROUP.iter().rev().for_each(|device| world.power_off(*device));
+            until_left(&mut world);
+            assert_eq!(told(&world, mark), [own((2, 1), (3, 0), true)], "{what}");
+            others_stay(&world, &what);
+        }
+    }
+}
