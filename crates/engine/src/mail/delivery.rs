@@ -2,7 +2,8 @@
 
 use alloc::rc::Rc;
 
-use ringcat_wire::mailbox::coe::{CoeHeader, CoeService, Emergency};
+use ringcat_wire::mailbox::coe::{CoeHeader, CoeService, Emergency, SdoInformation};
+use ringcat_wire::mailbox::soe::SoeMessage;
 use ringcat_wire::mailbox::{ErrorReply, Message, Protocol};
 
 use super::lane::{Arrival, Lane, LaneState};
@@ -53,6 +54,8 @@ fn is_double(state: &mut State, message: &Message<'_>, way: Way, sent: Instant) 
 fn sort(room: &Rc<Room>, state: &mut State, message: &Message<'_>) -> bool {
     let payload = message.payload;
     let first = payload.first().copied().unwrap_or(0);
+    // Frames are not answered, but whoever sends some knows them.
+    state.lanes[Lane::Frames.place()].proven |= message.header.protocol == Protocol::Eoe;
     match message.header.protocol {
         Protocol::Error => refused(state, message, room.bus.now()),
         Protocol::Coe => coe(room, state, message),
@@ -115,7 +118,7 @@ fn answer(state: &mut State, lane: Lane, message: &Message<'_>) -> bool {
     let own = &mut state.lanes[lane.place()];
     // Whoever talks takes one after the other; the oldest is not what is waited for.
     let oldest = if own.is_full() { own.take() } else { None };
-    let wanted = own.arrive(arrival, state.seen);
+    let wanted = own.arrive(arrival, state.seen, is_last(lane, message.payload));
     if let Some(oldest) = oldest {
         put_aside(state, lane, oldest);
     }
@@ -125,13 +128,25 @@ fn answer(state: &mut State, lane: Lane, message: &Message<'_>) -> bool {
     wanted
 }
 
+/// Whether a mail ends an answer: of SoE and of SDO information there may be further parts.
+pub(super) fn is_last(lane: Lane, payload: &[u8]) -> bool {
+    match lane {
+        Lane::Soe => SoeMessage::decode(payload).is_ok_and(|part| part.error || !part.incomplete),
+        Lane::Coe => SdoInformation::decode(payload).map_or(true, |part| !part.incomplete),
+        Lane::Foe | Lane::Aoe | Lane::Voe | Lane::Eoe | Lane::Frames | Lane::Other(_) => true,
+    }
+}
+
 /// What came for a lane and was not what somebody waited for: mail that nobody asked for, or a late answer.
 pub(super) fn put_aside(state: &mut State, lane: Lane, arrival: Arrival) {
-    let Arrival::Payload(payload) = arrival else { return };
-    if lane.shelf() == Unsolicited::Other {
+    let (shelf, protocol, payload) = match arrival {
+        Arrival::Payload(payload) => (lane.shelf(), lane.protocol(), payload),
+        Arrival::Refused(reply, _) => (Unsolicited::Other, Protocol::Error, reply.encode().to_vec()),
+    };
+    if shelf == Unsolicited::Other {
         state.counters.unclaimed += 1;
     }
-    state.shelves.ring(lane.shelf()).push(Unclaimed { protocol: lane.protocol(), payload });
+    state.shelves.ring(shelf).push(Unclaimed { protocol, payload });
 }
 
 fn shelve(state: &mut State, message: &Message<'_>, kind: Unsolicited) -> bool {
@@ -142,7 +157,8 @@ fn shelve(state: &mut State, message: &Message<'_>, kind: Unsolicited) -> bool {
 
 /// An error reply does not say to what. It goes to the request that waits; of several, first to one whose protocol the
 /// SubDevice has not shown to know, then to the oldest. Whoever writes a message in parts is told, too. It is certain only
-/// where it can be to nothing else; else the answer to the request that it ends may still come.
+/// where it can be to nothing else, neither to a request that was given up nor to a message that nobody answers; else the
+/// answer to the request that it ends may still come.
 fn refused(state: &mut State, message: &Message<'_>, now: Instant) -> bool {
     let Some(bytes) = message.payload.first_chunk() else {
         state.counters.malformed += 1;
@@ -154,16 +170,19 @@ fn refused(state: &mut State, message: &Message<'_>, now: Instant) -> bool {
         lane.refusal = Some(reply);
         in_parts = true;
     }
-    let waiting = |proven| state.lanes.iter().filter(|l| l.waiting().is_some() && l.proven == proven).count();
-    let is_late = |lane: &LaneState| lane.late_until.is_some_and(|until| now < until);
+    let is_waiting = |lane: &LaneState| lane.waiting().is_some();
+    let is_late = |lane: &LaneState| !lane.settling && lane.late_until.is_some_and(|until| now < until);
+    let may_be_to = |lane: &LaneState| is_waiting(lane) || is_late(lane) || lane.is_unanswered(now);
     // Only a protocol that is not known is refused for itself.
-    let unknown = reply.detail == ErrorReply::UNSUPPORTED_PROTOCOL && waiting(false) > 0;
-    let others = if unknown { waiting(false) } else { waiting(false) + waiting(true) };
-    let late = state.lanes.iter().any(|lane| is_late(lane) && !(unknown && lane.proven));
-    let doubtful = in_parts || late || others > 1;
-    let candidates = state.lanes.iter_mut().filter(|lane| lane.waiting().is_some());
+    let unknown = reply.detail == ErrorReply::UNSUPPORTED_PROTOCOL
+        && state.lanes.iter().any(|lane| !lane.proven && may_be_to(lane));
+    let in_question = |lane: &LaneState| !(unknown && lane.proven);
+    let lanes = || state.lanes.iter().filter(|lane| in_question(lane));
+    let others = lanes().any(|lane| is_late(lane) || lane.is_unanswered(now));
+    let doubtful = in_parts || others || lanes().filter(|lane| is_waiting(lane)).count() > 1;
+    let candidates = state.lanes.iter_mut().filter(|lane| is_waiting(lane) && in_question(lane));
     match candidates.min_by_key(|lane| (lane.proven, lane.asked.map(|asked| asked.at))) {
-        Some(lane) => lane.arrive(Arrival::Refused(reply, doubtful), state.seen),
+        Some(lane) => lane.arrive(Arrival::Refused(reply, doubtful), state.seen, true),
         None if in_parts => false,
         None => {
             state.counters.unclaimed += 1;

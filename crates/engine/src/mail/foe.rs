@@ -79,7 +79,7 @@ enum Said<T> {
 impl<P: FnMut(FoeProgress)> Transfer<P> {
     async fn begin(mailbox: &Mailbox, options: FoeOptions, progress: P) -> Result<Transfer<P>, FoeFailure> {
         let mut talk = mailbox.talk(Lane::Foe).await?;
-        talk.settle(|_| true).await?;
+        talk.settle().await?;
         let payload = alloc::vec![0; talk.room()];
         Ok(Transfer { talk, options, progress, payload, busy: false, since: None })
     }

@@ -15,6 +15,8 @@ use crate::time::Instant;
 const INBOX: usize = 8;
 /// Messages that may wait to be written in a lane.
 const OUTBOX: usize = 64;
+/// How long after a message to which no answer is waited for an error reply may still be to it.
+const UNANSWERED_LIMIT: Duration = Duration::from_secs(1);
 
 /// One conversation at a time; different lanes run side by side.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -150,10 +152,18 @@ pub(super) struct LaneState {
     /// The message that was written last, or not.
     pub written: Option<(u32, Result<(), MailboxError>)>,
     pub asked: Option<Asked>,
-    /// Until when the answer to a request that was given up may still come.
+    /// Until when the answer to a request that was given up, or its next part, may still come.
     pub late_until: Option<Instant>,
+    /// How long each part of it may take.
+    late_limit: Duration,
     /// How long it may take, while nothing can be read.
     late_for: Option<Duration>,
+    /// Whoever talks waits for that answer and has asked for nothing.
+    pub settling: bool,
+    /// A request is being written: its turn.
+    writing: Option<u32>,
+    /// Until when an error reply may be to a message to which no answer is waited for.
+    pub unanswered_until: Option<Instant>,
     /// What the last request was about, so that its answer can be told from that to another one.
     pub mark: u16,
     /// CoE header of the PDO that was asked for by mailbox.
@@ -181,16 +191,51 @@ impl LaneState {
 
     /// As [`LaneState::reset`], but the SubDevice still has what it was given: an answer may come when it is back.
     pub(super) fn suspend(&mut self, now: Instant) {
-        let late = self.late_until.filter(|until| *until > now).map(|until| until.since(now));
+        let late = self.late_until.filter(|until| *until > now).map(|_| self.late_limit);
         let late_for = self.asked.map(|asked| asked.limit).into_iter().chain(late).chain(self.late_for).max();
         let (mark, proven, expected) = (self.mark, self.proven, self.expected);
+        let unanswered = self.is_unanswered(now).then_some(Instant::NEVER);
         self.reset();
         (self.mark, self.proven, self.late_for, self.expected) = (mark, proven, late_for, expected);
+        self.unanswered_until = unanswered;
     }
 
     /// The SubDevice is back.
     pub(super) fn resume(&mut self, now: Instant) {
-        self.late_until = self.late_for.take().map(|limit| now + limit);
+        if let Some(limit) = self.late_for.take() {
+            self.late_from(now, limit);
+        }
+        self.unanswered_until = self.unanswered_until.map(|_| now + UNANSWERED_LIMIT);
+    }
+
+    /// The answer to a request that was given up may still come, each part of it within a time.
+    pub(super) fn late_from(&mut self, now: Instant, limit: Duration) {
+        (self.late_until, self.late_limit) = (Some(now + limit), limit);
+    }
+
+    /// A part of that answer has come: the next one may take as long again.
+    pub(super) fn late_goes_on(&mut self, now: Instant) {
+        self.late_until = self.late_until.map(|until| until.max(now + self.late_limit));
+    }
+
+    /// The talk of a turn gives its request up; `open` where not all of the answer has come.
+    pub(super) fn give_up(&mut self, turn: u32, open: bool, now: Instant, limit: Duration) {
+        let unanswered = self.asked.take().is_some_and(|asked| !asked.answered);
+        // Who has only waited for the answer to what others asked leaves that as it is.
+        if core::mem::take(&mut self.settling) {
+            return;
+        }
+        if self.writing == Some(turn) {
+            // The time of its answer begins when it is written.
+            (self.late_until, self.late_limit) = (Some(Instant::NEVER), limit);
+        } else if unanswered || open {
+            self.late_from(now, limit);
+        }
+    }
+
+    /// Whether an error reply may be to a message to which no answer is waited for.
+    pub(super) fn is_unanswered(&self, now: Instant) -> bool {
+        self.unanswered_until.is_some_and(|until| now < until)
     }
 
     pub(super) fn is_idle(&self) -> bool {
@@ -203,6 +248,10 @@ impl LaneState {
 
     /// A message of a talk is about to be written. Its answer may come before it is known that it was.
     pub(super) fn writing(&mut self, message: &Outgoing, now: Instant) {
+        match message.asks {
+            Some(_) => self.writing = Some(message.turn),
+            None => self.unanswered_until = Some(Instant::NEVER),
+        }
         if let Some(limit) = message.asks.filter(|_| self.turns.front() == Some(&message.turn)) {
             self.asked = Some(Asked::at(now, limit));
             self.expected = Some(message.lane.protocol());
@@ -223,14 +272,18 @@ impl LaneState {
                 if let Some(asked) = self.asked.as_mut().filter(|asked| !asked.answered) {
                     *asked = Asked::at(now, limit);
                 }
-            } else {
-                if held {
-                    self.asked = None;
-                }
+            } else if held {
+                self.asked = None;
                 if arrived {
-                    self.late_until = Some(now + limit);
+                    self.late_from(now, limit);
                 }
+            } else if self.late_until.is_some() {
+                // It was given up meanwhile, and its answer has not come yet.
+                self.late_from(now, limit);
             }
+            self.writing = None;
+        } else {
+            self.unanswered_until = Some(now + UNANSWERED_LIMIT);
         }
         self.written = Some((message.id, result));
     }
@@ -254,10 +307,14 @@ impl LaneState {
 
     /// An answer, or what may be one, for whoever talks. False where nobody waits for one.
     ///
-    /// `seen` is when it was there, for all one knows.
-    pub(super) fn arrive(&mut self, arrival: Arrival, seen: Instant) -> bool {
+    /// `seen` is when it was there, for all one knows; `last` says that no further part of it follows.
+    pub(super) fn arrive(&mut self, arrival: Arrival, seen: Instant, last: bool) -> bool {
         let Some(asked) = &mut self.asked else {
-            self.late_until = None;
+            if last {
+                self.late_until = None;
+            } else {
+                self.late_goes_on(seen);
+            }
             return false;
         };
         self.proven |= matches!(arrival, Arrival::Payload(_));

@@ -19,7 +19,7 @@ pub async fn send(mailbox: &Mailbox, lane: Lane, payload: &[u8], limit: Duration
 /// unasked: emergencies and PDOs (CoE), notifications (SoE), requests (AoE), Ethernet frames (EoE).
 pub async fn exchange(mailbox: &Mailbox, lane: Lane, payload: &[u8], limits: Limits) -> Result<Vec<u8>, MailboxError> {
     let mut talk = mailbox.talk(lane).await?;
-    talk.settle(|_| true).await?;
+    talk.settle().await?;
     talk.expect_any(true);
     talk.ask(payload, limits, |payload| Some(payload.to_vec())).await
 }

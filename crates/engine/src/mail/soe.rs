@@ -108,7 +108,7 @@ async fn begin(mailbox: &Mailbox, address: SoeAddress) -> Result<Talk, SoeFailur
         return Err(SoeFailure::Drive);
     }
     let mut talk = mailbox.talk(Lane::Soe).await?;
-    talk.settle(|payload| SoeMessage::decode(payload).is_ok_and(|message| !message.incomplete)).await?;
+    talk.settle().await?;
     Ok(talk)
 }
 

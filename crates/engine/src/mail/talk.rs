@@ -21,6 +21,9 @@ const POST_LIMIT: Duration = Duration::from_millis(100);
 /// How long after the end of a conversation an error reply may still be to one of its parts.
 const PARTS_LIMIT: Duration = Duration::from_secs(1);
 
+/// Parts of an answer that comes late, at most: they are counted with 16 bits (facts 6.3, 6.6).
+const LATE_PARTS: usize = 1 << 16;
+
 /// A lane of a mailbox, held by one conversation. Dropped, it is free for the next; what was asked and not answered is
 /// remembered, so that its answer is not taken for another's.
 #[derive(Debug)]
@@ -157,27 +160,45 @@ impl Talk {
         let _ = self.with(|lane| lane.late_until = None);
     }
 
-    /// Waits until the answer to a request that was given up before has come or cannot come any more, in protocols whose
-    /// answers do not say to what they belong. `is_last` knows the last part of an answer.
-    pub async fn settle(&mut self, is_last: impl Fn(&[u8]) -> bool) -> Result<(), MailboxError> {
+    /// The answer to a request that was given up may come within a time.
+    pub(super) fn expect_late(&mut self, limit: Duration) {
         let now = self.room.bus.now();
-        let Some(until) = self.with(|lane| lane.late_until.take())?.filter(|until| *until > now) else { return Ok(()) };
-        self.limit = until.since(now);
-        self.open = true;
-        loop {
+        let _ = self.with(|lane| lane.late_from(now, limit));
+    }
+
+    /// Waits until the answer to a request that was given up before has come or cannot come any more, all parts of it, in
+    /// protocols whose answers do not say to what they belong.
+    pub async fn settle(&mut self) -> Result<(), MailboxError> {
+        for _ in 0..LATE_PARTS {
+            let now = self.room.bus.now();
+            let Some(until) = self.with(|lane| lane.late_until)?.filter(|until| *until > now) else { break };
+            self.limit = until.since(now);
+            self.with(|lane| lane.settling = true)?;
             self.look_on()?;
-            match self.arrival(until.since(self.room.bus.now())).await {
-                Ok(Arrival::Payload(payload)) => {
-                    let is_last = is_last(&payload);
-                    delivery::put_aside(&mut self.room.state(), self.lane, Arrival::Payload(payload));
-                    if is_last {
-                        break;
-                    }
-                }
-                Ok(Arrival::Refused(..)) | Err(MailboxError::NoAnswer { .. }) => break,
-                Err(error) => return Err(error),
+            // A request that is only written now has its time from then on.
+            let ready = || {
+                let heard = |lane: &mut LaneState| match lane.take() {
+                    Some(arrival) => Some(Some(arrival)),
+                    None => (lane.late_until != Some(until)).then_some(None),
+                };
+                self.with(heard).transpose()
+            };
+            let heard = self.room.bus.within(self.limit, self.room.news.until(ready)).await.unwrap_or(Ok(None))?;
+            let Some(arrival) = heard else { continue };
+            let (is_part, is_over) = match &arrival {
+                Arrival::Payload(payload) => (true, delivery::is_last(self.lane, payload)),
+                Arrival::Refused(_, doubtful) => (false, !doubtful),
+            };
+            delivery::put_aside(&mut self.room.state(), self.lane, arrival);
+            if is_over {
+                break;
+            }
+            if is_part {
+                let now = self.room.bus.now();
+                self.with(|lane| lane.late_goes_on(now))?;
             }
         }
+        self.with(|lane| (lane.settling, lane.late_until) = (false, None))?;
         self.complete();
         Ok(())
     }
@@ -241,8 +262,9 @@ impl Talk {
     ) -> Result<T, MailboxError> {
         self.limit = limits.1;
         self.put_aside();
-        self.write(payload, limits.0, Some(limits.1)).await?;
+        // Its answer may begin before it is known that it was written.
         self.open = true;
+        self.write(payload, limits.0, Some(limits.1)).await.inspect_err(|_| self.open = false)?;
         self.answer(limits.1, accept).await
     }
 
@@ -322,13 +344,9 @@ impl Talk {
 
     /// What was asked is no longer waited for; its answer may come late.
     fn give_up(&mut self) {
-        let late_until = self.room.bus.now() + self.limit;
+        let (now, limit, turn) = (self.room.bus.now(), self.limit, self.turn);
         let open = core::mem::take(&mut self.open);
-        let _ = self.with(|lane| {
-            if lane.asked.take().is_some_and(|asked| !asked.answered) || open {
-                lane.late_until = Some(late_until);
-            }
-        });
+        let _ = self.with(|lane| lane.give_up(turn, open, now, limit));
         self.put_aside();
     }
 
@@ -355,7 +373,14 @@ impl Talk {
 
     /// A message that was queued and not written yet when the talk ends is taken back, unless nobody waits for it.
     fn withdraw(&mut self) {
-        let _ = self.with(|lane| lane.outbox.retain(|message| message.asks.is_none()));
+        let withdraw = |lane: &mut LaneState| {
+            let queued = lane.outbox.len();
+            lane.outbox.retain(|message| message.asks.is_none());
+            lane.outbox.len() < queued
+        };
+        if self.with(withdraw).unwrap_or(false) {
+            self.open = false;
+        }
     }
 }
 

@@ -3,6 +3,7 @@
 
 mod device;
 mod interrupted;
+mod late;
 mod protocols;
 mod raw_mail;
 mod server;

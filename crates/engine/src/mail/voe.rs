@@ -37,7 +37,7 @@ pub async fn send(mailbox: &Mailbox, message: &Voe, limit: Duration) -> Result<(
 /// Sends a message and waits for the next one of the same vendor.
 pub async fn exchange(mailbox: &Mailbox, message: &Voe, limits: Limits) -> Result<Voe, MailboxError> {
     let mut talk = mailbox.talk(Lane::Voe).await?;
-    talk.settle(|_| true).await?;
+    talk.settle().await?;
     let payload = encode(&talk, message)?;
     let accept = |payload: &[u8]| decode(payload).filter(|answer| answer.vendor_id == message.vendor_id);
     talk.ask(&payload, limits, accept).await

@@ -12,6 +12,8 @@ use crate::mail::{Mailbox, MailboxError, Talk};
 /// Objects that every CoE device has; one that it lacks is answered with an abort, which does as well.
 const DEVICE_TYPE: u16 = 0x1000;
 const IDENTITY: u16 = 0x1018;
+/// Attempts to ask for it, where it is not certain that an error reply was to that.
+const FENCES: usize = 3;
 
 /// A transfer under way. Ended before its time, by an error or because nobody wants it any more, it is aborted.
 pub(super) struct Transfer {
@@ -65,7 +67,8 @@ impl Transfer {
             }
             Err(error) => {
                 // What the SubDevice refused or never got is not under way.
-                self.busy = in_segments || matches!(error, MailboxError::Bus(_));
+                let doubtful = self.talk.late_mark().is_some();
+                self.busy = in_segments || doubtful || matches!(error, MailboxError::Bus(_));
                 Err(self.failed(SdoFailure::Mailbox(error)))
             }
         }
@@ -108,10 +111,31 @@ impl Drop for Transfer {
 /// object. So another object is asked for first: a SubDevice answers in order, and with that answer in hand older ones
 /// have come or never will.
 pub(in crate::mail) async fn settle(talk: &mut Talk, limits: Limits) -> Result<(), MailboxError> {
-    let Some(late) = talk.late_mark() else { return Ok(()) };
-    let fence = if late == DEVICE_TYPE { IDENTITY } else { DEVICE_TYPE };
-    talk.mark(fence);
-    talk.forget_late();
+    let mut result = Ok(());
+    for _ in 0..FENCES {
+        let Some(late) = talk.late_mark() else { return Ok(()) };
+        let fence = if late == DEVICE_TYPE { IDENTITY } else { DEVICE_TYPE };
+        talk.mark(fence);
+        talk.forget_late();
+        result = ask_fence(talk, fence, limits).await;
+        match result {
+            Ok(()) => return Ok(()),
+            // Refused for sure it is an answer, too; else it may have been something else that was refused.
+            Err(MailboxError::Error(_)) => {}
+            Err(error) => {
+                // Where nothing was asked, all is as before.
+                if talk.late_mark().is_none() {
+                    talk.mark(late);
+                    talk.expect_late(limits.1);
+                }
+                return Err(error);
+            }
+        }
+    }
+    if talk.late_mark().is_some() { result } else { Ok(()) }
+}
+
+async fn ask_fence(talk: &mut Talk, fence: u16, limits: Limits) -> Result<(), MailboxError> {
     let request = SdoRequest::Upload { index: fence, sub_index: 0, complete_access: false };
     let mut payload = [0; INITIATE_LEN];
     let length = request.encode(&mut payload).unwrap_or(0);
@@ -123,8 +147,5 @@ pub(in crate::mail) async fn settle(talk: &mut Talk, limits: Limits) -> Result<(
         | SdoResponse::DownloadSegmentDone { .. }
         | SdoResponse::UploadSegment { .. } => None,
     };
-    match talk.ask(&payload[..length], limits, accept).await {
-        Ok(()) | Err(MailboxError::Error(_)) => Ok(()),
-        Err(error) => Err(error),
-    }
+    talk.ask(&payload[..length], limits, accept).await
 }

@@ -87,7 +87,7 @@ async fn request<T>(
     let length = EoeMessage { port, body }.encode(&mut payload).ok_or(failed(too_long.into()))?;
     let exchange = async {
         let mut talk = mailbox.talk(Lane::Eoe).await?;
-        talk.settle(|_| true).await?;
+        talk.settle().await?;
         let accept = |payload: &[u8]| {
             let message = EoeMessage::decode(payload).ok()?;
             // Some SubDevices leave the port out.

@@ -291,7 +291,7 @@ async fn serve_own(shared: Rc<Shared>, key: (u16, usize)) {
 async fn settle(talk: &mut Talk, lane: Lane) -> Result<(), MailboxError> {
     match lane {
         Lane::Coe => coe::settle(talk, LIMITS).await,
-        _ => talk.settle(|_| true).await,
+        _ => talk.settle().await,
     }
 }
 

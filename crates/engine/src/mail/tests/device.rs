@@ -70,6 +70,14 @@ impl<S: Server> Device<S> {
         self.queue.push_back((now, mail));
     }
 
+    /// A mail that nobody asked for, before all that wait.
+    pub fn cut_in(&mut self, protocol: Protocol, payload: &[u8], now: Instant) {
+        self.say(protocol, payload, now);
+        if let Some(mail) = self.queue.pop_back() {
+            self.queue.push_front(mail);
+        }
+    }
+
     /// Lets the application work.
     pub fn run(&mut self, now: Instant) {
         // With many answers queued it takes no more.

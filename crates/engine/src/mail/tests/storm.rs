@@ -176,6 +176,12 @@ fn a_mail_that_comes_late_long_after_it_was_accepted_is_a_double_seed_2468() {
     storm(2468, LinkSet::Ring, 20, false);
 }
 
+/// A request was given up whose answer had begun before it was known to be written.
+#[test]
+fn fragments_of_a_request_that_was_given_up_are_not_taken_for_those_of_the_next_seed_3580() {
+    storm(3580, LinkSet::Ring, 20, true);
+}
+
 #[test]
 fn procedures_that_are_dropped_harm_nobody_seeds_0_to_99() {
     for seed in 0..100 {

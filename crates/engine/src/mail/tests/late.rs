@@ -1,0 +1,219 @@
+//! What comes late: fragments of an answer that nobody waits for any more, and error replies that may be to something else.
+
+use alloc::vec;
+use alloc::vec::Vec;
+use core::future::{Future, poll_fn};
+use core::pin::pin;
+use core::task::Poll;
+use core::time::Duration;
+
+use ringcat_wire::mailbox::sdo::AbortCode;
+use ringcat_wire::mailbox::soe::Idn;
+use ringcat_wire::mailbox::{ErrorReply, Protocol};
+
+use super::device::pattern;
+use super::{Bench, Fate, LIMITS};
+use crate::link::LinkSet;
+use crate::mail::coe::{SdoAddress, write};
+use crate::mail::soe::SoeAddress;
+use crate::mail::voe::Voe;
+use crate::mail::{Lane, Limits, MailboxError, Unsolicited, raw, soe, voe};
+
+const MS: Duration = Duration::from_millis(1);
+
+fn message(text: &[u8]) -> Voe {
+    Voe { vendor_id: 1, vendor_type: 1, data: text.to_vec() }
+}
+
+impl Bench {
+    /// Begins a vendor message and its answer; after a time nobody waits for it any more.
+    fn ask_for(&mut self, text: &[u8], time: Duration, limits: Limits) -> Outcome {
+        let (mailbox, bus, message) = (self.mailbox.clone(), self.supervisor.bus(), message(text));
+        self.start(async move { bus.within(time, voe::exchange(&mailbox, &message, limits)).await.ok() })
+    }
+
+    /// A message of a protocol of the vendor's own that nobody answers.
+    fn send_unanswered(&mut self) {
+        let mailbox = self.mailbox.clone();
+        assert_eq!(self.run(async move { raw::send(&mailbox, Lane::of(9), &[0], LIMITS.0).await }), Ok(()));
+    }
+
+    fn refuse(&mut self, detail: u16) -> ErrorReply {
+        let reply = ErrorReply::new(detail);
+        self.device.say(Protocol::Error, &reply.encode(), self.now);
+        reply
+    }
+
+    fn until_served(&mut self, count: usize) {
+        while self.device.served.len() < count {
+            self.step(|| Fate::Passes);
+        }
+    }
+}
+
+type Outcome = alloc::rc::Rc<core::cell::RefCell<Option<Option<Result<Voe, MailboxError>>>>>;
+
+#[test]
+fn late_fragments_of_which_the_first_came_when_nobody_waited_are_not_taken_for_those_of_the_next_facts_6_6() {
+    let mut bench = Bench::new(LinkSet::Single, 64);
+    let (old, new) = (pattern(1, 150), pattern(2, 150));
+    let address = SoeAddress::value(1, Idn::standard(0, 7));
+    bench.device.server.idns.insert((1, 7), old);
+    let (mailbox, bus) = (bench.mailbox.clone(), bench.supervisor.bus());
+    bench.start(async move { bus.within(MS / 5, soe::read(&mailbox, address, LIMITS, 1000)).await.is_ok() });
+    bench.until_served(1);
+    bench.pass(MS);
+    bench.device.server.idns.insert((1, 7), new.clone());
+    // One of the three is read before anybody asks again.
+    bench.mailbox.is_full();
+    while bench.mailbox.counters().unclaimed == 0 {
+        bench.step(|| Fate::Passes);
+    }
+    assert_eq!(bench.mailbox.counters().unclaimed, 1);
+    let mailbox = bench.mailbox.clone();
+    assert_eq!(bench.run(async move { soe::read(&mailbox, address, LIMITS, 1000).await }), Ok(new));
+    assert_eq!(bench.mailbox.counters().unclaimed, 3);
+}
+
+// The write was taken, what came back of it was late, and meanwhile the reader brought the first fragment.
+#[test]
+fn late_fragments_of_which_the_first_came_before_the_request_was_known_to_be_written_are_not_taken_for_those_of_the_next()
+ {
+    let mut bench = Bench::new(LinkSet::Single, 64);
+    let (old, new) = (pattern(1, 150), pattern(2, 150));
+    let address = SoeAddress::value(1, Idn::standard(0, 7));
+    bench.device.server.idns.insert((1, 7), old);
+    let (mailbox, bus) = (bench.mailbox.clone(), bench.supervisor.bus());
+    let given_up =
+        bench.start(async move { bus.within(2 * MS, soe::read(&mailbox, address, LIMITS, 1000)).await.is_err() });
+    bench.step(|| Fate::Late(40 * MS));
+    bench.pass(MS / 2);
+    assert_eq!(bench.device.served, [1]);
+    bench.device.server.idns.insert((1, 7), new.clone());
+    bench.mailbox.is_full();
+    while given_up.borrow().is_none() {
+        bench.step(|| Fate::Late(40 * MS));
+    }
+    assert_eq!(given_up.take(), Some(true));
+    let mailbox = bench.mailbox.clone();
+    assert_eq!(bench.run(async move { soe::read(&mailbox, address, LIMITS, 1000).await }), Ok(new));
+    assert_eq!(bench.mailbox.counters().unclaimed, 3);
+}
+
+#[test]
+fn the_answer_to_a_request_that_is_written_only_after_it_was_given_up_is_not_taken_for_that_to_the_next() {
+    let limits = (Duration::from_secs(1), 10 * MS);
+    let mut bench = Bench::new(LinkSet::Single, 64);
+    let given_up = bench.ask_for(b"before", MS, limits);
+    // No frame arrives for longer than an answer may take.
+    let end = bench.now + 40 * MS;
+    while given_up.borrow().is_none() {
+        bench.step(|| Fate::LostOut);
+    }
+    let asked = bench.ask_for(b"after", 10 * LIMITS.1, limits);
+    while bench.now < end {
+        bench.step(|| Fate::LostOut);
+    }
+    bench.pass(100 * MS);
+    assert_eq!(given_up.take(), Some(None));
+    assert_eq!(asked.take(), Some(Some(Ok(message(b"after")))));
+    assert_eq!(bench.device.served, [1, 2], "both were written");
+}
+
+#[test]
+fn an_error_reply_that_may_be_to_something_that_nobody_answers_leaves_the_request_that_it_ends_in_doubt_facts_6_1() {
+    let mut bench = Bench::new(LinkSet::Single, 64);
+    bench.device.delay = 3 * MS;
+    bench.send_unanswered();
+    let first = bench.ask_for(b"first", LIMITS.1, LIMITS);
+    bench.until_served(2);
+    let at = bench.now;
+    let reply = ErrorReply::new(ErrorReply::NO_MORE_MEMORY);
+    bench.device.cut_in(Protocol::Error, &reply.encode(), at);
+    while first.borrow().is_none() {
+        bench.step(|| Fate::Passes);
+    }
+    assert_eq!(first.take(), Some(Some(Err(MailboxError::Error(reply)))));
+    let mailbox = bench.mailbox.clone();
+    let second = bench.run(async move { voe::exchange(&mailbox, &message(b"second"), LIMITS).await });
+    assert_eq!(second, Ok(message(b"second")));
+}
+
+#[test]
+fn a_download_that_was_perhaps_not_what_was_refused_is_aborted_facts_6_3() {
+    for in_doubt in [false, true] {
+        let mut bench = Bench::new(LinkSet::Single, 64);
+        bench.device.delay = 3 * MS;
+        if in_doubt {
+            bench.send_unanswered();
+        }
+        let before = bench.device.served.len();
+        let mailbox = bench.mailbox.clone();
+        let object = SdoAddress::new(0x2000, 1);
+        let written = bench.start(async move { write(&mailbox, object, &pattern(1, 300), LIMITS).await });
+        bench.until_served(before + 1);
+        let at = bench.now;
+        let reply = ErrorReply::new(ErrorReply::NO_MORE_MEMORY);
+        bench.device.cut_in(Protocol::Error, &reply.encode(), at);
+        bench.pass(50 * MS);
+        assert!(written.take().is_some_and(|result| result.is_err()), "in doubt: {in_doubt}");
+        let aborts: &[AbortCode] = if in_doubt { &[AbortCode::GENERAL] } else { &[] };
+        assert_eq!(bench.device.server.aborts, aborts, "in doubt: {in_doubt}");
+    }
+}
+
+#[test]
+fn a_protocol_that_is_known_is_not_refused_because_ethernet_frames_are_facts_6_1() {
+    let mut bench = Bench::new(LinkSet::Single, 64);
+    bench.device.delay = 3 * MS;
+    let mailbox = bench.mailbox.clone();
+    assert_eq!(
+        bench.run(async move { voe::exchange(&mailbox, &message(b"first"), LIMITS).await }),
+        Ok(message(b"first"))
+    );
+    // The server does not know EoE; its error reply is there before the answer.
+    let mailbox = bench.mailbox.clone();
+    bench.start(async move { mailbox.talk(Lane::Frames).await?.send(&[0; 12], LIMITS.0).await });
+    let second = bench.ask_for(b"second", LIMITS.1, LIMITS);
+    bench.pass(20 * MS);
+    assert_eq!(second.take(), Some(Some(Ok(message(b"second")))));
+    let kept = bench.mailbox.pop_unsolicited(Unsolicited::Other).map(|mail| mail.protocol);
+    assert_eq!(kept, Some(Protocol::Error));
+}
+
+#[test]
+fn an_error_reply_to_something_else_does_not_end_the_wait_for_a_late_answer_facts_6_1() {
+    let mut bench = Bench::new(LinkSet::Single, 64);
+    bench.device.delay = 3 * MS;
+    bench.send_unanswered();
+    bench.ask_for(b"first", MS / 5, LIMITS);
+    bench.until_served(2);
+    bench.pass(MS / 2);
+    let second = bench.ask_for(b"second", LIMITS.1, LIMITS);
+    let at = bench.now;
+    bench.device.cut_in(Protocol::Error, &ErrorReply::new(ErrorReply::NO_MORE_MEMORY).encode(), at);
+    bench.pass(100 * MS);
+    assert_eq!(second.take(), Some(Some(Ok(message(b"second")))));
+}
+
+#[test]
+fn an_error_reply_that_comes_while_its_conversation_ends_is_kept_as_unasked_mail() {
+    let mut bench = Bench::new(LinkSet::Single, 64);
+    let (mailbox, asking) = (bench.mailbox.clone(), bench.mailbox.clone());
+    // Nobody answers this; whoever asks has gone when the error reply has just been sorted.
+    let ended = bench.start(async move {
+        let mut exchange = pin!(raw::exchange(&asking, Lane::of(9), &[0], LIMITS));
+        poll_fn(|context| {
+            let gone = mailbox.room().state().lanes[Lane::of(9).place()].has_arrivals();
+            if gone { Poll::Ready(true) } else { exchange.as_mut().poll(context).map(|_| false) }
+        })
+        .await
+    });
+    bench.until_served(1);
+    let reply = bench.refuse(ErrorReply::NO_MORE_MEMORY);
+    bench.pass(20 * MS);
+    assert_eq!(ended.take(), Some(true));
+    let kept: Vec<_> =
+        core::iter::from_fn(|| bench.mailbox.pop_unsolicited(Unsolicited::Other)).map(|mail| mail.payload).collect();
+    assert_eq!(kept, vec![reply.encode().to_vec()]);
+}
