@@ -10,6 +10,7 @@ use std::time::Duration;
 use ringcat::simulated::SimulatedSegment;
 use ringcat::tee::Tee;
 use ringcat::{Application, ClockConfig, JunctionMode, MainDevice, Options};
+use ringcat_engine::ring::identity::{Class, class_of};
 use ringcat_link::Recorder;
 use ringcat_link::pcapng::{Direction, Writer};
 use ringcat_sim::cable::{CableId, DeviceIndex};
@@ -17,6 +18,7 @@ use ringcat_sim::description::DeviceDescription;
 use ringcat_sim::fault::Fault;
 use ringcat_sim::frame::Port::{A, B, C, D};
 use ringcat_sim::network::{Network, NetworkOptions};
+use scenarios::capture::ethercat::Frame;
 use scenarios::capture::pcapng::Capture;
 use scenarios::clocks::{clock_tree, clocked, config, wired, with_clocks};
 use scenarios::segments::{MAIN, RING_BEHIND_JUNCTION, RING_OF_THREE, at, line, ring};
@@ -65,28 +67,92 @@ fn cycles(application: &mut Recorded, count: usize) {
     }
 }
 
-/// What the script says, and whether it has no findings; `None` where there is no Python.
-fn check(path: &Path) -> Option<(bool, String)> {
-    let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../ci/check-clocks");
-    let output = Command::new(script).arg(path).output().expect("env is everywhere");
-    if output.status.code() == Some(NOT_FOUND) {
-        println!("skipped: there is no python3");
-        return None;
-    }
-    let text = format!("{}{}", String::from_utf8_lossy(&output.stdout), String::from_utf8_lossy(&output.stderr));
-    Some((output.status.success(), text))
+/// Captures, and what the script must say of each. It is started once for all of them.
+#[derive(Default)]
+struct Cases {
+    all: Vec<(PathBuf, Case)>,
 }
 
-/// The script must find nothing wrong, and say that it has judged so much.
-fn expect(name: &str, network: Network, judged: &str, work: impl FnOnce(&mut Recorded)) {
+/// What is to be said.
+enum Case {
+    /// Of this run nothing is wrong, and so much was judged.
+    Fine(&'static str, &'static str),
+    /// This is wrong.
+    Finding(&'static str),
+}
+
+impl Cases {
+    /// The script must find nothing wrong, and say that it has judged so much.
+    fn fine(&mut self, name: &'static str, network: Network, judged: &'static str, work: impl FnOnce(&mut Recorded)) {
+        let path = file();
+        let options = Options { junctions: JunctionMode::Automatic, ..Options::default() };
+        recorded(&options, network, &path, work);
+        self.all.push((path, Case::Fine(name, judged)));
+    }
+
+    /// Judges them all.
+    fn judge(self) {
+        let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../ci/check-clocks");
+        let paths = self.all.iter().map(|(path, _)| path);
+        let output = Command::new(script).args(paths).output().expect("env is everywhere");
+        if output.status.code() == Some(NOT_FOUND) {
+            println!("skipped: there is no python3");
+            return;
+        }
+        let text = format!("{}{}", String::from_utf8_lossy(&output.stdout), String::from_utf8_lossy(&output.stderr));
+        let any_finding = self.all.iter().any(|(_, case)| matches!(case, Case::Finding(_)));
+        assert_eq!(output.status.code(), Some(i32::from(any_finding)), "{text}");
+        for (path, case) in &self.all {
+            let begin = format!("file: {}\n", path.display());
+            let said = if self.all.len() == 1 { Some(&*text) } else { text.split_once(&begin).map(|(_, said)| said) };
+            let said = said.unwrap_or_else(|| panic!("nothing is said of {}: {text}", path.display()));
+            let said = said.split("\nfile: ").next().unwrap_or_default();
+            match case {
+                Case::Fine(name, judged) => {
+                    println!("{name}\n{said}");
+                    assert!(said.contains("findings: 0") && said.contains(judged), "{name}: expected {judged}\n{said}");
+                }
+                Case::Finding(finding) => {
+                    assert!(!said.contains("findings: 0") && said.contains(finding), "expected \"{finding}\": {said}");
+                }
+            }
+        }
+    }
+}
+
+impl Drop for Cases {
+    fn drop(&mut self) {
+        self.all.iter().for_each(|(path, _)| drop(std::fs::remove_file(path)));
+    }
+}
+
+/// As often as declared (here 100 times), eight at a time, while states change.
+#[test]
+fn the_static_drift_phase_is_as_long_as_declared_in_bursts_beside_the_start_up_facts_7_2() {
     let path = file();
-    let options = Options { junctions: JunctionMode::Automatic, ..Options::default() };
-    recorded(&options, network, &path, work);
-    let result = check(&path);
+    recorded(&Options::default(), line(clocked(3, 50), NetworkOptions::default()), &path, |run| cycles(run, 20));
+    let capture = Capture::parse(&std::fs::read(&path).expect("a capture")).expect("a capture");
     std::fs::remove_file(&path).expect("it was written");
-    let Some((fine, said)) = result else { return };
-    println!("{name}\n{said}");
-    assert!(fine && said.contains(judged), "{name}: expected {judged}\n{said}");
+    let (mut handed_out, mut states) = (Vec::new(), Vec::new());
+    for packet in capture.packets.iter().filter(|packet| packet.sent) {
+        let is_acyclic = class_of(&packet.bytes) == Some(Class::Acyclic);
+        for datagram in Frame::parse(&packet.bytes).expect("one of ours").datagrams {
+            match (datagram.command, datagram.ado) {
+                (FRMW, 0x0910) if is_acyclic => handed_out.push(packet.time_ns),
+                (FPWR, 0x0120) => states.push(packet.time_ns),
+                _ => {}
+            }
+        }
+    }
+    assert_eq!(handed_out.len(), 100);
+    let (first, last) = (handed_out[0], handed_out[99]);
+    assert!(states.iter().any(|at| (first..last).contains(at)), "{first} to {last}: {states:?}");
+    // 80 us apart in the mean, since loops need their time; less within a burst, so that others have the bus in between.
+    assert!(last - first >= 12 * 640_000, "{handed_out:?}");
+    for bursts in handed_out.chunks(8).collect::<Vec<_>>().windows(2) {
+        let (within, between) = (bursts[0][7] - bursts[0][0], bursts[1][0] - bursts[0][7]);
+        assert!(within < 640_000 && between >= 100_000, "{within} ns, next after {between} ns: {handed_out:?}");
+    }
 }
 
 /// Some of these have no clock.
@@ -100,28 +166,31 @@ fn with_gaps(count: usize) -> Vec<DeviceDescription> {
 
 #[test]
 fn written_delays_and_offsets_are_those_that_a_capture_gives_facts_7_1_facts_7_2() {
+    let mut cases = Cases::default();
     let options = NetworkOptions::default;
-    expect("line", line(clocked(12, 100), options()), "judged: 12 delays", |_| ());
-    expect("tree", clock_tree(clocked(20, 100)), "judged: 20 delays", |_| ());
-    expect("without a clock", line(with_gaps(11), options()), "judged: 7 delays", |_| ());
-    expect("ring", ring(clocked(8, 100), options()), "judged: 8 delays", |_| ());
+    cases.fine("line", line(clocked(12, 100), options()), "judged: 12 delays", |_| ());
+    cases.fine("tree", clock_tree(clocked(20, 100)), "judged: 20 delays", |_| ());
+    cases.fine("without a clock", line(with_gaps(11), options()), "judged: 7 delays", |_| ());
+    cases.fine("ring", ring(clocked(8, 100), options()), "judged: 8 delays", |_| ());
     let mut broken = ring(clocked(8, 100), options());
     broken.cut(CableId(3));
     broken.advance_by(Duration::from_millis(1));
-    expect("broken ring", broken, "judged: 8 delays", |_| ());
+    cases.fine("broken ring", broken, "judged: 8 delays", |_| ());
+    cases.judge();
 }
 
 #[test]
 fn clocks_of_a_ring_that_breaks_and_of_a_subdevice_that_returns_keep_their_delays_facts_7_5() {
+    let mut cases = Cases::default();
     let network = ring(clocked(8, 100), NetworkOptions::default());
-    expect("ring that breaks", network, "judged: 21 delays", |run| {
+    cases.fine("ring that breaks", network, "judged: 21 delays", |run| {
         cycles(run, 20);
         apply(run, Fault::Cut(CableId(3)));
         cycles(run, 100);
         apply(run, Fault::Heal(CableId(3)));
         cycles(run, 100);
     });
-    expect("SubDevice that returns", line(clocked(6, 100), NetworkOptions::default()), "7 offsets", |run| {
+    cases.fine("SubDevice that returns", line(clocked(6, 100), NetworkOptions::default()), "7 offsets", |run| {
         apply(run, Fault::PowerOff(DeviceIndex(5)));
         cycles(run, 50);
         apply(run, Fault::PowerOn(DeviceIndex(5)));
@@ -129,6 +198,7 @@ fn clocks_of_a_ring_that_breaks_and_of_a_subdevice_that_returns_keep_their_delay
         settle(run);
         cycles(run, 50);
     });
+    cases.judge();
 }
 
 fn apply(run: &mut Recorded, fault: Fault) {
@@ -166,14 +236,17 @@ fn fork() -> Network {
 
 #[test]
 fn crossed_subdevices_and_branches_of_a_fork_without_a_clock_are_judged_facts_7_1() {
-    expect("crossed", crossed(), "judged: 6 delays", |_| ());
-    expect("fork without a clock", fork(), "judged: 6 delays", |_| ());
+    let mut cases = Cases::default();
+    cases.fine("crossed", crossed(), "judged: 6 delays", |_| ());
+    cases.fine("fork without a clock", fork(), "judged: 6 delays", |_| ());
+    cases.judge();
 }
 
 #[test]
 fn rings_behind_junctions_are_judged_whole_and_broken_facts_7_5_9_4() {
+    let mut cases = Cases::default();
     let network = || wired(clocked(7, 100), &RING_BEHIND_JUNCTION);
-    expect("ring behind a junction", network(), "judged: 63 delays", |run| {
+    cases.fine("ring behind a junction", network(), "judged: 63 delays", |run| {
         cycles(run, 20);
         for cable in RING_OF_THREE {
             apply(run, Fault::Cut(CableId(cable)));
@@ -185,11 +258,12 @@ fn rings_behind_junctions_are_judged_whole_and_broken_facts_7_5_9_4() {
     let mut broken = network();
     broken.cut(CableId(3));
     broken.advance_by(Duration::from_millis(1));
-    expect("ring that is whole later", broken, "judged: 14 delays", |run| {
+    cases.fine("ring that is whole later", broken, "judged: 14 delays", |run| {
         cycles(run, 20);
         apply(run, Fault::Heal(CableId(3)));
         cycles(run, 100);
     });
+    cases.judge();
 }
 
 /// Is shown a datagram: whether it was sent, command, register, the bytes from its header to its counter.
@@ -227,9 +301,8 @@ const FRMW: u8 = 14;
 /// Of the third SubDevice.
 const STATION: [u8; 2] = 0x1003_u16.to_le_bytes();
 
-/// A capture, judged as it is and with changes.
+/// A capture, judged with changes.
 struct Tampering {
-    path: PathBuf,
     original: Capture,
 }
 
@@ -240,25 +313,21 @@ impl Tampering {
         let options = Options { junctions: JunctionMode::Automatic, ..Options::default() };
         recorded(&options, network, &path, work);
         let original = Capture::parse(&std::fs::read(&path).expect("a capture")).expect("a capture");
-        Tampering { path, original }
+        std::fs::remove_file(&path).expect("it was written");
+        Tampering { original }
     }
 
-    fn judged(&self, tamper: &mut Tamper<'_>) -> Option<(bool, String)> {
-        let mut capture = self.original.clone();
+    fn add(&self, cases: &mut Cases, case: Case, tamper: &mut Tamper<'_>) {
+        let (mut capture, path) = (self.original.clone(), file());
         visit(&mut capture, tamper);
-        write(&capture, &self.path);
-        check(&self.path)
-    }
-
-    fn expect(&self, finding: &str, tamper: &mut Tamper<'_>) {
-        let Some((fine, said)) = self.judged(tamper) else { return };
-        assert!(!fine && said.contains(finding), "expected \"{finding}\": {said}");
+        write(&capture, &path);
+        cases.all.push((path, case));
     }
 
     /// The delays of these stations are told to be longer by so much: those written with their offsets, or those written by
     /// themselves later.
-    fn expect_longer(&self, finding: &str, stations: &[u16], from: u16, by: i32) {
-        self.expect(finding, &mut |_, command, register, bytes| {
+    fn add_longer(&self, cases: &mut Cases, finding: &'static str, stations: &[u16], from: u16, by: i32) {
+        self.add(cases, Case::Finding(finding), &mut |_, command, register, bytes| {
             let station = u16::from_le_bytes([bytes[2], bytes[3]]);
             if (command, register) == (FPWR, from) && stations.contains(&station) {
                 let delay = bytes[usize::from(10 + 0x0928 - from)..].first_chunk_mut().expect("a delay");
@@ -268,22 +337,17 @@ impl Tampering {
     }
 }
 
-impl Drop for Tampering {
-    fn drop(&mut self) {
-        let _ = std::fs::remove_file(&self.path);
-    }
-}
-
 #[test]
 fn delays_that_were_tampered_with_are_found_when_crossed_behind_forks_without_a_clock_and_in_rings() {
+    let mut cases = Cases::default();
     // Stations are numbered in the order in which the frame is processed: device 1 is the last.
     let tampering = Tampering::with(crossed(), |_| ());
-    tampering.expect_longer("ns is what was measured", &[0x1006], 0x0920, 4);
+    tampering.add_longer(&mut cases, "ns is what was measured", &[0x1006], 0x0920, 4);
     let tampering = Tampering::with(fork(), |_| ());
     // The second of a branch against its first; a branch as a whole between what is in front of it and behind it.
-    tampering.expect_longer("ns is what was measured", &[0x1004], 0x0920, 4);
-    tampering.expect_longer("before what is in front of it has ended", &[0x1005, 0x1006], 0x0920, -2_000);
-    tampering.expect_longer("after the frame was back", &[0x1007], 0x0920, 2_000);
+    tampering.add_longer(&mut cases, "ns is what was measured", &[0x1004], 0x0920, 4);
+    tampering.add_longer(&mut cases, "before what is in front of it has ended", &[0x1005, 0x1006], 0x0920, -2_000);
+    tampering.add_longer(&mut cases, "after the frame was back", &[0x1007], 0x0920, 2_000);
     // Of a ring that was broken from the start and is whole later.
     let mut network = wired(clocked(7, 100), &RING_BEHIND_JUNCTION);
     network.cut(CableId(3));
@@ -292,16 +356,18 @@ fn delays_that_were_tampered_with_are_found_when_crossed_behind_forks_without_a_
         apply(run, Fault::Heal(CableId(3)));
         cycles(run, 100);
     });
-    tampering.expect_longer("ns is what was measured", &[0x1004], 0x0928, 30);
+    tampering.add_longer(&mut cases, "ns is what was measured", &[0x1004], 0x0928, 30);
+    cases.judge();
 }
 
 #[test]
 fn clocks_that_were_tampered_with_are_found() {
     let tampering = Tampering::with(line(clocked(6, 100), NetworkOptions::default()), |run| cycles(run, 20));
-    let Some((fine, said)) = tampering.judged(&mut |_, _, _, _| ()) else { return };
-    assert!(fine, "written anew, nothing is wrong with it: {said}");
+    let mut cases = Cases::default();
+    tampering.add(&mut cases, Case::Fine("written anew", "judged: 6 delays"), &mut |_, _, _, _| ());
     let is_own = |bytes: &[u8]| bytes[2..4] == STATION;
-    let expect = |finding: &str, tamper: &mut Tamper<'_>| tampering.expect(finding, tamper);
+    let mut expect =
+        |finding: &'static str, tamper: &mut Tamper<'_>| tampering.add(&mut cases, Case::Finding(finding), tamper);
     // The delay is 4 ns too long, then the offset.
     expect("ns is what was measured", &mut |_, command, register, bytes| {
         if (command, register) == (FPWR, 0x0920) && is_own(bytes) {
@@ -335,4 +401,5 @@ fn clocks_that_were_tampered_with_are_found() {
             bytes[10..14].fill(0);
         }
     });
+    cases.judge();
 }
