@@ -48,6 +48,7 @@ pub struct ClockWords {
     references: AtomicU64,
     spread: AtomicU32,
     is_window_watched: AtomicBool,
+    is_reference_led: AtomicBool,
     spread_count: AtomicU32,
     are_ports_guarded: AtomicBool,
     /// How often the exchange stopped handing out a time, and how many of these times the supervisor has answered.
@@ -114,6 +115,16 @@ impl ClockWords {
 
     pub(crate) fn is_window_watched(&self) -> bool {
         self.is_window_watched.load(Ordering::Relaxed)
+    }
+
+    /// The segment's reference is told the time of the host or of the application: its own difference shows how punctual that
+    /// is, and counts no longer.
+    pub(crate) fn lead_reference(&self) {
+        self.is_reference_led.store(true, Ordering::Relaxed);
+    }
+
+    pub(crate) fn is_reference_led(&self) -> bool {
+        self.is_reference_led.load(Ordering::Relaxed)
     }
 
     pub(crate) fn post_spread(&self, spread_ns: u32) {

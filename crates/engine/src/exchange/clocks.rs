@@ -140,6 +140,9 @@ pub(crate) struct Clocks {
     last: Option<ReferenceTime>,
     /// How the steered reference differs from the other one.
     lead: Option<Lead>,
+    /// How the segment's reference differs from the time that it is led to, and what that was last.
+    behind: Option<Lead>,
+    led: Option<ReferenceTime>,
     /// The application's time, and when it said so.
     application: Option<ReferenceTime>,
     /// The reference is to have this time when the next frame passes it.
@@ -194,7 +197,7 @@ impl Clocks {
         if board.clocks.is_held() {
             return payloads;
         }
-        let steer = self.steering(now);
+        let steer = self.steering(board, now);
         for link in Link::ALL {
             let sync = self.references.on(link).map(|station| (station, self.predicted(link, now) as u32));
             payloads[link.index()] = Payload { sync, steer: steer[link.index()] };
@@ -214,14 +217,18 @@ impl Clocks {
             }
         }
         self.lead = None;
+        let leader = |references: References| references.leader().0.and_then(|link| references.on(link));
+        if leader(references) != leader(self.references) {
+            self.behind = None;
+        }
         (self.references, self.changes) = (references, changes);
     }
 
     /// Who is told another time than its own, and which, by the link of the copy: in an open ring each copy meets its own
     /// reference, and the one that leads may follow the host while the other one follows it.
-    fn steering(&mut self, now: Instant) -> [Option<(StationAddress, u32)>; 2] {
+    fn steering(&mut self, board: &Board, now: Instant) -> [Option<(StationAddress, u32)>; 2] {
         let (leader, steered) = self.references.leader();
-        let to_host = self.leading(leader, now);
+        let to_host = self.leading(leader, board, now);
         match (leader, steered) {
             (Some(Link::Main), Some(_)) => [to_host, self.following(Link::Redundant, now)],
             (Some(Link::Redundant), Some(_)) => [self.following(Link::Main, now), to_host],
@@ -229,15 +236,24 @@ impl Clocks {
         }
     }
 
-    /// What the segment's reference is told: the time of the host or of the application.
-    fn leading(&mut self, leader: Option<Link>, now: Instant) -> Option<(StationAddress, u32)> {
-        let station = self.references.on(leader?)?;
+    /// What the segment's reference is told: the time of the host or of the application, and once it is known by how much it
+    /// differs from that, what it shows itself, less a part of that.
+    fn leading(&mut self, leader: Option<Link>, board: &Board, now: Instant) -> Option<(StationAddress, u32)> {
+        let leader = leader?;
+        let station = self.references.on(leader)?;
         let time = match self.wanted.take() {
             Some(time) => time,
             None if self.setup.bus_shift => self.application_time(now),
             None => return None,
         };
-        Some((station, time as u32))
+        board.clocks.lead_reference();
+        self.led = Some(ReferenceTime { time, sent_at: now });
+        let behind = self.behind.filter(|behind| behind.is_fresh(now));
+        let told = match (self.times[leader.index()], behind.and_then(|behind| behind.steering_ns())) {
+            (Some(own), Some(too_much)) => own.at(now).wrapping_sub(too_much as u64),
+            _ => time,
+        };
+        Some((station, told as u32))
     }
 
     /// What a second reference is told, so that it follows the first one.
@@ -272,14 +288,15 @@ impl Clocks {
         if seen.spread_wkc > 0 {
             // While nobody is told a time, differences are those of a frame that came another way. A reference that is steered
             // shows how punctual the host is; there the supervisor looks at each of the others.
-            let is_meant = !is_held && self.references.leader().1.is_none();
+            let is_steered = self.references.leader().1.is_some() || board.clocks.is_reference_led();
+            let is_meant = !is_held && !is_steered;
             self.judge_spread(seen.spread, is_meant, board, events);
         }
     }
 
     /// What the references showed; whether one of them is steered towards the other.
     fn observe_references(&mut self, seen: &Seen) -> bool {
-        let (_, steered) = self.references.leader();
+        let (leader, steered) = self.references.leader();
         let mut fresh = 0;
         for link in Link::ALL {
             let (low, wkc) = seen.sync[link.index()];
@@ -289,6 +306,9 @@ impl Clocks {
             let time = extend(low, self.predicted(link, seen.sent_at));
             self.times[link.index()] = Some(ReferenceTime { time, sent_at: seen.sent_at });
             fresh += 1;
+            if leader == Some(link) {
+                self.observe_led(time, seen.sent_at);
+            }
         }
         let Some(steered) = steered else { return false };
         if fresh == 2 {
@@ -299,6 +319,18 @@ impl Clocks {
             self.lead = Some(self.lead.map_or(begin, |lead| lead.go_on(difference, seen.sent_at)));
         }
         true
+    }
+
+    /// The segment's reference showed this time to a frame.
+    fn observe_led(&mut self, time: u64, sent_at: Instant) {
+        let wanted = match self.led {
+            Some(led) if led.sent_at == sent_at => led.time,
+            _ if self.setup.bus_shift => self.application_time(sent_at),
+            _ => return,
+        };
+        let difference = time.wrapping_sub(wanted) as i64;
+        let behind = self.behind.filter(|behind| behind.is_fresh(sent_at));
+        self.behind = Some(behind.map_or(Lead::behind_host(sent_at), |behind| behind.go_on(difference, sent_at)));
     }
 
     fn judge_spread(&mut self, spread_ns: u32, is_meant: bool, board: &Board, events: &mut Producer) {

@@ -363,3 +363,62 @@ fn a_group_that_joins_late_and_then_elsewhere_has_the_delays_and_sync_signals_of
         assert!(others <= 200 && world.left_op(mark).iter().all(|device| device.0 > 3), "{others} ns");
     }
 }
+
+/// Three without a clock; a group of three behind port 3 of the second one brings the first clocks of the segment, and one
+/// SubDevice without a clock between them.
+#[test]
+fn the_first_clocks_of_a_segment_may_come_with_a_group_and_come_again_facts_7_2() {
+    let cables = [
+        (MAIN, at(0, A)),
+        (at(0, B), at(1, A)),
+        (at(1, B), at(2, A)),
+        (at(1, D), at(3, A)),
+        (at(3, B), at(4, A)),
+        (at(4, B), at(5, A)),
+    ];
+    let mut descriptions = clocked(6, 50);
+    [0, 1, 2, 4].into_iter().for_each(|device: usize| descriptions[device].dc = None);
+    descriptions[3].alias = TOOL;
+    let infos = MainDevice::request(Tap::new(wired(descriptions.clone(), &cables)), &Options::default());
+    let infos = { infos }.scan().expect("a scan").subdevices;
+    let mut network = wired(descriptions, &cables);
+    (3..6).for_each(|device| network.power_off(DeviceIndex(device)));
+    let signals = Some(SyncSignals::sync0(1_000_000, 0));
+    let mut world = World::with(10, network, &Options::default(), |scan| {
+        let mut declaration = automatic(&scan.subdevices, CYCLE);
+        let head = SubDeviceConfig { sync: signals, ..SubDeviceConfig::at_alias(TOOL, 0) };
+        let member = |config: SubDeviceConfig, info: &SubDeviceInfo| {
+            config.expect_product(info.identity.vendor_id, info.identity.product_code).pdos_of(info)
+        };
+        let group = Group::new(member(head, &infos[0])).then(member(SubDeviceConfig::default(), &infos[0]));
+        let last = SubDeviceConfig { sync: signals, ..SubDeviceConfig::default() };
+        let (_, members) = declaration.add_group(group.then(member(last, &infos[0])));
+        declaration.domains[0].members.extend(members.map(|subdevice| DomainMember { subdevice, sync_managers: None }));
+        declaration.clocks = Some(config());
+        declaration
+    })
+    .expect("it can be activated");
+    world.until(Duration::from_secs(4), "the others settled", |world| world.application().all_settled());
+    let mark = world.beginning();
+    for _ in 0..2 {
+        (3..6).for_each(|device| world.power_on(DeviceIndex(device)));
+        world.until(Duration::from_secs(8), "the group has joined", |world| {
+            world.application().groups()[0].has_joined() && world.application().engine().clocks_locked()
+        });
+        let [apart] = watch(&mut world, [&[3, 5]], 200);
+        assert!(apart <= 100, "{apart} ns");
+        let now = world.network().now();
+        [3, 5].into_iter().for_each(|device| {
+            assert!(
+                world.network().device(DeviceIndex(device)).controller.next_sync0(now).is_some(),
+                "device {device}"
+            );
+        });
+        (3..6).rev().for_each(|device| world.power_off(DeviceIndex(device)));
+        world.until(Duration::from_secs(2), "the group has left", |world| world.application().groups()[0].present == 0);
+    }
+    // That nobody had a clock was told once.
+    let failed = |timed: &&ringcat::TimedEvent| matches!(timed.event, Event::ClocksFailed { .. });
+    assert_eq!(world.events(mark).iter().filter(failed).count(), 1);
+    assert!(world.left_op(mark).iter().all(|device| device.0 > 2));
+}

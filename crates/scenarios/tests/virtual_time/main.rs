@@ -8,6 +8,7 @@ mod captures;
 mod clock_captures;
 mod clock_changes;
 mod clock_delays;
+mod clock_shifts;
 mod clocks;
 mod configuration;
 mod copies;

@@ -1,10 +1,14 @@
-//! How a second reference follows the first one, in a ring that is open (facts 7.5).
+//! How a reference follows another time: in a ring that is open the second one the first (facts 7.5), with bus shift the
+//! segment's reference the host (facts 7.4).
 //!
-//! In: how both times differ when frames that left together pass them. Out: what to tell the second one. Every telling has
-//! the jitter of the host's sending in it, and so has each difference, while two clocks that have followed one before differ
-//! by nanoseconds for seconds. So a clock that is near is left alone; it is told something when its mean has strayed, and
-//! then of a mean, in every cycle. One that is far away, since it has never followed the other, is taken there as fast as
-//! its loop can.
+//! In: how both times differ when a frame, or frames that left together, pass them. Out: what to tell the one that follows.
+//! Every telling has the jitter of the host's sending in it, and so has each difference. One that is far away, since it has
+//! never followed the other, is taken there as fast as its loop can. Once it is near:
+//!
+//! * a second reference, which has followed the same clock as the first one and so differs by nanoseconds for seconds, is left
+//!   alone; it is told something when its mean has strayed, and then of a mean, in every cycle;
+//! * one that follows the host is told in every cycle, but of a small part of a long mean. What it is told is that much less
+//!   than what it showed last: the jitter of one cycle is taken back in the next.
 
 use crate::time::Instant;
 
@@ -21,17 +25,13 @@ const UNEXPECTED_NS: i64 = 20_000;
 const ABSURD_NS: i64 = 1 << 40;
 /// A time between two differences counts for at most so much.
 const LONGEST_NS: u64 = 10_000_000;
-/// Filter depth of the difference that decides what to do.
-const SLOW_DEPTH: u32 = 6;
-/// There a difference is at most so far from the mean: a stall of the host between both copies says nothing about clocks.
-const OUTLIER_NS: i64 = 3_000;
 /// From here on a clock that was left alone is steered.
 const FREE_NS: i64 = 1_000;
 /// It is left alone again when it has been as near as this for so many cycles.
 const CALM_NS: i64 = 500;
 const CALM_CYCLES: u32 = 1_000;
-/// From here on it is far away, until it has been nearer than [`FREE_NS`] for as many.
-const FAR_NS: i64 = 5_000;
+/// A difference that was seen longer ago than this says nothing.
+const FRESH_NS: u64 = 100_000_000;
 /// It is told of at most this difference at a time.
 const MOST_NS: i64 = 50_000;
 /// Far away, a change of the difference counts like the difference that it would lead to within this time: without that, the
@@ -39,6 +39,27 @@ const MOST_NS: i64 = 50_000;
 const FORESIGHT_NS: i64 = 150_000_000;
 /// Clocks never differ by more than what their loops can take out.
 const MOST_PPB: i64 = 800_000;
+
+/// Who follows whom.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+struct Law {
+    /// Filter depth of the difference that decides what to do.
+    slow_depth: u32,
+    /// There a difference is at most so far from the mean: a stall of the host says nothing about clocks.
+    outlier_ns: i64,
+    /// From here on it is far away.
+    far_ns: i64,
+    /// Until it has been nearer than this for [`CALM_CYCLES`].
+    settled_ns: i64,
+    /// One that is near is told of this part of the long mean, as a shift; `None`: of all of a short one, and it is left alone
+    /// when it may be.
+    share: Option<u32>,
+}
+
+/// A second reference and the first one.
+const SECOND: Law = Law { slow_depth: 6, outlier_ns: 3_000, far_ns: 5_000, settled_ns: FREE_NS, share: None };
+/// A reference and the host, which sends tens of microseconds late.
+const HOST: Law = Law { slow_depth: 7, outlier_ns: 50_000, far_ns: 10_000, settled_ns: 5_000, share: Some(5) };
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Mode {
@@ -50,6 +71,7 @@ enum Mode {
 /// How the time of a steered reference differs from that of the segment's, when frames that left together pass them.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Lead {
+    law: Law,
     /// What it differs when both show the same: their ways from the host are not equally long.
     gap: i64,
     /// Differences so far, up to [`GAP_CYCLES`].
@@ -66,10 +88,20 @@ pub(super) struct Lead {
 }
 
 impl Lead {
-    /// Both show the same.
-    pub fn begin(difference: i64, seen_at: Instant) -> Lead {
-        let cycles = 1;
-        Lead { gap: difference, cycles, ahead: 0, change_ppb: 0, slow: 0, seen_at, mode: Mode::Free, calm: 0 }
+    /// A second reference and the first one, which show the same.
+    pub const fn begin(difference: i64, seen_at: Instant) -> Lead {
+        let (law, gap, cycles, mode) = (SECOND, difference, 1, Mode::Free);
+        Lead { law, gap, cycles, ahead: 0, change_ppb: 0, slow: 0, seen_at, mode, calm: 0 }
+    }
+
+    /// A reference that is to show what the host does, which it has never followed.
+    pub const fn behind_host(seen_at: Instant) -> Lead {
+        Lead { law: HOST, gap: 0, cycles: GAP_CYCLES, mode: Mode::Far, ..Lead::begin(0, seen_at) }
+    }
+
+    /// Whether what was seen still holds.
+    pub const fn is_fresh(&self, now: Instant) -> bool {
+        now.0.saturating_sub(self.seen_at.0) <= FRESH_NS
     }
 
     /// Another difference was seen.
@@ -87,16 +119,17 @@ impl Lead {
         let ahead = expected + (unexpected >> DIFFERENCE_DEPTH);
         let change = (unexpected * 1_000_000_000 / passed) >> (CHANGE_DEPTH + FRACTION);
         let change_ppb = (self.change_ppb + change).clamp(-MOST_PPB, MOST_PPB);
-        let mean = self.slow >> SLOW_DEPTH;
-        let told = seen.clamp(mean - OUTLIER_NS, mean + OUTLIER_NS);
-        let slow = self.slow + told - (self.slow >> SLOW_DEPTH);
-        let far = (slow >> SLOW_DEPTH).abs();
-        let enough = if self.mode == Mode::Far { FREE_NS } else { CALM_NS };
+        let Law { slow_depth, outlier_ns, far_ns, settled_ns, share } = self.law;
+        let mean = self.slow >> slow_depth;
+        let told = seen.clamp(mean - outlier_ns, mean + outlier_ns);
+        let slow = self.slow + told - (self.slow >> slow_depth);
+        let far = (slow >> slow_depth).abs();
+        let enough = if self.mode == Mode::Far { settled_ns } else { CALM_NS };
         let calm = if far < enough { self.calm.saturating_add(1) } else { 0 };
         let (mode, calm) = match self.mode {
-            _ if far > FAR_NS => (Mode::Far, 0),
+            _ if far > far_ns => (Mode::Far, 0),
             Mode::Far if calm >= CALM_CYCLES => (Mode::Near, 0),
-            Mode::Near if calm >= CALM_CYCLES => (Mode::Free, 0),
+            Mode::Near if share.is_none() && calm >= CALM_CYCLES => (Mode::Free, 0),
             Mode::Free if far > FREE_NS => (Mode::Near, 0),
             mode => (mode, calm),
         };
@@ -108,7 +141,7 @@ impl Lead {
         let ahead = self.ahead >> FRACTION;
         let told = match self.mode {
             Mode::Free => return None,
-            Mode::Near => ahead,
+            Mode::Near => self.law.share.map_or(ahead, |share| self.slow / (1 << (self.law.slow_depth + share))),
             Mode::Far => ahead + self.change_ppb * (FORESIGHT_NS / 1_000) / 1_000_000,
         };
         Some(told.clamp(-MOST_NS, MOST_NS))
@@ -156,6 +189,21 @@ mod tests {
         assert!((1_400..=1_500).contains(&told), "{told}");
         let back = after(strayed, [0; 1_500]);
         assert_eq!(back.steering_ns(), None);
+    }
+
+    #[test]
+    fn one_that_follows_the_host_is_told_of_a_small_part_of_a_long_mean_facts_7_4() {
+        // Up to 50 us of jitter around a difference of 4 us.
+        let late = |count: i64| (0..count).map(|number| 4_000 + (number * 7_919) % 50_001 - 25_000);
+        let lead = after(Lead::behind_host(Instant(0)), late(5_000));
+        assert_eq!(lead.mode, Mode::Near);
+        let told = lead.steering_ns().expect("it is told in every cycle");
+        assert!((50..=200).contains(&told), "{told}");
+        let stray = after(lead, [40_000; 200]);
+        assert_eq!(stray.mode, Mode::Far);
+        assert!(stray.steering_ns().is_some_and(|told| told > 30_000), "{stray:?}");
+        assert!(stray.is_fresh(Instant(stray.seen_at.0 + FRESH_NS)));
+        assert!(!stray.is_fresh(Instant(stray.seen_at.0 + FRESH_NS + 1)));
     }
 
     #[test]

@@ -22,7 +22,7 @@ const EXACT_DEPTH: u8 = 0;
 const HOST_DEPTH: u8 = 4;
 /// DC_FILTER_SPEED: its reset value.
 const SPEED_DEPTH: u8 = 12;
-/// Of a second reference: the host's jitter must not change its speed.
+/// Of a reference that is steered: the host's jitter must not change its speed.
 const STEADY_DEPTH: u8 = 15;
 /// Delays that differ by no more than this from what is written are what the same way gives when it is measured again.
 const SAME_NS: i64 = 30;
@@ -140,9 +140,10 @@ impl Clocks {
         let reference = self.reference_on(node.link.unwrap_or(Link::Main));
         // A SubDevice is behind its reference where frames meet it later.
         let is_behind = reference.is_some_and(|reference| node.unit > self.nodes[reference].unit);
-        let is_second = reference == Some(index) && self.reference != Some(index);
+        let follows_host = self.config.as_ref().is_some_and(|config| config.bus_shift);
+        let is_steered = reference == Some(index) && (follows_host || self.reference != Some(index));
         let difference = if is_behind { EXACT_DEPTH } else { HOST_DEPTH };
-        [difference, if is_second { STEADY_DEPTH } else { SPEED_DEPTH }]
+        [difference, if is_steered { STEADY_DEPTH } else { SPEED_DEPTH }]
     }
 
     /// Whether delays on a link count from different places.

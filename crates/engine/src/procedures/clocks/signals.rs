@@ -53,6 +53,14 @@ impl fmt::Display for NotLocked {
 /// Sets up anew what a clock has lost with its power, or what one that came later has never had.
 pub(in crate::procedures) async fn restore(bus: &Bus, fleet: &SharedFleet, member: usize) -> Result<(), BusError> {
     let Some(index) = index_of(fleet, member) else { return Ok(()) };
+    // The first clock of a segment begins with the set-up of all, which takes in whoever is there by then.
+    let until = bus.now() + MEASURING_LIMIT;
+    while !fleet.clocks.access().is_set_up {
+        if bus.now() >= until {
+            return Ok(());
+        }
+        bus.sleep(PAUSE).await;
+    }
     let (station, expected, is_new) = {
         let clocks = fleet.clocks.access();
         let node = &clocks.nodes[index];
@@ -81,17 +89,18 @@ pub(in crate::procedures) async fn restore(bus: &Bus, fleet: &SharedFleet, membe
     Ok(())
 }
 
-/// The clock of a member. One that was not there at the scan is added.
+/// The clock of a member. One that was not there at the scan is added. `None` where those that are known could not be set up
+/// yet: whoever is among them is when they are.
 fn index_of(fleet: &SharedFleet, member: usize) -> Option<usize> {
     let access = fleet.access();
     let declared = access.members.get(member)?;
     let info = declared.info.as_ref()?;
     let mut clocks = fleet.clocks.access();
-    if !clocks.is_set_up || !info.controller.features.dc {
+    if !info.controller.features.dc {
         return None;
     }
     if let Some(index) = clocks.position_of(member) {
-        return Some(index);
+        return clocks.is_set_up.then_some(index);
     }
     clocks.nodes.push(Node::new(info, Some((member, &*declared.config))));
     Some(clocks.nodes.len() - 1)

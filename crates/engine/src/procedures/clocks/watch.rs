@@ -74,8 +74,9 @@ async fn try_set_up(bus: &Bus, fleet: &SharedFleet) {
 
 /// Runs for ever.
 pub(crate) async fn keep(bus: Bus, fleet: SharedFleet) {
-    if !fleet.clocks.access().nodes.iter().any(|node| node.has_clock) {
-        return;
+    // The first clock may come with a group that joins.
+    while !fleet.clocks.access().nodes.iter().any(|node| node.has_clock) {
+        bus.sleep(RETRY).await;
     }
     let mut pause = RETRY;
     while !fleet.clocks.access().is_set_up {
@@ -284,7 +285,7 @@ fn judge(bus: &Bus, fleet: &SharedFleet, answers: &[Option<Answer>]) {
         largest = largest.max(magnitude);
     }
     // Where a reference is steered, the exchange does not see how far the others are from theirs.
-    let is_steered = references.iter().all(Option::is_some);
+    let is_steered = references.iter().all(Option::is_some) || fleet.board.clocks.is_reference_led();
     let is_outside = largest > config.sync_window_ns;
     let is_contrary = clocks.is_locked && is_outside != clocks.is_outside && (is_steered || clocks.is_outside);
     clocks.contrary = if is_contrary { clocks.contrary + 1 } else { 0 };
@@ -296,6 +297,9 @@ fn judge(bus: &Bus, fleet: &SharedFleet, answers: &[Option<Answer>]) {
         clocks.is_locked = true;
         fleet.board.clocks.watch_window();
         bus.report(Event::ClocksLocked { largest_ns: largest });
+        if is_steered {
+            bus.report(Event::SyncWindow { inside: true, spread_ns: largest });
+        }
     }
 }
 

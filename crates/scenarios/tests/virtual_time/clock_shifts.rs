@@ -1,0 +1,185 @@
+//! Who follows whom: the reference clock the host (bus shift), the host's cycles the reference clock (master shift)
+//! (facts 7.4).
+
+use std::time::Duration;
+
+use ringcat::{ClockConfig, Event, Follower, Trigger, phase_error};
+use ringcat_sim::cable::{CableId, DeviceIndex};
+use ringcat_sim::network::NetworkOptions;
+use ringcat_sim::time::SimTime;
+use ringcat_wire::register::map;
+use scenarios::clocks::{EPOCH, clocked, config, lock, spread, world};
+use scenarios::segments::{line, ring};
+use scenarios::world::World;
+
+fn all(count: usize) -> Vec<usize> {
+    (0..count).collect()
+}
+
+#[test]
+fn with_bus_shift_the_reference_follows_the_host_facts_7_4() {
+    let shift = ClockConfig { bus_shift: true, ..config() };
+    let mut world = world(6, line(clocked(5, 50), NetworkOptions::default()), shift);
+    world.run_cycles(6_000);
+    let network = world.network();
+    let host = world.application().now().0.wrapping_add(EPOCH);
+    let truth = network.device(DeviceIndex(0)).controller.system_time(network.now());
+    let error = truth.wrapping_sub(host) as i64;
+    assert!(error.abs() <= 20_000, "{error} ns");
+    assert!(spread(network, &all(5)) <= 200);
+}
+
+#[test]
+fn the_reference_follows_the_time_of_the_application_and_is_led_to_a_given_time_facts_7_4() {
+    // The application's time runs 30 ppm faster than the host's.
+    let time = |world: &World| {
+        let host = world.application().now().0;
+        host.wrapping_add(host / 1_000_000 * 30).wrapping_add(EPOCH)
+    };
+    for every_cycle in [false, true] {
+        let config = ClockConfig { bus_shift: !every_cycle, ..config() };
+        let mut world = world(12, line(clocked(3, 50), NetworkOptions::default()), config);
+        lock(&mut world, Duration::from_secs(5));
+        for _ in 0..5_000 {
+            world.cycle();
+            let (time, now) = (time(&world), world.application().now());
+            let exchange = world.application_mut().exchange_mut();
+            if every_cycle {
+                exchange.sync_reference_to(time + 1_000_000);
+            } else {
+                exchange.set_application_time(time, now);
+                assert_eq!(exchange.application_time(now), time);
+            }
+        }
+        let network = world.network();
+        let truth = network.device(DeviceIndex(0)).controller.system_time(network.now());
+        let error = truth.wrapping_sub(time(&world)) as i64;
+        let apart = spread(network, &all(3));
+        assert!(error.abs() <= 20_000 && apart <= 1_000, "every cycle {every_cycle}: {error} ns, {apart} ns apart");
+    }
+}
+
+/// Where the host says what time it is, the reference follows it through a break; where the reference does, cycles follow
+/// it, also when all frames meet it from the other side.
+#[test]
+fn bus_shift_and_master_shift_go_on_through_a_cut_and_a_repair_cr_26_facts_7_5() {
+    for cable in [0, 2] {
+        let shift = ClockConfig { bus_shift: true, ..config() };
+        let mut world = world(11, ring(clocked(4, 50), NetworkOptions::default()), shift);
+        world.run_cycles(4_000);
+        for heal in [false, true] {
+            if heal {
+                world.heal(CableId(cable))
+            } else {
+                world.cut(CableId(cable))
+            }
+            let mut worst = 0;
+            for _ in 0..1_000 {
+                world.cycle();
+                let host = world.application().now().0.wrapping_add(EPOCH);
+                let network = world.network();
+                let truth = network.device(DeviceIndex(0)).controller.system_time(network.now());
+                worst = worst.max((truth.wrapping_sub(host) as i64).abs());
+            }
+            println!("bus shift, cable {cable}, healed {heal}: {worst} ns from the host's time");
+            assert!(worst <= 20_000, "cable {cable}, healed {heal}: {worst} ns");
+        }
+        assert!(world.all_in_op());
+    }
+    for cable in [0, 2] {
+        let mut world = world(12, ring(clocked(4, 80), NetworkOptions::default()), config());
+        world.application_mut().set_trigger(Trigger::ReferenceClock { phase_ns: -250_000 });
+        lock(&mut world, Duration::from_secs(8));
+        world.run_cycles(3_000);
+        for heal in [false, true] {
+            if heal {
+                world.heal(CableId(cable))
+            } else {
+                world.cut(CableId(cable))
+            }
+            let mut worst = 0;
+            for _ in 0..1_000 {
+                world.cycle();
+                let scheduled =
+                    SimTime(world.application().begun_at().0 - world.application().pace().last_delay.as_nanos() as u64);
+                let time = world.network().device(DeviceIndex(0)).controller.system_time(scheduled);
+                worst = worst.max(phase_error(time, 1_000_000, -250_000).abs());
+            }
+            println!("master shift, cable {cable}, healed {heal}: {worst} ns from the phase");
+            assert!(worst <= 5_000, "cable {cable}, healed {heal}: {worst} ns");
+        }
+        assert!(world.application().follower().is_some_and(Follower::is_locked));
+    }
+}
+
+#[test]
+fn cycles_follow_the_reference_clock_though_the_host_wakes_late_facts_7_4() {
+    let mut world = world(10, line(clocked(4, 80), NetworkOptions::default()), config());
+    world.application_mut().set_trigger(Trigger::ReferenceClock { phase_ns: -250_000 });
+    world.application_mut().links_mut().oversleep(Duration::from_micros(50));
+    lock(&mut world, Duration::from_secs(8));
+    world.run_cycles(3_000);
+    for _ in 0..500 {
+        world.cycle();
+        let application = world.application();
+        let late = application.pace().last_delay.as_nanos() as u64;
+        let scheduled = SimTime(application.begun_at().0 - late);
+        let time = world.network().device(DeviceIndex(0)).controller.system_time(scheduled);
+        let error = phase_error(time, 1_000_000, -250_000);
+        assert!(error.abs() <= 1_000, "{error} ns");
+    }
+    assert!(world.application().follower().is_some_and(Follower::is_locked));
+}
+
+/// What the reference is told is up to 50 us late at random. It keeps near the host in the mean, so calmly that the others
+/// lock on it; nobody is told that they left their window, though the reference itself shows the host's jitter.
+#[test]
+fn with_bus_shift_clocks_lock_and_keep_their_window_though_the_host_sends_50_us_late_facts_7_4() {
+    const COUNT: usize = 5;
+    let shift = ClockConfig { bus_shift: true, ..config() };
+    for reference in [50_000, -100_000] {
+        let mut descriptions = clocked(COUNT, 50);
+        descriptions[0].clock_drift_ppb = reference;
+        let mut world = world(18, line(descriptions, NetworkOptions::default()), shift.clone());
+        world.application_mut().links_mut().send_late(Duration::from_micros(50));
+        let mark = world.beginning();
+        lock(&mut world, Duration::from_secs(8));
+        world.run_cycles(2_000);
+        let (mut apart, mut sum, mut worst) = (0, 0, 0);
+        for _ in 0..1_000 {
+            world.cycle();
+            apart = apart.max(spread(world.network(), &all(COUNT)));
+            let (network, now) = (world.network(), world.application().now());
+            let truth = network.device(DeviceIndex(0)).controller.system_time(network.now());
+            let error = truth.wrapping_sub(now.0.wrapping_add(EPOCH)) as i64;
+            (sum, worst) = (sum + error, worst.max(error.abs()));
+        }
+        let text = format!("{reference} ppb: {apart} ns apart, {} ns from the host, {worst} ns at most", sum / 1_000);
+        println!("locked at {} ms, {text}", world.now().0 / 1_000_000);
+        assert!(apart <= 400 && worst <= 30_000, "{text}");
+        let window =
+            |inside: bool| move |event: &Event| matches!(event, Event::SyncWindow { inside: of, .. } if *of == inside);
+        assert!(world.saw(mark, window(true)) && !world.saw(mark, window(false)), "{text}");
+    }
+}
+
+/// A clock that is moved by 6 us is told of when it has left the window, and when it is back; with bus shift each clock is
+/// looked at, without it the broadcast read of all.
+#[test]
+fn clocks_that_leave_their_window_and_come_back_are_told_facts_7_2() {
+    for bus_shift in [false, true] {
+        let shift = ClockConfig { bus_shift, ..config() };
+        let mut world = world(20, line(clocked(3, 30), NetworkOptions::default()), shift);
+        lock(&mut world, Duration::from_secs(8));
+        world.run_cycles(1_000);
+        let mark = world.mark();
+        let offset = world.application().engine().clocks()[2].offset_ns + 6_000;
+        let bytes = offset.to_le_bytes().to_vec();
+        let written = world.application_mut().engine_mut().start_register_write(2, map::DC_SYSTEM_TIME_OFFSET, bytes);
+        for inside in [false, true] {
+            let told = |event: &Event| matches!(event, Event::SyncWindow { inside: of, .. } if *of == inside);
+            world.until(Duration::from_secs(4), "the window", |world| world.saw(mark, told));
+        }
+        drop(written);
+    }
+}
