@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use ringcat::{Event, JunctionConnection, JunctionMode, SubDeviceState};
+use ringcat::{Event, JunctionConnection, JunctionMode, Options, SubDeviceState, automatic};
 use ringcat_engine::topology::PortOf;
 use ringcat_sim::cable::{CableId, DeviceIndex};
 use ringcat_sim::fault::Fault;
@@ -316,5 +316,38 @@ fn a_local_ring_in_a_ring_of_two_links_goes_on_with_one_break_anywhere_jr_02() {
         world.heal(CableId(3));
         world.until(Duration::from_secs(5), "all in OP", |w| w.all_in_op() && w.application().all_settled());
         edge(&mut world, "the last one", |world| world.heal(CableId(1)));
+    }
+}
+
+/// Enhanced detection opens the ring of two links for a moment whenever ports change, and finds nobody crossed in a local ring
+/// that is entered from behind.
+#[test]
+fn a_local_ring_that_breaks_is_no_crossed_line_for_enhanced_detection_either_lc_03_lc_06() {
+    let strict = JunctionConnection { head: 1, head_port: 1, tail: 3, tail_port: 1 };
+    for (mode, connections) in [(JunctionMode::Automatic, &[][..]), (JunctionMode::Strict, &[strict])] {
+        let options = Options { junctions: mode, enhanced_line_crossed: true, ..Options::default() };
+        let declare = |scan: &ringcat::Scan| automatic(&scan.subdevices, CYCLE);
+        let mut world = World::with_junctions(44, ring_in_ring(), &options, declare, connections).expect("it fits");
+        world.settle();
+        world.run_cycles(100);
+        let lost_links =
+            |world: &World| world.network().device(DeviceIndex(4)).controller.register(map::LOST_LINK_COUNTER, 4)[1];
+        let before = lost_links(&world);
+        for cable in 2..5 {
+            for broken in [true, false] {
+                let mark = world.mark();
+                world.fault(if broken { Fault::Cut(CableId(cable)) } else { Fault::Heal(CableId(cable)) });
+                world.run_cycles(200);
+                let what = format!("{mode:?}, cable {cable}, broken: {broken}");
+                assert_eq!((crossed(&world, mark), told(&world, mark).len()), (0, 1), "{what}");
+                assert_eq!(world.left_op(mark), [], "{what}");
+                // The edge itself, the redundant link taken down, and brought up again.
+                assert!(world.incomplete(mark) <= 3, "{what}: {}", world.incomplete(mark));
+                let opened = |event: &Event| matches!(event, Event::RingOpened { .. });
+                assert!(!world.saw(mark, opened), "{what}: a controlled break is not told");
+                assert_eq!(world.application().ring(), ringcat::RingState::Closed, "{what}");
+            }
+        }
+        assert!(lost_links(&world) > before, "the redundant link was down in between");
     }
 }
