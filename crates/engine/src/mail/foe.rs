@@ -122,7 +122,14 @@ impl<P: FnMut(FoeProgress)> Transfer<P> {
             other => accept(other).map(Heard::Answer),
         };
         self.busy = true;
-        match self.talk.ask(&self.payload[..length], self.options.limits, heard).await? {
+        let answer = self.talk.ask(&self.payload[..length], self.options.limits, heard).await.inspect_err(|error| {
+            // A file that the SubDevice surely does not open is not to be given up.
+            let opens = matches!(message, FoeMessage::Read { .. } | FoeMessage::Write { .. });
+            if opens && matches!(error, MailboxError::Error(_)) && self.talk.late_mark().is_none() {
+                self.busy = false;
+            }
+        })?;
+        match answer {
             Heard::Answer(answer) => Ok(Said::Answer(answer)),
             Heard::Error(code, text) => {
                 self.busy = false;

@@ -15,9 +15,11 @@ use super::device::pattern;
 use super::{Bench, Fate, LIMITS};
 use crate::link::LinkSet;
 use crate::mail::coe::{SdoAddress, write};
+use crate::mail::foe::FoeOptions;
 use crate::mail::soe::SoeAddress;
+use crate::mail::stream::Bytes;
 use crate::mail::voe::Voe;
-use crate::mail::{Lane, Limits, MailboxError, Unsolicited, raw, soe, voe};
+use crate::mail::{Lane, Limits, MailboxError, Unsolicited, foe, raw, soe, voe};
 
 const MS: Duration = Duration::from_millis(1);
 
@@ -159,6 +161,28 @@ fn a_download_that_was_perhaps_not_what_was_refused_is_aborted_facts_6_3() {
         assert!(written.take().is_some_and(|result| result.is_err()), "in doubt: {in_doubt}");
         let aborts: &[AbortCode] = if in_doubt { &[AbortCode::GENERAL] } else { &[] };
         assert_eq!(bench.device.server.aborts, aborts, "in doubt: {in_doubt}");
+    }
+}
+
+#[test]
+fn a_file_that_is_surely_refused_with_an_error_reply_is_not_given_up_facts_6_4() {
+    for in_doubt in [false, true] {
+        let mut bench = Bench::new(LinkSet::Single, 64);
+        bench.device.delay = 3 * MS;
+        if in_doubt {
+            bench.send_unanswered();
+        }
+        let before = bench.device.served.len();
+        let mailbox = bench.mailbox.clone();
+        let written = bench.start(async move {
+            foe::write(&mailbox, "a", FoeOptions::default(), &mut Bytes::new(b"abc"), |_| ()).await
+        });
+        bench.until_served(before + 1);
+        let at = bench.now;
+        bench.device.cut_in(Protocol::Error, &ErrorReply::new(ErrorReply::NO_MORE_MEMORY).encode(), at);
+        bench.pass(50 * MS);
+        assert!(written.take().is_some_and(|result| result.is_err()), "in doubt: {in_doubt}");
+        assert_eq!(bench.device.server.foe_errors.len(), usize::from(in_doubt), "in doubt: {in_doubt}");
     }
 }
 
