@@ -185,8 +185,8 @@ impl Room {
         self.tell();
     }
 
-    /// The mailbox cannot be used for now; everything under way ends. What was read from it, perhaps in vain, has to be
-    /// asked for again.
+    /// The mailbox cannot be used until it is taken up again; everything under way ends. What was read from it, perhaps in
+    /// vain, has to be asked for again.
     pub(super) fn suspend(&self) {
         {
             let state = &mut *self.state();
