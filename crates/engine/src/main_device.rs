@@ -285,6 +285,7 @@ impl MainDevice {
         let (producer, consumer) = queue(CYCLIC_EVENTS);
         let mut exchange = Exchange::new(self.identity, self.options.links(), &layout, board.clone(), producer);
         let stations = stations_by_position(&members, scan.subdevices.iter().map(|info| info.station));
+        let closings = loaded.closings(&topology, &members, &stations);
         let cables = cables(&topology, self.options.links());
         let book = Book::new(&bus, members.len(), self.statistics_period);
         let fleet = Fleet {
@@ -292,6 +293,7 @@ impl MainDevice {
             strangers,
             next_temporary: 0,
             layout,
+            closings,
             topology,
             stations,
             ring: self.first_ring_status(),

@@ -9,10 +9,12 @@ use super::{Active, MainDevice};
 use crate::event::Event;
 use crate::info::SubDeviceInfo;
 use crate::junction::{JunctionConnection, JunctionError, JunctionMode, START_PORT};
+use crate::procedures::fleet::Member;
 use crate::procedures::scan::{Scan, node_status, report_cabling};
 use crate::supervisor::Bus;
 use crate::topology::{Closing, NodeStatus, PortOf, Topology};
 
+use ringcat_wire::address::StationAddress;
 use ringcat_wire::register::PortKind;
 
 /// What was loaded and is not applied yet.
@@ -99,6 +101,26 @@ impl Loaded {
             report_cabling(bus, &Scan { topology: topology.clone(), ..scan.clone() }, false);
         }
         Ok(topology)
+    }
+}
+
+impl Loaded {
+    /// Both ends of the closing cables of the rings that were declared, if any were, wherever their SubDevices are;
+    /// otherwise of those of the topology.
+    pub(super) fn closings(
+        &self,
+        topology: &Topology,
+        members: &[Member],
+        stations: &[StationAddress],
+    ) -> Vec<[(StationAddress, u8); 2]> {
+        if self.connections.is_empty() {
+            let end = |at: PortOf| Some((*stations.get(at.node)?, at.port));
+            let rings = topology.local_rings.iter().map(|ring| ring.closing);
+            return rings.filter_map(|closing| Some([end(closing.head)?, end(closing.tail)?])).collect();
+        }
+        let end = |subdevice: usize, port: u8| Some((members.get(subdevice)?.station, port));
+        let ends = |it: &JunctionConnection| Some([end(it.head, it.head_port)?, end(it.tail, it.tail_port)?]);
+        self.connections.iter().filter_map(ends).collect()
     }
 }
 

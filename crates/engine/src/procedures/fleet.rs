@@ -10,6 +10,7 @@ use ringcat_wire::al::AlState;
 use ringcat_wire::register::{DlControl, Fmmu};
 
 use super::clocks::SharedClocks;
+use super::junction::End;
 use super::mail_watch;
 use super::services::ports::BlockedPort;
 use super::services::statistics::Book;
@@ -228,6 +229,9 @@ pub struct Fleet {
     pub next_temporary: u16,
     /// Where process data lies.
     pub layout: Layout,
+    /// Both ends of the closing cables of all rings behind junctions that were learned or declared, the junction's first:
+    /// also those of whom somebody is not there.
+    pub closings: Vec<[End; 2]>,
     /// Connections as the scan found them, or a rescan after it.
     pub topology: Topology,
     /// Station addresses by position, as found together with these.
@@ -236,7 +240,7 @@ pub struct Fleet {
     pub ring: RingStatus,
     /// All cables with what their ends have counted.
     pub cables: Vec<(Cable, CableErrors)>,
-    /// How often other cables were found since.
+    /// How often other cables, or others at their ends, were found since.
     pub recablings: u32,
     /// SII contents read before.
     pub cache: SiiCache,
@@ -247,6 +251,9 @@ pub struct Fleet {
     /// Error counters.
     pub(crate) statistics: Book,
 }
+
+/// What SubDevices said about their ports, by position in the cabling of that number ([`Fleet::recablings`]).
+type Found = (u32, Vec<Option<NodeStatus>>);
 
 /// Shared by all procedures of one MainDevice.
 #[derive(Clone, Debug)]
@@ -272,7 +279,7 @@ struct Inside {
     /// How many there were.
     looks: Cell<u32>,
     /// What the last one found, by position, until somebody takes it.
-    found: RefCell<Option<Vec<Option<NodeStatus>>>>,
+    found: RefCell<Option<Found>>,
 }
 
 impl SharedFleet {
@@ -309,8 +316,8 @@ impl SharedFleet {
         self.inside.looks.set(self.inside.looks.get().wrapping_add(1));
     }
 
-    /// That is over; what SubDevices said about their ports, by position.
-    pub(super) fn end_to_look_inside(&self, found: Vec<Option<NodeStatus>>) {
+    /// That is over; what SubDevices said about their ports.
+    pub(super) fn end_to_look_inside(&self, found: Found) {
         self.inside.is_looking.set(false);
         *self.inside.found.borrow_mut() = Some(found);
     }
@@ -325,9 +332,10 @@ impl SharedFleet {
         self.inside.looks.get()
     }
 
-    /// What was found, once.
+    /// What was found, once, unless the cabling is another one since.
     pub(super) fn take_found_inside(&self) -> Option<Vec<Option<NodeStatus>>> {
-        self.inside.found.borrow_mut().take()
+        let (recablings, found) = self.inside.found.borrow_mut().take()?;
+        (recablings == self.access().recablings).then_some(found)
     }
 
     /// Tells whoever supervises that there is something to act on.

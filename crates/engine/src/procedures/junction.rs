@@ -1,13 +1,15 @@
-//! Rings behind junctions (facts 9.4): which there are ([`learn`]), what becomes of them ([`watch`]), and
-//! where they are broken when nothing comes back ([`look_inside`]).
+//! Rings behind junctions (facts 9.4): which there are ([`learn`]), what becomes of them ([`watch`]), how they lie in a
+//! segment that has changed ([`retrace`]), and where they are broken when nothing comes back ([`look_inside`]).
 //!
 //! The controllers keep a local ring going by themselves; nothing here is needed for that. It is about knowing: who may
 //! be entered from behind without being cabled wrongly, that a cable is broken, and when there must not be another one.
 
 mod learn;
 mod look_inside;
+mod retrace;
 mod watch;
 
 pub(super) use self::learn::learn;
 pub(super) use self::look_inside::note_controls;
+pub(super) use self::retrace::{End, cabling};
 pub(super) use self::watch::{JunctionWatch, watch_blocked};

@@ -389,7 +389,9 @@ async fn admit(bus: &Bus, fleet: &SharedFleet, stranger: &Stranger, info: &SubDe
         return false;
     }
     {
-        let member = &mut fleet.access().members[index];
+        let access = &mut *fleet.access();
+        recabling::take_place(access, stranger.station, index);
+        let member = &mut access.members[index];
         member.setup = Some(Rc::new(setup));
         member.info = Some(info);
         member.configured = false;

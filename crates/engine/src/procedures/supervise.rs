@@ -58,8 +58,9 @@ pub(crate) async fn supervise(bus: Bus, fleet: SharedFleet, enhanced_line_crosse
     let reported = Rc::new(Cell::new(RingState::Unknown));
     bus.spawn(watch_ring(bus.clone(), fleet.clone(), reported.clone()));
     bus.spawn(verify(bus.clone(), fleet.clone()));
-    let junctions = JunctionWatch::new(&fleet.access().topology);
-    if !junctions.is_empty() {
+    let junctions = JunctionWatch::new(&fleet.access());
+    let are_known = !fleet.access().closings.is_empty();
+    if are_known {
         bus.spawn(watch_blocked(bus.clone(), fleet.clone(), junctions.broken()));
     }
     bus.spawn(watch_errors(bus.clone(), fleet.clone()));
@@ -303,8 +304,10 @@ impl Watch {
 
     /// Events of rings behind junctions.
     fn report_junctions(&mut self, looks: &[Look]) {
+        let status = self.by_position(looks);
+        self.junctions.follow(&self.fleet.access(), &status);
         if !self.junctions.is_empty() {
-            self.observe_junctions(&self.by_position(looks));
+            self.observe_junctions(&status);
         }
     }
 
@@ -318,6 +321,7 @@ impl Watch {
     /// What was seen in rings of which no frame comes back.
     fn take_found_inside(&mut self) {
         if let Some(status) = self.fleet.take_found_inside() {
+            self.junctions.follow(&self.fleet.access(), &status);
             self.observe_junctions(&status);
         }
     }

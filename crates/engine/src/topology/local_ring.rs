@@ -89,6 +89,20 @@ pub(super) fn unconnected(status: &NodeStatus) -> bool {
     !port.communication || port.loop_closed
 }
 
+impl Topology {
+    /// Hangs a member of a broken local ring where the cable begins that is broken: as it hangs when the ring is whole.
+    pub fn hang_behind_break(&mut self, near: PortOf, node: usize) {
+        let port = usize::from(near.port & 3);
+        let is_free = self.nodes.get(near.node).is_some_and(|parent| parent.children[port].is_none());
+        match self.nodes.get_mut(node).filter(|orphan| is_free && orphan.parent.is_none()) {
+            Some(orphan) => orphan.parent = Some((near.node, near.port)),
+            None => return,
+        }
+        self.nodes[near.node].children[port] = Some(node);
+        self.local_rings = self.local_rings.iter().map(|ring| trace(self, ring.closing)).collect();
+    }
+}
+
 /// Follows the tree from the tail up to the junction, or to the break.
 fn trace(topology: &Topology, closing: Closing) -> LocalRing {
     let mut cables = alloc::vec![RingCable { near: Some(closing.tail), far: closing.head }];

@@ -232,3 +232,104 @@ fn a_break_that_changes_the_order_of_a_ring_with_a_branch_has_moved_nobody_cr_09
         world.run_cycles(50);
     }
 }
+
+/// The redundant copy meets the branch on port 2 of a closed ring: that is no break (CR-09).
+#[test]
+fn after_a_rescan_of_a_closed_ring_with_a_branch_on_port_2_places_are_those_of_the_segment_cr_09_cr_17() {
+    use ringcat_sim::frame::Port::{A, B, D};
+    use scenarios::segments::{MAIN, REDUNDANT, at, wired};
+    const LEAVING: DeviceIndex = DeviceIndex(4);
+    let cables = [
+        (MAIN, at(0, A)),
+        (at(0, D), at(1, A)),
+        (at(1, B), at(2, A)),
+        (at(2, B), REDUNDANT),
+        (at(0, B), at(3, A)),
+        (at(1, D), at(4, A)),
+    ];
+    let kinds = ["junction", "junction", "digital-output-8", "digital-input-16", "digital-output-16"];
+    // Known from the scan on, or scanned while the ring was open, so that frames met them in another order.
+    for open_at_scan in [None, Some(CableId(2)), Some(CableId(0))] {
+        let mut network = wired(&kinds, &cables);
+        open_at_scan.into_iter().for_each(|cable| network.cut(cable));
+        let declare = |scan: &ringcat::Scan| {
+            let mut declaration = automatic(&scan.subdevices, CYCLE);
+            declaration.subdevices.iter_mut().for_each(|it| it.optional = true);
+            declaration
+        };
+        let mut world = World::with(4, network, &Options::default(), declare).expect("scan and activation");
+        world.settle();
+        world.set_strict(false);
+        open_at_scan.into_iter().for_each(|cable| world.heal(cable));
+        world.run_cycles(60);
+        let mark = world.mark();
+        let all = rescan(&mut world);
+        assert_eq!((all.counts.0.0, all.counts.1.0), (4, 1), "{open_at_scan:?}");
+        assert!(all.moved().count() == 0 && !world.saw(mark, |event| matches!(event, Event::Moved { .. })));
+        // In the order of the closed ring: 0, 1, the one that leaves, 2, and the branch that the redundant copy meets.
+        let located = |world: &mut World, between: CableId, at| {
+            let mark = world.mark();
+            world.cut(between);
+            world.run_cycles(100);
+            assert_eq!(place(world), Some(at), "{open_at_scan:?}");
+            let told = |event: &Event| matches!(event, Event::BreakLocated { .. });
+            assert_eq!(world.events(mark).iter().filter(|timed| told(&timed.event)).count(), 1);
+            world.heal(between);
+            world.until(LIMIT, "closed", |world| world.application().ring_status().state == RingState::Closed);
+            world.run_cycles(100);
+        };
+        located(&mut world, CableId(2), (Some(1), Some(3)));
+        world.power_off(LEAVING);
+        world.until(LIMIT, "gone", |world| world.application().states().contains(&SubDeviceState::Absent));
+        world.run_cycles(50);
+        let gone = rescan(&mut world);
+        assert_eq!((gone.subdevices.len(), gone.missing.len(), gone.moved().count()), (4, 1, 0));
+        located(&mut world, CableId(2), (Some(1), Some(2)));
+        world.power_on(LEAVING);
+        world.until(LIMIT, "back", |world| world.application().all_settled() && world.all_in_op());
+        world.run_cycles(50);
+        rescan(&mut world);
+        located(&mut world, CableId(2), (Some(1), Some(3)));
+    }
+}
+
+/// Somebody like a declared one is at a place of the cabling as nobody's; when that one goes he takes over, where he is.
+#[test]
+fn a_stranger_that_becomes_a_member_has_the_place_that_a_rescan_found_him_at_cr_09_cr_17() {
+    use ringcat_sim::frame::Port::{A, C, D};
+    use scenarios::segments::{MAIN, at, wired};
+    const FIRST: DeviceIndex = DeviceIndex(1);
+    const SPARE: DeviceIndex = DeviceIndex(2);
+    let mut network = wired(
+        &["junction", "digital-output-16", "digital-output-16"],
+        &[(MAIN, at(0, A)), (at(0, D), at(1, A)), (at(0, C), at(2, A))],
+    );
+    network.power_off(SPARE);
+    let declare = |scan: &ringcat::Scan| {
+        let mut declaration = automatic(&scan.subdevices, CYCLE);
+        declaration.subdevices[1].optional = true;
+        declaration
+    };
+    let mut world = World::with(5, network, &Options::default(), declare).expect("scan and activation");
+    world.settle();
+    world.set_strict(false);
+    world.power_on(SPARE);
+    world.until(LIMIT, "told", |world| world.saw(world.beginning(), |event| matches!(event, Event::Unexpected { .. })));
+    assert_eq!(declared(&rescan(&mut world)), [Some(0), Some(1), None]);
+    world.power_off(FIRST);
+    world.until(LIMIT, "taken over", |world| {
+        world.network().device(SPARE).al_status().al_state() == Some(AlState::Op) && world.application().all_settled()
+    });
+    for _ in 0..3 {
+        world.corrupt(CableId(2), 1);
+        world.run_cycles(20);
+    }
+    world.run_cycles(1_600);
+    assert!(matches!(damaged(&world)[..], [(Some(0), Some(2), _)]), "{:?}", damaged(&world));
+    // Who looks for position 2 finds him, and at position 1 nobody is.
+    let stations = world.application().engine().stations();
+    assert_eq!(world.station_of(SPARE.0), stations[1].0);
+    let mark = world.mark();
+    assert_eq!(declared(&rescan(&mut world)), [Some(0), Some(1)]);
+    assert!(!world.saw(mark, |event| matches!(event, Event::Moved { .. })));
+}

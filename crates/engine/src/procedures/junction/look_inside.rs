@@ -70,13 +70,15 @@ fn station_of(fleet: &Fleet, node: usize) -> Option<StationAddress> {
 
 /// Looks into all local rings; returns what members said about their ports, by position. Empty where that cannot be
 /// done: there is one ring only, or a junction is not declared.
-pub(super) async fn look_inside(bus: &Bus, fleet: &SharedFleet) -> Vec<Option<NodeStatus>> {
-    let (rings, count) = {
+///
+/// With the number of the cabling to which the positions belong.
+pub(super) async fn look_inside(bus: &Bus, fleet: &SharedFleet) -> (u32, Vec<Option<NodeStatus>>) {
+    let (rings, count, recablings) = {
         let access = fleet.access();
         let rings = access.topology.local_rings.iter().map(|ring| Ring::new(&access, ring));
         let rings: Vec<Ring> = rings.collect::<Option<_>>().unwrap_or_default();
         let is_possible = (2..=MOST).contains(&rings.len());
-        (if is_possible { rings } else { Vec::new() }, access.topology.nodes.len())
+        (if is_possible { rings } else { Vec::new() }, access.topology.nodes.len(), access.recablings)
     };
     let mut found = vec![None; if rings.is_empty() { 0 } else { count }];
     for ring in &rings {
@@ -90,7 +92,7 @@ pub(super) async fn look_inside(bus: &Bus, fleet: &SharedFleet) -> Vec<Option<No
         // Nobody may be able to answer this.
         let _ = set_loops(bus, &rings, |_| false).await;
     }
-    found
+    (recablings, found)
 }
 
 /// Reads what the junctions of all local rings were told to do about their ports, while they can be asked. Where there is

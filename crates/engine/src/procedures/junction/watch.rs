@@ -6,8 +6,11 @@ use alloc::vec::Vec;
 use core::cell::Cell;
 use core::time::Duration;
 
-use super::super::fleet::SharedFleet;
+use super::super::fleet::{Fleet, SharedFleet};
 use super::look_inside::look_inside;
+use super::retrace::End;
+use ringcat_wire::address::StationAddress;
+
 use crate::event::Event;
 use crate::link::{Link, LinkSet};
 use crate::supervisor::Bus;
@@ -39,19 +42,59 @@ pub(in super::super) struct JunctionWatch {
     rings: Vec<Vec<Watched>>,
     closings: Vec<Closing>,
     main_count: usize,
+    /// Who is at the places of the cabling, and the number of that cabling.
+    stations: Vec<StationAddress>,
+    recablings: u32,
     /// How many cables are broken, for whoever else wants to know.
     broken: Rc<Cell<usize>>,
 }
 
 impl JunctionWatch {
-    /// Watches the rings of a topology.
-    pub fn new(topology: &Topology) -> JunctionWatch {
+    /// Watches the rings of a fleet.
+    pub fn new(fleet: &Fleet) -> JunctionWatch {
+        JunctionWatch { recablings: fleet.recablings, ..JunctionWatch::over(&fleet.topology, &fleet.stations) }
+    }
+
+    fn over(topology: &Topology, stations: &[StationAddress]) -> JunctionWatch {
         JunctionWatch {
             rings: topology.local_rings.iter().map(watched).collect(),
             closings: topology.local_rings.iter().map(|ring| ring.closing).collect(),
             main_count: topology.main_count,
+            stations: stations.to_vec(),
+            recablings: 0,
             broken: Rc::default(),
         }
+    }
+
+    /// Goes over to the cabling that a rescan has found since, if one has. `status` is by the positions of that.
+    pub fn follow(&mut self, fleet: &Fleet, status: &[Option<NodeStatus>]) {
+        if self.recablings != fleet.recablings {
+            self.recablings = fleet.recablings;
+            self.go_over(JunctionWatch::over(&fleet.topology, &fleet.stations), status);
+        }
+    }
+
+    /// A break that was told goes on to be that of one cable that has an end in common with the one of which it was told:
+    /// the one that is broken. Where there is none, the cable is gone.
+    fn go_over(&mut self, new: JunctionWatch, status: &[Option<NodeStatus>]) {
+        let told: Vec<Watched> = self.rings.iter().flatten().filter(|watched| watched.reported).cloned().collect();
+        let before = core::mem::take(&mut self.stations);
+        let JunctionWatch { rings, closings, main_count, stations, .. } = new;
+        (self.rings, self.closings, self.main_count, self.stations) = (rings, closings, main_count, stations);
+        for told in told {
+            let ends = ends(&told.cable, &before);
+            let stations = &self.stations;
+            let shares = |watched: &&mut Watched| {
+                !watched.reported
+                    && self::ends(&watched.cable, stations).iter().flatten().any(|end| ends.contains(&Some(*end)))
+            };
+            let mut shared: Vec<&mut Watched> = self.rings.iter_mut().flatten().filter(shares).collect();
+            shared.sort_by_key(|watched| is_down(&watched.cable, status) != Some(true));
+            if let Some(watched) = shared.into_iter().next() {
+                (watched.reported, watched.whole_since) = (true, told.whole_since);
+            }
+        }
+        self.broken.set(self.rings.iter().flatten().filter(|watched| watched.reported).count());
     }
 
     /// Whether there is anything to watch.
@@ -119,6 +162,11 @@ fn watched(ring: &LocalRing) -> Vec<Watched> {
     ring.cables.iter().map(|cable| Watched { cable: *cable, reported: false, whole_since: None }).collect()
 }
 
+/// Both ends of a cable, by who is there.
+fn ends(cable: &RingCable, stations: &[StationAddress]) -> [Option<End>; 2] {
+    [cable.near, Some(cable.far)].map(|at| at.and_then(|at| Some((*stations.get(at.node)?, at.port))))
+}
+
 /// Whether a cable has no communication at one end; `None` where neither end says anything.
 fn is_down(cable: &RingCable, status: &[Option<NodeStatus>]) -> Option<bool> {
     let end = |at: PortOf| {
@@ -143,7 +191,6 @@ pub(in super::super) async fn watch_blocked(bus: Bus, fleet: SharedFleet, broken
         let seen = fleet.board.supervision().filter(|(_, seen)| seen.total().0 > 0);
         seen.map(|(number, _)| number)
     };
-    let several = fleet.access().topology.local_rings.len() > 1;
     let mut last = (number(&fleet), bus.now(), fleet.board.cycles());
     let mut blocked = false;
     loop {
@@ -161,6 +208,7 @@ pub(in super::super) async fn watch_blocked(bus: Bus, fleet: SharedFleet, broken
         let sent = fleet.board.cycles().wrapping_sub(last.2);
         let is_long = bus.now().since(last.1) >= BLOCKED && sent >= BLOCKED_CYCLES;
         // Without a carrier it is the cable of the interface.
+        let several = fleet.access().topology.local_rings.len() > 1;
         let at_once = several && Link::ALL.iter().all(|link| !has_no_carrier(&bus, *link));
         if is_long && (broken.get() > 0 || at_once) && !blocked {
             blocked = true;
@@ -207,7 +255,8 @@ mod tests {
 
     fn watch(open: [&[u8]; 4]) -> JunctionWatch {
         let closing = Closing { head: at(0, 1), tail: at(3, 1) };
-        JunctionWatch::new(&Topology::with_local_rings(&nodes(open), 4, &[closing]))
+        let stations: Vec<StationAddress> = (0x1001..0x1005).map(StationAddress).collect();
+        JunctionWatch::over(&Topology::with_local_rings(&nodes(open), 4, &[closing]), &stations)
     }
 
     fn seen(watch: &mut JunctionWatch, ms: u64, open: [&[u8]; 4]) -> Vec<Event> {

@@ -85,6 +85,7 @@ fn fresh(fleet: &SharedFleet, present: &[StationAddress]) -> StationAddress {
         address = StationAddress(TEMPORARY.start() + access.next_temporary % TEMPORARY.len() as u16);
         access.next_temporary = access.next_temporary.wrapping_add(1);
         let is_taken = present.contains(&address)
+            || access.stations.contains(&address)
             || access.members.iter().any(|member| member.station == address)
             || access.strangers.iter().any(|stranger| stranger.station == address);
         if !is_taken {

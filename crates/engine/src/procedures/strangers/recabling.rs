@@ -3,7 +3,7 @@
 
 use alloc::vec::Vec;
 
-use ringcat_wire::address::{StationAddress, Wkc};
+use ringcat_wire::address::StationAddress;
 
 use super::rescan::{Rescan, Who};
 use crate::link::LinkSet;
@@ -16,15 +16,15 @@ use crate::topology::PortOf;
 /// The ends of a cable, by who is there.
 type Ends = [Option<(StationAddress, u8)>; 2];
 
-/// Takes over the cabling, unless the segment is broken, or known to have rings behind junctions: what is broken would be
-/// forgotten, and where such rings close is not seen by a look. Mandatory SubDevices that do not answer count as broken.
-/// True where it was taken over.
-pub(super) fn adopt(bus: &Bus, fleet: &SharedFleet, rescan: &Rescan) -> bool {
-    let mut access = fleet.access();
-    let closed = fleet.board.ring().state == RingState::Closed && access.ring.state == RingState::Closed;
-    let is_whole = bus.links() == LinkSet::Single || (closed && rescan.counts.1 == Wkc(0));
+/// Takes over the cabling, unless the ring of two links is open, or a mandatory SubDevice does not answer: what is broken
+/// would be forgotten. A ring behind a junction may be broken, for it is known where it closes, and what was told of it goes
+/// on to hold ([`crate::procedures::junction`]). True where it was taken over.
+pub(super) fn adopt(bus: &Bus, shared: &SharedFleet, rescan: &Rescan) -> bool {
+    let mut access = shared.access();
+    let closed = shared.board.ring().state == RingState::Closed && access.ring.state == RingState::Closed;
+    let is_whole = bus.links() == LinkSet::Single || (closed && rescan.topology.redundant_head.is_none());
     let is_missed = |index: &usize| access.members.get(*index).is_none_or(|member| !member.config.optional);
-    if !is_whole || !access.topology.local_rings.is_empty() || rescan.missing.iter().any(is_missed) {
+    if !is_whole || rescan.missing.iter().any(is_missed) {
         return false;
     }
     let fleet = &mut *access;
@@ -40,14 +40,35 @@ pub(super) fn adopt(bus: &Bus, fleet: &SharedFleet, rescan: &Rescan) -> bool {
         let same = before.iter().find(|(ends, _)| *ends == now && now != [None, None]);
         (cable, same.map_or(CableErrors::default(), |(_, errors)| *errors))
     };
+    let stations = stations_by_position(&fleet.members, rescan.subdevices.iter().map(|found| found.station));
     let cables: Vec<(Cable, CableErrors)> = cables(&rescan.topology, bus.links()).into_iter().map(counted).collect();
-    if fleet.cables != cables {
+    if fleet.cables != cables || fleet.stations != stations || fleet.topology.local_rings != rescan.topology.local_rings
+    {
         fleet.recablings = fleet.recablings.wrapping_add(1);
     }
     fleet.cables = cables;
     fleet.topology = rescan.topology.clone();
-    fleet.stations = stations_by_position(&fleet.members, rescan.subdevices.iter().map(|found| found.station));
+    fleet.stations = stations;
+    let end = |at: PortOf| Some((*fleet.stations.get(at.node)?, at.port));
+    let rings = fleet.topology.local_rings.iter().map(|ring| ring.closing);
+    let closings = rings.filter_map(|closing| Some([end(closing.head)?, end(closing.tail)?])).collect();
+    shared.clocks.access().closings = closings;
+    // What is broken in it may not have been told yet.
+    shared.note_news();
     true
+}
+
+/// A stranger that has a place in the cabling and becomes a member has that place as a member.
+pub(super) fn take_place(fleet: &mut Fleet, stranger: StationAddress, index: usize) {
+    let Some(at) = fleet.stations.iter().position(|station| *station == stranger) else { return };
+    let member = &mut fleet.members[index];
+    // Nobody answers at its temporary address any more, nor is anybody where the member was.
+    if let Some(place) = member.node.and_then(|node| fleet.stations.get_mut(node)) {
+        *place = stranger;
+    }
+    fleet.stations[at] = member.station;
+    member.node = Some(at);
+    fleet.recablings = fleet.recablings.wrapping_add(1);
 }
 
 fn ends(cable: &Cable, station: impl Fn(usize) -> Option<StationAddress>) -> Ends {

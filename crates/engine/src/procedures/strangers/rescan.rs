@@ -17,6 +17,7 @@ use super::recabling;
 use super::{Knowledge, view};
 use crate::event::Event;
 use crate::procedures::fleet::SharedFleet;
+use crate::procedures::junction::cabling;
 use crate::procedures::services::ServiceError;
 use crate::ring::RingState;
 use crate::supervisor::{Bus, BusError};
@@ -59,7 +60,7 @@ pub struct Rescan {
     pub subdevices: Vec<Found>,
     /// Declared ones that do not, by their index in the declaration.
     pub missing: Vec<usize>,
-    /// Cabling as the ports tell it now.
+    /// Cabling as the ports tell it now, with the rings behind junctions that are known.
     pub topology: Topology,
 }
 
@@ -141,16 +142,21 @@ async fn look(bus: &Bus, fleet: &SharedFleet) -> Result<Option<Rescan>, BusError
         subdevices.push(Found { position: Position(at as u16), station: *station, who, moved_from: None });
     }
     let place_at_scan = |index: usize| access.members[index].node;
-    // In a ring that is open elsewhere than at the scan frames meet branches in another order (CR-09): that moves nobody.
+    // In a ring that is open elsewhere than at the scan, or that was open then and has branches, frames meet these in
+    // another order (CR-09): that moves nobody.
     let scanned = &access.topology;
-    let is_as_scanned = scanned.redundant_head.is_some() && usize::from(seen.counts.0.0) == scanned.main_count;
+    let was_open = scanned.redundant_head.is_some();
+    let is_comparable = match bus.ring() {
+        RingState::Open => was_open && usize::from(seen.counts.0.0) == scanned.main_count,
+        RingState::Closed | RingState::Unknown => !was_open,
+    };
     let is_one_line = seen.counts.1 == Wkc(0);
-    if bus.ring() != RingState::Open || is_one_line || is_as_scanned {
+    if is_comparable || is_one_line {
         mark_moved(&mut subdevices, place_at_scan);
     }
     let is_found = |index: &usize| subdevices.iter().any(|found| found.who == Who::Declared(*index));
     let missing = (0..access.members.len()).filter(|index| !is_found(index)).collect();
-    let topology = Topology::build(&nodes, usize::from(seen.counts.0.0));
+    let topology = cabling(&access, &seen.stations, &nodes, usize::from(seen.counts.0.0));
     Ok(Some(Rescan { counts: seen.counts, subdevices, missing, topology }))
 }
 

@@ -1,7 +1,9 @@
 //! Hot connect groups in rings behind junctions and behind their members, on one link and on two, whole and broken.
 
+use std::time::Duration;
+
 use ringcat::{
-    Declaration, DomainMember, Event, JunctionConnection, JunctionMode, Options, Scan, SubDeviceConfig, automatic,
+    Declaration, DomainMember, Event, JunctionConnection, JunctionMode, Options, Scan, SubDeviceConfig, Who, automatic,
 };
 use ringcat_engine::topology::PortOf;
 use ringcat_sim::cable::{CableId, DeviceIndex, Endpoint};
@@ -125,27 +127,167 @@ fn a_group_behind_a_member_of_a_local_ring_joins_and_leaves_whole_and_broken() {
     }
 }
 
+/// The group between the two that are always members: cables 3 to 5 are the group's.
+const PIECE: [(Endpoint, Endpoint); 8] = [
+    (MAIN, at(0, A)),
+    (at(0, B), at(1, A)),
+    (at(1, D), at(2, A)),
+    (at(2, B), at(5, A)),
+    (at(5, B), at(6, A)),
+    (at(6, B), at(3, A)),
+    (at(3, B), at(1, B)),
+    (at(1, C), at(4, A)),
+];
+
+fn piece(seed: u64, two_links: bool, setting: Setting<'_>) -> World {
+    let mut network = network(&PIECE, two_links);
+    GROUP.iter().for_each(|device| network.power_off(*device));
+    world(seed, network, setting)
+}
+
+/// Looks at the whole segment; the places of the declared ones.
+fn rescan(world: &mut World) -> Vec<Option<usize>> {
+    let mark = world.mark();
+    let pending = world.application_mut().engine_mut().start_rescan(LIMIT);
+    let rescan = world.finish(2 * LIMIT, pending).expect("it holds still");
+    assert_eq!((world.incomplete(mark), rescan.moved().count()), (0, 0), "{:?}", rescan.subdevices);
+    let index = |who| if let Who::Declared(index) = who { Some(index) } else { None };
+    rescan.subdevices.iter().map(|found| index(found.who)).collect()
+}
+
+fn own(near: (usize, u8), far: (usize, u8), broken: bool) -> Event {
+    let port = |(node, port)| PortOf { node, port };
+    Event::JunctionChanged { near: Some(port(near)), far: port(far), broken, breaks: usize::from(broken) }
+}
+
+/// Both ends of a cable of the ring with the group in it, once that is known.
+fn own_with_group(cable: usize, broken: bool) -> Event {
+    let (near, far) = match cable {
+        2 => ((1, 3), (2, 0)),
+        6 => ((5, 1), (1, 1)),
+        cable => ((cable - 1, 1), (cable, 0)),
+    };
+    own(near, far, broken)
+}
+
+fn power_on_group(world: &mut World) {
+    for device in GROUP {
+        world.power_on(device);
+        world.run_cycles(3);
+    }
+    until_joined(world);
+}
+
+/// Positions with the group, by index in the declaration.
+const WITH_GROUP: [Option<usize>; 7] = [Some(0), Some(1), Some(2), Some(5), Some(6), Some(3), Some(4)];
+const WITHOUT_GROUP: [Option<usize>; 5] = [Some(0), Some(1), Some(2), Some(3), Some(4)];
+
+#[test]
+fn after_a_rescan_a_group_in_a_local_ring_is_a_piece_of_it_and_after_another_one_no_more_jr_07_cr_17() {
+    for (seed, (two_links, setting)) in (20..).zip(SETTINGS) {
+        let mut world = piece(seed, two_links, setting);
+        let what = format!("{setting:?}, two links: {two_links}");
+        for round in 0..2 {
+            let mark = world.mark();
+            power_on_group(&mut world);
+            assert_eq!(told(&world, mark).len(), 1, "{what}: the gap is closed");
+            assert_eq!(rescan(&mut world), WITH_GROUP, "{what}");
+            for cable in [2, 3, 4, 5, 6] {
+                for broken in [true, false] {
+                    let fault = if broken { Fault::Cut } else { Fault::Heal };
+                    let mark = edge(&mut world, &what, |world| world.fault(fault(CableId(cable))));
+                    let expected = vec![own_with_group(cable, broken)];
+                    assert_eq!((told(&world, mark), crossed(&world, mark)), (expected, 0), "{what}, cable {cable}");
+                }
+            }
+            let mark = world.mark();
+            GROUP.iter().rev().for_each(|device| world.power_off(*device));
+            until_left(&mut world);
+            let ends = [own_with_group(3, true), {
+                let Event::JunctionChanged { near, far, .. } = own_with_group(5, true) else { unreachable!() };
+                Event::JunctionChanged { near, far, broken: true, breaks: 2 }
+            }];
+            assert_eq!(told(&world, mark), ends, "{what}: both of its ends are open");
+            // What is behind the gap is known: it is one cable now.
+            assert_eq!(rescan(&mut world), WITHOUT_GROUP, "{what}");
+            world.run_cycles(60);
+            assert_eq!(told(&world, mark).len(), 2, "{what}: which was told");
+            if round == 0 {
+                let mark = world.mark();
+                power_on_group(&mut world);
+                assert_eq!(told(&world, mark), [own((2, 1), (3, 0), false)], "{what}");
+                world.power_off(GROUP[1]);
+                world.power_off(GROUP[0]);
+                until_left(&mut world);
+                assert_eq!(told(&world, mark)[1..], [own((2, 1), (3, 0), true)], "{what}");
+            }
+        }
+        others_stay(&world, &what);
+        assert_eq!(crossed(&world, world.beginning()), 0, "{what}");
+    }
+}
+
+/// Broken and whole again, once each, the latter with its true place, however the break and the look at the segment meet.
+#[test]
+fn a_break_at_the_moment_of_a_groups_join_is_told_once_jr_07() {
+    for (number, cable) in [4, 3, 5, 4, 6, 2].into_iter().enumerate() {
+        let (two_links, setting) = SETTINGS[number % SETTINGS.len()];
+        let what = format!("{setting:?}, two links: {two_links}, cable {cable}");
+        let mut world = piece(30 + number as u64, two_links, setting);
+        power_on_group(&mut world);
+        let mark = world.mark();
+        // Before the look, while it goes on, and right behind it.
+        world.fault_in(Duration::from_micros([0, 1_500, 4_000][number % 3]), Fault::Cut(CableId(cable)));
+        let pending = world.application_mut().engine_mut().start_rescan(LIMIT);
+        let rescan = world.finish(2 * LIMIT, pending).expect("it holds still");
+        assert!(rescan.is_complete() && rescan.subdevices.len() == 7, "{what}");
+        world.run_cycles(100);
+        let broken = told(&world, mark);
+        assert!(matches!(broken[..], [Event::JunctionChanged { broken: true, breaks: 1, .. }]), "{what}: {broken:?}");
+        let mark = edge(&mut world, &what, |world| world.heal(CableId(cable)));
+        assert_eq!(told(&world, mark), [own_with_group(cable, false)], "{what}");
+        let mark = edge(&mut world, &what, |world| world.cut(CableId(cable)));
+        assert_eq!((told(&world, mark), crossed(&world, mark)), (vec![own_with_group(cable, true)], 0), "{what}");
+        others_stay(&world, &what);
+    }
+}
+
+/// Two breaks of one ring, or one of each ring: nothing is taken over until the segment is whole but for the gap.
+#[test]
+fn a_group_that_leaves_while_a_ring_is_broken_elsewhere_is_no_piece_of_it_once_that_is_mended() {
+    for (number, (cable, (two_links, setting))) in
+        [(6, SETTINGS[0]), (2, SETTINGS[1]), (8, SETTINGS[2]), (7, SETTINGS[3])].into_iter().enumerate()
+    {
+        let what = format!("{setting:?}, two links: {two_links}, cable {cable}");
+        let mut world = piece(40 + number as u64, two_links, setting);
+        power_on_group(&mut world);
+        rescan(&mut world);
+        edge(&mut world, &what, |world| world.cut(CableId(cable)));
+        GROUP.iter().rev().for_each(|device| world.power_off(*device));
+        until_left(&mut world);
+        let work = world.application_mut().engine_mut().start_rescan(LIMIT);
+        let _ = world.finish(2 * LIMIT, work);
+        world.heal(CableId(cable));
+        world.until(LIMIT, "all that are there settled", |world| world.application().all_settled());
+        world.run_cycles(120);
+        assert_eq!(rescan(&mut world), WITHOUT_GROUP, "{what}");
+        let mark = world.mark();
+        power_on_group(&mut world);
+        assert_eq!(told(&world, mark), [own((2, 1), (3, 0), false)], "{what}");
+        assert_eq!(rescan(&mut world), WITH_GROUP, "{what}");
+        for cable in [3, 4, 5] {
+            let mark = edge(&mut world, &what, |world| world.cut(CableId(cable)));
+            assert_eq!((told(&world, mark), crossed(&world, mark)), (vec![own_with_group(cable, true)], 0), "{what}");
+            edge(&mut world, &what, |world| world.heal(CableId(cable)));
+        }
+    }
+}
+
 #[test]
 fn a_group_that_is_a_piece_of_a_local_ring_joins_and_leaves() {
-    let cables = [
-        (MAIN, at(0, A)),
-        (at(0, B), at(1, A)),
-        (at(1, D), at(2, A)),
-        (at(2, B), at(5, A)),
-        (at(5, B), at(6, A)),
-        (at(6, B), at(3, A)),
-        (at(3, B), at(1, B)),
-        (at(1, C), at(4, A)),
-    ];
     for (seed, (two_links, setting)) in (10..).zip(SETTINGS) {
-        let mut network = network(&cables, two_links);
-        GROUP.iter().for_each(|device| network.power_off(*device));
-        let mut world = world(seed, network, setting);
+        let mut world = piece(seed, two_links, setting);
         let what = format!("{setting:?}, two links: {two_links}");
-        let own = |near: (usize, u8), far: (usize, u8), broken| {
-            let port = |(node, port)| PortOf { node, port };
-            Event::JunctionChanged { near: Some(port(near)), far: port(far), broken, breaks: usize::from(broken) }
-        };
         let changes = |world: &World, mark| -> Vec<bool> {
             let is = |event: &Event| matches!(event, Event::JunctionChanged { broken: true, .. });
             told(world, mark).iter().map(is).collect()

@@ -1,0 +1,115 @@
+//! Rings behind junctions that are known, in a segment that is looked at anew: where they close now, and where they are
+//! broken.
+//!
+//! Hot connect groups may be pieces of them. A ring whose last SubDevices have left ends at the one before these. What
+//! leads to the SubDevice behind a break no port tells: it is followed from the junction on, along the members that were
+//! known before and those that have come since, as far as there is no choice.
+
+use alloc::vec::Vec;
+
+use ringcat_wire::address::StationAddress;
+use ringcat_wire::register::PortKind;
+
+use super::super::fleet::Fleet;
+use crate::junction::{HEAD_PORT, START_PORT};
+use crate::topology::{Closing, LocalRing, NodeStatus, PortOf, Topology};
+
+/// A port, by who has it.
+pub(in super::super) type End = (StationAddress, u8);
+
+/// Where the rings that are known close in a segment in which these are, by position.
+pub(in super::super) fn closings(fleet: &Fleet, stations: &[StationAddress]) -> Vec<Closing> {
+    let place = |(station, port): End| Some(PortOf { node: position(stations, station)?, port });
+    let known = fleet.closings.iter().filter_map(|[head, tail]| {
+        let head_now = place(*head)?;
+        // Its last members may have left.
+        let left = || before(fleet, *head)?.cables.iter().rev().find_map(|cable| place(end(fleet, cable.near?)?));
+        let tail = place(*tail).or_else(left)?;
+        (head_now.node < tail.node).then_some(Closing { head: head_now, tail })
+    });
+    known.collect()
+}
+
+/// The cabling of the segment in which these are, with these rings. Who is behind a break of one hangs where it hangs
+/// when the ring is whole, as far as that is known.
+pub(in super::super) fn cabling(
+    fleet: &Fleet,
+    stations: &[StationAddress],
+    status: &[NodeStatus],
+    main_count: usize,
+) -> Topology {
+    let mut topology = Topology::with_local_rings(status, main_count, &closings(fleet, stations));
+    for at in 0..topology.local_rings.len() {
+        let ring = &topology.local_rings[at];
+        let Some(orphan) = ring.cables.first().filter(|cable| cable.near.is_none()).map(|cable| cable.far.node) else {
+            continue;
+        };
+        if let Some(near) = last_before_break(fleet, stations, status, &topology, ring) {
+            topology.hang_behind_break(near, orphan);
+        }
+    }
+    topology
+}
+
+/// The port at which the members before a break end.
+fn last_before_break(
+    fleet: &Fleet,
+    stations: &[StationAddress],
+    status: &[NodeStatus],
+    topology: &Topology,
+    ring: &LocalRing,
+) -> Option<PortOf> {
+    let head = ring.closing.head;
+    let known = before(fleet, (*stations.get(head.node)?, head.port));
+    // The port at which the ring left a SubDevice when that was seen last.
+    let port_before = |node: usize| {
+        let cables = known.map(|ring| ring.cables.as_slice()).unwrap_or_default();
+        let nears = cables.iter().filter_map(|cable| end(fleet, cable.near?));
+        nears.into_iter().find(|(station, _)| stations.get(node) == Some(station)).map(|(_, port)| port)
+    };
+    let is_member = |node: usize| head.node < node && node <= ring.closing.tail.node;
+    let begin = || {
+        let children = topology.nodes[head.node].children;
+        let begins = (0..4).find(|port| children[usize::from(*port)].is_some_and(is_member));
+        begins.or_else(|| (head.port == HEAD_PORT).then_some(START_PORT))
+    };
+    let mut at = PortOf { node: head.node, port: port_before(head.node).or_else(begin)? };
+    for _ in 0..topology.nodes.len() {
+        let Some(next) = topology.nodes[at.node].children[usize::from(at.port & 3)] else {
+            return Some(at);
+        };
+        let port = port_before(next).or_else(|| only_way_on(topology, status, next))?;
+        at = PortOf { node: next, port };
+    }
+    None
+}
+
+/// The port at which a line goes on or ends behind a SubDevice, where there is no choice.
+fn only_way_on(topology: &Topology, status: &[NodeStatus], node: usize) -> Option<u8> {
+    let here = topology.nodes.get(node)?;
+    let kinds = status.get(node)?.ports;
+    let exists =
+        |port: &u8| kinds[usize::from(*port)] != PortKind::NotImplemented || kinds == [PortKind::NotImplemented; 4];
+    let taken: Vec<u8> = (0..4).filter(|port| here.children[usize::from(*port)].is_some()).collect();
+    match taken[..] {
+        [] => [1, 3, 2].into_iter().find(|port| *port != here.entry_port && exists(port)),
+        [1] => Some(1),
+        _ => None,
+    }
+}
+
+/// The ring that closes at a port of a junction, as it was known so far.
+fn before(fleet: &Fleet, head: End) -> Option<&LocalRing> {
+    fleet.topology.local_rings.iter().find(|ring| end(fleet, ring.closing.head) == Some(head))
+}
+
+fn end(fleet: &Fleet, at: PortOf) -> Option<End> {
+    Some((*fleet.stations.get(at.node)?, at.port))
+}
+
+/// The position of a station address that only one SubDevice has.
+fn position(stations: &[StationAddress], station: StationAddress) -> Option<usize> {
+    let mut positions = stations.iter().enumerate().filter(|(_, at)| **at == station).map(|(position, _)| position);
+    let first = positions.next()?;
+    positions.next().is_none().then_some(first)
+}
