@@ -4,11 +4,13 @@
 //! takes the application's declaration, lays out process data, starts the configuration of all SubDevices and the
 //! supervision, and hands out the [`Exchange`] for the application's cyclic thread.
 
+mod activate_error;
 mod areas;
 mod datagrams;
 mod declaration;
 mod ethernet;
 mod gateway;
+mod lrw;
 mod mail;
 mod pending;
 mod services;
@@ -27,9 +29,10 @@ use ringcat_wire::al::AlState;
 use ringcat_wire::frame::MacAddress;
 use ringcat_wire::source_address::MacCodec;
 
+pub use activate_error::ActivateError;
 pub use areas::{AreaEntries, Directory};
 pub use datagrams::{MAX_DATAGRAMS, RawDatagram};
-pub use declaration::{ActivateError, Declaration, DomainConfig, DomainMember, MAX_UNDER_WAY, Required};
+pub use declaration::{Declaration, DomainConfig, DomainMember, MAX_UNDER_WAY, Required};
 pub use ethernet::EthernetSubDevice;
 pub use pending::Pending;
 pub use ticket::Ticket;
@@ -65,9 +68,8 @@ use crate::ring_status::{Cable, CableErrors, LinkStatus, Redundancy, RingStatus,
 use crate::supervisor::{AcyclicCounters, Bus, Received, Supervisor, UnderWay};
 use crate::time::Instant;
 use crate::topology::Topology;
-use declaration::{
-    check_clocks, check_lrw, domain_specs, match_declaration, members, plan_all, report_oddities, with_domain,
-};
+use declaration::{check_clocks, domain_specs, match_declaration, members, plan_all, report_oddities, with_domain};
+use lrw::check_lrw;
 use steps::Loaded;
 
 /// Messages of the exchange that may wait until somebody fetches events.

@@ -4,7 +4,8 @@
 
 use alloc::vec::Vec;
 
-use super::declaration::{ActivateError, Declaration, check};
+use super::activate_error::ActivateError;
+use super::declaration::{Declaration, check};
 use super::{Active, MainDevice};
 use crate::event::Event;
 use crate::info::SubDeviceInfo;

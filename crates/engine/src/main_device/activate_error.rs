@@ -1,0 +1,169 @@
+//! Why a declaration is not activated, in types and in words.
+
+use alloc::vec::Vec;
+use core::fmt;
+use core::time::Duration;
+
+use ringcat_wire::address::LogicalAddress;
+use ringcat_wire::al::AlState;
+
+use super::declaration::MAX_UNDER_WAY;
+use crate::config::ConfigError;
+use crate::junction::JunctionError;
+use crate::layout::LayoutError;
+use crate::procedures::fleet::SetupError;
+
+/// Why a declaration cannot be activated.
+#[derive(Clone, Debug, PartialEq)]
+pub enum ActivateError {
+    /// There is no scan result.
+    NoScan,
+    /// The MainDevice is active.
+    Active,
+    /// A declared SubDevice is not there, or another one is.
+    Config {
+        /// Index in the declaration.
+        subdevice: usize,
+        /// What is wrong.
+        error: ConfigError,
+    },
+    /// A SubDevice cannot be configured as declared.
+    Setup {
+        /// Index in the declaration.
+        subdevice: usize,
+        /// What is wrong.
+        error: SetupError,
+    },
+    /// A scan is running.
+    Scanning,
+    /// Nothing was loaded that could be applied.
+    NotLoaded,
+    /// A connection of a local ring does not fit.
+    Junction(JunctionError),
+    /// A SubDevice is to stay in a state that process data and mailbox do not lead to.
+    Target {
+        /// Index in the declaration.
+        subdevice: usize,
+        /// The state that was declared.
+        target: AlState,
+    },
+    /// The head of a hot connect group has neither alias nor identification.
+    Headless {
+        /// Index in the declaration.
+        subdevice: usize,
+    },
+    /// Process data of a SubDevice was put into two domains.
+    TwoDomains {
+        /// Index in the declaration.
+        subdevice: usize,
+        /// The SyncManager.
+        sync_manager: u8,
+        /// The domains.
+        domains: [usize; 2],
+    },
+    /// The period of a domain is zero, or no multiple of the shortest one.
+    Period {
+        /// Number of the domain.
+        domain: usize,
+        /// Its period.
+        period: Duration,
+        /// The shortest period.
+        shortest: Duration,
+    },
+    /// No cycle of a domain may be under way, or more than [`MAX_UNDER_WAY`].
+    UnderWay {
+        /// Number of the domain.
+        domain: usize,
+        /// What was declared.
+        under_way: u8,
+    },
+    /// LRW was asked for on two links. When the ring breaks, half of its SubDevices would be met by one copy and half by the
+    /// other (facts CR-16, 9.2.2).
+    LrwOnTwoLinks {
+        /// Number of the domain.
+        domain: usize,
+        /// First logical address of the datagram.
+        logical: LogicalAddress,
+        /// Its bytes.
+        length: usize,
+        /// Indices in the declaration of the SubDevices that it addresses.
+        subdevices: Vec<usize>,
+    },
+    /// LRW was asked for, and a SubDevice does not know it.
+    LrwUnknown {
+        /// Number of the domain.
+        domain: usize,
+        /// Index in the declaration.
+        subdevice: usize,
+    },
+    /// Process data does not fit.
+    Layout(LayoutError),
+    /// SYNC signals are declared for a SubDevice, but no distributed clocks, or it has no clock.
+    NoClock {
+        /// Index in the declaration.
+        subdevice: usize,
+        /// It has a clock.
+        has_clock: bool,
+    },
+    /// A domain names a SubDevice that was not declared.
+    UnknownMember {
+        /// Number of the domain.
+        domain: usize,
+        /// Index that was given.
+        subdevice: usize,
+    },
+}
+
+impl fmt::Display for ActivateError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            ActivateError::NoScan => f.write_str("no scan result: scan before activating"),
+            ActivateError::Active => f.write_str("the MainDevice is active already"),
+            ActivateError::Config { subdevice, error } => write!(f, "declaration {subdevice}: {error}"),
+            ActivateError::Setup { subdevice, error } => write!(f, "declaration {subdevice}: {error}"),
+            ActivateError::Scanning => f.write_str("a scan is running"),
+            ActivateError::NotLoaded => f.write_str("nothing is loaded: load a declaration before applying it"),
+            ActivateError::Junction(error) => error.fmt(f),
+            ActivateError::Target { subdevice, target } => {
+                write!(f, "declaration {subdevice}: expected target INIT, PREOP, SAFEOP or OP, got {target}")
+            }
+            ActivateError::Headless { subdevice } => write!(
+                f,
+                "declaration {subdevice}: the head of a group is found by alias or identification, got another address"
+            ),
+            ActivateError::TwoDomains { subdevice, sync_manager, domains: [a, b] } => write!(
+                f,
+                "declaration {subdevice}: process data of SyncManager {sync_manager} is in domain {a} and in domain {b}"
+            ),
+            ActivateError::Period { domain, period, shortest } => write!(
+                f,
+                "domain {domain}: expected a period that is a multiple of {} us and not zero, got {} us",
+                shortest.as_micros(),
+                period.as_micros()
+            ),
+            ActivateError::UnderWay { domain, under_way } => {
+                write!(f, "domain {domain}: expected 1 to {MAX_UNDER_WAY} cycles under way, got {under_way}")
+            }
+            ActivateError::LrwOnTwoLinks { domain, logical, length, subdevices } => write!(
+                f,
+                "domain {domain}: an LRW at logical address {logical} of {length} bytes for declarations {subdevices:?} \
+                 cannot be used with two links: leave it to the MainDevice, or use one LRW per SubDevice"
+            ),
+            ActivateError::LrwUnknown { domain, subdevice } => {
+                write!(f, "domain {domain}: LRW was asked for, declaration {subdevice} does not know it")
+            }
+            ActivateError::Layout(error) => error.fmt(f),
+            ActivateError::NoClock { subdevice, has_clock: false } => {
+                write!(f, "declaration {subdevice}: SYNC signals for a SubDevice without a distributed clock")
+            }
+            ActivateError::NoClock { subdevice, has_clock: true } => {
+                write!(f, "declaration {subdevice}: SYNC signals, but no distributed clocks are declared")
+            }
+            ActivateError::UnknownMember { domain, subdevice } => {
+                write!(f, "domain {domain} names declaration {subdevice}, which does not exist")
+            }
+        }
+    }
+}
+
+impl core::error::Error for ActivateError {}

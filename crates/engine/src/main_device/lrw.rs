@@ -1,0 +1,30 @@
+//! Where LRW may be used: never over several SubDevices on two links (facts 9.2.2, CR-16).
+
+use alloc::vec::Vec;
+
+use ringcat_wire::command::Command;
+
+use super::activate_error::ActivateError;
+use crate::layout::{DomainSpec, Layout, LrwPolicy};
+use crate::link::LinkSet;
+
+/// Refuses LRW over several SubDevices on two links, and names the datagram.
+pub(super) fn check_lrw(lrw: LrwPolicy, specs: &[DomainSpec], links: LinkSet) -> Result<(), ActivateError> {
+    if lrw != LrwPolicy::Explicit || links == LinkSet::Single {
+        return Ok(());
+    }
+    let specs: Vec<DomainSpec> = specs.iter().map(|spec| DomainSpec { lrw: true, ..spec.clone() }).collect();
+    let asked = Layout::with_lrw(&specs, LinkSet::Single, false, lrw).map_err(ActivateError::Layout)?;
+    for (domain, planned) in asked.domains.iter().enumerate() {
+        let datagrams = planned.frames.iter().flat_map(|frame| &frame.datagrams);
+        if let Some(datagram) = datagrams.clone().find(|datagram| datagram.command == Command::Lrw) {
+            return Err(ActivateError::LrwOnTwoLinks {
+                domain,
+                logical: datagram.logical,
+                length: usize::from(datagram.outputs) + usize::from(datagram.inputs),
+                subdevices: datagram.contributions.iter().map(|(subdevice, _)| *subdevice).collect(),
+            });
+        }
+    }
+    Ok(())
+}
