@@ -7,8 +7,10 @@
 mod address;
 mod builder;
 mod clocks;
+mod declared;
 mod groups;
 mod ip;
+mod register;
 mod resolve;
 mod startup;
 mod sync_modes;
@@ -24,10 +26,12 @@ use crate::info::{Direction, SubDeviceInfo};
 pub use crate::info::IdentityField;
 
 pub use address::ConfigAddress;
+pub use declared::{DeclaredSyncManager, SyncManagerRole};
 pub(crate) use groups::can_lead;
 pub use groups::{Group, groups};
 pub use ip::IpSettings;
-pub use startup::{IdnWrite, SdoDownload, StartupAction, StartupCommand, Transition};
+pub use register::{RegisterAccess, RegisterCommand};
+pub use startup::{IdnWrite, SdoDownload, SdoUpload, StartupAction, StartupCommand, Transition};
 pub use timeouts::{StateTimeout, Timeouts};
 
 pub use clocks::{ClockConfig, Passage, ReferenceClock, SyncSignals};
@@ -140,6 +144,12 @@ pub struct SubDeviceConfig {
     pub sync_managers: Vec<SyncManagerOverride>,
     /// PDOs of the SyncManagers named here; the others, and all where this is `None`, are as in the SII.
     pub pdos: Option<Vec<PdoAssignment>>,
+    /// All its SyncManagers as a configuration file writes them; `None` takes them from the SII. With them `sync_managers`
+    /// and `pdos` do not count, nothing is assigned or mapped, and the file's mailboxes take the place of the SII's.
+    pub declared: Option<Vec<DeclaredSyncManager>>,
+    /// Its mailboxes in BOOT as a configuration file writes them, first the one that the MainDevice writes; `None` takes
+    /// them from the SII.
+    pub declared_bootstrap: Option<[DeclaredSyncManager; 2]>,
     /// Register WATCHDOG_DIVIDER.
     pub watchdog_divider: Option<u16>,
     /// Register WATCHDOG_TIME_PROCESS_DATA, in units of the divider; 0 switches the watchdog off.
@@ -173,6 +183,8 @@ impl Default for SubDeviceConfig {
             group: None,
             sync_managers: Vec::new(),
             pdos: None,
+            declared: None,
+            declared_bootstrap: None,
             watchdog_divider: None,
             watchdog_intervals: None,
             pdi_watchdog_intervals: None,

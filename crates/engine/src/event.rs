@@ -228,6 +228,21 @@ pub enum Event {
         /// What.
         what: String,
     },
+    /// A start-up command has read an object without a value that it must have.
+    StartupRead {
+        /// Index in the declaration.
+        subdevice: usize,
+        /// Number of the command in the declaration, from 0.
+        number: usize,
+        /// Index of the object.
+        index: u16,
+        /// Subindex of the object.
+        sub_index: u8,
+        /// What the command is for, in the words of its declaration.
+        comment: Option<String>,
+        /// What came.
+        data: Vec<u8>,
+    },
     /// A SubDevice sent a CoE emergency (facts 6.3). The last ones of each SubDevice are kept with its mailbox, too.
     Emergency {
         /// Index in the declaration; before activation the position.

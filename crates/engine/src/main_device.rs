@@ -34,6 +34,7 @@ pub use areas::{AreaEntries, Directory};
 pub use datagrams::{MAX_DATAGRAMS, RawDatagram};
 pub use declaration::{Declaration, DomainConfig, DomainMember, MAX_UNDER_WAY, Required};
 pub use ethernet::EthernetSubDevice;
+pub use lrw::ExplicitLrw;
 pub use pending::Pending;
 pub use ticket::Ticket;
 
@@ -270,8 +271,9 @@ impl MainDevice {
         check_clocks(&declaration, &found)?;
         let clock_config = declaration.clocks.clone();
         let plans = plan_all(&declaration, &found)?;
-        let (links, lrw) = (self.options.links(), declaration.lrw);
-        let specs = domain_specs(&declaration, &plans, links)?;
+        let links = self.options.links();
+        let lrw = lrw::policy(declaration.lrw, &declaration.explicit_lrw, links)?;
+        let specs = domain_specs(&declaration, &plans, lrw, links)?;
         check_lrw(lrw, &specs, links)?;
         let mut layout =
             Layout::with_lrw(&specs, links, self.options.supervision, lrw).map_err(ActivateError::Layout)?;

@@ -3,11 +3,12 @@
 //!
 //! In go a [`SubDeviceConfig`] and the [`SubDeviceInfo`] to which it belongs; out comes a [`SubDevicePlan`]: mailbox
 //! and process data SyncManagers, the layout of each process data area, watchdog registers, SDO downloads for PDO
-//! assignment and mapping. Logical addresses are given later, when domains are laid out: [`fmmu`]. Writing all this,
+//! assignment and mapping. Where a configuration file declares the SyncManagers, it counts before the SII. Logical addresses are given later, when domains are laid out: [`fmmu`]. Writing all this,
 //! in which order and in which state, is the matter of the procedures.
 
 mod areas;
 mod check;
+mod declared;
 mod error;
 mod sdos;
 
@@ -106,6 +107,16 @@ impl SubDevicePlan {
     pub fn mapped_areas(&self) -> impl Iterator<Item = (u8, &AreaPlan)> {
         (0..).zip(self.process_data.iter().filter(|area| area.length > 0))
     }
+
+    /// Where the mailboxes lie from PREOP on; `None` where there are none.
+    pub fn mailbox_layout(&self) -> Option<MailboxLayout> {
+        layout_of(&self.mailbox)
+    }
+
+    /// Where the mailboxes lie in BOOT; `None` where there are none.
+    pub fn bootstrap_layout(&self) -> Option<MailboxLayout> {
+        layout_of(&self.bootstrap)
+    }
 }
 
 /// Plans one SubDevice. The error names SubDevice, SyncManager, PDO or object, what was expected and what came.
@@ -114,16 +125,26 @@ pub fn plan(config: &SubDeviceConfig, info: &SubDeviceInfo) -> Result<SubDeviceP
 }
 
 fn plan_inner(config: &SubDeviceConfig, info: &SubDeviceInfo) -> Result<SubDevicePlan, PlanProblem> {
-    let mailbox = info
-        .mailbox
-        .filter(|_| mailbox_wanted(info))
-        .map_or(Vec::new(), |layout| mailbox_pair(info, &layout, info.mailbox_sync_managers()));
-    let bootstrap = info.bootstrap.map_or(Vec::new(), |layout| mailbox_pair(info, &layout, info.boot_sync_managers()));
-    let process_data = areas::areas(config, info, &mailbox)?;
-    check::check(info, &mailbox, &process_data)?;
+    let of_sii = || info.bootstrap.map_or(Vec::new(), |layout| mailbox_pair(info, &layout, info.boot_sync_managers()));
+    let bootstrap = config.declared_bootstrap.as_ref().map_or_else(of_sii, |pair| declared::managers(pair).collect());
     let mut warnings = Vec::new();
-    let assign_sdos = sdos::assign_sdos(config, info, &process_data, &mut warnings)?;
-    config.startup.iter().try_for_each(|command| check::command(info, !mailbox.is_empty(), &command.action))?;
+    let (mailbox, process_data, assign_sdos) = match &config.declared {
+        Some(declared) => {
+            let (mailbox, process_data) = declared::areas(declared, info)?;
+            (mailbox, process_data, Vec::new())
+        }
+        None => {
+            let layout = info.mailbox.filter(|_| mailbox_wanted(info));
+            let mailbox = layout.map(|layout| mailbox_pair(info, &layout, info.mailbox_sync_managers()));
+            let mailbox = mailbox.unwrap_or_default();
+            let process_data = areas::areas(config, info, &mailbox)?;
+            let assign_sdos = sdos::assign_sdos(config, info, &process_data, &mut warnings)?;
+            (mailbox, process_data, assign_sdos)
+        }
+    };
+    check::check(info, &mailbox, &process_data)?;
+    let speaks = check::Speaks::new(config, info, !mailbox.is_empty());
+    config.startup.iter().try_for_each(|command| check::command(speaks, &command.action))?;
     let used = |index: &u8| {
         mailbox.iter().any(|sm| sm.index == *index) || process_data.iter().any(|area| area.sync_manager == *index)
     };
@@ -174,6 +195,16 @@ fn mailbox_pair(info: &SubDeviceInfo, layout: &MailboxLayout, (out, inward): (u8
         SmPlan { index: out, register: sync_manager(layout.receive_offset, layout.receive_size, out_control) },
         SmPlan { index: inward, register: sync_manager(layout.send_offset, layout.send_size, in_control) },
     ])
+}
+
+fn layout_of(pair: &[SmPlan]) -> Option<MailboxLayout> {
+    let [out, inward] = pair else { return None };
+    Some(MailboxLayout {
+        receive_offset: out.register.start,
+        receive_size: out.register.length,
+        send_offset: inward.register.start,
+        send_size: inward.register.length,
+    })
 }
 
 fn sync_manager(start: u16, length: u16, control: u8) -> SyncManager {

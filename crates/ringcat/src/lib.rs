@@ -68,9 +68,10 @@ pub use supervisor_thread::SupervisorThread;
 
 pub use ringcat_engine::clocks::{Follower, phase_error};
 pub use ringcat_engine::config::{
-    ClockConfig, ConfigAddress, Expected, Group, IdentityField, IdnWrite, IpSettings, ModeError, Passage,
-    PdoAssignment, PdoEntry, PdoMapping, ReferenceClock, SdoDownload, StartupAction, StartupCommand, StateTimeout,
-    SubDeviceConfig, SyncSignals, Timeouts, Transition, Watchdog,
+    ClockConfig, ConfigAddress, DeclaredSyncManager, Expected, Group, IdentityField, IdnWrite, IpSettings, ModeError,
+    Passage, PdoAssignment, PdoEntry, PdoMapping, ReferenceClock, RegisterAccess, RegisterCommand, SdoDownload,
+    SdoUpload, StartupAction, StartupCommand, StateTimeout, SubDeviceConfig, SyncManagerRole, SyncSignals, Timeouts,
+    Transition, Watchdog,
 };
 pub use ringcat_engine::domain::{DomainId, DomainState, DomainStatus, Freshness};
 pub use ringcat_engine::event::{Event, TimedEvent};
@@ -83,8 +84,8 @@ pub use ringcat_engine::link::Link;
 pub use ringcat_engine::mail::coe::{SdoAddress, SdoError, SdoFailure};
 pub use ringcat_engine::mail::{Limits, Mailbox};
 pub use ringcat_engine::main_device::{
-    ActivateError, Declaration, DomainConfig, DomainMember, GroupState, MAX_UNDER_WAY, RawDatagram, Required,
-    SubDeviceState,
+    ActivateError, Declaration, DomainConfig, DomainMember, ExplicitLrw, GroupState, MAX_UNDER_WAY, RawDatagram,
+    Required, SubDeviceState,
 };
 pub use ringcat_engine::procedures::clocks::ClockStatus;
 pub use ringcat_engine::procedures::dictionary::ReadPdos;

@@ -132,6 +132,15 @@ pub fn describe(event: &Event, names: &Names) -> String {
         Event::StateError { subdevice, requested: None, status, code } => {
             format!("{}: is in {status}: {code}", names.of(*subdevice))
         }
+        Event::StartupRead { subdevice, number, index, sub_index, comment, data } => {
+            let bytes: Vec<String> = data.iter().map(|byte| format!("{byte:02x}")).collect();
+            let comment = comment.as_ref().map_or(String::new(), |comment| format!(" \"{comment}\""));
+            let bytes = bytes.join(" ");
+            format!(
+                "{}: start-up command {number}{comment} read {index:#06x}:{sub_index:02x}: {bytes}",
+                names.of(*subdevice)
+            )
+        }
         Event::PlanOddity { subdevice, what } => format!("{}: {what}", names.of(*subdevice)),
         Event::Lost { subdevice } => format!("{}: no longer answers", names.of(*subdevice)),
         Event::Returned { subdevice } => format!("{}: answers again", names.of(*subdevice)),

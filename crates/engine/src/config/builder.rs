@@ -165,7 +165,7 @@ impl SubDeviceConfig {
     /// Appends a start-up command.
     #[must_use]
     pub fn startup(mut self, transition: Transition, action: StartupAction) -> SubDeviceConfig {
-        self.startup.push(StartupCommand { transition, action });
+        self.startup.push(StartupCommand::new(transition, action));
         self
     }
 

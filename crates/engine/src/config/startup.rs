@@ -1,16 +1,20 @@
-//! Start-up commands: objects, IDNs and addresses that are written whenever a SubDevice passes a transition (facts 5.1,
+//! Start-up commands: objects, IDNs, addresses and registers that are written whenever a SubDevice passes a transition (facts 5.1,
 //! 6.3, 6.5, 6.6).
 
+use alloc::string::String;
 use alloc::vec::Vec;
 use core::fmt;
+use core::time::Duration;
 
 use ringcat_wire::al::AlState;
 use ringcat_wire::mailbox::soe::Idn;
 
 use super::ip::IpSettings;
+use super::register::RegisterCommand;
 
 /// A transition at which start-up commands are sent. Towards OP they come before the upper state is requested, on the way
-/// back before the lower one is; those of IP come as soon as PREOP is reached, because INIT has no mailbox.
+/// back before the lower one is. INIT has no mailbox: of the commands of IP those to registers are sent in INIT, before the
+/// mailbox is set up, the others as soon as PREOP is reached.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Transition {
     /// INIT to PREOP.
@@ -58,6 +62,19 @@ pub struct SdoDownload {
     pub data: Vec<u8>,
 }
 
+/// An SDO upload.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct SdoUpload {
+    /// Index of the object.
+    pub index: u16,
+    /// Subindex; with complete access 0 or 1, where to start.
+    pub sub_index: u8,
+    /// All entries at once.
+    pub complete_access: bool,
+    /// What must come, little-endian, or the configuration fails; with `None` what comes is told by an event.
+    pub expected: Option<Vec<u8>>,
+}
+
 /// A write of the value of an IDN.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct IdnWrite {
@@ -74,10 +91,14 @@ pub struct IdnWrite {
 pub enum StartupAction {
     /// CoE.
     Sdo(SdoDownload),
+    /// CoE, the other way.
+    Upload(SdoUpload),
     /// SoE.
     Idn(IdnWrite),
     /// EoE: the addresses behind it.
     Ip(IpSettings),
+    /// A register of its controller.
+    Register(RegisterCommand),
 }
 
 /// A start-up command.
@@ -87,4 +108,15 @@ pub struct StartupCommand {
     pub transition: Transition,
     /// What.
     pub action: StartupAction,
+    /// So long one message of a mailbox command may take; `None`: as long as the SubDevice's time limits say.
+    pub limit: Option<Duration>,
+    /// What it is for, in the words of whoever wrote it, for messages.
+    pub comment: Option<String>,
+}
+
+impl StartupCommand {
+    /// A command with the usual time limit and without a comment.
+    pub const fn new(transition: Transition, action: StartupAction) -> StartupCommand {
+        StartupCommand { transition, action, limit: None, comment: None }
+    }
 }

@@ -8,6 +8,7 @@ use ringcat_wire::address::LogicalAddress;
 use ringcat_wire::al::AlState;
 
 use super::declaration::MAX_UNDER_WAY;
+use super::lrw::ExplicitLrw;
 use crate::config::ConfigError;
 use crate::junction::JunctionError;
 use crate::layout::LayoutError;
@@ -89,6 +90,8 @@ pub enum ActivateError {
         /// Indices in the declaration of the SubDevices that it addresses.
         subdevices: Vec<usize>,
     },
+    /// A configuration file names an LRW over several SubDevices, and there are two links (facts CR-16, 9.2.2).
+    NamedLrwOnTwoLinks(ExplicitLrw),
     /// LRW was asked for, and a SubDevice does not know it.
     LrwUnknown {
         /// Number of the domain.
@@ -148,6 +151,11 @@ impl fmt::Display for ActivateError {
                 f,
                 "domain {domain}: an LRW at logical address {logical} of {length} bytes for declarations {subdevices:?} \
                  cannot be used with two links: leave it to the MainDevice, or use one LRW per SubDevice"
+            ),
+            ActivateError::NamedLrwOnTwoLinks(ExplicitLrw { name, logical, length, subdevices }) => write!(
+                f,
+                "{name}: an LRW at logical address {logical} of {length} bytes for declarations {subdevices:?} cannot be \
+                 used with two links: let it be split into LRD and LWR, or use one LRW per SubDevice"
             ),
             ActivateError::LrwUnknown { domain, subdevice } => {
                 write!(f, "domain {domain}: LRW was asked for, declaration {subdevice} does not know it")

@@ -1,9 +1,10 @@
 //! Where the process data of the declared SubDevices lies, and which PDO entries it has.
 
+use alloc::boxed::Box;
 use alloc::vec;
 use alloc::vec::Vec;
 
-use crate::config::{PdoEntry, SubDeviceConfig};
+use crate::config::{PdoEntry, PdoMapping, SubDeviceConfig};
 use crate::domain::DomainId;
 use crate::exchange::Entry;
 use crate::info::Direction;
@@ -71,7 +72,7 @@ impl Directory {
 pub(super) enum Areas {
     /// Planned; `None` where its target state exchanges nothing.
     Planned(Option<SubDevicePlan>),
-    Declared(Vec<(u8, Direction, u16)>, SubDeviceConfig),
+    Declared(Vec<(u8, Direction, u16)>, Box<SubDeviceConfig>),
 }
 
 impl Areas {
@@ -112,8 +113,14 @@ impl Areas {
                 pdos.flat_map(|pdo| &pdo.entries).copied().collect()
             }
             Areas::Declared(_, config) => {
-                let assignments = config.pdos.iter().flatten().filter(|a| a.sync_manager == sync_manager);
-                let entries = assignments.flat_map(|a| &a.pdos).flat_map(|pdo| pdo.entries.iter().flatten());
+                let pdos: &[PdoMapping] = match &config.declared {
+                    Some(all) => all.iter().find(|sm| sm.index == sync_manager).map_or(&[], |sm| &sm.pdos),
+                    None => {
+                        let mut all = config.pdos.iter().flatten();
+                        all.find(|a| a.sync_manager == sync_manager).map_or(&[], |a| &a.pdos)
+                    }
+                };
+                let entries = pdos.iter().flat_map(|pdo| pdo.entries.iter().flatten());
                 let place = |bit_offset: &mut u32, entry: &PdoEntry| {
                     let PdoEntry { index, sub_index, bit_length } = *entry;
                     let mapped = MappedEntry { index, sub_index, bit_offset: *bit_offset, bit_length };

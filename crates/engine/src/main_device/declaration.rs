@@ -1,6 +1,7 @@
 //! What the application declares, held against what the scan found, and turned into domains and members.
 
 use alloc::borrow::ToOwned;
+use alloc::boxed::Box;
 use alloc::format;
 use alloc::rc::Rc;
 use alloc::string::ToString;
@@ -15,6 +16,7 @@ use ringcat_wire::register::{WatchdogDivider, WatchdogTime};
 
 use super::activate_error::ActivateError;
 use super::areas::Areas;
+use super::lrw::ExplicitLrw;
 use crate::config::{ClockConfig, ConfigError, Group, Resolution, SubDeviceConfig, can_lead, groups, resolve};
 use crate::event::Event;
 use crate::info::SubDeviceInfo;
@@ -70,6 +72,9 @@ pub struct Declaration {
     pub domains: Vec<DomainConfig>,
     /// Where LRW is used.
     pub lrw: LrwPolicy,
+    /// Datagrams with LRW that a configuration file names. With two links one over several SubDevices is refused, and where
+    /// each has one SubDevice the policy is [`LrwPolicy::PerSubDevice`]; with one link they change nothing.
+    pub explicit_lrw: Vec<ExplicitLrw>,
     /// Distributed clocks; `None` leaves them alone.
     pub clocks: Option<ClockConfig>,
     /// Who must be there for the activation.
@@ -176,7 +181,7 @@ pub(super) fn plan_all(
             Some(info) => plan(config, info)
                 .map(|plan| Areas::Planned(exchanges(config.target).then_some(plan)))
                 .map_err(|error| ActivateError::Setup { subdevice, error: SetupError::Plan(error) }),
-            None => Ok(Areas::Declared(declared_areas(config).unwrap_or_default(), config.clone())),
+            None => Ok(Areas::Declared(declared_areas(config).unwrap_or_default(), Box::new(config.clone()))),
         })
         .collect()
 }
@@ -210,10 +215,11 @@ pub(super) fn check(declaration: &Declaration) -> Result<(), ActivateError> {
 pub(super) fn domain_specs(
     declaration: &Declaration,
     plans: &[Areas],
+    lrw: LrwPolicy,
     links: LinkSet,
 ) -> Result<Vec<DomainSpec>, ActivateError> {
     // With two links it is refused whoever knows it ([`super::lrw::check_lrw`]).
-    let is_asked_for = declaration.lrw == LrwPolicy::Explicit && links == LinkSet::Single;
+    let is_asked_for = lrw == LrwPolicy::Explicit && links == LinkSet::Single;
     let mut specs: Vec<DomainSpec> = Vec::new();
     for (domain, config) in declaration.domains.iter().enumerate() {
         let mut spec = DomainSpec { period: config.period, under_way: config.under_way, lrw: true, areas: Vec::new() };

@@ -1,12 +1,38 @@
 //! Where LRW may be used: never over several SubDevices on two links (facts 9.2.2, CR-16).
 
+use alloc::string::String;
 use alloc::vec::Vec;
 
+use ringcat_wire::address::LogicalAddress;
 use ringcat_wire::command::Command;
 
 use super::activate_error::ActivateError;
 use crate::layout::{DomainSpec, Layout, LrwPolicy};
 use crate::link::LinkSet;
+
+/// A datagram with LRW as a configuration file names it. What leaves is laid out by the MainDevice.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct ExplicitLrw {
+    /// How whoever wrote the file finds it: its frame, its place in it, its comment.
+    pub name: String,
+    /// Its logical address in the file.
+    pub logical: LogicalAddress,
+    /// Its bytes.
+    pub length: usize,
+    /// Indices in the declaration of the SubDevices that it addresses.
+    pub subdevices: Vec<usize>,
+}
+
+/// The policy with datagrams that a configuration file names.
+pub(super) fn policy(policy: LrwPolicy, named: &[ExplicitLrw], links: LinkSet) -> Result<LrwPolicy, ActivateError> {
+    if links == LinkSet::Single || named.is_empty() {
+        return Ok(policy);
+    }
+    match named.iter().find(|datagram| datagram.subdevices.len() > 1) {
+        Some(datagram) => Err(ActivateError::NamedLrwOnTwoLinks(datagram.clone())),
+        None => Ok(LrwPolicy::PerSubDevice),
+    }
+}
 
 /// Refuses LRW over several SubDevices on two links, and names the datagram.
 pub(super) fn check_lrw(lrw: LrwPolicy, specs: &[DomainSpec], links: LinkSet) -> Result<(), ActivateError> {

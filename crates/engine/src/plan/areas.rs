@@ -166,7 +166,7 @@ fn declared_pdos(
 }
 
 /// Places entries back to back, from bit `bit` on.
-fn place(entries: impl Iterator<Item = (u16, u8, u8)>, bit: &mut u32) -> Vec<MappedEntry> {
+pub(super) fn place(entries: impl Iterator<Item = (u16, u8, u8)>, bit: &mut u32) -> Vec<MappedEntry> {
     entries
         .map(|(index, sub_index, bit_length)| {
             let bit_offset = *bit;

@@ -7,7 +7,7 @@ use ringcat_wire::register::SyncManager;
 use super::areas::{PROCESS_RAM, occupied};
 use super::error::PlanProblem;
 use super::{AreaPlan, SmPlan};
-use crate::config::{IdnWrite, SdoDownload, StartupAction};
+use crate::config::{IdnWrite, SdoDownload, SdoUpload, StartupAction, SubDeviceConfig};
 use crate::info::SubDeviceInfo;
 
 /// Checks mailbox and process data SyncManagers against the controller and against each other.
@@ -43,17 +43,49 @@ pub(super) fn check(info: &SubDeviceInfo, mailbox: &[SmPlan], areas: &[AreaPlan]
     }
 }
 
+/// Which start-up commands a SubDevice can be given.
+#[derive(Clone, Copy)]
+pub(super) struct Speaks {
+    coe: bool,
+    soe: bool,
+    eoe: bool,
+}
+
+impl Speaks {
+    /// As its SII says; a configuration file that declares its mailboxes knows better.
+    pub(super) fn new(config: &SubDeviceConfig, info: &SubDeviceInfo, mailbox: bool) -> Speaks {
+        let declared = config.declared.is_some();
+        let protocols = info.protocols;
+        Speaks {
+            coe: mailbox && (declared || protocols.coe()),
+            soe: mailbox && (declared || protocols.soe()),
+            eoe: mailbox && (declared || protocols.eoe()),
+        }
+    }
+}
+
 /// Whether a SubDevice can be given a start-up command.
-pub(super) fn command(info: &SubDeviceInfo, mailbox: bool, action: &StartupAction) -> Result<(), PlanProblem> {
+pub(super) fn command(speaks: Speaks, action: &StartupAction) -> Result<(), PlanProblem> {
     match action {
-        StartupAction::Sdo(SdoDownload { index, sub_index, .. }) if !mailbox || !info.protocols.coe() => {
+        StartupAction::Sdo(SdoDownload { index, sub_index, .. })
+        | StartupAction::Upload(SdoUpload { index, sub_index, .. })
+            if !speaks.coe =>
+        {
             Err(PlanProblem::NoCoe { index: *index, sub_index: *sub_index })
         }
-        StartupAction::Idn(IdnWrite { drive, idn, .. }) if !mailbox || !info.protocols.soe() => {
+        StartupAction::Idn(IdnWrite { drive, idn, .. }) if !speaks.soe => {
             Err(PlanProblem::NoSoe { drive: *drive, idn: *idn })
         }
-        StartupAction::Ip(_) if !mailbox || !info.protocols.eoe() => Err(PlanProblem::NoEoe),
-        StartupAction::Sdo(_) | StartupAction::Idn(_) | StartupAction::Ip(_) => Ok(()),
+        StartupAction::Ip(_) if !speaks.eoe => Err(PlanProblem::NoEoe),
+        StartupAction::Register(command) if !command.is_sound() => {
+            let (data, mask) = command.lengths();
+            Err(PlanProblem::RegisterCommand { register: command.address, data, mask })
+        }
+        StartupAction::Sdo(_)
+        | StartupAction::Upload(_)
+        | StartupAction::Idn(_)
+        | StartupAction::Ip(_)
+        | StartupAction::Register(_) => Ok(()),
     }
 }
 

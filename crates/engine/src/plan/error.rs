@@ -2,7 +2,7 @@
 
 use core::fmt;
 
-use ringcat_wire::address::{Position, StationAddress};
+use ringcat_wire::address::{Position, RegisterAddress, StationAddress};
 use ringcat_wire::mailbox::soe::Idn;
 
 use crate::info::Direction;
@@ -146,6 +146,46 @@ pub enum PlanProblem {
     },
     /// Addresses for a SubDevice without EoE.
     NoEoe,
+    /// A configuration file declares a SyncManager twice.
+    DeclaredTwice {
+        /// Its number.
+        sync_manager: u8,
+    },
+    /// A configuration file declares other mailboxes than one of each direction or none.
+    DeclaredMailboxes {
+        /// Those that the MainDevice writes.
+        out: usize,
+        /// Those that it reads.
+        inward: usize,
+    },
+    /// A configuration file declares a SyncManager for one direction, with a control byte for the other.
+    DeclaredControl {
+        /// Its number.
+        sync_manager: u8,
+        /// The direction for which it is declared.
+        expected: Direction,
+        /// The direction of its control byte.
+        got: Direction,
+    },
+    /// A configuration file declares more PDO entries than the length of their SyncManager has bits.
+    DeclaredTooShort {
+        /// Its number.
+        sync_manager: u8,
+        /// Bits of its PDO entries.
+        expected: u64,
+        /// Bits of its length.
+        got: u64,
+    },
+    /// A command to a register has no data, more than a datagram carries, some beyond the last register, or a mask of
+    /// another length.
+    RegisterCommand {
+        /// The register.
+        register: RegisterAddress,
+        /// Bytes of data.
+        data: usize,
+        /// Bytes of the mask.
+        mask: Option<usize>,
+    },
 }
 
 /// What the application asked for and the SubDevice may not follow. The plan takes it as asked for.
@@ -223,6 +263,23 @@ impl fmt::Display for PlanProblem {
                 write!(f, "{idn} of drive {drive} is to be written, but there is no SoE")
             }
             PlanProblem::NoEoe => f.write_str("addresses are to be set, but there is no EoE"),
+            PlanProblem::DeclaredTwice { sync_manager } => write!(f, "SM {sync_manager} is declared twice"),
+            PlanProblem::DeclaredMailboxes { out, inward } => {
+                write!(f, "expected a mailbox to the SubDevice and one from it, or none, got {out} and {inward}")
+            }
+            PlanProblem::DeclaredControl { sync_manager, expected, got } => {
+                write!(f, "SM {sync_manager} is declared for {expected}, its control byte for {got}")
+            }
+            PlanProblem::DeclaredTooShort { sync_manager, expected, got } => {
+                write!(f, "SM {sync_manager}: its PDO entries have {expected} bits, its length {got}")
+            }
+            PlanProblem::RegisterCommand { register, data, mask } => {
+                write!(f, "a command to register {register} has {data} bytes of data")?;
+                match mask {
+                    Some(mask) => write!(f, " and {mask} of mask"),
+                    None => Ok(()),
+                }
+            }
         }
     }
 }

@@ -3,6 +3,7 @@
 mod compare;
 mod error;
 mod leave;
+mod registers;
 mod startup;
 
 use alloc::rc::Rc;
@@ -23,6 +24,7 @@ use crate::mail::coe::{self, SdoAddress};
 use crate::supervisor::{Bus, BusError};
 
 pub use error::{ConfigureError, StartupError};
+pub use registers::{RegisterError, RegisterFailure, WrongValue};
 
 /// Cycles of the exchange that must have gone by before OP is requested, so that valid outputs are there (facts 5.2). The
 /// first of them may have been queued without process data.
@@ -107,8 +109,9 @@ impl BringUp<'_> {
         self.bus.fpwr(self.station, map::sync_manager(index), &register.encode()).await
     }
 
-    /// Mailbox, EEPROM to the PDI for the time of the transition, PREOP, commands of IP.
+    /// Registers of IP, mailbox, EEPROM to the PDI for the time of the transition, PREOP, other commands of IP.
     async fn preop(&self) -> Result<(), ConfigureError> {
+        self.command_registers(Transition::Ip).await?;
         for sync_manager in &self.setup.plan.mailbox {
             self.write_sync_manager(sync_manager.index, &sync_manager.register).await?;
         }
@@ -117,21 +120,19 @@ impl BringUp<'_> {
             sii::assign(self.bus, self.station, true).await?;
         }
         self.request(AlState::Init, AlState::PreOp).await?;
-        let layout = self.fleet.access().members.get(self.index).and_then(|member| member.info.as_ref()?.mailbox);
-        if let (Some(layout), [_, send]) = (layout, &self.setup.plan.mailbox[..]) {
+        if let (Some(layout), [_, send]) = (self.setup.plan.mailbox_layout(), &self.setup.plan.mailbox[..]) {
             self.show_mail(send.index).await?;
             self.mailbox.open(self.station, layout, send.index);
         }
         if has_application && !self.config.sii_to_pdi {
             sii::assign(self.bus, self.station, false).await?;
         }
-        self.command(Transition::Ip).await
+        self.command_mail(Transition::Ip).await
     }
 
     /// Mailboxes of the boot loader, which keeps the EEPROM, BOOT.
     async fn boot(&self) -> Result<(), ConfigureError> {
-        let layout = self.fleet.access().members.get(self.index).and_then(|member| member.info.as_ref()?.bootstrap);
-        let (Some(layout), [_, send]) = (layout, &self.setup.plan.bootstrap[..]) else {
+        let (Some(layout), [_, send]) = (self.setup.plan.bootstrap_layout(), &self.setup.plan.bootstrap[..]) else {
             return Err(ConfigureError::NoBoot);
         };
         for sync_manager in &self.setup.plan.bootstrap {

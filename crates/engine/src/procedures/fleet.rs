@@ -17,7 +17,7 @@ use super::services::statistics::Book;
 use super::sii::SiiCache;
 use super::strangers::Stranger;
 use crate::board::Board;
-use crate::config::SubDeviceConfig;
+use crate::config::{DeclaredSyncManager, SubDeviceConfig};
 use crate::info::{Direction, SubDeviceInfo};
 use crate::layout::Layout;
 use crate::mail::Mailbox;
@@ -191,6 +191,9 @@ impl Setup {
 
 /// Bytes of the process data areas that a declaration fixes by itself, for a SubDevice that is not there yet.
 pub fn declared_areas(config: &SubDeviceConfig) -> Option<Vec<(u8, Direction, u16)>> {
+    if let Some(declared) = &config.declared {
+        return Some(declared.iter().filter_map(DeclaredSyncManager::area).collect());
+    }
     let mut areas = Vec::new();
     for assignment in config.pdos.as_ref()? {
         let mut bits = 0;

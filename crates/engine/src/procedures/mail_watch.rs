@@ -36,16 +36,14 @@ pub(super) fn fmmu(index: usize, plan: &SubDevicePlan, info: &SubDeviceInfo) -> 
     let mapped = plan.mapped_areas().count();
     let number = u8::try_from(named.max(mapped)).ok().filter(|number| *number < info.controller.fmmu_count)?;
     let byte = u32::try_from(index / 8).ok().filter(|byte| *byte < MAX_DATA as u32)?;
-    if plan.mailbox.is_empty() || info.controller.features.fmmu_byte_oriented {
-        return None;
-    }
+    let send = plan.mailbox.last().filter(|_| !info.controller.features.fmmu_byte_oriented)?;
     let bit = (index % 8) as u8;
     let register = Fmmu {
         logical_start: LogicalAddress(BITS_AT.0 + byte),
         length: 1,
         logical_start_bit: bit,
         logical_stop_bit: bit,
-        physical_start: map::sync_manager(info.mailbox_sync_managers().1).offset(SyncManager::STATUS).0,
+        physical_start: map::sync_manager(send.index).offset(SyncManager::STATUS).0,
         physical_start_bit: FULL_BIT,
         read: true,
         active: true,

@@ -10,7 +10,7 @@ use core::time::Duration;
 use ringcat_wire::al::AlState;
 
 use super::al_state;
-use super::configure::{BringUp, ConfigureError, Start, StartupError};
+use super::configure::{BringUp, ConfigureError, RegisterFailure, Start, StartupError};
 use super::fleet::{Phase, SharedFleet};
 use super::request_state::exchanges;
 use super::sii;
@@ -80,7 +80,11 @@ pub(super) fn is_of_bus(error: &ConfigureError) -> bool {
         ConfigureError::Startup { error: StartupError::Eoe(error), .. } => {
             matches!(error.cause, EoeFailure::Mailbox(MailboxError::Bus(_) | MailboxError::Closed))
         }
-        ConfigureError::State(_)
+        ConfigureError::Startup { error: StartupError::Register(error), .. } => {
+            matches!(error.cause, RegisterFailure::Bus(_))
+        }
+        ConfigureError::Startup { error: StartupError::Value { .. }, .. }
+        | ConfigureError::State(_)
         | ConfigureError::NotLocked(_)
         | ConfigureError::NoSetup
         | ConfigureError::NoBoot

@@ -18,7 +18,7 @@ use ringcat_engine::mail::{Limits, Mailbox};
 use ringcat_sim::application::aoe::MEMORY;
 use ringcat_sim::cable::{CableId, DeviceIndex};
 use ringcat_sim::network::{Network, NetworkOptions};
-use ringcat_wire::address::{Position, RegisterAddress, StationAddress};
+use ringcat_wire::address::{LogicalAddress, Position, RegisterAddress, StationAddress};
 use ringcat_wire::al::{AlState, AlStatus};
 use ringcat_wire::mailbox::aoe::{AmsAddress, NetId};
 use ringcat_wire::mailbox::soe::Idn;
@@ -251,6 +251,37 @@ fn one_lrw_per_subdevice_survives_any_break_and_counts_three_each_cr_16_facts_9_
     // Input 1, all-protocols and servo 3 each with LRW, output 1.
     assert_eq!((status.wkc, status.expected), (8, 8));
     assert!(world.compared() > 0);
+}
+
+/// As a configuration file names them.
+#[test]
+fn an_lrw_that_a_file_names_is_refused_on_two_links_with_its_name_and_one_per_subdevice_is_allowed_cr_16_facts_9_2_2() {
+    let named = |subdevices: &[usize]| ringcat::ExplicitLrw {
+        name: format!("frame 1, command {} \"cyclic cmd\"", subdevices[0]),
+        logical: LogicalAddress(0x0100_0000),
+        length: 12,
+        subdevices: subdevices.to_vec(),
+    };
+    let declare = |explicit_lrw: Vec<ringcat::ExplicitLrw>| {
+        move |scan: &Scan| ringcat::Declaration {
+            explicit_lrw: explicit_lrw.clone(),
+            ..automatic(&scan.subdevices, CYCLE)
+        }
+    };
+    let several = || declare(vec![named(&[1]), named(&[2, 3])]);
+    let error = World::with(0, segment(), &Options::default(), several()).expect_err("it was taken").to_string();
+    let expected = "frame 1, command 2 \"cyclic cmd\": an LRW at logical address 0x01000000 of 12 bytes for declarations [2, 3] \
+                    cannot be used with two links";
+    assert!(error.contains(expected), "{error}");
+    // On one link nothing speaks against it.
+    let line = scenarios::segments::line(descriptions(&KINDS), NetworkOptions::default());
+    World::with(0, line, &Options::default(), several()).expect("one link").settle();
+    let mut world =
+        World::with(1, segment(), &Options::default(), declare(vec![named(&[1]), named(&[2])])).expect("allowed");
+    world.settle();
+    let status = world.judged(world.beginning()).last().expect("cycles went by").status;
+    // As in the test above: LRW counts three each.
+    assert_eq!((status.wkc, status.expected), (8, 8));
 }
 
 #[test]

@@ -1,9 +1,12 @@
 //! Why a SubDevice is not configured.
 
+use alloc::string::String;
+use alloc::vec::Vec;
 use core::fmt;
 
+use super::registers::{Hex, RegisterError};
 use crate::config::Transition;
-use crate::mail::coe::SdoError;
+use crate::mail::coe::{SdoAddress, SdoError};
 use crate::mail::eoe::EoeError;
 use crate::mail::soe::SoeError;
 use crate::procedures::al_state::StateError;
@@ -25,6 +28,8 @@ pub enum ConfigureError {
         number: usize,
         /// The transition to which it belongs.
         transition: Transition,
+        /// What it is for, in the words of its declaration.
+        comment: Option<String>,
         /// What happened.
         error: StartupError,
     },
@@ -41,7 +46,7 @@ pub enum ConfigureError {
 }
 
 /// What happened to a start-up command.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub enum StartupError {
     /// CoE.
     Sdo(SdoError),
@@ -49,6 +54,17 @@ pub enum StartupError {
     Soe(SoeError),
     /// EoE.
     Eoe(EoeError),
+    /// An object holds another value than it must.
+    Value {
+        /// The object.
+        object: SdoAddress,
+        /// What it must hold.
+        expected: Vec<u8>,
+        /// What it holds.
+        got: Vec<u8>,
+    },
+    /// A register.
+    Register(RegisterError),
 }
 
 impl fmt::Display for ConfigureError {
@@ -57,8 +73,11 @@ impl fmt::Display for ConfigureError {
             ConfigureError::Bus(error) => error.fmt(f),
             ConfigureError::State(error) => error.fmt(f),
             ConfigureError::Sdo(error) => error.fmt(f),
-            ConfigureError::Startup { number, transition, error } => {
+            ConfigureError::Startup { number, transition, comment: None, error } => {
                 write!(f, "start-up command {number} ({transition}): {error}")
+            }
+            ConfigureError::Startup { number, transition, comment: Some(comment), error } => {
+                write!(f, "start-up command {number} ({transition}) \"{comment}\": {error}")
             }
             ConfigureError::NotLocked(error) => error.fmt(f),
             ConfigureError::NoSetup => f.write_str("nothing is known about this SubDevice yet"),
@@ -75,6 +94,10 @@ impl fmt::Display for StartupError {
             StartupError::Sdo(error) => error.fmt(f),
             StartupError::Soe(error) => error.fmt(f),
             StartupError::Eoe(error) => error.fmt(f),
+            StartupError::Value { object, expected, got } => {
+                write!(f, "SDO {object}: expected {}, got {}", Hex(expected), Hex(got))
+            }
+            StartupError::Register(error) => error.fmt(f),
         }
     }
 }

@@ -1,38 +1,88 @@
 //! Start-up commands of a transition, one after the other in the order of the declaration.
 
+use core::time::Duration;
+
 use super::{BringUp, ConfigureError, StartupError};
-use crate::config::{IdnWrite, SdoDownload, StartupAction, Transition};
+use crate::config::{IdnWrite, SdoDownload, SdoUpload, StartupAction, StartupCommand, Transition};
+use crate::event::Event;
+use crate::mail::Limits;
 use crate::mail::coe::{self, SdoAddress};
 use crate::mail::eoe;
 use crate::mail::soe::{self, SoeAddress};
 
+/// Longest object that a start-up command reads.
+const MAX_READ: usize = 0x1_0000;
+
 impl BringUp<'_> {
     /// Sends all commands of a transition. The first that fails ends it.
     pub(super) async fn command(&self, transition: Transition) -> Result<(), ConfigureError> {
+        self.command_those(transition, |_| true).await
+    }
+
+    /// Sends those that need no mailbox.
+    pub(super) async fn command_registers(&self, transition: Transition) -> Result<(), ConfigureError> {
+        self.command_those(transition, |action| matches!(action, StartupAction::Register(_))).await
+    }
+
+    /// Sends those that need one.
+    pub(super) async fn command_mail(&self, transition: Transition) -> Result<(), ConfigureError> {
+        self.command_those(transition, |action| !matches!(action, StartupAction::Register(_))).await
+    }
+
+    async fn command_those(
+        &self,
+        transition: Transition,
+        wanted: fn(&StartupAction) -> bool,
+    ) -> Result<(), ConfigureError> {
         let all = self.config.startup.iter().enumerate();
-        for (number, command) in all.filter(|(_, command)| command.transition == transition) {
-            let sent = self.send(&command.action).await;
-            sent.map_err(|error| ConfigureError::Startup { number, transition, error })?;
+        for (number, command) in all.filter(|(_, command)| command.transition == transition && wanted(&command.action))
+        {
+            let sent = self.send(number, command).await;
+            let comment = || command.comment.clone();
+            sent.map_err(|error| ConfigureError::Startup { number, transition, comment: comment(), error })?;
         }
         Ok(())
     }
 
-    async fn send(&self, action: &StartupAction) -> Result<(), StartupError> {
+    async fn send(&self, number: usize, command: &StartupCommand) -> Result<(), StartupError> {
         let timeouts = &self.config.timeouts;
-        match action {
+        let limits = |usual: Duration| (timeouts.mailbox_request, command.limit.unwrap_or(usual));
+        match &command.action {
             StartupAction::Sdo(SdoDownload { index, sub_index, complete_access, data }) => {
                 let object = SdoAddress { index: *index, sub_index: *sub_index, complete_access: *complete_access };
-                let limits = (timeouts.mailbox_request, timeouts.sdo);
-                coe::write(&self.mailbox, object, data, limits).await.map_err(StartupError::Sdo)
+                coe::write(&self.mailbox, object, data, limits(timeouts.sdo)).await.map_err(StartupError::Sdo)
             }
+            StartupAction::Upload(upload) => self.upload(number, command, upload, limits(timeouts.sdo)).await,
             StartupAction::Idn(IdnWrite { drive, idn, data }) => {
-                let limits = (timeouts.mailbox_request, timeouts.soe);
                 let address = SoeAddress::value(*drive, *idn);
-                soe::write(&self.mailbox, address, data, limits).await.map_err(StartupError::Soe)
+                soe::write(&self.mailbox, address, data, limits(timeouts.soe)).await.map_err(StartupError::Soe)
             }
             StartupAction::Ip(settings) => {
-                let limits = (timeouts.mailbox_request, timeouts.eoe);
-                eoe::set_ip(&self.mailbox, 0, settings, limits).await.map_err(StartupError::Eoe)
+                eoe::set_ip(&self.mailbox, 0, settings, limits(timeouts.eoe)).await.map_err(StartupError::Eoe)
+            }
+            StartupAction::Register(command) => self.register(command).await.map_err(StartupError::Register),
+        }
+    }
+
+    async fn upload(
+        &self,
+        number: usize,
+        command: &StartupCommand,
+        upload: &SdoUpload,
+        limits: Limits,
+    ) -> Result<(), StartupError> {
+        let SdoUpload { index, sub_index, complete_access, ref expected } = *upload;
+        let object = SdoAddress { index, sub_index, complete_access };
+        let data = coe::read(&self.mailbox, object, limits, MAX_READ).await.map_err(StartupError::Sdo)?;
+        match expected {
+            Some(expected) if *expected != data => {
+                Err(StartupError::Value { object, expected: expected.clone(), got: data })
+            }
+            Some(_) => Ok(()),
+            None => {
+                let (subdevice, comment) = (self.index, command.comment.clone());
+                self.bus.report(Event::StartupRead { subdevice, number, index, sub_index, comment, data });
+                Ok(())
             }
         }
     }

@@ -127,7 +127,8 @@ async fn configuration(bus: &Bus, fleet: &SharedFleet, index: usize, wanted: Opt
     let access = fleet.access();
     let Some(member) = access.members.get(index) else { return Vec::new() };
     let (expected, info) = (&member.config.expected, member.info.as_ref());
-    let mailbox = info.and_then(|info| info.mailbox);
+    let planned = member.setup.as_ref().and_then(|setup| setup.plan.mailbox_layout());
+    let mailbox = planned.or_else(|| info.and_then(|info| info.mailbox));
     let string = |of: fn(&SubDeviceInfo) -> &str| info.map_or("", of).as_bytes();
     vec![
         u16_(1, member.station.0),

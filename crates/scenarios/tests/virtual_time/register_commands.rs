@@ -1,0 +1,188 @@
+//! Start-up commands that a configuration file brings: registers that are written and checked, objects that are read, time
+//! limits and comments (facts 8.2).
+
+use std::time::Duration;
+
+use ringcat::{
+    Event, Options, RegisterAccess, RegisterCommand, Scan, SdoUpload, StartupAction, StartupCommand, SubDeviceConfig,
+    Transition, automatic,
+};
+use ringcat_sim::cable::DeviceIndex;
+use ringcat_sim::description::DeviceDescription;
+use ringcat_sim::network::NetworkOptions;
+use ringcat_wire::address::RegisterAddress;
+use ringcat_wire::al::AlState;
+use ringcat_wire::register::map;
+use scenarios::check::troubles;
+use scenarios::segments::{descriptions, line};
+use scenarios::world::{CYCLE, World};
+
+const KINDS: [&str; 4] = ["coupler", "digital-output-8", "all-protocols", "digital-input-8"];
+/// The one with commands.
+const DRIVE: usize = 2;
+/// Registers of no function.
+const NOBODY: RegisterAddress = RegisterAddress(0x0E80);
+
+fn world_of(change: impl FnOnce(&mut DeviceDescription), commands: &[StartupCommand]) -> World {
+    let mut devices = descriptions(&KINDS);
+    change(&mut devices[DRIVE]);
+    let declare = |scan: &Scan| {
+        let mut declaration = automatic(&scan.subdevices, CYCLE);
+        let config = &mut declaration.subdevices[DRIVE];
+        *config = SubDeviceConfig { startup: commands.to_vec(), ..config.clone() };
+        declaration
+    };
+    let network = line(devices, NetworkOptions::default());
+    World::with(1, network, &Options::default(), declare).expect("scan and activation")
+}
+
+fn world(commands: &[StartupCommand]) -> World {
+    world_of(|_| (), commands)
+}
+
+fn command(transition: Transition, address: RegisterAddress, access: RegisterAccess) -> StartupCommand {
+    let command = RegisterCommand { address, access, retries: 3, required: true };
+    StartupCommand::new(transition, StartupAction::Register(command))
+}
+
+fn write(transition: Transition, address: RegisterAddress, data: &[u8]) -> StartupCommand {
+    command(transition, address, RegisterAccess::Write(data.to_vec()))
+}
+
+fn check(transition: Transition, address: RegisterAddress, data: &[u8], mask: &[u8], limit_ms: u64) -> StartupCommand {
+    let (data, mask, limit) = (data.to_vec(), Some(mask.to_vec()), Duration::from_millis(limit_ms));
+    command(transition, address, RegisterAccess::Check { data, mask, limit })
+}
+
+/// The reason why the configuration fails, once it has; the others are in OP then.
+fn failure(mut world: World) -> String {
+    world.run_cycles(600);
+    let others = world.network().devices().enumerate().filter(|(number, _)| *number != DRIVE);
+    assert!(others.into_iter().all(|(_, device)| device.al_status().al_state() == Some(AlState::Op)));
+    let reasons = world.events(world.beginning()).iter().find_map(|timed| match &timed.event {
+        Event::ConfigurationFailed { subdevice: DRIVE, reason } => Some(reason.clone()),
+        _ => None,
+    });
+    reasons.unwrap_or_else(|| panic!("{:?}", troubles(world.events(world.beginning()))))
+}
+
+#[test]
+fn registers_are_written_and_checked_at_their_transitions_facts_8_2() {
+    let state = |transition, state: u8| check(transition, map::AL_STATUS, &[state, 0], &[0x0F, 0], 0);
+    let mut world = world(&[
+        state(Transition::So, 4),
+        state(Transition::Ip, 1),
+        write(Transition::Ip, map::WATCHDOG_DIVIDER, &[0x34, 0x12]),
+        state(Transition::Ps, 2),
+        write(Transition::Ps, map::WATCHDOG_TIME_PDI, &[0x78, 0x56]),
+        // The SyncManagers of the mailbox come behind those of IP.
+        check(Transition::Ip, map::sync_manager(0), &[0; 8], &[0xFF, 0xFF, 0xFF, 0xFF, 0xFF, 0, 0xFF, 0xFF], 0),
+        state(Transition::Os, 8),
+    ]);
+    world.settle();
+    let register = |world: &World, address| {
+        let controller = &world.network().device(DeviceIndex(DRIVE)).controller;
+        *controller.register(address, 2).first_chunk().expect("two bytes")
+    };
+    assert_eq!(register(&world, map::WATCHDOG_DIVIDER), [0x34, 0x12]);
+    assert_eq!(register(&world, map::WATCHDOG_TIME_PDI), [0x78, 0x56]);
+    assert_eq!(troubles(world.events(world.beginning())), Vec::<&Event>::new());
+    // Again when it comes back.
+    world.power_off(DeviceIndex(DRIVE));
+    world.run_cycles(20);
+    world.power_on(DeviceIndex(DRIVE));
+    world.settle();
+    assert_eq!(register(&world, map::WATCHDOG_DIVIDER), [0x34, 0x12]);
+}
+
+#[test]
+fn a_register_with_another_value_is_told_with_comment_expected_and_got_facts_8_2() {
+    let mut wrong = check(Transition::Ps, map::AL_STATUS, &[0x04, 0x00], &[0x0F, 0x00], 20);
+    wrong.comment = Some("check device state for SAFEOP".to_owned());
+    let text = failure(world(&[write(Transition::Ip, map::WATCHDOG_DIVIDER, &[0x34, 0x12]), wrong]));
+    let expected = "start-up command 1 (PREOP to SAFEOP) \"check device state for SAFEOP\": register 0x0130: \
+                    expected 04 00 (mask 0f 00) within 20 ms, got 02 00";
+    assert_eq!(text, expected);
+}
+
+#[test]
+fn a_register_may_take_until_its_limit_to_hold_the_value_facts_8_2() {
+    // Outputs come some cycles after SAFEOP: bit 0 of the watchdog status is set when they do.
+    let watched = |limit| check(Transition::So, map::WATCHDOG_STATUS, &[1, 0], &[1, 0], limit);
+    let mut patient = world(&[watched(200)]);
+    patient.settle();
+    assert_eq!(troubles(patient.events(patient.beginning())), Vec::<&Event>::new());
+    let text = failure(world(&[check(Transition::So, map::WATCHDOG_STATUS, &[0xF0, 0], &[0xF0, 0], 30)]));
+    assert!(text.contains("expected f0 00 (mask f0 00) within 30 ms, got 01 00"), "{text}");
+}
+
+#[test]
+fn a_write_that_nobody_takes_fails_only_where_it_must_be_taken_facts_8_2() {
+    let text = failure(world(&[write(Transition::Ps, NOBODY, &[0; 4])]));
+    assert!(text.starts_with("start-up command 0 (PREOP to SAFEOP): register 0x0e80:"), "{text}");
+    let mut may = write(Transition::Ps, NOBODY, &[0; 4]);
+    if let StartupAction::Register(command) = &mut may.action {
+        command.required = false;
+    }
+    let mut world = world(&[may]);
+    world.settle();
+    assert_eq!(troubles(world.events(world.beginning())), Vec::<&Event>::new());
+}
+
+#[test]
+fn commands_to_registers_that_cannot_be_sent_are_refused_before_anything_is() {
+    let refused = |wrong: &StartupCommand| {
+        let declare = |scan: &Scan| {
+            let mut declaration = automatic(&scan.subdevices, CYCLE);
+            declaration.subdevices[DRIVE].startup.push(wrong.clone());
+            declaration
+        };
+        let network = line(descriptions(&KINDS), NetworkOptions::default());
+        World::with(0, network, &Options::default(), declare).expect_err("it was taken").to_string()
+    };
+    let text = refused(&check(Transition::Ps, map::AL_STATUS, &[4, 0], &[0x0F], 0));
+    assert!(text.contains("register 0x0130 has 2 bytes of data and 1 of mask"), "{text}");
+    let text = refused(&write(Transition::Ps, RegisterAddress(0xFFFF), &[0, 0]));
+    assert!(text.contains("register 0xffff has 2 bytes of data"), "{text}");
+    assert!(refused(&write(Transition::Ps, map::AL_STATUS, &[])).contains("has 0 bytes"));
+}
+
+fn upload(index: u16, sub_index: u8, expected: Option<&[u8]>) -> StartupCommand {
+    let expected = expected.map(<[u8]>::to_vec);
+    let upload = SdoUpload { index, sub_index, complete_access: false, expected };
+    let command = StartupCommand::new(Transition::Ps, StartupAction::Upload(upload));
+    StartupCommand { comment: Some("a look".to_owned()), ..command }
+}
+
+#[test]
+fn objects_are_read_and_compared_or_told_facts_8_2() {
+    let mut world = world(&[upload(0x2001, 7, Some(&[7, 0])), upload(0x2003, 2, None)]);
+    world.settle();
+    let read = world.events(world.beginning()).iter().filter_map(|timed| match &timed.event {
+        Event::StartupRead { subdevice: DRIVE, number, index, sub_index, comment, data } => {
+            Some((*number, *index, *sub_index, comment.clone(), data.clone()))
+        }
+        _ => None,
+    });
+    let told = (1, 0x2003, 2, Some("a look".to_owned()), 50_000u32.to_le_bytes().to_vec());
+    assert_eq!(read.collect::<Vec<_>>(), [told]);
+    let text = failure(self::world(&[upload(0x2001, 7, Some(&[8, 0]))]));
+    assert_eq!(text, "start-up command 0 (PREOP to SAFEOP) \"a look\": SDO 0x2001:07: expected 08 00, got 07 00");
+}
+
+#[test]
+fn a_command_may_have_a_time_limit_of_its_own_facts_8_2() {
+    let slow = |device: &mut DeviceDescription| {
+        device.mailbox.as_mut().expect("it has one").response_time = Duration::from_millis(60);
+    };
+    let download = |limit: Option<u64>| {
+        let sdo = ringcat::SdoDownload { index: 0x2001, sub_index: 1, complete_access: false, data: vec![1, 0] };
+        let command = StartupCommand::new(Transition::Ps, StartupAction::Sdo(sdo));
+        [StartupCommand { limit: limit.map(Duration::from_millis), ..command }]
+    };
+    let mut usual = world_of(slow, &download(None));
+    usual.settle();
+    let text = failure(world_of(slow, &download(Some(25))));
+    assert!(text.starts_with("start-up command 0 (PREOP to SAFEOP): SDO 0x2001:01: "), "{text}");
+    assert!(text.contains("25 ms"), "{text}");
+}
