@@ -82,6 +82,9 @@ pub enum Event {
         /// The port of entry, where known.
         entry_port: Option<u8>,
     },
+    /// All SubDevices of a ring are entered at another port than 0: the main link is plugged in where the redundant one
+    /// belongs, and the other way round (facts LC-01). All works, as with any crossed line.
+    InterfacesSwapped,
     /// A scan found a ring behind a junction (JR-03).
     JunctionLearned {
         /// Its closing cable, from the last SubDevice back to the junction; nodes are positions.

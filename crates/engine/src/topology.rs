@@ -9,6 +9,7 @@
 //!
 //! Rings behind junctions ([`LocalRing`]) have to be known: open ports do not tell them from a tree.
 
+mod ends;
 mod local_ring;
 mod place;
 mod stub;
@@ -19,6 +20,7 @@ use core::fmt;
 use ringcat_wire::register::{DlStatus, PortKind};
 
 use crate::info::SubDeviceInfo;
+pub(crate) use ends::{are_doubtful, ends_of_break};
 use local_ring::Rings;
 pub(crate) use local_ring::rings_shown;
 pub use local_ring::{Closing, LocalRing, RingCable, candidates};
@@ -185,6 +187,12 @@ impl Topology {
     /// broken; a connection that does not fit is left out.
     pub fn with_local_rings(nodes: &[NodeStatus], main_count: usize, closings: &[Closing]) -> Topology {
         place::build(nodes, main_count.min(nodes.len()), &Rings::new(nodes, closings))
+    }
+
+    /// Whether neighbours are an assumption: frames of both links meet SubDevices though no break separates them. Who of
+    /// them is crossed, or hangs on a port 2, does not show as long as the ring is closed (LC-02).
+    pub fn is_assumed(&self) -> bool {
+        self.redundant_head.is_none() && self.main_count < self.nodes.len()
     }
 
     /// Whether the cable that leads to a SubDevice from the one before it is part of a local ring.

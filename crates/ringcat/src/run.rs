@@ -170,6 +170,7 @@ fn tell_events(supervisor: &SupervisorThread, surroundings: &mut Surroundings) {
     while let Some(event) = supervisor.pop_event() {
         if let Event::JunctionLearned { .. }
         | Event::LineCrossed { .. }
+        | Event::InterfacesSwapped
         | Event::UnconnectedPort0 { .. }
         | Event::CannotDisconnect { .. } = event.event
         {

@@ -26,7 +26,7 @@ pub fn lines(scan: &Scan) -> Vec<String> {
         let position = usize::from(info.position.0);
         let parent = match scan.topology.connection_to(position) {
             Some(connection) => format!("{} port {}", connection.near.node, connection.near.port),
-            None if position == 0 => "MAIN".to_owned(),
+            None if position == 0 && scan.topology.main_count > 0 => "MAIN".to_owned(),
             None => "REDUNDANT".to_owned(),
         };
         format!(

@@ -77,7 +77,13 @@ pub fn describe(event: &Event, names: &Names) -> String {
                 "{link} cannot be taken down (CAP_NET_ADMIN): where a line is crossed stays unknown in a closed ring"
             )
         }
-        Event::LineCrossed { .. } => "line crossed: the redundant copy is processed in a closed ring".to_owned(),
+        Event::LineCrossed { .. } => {
+            let causes = "IN and OUT of one are swapped, or a branch is on port 2 of one";
+            format!("line crossed: SubDevices answer on REDUNDANT in a closed ring, so {causes}")
+        }
+        Event::InterfacesSwapped => {
+            "interfaces swapped: MAIN is plugged in at the end of the ring, REDUNDANT at its beginning".to_owned()
+        }
         Event::DuplicateAlias { alias, first, second } => {
             format!("alias {alias} is used twice: {} and {}", names.at(*first), names.at(*second))
         }

@@ -60,6 +60,10 @@ pub(super) trait Known {
 pub(super) struct Cabling {
     /// Who is crossed.
     pub crossings: Vec<Crossing>,
+    /// Everybody is, in a ring: its interfaces are swapped.
+    pub swapped: bool,
+    /// Who else was looked at and is not crossed; empty where the ring was closed, which shows that of nobody.
+    pub straight: Vec<StationAddress>,
     /// Rings behind junctions that are whole and not known.
     pub unknown_rings: usize,
 }
@@ -160,7 +164,21 @@ async fn look(bus: &Bus, known: &impl Known) -> Result<Option<Cabling>, BusError
     // Odd ports and stubs of a broken ring would be counted wrongly.
     let is_plain = topology.findings.is_empty() && !on_redundant;
     let shown = if is_plain { rings_shown(&nodes, is_closed) } else { 0 };
-    Ok(Some(Cabling { crossings: found, unknown_rings: shown.saturating_sub(closings.len()) }))
+    let swapped = bus.links() == LinkSet::Ring && is_swapped(&topology);
+    let is_crossed = |station: &StationAddress| found.iter().any(|it| it.who.is_some_and(|(who, _)| who == *station));
+    let straight = before.stations.iter().copied().filter(|station| !is_closed && !is_crossed(station)).collect();
+    let unknown_rings = shown.saturating_sub(closings.len());
+    Ok(Some(Cabling { crossings: found, swapped, straight, unknown_rings }))
+}
+
+/// Whether all of a ring are met the wrong way round: in a closed one by frames of the redundant link only, in an open one as
+/// the findings say.
+pub(super) fn is_swapped(topology: &Topology) -> bool {
+    let crossed = |finding: &&Finding| matches!(finding, Finding::CrossedLine { .. });
+    let count = topology.nodes.len();
+    count > 0
+        && ((topology.is_assumed() && topology.main_count == 0)
+            || topology.findings.iter().filter(crossed).count() == count)
 }
 
 /// Looks out for changes of ports, and has crossings told once each.
@@ -186,7 +204,11 @@ impl CablingWatch {
             }
             _ => None,
         });
-        let told = Cabling { crossings: told.collect(), unknown_rings: 0 };
+        let mut told = Cabling { crossings: told.collect(), ..Cabling::default() };
+        if access.topology.is_assumed() {
+            told.crossings.push(Crossing { who: None, entry_port: None });
+        }
+        told.swapped = is_swapped(&access.topology);
         let junctions = junctions != JunctionMode::Disabled || !access.topology.local_rings.is_empty();
         CablingWatch { enhanced, junctions, ports: Vec::new(), busy: Rc::default(), told: Rc::new(told.into()) }
     }
@@ -222,12 +244,12 @@ impl CablingWatch {
             let found = cabling(&bus, &fleet, enhanced).await;
             fleet.set_controlled_break(false);
             if let Some(found) = found {
-                tell(&bus, &fleet, &found.crossings, &told.borrow().crossings);
+                tell(&bus, &fleet, &found, &told.borrow());
                 if junctions && found.unknown_rings > told.borrow().unknown_rings {
                     bus.report(Event::JunctionUnknown { rings: found.unknown_rings });
                 }
-                let unknown_rings = found.unknown_rings.max(told.borrow().unknown_rings);
-                *told.borrow_mut() = Cabling { unknown_rings, ..found };
+                let before = told.take();
+                *told.borrow_mut() = before.and(found);
             }
             busy.set(false);
         });
@@ -237,9 +259,46 @@ impl CablingWatch {
 /// Bits of DL_STATUS that are about ports.
 const PORT_BITS: u16 = 0xFFF0;
 
-fn tell(bus: &Bus, fleet: &SharedFleet, found: &[Crossing], told: &[Crossing]) {
-    let who = |crossing: &Crossing| crossing.who.map(|(station, _)| station);
-    for crossing in found.iter().filter(|new| !told.iter().any(|old| who(old) == who(new))) {
+impl Cabling {
+    /// What was told and still stands, with what is new. A closed ring takes nothing back that an open one has shown, and
+    /// an open one shows nothing of those who do not answer.
+    fn and(mut self, found: Cabling) -> Cabling {
+        if found.crossings.is_empty() {
+            self.crossings.clear();
+        }
+        let straight = |it: &Crossing| it.who.is_some_and(|(station, _)| found.straight.contains(&station));
+        self.crossings.retain(|it| !straight(it));
+        let is_new = |it: &Crossing| !self.crossings.iter().any(|old| old.station() == it.station());
+        let new: Vec<Crossing> = found.crossings.iter().copied().filter(is_new).collect();
+        self.crossings.extend(new);
+        Cabling {
+            swapped: found.swapped || (self.swapped && !found.crossings.is_empty()),
+            unknown_rings: self.unknown_rings.max(found.unknown_rings),
+            crossings: self.crossings,
+            straight: Vec::new(),
+        }
+    }
+}
+
+impl Crossing {
+    fn station(&self) -> Option<StationAddress> {
+        self.who.map(|(station, _)| station)
+    }
+}
+
+fn tell(bus: &Bus, fleet: &SharedFleet, found: &Cabling, told: &Cabling) {
+    if found.swapped {
+        if !told.swapped {
+            bus.report(Event::InterfacesSwapped);
+        }
+        return;
+    }
+    let is_told = |new: &Crossing| match new.who {
+        Some((station, _)) => told.crossings.iter().any(|old| old.station() == Some(station)),
+        // Who it is may be known from when the ring was open.
+        None => !told.crossings.is_empty(),
+    };
+    for crossing in found.crossings.iter().filter(|new| !is_told(new)) {
         let position = crossing.who.map(|(station, now)| {
             let access = fleet.access();
             let member = access.members.iter().find(|member| member.station == station);

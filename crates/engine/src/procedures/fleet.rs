@@ -239,7 +239,7 @@ pub struct Fleet {
     pub topology: Topology,
     /// Station addresses by position, as found together with these.
     pub stations: Vec<StationAddress>,
-    /// What was told of the ring; counts and carriers are added where it is asked for.
+    /// What was told of the ring, counts as they were then; those of now and carriers are added where it is asked for.
     pub ring: RingStatus,
     /// All cables with what their ends have counted.
     pub cables: Vec<(Cable, CableErrors)>,

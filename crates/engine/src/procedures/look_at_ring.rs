@@ -11,7 +11,7 @@ use crate::link::LinkSet;
 use crate::ring::RingState;
 use crate::ring_status::{Cable, CableErrors, cables, port_errors};
 use crate::supervisor::{Bus, BusError};
-use crate::topology::{NodeStatus, PortOf, Topology};
+use crate::topology::{NodeStatus, PortOf, Topology, are_doubtful, ends_of_break};
 
 /// What was found.
 #[derive(Clone, Debug)]
@@ -51,7 +51,8 @@ pub async fn look_at_ring(bus: Bus) -> Result<RingLook, BusError> {
     }
     let state = bus.ring();
     let topology = Topology::build(&statuses, usize::from(counts.0));
-    let place = broken(&topology, bus.links(), state);
+    let dl_status: Vec<_> = statuses.iter().map(|status| Some(status.dl_status)).collect();
+    let place = broken(&topology, bus.links(), state, &dl_status, counts);
     let errors = |end: Option<PortOf>| {
         let end = end.and_then(|at| Some(port_errors(counters.get(at.node)?, at.port)));
         end.unwrap_or_default()
@@ -88,9 +89,18 @@ fn array<const N: usize>(bytes: &[u8]) -> [u8; N] {
 }
 
 /// The cable without which the ring is open.
-fn broken(topology: &Topology, links: LinkSet, state: RingState) -> Option<Cable> {
+fn broken(
+    topology: &Topology,
+    links: LinkSet,
+    state: RingState,
+    dl_status: &[Option<DlStatus>],
+    counts: (u16, u16),
+) -> Option<Cable> {
     if links != LinkSet::Ring || state != RingState::Open {
         return None;
+    }
+    if are_doubtful(topology) {
+        return ends_of_break(topology, dl_status, [counts.0, counts.1]).map(|(near, far)| Cable { near, far });
     }
     let all = cables(topology, links);
     match topology.redundant_head {

@@ -17,8 +17,9 @@ use crate::board::{RingWord, Supervision};
 use crate::event::Event;
 use crate::link::{Link, LinkSet};
 use crate::ring::RingState;
-use crate::ring_status::{Redundancy, RedundancyLoss};
+use crate::ring_status::{LinkStatus, Redundancy, RedundancyLoss};
 use crate::supervisor::Bus;
+use crate::topology::are_doubtful;
 
 /// Pause between two looks at the board.
 const PAUSE: Duration = Duration::from_micros(500);
@@ -164,7 +165,8 @@ impl RingWatch {
     /// Where all answer on one side it is the other interface's cable, which nobody needs to be asked for.
     fn place_at_host(&self, word: RingWord, main: u16, redundant: u16) {
         let mut access = self.fleet.access();
-        let all = self.steady > 0 && main + redundant == self.steady;
+        // Which cable leads to an interface is certain only where neighbours are.
+        let all = self.steady > 0 && main + redundant == self.steady && !are_doubtful(&access.topology);
         let cable = match (word.state, main, redundant) {
             (RingState::Open, 0, _) if all => access.cables.first().filter(|(cable, _)| cable.near.is_none()),
             (RingState::Open, _, 0) if all => access.cables.last().filter(|(cable, _)| cable.far.is_none()),
@@ -172,6 +174,7 @@ impl RingWatch {
         };
         let place = cable.map(|(cable, _)| *cable);
         access.ring.place = place;
+        access.ring.links = [main, redundant].map(|answering| LinkStatus { answering, ..LinkStatus::default() });
         if let Some(cable) = place {
             self.bus.report(Event::BreakLocated { cable });
         }

@@ -24,7 +24,7 @@ use ringcat_wire::register::{DcReceiveTimes, DlStatus, EcatEvent, Fmmu, Informat
 
 use self::count::Count;
 pub use self::error::ScanError;
-use super::cabling::{Known, cabling};
+use super::cabling::{Known, cabling, is_swapped};
 use super::dictionary::{ReadPdos, complete};
 use super::junction::learn;
 use super::sii::{self, SiiCache, SiiContents};
@@ -398,10 +398,15 @@ impl Known for Scan {
 
 /// What is odd about the cabling. `exact`: where lines are crossed is known, also in a closed ring.
 pub(crate) fn report_cabling(bus: &Bus, scan: &Scan, exact: bool) {
+    let swapped = bus.links() == LinkSet::Ring && is_swapped(&scan.topology);
+    if swapped {
+        bus.report(Event::InterfacesSwapped);
+    }
     let position = |node: usize| scan.subdevices.get(node).map_or(Position(node as u16), |info| info.position);
     for finding in &scan.topology.findings {
         match *finding {
             Finding::UnconnectedPort0 { node } => bus.report(Event::UnconnectedPort0 { position: position(node) }),
+            Finding::CrossedLine { .. } if swapped => {}
             Finding::CrossedLine { node, entry_port } => {
                 bus.report(Event::LineCrossed { position: Some(position(node)), entry_port: Some(entry_port) })
             }
@@ -420,6 +425,7 @@ pub(crate) fn report_cabling(bus: &Bus, scan: &Scan, exact: bool) {
         && scan.redundant_count > 0
         && !crossed_known
         && !exact
+        && !swapped
     {
         bus.report(Event::LineCrossed { position: None, entry_port: None });
     }

@@ -292,7 +292,12 @@ async fn find_places(bus: &Bus, fleet: &SharedFleet) -> bool {
     };
     if somebody_is_missed {
         let Ok(Some(view)) = view(bus).await else { return false };
-        refresh(fleet, &view, &owners_of(fleet, &view.stations));
+        let owners = owners_of(fleet, &view.stations);
+        // One that has come since may be the first of several alike.
+        if !unknown(fleet, &view, &owners).is_empty() {
+            return false;
+        }
+        refresh(fleet, &view, &owners);
     }
     true
 }

@@ -32,7 +32,7 @@ use crate::ring::RingState;
 use crate::ring_status::Cable;
 use crate::supervisor::Bus;
 use crate::time::Instant;
-use crate::topology::NodeStatus;
+use crate::topology::{NodeStatus, are_doubtful, ends_of_break};
 
 /// Pause between two looks at the board.
 const PAUSE: Duration = Duration::from_micros(500);
@@ -285,7 +285,13 @@ impl Watch {
 
     fn break_place(&self, looks: &[Look]) -> Option<Cable> {
         let by_position: Vec<_> = self.by_position(looks).iter().map(|it| it.map(|node| node.dl_status)).collect();
-        locate_break(&self.fleet.access().topology, &by_position)
+        let access = self.fleet.access();
+        if !are_doubtful(&access.topology) {
+            return locate_break(&access.topology, &by_position);
+        }
+        let counts = access.ring.links.map(|link| link.answering);
+        let (near, far) = ends_of_break(&access.topology, &by_position, counts)?;
+        Some(Cable { near, far })
     }
 
     /// What members said about their ports, by their position in the scan.

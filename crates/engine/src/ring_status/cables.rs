@@ -55,10 +55,16 @@ pub fn cables(topology: &Topology, links: LinkSet) -> Vec<Cable> {
     let port = |node: usize| PortOf { node, port: topology.nodes[node].entry_port };
     let mut cables = Vec::with_capacity(topology.nodes.len() + 1);
     let is_headed = |node: usize| topology.redundant_head == Some(node);
+    let is_swapped = topology.is_assumed() && topology.main_count == 0;
     for (node, it) in topology.nodes.iter().enumerate() {
         let near = match it.parent {
             Some((parent, port)) => Some(PortOf { node: parent, port }),
             None if is_headed(node) => topology.main_count.checked_sub(1).map(|last| loose_end(topology, last)),
+            // The interfaces are swapped: frames of the redundant link meet everybody.
+            None if is_swapped => {
+                cables.push(Cable { near: Some(port(node)), far: None });
+                continue;
+            }
             None => None,
         };
         cables.push(Cable { near, far: Some(port(node)) });
@@ -67,7 +73,8 @@ pub fn cables(topology: &Topology, links: LinkSet) -> Vec<Cable> {
     cables.extend(closings.map(|closing| Cable { near: Some(closing.tail), far: Some(closing.head) }));
     let Some(last) = topology.nodes.len().checked_sub(1).filter(|_| links == LinkSet::Ring) else { return cables };
     let open = topology.open_ports.first().copied();
-    cables.push(Cable { near: Some(open.unwrap_or_else(|| loose_end(topology, last))), far: None });
+    let end = Some(open.unwrap_or_else(|| loose_end(topology, last)));
+    cables.push(if is_swapped { Cable { near: None, far: end } } else { Cable { near: end, far: None } });
     cables
 }
 

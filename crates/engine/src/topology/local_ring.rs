@@ -37,6 +37,13 @@ pub struct LocalRing {
     pub cables: Vec<RingCable>,
 }
 
+impl LocalRing {
+    /// Whether one of its cables ends at a port.
+    pub fn is_at(&self, at: PortOf) -> bool {
+        self.cables.iter().any(|cable| cable.near == Some(at) || cable.far == at)
+    }
+}
+
 /// The local rings among the SubDevices that frames meet in this order.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Rings {

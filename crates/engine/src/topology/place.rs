@@ -30,7 +30,7 @@ struct Placed {
 pub(super) struct Walk<'s> {
     status: &'s [NodeStatus],
     rings: &'s Rings,
-    trust_times: bool,
+    pub(super) trust_times: bool,
     pub(super) nodes: Vec<Node>,
     /// Slots that the frame will still come to, the next one last.
     pub(super) slots: Vec<Slot>,
@@ -52,14 +52,20 @@ pub(super) fn build(status: &[NodeStatus], main_count: usize, rings: &Rings) -> 
     }
     let rest = main_count..status.len();
     let head = rest.clone().find(|node| !walk.is_open(*node, 0) && !walk.is_orphan(*node));
-    let redundant_head = match head {
-        Some(head) => {
+    let crossed = walk.crossed_stub(main_count);
+    let redundant_head = match (crossed, head) {
+        (Some(chain), _) => {
+            walk.close();
+            walk.chain(&chain);
+            chain.first().map(|end| end.node)
+        }
+        (None, Some(head)) => {
             walk.close();
             walk.trust_times = true;
             walk.stub(rest, head);
             Some(head)
         }
-        None => {
+        (None, None) => {
             // A closed ring: the frame of the main link left through the next slot; what comes behind it, frames of
             // the redundant link meet. Where the main link met nobody, the other one is all there is.
             if !rest.is_empty() && walk.slots.last() != Some(&None) {
@@ -131,7 +137,7 @@ impl<'s> Walk<'s> {
     }
 
     /// Time from the frame's first to its last passage, in nanoseconds.
-    fn span(&self, node: usize) -> Option<u32> {
+    pub(super) fn span(&self, node: usize) -> Option<u32> {
         let times = self.status[node].receive_times?;
         let first = times[usize::from(self.earliest(node)?)];
         (0..4).filter(|port| self.is_open(node, *port)).map(|port| times[usize::from(port)].wrapping_sub(first)).max()

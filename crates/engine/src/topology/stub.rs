@@ -7,8 +7,8 @@
 use alloc::vec::Vec;
 use core::ops::Range;
 
-use super::PortOf;
 use super::place::{Slot, TRAVEL, Walk};
+use super::{Finding, PortOf};
 
 impl Walk<'_> {
     /// Hangs the SubDevices of the redundant link; `head` is the one with nothing on its port 0.
@@ -55,5 +55,74 @@ impl Walk<'_> {
         }
         self.slots.extend(first.iter().rev().map(|port| Some(PortOf { node, port: *port })));
         *trunk = Some(PortOf { node, port: ports[on] });
+    }
+}
+
+/// A SubDevice of a plain stub, from the break on.
+pub(super) struct Link {
+    pub(super) node: usize,
+    /// It is plugged in the wrong way round.
+    crossed: bool,
+}
+
+/// Stubs without branches in which SubDevices are crossed. Frames of the redundant link meet those on their way to the break,
+/// and the others on their way back. So where the last one is in the order tells of all who is crossed; how both
+/// kinds follow each other, only receive times do.
+impl Walk<'_> {
+    /// The SubDevices of the redundant link, from the break on, where the ring is open, has no branches, and some of them are
+    /// crossed. Not where all are and nobody else is there: that is a line on the redundant link.
+    pub(super) fn crossed_stub(&mut self, main_count: usize) -> Option<Vec<Link>> {
+        let rest = main_count..self.nodes.len();
+        if main_count > 0 {
+            self.end_of(0..main_count)?;
+        }
+        let (end, crossed) = self.end_of(rest.clone())?;
+        // Those that were met before the last one; it itself where nothing is plugged in behind it.
+        let met_first = rest.start..end + usize::from(crossed);
+        if met_first.is_empty() || (main_count == 0 && met_first == rest) {
+            return None;
+        }
+        let straight = met_first.end..rest.end;
+        let mut chain: Vec<Link> = met_first.rev().map(|node| Link { node, crossed: true }).collect();
+        chain.extend(straight.map(|node| Link { node, crossed: false }));
+        self.trust_times = true;
+        let spans: Option<Vec<u32>> = rest.clone().map(|node| self.span(node)).collect();
+        if let Some(spans) = spans {
+            chain.sort_by_key(|link| spans[link.node - rest.start]);
+        }
+        if let Some(at) = chain.iter().position(|link| link.node == end) {
+            let last = chain.remove(at);
+            chain.insert(0, last);
+        }
+        Some(chain)
+    }
+
+    /// The one SubDevice at which a stub without branches ends, and whether its port 0 leads to the others.
+    fn end_of(&self, stub: Range<usize>) -> Option<(usize, bool)> {
+        let mut end = None;
+        for node in stub {
+            match (self.is_open(node, 0), (1..4).filter(|port| self.is_open(node, *port)).count()) {
+                (true, 1) => {}
+                (behind, others) if usize::from(behind) + others == 1 && end.is_none() => end = Some((node, behind)),
+                _ => return None,
+            }
+        }
+        end
+    }
+
+    /// Hangs the SubDevices of the redundant link one behind the other.
+    pub(super) fn chain(&mut self, chain: &[Link]) {
+        let mut slot = None;
+        for link in chain {
+            let node = link.node;
+            let other = (1..4).find(|port| self.is_open(node, *port)).unwrap_or(1);
+            let (entry, on) = if link.crossed { (other, 0) } else { (0, other) };
+            if link.crossed {
+                self.findings.push(Finding::CrossedLine { node, entry_port: entry });
+            }
+            self.hang(node, slot, entry);
+            slot = Some(PortOf { node, port: on });
+        }
+        self.open_ports.extend(slot);
     }
 }

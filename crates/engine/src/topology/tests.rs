@@ -252,6 +252,45 @@ proptest! {
     }
 
     #[test]
+    fn any_crossed_subdevices_of_a_ring_that_is_cut_anywhere_are_found(
+        crossed in proptest::collection::vec(any::<bool>(), 1..12), cut in any::<prop::sample::Index>(),
+        times in any::<bool>()
+    ) {
+        let cut = cut.index(crossed.len() + 1);
+        // A line on the redundant link alone reads as a line.
+        prop_assume!(cut > 0 || !crossed.iter().all(|crossed| *crossed));
+        let mut segment = Segment::new();
+        let ports = |node: usize| if crossed[node] { (1, 0) } else { (0, 1) };
+        let mut end = End::Main;
+        for node in 0..crossed.len() {
+            segment.add(end, ports(node).0);
+            end = End::Port(node, ports(node).1);
+        }
+        segment.connect(end, End::Redundant);
+        match cut.checked_sub(1) {
+            Some(node) => segment.cut(node, ports(node).1),
+            None => segment.cut(0, ports(0).0),
+        }
+        let seen = segment.walk();
+        prop_assert_eq!(seen.main_count, cut);
+        let status = seen.status(times);
+        let topology = Topology::build(&status, cut);
+        let is_crossed = |node: &usize| {
+            let here = |finding: &&Finding| matches!(finding, Finding::CrossedLine { node: at, .. } if at == node);
+            topology.findings.iter().any(|finding| here(&finding))
+        };
+        for (node, device) in seen.order.iter().enumerate() {
+            prop_assert_eq!(is_crossed(&node), crossed[*device], "device {}", device);
+        }
+        let dl_status: Vec<_> = status.iter().map(|status| Some(status.dl_status)).collect();
+        let place = |device: usize, port: u8| at(seen.order.iter().position(|met| *met == device).unwrap(), port);
+        let near = cut.checked_sub(1).map(|node| place(node, ports(node).1));
+        let far = (cut < crossed.len()).then(|| place(cut, ports(cut).0));
+        let counts = [cut as u16, (crossed.len() - cut) as u16];
+        prop_assert_eq!(super::ends_of_break(&topology, &dl_status, counts), Some((near, far)));
+    }
+
+    #[test]
     fn any_status_words_give_a_tree_without_panic(
         nodes in proptest::collection::vec((any::<u16>(), any::<Option<[u32; 4]>>(), 0u8..2), 0..40),
         main_count in 0usize..50,
@@ -265,6 +304,9 @@ proptest! {
             .collect();
         let topology = Topology::build(&nodes, main_count);
         prop_assert_eq!(topology.nodes.len(), nodes.len());
+        let dl_status: Vec<_> = nodes.iter().map(|node| Some(node.dl_status)).collect();
+        let counts = [main_count as u16, nodes.len().saturating_sub(main_count) as u16];
+        let _ = super::ends_of_break(&topology, &dl_status, counts);
         for (index, node) in topology.nodes.iter().enumerate() {
             if let Some((parent, port)) = node.parent {
                 prop_assert_eq!(topology.nodes[parent].children[usize::from(port)], Some(index));

@@ -12,6 +12,7 @@ mod clock_shifts;
 mod clocks;
 mod configuration;
 mod copies;
+mod crossed_rings;
 mod declared_sync_managers;
 mod determinism;
 mod disturbed_frames;

@@ -180,6 +180,28 @@ fn neighbours_alike_keep_their_places_whichever_side_they_come_back_from() {
     }
 }
 
+/// The first of two alike has its cables again at the moment in which the second one, who answered from the redundant side
+/// before, is told who it is: nobody takes the place of the one who has not been seen yet.
+#[test]
+fn neighbours_alike_keep_their_places_when_the_ring_closes_while_one_is_recognised() {
+    let kinds = ["coupler", "digital-input-8", "digital-output-8", "digital-output-8", "digital-input-8"];
+    for step in 0..60 {
+        let options = NetworkOptions::default().with_detection_delay(Duration::from_micros(1_500));
+        let mut world = World::in_op(7, ring(descriptions(&kinds), options));
+        world.set_strict(false);
+        let before = stations(&world);
+        [2, 3].into_iter().for_each(|device| world.power_off(DeviceIndex(device)));
+        world.run_cycles(20);
+        world.power_on(DeviceIndex(3));
+        world.fault_in(Duration::from_micros(250 * step), Fault::PowerOn(DeviceIndex(2)));
+        world.run_cycles(20);
+        world.until(Duration::from_secs(2), "everybody in OP", |world| {
+            world.all_in_op() && world.application().all_settled()
+        });
+        assert_eq!(stations(&world), before, "{} us between", 250 * step);
+    }
+}
+
 #[test]
 fn a_segment_that_loses_its_power_as_a_whole_comes_back_with_everybody_in_his_place() {
     let kinds = ["digital-output-8"; 100];
