@@ -10,7 +10,7 @@ pub mod dictionary;
 mod error_watch;
 pub mod fleet;
 pub mod inspect;
-mod junction;
+pub(crate) mod junction;
 pub mod look_at_ring;
 pub mod mail_watch;
 pub(crate) mod own_objects;

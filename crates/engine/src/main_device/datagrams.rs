@@ -14,6 +14,8 @@ use super::MainDevice;
 use super::pending::Pending;
 use crate::layout::Layout;
 use crate::link::LinkSet;
+use crate::procedures::fleet::SharedFleet;
+use crate::procedures::junction::{UnderWay, ordering};
 use crate::procedures::services::ServiceError;
 use crate::supervisor::{Bus, BusError, Reply};
 
@@ -47,7 +49,12 @@ impl MainDevice {
     ) -> Pending<Result<Vec<Result<Reply, BusError>>, ServiceError>> {
         let bus = self.bus();
         let addressed = self.addressed(datagrams);
-        self.start(async move { Ok(bus.gather(addressed?, send).await) })
+        let fleet = self.fleet.clone();
+        self.start(async move {
+            let addressed = addressed?;
+            let _orders: Vec<_> = addressed.iter().flat_map(|(it, _)| orders(fleet.as_ref(), it)).collect();
+            Ok(bus.gather(addressed, send).await)
+        })
     }
 
     /// How each of them leaves, and whom it was meant for.
@@ -88,6 +95,22 @@ impl MainDevice {
             None => Ok(()),
         }
     }
+}
+
+/// Notes what a datagram tells junctions to do about their ports.
+fn orders(fleet: Option<&SharedFleet>, datagram: &RawDatagram) -> Vec<UnderWay> {
+    use Command::{Aprw, Apwr, Brw, Bwr, Fprw, Fpwr};
+    let Some(known) = fleet.filter(|_| matches!(datagram.command, Aprw | Apwr | Brw | Bwr | Fprw | Fpwr)) else {
+        return Vec::new();
+    };
+    let at = |place: usize| known.access().stations.get(place).copied();
+    let (stations, register) = match datagram.target {
+        Target::Station(station, register) => (Vec::from([station]), register),
+        Target::Position(Position(place), register) => (at(place.into()).into_iter().collect(), register),
+        Target::Broadcast(register) => (known.access().stations.clone(), register),
+        Target::Logical(_) | Target::None => return Vec::new(),
+    };
+    stations.into_iter().filter_map(|station| ordering(fleet, station, register, &datagram.data)).collect()
 }
 
 /// Two SubDevices of which process data lies in a range of logical addresses, if there are as many.

@@ -69,10 +69,10 @@ impl MainDevice {
         address: RegisterAddress,
         data: Vec<u8>,
     ) -> Pending<Result<(), ServiceError>> {
-        self.start_on(
-            subdevice,
-            move |bus, station| async move { registers::write(&bus, station, address, &data).await },
-        )
+        let fleet = self.fleet.clone();
+        self.start_on(subdevice, move |bus, station| async move {
+            registers::write(&bus, fleet.as_ref(), station, address, &data).await
+        })
     }
 
     /// Starts to ask what a port does about its loop.
@@ -87,7 +87,10 @@ impl MainDevice {
         port: u8,
         control: LoopControl,
     ) -> Pending<Result<(), ServiceError>> {
-        self.start_on(subdevice, move |bus, station| async move { ports::set(&bus, station, port, control).await })
+        let fleet = self.fleet.clone();
+        self.start_on(subdevice, move |bus, station| async move {
+            ports::set(&bus, fleet.as_ref(), station, port, control).await
+        })
     }
 
     /// Starts to cut a declared SubDevice off, by closing the ports of its neighbours. In a line those behind it go with it.
@@ -126,9 +129,9 @@ impl MainDevice {
     /// moved or is gone. New ones are read, but left alone. Until the segment holds still and it is known of everybody
     /// who it is, for so long at most; then the result is what is known.
     ///
-    /// Places of breaks, errors of cables and positions in events go by the new cabling from then on, unless it is not
-    /// whole: while a ring is open, or a mandatory SubDevice does not answer, and where rings behind junctions are known,
-    /// they go by the cabling of before.
+    /// Places of breaks, errors of cables and positions in events go by the new cabling from then on, rings behind
+    /// junctions included, unless it is not whole: while the ring of two links is open, or a mandatory SubDevice does not
+    /// answer, they go by the cabling of before.
     pub fn start_rescan(&mut self, limit: Duration) -> Pending<Result<Rescan, ServiceError>> {
         let (bus, fleet) = (self.bus(), self.fleet.clone());
         self.start(async move { rescan(&bus, &fleet.ok_or(ServiceError::NotActive)?, limit).await })

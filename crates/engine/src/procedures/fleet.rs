@@ -7,10 +7,10 @@ use core::cell::{Cell, RefCell, RefMut};
 
 use ringcat_wire::address::StationAddress;
 use ringcat_wire::al::AlState;
-use ringcat_wire::register::{DlControl, Fmmu};
+use ringcat_wire::register::Fmmu;
 
 use super::clocks::SharedClocks;
-use super::junction::End;
+use super::junction::{End, Told};
 use super::mail_watch;
 use super::services::ports::BlockedPort;
 use super::services::statistics::Book;
@@ -249,8 +249,8 @@ pub struct Fleet {
     pub cache: SiiCache,
     /// Ports that were closed to cut SubDevices off.
     pub blocked: Vec<BlockedPort>,
-    /// What junctions of local rings were told to do about their ports, by station address.
-    pub junction_controls: Vec<(StationAddress, DlControl)>,
+    /// What junctions of local rings were told to do about their ports.
+    pub(crate) junction_controls: Vec<Told>,
     /// Error counters.
     pub(crate) statistics: Book,
 }

@@ -6,10 +6,21 @@
 
 mod learn;
 mod look_inside;
+mod orders;
 mod retrace;
 mod watch;
 
 pub(super) use self::learn::learn;
-pub(super) use self::look_inside::note_controls;
+pub(super) use self::orders::note_controls;
+pub(crate) use self::orders::{Told, UnderWay, ordering};
 pub(super) use self::retrace::{End, cabling};
 pub(super) use self::watch::{JunctionWatch, watch_blocked};
+
+use ringcat_wire::address::StationAddress;
+
+use super::fleet::Fleet;
+
+/// The station address of the member at a place.
+fn station_of(fleet: &Fleet, node: usize) -> Option<StationAddress> {
+    fleet.members.iter().find(|member| member.node == Some(node)).map(|member| member.station)
+}

@@ -61,7 +61,7 @@ pub(crate) async fn serve_requests(bus: Bus, fleet: SharedFleet, requests: Reque
         for (served, order) in requests.asked() {
             let member = fleet.access().members.get(order.subdevice).map(|m| (m.station, m.mailbox.clone()));
             match member {
-                Some(target) => bus.spawn(serve(bus.clone(), served, order, target, cancelled.clone())),
+                Some(target) => bus.spawn(serve(bus.clone(), fleet.clone(), served, order, target, cancelled.clone())),
                 None => served.fail(RequestFailure::Failed),
             }
         }
@@ -71,9 +71,16 @@ pub(crate) async fn serve_requests(bus: Bus, fleet: SharedFleet, requests: Reque
 /// What a request that has worked brought: data of a read, and what the data says it is about.
 type Done = (Option<Vec<u8>>, Option<Subject>);
 
-async fn serve(bus: Bus, served: Served, order: Order, target: (StationAddress, Mailbox), cancelled: Signal) {
+async fn serve(
+    bus: Bus,
+    fleet: SharedFleet,
+    served: Served,
+    order: Order,
+    target: (StationAddress, Mailbox),
+    cancelled: Signal,
+) {
     let result = {
-        let mut work = pin!(bus.within(order.timeout, execute(&bus, &order, target)));
+        let mut work = pin!(bus.within(order.timeout, execute(&bus, &fleet, &order, target)));
         let mut cancel = pin!(cancelled.until(|| served.is_cancelled().then_some(())));
         poll_fn(|context| {
             if cancel.as_mut().poll(context).is_ready() {
@@ -89,7 +96,12 @@ async fn serve(bus: Bus, served: Served, order: Order, target: (StationAddress, 
     }
 }
 
-async fn execute(bus: &Bus, order: &Order, target: (StationAddress, Mailbox)) -> Result<Done, RequestFailure> {
+async fn execute(
+    bus: &Bus,
+    fleet: &SharedFleet,
+    order: &Order,
+    target: (StationAddress, Mailbox),
+) -> Result<Done, RequestFailure> {
     let (station, mailbox) = target;
     // The whole has a limit; no part of it needs a shorter one.
     let limits = (order.timeout, order.timeout);
@@ -98,7 +110,7 @@ async fn execute(bus: &Bus, order: &Order, target: (StationAddress, Mailbox)) ->
             object(&mailbox, SdoAddress { index, sub_index, complete_access }, order, limits).await?
         }
         Subject::Register { address, length } => {
-            register(bus, station, RegisterAddress(address), length, order).await?
+            register(bus, fleet, station, RegisterAddress(address), length, order).await?
         }
         Subject::Idn { drive, idn, elements } => {
             let address = SoeAddress { drive, idn: Idn(idn), elements: SoeElements(elements) };
@@ -124,13 +136,14 @@ async fn object(
 
 async fn register(
     bus: &Bus,
+    fleet: &SharedFleet,
     station: StationAddress,
     address: RegisterAddress,
     length: u16,
     order: &Order,
 ) -> Result<Option<Vec<u8>>, RequestFailure> {
     let result = match &order.access {
-        Access::Write(data) => registers::write(bus, station, address, data).await.map(|()| None),
+        Access::Write(data) => registers::write(bus, Some(fleet), station, address, data).await.map(|()| None),
         Access::Read | Access::ReadDirectly => registers::read(bus, station, address, length.into()).await.map(Some),
     };
     result.map_err(|_| RequestFailure::Failed)

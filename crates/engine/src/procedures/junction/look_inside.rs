@@ -5,8 +5,12 @@
 //! both ports of the ring. One ring after the other is looked into while all others are left out; then the others are
 //! reached again, too. The settings are temporary (facts 2.2, DL control bit 1): what becomes of frames meanwhile, the
 //! loops return to what they were within about a second. All loops of a junction are written at once, and nobody can be
-//! asked for them any more: those that somebody had closed on purpose are known from before ([`note_controls`]), and stay
+//! asked for them any more: those that somebody had closed on purpose are known from before ([`super::orders`]), and stay
 //! closed.
+//!
+//! A ring behind a member of another one that is broken too is reached from one side of that one: from the side on which
+//! it begins, where all are entered at port 0, or else from the one on which it closes. Then its own closing side is left out:
+//! the break of the outer ring is the one unconnected port 0 that frames may pass.
 //!
 //! While it goes on, most SubDevices are out of reach at one time or another, which must tell nobody that they are lost
 //! ([`super::super::fleet::SharedFleet::is_looking_inside`]).
@@ -20,52 +24,71 @@ use ringcat_wire::datagram::Target;
 use ringcat_wire::register::{DlControl, DlStatus, LoopControl, map};
 
 use super::super::fleet::{Fleet, SharedFleet};
+use super::orders::control_of;
+use super::station_of;
+use super::watch::is_down;
 use crate::supervisor::{Bus, BusError};
-use crate::topology::{LocalRing, NodeStatus};
+use crate::topology::{Closing, LocalRing, NodeStatus, PortOf};
 
 /// Bytes of DL_CONTROL that are written: forwarding rule and temporary bit, loops.
 const WRITTEN: usize = 2;
 /// Rings that are looked into; each takes some frames, and what the settings last for is about a second.
 const MOST: usize = 16;
+/// Orders that come back without the junction's answer before it is out of reach: the first ones open the way for the next.
+const TRIES: usize = 4;
 
 /// A ring, as far as it has to be known here.
 #[derive(Clone, Debug)]
 struct Ring {
-    /// What its junction had been told to do.
-    control: DlControl,
     /// Its junction, by position and by station address.
     head: usize,
     junction: StationAddress,
-    /// The last of its members.
-    tail: usize,
-    /// Ports of the junction that belong to it.
-    ports: Vec<u8>,
+    /// Ports of the junction at which it begins, and the one at which it closes.
+    begins: Vec<u8>,
+    closes: u8,
+    ring: LocalRing,
+}
+
+/// How far frames get into a ring.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Sides {
+    /// Not at all.
+    Neither,
+    /// As they do: in at its beginning, and in at its end where it is broken.
+    Both,
+    /// At its beginning only. Where it is whole they do not come back.
+    Beginning,
+    /// At its end only. Where it is whole they do not come back.
+    End,
 }
 
 impl Ring {
     /// `None` where its junction is not declared.
     fn new(fleet: &Fleet, ring: &LocalRing) -> Option<Ring> {
-        let (head, tail) = (ring.closing.head.node, ring.closing.tail.node);
+        let Closing { head: PortOf { node: head, port: closes }, tail } = ring.closing;
         let junction = station_of(fleet, head)?;
-        let known = fleet.junction_controls.iter().find(|(station, _)| *station == junction);
-        let control = known.map_or_else(DlControl::default, |(_, control)| *control);
         let children = fleet.topology.nodes.get(head)?.children;
         let begins = (0..4).filter(|port| {
             let child = children[usize::from(*port)];
-            child.is_some_and(|child| head < child && child <= tail)
+            child.is_some_and(|child| head < child && child <= tail.node)
         });
-        let mut ports: Vec<u8> = begins.collect();
-        ports.push(ring.closing.head.port);
-        Some(Ring { control, head, junction, tail, ports })
+        Some(Ring { head, junction, begins: begins.collect(), closes, ring: ring.clone() })
     }
 
     fn holds(&self, node: usize) -> bool {
-        self.head < node && node <= self.tail
+        self.head < node && node <= self.ring.closing.tail.node
     }
-}
 
-fn station_of(fleet: &Fleet, node: usize) -> Option<StationAddress> {
-    fleet.members.iter().find(|member| member.node == Some(node)).map(|member| member.station)
+    /// Whether one of its cables was seen to be broken.
+    fn is_broken(&self, found: &[Option<NodeStatus>]) -> bool {
+        self.ring.cables.iter().any(|cable| is_down(cable, found) == Some(true))
+    }
+
+    /// The ports of its junction to close.
+    fn closed(&self, sides: Sides) -> Vec<u8> {
+        let begins = self.begins.iter().copied().filter(|_| matches!(sides, Sides::Neither | Sides::End));
+        begins.chain((matches!(sides, Sides::Neither | Sides::Beginning)).then_some(self.closes)).collect()
+    }
 }
 
 /// Looks into all local rings; returns what members said about their ports, by position. Empty where that cannot be
@@ -76,65 +99,78 @@ pub(super) async fn look_inside(bus: &Bus, fleet: &SharedFleet) -> (u32, Vec<Opt
     let (rings, count, recablings) = {
         let access = fleet.access();
         let rings = access.topology.local_rings.iter().map(|ring| Ring::new(&access, ring));
-        let rings: Vec<Ring> = rings.collect::<Option<_>>().unwrap_or_default();
+        let mut rings: Vec<Ring> = rings.collect::<Option<_>>().unwrap_or_default();
+        // Those around others first.
+        rings.sort_by_key(|ring| ring.head);
         let is_possible = (2..=MOST).contains(&rings.len());
         (if is_possible { rings } else { Vec::new() }, access.topology.nodes.len(), access.recablings)
     };
     let mut found = vec![None; if rings.is_empty() { 0 } else { count }];
     for ring in &rings {
-        // Rings around it lead there. Where one of these is broken too nothing comes back, and this one keeps its secret.
-        let is_left_out = |other: &Ring| other.head != ring.head && !other.holds(ring.head);
-        if set_loops(bus, &rings, is_left_out).await.is_ok() {
-            read(bus, fleet, ring, &mut found).await;
+        // Rings around it lead there.
+        let broken_around = |other: &Ring| other.holds(ring.head) && other.is_broken(&found);
+        let broken: Vec<usize> = rings.iter().filter(|other| broken_around(other)).map(|other| other.head).collect();
+        let ways: &[(Sides, Sides)] = match broken[..] {
+            [] => &[(Sides::Both, Sides::Both)],
+            _ => &[(Sides::Beginning, Sides::Both), (Sides::End, Sides::Beginning)],
+        };
+        for (around, own) in ways.iter().copied() {
+            let sides = |other: &Ring| match other {
+                _ if other.head == ring.head => own,
+                _ if broken.contains(&other.head) => around,
+                _ if other.holds(ring.head) => Sides::Both,
+                _ => Sides::Neither,
+            };
+            if let Ok(true) = set_loops(bus, fleet, &rings, sides, ring).await {
+                read(bus, fleet, ring, &mut found).await;
+                break;
+            }
         }
     }
     if !rings.is_empty() {
-        // Nobody may be able to answer this.
-        let _ = set_loops(bus, &rings, |_| false).await;
+        // It need not come back, and will not where two are open. What it does not reach ends by itself.
+        let open = loops(fleet, &rings, |_| Sides::Both);
+        let write = |bus: Bus, (command, target, data)| async move { bus.transfer_once(command, target, data).await };
+        let _ = bus.gather(open, write).await;
     }
     (recablings, found)
 }
 
-/// Reads what the junctions of all local rings were told to do about their ports, while they can be asked. Where there is
-/// one ring only it never has to be known.
-pub(in super::super) async fn note_controls(bus: &Bus, fleet: &SharedFleet) {
-    let junctions: Vec<StationAddress> = {
-        let access = fleet.access();
-        let heads = access.topology.local_rings.iter().map(|ring| ring.closing.head.node);
-        if access.topology.local_rings.len() > 1 {
-            heads.filter_map(|head| station_of(&access, head)).collect()
-        } else {
-            Vec::new()
-        }
-    };
-    let read = bus.gather(junctions, |bus, station| async move {
-        let control = DlControl::decode(&bus.fprd_array(station, map::DL_CONTROL).await.ok()?);
-        // What holds for a moment is our own order.
-        (!control.temporary).then_some((station, control))
-    });
-    for (station, control) in read.await.into_iter().flatten() {
-        let known = &mut fleet.access().junction_controls;
-        match known.iter_mut().find(|(junction, _)| *junction == station) {
-            Some((_, before)) => *before = control,
-            None => known.push((station, control)),
+/// Has junctions let frames into their rings or not, for a moment. Frames that do not come back have done it all the same, so it
+/// is done when one does: each that is lost may have been the one that makes the next one return. And each that comes back
+/// may have opened the way to the junction that is wanted; false where it is out of reach all the same.
+async fn set_loops(
+    bus: &Bus,
+    fleet: &SharedFleet,
+    rings: &[Ring],
+    sides: impl Fn(&Ring) -> Sides,
+    wanted: &Ring,
+) -> Result<bool, BusError> {
+    for number in 0..TRIES {
+        let replies = bus.transfer_all(loops(fleet, rings, &sides), Some(Wkc(1))).await?;
+        let mut all = rings.iter().zip(&replies);
+        // The first one went where the loops of before let it.
+        if number > 0 && all.any(|(ring, reply)| ring.head == wanted.head && reply.wkc() == Wkc(1)) {
+            return Ok(true);
         }
     }
+    Ok(false)
 }
 
-/// Has junctions leave their rings out or not, for a moment. Frames that do not come back have done it all the same, so it
-/// is done when one does: each that is lost may have been the one that makes the next one return.
-async fn set_loops(bus: &Bus, rings: &[Ring], is_left_out: impl Fn(&Ring) -> bool) -> Result<(), BusError> {
+/// What has them do that.
+fn loops(fleet: &SharedFleet, rings: &[Ring], sides: impl Fn(&Ring) -> Sides) -> Vec<(Command, Target, Vec<u8>)> {
     let controls = rings.iter().map(|ring| {
-        let mut control = DlControl { temporary: true, ..ring.control };
-        if is_left_out(ring) {
-            ring.ports.iter().for_each(|port| control.loops[usize::from(port & 3)] = LoopControl::Closed);
+        // The application may order something meanwhile.
+        let mut control = DlControl { temporary: true, ..control_of(&fleet.access(), ring.junction) };
+        for port in ring.closed(sides(ring)) {
+            control.loops[usize::from(port & 3)] = LoopControl::Closed;
         }
         (ring.junction, control)
     });
     let writes = controls.map(|(station, control)| {
         (Command::Fpwr, Target::Station(station, map::DL_CONTROL), control.encode()[..WRITTEN].to_vec())
     });
-    bus.transfer_all(writes, Some(Wkc(1))).await.map(drop)
+    writes.collect()
 }
 
 /// Reads the ports of a ring's junction and members.

@@ -168,7 +168,7 @@ fn ends(cable: &RingCable, stations: &[StationAddress]) -> [Option<End>; 2] {
 }
 
 /// Whether a cable has no communication at one end; `None` where neither end says anything.
-fn is_down(cable: &RingCable, status: &[Option<NodeStatus>]) -> Option<bool> {
+pub(super) fn is_down(cable: &RingCable, status: &[Option<NodeStatus>]) -> Option<bool> {
     let end = |at: PortOf| {
         let status = status.get(at.node).copied().flatten()?;
         Some(!status.dl_status.ports[usize::from(at.port & 3)].communication)

@@ -1,17 +1,24 @@
 //! Ports of a SubDevice: opened and closed by DL control; SubDevices cut off from the others on purpose (facts 2.2).
 
 use alloc::vec::Vec;
+use core::time::Duration;
 
 use ringcat_wire::address::{RegisterAddress, StationAddress};
 use ringcat_wire::register::{DlControl, LoopControl, map};
 
 use super::ServiceError;
 use crate::procedures::fleet::SharedFleet;
+use crate::procedures::junction::ordering;
 use crate::ring::RingState;
-use crate::supervisor::Bus;
+use crate::supervisor::{Bus, BusError};
 
 /// The byte of DL_CONTROL that holds the loops of all ports.
 const LOOPS: RegisterAddress = map::DL_CONTROL.offset(1);
+
+/// Until settings that end by themselves have certainly ended.
+const TEMPORARY: Duration = Duration::from_millis(1_300);
+/// Pause between two looks for that.
+const PAUSE: Duration = Duration::from_millis(20);
 
 /// A port that was closed to cut a SubDevice off.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -30,13 +37,34 @@ pub async fn read(bus: &Bus, station: StationAddress, port: u8) -> Result<LoopCo
 }
 
 /// Opens or closes a port. Who is behind a port that is closed is gone for everybody.
-pub async fn set(bus: &Bus, station: StationAddress, port: u8, control: LoopControl) -> Result<(), ServiceError> {
+pub async fn set(
+    bus: &Bus,
+    fleet: Option<&SharedFleet>,
+    station: StationAddress,
+    port: u8,
+    control: LoopControl,
+) -> Result<(), ServiceError> {
     check(port)?;
-    let [before] = bus.fprd_array(station, LOOPS).await?;
+    let before = lasting_loops(bus, station).await?;
     let shift = 2 * port;
     let loops = before & !(3 << shift) | control.code() << shift;
+    let _order = ordering(fleet, station, LOOPS, &[loops]);
     bus.fpwr(station, LOOPS, &[loops]).await?;
     Ok(())
+}
+
+/// What a SubDevice was told to do about its loops. Settings that end by themselves, as of rings that are looked into, are
+/// waited for: whatever is written meanwhile would end with them.
+async fn lasting_loops(bus: &Bus, station: StationAddress) -> Result<u8, BusError> {
+    let until = bus.now() + TEMPORARY;
+    loop {
+        let [first, loops] = bus.fprd_array(station, map::DL_CONTROL).await?;
+        let is_temporary = DlControl::decode(&[first, loops, 0, 0]).temporary;
+        if !is_temporary || bus.now() >= until {
+            return Ok(loops);
+        }
+        bus.sleep(PAUSE).await;
+    }
 }
 
 const fn check(port: u8) -> Result<(), ServiceError> {
@@ -47,9 +75,9 @@ const fn check(port: u8) -> Result<(), ServiceError> {
 /// for the port of the neighbour behind it is closed too; in a line they go with it.
 pub(crate) async fn block(bus: &Bus, fleet: &SharedFleet, subdevice: usize) -> Result<Vec<BlockedPort>, ServiceError> {
     let ports = neighbours(bus, fleet, subdevice)?;
-    if let Err(error) = set_all(bus, &ports, LoopControl::Closed).await {
+    if let Err(error) = set_all(bus, fleet, &ports, LoopControl::Closed).await {
         // One end that is closed alone swallows the frames of the other side.
-        let _ = set_all(bus, &ports, LoopControl::Auto).await;
+        let _ = set_all(bus, fleet, &ports, LoopControl::Auto).await;
         return Err(error);
     }
     fleet.access().blocked.extend(&ports);
@@ -60,7 +88,7 @@ pub(crate) async fn block(bus: &Bus, fleet: &SharedFleet, subdevice: usize) -> R
 /// are kept for the next try.
 pub(crate) async fn open_blocked(bus: &Bus, fleet: &SharedFleet) -> Result<usize, ServiceError> {
     let blocked = core::mem::take(&mut fleet.access().blocked);
-    let opened = set_all(bus, &blocked, LoopControl::Auto).await;
+    let opened = set_all(bus, fleet, &blocked, LoopControl::Auto).await;
     if opened.is_err() {
         fleet.access().blocked.extend(&blocked);
     }
@@ -69,20 +97,27 @@ pub(crate) async fn open_blocked(bus: &Bus, fleet: &SharedFleet) -> Result<usize
 }
 
 /// Sets ports of several SubDevices with one frame: a cable of which one end is closed swallows frames.
-async fn set_all(bus: &Bus, ports: &[BlockedPort], control: LoopControl) -> Result<(), ServiceError> {
+async fn set_all(
+    bus: &Bus,
+    fleet: &SharedFleet,
+    ports: &[BlockedPort],
+    control: LoopControl,
+) -> Result<(), ServiceError> {
     let mut stations: Vec<StationAddress> = ports.iter().map(|port| port.station).collect();
     stations.sort_unstable();
     stations.dedup();
-    let before = bus.gather(stations.clone(), |bus, station| async move { bus.fprd_array(station, LOOPS).await }).await;
+    let before = bus.gather(stations.clone(), |bus, station| async move { lasting_loops(&bus, station).await }).await;
     let mut writes = Vec::new();
     for (station, before) in stations.into_iter().zip(before) {
-        let [mut loops]: [u8; 1] = before?;
+        let mut loops = before?;
         for BlockedPort { port, .. } in ports.iter().filter(|port| port.station == station) {
             let shift = 2 * port;
             loops = loops & !(3 << shift) | control.code() << shift;
         }
         writes.push((station, loops));
     }
+    let order = |(station, loops): &(StationAddress, u8)| ordering(Some(fleet), *station, LOOPS, &[*loops]);
+    let _orders: Vec<_> = writes.iter().map(order).collect();
     let write = |bus: Bus, (station, loops)| async move { bus.fpwr(station, LOOPS, &[loops]).await };
     for written in bus.gather(writes, write).await {
         written?;

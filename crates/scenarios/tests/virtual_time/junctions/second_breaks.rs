@@ -2,12 +2,15 @@
 
 use std::time::Duration;
 
-use ringcat::{Event, JunctionConnection, JunctionMode, Options, SubDeviceState, automatic};
+use ringcat::{Event, JunctionConnection, JunctionMode, Options, RawDatagram, SubDeviceState, automatic};
 use ringcat_engine::topology::PortOf;
 use ringcat_sim::cable::{CableId, DeviceIndex};
 use ringcat_sim::fault::Fault;
 use ringcat_sim::frame::Port::{A, B, C, D};
 use ringcat_sim::network::Network;
+use ringcat_wire::address::Position;
+use ringcat_wire::command::Command;
+use ringcat_wire::datagram::Target;
 use ringcat_wire::register::{DlStatus, LoopControl, map};
 use scenarios::check::{Delivery, troubles};
 use scenarios::segments::{MAIN, REDUNDANT, RING_IN_RING, TWO_RINGS, at, wired};
@@ -199,9 +202,9 @@ fn a_port_that_is_closed_on_purpose_stays_closed_while_rings_are_looked_into_fac
     }
 }
 
-/// A ring behind a member of another one: while both are broken, frames that reach the inner one never come back.
+/// A ring behind a member of another one, before the break of that one and behind it.
 #[test]
-fn of_a_ring_in_a_ring_that_break_at_once_the_outer_one_is_placed_and_the_inner_one_when_that_is_mended() {
+fn of_a_ring_in_a_ring_that_break_at_once_both_are_told_with_their_places_jr_02() {
     let kinds = ["junction", "junction", "digital-output-8", "servo", "digital-input-8", "digital-input-8"];
     let cables = [
         (MAIN, at(0, A)),
@@ -217,29 +220,40 @@ fn of_a_ring_in_a_ring_that_break_at_once_the_outer_one_is_placed_and_the_inner_
         JunctionConnection { head: 0, head_port: 1, tail: 4, tail_port: 1 },
         JunctionConnection { head: 1, head_port: 1, tail: 3, tail_port: 1 },
     ];
-    let mut world = in_op(41, wired(&kinds, &cables), (JunctionMode::Strict, &strict));
-    let place = |near: (usize, u8), far, broken, breaks| {
-        let (near, far) = (Some(PortOf { node: near.0, port: near.1 }), PortOf { node: far, port: 0 });
-        Event::JunctionChanged { near, far, broken, breaks }
+    let place = |cable: usize, broken, breaks| {
+        let (node, port, far) = match cable {
+            1 => (0, 3, 1),
+            2 => (1, 3, 2),
+            3 => (2, 1, 3),
+            _ => (1, 2, 4),
+        };
+        Event::JunctionChanged { near: Some(PortOf { node, port }), far: PortOf { node: far, port: 0 }, broken, breaks }
     };
-    let (inner, outer) = (3, 5);
-    let mark = world.mark();
-    world.cut(CableId(inner));
-    world.cut(CableId(outer));
-    world.run_cycles(1_500);
     let blocked = |blocked, breaks| Event::JunctionsBlocked { blocked, breaks };
-    assert_eq!(told(&world, mark), [blocked(true, 0), place((1, 2), 4, true, 1)]);
-    let mark = world.mark();
-    world.heal(CableId(outer));
-    world.until(Duration::from_secs(3), "all in OP", |w| w.all_in_op() && w.application().all_settled());
-    world.run_cycles(100);
-    // That frames come back may be told before or after what they bring.
-    let told_then = told(&world, mark);
-    let free = |event: &&Event| matches!(event, Event::JunctionsBlocked { blocked: false, .. });
-    assert_eq!(told_then.iter().filter(free).count(), 1, "{told_then:?}");
-    let places: Vec<&Event> = told_then.iter().filter(|event| !free(event)).collect();
-    assert_eq!(places, [&place((2, 1), 3, true, 2), &place((1, 2), 4, false, 1)]);
-    edge(&mut world, "the inner one", |world| world.heal(CableId(inner)));
+    let settings = [(JunctionMode::Strict, &strict[..]), (JunctionMode::Automatic, &[])];
+    for (number, (inner, outer)) in [(3, 5), (3, 1), (2, 5), (2, 1)].into_iter().enumerate() {
+        let mut world = in_op(41, wired(&kinds, &cables), settings[number % 2]);
+        let mark = world.mark();
+        world.cut(CableId(inner));
+        world.cut(CableId(outer));
+        world.run_cycles(1_500);
+        let what = format!("cables {inner} and {outer}: {:?}", told(&world, mark));
+        let begin = world.events(mark)[0].at;
+        let placed = |timed: &&ringcat::TimedEvent| matches!(timed.event, Event::JunctionChanged { .. });
+        let at = world.events(mark).iter().rfind(placed).map(|timed| timed.at.since(begin));
+        assert!(at.is_some_and(|at| at < Duration::from_millis(100)), "{at:?} after the first event, {what}");
+        let either = [[inner, outer], [outer, inner]]
+            .map(|[one, other]| vec![blocked(true, 0), place(one, true, 1), place(other, true, 2)]);
+        assert!(either.contains(&told(&world, mark)), "{what}");
+        assert!(!world.saw(mark, |event| matches!(event, Event::Lost { .. } | Event::LineCrossed { .. })), "{what}");
+        let (first, second) = if number < 2 { (outer, inner) } else { (inner, outer) };
+        let mark = world.mark();
+        world.heal(CableId(first));
+        world.until(Duration::from_secs(3), "all in OP", |w| w.all_in_op() && w.application().all_settled());
+        world.run_cycles(100);
+        assert_eq!(told(&world, mark), [blocked(false, 2), place(first, false, 1)], "{what}");
+        edge(&mut world, &what, |world| world.heal(CableId(second)));
+    }
 }
 
 #[test]
@@ -350,4 +364,65 @@ fn a_local_ring_that_breaks_is_no_crossed_line_for_enhanced_detection_either_lc_
         }
         assert!(lost_links(&world) > before, "the redundant link was down in between");
     }
+}
+
+/// Starts to have junction 3 of [`two_rings`] close its port 2, in one of several ways. What comes back says whether that
+/// has worked, once it is known.
+fn close_port(world: &mut World, way: usize) -> Box<dyn FnMut() -> Option<bool>> {
+    let loops = vec![LoopControl::Closed.code() << 4];
+    let register = map::DL_CONTROL.offset(1);
+    let engine = world.application_mut().engine_mut();
+    match way {
+        0 => {
+            let mut work = engine.start_port_set(3, 2, LoopControl::Closed);
+            Box::new(move || work.take().map(|result| result.is_ok()))
+        }
+        1 => {
+            let mut work = engine.start_block(6);
+            Box::new(move || work.take().map(|result| result.is_ok()))
+        }
+        2 => {
+            let mut work = engine.start_register_write(3, register, loops);
+            Box::new(move || work.take().map(|result| result.is_ok()))
+        }
+        _ => {
+            let target = Target::Position(Position(3), register);
+            let order = RawDatagram { command: Command::Apwr, target, data: loops, resend: false };
+            let mut work = engine.start_datagrams(vec![order]);
+            Box::new(move || work.take().map(|result| matches!(result.as_deref(), Ok([Ok(_)]))))
+        }
+    }
+}
+
+/// The order to close a port and both breaks come within some milliseconds: what the junction had been told when it was
+/// asked last is out of date, and the answer to the order may never come back. A port that was closed stays closed.
+#[test]
+fn a_port_that_was_closed_right_before_two_rings_break_stays_closed_facts_2_2() {
+    let is_closed = |world: &World| {
+        let bytes = world.network().device(DeviceIndex(3)).controller.register(map::DL_STATUS, 2);
+        DlStatus::decode(&[bytes[0], bytes[1]]).ports[2].loop_closed
+    };
+    let mut unanswered = 0;
+    for (number, after_us) in [20, 700].into_iter().enumerate() {
+        for way in 0..4 {
+            let mut world = in_op(100 + number as u64, two_rings(), (JunctionMode::Automatic, &[]));
+            let mut result = close_port(&mut world, way);
+            for cable in [2, 6] {
+                world.fault_in(Duration::from_micros(after_us), Fault::Cut(CableId(cable)));
+            }
+            let (mut was_closed, mut answer) = (false, None);
+            for cycle in 0..1_500 {
+                world.cycle();
+                answer = answer.or_else(&mut result);
+                unanswered += usize::from(cycle == 10 && was_closed && answer.is_none());
+                let closed = is_closed(&world);
+                let what = format!("after {after_us} us, way {way}, cycle {cycle}, {answer:?}");
+                assert!(closed || !was_closed, "{what}: it opened");
+                was_closed |= closed;
+            }
+            let blocked = |event: &Event| matches!(event, Event::JunctionsBlocked { blocked: true, .. });
+            assert!(world.saw(world.beginning(), blocked), "after {after_us} us, way {way}");
+        }
+    }
+    assert!(unanswered > 0, "in some of them the rings broke before the answer came back");
 }
