@@ -15,7 +15,7 @@ use ringcat_engine::main_device::{
 };
 use ringcat_engine::procedures::dictionary::ReadPdos;
 use ringcat_engine::procedures::look_at_ring::{RingLook, look_at_ring};
-use ringcat_engine::procedures::scan::{Scan, ScanError};
+use ringcat_engine::procedures::scan::Scan;
 use ringcat_engine::supervisor::AcyclicCounters;
 use ringcat_wire::al::AlState;
 use ringcat_wire::source_address::MacCodec;
@@ -130,10 +130,10 @@ impl<L: Links> MainDevice<L> {
     /// Looks at the ring without changing anything on it: counts, cabling, the place of a break, error counters.
     ///
     /// # Errors
-    /// Frames that are lost again and again, or SubDevices that come or go meanwhile.
+    /// Frames that are lost again and again, nobody who answers, or SubDevices that come or go meanwhile.
     pub fn look_at_ring(&mut self) -> Result<RingLook, Error> {
         let bus = self.engine.bus();
-        Ok(self.run(look_at_ring(bus)).map_err(ScanError::Bus)?)
+        Ok(self.run(look_at_ring(bus))?)
     }
 
     /// Receives, lets procedures go on, sends.

@@ -18,6 +18,9 @@ It only reads, so that a segment in operation stays in operation; but do not run
 its frames. Counters end at 255, and nothing here clears them: look at them twice (--for) to see which ones rise. A cable
 whose counter rises has a bad plug, or is bent, or lies beside something that disturbs it.
 
+It knows nobody who does not answer: with two breaks, those between them are missing in the counts, the positions of those
+behind are lower, and the line break is named as if they did not exist. Compare the counts with what should be there.
+
 Exit status: 0 the ring is closed (or there is one link), 1 it is open, 2 it could not be looked at.";
 
 /// Options of `ringcat ring`.
@@ -84,6 +87,11 @@ fn lines(look: &RingLook, two_links: bool) -> Vec<String> {
     for (link, count) in [(Link::Main, main), (Link::Redundant, redundant)].into_iter().take(1 + usize::from(two_links))
     {
         lines.push(format!("{:<11} {count} SubDevices", link.to_string()));
+    }
+    if two_links && look.topology.is_assumed() {
+        let swapped = "interfaces swapped: MAIN is plugged in at the end of the ring";
+        let crossed = "line crossed, or a branch on port 2: which SubDevices are neighbours is assumed below";
+        lines.push(format!("cabling     {}", if look.topology.main_count == 0 { swapped } else { crossed }));
     }
     if let Some(place) = look.place {
         lines.push(format!("line break  {}", names.cable(place)));
@@ -158,6 +166,32 @@ mod tests {
         assert_eq!(lines[2], "REDUNDANT   0 SubDevices");
         assert_eq!(lines[4], "     0      0  between the MAIN interface and SubDevice 0 port 0");
         assert_eq!(lines.len(), 8);
+    }
+
+    #[test]
+    fn a_ring_with_swapped_interfaces_is_shown_as_such_and_one_that_nobody_answers_in_is_none() {
+        use ringcat_sim::cable::{CableId, DeviceIndex, Endpoint, HostLink};
+        use ringcat_sim::frame::Port;
+        let device = || ringcat_sim::device::Device::new(ringcat_sim::catalogue::by_name("coupler").unwrap());
+        let port = |device, port| Endpoint::Device(DeviceIndex(device), port);
+        let builder = ringcat_sim::network::builder::SegmentBuilder::new().device(device()).device(device());
+        let network = builder
+            .cable(Endpoint::Host(HostLink::Redundant), port(0, Port::A))
+            .cable(port(0, Port::B), port(1, Port::A))
+            .cable(port(1, Port::B), Endpoint::Host(HostLink::Main))
+            .build();
+        let mut segment = SimulatedSegment::new(network.unwrap());
+        segment.network_mut().advance_by(Duration::from_millis(20));
+        let mut main_device = MainDevice::request(segment, &Options::default());
+        let look = main_device.look_at_ring().unwrap();
+        assert_eq!((look.state, look.counts), (RingState::Closed, (0, 2)));
+        let lines = lines(&look, true);
+        assert!(lines[3].contains("interfaces swapped"), "{lines:?}");
+        assert!(lines[5].ends_with("between SubDevice 0 port 0 and the REDUNDANT interface"), "{lines:?}");
+        assert!(lines[7].ends_with("between the MAIN interface and SubDevice 1 port 1"), "{lines:?}");
+        [0, 2].map(CableId).into_iter().for_each(|cable| main_device.links_mut().network_mut().cut(cable));
+        let error = main_device.look_at_ring().unwrap_err().to_string();
+        assert!(error.contains("no frame returns"), "{error}");
     }
 
     #[test]

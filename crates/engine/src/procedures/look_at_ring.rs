@@ -7,6 +7,7 @@ use ringcat_wire::address::Position;
 use ringcat_wire::al::AlStatus;
 use ringcat_wire::register::{DlStatus, ErrorCounters, Information, map};
 
+use super::scan::ScanError;
 use crate::link::LinkSet;
 use crate::ring::RingState;
 use crate::ring_status::{Cable, CableErrors, cables, port_errors};
@@ -35,16 +36,20 @@ pub struct RingLook {
 /// Looks once. SubDevices are addressed by position, which needs no station addresses.
 ///
 /// # Errors
-/// Frames that are lost again and again, or SubDevices that come or go meanwhile.
-pub async fn look_at_ring(bus: Bus) -> Result<RingLook, BusError> {
-    let counted = bus.brd(map::TYPE, 1).await?;
+/// Frames that are lost again and again, nobody who answers, or SubDevices that come or go meanwhile.
+pub async fn look_at_ring(bus: Bus) -> Result<RingLook, ScanError> {
+    let counted = match bus.brd(map::TYPE, 1).await {
+        Ok(counted) if counted.wkc().0 == 0 => return Err(ScanError::NoSubDevices),
+        Err(BusError::Lost { .. }) => return Err(ScanError::NoAnswer),
+        counted => counted.map_err(ScanError::Bus)?,
+    };
     let counts = (counted.main.0, counted.redundant.0);
     let positions = (0..counted.wkc().0).map(Position);
     let looks = bus.gather_in_turns(positions.collect(), look_at).await;
     let mut statuses = Vec::with_capacity(looks.len());
     let (mut states, mut counters) = (Vec::new(), Vec::new());
     for look in looks {
-        let (status, state, counted) = look?;
+        let (status, state, counted) = look.map_err(ScanError::Bus)?;
         statuses.push(status);
         states.push(state);
         counters.push(counted);

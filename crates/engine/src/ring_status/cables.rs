@@ -59,7 +59,7 @@ pub fn cables(topology: &Topology, links: LinkSet) -> Vec<Cable> {
     for (node, it) in topology.nodes.iter().enumerate() {
         let near = match it.parent {
             Some((parent, port)) => Some(PortOf { node: parent, port }),
-            None if is_headed(node) => topology.main_count.checked_sub(1).map(|last| loose_end(topology, last)),
+            None if is_headed(node) => last_leaf(topology, topology.main_count).map(|last| loose_end(topology, last)),
             // The interfaces are swapped: frames of the redundant link meet everybody.
             None if is_swapped => {
                 cables.push(Cable { near: Some(port(node)), far: None });
@@ -71,19 +71,29 @@ pub fn cables(topology: &Topology, links: LinkSet) -> Vec<Cable> {
     }
     let closings = topology.local_rings.iter().map(|ring| ring.closing);
     cables.extend(closings.map(|closing| Cable { near: Some(closing.tail), far: Some(closing.head) }));
-    let Some(last) = topology.nodes.len().checked_sub(1).filter(|_| links == LinkSet::Ring) else { return cables };
+    let Some(last) = last_leaf(topology, topology.nodes.len()).filter(|_| links == LinkSet::Ring) else {
+        return cables;
+    };
     let open = topology.open_ports.first().copied();
     let end = Some(open.unwrap_or_else(|| loose_end(topology, last)));
     cables.push(if is_swapped { Cable { near: None, far: end } } else { Cable { near: end, far: None } });
     cables
 }
 
-/// The port at which a line ends: of those without a neighbour the usual way on, port 1, or else the next in the order
-/// of travel.
+/// Where the line of the first so many SubDevices ends: the last one that has nobody behind it, since frames meet crossed
+/// SubDevices on their way back.
+fn last_leaf(topology: &Topology, count: usize) -> Option<usize> {
+    let is_leaf = |node: &usize| topology.nodes[*node].children.iter().all(Option::is_none);
+    (0..count).rev().find(is_leaf).or(count.checked_sub(1))
+}
+
+/// The port at which a line ends: of those without a neighbour the usual way on, port 1 or for a crossed SubDevice 0, or else
+/// the next in the order of travel.
 fn loose_end(topology: &Topology, node: usize) -> PortOf {
     let it = &topology.nodes[node];
     let is_loose = |port: &u8| *port != it.entry_port && it.children[usize::from(*port)].is_none();
-    PortOf { node, port: [1, 3, 2, 0].into_iter().find(is_loose).unwrap_or(1) }
+    let order = if it.entry_port == 0 { [1, 3, 2, 0] } else { [0, 1, 3, 2] };
+    PortOf { node, port: order.into_iter().find(is_loose).unwrap_or(1) }
 }
 
 #[cfg(test)]

@@ -302,9 +302,18 @@ impl Drop for Bench {
     fn drop(&mut self) {
         self.end_simulator();
         for namespace in [&self.main, &self.sim].into_iter().chain(&self.other) {
+            end_all_in(namespace);
             // One that could not be made cannot be removed.
             let _ = ip(&format!("netns del {namespace}"));
         }
+    }
+}
+
+/// Ends what a test that failed has left running in a namespace of ours, and what that has started.
+fn end_all_in(namespace: &str) {
+    let Ok(left) = Command::new("ip").args(["netns", "pids", namespace]).output() else { return };
+    for process in String::from_utf8_lossy(&left.stdout).split_whitespace() {
+        let _ = Command::new("kill").args(["-KILL", process]).status();
     }
 }
 
