@@ -6,7 +6,7 @@ use alloc::collections::VecDeque;
 use alloc::string::String;
 use alloc::vec::Vec;
 
-use ringcat_wire::address::Position;
+use ringcat_wire::address::{Position, StationAddress};
 use ringcat_wire::al::{AlState, AlStatus, AlStatusCode};
 use ringcat_wire::mailbox::coe::Emergency;
 use ringcat_wire::sii::Identity;
@@ -90,13 +90,18 @@ pub enum Event {
         /// Its closing cable, from the last SubDevice back to the junction; nodes are positions.
         closing: Closing,
     },
-    /// A cable of a ring behind a junction broke or is whole again (JUNCTION_RED_CHANGE of the seeds). Nodes are positions.
+    /// A cable of a ring behind a junction broke or is whole again (JUNCTION_RED_CHANGE of the seeds). Nodes are positions,
+    /// of the cabling as it was found last.
     JunctionChanged {
         /// The port from which frames come; `None` where the ring has not been seen whole yet.
         near: Option<PortOf>,
         /// The port that they reach. Behind a break it is port 0 of the SubDevice that is entered from behind; at the
         /// closing cable it is the junction's.
         far: PortOf,
+        /// The SubDevice that they reach: its station address, `None` where nobody has one there.
+        station: Option<StationAddress>,
+        /// Indices in the declaration of the SubDevices at both ends, `near` first.
+        declared: [Option<usize>; 2],
         /// It broke.
         broken: bool,
         /// Broken cables of all such rings now. One is tolerated; with two, SubDevices between them in one ring are cut

@@ -37,6 +37,14 @@ impl Names {
         }
     }
 
+    /// A port of a SubDevice of which it is known who it is in the declaration, by its place.
+    fn port_of(&self, at: PortOf, declared: Option<usize>) -> String {
+        match declared.and_then(|index| self.0.get(index)) {
+            Some(name) => format!("SubDevice {} \"{name}\" port {}", at.node, at.port),
+            None => at.to_string(),
+        }
+    }
+
     /// End of a cable: a SubDevice with its port, or the interface of the host.
     fn end(&self, port: Option<PortOf>, link: Link) -> String {
         port.map_or_else(|| format!("the {link} interface"), |at| self.port(at))
@@ -99,9 +107,10 @@ pub fn describe(event: &Event, names: &Names) -> String {
             let (head, tail) = (names.port(closing.head), names.port(closing.tail));
             format!("ring behind a junction: from {tail} back to {head}")
         }
-        Event::JunctionChanged { near, far, broken, breaks } => {
-            let before = near.map_or_else(|| "an unknown SubDevice".to_owned(), |near| names.port(near));
-            let place = format!("between {before} and {}", names.port(*far));
+        Event::JunctionChanged { near, far, station, declared: [before, behind], broken, breaks } => {
+            let before = near.map_or_else(|| "an unknown SubDevice".to_owned(), |near| names.port_of(near, *before));
+            let station = station.map_or_else(String::new, |station| format!(" ({station})"));
+            let place = format!("between {before} and {}{station}", names.port_of(*far, *behind));
             match (broken, breaks) {
                 (true, 0 | 1) => format!("Line break {place}: the ring behind the junction goes on without this cable"),
                 (true, _) => {

@@ -55,8 +55,8 @@ impl Incident {
             Event::Emergency { subdevice, emergency } => {
                 (12, Warning, Some(subdevice), u32::from(emergency.error_code))
             }
-            Event::JunctionChanged { broken, .. } => {
-                (13, if broken { Warning } else { Information }, None, broken.into())
+            Event::JunctionChanged { broken, declared: [_, subdevice], .. } => {
+                (13, if broken { Warning } else { Information }, subdevice, broken.into())
             }
             _ => return None,
         };

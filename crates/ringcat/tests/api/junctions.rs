@@ -9,6 +9,7 @@ use ringcat::{
     Refused, automatic,
 };
 use ringcat_engine::topology::{Closing, PortOf};
+use ringcat_wire::address::StationAddress;
 
 const SEGMENT: &str = include_str!("../../../sim/segments/junction-ring.toml");
 /// The junction is number 1, the members of its ring are 2 to 4.
@@ -94,8 +95,16 @@ fn load_add_apply_and_each_misuse_is_an_error_of_its_own_jr_05_jr_06_jr_08() {
 fn breaks_of_rings_behind_junctions_are_told_in_the_words_of_seed_001() {
     let names = Names(vec!["head".into(), "junction".into(), "first".into(), "second".into()]);
     let port = |node, port| PortOf { node, port };
-    let changed = |broken, breaks| Event::JunctionChanged { near: Some(port(2, 1)), far: port(3, 0), broken, breaks };
-    let place = "between SubDevice 2 \"first\" port 1 and SubDevice 3 \"second\" port 0";
+    // The places of the scan are not those of the declaration.
+    let changed = |broken, breaks| Event::JunctionChanged {
+        near: Some(port(5, 1)),
+        far: port(6, 0),
+        station: Some(StationAddress(0x1004)),
+        declared: [Some(2), Some(3)],
+        broken,
+        breaks,
+    };
+    let place = "between SubDevice 5 \"first\" port 1 and SubDevice 6 \"second\" port 0 (0x1004)";
     assert!(describe(&changed(true, 1), &names).starts_with(&format!("Line break {place}")));
     assert_eq!(describe(&changed(false, 0), &names), format!("Line is fixed {place}"));
     assert!(describe(&changed(true, 2), &names).contains("2 cables"));

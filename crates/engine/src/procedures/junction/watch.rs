@@ -43,7 +43,7 @@ pub(in super::super) struct JunctionWatch {
     closings: Vec<Closing>,
     main_count: usize,
     /// Who is at the places of the cabling, and the number of that cabling.
-    stations: Vec<StationAddress>,
+    places: Places,
     recablings: u32,
     /// How many cables are broken, for whoever else wants to know.
     broken: Rc<Cell<usize>>,
@@ -52,15 +52,18 @@ pub(in super::super) struct JunctionWatch {
 impl JunctionWatch {
     /// Watches the rings of a fleet.
     pub fn new(fleet: &Fleet) -> JunctionWatch {
-        JunctionWatch { recablings: fleet.recablings, ..JunctionWatch::over(&fleet.topology, &fleet.stations) }
+        let declared = |node: usize| fleet.members.iter().position(|member| member.node == Some(node));
+        let places =
+            Places { stations: fleet.stations.clone(), declared: (0..fleet.stations.len()).map(declared).collect() };
+        JunctionWatch { recablings: fleet.recablings, ..JunctionWatch::over(&fleet.topology, places) }
     }
 
-    fn over(topology: &Topology, stations: &[StationAddress]) -> JunctionWatch {
+    fn over(topology: &Topology, places: Places) -> JunctionWatch {
         JunctionWatch {
             rings: topology.local_rings.iter().map(watched).collect(),
             closings: topology.local_rings.iter().map(|ring| ring.closing).collect(),
             main_count: topology.main_count,
-            stations: stations.to_vec(),
+            places,
             recablings: 0,
             broken: Rc::default(),
         }
@@ -69,8 +72,7 @@ impl JunctionWatch {
     /// Goes over to the cabling that a rescan has found since, if one has. `status` is by the positions of that.
     pub fn follow(&mut self, fleet: &Fleet, status: &[Option<NodeStatus>]) {
         if self.recablings != fleet.recablings {
-            self.recablings = fleet.recablings;
-            self.go_over(JunctionWatch::over(&fleet.topology, &fleet.stations), status);
+            self.go_over(JunctionWatch::new(fleet), status);
         }
     }
 
@@ -78,15 +80,13 @@ impl JunctionWatch {
     /// the one that is broken. Where there is none, the cable is gone.
     fn go_over(&mut self, new: JunctionWatch, status: &[Option<NodeStatus>]) {
         let told: Vec<Watched> = self.rings.iter().flatten().filter(|watched| watched.reported).cloned().collect();
-        let before = core::mem::take(&mut self.stations);
-        let JunctionWatch { rings, closings, main_count, stations, .. } = new;
-        (self.rings, self.closings, self.main_count, self.stations) = (rings, closings, main_count, stations);
+        let broken = self.broken.clone();
+        let before = core::mem::replace(self, JunctionWatch { broken, ..new }).places;
         for told in told {
-            let ends = ends(&told.cable, &before);
-            let stations = &self.stations;
+            let ends = before.ends(&told.cable);
+            let places = &self.places;
             let shares = |watched: &&mut Watched| {
-                !watched.reported
-                    && self::ends(&watched.cable, stations).iter().flatten().any(|end| ends.contains(&Some(*end)))
+                !watched.reported && places.ends(&watched.cable).iter().flatten().any(|end| ends.contains(&Some(*end)))
             };
             let mut shared: Vec<&mut Watched> = self.rings.iter_mut().flatten().filter(shares).collect();
             shared.sort_by_key(|watched| is_down(&watched.cable, status) != Some(true));
@@ -121,7 +121,7 @@ impl JunctionWatch {
                 (Some(true), false) => {
                     watched.reported = true;
                     self.broken.set(self.broken.get() + 1);
-                    report(changed(&watched.cable, true, self.broken.get()));
+                    report(self.places.changed(&watched.cable, true, self.broken.get()));
                 }
                 (Some(true), true) | (None, _) => watched.whole_since = None,
                 (Some(false), true) => {
@@ -132,7 +132,7 @@ impl JunctionWatch {
                     }
                     (watched.reported, watched.whole_since) = (false, None);
                     self.broken.set(self.broken.get().saturating_sub(1));
-                    report(changed(&watched.cable, false, self.broken.get()));
+                    report(self.places.changed(&watched.cable, false, self.broken.get()));
                 }
                 (Some(false), false) => {}
             }
@@ -162,9 +162,27 @@ fn watched(ring: &LocalRing) -> Vec<Watched> {
     ring.cables.iter().map(|cable| Watched { cable: *cable, reported: false, whole_since: None }).collect()
 }
 
-/// Both ends of a cable, by who is there.
-fn ends(cable: &RingCable, stations: &[StationAddress]) -> [Option<End>; 2] {
-    [cable.near, Some(cable.far)].map(|at| at.and_then(|at| Some((*stations.get(at.node)?, at.port))))
+/// Who is where, by position.
+#[derive(Clone, Debug, Default)]
+struct Places {
+    stations: Vec<StationAddress>,
+    /// Index in the declaration.
+    declared: Vec<Option<usize>>,
+}
+
+impl Places {
+    /// Both ends of a cable, by who is there.
+    fn ends(&self, cable: &RingCable) -> [Option<End>; 2] {
+        [cable.near, Some(cable.far)].map(|at| at.and_then(|at| Some((*self.stations.get(at.node)?, at.port))))
+    }
+
+    fn changed(&self, cable: &RingCable, broken: bool, breaks: usize) -> Event {
+        let RingCable { near, far } = *cable;
+        let declared = |at: Option<PortOf>| at.and_then(|at| *self.declared.get(at.node)?);
+        let station = self.stations.get(far.node).copied();
+        let declared = [declared(near), declared(Some(far))];
+        Event::JunctionChanged { near, far, station, declared, broken, breaks }
+    }
 }
 
 /// Whether a cable has no communication at one end; `None` where neither end says anything.
@@ -177,10 +195,6 @@ pub(super) fn is_down(cable: &RingCable, status: &[Option<NodeStatus>]) -> Optio
         (None, None) => None,
         (near, far) => Some(near == Some(true) || far == Some(true)),
     }
-}
-
-fn changed(cable: &RingCable, broken: bool, breaks: usize) -> Event {
-    Event::JunctionChanged { near: cable.near, far: cable.far, broken, breaks }
 }
 
 /// Reports when no frame comes back while a local ring is open, or all of a sudden where there are two that may have
@@ -255,8 +269,9 @@ mod tests {
 
     fn watch(open: [&[u8]; 4]) -> JunctionWatch {
         let closing = Closing { head: at(0, 1), tail: at(3, 1) };
-        let stations: Vec<StationAddress> = (0x1001..0x1005).map(StationAddress).collect();
-        JunctionWatch::over(&Topology::with_local_rings(&nodes(open), 4, &[closing]), &stations)
+        let stations = (0x1001..0x1005).map(StationAddress).collect();
+        let places = Places { stations, declared: vec![Some(0), None, Some(7), Some(8)] };
+        JunctionWatch::over(&Topology::with_local_rings(&nodes(open), 4, &[closing]), places)
     }
 
     fn seen(watch: &mut JunctionWatch, ms: u64, open: [&[u8]; 4]) -> Vec<Event> {
@@ -267,7 +282,10 @@ mod tests {
     }
 
     fn event(near: Option<PortOf>, far: PortOf, broken: bool, breaks: usize) -> Event {
-        Event::JunctionChanged { near, far, broken, breaks }
+        let declared = |node: usize| [Some(0), None, Some(7), Some(8)][node];
+        let station = Some(StationAddress(0x1001 + far.node as u16));
+        let declared = [near.and_then(|near| declared(near.node)), declared(far.node)];
+        Event::JunctionChanged { near, far, station, declared, broken, breaks }
     }
 
     #[test]

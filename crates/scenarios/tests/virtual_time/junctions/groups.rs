@@ -11,9 +11,9 @@ use ringcat_sim::fault::Fault;
 use ringcat_sim::frame::Port::{A, B, C, D};
 use ringcat_sim::network::Network;
 use scenarios::segments::{MAIN, REDUNDANT, at, descriptions, wired_with};
-use scenarios::world::{CYCLE, World};
+use scenarios::world::{CYCLE, Mark, World};
 
-use super::{Setting, crossed, edge, told};
+use super::{Setting, change, crossed, edge, told};
 use crate::hot_connect::{LIMIT, TOOL, group, infos, tool};
 
 /// Those that are always there: the junction is the second one, the tail of its ring the fourth one.
@@ -157,7 +157,7 @@ fn rescan(world: &mut World) -> Vec<Option<usize>> {
 
 fn own(near: (usize, u8), far: (usize, u8), broken: bool) -> Event {
     let port = |(node, port)| PortOf { node, port };
-    Event::JunctionChanged { near: Some(port(near)), far: port(far), broken, breaks: usize::from(broken) }
+    change(Some(port(near)), port(far), broken, usize::from(broken))
 }
 
 /// Both ends of a cable of the ring with the group in it, once that is known.
@@ -168,6 +168,17 @@ fn own_with_group(cable: usize, broken: bool) -> Event {
         cable => ((cable - 1, 1), (cable, 0)),
     };
     own(near, far, broken)
+}
+
+/// Changes name who is where with the group: station address, indices in the declaration (JR-07).
+fn names_fit(world: &World, mark: Mark) -> bool {
+    let stations = world.application().engine().stations();
+    world.events(mark).iter().all(|timed| match timed.event {
+        Event::JunctionChanged { near: Some(near), far, station, declared, .. } => {
+            declared == [WITH_GROUP[near.node], WITH_GROUP[far.node]] && station == declared[1].map(|it| stations[it])
+        }
+        _ => true,
+    })
 }
 
 fn power_on_group(world: &mut World) {
@@ -198,6 +209,7 @@ fn after_a_rescan_a_group_in_a_local_ring_is_a_piece_of_it_and_after_another_one
                     let mark = edge(&mut world, &what, |world| world.fault(fault(CableId(cable))));
                     let expected = vec![own_with_group(cable, broken)];
                     assert_eq!((told(&world, mark), crossed(&world, mark)), (expected, 0), "{what}, cable {cable}");
+                    assert!(names_fit(&world, mark), "{what}, cable {cable}");
                 }
             }
             let mark = world.mark();
@@ -205,7 +217,7 @@ fn after_a_rescan_a_group_in_a_local_ring_is_a_piece_of_it_and_after_another_one
             until_left(&mut world);
             let ends = [own_with_group(3, true), {
                 let Event::JunctionChanged { near, far, .. } = own_with_group(5, true) else { unreachable!() };
-                Event::JunctionChanged { near, far, broken: true, breaks: 2 }
+                change(near, far, true, 2)
             }];
             assert_eq!(told(&world, mark), ends, "{what}: both of its ends are open");
             // What is behind the gap is known: it is one cable now.
