@@ -33,6 +33,11 @@ const ROOMS: &[Room] = &[
     Room { directory: "wire", internal: Internal::Only(&[]), external: External::Only(&[]) },
     Room { directory: "engine", internal: Internal::Only(&["ringcat-wire"]), external: External::Only(&[]) },
     Room {
+        directory: "config",
+        internal: Internal::Only(&["ringcat-engine", "ringcat-wire"]),
+        external: External::Only(&["encoding_rs", "roxmltree"]),
+    },
+    Room {
         directory: "sim",
         internal: Internal::Only(&["ringcat-wire"]),
         external: External::Only(&["serde", "smoltcp", "toml"]),
@@ -40,7 +45,7 @@ const ROOMS: &[Room] = &[
     Room { directory: "link", internal: Internal::Only(&[]), external: External::Only(&["libc"]) },
     Room {
         directory: "ringcat",
-        internal: Internal::Only(&["ringcat-engine", "ringcat-link", "ringcat-sim", "ringcat-wire"]),
+        internal: Internal::Only(&["ringcat-config", "ringcat-engine", "ringcat-link", "ringcat-sim", "ringcat-wire"]),
         external: External::Any,
     },
     Room { directory: "scenarios", internal: Internal::Any, external: External::Any },

@@ -1,0 +1,81 @@
+//! What a file is, where it is no ENI: users mix up files with similar roots, so the error says which one they have.
+
+use std::fmt;
+
+use roxmltree::Node;
+
+use super::error::shown;
+
+/// What a file looks like.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum FileKind {
+    /// Root `EtherCATInfo` or `EtherCATInfoList` with devices.
+    DeviceDescription,
+    /// What `ethercat xml` of the IgH stack prints: `EtherCATInfo` with one vendor and one device per SubDevice found.
+    EthercatXml,
+    /// Root `EtherCATConfig` of a Beremiz project.
+    BeremizProject,
+    /// A TwinCAT project or system manager file.
+    TwinCatProject,
+    /// A configuration of the LinuxCNC driver.
+    LinuxCnc,
+    /// Not XML at all: no `<` at its beginning.
+    NotXml,
+    /// Another XML file, with the name of its root.
+    OtherXml(String),
+}
+
+impl FileKind {
+    /// What the root element tells; `None` for an ENI.
+    pub(super) fn of(root: Node<'_, '_>) -> Option<FileKind> {
+        let name = root.tag_name().name();
+        match name {
+            "EtherCATConfig" if is_beremiz(root) => Some(FileKind::BeremizProject),
+            "EtherCATConfig" => None,
+            "EtherCATInfo" | "EtherCATInfoList" if is_ethercat_xml(root) => Some(FileKind::EthercatXml),
+            "EtherCATInfo" | "EtherCATInfoList" => Some(FileKind::DeviceDescription),
+            "TcSmProject" | "TcSmItem" | "TcSmBoxes" | "TcBlackBox" => Some(FileKind::TwinCatProject),
+            "masters" => Some(FileKind::LinuxCnc),
+            other => Some(FileKind::OtherXml(other.to_owned())),
+        }
+    }
+}
+
+/// A root `EtherCATConfig` that names the schema of device descriptions.
+fn is_beremiz(root: Node<'_, '_>) -> bool {
+    root.attributes().any(|attribute| {
+        attribute.name() == "noNamespaceSchemaLocation" && attribute.value().trim().ends_with("EtherCATInfo.xsd")
+    })
+}
+
+/// Comments `Slave 0`, `Slave 1` before vendor and description.
+fn is_ethercat_xml(root: Node<'_, '_>) -> bool {
+    let comments = root.descendants().take(64).filter(Node::is_comment).filter_map(|node| node.text());
+    comments.map(str::trim).any(|text| text.strip_prefix("Slave ").is_some_and(|number| number.parse::<u16>().is_ok()))
+}
+
+impl fmt::Display for FileKind {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let eni = "An ENI has the root EtherCATConfig; the configuration tool exports it (TwinCAT: EtherCAT device, \
+                   \"Export Configuration File\"; EC-Engineer: \"Export ENI\").";
+        match self {
+            FileKind::DeviceDescription => write!(
+                f,
+                "a device description (ESI, root EtherCATInfo), not an ENI: it describes what devices can do, not how a \
+                 network is configured. {eni}"
+            ),
+            FileKind::EthercatXml => {
+                write!(f, "what `ethercat xml` prints (a device description made of an SII), not an ENI. {eni}")
+            }
+            FileKind::BeremizProject => write!(
+                f,
+                "the EtherCATConfig of a Beremiz project, not an ENI: it has neither commands for the transitions nor cyclic \
+                 ones. {eni}"
+            ),
+            FileKind::TwinCatProject => write!(f, "a TwinCAT project, not an ENI. {eni}"),
+            FileKind::LinuxCnc => write!(f, "a configuration of LinuxCNC's EtherCAT driver, not an ENI. {eni}"),
+            FileKind::NotXml => write!(f, "no XML file. {eni}"),
+            FileKind::OtherXml(root) => write!(f, "an XML file with the root {}, not an ENI. {eni}", shown(root)),
+        }
+    }
+}

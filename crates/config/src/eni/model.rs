@@ -1,0 +1,629 @@
+//! What an ENI says, as it says it (facts 8.1). Numbers are checked to be numbers, nothing is interpreted yet.
+
+use ringcat_wire::address::{LogicalAddress, RegisterAddress};
+use ringcat_wire::command::Command;
+
+use super::error::Place;
+
+/// A file.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Eni {
+    /// Version of the schema.
+    pub version: Option<String>,
+    /// What made it, where a comment in front of the root says so.
+    pub made_by: Option<String>,
+    /// The MainDevice.
+    pub main_device: MainDevice,
+    /// The SubDevices in document order.
+    pub subdevices: Vec<SubDevice>,
+    /// The cyclic tasks.
+    pub tasks: Vec<CyclicTask>,
+    /// The process image.
+    pub image: ProcessImage,
+    /// Elements that the reader does not know, at most [`super::MAX_UNKNOWN`].
+    pub unknown: Vec<Unknown>,
+    /// How many more of them there are.
+    pub more_unknown: usize,
+}
+
+/// An element that the reader does not know.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Unknown {
+    /// Where.
+    pub place: Place,
+    /// The element, from the root.
+    pub element: String,
+}
+
+/// `Master`.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct MainDevice {
+    /// `Info/Name`.
+    pub name: String,
+    /// `Info/Destination`: destination address of the frames, normally 6 bytes.
+    pub destination: Vec<u8>,
+    /// `Info/Source`: source address of the frames.
+    pub source: Vec<u8>,
+    /// `MailboxStates`.
+    pub mailbox_states: Option<MailboxStates>,
+    /// `EoE`: it bridges Ethernet.
+    pub eoe: bool,
+    /// `InitCmds`: for the whole bus.
+    pub init_commands: Vec<EcatCommand>,
+}
+
+/// `MailboxStates`: where a logical read collects whether mailboxes are full.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct MailboxStates {
+    /// Where it stands.
+    pub place: Place,
+    /// Logical address.
+    pub start: LogicalAddress,
+    /// Bytes.
+    pub count: u32,
+}
+
+/// A transition of the state machine at which commands are sent (facts 8.2); `Op` is OP to PREOP.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub enum Transition {
+    /// INIT to INIT.
+    Ii,
+    /// INIT to PREOP.
+    Ip,
+    /// PREOP to PREOP.
+    Pp,
+    /// PREOP to INIT.
+    Pi,
+    /// PREOP to SAFEOP.
+    Ps,
+    /// SAFEOP to SAFEOP.
+    Ss,
+    /// SAFEOP to PREOP.
+    Sp,
+    /// SAFEOP to INIT.
+    Si,
+    /// SAFEOP to OP.
+    So,
+    /// OP to SAFEOP.
+    Os,
+    /// OP to PREOP.
+    Op,
+    /// OP to INIT.
+    Oi,
+    /// INIT to BOOT.
+    Ib,
+    /// BOOT to INIT.
+    Bi,
+}
+
+impl Transition {
+    /// All of them.
+    pub const ALL: [Transition; 14] = [
+        Transition::Ii,
+        Transition::Ip,
+        Transition::Pp,
+        Transition::Pi,
+        Transition::Ps,
+        Transition::Ss,
+        Transition::Sp,
+        Transition::Si,
+        Transition::So,
+        Transition::Os,
+        Transition::Op,
+        Transition::Oi,
+        Transition::Ib,
+        Transition::Bi,
+    ];
+
+    /// As the file writes it.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Transition::Ii => "II",
+            Transition::Ip => "IP",
+            Transition::Pp => "PP",
+            Transition::Pi => "PI",
+            Transition::Ps => "PS",
+            Transition::Ss => "SS",
+            Transition::Sp => "SP",
+            Transition::Si => "SI",
+            Transition::So => "SO",
+            Transition::Os => "OS",
+            Transition::Op => "OP",
+            Transition::Oi => "OI",
+            Transition::Ib => "IB",
+            Transition::Bi => "BI",
+        }
+    }
+}
+
+/// What a datagram addresses.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Target {
+    /// `Adp` and `Ado`.
+    Register {
+        /// Position, station address or nothing, depending on the command.
+        adp: u16,
+        /// Register.
+        ado: RegisterAddress,
+    },
+    /// `Addr`.
+    Logical(LogicalAddress),
+}
+
+/// A datagram.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Datagram {
+    /// `Cmd`.
+    pub command: Command,
+    /// Where it goes.
+    pub target: Target,
+    /// `Data`, or as many zeros as `DataLength` says.
+    pub data: Vec<u8>,
+    /// `Cnt`: the working counter that is expected.
+    pub count: Option<u16>,
+}
+
+/// `Requires`: with what the command begins.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Requires {
+    /// A frame of its own.
+    Frame,
+    /// A cycle of its own.
+    Cycle,
+}
+
+/// `Validate`: a read is repeated until `answer & mask == data`.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Validate {
+    /// What must come.
+    pub data: Vec<u8>,
+    /// Bits that count; all of them where there is no mask.
+    pub mask: Option<Vec<u8>>,
+    /// Milliseconds.
+    pub timeout_ms: u32,
+}
+
+/// `InitCmd` with a datagram (ECatCmd).
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct EcatCommand {
+    /// Where it stands.
+    pub place: Place,
+    /// When it is sent.
+    pub transitions: Vec<Transition>,
+    /// A command of the MainDevice that comes before those of the SubDevices.
+    pub before_subdevices: bool,
+    /// What it is for.
+    pub comment: String,
+    /// With what it begins.
+    pub requires: Option<Requires>,
+    /// What is sent.
+    pub datagram: Datagram,
+    /// How often it is sent again when the working counter is wrong.
+    pub retries: u16,
+    /// What the answer must be.
+    pub validate: Option<Validate>,
+    /// Milliseconds, as some tools write for state changes.
+    pub timeout_ms: Option<u32>,
+}
+
+/// `Slave`.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct SubDevice {
+    /// Where it stands.
+    pub place: Place,
+    /// `Info/Name`.
+    pub name: String,
+    /// `Info/PhysAddr`: its station address.
+    pub station: Option<u16>,
+    /// `Info/AutoIncAddr`: 0, 65535, 65534, ...
+    pub auto_increment: Option<u16>,
+    /// `Info/Physics`: a letter per port.
+    pub physics: String,
+    /// `Info/VendorId`.
+    pub vendor_id: Option<u32>,
+    /// `Info/ProductCode`.
+    pub product_code: Option<u32>,
+    /// `Info/RevisionNo`.
+    pub revision: Option<u32>,
+    /// `Info/SerialNo`.
+    pub serial: Option<u32>,
+    /// `ProcessData`.
+    pub process_data: Option<ProcessData>,
+    /// `Mailbox`.
+    pub mailbox: Option<Mailbox>,
+    /// `InitCmds`.
+    pub init_commands: Vec<EcatCommand>,
+    /// `PreviousPort`.
+    pub previous_ports: Vec<PreviousPort>,
+    /// `HotConnect`.
+    pub hot_connect: Option<HotConnect>,
+    /// `DC`.
+    pub clock: Option<DistributedClock>,
+}
+
+/// Bits of an image.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct BitRange {
+    /// Where it stands.
+    pub place: Place,
+    /// `BitStart`.
+    pub start: u32,
+    /// `BitLength`.
+    pub length: u32,
+}
+
+/// `ProcessData`.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct ProcessData {
+    /// `Send`: where its outputs lie in the output image.
+    pub send: Vec<BitRange>,
+    /// `Recv`: where its inputs lie in the input image.
+    pub receive: Vec<BitRange>,
+    /// `Sm0` to `Sm15`.
+    pub sync_managers: Vec<SyncManagerSettings>,
+    /// `RxPdo` and `TxPdo`.
+    pub pdos: Vec<Pdo>,
+}
+
+/// `Type` of a SyncManager.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum SyncManagerKind {
+    /// `Outputs`.
+    Outputs,
+    /// `Inputs`.
+    Inputs,
+    /// `MBoxOut`.
+    MailboxOut,
+    /// `MBoxIn`.
+    MailboxIn,
+}
+
+/// `Sm0` to `Sm15`.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct SyncManagerSettings {
+    /// Where it stands.
+    pub place: Place,
+    /// Its number.
+    pub index: u8,
+    /// `Type`.
+    pub kind: Option<SyncManagerKind>,
+    /// `DefaultSize`.
+    pub default_size: Option<u16>,
+    /// `StartAddress`.
+    pub start: Option<u16>,
+    /// `ControlByte`.
+    pub control: Option<u8>,
+    /// `Enable`.
+    pub enable: Option<bool>,
+    /// `Pdo`: what is assigned to it.
+    pub pdos: Vec<u16>,
+}
+
+/// `RxPdo` or `TxPdo`.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Pdo {
+    /// Where it stands.
+    pub place: Place,
+    /// Whether it is an RxPdo: outputs.
+    pub outputs: bool,
+    /// `Index`.
+    pub index: u16,
+    /// `Name`.
+    pub name: String,
+    /// Attribute `Sm`: where it belongs.
+    pub sync_manager: Option<u8>,
+    /// `Entry`.
+    pub entries: Vec<PdoEntry>,
+}
+
+/// An entry of a PDO; index 0 is a gap.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct PdoEntry {
+    /// `Index`.
+    pub index: u16,
+    /// `SubIndex`.
+    pub sub_index: u8,
+    /// `BitLen`: entries such as `ARRAY [0..99] OF BYTE` have more than a byte can say.
+    pub bit_length: u16,
+    /// `Name`.
+    pub name: String,
+    /// `DataType`.
+    pub data_type: String,
+}
+
+/// `Send` or `Recv` of a mailbox.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct MailboxBuffer {
+    /// Where it stands.
+    pub place: Place,
+    /// First byte.
+    pub start: u16,
+    /// Bytes.
+    pub length: u16,
+}
+
+/// How it is noticed that a mail waits.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Poll {
+    /// `PollTime`, milliseconds.
+    Every(u32),
+    /// `StatusBitAddr`: bit in the area of `MailboxStates`.
+    StatusBit(u32),
+}
+
+/// `Mailbox`.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Mailbox {
+    /// `Send`.
+    pub send: Option<MailboxBuffer>,
+    /// `Recv`.
+    pub receive: Option<MailboxBuffer>,
+    /// `Recv/PollTime` or `Recv/StatusBitAddr`.
+    pub poll: Option<Poll>,
+    /// `BootStrap/Send` and `BootStrap/Recv`.
+    pub bootstrap: Option<(MailboxBuffer, MailboxBuffer)>,
+    /// `Protocol`.
+    pub protocols: Vec<String>,
+    /// `CoE/InitCmds`.
+    pub coe: Vec<CoeCommand>,
+    /// `SoE/InitCmds`.
+    pub soe: Vec<SoeCommand>,
+    /// `EoE/InitCmds`.
+    pub eoe: Vec<EoeCommand>,
+    /// `AoE/InitCmds`, `FoE/InitCmds`, `VoE/InitCmds`.
+    pub others: Vec<RawMailCommand>,
+    /// `AoE/NetId`.
+    pub net_id: Option<[u8; 6]>,
+}
+
+/// `CoE/InitCmds/InitCmd`.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct CoeCommand {
+    /// Where it stands.
+    pub place: Place,
+    /// When it is sent.
+    pub transitions: Vec<Transition>,
+    /// What it is for.
+    pub comment: String,
+    /// Milliseconds; 0 is the tool's default.
+    pub timeout_ms: u32,
+    /// `Ccs`: 1 downloads, 2 uploads; some files have it the other way round (facts 8.2).
+    pub ccs: u8,
+    /// Attribute `CompleteAccess`.
+    pub complete_access: bool,
+    /// `Index`.
+    pub index: u16,
+    /// `SubIndex`.
+    pub sub_index: u8,
+    /// `Data`.
+    pub data: Vec<u8>,
+    /// `Disabled`: not sent.
+    pub disabled: bool,
+}
+
+/// `SoE/InitCmds/InitCmd`.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct SoeCommand {
+    /// Where it stands.
+    pub place: Place,
+    /// When it is sent.
+    pub transitions: Vec<Transition>,
+    /// What it is for.
+    pub comment: String,
+    /// Milliseconds; 0 is the tool's default.
+    pub timeout_ms: u32,
+    /// `OpCode`: 2 reads, 3 writes, missing writes.
+    pub op_code: u8,
+    /// `DriveNo`.
+    pub drive: u8,
+    /// `IDN`.
+    pub idn: u16,
+    /// `Elements`, a bit mask.
+    pub elements: u8,
+    /// `Attribute`.
+    pub attribute: u32,
+    /// `Data`.
+    pub data: Vec<u8>,
+    /// `Disabled`: not sent.
+    pub disabled: bool,
+}
+
+/// `EoE/InitCmds/InitCmd`: with `Type` 2 it sets addresses.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct EoeCommand {
+    /// Where it stands.
+    pub place: Place,
+    /// When it is sent.
+    pub transitions: Vec<Transition>,
+    /// What it is for.
+    pub comment: String,
+    /// Milliseconds; 0 is the tool's default.
+    pub timeout_ms: u32,
+    /// `Type`.
+    pub kind: Option<u8>,
+    /// `MAC`.
+    pub mac: Option<Vec<u8>>,
+    /// `IP`, bytes in hexadecimal.
+    pub ip: Option<Vec<u8>>,
+    /// `Subnet`.
+    pub subnet: Option<Vec<u8>>,
+    /// `DefGateway`.
+    pub gateway: Option<Vec<u8>>,
+    /// `ServerIP`: DNS.
+    pub server: Option<Vec<u8>>,
+    /// `DNSName`.
+    pub name: Option<String>,
+    /// `Data`: the message behind the mailbox header.
+    pub data: Vec<u8>,
+    /// `Disabled`: not sent.
+    pub disabled: bool,
+}
+
+/// A mailbox command of another protocol, as bytes.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct RawMailCommand {
+    /// Where it stands.
+    pub place: Place,
+    /// `AoE`, `FoE` or `VoE`.
+    pub protocol: &'static str,
+    /// When it is sent.
+    pub transitions: Vec<Transition>,
+    /// What it is for.
+    pub comment: String,
+    /// `Data`.
+    pub data: Vec<u8>,
+    /// `Disabled`: not sent.
+    pub disabled: bool,
+}
+
+/// A port of a SubDevice.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub enum Port {
+    /// Port 0.
+    A,
+    /// Port 1.
+    B,
+    /// Port 2.
+    C,
+    /// Port 3.
+    D,
+}
+
+/// `PreviousPort`: what the SubDevice is plugged into.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct PreviousPort {
+    /// Where it stands.
+    pub place: Place,
+    /// Attribute `Selected`.
+    pub selected: bool,
+    /// `Port` of the other SubDevice.
+    pub port: Port,
+    /// `PhysAddr` of the other SubDevice; `None` where the file only has a `DeviceId`.
+    pub station: Option<u16>,
+}
+
+/// `HotConnect`.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct HotConnect {
+    /// Where it stands.
+    pub place: Place,
+    /// `GroupName`.
+    pub name: String,
+    /// `GroupMemberCnt`, head included.
+    pub members: u16,
+    /// `IdentifyCmd`.
+    pub identify: Vec<EcatCommand>,
+}
+
+/// `DC`.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct DistributedClock {
+    /// Where it stands.
+    pub place: Place,
+    /// `ReferenceClock`.
+    pub reference: bool,
+    /// `CycleTime0` in nanoseconds.
+    pub cycle_0_ns: u32,
+    /// `CycleTime1` in nanoseconds.
+    pub cycle_1_ns: u32,
+    /// `ShiftTime` in nanoseconds.
+    pub shift_ns: i32,
+}
+
+/// A state in which a cyclic command is sent (facts 8.2: numbers count states, they are no AL codes).
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub enum CyclicState {
+    /// 1, INIT.
+    Init,
+    /// 2, PREOP.
+    PreOp,
+    /// 3, SAFEOP.
+    SafeOp,
+    /// 4, OP.
+    Op,
+}
+
+/// `Cyclic`.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct CyclicTask {
+    /// Where it stands.
+    pub place: Place,
+    /// `Comment`.
+    pub comment: String,
+    /// `CycleTime` in microseconds.
+    pub cycle_us: Option<u32>,
+    /// `Frame`.
+    pub frames: Vec<Frame>,
+}
+
+/// `Cyclic/Frame`.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Frame {
+    /// Its commands.
+    pub commands: Vec<CyclicCommand>,
+}
+
+/// `Cyclic/Frame/Cmd`.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct CyclicCommand {
+    /// Where it stands.
+    pub place: Place,
+    /// When it is sent.
+    pub states: Vec<CyclicState>,
+    /// What it is for.
+    pub comment: String,
+    /// What is sent.
+    pub datagram: Datagram,
+    /// `InputOffs`: byte in the input image.
+    pub input_offset: Option<u32>,
+    /// `OutputOffs`: byte in the output image.
+    pub output_offset: Option<u32>,
+    /// `CopyInfos`.
+    pub copies: Vec<CopyInfo>,
+}
+
+/// `CopyInfo`: bits of the input image that become bits of the output image.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct CopyInfo {
+    /// Where it stands.
+    pub place: Place,
+    /// `SrcBitOffs`.
+    pub source: u32,
+    /// `DstBitOffs`.
+    pub target: u32,
+    /// `BitSize`.
+    pub bits: u32,
+}
+
+/// `ProcessImage`.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct ProcessImage {
+    /// `Inputs`.
+    pub inputs: ImageSide,
+    /// `Outputs`.
+    pub outputs: ImageSide,
+}
+
+/// `Inputs` or `Outputs`.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct ImageSide {
+    /// `ByteSize`; `None` where the file has no image.
+    pub bytes: Option<u32>,
+    /// `Variable`.
+    pub variables: Vec<Variable>,
+}
+
+/// `Variable`.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Variable {
+    /// Where it stands.
+    pub place: Place,
+    /// `Name`.
+    pub name: String,
+    /// `DataType`.
+    pub data_type: String,
+    /// `BitSize`.
+    pub bits: u32,
+    /// `BitOffs`.
+    pub bit_offset: u32,
+}

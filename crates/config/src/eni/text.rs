@@ -1,0 +1,72 @@
+//! Bytes of a file as text: byte order marks, UTF-8, UTF-16, and the one-byte encodings that an XML declaration names.
+//!
+//! A declaration that says UTF-16 in a file of single bytes is not believed: tools write it so by mistake.
+
+use std::borrow::Cow;
+
+use encoding_rs::{Encoding, UTF_8, UTF_16BE, UTF_16LE};
+
+use super::MAX_BYTES;
+use super::error::{EniError, Place, Problem, shown};
+
+/// Bytes at the beginning in which a declaration is looked for.
+const DECLARATION: usize = 256;
+
+/// The text of a file.
+pub(super) fn decode(bytes: &[u8]) -> Result<Cow<'_, str>, EniError> {
+    if bytes.len() > MAX_BYTES {
+        return Err(EniError::of_file(Problem::TooMuch { what: "bytes", limit: MAX_BYTES }));
+    }
+    let (encoding, mark) = match Encoding::for_bom(bytes) {
+        Some(found) => found,
+        None => (without_mark(bytes)?, 0),
+    };
+    match encoding.decode_without_bom_handling_and_without_replacement(&bytes[mark..]) {
+        Some(text) => Ok(text),
+        None => Err(not_in(encoding, &bytes[mark..])),
+    }
+}
+
+/// The encoding of a file without byte order mark.
+fn without_mark(bytes: &[u8]) -> Result<&'static Encoding, EniError> {
+    match bytes {
+        [b'<', 0, ..] => return Ok(UTF_16LE),
+        [0, b'<', ..] => return Ok(UTF_16BE),
+        _ => {}
+    }
+    let Some(label) = declared(bytes) else { return Ok(UTF_8) };
+    match Encoding::for_label(label.as_bytes()) {
+        Some(encoding) if encoding == UTF_16LE || encoding == UTF_16BE => Ok(UTF_8),
+        Some(encoding) => Ok(encoding),
+        None => {
+            let reason = format!("the encoding {} is not known: save the file as UTF-8", shown(&label));
+            Err(EniError::at(Place { line: 1, column: 1 }, Problem::Encoding { reason }))
+        }
+    }
+}
+
+/// What the XML declaration says about the encoding.
+fn declared(bytes: &[u8]) -> Option<String> {
+    let head = String::from_utf8_lossy(&bytes[..bytes.len().min(DECLARATION)]);
+    let declaration = head.trim_start().strip_prefix("<?xml")?.split("?>").next()?.to_owned();
+    let value = declaration.split_once("encoding")?.1.trim_start().strip_prefix('=')?.trim_start().to_owned();
+    let quote = value.chars().next().filter(|quote| matches!(quote, '"' | '\''))?;
+    Some(value[1..].split(quote).next()?.to_owned())
+}
+
+/// The first line that is not in the encoding.
+fn not_in(encoding: &'static Encoding, bytes: &[u8]) -> EniError {
+    let reason = format!(
+        "the bytes are not in {}: save the file as UTF-8, or declare the encoding that it has (windows-1252?)",
+        encoding.name()
+    );
+    let problem = Problem::Encoding { reason };
+    if encoding != UTF_8 {
+        return EniError::of_file(problem);
+    }
+    let valid = std::str::from_utf8(bytes).err().map_or(0, |error| error.valid_up_to());
+    let line = bytes[..valid].iter().filter(|byte| **byte == b'\n').count() + 1;
+    let begin = bytes[..valid].iter().rposition(|byte| *byte == b'\n').map_or(0, |at| at + 1);
+    let column = String::from_utf8_lossy(&bytes[begin..valid]).chars().count() + 1;
+    EniError::at(Place { line: line as u32, column: column as u32 }, problem)
+}

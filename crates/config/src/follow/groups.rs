@@ -1,0 +1,38 @@
+//! Hot connect groups: the head is found by alias or identification, its members stand behind it (facts 8.2).
+
+use ringcat_engine::config::{ConfigAddress, SubDeviceConfig};
+
+use super::bus::Bus;
+use super::contradiction;
+use super::identity::{Mark, group_mark};
+use crate::eni::{Eni, EniError};
+
+/// Declares the groups in place; returns their names.
+pub(super) fn follow(eni: &Eni, bus: &Bus, configs: &mut [SubDeviceConfig]) -> Result<Vec<String>, EniError> {
+    let mut names = Vec::new();
+    for (index, subdevice) in eni.subdevices.iter().enumerate() {
+        let Some(group) = &subdevice.hot_connect else { continue };
+        let address = |offset| match group_mark(&group.identify) {
+            Some(Mark::Alias(alias)) if alias != 0 => Ok(ConfigAddress::Alias { alias, offset }),
+            Some(Mark::Identification(value)) => Ok(ConfigAddress::Identification { value, offset }),
+            Some(Mark::Alias(_) | Mark::Eeprom { .. } | Mark::EepromWord { .. }) | None => {
+                let what = format!("identification of the hot connect group {}", crate::eni::quoted(&group.name));
+                let expected = "an IdentifyCmd that compares the alias (register 0x0012 or EEPROM word 4) or the \
+                                identification (register 0x0134)";
+                let got = format!("{} commands, none of that kind", group.identify.len());
+                let hint = "other kinds of identification, as a data word, are not known to RingCAT";
+                Err(contradiction(eni, index, group.place, what, expected, got, hint))
+            }
+        };
+        let number = names.len();
+        for (offset, member) in (0..group.members).zip(index..) {
+            debug_assert_eq!(bus.groups[member], Some(number));
+            let config = &mut configs[member];
+            config.address = address(offset)?;
+            config.optional = true;
+            config.group = Some(number);
+        }
+        names.push(group.name.clone());
+    }
+    Ok(names)
+}

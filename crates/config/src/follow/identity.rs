@@ -1,0 +1,150 @@
+//! Who a SubDevice must be: reads of the EEPROM through registers 0x0502 to 0x050B whose answers are compared, and the
+//! identification of hot connect groups (facts 8.2).
+
+use ringcat_engine::config::Expected;
+use ringcat_wire::register::map;
+
+use super::contradiction;
+use crate::eni::{EcatCommand, Eni, EniError, Place, Target, Transition};
+
+/// What a command that compares is about.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Mark {
+    /// Two words of the EEPROM from this address.
+    Eeprom {
+        /// Word address.
+        word: u32,
+        /// What must be there.
+        value: u32,
+    },
+    /// One word of the EEPROM.
+    EepromWord {
+        /// Its address.
+        word: u32,
+        /// What must be there.
+        value: u16,
+    },
+    /// The alias, from its register.
+    Alias(u16),
+    /// The identification in AL status code (facts 5.3).
+    Identification(u16),
+}
+
+const WORD_ALIAS: u32 = 0x0004;
+const WORD_VENDOR: u32 = 0x0008;
+const WORD_PRODUCT: u32 = 0x000A;
+const WORD_REVISION: u32 = 0x000C;
+const WORD_SERIAL: u32 = 0x000E;
+
+/// What commands compare, in their order, and whether all bits count.
+pub(super) fn marks(commands: &[EcatCommand]) -> Vec<(Mark, bool, Place)> {
+    let mut word = None;
+    let mut found = Vec::new();
+    for command in commands {
+        let Target::Register { ado, .. } = command.datagram.target else { continue };
+        let data = &command.datagram.data;
+        if command.datagram.command.writes() {
+            let address = match ado {
+                map::SII_CONTROL => data.get(2..6),
+                map::SII_ADDRESS => data.get(0..4),
+                _ => None,
+            };
+            word = address.and_then(|bytes| bytes.try_into().ok()).map(u32::from_le_bytes).or(word);
+        }
+        let Some(validate) = &command.validate else { continue };
+        let whole = validate.mask.as_ref().is_none_or(|mask| mask.iter().all(|byte| *byte == 0xFF));
+        let first_word = validate.data.first_chunk().map(|bytes| u16::from_le_bytes(*bytes));
+        match ado {
+            map::SII_DATA => {
+                let (pairs, rest) = validate.data.as_chunks();
+                for (number, value) in (0_u32..).zip(pairs) {
+                    let word = word.unwrap_or_default().wrapping_add(2 * number);
+                    found.push((Mark::Eeprom { word, value: u32::from_le_bytes(*value) }, whole, command.place));
+                }
+                if let [low, high, ..] = rest {
+                    let word = word.unwrap_or_default().wrapping_add(2 * pairs.len() as u32);
+                    let mark = Mark::EepromWord { word, value: u16::from_le_bytes([*low, *high]) };
+                    found.push((mark, whole, command.place));
+                }
+            }
+            map::STATION_ALIAS => found.extend(first_word.map(|alias| (Mark::Alias(alias), whole, command.place))),
+            map::AL_STATUS_CODE => {
+                found.extend(first_word.map(|id| (Mark::Identification(id), whole, command.place)));
+            }
+            _ => {}
+        }
+    }
+    found
+}
+
+/// Who is expected: exactly what the commands compare. A file without commands means vendor and product of `Info`.
+pub(super) fn expected(eni: &Eni, index: usize, complete: bool) -> Result<Expected, EniError> {
+    let subdevice = &eni.subdevices[index];
+    let mut expected = Expected::default();
+    if !complete {
+        expected.vendor_id = subdevice.vendor_id.filter(|id| *id != 0);
+        expected.product_code = subdevice.product_code.filter(|code| *code != 0);
+        return Ok(expected);
+    }
+    let identify = subdevice.hot_connect.iter().flat_map(|group| marks(&group.identify));
+    for (mark, whole, place) in marks(&subdevice.init_commands).into_iter().chain(identify) {
+        let Mark::Eeprom { word, value } = mark else { continue };
+        let (field, what, said) = match word {
+            WORD_VENDOR => (&mut expected.vendor_id, "the vendor id that is compared", subdevice.vendor_id),
+            WORD_PRODUCT => (&mut expected.product_code, "the product code that is compared", subdevice.product_code),
+            WORD_REVISION => (&mut expected.revision, "the revision that is compared", None),
+            WORD_SERIAL => (&mut expected.serial, "the serial number that is compared", None),
+            _ => continue,
+        };
+        if !whole {
+            continue;
+        }
+        if let Some(said) = said.filter(|said| *said != value) {
+            let hint = "Info and the command that compares must agree: export the file again";
+            return Err(contradiction(eni, index, place, what, format!("{said:#x}"), format!("{value:#x}"), hint));
+        }
+        *field = Some(value);
+    }
+    Ok(expected)
+}
+
+/// Whether a command compares something of the EEPROM that is not in [`expected`]: a part of a number (TwinCAT compares
+/// single words of the revision), or another word. Such commands are sent as they are.
+pub(super) fn is_sent(command: &EcatCommand, address: Option<&EcatCommand>) -> bool {
+    let Target::Register { ado, .. } = command.datagram.target else { return false };
+    let pair: Vec<EcatCommand> = address.into_iter().chain([command]).cloned().collect();
+    let is_whole = |(mark, whole, _): &(Mark, bool, Place)| {
+        let known = [WORD_VENDOR, WORD_PRODUCT, WORD_REVISION, WORD_SERIAL];
+        *whole && matches!(mark, Mark::Eeprom { word, .. } if known.contains(word))
+    };
+    ado == map::SII_DATA && command.validate.is_some() && !marks(&pair).iter().all(is_whole)
+}
+
+/// Whether a command says which words of the EEPROM the next read is about.
+pub(super) fn is_eeprom_address(command: &EcatCommand) -> bool {
+    let Target::Register { ado, .. } = command.datagram.target else { return false };
+    (ado == map::SII_CONTROL || ado == map::SII_ADDRESS) && command.datagram.command.writes()
+}
+
+/// The alias or identification by which a group is found; an alias may be read from the EEPROM or from its register.
+pub(super) fn group_mark(commands: &[EcatCommand]) -> Option<Mark> {
+    marks(commands).into_iter().find_map(|(mark, whole, _)| match mark {
+        Mark::Eeprom { word: WORD_ALIAS, value } => Some(Mark::Alias(value as u16)),
+        Mark::EepromWord { word: WORD_ALIAS, value } => Some(Mark::Alias(value)),
+        Mark::Eeprom { .. } | Mark::EepromWord { .. } => None,
+        Mark::Alias(_) | Mark::Identification(_) if whole => Some(mark),
+        Mark::Alias(_) | Mark::Identification(_) => None,
+    })
+}
+
+/// Whether the PDI still has the EEPROM in PREOP: given to it at IP and not taken back.
+pub(super) fn keeps_eeprom(commands: &[EcatCommand]) -> bool {
+    let up = commands.iter().filter(|command| command.transitions.contains(&Transition::Ip));
+    let given = up.filter_map(|command| match command.datagram.target {
+        Target::Register { ado, .. } if ado == map::SII_CONFIGURATION && command.datagram.command.writes() => {
+            command.datagram.data.first().map(|byte| byte & 1 != 0)
+        }
+        Target::Register { .. } | Target::Logical(_) => None,
+    });
+    given.last().unwrap_or(false)
+}

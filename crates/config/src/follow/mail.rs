@@ -1,0 +1,180 @@
+//! Commands through mailboxes: CoE, SoE and EoE become start-up commands (facts 6, 8.1).
+
+use std::net::Ipv4Addr;
+use std::time::Duration;
+
+use ringcat_engine::config::{IdnWrite, IpSettings, SdoDownload, SdoUpload, StartupAction, StartupCommand};
+use ringcat_wire::mailbox::eoe::{EoeBody, EoeMessage};
+use ringcat_wire::mailbox::soe::Idn;
+
+use super::bus::Bus;
+use super::contradiction;
+use super::notices::Notices;
+use super::subdevice::{at_transitions, comment, named};
+use crate::eni::{CoeCommand, Eni, EniError, EoeCommand, Place, SoeCommand, Transition};
+
+/// SoE: the value of an IDN in the elements, and the code of a write.
+const SOE_VALUE: u8 = 0x40;
+const SOE_WRITE: u8 = 3;
+/// Drives of a SubDevice (facts 6.6).
+const SOE_DRIVES: u8 = 8;
+/// EoE type of a command that sets addresses.
+const EOE_SET_IP: u8 = 2;
+/// Bytes of the name in it.
+const EOE_NAME: usize = 32;
+
+/// Appends what a SubDevice's mailbox gets.
+pub(super) fn startup(
+    eni: &Eni,
+    index: usize,
+    bus: &Bus,
+    startup: &mut Vec<(Place, StartupCommand)>,
+    notices: &mut Notices,
+) -> Result<(), EniError> {
+    let Some(mailbox) = &eni.subdevices[index].mailbox else { return Ok(()) };
+    let mut add =
+        |place, transitions: &[Transition], subject: &str, timeout_ms, words: &str, action, notices: &mut Notices| {
+            startup.extend(at_transitions(place, transitions, index, subject, notices, |transition| StartupCommand {
+                limit: limit(timeout_ms),
+                comment: comment(words),
+                ..StartupCommand::new(transition, StartupAction::clone(&action))
+            }));
+        };
+    if bus.ccs_is_reversed && !mailbox.coe.is_empty() {
+        let reason = "2 in all commands, which have data: taken as downloads, as some tools write it";
+        notices.add(Some(mailbox.coe[0].place), Some(index), "CoE/InitCmd/Ccs", reason);
+    }
+    for command in mailbox.coe.iter().filter(|command| !command.disabled) {
+        let subject = named("CoE/InitCmd", &command.comment);
+        match sdo(command, bus.ccs_is_reversed) {
+            Ok(action) => {
+                add(
+                    command.place,
+                    &command.transitions,
+                    &subject,
+                    command.timeout_ms,
+                    &command.comment,
+                    action,
+                    notices,
+                );
+            }
+            Err(reason) => {
+                let what = format!("{subject} of object {:#06x}:{:02x}", command.index, command.sub_index);
+                return Err(contradiction(eni, index, command.place, what, reason, "none", ""));
+            }
+        }
+    }
+    for command in mailbox.soe.iter().filter(|command| !command.disabled) {
+        let subject = named("SoE/InitCmd", &command.comment);
+        match idn(command) {
+            Ok(action) => {
+                add(
+                    command.place,
+                    &command.transitions,
+                    &subject,
+                    command.timeout_ms,
+                    &command.comment,
+                    action,
+                    notices,
+                );
+            }
+            Err(reason) => notices.add(Some(command.place), Some(index), subject, reason),
+        }
+    }
+    for command in mailbox.eoe.iter().filter(|command| !command.disabled) {
+        let subject = named("EoE/InitCmd", &command.comment);
+        match ip(command) {
+            Ok(settings) => {
+                let action = StartupAction::Ip(settings);
+                add(
+                    command.place,
+                    &command.transitions,
+                    &subject,
+                    command.timeout_ms,
+                    &command.comment,
+                    action,
+                    notices,
+                );
+            }
+            Err(reason) => notices.add(Some(command.place), Some(index), subject, reason),
+        }
+    }
+    for command in mailbox.others.iter().filter(|command| !command.disabled) {
+        let subject = named(&format!("{}/InitCmd", command.protocol), &command.comment);
+        notices.add(Some(command.place), Some(index), subject, "mailbox commands of this protocol are not sent");
+    }
+    Ok(())
+}
+
+/// A limit of 0 is the usual one.
+fn limit(timeout_ms: u32) -> Option<Duration> {
+    (timeout_ms > 0).then(|| Duration::from_millis(timeout_ms.into()))
+}
+
+fn sdo(command: &CoeCommand, is_reversed: bool) -> Result<StartupAction, &'static str> {
+    let (index, sub_index, complete_access) = (command.index, command.sub_index, command.complete_access);
+    let data = command.data.clone();
+    if (command.ccs == 2) != is_reversed {
+        let expected = (!data.is_empty()).then_some(data);
+        return Ok(StartupAction::Upload(SdoUpload { index, sub_index, complete_access, expected }));
+    }
+    if data.is_empty() {
+        return Err("Data to download");
+    }
+    Ok(StartupAction::Sdo(SdoDownload { index, sub_index, complete_access, data }))
+}
+
+fn idn(command: &SoeCommand) -> Result<StartupAction, String> {
+    if command.op_code != SOE_WRITE {
+        return Err(format!("OpCode {}: only writes (3) are sent", command.op_code));
+    }
+    if command.elements & SOE_VALUE == 0 {
+        return Err(format!("Elements {:#04x}: only values (0x40) are written", command.elements));
+    }
+    if command.drive >= SOE_DRIVES {
+        return Err(format!("DriveNo {}: a SubDevice has drives 0 to 7", command.drive));
+    }
+    Ok(StartupAction::Idn(IdnWrite { drive: command.drive, idn: Idn(command.idn), data: command.data.clone() }))
+}
+
+/// Addresses, by elements of their own or as the message that is sent.
+fn ip(command: &EoeCommand) -> Result<IpSettings, &'static str> {
+    if !command.data.is_empty() {
+        return match EoeMessage::decode(&command.data) {
+            Ok(EoeMessage { body: EoeBody::SetIp(found), .. }) => Ok(IpSettings {
+                mac: found.mac,
+                address: found.address,
+                mask: found.mask,
+                gateway: found.gateway,
+                dns: found.dns,
+                name: found.name.map(<[u8]>::to_vec),
+            }),
+            Ok(_) | Err(_) => Err("a message that does not set addresses is not sent"),
+        };
+    }
+    if command.kind.is_some_and(|kind| kind != EOE_SET_IP) {
+        return Err("a message that does not set addresses is not sent");
+    }
+    let address = |bytes: &Option<Vec<u8>>| match bytes.as_deref() {
+        None | Some([]) => Ok(None),
+        Some(&[a, b, c, d]) => Ok(Some(Ipv4Addr::new(a, b, c, d))),
+        Some(_) => Err("an IP address that has not four bytes: not sent"),
+    };
+    let mac = match command.mac.as_deref() {
+        None | Some([]) => None,
+        Some(bytes) => Some(bytes.try_into().map_err(|_| "a MAC address that has not six bytes: not sent")?),
+    };
+    let name = command.name.as_ref().filter(|name| !name.is_empty()).map(|name| name.clone().into_bytes());
+    if name.as_ref().is_some_and(|name| name.len() > EOE_NAME) {
+        return Err("a name of more than 32 bytes: not sent");
+    }
+    let settings = IpSettings {
+        mac,
+        address: address(&command.ip)?,
+        mask: address(&command.subnet)?,
+        gateway: address(&command.gateway)?,
+        dns: address(&command.server)?,
+        name,
+    };
+    if settings == IpSettings::default() { Err("no address in it: not sent") } else { Ok(settings) }
+}

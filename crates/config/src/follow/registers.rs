@@ -1,0 +1,85 @@
+//! What the commands of a file leave in the registers of a controller: they are replayed in the order in which they would
+//! be sent, and the result is read. So it does not matter in how many pieces a register is written.
+
+use std::collections::BTreeMap;
+
+use ringcat_wire::address::RegisterAddress;
+use ringcat_wire::register::{Fmmu, SyncManager, map};
+
+use crate::eni::{EcatCommand, Place, Target, Transition};
+
+/// Registers that were written, by address, each with the command that wrote it last.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Registers {
+    bytes: BTreeMap<u16, (u8, Place)>,
+}
+
+impl Registers {
+    /// What the commands of these transitions leave, one transition after the other, each in document order.
+    pub fn after(commands: &[EcatCommand], transitions: &[Transition]) -> Registers {
+        let mut registers = Registers::default();
+        for transition in transitions {
+            for command in commands.iter().filter(|command| command.transitions.contains(transition)) {
+                registers.write(command);
+            }
+        }
+        registers
+    }
+
+    fn write(&mut self, command: &EcatCommand) {
+        let Target::Register { ado, .. } = command.datagram.target else { return };
+        if !command.datagram.command.writes() || command.datagram.command.reads() {
+            return;
+        }
+        for (offset, byte) in (0_u16..).zip(&command.datagram.data) {
+            // Only configuration registers are of interest; memory behind them would cost without use.
+            let Some(address) = ado.0.checked_add(offset).filter(|address| *address < 0x1000) else { break };
+            self.bytes.insert(address, (*byte, command.place));
+        }
+    }
+
+    /// Whether something wrote here.
+    pub fn place(&self, address: RegisterAddress, length: u16) -> Option<Place> {
+        let end = address.0.saturating_add(length);
+        self.bytes.range(address.0..end).map(|(_, (_, place))| *place).next_back()
+    }
+
+    /// A register; bytes that nobody wrote are 0.
+    pub fn read<const N: usize>(&self, address: RegisterAddress) -> [u8; N] {
+        let mut read = [0; N];
+        for (offset, byte) in (0_u16..).zip(&mut read) {
+            *byte = self.bytes.get(&address.0.saturating_add(offset)).map_or(0, |(byte, _)| *byte);
+        }
+        read
+    }
+
+    /// A register of 16 bits; `None` where nobody wrote it.
+    pub fn word(&self, address: RegisterAddress) -> Option<u16> {
+        self.place(address, 2).map(|_| u16::from_le_bytes(self.read(address)))
+    }
+
+    /// A register of 32 bits; `None` where nobody wrote it.
+    pub fn double_word(&self, address: RegisterAddress) -> Option<u32> {
+        self.place(address, 4).map(|_| u32::from_le_bytes(self.read(address)))
+    }
+
+    /// The SyncManagers that are not all zero, with the place of their last command.
+    pub fn sync_managers(&self) -> impl Iterator<Item = (u8, SyncManager, Place)> + '_ {
+        (0..16).filter_map(|index| {
+            let address = map::sync_manager(index);
+            let bytes: [u8; SyncManager::LEN] = self.read(address);
+            let place = self.place(address, SyncManager::LEN as u16)?;
+            (bytes != [0; SyncManager::LEN]).then(|| (index, SyncManager::decode(&bytes), place))
+        })
+    }
+
+    /// The FMMUs that are switched on.
+    pub fn fmmus(&self) -> impl Iterator<Item = (u8, Fmmu, Place)> + '_ {
+        (0..16).filter_map(|index| {
+            let address = map::fmmu(index);
+            let place = self.place(address, Fmmu::LEN as u16)?;
+            let fmmu = Fmmu::decode(&self.read(address));
+            fmmu.active.then_some((index, fmmu, place))
+        })
+    }
+}

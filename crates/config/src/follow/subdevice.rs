@@ -1,0 +1,350 @@
+//! One SubDevice: its commands by register, and the declaration that follows.
+
+use std::time::Duration;
+
+use ringcat_engine::config::{
+    RegisterAccess, RegisterCommand, StartupAction, StartupCommand, StateTimeout, SubDeviceConfig,
+    Transition as EngineTransition,
+};
+use ringcat_wire::al::AlState;
+use ringcat_wire::command::{Addressing, Command};
+use ringcat_wire::register::map;
+
+use super::areas::{self, Piece};
+use super::bus::Bus;
+use super::notices::Notices;
+use super::registers::Registers;
+use super::{clocks, contradiction, identity, mail, sync_managers};
+use crate::eni::{EcatCommand, Eni, EniError, Place, Target, Transition, quoted};
+
+/// The way up, in the order in which its commands are sent.
+pub(super) const UP: [Transition; 3] = [Transition::Ip, Transition::Ps, Transition::So];
+
+/// The declaration of a SubDevice, and which parts of its process data are mapped where.
+pub(super) fn follow(
+    eni: &Eni,
+    index: usize,
+    bus: &Bus,
+    notices: &mut Notices,
+) -> Result<(SubDeviceConfig, Vec<Piece>), EniError> {
+    let subdevice = &eni.subdevices[index];
+    let commands = &subdevice.init_commands;
+    let registers = Registers::after(commands, &UP);
+    let complete = is_complete(commands);
+    let mut config = SubDeviceConfig { address: bus.addresses[index], ..SubDeviceConfig::default() };
+    config.expected = identity::expected(eni, index, complete)?;
+    config.watchdog_divider = registers.word(map::WATCHDOG_DIVIDER);
+    config.pdi_watchdog_intervals = registers.word(map::WATCHDOG_TIME_PDI);
+    config.watchdog_intervals = registers.word(map::WATCHDOG_TIME_PROCESS_DATA);
+    config.sii_to_pdi = identity::keeps_eeprom(commands);
+    config.declared = sync_managers::declared(eni, index, &registers, complete, notices)?;
+    config.declared_bootstrap = sync_managers::bootstrap(eni, index)?;
+    config.sync = clocks::of_subdevice(eni, index, &registers, complete, notices);
+    let mut startup: Vec<(Place, StartupCommand)> = Vec::new();
+    let mut eeprom_address = None;
+    for command in commands {
+        if !is_own(eni, index, command, bus, notices) {
+            continue;
+        }
+        check_addresses(eni, index, command)?;
+        if identity::is_eeprom_address(command) {
+            eeprom_address = Some(command);
+        }
+        match class(command) {
+            Class::Ours if identity::is_sent(command, eeprom_address) => {
+                for command in eeprom_address.into_iter().chain([command]) {
+                    raw(eni, index, command, &mut startup, notices)?;
+                }
+            }
+            Class::Ours => {}
+            Class::State => config.state_timeouts.extend(time_limits(eni, index, command)?),
+            Class::Refused(reason) => {
+                notices.add(Some(command.place), Some(index), named("InitCmd", &command.comment), reason)
+            }
+            Class::Raw => raw(eni, index, command, &mut startup, notices)?,
+        }
+    }
+    late_sync_managers(index, commands, &registers, notices);
+    mail::startup(eni, index, bus, &mut startup, notices)?;
+    startup.sort_by_key(|(place, _)| *place);
+    config.startup = startup.into_iter().map(|(_, command)| command).collect();
+    let pieces = areas::pieces(eni, index, config.declared.as_deref().unwrap_or_default(), &registers, notices)?;
+    Ok((config, pieces))
+}
+
+/// Whether the file has the commands with which a MainDevice brings a SubDevice up. Files written by hand have a few extra
+/// ones at most, and leave the rest to the SII.
+pub(super) fn is_complete(commands: &[EcatCommand]) -> bool {
+    commands.iter().any(|command| match command.datagram.target {
+        Target::Register { ado, .. } => {
+            ado == map::AL_CONTROL || (map::FMMU_BASE.0..map::SYNC_MANAGER_BASE.0 + 0x80).contains(&ado.0)
+        }
+        Target::Logical(_) => false,
+    })
+}
+
+/// An element with what it is for, for messages.
+pub(super) fn named(element: &str, comment: &str) -> String {
+    if comment.is_empty() { element.to_owned() } else { format!("{element} {}", quoted(comment)) }
+}
+
+/// Whether a command goes to the SubDevice below which it stands; another one is noted.
+fn is_own(eni: &Eni, index: usize, command: &EcatCommand, bus: &Bus, notices: &mut Notices) -> bool {
+    let subdevice = &eni.subdevices[index];
+    let mut note = |reason: String| {
+        notices.add(Some(command.place), Some(index), named("InitCmd", &command.comment), reason);
+        false
+    };
+    let Target::Register { adp, .. } = command.datagram.target else {
+        return note("a logical command among those of a SubDevice is not sent".to_owned());
+    };
+    let name = command_name(command.datagram.command);
+    match command.datagram.command.addressing() {
+        Addressing::None => false,
+        Addressing::AutoIncrement if bus.groups[index].is_some() => true,
+        Addressing::AutoIncrement => match subdevice.auto_increment {
+            Some(own) if own != adp && subdevice.station == Some(adp) => note(format!(
+                "{name} counts positions, and Adp {adp} is the PhysAddr: nobody would be reached, so it is not sent (Cmd 4 and \
+                 5 address by PhysAddr)"
+            )),
+            Some(own) if own != adp => note(format!("{name} with Adp {adp} goes to another SubDevice: not sent")),
+            None if subdevice.station == Some(adp) => note(format!(
+                "{name} counts positions, and Adp {adp} is the PhysAddr: nobody would be reached, so it is not sent (Cmd 4 and \
+                 5 address by PhysAddr)"
+            )),
+            Some(_) | None => true,
+        },
+        Addressing::Station => {
+            subdevice.station == Some(adp)
+                || note(format!("{name} with Adp {adp} goes to another SubDevice or address: not sent"))
+        }
+        Addressing::Broadcast | Addressing::Logical => {
+            note(format!("{name} to everybody among the commands of a SubDevice is not sent"))
+        }
+    }
+}
+
+/// A command's name, as in specifications.
+pub(super) fn command_name(command: Command) -> String {
+    command.to_string()
+}
+
+/// What becomes of a command.
+enum Class {
+    /// RingCAT does it by itself, or it has become part of the declaration.
+    Ours,
+    /// A state change or the look at its result.
+    State,
+    /// Sent as it is.
+    Raw,
+    /// Not sent.
+    Refused(&'static str),
+}
+
+/// By the register that is addressed (facts 3).
+fn class(command: &EcatCommand) -> Class {
+    let Target::Register { ado, .. } = command.datagram.target else { return Class::Ours };
+    let zero = command.datagram.data.iter().all(|byte| *byte == 0);
+    match ado.0 {
+        0x0010..=0x0011 => Class::Ours,
+        0x0100..=0x0117 => Class::Refused("ports and forwarding are the matter of RingCAT: not sent"),
+        0x0120..=0x0137 => Class::State,
+        0x0300..=0x0313 => Class::Ours,
+        0x0400 | 0x0410 | 0x0420 => Class::Ours,
+        0x0500..=0x050F => Class::Ours,
+        0x0600..=0x06FF | 0x0800..=0x087F => Class::Ours,
+        0x0900..=0x0937 | 0x0980..=0x09A7 => Class::Ours,
+        0x09A8..=0x09A9 if zero => Class::Ours,
+        _ => Class::Raw,
+    }
+}
+
+/// The station address that is written must be that of `PhysAddr`.
+fn check_addresses(eni: &Eni, index: usize, command: &EcatCommand) -> Result<(), EniError> {
+    let Target::Register { ado, .. } = command.datagram.target else { return Ok(()) };
+    let (true, Some(station)) = (ado == map::STATION_ADDRESS, eni.subdevices[index].station) else { return Ok(()) };
+    let Some(bytes) = command.datagram.data.first_chunk().filter(|_| is_write(command.datagram.command)) else {
+        return Ok(());
+    };
+    let written = u16::from_le_bytes(*bytes);
+    if written == station || written == 0 {
+        return Ok(());
+    }
+    let what = "the station address that is set";
+    let hint = "PhysAddr and the command to register 0x0010 must agree: export the file again";
+    Err(contradiction(eni, index, command.place, what, station.to_string(), written.to_string(), hint))
+}
+
+fn is_write(command: Command) -> bool {
+    command.writes() && !command.reads()
+}
+
+/// States of a transition.
+const fn states(transition: Transition) -> (AlState, AlState) {
+    use AlState::{Boot, Init, Op, PreOp, SafeOp};
+    match transition {
+        Transition::Ii => (Init, Init),
+        Transition::Ip => (Init, PreOp),
+        Transition::Pp => (PreOp, PreOp),
+        Transition::Pi => (PreOp, Init),
+        Transition::Ps => (PreOp, SafeOp),
+        Transition::Ss => (SafeOp, SafeOp),
+        Transition::Sp => (SafeOp, PreOp),
+        Transition::Si => (SafeOp, Init),
+        Transition::So => (SafeOp, Op),
+        Transition::Os => (Op, SafeOp),
+        Transition::Op => (Op, PreOp),
+        Transition::Oi => (Op, Init),
+        Transition::Ib => (Init, Boot),
+        Transition::Bi => (Boot, Init),
+    }
+}
+
+/// State in the lower bits of AL control and AL status.
+const AL_STATE: u8 = 0x0F;
+
+/// Time limits from the looks at AL status; what AL control asks for must be the state of the transition.
+fn time_limits(eni: &Eni, index: usize, command: &EcatCommand) -> Result<Vec<StateTimeout>, EniError> {
+    let Target::Register { ado, .. } = command.datagram.target else { return Ok(Vec::new()) };
+    let mut limits = Vec::new();
+    for transition in &command.transitions {
+        let (from, to) = states(*transition);
+        if ado == map::AL_CONTROL && is_write(command.datagram.command) {
+            let asked = command.datagram.data.first().copied().unwrap_or_default() & AL_STATE;
+            // Some tools go through INIT first, or ask again for where they are.
+            if ![to, from, AlState::Init].iter().any(|state| state.code() == asked) {
+                let what = format!("AL control at the transition {}", transition.name());
+                return Err(contradiction(
+                    eni,
+                    index,
+                    command.place,
+                    what,
+                    to.to_string(),
+                    format!("{asked:#04x}"),
+                    "",
+                ));
+            }
+        }
+        if let Some(validate) = &command.validate
+            && ado == map::AL_STATUS
+            && from != to
+            && validate.timeout_ms > 0
+            && validate.data.first().is_some_and(|state| state & AL_STATE == to.code())
+        {
+            limits.push(StateTimeout { from, to, limit: Duration::from_millis(validate.timeout_ms.into()) });
+        }
+    }
+    Ok(limits)
+}
+
+/// The engine's transition; `None` where it has no commands.
+pub(super) const fn followed(transition: Transition) -> Option<EngineTransition> {
+    match transition {
+        Transition::Ip => Some(EngineTransition::Ip),
+        Transition::Ps => Some(EngineTransition::Ps),
+        Transition::So => Some(EngineTransition::So),
+        Transition::Os => Some(EngineTransition::Os),
+        Transition::Sp => Some(EngineTransition::Sp),
+        Transition::Ii
+        | Transition::Pp
+        | Transition::Pi
+        | Transition::Ss
+        | Transition::Si
+        | Transition::Op
+        | Transition::Oi
+        | Transition::Ib
+        | Transition::Bi => None,
+    }
+}
+
+/// Start-up commands for the transitions of a command; transitions at which RingCAT sends none are noted.
+pub(super) fn at_transitions(
+    place: Place,
+    transitions: &[Transition],
+    index: usize,
+    subject: &str,
+    notices: &mut Notices,
+    mut make: impl FnMut(EngineTransition) -> StartupCommand,
+) -> Vec<(Place, StartupCommand)> {
+    let mut commands = Vec::new();
+    let mut left: Vec<&str> = Vec::new();
+    for transition in transitions {
+        match followed(*transition) {
+            Some(found) => commands.push((place, make(found))),
+            // OP is left through SAFEOP: the command is sent on the second half of the way.
+            None if *transition == Transition::Op && transitions.contains(&Transition::Sp) => {}
+            None => left.push(transition.name()),
+        }
+    }
+    if !left.is_empty() {
+        let reason = format!("not sent at {}: RingCAT sends commands at IP, PS, SO, OS and SP", left.join(", "));
+        notices.add(Some(place), Some(index), subject, reason);
+    }
+    commands
+}
+
+/// A command that is sent as it is.
+fn raw(
+    eni: &Eni,
+    index: usize,
+    command: &EcatCommand,
+    startup: &mut Vec<(Place, StartupCommand)>,
+    notices: &mut Notices,
+) -> Result<(), EniError> {
+    let Target::Register { ado, .. } = command.datagram.target else { return Ok(()) };
+    let subject = named("InitCmd", &command.comment);
+    let mut note = |reason: &str| {
+        notices.add(Some(command.place), Some(index), subject.clone(), reason);
+        Ok(())
+    };
+    let access = match (command.datagram.command, &command.validate) {
+        (Command::Aprw | Command::Fprw | Command::Armw | Command::Frmw, _) => {
+            return note("a command that reads and writes at once is not sent");
+        }
+        (_, Some(validate)) if validate.data.is_empty() => return note("Validate has no data: not sent"),
+        (_, Some(validate)) => RegisterAccess::Check {
+            data: validate.data.clone(),
+            mask: validate.mask.clone(),
+            limit: Duration::from_millis(validate.timeout_ms.into()),
+        },
+        (command, None) if command.reads() => return note("a read whose answer is not compared is not sent"),
+        (_, None) if command.datagram.data.is_empty() => return note("a write without data is not sent"),
+        (_, None) => RegisterAccess::Write(command.datagram.data.clone()),
+    };
+    let end = usize::from(ado.0) + command.datagram.data.len();
+    if end > 0x1_0000 {
+        let what = subject.clone();
+        let got = format!("{} bytes at {ado}", command.datagram.data.len());
+        return Err(contradiction(eni, index, command.place, what, "an end within 64 KiB", got, ""));
+    }
+    let register = RegisterCommand {
+        address: ado,
+        access,
+        retries: u8::try_from(command.retries).unwrap_or(u8::MAX),
+        required: command.datagram.count.is_some_and(|count| count > 0),
+    };
+    startup.extend(at_transitions(command.place, &command.transitions, index, &subject, notices, |transition| {
+        StartupCommand {
+            comment: comment(&command.comment),
+            ..StartupCommand::new(transition, StartupAction::Register(register.clone()))
+        }
+    }));
+    Ok(())
+}
+
+/// A comment, if it says something.
+pub(super) fn comment(text: &str) -> Option<String> {
+    (!text.is_empty()).then(|| text.to_owned())
+}
+
+/// SyncManagers that the file switches on at SO only.
+fn late_sync_managers(index: usize, commands: &[EcatCommand], up: &Registers, notices: &mut Notices) {
+    let early = Registers::after(commands, &UP[..2]);
+    for (number, register, place) in up.sync_managers().filter(|(_, register, _)| register.activate.enable) {
+        let before: [u8; 8] = early.read(map::sync_manager(number));
+        if before != register.encode() {
+            let reason = "set on the way to SAFEOP already, not to OP: RingCAT sets all SyncManagers there";
+            notices.add(Some(place), Some(index), format!("SyncManager {number} at SO"), reason);
+        }
+    }
+}

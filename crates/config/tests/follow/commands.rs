@@ -1,0 +1,212 @@
+//! Commands of a SubDevice: what becomes part of the declaration, what is sent, what is not.
+
+use std::net::Ipv4Addr;
+use std::time::Duration;
+
+use ringcat_engine::config::{
+    IdnWrite, IpSettings, RegisterAccess, RegisterCommand, SdoDownload, SdoUpload, StartupAction, SubDeviceConfig,
+    SyncManagerRole, SyncSignals, Transition,
+};
+use ringcat_wire::address::RegisterAddress;
+use ringcat_wire::al::AlState;
+use ringcat_wire::mailbox::soe::Idn;
+
+use crate::{SMALL, changed, configured, has_notice};
+
+fn drive(configuration: &ringcat_config::Configuration) -> SubDeviceConfig {
+    configuration.declaration.subdevices[3].clone()
+}
+
+/// Commands to registers, with their transitions.
+fn registers(config: &SubDeviceConfig) -> Vec<(Transition, RegisterCommand)> {
+    let register = |action: &StartupAction| match action {
+        StartupAction::Register(command) => Some(command.clone()),
+        _ => None,
+    };
+    config.startup.iter().filter_map(|command| Some((command.transition, register(&command.action)?))).collect()
+}
+
+#[test]
+fn commands_that_every_main_device_sends_become_part_of_the_declaration_facts_8_2() {
+    let configuration = configured(SMALL);
+    let drive = drive(&configuration);
+    assert_eq!(drive.watchdog_divider, Some(0x09C2));
+    assert_eq!(drive.pdi_watchdog_intervals, Some(1000));
+    assert_eq!(drive.watchdog_intervals, Some(10_000));
+    assert!(!drive.sii_to_pdi, "the EEPROM is taken back");
+    assert_eq!(drive.limit(AlState::Init, AlState::PreOp), Duration::from_secs(7));
+    assert!(configuration.declaration.subdevices[0].startup.is_empty(), "a coupler gets nothing else");
+    assert_eq!(configuration.declaration.subdevices[0].declared, Some(Vec::new()));
+}
+
+#[test]
+fn only_what_the_commands_compare_is_expected_facts_8_2() {
+    let configuration = configured(SMALL);
+    let coupler = configuration.declaration.subdevices[0].expected;
+    assert_eq!((coupler.vendor_id, coupler.product_code, coupler.revision), (Some(2), None, None));
+    let terminal = configuration.declaration.subdevices[1].expected;
+    assert_eq!(terminal, ringcat_engine::config::Expected::default(), "nothing is compared, nothing is expected");
+}
+
+#[test]
+fn a_single_word_of_the_revision_is_compared_as_the_file_does() {
+    let lookup = ("<Data>000108000000</Data>", "<Data>00010c000000</Data>");
+    let check = ("<Data>02000000</Data>", "<Data>0000</Data>");
+    let configuration = changed(&[lookup, check]);
+    let coupler = &configuration.declaration.subdevices[0];
+    assert_eq!(coupler.expected.revision, None, "the upper word may be anything");
+    let commands = registers(coupler);
+    assert_eq!(commands.len(), 2, "the address, then the look");
+    assert_eq!(commands[0].1.address, RegisterAddress(0x0502));
+    assert_eq!(commands[0].1.access, RegisterAccess::Write(vec![0x00, 0x01, 0x0C, 0, 0, 0]));
+    let limit = Duration::from_millis(100);
+    assert_eq!(commands[1].1.access, RegisterAccess::Check { data: vec![0, 0], mask: None, limit });
+    let whole = changed(&[lookup]);
+    assert_eq!(whole.declaration.subdevices[0].expected.revision, Some(2), "all of it is the engine's own matter");
+    assert!(registers(&whole.declaration.subdevices[0]).is_empty());
+}
+
+#[test]
+fn sync_managers_are_what_the_commands_leave_in_how_many_pieces_ever_facts_3_11() {
+    let drive = drive(&configured(SMALL));
+    let declared = drive.declared.expect("the file declares them");
+    let found: Vec<_> = declared.iter().map(|sm| (sm.index, sm.role, sm.register.start, sm.register.length)).collect();
+    let expected = [
+        (0, SyncManagerRole::MailboxOut, 0x1000, 128),
+        (1, SyncManagerRole::MailboxIn, 0x1080, 128),
+        (2, SyncManagerRole::Outputs, 0x1100, 6),
+        (3, SyncManagerRole::Inputs, 0x1180, 6),
+    ];
+    assert_eq!(found, expected);
+    assert_eq!(declared[2].register.control.bits(), 0x64);
+    assert!(declared.iter().all(|sm| sm.register.activate.enable));
+    let entries: Vec<_> =
+        declared[3].pdos[0].entries.iter().flatten().map(|entry| (entry.index, entry.bit_length)).collect();
+    assert_eq!(entries, [(0x6041, 16), (0x6064, 32)]);
+    let split = "<Data>001106006400</Data></InitCmd><InitCmd><Transition>PS</Transition><Cmd>5</Cmd><Adp>1004</Adp>\
+                 <Ado>2070</Ado><Data>01008011060020000100</Data>";
+    let in_pieces = changed(&[("<Data>00110600640001008011060020000100</Data>", split)]);
+    assert_eq!(in_pieces.declaration.subdevices[3].declared.as_ref(), Some(&declared));
+    let [out, back] = drive.declared_bootstrap.expect("BootStrap declares them");
+    assert_eq!((out.register.start, out.register.length, out.register.control.bits()), (4096, 256, 0x26));
+    assert_eq!((back.register.start, back.register.length, back.register.control.bits()), (4352, 256, 0x22));
+}
+
+#[test]
+fn long_entries_are_cut_and_pdos_that_do_not_fit_have_no_places() {
+    let entry = "<Entry><Index>#x6064</Index><SubIndex>0</SubIndex><BitLen>32</BitLen></Entry>";
+    let array = "<Entry><Index>#x2000</Index><SubIndex>1</SubIndex><BitLen>800</BitLen><DataType>ARRAY [0..99] OF BYTE</DataType></Entry>";
+    let lengths = ("<Data>00110600640001008011060020000100</Data>", "<Data>00110600640001008011660020000100</Data>");
+    let fmmu = ("<Data>00000010060000078011000101000000</Data>", "<Data>00000010660000078011000101000000</Data>");
+    let place = ("<BitStart>0</BitStart><BitLength>48</BitLength>", "<BitStart>0</BitStart><BitLength>816</BitLength>");
+    let datagram = ("<Addr>268435456</Addr><DataLength>6<", "<Addr>268435456</Addr><DataLength>102<");
+    let room = ("<ByteSize>8</ByteSize>", "<ByteSize>102</ByteSize>");
+    let configuration = changed(&[(entry, array), lengths, fmmu, place, datagram, room]);
+    let declared = drive(&configuration).declared.unwrap();
+    let bits: Vec<_> = declared[3].pdos[0].entries.iter().flatten().map(|e| (e.index, e.bit_length)).collect();
+    assert_eq!(bits, [(0x6041, 16), (0x2000, 248), (0, 248), (0, 248), (0, 56)]);
+    let too_long = changed(&[(entry, array)]);
+    assert!(drive(&too_long).declared.unwrap()[3].pdos.is_empty());
+    assert!(has_notice(&too_long, &["PDOs of SyncManager 3", "816 bits, more than its 48"]));
+}
+
+#[test]
+fn sync_signals_come_from_the_registers_and_the_shift_from_the_element_facts_7_3() {
+    let configuration = configured(SMALL);
+    let expected = SyncSignals {
+        assign_activate: 0x0700,
+        sync0_cycle_ns: 1_000_000,
+        sync0_shift_ns: -20_000,
+        sync1_cycle_ns: 0,
+        sync1_shift_ns: 250_000,
+    };
+    assert_eq!(drive(&configuration).sync, Some(expected));
+    assert_eq!(expected.sync1_register_ns(), 250_000);
+    // 2,250,000 ns: SYNC1 comes with every third SYNC0, a quarter of a cycle later.
+    let slower = changed(&[("<Data>40420f0090d00300</Data>", "<Data>40420f0010552200</Data>")]);
+    let signals = drive(&slower).sync.unwrap();
+    assert_eq!((signals.sync1_cycle_ns, signals.sync1_shift_ns), (3_000_000, 250_000));
+    assert_eq!(signals.sync1_register_ns(), 2_250_000);
+    assert!(drive(&changed(&[("<Data>0007</Data>", "<Data>0000</Data>")])).sync.is_none());
+}
+
+#[test]
+fn commands_through_the_mailbox_become_start_up_commands_in_document_order_facts_8_1() {
+    let drive = drive(&configured(SMALL));
+    let mail: Vec<_> = drive.startup.iter().filter(|c| !matches!(c.action, StartupAction::Register(_))).collect();
+    let sdo = |sub_index, complete_access, data: &[u8]| {
+        StartupAction::Sdo(SdoDownload { index: 0x1C12, sub_index, complete_access, data: data.to_vec() })
+    };
+    let found: Vec<_> = mail.iter().map(|command| (command.transition, &command.action)).collect();
+    let upload = SdoUpload { index: 0x1018, sub_index: 1, complete_access: false, expected: Some(vec![0x9A, 0, 0, 0]) };
+    let addresses = IpSettings {
+        mac: Some([2, 0, 0, 0, 0, 4]),
+        address: Some(Ipv4Addr::new(192, 168, 1, 4)),
+        mask: Some(Ipv4Addr::new(255, 255, 255, 0)),
+        ..IpSettings::default()
+    };
+    let expected = [
+        (Transition::Ps, &sdo(0, false, &[0])),
+        (Transition::Ps, &sdo(0, true, &[1, 0, 0, 0x16])),
+        (Transition::Ps, &StartupAction::Upload(upload)),
+        (Transition::Ip, &StartupAction::Idn(IdnWrite { drive: 1, idn: Idn(2), data: vec![0xE8, 0x03] })),
+        (Transition::Ip, &StartupAction::Ip(addresses)),
+    ];
+    assert_eq!(found, expected, "and not what is disabled");
+    assert_eq!(mail[0].limit, None, "0 is the usual limit");
+    assert_eq!(mail[1].limit, Some(Duration::from_millis(250)));
+    assert_eq!(mail[1].comment.as_deref(), Some("assign"));
+}
+
+#[test]
+fn a_file_that_only_says_ccs_2_means_downloads_facts_8_2() {
+    let upload = "<Comment>look</Comment><Ccs>2</Ccs><Index>#x1018</Index><SubIndex>1</SubIndex><Data>9A000000</Data>";
+    let text = SMALL.replace("<Ccs>1</Ccs>", "<Ccs>2</Ccs>").replace("<Comment>not this</Comment>", "<Ccs>2</Ccs>");
+    assert!(text.contains(upload));
+    let configuration = configured(&text);
+    let downloads = drive(&configuration).startup.iter().filter(|c| matches!(c.action, StartupAction::Sdo(_))).count();
+    assert_eq!(downloads, 3);
+    assert!(has_notice(&configuration, &["CoE/InitCmd/Ccs", "taken as downloads"]));
+}
+
+#[test]
+fn other_registers_are_written_and_looked_at_as_the_file_says() {
+    let configuration = configured(SMALL);
+    let commands = registers(&drive(&configuration));
+    let write = RegisterCommand {
+        address: RegisterAddress(0x0F00),
+        access: RegisterAccess::Write(vec![0xC0, 0xDE]),
+        retries: 5,
+        required: true,
+    };
+    let check = RegisterCommand {
+        address: RegisterAddress(0x0F04),
+        access: RegisterAccess::Check { data: vec![1, 0], mask: Some(vec![3, 0]), limit: Duration::from_millis(40) },
+        retries: 0,
+        required: false,
+    };
+    assert_eq!(commands, [(Transition::Ps, write.clone()), (Transition::Sp, write), (Transition::So, check)]);
+    assert!(has_notice(&configuration, &["own register", "not sent at OI"]));
+}
+
+#[test]
+fn what_addresses_somebody_else_is_not_sent_and_said() {
+    let position = changed(&[("<Adp>1004</Adp><Ado>3840</Ado>", "<Adp>1003</Adp><Ado>3840</Ado>")]);
+    assert!(has_notice(&position, &["own register", "FPWR with Adp 1003 goes to another SubDevice"]));
+    assert!(registers(&drive(&position)).iter().all(|(_, command)| command.address != RegisterAddress(0x0F00)));
+    let raw = ("<Comment>own register</Comment><Cmd>5</Cmd>", "<Comment>own register</Comment><Cmd>2</Cmd>");
+    let mixed_up = changed(&[raw]);
+    assert!(has_notice(&mixed_up, &["own register", "APWR counts positions", "Cmd 4 and 5 address by PhysAddr"]));
+}
+
+#[test]
+fn what_is_ours_is_not_in_the_notices_and_what_is_not_followed_is() {
+    let configuration = configured(SMALL);
+    let found = crate::notices(&configuration);
+    assert_eq!(found.len(), 4, "{found:#?}");
+    assert!(has_notice(&configuration, &["PreviousPort", "not compared"]));
+    assert!(has_notice(&configuration, &["SyncManager 0 at SO", "SAFEOP already"]));
+    assert!(has_notice(&configuration, &["1 variables of no SubDevice", "Inputs.DevState"]));
+    let ports = changed(&[("<Ado>3840</Ado>", "<Ado>256</Ado>")]);
+    assert!(has_notice(&ports, &["own register", "ports and forwarding"]));
+}

@@ -1,0 +1,61 @@
+//! What follows from an ENI (facts 8): one own file, `files/small.xml`, and what becomes of it when something in it is
+//! different.
+
+mod commands;
+mod contradictions;
+mod images;
+mod reading;
+mod real_files;
+mod segments;
+
+use ringcat_config::eni::{self, Eni};
+use ringcat_config::{Configuration, follow};
+
+/// A coupler, two terminals whose outputs share a byte, a drive with mailbox and clock.
+pub const SMALL: &str = include_str!("../files/small.xml");
+
+/// The file with some texts replaced; each must be there exactly once.
+pub fn with(changes: &[(&str, &str)]) -> String {
+    changes.iter().fold(SMALL.to_owned(), |text, (from, to)| {
+        assert_eq!(text.matches(from).count(), 1, "{from} is there once");
+        text.replace(from, to)
+    })
+}
+
+/// The model of a file that can be read.
+pub fn model(text: &str) -> Eni {
+    eni::read(text.as_bytes()).unwrap_or_else(|error| panic!("{error}"))
+}
+
+/// What follows from a file that can be followed.
+pub fn configured(text: &str) -> Configuration {
+    follow(&model(text)).unwrap_or_else(|error| panic!("{error}"))
+}
+
+/// What follows from the own file with some texts replaced.
+pub fn changed(changes: &[(&str, &str)]) -> Configuration {
+    configured(&with(changes))
+}
+
+/// Why a file cannot be read or followed.
+pub fn refusal(text: &str) -> String {
+    match eni::read(text.as_bytes()).and_then(|model| follow(&model)) {
+        Ok(_) => panic!("it is followed"),
+        Err(error) => error.to_string(),
+    }
+}
+
+/// Why the own file with some texts replaced cannot be read or followed.
+pub fn refused(changes: &[(&str, &str)]) -> String {
+    refusal(&with(changes))
+}
+
+/// Notices as text.
+pub fn notices(configuration: &Configuration) -> Vec<String> {
+    configuration.notices.iter().map(ToString::to_string).collect()
+}
+
+/// Whether one notice has all these parts.
+pub fn has_notice(configuration: &Configuration, parts: &[&str]) -> bool {
+    notices(configuration).iter().any(|notice| parts.iter().all(|part| notice.contains(part)))
+}

@@ -1,0 +1,141 @@
+//! Reading: encodings, dialects of numbers, other kinds of files, limits, errors with their place.
+
+use ringcat_config::eni::{self, EniError, MAX_DEPTH, Problem, Requires, Transition};
+
+use crate::{SMALL, configured, has_notice, model, refusal, refused, with};
+
+#[test]
+fn the_order_of_elements_and_the_case_of_digits_do_not_matter_facts_8_2() {
+    let info = "<Name>Small</Name>\n        <Destination>ffffffffffff</Destination>";
+    let turned = "<Destination>FF-FF-ff-ff-ff-ff</Destination>\n        <Name>Small</Name>";
+    let (plain, other) = (model(SMALL), model(&with(&[(info, turned)])));
+    assert_eq!(plain.main_device.name, other.main_device.name);
+    assert_eq!((plain.main_device.destination, plain.main_device.source), (vec![0xFF; 6], vec![2, 0, 0, 0, 0, 1]));
+    assert_eq!(other.main_device.destination, [0xFF; 6]);
+    let (begin, end) = (SMALL.find("<Cyclic>").unwrap(), SMALL.find("</Cyclic>").unwrap() + "</Cyclic>".len());
+    let first = format!("<Config>{}{}", &SMALL[begin..end], &SMALL[SMALL.find("<Config>").unwrap() + 8..begin]);
+    let moved = format!("<EtherCATConfig>{first}{}", &SMALL[end..]);
+    let (image, turned) = (configured(SMALL).image, configured(&moved).image);
+    assert_eq!(image, turned);
+    assert_eq!(plain.subdevices[3].vendor_id, Some(0x9A), "#x");
+    assert_eq!(plain.subdevices[3].product_code, Some(0x30924), "0x");
+    assert_eq!(plain.subdevices[0].name, "Coupler <1>", "CDATA");
+    assert_eq!(plain.made_by.as_deref().map(|text| text.starts_with("Created by hand")), Some(true));
+    assert_eq!(plain.version.as_deref(), Some("1.3"));
+}
+
+#[test]
+fn a_command_keeps_all_that_the_file_says_facts_8_2() {
+    let text = with(&[("<Comment>read count</Comment>", "<Comment>read count</Comment><Requires>cycle</Requires>")]);
+    let command = &model(&text).main_device.init_commands[0];
+    assert_eq!(command.requires, Some(Requires::Cycle));
+    assert!(command.before_subdevices);
+    assert_eq!((command.transitions.as_slice(), command.datagram.data.len()), (&[Transition::Ip][..], 2));
+    assert_eq!(model(SMALL).main_device.init_commands[1].retries, 3);
+}
+
+#[test]
+fn files_come_in_utf_8_utf_16_and_one_byte_encodings_with_and_without_a_mark() {
+    let text = SMALL.replace("<Name>Left</Name>", "<Name>Türe</Name>");
+    let name = |bytes: &[u8]| eni::read(bytes).unwrap_or_else(|error| panic!("{error}")).subdevices[1].name.clone();
+    assert_eq!(name(text.as_bytes()), "Türe");
+    assert_eq!(name(&[&[0xEF, 0xBB, 0xBF], text.as_bytes()].concat()), "Türe");
+    for mark in [&[0xFF, 0xFE][..], &[]] {
+        let units = text.replace("UTF-8", "utf-16");
+        let bytes: Vec<u8> = mark.iter().copied().chain(units.encode_utf16().flat_map(u16::to_le_bytes)).collect();
+        assert_eq!(name(&bytes), "Türe");
+    }
+    let big: Vec<u8> = [0xFE, 0xFF].into_iter().chain(text.encode_utf16().flat_map(u16::to_be_bytes)).collect();
+    assert_eq!(name(&big), "Türe");
+    for label in ["iso-8859-1", "windows-1252"] {
+        let labelled = text.replace("UTF-8", label);
+        let bytes: Vec<u8> = labelled.chars().map(|c| u8::try_from(u32::from(c)).unwrap()).collect();
+        assert_eq!(name(&bytes), "Türe");
+    }
+    // .NET writes this into files that are UTF-8.
+    assert_eq!(name(text.replace("UTF-8", "utf-16").as_bytes()), "Türe");
+}
+
+#[test]
+fn bytes_that_are_not_in_the_encoding_are_refused_with_their_line() {
+    let mut bytes = SMALL.as_bytes().to_vec();
+    let at = SMALL.find("Left").unwrap();
+    bytes[at] = 0xFC;
+    let error = eni::read(&bytes).unwrap_err();
+    let line = SMALL[..at].matches('\n').count() as u32 + 1;
+    assert_eq!(error.place.map(|place| place.line), Some(line));
+    assert!(error.to_string().contains("not in UTF-8"), "{error}");
+    assert!(refusal(&SMALL.replace("UTF-8", "klingon")).contains("\"klingon\" is not known"));
+}
+
+#[test]
+fn other_files_are_called_by_their_name() {
+    let said = |text: &str, what: &str| {
+        let refusal = refusal(text);
+        assert!(refusal.contains(what) && refusal.contains("An ENI has the root EtherCATConfig"), "{refusal}");
+    };
+    said("<EtherCATInfo Version=\"1.2\"><Vendor/></EtherCATInfo>", "a device description (ESI");
+    said("<EtherCATInfoList><EtherCATInfo/></EtherCATInfoList>", "a device description (ESI");
+    said("<EtherCATInfo>\n  <!-- Slave 0 -->\n  <Vendor/></EtherCATInfo>", "what `ethercat xml` prints");
+    said("<masters><master idx=\"0\"/></masters>", "LinuxCNC");
+    said("<TcSmProject/>", "TwinCAT project");
+    let schema =
+        "xmlns:xsi=\"http://www.w3.org/2001/XMLSchema-instance\" xsi:noNamespaceSchemaLocation=\"EtherCATInfo.xsd\"";
+    said(&format!("<EtherCATConfig {schema}><Config/></EtherCATConfig>"), "Beremiz");
+    said("<svg/>", "the root \"svg\"");
+    said("", "no XML file");
+    said("\u{7f}ELF", "no XML file");
+}
+
+#[test]
+fn errors_name_line_column_element_expected_and_got() {
+    let error = refused(&[("<BitStart>20</BitStart>", "<BitStart>twenty</BitStart>")]);
+    let line = SMALL[..SMALL.find("<BitStart>20").unwrap()].matches('\n').count() + 1;
+    let expected = format!(
+        "line {line}, column 15: Config/Slave[3] \"Right\"/ProcessData/Send/BitStart: expected a number from 0 to 4294967295, \
+         got \"twenty\""
+    );
+    assert_eq!(error, expected);
+    assert!(refused(&[("<Data>c209</Data>", "<Data>c20</Data>")]).contains("pairs of hexadecimal digits, got \"c20\""));
+    assert!(refused(&[("<State>3</State>", "<State>8</State>")]).contains("INIT, PREOP, SAFEOP, OP"));
+    assert!(refused(&[("<BitStart>20</BitStart>", "")]).contains("Send: <BitStart> is missing"));
+    let wrong = refused(&[("<Cmd>14</Cmd>", "<Cmd>15</Cmd>")]);
+    assert!(wrong.contains("Cyclic/Frame/Cmd[2] \"time\"/Cmd: expected a command from 0 (NOP) to 14"), "{wrong}");
+    assert!(
+        refused(&[("<PhysAddr>1002</PhysAddr><AutoIncAddr>", "<PhysAddr>70000</PhysAddr><AutoIncAddr>")])
+            .contains("from 0 to 65535")
+    );
+    let mask = refused(&[("<DataMask>0300</DataMask>", "<DataMask>03</DataMask>")]);
+    assert!(mask.contains("a mask of 2 bytes"), "{mask}");
+    let broken = refused(&[("</Cyclic>", "</Cycle>")]);
+    assert!(broken.starts_with("line ") && broken.contains("no well-formed XML"), "{broken}");
+}
+
+#[test]
+fn unknown_elements_are_listed_and_do_no_harm() {
+    let text = with(&[("<Name>Right</Name>", "<Name>Right</Name><Colour>red</Colour>")]);
+    let unknown = &model(&text).unknown;
+    assert_eq!(unknown.len(), 1);
+    assert_eq!(unknown[0].element, "Config/Slave[3] \"Right\"/Info/Colour");
+    let configuration = configured(&text);
+    assert!(has_notice(&configuration, &["Info/Colour", "not known"]));
+    let many = with(&[("<Name>Right</Name>", &format!("<Name>Right</Name>{}", "<X/>".repeat(500)))]);
+    let found = model(&many);
+    assert_eq!((found.unknown.len(), found.more_unknown), (eni::MAX_UNKNOWN, 500 - eni::MAX_UNKNOWN));
+}
+
+#[test]
+fn what_is_too_much_is_refused_before_it_costs_anything() {
+    let problem = |text: &str| match eni::read(text.as_bytes()) {
+        Err(EniError { problem: Problem::TooMuch { what, .. }, .. }) => what,
+        other => panic!("{other:?}"),
+    };
+    let deep = format!("<EtherCATConfig>{}", "<a>".repeat(MAX_DEPTH + 1));
+    assert_eq!(problem(&deep), "levels of elements");
+    let attributes: String = (0..100).map(|number| format!(" a{number}=\"\"")).collect();
+    assert_eq!(problem(&format!("<EtherCATConfig{attributes}/>")), "attributes of an element");
+    let namespaces = "<a xmlns:b=\"c\"/>".repeat(100);
+    assert_eq!(problem(&format!("<EtherCATConfig>{namespaces}</EtherCATConfig>")), "namespaces");
+    let entities = "<!DOCTYPE a [<!ENTITY b \"bb\">]><EtherCATConfig/>";
+    assert!(refusal(entities).contains("document type definition"));
+}

@@ -1,0 +1,111 @@
+//! The segment: positions, groups, clocks, files without commands.
+
+use ringcat_config::eni::Port;
+use ringcat_engine::config::{ConfigAddress, ReferenceClock};
+
+use crate::{SMALL, changed, configured, has_notice, refused};
+
+fn addresses(configuration: &ringcat_config::Configuration) -> Vec<ConfigAddress> {
+    configuration.declaration.subdevices.iter().map(|config| config.address).collect()
+}
+
+#[test]
+fn positions_follow_auto_inc_addr_and_not_the_order_of_the_file_facts_8_1() {
+    let swapped = changed(&[
+        ("<AutoIncAddr>65535</AutoIncAddr>", "<AutoIncAddr>1</AutoIncAddr>"),
+        ("<AutoIncAddr>65534</AutoIncAddr>", "<AutoIncAddr>65535</AutoIncAddr>"),
+        ("<AutoIncAddr>1</AutoIncAddr>", "<AutoIncAddr>65534</AutoIncAddr>"),
+    ]);
+    assert_eq!(addresses(&swapped), [0, 2, 1, 3].map(ConfigAddress::Position));
+    let facts: Vec<_> = swapped.subdevices.iter().map(|facts| (facts.station, facts.plugged_into)).collect();
+    let expected = [
+        (Some(1001), None),
+        (Some(1002), Some((0, Port::B))),
+        (Some(1003), Some((1, Port::B))),
+        (Some(1004), Some((0, Port::C))),
+    ];
+    assert_eq!(facts, expected);
+    assert_eq!(swapped.at_station(1003), Some(2));
+    assert_eq!(swapped.subdevices[3].net_id, Some([5, 6, 7, 8, 3, 1]));
+}
+
+#[test]
+fn without_auto_inc_addr_the_order_of_the_file_counts_and_that_is_said() {
+    let zeros = changed(&[
+        ("<AutoIncAddr>65535</AutoIncAddr>", ""),
+        ("<AutoIncAddr>65534</AutoIncAddr>", ""),
+        ("<AutoIncAddr>65533</AutoIncAddr>", ""),
+    ]);
+    assert_eq!(addresses(&zeros), [0, 1, 2, 3].map(ConfigAddress::Position));
+    assert!(has_notice(&zeros, &["AutoIncAddr", "order of the file"]));
+}
+
+const GROUP: &str = "<HotConnect><GroupName>Gripper</GroupName><GroupMemberCnt>2</GroupMemberCnt>\
+    <IdentifyCmd><Cmd>1</Cmd><Adp>0</Adp><Ado>18</Ado><DataLength>2</DataLength>\
+    <Validate><Data>3412</Data></Validate></IdentifyCmd></HotConnect>";
+/// Where the second SubDevice has its `PreviousPort`, which becomes a group's head.
+const HEAD: &str = "<PreviousPort Selected=\"1\"><Port>B</Port><PhysAddr>1001</PhysAddr></PreviousPort>";
+
+#[test]
+fn a_hot_connect_group_is_found_by_its_alias_and_its_members_are_behind_it_facts_8_2() {
+    let configuration = changed(&[(HEAD, GROUP)]);
+    let alias = |offset| ConfigAddress::Alias { alias: 0x1234, offset };
+    let expected = [ConfigAddress::Position(0), alias(0), alias(1), ConfigAddress::Position(1)];
+    assert_eq!(addresses(&configuration), expected, "those of a group are not counted");
+    let groups: Vec<_> = configuration.declaration.subdevices.iter().map(|c| (c.group, c.optional)).collect();
+    assert_eq!(groups, [(None, false), (Some(0), true), (Some(0), true), (None, false)]);
+    assert_eq!(configuration.groups, ["Gripper"]);
+}
+
+#[test]
+fn a_group_may_be_identified_by_its_eeprom_or_its_switch() {
+    let eeprom = "<IdentifyCmd><Cmd>2</Cmd><Adp>0</Adp><Ado>1282</Ado><Data>000104000000</Data></IdentifyCmd>\
+                  <IdentifyCmd><Cmd>1</Cmd><Adp>0</Adp><Ado>1288</Ado><DataLength>2</DataLength>\
+                  <Validate><Data>0700</Data></Validate></IdentifyCmd></HotConnect>";
+    let head = GROUP.split("<IdentifyCmd>").next().unwrap();
+    let configuration = changed(&[(HEAD, &format!("{head}{eeprom}"))]);
+    assert_eq!(addresses(&configuration)[1], ConfigAddress::Alias { alias: 7, offset: 0 });
+    let switch = changed(&[(HEAD, &GROUP.replace("<Ado>18</Ado>", "<Ado>308</Ado>"))]);
+    assert_eq!(addresses(&switch)[2], ConfigAddress::Identification { value: 0x1234, offset: 1 });
+}
+
+#[test]
+fn a_group_that_cannot_be_found_or_is_not_complete_is_refused() {
+    let word = refused(&[(HEAD, &GROUP.replace("<Ado>18</Ado>", "<Ado>4096</Ado>"))]);
+    assert!(word.contains("identification of the hot connect group \"Gripper\""), "{word}");
+    assert!(word.contains("other kinds of identification"), "{word}");
+    let long = refused(&[(HEAD, &GROUP.replace(">2</GroupMemberCnt>", ">9</GroupMemberCnt>"))]);
+    assert!(long.contains("expected 9, got 3"), "{long}");
+}
+
+#[test]
+fn the_reference_is_whom_the_cycle_asks_for_the_time_facts_7() {
+    let clocks = configured(SMALL).declaration.clocks.expect("the file uses clocks");
+    assert_eq!((clocks.reference, clocks.bus_shift), (ReferenceClock::Declared(3), false));
+    let bus_shift = "<Cmd><Cmd>5</Cmd><Adp>1004</Adp><Ado>2320</Ado><DataLength>4</DataLength></Cmd>";
+    let first = "<Comment>time</Comment><Cmd>13</Cmd><Adp>0</Adp>";
+    let frame = "<Frame>\n        <Cmd><State>PREOP</State>";
+    let shifted = changed(&[
+        ("<Comment>time</Comment><Cmd>14</Cmd><Adp>1004</Adp>", first),
+        (frame, &frame.replace("<Frame>", &format!("<Frame>{bus_shift}"))),
+    ]);
+    let clocks = shifted.declaration.clocks.unwrap();
+    assert_eq!((clocks.reference, clocks.bus_shift), (ReferenceClock::Declared(0), true));
+}
+
+#[test]
+fn a_file_without_commands_leaves_the_rest_to_the_sii_and_expects_what_info_says() {
+    let text = "<EtherCATConfig><Config><Slave><Info><Name>A</Name><PhysAddr>1001</PhysAddr><VendorId>2</VendorId>\
+        <ProductCode>0</ProductCode></Info><ProcessData><Send><BitStart>8</BitStart><BitLength>16</BitLength></Send>\
+        <Send><BitStart>32</BitStart><BitLength>8</BitLength></Send></ProcessData></Slave></Config></EtherCATConfig>";
+    let configuration = configured(text);
+    let config = &configuration.declaration.subdevices[0];
+    assert_eq!(config.declared, None);
+    assert_eq!((config.expected.vendor_id, config.expected.product_code), (Some(2), None));
+    let areas: Vec<_> =
+        configuration.image.areas.iter().map(|a| (a.sync_manager, a.bit_offset, a.image_bit, a.bits)).collect();
+    assert_eq!(areas, [(None, 0, 8, 16), (None, 16, 32, 8)]);
+    assert_eq!(configuration.image.outputs_len, 5, "without an image of the file as long as needed");
+    assert_eq!(configuration.declaration.domains.len(), 1);
+    assert!(has_notice(&configuration, &["Cyclic/CycleTime", "1ms is taken"]));
+}
