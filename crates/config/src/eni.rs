@@ -13,7 +13,7 @@ mod parse;
 mod text;
 
 pub(crate) use error::shown as quoted;
-pub use error::{EniError, Place, Problem};
+pub use error::{Contradiction, EniError, Place, Problem};
 pub use kind::FileKind;
 pub use model::{
     BitRange, CoeCommand, CopyInfo, CyclicCommand, CyclicState, CyclicTask, Datagram, DistributedClock, EcatCommand,

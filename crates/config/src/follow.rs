@@ -21,7 +21,7 @@ mod sync_managers;
 use ringcat_engine::main_device::Declaration;
 
 use crate::configuration::{Configuration, SubDeviceFacts};
-use crate::eni::{Eni, EniError, Place, Problem};
+use crate::eni::{Contradiction, Eni, EniError, Place, Problem};
 use notices::Notices;
 
 /// Bytes of an image, at most.
@@ -72,8 +72,9 @@ fn contradiction(
     got: impl Into<String>,
     hint: &str,
 ) -> EniError {
-    let problem =
-        Problem::Contradiction { what: what.into(), expected: expected.into(), got: got.into(), hint: hint.to_owned() };
+    let contradiction =
+        Contradiction { what: what.into(), expected: expected.into(), got: got.into(), hint: hint.to_owned() };
+    let problem = Problem::Contradiction(Box::new(contradiction));
     EniError { place: Some(place), element: label(eni, subdevice), problem }
 }
 

@@ -68,16 +68,20 @@ pub enum Problem {
         got: String,
     },
     /// Two places of the file, or the file and what can be, contradict each other.
-    Contradiction {
-        /// What about.
-        what: String,
-        /// What one place says, or what must be.
-        expected: String,
-        /// What the other one says.
-        got: String,
-        /// What to do about it; may be empty.
-        hint: String,
-    },
+    Contradiction(Box<Contradiction>),
+}
+
+/// Two places of the file, or the file and what can be, that contradict each other.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Contradiction {
+    /// What about.
+    pub what: String,
+    /// What one place says, or what must be.
+    pub expected: String,
+    /// What the other one says.
+    pub got: String,
+    /// What to do about it; may be empty.
+    pub hint: String,
 }
 
 impl EniError {
@@ -113,7 +117,8 @@ impl fmt::Display for Problem {
             Problem::WrongFile { kind } => write!(f, "this is {kind}"),
             Problem::Missing { element } => write!(f, "<{element}> is missing"),
             Problem::Value { expected, got } => write!(f, "expected {expected}, got {got}"),
-            Problem::Contradiction { what, expected, got, hint } => {
+            Problem::Contradiction(contradiction) => {
+                let Contradiction { what, expected, got, hint } = &**contradiction;
                 write!(f, "{what}: expected {expected}, got {got}")?;
                 if hint.is_empty() { Ok(()) } else { write!(f, " ({hint})") }
             }

@@ -140,11 +140,11 @@ pub(super) fn group_mark(commands: &[EcatCommand]) -> Option<Mark> {
 /// Whether the PDI still has the EEPROM in PREOP: given to it at IP and not taken back.
 pub(super) fn keeps_eeprom(commands: &[EcatCommand]) -> bool {
     let up = commands.iter().filter(|command| command.transitions.contains(&Transition::Ip));
-    let given = up.filter_map(|command| match command.datagram.target {
+    let mut given = up.filter_map(|command| match command.datagram.target {
         Target::Register { ado, .. } if ado == map::SII_CONFIGURATION && command.datagram.command.writes() => {
             command.datagram.data.first().map(|byte| byte & 1 != 0)
         }
         Target::Register { .. } | Target::Logical(_) => None,
     });
-    given.last().unwrap_or(false)
+    given.next_back().unwrap_or(false)
 }

@@ -1,0 +1,101 @@
+//! What an ENI says of cycles and of the process image (facts 8.1).
+
+use super::{Datagram, Place};
+
+/// A state in which a cyclic command is sent (facts 8.2: numbers count states, they are no AL codes).
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub enum CyclicState {
+    /// 1, INIT.
+    Init,
+    /// 2, PREOP.
+    PreOp,
+    /// 3, SAFEOP.
+    SafeOp,
+    /// 4, OP.
+    Op,
+}
+
+/// `Cyclic`.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct CyclicTask {
+    /// Where it stands.
+    pub place: Place,
+    /// `Comment`.
+    pub comment: String,
+    /// `CycleTime` in microseconds.
+    pub cycle_us: Option<u32>,
+    /// `Frame`.
+    pub frames: Vec<Frame>,
+}
+
+/// `Cyclic/Frame`.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Frame {
+    /// Its commands.
+    pub commands: Vec<CyclicCommand>,
+}
+
+/// `Cyclic/Frame/Cmd`.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct CyclicCommand {
+    /// Where it stands.
+    pub place: Place,
+    /// When it is sent.
+    pub states: Vec<CyclicState>,
+    /// What it is for.
+    pub comment: String,
+    /// What is sent.
+    pub datagram: Datagram,
+    /// `InputOffs`: byte in the input image.
+    pub input_offset: Option<u32>,
+    /// `OutputOffs`: byte in the output image.
+    pub output_offset: Option<u32>,
+    /// `CopyInfos`.
+    pub copies: Vec<CopyInfo>,
+}
+
+/// `CopyInfo`: bits of the input image that become bits of the output image.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct CopyInfo {
+    /// Where it stands.
+    pub place: Place,
+    /// `SrcBitOffs`.
+    pub source: u32,
+    /// `DstBitOffs`.
+    pub target: u32,
+    /// `BitSize`.
+    pub bits: u32,
+}
+
+/// `ProcessImage`.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct ProcessImage {
+    /// `Inputs`.
+    pub inputs: ImageSide,
+    /// `Outputs`.
+    pub outputs: ImageSide,
+}
+
+/// `Inputs` or `Outputs`.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct ImageSide {
+    /// `ByteSize`; `None` where the file has no image.
+    pub bytes: Option<u32>,
+    /// `Variable`.
+    pub variables: Vec<Variable>,
+}
+
+/// `Variable`.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Variable {
+    /// Where it stands.
+    pub place: Place,
+    /// `Name`.
+    pub name: String,
+    /// `DataType`.
+    pub data_type: String,
+    /// `BitSize`.
+    pub bits: u32,
+    /// `BitOffs`.
+    pub bit_offset: u32,
+}
