@@ -456,11 +456,6 @@ impl MainDevice {
         self.supervisor.transmit(now, budget, transmit)
     }
 
-    /// Sends one acyclic frame; see [`Supervisor::transmit_frame`].
-    pub fn transmit_frame(&mut self, now: Instant, limit: usize, transmit: &mut impl FnMut(Link, &[u8])) -> usize {
-        self.supervisor.transmit_frame(now, limit, transmit)
-    }
-
     /// When [`MainDevice::poll`] has something to do at the latest.
     pub fn next_deadline(&self) -> Option<Instant> {
         self.supervisor.next_deadline()

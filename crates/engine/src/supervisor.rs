@@ -125,13 +125,6 @@ impl Supervisor {
         shared.transmit(budget, transmit)
     }
 
-    /// As [`Supervisor::transmit`], but one frame: for who looks at the clock before each. Its length, 0 where nothing is sent.
-    pub fn transmit_frame(&mut self, now: Instant, limit: usize, transmit: &mut impl FnMut(Link, &[u8])) -> usize {
-        let shared = &mut *self.shared.borrow_mut();
-        shared.now = now;
-        shared.transmit_frame(limit, transmit)
-    }
-
     /// When [`Supervisor::poll`] has something to do at the latest, frames received meanwhile aside.
     pub fn next_deadline(&self) -> Option<Instant> {
         self.shared.borrow().next_deadline()

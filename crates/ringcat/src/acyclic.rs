@@ -97,21 +97,16 @@ pub(crate) fn work(engine: &mut Engine, links: &mut impl Links, window: &Window)
     if !engine.wants_to_send() {
         return false;
     }
-    // Procedures have taken their time, the kernel takes some for each frame, more than the wire does for a short one: the
-    // window is looked at before each, and the copy on the second link has to be in it too.
-    let mut now = links.now();
-    loop {
-        let length = engine.transmit_frame(now, window.bytes(now), &mut |link, frame| {
+    // Procedures have taken their time, the kernel takes some for each frame: the window is looked at as late as possible.
+    let now = links.now();
+    let budget = window.bytes(now);
+    if budget > 0 {
+        engine.transmit(now, budget, &mut |link, frame| {
             if link == Link::Main {
                 window.occupy(Half::Acyclic, links.now(), frame.len());
             }
             links.send(link, frame);
         });
-        if length == 0 {
-            return engine.wants_to_send();
-        }
-        let sent = links.now();
-        window.took(sent.since(now));
-        now = sent;
     }
+    engine.wants_to_send()
 }

@@ -101,9 +101,24 @@ impl ClockOptions {
         }
     }
 
-    /// What makes cycles begin.
-    pub fn trigger(&self) -> Trigger {
-        if self.bus_shift { Trigger::Time } else { Trigger::ReferenceClock { phase_ns: self.phase.unwrap_or(0) } }
+    /// As [`ClockOptions::declare`] for a declaration that brings its clocks with it, from an ENI: who has SYNC signals and
+    /// who is followed is said there, which of host and reference follows the other may be chosen.
+    pub fn adapt(&self, declaration: &mut Declaration, asked: bool) -> Result<(), Failure> {
+        if !self.sync.is_empty() || self.reference != ReferenceClock::default() {
+            return Err(Failure::new("--sync and --reference: the ENI says who has SYNC signals and who is followed"));
+        }
+        let Some(config) = &mut declaration.clocks else {
+            return if asked { Err(Failure::new("the ENI has no distributed clocks")) } else { Ok(()) };
+        };
+        config.epoch = system_time::epoch(now());
+        config.bus_shift = (config.bus_shift || self.bus_shift) && self.phase.is_none();
+        let cycle = declaration.domains.iter().map(|domain| domain.period).min().unwrap_or_default();
+        self.check(&[], &[], cycle.as_nanos() as u64).map_err(Failure::new)
+    }
+
+    /// What makes cycles begin, with bus shift or without.
+    pub fn trigger(&self, bus_shift: bool) -> Trigger {
+        if bus_shift { Trigger::Time } else { Trigger::ReferenceClock { phase_ns: self.phase.unwrap_or(0) } }
     }
 }
 

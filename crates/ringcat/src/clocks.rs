@@ -89,7 +89,7 @@ pub fn run(arguments: &ClocksArguments) -> Result<bool, Failure> {
     arguments.options.declare(&mut declaration, &scan.subdevices)?;
     let signals: Vec<Option<SyncSignals>> = declaration.subdevices.iter().map(|config| config.sync).collect();
     let mut application = supervisor.activate(declaration, cyclic).map_err(ringcat::Error::from)?;
-    application.set_trigger(arguments.options.trigger());
+    application.set_trigger(arguments.options.trigger(arguments.options.bus_shift));
     let cycles = application.start_cycles(move || thread.prepare_cycles(), |_| ControlFlow::Continue(()))?;
     let telling = Telling::new(begin, names, surroundings);
     let mut watch = Watch { begin, telling, end: &end, json: arguments.json };

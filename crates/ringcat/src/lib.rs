@@ -33,6 +33,7 @@ pub mod application;
 mod cyclic;
 pub mod cyclic_thread;
 mod device_services;
+pub mod eni;
 pub mod eoe;
 mod error;
 pub mod gateway;

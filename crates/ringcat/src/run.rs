@@ -1,10 +1,11 @@
-//! `ringcat run`: everything on the wire to OP as its SII says, process data in a fixed cycle, and an orderly stop.
+//! `ringcat run`: everything on the wire to OP as its SII says, or as an ENI says, process data in a fixed cycle, and an orderly stop.
 //!
-//! Cycles have a thread of their own, and so has everything else; this one only tells. Outputs stay zero: this command
-//! knows of no application. What keeps the cycle from its time is told apart: wake-ups
+//! Cycles have a thread of their own, and so has everything else; this one only tells. Outputs stay zero, or what was asked
+//! for with an ENI: this command knows of no application. What keeps the cycle from its time is told apart: wake-ups
 //! that came late and cycles that were left out are this machine's, lost frames are the wire's.
 
 mod beside;
+mod eni;
 mod junction;
 mod live;
 mod summary;
@@ -18,7 +19,10 @@ use clap::Args;
 use ringcat::packet::PacketLinks;
 use ringcat::tee::Tee;
 use ringcat::text::{Names, address_of_sender, describe};
-use ringcat::{CyclicThread, Event, Instant, LastOutputs, Links, MAX_UNDER_WAY, Options, SupervisorThread, automatic};
+use ringcat::{
+    CyclicThread, Declaration, Event, Instant, LastOutputs, Links, MAX_UNDER_WAY, Options, ReadPdos, SubDeviceInfo,
+    SupervisorThread, automatic,
+};
 use ringcat_wire::al::AlState;
 
 use crate::clock_options::ClockOptions;
@@ -29,6 +33,7 @@ use crate::surroundings::Surroundings;
 use crate::telling::{Telling, Told};
 use crate::times::time;
 use beside::{Beside, BesideArguments};
+use eni::{EniArguments, EniNetwork, Watched};
 use junction::{Junctions, junctions};
 use live::Live;
 use summary::{clock_account, final_account, summary};
@@ -42,7 +47,8 @@ const LOOK: Duration = Duration::from_millis(1);
 
 /// How to read what it prints.
 const SUMMARY_HELP: &str = "\
-All outputs stay zero. Watchdogs, process data and mailboxes are set up as each SubDevice's EEPROM (SII) says.
+All outputs stay zero. Watchdogs, process data and mailboxes are set up as each SubDevice's EEPROM (SII) says; with
+--eni as the file says, and outputs as --set does.
 
 Ctrl-C ends it in order: outputs zero, all SubDevices to INIT. Exit status 0: all reached OP, no frame was lost, and all
 clocks are locked where there are any.
@@ -71,6 +77,8 @@ pub struct RunArguments {
     /// Cycle time, with its unit: 250us, 1ms.
     #[arg(long, value_name = "TIME", default_value = "1ms", value_parser = time)]
     cycle: Duration,
+    #[command(flatten)]
+    eni: EniArguments,
     /// Cycles that may be under way at once, for a cycle time that is shorter than the way of a frame through segment and
     /// host. Inputs are then as many cycles old as their way takes.
     #[arg(long, value_name = "CYCLES", default_value = "1", value_parser = clap::value_parser!(u8).range(1..=i64::from(MAX_UNDER_WAY)))]
@@ -97,6 +105,7 @@ pub struct RunArguments {
 /// Runs cycles; true where all SubDevices reached OP and no frame was lost afterwards.
 pub fn run(arguments: &RunArguments) -> Result<bool, Failure> {
     let end = end_request();
+    let network = arguments.eni.load()?;
     let thread = arguments.thread;
     let (cyclic, acyclic) = arguments.interfaces.open_halves(thread)?;
     let mut surroundings = Surroundings::watch(&arguments.interfaces, &cyclic);
@@ -107,6 +116,8 @@ pub fn run(arguments: &RunArguments) -> Result<bool, Failure> {
     let options = Options {
         junctions: arguments.junction.mode,
         enhanced_line_crossed: arguments.enhanced_line_crossed,
+        // The file says what PDOs there are.
+        pdos: if network.is_some() { ReadPdos::Never } else { ReadPdos::default() },
         ..arguments.interfaces.options()
     };
     let supervisor = SupervisorThread::start(acyclic, &options, move || thread.prepare_supervisor())?;
@@ -117,24 +128,48 @@ pub fn run(arguments: &RunArguments) -> Result<bool, Failure> {
         others += tell_of_others(&mut cyclic, &mut surroundings);
     });
     let scan = result.map_err(|error| surroundings.explain(error, others + supervisor.counters().foreign))?;
-    say!("{} SubDevices; cycle {} us", scan.subdevices.len(), arguments.cycle.as_micros());
-    let names = Names(scan.subdevices.iter().map(|info| info.name.clone()).collect());
-    let mut declaration = automatic(&scan.subdevices, arguments.cycle).with_under_way(arguments.under_way);
-    let clocks = arguments.clocks || arguments.clock_options.are_given();
-    if clocks {
-        arguments.clock_options.declare(&mut declaration, &scan.subdevices)?;
-    }
+    let names = match &network {
+        Some(network) => network.names(),
+        None => Names(scan.subdevices.iter().map(|info| info.name.clone()).collect()),
+    };
+    let declaration = declare(arguments, network.as_ref(), &scan.subdevices)?;
+    let period = declaration.domains.iter().map(|domain| domain.period).min().unwrap_or(arguments.cycle);
+    say!("{} SubDevices; cycle {} us", scan.subdevices.len(), period.as_micros());
+    let trigger = declaration.clocks.as_ref().map(|clocks| arguments.clock_options.trigger(clocks.bus_shift));
+    let clocks = trigger.is_some();
     supervisor.load(declaration)?;
-    let connections = arguments.junction.connections.iter();
-    connections.copied().try_for_each(|connection| supervisor.add_junction_connection(connection))?;
-    let mut application = supervisor.apply(cyclic).map_err(ringcat::Error::from)?;
-    if clocks {
-        application.set_trigger(arguments.clock_options.trigger());
+    let at_station = |station| network.as_ref().and_then(|network| network.at_station(station));
+    for connection in &arguments.junction.connections {
+        let connection = connection.resolve(at_station).map_err(Failure::new)?;
+        supervisor.add_junction_connection(connection)?;
     }
-    let cycles = application.start_cycles(move || thread.prepare_cycles(), |_| ControlFlow::Continue(()))?;
+    let mut application = supervisor.apply(cyclic).map_err(|error| match &network {
+        Some(network) => network.explain(error.into()),
+        None => Failure::from(ringcat::Error::from(error)),
+    })?;
+    if let Some(trigger) = trigger {
+        application.set_trigger(trigger);
+    }
+    let (mut work, watched) = match &network {
+        Some(network) => {
+            let (work, watched) = network.work(application.directory())?;
+            application.set_copies(work.copies()).map_err(|error| Failure::new(error.to_string()))?;
+            (Some(work), watched)
+        }
+        None => (None, Watched::default()),
+    };
+    let cycles = application.start_cycles(
+        move || thread.prepare_cycles(),
+        move |data| {
+            if let Some(work) = &mut work {
+                work.cycle(data);
+            }
+            ControlFlow::Continue(())
+        },
+    )?;
     let live = Live::new(arguments.interfaces.redundant.is_some(), clocks);
     let telling = Telling::new(begin, names, surroundings).one_by_one(arguments.tell_all);
-    let mut run = Run { cycles, telling, live, clocks, beside };
+    let mut run = Run { cycles, telling, live, clocks, beside, watched };
     let in_op = run.reach_op(&end);
     let before = run.cycles.news().counters();
     if in_op {
@@ -148,12 +183,38 @@ pub fn run(arguments: &RunArguments) -> Result<bool, Failure> {
     if clocks {
         clock_account(&status, application.news(), run.telling.names());
     }
+    run.watched.account();
     run.beside.account();
     let lost = application.cyclic_counters().lost - before.lost;
     let (supervisor, mut links) = application.stop(LastOutputs::Zero, AlState::Init, STOP_LIMIT)?;
     final_account(&mut links, &supervisor);
     say!("  stopped: outputs zero, all SubDevices in INIT");
     Ok(in_op && lost == 0 && locked)
+}
+
+/// What is to be activated: the file's network, or what was found as its SIIs say.
+fn declare(
+    arguments: &RunArguments,
+    network: Option<&EniNetwork>,
+    found: &[SubDeviceInfo],
+) -> Result<Declaration, Failure> {
+    let options = &arguments.clock_options;
+    let asked = arguments.clocks || options.are_given();
+    let declaration = match network {
+        Some(network) => {
+            let mut declaration = network.declaration(found)?;
+            options.adapt(&mut declaration, asked)?;
+            declaration
+        }
+        None => {
+            let mut declaration = automatic(found, arguments.cycle);
+            if asked {
+                options.declare(&mut declaration, found)?;
+            }
+            declaration
+        }
+    };
+    Ok(declaration.with_under_way(arguments.under_way))
 }
 
 struct Run {
@@ -163,6 +224,8 @@ struct Run {
     /// Distributed clocks are in use.
     clocks: bool,
     beside: Beside,
+    /// Variables of a file.
+    watched: Watched,
 }
 
 /// Tells of other MainDevices and of the cabling among the events of a scan.
@@ -205,6 +268,10 @@ impl Run {
         for words in self.beside.news() {
             self.live.clear();
             eprintln!("ringcat: {words}");
+        }
+        for line in self.watched.news(now()) {
+            self.live.clear();
+            say!("{line}");
         }
     }
 

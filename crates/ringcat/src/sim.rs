@@ -11,6 +11,7 @@ use std::path::PathBuf;
 use std::time::Duration;
 
 use clap::Args;
+use ringcat::eni::EniFile;
 use ringcat_link::{CarrierWatch, monotonic};
 use ringcat_sim::cable::HostLink;
 use ringcat_sim::network::Network;
@@ -37,8 +38,11 @@ pub struct SimArguments {
     #[arg(long, value_name = "IF")]
     redundant: Option<String>,
     /// Segment file (see docs/segments.md).
-    #[arg(long, value_name = "FILE.toml")]
-    segment: PathBuf,
+    #[arg(long, value_name = "FILE.toml", required_unless_present = "eni")]
+    segment: Option<PathBuf>,
+    /// Make the segment from this ENI, with the SubDevices that it describes; a ring with --redundant (see docs/eni.md).
+    #[arg(long, value_name = "FILE", conflicts_with = "segment")]
+    eni: Option<PathBuf>,
     /// Unix socket at which orders are taken; each answer ends with a line `ok` or `error: ...`.
     #[arg(long, value_name = "PATH")]
     control: Option<PathBuf>,
@@ -105,8 +109,14 @@ pub fn run(arguments: &SimArguments) -> Result<(), Failure> {
 }
 
 fn load(arguments: &SimArguments) -> Result<Network, Failure> {
-    let path = arguments.segment.display();
-    let network = Network::from_description(Segment::load(&arguments.segment)?)?;
+    let (path, network) = match (&arguments.eni, &arguments.segment) {
+        (Some(path), _) => {
+            let file = EniFile::load(path).map_err(|error| Failure::new(error.to_string()))?;
+            (path.display(), file.simulated(arguments.redundant.is_some())?)
+        }
+        (None, Some(path)) => (path.display(), Network::from_description(Segment::load(path)?)?),
+        (None, None) => return Err(Failure::new("expected --segment FILE.toml or --eni FILE")),
+    };
     if network.host_cable(HostLink::Main).is_none() {
         return Err(Failure::new(format!("{path}: no device is plugged into the main interface")));
     }

@@ -14,8 +14,6 @@ use ringcat_wire::frame::{BYTE_TIME_NS, MAX_FRAME, MIN_FRAME, WIRE_OVERHEAD, wir
 /// Before a cycle begins, the wire is left to itself for so long: an acyclic frame that is under way then has passed
 /// the interface.
 const GUARD: Duration = Duration::from_nanos(wire_time_ns(MAX_FRAME) / 4);
-/// Longest time for handing a frame to the kernel that is reckoned with; what takes longer is a stall of the machine.
-const LONGEST_SENDING: Duration = Duration::from_nanos(wire_time_ns(MAX_FRAME) / 2);
 /// A pause between two cycles that is shorter has no room for a frame: there is no window to keep then.
 pub const SHORTEST: Duration = Duration::from_nanos(wire_time_ns(MAX_FRAME) + wire_time_ns(MAX_FRAME) / 2);
 /// A cyclic half that is so much later than it said has stopped: nobody's frames are in the way then.
@@ -46,8 +44,6 @@ pub struct Window {
     next_cycle: AtomicU64,
     /// When what each half sent will have left.
     free: [AtomicU64; 2],
-    /// How long it takes the acyclic half to hand a frame to the kernel, on all links.
-    sending: AtomicU64,
 }
 
 impl Default for Window {
@@ -65,7 +61,6 @@ impl Window {
             spent: [zero(), zero()],
             next_cycle: AtomicU64::new(Instant::NEVER.0),
             free: [zero(), zero()],
-            sending: zero(),
         }
     }
 
@@ -91,14 +86,6 @@ impl Window {
         }
     }
 
-    /// Notes how long it took to hand over a frame of the acyclic half: the next one will take as long, the slow ones among
-    /// the last few deciding.
-    pub fn took(&self, sending: Duration) {
-        let before = self.sending.load(Ordering::Relaxed);
-        let took = u64::try_from(sending.min(LONGEST_SENDING).as_nanos()).unwrap_or(u64::MAX);
-        self.sending.store(took.max(before - before / 8), Ordering::Relaxed);
-    }
-
     /// What the acyclic half has sent in the cycle that ends then.
     fn spent_before(&self, next: u64) -> u64 {
         let [of, spent] = &self.spent;
@@ -116,8 +103,7 @@ impl Window {
         if next == Instant::NEVER.0 || now.0.saturating_sub(next) > SILENCE_NS {
             return usize::MAX;
         }
-        let ready = now + Duration::from_nanos(self.sending.load(Ordering::Relaxed));
-        let bytes = Instant(next).since(self.free_at(ready) + GUARD).as_nanos() / u128::from(BYTE_TIME_NS);
+        let bytes = Instant(next).since(self.free_at(now) + GUARD).as_nanos() / u128::from(BYTE_TIME_NS);
         let room = usize::try_from(bytes).unwrap_or(usize::MAX).saturating_sub(WIRE_OVERHEAD);
         let spent = usize::try_from(self.spent_before(next)).unwrap_or(usize::MAX);
         let left = room.min(self.budget.saturating_sub(spent));
@@ -172,24 +158,6 @@ mod tests {
         let least = Window::new(0);
         least.expect_cycle(Instant(10 * MS));
         assert_eq!(least.bytes(Instant(0)), MAX_FRAME);
-    }
-
-    #[test]
-    fn handing_a_frame_over_takes_time_of_the_window_too() {
-        let window = Window::default();
-        window.expect_cycle(Instant(MS));
-        let before = window.bytes(Instant(0));
-        window.took(Duration::from_micros(40));
-        assert_eq!(before - window.bytes(Instant(0)), 500, "40 us of the wire");
-        assert_eq!(window.bytes(Instant(MS - 70_000)), 0);
-        window.took(Duration::from_secs(1));
-        assert!(before - window.bytes(Instant(0)) < 800, "a stall says nothing about the next one");
-        (0..50).for_each(|_| window.took(Duration::from_micros(8)));
-        assert_eq!(before - window.bytes(Instant(0)), 100);
-        window.occupy(Half::Acyclic, Instant(0), 1_514);
-        let behind = window.bytes(Instant(0));
-        window.took(Duration::from_micros(40));
-        assert_eq!(window.bytes(Instant(0)), behind, "meanwhile the one before leaves");
     }
 
     #[test]

@@ -2,8 +2,10 @@
 
 use std::time::Duration;
 
+use ringcat::eni::{EniFile, EniImage};
 use ringcat::links::Links;
 use ringcat::memory::MemoryLinks;
+use ringcat::simulated::SimulatedSegment;
 use ringcat::tee::Tee;
 use ringcat_engine::domain::{DomainId, Freshness};
 use ringcat_engine::exchange::{CopyRule, CyclicCounters, Entry, Received};
@@ -256,4 +258,30 @@ fn copy_first(links: &mut MemoryLinks, first: &mut [u8; 1514]) -> (Link, usize) 
     let (link, frame) = links.arriving.pop().expect("there is one");
     first[..frame.len()].copy_from_slice(frame);
     (link, frame.len())
+}
+
+/// The image of an ENI is copied bit by bit where its SubDevices share bytes.
+#[test]
+fn the_image_of_an_eni_takes_no_memory() {
+    let file = EniFile::from_bytes(include_bytes!("../../ringcat/examples/machine.eni.xml")).expect("it is ours");
+    let segment = SimulatedSegment::new(file.simulated(false).expect("cables fit"));
+    let mut main_device = ringcat::MainDevice::request(segment, &ringcat::Options::default());
+    main_device.scan().expect("a scan");
+    let mut application = main_device.activate(file.declaration(false)).expect("it fits");
+    let mut image = EniImage::new(&file.configuration, application.directory()).expect("it fits");
+    while !application.all_settled() {
+        application.cycle(|_| ());
+    }
+    let lamp = image.variable("Lamps.Channel 2").cloned().expect("it is there");
+    let (exchange, mut values) = (application.exchange_mut(), 0);
+    let used = counted(|| {
+        for cycle in 0..CYCLES {
+            image.take_inputs_of(exchange);
+            image.write(&lamp, cycle);
+            image.give_outputs_to(exchange);
+            values += image.read(&lamp) + u64::from(image.value(&lamp).is_some());
+        }
+    });
+    assert_eq!((used, values), ((0, 0), CYCLES / 2 + CYCLES));
+    assert!(application.exchange_mut().image(DomainId(0)).iter().any(|byte| byte & 2 != 0));
 }

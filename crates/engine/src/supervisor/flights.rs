@@ -99,50 +99,40 @@ impl Shared {
     /// Packs what waits in the outbox into frames and sends them, within the budget and the window.
     pub(super) fn transmit(&mut self, budget: usize, transmit: &mut impl FnMut(Link, &[u8])) -> usize {
         let mut used = 0;
-        loop {
-            match self.transmit_frame(budget.saturating_sub(used), transmit) {
-                0 => return used,
-                length => used += length,
-            }
-        }
-    }
-
-    /// Sends a frame of at most so many bytes, once on each link; its length, 0 where there is none.
-    pub(super) fn transmit_frame(&mut self, limit: usize, transmit: &mut impl FnMut(Link, &[u8])) -> usize {
-        if !self.outbox.is_ready(self.now) || !self.flights.has_room() || limit == 0 {
-            return 0;
-        }
-        let Some(flight) = self.pack(limit.min(MAX_FRAME)) else { return 0 };
-        let length = flight.bytes.len();
-        self.blocked = None;
-        self.counters.sent += 1;
-        self.counters.bytes += flight.bytes.len() as u64;
-        self.counters.datagrams += flight.places.len() as u64;
-        self.silence.sent(Link::Main, self.now);
-        transmit(Link::Main, &flight.bytes);
-        if self.links == LinkSet::Ring {
-            self.silence.sent(Link::Redundant, self.now);
-            let copy = &mut self.flights.redundant[..flight.bytes.len()];
-            copy.copy_from_slice(&flight.bytes);
-            Identity::mark_redundant(copy, true);
-            adjust_auto_increment(copy, &flight.places, self.main_count);
-            for place in &flight.places {
-                let Some(transfer) = self.transfers.find(place.transfer) else { continue };
-                if let Some(station) = transfer.request.redundant_station {
-                    let at = place.header_at + 2;
-                    copy[at..at + 2].copy_from_slice(&station.0.to_le_bytes());
+        while self.outbox.is_ready(self.now) && self.flights.has_room() && used < budget {
+            let limit = (budget - used).min(MAX_FRAME);
+            let Some(flight) = self.pack(limit) else { break };
+            self.blocked = None;
+            used += flight.bytes.len();
+            self.counters.sent += 1;
+            self.counters.bytes += flight.bytes.len() as u64;
+            self.counters.datagrams += flight.places.len() as u64;
+            self.silence.sent(Link::Main, self.now);
+            transmit(Link::Main, &flight.bytes);
+            if self.links == LinkSet::Ring {
+                self.silence.sent(Link::Redundant, self.now);
+                let copy = &mut self.flights.redundant[..flight.bytes.len()];
+                copy.copy_from_slice(&flight.bytes);
+                Identity::mark_redundant(copy, true);
+                adjust_auto_increment(copy, &flight.places, self.main_count);
+                for place in &flight.places {
+                    let Some(transfer) = self.transfers.find(place.transfer) else { continue };
+                    if let Some(station) = transfer.request.redundant_station {
+                        let at = place.header_at + 2;
+                        copy[at..at + 2].copy_from_slice(&station.0.to_le_bytes());
+                    }
+                    if let Some(data) = &transfer.request.redundant {
+                        let at = place.header_at + HEADER_LEN;
+                        copy[at..at + place.length].copy_from_slice(data);
+                    }
                 }
-                if let Some(data) = &transfer.request.redundant {
-                    let at = place.header_at + HEADER_LEN;
-                    copy[at..at + place.length].copy_from_slice(data);
-                }
+                transmit(Link::Redundant, copy);
             }
-            transmit(Link::Redundant, copy);
+            let slot = Flights::slot(flight.sequence);
+            self.flights.slots[slot] = Some(flight);
+            self.flights.in_flight += 1;
         }
-        let slot = Flights::slot(flight.sequence);
-        self.flights.slots[slot] = Some(flight);
-        self.flights.in_flight += 1;
-        length
+        used
     }
 
     /// Whether a first datagram that is too long for the window has waited for so long that it goes out all the same:

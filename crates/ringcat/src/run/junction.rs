@@ -5,15 +5,46 @@ use ringcat::{JunctionConnection, JunctionMode};
 /// How the option is explained.
 pub const HELP: &str = "Rings behind junctions: disabled, automatic (those that are there at the scan are learned), or \
     strict=HEAD:PORT-TAIL:PORT[,...] with the positions of the junction and of the last SubDevice of its ring, and the \
-    ports of the cable between them (head: port 1)";
+    ports of the cable between them (head: port 1). With --eni, @ and the station address of the file may take the place of \
+    a position, as in @1001:1-@1004:1";
 
 /// A mode, and the connections that strict needs.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Junctions {
     /// The mode.
     pub mode: JunctionMode,
-    /// The connections, SubDevices by position.
-    pub connections: Vec<JunctionConnection>,
+    /// The connections.
+    pub connections: Vec<Connection>,
+}
+
+/// A connection as it is written.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Connection {
+    head: (Who, u8),
+    tail: (Who, u8),
+}
+
+/// A SubDevice as it is written.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Who {
+    /// `4`: by its position.
+    Position(usize),
+    /// `@1004`: by the station address that an ENI gives it.
+    Station(u16),
+}
+
+impl Connection {
+    /// With indices in the declaration; `at_station` finds those of station addresses.
+    pub fn resolve(&self, at_station: impl Fn(u16) -> Option<usize>) -> Result<JunctionConnection, String> {
+        let index = |who: Who| match who {
+            Who::Position(position) => Ok(position),
+            Who::Station(station) => at_station(station).ok_or_else(|| {
+                format!("--junction: no SubDevice has station address {station} in an ENI (--eni FILE)")
+            }),
+        };
+        let ((head, head_port), (tail, tail_port)) = (self.head, self.tail);
+        Ok(JunctionConnection { head: index(head)?, head_port, tail: index(tail)?, tail_port })
+    }
 }
 
 /// Reads `disabled`, `automatic` or `strict=HEAD:PORT-TAIL:PORT[,...]`.
@@ -30,20 +61,26 @@ pub fn junctions(text: &str) -> Result<Junctions, String> {
     }
 }
 
-fn connection(text: &str) -> Result<JunctionConnection, String> {
+fn connection(text: &str) -> Result<Connection, String> {
     let parts = text.split_once('-').and_then(|(head, tail)| Some((end(head)?, end(tail)?)));
-    let Some(((head, head_port), (tail, tail_port))) = parts else {
+    let Some((head, tail)) = parts else {
         return Err(format!("expected HEAD:PORT-TAIL:PORT, as in 1:1-4:1, got \"{text}\""));
     };
-    let connection = JunctionConnection { head, head_port, tail, tail_port };
-    // How many SubDevices there are is not known yet.
-    connection.check(&[], usize::MAX).map_err(|error| error.to_string())?;
+    let connection = Connection { head, tail };
+    // How many SubDevices there are is not known yet, nor who has which station address.
+    let known = JunctionConnection { head: 0, head_port: head.1, tail: 1, tail_port: tail.1 };
+    let known = connection.resolve(|_| None).unwrap_or(known);
+    known.check(&[], usize::MAX).map_err(|error| error.to_string())?;
     Ok(connection)
 }
 
-fn end(text: &str) -> Option<(usize, u8)> {
-    let (position, port) = text.split_once(':')?;
-    Some((position.parse().ok()?, port.parse().ok()?))
+fn end(text: &str) -> Option<(Who, u8)> {
+    let (who, port) = text.split_once(':')?;
+    let who = match who.strip_prefix('@') {
+        Some(station) => Who::Station(station.parse().ok()?),
+        None => Who::Position(who.parse().ok()?),
+    };
+    Some((who, port.parse().ok()?))
 }
 
 #[cfg(test)]
@@ -56,13 +93,21 @@ mod tests {
             mode: JunctionMode::Strict,
             connections: list
                 .iter()
-                .map(|&(head, head_port, tail, tail_port)| JunctionConnection { head, head_port, tail, tail_port })
+                .map(|&(head, head_port, tail, tail_port)| Connection {
+                    head: (Who::Position(head), head_port),
+                    tail: (Who::Position(tail), tail_port),
+                })
                 .collect(),
         };
         assert_eq!(junctions("automatic").map(|it| it.mode), Ok(JunctionMode::Automatic));
         assert_eq!(junctions("disabled"), Ok(Junctions::default()));
         assert_eq!(junctions("strict=1:1-4:1"), Ok(strict(&[(1, 1, 4, 1)])));
         assert_eq!(junctions("strict=0:1-2:1,3:1-5:3"), Ok(strict(&[(0, 1, 2, 1), (3, 1, 5, 3)])));
+        let by_station = junctions("strict=@1002:1-4:1").expect("as a file calls it").connections[0];
+        let resolved = JunctionConnection { head: 1, head_port: 1, tail: 4, tail_port: 1 };
+        assert_eq!(by_station.resolve(|station| (station == 1002).then_some(1)), Ok(resolved));
+        assert!(by_station.resolve(|_| None).is_err_and(|text| text.contains("station address 1002")));
+        assert!(junctions("strict=@1002:2-@1004:1").is_err(), "the head's port is 1");
         for wrong in
             ["", "strict", "strict=", "strict=1:1", "strict=1:1-4", "strict=a:1-4:1", "automatic=1", "Strict=1:1-4:1"]
         {

@@ -196,12 +196,18 @@ impl Bench {
 
     /// Starts the simulator on all interfaces; ends the one before.
     pub fn simulate(&mut self, segment: &str, ring: bool) {
-        self.end_simulator();
-        let base = std::env::temp_dir().join(&self.sim);
-        let (file, socket) = (base.with_extension("toml"), base.with_extension("control"));
+        let file = std::env::temp_dir().join(&self.sim).with_extension("toml");
         std::fs::write(&file, segment).expect("the temporary directory is writable");
+        self.simulate_file("--segment", &file, ring);
+        std::fs::remove_file(&file).expect("it was just written");
+    }
+
+    /// As [`Bench::simulate`], from a file that an option of `ringcat sim` names.
+    pub fn simulate_file(&mut self, option: &str, file: &Path, ring: bool) {
+        self.end_simulator();
+        let socket = std::env::temp_dir().join(&self.sim).with_extension("control");
         let mut command = self.command(&self.sim, &program("ringcat"));
-        command.args(["sim", "--main", "sim0", "--segment"]).arg(&file).arg("--control").arg(&socket).args(THREAD);
+        command.args(["sim", "--main", "sim0", option]).arg(file).arg("--control").arg(&socket).args(THREAD);
         if ring {
             command.args(["--redundant", "sim1"]);
         }
@@ -213,7 +219,6 @@ impl Bench {
             assert!(Instant::now() < until, "the simulator does not answer");
             std::thread::sleep(Duration::from_millis(20));
         }
-        std::fs::remove_file(&file).expect("it was just written");
     }
 
     fn connect(&self) -> Option<UnixStream> {

@@ -11,6 +11,7 @@ mod captures;
 mod clocks;
 mod clocks_in_a_ring;
 mod cuts_beside;
+mod eni;
 mod ethernet;
 mod foreign;
 mod frames;

@@ -19,6 +19,7 @@ mod disturbed_frames;
 mod domains;
 mod eeprom;
 mod eeprom_writes;
+mod eni;
 mod ethernet;
 mod explorer;
 mod failures;

@@ -1,0 +1,14 @@
+//! Networks from an ENI (EtherCAT Network Information, ETG.2100): the file says what is configured, the engine how.
+//!
+//! `ringcat-config` reads the file; [`EniImage`] is its process image at run time; [`segment`] makes a simulated segment
+//! of it, for those who want to try it without hardware. `docs/eni.md` has it all.
+
+mod file;
+mod image;
+mod segment;
+mod value;
+
+pub use file::{Difference, EniFile, LoadError, LoadFailure};
+pub use image::{EniImage, EniVariable, ImageError};
+pub use segment::segment;
+pub use value::{Value, VariableType};

@@ -1,0 +1,180 @@
+//! An ENI from a file: read, followed, and ready to be activated.
+
+use std::fmt;
+use std::path::{Path, PathBuf};
+use std::{fs, io};
+
+use ringcat_config::eni::{Eni, EniError, read};
+use ringcat_config::{Configuration, follow};
+use ringcat_engine::config::{ConfigError, Resolution, resolve};
+use ringcat_engine::info::SubDeviceInfo;
+use ringcat_engine::main_device::Declaration;
+use ringcat_sim::network::Network;
+use ringcat_sim::segment::SegmentError;
+use ringcat_wire::address::Position;
+
+use super::segment::segment;
+use crate::text::Names;
+
+/// A file with what follows from it.
+#[derive(Clone, Debug)]
+pub struct EniFile {
+    /// What it says.
+    pub eni: Eni,
+    /// What follows.
+    pub configuration: Configuration,
+}
+
+/// Why a file cannot be used.
+#[derive(Debug)]
+pub struct LoadError {
+    /// The file.
+    pub path: PathBuf,
+    /// What is wrong.
+    pub cause: LoadFailure,
+}
+
+/// What is wrong with a file.
+#[derive(Debug)]
+pub enum LoadFailure {
+    /// It cannot be read.
+    Read(io::Error),
+    /// It is larger than any ENI.
+    TooLarge {
+        /// Its bytes.
+        bytes: u64,
+    },
+    /// It is no ENI, or one that cannot be followed.
+    Eni(Box<EniError>),
+}
+
+/// Where a network is not that of a file.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Difference {
+    /// Index in the file; `None` for a SubDevice that is not in it.
+    pub subdevice: Option<usize>,
+    /// The network cannot be activated so.
+    pub is_grave: bool,
+    /// What.
+    pub text: String,
+}
+
+impl fmt::Display for Difference {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(&self.text)
+    }
+}
+
+impl fmt::Display for LoadError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}: ", self.path.display())?;
+        match &self.cause {
+            LoadFailure::Read(error) => write!(f, "cannot be read: {error}"),
+            LoadFailure::TooLarge { bytes } => {
+                write!(f, "expected at most {} bytes, got {bytes}", ringcat_config::eni::MAX_BYTES)
+            }
+            LoadFailure::Eni(error) => error.fmt(f),
+        }
+    }
+}
+
+impl std::error::Error for LoadError {}
+
+impl EniFile {
+    /// Reads a file.
+    ///
+    /// # Errors
+    /// [`LoadError`]: with line, column and element where something in it is wrong.
+    pub fn load(path: &Path) -> Result<EniFile, LoadError> {
+        let failed = |cause| LoadError { path: path.to_owned(), cause };
+        let bytes = fs::metadata(path).map_err(|error| failed(LoadFailure::Read(error)))?.len();
+        if bytes > ringcat_config::eni::MAX_BYTES as u64 {
+            return Err(failed(LoadFailure::TooLarge { bytes }));
+        }
+        let bytes = fs::read(path).map_err(|error| failed(LoadFailure::Read(error)))?;
+        EniFile::from_bytes(&bytes).map_err(|error| failed(LoadFailure::Eni(Box::new(error))))
+    }
+
+    /// Reads the bytes of a file.
+    ///
+    /// # Errors
+    /// [`EniError`]: with line, column and element.
+    pub fn from_bytes(bytes: &[u8]) -> Result<EniFile, EniError> {
+        let eni = read(bytes)?;
+        let configuration = follow(&eni)?;
+        Ok(EniFile { eni, configuration })
+    }
+
+    /// What is activated. With `split_lrw` the engine is free to send LRD and LWR where the file has an LRW over several
+    /// SubDevices, as it must with two links (facts CR-16, 9.2.2).
+    pub fn declaration(&self, split_lrw: bool) -> Declaration {
+        let mut declaration = self.configuration.declaration.clone();
+        if split_lrw {
+            declaration.explicit_lrw.clear();
+        }
+        declaration
+    }
+
+    /// What people call the SubDevices: name and station address of the file.
+    pub fn names(&self) -> Names {
+        let name = |facts: &ringcat_config::SubDeviceFacts| match facts.station {
+            Some(station) => format!("{} ({station})", facts.name),
+            None => facts.name.clone(),
+        };
+        Names(self.configuration.subdevices.iter().map(name).collect())
+    }
+
+    /// Whether the SubDevices that a scan found are those of the file: each that is missing, another one, or not in the file.
+    pub fn compare(&self, found: &[SubDeviceInfo]) -> Vec<Difference> {
+        let configs = &self.configuration.declaration.subdevices;
+        let names = self.names().0;
+        let name = |config: usize| names.get(config).cloned().unwrap_or_default();
+        let differs = |config: usize, is_grave: bool, error: &ConfigError| Difference {
+            subdevice: Some(config),
+            is_grave,
+            text: format!("SubDevice {config} \"{}\" of the file: {error}", name(config)),
+        };
+        let mut differences = Vec::new();
+        // Whoever is not who is expected is told once.
+        let mut told = Vec::new();
+        for resolution in resolve(configs, found) {
+            match resolution {
+                Resolution::Found { .. } => {}
+                Resolution::Absent { config, error } => {
+                    told.extend(in_its_place(&error));
+                    differences.push(differs(config, false, &error));
+                }
+                Resolution::Failed { config, error } => {
+                    told.extend(in_its_place(&error));
+                    differences.push(differs(config, true, &error));
+                }
+                Resolution::Extra { info } if told.contains(&found[info].position) => {}
+                Resolution::Extra { info } => {
+                    let SubDeviceInfo { position, name, identity, .. } = &found[info];
+                    let text = format!(
+                        "position {position} \"{name}\" is not in the file: vendor {:#010x}, product {:#010x}",
+                        identity.vendor_id, identity.product_code
+                    );
+                    differences.push(Difference { subdevice: None, is_grave: false, text });
+                }
+            }
+        }
+        differences
+    }
+
+    /// A simulated segment that is as the file says; with `ring` its end leads to the redundant interface.
+    ///
+    /// # Errors
+    /// [`SegmentError`]: cables that do not fit.
+    pub fn simulated(&self, ring: bool) -> Result<Network, SegmentError> {
+        Network::from_description(segment(&self.eni, &self.configuration, ring))
+    }
+}
+
+/// Position of the SubDevice that is in the place of another one.
+const fn in_its_place(error: &ConfigError) -> Option<Position> {
+    match error {
+        ConfigError::Mismatch { position, .. } => Some(*position),
+        ConfigError::Missing { .. } | ConfigError::Ambiguous { .. } | ConfigError::DeclaredTwice { .. } => None,
+    }
+}

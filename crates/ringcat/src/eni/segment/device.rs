@@ -1,0 +1,297 @@
+//! One SubDevice of a file as a simulated device.
+
+use std::collections::BTreeSet;
+use std::time::Duration;
+
+use ringcat_config::eni::{BitRange, Eni, Mailbox, MailboxBuffer, PdoEntry, SubDevice};
+use ringcat_engine::config::{ConfigAddress, DeclaredSyncManager, SubDeviceConfig, SyncManagerRole};
+use ringcat_sim::application::{Behaviour, InputSource};
+use ringcat_sim::description::{
+    DcDescription, DeviceDescription, MailboxDescription, PdoDescription, PdoEntryDescription, SyncManagerDescription,
+};
+use ringcat_wire::register::{PortKind, SyncManager, SyncManagerControl};
+use ringcat_wire::sii::{
+    CoeDetails, DcMode, FmmuUsage, Identity, MailboxLayout, MailboxProtocols, PdoDirection, SyncManagerKind,
+};
+
+use super::objects;
+
+/// A mailbox of a device whose file gives it none though it sends mail.
+const MAILBOX: MailboxLayout =
+    MailboxLayout { receive_offset: 0x1000, receive_size: 128, send_offset: 0x1080, send_size: 128 };
+/// Time from a request to its answer.
+const ANSWER: Duration = Duration::from_micros(200);
+/// Where process data of a device begins whose file does not say.
+const PROCESS_DATA_START: u16 = 0x1800;
+/// An index for PDOs that the file does not describe, by SyncManager.
+const UNNAMED: [u16; 2] = [0x17F0, 0x1BF0];
+/// Bits of an entry without a name, at most: a multiple of 8 that fits into a byte.
+const GAP: u32 = 248;
+/// The SII of a device with long lists of PDOs.
+const SII_BYTES: usize = 2048;
+
+pub(super) fn describe(subdevice: &SubDevice, config: &SubDeviceConfig) -> DeviceDescription {
+    let number = |of_file: Option<u32>, expected: Option<u32>| expected.or(of_file).unwrap_or(0);
+    let expected = &config.expected;
+    let identity = Identity {
+        vendor_id: number(subdevice.vendor_id, expected.vendor_id),
+        product_code: number(subdevice.product_code, expected.product_code),
+        revision: number(subdevice.revision, expected.revision.or(expected.minimum_revision)),
+        serial: number(subdevice.serial, expected.serial),
+    };
+    let mut device = DeviceDescription::plain(&subdevice.name, identity);
+    device.group = "ENI".into();
+    match config.address {
+        ConfigAddress::Alias { alias, offset: 0 } => device.alias = alias,
+        ConfigAddress::Identification { value, offset: 0 } => device.identification = Some(value),
+        _ => {}
+    }
+    device.identification = expected.identification.or(device.identification);
+    device.ports = ports(&subdevice.physics);
+    device.mailbox = mailbox(subdevice, config);
+    let declared = config.declared.clone().unwrap_or_else(|| guessed(subdevice, device.mailbox.as_ref()));
+    device.sync_managers = sync_managers(&declared);
+    device.pdos = pdos(subdevice, &declared);
+    let areas = declared.iter().filter(|sm| sm.role.direction().is_some()).map(|sm| match sm.role {
+        SyncManagerRole::Inputs => FmmuUsage::Inputs,
+        _ => FmmuUsage::Outputs,
+    });
+    device.fmmus = areas.chain(device.mailbox.map(|_| FmmuUsage::MailboxStatus)).collect();
+    device.fmmus.resize(device.fmmus.len().max(4), FmmuUsage::Unused);
+    device.objects = objects::objects(subdevice, &device.pdos, &device.sync_managers);
+    device.services.soe.drives = objects::drives(subdevice);
+    device.dc = (subdevice.clock.is_some() || config.sync.is_some()).then(|| clock(config));
+    device.behaviour = Behaviour::Terminal(InputSource::Outputs);
+    device.sii_size_bytes = SII_BYTES;
+    device
+}
+
+/// Devices of one name get their station address behind it.
+pub(super) fn tell_apart(eni: &Eni, devices: &mut [DeviceDescription]) {
+    let mut names = BTreeSet::new();
+    for (number, device) in devices.iter_mut().enumerate() {
+        if names.insert(device.name.clone()) && !device.name.is_empty() {
+            continue;
+        }
+        let station = eni.subdevices.get(number).and_then(|subdevice| subdevice.station);
+        device.name = match station {
+            Some(station) => format!("{} {station}", device.name).trim().to_owned(),
+            None => format!("{} #{number}", device.name).trim().to_owned(),
+        };
+        names.insert(device.name.clone());
+    }
+}
+
+/// A letter per port (facts 8.1): K is EBUS, blank is none, others are Ethernet in some form.
+fn ports(physics: &str) -> [PortKind; 4] {
+    let mut ports = [PortKind::NotImplemented; 4];
+    for (port, letter) in ports.iter_mut().zip(physics.chars()) {
+        *port = match letter {
+            'K' | 'k' => PortKind::Ebus,
+            ' ' => PortKind::NotImplemented,
+            _ => PortKind::Mii,
+        };
+    }
+    ports
+}
+
+fn mailbox(subdevice: &SubDevice, config: &SubDeviceConfig) -> Option<MailboxDescription> {
+    let given = subdevice.mailbox.as_ref();
+    let declared = |role| config.declared.iter().flatten().find(|sm| sm.role == role).map(|sm| sm.register);
+    let pair = (declared(SyncManagerRole::MailboxOut), declared(SyncManagerRole::MailboxIn));
+    let standard = match (pair, given) {
+        ((Some(out), Some(inward)), _) => layout(out.start, out.length, inward.start, inward.length),
+        (_, Some(Mailbox { send: Some(send), receive: Some(receive), .. })) => of_buffers(send, receive),
+        (_, Some(mailbox)) if !mailbox.coe.is_empty() || !mailbox.soe.is_empty() || !mailbox.eoe.is_empty() => MAILBOX,
+        _ => return None,
+    };
+    let bootstrap = given.and_then(|mailbox| mailbox.bootstrap.as_ref());
+    let protocols = protocols(given);
+    let coe = CoeDetails::SDO
+        | CoeDetails::SDO_INFORMATION
+        | CoeDetails::PDO_ASSIGN
+        | CoeDetails::PDO_CONFIGURATION
+        | CoeDetails::COMPLETE_ACCESS;
+    Some(MailboxDescription {
+        standard,
+        bootstrap: bootstrap.map_or(MailboxLayout::default(), |(send, receive)| of_buffers(send, receive)),
+        protocols,
+        coe_details: CoeDetails(if protocols.coe() { coe } else { 0 }),
+        response_time: ANSWER,
+    })
+}
+
+fn of_buffers(send: &MailboxBuffer, receive: &MailboxBuffer) -> MailboxLayout {
+    layout(send.start, send.length, receive.start, receive.length)
+}
+
+const fn layout(receive_offset: u16, receive_size: u16, send_offset: u16, send_size: u16) -> MailboxLayout {
+    MailboxLayout { receive_offset, receive_size, send_offset, send_size }
+}
+
+/// Those that are named, and those whose commands there are.
+fn protocols(mailbox: Option<&Mailbox>) -> MailboxProtocols {
+    let Some(mailbox) = mailbox else { return MailboxProtocols(0) };
+    let bit = |name: &str| match name.trim().to_ascii_lowercase().as_str() {
+        "aoe" => MailboxProtocols::AOE,
+        "eoe" => MailboxProtocols::EOE,
+        "coe" => MailboxProtocols::COE,
+        "foe" => MailboxProtocols::FOE,
+        "soe" => MailboxProtocols::SOE,
+        "voe" => MailboxProtocols::VOE,
+        _ => 0,
+    };
+    let named = mailbox.protocols.iter().map(|name| bit(name)).fold(0, |all, one| all | one);
+    let used = [
+        (!mailbox.coe.is_empty(), MailboxProtocols::COE),
+        (!mailbox.soe.is_empty(), MailboxProtocols::SOE),
+        (!mailbox.eoe.is_empty(), MailboxProtocols::EOE),
+    ];
+    MailboxProtocols(used.into_iter().filter(|(used, _)| *used).fold(named, |all, (_, one)| all | one))
+}
+
+/// What a file without commands to SyncManagers may mean: mailboxes, then outputs and inputs as long as in the image.
+fn guessed(subdevice: &SubDevice, mailbox: Option<&MailboxDescription>) -> Vec<DeclaredSyncManager> {
+    let Some(data) = &subdevice.process_data else { return Vec::new() };
+    let mut declared = Vec::new();
+    let mut add = |role, start, length, control| {
+        let mut register =
+            SyncManager { start, length, control: SyncManagerControl::from_bits(control), ..SyncManager::default() };
+        register.activate.enable = true;
+        declared.push(DeclaredSyncManager { index: declared.len() as u8, role, register, pdos: Vec::new() });
+    };
+    if let Some(mailbox) = mailbox {
+        let MailboxLayout { receive_offset, receive_size, send_offset, send_size } = mailbox.standard;
+        add(SyncManagerRole::MailboxOut, receive_offset, receive_size, 0x26);
+        add(SyncManagerRole::MailboxIn, send_offset, send_size, 0x22);
+    }
+    let bytes = |ranges: &[BitRange]| {
+        let bits: u32 = ranges.iter().map(|range| range.length).fold(0, u32::saturating_add);
+        u16::try_from(bits.div_ceil(8)).unwrap_or(u16::MAX / 8)
+    };
+    let (outputs, inputs) = (bytes(&data.send), bytes(&data.receive));
+    if outputs > 0 {
+        add(SyncManagerRole::Outputs, PROCESS_DATA_START, outputs, 0x64);
+    }
+    if inputs > 0 {
+        let start = PROCESS_DATA_START.saturating_add(outputs.saturating_mul(3).next_multiple_of(8));
+        add(SyncManagerRole::Inputs, start, inputs, 0x20);
+    }
+    declared
+}
+
+fn sync_managers(declared: &[DeclaredSyncManager]) -> Vec<SyncManagerDescription> {
+    let count = declared.iter().map(|sm| usize::from(sm.index) + 1).max().unwrap_or(0);
+    let unused = SyncManagerDescription { start: 0, length: 0, control: 0, enable: 0, kind: SyncManagerKind::Unused };
+    let mut described = vec![unused; count];
+    for sm in declared {
+        described[usize::from(sm.index)] = SyncManagerDescription {
+            start: sm.register.start,
+            length: sm.register.length,
+            control: sm.register.control.bits(),
+            enable: u8::from(sm.register.activate.enable),
+            kind: match sm.role {
+                SyncManagerRole::MailboxOut => SyncManagerKind::MailboxOut,
+                SyncManagerRole::MailboxIn => SyncManagerKind::MailboxIn,
+                SyncManagerRole::Outputs => SyncManagerKind::Outputs,
+                SyncManagerRole::Inputs => SyncManagerKind::Inputs,
+            },
+        };
+    }
+    described
+}
+
+/// Those that the file declares in SyncManagers, then those that are only described. Where they do not fill their
+/// SyncManager, a PDO without names does.
+fn pdos(subdevice: &SubDevice, declared: &[DeclaredSyncManager]) -> Vec<PdoDescription> {
+    let of_file = subdevice.process_data.iter().flat_map(|data| &data.pdos);
+    let names = |index: u16| of_file.clone().find(|pdo| pdo.index == index);
+    let mut pdos: Vec<PdoDescription> = Vec::new();
+    for sm in declared {
+        let Some((sync_manager, direction, length)) = sm.area() else { continue };
+        let inputs = direction == ringcat_engine::info::Direction::Inputs;
+        let direction = if inputs { PdoDirection::Tx } else { PdoDirection::Rx };
+        let mapped: Vec<PdoDescription> = sm
+            .pdos
+            .iter()
+            .filter(|pdo| !pdos.iter().any(|known| known.index == pdo.index))
+            .map(|pdo| PdoDescription {
+                direction,
+                index: pdo.index,
+                name: names(pdo.index).map_or(String::new(), |found| found.name.clone()),
+                sync_manager: Some(sync_manager),
+                flags: 0,
+                entries: (0..)
+                    .zip(pdo.entries.iter().flatten())
+                    .map(|(place, entry)| {
+                        let found = names(pdo.index)
+                            .and_then(|found: &ringcat_config::eni::Pdo| found.entries.get::<usize>(place));
+                        PdoEntryDescription {
+                            index: entry.index,
+                            sub_index: entry.sub_index,
+                            name: found.map_or(String::new(), |found| found.name.clone()),
+                            data_type: objects::data_type(entry.bit_length.into()),
+                            bit_length: entry.bit_length,
+                        }
+                    })
+                    .collect(),
+            })
+            .collect();
+        let bits: u32 = mapped.iter().map(PdoDescription::bit_length).sum();
+        if bits.div_ceil(8) == u32::from(length) {
+            pdos.extend(mapped);
+        } else {
+            pdos.push(without_names(sync_manager, direction, length));
+        }
+    }
+    for pdo in of_file {
+        if pdos.iter().any(|known| known.index == pdo.index) {
+            continue;
+        }
+        let entry = |entry: &PdoEntry| PdoEntryDescription {
+            index: entry.index,
+            sub_index: entry.sub_index,
+            name: entry.name.clone(),
+            data_type: objects::data_type(entry.bit_length),
+            bit_length: u8::try_from(entry.bit_length).unwrap_or(u8::MAX),
+        };
+        pdos.push(PdoDescription {
+            direction: if pdo.outputs { PdoDirection::Rx } else { PdoDirection::Tx },
+            index: pdo.index,
+            name: pdo.name.clone(),
+            sync_manager: None,
+            flags: 0,
+            entries: pdo.entries.iter().map(entry).collect(),
+        });
+    }
+    pdos
+}
+
+fn without_names(sync_manager: u8, direction: PdoDirection, length: u16) -> PdoDescription {
+    let mut left = 8 * u32::from(length);
+    let mut entries = Vec::new();
+    while left > 0 {
+        let bit_length = left.min(GAP) as u8;
+        left -= u32::from(bit_length);
+        entries.push(PdoEntryDescription { index: 0, sub_index: 0, name: String::new(), data_type: 0, bit_length });
+    }
+    let base = UNNAMED[usize::from(direction == PdoDirection::Tx)];
+    let index = base + u16::from(sync_manager);
+    PdoDescription { direction, index, name: String::new(), sync_manager: Some(sync_manager), flags: 0, entries }
+}
+
+/// It takes the SYNC signals of the file.
+fn clock(config: &SubDeviceConfig) -> DcDescription {
+    let mode = config.sync.map(|signals| DcMode {
+        sync0_cycle_ns: signals.sync0_cycle_ns,
+        sync0_shift_ns: 0,
+        sync1_shift_ns: 0,
+        sync1_cycle_factor: 0,
+        assign_activate: signals.assign_activate,
+        sync0_cycle_factor: 0,
+        name: 0,
+        description: 0,
+        reserved: [0; 4],
+    });
+    DcDescription { wide: true, modes: mode.into_iter().collect(), minimum_cycle_ns: 0 }
+}

@@ -1,0 +1,219 @@
+//! `ringcat run --eni FILE`: the network is the one of the file, outputs are what `--set` says.
+
+use std::path::PathBuf;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::time::Duration;
+
+use clap::Args;
+use ringcat::eni::{EniFile, EniImage, EniVariable, Value};
+use ringcat::text::Names;
+use ringcat::{ActivateError, Declaration, Direction, Error, Instant, ProcessData, SubDeviceInfo};
+use ringcat_engine::main_device::Directory;
+
+use crate::interfaces::Failure;
+use crate::output::say;
+
+/// Values of a variable are told so often at most.
+const TELL_PERIOD: Duration = Duration::from_secs(1);
+
+/// Options about an ENI.
+#[derive(Args, Debug, Default)]
+pub struct EniArguments {
+    /// Bring the network of this ENI to OP (TwinCAT, EC-Engineer and others export it) instead of whatever is there; see
+    /// docs/eni.md, and `ringcat eni FILE` for what of it is followed.
+    #[arg(long, value_name = "FILE", conflicts_with = "cycle")]
+    eni: Option<PathBuf>,
+    /// Send LRD and LWR where the file has an LRW over several SubDevices, which two interfaces cannot have.
+    #[arg(long, requires = "eni")]
+    split_lrw: bool,
+    /// Output variable of the file with the value that it has from the first cycle on; may be given several times.
+    #[arg(long, value_name = "NAME=VALUE", requires = "eni")]
+    set: Vec<String>,
+    /// Variable of the file whose value is told when it changes, at most once a second, and in the end; may be given
+    /// several times.
+    #[arg(long, value_name = "NAME", requires = "eni")]
+    watch: Vec<String>,
+}
+
+/// A network from a file.
+#[derive(Debug)]
+pub struct EniNetwork {
+    file: EniFile,
+    split_lrw: bool,
+    set: Vec<String>,
+    watch: Vec<String>,
+}
+
+impl EniArguments {
+    /// Reads the file, if there is one, and tells what of it is not followed.
+    pub fn load(&self) -> Result<Option<EniNetwork>, Failure> {
+        let Some(path) = &self.eni else { return Ok(None) };
+        let file = EniFile::load(path).map_err(|error| Failure::new(error.to_string()))?;
+        for notice in &file.configuration.notices {
+            say!("{}: {notice}", path.display());
+        }
+        let network = EniNetwork { file, split_lrw: self.split_lrw, set: self.set.clone(), watch: self.watch.clone() };
+        network.check_variables()?;
+        Ok(Some(network))
+    }
+}
+
+impl EniNetwork {
+    /// What people call the SubDevices.
+    pub fn names(&self) -> Names {
+        self.file.names()
+    }
+
+    /// Index in the declaration of the SubDevice with this station address in the file.
+    pub fn at_station(&self, station: u16) -> Option<usize> {
+        self.file.configuration.at_station(station)
+    }
+
+    /// What is activated, where the SubDevices that were found are those of the file. Each that is not is told.
+    pub fn declaration(&self, found: &[SubDeviceInfo]) -> Result<Declaration, Failure> {
+        let differences = self.file.compare(found);
+        for difference in &differences {
+            eprintln!("ringcat: {difference}");
+        }
+        if differences.iter().any(|difference| difference.is_grave) {
+            return Err(Failure::new("the network is not the one of the file: correct the file, or the network"));
+        }
+        Ok(self.file.declaration(self.split_lrw))
+    }
+
+    /// Why it cannot be activated, in terms of the file and of this program.
+    pub fn explain(&self, error: Error) -> Failure {
+        match error {
+            Error::Activate(ActivateError::NamedLrwOnTwoLinks(lrw)) => {
+                let names = self.names().0;
+                let who: Vec<&str> = lrw.subdevices.iter().filter_map(|at| Some(names.get(*at)?.as_str())).collect();
+                Failure::new(format!(
+                    "{}: an LRW of {} bytes over {} SubDevices ({}) cannot be used with two interfaces, because a break of \
+                     the ring would divide it: add --split-lrw to have it sent as LRD and LWR, or leave --redundant out",
+                    lrw.name,
+                    lrw.length,
+                    who.len(),
+                    who.join(", ")
+                ))
+            }
+            other => Failure::from(other),
+        }
+    }
+
+    fn check_variables(&self) -> Result<(), Failure> {
+        let known = |name: &str| {
+            let mut variables = self.file.configuration.image.variables.iter();
+            variables.any(|variable| variable.name == name)
+        };
+        let set = self.set.iter().map(|text| Ok(assignment(text)?.0)).collect::<Result<Vec<_>, Failure>>()?;
+        let mut names = set.into_iter().chain(self.watch.iter().map(String::as_str));
+        match names.find(|name| !known(name)) {
+            None => Ok(()),
+            Some(name) => Err(Failure::new(format!(
+                "the file has no variable \"{name}\": `ringcat eni FILE` lists its {} variables",
+                self.file.configuration.image.variables.len()
+            ))),
+        }
+    }
+
+    /// What the cycles do, and what they show.
+    pub fn work(&self, directory: &Directory) -> Result<(Work, Watched), Failure> {
+        let mut image =
+            EniImage::new(&self.file.configuration, directory).map_err(|error| Failure::new(error.to_string()))?;
+        for text in &self.set {
+            let (name, value) = assignment(text)?;
+            let variable = image.variable(name).cloned();
+            let variable = variable.ok_or_else(|| Failure::new(format!("there is no variable \"{name}\"")))?;
+            if variable.direction == Direction::Inputs {
+                return Err(Failure::new(format!("--set: \"{name}\" is an input")));
+            }
+            let bits = u16::try_from(variable.bits).ok().filter(|bits| *bits <= 64);
+            let value = bits.and_then(|bits| variable.data_type.parse(value, bits)).ok_or_else(|| {
+                Failure::new(format!(
+                    "--set: expected a value of {} bits for \"{name}\", got \"{value}\"",
+                    variable.bits
+                ))
+            })?;
+            image.write(&variable, value);
+        }
+        for subdevice in image.unplaced() {
+            let name = self.names().0.get(*subdevice).cloned().unwrap_or_default();
+            eprintln!("ringcat: SubDevice {subdevice} \"{name}\" has places in the file's image and no process data");
+        }
+        let watched: Vec<EniVariable> = self.watch.iter().filter_map(|name| image.variable(name).cloned()).collect();
+        let values: Arc<[AtomicU64]> = watched.iter().map(|_| AtomicU64::new(0)).collect();
+        let work = Work { image, watched: watched.clone(), values: values.clone() };
+        let told = vec![None; watched.len()];
+        Ok((work, Watched { watched, values, told, next: Instant(0) }))
+    }
+}
+
+fn assignment(text: &str) -> Result<(&str, &str), Failure> {
+    // Names may have an equals sign, values have none.
+    text.rsplit_once('=').ok_or_else(|| Failure::new(format!("--set: expected NAME=VALUE, got \"{text}\"")))
+}
+
+/// What is done in each cycle; it neither allocates nor waits.
+#[derive(Debug)]
+pub struct Work {
+    image: EniImage,
+    watched: Vec<EniVariable>,
+    values: Arc<[AtomicU64]>,
+}
+
+impl Work {
+    /// One cycle.
+    pub fn cycle(&mut self, data: &mut ProcessData<'_>) {
+        self.image.take_inputs(data);
+        for (variable, value) in self.watched.iter().zip(self.values.iter()) {
+            value.store(self.image.read(variable), Ordering::Relaxed);
+        }
+        self.image.give_outputs(data);
+    }
+
+    /// What the file copies from inputs to outputs.
+    pub fn copies(&self) -> &[ringcat::CopyRule] {
+        self.image.copies()
+    }
+}
+
+/// Variables that are told.
+#[derive(Debug, Default)]
+pub struct Watched {
+    watched: Vec<EniVariable>,
+    values: Arc<[AtomicU64]>,
+    told: Vec<Option<u64>>,
+    next: Instant,
+}
+
+impl Watched {
+    /// Lines about what has changed since the last ones, where it is time for them.
+    pub fn news(&mut self, now: Instant) -> Vec<String> {
+        if now < self.next || self.watched.is_empty() {
+            return Vec::new();
+        }
+        self.next = now + TELL_PERIOD;
+        let mut lines = Vec::new();
+        for ((variable, value), told) in self.watched.iter().zip(self.values.iter()).zip(&mut self.told) {
+            let value = value.load(Ordering::Relaxed);
+            if told.replace(value) != Some(value) {
+                lines.push(line(variable, value));
+            }
+        }
+        lines
+    }
+
+    /// The last values.
+    pub fn account(&self) {
+        for (variable, value) in self.watched.iter().zip(self.values.iter()) {
+            say!("  {}", line(variable, value.load(Ordering::Relaxed)));
+        }
+    }
+}
+
+fn line(variable: &EniVariable, value: u64) -> String {
+    let bits = u16::try_from(variable.bits.min(64)).unwrap_or(64);
+    let value: Value = variable.data_type.value(value, bits);
+    format!("{} = {value}", variable.name)
+}

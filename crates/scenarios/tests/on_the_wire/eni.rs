@@ -1,0 +1,29 @@
+//! An ENI on interfaces: `ringcat sim --eni` makes the segment, `ringcat run --eni` brings it to OP (facts 8).
+
+use std::path::Path;
+
+use crate::bench::Bench;
+use crate::said;
+
+#[test]
+fn a_network_from_an_eni_runs_on_a_ring_of_interfaces_with_its_lrw_split_and_not_otherwise_cr_16_facts_8() {
+    let Some(mut bench) = Bench::new(2) else { return };
+    let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("../ringcat/examples/machine.eni.xml");
+    let path = file.to_str().expect("its name is text");
+    bench.simulate_file("--eni", &file, true);
+    let run = ["run", "--main", "main0", "--redundant", "main1", "--eni", path];
+    let refused = bench.ringcat(&run);
+    let (_, errors) = said(&refused);
+    assert_eq!(refused.status.code(), Some(2), "{errors}");
+    for words in
+        ["LRW of 8 bytes over 4 SubDevices (Lamps (1002), Valves (1003), Buttons (1004), Drive (1005))", "--split-lrw"]
+    {
+        assert!(errors.contains(words), "{errors}");
+    }
+    let more = ["--split-lrw", "--for", "1s", "--set", "Drive.Target velocity=-1234", "--watch", "Drive.Position"];
+    let (output, errors) = said(&bench.ringcat(&[&run[..], &more[..]].concat()));
+    for words in ["all SubDevices are in OP", "Drive.Position = -1234", "stopped: outputs zero, all SubDevices in INIT"]
+    {
+        assert!(output.contains(words), "{words}: {output}{errors}");
+    }
+}

@@ -1,0 +1,345 @@
+//! Networks from ENIs, end to end: the file is read, a segment is made of it, it comes to OP as the file says, and exchanges
+//! data through the variables of the file (facts 8).
+
+use std::path::{Path, PathBuf};
+use std::time::Duration;
+
+use ringcat::eni::{EniFile, EniImage, segment};
+use ringcat::simulated::SimulatedSegment;
+use ringcat::{
+    ActivateError, Application, Direction, DomainId, DomainState, Error, Event, Freshness, MainDevice, Options,
+};
+use ringcat_sim::cable::{CableId, DeviceIndex};
+use ringcat_sim::device::Device;
+use ringcat_sim::network::{Network, NetworkOptions};
+use ringcat_sim::sii_image;
+use ringcat_wire::al::{AlState, AlStatus};
+use scenarios::dice::Dice;
+use scenarios::segments::{descriptions, line};
+
+/// A machine of our own: packed outputs, a copy, a drive with a mapping of its own and SYNC0, one LRW for all.
+const MACHINE: &[u8] = include_bytes!("../../../ringcat/examples/machine.eni.xml");
+const LAMPS: usize = 1;
+const VALVES: usize = 2;
+const BUTTONS: usize = 3;
+const DRIVE: usize = 4;
+/// The output that another SubDevice's input is copied to.
+const COPIED: &str = "Valves.Channel 4";
+/// Files of tools, with the SubDevices that they have.
+const REAL: [(&str, usize); 5] = [
+    ("twincat_mega_ek1100_el2008_el4002_el1809.xml", 4),
+    ("rocos_eni.xml", 1),
+    ("rocos_bcr_eni.xml", 3),
+    ("rocos_eni4.xml", 4),
+    ("rocos_eni7.xml", 7),
+];
+
+/// A network from a file.
+struct Plant {
+    file: EniFile,
+    application: Application<SimulatedSegment>,
+    image: EniImage,
+    events: Vec<Event>,
+}
+
+fn machine() -> EniFile {
+    EniFile::from_bytes(MACHINE).unwrap_or_else(|error| panic!("{error}"))
+}
+
+/// A real file, where it is there.
+fn real(name: &str) -> Option<EniFile> {
+    let path: PathBuf = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared/data/eni").join(name);
+    if !path.exists() {
+        println!("skipped: {} is not there", path.display());
+        return None;
+    }
+    Some(EniFile::load(&path).unwrap_or_else(|error| panic!("{error}")))
+}
+
+fn activate(file: EniFile, ring: bool, split_lrw: bool) -> Result<Plant, Error> {
+    let network = file.simulated(ring).expect("a segment");
+    activate_on(network, file, split_lrw)
+}
+
+fn activate_on(network: Network, file: EniFile, split_lrw: bool) -> Result<Plant, Error> {
+    let mut main_device = MainDevice::request(SimulatedSegment::new(network), &Options::default());
+    let found = main_device.scan()?.subdevices;
+    assert_eq!(file.compare(&found), [], "it is the network of the file");
+    let mut application = main_device.activate(file.declaration(split_lrw))?;
+    let image = EniImage::new(&file.configuration, application.directory()).expect("the image fits");
+    assert_eq!(image.unplaced(), [0_usize; 0]);
+    application.set_copies(image.copies()).expect("copies fit");
+    Ok(Plant { file, application, image, events: Vec::new() })
+}
+
+/// Up to 64 bits of a device's image.
+fn bits(image: &[u8], first: u32, count: u32) -> u64 {
+    (0..count.min(64)).fold(0, |value, number| {
+        let at = first + number;
+        let byte = image.get(at as usize / 8).copied().unwrap_or(0);
+        value | u64::from(byte >> (at % 8) & 1) << number
+    })
+}
+
+impl Plant {
+    fn cycle(&mut self) {
+        let image = &mut self.image;
+        self.application.cycle(|data| {
+            image.take_inputs(data);
+            image.give_outputs(data);
+        });
+        while let Some(event) = self.application.pop_event() {
+            self.events.push(event.event);
+        }
+    }
+
+    fn run(&mut self, cycles: usize) {
+        (0..cycles).for_each(|_| self.cycle());
+    }
+
+    fn device(&self, index: usize) -> &Device {
+        self.application.links().network().device(DeviceIndex(index))
+    }
+
+    fn network_mut(&mut self) -> &mut Network {
+        self.application.links_mut().network_mut()
+    }
+
+    fn is_complete(&mut self) -> bool {
+        self.application.exchange_mut().status(DomainId(0)).state == DomainState::Complete
+    }
+
+    /// Everything in OP, with all clocks locked where there are any.
+    fn settle(&mut self) {
+        let until = self.application.now() + Duration::from_secs(30);
+        let has_clocks = self.file.configuration.declaration.clocks.is_some();
+        let is_ready = |application: &Application<SimulatedSegment>| {
+            application.all_settled() && (!has_clocks || application.engine().clocks_locked())
+        };
+        while !is_ready(&self.application) {
+            assert!(self.application.now() < until, "not in OP: {:?}", self.events);
+            self.cycle();
+        }
+        self.run(20);
+        let network = self.application.links().network();
+        assert!(network.devices().all(|device| device.al_status() == AlStatus::new(AlState::Op)));
+        assert!(self.is_complete());
+        let failed = self.events.iter().find(|event| matches!(event, Event::ConfigurationFailed { .. }));
+        assert_eq!(failed, None);
+    }
+
+    /// Where a variable lies in its SubDevice's process data, from the file alone.
+    fn place(&self, variable: usize) -> Option<(usize, Direction, u32, u32)> {
+        let variable = &self.image.variables()[variable];
+        let subdevice = variable.subdevice?;
+        let data = self.file.eni.subdevices[subdevice].process_data.as_ref()?;
+        let ranges = if variable.direction == Direction::Outputs { &data.send } else { &data.receive };
+        let mut before = 0;
+        for range in ranges {
+            if (range.start..range.start + range.length).contains(&variable.bit) {
+                return Some((subdevice, variable.direction, before + variable.bit - range.start, variable.bits));
+            }
+            before += range.length;
+        }
+        None
+    }
+
+    /// Sets all output variables at random, and compares all variables with what the devices have. Returns how many.
+    fn compare(&mut self, dice: &mut Dice) -> [usize; 2] {
+        for number in 0..self.image.variables().len() {
+            let variable = self.image.variables()[number].clone();
+            if variable.direction == Direction::Outputs {
+                assert!(self.image.write(&variable, dice.roll()));
+            }
+        }
+        self.run(4);
+        let mut compared = [0; 2];
+        for number in 0..self.image.variables().len() {
+            let Some((subdevice, direction, first, count)) = self.place(number) else { continue };
+            let variable = &self.image.variables()[number];
+            if variable.name == COPIED {
+                continue;
+            }
+            let device = self.device(subdevice);
+            let bytes = if direction == Direction::Outputs { device.outputs() } else { device.inputs() };
+            assert_eq!(self.image.read(variable), bits(bytes, first, count), "{}", variable.name);
+            compared[usize::from(direction == Direction::Inputs)] += 1;
+        }
+        compared
+    }
+}
+
+#[test]
+fn files_of_tools_come_to_op_and_exchange_data_through_their_variables_facts_8() {
+    for (name, count) in REAL {
+        let Some(file) = real(name) else { continue };
+        let has_clocks = file.configuration.declaration.clocks.is_some();
+        let mut plant = activate(file, false, false).unwrap_or_else(|error| panic!("{name}: {error}"));
+        plant.settle();
+        assert_eq!(plant.application.links().network().devices().len(), count, "{name}");
+        let mut dice = Dice::new(7);
+        let mut compared = [0; 2];
+        for _ in 0..10 {
+            compared = plant.compare(&mut dice);
+        }
+        assert!(compared.iter().all(|count| *count > 0), "{name}: {compared:?}");
+        assert_eq!(has_clocks, name.starts_with("rocos"), "{name}");
+        println!("{name}: {} outputs and {} inputs by name", compared[0], compared[1]);
+    }
+}
+
+#[test]
+fn a_file_with_packed_bits_copies_and_a_mapping_of_its_own_works_on_one_link_and_on_a_ring_facts_8() {
+    for ring in [false, true] {
+        let mut plant = activate(machine(), ring, ring).expect("it fits");
+        plant.settle();
+        let mut dice = Dice::new(3);
+        for _ in 0..10 {
+            // The copy has the last word about one bit.
+            let copied = plant.image.variable("Buttons.Channel 4").cloned().expect("it is there");
+            let target = plant.image.variable(COPIED).cloned().expect("it is there");
+            let pressed = dice.roll() % 2;
+            plant.network_mut().device_mut(DeviceIndex(BUTTONS)).set_inputs(&[(pressed as u8) << 3 | 0x05]);
+            plant.run(4);
+            assert_eq!(plant.image.read(&copied), pressed);
+            assert_eq!(bits(plant.device(VALVES).outputs(), 3, 1), pressed);
+            plant.image.write(&target, 1 - pressed);
+            plant.run(4);
+            assert_eq!(bits(plant.device(VALVES).outputs(), 3, 1), pressed, "copied, not written");
+        }
+        for (name, value, subdevice, bytes) in [
+            ("Lamps.Channel 2", 1, LAMPS, &[0x02][..]),
+            ("Valves.Channel 1", 1, VALVES, &[0x01]),
+            ("Drive.Target velocity", 0x0403_0201, DRIVE, &[1, 2, 3, 4, 0, 0]),
+        ] {
+            plant.image.outputs_mut().fill(0);
+            plant.network_mut().device_mut(DeviceIndex(BUTTONS)).set_inputs(&[0]);
+            let variable = plant.image.variable(name).cloned().expect("it is there");
+            plant.image.write(&variable, value);
+            plant.run(4);
+            assert_eq!(plant.device(subdevice).outputs(), bytes, "{name}");
+            // The drive's inputs are what its outputs were.
+            let position = plant.image.variable("Drive.Position").cloned().expect("it is there");
+            assert_eq!(plant.image.read(&position), if subdevice == DRIVE { value } else { 0 });
+        }
+    }
+}
+
+/// A drive that knows nothing of the file's mapping but what the file tells it (SOEM#958).
+#[test]
+fn a_mapping_that_is_not_that_of_the_sii_is_set_by_the_file_alone_facts_8() {
+    let file = machine();
+    let mut segment = segment(&file.eni, &file.configuration, false);
+    let drive = &mut segment.devices[DRIVE];
+    // As delivered: other PDOs, of other lengths, in its dictionary and in its SII.
+    for pdo in &mut drive.pdos {
+        pdo.entries.swap(0, 1);
+        pdo.entries.truncate(1);
+    }
+    drive.objects.extend([0x60FF, 0x6064].map(|index| {
+        use ringcat_sim::application::dictionary::{Access, Object};
+        Object::variable(index, "", ringcat_sim::description::data_type::U32, Access::ReadWrite, &[0; 4])
+    }));
+    for sync_manager in drive.sync_managers.iter_mut().skip(2) {
+        sync_manager.length = 2;
+    }
+    drive.sii_image = Some(sii_image::build(drive));
+    let network = Network::from_description(segment).expect("cables fit");
+    let mut plant = activate_on(network, file, false).expect("it fits");
+    plant.settle();
+    let velocity = plant.image.variable("Drive.Target velocity").cloned().expect("it is there");
+    plant.image.write(&velocity, 0x0403_0201);
+    plant.run(4);
+    assert_eq!(plant.device(DRIVE).outputs(), [1, 2, 3, 4, 0, 0]);
+}
+
+#[test]
+fn an_lrw_of_a_file_is_refused_on_two_links_with_datagram_and_subdevices_unless_it_may_be_split_cr_16_facts_9_2_2() {
+    let files = std::iter::once(("machine", Some(machine()), vec![1, 2, 3, 4]));
+    let real = [("rocos_bcr_eni.xml", vec![0, 1, 2]), ("rocos_eni7.xml", (0..7).collect())];
+    let files = files.chain(real.into_iter().map(|(name, who)| (name, self::real(name), who)));
+    for (name, file, who) in files {
+        let Some(file) = file else { continue };
+        let Err(Error::Activate(error)) = activate(file.clone(), true, false) else { panic!("{name} was taken") };
+        let ActivateError::NamedLrwOnTwoLinks(lrw) = &error else { panic!("{name}: {error}") };
+        assert_eq!(lrw.subdevices, who, "{name}");
+        assert!(!lrw.name.is_empty() && error.to_string().contains(&lrw.name), "{name}: {error}");
+        let mut plant = activate(file, true, true).expect("split it is allowed");
+        plant.settle();
+        // A break and its repair, with everything in OP.
+        let last = plant.application.links().network().devices().len() - 1;
+        for fault in [Network::cut, Network::heal] {
+            fault(plant.network_mut(), CableId(last));
+            plant.run(200);
+            assert!(plant.is_complete() && plant.application.all_settled(), "{name}");
+        }
+        plant.compare(&mut Dice::new(5));
+    }
+}
+
+#[test]
+fn a_network_that_is_not_the_one_of_the_file_is_told_for_each_subdevice() {
+    let file = machine();
+    let mut other = segment(&file.eni, &file.configuration, false);
+    other.devices[LAMPS].identity.product_code = 0x4711;
+    other.devices[BUTTONS].identity.vendor_id = 0xBEC;
+    let network = Network::from_description(other).expect("cables fit");
+    let mut main_device = MainDevice::request(SimulatedSegment::new(network), &Options::default());
+    let found = main_device.scan().expect("a scan").subdevices;
+    let told: Vec<String> = file.compare(&found).iter().map(ToString::to_string).collect();
+    assert_eq!(told.len(), 2, "{told:?}");
+    assert!(
+        told[0].contains("\"Lamps (1002)\"") && told[0].contains("expected product code 0x00000002, got 0x00004711")
+    );
+    assert!(
+        told[1].contains("\"Buttons (1004)\"") && told[1].contains("expected vendor id 0x00000c47, got 0x00000bec")
+    );
+    assert!(
+        file.compare(&found[..4]).iter().any(|difference| difference.is_grave && difference.subdevice == Some(DRIVE))
+    );
+}
+
+#[test]
+fn variables_tell_how_old_they_are_by_the_subdevice_that_they_come_from() {
+    let mut plant = activate(machine(), false, false).expect("it fits");
+    plant.settle();
+    let variable = |plant: &Plant, name: &str| plant.image.variable(name).cloned().expect("it is there");
+    let (button, position) = (variable(&plant, "Buttons.Channel 1"), variable(&plant, "Drive.Position"));
+    plant.network_mut().power_off(DeviceIndex(DRIVE));
+    plant.run(50);
+    let Plant { application, image, .. } = &mut plant;
+    application.cycle(|data| {
+        let (button, position) = (image.freshness(&button, data), image.freshness(&position, data));
+        assert_eq!(button, Freshness::Fresh);
+        assert_ne!(position, Freshness::Fresh);
+    });
+    plant.network_mut().power_on(DeviceIndex(DRIVE));
+    plant.run(20);
+    plant.settle();
+}
+
+/// Written by hand, with two outputs' worth of process data for a SubDevice whose SII has eight bits.
+const BY_HAND: &str = r#"<EtherCATConfig><Config>
+<Slave><Info><Name>Outputs</Name><PhysAddr>1001</PhysAddr><VendorId>3143</VendorId><ProductCode>131596296</ProductCode></Info>
+<ProcessData><Send><BitStart>0</BitStart><BitLength>BITS</BitLength></Send></ProcessData></Slave>
+<Cyclic><CycleTime>1000</CycleTime></Cyclic>
+<ProcessImage><Outputs><ByteSize>2</ByteSize></Outputs></ProcessImage>
+</Config></EtherCATConfig>"#;
+
+#[test]
+fn places_for_more_than_a_subdevice_has_are_refused_with_both_numbers() {
+    let image = |bits: &str, outputs_len: usize| {
+        let mut file = EniFile::from_bytes(BY_HAND.replace("BITS", bits).as_bytes()).expect("it is an ENI");
+        file.configuration.image.outputs_len = outputs_len;
+        let network = line(descriptions(&["digital-output-8"]), NetworkOptions::default());
+        let mut main_device = MainDevice::request(SimulatedSegment::new(network), &Options::default());
+        main_device.scan().expect("a scan");
+        let application = main_device.activate(file.declaration(false)).expect("the SII says how");
+        EniImage::new(&file.configuration, application.directory())
+    };
+    assert!(image("8", 2).is_ok());
+    let text = image("16", 2).expect_err("eight are there").to_string();
+    assert_eq!(text, "SubDevice 0: the file has places for 16 bits of outputs, the SubDevice has 8");
+    let text = image("8", 0).expect_err("there is no image").to_string();
+    assert_eq!(text, "SubDevice 0: its outputs end at bit 8 of the process image, which has 0");
+}
