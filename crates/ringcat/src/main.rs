@@ -5,6 +5,7 @@ mod capture;
 mod clock_options;
 mod clocks;
 mod demo;
+mod eni_summary;
 mod interfaces;
 mod output;
 mod recording;
@@ -63,6 +64,8 @@ enum Command {
     Capture(capture::CaptureArguments),
     /// Puts a simulated segment on network interfaces, for any EtherCAT MainDevice at their other end.
     Sim(sim::SimArguments),
+    /// Shows what an ENI (a network configured with TwinCAT, EC-Engineer, ...) says and what follows from it.
+    Eni(eni_summary::EniArguments),
     /// Measures: round trips against a bare echo, cycles back to back, start-up.
     Bench(bench::BenchArguments),
 }
@@ -77,6 +80,7 @@ fn main() -> ExitCode {
         Command::Clocks(arguments) => clocks::run(&arguments),
         Command::Capture(arguments) => capture::run(&arguments).map(|()| true),
         Command::Sim(arguments) => sim::run(&arguments).map(|()| true),
+        Command::Eni(arguments) => eni_summary::run(&arguments).map(|()| true),
         Command::Bench(arguments) => bench::run(&arguments),
     };
     match held {

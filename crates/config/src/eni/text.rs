@@ -8,6 +8,7 @@ use encoding_rs::{Encoding, UTF_8, UTF_16BE, UTF_16LE};
 
 use super::MAX_BYTES;
 use super::error::{EniError, Place, Problem, shown};
+use super::kind::FileKind;
 
 /// Bytes at the beginning in which a declaration is looked for.
 const DECLARATION: usize = 256;
@@ -56,6 +57,9 @@ fn declared(bytes: &[u8]) -> Option<String> {
 
 /// The first line that is not in the encoding.
 fn not_in(encoding: &'static Encoding, bytes: &[u8]) -> EniError {
+    if bytes.trim_ascii_start().first() != Some(&b'<') {
+        return EniError::of_file(Problem::WrongFile { kind: FileKind::NotXml });
+    }
     let reason = format!(
         "the bytes are not in {}: save the file as UTF-8, or declare the encoding that it has (windows-1252?)",
         encoding.name()
