@@ -163,6 +163,8 @@ pub enum Event {
         main: u16,
         /// SubDevices on the redundant link.
         redundant: u16,
+        /// The cable that is whole again: where the break was located last, if it was.
+        place: Option<Cable>,
     },
     /// The ring opens and closes so often that not every change is told any more: the next one when it has been steady
     /// for a second.

@@ -99,7 +99,10 @@ pub fn describe(event: &Event, names: &Names) -> String {
             format!("ring open: {main} SubDevices on MAIN, {redundant} on REDUNDANT")
         }
         Event::BreakLocated { cable } => format!("Line break {}", names.cable(*cable)),
-        Event::RingClosed { main, .. } => format!("Line is fixed: ring closed, {main} SubDevices on MAIN"),
+        Event::RingClosed { main, place, .. } => {
+            let place = place.map_or_else(String::new, |cable| format!(" {}", names.cable(cable)));
+            format!("Line is fixed{place}: ring closed, {main} SubDevices on MAIN")
+        }
         Event::RingUnsteady { changes } => {
             format!("ring unsteady: {changes} changes so far, the next is told when it has held for a second")
         }

@@ -397,7 +397,7 @@ fn operate(case: &Case, twin: &[Vec<u8>]) -> Outcome {
     let (main, redundant) = (case.cable as u16, (case.count - case.cable) as u16);
     let cable = cable_of_ring(case.cable, case.count);
     let opened = [Event::RingOpened { main, redundant }, Event::BreakLocated { cable }];
-    let closed = [Event::RingClosed { main: case.count as u16, redundant: 0 }];
+    let closed = [Event::RingClosed { main: case.count as u16, redundant: 0, place: Some(cable) }];
     let mut outcome = Outcome { allowed: bound, ..Outcome::default() };
     for (at, fault) in [Fault::Cut(CableId(case.cable)), Fault::Heal(CableId(case.cable))].into_iter().enumerate() {
         let mark = pair.cut.mark();

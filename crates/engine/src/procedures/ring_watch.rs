@@ -149,9 +149,10 @@ impl RingWatch {
             return;
         }
         let Some((main, redundant)) = self.counts(word, number, supervision) else { return };
+        let place = self.fleet.access().ring.place;
         let event = match (self.reported.replace(word.state), word.state) {
             (_, RingState::Open) => Event::RingOpened { main, redundant },
-            (RingState::Open, RingState::Closed) => Event::RingClosed { main, redundant },
+            (RingState::Open, RingState::Closed) => Event::RingClosed { main, redundant, place },
             (_, RingState::Closed | RingState::Unknown) => return,
         };
         self.bus.report(event);

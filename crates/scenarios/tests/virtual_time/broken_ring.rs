@@ -55,7 +55,7 @@ fn a_ring_that_is_broken_from_the_start_comes_to_op_wherever_the_break_is_and_cl
             let mark = world.mark();
             world.heal(CableId(cable));
             world.run_cycles(50);
-            let closed = Event::RingClosed { main: COUNT, redundant: 0 };
+            let closed = Event::RingClosed { main: COUNT, redundant: 0, place: Some(cable_of_ring(cable, 16)) };
             assert_eq!(ring_events(world.events(mark)), [&closed]);
             assert_eq!(world.left_op(mark), []);
             assert!(world.incomplete(mark) <= 2, "{}", world.incomplete(mark));
@@ -177,8 +177,11 @@ fn two_breaks_isolate_a_piece_which_returns_without_losing_others() {
                     world.events(healing).iter().filter(|timed| timed.event == Event::Returned { subdevice });
                 assert_eq!(returned.count(), usize::from(isolated.contains(&subdevice)), "{subdevice}");
             }
-            let closed = Event::RingClosed { main: COUNT, redundant: 0 };
-            assert_eq!(ring_events(world.events(healing)).last(), Some(&&closed));
+            let told = ring_events(world.events(healing));
+            let Some(Event::RingClosed { main: COUNT, redundant: 0, place: Some(place) }) = told.last() else {
+                panic!("{told:?}")
+            };
+            assert_eq!(*place, cable_of_ring(second, 16));
         }
     }
 }

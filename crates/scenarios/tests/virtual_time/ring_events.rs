@@ -290,7 +290,7 @@ fn an_unsteady_ring_is_told_once_and_then_when_it_holds() {
     assert!(told <= 80, "{told} events for {} changes", world.application().ring_status().changes);
     world.run_cycles(1_100);
     assert!(!world.application().ring_status().unsteady);
-    assert!(matches!(ring_events(world.events(mark)).last(), Some(Event::RingClosed { main: 4, redundant: 0 })));
+    assert!(matches!(ring_events(world.events(mark)).last(), Some(Event::RingClosed { main: 4, redundant: 0, .. })));
     // It is told at once again.
     let mark = world.mark();
     world.cut(CableId(1));

@@ -68,7 +68,7 @@ fn cut_and_heal(world: &mut World, cable: usize, phase: u32, row: &mut Row) {
     row.slowest_place = row.slowest_place.max(delay(world, mark, |event| matches!(event, Event::BreakLocated { .. })));
     let mark = world.mark();
     let heal = edge(world, Fault::Heal(CableId(cable)), phase, row.detection);
-    let closed = Event::RingClosed { main: COUNT, redundant: 0 };
+    let closed = Event::RingClosed { main: COUNT, redundant: 0, place: Some(cable_of_ring(cable, 16)) };
     assert_eq!(ring_events(world.events(mark)), [&closed], "cable {cable}, phase {phase}");
     row.slowest_event = row.slowest_event.max(delay(world, mark, |event| matches!(event, Event::RingClosed { .. })));
     row.edges += 2;
@@ -139,7 +139,7 @@ fn ends_that_open_one_after_the_other_cost_no_more_cycles_than_the_difference_cr
                 let mark = world.mark();
                 let fault = Fault::HealUnevenly { cable: CableId(cable), direction, by };
                 let incomplete = edge(&mut world, fault, 430, by);
-                let closed = Event::RingClosed { main: COUNT, redundant: 0 };
+                let closed = Event::RingClosed { main: COUNT, redundant: 0, place: Some(cable_of_ring(cable, 16)) };
                 assert_eq!(ring_events(world.events(mark)), [&closed], "cable {cable}, {direction:?}, {by_us} us");
                 assert!(incomplete <= allowed, "cable {cable}, {direction:?}, {by_us} us: {incomplete} of {allowed}");
                 worst = worst.max(incomplete);

@@ -12,9 +12,11 @@ use ringcat::{Direction, DomainId, DomainState, MainDevice, Options, automatic};
 use ringcat_link::Recorder;
 use ringcat_sim::cable::CableId;
 use ringcat_sim::fault::Fault;
-use ringcat_sim::network::NetworkOptions;
+use ringcat_sim::frame::Port;
+use ringcat_sim::network::builder::SegmentBuilder;
+use ringcat_sim::network::{Network, NetworkOptions};
 use scenarios::dice::Dice;
-use scenarios::segments::{descriptions, ring};
+use scenarios::segments::{MAIN, REDUNDANT, at, descriptions, devices, ring};
 
 const CYCLE: Duration = Duration::from_millis(1);
 const KINDS: [&str; 6] =
@@ -29,6 +31,30 @@ struct Cycle {
     inputs: String,
 }
 
+/// A straight ring, or one with branches on ports 3 and 2, of which the latter is met by the redundant copy even while the ring
+/// is closed, and with crossed SubDevices; with the number of cables that are the ring's.
+fn segment(shape: u64, options: NetworkOptions) -> (Network, usize) {
+    if shape == 0 {
+        return (ring(descriptions(&KINDS), options), KINDS.len() + 1);
+    }
+    use Port::{A, B, C, D};
+    let kinds = ["junction", "analog-input-4", "digital-output-8", "junction", "servo", "digital-input-16", "coupler"];
+    let (entry, exit) = if shape == 1 { (A, B) } else { (B, A) };
+    let cables = [
+        (MAIN, at(0, A)),
+        (at(0, B), at(1, entry)),
+        (at(1, exit), at(2, A)),
+        (at(2, B), at(3, A)),
+        (at(3, B), at(4, entry)),
+        (at(4, exit), REDUNDANT),
+        (at(0, C), at(5, A)),
+        (at(3, D), at(6, A)),
+    ];
+    let builder = devices(descriptions(&kinds)).into_iter().fold(SegmentBuilder::new(), SegmentBuilder::device);
+    let builder = cables.iter().fold(builder, |builder, (one, other)| builder.cable(*one, *other));
+    (builder.options(options).build().expect("the cables fit"), 6)
+}
+
 fn hex(bytes: &[u8]) -> String {
     bytes.iter().map(|byte| format!("{byte:02x}")).collect()
 }
@@ -37,14 +63,14 @@ fn hex(bytes: &[u8]) -> String {
 fn run(seed: u64, path: &Path) -> (usize, Vec<Cycle>) {
     let mut dice = Dice::new(seed);
     let detection = Duration::from_micros(*dice.pick(&[10, 600, 3_000]));
-    let network = ring(descriptions(&KINDS), NetworkOptions::default().with_detection_delay(detection));
+    let (network, cables) = segment(seed % 3, NetworkOptions::default().with_detection_delay(detection));
     let recorder = Recorder::start(path, &[("main", "main link"), ("redundant", "redundant link")]).expect("a file");
     let links = Tee::new(SimulatedSegment::new(network), recorder.tap());
     let mut main_device = MainDevice::request(links, &Options::default());
     let scan = main_device.scan().expect("a segment");
     let mut application = main_device.activate(automatic(&scan.subdevices, CYCLE)).expect("it fits");
     let areas: Vec<_> =
-        (0..KINDS.len()).flat_map(|subdevice| application.directory().areas(subdevice).to_vec()).collect();
+        (0..scan.subdevices.len()).flat_map(|subdevice| application.directory().areas(subdevice).to_vec()).collect();
     let mut inputs: Vec<_> = areas
         .iter()
         .filter(|area| area.direction == Direction::Inputs)
@@ -58,7 +84,7 @@ fn run(seed: u64, path: &Path) -> (usize, Vec<Cycle>) {
         if first.is_some() && dice.one_in(12) {
             let fault = match cut.take() {
                 Some(cable) => Fault::Heal(cable),
-                None => Fault::Cut(*cut.insert(CableId(dice.below(KINDS.len() as u64 + 1) as usize))),
+                None => Fault::Cut(*cut.insert(CableId(dice.below(cables as u64) as usize))),
             };
             let network = application.links_mut().links_mut().network_mut();
             let at = network.now() + Duration::from_micros(dice.below(1_000));

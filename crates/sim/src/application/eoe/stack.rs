@@ -5,6 +5,7 @@
 
 use core::fmt;
 use core::fmt::Write as _;
+use core::ops::Range;
 use core::time::Duration;
 
 use smoltcp::iface::{Config, Interface, PollResult, SocketHandle, SocketSet};
@@ -49,7 +50,7 @@ struct Connection {
     port: u16,
     request: Vec<u8>,
     /// Head of the answer, and bytes behind it that are still to be sent.
-    answer: Option<(Vec<u8>, usize)>,
+    answer: Option<(Vec<u8>, Range<usize>)>,
 }
 
 impl Clone for Stack {
@@ -182,15 +183,16 @@ impl Connection {
             head.drain(..sent);
             moved |= sent > 0;
         }
-        while head.is_empty() && *body > 0 && socket.can_send() {
-            let sent = socket.send_slice(&[b'.'; 1024][..(*body).min(1024)]).unwrap_or(0);
-            *body -= sent;
+        while head.is_empty() && body.start < body.end && socket.can_send() {
+            let piece: Vec<u8> = body.clone().take(1024).map(body_byte).collect();
+            let sent = socket.send_slice(&piece).unwrap_or(0);
+            body.start += sent;
             moved |= sent > 0;
             if sent == 0 {
                 break;
             }
         }
-        if head.is_empty() && *body == 0 {
+        if head.is_empty() && body.start == body.end {
             self.answer = None;
             socket.close();
             moved = true;
@@ -213,8 +215,13 @@ fn echo(socket: &mut tcp::Socket<'_>) -> bool {
     moved
 }
 
-/// Head of the answer to a request, and how many bytes follow.
-fn answer(request: &[u8], addresses: &Addresses) -> (Vec<u8>, usize) {
+/// A byte of what `/bytes/N` answers: none is like those around it.
+fn body_byte(number: usize) -> u8 {
+    b'!' + (number % 89) as u8
+}
+
+/// Head of the answer to a request, and which bytes of the body follow.
+fn answer(request: &[u8], addresses: &Addresses) -> (Vec<u8>, Range<usize>) {
     let text = String::from_utf8_lossy(request);
     let wanted = text.strip_prefix("GET /bytes/").and_then(|rest| rest.split_whitespace().next()?.parse().ok());
     let mut head = String::from("HTTP/1.0 200 OK\r\nConnection: close\r\n");
@@ -222,12 +229,12 @@ fn answer(request: &[u8], addresses: &Addresses) -> (Vec<u8>, usize) {
     match wanted.filter(|bytes| *bytes <= MAX_BYTES) {
         Some(bytes) => {
             let _ = write!(head, "Content-Type: application/octet-stream\r\nContent-Length: {bytes}\r\n\r\n");
-            (head.into_bytes(), bytes)
+            (head.into_bytes(), 0..bytes)
         }
         None => {
             let page = format!("RingCAT simulated device {}\n", String::from_utf8_lossy(&addresses.name));
             let _ = write!(head, "Content-Type: text/plain\r\nContent-Length: {}\r\n\r\n{page}", page.len());
-            (head.into_bytes(), 0)
+            (head.into_bytes(), 0..0)
         }
     }
 }
