@@ -1,6 +1,8 @@
 //! Networks from ENIs, end to end: the file is read, a segment is made of it, it comes to OP as the file says, and exchanges
 //! data through the variables of the file (facts 8).
 
+mod variants;
+
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
@@ -8,6 +10,7 @@ use ringcat::eni::{EniFile, EniImage, segment};
 use ringcat::simulated::SimulatedSegment;
 use ringcat::{
     ActivateError, Application, Direction, DomainId, DomainState, Error, Event, Freshness, MainDevice, Options,
+    SubDeviceInfo,
 };
 use ringcat_sim::cable::{CableId, DeviceIndex};
 use ringcat_sim::device::Device;
@@ -39,6 +42,7 @@ struct Plant {
     file: EniFile,
     application: Application<SimulatedSegment>,
     image: EniImage,
+    found: Vec<SubDeviceInfo>,
     events: Vec<Event>,
 }
 
@@ -62,14 +66,20 @@ fn activate(file: EniFile, ring: bool, split_lrw: bool) -> Result<Plant, Error> 
 }
 
 fn activate_on(network: Network, file: EniFile, split_lrw: bool) -> Result<Plant, Error> {
+    let plant = start(network, file, split_lrw)?;
+    assert_eq!(plant.image.unplaced(), [0_usize; 0]);
+    assert_eq!(plant.file.compare(&plant.found), [], "it is the network of the file");
+    Ok(plant)
+}
+
+/// Activates a file on a network, whoever is there.
+fn start(network: Network, file: EniFile, split_lrw: bool) -> Result<Plant, Error> {
     let mut main_device = MainDevice::request(SimulatedSegment::new(network), &Options::default());
     let found = main_device.scan()?.subdevices;
-    assert_eq!(file.compare(&found), [], "it is the network of the file");
     let mut application = main_device.activate(file.declaration(split_lrw))?;
     let image = EniImage::new(&file.configuration, application.directory()).expect("the image fits");
-    assert_eq!(image.unplaced(), [0_usize; 0]);
     application.set_copies(image.copies()).expect("copies fit");
-    Ok(Plant { file, application, image, events: Vec::new() })
+    Ok(Plant { file, application, image, found, events: Vec::new() })
 }
 
 /// Up to 64 bits of a device's image.
@@ -342,4 +352,64 @@ fn places_for_more_than_a_subdevice_has_are_refused_with_both_numbers() {
     assert_eq!(text, "SubDevice 0: the file has places for 16 bits of outputs, the SubDevice has 8");
     let text = image("8", 0).expect_err("there is no image").to_string();
     assert_eq!(text, "SubDevice 0: its outputs end at bit 8 of the process image, which has 0");
+}
+
+/// Whatever numbers a file has, a segment is made and comes up or not, and an error says why.
+#[test]
+fn files_with_wrong_numbers_are_refused_or_followed_without_harm() {
+    let text = std::str::from_utf8(MACHINE).expect("it is text");
+    let numbers: Vec<(usize, usize)> = numbers(text);
+    let mut dice = Dice::new(1);
+    let (mut refused, mut started) = (0, 0);
+    for _ in 0..std::env::var("RINGCAT_FILES").ok().and_then(|count| count.parse().ok()).unwrap_or(40) {
+        let mut changed = text.to_owned();
+        let mut places: Vec<(usize, usize)> = (0..=dice.below(3)).map(|_| *dice.pick(&numbers)).collect();
+        places.sort_unstable();
+        places.dedup();
+        for (start, end) in places.into_iter().rev() {
+            let hex = changed[start..end].len() > 3 && dice.one_in(2);
+            let number = match dice.below(5) {
+                0 => "0".to_owned(),
+                1 => "65535".to_owned(),
+                2 => dice.below(300).to_string(),
+                3 if hex => format!("{:016x}", dice.roll()),
+                _ => dice.below(1 << 33).to_string(),
+            };
+            changed.replace_range(start..end, &number);
+        }
+        let Ok(file) = EniFile::from_bytes(changed.as_bytes()) else {
+            refused += 1;
+            continue;
+        };
+        let ring = dice.one_in(2);
+        let Ok(network) = file.simulated(ring) else { continue };
+        let mut main_device = MainDevice::request(SimulatedSegment::new(network), &Options::default());
+        let Ok(scan) = main_device.scan() else { continue };
+        file.compare(&scan.subdevices);
+        let Ok(mut application) = main_device.activate(file.declaration(ring)) else { continue };
+        let Ok(mut image) = EniImage::new(&file.configuration, application.directory()) else { continue };
+        let _ = application.set_copies(image.copies());
+        for _ in 0..30 {
+            application.cycle(|data| {
+                image.take_inputs(data);
+                image.give_outputs(data);
+            });
+        }
+        started += 1;
+    }
+    println!("{refused} refused, {started} started");
+    assert!(refused > 0 && started > 0);
+}
+
+/// Where numbers stand in the text of elements.
+fn numbers(text: &str) -> Vec<(usize, usize)> {
+    let mut found = Vec::new();
+    for (at, _) in text.match_indices('>') {
+        let rest = &text[at + 1..];
+        let length = rest.find('<').unwrap_or(0);
+        if length > 0 && rest[..length].chars().all(|c| c.is_ascii_hexdigit()) {
+            found.push((at + 1, at + 1 + length));
+        }
+    }
+    found
 }

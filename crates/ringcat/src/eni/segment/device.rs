@@ -174,7 +174,8 @@ fn guessed(subdevice: &SubDevice, mailbox: Option<&MailboxDescription>) -> Vec<D
         add(SyncManagerRole::Outputs, PROCESS_DATA_START, outputs, 0x64);
     }
     if inputs > 0 {
-        let start = PROCESS_DATA_START.saturating_add(outputs.saturating_mul(3).next_multiple_of(8));
+        // Three buffers, and the next one begins with a word.
+        let start = PROCESS_DATA_START.saturating_add(outputs.saturating_mul(3).saturating_add(7) & !7);
         add(SyncManagerRole::Inputs, start, inputs, 0x20);
     }
     declared

@@ -1,0 +1,108 @@
+//! What files say beside the usual: groups that come later, tasks of several speeds, objects that a drive does not have.
+
+use std::time::Duration;
+
+use ringcat::{DomainId, Event};
+use ringcat_sim::cable::DeviceIndex;
+use ringcat_sim::network::Network;
+
+use super::{BUTTONS, DRIVE, EniFile, LAMPS, MACHINE, Plant, activate, activate_on, segment};
+
+/// The machine with some of its text replaced.
+fn with(changes: &[(&str, &str)]) -> EniFile {
+    let mut text = String::from_utf8(MACHINE.to_vec()).expect("it is text");
+    for (from, to) in changes {
+        assert_eq!(text.matches(from).count(), 1, "{from}");
+        text = text.replace(from, to);
+    }
+    EniFile::from_bytes(text.as_bytes()).unwrap_or_else(|error| panic!("{error}"))
+}
+
+fn set(plant: &mut Plant, name: &str, value: u64) {
+    let variable = plant.image.variable(name).cloned().expect("it is there");
+    assert!(plant.image.write(&variable, value));
+}
+
+fn get(plant: &Plant, name: &str) -> u64 {
+    plant.image.read(plant.image.variable(name).expect("it is there"))
+}
+
+#[test]
+fn a_hot_connect_group_of_a_file_has_its_places_from_the_start_and_takes_them_when_it_comes_facts_8_2() {
+    let group = "      <HotConnect><GroupName>Drive</GroupName><GroupMemberCnt>1</GroupMemberCnt>
+        <IdentifyCmd><Comment>alias</Comment><Cmd>1</Cmd><Adp>0</Adp><Ado>18</Ado><Data>0000</Data>
+          <Validate><Data>0700</Data><Timeout>100</Timeout></Validate></IdentifyCmd></HotConnect>
+      <DC>";
+    let file = with(&[("      <DC>", group)]);
+    let mut network = file.simulated(false).expect("a segment");
+    network.power_off(DeviceIndex(DRIVE));
+    let mut plant = activate_on_any(network, file);
+    plant.run(300);
+    assert!(plant.application.exchange_mut().status(DomainId(0)).wkc > 0);
+    set(&mut plant, "Lamps.Channel 2", 1);
+    set(&mut plant, "Drive.Target velocity", 0x0102_0304);
+    plant.run(4);
+    assert_eq!(plant.device(LAMPS).outputs(), [2], "the others work");
+    assert_eq!(get(&plant, "Drive.Position"), 0);
+    plant.network_mut().power_on(DeviceIndex(DRIVE));
+    let until = plant.application.now() + Duration::from_secs(20);
+    while get(&plant, "Drive.Position") != 0x0102_0304 {
+        assert!(plant.application.now() < until, "{:?}", plant.events);
+        plant.cycle();
+    }
+    assert_eq!(plant.device(DRIVE).outputs(), [4, 3, 2, 1, 0, 0]);
+}
+
+/// As [`activate_on`], whoever is there.
+fn activate_on_any(network: Network, file: EniFile) -> Plant {
+    let plant = super::start(network, file, false).expect("the others are there");
+    assert!(plant.image.unplaced().is_empty(), "who is absent has places too");
+    plant
+}
+
+#[test]
+fn tasks_of_a_file_are_domains_with_cycle_times_of_their_own_facts_8_1() {
+    let slow = "    </Cyclic>
+    <Cyclic>
+      <CycleTime>4000</CycleTime>
+      <Frame><Cmd><State>4</State><Comment>drive</Comment><Cmd>12</Cmd><Addr>16777218</Addr><DataLength>6</DataLength>
+        <Cnt>3</Cnt><InputOffs>2</InputOffs><OutputOffs>2</OutputOffs></Cmd></Frame>
+    </Cyclic>";
+    let file = with(&[
+        ("    </Cyclic>", slow),
+        ("<DataLength>8</DataLength>\n          <Cnt>8</Cnt>", "<DataLength>1</DataLength>\n          <Cnt>5</Cnt>"),
+    ]);
+    let periods: Vec<Duration> = file.configuration.declaration.domains.iter().map(|domain| domain.period).collect();
+    assert_eq!(periods, [1, 4].map(Duration::from_millis));
+    let mut plant = activate(file, false, false).expect("it fits");
+    plant.settle();
+    plant.network_mut().device_mut(DeviceIndex(BUTTONS)).set_inputs(&[0x05]);
+    set(&mut plant, "Lamps.Channel 1", 1);
+    set(&mut plant, "Drive.Target velocity", 0x0506_0708);
+    plant.run(3);
+    assert_eq!((plant.device(LAMPS).outputs(), get(&plant, "Buttons.Channel 3")), (&[1][..], 1));
+    // There and back takes the slow task two of its cycles, and may just have missed one.
+    plant.run(12);
+    assert_eq!(get(&plant, "Drive.Position"), 0x0506_0708);
+    let domain = |plant: &Plant, name: &str| plant.image.variable(name).expect("it is there").domain;
+    assert_eq!(domain(&plant, "Drive.Position"), Some(DomainId(1)));
+    assert_eq!(domain(&plant, "Buttons.Channel 3"), Some(DomainId(0)));
+}
+
+#[test]
+fn an_object_that_a_drive_refuses_is_told_with_the_comment_of_the_file_facts_8_2() {
+    let file = with(&[]);
+    let mut segment = segment(&file.eni, &file.configuration, false);
+    segment.devices[DRIVE].objects.clear();
+    let network = Network::from_description(segment).expect("cables fit");
+    let mut plant = activate_on(network, file, false).expect("it fits");
+    plant.run(300);
+    let told = |event: &Event| {
+        matches!(event, Event::ConfigurationFailed { subdevice: DRIVE, reason }
+            if reason.starts_with("start-up command 14 (PREOP to SAFEOP) \"velocity mode\": SDO 0x6060:00: aborted"))
+    };
+    assert!(plant.events.iter().any(told), "{:?}", plant.events);
+    set(&mut plant, "Lamps.Channel 1", 1);
+    plant.run(4);
+    assert_eq!(plant.device(LAMPS).outputs(), [1], "the others work");
+}
