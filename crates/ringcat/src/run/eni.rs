@@ -50,8 +50,12 @@ impl EniArguments {
     pub fn load(&self) -> Result<Option<EniNetwork>, Failure> {
         let Some(path) = &self.eni else { return Ok(None) };
         let file = EniFile::load(path).map_err(|error| Failure::new(error.to_string()))?;
-        for notice in &file.configuration.notices {
-            say!("{}: {notice}", path.display());
+        if !file.configuration.notices.is_empty() {
+            say!("{}: not followed, or done in another way:", path.display());
+            file.configuration.notices.iter().for_each(|notice| say!("  {notice}"));
+        }
+        if file.configuration.declaration.clocks.as_ref().is_some_and(|clocks| clocks.bus_shift) {
+            say!("  the reference clock follows this host (bus shift); with --phase 0us the cycles follow it instead");
         }
         let network = EniNetwork { file, split_lrw: self.split_lrw, set: self.set.clone(), watch: self.watch.clone() };
         network.check_variables()?;

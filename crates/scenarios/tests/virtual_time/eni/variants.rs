@@ -1,10 +1,15 @@
-//! What files say beside the usual: groups that come later, tasks of several speeds, objects that a drive does not have.
+//! What files say beside the usual: groups that come later, tasks of several speeds, objects that a drive does not have; and
+//! a ring behind a junction, of which no file says anything.
 
 use std::time::Duration;
 
-use ringcat::{DomainId, Event};
-use ringcat_sim::cable::DeviceIndex;
+use ringcat::eni::EniImage;
+use ringcat::simulated::SimulatedSegment;
+use ringcat::{DomainId, Event, JunctionConnection, MainDevice, Options};
+use ringcat_sim::cable::{CableId, CableSpec, DeviceIndex, Endpoint};
+use ringcat_sim::frame::Port;
 use ringcat_sim::network::Network;
+use ringcat_wire::register::PortKind;
 
 use super::{BUTTONS, DRIVE, EniFile, LAMPS, MACHINE, Plant, activate, activate_on, segment};
 
@@ -105,4 +110,35 @@ fn an_object_that_a_drive_refuses_is_told_with_the_comment_of_the_file_facts_8_2
     set(&mut plant, "Lamps.Channel 1", 1);
     plant.run(4);
     assert_eq!(plant.device(LAMPS).outputs(), [1], "the others work");
+}
+
+/// Coupler, lamps, valves, buttons and back to the coupler, which has the drive on its port 2. The file knows nothing of it.
+#[test]
+fn a_ring_behind_a_junction_is_declared_by_station_addresses_of_the_file_between_load_and_apply_jr_05() {
+    let file = with(&[]);
+    let mut segment = segment(&file.eni, &file.configuration, false);
+    segment.devices[0].ports = [PortKind::Mii; 4];
+    let port = |device: usize, port| Endpoint::Device(DeviceIndex(device), port);
+    let CableSpec { delay, .. } = segment.cables[0];
+    segment.cables[1].a = port(0, Port::D);
+    segment.cables.push(CableSpec { a: port(BUTTONS, Port::B), b: port(0, Port::B), delay });
+    let network = Network::from_description(segment).expect("cables fit");
+    let mut main_device = MainDevice::request(SimulatedSegment::new(network), &Options::default());
+    let found = main_device.scan().expect("a scan").subdevices;
+    main_device.load(file.declaration(false)).expect("it is sound");
+    let at = |station| file.configuration.at_station(station).expect("it is in the file");
+    let connection = JunctionConnection { head: at(1001), head_port: 1, tail: at(1004), tail_port: 1 };
+    main_device.add_junction_connection(connection).expect("it fits");
+    let application = main_device.apply().map_err(ringcat::Error::from).expect("it fits");
+    let image = EniImage::new(&file.configuration, application.directory()).expect("the image fits");
+    let mut plant = Plant { file, application, image, found, events: Vec::new() };
+    plant.settle();
+    for (fault, broken) in [(Network::cut as fn(&mut Network, CableId), true), (Network::heal, false)] {
+        plant.events.clear();
+        fault(plant.network_mut(), CableId(2));
+        plant.run(200);
+        let told = |event: &&Event| matches!(event, Event::JunctionChanged { broken: now, .. } if *now == broken);
+        assert_eq!(plant.events.iter().filter(told).count(), 1, "{:?}", plant.events);
+        assert!(plant.is_complete() && plant.application.all_settled());
+    }
 }
