@@ -87,28 +87,49 @@ async fn read_both(bus: &Bus, station: StationAddress) -> Result<Look, BusError>
     Ok(Look::Answer { status, code, dl_status })
 }
 
-/// The place where a connection of the scan no longer has communication. `dl_status` by position.
-pub(super) fn locate_break(topology: &Topology, dl_status: &[Option<DlStatus>]) -> Option<Cable> {
-    let is_down = |at: PortOf| communicates(dl_status, at) == Some(false);
-    let first = PortOf { node: 0, port: topology.nodes.first()?.entry_port };
-    if is_down(first) {
-        return Some(Cable { near: None, far: Some(first) });
+/// The cables of the ring that no longer have communication, in its order. Branches are none of it: who is behind one is told
+/// as lost. `dl_status` by position.
+pub(super) fn locate_breaks(topology: &Topology, dl_status: &[Option<DlStatus>]) -> Vec<Cable> {
+    let Some(first) = topology.nodes.first() else { return Vec::new() };
+    let trunk = trunk(topology);
+    let first = Cable { near: None, far: Some(PortOf { node: 0, port: first.entry_port }) };
+    let inner = (0..topology.nodes.len()).filter(|node| trunk[*node] && !topology.is_in_local_ring(*node));
+    let inner = inner.filter_map(|node| topology.connection_to(node));
+    let inner = inner.map(|it| Cable { near: Some(it.near), far: Some(it.far) });
+    let last = topology.open_ports.iter().map(|at| Cable { near: Some(*at), far: None });
+    // One end is enough: the other may have no power.
+    let all = core::iter::once(first).chain(inner).chain(last);
+    let mut broken: Vec<Cable> = all.filter(|cable| is_broken(dl_status, cable) == Some(true)).collect();
+    if broken.is_empty() {
+        broken.extend(seam(topology, dl_status));
     }
-    for node in 0..topology.nodes.len() {
-        // Breaks in rings behind junctions are told apart.
-        if topology.is_in_local_ring(node) {
-            continue;
+    broken
+}
+
+/// Whether a cable has no communication at one of its ends, as far as that is known.
+pub(super) fn is_broken(dl_status: &[Option<DlStatus>], cable: &Cable) -> Option<bool> {
+    let ends = [cable.near, cable.far].into_iter().flatten().filter_map(|at| communicates(dl_status, at));
+    ends.reduce(|one, other| one && other).map(|communicates| !communicates)
+}
+
+/// Who is on the way between the interfaces, by position; everybody where that way is not known.
+fn trunk(topology: &Topology) -> Vec<bool> {
+    let mut trunk = vec![false; topology.nodes.len()];
+    let mut follow = |end: Option<usize>| {
+        let mut next = end;
+        while let Some(node) = next.filter(|node| !core::mem::replace(&mut trunk[*node], true)) {
+            next = topology.nodes[node].parent.map(|(parent, _)| parent);
         }
-        let Some(connection) = topology.connection_to(node) else { continue };
-        // One end is enough: the other may have no power.
-        if is_down(connection.near) || is_down(connection.far) {
-            return Some(Cable { near: Some(connection.near), far: Some(connection.far) });
-        }
+    };
+    let end = topology.open_ports.last().map(|at| at.node);
+    follow(end);
+    if topology.redundant_head.is_some() {
+        follow(topology.main_count.checked_sub(1));
     }
-    match topology.open_ports.iter().copied().find(|at| is_down(*at)) {
-        Some(lost) => Some(Cable { near: Some(lost), far: None }),
-        None => seam(topology, dl_status),
+    if end.is_none() {
+        trunk.fill(true);
     }
+    trunk
 }
 
 /// Whether a port has communication, where that is known.

@@ -19,7 +19,7 @@ use super::cabling::CablingWatch;
 use super::configure::Start;
 use super::error_watch::watch_errors;
 use super::fleet::{Phase, SharedFleet};
-use super::inspect::{Look, locate_break, look_at_all, look_at_strangers};
+use super::inspect::{Look, is_broken, locate_breaks, look_at_all, look_at_strangers};
 use super::junction::{JunctionWatch, note_controls, watch_blocked};
 use super::recover::{lose, start, welcome};
 use super::ring_watch::watch_ring;
@@ -75,6 +75,7 @@ pub(crate) async fn supervise(bus: Bus, fleet: SharedFleet, enhanced_line_crosse
         reported,
         seen_reported: RingState::Unknown,
         break_looks: 0,
+        breaks: Vec::new(),
         next_routine: Instant::default(),
         is_awaited: false,
         is_routine: false,
@@ -108,6 +109,8 @@ struct Watch {
     seen_reported: RingState,
     /// Looks for it that are left.
     break_looks: u8,
+    /// Broken cables of the open ring that were told.
+    breaks: Vec<Cable>,
     next_routine: Instant,
     /// The next check was asked for before its time.
     is_awaited: bool,
@@ -268,30 +271,42 @@ impl Watch {
         if self.seen_reported != RingState::Open || self.reported.get() != RingState::Open {
             return;
         }
-        let reported = self.fleet.access().ring.place;
-        match self.break_place(looks) {
-            Some(place) if reported != Some(place) => {
-                self.fleet.access().ring.place = Some(place);
-                self.bus.report(Event::BreakLocated { cable: place });
+        let by_position: Vec<_> = self.by_position(looks).iter().map(|it| it.map(|node| node.dl_status)).collect();
+        // An interface's cable is told together with the ring.
+        match self.fleet.access().ring.place {
+            None => self.breaks.clear(),
+            Some(place) if !self.breaks.contains(&place) => self.breaks = vec![place],
+            Some(_) => {}
+        }
+        let broken = self.broken_cables(&by_position);
+        for cable in &broken {
+            if !self.breaks.contains(cable) {
+                self.breaks.push(*cable);
+                self.bus.report(Event::BreakLocated { cable: *cable });
             }
-            None if reported.is_none() && self.break_looks > 0 => {
-                let is_first = BREAK_LOOKS - self.break_looks < FIRST_BREAK_LOOKS;
-                self.break_looks -= 1;
-                self.again_in(if is_first { FIRST_BREAK_LOOK_PAUSE } else { BREAK_LOOK_PAUSE });
-            }
-            Some(_) | None => {}
+        }
+        // The last one that is mended closes the ring.
+        let mended = |cable: &Cable| !broken.contains(cable) && is_broken(&by_position, cable) == Some(false);
+        while let Some(at) = self.breaks.iter().position(mended).filter(|_| self.breaks.len() > 1) {
+            self.breaks.remove(at);
+        }
+        let place = self.breaks.first().copied();
+        self.fleet.access().ring.place = place;
+        if place.is_none() && self.break_looks > 0 {
+            let is_first = BREAK_LOOKS - self.break_looks < FIRST_BREAK_LOOKS;
+            self.break_looks -= 1;
+            self.again_in(if is_first { FIRST_BREAK_LOOK_PAUSE } else { BREAK_LOOK_PAUSE });
         }
     }
 
-    fn break_place(&self, looks: &[Look]) -> Option<Cable> {
-        let by_position: Vec<_> = self.by_position(looks).iter().map(|it| it.map(|node| node.dl_status)).collect();
+    fn broken_cables(&self, by_position: &[Option<DlStatus>]) -> Vec<Cable> {
         let access = self.fleet.access();
         if !are_doubtful(&access.topology) {
-            return locate_break(&access.topology, &by_position);
+            return locate_breaks(&access.topology, by_position);
         }
         let counts = access.ring.links.map(|link| link.answering);
-        let (near, far) = ends_of_break(&access.topology, &by_position, counts)?;
-        Some(Cable { near, far })
+        let ends = ends_of_break(&access.topology, by_position, counts);
+        ends.map(|(near, far)| Cable { near, far }).into_iter().collect()
     }
 
     /// What members said about their ports, by their position in the scan.

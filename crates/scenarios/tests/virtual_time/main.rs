@@ -2,6 +2,7 @@
 //!
 //! One program and not twenty, because each would be linked with everything; only those that count allocations are apart.
 
+mod break_places;
 mod broken_ring;
 mod calm;
 mod captures;

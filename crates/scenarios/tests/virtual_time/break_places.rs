@@ -1,0 +1,115 @@
+//! Places of breaks where more than one cable is out: branches that are not there, a second break, a SubDevice without
+//! power. CR-12, CR-18.
+
+use std::time::Duration;
+
+use ringcat::{Cable, Event, PortOf};
+use ringcat_sim::cable::{CableId, DeviceIndex};
+use ringcat_sim::frame::Port;
+use ringcat_sim::network::Network;
+use scenarios::check::ring_events;
+use scenarios::segments::{MAIN, REDUNDANT, at, cable_of_ring, ring_of_16, wired};
+use scenarios::world::{Mark, World};
+
+/// A ring of five with a branch of two on port 3 of its second device. Cables 0 to 5 are the ring's, 6 leads to the branch.
+fn ring_with_branch() -> Network {
+    use Port::{A, B, D};
+    let kinds = ["digital-output-8", "junction", "servo", "coupler", "digital-input-8", "block", "analog-input-4"];
+    let cables = [
+        (MAIN, at(0, A)),
+        (at(0, B), at(1, A)),
+        (at(1, B), at(2, A)),
+        (at(2, B), at(3, A)),
+        (at(3, B), at(4, A)),
+        (at(4, B), REDUNDANT),
+        (at(1, D), at(5, A)),
+        (at(5, B), at(6, A)),
+    ];
+    wired(&kinds, &cables)
+}
+
+/// A cable of its ring, by positions: those of the branch are met behind the second one.
+fn cable(number: usize) -> Cable {
+    const POSITIONS: [usize; 5] = [0, 1, 4, 5, 6];
+    let port = |device: usize, port: u8| PortOf { node: POSITIONS[device], port };
+    Cable { near: number.checked_sub(1).map(|device| port(device, 1)), far: (number < 5).then(|| port(number, 0)) }
+}
+
+fn places(world: &World, mark: Mark) -> Vec<Cable> {
+    let place = |event: &Event| match event {
+        Event::BreakLocated { cable } => Some(*cable),
+        _ => None,
+    };
+    ring_events(world.events(mark)).into_iter().filter_map(place).collect()
+}
+
+#[test]
+fn a_branch_that_is_not_there_is_never_taken_for_the_break_of_the_ring_cr_12() {
+    for number in 0..=5 {
+        let mut world = World::in_op(number as u64, ring_with_branch());
+        world.cut(CableId(6));
+        world.run_cycles(200);
+        let mark = world.mark();
+        world.cut(CableId(number));
+        world.run_cycles(200);
+        assert_eq!(places(&world, mark), [cable(number)], "cable {number}");
+        assert_eq!(world.application().ring_status().place, Some(cable(number)));
+        // Nor one that goes while the ring is open.
+        world.heal(CableId(6));
+        world
+            .until(Duration::from_secs(3), "all in OP", |world| world.all_in_op() && world.application().all_settled());
+        world.cut(CableId(6));
+        world.run_cycles(200);
+        assert_eq!(places(&world, mark), [cable(number)], "cable {number}");
+        assert_eq!(world.application().ring_status().place, Some(cable(number)));
+        world.heal(CableId(number));
+        world.run_cycles(100);
+        let told = ring_events(world.events(mark));
+        assert!(
+            matches!(told.last(), Some(Event::RingClosed { place: Some(it), .. }) if *it == cable(number)),
+            "{told:?}"
+        );
+    }
+}
+
+#[test]
+fn each_of_two_breaks_is_told_once_with_its_place_whichever_comes_first_cr_12_cr_18() {
+    for [first, second] in [[4, 11], [11, 4], [0, 9], [9, 0], [16, 5], [5, 16], [7, 8], [8, 7]] {
+        let mut world = World::in_op(3, ring_of_16(Duration::from_micros(10)));
+        let [one, other] = [first, second].map(|number| cable_of_ring(number, 16));
+        let mark = world.mark();
+        world.cut(CableId(first));
+        world.run_cycles(50);
+        assert_eq!(places(&world, mark), [one], "{first} and {second}");
+        world.cut(CableId(second));
+        world.run_cycles(200);
+        // Nobody is left who could see the cable of an interface behind which all are cut off.
+        let told: &[Cable] = if [0, 16].contains(&second) { &[one] } else { &[one, other] };
+        assert_eq!(places(&world, mark), told, "{first} and {second}");
+        world.heal(CableId(first));
+        world
+            .until(Duration::from_secs(3), "all in OP", |world| world.all_in_op() && world.application().all_settled());
+        world.run_cycles(50);
+        assert_eq!(places(&world, mark), [one, other], "{first} and {second}");
+        assert_eq!(world.application().ring_status().place, Some(other));
+        world.heal(CableId(second));
+        world.run_cycles(50);
+        let told = ring_events(world.events(mark));
+        assert!(matches!(told.last(), Some(Event::RingClosed { place: Some(it), .. }) if *it == other), "{told:?}");
+        assert_eq!(told.len(), 4, "{told:?}");
+    }
+}
+
+#[test]
+fn a_subdevice_without_power_is_two_breaks_cr_18() {
+    let mut world = World::in_op(4, ring_of_16(Duration::from_micros(10)));
+    let mark = world.mark();
+    world.power_off(DeviceIndex(6));
+    world.run_cycles(200);
+    assert_eq!(places(&world, mark), [6, 7].map(|number| cable_of_ring(number, 16)));
+    world.power_on(DeviceIndex(6));
+    world.until(Duration::from_secs(3), "all in OP", |world| world.all_in_op() && world.application().all_settled());
+    world.run_cycles(50);
+    let told = ring_events(world.events(mark));
+    assert!(matches!(told[..], [Event::RingOpened { .. }, _, _, Event::RingClosed { .. }]), "{told:?}");
+}
