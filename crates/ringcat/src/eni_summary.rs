@@ -3,14 +3,13 @@
 mod details;
 mod json;
 
-use std::fs::File;
-use std::io::Read;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::time::Duration;
 
 use clap::Args;
-use ringcat_config::eni::{self, Eni, SubDevice};
-use ringcat_config::{Configuration, follow};
+use ringcat::eni::EniFile;
+use ringcat_config::Configuration;
+use ringcat_config::eni::{Eni, SubDevice};
 use ringcat_engine::config::{ConfigAddress, ReferenceClock, StartupAction, SubDeviceConfig, SyncManagerRole};
 use ringcat_engine::info::Direction;
 
@@ -42,10 +41,8 @@ pub struct EniArguments {
 
 /// Reads the file and prints what follows.
 pub fn run(arguments: &EniArguments) -> Result<(), Failure> {
-    let in_file = |error: &dyn std::fmt::Display| Failure::new(format!("{}: {error}", arguments.file.display()));
-    let bytes = read(&arguments.file).map_err(|error| in_file(&error))?;
-    let model = eni::read(&bytes).map_err(|error| in_file(&error))?;
-    let configuration = follow(&model).map_err(|error| in_file(&error))?;
+    let EniFile { eni: model, configuration } =
+        EniFile::load(&arguments.file).map_err(|error| Failure::new(error.to_string()))?;
     if arguments.json {
         say!("{:#}", json::json(&model, &configuration));
         return Ok(());
@@ -56,13 +53,6 @@ pub fn run(arguments: &EniArguments) -> Result<(), Failure> {
     }
     not_followed(&configuration).iter().for_each(|line| say!("{line}"));
     Ok(())
-}
-
-/// A whole file, or a byte more than may be.
-fn read(path: &Path) -> std::io::Result<Vec<u8>> {
-    let mut bytes = Vec::new();
-    File::open(path)?.take(eni::MAX_BYTES as u64 + 1).read_to_end(&mut bytes)?;
-    Ok(bytes)
 }
 
 fn summary(model: &Eni, configuration: &Configuration) -> Vec<String> {
@@ -237,9 +227,8 @@ mod tests {
     const SMALL: &str = include_str!("../../config/tests/files/small.xml");
 
     fn small() -> (Eni, Configuration) {
-        let model = eni::read(SMALL.as_bytes()).unwrap();
-        let configuration = follow(&model).unwrap();
-        (model, configuration)
+        let EniFile { eni, configuration } = EniFile::from_bytes(SMALL.as_bytes()).unwrap();
+        (eni, configuration)
     }
 
     #[test]

@@ -1,9 +1,10 @@
-//! What a fuzzer may throw any bytes at: one target per mailbox decoder (facts 6, 10.1).
+//! What a fuzzer may throw any bytes at: one target per mailbox decoder (facts 6, 10.1), and one for ENI files (facts 8).
 //!
 //! A target is a plain function. It panics where a decoder does, and where what was decoded does not survive being
 //! encoded and decoded again. `fuzz/` runs the targets under cargo-fuzz, `cargo test` with the corpora in `fuzz/corpus`
 //! and mutants of them ([`mutate`]); the corpora come from our own encoders ([`seeds`]).
 
+pub mod eni;
 pub mod seeds;
 
 use ringcat_wire::mailbox::aoe::{AdsRequest, AdsResponse, AmsHeader};
@@ -24,7 +25,7 @@ use crate::dice::Dice;
 pub type Target = fn(&[u8]);
 
 /// All targets by the names of their corpora.
-pub const TARGETS: [(&str, Target); 13] = [
+pub const TARGETS: [(&str, Target); 14] = [
     ("mailbox", mailbox),
     ("error_reply", error_reply),
     ("coe", coe),
@@ -38,6 +39,7 @@ pub const TARGETS: [(&str, Target); 13] = [
     ("aoe", aoe),
     ("voe", voe),
     ("gateway", any_gateway),
+    ("eni", eni::target),
 ];
 
 /// Bytes that any message fits into: more than a mailbox has, and what an encoder puts before shorter ones.

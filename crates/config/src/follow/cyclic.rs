@@ -72,7 +72,8 @@ pub(super) fn follow(eni: &Eni, bus: &Bus, mappings: &[Vec<Piece>], notices: &mu
             of_registers(eni, bus, command, &mut cyclic, notices);
         }
     }
-    domains(eni, mappings, logical > 0, &mut cyclic, notices);
+    let any_cover = cyclic.covers.iter().flatten().any(Option::is_some);
+    domains(eni, mappings, any_cover, &mut cyclic, notices);
     Ok(cyclic)
 }
 
@@ -183,7 +184,7 @@ fn addressed(eni: &Eni, bus: &Bus, command: Command, adp: u16) -> Option<usize> 
 }
 
 /// A domain per task that exchanges something.
-fn domains(eni: &Eni, mappings: &[Vec<Piece>], any_logical: bool, cyclic: &mut Cyclic, notices: &mut Notices) {
+fn domains(eni: &Eni, mappings: &[Vec<Piece>], any_cover: bool, cyclic: &mut Cyclic, notices: &mut Notices) {
     let fastest_clock = eni.subdevices.iter().filter_map(|subdevice| subdevice.clock.as_ref());
     let clock_cycle = fastest_clock.map(|clock| clock.cycle_0_ns).filter(|cycle| *cycle > 0).min();
     let period = |task: usize| {
@@ -194,13 +195,13 @@ fn domains(eni: &Eni, mappings: &[Vec<Piece>], any_logical: bool, cyclic: &mut C
     cyclic.cycle = (0..eni.tasks.len()).filter_map(period).min();
     let tasks = eni.tasks.len().max(1);
     let mut members: Vec<Vec<DomainMember>> = vec![Vec::new(); tasks];
-    if !any_logical && mappings.iter().any(|pieces| !pieces.is_empty()) {
+    if !any_cover && mappings.iter().any(|pieces| !pieces.is_empty()) {
         let reason = "no logical command exchanges process data: all of it is exchanged in one domain";
         notices.add(None, None, "Cyclic", reason);
     }
     for (subdevice, pieces) in mappings.iter().enumerate() {
         let left_to_sii = !is_complete(&eni.subdevices[subdevice].init_commands);
-        if left_to_sii || (!any_logical && !pieces.is_empty()) {
+        if left_to_sii || (!any_cover && !pieces.is_empty()) {
             members[0].push(DomainMember { subdevice, sync_managers: None });
             continue;
         }

@@ -4,6 +4,8 @@
 //! is by themselves; all three must agree. Offsets of commands count either from the datagram's data (EC-Engineer) or from
 //! its header, ten bytes before (TwinCAT, whose image is the frame): which one it is shows from the file.
 
+use std::collections::BTreeSet;
+
 use ringcat_engine::info::Direction;
 
 use super::areas::Piece;
@@ -33,6 +35,8 @@ pub(super) fn follow(
             of_subdevice(eni, index, direction, &mappings[index], &covers[index], header, &mut areas, notices)?;
         }
     }
+    let exchanged = exchanged(mappings, covers);
+    areas.retain(|area| area.sync_manager.is_none_or(|sm| exchanged[area.subdevice].contains(&sm)));
     areas.sort_by_key(|area| (area.direction == Direction::Inputs, area.image_bit));
     check_overlaps(eni, &areas)?;
     let end =
@@ -59,6 +63,16 @@ pub(super) fn follow(
     variables(eni, &mut image, notices);
     copies(eni, &mut image, notices);
     Ok(image)
+}
+
+/// SyncManagers that somebody exchanges, by SubDevice: as a whole, and all of them where no command says who.
+fn exchanged(mappings: &[Vec<Piece>], covers: &[Vec<Option<Cover>>]) -> Vec<BTreeSet<u8>> {
+    let any = covers.iter().flatten().any(Option::is_some);
+    let of_subdevice = |(pieces, covers): (&Vec<Piece>, &Vec<Option<Cover>>)| {
+        let covered = pieces.iter().zip(covers).filter(|(_, cover)| !any || cover.is_some());
+        covered.map(|(piece, _)| piece.sync_manager).collect()
+    };
+    mappings.iter().zip(covers).map(of_subdevice).collect()
 }
 
 const fn side(direction: Direction) -> &'static str {

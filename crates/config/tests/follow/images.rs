@@ -139,4 +139,7 @@ fn what_no_command_covers_is_not_exchanged_and_said() {
     assert!(has_notice(&nothing, &["SyncManager 0", "no cyclic command covers"]));
     assert!(has_notice(&nothing, &["command 3 \"terminals\"", "meets no FMMU"]));
     assert_eq!(nothing.declaration.domains[0].members.len(), 1);
+    assert_eq!(nothing.image.areas, AREAS[2..], "nor is it in the image");
+    let variable = nothing.image.variables.iter().find(|variable| variable.name.starts_with("Left")).unwrap();
+    assert_eq!(variable.subdevice, None);
 }

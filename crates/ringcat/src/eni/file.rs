@@ -1,10 +1,11 @@
 //! An ENI from a file: read, followed, and ready to be activated.
 
 use std::fmt;
+use std::fs::File;
+use std::io::{self, Read};
 use std::path::{Path, PathBuf};
-use std::{fs, io};
 
-use ringcat_config::eni::{Eni, EniError, read};
+use ringcat_config::eni::{Eni, EniError, MAX_BYTES, read};
 use ringcat_config::{Configuration, follow};
 use ringcat_engine::config::{ConfigError, Resolution, resolve};
 use ringcat_engine::info::SubDeviceInfo;
@@ -40,10 +41,7 @@ pub enum LoadFailure {
     /// It cannot be read.
     Read(io::Error),
     /// It is larger than any ENI.
-    TooLarge {
-        /// Its bytes.
-        bytes: u64,
-    },
+    TooLarge,
     /// It is no ENI, or one that cannot be followed.
     Eni(Box<EniError>),
 }
@@ -70,9 +68,7 @@ impl fmt::Display for LoadError {
         write!(f, "{}: ", self.path.display())?;
         match &self.cause {
             LoadFailure::Read(error) => write!(f, "cannot be read: {error}"),
-            LoadFailure::TooLarge { bytes } => {
-                write!(f, "expected at most {} bytes, got {bytes}", ringcat_config::eni::MAX_BYTES)
-            }
+            LoadFailure::TooLarge => write!(f, "expected at most {MAX_BYTES} bytes, got more"),
             LoadFailure::Eni(error) => error.fmt(f),
         }
     }
@@ -87,11 +83,14 @@ impl EniFile {
     /// [`LoadError`]: with line, column and element where something in it is wrong.
     pub fn load(path: &Path) -> Result<EniFile, LoadError> {
         let failed = |cause| LoadError { path: path.to_owned(), cause };
-        let bytes = fs::metadata(path).map_err(|error| failed(LoadFailure::Read(error)))?.len();
-        if bytes > ringcat_config::eni::MAX_BYTES as u64 {
-            return Err(failed(LoadFailure::TooLarge { bytes }));
+        // No more than may be, whatever the file says about its length: a device or a pipe has none.
+        let mut bytes = Vec::new();
+        let room = MAX_BYTES as u64 + 1;
+        let read = File::open(path).and_then(|file| file.take(room).read_to_end(&mut bytes));
+        read.map_err(|error| failed(LoadFailure::Read(error)))?;
+        if bytes.len() > MAX_BYTES {
+            return Err(failed(LoadFailure::TooLarge));
         }
-        let bytes = fs::read(path).map_err(|error| failed(LoadFailure::Read(error)))?;
         EniFile::from_bytes(&bytes).map_err(|error| failed(LoadFailure::Eni(Box::new(error))))
     }
 

@@ -4,7 +4,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use scenarios::dice::Dice;
-use scenarios::fuzz_targets::{TARGETS, Target, mutate, seeds};
+use scenarios::fuzz_targets::{TARGETS, Target, eni, mutate, seeds};
 
 /// Mutants of each file of a corpus.
 const MUTANTS: usize = 400;
@@ -27,7 +27,10 @@ struct Running<'a>(&'a str, &'a [u8]);
 impl Drop for Running<'_> {
     fn drop(&mut self) {
         if std::thread::panicking() {
-            println!("target {}, bytes {:02x?}", self.0, self.1);
+            match std::str::from_utf8(self.1) {
+                Ok(text) if self.0 == "eni" => println!("target eni, text {text}"),
+                Ok(_) | Err(_) => println!("target {}, bytes {:02x?}", self.0, self.1),
+            }
         }
     }
 }
@@ -67,6 +70,25 @@ fn mutants_of_the_corpora_never_panic_and_what_decodes_survives_being_encoded() 
                 run(name, target, &mutant);
             }
         }
+    }
+}
+
+/// Mutants of each own ENI.
+const ENI_MUTANTS: usize = 150;
+
+#[test]
+fn mutants_of_an_eni_are_configurations_that_hold_together_or_errors_facts_8() {
+    let runs = std::env::var("RINGCAT_ENI_MUTANTS").ok().and_then(|text| text.parse().ok()).unwrap_or(ENI_MUTANTS);
+    let mut dice = Dice::new(8);
+    for text in [eni::WHOLE, eni::GROUP] {
+        let mut followed = 0;
+        for number in 0..=runs {
+            let mutant = if number == 0 { text.to_owned() } else { eni::mutate(text, &mut dice) };
+            let _running = Running("eni", mutant.as_bytes());
+            followed += usize::from(eni::is_followed(mutant.as_bytes()));
+        }
+        let share = followed * 100 / (runs + 1);
+        assert!((10..90).contains(&share), "{share} % are followed: the changes are too small or too large");
     }
 }
 
