@@ -22,8 +22,8 @@ use ringcat_wire::register::{DlStatus, PortKind};
 use crate::info::SubDeviceInfo;
 pub(crate) use ends::{are_doubtful, ends_of_break};
 use local_ring::Rings;
-pub(crate) use local_ring::rings_shown;
 pub use local_ring::{Closing, LocalRing, RingCable, candidates};
+pub(crate) use local_ring::{candidates_with, rings_shown};
 
 /// What a SubDevice reported about its ports.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -200,6 +200,19 @@ impl Topology {
         let Some(here) = self.nodes.get(node) else { return false };
         let far = PortOf { node, port: here.entry_port };
         self.local_rings.iter().flat_map(|ring| &ring.cables).any(|cable| cable.far == far)
+    }
+
+    /// Whether a SubDevice is another one, or is reached through it.
+    pub(crate) fn hangs_behind(&self, node: usize, other: usize) -> bool {
+        let mut at = node;
+        for _ in 0..=self.nodes.len() {
+            if at == other {
+                return true;
+            }
+            let Some((parent, _)) = self.nodes.get(at).and_then(|here| here.parent) else { break };
+            at = parent;
+        }
+        false
     }
 
     /// The cable that leads to a SubDevice from the one before it.

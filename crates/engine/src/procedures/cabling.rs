@@ -18,13 +18,14 @@ use ringcat_wire::register::{DcReceiveTimes, DlStatus, PortKind, map};
 
 use super::fleet::{Phase, SharedFleet};
 use super::inspect::Look;
-use super::strangers::view;
+use super::junction::closings;
+use super::strangers::{Stranger, view};
 use crate::event::Event;
 use crate::junction::JunctionMode;
 use crate::link::{Link, LinkSet};
 use crate::ring::RingState;
 use crate::supervisor::{Bus, BusError};
-use crate::topology::{Closing, Finding, NodeStatus, PortOf, Topology, rings_shown};
+use crate::topology::{Closing, Finding, NodeStatus, Topology, rings_shown};
 
 /// From a change of ports until the segment is looked at: a plug that is pushed in bounces.
 const SETTLE: Duration = Duration::from_millis(5);
@@ -51,8 +52,10 @@ pub(super) struct Crossing {
 pub(super) trait Known {
     /// Kinds of the ports.
     fn ports(&self, station: StationAddress) -> [PortKind; 4];
-    /// Closing cables of local rings, by the station addresses of both ends.
-    fn closings(&self) -> Vec<[(StationAddress, u8); 2]>;
+    /// Closing cables of the local rings that are known, in a segment in which these are, by position.
+    fn closings(&self, stations: &[StationAddress]) -> Vec<Closing>;
+    /// Of all of these it is known who they are.
+    fn are_known(&self, stations: &[StationAddress]) -> bool;
 }
 
 /// What a look at the segment shows.
@@ -114,7 +117,7 @@ async fn look_often(bus: &Bus, known: &impl Known) -> Option<Cabling> {
 }
 
 async fn look(bus: &Bus, known: &impl Known) -> Result<Option<Cabling>, BusError> {
-    let Some(before) = view(bus).await? else { return Ok(None) };
+    let Some(before) = view(bus).await?.filter(|view| known.are_known(&view.stations)) else { return Ok(None) };
     bus.bwr(map::DC_RECEIVE_TIME, &[0; 4]).await?;
     let read = bus.gather(before.stations.clone(), |bus, station| async move {
         let dl_status = DlStatus::decode(&bus.fprd_array(station, map::DL_STATUS).await?);
@@ -136,13 +139,8 @@ async fn look(bus: &Bus, known: &impl Known) -> Result<Option<Cabling>, BusError
         receive_times,
         ports: known.ports(station),
     });
-    let place = |(station, port): (StationAddress, u8)| Some(PortOf { node: before.position(station)?, port });
-    let closings = known
-        .closings()
-        .into_iter()
-        .filter_map(|[head, tail]| Some(Closing { head: place(head)?, tail: place(tail)? }));
     let nodes: Vec<NodeStatus> = nodes.collect();
-    let closings: Vec<Closing> = closings.collect();
+    let closings = known.closings(&before.stations);
     let topology = Topology::with_local_rings(&nodes, usize::from(before.counts.0.0), &closings);
     let mut found: Vec<Crossing> = topology
         .findings
@@ -189,6 +187,8 @@ pub(super) struct CablingWatch {
     junctions: bool,
     /// What members said about their ports when the segment was looked at last.
     ports: Vec<Option<u16>>,
+    /// That look has come to nothing.
+    again: Rc<Cell<bool>>,
     busy: Rc<Cell<bool>>,
     told: Rc<RefCell<Cabling>>,
 }
@@ -210,7 +210,8 @@ impl CablingWatch {
         }
         told.swapped = is_swapped(&access.topology);
         let junctions = junctions != JunctionMode::Disabled || !access.topology.local_rings.is_empty();
-        CablingWatch { enhanced, junctions, ports: Vec::new(), busy: Rc::default(), told: Rc::new(told.into()) }
+        let told = Rc::new(told.into());
+        CablingWatch { enhanced, junctions, ports: Vec::new(), again: Rc::default(), busy: Rc::default(), told }
     }
 
     /// Takes in looks at all members; where ports have changed, the segment is looked at.
@@ -224,10 +225,14 @@ impl CablingWatch {
         let is_open = |(index, ports): (usize, &Option<u16>)| ports.is_none() && fleet.phase(index) != Phase::Absent;
         // Clocks that are being measured need the receive times of their own frame.
         let waits = self.busy.get() || fleet.clocks.are_measuring();
-        if waits || now == self.ports || now.iter().enumerate().any(is_open) {
+        // Who may be a member, and the end of a ring, is somebody else before it is known who he is.
+        let waits = waits || !fleet.access().strangers.iter().all(Stranger::is_settled);
+        let is_new = now != self.ports || self.again.get();
+        if waits || !is_new || now.iter().enumerate().any(is_open) {
             return;
         }
         let first = self.ports.is_empty();
+        self.again.set(false);
         self.ports = now;
         if first {
             return;
@@ -235,7 +240,7 @@ impl CablingWatch {
         self.busy.set(true);
         let (bus, fleet) = (bus.clone(), fleet.clone());
         let (busy, told, enhanced) = (self.busy.clone(), self.told.clone(), self.enhanced);
-        let junctions = self.junctions;
+        let (junctions, again) = (self.junctions, self.again.clone());
         bus.clone().spawn(async move {
             bus.sleep(SETTLE).await;
             // Only where the link is really taken down: a ring that breaks or closes meanwhile has to be told.
@@ -243,6 +248,8 @@ impl CablingWatch {
             fleet.set_controlled_break(in_control);
             let found = cabling(&bus, &fleet, enhanced).await;
             fleet.set_controlled_break(false);
+            // Where more than the places was not known, looking again soon would not help.
+            again.set(found.is_none() && !in_control);
             if let Some(found) = found {
                 tell(&bus, &fleet, &found, &told.borrow());
                 if junctions && found.unknown_rings > told.borrow().unknown_rings {
@@ -315,13 +322,14 @@ impl Known for SharedFleet {
         member.and_then(|member| member.info.as_ref()).map(|info| info.controller.ports).unwrap_or_default()
     }
 
-    fn closings(&self) -> Vec<[(StationAddress, u8); 2]> {
+    fn closings(&self, stations: &[StationAddress]) -> Vec<Closing> {
+        closings(&self.access(), stations)
+    }
+
+    fn are_known(&self, stations: &[StationAddress]) -> bool {
         let access = self.access();
-        let end = |at: PortOf| {
-            let member = access.members.iter().find(|member| member.node == Some(at.node))?;
-            Some((member.station, at.port))
-        };
-        let rings = access.topology.local_rings.iter();
-        rings.filter_map(|ring| Some([end(ring.closing.head)?, end(ring.closing.tail)?])).collect()
+        let is_member = |station: &StationAddress| access.members.iter().any(|member| member.station == *station);
+        let stranger = |station: &StationAddress| access.strangers.iter().find(|it| it.station == *station);
+        stations.iter().all(|station| is_member(station) || stranger(station).is_some_and(Stranger::is_settled))
     }
 }

@@ -13,7 +13,7 @@ mod watch;
 pub(super) use self::learn::learn;
 pub(super) use self::orders::note_controls;
 pub(crate) use self::orders::{Told, UnderWay, ordering};
-pub(super) use self::retrace::{End, cabling};
+pub(super) use self::retrace::{End, cabling, closings};
 pub(super) use self::watch::{JunctionWatch, watch_blocked};
 
 use ringcat_wire::address::StationAddress;

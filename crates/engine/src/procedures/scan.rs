@@ -35,7 +35,7 @@ use crate::junction::JunctionMode;
 use crate::link::LinkSet;
 use crate::ring::RingState;
 use crate::supervisor::{Bus, BusError, Reply};
-use crate::topology::{Finding, NodeStatus, PortOf, Topology};
+use crate::topology::{Closing, Finding, NodeStatus, PortOf, Topology};
 
 /// Station address of the SubDevice at position 0; the others follow.
 pub const FIRST_STATION: u16 = 0x1001;
@@ -389,10 +389,18 @@ impl Known for Scan {
         info.map(|info| info.controller.ports).unwrap_or_default()
     }
 
-    fn closings(&self) -> Vec<[(StationAddress, u8); 2]> {
-        let end = |at: PortOf| Some((self.subdevices.get(at.node)?.station, at.port));
-        let rings = self.topology.local_rings.iter();
-        rings.filter_map(|ring| Some([end(ring.closing.head)?, end(ring.closing.tail)?])).collect()
+    fn closings(&self, stations: &[StationAddress]) -> Vec<Closing> {
+        // Nobody has moved that shortly after.
+        let place = |at: PortOf| {
+            let station = self.subdevices.get(at.node)?.station;
+            Some(PortOf { node: stations.iter().position(|it| *it == station)?, port: at.port })
+        };
+        let rings = self.topology.local_rings.iter().map(|ring| ring.closing);
+        rings.filter_map(|it| Some(Closing { head: place(it.head)?, tail: place(it.tail)? })).collect()
+    }
+
+    fn are_known(&self, _: &[StationAddress]) -> bool {
+        true
     }
 }
 

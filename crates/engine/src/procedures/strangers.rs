@@ -94,6 +94,11 @@ impl Stranger {
         Stranger { station, between, behind, position, from_main: at < main_count, reported, knowledge }
     }
 
+    /// It is known, as well as it will be for now, that it is nobody's.
+    pub(super) fn is_settled(&self) -> bool {
+        self.reported || matches!(self.knowledge, Knowledge::Unreadable(_))
+    }
+
     /// It is being read, and those around it should wait.
     fn is_awaited(&self, now: Instant) -> bool {
         matches!(self.knowledge, Knowledge::Reading(since) if now.since(since) < HOLD)

@@ -337,6 +337,7 @@ impl Watch {
         if let Some(pause) = self.junctions.observe(bus.now(), status, |event| bus.report(event)) {
             self.again_in(pause);
         }
+        self.junctions.complete_cabling(&mut self.fleet.access());
     }
 
     /// What was seen in rings of which no frame comes back.

@@ -131,6 +131,17 @@ fn trace(topology: &Topology, closing: Closing) -> LocalRing {
 /// Whoever asks has to find out which of these it is. Where the redundant link meets somebody (a broken ring, or branches
 /// that only its frames meet), nothing is looked for.
 pub fn candidates(nodes: &[NodeStatus], main_count: usize, ring_closed: bool, most: usize) -> Vec<Vec<Closing>> {
+    candidates_with(nodes, main_count, ring_closed, most, (&[], &[]))
+}
+
+/// As [`candidates`], with those among them that are known to be right, and without those known to be wrong.
+pub(crate) fn candidates_with(
+    nodes: &[NodeStatus],
+    main_count: usize,
+    ring_closed: bool,
+    most: usize,
+    (right, wrong): (&[Closing], &[Closing]),
+) -> Vec<Vec<Closing>> {
     if main_count != nodes.len() {
         return Vec::new();
     }
@@ -140,7 +151,7 @@ pub fn candidates(nodes: &[NodeStatus], main_count: usize, ring_closed: bool, mo
     if rings == 0 || rings > MOST_RINGS {
         return Vec::new();
     }
-    let mut search = Search { nodes, spare, rings, most, steps: STEPS, found: Vec::new() };
+    let mut search = Search { nodes, right, wrong, spare, rings, most, steps: STEPS, found: Vec::new() };
     search.go(0, Vec::new(), Vec::new());
     search.found
 }
@@ -160,6 +171,8 @@ const MOST_RINGS: usize = 16;
 
 struct Search<'s> {
     nodes: &'s [NodeStatus],
+    right: &'s [Closing],
+    wrong: &'s [Closing],
     /// Ports that stay open in the end.
     spare: usize,
     rings: usize,
@@ -173,11 +186,14 @@ impl Search<'_> {
         while self.found.len() < self.most && self.steps > 0 {
             self.steps -= 1;
             if closings.len() < self.rings
-                && let Some(closing) = closing_at(&slots, self.nodes)
+                && let Some(closing) = closing_at(&slots, self.nodes).filter(|closing| self.may_be(closing))
             {
                 let mut closed = closings.clone();
                 closed.push(closing);
                 self.go(node, slots[..slots.len() - 2].to_vec(), closed);
+                if self.right.contains(&closing) {
+                    return;
+                }
             }
             let Some(status) = self.nodes.get(node) else {
                 if slots.len() == self.spare && closings.len() == self.rings {
@@ -193,6 +209,15 @@ impl Search<'_> {
             slots.extend(ports.map(|port| PortOf { node, port }));
             node += 1;
         }
+    }
+}
+
+impl Search<'_> {
+    /// Neither wrong nor in the place of one that is right.
+    fn may_be(&self, closing: &Closing) -> bool {
+        let takes_from =
+            |right: &Closing| right != closing && (right.head == closing.head || right.tail == closing.tail);
+        !self.wrong.contains(closing) && !self.right.iter().any(takes_from)
     }
 }
 

@@ -1,6 +1,10 @@
 //! Rings behind junctions on one link (facts 9.4): every cable cut and healed, in every mode.
 
+mod closed_ports;
+mod explorer;
 mod groups;
+mod learning;
+mod plans;
 mod second_breaks;
 
 use std::time::Duration;

@@ -1,6 +1,6 @@
 //! Finding out where local rings close, at a scan in mode automatic (JR-03).
 //!
-//! Open ports allow several answers ([`candidates`]), so each is tried: both ends of a supposed closing cable are
+//! Open ports allow several answers ([`candidates_with`]), so each is tried: both ends of a supposed closing cable are
 //! closed for a moment, in one frame. If it is that cable, the ring is open there and all SubDevices still answer; any
 //! other pair of ports cuts somebody off. Where the ring is broken already, the end at the junction alone is closed, and
 //! those between the break and the closing cable, and nobody else, must fall silent. The loops return to what they were
@@ -16,9 +16,9 @@ use ringcat_wire::register::{DlControl, LoopControl, map};
 
 use super::super::scan::station_at;
 use crate::supervisor::{Bus, BusError};
-use crate::topology::{Closing, NodeStatus, PortOf, candidates};
+use crate::topology::{Closing, NodeStatus, PortOf, Topology, candidates_with};
 
-/// Sets of closing cables that are tried. Wrong ones of which frames do not come back cost [`TEMPORARY`] each.
+/// Closing cables that are tried and are none. Those of which frames do not come back cost [`TEMPORARY`] each.
 const TRIES: usize = 16;
 /// Until temporary loop settings have certainly ended.
 const TEMPORARY: Duration = Duration::from_millis(1_200);
@@ -33,34 +33,37 @@ pub(in super::super) async fn learn(
     main_count: usize,
     ring_closed: bool,
 ) -> Result<Vec<Closing>, BusError> {
-    let mut known: Vec<(Closing, bool)> = Vec::new();
-    'sets: for set in candidates(nodes, main_count, ring_closed, TRIES) {
-        for closing in &set {
-            let before = known.iter().find(|(tried, _)| tried == closing).map(|(_, result)| *result);
-            let closes = match before {
-                Some(result) => result,
-                None => {
-                    let result = attempt(bus, nodes, *closing).await?;
-                    known.push((*closing, result));
-                    result
-                }
-            };
-            if !closes {
+    // In a ring that is taken for something else, times of reception tell of crossed lines.
+    let untimed: Vec<NodeStatus> = nodes.iter().map(|node| NodeStatus { receive_times: None, ..*node }).collect();
+    let (mut right, mut wrong) = (Vec::new(), Vec::new());
+    'sets: while wrong.len() < TRIES {
+        let sets = candidates_with(nodes, main_count, ring_closed, 1, (&right, &wrong));
+        let Some(mut set) = sets.into_iter().next() else { break };
+        let topology = Topology::with_local_rings(&untimed, main_count, &set);
+        // Who is behind a break depends on the rings that are in it, which are tried first.
+        set.sort_by_key(|closing| core::cmp::Reverse(closing.head.node));
+        for closing in set.iter().filter(|closing| !right.contains(closing)).copied().collect::<Vec<_>>() {
+            if !attempt(bus, nodes, &topology, closing).await? {
+                wrong.push(closing);
                 continue 'sets;
             }
+            right.push(closing);
         }
+        set.sort_unstable();
         return Ok(set);
     }
     Ok(Vec::new())
 }
 
 /// Whether a ring closes here.
-async fn attempt(bus: &Bus, nodes: &[NodeStatus], closing: Closing) -> Result<bool, BusError> {
+async fn attempt(bus: &Bus, nodes: &[NodeStatus], topology: &Topology, closing: Closing) -> Result<bool, BusError> {
     let Closing { head, tail } = closing;
-    let mut members = head.node + 1..=tail.node;
-    let broken = members.find(|node| !nodes[*node].dl_status.ports[0].communication);
+    let ring = topology.local_rings.iter().find(|ring| ring.closing == closing);
+    let first = ring.and_then(|ring| ring.cables.first()).filter(|cable| cable.near.is_none());
+    let is_open = |node: &usize| !nodes[*node].dl_status.ports[0].communication;
+    let broken = first.map(|cable| cable.far.node).filter(is_open);
     // Behind a break all is reached through the closing cable.
-    let silent = broken.map_or(0..0, |first| first..tail.node + 1);
+    let silent = |node: usize| broken.is_some_and(|first| topology.hangs_behind(node, first));
     let ports = if broken.is_some() { Vec::from([head]) } else { Vec::from([head, tail]) };
     let mut controls = Vec::new();
     for port in &ports {
@@ -77,7 +80,7 @@ async fn attempt(bus: &Bus, nodes: &[NodeStatus], closing: Closing) -> Result<bo
         // Frames get lost, or one of the two does not answer: the settings end by themselves.
         bus.sleep(TEMPORARY).await;
     }
-    let expected = |answers: &Vec<bool>| answers.iter().enumerate().all(|(node, is)| *is != silent.contains(&node));
+    let expected = |answers: &Vec<bool>| answers.iter().enumerate().all(|(node, is)| *is != silent(node));
     Ok(result.as_ref().is_ok_and(expected))
 }
 

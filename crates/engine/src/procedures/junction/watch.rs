@@ -45,6 +45,8 @@ pub(in super::super) struct JunctionWatch {
     /// Who is at the places of the cabling, and the number of that cabling.
     places: Places,
     recablings: u32,
+    /// Cables that were not known and are: from where they come, and who is behind them.
+    completed: Vec<(PortOf, usize)>,
     /// How many cables are broken, for whoever else wants to know.
     broken: Rc<Cell<usize>>,
 }
@@ -65,6 +67,7 @@ impl JunctionWatch {
             main_count: topology.main_count,
             places,
             recablings: 0,
+            completed: Vec::new(),
             broken: Rc::default(),
         }
     }
@@ -76,25 +79,51 @@ impl JunctionWatch {
         }
     }
 
-    /// A break that was told goes on to be that of one cable that has an end in common with the one of which it was told:
-    /// the one that is broken. Where there is none, the cable is gone.
+    /// A break that was told goes on to be that of one cable: one that is broken and has an end in common with the one of
+    /// which it was told, or else is in the same ring, or else has that and is whole again. Where there is none, the cable
+    /// is gone.
     fn go_over(&mut self, new: JunctionWatch, status: &[Option<NodeStatus>]) {
-        let told: Vec<Watched> = self.rings.iter().flatten().filter(|watched| watched.reported).cloned().collect();
         let broken = self.broken.clone();
-        let before = core::mem::replace(self, JunctionWatch { broken, ..new }).places;
-        for told in told {
-            let ends = before.ends(&told.cable);
-            let places = &self.places;
-            let shares = |watched: &&mut Watched| {
-                !watched.reported && places.ends(&watched.cable).iter().flatten().any(|end| ends.contains(&Some(*end)))
+        let before = core::mem::replace(self, JunctionWatch { broken, ..new });
+        let places = &self.places;
+        let told = before.rings.iter().zip(&before.closings).flat_map(|(ring, closing)| {
+            let head = before.places.end(closing.head);
+            ring.iter().filter(|watched| watched.reported).map(move |watched| (watched, head))
+        });
+        for (told, head) in told {
+            let ends = before.places.ends(&told.cable);
+            let rank = |watched: &Watched, is_of_ring: bool| {
+                let shares = places.ends(&watched.cable).iter().flatten().any(|end| ends.contains(&Some(*end)));
+                match (is_down(&watched.cable, status) == Some(true), shares, is_of_ring) {
+                    (true, true, _) => Some(0),
+                    (true, false, true) => Some(1),
+                    (false, true, _) => Some(2),
+                    (true, false, false) | (false, false, _) => None,
+                }
             };
-            let mut shared: Vec<&mut Watched> = self.rings.iter_mut().flatten().filter(shares).collect();
-            shared.sort_by_key(|watched| is_down(&watched.cable, status) != Some(true));
-            if let Some(watched) = shared.into_iter().next() {
+            let of_rings = self.rings.iter_mut().zip(&self.closings).flat_map(|(ring, closing)| {
+                let is_of_ring = head.is_some() && places.end(closing.head) == head;
+                ring.iter_mut().map(move |watched| (watched, is_of_ring))
+            });
+            let ranked = of_rings
+                .filter(|(watched, _)| !watched.reported)
+                .filter_map(|(watched, is_of_ring)| Some((rank(watched, is_of_ring)?, watched)));
+            if let Some((_, watched)) = ranked.min_by_key(|(rank, _)| *rank) {
                 (watched.reported, watched.whole_since) = (true, told.whole_since);
             }
         }
         self.broken.set(self.rings.iter().flatten().filter(|watched| watched.reported).count());
+    }
+
+    /// Puts cables that have become known since into the cabling.
+    pub fn complete_cabling(&mut self, fleet: &mut Fleet) {
+        for (near, node) in self.completed.drain(..) {
+            fleet.topology.hang_behind_break(near, node);
+            let far = fleet.topology.nodes.get(node).map(|it| PortOf { node, port: it.entry_port });
+            let known = fleet.cables.iter_mut().map(|(cable, _)| cable);
+            known.filter(|cable| cable.near.is_none() && cable.far == far).for_each(|cable| cable.near = Some(near));
+            fleet.recablings = fleet.recablings.wrapping_add(1);
+        }
     }
 
     /// Whether there is anything to watch.
@@ -152,6 +181,11 @@ impl JunctionWatch {
         for (ring, known) in topology.local_rings.iter().zip(&mut self.rings) {
             let is_whole = ring.cables.iter().all(|cable| cable.near.is_some());
             if is_whole && known.iter().any(is_unknown) && !known.iter().any(|watched| watched.reported) {
+                let unknown = ring
+                    .cables
+                    .iter()
+                    .filter(|cable| known.iter().any(|it| is_unknown(it) && it.cable.far == cable.far));
+                self.completed.extend(unknown.filter_map(|cable| Some((cable.near?, cable.far.node))));
                 *known = watched(ring);
             }
         }
@@ -173,7 +207,11 @@ struct Places {
 impl Places {
     /// Both ends of a cable, by who is there.
     fn ends(&self, cable: &RingCable) -> [Option<End>; 2] {
-        [cable.near, Some(cable.far)].map(|at| at.and_then(|at| Some((*self.stations.get(at.node)?, at.port))))
+        [cable.near, Some(cable.far)].map(|at| self.end(at?))
+    }
+
+    fn end(&self, at: PortOf) -> Option<End> {
+        Some((*self.stations.get(at.node)?, at.port))
     }
 
     fn changed(&self, cable: &RingCable, broken: bool, breaks: usize) -> Event {

@@ -1,0 +1,278 @@
+//! Random segments with rings behind junctions, one in another or side by side, hot connect groups in them or beside them,
+//! one link or two: groups come and go, cables break and are mended, the segment is looked at anew, at any moment. What is
+//! told is held against what was done.
+//!
+//! `SEED=17 cargo test --workspace --test virtual_time junctions::explorer::seeds -- --nocapture` runs one seed,
+//! `SEED=1000..2000` many.
+
+use ringcat::{Event, RingState};
+use ringcat_engine::main_device::Pending;
+use ringcat_sim::cable::{CableId, DeviceIndex, Endpoint};
+use ringcat_sim::fault::Fault;
+use scenarios::check::Delivery;
+use scenarios::dice::Dice;
+use scenarios::world::{Mark, World};
+
+use super::plans::Plan;
+use crate::hot_connect::LIMIT;
+
+/// A run.
+struct Run {
+    plan: Plan,
+    world: World,
+    dice: Dice,
+    group_is_on: bool,
+    broken: Option<usize>,
+    /// The group has joined or left as it was made to.
+    is_settled: bool,
+    /// A look at the segment has taken over the cabling as it is.
+    is_known: bool,
+    looking: Option<Pending<Result<ringcat::Rescan, ringcat::ServiceError>>>,
+    /// The cable that is broken was told while the cabling was known.
+    was_told: bool,
+    mark: Mark,
+}
+
+impl Run {
+    fn changes(&mut self, since: Mark) -> Vec<Event> {
+        // Who has joined has an address since then.
+        self.world.recognise();
+        let events = self.world.events(since).iter().map(|timed| timed.event.clone());
+        events.filter(|event| matches!(event, Event::JunctionChanged { .. })).collect()
+    }
+
+    /// Who is told of has these ports.
+    fn ends(&self, event: &Event) -> [Option<(DeviceIndex, u8)>; 2] {
+        let Event::JunctionChanged { near, far, declared, .. } = event else { return [None; 2] };
+        let end = |port: Option<u8>, declared: Option<usize>| Some((self.world.device_of(declared?)?, port?));
+        [end(near.map(|near| near.port), declared[0]), end(Some(far.port), declared[1])]
+    }
+
+    fn is_of(&self, event: &Event, cable: usize, is_broken: bool) -> bool {
+        let end = |end: Endpoint| match end {
+            Endpoint::Device(device, port) => Some((device, port.index() as u8)),
+            Endpoint::Host(_) => None,
+        };
+        let (one, other) = self.plan.cables[cable];
+        let ends = [end(one), end(other)];
+        let told = self.ends(event);
+        matches!(event, Event::JunctionChanged { broken, .. } if *broken == is_broken)
+            && (told == ends || told == [ends[1], ends[0]])
+    }
+
+    fn cycles(&mut self, cycles: u64) {
+        for _ in 0..cycles {
+            self.world.cycle();
+            if self.looking.as_mut().is_some_and(|pending| pending.take().is_some()) {
+                self.looking = None;
+            }
+        }
+    }
+
+    fn is_closed(&self) -> bool {
+        self.world.application().ring() == RingState::Closed || !self.plan.two_links
+    }
+
+    /// A look, which may go on while other things happen.
+    fn look(&mut self) {
+        self.world.say("a look");
+        self.looking = Some(self.world.application_mut().engine_mut().start_rescan(LIMIT));
+        if self.dice.one_in(3) {
+            // Whatever comes next meets it.
+            let cycles = self.dice.below(4);
+            return self.cycles(cycles);
+        }
+        self.finish_looking();
+        self.is_known = self.is_closed() || self.is_known;
+        self.cycles(60);
+    }
+
+    fn finish_looking(&mut self) {
+        let begin = self.world.now();
+        while self.looking.is_some() {
+            self.cycles(1);
+            assert!(self.world.now().since(begin) < 3 * LIMIT, "a look ends");
+        }
+    }
+
+    fn toggle_group(&mut self) {
+        self.group_is_on = !self.group_is_on;
+        self.is_known = false;
+        let mut devices = self.plan.group();
+        if self.dice.one_in(2) {
+            devices.reverse();
+        }
+        for device in devices {
+            self.world.fault(if self.group_is_on { Fault::PowerOn(device) } else { Fault::PowerOff(device) });
+            let pause = self.dice.below(4);
+            self.cycles(pause);
+        }
+        // Sometimes nobody waits until it is settled.
+        self.is_settled = false;
+        if !self.dice.one_in(4) {
+            self.settle();
+        }
+    }
+
+    fn settle(&mut self) {
+        let is_on = self.group_is_on;
+        if self.plan.has_group {
+            self.world.until(LIMIT, "the group has joined or left", |world| {
+                let group = world.application().groups()[0];
+                if is_on { group.has_joined() } else { group.present == 0 }
+            });
+            self.world.recognise();
+        }
+        self.cycles(200);
+        self.is_settled = true;
+        let last = self.world.judged(self.mark).last().map(|judged| judged.delivery);
+        assert!(matches!(last, Some(Delivery::Complete | Delivery::WithoutAbsent)), "{last:?}");
+    }
+
+    fn cut_or_heal(&mut self) {
+        if let Some(cable) = self.broken.take() {
+            let mark = self.world.mark();
+            self.world.heal(CableId(cable));
+            self.cycles(150);
+            let told = self.changes(mark);
+            let is_local = self.plan.local.contains(&cable);
+            if is_local && self.was_told && self.is_settled {
+                assert_eq!(told.len(), 1, "cable {cable}");
+                assert!(!self.is_known || self.is_of(&told[0], cable, false), "cable {cable}: {told:?}");
+            }
+            return;
+        }
+        let cable = *self.dice.pick(&self.plan.redundant_cables());
+        let of_group =
+            |end: Endpoint| matches!(end, Endpoint::Device(device, _) if self.plan.group().contains(&device));
+        let (one, other) = self.plan.cables[cable];
+        // While it is away there is a break there already.
+        if !self.group_is_on && (self.plan.in_ring || of_group(one) || of_group(other)) {
+            return;
+        }
+        let is_exact = self.is_known && self.is_settled && self.looking.is_none();
+        self.broken = Some(cable);
+        let mark = self.world.mark();
+        self.world.cut(CableId(cable));
+        self.cycles(60);
+        let told = self.changes(mark);
+        let is_local = self.plan.local.contains(&cable);
+        assert!(told.len() <= usize::from(is_local) || !self.is_settled, "cable {cable}: {told:?}");
+        self.was_told = told.iter().any(|event| matches!(event, Event::JunctionChanged { broken: true, .. }));
+        if is_exact && is_local {
+            assert!(self.was_told && self.is_of(&told[0], cable, true), "cable {cable}: {told:?}");
+        }
+    }
+
+    fn step(&mut self) {
+        match self.dice.below(6) {
+            0 | 1 if self.looking.is_none() => self.look(),
+            2 if self.plan.has_group && (self.broken.is_none() || !self.plan.in_ring) => self.toggle_group(),
+            3..=5 => self.cut_or_heal(),
+            _ => self.cycles(20),
+        }
+    }
+
+    /// What must never be.
+    fn check(&self) {
+        let group = if self.plan.has_group { self.plan.group().to_vec() } else { Vec::new() };
+        let left: Vec<DeviceIndex> =
+            self.world.left_op(self.mark).into_iter().filter(|it| !group.contains(it)).collect();
+        assert_eq!(left, [], "nobody but the group leaves OP");
+        let is_wrong = |event: &Event| {
+            matches!(
+                event,
+                Event::LineCrossed { .. }
+                    | Event::JunctionUnknown { .. }
+                    | Event::Moved { .. }
+                    | Event::JunctionsBlocked { .. }
+                    | Event::Unexpected { .. }
+                    | Event::ConfigurationFailed { .. }
+                    | Event::ScanFailed { .. }
+            )
+        };
+        assert!(!self.world.saw(self.mark, is_wrong), "{:?}", self.world.events(self.mark));
+    }
+}
+
+fn run(seed: u64) {
+    let mut dice = Dice::new(seed);
+    let plan = Plan::random(&mut dice);
+    let strict = plan.connections.iter().all(|it| it.head_port == 1) && dice.one_in(2);
+    // A ring whose end is not there is not learned.
+    let is_tail = plan.connections.iter().any(|it| it.tail >= plan.kinds.len());
+    let group_is_on = plan.has_group && (is_tail || dice.one_in(2));
+    let mut world = plan.world(seed, strict, group_is_on);
+    world.say(format!("{plan:?}, strict: {strict}"));
+    world.until(LIMIT, "all that are there settled", |world| world.application().all_settled());
+    world.recognise();
+    // Joining, they latch outputs that others had before.
+    world.set_strict(false);
+    world.run_cycles(60);
+    let mark = world.mark();
+    // With the group away a ring is broken where it will be.
+    let is_known = !plan.in_ring || group_is_on;
+    let mut run = Run {
+        plan,
+        world,
+        dice,
+        group_is_on,
+        broken: None,
+        is_known,
+        is_settled: true,
+        looking: None,
+        was_told: false,
+        mark,
+    };
+    for _ in 0..12 {
+        run.step();
+        run.check();
+    }
+    run.finish_looking();
+    if run.broken.is_some() {
+        run.cut_or_heal();
+    }
+    if run.plan.has_group && !run.group_is_on {
+        run.toggle_group();
+    }
+    run.settle();
+    run.look();
+    run.finish_looking();
+    run.cycles(60);
+    run.is_known = true;
+    // Then every cable of a ring is told with its true place.
+    for cable in run.plan.local.clone() {
+        for broken in [true, false] {
+            let mark = run.world.mark();
+            run.world.fault(if broken { Fault::Cut(CableId(cable)) } else { Fault::Heal(CableId(cable)) });
+            run.cycles(100);
+            let told = run.changes(mark);
+            assert!(told.len() == 1 && run.is_of(&told[0], cable, broken), "cable {cable}: {told:?}");
+            let Event::JunctionChanged { breaks, .. } = told[0] else { unreachable!() };
+            assert_eq!(breaks, usize::from(broken), "cable {cable}");
+        }
+    }
+    run.check();
+}
+
+fn runs(seeds: std::ops::Range<u64>) {
+    println!("seeds {} to {}", seeds.start, seeds.end - 1);
+    let failed: Vec<u64> = seeds.filter(|seed| std::panic::catch_unwind(|| run(*seed)).is_err()).collect();
+    assert_eq!(failed, [], "seeds that fail");
+}
+
+#[test]
+fn what_is_told_of_rings_groups_and_looks_at_random_is_what_was_done_jr_07_cr_17() {
+    runs(0..8);
+}
+
+#[test]
+fn seeds_from_the_environment() {
+    let Ok(text) = std::env::var("SEED") else { return println!("skipped: no SEED given") };
+    let (first, last) = text.split_once("..").unwrap_or((&text, ""));
+    let first = first.parse().expect("SEED=17 or SEED=1000..2000");
+    match last.parse() {
+        Ok(last) => runs(first..last),
+        Err(_) => run(first),
+    }
+}

@@ -1,0 +1,70 @@
+//! Rings in mode automatic that a scan finds though open ports allow many answers: several of them, one in another, one of
+//! them broken (JR-03).
+
+use ringcat::{Event, JunctionMode};
+use ringcat_engine::topology::{Closing, PortOf};
+use ringcat_sim::cable::CableId;
+use ringcat_sim::frame::Port::{A, B, C, D};
+use scenarios::segments::{MAIN, REDUNDANT, at, wired};
+
+use super::{crossed, edge, in_op, told};
+
+/// Junction 0 has a ring with two more of them, 1 and 3, with a ring each, and behind it another one, 5.
+const KINDS: [&str; 8] = [
+    "junction",
+    "junction",
+    "digital-output-8",
+    "junction",
+    "digital-input-8",
+    "junction",
+    "digital-output-8",
+    "digital-input-16",
+];
+
+#[test]
+fn four_rings_one_in_another_are_learned_whole_and_with_any_one_broken_jr_03() {
+    let mut cables = vec![
+        (MAIN, at(0, A)),
+        (at(0, D), at(1, A)),
+        (at(1, D), at(2, A)),
+        (at(2, B), at(1, B)),
+        (at(1, C), at(3, A)),
+        (at(3, D), at(4, A)),
+        (at(4, B), at(3, B)),
+        (at(3, C), at(0, B)),
+        (at(0, C), at(5, A)),
+        (at(5, D), at(6, A)),
+        (at(6, B), at(5, B)),
+        (at(5, C), at(7, A)),
+    ];
+    let closing = |(head, head_port), (tail, tail_port)| Closing {
+        head: PortOf { node: head, port: head_port },
+        tail: PortOf { node: tail, port: tail_port },
+    };
+    let all = [closing((0, 1), (3, 2)), closing((1, 1), (2, 1)), closing((3, 1), (4, 1)), closing((5, 1), (6, 1))];
+    for two_links in [false, true] {
+        if two_links {
+            cables.push((at(7, B), REDUNDANT));
+        }
+        // Those that lead into the rings and from one member to the next. One that closes a ring hides it (JR-03).
+        for broken in [None, Some(1), Some(4), Some(2), Some(5), Some(9)] {
+            let what = format!("two links: {two_links}, cable {broken:?}");
+            let mut network = wired(&KINDS, &cables);
+            broken.into_iter().for_each(|cable| network.cut(CableId(cable)));
+            let mut world = in_op(50, network, (JunctionMode::Automatic, &[]));
+            let learned = world.events(world.beginning()).iter().filter_map(|timed| match timed.event {
+                Event::JunctionLearned { closing } => Some(closing),
+                _ => None,
+            });
+            let mut learned: Vec<Closing> = learned.collect();
+            learned.sort_unstable();
+            assert_eq!(learned, all, "{what}");
+            assert_eq!(told(&world, world.beginning()).len(), usize::from(broken.is_some()), "{what}");
+            assert_eq!(crossed(&world, world.beginning()), 0, "{what}");
+            if let Some(cable) = broken {
+                let mark = edge(&mut world, &what, |world| world.heal(CableId(cable)));
+                assert_eq!(told(&world, mark).len(), 1, "{what}");
+            }
+        }
+    }
+}
