@@ -108,6 +108,11 @@ impl SubDevicePlan {
         (0..).zip(self.process_data.iter().filter(|area| area.length > 0))
     }
 
+    /// Some of its SyncManagers are for OP only: then none of its process data flows before.
+    pub fn is_op_only(&self) -> bool {
+        self.mapped_areas().any(|(_, area)| area.op_only)
+    }
+
     /// Where the mailboxes lie from PREOP on; `None` where there are none.
     pub fn mailbox_layout(&self) -> Option<MailboxLayout> {
         layout_of(&self.mailbox)

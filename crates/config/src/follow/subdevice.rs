@@ -3,12 +3,12 @@
 use std::time::Duration;
 
 use ringcat_engine::config::{
-    RegisterAccess, RegisterCommand, StartupAction, StartupCommand, StateTimeout, SubDeviceConfig,
+    DeclaredSyncManager, RegisterAccess, RegisterCommand, StartupAction, StartupCommand, StateTimeout, SubDeviceConfig,
     Transition as EngineTransition,
 };
 use ringcat_wire::al::AlState;
 use ringcat_wire::command::{Addressing, Command};
-use ringcat_wire::register::map;
+use ringcat_wire::register::{SyncManager, map};
 
 use super::areas::{self, Piece};
 use super::bus::Bus;
@@ -64,7 +64,7 @@ pub(super) fn follow(
             Class::Raw => raw(eni, index, command, &mut startup, notices)?,
         }
     }
-    late_sync_managers(index, commands, &registers, notices);
+    late_sync_managers(index, commands, &registers, config.declared.as_deref_mut().unwrap_or_default(), notices);
     mail::startup(eni, index, bus, &mut startup, notices)?;
     startup.sort_by_key(|(place, _)| *place);
     config.startup = startup.into_iter().map(|(_, command)| command).collect();
@@ -337,14 +337,28 @@ pub(super) fn comment(text: &str) -> Option<String> {
     (!text.is_empty()).then(|| text.to_owned())
 }
 
-/// SyncManagers that the file switches on at SO only.
-fn late_sync_managers(index: usize, commands: &[EcatCommand], up: &Registers, notices: &mut Notices) {
+/// SyncManagers of process data that the file switches on at SO are for OP only: outputs that act in SAFEOP already would be
+/// dangerous. Others that differ there are noted.
+fn late_sync_managers(
+    index: usize,
+    commands: &[EcatCommand],
+    up: &Registers,
+    declared: &mut [DeclaredSyncManager],
+    notices: &mut Notices,
+) {
     let early = Registers::after(commands, &UP[..2]);
     for (number, register, place) in up.sync_managers().filter(|(_, register, _)| register.activate.enable) {
-        let before: [u8; 8] = early.read(map::sync_manager(number));
-        if before != register.encode() {
-            let reason = "set on the way to SAFEOP already, not to OP: RingCAT sets all SyncManagers there";
-            notices.add(Some(place), Some(index), format!("SyncManager {number} at SO"), reason);
+        let before: [u8; SyncManager::LEN] = early.read(map::sync_manager(number));
+        if before == register.encode() {
+            continue;
+        }
+        let found = declared.iter_mut().find(|sm| sm.index == number && sm.role.direction().is_some());
+        match found.filter(|_| !SyncManager::decode(&before).activate.enable) {
+            Some(late) => late.op_only = true,
+            None => {
+                let reason = "set on the way to SAFEOP already, not to OP: RingCAT sets all SyncManagers there";
+                notices.add(Some(place), Some(index), format!("SyncManager {number} at SO"), reason);
+            }
         }
     }
 }

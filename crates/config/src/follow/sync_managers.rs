@@ -63,7 +63,7 @@ pub(super) fn declared(
 fn declare(index: u8, role: SyncManagerRole, register: SyncManager) -> DeclaredSyncManager {
     let register =
         SyncManager { status: SyncManagerStatus::default(), pdi_control: SyncManagerPdiControl::default(), ..register };
-    DeclaredSyncManager { index, role, register, pdos: Vec::new() }
+    DeclaredSyncManager { index, role, register, op_only: false, pdos: Vec::new() }
 }
 
 /// By `Type`; without it by the control byte.

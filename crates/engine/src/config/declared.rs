@@ -42,6 +42,8 @@ pub struct DeclaredSyncManager {
     /// Start, length, control and activate byte; the other two are left 0. One that is not enabled has no place in the
     /// process image.
     pub register: SyncManager,
+    /// It is switched on on the way to OP only, and off when OP is left (commands of SO and OS in the file).
+    pub op_only: bool,
     /// PDOs in its area, in order: where entries lie. May be empty; with entries they need no more than its length.
     pub pdos: Vec<PdoMapping>,
 }

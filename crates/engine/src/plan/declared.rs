@@ -63,8 +63,8 @@ fn area(sm: &DeclaredSyncManager, info: &SubDeviceInfo) -> Result<Option<AreaPla
     } else if expected > got {
         return Err(PlanProblem::DeclaredTooShort { sync_manager, expected, got });
     }
-    let (register, physical) = (sm.register, sm.register.start);
-    Ok(Some(AreaPlan { sync_manager, direction, physical, length, register, op_only: false, pdos }))
+    let DeclaredSyncManager { register, op_only, .. } = *sm;
+    Ok(Some(AreaPlan { sync_manager, direction, physical: register.start, length, register, op_only, pdos }))
 }
 
 /// One that is written the wrong way round takes nothing, and nobody would know why.

@@ -178,12 +178,20 @@ impl BringUp<'_> {
             self.explain(error).await;
         }
         reached?;
+        if !plan.is_op_only() {
+            self.join().await?;
+        }
+        self.fleet.set_configured(self.index, true);
+        Ok(())
+    }
+
+    /// Process data counts on it from now on.
+    async fn join(&self) -> Result<(), BusError> {
         let fmmus = self.setup.fmmu_registers();
         if !fmmus.is_empty() {
             self.bus.fpwr(self.station, map::FMMU_BASE, &fmmus).await?;
         }
         self.fleet.board.set_taking_part(self.index, true);
-        self.fleet.set_configured(self.index, true);
         Ok(())
     }
 
@@ -200,18 +208,21 @@ impl BringUp<'_> {
         Ok(())
     }
 
-    /// Commands of SO; waits until outputs flow, then OP.
+    /// Commands of SO; waits until clocks are locked and outputs flow, then OP.
     pub(super) async fn op(&self) -> Result<(), ConfigureError> {
         self.command(Transition::So).await?;
+        if self.config.sync.is_some() {
+            clocks::wait_for_lock(self.bus, self.fleet, self.index).await.map_err(ConfigureError::NotLocked)?;
+        }
         for area in self.setup.plan.process_data.iter().filter(|area| area.op_only) {
             self.write_sync_manager(area.sync_manager, &area.register).await?;
+        }
+        if self.setup.plan.is_op_only() {
+            self.join().await?;
         }
         let cycles = self.fleet.board.cycles() + CYCLES_BEFORE_OP;
         while self.fleet.board.cycles() < cycles {
             self.bus.sleep(CYCLE_PAUSE).await;
-        }
-        if self.config.sync.is_some() {
-            clocks::wait_for_lock(self.bus, self.fleet, self.index).await.map_err(ConfigureError::NotLocked)?;
         }
         self.request(AlState::SafeOp, AlState::Op).await
     }

@@ -383,6 +383,14 @@ impl SharedFleet {
         self.access().members.get_mut(index).map(|member| core::mem::replace(&mut member.target, target))
     }
 
+    /// Whether a SubDevice's process data flows in a state.
+    pub fn exchanges(&self, index: usize, state: AlState) -> bool {
+        let access = self.access();
+        let setup = access.members.get(index).and_then(|member| member.setup.as_ref());
+        let early = || setup.is_none_or(|setup| !setup.plan.is_op_only());
+        state == AlState::Op || (state == AlState::SafeOp && early())
+    }
+
     /// The state to which a SubDevice is to be brought.
     pub fn target(&self, index: usize) -> AlState {
         self.access().members.get(index).map_or(AlState::Init, |member| member.target)

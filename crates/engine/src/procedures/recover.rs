@@ -12,7 +12,6 @@ use ringcat_wire::al::AlState;
 use super::al_state;
 use super::configure::{BringUp, ConfigureError, RegisterFailure, Start, StartupError};
 use super::fleet::{Phase, SharedFleet};
-use super::request_state::exchanges;
 use super::sii;
 use super::strangers::take_away;
 use crate::event::Event;
@@ -43,7 +42,7 @@ pub(super) async fn keep_up(bus: Bus, fleet: SharedFleet, index: usize, start: S
         match result {
             Ok(state) => {
                 fleet.set_phase(index, Phase::Settled(state));
-                fleet.board.set_excused(index, !exchanges(state));
+                fleet.board.set_excused(index, !fleet.exchanges(index, state));
                 bus.report(Event::StateReached { subdevice: index, state });
                 return;
             }
@@ -115,7 +114,7 @@ pub(super) fn lose(bus: &Bus, fleet: &SharedFleet, index: usize) {
     }
     fleet.board.set_taking_part(index, false);
     // One that was on its way to process data is missed from now on.
-    fleet.board.set_excused(index, !exchanges(fleet.target(index)));
+    fleet.board.set_excused(index, !fleet.exchanges(index, fleet.target(index)));
     if let Some(mailbox) = fleet.mailbox(index) {
         mailbox.suspend();
     }
@@ -166,7 +165,7 @@ async fn quick(bring_up: &BringUp<'_>) -> Result<bool, ConfigureError> {
     let BringUp { bus, fleet, index, station, setup, target, mailbox, .. } = bring_up;
     let (status, code) = al_state::read_status(bus, *station).await?;
     if !status.error && status.al_state() == Some(*target) {
-        fleet.board.set_taking_part(*index, *target == AlState::SafeOp || *target == AlState::Op);
+        fleet.board.set_taking_part(*index, fleet.exchanges(*index, *target));
         mailbox.resume();
         return Ok(true);
     }

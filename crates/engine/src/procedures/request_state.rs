@@ -23,7 +23,7 @@ use crate::supervisor::Bus;
 /// Pause between two looks whether the SubDevice is there.
 const PAUSE: Duration = Duration::from_micros(500);
 
-/// Whether process data flows in a state.
+/// Whether process data may flow in a state.
 pub(crate) const fn exchanges(state: AlState) -> bool {
     matches!(state, AlState::SafeOp | AlState::Op)
 }
@@ -74,7 +74,7 @@ fn begin(bus: &Bus, fleet: &SharedFleet, index: usize, state: AlState, result: &
     let before = fleet.set_target(index, state).unwrap_or(state);
     match fleet.phase(index) {
         Phase::Absent => {
-            fleet.board.set_excused(index, !exchanges(state));
+            fleet.board.set_excused(index, !fleet.exchanges(index, state));
             *result.borrow_mut() = Some(Err(ConfigureError::Absent));
             return fleet.attempt(index);
         }
@@ -83,7 +83,7 @@ fn begin(bus: &Bus, fleet: &SharedFleet, index: usize, state: AlState, result: &
             return fleet.attempt(index);
         }
         // On the way up it is excused until it is there.
-        Phase::Settled(_) | Phase::Configuring if exchanges(state) => {}
+        Phase::Settled(_) | Phase::Configuring if fleet.exchanges(index, state) => {}
         Phase::Settled(_) | Phase::Configuring => fleet.board.set_excused(index, true),
     }
     fleet.set_phase(index, Phase::Configuring);
@@ -100,7 +100,7 @@ async fn go(bus: &Bus, fleet: &SharedFleet, index: usize, before: AlState, resul
     match travel(bus, fleet, index, before).await {
         Ok(state) => {
             fleet.set_phase(index, Phase::Settled(state));
-            fleet.board.set_excused(index, !exchanges(state));
+            fleet.board.set_excused(index, !fleet.exchanges(index, state));
             bus.report(Event::StateReached { subdevice: index, state });
             *result.borrow_mut() = Some(Ok(()));
         }
@@ -109,7 +109,7 @@ async fn go(bus: &Bus, fleet: &SharedFleet, index: usize, before: AlState, resul
             // One that the frames did not reach has refused nothing.
             if !is_of_bus(&error) {
                 fleet.set_target(index, before);
-                fleet.board.set_excused(index, !exchanges(before));
+                fleet.board.set_excused(index, !fleet.exchanges(index, before));
             }
             *result.borrow_mut() = Some(Err(error));
             keep_up(bus.clone(), fleet.clone(), index, Start::Unknown).await;

@@ -27,7 +27,7 @@ fn declared(index: u8, role: SyncManagerRole, start: u16, length: u16, control: 
     let mut register =
         SyncManager { start, length, control: SyncManagerControl::from_bits(control), ..SyncManager::default() };
     register.activate.enable = true;
-    DeclaredSyncManager { index, role, register, pdos: Vec::new() }
+    DeclaredSyncManager { index, role, register, op_only: false, pdos: Vec::new() }
 }
 
 fn outputs() -> Vec<PdoMapping> {

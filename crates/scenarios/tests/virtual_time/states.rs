@@ -16,7 +16,7 @@ use ringcat_wire::al::{AlState, AlStatus, AlStatusCode};
 use ringcat_wire::mailbox::Protocol;
 use ringcat_wire::mailbox::coe::Emergency;
 use ringcat_wire::register::{SyncManager, map};
-use ringcat_wire::sii::{MailboxLayout, SyncManagerKind};
+use ringcat_wire::sii::{MailboxLayout, SiiSyncManager, SyncManagerKind};
 use scenarios::loss::Loss;
 use scenarios::segments::{descriptions, line, ring_of_16};
 use scenarios::world::{CYCLE, Mark, World};
@@ -215,6 +215,31 @@ fn commands_of_the_way_down_and_up_are_sent_in_order() {
         (AlState::SafeOp, 5),
     ];
     assert_eq!(got, expected);
+}
+
+/// Outputs of a terminal without a state machine of its own: nothing else keeps them from acting in SAFEOP.
+#[test]
+fn a_sync_manager_for_op_only_is_off_in_safeop_on_the_way_up_and_down_facts_4_4() {
+    let mut devices = descriptions(&["coupler", "emulated-output-8", "digital-input-8"]);
+    devices[1].sync_managers[0].enable = SiiSyncManager::ENABLE | SiiSyncManager::OP_ONLY;
+    let mut world = World::in_op(6, line(devices, NetworkOptions::default()));
+    let is_on = |world: &World| {
+        let register = map::sync_manager(0).offset(SyncManager::ACTIVATE);
+        world.network().device(DeviceIndex(1)).controller.register(register, 1)[0] & 1 == 1
+    };
+    assert!(is_on(&world));
+    for way in [&[AlState::SafeOp][..], &[AlState::PreOp, AlState::SafeOp], &[AlState::Init, AlState::SafeOp]] {
+        let mark = world.mark();
+        for to in way {
+            assert_eq!(request(&mut world, 1, *to), Ok(()));
+            world.run_cycles(20);
+            assert!(!is_on(&world), "on in {to}, by {way:?}");
+        }
+        assert_eq!(request(&mut world, 1, AlState::Op), Ok(()));
+        world.run_cycles(20);
+        assert!(is_on(&world), "off in OP, by {way:?}");
+        assert_undisturbed(&world, mark, 1);
+    }
 }
 
 #[test]

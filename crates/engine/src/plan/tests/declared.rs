@@ -4,7 +4,13 @@ use super::*;
 use crate::config::{DeclaredSyncManager, SyncManagerRole};
 
 fn manager(index: u8, role: SyncManagerRole, start: u16, length: u16, control: u8) -> DeclaredSyncManager {
-    DeclaredSyncManager { index, role, register: sync_manager(start, length, control), pdos: Vec::new() }
+    DeclaredSyncManager {
+        index,
+        role,
+        register: sync_manager(start, length, control),
+        op_only: false,
+        pdos: Vec::new(),
+    }
 }
 
 fn of_file() -> Vec<DeclaredSyncManager> {

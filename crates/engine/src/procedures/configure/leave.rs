@@ -6,6 +6,7 @@ use ringcat_wire::register::{Fmmu, SyncManager, map};
 use super::{BringUp, ConfigureError, Start};
 use crate::config::Transition;
 use crate::procedures::al_state;
+use crate::supervisor::BusError;
 
 impl BringUp<'_> {
     /// Goes to the target state. Where there is no short way it is the one through INIT.
@@ -31,16 +32,22 @@ impl BringUp<'_> {
         self.setup.plan.mailbox.is_empty() || self.mailbox.is_open()
     }
 
+    /// SyncManagers for OP only are switched off first: where nobody but they knows of states, outputs end with them.
     async fn leave_op(&self) -> Result<(), ConfigureError> {
         self.command(Transition::Os).await?;
+        if self.setup.plan.is_op_only() {
+            self.part().await?;
+        }
+        for area in self.setup.plan.process_data.iter().filter(|area| area.op_only) {
+            let activate = map::sync_manager(area.sync_manager).offset(SyncManager::ACTIVATE);
+            self.bus.fpwr(self.station, activate, &[0]).await?;
+        }
         self.request(AlState::Op, AlState::SafeOp).await
     }
 
     /// Process data ends for all of it at once, before the SubDevice ends it by halves. Mail goes on.
-    async fn leave_safeop(&self) -> Result<(), ConfigureError> {
-        self.command(Transition::Sp).await?;
+    async fn part(&self) -> Result<(), BusError> {
         self.fleet.board.set_taking_part(self.index, false);
-        self.fleet.set_configured(self.index, false);
         let mut fmmus = alloc::vec![0; self.setup.fmmu_registers().len()];
         for (number, register) in self.setup.fmmus.iter().filter(|(number, _)| Some(*number) == self.setup.mail_fmmu) {
             let at = Fmmu::LEN * usize::from(*number);
@@ -49,6 +56,13 @@ impl BringUp<'_> {
         if !fmmus.is_empty() {
             self.bus.fpwr(self.station, map::FMMU_BASE, &fmmus).await?;
         }
+        Ok(())
+    }
+
+    async fn leave_safeop(&self) -> Result<(), ConfigureError> {
+        self.command(Transition::Sp).await?;
+        self.fleet.set_configured(self.index, false);
+        self.part().await?;
         self.request(AlState::SafeOp, AlState::PreOp).await?;
         for area in &self.setup.plan.process_data {
             self.write_sync_manager(area.sync_manager, &SyncManager::default()).await?;

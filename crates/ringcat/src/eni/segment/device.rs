@@ -11,7 +11,8 @@ use ringcat_sim::description::{
 };
 use ringcat_wire::register::{PortKind, SyncManager, SyncManagerControl};
 use ringcat_wire::sii::{
-    CoeDetails, DcMode, FmmuUsage, Identity, MailboxLayout, MailboxProtocols, PdoDirection, SyncManagerKind,
+    CoeDetails, DcMode, FmmuUsage, Identity, MailboxLayout, MailboxProtocols, PdoDirection, SiiSyncManager,
+    SyncManagerKind,
 };
 
 use super::objects;
@@ -50,6 +51,8 @@ pub(super) fn describe(subdevice: &SubDevice, config: &SubDeviceConfig) -> Devic
     device.ports = ports(&subdevice.physics);
     device.mailbox = mailbox(subdevice, config);
     let declared = config.declared.clone().unwrap_or_else(|| guessed(subdevice, device.mailbox.as_ref()));
+    // Outputs that are switched on at SO belong to terminals without a state machine of their own.
+    device.emulation = declared.iter().any(|sm| sm.op_only);
     device.sync_managers = sync_managers(&declared);
     device.pdos = pdos(subdevice, &declared);
     let areas = declared.iter().filter(|sm| sm.role.direction().is_some()).map(|sm| match sm.role {
@@ -158,7 +161,13 @@ fn guessed(subdevice: &SubDevice, mailbox: Option<&MailboxDescription>) -> Vec<D
         let mut register =
             SyncManager { start, length, control: SyncManagerControl::from_bits(control), ..SyncManager::default() };
         register.activate.enable = true;
-        declared.push(DeclaredSyncManager { index: declared.len() as u8, role, register, pdos: Vec::new() });
+        declared.push(DeclaredSyncManager {
+            index: declared.len() as u8,
+            role,
+            register,
+            op_only: false,
+            pdos: Vec::new(),
+        });
     };
     if let Some(mailbox) = mailbox {
         let MailboxLayout { receive_offset, receive_size, send_offset, send_size } = mailbox.standard;
@@ -190,7 +199,7 @@ fn sync_managers(declared: &[DeclaredSyncManager]) -> Vec<SyncManagerDescription
             start: sm.register.start,
             length: sm.register.length,
             control: sm.register.control.bits(),
-            enable: u8::from(sm.register.activate.enable),
+            enable: u8::from(sm.register.activate.enable) | if sm.op_only { SiiSyncManager::OP_ONLY } else { 0 },
             kind: match sm.role {
                 SyncManagerRole::MailboxOut => SyncManagerKind::MailboxOut,
                 SyncManagerRole::MailboxIn => SyncManagerKind::MailboxIn,

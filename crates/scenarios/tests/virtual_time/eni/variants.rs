@@ -9,7 +9,8 @@ use ringcat::{DomainId, Event, JunctionConnection, MainDevice, Options};
 use ringcat_sim::cable::{CableId, CableSpec, DeviceIndex, Endpoint};
 use ringcat_sim::frame::Port;
 use ringcat_sim::network::Network;
-use ringcat_wire::register::PortKind;
+use ringcat_wire::al::AlState;
+use ringcat_wire::register::{PortKind, map};
 
 use super::{BUTTONS, DRIVE, EniFile, LAMPS, MACHINE, Plant, activate, activate_on, segment};
 
@@ -141,4 +142,29 @@ fn a_ring_behind_a_junction_is_declared_by_station_addresses_of_the_file_between
         assert_eq!(plant.events.iter().filter(told).count(), 1, "{:?}", plant.events);
         assert!(plant.is_complete() && plant.application.all_settled());
     }
+}
+
+/// As files of TwinCAT do with terminals: outputs that act in SAFEOP already would be dangerous.
+#[test]
+fn outputs_that_a_file_switches_on_at_so_are_off_in_safeop_facts_8_2() {
+    let set_sm = "<Data>000f010044000100</Data>";
+    let text = String::from_utf8(MACHINE.to_vec()).expect("it is text");
+    let lamps = text.find(set_sm).expect("the lamps have one");
+    let at = text[..lamps].rfind("<Transition>PS</Transition>").expect("it is set at PS");
+    let text = format!("{}{}", &text[..at], text[at..].replacen(">PS<", ">SO<", 1));
+    let file = EniFile::from_bytes(text.as_bytes()).expect("it is sound");
+    let declared = file.configuration.declaration.subdevices[LAMPS].declared.clone().expect("it has commands");
+    assert!(declared[0].op_only && !file.configuration.notices.iter().any(|notice| notice.subject.contains("at SO")));
+    let mut plant = activate(file, false, false).expect("it fits");
+    plant.settle();
+    let is_on = |plant: &Plant| plant.device(LAMPS).controller.register(map::sync_manager(0).offset(6), 1)[0] & 1 == 1;
+    assert!(is_on(&plant));
+    for (to, on) in [(AlState::SafeOp, false), (AlState::Op, true)] {
+        let mut work = plant.application.request_state(LAMPS, to);
+        while work.take().is_none() {
+            plant.cycle();
+        }
+        assert_eq!(is_on(&plant), on, "{to}");
+    }
+    plant.settle();
 }
