@@ -203,10 +203,26 @@ fn what_addresses_somebody_else_is_not_sent_and_said() {
 fn what_is_ours_is_not_in_the_notices_and_what_is_not_followed_is() {
     let configuration = configured(SMALL);
     let found = crate::notices(&configuration);
-    assert_eq!(found.len(), 4, "{found:#?}");
+    assert_eq!(found.len(), 3, "{found:#?}");
     assert!(has_notice(&configuration, &["PreviousPort", "not compared"]));
-    assert!(has_notice(&configuration, &["SyncManager 0 at SO", "SAFEOP already"]));
     assert!(has_notice(&configuration, &["1 variables of no SubDevice", "Inputs.DevState"]));
     let ports = changed(&[("<Ado>3840</Ado>", "<Ado>256</Ado>")]);
     assert!(has_notice(&ports, &["own register", "ports and forwarding"]));
+}
+
+/// Facts 4.4, 8.2: outputs that a file switches on at SO must not act in SAFEOP.
+#[test]
+fn a_sync_manager_that_is_switched_on_at_so_is_for_op_only_and_one_that_only_changes_there_is_noted() {
+    let op_only = |configuration: &ringcat_config::Configuration, index: usize| -> Vec<bool> {
+        let declared = configuration.declaration.subdevices[index].declared.iter().flatten();
+        declared.map(|sync_manager| sync_manager.op_only).collect()
+    };
+    let configuration = configured(SMALL);
+    assert_eq!((op_only(&configuration, 1), op_only(&configuration, 2)), (vec![true], vec![false]));
+    let at_so = "<InitCmd><Transition>SO</Transition><Comment>set sm 0 of left</Comment>";
+    let at_ps = "<InitCmd><Transition>PS</Transition><Cmd>5</Cmd><Adp>1002</Adp><Ado>2048</Ado>\
+                 <Data>000f010004000100</Data></InitCmd>";
+    let twice = changed(&[(at_so, &format!("{at_ps}{at_so}"))]);
+    assert_eq!(op_only(&twice, 1), [false]);
+    assert!(has_notice(&twice, &["SyncManager 0 at SO", "SAFEOP already"]));
 }
