@@ -6,6 +6,7 @@
 //! and SYNC signals become declarations; what is left is sent as it is, or named in the notices.
 
 mod areas;
+mod assignment;
 mod bus;
 mod clocks;
 mod cyclic;

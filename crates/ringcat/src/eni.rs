@@ -3,6 +3,7 @@
 //! `ringcat-config` reads the file; [`EniImage`] is its process image at run time; [`segment`] makes a simulated segment
 //! of it, for those who want to try it without hardware. `docs/eni.md` has it all.
 
+mod cables;
 mod file;
 mod image;
 mod segment;

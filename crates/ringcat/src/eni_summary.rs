@@ -247,7 +247,7 @@ mod tests {
         let expected = ["3", "1004", "position", "3", "(0x9a)", "(0x30924)", "48", "48", "128", "8", "1ms", "Drive"];
         assert_eq!(columns, expected);
         let notices = not_followed(&configuration);
-        assert!(notices.iter().any(|line| line.contains("SyncManager 0 at SO") && line.ends_with("[SubDevice 1]")));
+        assert!(notices.iter().any(|line| line.contains("not sent at OI") && line.ends_with("[SubDevice 3]")));
         let details = details::lines(&model, &configuration);
         assert!(
             details

@@ -116,8 +116,8 @@ pub fn run(arguments: &RunArguments) -> Result<bool, Failure> {
     let options = Options {
         junctions: arguments.junction.mode,
         enhanced_line_crossed: arguments.enhanced_line_crossed,
-        // The file says what PDOs there are.
-        pdos: if network.is_some() { ReadPdos::Never } else { ReadPdos::default() },
+        // A file that declares all SyncManagers says what PDOs there are.
+        pdos: if network.as_ref().is_some_and(EniNetwork::is_complete) { ReadPdos::Never } else { ReadPdos::default() },
         ..arguments.interfaces.options()
     };
     let supervisor = SupervisorThread::start(acyclic, &options, move || thread.prepare_supervisor())?;
@@ -133,6 +133,9 @@ pub fn run(arguments: &RunArguments) -> Result<bool, Failure> {
         None => Names(scan.subdevices.iter().map(|info| info.name.clone()).collect()),
     };
     let declaration = declare(arguments, network.as_ref(), &scan.subdevices)?;
+    if let Some(network) = &network {
+        network.tell_cables(&scan);
+    }
     let period = declaration.domains.iter().map(|domain| domain.period).min().unwrap_or(arguments.cycle);
     say!("{} SubDevices; cycle {} us", scan.subdevices.len(), period.as_micros());
     let trigger = declaration.clocks.as_ref().map(|clocks| arguments.clock_options.trigger(clocks.bus_shift));

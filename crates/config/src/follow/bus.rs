@@ -33,10 +33,6 @@ impl Bus {
             groups,
             ccs_is_reversed: ccs_is_reversed(eni),
         };
-        if bus.plugged_into.iter().any(Option::is_some) {
-            let reason = "the cables of the segment are not compared with it; order and identity of the SubDevices are";
-            notices.add(None, None, "PreviousPort", reason);
-        }
         for command in &eni.main_device.init_commands {
             of_everybody(command, notices);
         }

@@ -14,7 +14,7 @@ use super::areas::{self, Piece};
 use super::bus::Bus;
 use super::notices::Notices;
 use super::registers::Registers;
-use super::{clocks, contradiction, identity, mail, sync_managers};
+use super::{assignment, clocks, contradiction, identity, mail, sync_managers};
 use crate::eni::{EcatCommand, Eni, EniError, Place, Target, Transition, quoted};
 
 /// The way up, in the order in which its commands are sent.
@@ -38,6 +38,9 @@ pub(super) fn follow(
     config.watchdog_intervals = registers.word(map::WATCHDOG_TIME_PROCESS_DATA);
     config.sii_to_pdi = identity::keeps_eeprom(commands);
     config.declared = sync_managers::declared(eni, index, &registers, complete, notices)?;
+    if config.declared.is_none() {
+        config.pdos = assignment::of_commands(subdevice, bus.ccs_is_reversed);
+    }
     config.declared_bootstrap = sync_managers::bootstrap(eni, index)?;
     config.sync = clocks::of_subdevice(eni, index, &registers, complete, notices);
     let mut startup: Vec<(Place, StartupCommand)> = Vec::new();

@@ -166,7 +166,7 @@ fn pdos(
 }
 
 /// An entry, in pieces where it is longer than an object dictionary can say (`ARRAY [0..99] OF BYTE`).
-fn entries(entry: &crate::eni::PdoEntry) -> impl Iterator<Item = PdoEntry> + '_ {
+pub(super) fn entries(entry: &crate::eni::PdoEntry) -> impl Iterator<Item = PdoEntry> + '_ {
     let pieces = entry.bit_length.div_ceil(ENTRY_BITS);
     (0..pieces).map(move |piece| {
         let bits = (entry.bit_length - piece * ENTRY_BITS).min(ENTRY_BITS);

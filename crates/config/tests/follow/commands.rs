@@ -93,6 +93,21 @@ fn sync_managers_are_what_the_commands_leave_in_how_many_pieces_ever_facts_3_11(
 }
 
 #[test]
+fn a_sync_manager_that_is_switched_on_at_so_is_for_op_only() {
+    let op_only = |configuration: &ringcat_config::Configuration, subdevice: usize| {
+        configuration.declaration.subdevices[subdevice].declared.as_ref().unwrap()[0].op_only
+    };
+    let configuration = configured(SMALL);
+    assert!(op_only(&configuration, 1), "left: at SO");
+    assert!(!op_only(&configuration, 2), "right: at PS");
+    let other = "<InitCmd><Transition>SO</Transition><Comment>set sm 0 of left</Comment>";
+    let both = "<InitCmd><Transition>PS</Transition><Cmd>5</Cmd><Adp>1002</Adp><Ado>2048</Ado><Data>000f010004000100</Data></InitCmd>";
+    let changed = changed(&[(other, &format!("{both}{other}"))]);
+    assert!(!op_only(&changed, 1), "on in SAFEOP already");
+    assert!(has_notice(&changed, &["SyncManager 0 at SO", "SAFEOP already"]));
+}
+
+#[test]
 fn long_entries_are_cut_and_pdos_that_do_not_fit_have_no_places() {
     let entry = "<Entry><Index>#x6064</Index><SubIndex>0</SubIndex><BitLen>32</BitLen></Entry>";
     let array = "<Entry><Index>#x2000</Index><SubIndex>1</SubIndex><BitLen>800</BitLen><DataType>ARRAY [0..99] OF BYTE</DataType></Entry>";
@@ -203,8 +218,7 @@ fn what_addresses_somebody_else_is_not_sent_and_said() {
 fn what_is_ours_is_not_in_the_notices_and_what_is_not_followed_is() {
     let configuration = configured(SMALL);
     let found = crate::notices(&configuration);
-    assert_eq!(found.len(), 3, "{found:#?}");
-    assert!(has_notice(&configuration, &["PreviousPort", "not compared"]));
+    assert_eq!(found.len(), 2, "{found:#?}");
     assert!(has_notice(&configuration, &["1 variables of no SubDevice", "Inputs.DevState"]));
     let ports = changed(&[("<Ado>3840</Ado>", "<Ado>256</Ado>")]);
     assert!(has_notice(&ports, &["own register", "ports and forwarding"]));

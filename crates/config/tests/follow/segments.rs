@@ -1,7 +1,8 @@
 //! The segment: positions, groups, clocks, files without commands.
 
 use ringcat_config::eni::Port;
-use ringcat_engine::config::{ConfigAddress, ReferenceClock};
+use ringcat_engine::config::{ConfigAddress, PdoAssignment, PdoEntry, PdoMapping, ReferenceClock};
+use ringcat_engine::info::Direction;
 
 use crate::{SMALL, changed, configured, has_notice, refused};
 
@@ -108,4 +109,43 @@ fn a_file_without_commands_leaves_the_rest_to_the_sii_and_expects_what_info_says
     assert_eq!(configuration.image.outputs_len, 5, "without an image of the file as long as needed");
     assert_eq!(configuration.declaration.domains.len(), 1);
     assert!(has_notice(&configuration, &["Cyclic/CycleTime", "1ms is taken"]));
+}
+
+/// As users write it who have only start-up lists (users' pain: a mapping that differs from the SII).
+#[test]
+fn a_file_with_nothing_but_coe_commands_says_with_them_how_long_process_data_is_facts_6_3() {
+    let command = |object: &str, sub_index: u8, complete: u8, data: &str| {
+        format!(
+            "<InitCmd CompleteAccess=\"{complete}\"><Transition>PS</Transition><Ccs>1</Ccs><Index>{object}</Index>\
+             <SubIndex>{sub_index}</SubIndex><Data>{data}</Data></InitCmd>"
+        )
+    };
+    let commands = [
+        command("0x1c13", 0, 0, "00"),
+        command("0x1c13", 1, 0, "021a"),
+        command("0x1c13", 2, 0, "051a"),
+        command("0x1c13", 0, 0, "02"),
+        command("0x1c12", 0, 1, "0200 0116 0716"),
+        command("0x1601", 0, 1, "0200 10004060 20007a60"),
+        command("0x1a05", 1, 0, "08006160"),
+        command("0x1a05", 0, 0, "01"),
+    ];
+    let text = format!(
+        "<EtherCATConfig><Config><Slave><Info><Name>A</Name></Info><Mailbox><CoE><InitCmds>{}</InitCmds></CoE></Mailbox>\
+         </Slave></Config></EtherCATConfig>",
+        commands.concat()
+    );
+    let config = &configured(&text).declaration.subdevices[0];
+    let assigned =
+        |sync_manager, direction, pdos: [PdoMapping; 2]| PdoAssignment { sync_manager, direction, pdos: pdos.to_vec() };
+    let drive = PdoMapping::of(0x1601, [PdoEntry::new(0x6040, 0, 16), PdoEntry::new(0x607A, 0, 32)]);
+    let mode = PdoMapping::of(0x1A05, [PdoEntry::new(0x6061, 0, 8)]);
+    let expected = vec![
+        assigned(2, Direction::Outputs, [drive, PdoMapping::from_sii(0x1607)]),
+        assigned(3, Direction::Inputs, [PdoMapping::from_sii(0x1A02), mode]),
+    ];
+    assert_eq!(config.pdos.as_ref(), Some(&expected));
+    assert_eq!(config.startup.len(), 8, "and they are sent");
+    let whole = configured(SMALL);
+    assert!(whole.declaration.subdevices.iter().all(|config| config.pdos.is_none()), "others have SyncManagers");
 }

@@ -41,7 +41,11 @@ fn of_subdevice(index: usize, model: &Eni, configuration: &Configuration, lines:
         Some(declared) => {
             for sm in declared {
                 let (start, length, control) = (sm.register.start, sm.register.length, sm.register.control.bits());
-                let off = if sm.register.activate.enable { "" } else { ", off" };
+                let off = match (sm.register.activate.enable, sm.op_only) {
+                    (true, false) => "",
+                    (true, true) => ", on in OP only",
+                    (false, _) => ", off",
+                };
                 let role = role(sm.role);
                 lines.push(format!(
                     "  SyncManager {:>2}  {role:<8} {start:#06x}  {length:>5} bytes, control {control:#04x}{off}",

@@ -70,6 +70,7 @@ fn subdevice(index: usize, configuration: &Configuration) -> Option<Value> {
                 "length": sm.register.length,
                 "control": sm.register.control.bits(),
                 "enabled": sm.register.activate.enable,
+                "op_only": sm.op_only,
                 "pdos": pdos.collect::<Value>(),
             })
         };

@@ -8,7 +8,7 @@ use std::time::Duration;
 use clap::Args;
 use ringcat::eni::{EniFile, EniImage, EniVariable, Value};
 use ringcat::text::Names;
-use ringcat::{ActivateError, Declaration, Direction, Error, Instant, ProcessData, SubDeviceInfo};
+use ringcat::{ActivateError, Declaration, Direction, Error, Instant, ProcessData, Scan, SubDeviceInfo};
 use ringcat_engine::main_device::Directory;
 
 use crate::interfaces::Failure;
@@ -69,6 +69,11 @@ impl EniNetwork {
         self.file.names()
     }
 
+    /// Whether nothing about process data is left to the SubDevices themselves.
+    pub fn is_complete(&self) -> bool {
+        self.file.configuration.declaration.subdevices.iter().all(|config| config.declared.is_some())
+    }
+
     /// Index in the declaration of the SubDevice with this station address in the file.
     pub fn at_station(&self, station: u16) -> Option<usize> {
         self.file.configuration.at_station(station)
@@ -84,6 +89,13 @@ impl EniNetwork {
             return Err(Failure::new("the network is not the one of the file: correct the file, or the network"));
         }
         Ok(self.file.declaration(self.split_lrw))
+    }
+
+    /// Cables that are not where the file says. The network works all the same.
+    pub fn tell_cables(&self, scan: &Scan) {
+        for difference in self.file.compare_cables(&scan.subdevices, &scan.topology) {
+            eprintln!("ringcat: {difference}");
+        }
     }
 
     /// Why it cannot be activated, in terms of the file and of this program.
@@ -115,7 +127,7 @@ impl EniNetwork {
         match names.find(|name| !known(name)) {
             None => Ok(()),
             Some(name) => Err(Failure::new(format!(
-                "the file has no variable \"{name}\": `ringcat eni FILE` lists its {} variables",
+                "the file has no variable \"{name}\": `ringcat eni --details FILE` lists its {} variables",
                 self.file.configuration.image.variables.len()
             ))),
         }

@@ -1,6 +1,7 @@
 //! Networks from ENIs, end to end: the file is read, a segment is made of it, it comes to OP as the file says, and exchanges
 //! data through the variables of the file (facts 8).
 
+mod cables;
 mod variants;
 
 use std::path::{Path, PathBuf};

@@ -1,0 +1,110 @@
+//! PDO assignment and mapping of a file without commands for SyncManagers: the objects that its CoE commands write say how
+//! long process data is (facts 6.3: 0x1C10 + n, 0x1600 to 0x17FF, 0x1A00 to 0x1BFF).
+
+use std::collections::BTreeMap;
+
+use ringcat_engine::config::{PdoAssignment, PdoEntry, PdoMapping};
+use ringcat_engine::info::Direction;
+
+use crate::eni::{CoeCommand, SubDevice, Transition};
+
+/// PDO assignment of SyncManager n is 0x1C10 + n.
+const ASSIGNMENT: u16 = 0x1C10;
+/// SyncManagers with an assignment: 0 and 1 are mailboxes.
+const ASSIGNED: std::ops::RangeInclusive<u16> = 0x1C12..=0x1C1F;
+/// Mappings of outputs and of inputs.
+const OUTPUTS: std::ops::RangeInclusive<u16> = 0x1600..=0x17FF;
+const INPUTS: std::ops::RangeInclusive<u16> = 0x1A00..=0x1BFF;
+
+/// What the commands leave in an object: subindex 0 counts.
+#[derive(Debug, Default)]
+struct Object {
+    values: BTreeMap<u8, u32>,
+}
+
+impl Object {
+    fn write(&mut self, command: &CoeCommand, width: usize) {
+        let value = |bytes: &[u8]| bytes.iter().rev().fold(0, |value, byte| value << 8 | u32::from(*byte));
+        if !command.complete_access {
+            let data = command.data.get(..command.data.len().min(4)).unwrap_or_default();
+            self.values.insert(command.sub_index, value(data));
+            return;
+        }
+        // Subindex 0 takes 16 bits, and is left out where it begins with 1.
+        let (count, rest) = match command.sub_index {
+            0 => command.data.split_at(command.data.len().min(2)),
+            _ => (&[][..], &command.data[..]),
+        };
+        if let Some(count) = count.first() {
+            self.values.insert(0, u32::from(*count));
+        }
+        for (sub_index, bytes) in (1..=u8::MAX).zip(rest.chunks_exact(width)) {
+            self.values.insert(sub_index, value(bytes));
+        }
+    }
+
+    /// The values that count; `None` where one of them was never written.
+    fn list(&self) -> Option<Vec<u32>> {
+        let count = u8::try_from(*self.values.get(&0)?).ok()?;
+        (1..=count).map(|sub_index| self.values.get(&sub_index).copied()).collect()
+    }
+}
+
+/// The assignments that the commands of the way to SAFEOP write; `None` where there are none.
+pub(super) fn of_commands(subdevice: &SubDevice, is_reversed: bool) -> Option<Vec<PdoAssignment>> {
+    let commands = &subdevice.mailbox.as_ref()?.coe;
+    let mut objects: BTreeMap<u16, Object> = BTreeMap::new();
+    for transition in [Transition::Ip, Transition::Ps] {
+        let sent = commands.iter().filter(|command| {
+            let downloads = (command.ccs == 1) != is_reversed;
+            downloads && !command.disabled && command.transitions.contains(&transition)
+        });
+        for command in sent {
+            let width = match command.index {
+                index if ASSIGNED.contains(&index) => 2,
+                index if OUTPUTS.contains(&index) || INPUTS.contains(&index) => 4,
+                _ => continue,
+            };
+            objects.entry(command.index).or_default().write(command, width);
+        }
+    }
+    let assignments: Vec<PdoAssignment> = objects
+        .iter()
+        .filter(|(index, _)| ASSIGNED.contains(index))
+        .filter_map(|(index, object)| {
+            let pdos: Vec<u16> = object.list()?.into_iter().map(|pdo| pdo as u16).collect();
+            let direction = direction(*index, &pdos)?;
+            let pdos = pdos.into_iter().map(|pdo| mapping(pdo, &objects, subdevice)).collect();
+            Some(PdoAssignment { sync_manager: (index - ASSIGNMENT) as u8, direction, pdos })
+        })
+        .collect();
+    (!assignments.is_empty()).then_some(assignments)
+}
+
+/// By the numbers of the PDOs; by the usual use of SyncManagers 2 and 3 where there are none.
+fn direction(index: u16, pdos: &[u16]) -> Option<Direction> {
+    match pdos.first() {
+        Some(pdo) if OUTPUTS.contains(pdo) => Some(Direction::Outputs),
+        Some(pdo) if INPUTS.contains(pdo) => Some(Direction::Inputs),
+        Some(_) | None if index == ASSIGNMENT + 2 => Some(Direction::Outputs),
+        Some(_) | None if index == ASSIGNMENT + 3 => Some(Direction::Inputs),
+        Some(_) | None => None,
+    }
+}
+
+/// Entries that the commands write, otherwise those that the file describes, otherwise those of the SII.
+fn mapping(index: u16, objects: &BTreeMap<u16, Object>, subdevice: &SubDevice) -> PdoMapping {
+    let written = objects.get(&index).and_then(Object::list);
+    if let Some(values) = written {
+        let entry = |value: u32| PdoEntry::new((value >> 16) as u16, (value >> 8) as u8, value as u8);
+        return PdoMapping::of(index, values.into_iter().map(entry).collect::<Vec<_>>());
+    }
+    let described = subdevice.process_data.iter().flat_map(|data| &data.pdos).find(|pdo| pdo.index == index);
+    match described.filter(|pdo| !pdo.entries.is_empty()) {
+        Some(pdo) => {
+            let entries = pdo.entries.iter().flat_map(super::sync_managers::entries);
+            PdoMapping::of(index, entries.collect::<Vec<_>>())
+        }
+        None => PdoMapping::from_sii(index),
+    }
+}

@@ -1,0 +1,71 @@
+//! The cables of a network held against `PreviousPort` of a file (facts 8.2): who is plugged into which port of whom.
+//!
+//! A difference is told and no more: process data finds its SubDevices by their order, but whoever looks for a broken cable
+//! with the drawing of the machine in hand wants to know.
+
+use ringcat_config::eni::Port;
+use ringcat_engine::config::{Resolution, resolve};
+use ringcat_engine::info::SubDeviceInfo;
+use ringcat_engine::topology::{PortOf, Topology};
+
+use super::file::{Difference, EniFile};
+
+/// Letters of the ports, by number.
+const LETTERS: [char; 4] = ['A', 'B', 'C', 'D'];
+
+impl EniFile {
+    /// Cables that are not where `PreviousPort` says. Nothing is told of what does not show: of SubDevices that are missing,
+    /// of the place where a ring is open, of rings behind junctions, or while crossed lines make neighbours doubtful.
+    pub fn compare_cables(&self, found: &[SubDeviceInfo], topology: &Topology) -> Vec<Difference> {
+        let facts = &self.configuration.subdevices;
+        let configs = &self.configuration.declaration.subdevices;
+        if topology.is_assumed() || facts.iter().all(|facts| facts.plugged_into.is_none()) {
+            return Vec::new();
+        }
+        let mut place = vec![None; configs.len()];
+        for resolution in resolve(configs, found) {
+            if let Resolution::Found { config, info } = resolution {
+                place[config] = Some(usize::from(found[info].position.0));
+            }
+        }
+        let names = self.names().0;
+        // Whoever is not of the file has its position for a name.
+        let name = |node: usize| match place.iter().position(|place| *place == Some(node)) {
+            Some(config) => format!("\"{}\"", names[config]),
+            None => format!("position {node}"),
+        };
+        let into = |at: PortOf| format!("port {} of {}", LETTERS[usize::from(at.port & 3)], name(at.node));
+        let mut differences = Vec::new();
+        for (config, facts) in facts.iter().enumerate() {
+            let Some(node) = place[config].filter(|node| !topology.is_in_local_ring(*node)) else { continue };
+            let said = match facts.plugged_into {
+                Some((previous, port)) => match place[previous] {
+                    Some(node) => Some(PortOf { node, port: number(port) }),
+                    // Missing, so that the next one is plugged in elsewhere.
+                    None => continue,
+                },
+                // Where a group's head is plugged in is nobody's concern.
+                None if configs[config].group.is_some() => continue,
+                None => None,
+            };
+            let got = topology.connection_to(node).map(|cable| cable.near);
+            // Behind the place where a ring is open nothing shows.
+            if said == got || (got.is_none() && topology.redundant_head == Some(node)) {
+                continue;
+            }
+            let words = |at: Option<PortOf>| at.map_or_else(|| "the MainDevice".to_owned(), into);
+            let text = format!("{} is plugged into {}; the file says {}", name(node), words(got), words(said));
+            differences.push(Difference { subdevice: Some(config), is_grave: false, text });
+        }
+        differences
+    }
+}
+
+const fn number(port: Port) -> u8 {
+    match port {
+        Port::A => 0,
+        Port::B => 1,
+        Port::C => 2,
+        Port::D => 3,
+    }
+}

@@ -1,0 +1,47 @@
+//! The cables of a network held against `PreviousPort` of a file (facts 8.2).
+
+use ringcat::eni::segment;
+use ringcat::simulated::SimulatedSegment;
+use ringcat::{MainDevice, Options, Scan};
+use ringcat_sim::cable::{CableId, DeviceIndex, Endpoint};
+use ringcat_sim::frame::Port;
+use ringcat_sim::network::Network;
+
+use super::{BUTTONS, DRIVE, EniFile, machine};
+
+/// What is found and told with one cable cut, or none.
+fn scanned(file: &EniFile, mut network: Network, cut: Option<CableId>) -> (Scan, Vec<String>) {
+    if let Some(cable) = cut {
+        network.cut(cable);
+    }
+    let mut main_device = MainDevice::request(SimulatedSegment::new(network), &Options::default());
+    let scan = main_device.scan().expect("a scan");
+    let told = file.compare_cables(&scan.subdevices, &scan.topology);
+    assert!(told.iter().all(|difference| !difference.is_grave));
+    (scan, told.iter().map(ToString::to_string).collect())
+}
+
+#[test]
+fn cables_as_the_file_says_are_not_told_also_in_a_ring_that_is_open_facts_8_2() {
+    let file = machine();
+    assert_eq!(scanned(&file, file.simulated(false).expect("a segment"), None).1, [""; 0]);
+    assert_eq!(scanned(&file, file.simulated(true).expect("a segment"), None).1, [""; 0]);
+    // The ring leads through coupler and drive; the terminals hang on the coupler, and are gone without their cable.
+    for (cable, there) in [(0, 5), (1, 2), (2, 3), (3, 4), (4, 5), (5, 5)] {
+        let (scan, told) = scanned(&file, file.simulated(true).expect("a segment"), Some(CableId(cable)));
+        assert_eq!(scan.subdevices.len(), there, "cable {cable}");
+        assert_eq!(told, [""; 0], "cable {cable}");
+    }
+}
+
+#[test]
+fn a_cable_that_is_plugged_in_elsewhere_is_told_with_both_places_facts_8_2() {
+    let file = machine();
+    let mut moved = segment(&file.eni, &file.configuration, false);
+    moved.cables[DRIVE].a = Endpoint::Device(DeviceIndex(BUTTONS), Port::B);
+    let (scan, told) = scanned(&file, Network::from_description(moved).expect("cables fit"), None);
+    assert!(file.compare(&scan.subdevices).is_empty(), "all are there, in their order");
+    let expected =
+        "\"Drive (1005)\" is plugged into port B of \"Buttons (1004)\"; the file says port C of \"Coupler (1001)\"";
+    assert_eq!(told, [expected]);
+}
