@@ -233,3 +233,55 @@ fn line(variable: &EniVariable, value: u64) -> String {
     let value: Value = variable.data_type.value(value, bits);
     format!("{} = {value}", variable.name)
 }
+
+#[cfg(test)]
+mod tests {
+    use ringcat::simulated::SimulatedSegment;
+    use ringcat::{MainDevice, Options};
+
+    use super::*;
+
+    const MACHINE: &[u8] = include_bytes!("../../examples/machine.eni.xml");
+
+    fn network(set: &[&str], watch: &[&str]) -> EniNetwork {
+        let strings = |texts: &[&str]| texts.iter().map(|text| (*text).to_owned()).collect();
+        let file = EniFile::from_bytes(MACHINE).unwrap();
+        EniNetwork { file, split_lrw: false, set: strings(set), watch: strings(watch) }
+    }
+
+    #[test]
+    fn variables_are_set_and_told_and_what_cannot_be_is_refused_with_its_name() {
+        let segment = SimulatedSegment::new(network(&[], &[]).file.simulated(false).unwrap());
+        let mut main_device = MainDevice::request(segment, &Options::default());
+        let found = main_device.scan().unwrap().subdevices;
+        let declaration = network(&[], &[]).declaration(&found).unwrap();
+        let mut application = main_device.activate(declaration).map_err(Error::from).unwrap();
+        let good = network(&["Lamps.Channel 2=on", "Drive.Target velocity=-5"], &["Drive.Position"]);
+        good.check_variables().unwrap();
+        let (mut work, mut watched) = good.work(application.directory()).unwrap();
+        for _ in 0..400 {
+            application.cycle(|data| work.cycle(data));
+        }
+        assert_eq!(application.links().network().device(ringcat_sim::cable::DeviceIndex(1)).outputs(), [2]);
+        assert_eq!(watched.news(Instant(1)), ["Drive.Position = -5"]);
+        assert_eq!(watched.news(Instant(2)), [""; 0], "at most once a second");
+        assert_eq!(watched.news(Instant(2_000_000_000)), [""; 0], "when it changes");
+
+        let unknown = network(&["Lamp=1"], &[]).check_variables().unwrap_err().to_string();
+        assert!(unknown.contains("no variable \"Lamp\""), "{unknown}");
+        assert!(network(&[], &["Lamp"]).check_variables().is_err());
+        let refused = |set: &str| network(&[set], &[]).work(application.directory()).unwrap_err().to_string();
+        assert!(refused("Buttons.Channel 1=1").contains("is an input"));
+        assert!(refused("Lamps.Channel 1=2").contains("expected a value of 1 bits"));
+        assert!(refused("Lamps.Channel 1").contains("expected NAME=VALUE"));
+    }
+
+    #[test]
+    fn an_lrw_that_is_refused_is_explained_with_subdevices_and_the_way_out_cr_16() {
+        let network = network(&[], &[]);
+        let lrw = network.file.configuration.declaration.explicit_lrw[0].clone();
+        let text = network.explain(Error::Activate(ActivateError::NamedLrwOnTwoLinks(lrw))).to_string();
+        let who = "(Lamps (1002), Valves (1003), Buttons (1004), Drive (1005))";
+        assert!(text.contains(who) && text.contains("add --split-lrw"), "{text}");
+    }
+}
