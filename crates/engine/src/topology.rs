@@ -20,7 +20,7 @@ use core::fmt;
 use ringcat_wire::register::{DlStatus, PortKind};
 
 use crate::info::SubDeviceInfo;
-pub(crate) use ends::{are_doubtful, ends_of_break};
+pub(crate) use ends::{are_doubtful, ends_of_break, seam};
 use local_ring::Rings;
 pub use local_ring::{Closing, LocalRing, RingCable, candidates};
 pub(crate) use local_ring::{candidates_with, rings_shown};
@@ -168,6 +168,9 @@ pub struct Topology {
     pub main_count: usize,
     /// Head of the tree on the redundant link, next to the break; `None` in a closed ring or without a second link.
     pub redundant_head: Option<usize>,
+    /// Where the SubDevices of the main link end in an open ring, or all of them where only the redundant link meets any and
+    /// enters each at port 0. Not where branches leave several ports that a cable of the ring could be missing from.
+    pub main_end: Option<PortOf>,
     /// Ports that are open but lead to no SubDevice: the redundant link, or a device that is no SubDevice. In the order
     /// in which frames of the main link, then of the redundant link, pass them.
     pub open_ports: Vec<PortOf>,

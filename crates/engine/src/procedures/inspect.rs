@@ -14,7 +14,7 @@ use super::al_state::split_status;
 use super::fleet::SharedFleet;
 use crate::ring_status::Cable;
 use crate::supervisor::{Bus, BusError, TURN, TURN_PAUSE};
-use crate::topology::{PortOf, Topology};
+use crate::topology::{PortOf, Topology, seam};
 
 /// Between two reports of what looks have brought so far: most answers are there by then.
 const STEP: Duration = Duration::from_micros(300);
@@ -101,7 +101,7 @@ pub(super) fn locate_breaks(topology: &Topology, dl_status: &[Option<DlStatus>])
     let all = core::iter::once(first).chain(inner).chain(last);
     let mut broken: Vec<Cable> = all.filter(|cable| is_broken(dl_status, cable) == Some(true)).collect();
     if broken.is_empty() {
-        broken.extend(seam(topology, dl_status));
+        broken.extend(seam(topology, dl_status).map(|(near, far)| Cable { near, far }));
     }
     broken
 }
@@ -136,33 +136,4 @@ fn trunk(topology: &Topology) -> Vec<bool> {
 fn communicates(dl_status: &[Option<DlStatus>], at: PortOf) -> Option<bool> {
     let status = dl_status.get(at.node).copied().flatten()?;
     Some(status.ports[usize::from(at.port & 3)].communication)
-}
-
-/// A connection that the scan did not see, because the ring was broken there already.
-fn seam(topology: &Topology, dl_status: &[Option<DlStatus>]) -> Option<Cable> {
-    let last = topology.main_count.checked_sub(1);
-    if let Some(head) = topology.redundant_head {
-        let far = PortOf { node: head, port: topology.nodes.get(head)?.entry_port };
-        if communicates(dl_status, far) != Some(false) {
-            return None;
-        }
-        let near = last.map(|node| PortOf { node, port: loose_port(topology, node) });
-        return Some(Cable { near, far: Some(far) });
-    }
-    // Only then was nothing seen of the redundant link.
-    let node = last.filter(|_| topology.open_ports.is_empty())?;
-    let mut loose = (0..4).filter(|port| !is_known(topology, node, *port)).map(|port| PortOf { node, port });
-    let is_broken = loose.all(|at| communicates(dl_status, at) == Some(false));
-    is_broken.then(|| Cable { near: Some(PortOf { node, port: loose_port(topology, node) }), far: None })
-}
-
-/// Whether the scan saw what is plugged into a port.
-fn is_known(topology: &Topology, node: usize, port: u8) -> bool {
-    topology.nodes.get(node).is_some_and(|it| port == it.entry_port || it.children[usize::from(port & 3)].is_some())
-}
-
-/// The port at which a line ends: of those without a neighbour the usual way on, port 1, or else the next in the order of
-/// travel. What the port itself says counts for nothing: the cable may be healed between two looks.
-fn loose_port(topology: &Topology, node: usize) -> u8 {
-    [1, 3, 2, 0].into_iter().find(|port| !is_known(topology, node, *port)).unwrap_or(1)
 }

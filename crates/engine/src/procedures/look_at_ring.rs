@@ -12,7 +12,7 @@ use crate::link::LinkSet;
 use crate::ring::RingState;
 use crate::ring_status::{Cable, CableErrors, cables, port_errors};
 use crate::supervisor::{Bus, BusError};
-use crate::topology::{NodeStatus, PortOf, Topology, are_doubtful, ends_of_break};
+use crate::topology::{NodeStatus, PortOf, Topology, seam};
 
 /// What was found.
 #[derive(Clone, Debug)]
@@ -57,7 +57,7 @@ pub async fn look_at_ring(bus: Bus) -> Result<RingLook, ScanError> {
     let state = bus.ring();
     let topology = Topology::build(&statuses, usize::from(counts.0));
     let dl_status: Vec<_> = statuses.iter().map(|status| Some(status.dl_status)).collect();
-    let place = broken(&topology, bus.links(), state, &dl_status, counts);
+    let place = broken(&topology, bus.links(), state, &dl_status);
     let errors = |end: Option<PortOf>| {
         let end = end.and_then(|at| Some(port_errors(counters.get(at.node)?, at.port)));
         end.unwrap_or_default()
@@ -94,22 +94,9 @@ fn array<const N: usize>(bytes: &[u8]) -> [u8; N] {
 }
 
 /// The cable without which the ring is open.
-fn broken(
-    topology: &Topology,
-    links: LinkSet,
-    state: RingState,
-    dl_status: &[Option<DlStatus>],
-    counts: (u16, u16),
-) -> Option<Cable> {
+fn broken(topology: &Topology, links: LinkSet, state: RingState, dl_status: &[Option<DlStatus>]) -> Option<Cable> {
     if links != LinkSet::Ring || state != RingState::Open {
         return None;
     }
-    if are_doubtful(topology) {
-        return ends_of_break(topology, dl_status, [counts.0, counts.1]).map(|(near, far)| Cable { near, far });
-    }
-    let all = cables(topology, links);
-    match topology.redundant_head {
-        Some(head) => all.get(head).copied(),
-        None => all.last().copied(),
-    }
+    seam(topology, dl_status).map(|(near, far)| Cable { near, far })
 }

@@ -168,9 +168,12 @@ impl RingWatch {
         let mut access = self.fleet.access();
         // Which cable leads to an interface is certain only where neighbours are.
         let all = self.steady > 0 && main + redundant == self.steady && !are_doubtful(&access.topology);
+        let is_end_known = !access.topology.open_ports.is_empty() || access.topology.main_end.is_some();
         let cable = match (word.state, main, redundant) {
             (RingState::Open, 0, _) if all => access.cables.first().filter(|(cable, _)| cable.near.is_none()),
-            (RingState::Open, _, 0) if all => access.cables.last().filter(|(cable, _)| cable.far.is_none()),
+            (RingState::Open, _, 0) if all && is_end_known => {
+                access.cables.last().filter(|(cable, _)| cable.far.is_none())
+            }
             _ => None,
         };
         let place = cable.map(|(cable, _)| *cable);

@@ -5,16 +5,20 @@ use alloc::vec::Vec;
 
 use ringcat_wire::register::DlStatus;
 
-use super::{Finding, PortOf, Topology};
+use super::{Finding, Node, PortOf, Topology};
 
 /// Both ends of a cable, the first nearer to MAIN as far as that is known. `None` is an interface: MAIN where it is the first
 /// one, REDUNDANT the second.
 pub type Ends = (Option<PortOf>, Option<PortOf>);
 
-/// Whether neighbours in a ring are an assumption.
+/// Whether neighbours in a ring are an assumption: where somebody is or may be crossed, and in an open ring with branches.
 pub fn are_doubtful(topology: &Topology) -> bool {
     let odd = |finding: &Finding| matches!(finding, Finding::CrossedLine { .. } | Finding::Inconsistent { .. });
-    topology.is_assumed() || topology.findings.iter().any(odd)
+    let was_open = topology.redundant_head.is_some() || topology.open_ports.is_empty();
+    let branches = |node: &Node| node.entry_port > 1 || node.children[2..].iter().any(Option::is_some);
+    topology.is_assumed()
+        || topology.findings.iter().any(odd)
+        || (was_open && (topology.nodes.iter().any(branches) || topology.open_ports.iter().any(|at| at.port > 1)))
 }
 
 /// The ends of the cable at which a ring is open, from the ports of all SubDevices now. `counts` is how many of them live on each
@@ -32,16 +36,7 @@ pub fn ends_of_break(topology: &Topology, dl_status: &[Option<DlStatus>], counts
         (&[end], [_, 0]) => Some((Some(end), None)),
         (&[near, far], _) if near.node != far.node => Some((Some(near), Some(far))),
         // It was open there when it was looked at.
-        (&[], [main, redundant]) if usize::from(main) == topology.main_count => {
-            let near = loose_end(dl_status, 0..topology.main_count);
-            let far = loose_end(dl_status, topology.main_count..dl_status.len());
-            match (near, far) {
-                (Some(near), _) if redundant == 0 => Some((Some(near), None)),
-                (_, Some(far)) if main == 0 => Some((None, Some(far))),
-                (Some(near), Some(far)) => Some((Some(near), Some(far))),
-                _ => None,
-            }
-        }
+        (&[], [main, _]) if usize::from(main) == topology.main_count => seam(topology, dl_status),
         _ => None,
     }
 }
@@ -61,17 +56,23 @@ fn seen(topology: &Topology) -> Vec<PortOf> {
     seen
 }
 
-/// Where a stub without branches ends: the one SubDevice with a single port that leads on, and its other port, the usual way on
-/// where that is any.
-fn loose_end(dl_status: &[Option<DlStatus>], stub: core::ops::Range<usize>) -> Option<PortOf> {
-    let mut ends = stub.filter_map(|node| {
-        let ports = dl_status[node]?.ports;
-        let mut open = (0..4u8).filter(|port| ports[usize::from(*port)].communication);
-        match (open.next(), open.next()) {
-            (Some(only), None) => Some(PortOf { node, port: if only == 0 { 1 } else { 0 } }),
-            _ => None,
+/// The ends of the cable that was broken already when the segment was looked at, as far as they are certain.
+pub fn seam(topology: &Topology, dl_status: &[Option<DlStatus>]) -> Option<Ends> {
+    let is_down = |at: &PortOf| {
+        let status = dl_status.get(at.node).copied().flatten();
+        status.is_some_and(|status| !status.ports[usize::from(at.port & 3)].communication)
+    };
+    let near = topology.main_end.filter(is_down);
+    match topology.redundant_head {
+        Some(head) => {
+            let far = PortOf { node: head, port: topology.nodes.get(head)?.entry_port };
+            let is_certain = is_down(&far) && (near.is_some() || topology.main_count == 0);
+            is_certain.then_some((near, Some(far)))
         }
-    });
-    let end = ends.next()?;
-    ends.next().is_none().then_some(end)
+        None if topology.main_count == 0 => Some((None, Some(near?))),
+        None if topology.main_count == topology.nodes.len() && topology.open_ports.is_empty() => {
+            Some((Some(near?), None))
+        }
+        None => None,
+    }
 }

@@ -79,9 +79,13 @@ pub(super) fn build(status: &[NodeStatus], main_count: usize, rings: &Rings) -> 
     for node in 0..status.len() {
         walk.report_ports(node, Some(node) == redundant_head || walk.is_orphan(node));
     }
+    let is_open = redundant_head.is_some() || walk.open_ports.is_empty();
+    let answering = if main_count == 0 && redundant_head.is_none() { status.len() } else { main_count };
+    let main_end = walk.loose_end(0..answering).filter(|_| is_open);
     let Walk { nodes, open_ports, mut findings, .. } = walk;
     findings.sort_by_key(Finding::node);
-    let mut topology = Topology { nodes, main_count, redundant_head, open_ports, findings, local_rings: Vec::new() };
+    let local_rings = Vec::new();
+    let mut topology = Topology { nodes, main_count, redundant_head, main_end, open_ports, findings, local_rings };
     rings.finish(&mut topology);
     topology
 }
@@ -113,6 +117,21 @@ impl<'s> Walk<'s> {
     /// Whether it is a member of a broken local ring with nothing on its port 0.
     pub(super) fn is_orphan(&self, node: usize) -> bool {
         self.rings.orphans.contains(&node)
+    }
+
+    /// Where a stub ends that goes the usual way from port to port: at the one SubDevice with a single port that leads on.
+    pub(super) fn loose_end(&self, stub: core::ops::Range<usize>) -> Option<PortOf> {
+        let mut end = None;
+        for node in stub {
+            match [0, 1, 2, 3].map(|port| self.is_open(node, port)) {
+                [true, true, false, false] => {}
+                [towards_0, towards_1, false, false] if towards_0 != towards_1 && end.is_none() => {
+                    end = Some(PortOf { node, port: u8::from(towards_0) });
+                }
+                _ => return None,
+            }
+        }
+        end.filter(|at| self.exists(at.node, at.port))
     }
 
     /// Whether the controller has the port. One that claims to have none is not believed.

@@ -74,9 +74,10 @@ impl Walk<'_> {
     pub(super) fn crossed_stub(&mut self, main_count: usize) -> Option<Vec<Link>> {
         let rest = main_count..self.nodes.len();
         if main_count > 0 {
-            self.end_of(0..main_count)?;
+            self.loose_end(0..main_count)?;
         }
-        let (end, crossed) = self.end_of(rest.clone())?;
+        let PortOf { node: end, port } = self.loose_end(rest.clone())?;
+        let crossed = port != 0;
         // Those that were met before the last one; it itself where nothing is plugged in behind it.
         let met_first = rest.start..end + usize::from(crossed);
         if met_first.is_empty() || (main_count == 0 && met_first == rest) {
@@ -95,19 +96,6 @@ impl Walk<'_> {
             chain.insert(0, last);
         }
         Some(chain)
-    }
-
-    /// The one SubDevice at which a stub without branches ends, and whether its port 0 leads to the others.
-    fn end_of(&self, stub: Range<usize>) -> Option<(usize, bool)> {
-        let mut end = None;
-        for node in stub {
-            match (self.is_open(node, 0), (1..4).filter(|port| self.is_open(node, *port)).count()) {
-                (true, 1) => {}
-                (behind, others) if usize::from(behind) + others == 1 && end.is_none() => end = Some((node, behind)),
-                _ => return None,
-            }
-        }
-        end
     }
 
     /// Hangs the SubDevices of the redundant link one behind the other.

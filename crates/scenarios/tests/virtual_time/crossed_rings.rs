@@ -8,6 +8,7 @@ use ringcat::{Cable, Event, PortOf, RingState};
 use ringcat_sim::cable::{CableId, Endpoint};
 use ringcat_sim::frame::Port;
 use scenarios::check::ring_events;
+use scenarios::dice::Dice;
 use scenarios::segments::{MAIN, REDUNDANT, at, wired};
 use scenarios::world::World;
 
@@ -120,4 +121,96 @@ fn a_ring_with_crossed_subdevices_that_is_broken_from_the_start_is_told_as_it_is
             assert_eq!((named, swapped), if crossed == ALL { (0, 1) } else { (crossed, 0) }, "{what}: {told:?}");
         }
     }
+}
+
+/// A ring through a random tree: any ports of junctions, branches anywhere, SubDevices the wrong way round.
+fn random_ring(dice: &mut Dice) -> (Vec<(Endpoint, Endpoint)>, usize, usize) {
+    let trunk = 2 + dice.below(4) as usize;
+    let total = trunk + dice.below(4) as usize;
+    let mut free: Vec<Vec<Port>> = vec![vec![Port::D, Port::B, Port::C]; total];
+    let (mut cables, mut end) = (Vec::new(), MAIN);
+    for (device, ports) in free.iter_mut().enumerate().take(trunk) {
+        let way_on = if dice.one_in(2) { 1 } else { dice.below(3) as usize };
+        let mut ends = [at(device, Port::A), at(device, ports.remove(way_on))];
+        if way_on != 1 {
+            // A branch on the usual way on would be taken for it where the ring is broken from the start.
+            ports.retain(|port| *port != Port::B);
+        }
+        if dice.one_in(4) {
+            ends.reverse();
+        }
+        cables.push((end, ends[0]));
+        end = ends[1];
+    }
+    cables.push((end, REDUNDANT));
+    for device in trunk..total {
+        let parents: Vec<usize> = (0..device).filter(|parent| !free[*parent].is_empty()).collect();
+        let parent = *dice.pick(&parents);
+        cables.push((at(parent, free[parent].remove(0)), at(device, Port::A)));
+    }
+    (cables, trunk, total)
+}
+
+#[test]
+fn places_in_random_rings_with_branches_and_crossed_subdevices_are_right_or_unknown_cr_12() {
+    let seeds = std::env::var("RINGCAT_SEEDS").ok().and_then(|it| it.parse().ok()).unwrap_or(60);
+    let (mut known, mut unknown, mut wrong) = (0, 0, Vec::new());
+    for seed in 0..seeds {
+        let mut dice = Dice::new(seed);
+        let (cables, trunk, total) = random_ring(&mut dice);
+        let kinds = vec!["junction"; total];
+        let mut network = wired(&kinds, &cables);
+        let from_start = dice.one_in(3).then(|| dice.below(trunk as u64 + 1) as usize);
+        if let Some(number) = from_start {
+            network.advance_by(Duration::from_millis(10));
+            network.cut(CableId(number));
+        }
+        let mut world = World::in_op(seed, network);
+        world.run_cycles(60);
+        let position = |device: usize| (0..total).find(|it| world.device_of(*it).map(|it| it.0) == Some(device));
+        let end = |end: Endpoint| match end {
+            Endpoint::Device(device, port) => {
+                Ok(PortOf { node: position(device.0).expect("scanned"), port: port.index() as u8 })
+            }
+            other => Err(if other == MAIN { "MAIN" } else { "REDUNDANT" }),
+        };
+        let truth: Vec<Ends> = cables
+            .iter()
+            .map(|(a, b)| {
+                let mut e = vec![end(*a), end(*b)];
+                e.sort();
+                e
+            })
+            .collect();
+        let nodes = |ends: &Ends| ends.iter().map(|end| end.map(|at| at.node)).collect::<Vec<_>>();
+        let mut note = |world: &World, mark, number: usize, what: &str| {
+            let told = ring_events(world.events(mark));
+            match &places(&told)[..] {
+                [] => unknown += 1,
+                [place] if *place == truth[number] => known += 1,
+                // What was never seen there goes on from the usual port.
+                [place] if from_start == Some(number) && nodes(place) == nodes(&truth[number]) => known += 1,
+                other => {
+                    wrong.push(format!("seed {seed} {what} cable {number} {:?}: {other:?}; {cables:?}", truth[number]))
+                }
+            }
+        };
+        if let Some(number) = from_start {
+            note(&world, world.beginning(), number, "from the start");
+            world.heal(CableId(number));
+            world.run_cycles(100);
+        }
+        for _ in 0..3 {
+            let number = dice.below(trunk as u64 + 1) as usize;
+            let mark = world.mark();
+            world.cut(CableId(number));
+            world.run_cycles(100);
+            note(&world, mark, number, "later");
+            world.heal(CableId(number));
+            world.run_cycles(100);
+        }
+    }
+    println!("{known} known, {unknown} unknown, {} wrong", wrong.len());
+    assert!(wrong.is_empty(), "{}", wrong.join("\n"));
+    assert!(known > 4 * unknown, "{known} known, {unknown} unknown");
 }
