@@ -6,7 +6,7 @@ use std::collections::BTreeMap;
 use ringcat_engine::config::{PdoAssignment, PdoEntry, PdoMapping};
 use ringcat_engine::info::Direction;
 
-use crate::eni::{CoeCommand, SubDevice, Transition};
+use crate::eni::{CoeCommand, Pdo, SubDevice, Transition};
 
 /// PDO assignment of SyncManager n is 0x1C10 + n.
 const ASSIGNMENT: u16 = 0x1C10;
@@ -15,6 +15,10 @@ const ASSIGNED: std::ops::RangeInclusive<u16> = 0x1C12..=0x1C1F;
 /// Mappings of outputs and of inputs.
 const OUTPUTS: std::ops::RangeInclusive<u16> = 0x1600..=0x17FF;
 const INPUTS: std::ops::RangeInclusive<u16> = 0x1A00..=0x1BFF;
+
+/// Bits and entries of a PDO at most: what a datagram carries, subindices of an object.
+const PDO_BITS: u32 = 1486 * 8;
+const PDO_ENTRIES: usize = 255;
 
 /// What the commands leave in an object: subindex 0 counts.
 #[derive(Debug, Default)]
@@ -100,7 +104,8 @@ fn mapping(index: u16, objects: &BTreeMap<u16, Object>, subdevice: &SubDevice) -
         return PdoMapping::of(index, values.into_iter().map(entry).collect::<Vec<_>>());
     }
     let described = subdevice.process_data.iter().flat_map(|data| &data.pdos).find(|pdo| pdo.index == index);
-    match described.filter(|pdo| !pdo.entries.is_empty()) {
+    let bits = |pdo: &Pdo| pdo.entries.iter().map(|entry| u32::from(entry.bit_length)).sum::<u32>();
+    match described.filter(|pdo| (1..=PDO_BITS).contains(&bits(pdo)) && pdo.entries.len() <= PDO_ENTRIES) {
         Some(pdo) => {
             let entries = pdo.entries.iter().flat_map(super::sync_managers::entries);
             PdoMapping::of(index, entries.collect::<Vec<_>>())

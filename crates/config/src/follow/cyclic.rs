@@ -15,7 +15,7 @@ use super::subdevice::{command_name, is_complete, named};
 use crate::eni::{CyclicCommand, Eni, EniError, Problem, Target};
 
 /// Looks at a pair of a logical command and a piece of process data: far more than a segment of 1,000 SubDevices needs.
-const MAX_LOOKS: usize = 20_000_000;
+const MAX_LOOKS: usize = 5_000_000;
 /// Cycle time where the file has none.
 const USUAL_CYCLE: Duration = Duration::from_millis(1);
 
@@ -59,7 +59,8 @@ pub(super) fn follow(eni: &Eni, bus: &Bus, mappings: &[Vec<Piece>], notices: &mu
     };
     let is_logical = |command: &CyclicCommand| command.datagram.command.addressing() == Addressing::Logical;
     let logical = commands().filter(|(_, command)| is_logical(command)).count();
-    if logical.saturating_mul(mappings.iter().map(Vec::len).sum()) > MAX_LOOKS {
+    let pieces: usize = mappings.iter().map(|pieces| pieces.len() + 1).sum();
+    if logical.saturating_mul(pieces) > MAX_LOOKS {
         return Err(EniError::of_file(Problem::TooMuch {
             what: "looks at cyclic commands and FMMUs",
             limit: MAX_LOOKS,
@@ -160,8 +161,10 @@ fn of_registers(eni: &Eni, bus: &Bus, command: &CyclicCommand, cyclic: &mut Cycl
     match (code, ado) {
         (Command::Nop, _) => {}
         (Command::Armw | Command::Frmw, map::DC_SYSTEM_TIME) => {
+            if !cyclic.distributes {
+                cyclic.reference = addressed(eni, bus, code, adp);
+            }
             cyclic.distributes = true;
-            cyclic.reference = cyclic.reference.or_else(|| addressed(eni, bus, code, adp));
         }
         (Command::Apwr | Command::Fpwr | Command::Bwr, map::DC_SYSTEM_TIME) => cyclic.bus_shift = true,
         (code, map::AL_STATUS | map::DC_SYSTEM_TIME | map::DC_SYSTEM_TIME_DIFFERENCE) if !code.writes() => {}

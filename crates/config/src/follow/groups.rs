@@ -12,7 +12,8 @@ pub(super) fn follow(eni: &Eni, bus: &Bus, configs: &mut [SubDeviceConfig]) -> R
     let mut names = Vec::new();
     for (index, subdevice) in eni.subdevices.iter().enumerate() {
         let Some(group) = &subdevice.hot_connect else { continue };
-        let address = |offset| match group_mark(&group.identify) {
+        let mark = group_mark(&group.identify);
+        let address = |offset| match mark {
             Some(Mark::Alias(alias)) if alias != 0 => Ok(ConfigAddress::Alias { alias, offset }),
             Some(Mark::Identification(value)) => Ok(ConfigAddress::Identification { value, offset }),
             Some(Mark::Alias(_) | Mark::Eeprom { .. } | Mark::EepromWord { .. }) | None => {

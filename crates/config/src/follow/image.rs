@@ -20,6 +20,8 @@ use crate::eni::{BitRange, Eni, EniError, ImageSide, Problem, SubDevice};
 const HEADERS: [u64; 2] = [0, 80];
 /// Names of variables that a notice shows.
 const NAMES: usize = 3;
+/// Copies, after they were cut at the borders of areas.
+const MAX_COPIES: usize = 8_192;
 
 /// The image.
 pub(super) fn follow(
@@ -61,7 +63,7 @@ pub(super) fn follow(
         }
     }
     variables(eni, &mut image, notices);
-    copies(eni, &mut image, notices);
+    copies(eni, &mut image, notices)?;
     Ok(image)
 }
 
@@ -272,7 +274,7 @@ fn variables(eni: &Eni, image: &mut ProcessImage, notices: &mut Notices) {
 }
 
 /// `CopyInfo`, cut at the borders of areas on both sides.
-fn copies(eni: &Eni, image: &mut ProcessImage, notices: &mut Notices) {
+fn copies(eni: &Eni, image: &mut ProcessImage, notices: &mut Notices) -> Result<(), EniError> {
     let commands = eni.tasks.iter().flat_map(|task| &task.frames).flat_map(|frame| &frame.commands);
     for copy in commands.flat_map(|command| &command.copies) {
         let mut done = 0;
@@ -288,8 +290,12 @@ fn copies(eni: &Eni, image: &mut ProcessImage, notices: &mut Notices) {
             let (source, target) = (image.areas[source_area], image.areas[target_area]);
             let (source_bit, target_bit) = (from - source.image_bit, to - target.image_bit);
             let bits = (copy.bits - done).min(source.bits - source_bit).min(target.bits - target_bit);
+            if image.copies.len() == MAX_COPIES {
+                return Err(EniError::at(copy.place, Problem::TooMuch { what: "copies", limit: MAX_COPIES }));
+            }
             image.copies.push(ImageCopy { source_area, source_bit, target_area, target_bit, bits });
             done += bits;
         }
     }
+    Ok(())
 }

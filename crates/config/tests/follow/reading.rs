@@ -139,3 +139,26 @@ fn what_is_too_much_is_refused_before_it_costs_anything() {
     let entities = "<!DOCTYPE a [<!ENTITY b \"bb\">]><EtherCATConfig/>";
     assert!(refusal(entities).contains("document type definition"));
 }
+
+/// What is short in a file must not become long in memory or time.
+#[test]
+fn repetitions_do_not_multiply() {
+    let transitions = "<Transition>PS</Transition>".repeat(1000);
+    let assign = "<InitCmd CompleteAccess=\"1\"><Transition>PS</Transition>";
+    let text = with(&[(assign, &format!("<InitCmd CompleteAccess=\"1\">{transitions}"))]);
+    let startup = |text: &str| configured(text).declaration.subdevices[3].startup.len();
+    assert_eq!(startup(&text), startup(SMALL));
+    let pdos = format!("<Sm3><Type>Inputs</Type>{}</Sm3>", "<Pdo>6656</Pdo>".repeat(256));
+    let assigned = refused(&[("<Sm3><Type>Inputs</Type><Pdo>6656</Pdo></Sm3>", &pdos)]);
+    assert!(assigned.contains("more than 255 PDOs of a SyncManager"), "{assigned}");
+    let copy = "<CopyInfo><SrcBitOffs>8</SrcBitOffs><DstBitOffs>18</DstBitOffs><BitSize>4</BitSize></CopyInfo>";
+    let copies = refused(&[(copy, &copy.repeat(4_097))]);
+    assert!(copies.contains("more than 8192 copies"), "{copies}");
+    let reads = "<Cmd><Cmd>10</Cmd><Addr>0</Addr><DataLength>1</DataLength></Cmd>";
+    let slaves = "<Slave><Info/></Slave>".repeat(2_500);
+    let many = format!(
+        "<EtherCATConfig><Config>{slaves}<Cyclic><Frame>{}</Frame></Cyclic></Config></EtherCATConfig>",
+        reads.repeat(2_001)
+    );
+    assert!(refusal(&many).contains("looks at cyclic commands"), "{}", refusal(&many));
+}

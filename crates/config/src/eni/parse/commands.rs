@@ -72,7 +72,11 @@ pub(super) fn transitions(element: Element<'_>) -> Result<Vec<Transition>, EniEr
         let found = Transition::ALL.into_iter().find(|transition| transition.name() == text);
         found.ok_or_else(|| element.wrong("a transition such as IP, PS or SO"))
     };
-    element.children("Transition").map(one).collect()
+    let mut found: Vec<Transition> = element.children("Transition").map(one).collect::<Result<_, _>>()?;
+    // Twice the same says no more than once.
+    let mut seen = [false; Transition::ALL.len()];
+    found.retain(|transition| !std::mem::replace(&mut seen[*transition as usize], true));
+    Ok(found)
 }
 
 fn validate(element: Element<'_>) -> Result<Validate, EniError> {

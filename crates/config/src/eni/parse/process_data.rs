@@ -6,6 +6,8 @@ use crate::eni::model::{
     BitRange, ImageSide, Pdo, PdoEntry, ProcessData, ProcessImage, SyncManagerKind, SyncManagerSettings, Variable,
 };
 
+/// PDOs that can be assigned to a SyncManager: subindices of an object (facts 6.3).
+const ASSIGNED: usize = 255;
 /// SyncManagers that a controller can have.
 const SYNC_MANAGERS: u8 = 16;
 
@@ -63,6 +65,9 @@ fn sync_manager(element: Element<'_>, index: u8) -> Result<SyncManagerSettings, 
             _ => return Err(kind.wrong("Outputs, Inputs, MBoxOut or MBoxIn")),
         },
     };
+    if element.children("Pdo").nth(ASSIGNED).is_some() {
+        return Err(element.error(Problem::TooMuch { what: "PDOs of a SyncManager", limit: ASSIGNED }));
+    }
     Ok(SyncManagerSettings {
         place: element.place(),
         index,
