@@ -248,6 +248,8 @@ impl CablingWatch {
             fleet.set_controlled_break(in_control);
             let found = cabling(&bus, &fleet, enhanced).await;
             fleet.set_controlled_break(false);
+            // Whose ports changed in between has told it to this look.
+            fleet.note_news();
             // Where more than the places was not known, looking again soon would not help.
             again.set(found.is_none() && !in_control);
             if let Some(found) = found {

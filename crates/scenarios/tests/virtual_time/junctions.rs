@@ -341,3 +341,29 @@ fn transfers_go_on_through_cuts_and_repairs_of_a_local_ring() {
         assert_eq!(told(&world, mark).len(), 2, "{cable:?}");
     }
 }
+
+/// Ports change while others than whoever watches them read them: the look for crossed lines, and the clocks. What they read
+/// is no longer told to anybody else.
+#[test]
+fn a_repair_right_behind_a_break_is_told_in_time_whoever_else_looks_at_ports_jr_07() {
+    for with_clocks in [false, true] {
+        let declare = |scan: &ringcat::Scan| {
+            let mut declaration = automatic(&scan.subdevices, CYCLE);
+            declaration.clocks = with_clocks.then(ringcat::ClockConfig::default);
+            declaration
+        };
+        let options = Options { junctions: JunctionMode::Strict, ..Options::default() };
+        let mut world = World::with_junctions(70, one_ring(), &options, declare, &[STRICT]).expect("it fits");
+        world.settle();
+        world.run_cycles(300);
+        for after_us in (2_000..14_000).step_by(400) {
+            let cable = RING[after_us as usize / 400 % RING.len()];
+            let mark = world.mark();
+            world.cut(CableId(cable));
+            world.fault_in(Duration::from_micros(after_us), ringcat_sim::fault::Fault::Heal(CableId(cable)));
+            world.run_cycles(120);
+            let what = format!("after {after_us} us, clocks: {with_clocks}");
+            assert_eq!(told(&world, mark), [changed(cable, true), changed(cable, false)], "{what}");
+        }
+    }
+}

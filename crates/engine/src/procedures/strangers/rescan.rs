@@ -86,6 +86,8 @@ pub(crate) async fn rescan(bus: &Bus, fleet: &SharedFleet, limit: Duration) -> R
     fleet.note_news();
     loop {
         let looked = look(bus, fleet).await;
+        // Whose ports changed in between has told it to this look.
+        fleet.note_news();
         let is_last = bus.now() >= until;
         match looked {
             Ok(Some(rescan)) if is_last || rescan.is_complete() => {
