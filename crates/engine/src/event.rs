@@ -1,8 +1,9 @@
 //! What happened: the events of both halves.
 
+mod cyclic;
 pub mod history;
+mod log;
 
-use alloc::collections::VecDeque;
 use alloc::string::String;
 use alloc::vec::Vec;
 
@@ -11,19 +12,15 @@ use ringcat_wire::al::{AlState, AlStatus, AlStatusCode};
 use ringcat_wire::mailbox::coe::Emergency;
 use ringcat_wire::sii::Identity;
 
-use self::history::History;
-use crate::domain::{DomainState, DomainStatus};
+pub use cyclic::CyclicEvent;
+pub use log::EventLog;
+
+use crate::domain::DomainStatus;
 use crate::info::IdentityField;
 use crate::link::Link;
-use crate::queue::WORDS;
 use crate::ring_status::{Cable, CableErrors, RedundancyLoss};
 use crate::time::Instant;
 use crate::topology::{Closing, PortOf};
-
-/// Frames of other MainDevices among them: a collision must be seen, not archived.
-const FOREIGN_KEPT: usize = 8;
-/// Events kept until the application fetches them; beyond, the oldest is dropped and counted.
-const KEPT: usize = 4096;
 
 /// An event with the time at which the engine saw it.
 #[derive(Clone, Debug, PartialEq)]
@@ -354,179 +351,4 @@ pub enum Event {
         /// OR of all |0x092C| in nanoseconds: at most twice the largest.
         spread_ns: u32,
     },
-}
-
-/// Events of one half, oldest first.
-#[derive(Debug, Default)]
-pub struct EventLog {
-    events: VecDeque<TimedEvent>,
-    foreign: usize,
-    dropped: u64,
-    history: History,
-}
-
-impl EventLog {
-    /// Appends an event.
-    pub fn push(&mut self, at: Instant, event: Event) {
-        self.history.note(at, &event);
-        if matches!(event, Event::ForeignFrame { .. }) {
-            if self.foreign >= FOREIGN_KEPT {
-                self.dropped += 1;
-                return;
-            }
-            self.foreign += 1;
-        }
-        if self.events.len() >= KEPT {
-            self.pop();
-            self.dropped += 1;
-        }
-        self.events.push_back(TimedEvent { at, event });
-    }
-
-    /// What is remembered of them, whoever takes them.
-    pub fn history(&mut self) -> &mut History {
-        &mut self.history
-    }
-
-    /// Takes the oldest.
-    pub fn pop(&mut self) -> Option<TimedEvent> {
-        let event = self.events.pop_front()?;
-        if matches!(event.event, Event::ForeignFrame { .. }) {
-            self.foreign -= 1;
-        }
-        Some(event)
-    }
-
-    /// Events that were dropped because nobody fetched them.
-    pub fn dropped(&self) -> u64 {
-        self.dropped
-    }
-}
-
-/// Events of the exchange, which travel as words.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum CyclicEvent {
-    /// The judgement of a domain changed.
-    Domain {
-        /// Number of the domain.
-        domain: u16,
-        /// The new judgement.
-        status: DomainStatus,
-    },
-    /// A domain was due while its frames were still out.
-    Skipped {
-        /// Number of the domain.
-        domain: u16,
-    },
-    /// The differences of the clocks came into their window or left it.
-    SyncWindow {
-        /// They are inside.
-        inside: bool,
-        /// OR of all magnitudes in nanoseconds.
-        spread_ns: u32,
-    },
-}
-
-const KIND_DOMAIN: u64 = 1;
-const KIND_SKIPPED: u64 = 2;
-const KIND_SYNC_WINDOW: u64 = 3;
-
-impl CyclicEvent {
-    /// As two words: kind 8 bits, state 8, domain 16, then the working counters.
-    pub const fn pack(self) -> [u64; WORDS] {
-        match self {
-            CyclicEvent::Domain { domain, status } => {
-                let state = match status.state {
-                    DomainState::Zero => 0,
-                    DomainState::Incomplete => 1,
-                    DomainState::Complete => 2,
-                };
-                [
-                    KIND_DOMAIN | state << 8 | (domain as u64) << 16 | (status.skipped << 32),
-                    status.wkc as u64 | (status.expected as u64) << 32,
-                ]
-            }
-            CyclicEvent::Skipped { domain } => [KIND_SKIPPED | (domain as u64) << 16, 0],
-            CyclicEvent::SyncWindow { inside, spread_ns } => {
-                [KIND_SYNC_WINDOW | (inside as u64) << 8, spread_ns as u64]
-            }
-        }
-    }
-
-    /// Back from words; `None` for words that [`CyclicEvent::pack`] does not make.
-    pub const fn unpack(words: [u64; WORDS]) -> Option<CyclicEvent> {
-        let domain = (words[0] >> 16) as u16;
-        match words[0] & 0xFF {
-            KIND_DOMAIN => {
-                let state = match (words[0] >> 8) & 0xFF {
-                    0 => DomainState::Zero,
-                    1 => DomainState::Incomplete,
-                    2 => DomainState::Complete,
-                    _ => return None,
-                };
-                let status = DomainStatus {
-                    wkc: words[1] as u32,
-                    expected: (words[1] >> 32) as u32,
-                    state,
-                    pending: false,
-                    skipped: words[0] >> 32,
-                };
-                Some(CyclicEvent::Domain { domain, status })
-            }
-            KIND_SKIPPED => Some(CyclicEvent::Skipped { domain }),
-            KIND_SYNC_WINDOW => {
-                Some(CyclicEvent::SyncWindow { inside: words[0] >> 8 & 1 != 0, spread_ns: words[1] as u32 })
-            }
-            _ => None,
-        }
-    }
-
-    /// As an event for the application.
-    pub fn event(self) -> Event {
-        match self {
-            CyclicEvent::Domain { domain, status } => Event::Domain { domain: domain.into(), status },
-            CyclicEvent::Skipped { domain } => Event::Skipped { domain: domain.into() },
-            CyclicEvent::SyncWindow { inside, spread_ns } => Event::SyncWindow { inside, spread_ns },
-        }
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn cyclic_events_survive_the_words() {
-        let status =
-            DomainStatus { wkc: 3, expected: 70_000, state: DomainState::Incomplete, pending: false, skipped: 9 };
-        let window = CyclicEvent::SyncWindow { inside: true, spread_ns: u32::MAX };
-        for event in [CyclicEvent::Domain { domain: 7, status }, CyclicEvent::Skipped { domain: 65_535 }, window] {
-            assert_eq!(CyclicEvent::unpack(event.pack()), Some(event));
-        }
-        assert_eq!(CyclicEvent::unpack([0xFF, 0]), None);
-    }
-
-    #[test]
-    fn a_flood_of_foreign_frames_leaves_room_for_other_events() {
-        let mut log = EventLog::default();
-        for n in 0..100 {
-            log.push(Instant(n), Event::ForeignFrame { arrived_on: Link::Main, bytes: alloc::vec![0; 60] });
-        }
-        log.push(Instant(100), Event::Skipped { domain: 0 });
-        assert_eq!(log.dropped(), 100 - FOREIGN_KEPT as u64);
-        let kept: Vec<_> = core::iter::from_fn(|| log.pop()).collect();
-        assert_eq!(kept.len(), FOREIGN_KEPT + 1);
-        log.push(Instant(101), Event::ForeignFrame { arrived_on: Link::Main, bytes: alloc::vec![0; 60] });
-        assert!(log.pop().is_some());
-    }
-
-    #[test]
-    fn the_log_keeps_the_newest() {
-        let mut log = EventLog::default();
-        for n in 0..KEPT + 3 {
-            log.push(Instant(n as u64), Event::Skipped { domain: n });
-        }
-        assert_eq!(log.dropped(), 3);
-        assert_eq!(log.pop().unwrap().event, Event::Skipped { domain: 3 });
-    }
 }

@@ -12,8 +12,10 @@ mod ethernet;
 mod gateway;
 mod lrw;
 mod mail;
+mod options;
 mod pending;
 mod services;
+mod states;
 mod steps;
 mod ticket;
 
@@ -26,8 +28,6 @@ use core::time::Duration;
 
 use ringcat_wire::address::StationAddress;
 use ringcat_wire::al::AlState;
-use ringcat_wire::frame::MacAddress;
-use ringcat_wire::source_address::MacCodec;
 
 pub use activate_error::ActivateError;
 pub use areas::{AreaEntries, Directory};
@@ -35,7 +35,9 @@ pub use datagrams::{MAX_DATAGRAMS, RawDatagram};
 pub use declaration::{Declaration, DomainConfig, DomainMember, MAX_UNDER_WAY, Required};
 pub use ethernet::EthernetSubDevice;
 pub use lrw::ExplicitLrw;
+pub use options::Options;
 pub use pending::Pending;
+pub use states::{GroupState, SubDeviceState};
 pub use ticket::Ticket;
 
 use crate::board::Board;
@@ -43,7 +45,6 @@ use crate::config::ClockConfig;
 use crate::event::{CyclicEvent, Event, TimedEvent};
 use crate::exchange::{ClockSetup, Exchange};
 use crate::info::SubDeviceInfo;
-use crate::junction::JunctionMode;
 use crate::layout::Layout;
 use crate::link::{Link, LinkSet};
 use crate::mail::Mailbox;
@@ -51,7 +52,6 @@ use crate::mail::eoe::EthernetPort;
 use crate::mail::relay::Desk;
 use crate::procedures::clocks::{self, ClockStatus, SharedClocks};
 use crate::procedures::configure::Start;
-use crate::procedures::dictionary::ReadPdos;
 use crate::procedures::fleet::{Fleet, Member, Phase, SharedFleet, stations_by_position};
 use crate::procedures::mail_watch::watch_mail;
 use crate::procedures::own_objects::OwnObjects;
@@ -75,82 +75,6 @@ use steps::Loaded;
 
 /// Messages of the exchange that may wait until somebody fetches events.
 const CYCLIC_EVENTS: usize = 1024;
-
-/// What a MainDevice needs to know before it sends its first frame.
-#[derive(Clone, Debug)]
-pub struct Options {
-    /// Address of the main interface.
-    pub main: MacAddress,
-    /// Address of the redundant interface; `None` for a single link.
-    pub redundant: Option<MacAddress>,
-    /// How marks are written into source addresses.
-    pub codec: MacCodec,
-    /// Whether SII contents are kept and used for SubDevices with the same first 64 words.
-    pub sii_cache: bool,
-    /// Whose dictionaries are asked for PDOs after a scan.
-    pub pdos: ReadPdos,
-    /// Whether a supervision datagram rides with the process data. Without it nothing is noticed by itself.
-    pub supervision: bool,
-    /// For so long the number of SubDevices must not change at the beginning of a scan.
-    pub settle: Duration,
-    /// So long a scan waits for the first SubDevice.
-    pub patience: Duration,
-    /// What becomes of rings behind junctions. A connection that is added makes it strict.
-    pub junctions: JunctionMode,
-    /// Whether the redundant link may be taken down for a moment to find out where a line is crossed.
-    pub enhanced_line_crossed: bool,
-}
-
-impl Options {
-    /// Usual options for these interfaces.
-    pub fn new(main: MacAddress, redundant: Option<MacAddress>) -> Options {
-        Options {
-            main,
-            redundant,
-            codec: MacCodec::FlagsFirst,
-            sii_cache: true,
-            pdos: ReadPdos::default(),
-            supervision: true,
-            settle: Duration::from_millis(5),
-            patience: Duration::from_secs(5),
-            junctions: JunctionMode::Disabled,
-            enhanced_line_crossed: false,
-        }
-    }
-
-    fn links(&self) -> LinkSet {
-        if self.redundant.is_some() { LinkSet::Ring } else { LinkSet::Single }
-    }
-}
-
-/// How far a declared SubDevice is.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum SubDeviceState {
-    /// It does not answer.
-    Absent,
-    /// It is being configured, or waits for the next attempt.
-    Configuring,
-    /// It is in its target state.
-    Settled(AlState),
-}
-
-/// How far a hot connect group is.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct GroupState {
-    /// SubDevices of it that answer.
-    pub present: usize,
-    /// Those in the states that were declared.
-    pub settled: usize,
-    /// All that belong to it.
-    pub members: usize,
-}
-
-impl GroupState {
-    /// All of them are in the states that were declared.
-    pub const fn has_joined(&self) -> bool {
-        self.settled == self.members
-    }
-}
 
 type StopSlot = Rc<RefCell<Option<Result<(), StopError>>>>;
 type ScanSlot = Rc<RefCell<Option<Result<Scan, ScanError>>>>;
@@ -547,16 +471,6 @@ fn clocks_of(config: Option<ClockConfig>, scan: &Scan, topology: &Topology, memb
     };
     let scanned: &[SubDeviceInfo] = if config.is_some() { &scan.subdevices } else { &[] };
     SharedClocks::new(config, scanned, topology, member)
-}
-
-impl From<Phase> for SubDeviceState {
-    fn from(phase: Phase) -> SubDeviceState {
-        match phase {
-            Phase::Absent => SubDeviceState::Absent,
-            Phase::Configuring => SubDeviceState::Configuring,
-            Phase::Settled(state) => SubDeviceState::Settled(state),
-        }
-    }
 }
 
 /// What activation hands out.

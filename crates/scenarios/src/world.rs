@@ -3,6 +3,8 @@
 //! Every cycle writes new outputs, takes all events, compares images with devices ([`Mirror`]) and notes who left OP. A
 //! failing test prints the seed and everything that happened.
 
+mod journal;
+
 use std::fmt::Display;
 use std::ops::Range;
 use std::time::Duration;
@@ -18,9 +20,11 @@ use ringcat_sim::device::Device;
 use ringcat_sim::fault::Fault;
 use ringcat_sim::network::Network;
 use ringcat_sim::time::SimTime;
-use ringcat_wire::al::{AlState, AlStatus, AlStatusCode};
+use ringcat_wire::al::{AlState, AlStatus};
 use ringcat_wire::register::map;
 
+use self::journal::Journal;
+pub use self::journal::Step;
 use crate::check::{Delivery, Judged, Mirror};
 use crate::loss::Loss;
 use crate::tap::{Fingerprint, Tap};
@@ -29,28 +33,6 @@ use crate::tap::{Fingerprint, Tap};
 pub const CYCLE: Duration = Duration::from_millis(1);
 /// Virtual time that a scan may take.
 const SCAN_LIMIT: Duration = Duration::from_secs(20);
-
-/// A device changed its AL status, as seen at the beginning of a cycle.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Step {
-    /// When it was seen.
-    pub at: Instant,
-    /// Who.
-    pub device: DeviceIndex,
-    /// AL status before.
-    pub from: AlStatus,
-    /// AL status since.
-    pub to: AlStatus,
-    /// AL status code since.
-    pub code: AlStatusCode,
-}
-
-impl Step {
-    /// It was in OP and is no longer.
-    pub fn leaves_op(&self) -> bool {
-        self.from.al_state() == Some(AlState::Op) && self.to != AlStatus::new(AlState::Op)
-    }
-}
 
 /// A point in the history of a world.
 #[derive(Clone, Copy, Debug)]
@@ -74,16 +56,6 @@ pub struct World {
     outputs: Vec<Vec<Range<usize>>>,
     domains: usize,
     cycles: u64,
-}
-
-/// What happened, in order.
-#[derive(Debug, Default)]
-struct Journal {
-    lines: Vec<(Instant, String)>,
-    events: Vec<TimedEvent>,
-    judged: Vec<Judged>,
-    steps: Vec<Step>,
-    status: Vec<AlStatus>,
 }
 
 impl World {
@@ -466,37 +438,6 @@ impl Drop for World {
     fn drop(&mut self) {
         if std::thread::panicking() {
             println!("seed {}, at {}; what happened:\n{}\n{}", self.seed, self.now(), self.log(), self.condition());
-        }
-    }
-}
-
-impl Journal {
-    fn event(&mut self, event: TimedEvent) {
-        self.lines.push((event.at, format!("{:?}", event.event)));
-        self.events.push(event);
-    }
-
-    /// Notes a judgement; the log has only those that differ from the one before.
-    fn judge(&mut self, judged: Judged) {
-        let before = self.judged.iter().rev().find(|before| before.domain == judged.domain);
-        if before.is_none_or(|before| before.delivery != judged.delivery || before.status.wkc != judged.status.wkc) {
-            let Judged { domain, at, status, delivery, .. } = &judged;
-            let line = format!("  domain {}: {delivery:?}, {} of {}", domain.0, status.wkc, status.expected);
-            self.lines.push((*at, line));
-        }
-        self.judged.push(judged);
-    }
-
-    /// Notes what the devices say about their state.
-    fn watch(&mut self, at: Instant, network: &Network) {
-        for (number, device) in network.devices().enumerate() {
-            let to = device.al_status();
-            let from = std::mem::replace(&mut self.status[number], to);
-            if from != to {
-                let code = device.al_status_code();
-                self.lines.push((at, format!("  device {number} ({}): {from} to {to}, {code}", device.name())));
-                self.steps.push(Step { at, device: DeviceIndex(number), from, to, code });
-            }
         }
     }
 }

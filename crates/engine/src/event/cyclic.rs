@@ -1,0 +1,109 @@
+//! Events of the exchange, which reach the acyclic half as words of a queue.
+
+use super::Event;
+use crate::domain::{DomainState, DomainStatus};
+use crate::queue::WORDS;
+
+/// Events of the exchange, which travel as words.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum CyclicEvent {
+    /// The judgement of a domain changed.
+    Domain {
+        /// Number of the domain.
+        domain: u16,
+        /// The new judgement.
+        status: DomainStatus,
+    },
+    /// A domain was due while its frames were still out.
+    Skipped {
+        /// Number of the domain.
+        domain: u16,
+    },
+    /// The differences of the clocks came into their window or left it.
+    SyncWindow {
+        /// They are inside.
+        inside: bool,
+        /// OR of all magnitudes in nanoseconds.
+        spread_ns: u32,
+    },
+}
+
+const KIND_DOMAIN: u64 = 1;
+const KIND_SKIPPED: u64 = 2;
+const KIND_SYNC_WINDOW: u64 = 3;
+
+impl CyclicEvent {
+    /// As two words: kind 8 bits, state 8, domain 16, then the working counters.
+    pub const fn pack(self) -> [u64; WORDS] {
+        match self {
+            CyclicEvent::Domain { domain, status } => {
+                let state = match status.state {
+                    DomainState::Zero => 0,
+                    DomainState::Incomplete => 1,
+                    DomainState::Complete => 2,
+                };
+                [
+                    KIND_DOMAIN | state << 8 | (domain as u64) << 16 | (status.skipped << 32),
+                    status.wkc as u64 | (status.expected as u64) << 32,
+                ]
+            }
+            CyclicEvent::Skipped { domain } => [KIND_SKIPPED | (domain as u64) << 16, 0],
+            CyclicEvent::SyncWindow { inside, spread_ns } => {
+                [KIND_SYNC_WINDOW | (inside as u64) << 8, spread_ns as u64]
+            }
+        }
+    }
+
+    /// Back from words; `None` for words that [`CyclicEvent::pack`] does not make.
+    pub const fn unpack(words: [u64; WORDS]) -> Option<CyclicEvent> {
+        let domain = (words[0] >> 16) as u16;
+        match words[0] & 0xFF {
+            KIND_DOMAIN => {
+                let state = match (words[0] >> 8) & 0xFF {
+                    0 => DomainState::Zero,
+                    1 => DomainState::Incomplete,
+                    2 => DomainState::Complete,
+                    _ => return None,
+                };
+                let status = DomainStatus {
+                    wkc: words[1] as u32,
+                    expected: (words[1] >> 32) as u32,
+                    state,
+                    pending: false,
+                    skipped: words[0] >> 32,
+                };
+                Some(CyclicEvent::Domain { domain, status })
+            }
+            KIND_SKIPPED => Some(CyclicEvent::Skipped { domain }),
+            KIND_SYNC_WINDOW => {
+                Some(CyclicEvent::SyncWindow { inside: words[0] >> 8 & 1 != 0, spread_ns: words[1] as u32 })
+            }
+            _ => None,
+        }
+    }
+
+    /// As an event for the application.
+    pub fn event(self) -> Event {
+        match self {
+            CyclicEvent::Domain { domain, status } => Event::Domain { domain: domain.into(), status },
+            CyclicEvent::Skipped { domain } => Event::Skipped { domain: domain.into() },
+            CyclicEvent::SyncWindow { inside, spread_ns } => Event::SyncWindow { inside, spread_ns },
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn cyclic_events_survive_the_words() {
+        let status =
+            DomainStatus { wkc: 3, expected: 70_000, state: DomainState::Incomplete, pending: false, skipped: 9 };
+        let window = CyclicEvent::SyncWindow { inside: true, spread_ns: u32::MAX };
+        for event in [CyclicEvent::Domain { domain: 7, status }, CyclicEvent::Skipped { domain: 65_535 }, window] {
+            assert_eq!(CyclicEvent::unpack(event.pack()), Some(event));
+        }
+        assert_eq!(CyclicEvent::unpack([0xFF, 0]), None);
+    }
+}

@@ -1,0 +1,91 @@
+//! The events of one half until somebody fetches them: bounded, the oldest are dropped and counted.
+
+use alloc::collections::VecDeque;
+
+use super::history::History;
+use super::{Event, TimedEvent};
+use crate::time::Instant;
+
+/// Frames of other MainDevices among them: a collision must be seen, not archived.
+const FOREIGN_KEPT: usize = 8;
+/// Events kept until the application fetches them; beyond, the oldest is dropped and counted.
+const KEPT: usize = 4096;
+
+/// Events of one half, oldest first.
+#[derive(Debug, Default)]
+pub struct EventLog {
+    events: VecDeque<TimedEvent>,
+    foreign: usize,
+    dropped: u64,
+    history: History,
+}
+
+impl EventLog {
+    /// Appends an event.
+    pub fn push(&mut self, at: Instant, event: Event) {
+        self.history.note(at, &event);
+        if matches!(event, Event::ForeignFrame { .. }) {
+            if self.foreign >= FOREIGN_KEPT {
+                self.dropped += 1;
+                return;
+            }
+            self.foreign += 1;
+        }
+        if self.events.len() >= KEPT {
+            self.pop();
+            self.dropped += 1;
+        }
+        self.events.push_back(TimedEvent { at, event });
+    }
+
+    /// What is remembered of them, whoever takes them.
+    pub fn history(&mut self) -> &mut History {
+        &mut self.history
+    }
+
+    /// Takes the oldest.
+    pub fn pop(&mut self) -> Option<TimedEvent> {
+        let event = self.events.pop_front()?;
+        if matches!(event.event, Event::ForeignFrame { .. }) {
+            self.foreign -= 1;
+        }
+        Some(event)
+    }
+
+    /// Events that were dropped because nobody fetched them.
+    pub fn dropped(&self) -> u64 {
+        self.dropped
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use alloc::vec::Vec;
+
+    use super::*;
+    use crate::link::Link;
+
+    #[test]
+    fn a_flood_of_foreign_frames_leaves_room_for_other_events() {
+        let mut log = EventLog::default();
+        for n in 0..100 {
+            log.push(Instant(n), Event::ForeignFrame { arrived_on: Link::Main, bytes: alloc::vec![0; 60] });
+        }
+        log.push(Instant(100), Event::Skipped { domain: 0 });
+        assert_eq!(log.dropped(), 100 - FOREIGN_KEPT as u64);
+        let kept: Vec<_> = core::iter::from_fn(|| log.pop()).collect();
+        assert_eq!(kept.len(), FOREIGN_KEPT + 1);
+        log.push(Instant(101), Event::ForeignFrame { arrived_on: Link::Main, bytes: alloc::vec![0; 60] });
+        assert!(log.pop().is_some());
+    }
+
+    #[test]
+    fn the_log_keeps_the_newest() {
+        let mut log = EventLog::default();
+        for n in 0..KEPT + 3 {
+            log.push(Instant(n as u64), Event::Skipped { domain: n });
+        }
+        assert_eq!(log.dropped(), 3);
+        assert_eq!(log.pop().unwrap().event, Event::Skipped { domain: 3 });
+    }
+}

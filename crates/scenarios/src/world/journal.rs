@@ -1,0 +1,72 @@
+//! What has happened in a world: events, judgements of domains, changes of AL status, and a log in words.
+
+use ringcat::{Instant, TimedEvent};
+use ringcat_sim::cable::DeviceIndex;
+use ringcat_sim::network::Network;
+use ringcat_wire::al::{AlState, AlStatus, AlStatusCode};
+
+use crate::check::Judged;
+
+/// A device changed its AL status, as seen at the beginning of a cycle.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Step {
+    /// When it was seen.
+    pub at: Instant,
+    /// Who.
+    pub device: DeviceIndex,
+    /// AL status before.
+    pub from: AlStatus,
+    /// AL status since.
+    pub to: AlStatus,
+    /// AL status code since.
+    pub code: AlStatusCode,
+}
+
+impl Step {
+    /// It was in OP and is no longer.
+    pub fn leaves_op(&self) -> bool {
+        self.from.al_state() == Some(AlState::Op) && self.to != AlStatus::new(AlState::Op)
+    }
+}
+
+/// What happened, in order.
+#[derive(Debug, Default)]
+pub(super) struct Journal {
+    pub(super) lines: Vec<(Instant, String)>,
+    pub(super) events: Vec<TimedEvent>,
+    pub(super) judged: Vec<Judged>,
+    pub(super) steps: Vec<Step>,
+    pub(super) status: Vec<AlStatus>,
+}
+
+impl Journal {
+    /// Notes an event.
+    pub(super) fn event(&mut self, event: TimedEvent) {
+        self.lines.push((event.at, format!("{:?}", event.event)));
+        self.events.push(event);
+    }
+
+    /// Notes a judgement; the log has only those that differ from the one before.
+    pub(super) fn judge(&mut self, judged: Judged) {
+        let before = self.judged.iter().rev().find(|before| before.domain == judged.domain);
+        if before.is_none_or(|before| before.delivery != judged.delivery || before.status.wkc != judged.status.wkc) {
+            let Judged { domain, at, status, delivery, .. } = &judged;
+            let line = format!("  domain {}: {delivery:?}, {} of {}", domain.0, status.wkc, status.expected);
+            self.lines.push((*at, line));
+        }
+        self.judged.push(judged);
+    }
+
+    /// Notes what the devices say about their state.
+    pub(super) fn watch(&mut self, at: Instant, network: &Network) {
+        for (number, device) in network.devices().enumerate() {
+            let to = device.al_status();
+            let from = std::mem::replace(&mut self.status[number], to);
+            if from != to {
+                let code = device.al_status_code();
+                self.lines.push((at, format!("  device {number} ({}): {from} to {to}, {code}", device.name())));
+                self.steps.push(Step { at, device: DeviceIndex(number), from, to, code });
+            }
+        }
+    }
+}
