@@ -20,7 +20,7 @@ fn a_network_from_an_eni_runs_on_a_ring_of_interfaces_with_its_lrw_split_and_not
     {
         assert!(errors.contains(words), "{errors}");
     }
-    let more = ["--split-lrw", "--for", "1s", "--set", "Drive.Target velocity=-1234", "--watch", "Drive.Position"];
+    let more = ["--split-lrw", "--for", "200ms", "--set", "Drive.Target velocity=-1234", "--watch", "Drive.Position"];
     let (output, errors) = said(&bench.ringcat(&[&run[..], &more[..]].concat()));
     for words in ["all SubDevices are in OP", "Drive.Position = -1234", "stopped: outputs zero, all SubDevices in INIT"]
     {
