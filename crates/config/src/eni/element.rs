@@ -2,6 +2,7 @@
 
 use std::cell::{Cell, RefCell};
 use std::fmt::Display;
+use std::net::Ipv4Addr;
 
 use roxmltree::Node;
 
@@ -179,6 +180,17 @@ impl<'a> Element<'a> {
     /// Bytes in a child; `None` where there is none.
     pub fn hex_of(&self, name: &str) -> Result<Option<Vec<u8>>, EniError> {
         self.child(name).map(|child| child.hex()).transpose()
+    }
+
+    /// The four bytes of an IP address in a child, in hexadecimal or with points between them.
+    pub fn ip_of(&self, name: &str) -> Result<Option<Vec<u8>>, EniError> {
+        match self.child(name).map(|child| (child, child.text())) {
+            Some((child, text)) if text.contains('.') => match text.parse::<Ipv4Addr>() {
+                Ok(address) => Ok(Some(address.octets().to_vec())),
+                Err(_) => Err(child.wrong("an IP address")),
+            },
+            _ => self.hex_of(name),
+        }
     }
 
     /// An error about this element.

@@ -240,3 +240,25 @@ fn a_sync_manager_that_is_switched_on_at_so_is_for_op_only_and_one_that_only_cha
     assert_eq!(op_only(&twice, 1), [false]);
     assert!(has_notice(&twice, &["SyncManager 0 at SO", "SAFEOP already"]));
 }
+
+#[test]
+fn addresses_are_hexadecimal_have_points_or_are_the_message_itself_facts_6_5() {
+    let elements = "<Type>2</Type><MAC>020000000004</MAC><IP>c0a80104</IP><Subnet>ffffff00</Subnet>";
+    let ip = |configuration: &ringcat_config::Configuration| {
+        drive(configuration).startup.iter().find_map(|command| match &command.action {
+            StartupAction::Ip(settings) => Some(settings.clone()),
+            _ => None,
+        })
+    };
+    let expected = ip(&configured(SMALL)).unwrap();
+    let points = elements.replace("c0a80104", "192.168.1.4").replace("ffffff00", "255.255.255.0");
+    assert_eq!(ip(&changed(&[(elements, &points)])), Some(expected.clone()));
+    // Type 2, last fragment; flags for MAC, address and mask; addresses little-endian, all fields at their places.
+    let message = format!("<Data>0201 0000 07000000 020000000004 0401a8c0 00ffffff {}</Data>", "00".repeat(40));
+    assert_eq!(ip(&changed(&[(elements, &message)])), Some(expected));
+    let filter = changed(&[(elements, "<Data>04010000</Data>")]);
+    assert!(ip(&filter).is_none() && has_notice(&filter, &["EoE/InitCmd \"addresses\"", "does not set addresses"]));
+    assert!(
+        crate::refused(&[(elements, &elements.replace("c0a80104", "300.1.1.1"))]).contains("expected an IP address")
+    );
+}

@@ -114,7 +114,7 @@ pub struct EoeCommand {
     pub kind: Option<u8>,
     /// `MAC`.
     pub mac: Option<Vec<u8>>,
-    /// `IP`, bytes in hexadecimal.
+    /// `IP`, in hexadecimal or with points.
     pub ip: Option<Vec<u8>>,
     /// `Subnet`.
     pub subnet: Option<Vec<u8>>,
