@@ -58,18 +58,18 @@ pub fn run(arguments: &EniArguments) -> Result<(), Failure> {
 fn summary(model: &Eni, configuration: &Configuration) -> Vec<String> {
     let declaration = &configuration.declaration;
     let count = declaration.subdevices.len();
-    let subdevices = if count == 1 { "1 SubDevice".to_owned() } else { format!("{count} SubDevices") };
+    let subdevices = counted(count, "SubDevice", "SubDevices");
     let mut lines = vec![format!("network     \"{}\", {subdevices}", one_line(&model.main_device.name))];
     if let Some(made_by) = &model.made_by {
         lines.push(format!("made by     {}", one_line(made_by)));
     }
     let image = &configuration.image;
     lines.push(format!(
-        "image       inputs {} bytes, outputs {} bytes, {} variables, {} copies",
-        image.inputs_len,
-        image.outputs_len,
-        image.variables.len(),
-        image.copies.len()
+        "image       inputs {}, outputs {}, {}, {}",
+        counted(image.inputs_len, "byte", "bytes"),
+        counted(image.outputs_len, "byte", "bytes"),
+        counted(image.variables.len(), "variable", "variables"),
+        counted(image.copies.len(), "copy", "copies")
     ));
     for domain in &declaration.domains {
         let members: Vec<usize> = domain.members.iter().map(|member| member.subdevice).collect();
@@ -195,6 +195,11 @@ fn not_followed(configuration: &Configuration) -> Vec<String> {
         lines.push(format!("  {}{whom}", one_line(&notice.to_string())));
     }
     lines
+}
+
+/// `1 copy`, `2 copies`.
+fn counted(count: usize, one: &str, more: &str) -> String {
+    format!("{count} {}", if count == 1 { one } else { more })
 }
 
 /// Ascending numbers, with rows of them as ranges: `0-3, 5`.
