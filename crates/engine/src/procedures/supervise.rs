@@ -13,7 +13,7 @@ use core::time::Duration;
 
 use ringcat_wire::address::StationAddress;
 use ringcat_wire::al::{AlStatus, AlStatusCode};
-use ringcat_wire::register::{DlStatus, map};
+use ringcat_wire::register::{DlStatus, EcatEvent, map};
 
 use super::cabling::CablingWatch;
 use super::configure::Start;
@@ -49,6 +49,10 @@ const BREAK_LOOK_PAUSE: Duration = Duration::from_millis(10);
 const FIRST_BREAK_LOOKS: u8 = 5;
 const FIRST_BREAK_LOOK_PAUSE: Duration = Duration::from_millis(1);
 
+/// A supervision result that so many came before since a look ended was not out when somebody was looked at.
+const SURELY_LATER: u32 = 8;
+/// Looks in a row because of a request that stands.
+const MOST_MISSED: u8 = 3;
 /// Pause between two searches for SubDevices that answer and are not known.
 const STRANGER_PAUSE: Duration = Duration::from_millis(10);
 
@@ -71,6 +75,8 @@ pub(crate) async fn supervise(bus: Bus, fleet: SharedFleet, enhanced_line_crosse
         silent: vec![0; members],
         suspended: vec![false; members],
         seen: Supervision::default(),
+        checked: 0,
+        missed: 0,
         ring: RingWord::default(),
         reported,
         seen_reported: RingState::Unknown,
@@ -89,6 +95,7 @@ pub(crate) async fn supervise(bus: Bus, fleet: SharedFleet, enhanced_line_crosse
         watch.take_found_inside();
         if !watch.fleet.is_looking_inside() && watch.is_called_for() {
             watch.check().await;
+            watch.checked = watch.fleet.board.supervision().map_or(0, |(number, _)| number);
         }
     }
 }
@@ -102,6 +109,9 @@ struct Watch {
     suspended: Vec<bool>,
     /// The supervision result that the last check was about.
     seen: Supervision,
+    /// Number of the result at the end of that check, and checks since only because of what had been missed.
+    checked: u32,
+    missed: u8,
     ring: RingWord,
     /// The state of the ring that was reported last.
     reported: Rc<Cell<RingState>>,
@@ -133,9 +143,23 @@ impl Watch {
             || self.fleet.news() != self.news
     }
 
+    /// Ports have changed again right behind a look that took their request for attention away: it stands, as before the
+    /// look.
+    fn has_missed(&mut self) -> bool {
+        let Some((number, supervision)) = self.fleet.board.supervision() else { return false };
+        if !EcatEvent::from_bits(supervision.irq).dl_status {
+            self.missed = 0;
+            return false;
+        }
+        // Requests of those that nobody looks at stand for ever.
+        let is_missed = number.wrapping_sub(self.checked) >= SURELY_LATER && self.missed < MOST_MISSED;
+        self.missed += u8::from(is_missed);
+        is_missed
+    }
+
     fn is_called_for(&mut self) -> bool {
         let now = self.bus.now();
-        let changed = self.has_changed();
+        let changed = self.has_changed() || self.has_missed();
         if !changed && now < self.next_routine {
             return false;
         }

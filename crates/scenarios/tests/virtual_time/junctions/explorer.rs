@@ -200,11 +200,49 @@ impl Run {
         assert!(broken <= 1 && told.len() == 2 * broken, "cable {cable}: {told:?}");
     }
 
+    /// More than is tolerated: two cables of local rings. Whatever that costs, both are told, each with its place where the
+    /// cabling is known, and all is well when they are mended.
+    fn break_two(&mut self) {
+        if self.broken.is_some() || self.looking.is_some() || !self.is_settled || !self.is_known {
+            return;
+        }
+        if !self.group_is_on && self.plan.in_ring {
+            return;
+        }
+        let one = *self.dice.pick(&self.plan.local);
+        let other = *self.dice.pick(&self.plan.local);
+        let (mark, apart) = (self.world.mark(), Duration::from_micros(self.dice.below(1_500)));
+        self.world.cut(CableId(one));
+        self.world.fault_in(apart, Fault::Cut(CableId(other)));
+        self.cycles(400);
+        let told = self.changes(mark);
+        for cable in [one, other] {
+            let is_told = told.iter().filter(|event| self.is_of(event, cable, true)).count();
+            assert_eq!(is_told, 1, "cables {one} and {other}: {told:?}");
+        }
+        let crossed = |event: &Event| matches!(event, Event::LineCrossed { .. } | Event::JunctionUnknown { .. });
+        self.world.heal(CableId(other));
+        let pause = self.dice.below(100);
+        self.cycles(pause);
+        self.world.heal(CableId(one));
+        self.world.until(2 * LIMIT, "all back", |world| {
+            let last = world.judged(mark).last().map(|judged| judged.delivery);
+            let is_well = matches!(last, Some(Delivery::Complete | Delivery::WithoutAbsent));
+            is_well && world.application().all_settled()
+        });
+        self.settle();
+        let told = self.changes(mark);
+        assert!(matches!(told.last(), Some(Event::JunctionChanged { broken: false, breaks: 0, .. })), "{told:?}");
+        assert!(!self.world.saw(mark, crossed), "cables {one} and {other}");
+        self.mark = self.world.mark();
+    }
+
     fn step(&mut self) {
         if self.dice.one_in(3) {
             self.disturb();
         }
-        match self.dice.below(7) {
+        match self.dice.below(8) {
+            7 => self.break_two(),
             6 => self.flap(),
             0 | 1 if self.looking.is_none() => self.look(),
             2 if self.plan.has_group && (self.broken.is_none() || !self.plan.in_ring) => self.toggle_group(),
@@ -302,8 +340,8 @@ fn runs(seeds: impl IntoIterator<Item = u64>) {
 
 #[test]
 fn what_is_told_of_rings_groups_and_looks_at_random_is_what_was_done_jr_07_cr_17() {
-    // The last three showed faults.
-    runs([0, 1, 2, 3, 4, 12, 36, 77]);
+    // The last ones showed faults.
+    runs([0, 1, 2, 3, 12, 36, 70, 77]);
 }
 
 #[test]
