@@ -134,7 +134,7 @@ fn closing(
     let JunctionConnection { head, head_port, tail, tail_port } = *connection;
     for (subdevice, port) in [(head, head_port), (head, START_PORT), (tail, tail_port)] {
         let Some(info) = found.get(subdevice).and_then(Option::as_ref) else {
-            let what = alloc::format!("not there: its {connection} is not watched");
+            let what = alloc::format!("not there: its {connection} is not watched until a rescan finds it");
             bus.report(Event::PlanOddity { subdevice, what });
             return Ok(None);
         };
