@@ -30,6 +30,7 @@ pub mod flights;
 pub mod pcapng;
 pub mod windows;
 
+use std::collections::HashMap;
 use std::fmt;
 use std::time::Duration;
 
@@ -121,6 +122,8 @@ pub fn judge_frames(capture: &Capture, cycle: Option<Duration>) -> Result<Verdic
     let mut verdict = Verdict::default();
     let mut flights = Flights::new(links);
     let mut traffic = Vec::new();
+    // When the copy on the main link was handed over, by number.
+    let mut first_copies: HashMap<(bool, u16), u64> = HashMap::new();
     for (number, packet) in packets {
         // As tshark counts.
         let number = number + 1;
@@ -134,7 +137,12 @@ pub fn judge_frames(capture: &Capture, cycle: Option<Duration>) -> Result<Verdic
             Ok(frame) if packet.sent => {
                 check_sent(&mut verdict, number, link, &frame);
                 flights.sent(&mut verdict, number, packet, &frame);
+                let key = (frame.is_acyclic(), frame.number());
+                let first =
+                    if link == 0 { first_copies.insert(key, packet.time_ns) } else { first_copies.remove(&key) };
+                let behind_ns = first.filter(|_| link > 0).map_or(0, |first| packet.time_ns.saturating_sub(first));
                 traffic.push(windows::Sent {
+                    behind_ns,
                     time_ns: packet.time_ns,
                     link,
                     acyclic: frame.is_acyclic(),

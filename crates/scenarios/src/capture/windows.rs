@@ -12,7 +12,8 @@
 //!
 //! A sender that keeps windows decides in time and may be stopped by its machine between the decision and the wire. Where
 //! the cycle begins late as well, by more than a tenth of the period, the machine's **stall** is seen in the capture itself
-//! and such frames are counted apart. Between `Windows::acyclic` and the rest stands the share that a sender without windows
+//! and such frames are counted apart. So is a second copy that was handed over more than a tenth of the period after the first
+//! one of the same frame: nothing is decided between the two. Between `Windows::acyclic` and the rest stands the share that a sender without windows
 //! would have: the wire time of acyclic frames, by chance.
 
 use std::fmt;
@@ -37,6 +38,8 @@ pub struct Sent {
     pub acyclic: bool,
     /// Its bytes without FCS.
     pub length: usize,
+    /// How long after its first copy it was handed over, where it is the second one.
+    pub behind_ns: u64,
 }
 
 /// What was measured on a link.
@@ -52,7 +55,7 @@ pub struct Windows {
     pub acyclic: u64,
     /// Of them, those that cross a point of the grid, or push in, where the cycle is not late.
     pub crossed: u64,
-    /// The same where the cycle is late: a stall of the machine.
+    /// The same where the cycle is late, or the frame was long after its first copy: a stall of the machine.
     pub crossed_in_stalls: u64,
     /// Cycles whose first frame found an acyclic one on the wire.
     pub held_up: u64,
@@ -154,7 +157,7 @@ fn measure_link(sent: &[Sent], grid: &Grid) -> Windows {
     let (Some(first), Some(last)) = (grid.starts.first(), grid.starts.last()) else { return windows };
     let (mut free_ns, mut chance_ns) = (0, 0);
     // Acyclic frames since the last cycle: when they are through.
-    let mut waiting: Vec<u64> = Vec::new();
+    let mut waiting: Vec<(u64, bool)> = Vec::new();
     let mut starts = grid.starts.iter().copied().peekable();
     for frame in sent {
         if starts.next_if(|start| *start == frame.time_ns && !frame.acyclic).is_some() {
@@ -166,32 +169,32 @@ fn measure_link(sent: &[Sent], grid: &Grid) -> Windows {
         if frame.acyclic && (*first..*last).contains(&frame.time_ns) {
             windows.acyclic += 1;
             chance_ns += busy_ns;
-            waiting.push(free_ns);
+            waiting.push((free_ns, frame.behind_ns as i64 > grid.period_ns / STALL_FRACTION));
         }
     }
     windows.by_chance = chance_ns / grid.period_ns as u64;
     windows
 }
 
-/// A cycle begins behind acyclic frames that are through at these times.
-fn cycle(windows: &mut Windows, grid: &Grid, start: u64, waiting: &[u64]) {
+/// A cycle begins behind acyclic frames that are through at these times, some of them held up by a stall.
+fn cycle(windows: &mut Windows, grid: &Grid, start: u64, waiting: &[(u64, bool)]) {
     let point = grid.point_of(start);
     let late = start as i64 - point > grid.period_ns / STALL_FRACTION;
     windows.cycles += 1;
     windows.late += u64::from(late);
-    for through in waiting {
+    for (through, stalled) in waiting {
         let beyond = *through as i64 - point;
         if beyond <= 0 {
             continue;
         }
-        if late {
+        if late || *stalled {
             windows.crossed_in_stalls += 1;
         } else {
             windows.crossed += 1;
             windows.furthest = windows.furthest.max(Duration::from_nanos(beyond as u64));
         }
     }
-    if let Some(hold_up) = waiting.last().and_then(|through| through.checked_sub(start)).filter(|ns| *ns > 0) {
+    if let Some(hold_up) = waiting.last().and_then(|(through, _)| through.checked_sub(start)).filter(|ns| *ns > 0) {
         windows.held_up += 1;
         windows.longest_hold_up = windows.longest_hold_up.max(Duration::from_nanos(hold_up));
     }
