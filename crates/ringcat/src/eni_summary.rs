@@ -260,6 +260,10 @@ mod tests {
                 .any(|line| line.contains("SDO 0x1c12:00, complete access = 01 00 00 16") && line.contains("assign"))
         );
         assert!(details.iter().any(|line| line.contains("outputs  0x1100      6 bytes")), "{details:#?}");
+        // Four bits, of which two belong to each terminal.
+        let copies = details.iter().skip_while(|line| !line.starts_with("copies: "));
+        let copies: Vec<Vec<&str>> = copies.skip(1).map(|line| line.split_whitespace().collect()).collect();
+        assert_eq!(copies, [["2", "8", "18"], ["2", "10", "20"]]);
     }
 
     #[test]
@@ -270,6 +274,7 @@ mod tests {
         assert_eq!(json["subdevices"][3]["sync_managers"][2]["length"], 6);
         assert_eq!(json["subdevices"][3]["startup"].as_array().unwrap().len(), 8);
         assert_eq!(json["image"]["areas"][1]["image_bit"], 20);
+        assert_eq!(json["image"]["copies"][1]["output_bit"], 20);
         assert_eq!(json["tasks"][0]["period_ns"], 2_000_000);
         assert_eq!(json["lrw"][0]["subdevices"][0], 3);
         assert_eq!(json["not_followed"].as_array().unwrap().len(), configuration.notices.len());

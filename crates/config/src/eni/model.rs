@@ -69,7 +69,8 @@ pub struct MailboxStates {
     pub count: u32,
 }
 
-/// A transition of the state machine at which commands are sent (facts 8.2); `Op` is OP to PREOP.
+/// A transition of the state machine at which commands are sent (facts 8.2); `Op` is OP to PREOP, `Po` the other
+/// way.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum Transition {
     /// INIT to INIT.
@@ -82,6 +83,8 @@ pub enum Transition {
     Pi,
     /// PREOP to SAFEOP.
     Ps,
+    /// PREOP to OP.
+    Po,
     /// SAFEOP to SAFEOP.
     Ss,
     /// SAFEOP to PREOP.
@@ -104,12 +107,13 @@ pub enum Transition {
 
 impl Transition {
     /// All of them.
-    pub const ALL: [Transition; 14] = [
+    pub const ALL: [Transition; 15] = [
         Transition::Ii,
         Transition::Ip,
         Transition::Pp,
         Transition::Pi,
         Transition::Ps,
+        Transition::Po,
         Transition::Ss,
         Transition::Sp,
         Transition::Si,
@@ -129,6 +133,7 @@ impl Transition {
             Transition::Pp => "PP",
             Transition::Pi => "PI",
             Transition::Ps => "PS",
+            Transition::Po => "PO",
             Transition::Ss => "SS",
             Transition::Sp => "SP",
             Transition::Si => "SI",

@@ -39,6 +39,10 @@ fn not_xml(text: &str, error: &roxmltree::Error) -> EniError {
     if matches!(error, roxmltree::Error::NodesLimitReached) {
         return EniError::of_file(Problem::TooMuch { what: "XML nodes", limit: MAX_NODES as usize });
     }
+    if matches!(error, roxmltree::Error::UnclosedRootNode | roxmltree::Error::UnexpectedEndOfStream) {
+        let reason = "the file ends before its elements do: it was cut off, copy or export it again".to_owned();
+        return EniError::at(File::new(text).place(text.len()), Problem::Xml { reason });
+    }
     let at = error.pos();
     let mut reason = match error {
         roxmltree::Error::DtdDetected => "a document type definition (DTD) is not read".to_owned(),

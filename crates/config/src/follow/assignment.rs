@@ -17,7 +17,7 @@ const OUTPUTS: std::ops::RangeInclusive<u16> = 0x1600..=0x17FF;
 const INPUTS: std::ops::RangeInclusive<u16> = 0x1A00..=0x1BFF;
 
 /// Bits and entries of a PDO at most: what a datagram carries, subindices of an object.
-const PDO_BITS: u32 = 1486 * 8;
+const PDO_BITS: u64 = 1486 * 8;
 const PDO_ENTRIES: usize = 255;
 
 /// What the commands leave in an object: subindex 0 counts.
@@ -104,7 +104,7 @@ fn mapping(index: u16, objects: &BTreeMap<u16, Object>, subdevice: &SubDevice) -
         return PdoMapping::of(index, values.into_iter().map(entry).collect::<Vec<_>>());
     }
     let described = subdevice.process_data.iter().flat_map(|data| &data.pdos).find(|pdo| pdo.index == index);
-    let bits = |pdo: &Pdo| pdo.entries.iter().map(|entry| u32::from(entry.bit_length)).sum::<u32>();
+    let bits = |pdo: &Pdo| pdo.entries.iter().map(|entry| u64::from(entry.bit_length)).sum::<u64>();
     match described.filter(|pdo| (1..=PDO_BITS).contains(&bits(pdo)) && pdo.entries.len() <= PDO_ENTRIES) {
         Some(pdo) => {
             let entries = pdo.entries.iter().flat_map(super::sync_managers::entries);

@@ -12,7 +12,7 @@ use super::areas::Piece;
 use super::bus::Bus;
 use super::notices::Notices;
 use super::subdevice::{command_name, is_complete, named};
-use crate::eni::{CyclicCommand, Eni, EniError, Problem, Target};
+use crate::eni::{CyclicCommand, CyclicState, Eni, EniError, Problem, Target};
 
 /// Looks at a pair of a logical command and a piece of process data: far more than a segment of 1,000 SubDevices needs.
 const MAX_LOOKS: usize = 5_000_000;
@@ -143,6 +143,12 @@ fn of_process_data(
             notices.add(Some(command.place), None, element, reason);
         }
         return;
+    }
+    let both = [CyclicState::SafeOp, CyclicState::Op];
+    if !command.states.is_empty() && !both.iter().all(|state| command.states.contains(state)) {
+        let states: Vec<String> = command.states.iter().map(ToString::to_string).collect();
+        let reason = format!("State is {}: RingCAT exchanges process data in SAFEOP and OP", states.join(", "));
+        notices.add(Some(command.place), None, element.clone(), reason);
     }
     if let Some(expected) = command.datagram.count.filter(|expected| !is_mailbox && u32::from(*expected) != count) {
         let reason = format!("Cnt is {expected}, but the FMMUs of the file give {count}: RingCAT expects what it maps");

@@ -133,11 +133,14 @@ fn of_subdevice(
             }
             return Ok(());
         }
-        let mut bit_offset = 0;
+        let mut bit_offset: u32 = 0;
         for range in ranges.iter().filter(|range| range.length > 0) {
             let (image_bit, bits) = (range.start, range.length);
             areas.push(ImageArea { subdevice: index, direction, sync_manager: None, bit_offset, image_bit, bits });
-            bit_offset += bits;
+            let what = side(direction);
+            bit_offset = bit_offset.checked_add(bits).ok_or_else(|| {
+                contradiction(eni, index, range.place, what, "fewer than 2^32 bits", "more in all ranges", "")
+            })?;
         }
         return Ok(());
     }

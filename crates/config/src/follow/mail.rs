@@ -128,8 +128,8 @@ fn idn(command: &SoeCommand) -> Result<StartupAction, String> {
     if command.op_code != SOE_WRITE {
         return Err(format!("OpCode {}: only writes (3) are sent", command.op_code));
     }
-    if command.elements & SOE_VALUE == 0 {
-        return Err(format!("Elements {:#04x}: only values (0x40) are written", command.elements));
+    if command.elements != SOE_VALUE {
+        return Err(format!("Elements {:#04x}: only values (0x40) are written, and alone", command.elements));
     }
     if command.drive >= SOE_DRIVES {
         return Err(format!("DriveNo {}: a SubDevice has drives 0 to 7", command.drive));

@@ -191,6 +191,7 @@ const fn states(transition: Transition) -> (AlState, AlState) {
         Transition::Pp => (PreOp, PreOp),
         Transition::Pi => (PreOp, Init),
         Transition::Ps => (PreOp, SafeOp),
+        Transition::Po => (PreOp, Op),
         Transition::Ss => (SafeOp, SafeOp),
         Transition::Sp => (SafeOp, PreOp),
         Transition::Si => (SafeOp, Init),
@@ -251,6 +252,7 @@ pub(super) const fn followed(transition: Transition) -> Option<EngineTransition>
         Transition::Ii
         | Transition::Pp
         | Transition::Pi
+        | Transition::Po
         | Transition::Ss
         | Transition::Si
         | Transition::Op
@@ -274,8 +276,9 @@ pub(super) fn at_transitions(
     for transition in transitions {
         match followed(*transition) {
             Some(found) => commands.push((place, make(found))),
-            // OP is left through SAFEOP: the command is sent on the second half of the way.
+            // OP is reached and left through SAFEOP: the command is sent on one half of the way.
             None if *transition == Transition::Op && transitions.contains(&Transition::Sp) => {}
+            None if *transition == Transition::Po && transitions.contains(&Transition::Ps) => {}
             None => left.push(transition.name()),
         }
     }

@@ -117,8 +117,8 @@ fn from_settings(settings: &SyncManagerSettings, process_data: &ProcessData) -> 
     let role = role(Some(settings), &register);
     let one = declare(settings.index, role, register);
     let described = mapped(&one, process_data);
-    let bits: Option<u32> =
-        described.map(|pdos| pdos.iter().flat_map(|pdo| &pdo.entries).map(|e| u32::from(e.bit_length)).sum());
+    let bits: Option<u64> =
+        described.map(|pdos| pdos.iter().flat_map(|pdo| &pdo.entries).map(|e| u64::from(e.bit_length)).sum());
     let bytes = bits.filter(|bits| *bits > 0).map(|bits| u16::try_from(bits.div_ceil(8)).unwrap_or(u16::MAX));
     register.length = bytes.or(settings.default_size).unwrap_or_default();
     Some(declare(settings.index, role, register))

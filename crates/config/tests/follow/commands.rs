@@ -262,3 +262,43 @@ fn addresses_are_hexadecimal_have_points_or_are_the_message_itself_facts_6_5() {
         crate::refused(&[(elements, &elements.replace("c0a80104", "300.1.1.1"))]).contains("expected an IP address")
     );
 }
+
+/// Facts 8.2: PO is among the transitions; OP is reached through SAFEOP.
+#[test]
+fn a_way_over_two_transitions_is_sent_at_the_one_that_is_listed_too_or_noted_facts_8_2() {
+    let own = "<Transition>PS</Transition><Transition>OP</Transition>";
+    let both = changed(&[(own, "<Transition>PO</Transition><Transition>PS</Transition><Transition>OP</Transition>")]);
+    let transitions = |configuration: &ringcat_config::Configuration| -> Vec<Transition> {
+        let own =
+            registers(&drive(configuration)).into_iter().filter(|(_, one)| one.address == RegisterAddress(0x0F00));
+        own.map(|(transition, _)| transition).collect()
+    };
+    assert_eq!(transitions(&both), [Transition::Ps, Transition::Sp]);
+    assert!(has_notice(&both, &["own register", "not sent at OI:"]));
+    let alone = changed(&[(own, "<Transition>PO</Transition><Transition>OP</Transition>")]);
+    assert_eq!(transitions(&alone), [Transition::Sp]);
+    assert!(has_notice(&alone, &["own register", "not sent at PO, OI:"]));
+}
+
+#[test]
+fn a_command_that_is_disabled_is_not_sent_whatever_it_is() {
+    let own = "<Comment>own register</Comment>";
+    let disabled = changed(&[(own, &format!("{own}<Disabled>1</Disabled>"))]);
+    assert!(registers(&drive(&disabled)).iter().all(|(_, command)| command.address != RegisterAddress(0x0F00)));
+    assert!(crate::notices(&disabled).iter().all(|notice| !notice.contains("own register")));
+    let enabled = changed(&[(own, &format!("{own}<Disabled>0</Disabled>"))]);
+    assert_eq!(drive(&enabled).startup, drive(&configured(SMALL)).startup);
+}
+
+/// Facts 6.6: a write with several elements has more than the value in its data.
+#[test]
+fn an_idn_is_written_where_the_command_has_its_value_and_nothing_else() {
+    let value = "<Elements>64</Elements>";
+    let idns = |configuration: &ringcat_config::Configuration| {
+        drive(configuration).startup.iter().filter(|command| matches!(command.action, StartupAction::Idn(_))).count()
+    };
+    assert_eq!(idns(&configured(SMALL)), 1);
+    let several = changed(&[(value, "<Elements>72</Elements>")]);
+    assert_eq!(idns(&several), 0);
+    assert!(has_notice(&several, &["SoE/InitCmd \"cycle time\"", "Elements 0x48", "only values (0x40)"]));
+}

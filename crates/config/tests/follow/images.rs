@@ -143,3 +143,16 @@ fn what_no_command_covers_is_not_exchanged_and_said() {
     let variable = nothing.image.variables.iter().find(|variable| variable.name.starts_with("Left")).unwrap();
     assert_eq!(variable.subdevice, None);
 }
+
+/// Facts 8.2: a command is active in the states that it lists.
+#[test]
+fn process_data_that_the_file_exchanges_in_other_states_is_told() {
+    let states = "<State>SAFEOP</State><State>OP</State><Comment>drive</Comment>";
+    let op = changed(&[(states, "<State>4</State><Comment>drive</Comment>")]);
+    assert!(has_notice(&op, &["command 4 \"drive\"", "State is OP: RingCAT exchanges process data in SAFEOP and OP"]));
+    let any = changed(&[(states, "<Comment>drive</Comment>")]);
+    let more = changed(&[(states, &format!("<State>PREOP</State>{states}"))]);
+    for usual in [any, more] {
+        assert!(!has_notice(&usual, &["State is"]));
+    }
+}

@@ -151,6 +151,9 @@ fn repetitions_do_not_multiply() {
     let pdos = format!("<Sm3><Type>Inputs</Type>{}</Sm3>", "<Pdo>6656</Pdo>".repeat(256));
     let assigned = refused(&[("<Sm3><Type>Inputs</Type><Pdo>6656</Pdo></Sm3>", &pdos)]);
     assert!(assigned.contains("more than 255 PDOs of a SyncManager"), "{assigned}");
+    let pdo = "<TxPdo><Index>#x1a00</Index>";
+    let described = refused(&[(pdo, &format!("{}{pdo}", "<TxPdo><Index>#x1a01</Index></TxPdo>".repeat(1023)))]);
+    assert!(described.contains("more than 1024 PDOs of a SubDevice"), "{described}");
     let copy = "<CopyInfo><SrcBitOffs>8</SrcBitOffs><DstBitOffs>18</DstBitOffs><BitSize>4</BitSize></CopyInfo>";
     let copies = refused(&[(copy, &copy.repeat(4_097))]);
     assert!(copies.contains("more than 8192 copies"), "{copies}");
@@ -161,4 +164,39 @@ fn repetitions_do_not_multiply() {
         reads.repeat(2_001)
     );
     assert!(refusal(&many).contains("looks at cyclic commands"), "{}", refusal(&many));
+}
+
+#[test]
+fn lengths_that_add_up_to_too_much_are_refused_or_left_out() {
+    let all = "<Send><BitStart>0</BitStart><BitLength>4294967295</BitLength></Send>".repeat(3);
+    let by_hand = |process_data: &str| {
+        format!(
+            "<EtherCATConfig><Config><Slave><Info/><ProcessData>{process_data}</ProcessData></Slave></Config></EtherCATConfig>"
+        )
+    };
+    let text = refusal(&by_hand(&all));
+    assert!(text.contains("ProcessData/Send: expected fewer than 2^32 bits"), "{text}");
+    let entries = "<Entry><BitLen>65535</BitLen></Entry>".repeat(65_538);
+    let sync_manager =
+        "<Sm2><Type>Outputs</Type><StartAddress>4096</StartAddress><ControlByte>100</ControlByte><Pdo>5632</Pdo></Sm2>";
+    let text = by_hand(&format!("{sync_manager}<RxPdo><Index>5632</Index>{entries}</RxPdo>"));
+    let declared = configured(&text).declaration.subdevices[0].declared.clone().unwrap();
+    assert_eq!(declared[0].register.length, u16::MAX, "and not what is left of a sum of 32 bits");
+    let assign = "<Mailbox><CoE><InitCmds><InitCmd CompleteAccess=\"1\"><Transition>PS</Transition><Index>7186</Index>\
+                  <Data>01000016</Data></InitCmd></InitCmds></CoE></Mailbox>";
+    let described = format!("<ProcessData><RxPdo><Index>5632</Index>{entries}</RxPdo></ProcessData>");
+    let text = format!("<EtherCATConfig><Config><Slave><Info/>{described}{assign}</Slave></Config></EtherCATConfig>");
+    let pdos = configured(&text).declaration.subdevices[0].pdos.clone().unwrap();
+    assert_eq!(pdos[0].pdos[0].entries, None, "too long for a PDO: left to the SII");
+}
+
+#[test]
+fn a_file_that_was_cut_off_is_told_as_such_with_its_end() {
+    let last = SMALL.rfind("</Config>").expect("it is there");
+    for end in [last, last + 4, SMALL.len() / 2] {
+        let text = refusal(&SMALL[..end]);
+        assert!(text.contains("the file ends before its elements do: it was cut off"), "{text}");
+        let line = format!("line {}, column ", SMALL[..end].matches('\n').count() + 1);
+        assert!(text.starts_with(&line), "{text}");
+    }
 }

@@ -23,6 +23,16 @@ pub(super) fn lines(model: &Eni, configuration: &Configuration) -> Vec<String> {
         let kind = one_line(&variable.data_type);
         lines.push(format!("  {side:<7}  {:>6}  {:>5}  {kind:<8} {name}", variable.image_bit, variable.bits));
     }
+    let image = &configuration.image;
+    if !image.copies.is_empty() {
+        lines.push(String::new());
+        lines.push("copies: bits, from bit of the inputs, to bit of the outputs".to_owned());
+    }
+    for copy in &image.copies {
+        let (source, target) = (image.areas[copy.source_area], image.areas[copy.target_area]);
+        let (from, to) = (source.image_bit + copy.source_bit, target.image_bit + copy.target_bit);
+        lines.push(format!("  {:>4}  {from:>6}  {to:>6}", copy.bits));
+    }
     lines
 }
 

@@ -143,10 +143,19 @@ fn image(configuration: &Configuration) -> Value {
             "subdevice": variable.subdevice,
         })
     });
+    let copies = image.copies.iter().filter_map(|copy| {
+        let (source, target) = (image.areas.get(copy.source_area)?, image.areas.get(copy.target_area)?);
+        Some(json!({
+            "input_bit": source.image_bit + copy.source_bit,
+            "output_bit": target.image_bit + copy.target_bit,
+            "bits": copy.bits,
+        }))
+    });
     json!({
         "input_bytes": image.inputs_len,
         "output_bytes": image.outputs_len,
         "areas": image.areas.iter().map(area).collect::<Value>(),
         "variables": variables.collect::<Value>(),
+        "copies": copies.collect::<Value>(),
     })
 }

@@ -6,9 +6,10 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Duration;
 
 use clap::Args;
-use ringcat::eni::{EniFile, EniImage, EniVariable, Value};
+use ringcat::eni::{EniFile, EniImage, EniVariable, Value, VariableType};
 use ringcat::text::Names;
 use ringcat::{ActivateError, Declaration, Direction, Error, Instant, ProcessData, Scan, SubDeviceInfo};
+use ringcat_config::Variable;
 use ringcat_engine::main_device::Directory;
 
 use crate::interfaces::Failure;
@@ -16,6 +17,9 @@ use crate::output::say;
 
 /// Values of a variable are told so often at most.
 const TELL_PERIOD: Duration = Duration::from_secs(1);
+/// Names that are told where one is not known: as many, and so like it (1 is equal).
+const NEAR: usize = 3;
+const LIKE: f64 = 0.6;
 
 /// Options about an ENI.
 #[derive(Args, Debug, Default)]
@@ -117,20 +121,53 @@ impl EniNetwork {
         }
     }
 
+    /// All that can be wrong with variables shows before anything is sent.
     fn check_variables(&self) -> Result<(), Failure> {
-        let known = |name: &str| {
-            let mut variables = self.file.configuration.image.variables.iter();
-            variables.any(|variable| variable.name == name)
-        };
-        let set = self.set.iter().map(|text| Ok(assignment(text)?.0)).collect::<Result<Vec<_>, Failure>>()?;
-        let mut names = set.into_iter().chain(self.watch.iter().map(String::as_str));
-        match names.find(|name| !known(name)) {
-            None => Ok(()),
-            Some(name) => Err(Failure::new(format!(
-                "the file has no variable \"{name}\": `ringcat eni --details FILE` lists its {} variables",
-                self.file.configuration.image.variables.len()
-            ))),
+        self.set.iter().try_for_each(|text| self.assignment(text).map(|_| ()))?;
+        self.watch.iter().try_for_each(|name| self.variable("--watch", name, Direction::Inputs).map(|_| ()))
+    }
+
+    /// Number of a variable in document order, and what the file says of it. Where an input and an output have one name, it
+    /// is the one of this direction.
+    fn variable(&self, option: &str, name: &str, wanted: Direction) -> Result<(usize, &Variable), Failure> {
+        let variables = &self.file.configuration.image.variables;
+        let mut named = variables.iter().enumerate().filter(|(_, variable)| variable.name == name);
+        let first = named.clone().next();
+        let found = named.find(|(_, variable)| variable.direction == wanted).or(first);
+        let (number, variable) = found.ok_or_else(|| {
+            let near = near(name, variables.iter().map(|variable| variable.name.as_str()));
+            let near = if near.is_empty() { String::new() } else { format!(", near it are {}", near.join(", ")) };
+            let all = format!("`ringcat eni --details FILE` lists its {} variables", variables.len());
+            Failure::new(format!("{option}: the file has no variable \"{name}\"{near}; {all}"))
+        })?;
+        if variable.subdevice.is_none() {
+            return Err(Failure::new(format!(
+                "{option}: \"{name}\" is nobody's process data: nothing writes or reads it"
+            )));
         }
+        Ok((number, variable))
+    }
+
+    /// Number of the variable in `NAME=VALUE`, and the bits that it gets.
+    fn assignment(&self, text: &str) -> Result<(usize, u64), Failure> {
+        // Names may have an equals sign, values have none.
+        let pair = text.rsplit_once('=');
+        let (name, value) = pair.ok_or_else(|| Failure::new(format!("--set: expected NAME=VALUE, got \"{text}\"")))?;
+        let (number, variable) = self.variable("--set", name, Direction::Outputs)?;
+        if variable.direction == Direction::Inputs {
+            return Err(Failure::new(format!("--set: \"{name}\" is an input: the SubDevice gives it its value")));
+        }
+        let length = u16::try_from(variable.bits).ok().filter(|length| *length <= 64);
+        let bits = length.and_then(|length| VariableType::named(&variable.data_type).parse(value, length));
+        let bits = bits.ok_or_else(|| {
+            let (count, kind) = (variable.bits, &variable.data_type);
+            let unit = if count == 1 { "bit" } else { "bits" };
+            let most = if length.is_none() { ": only up to 64 bits can be set" } else { "" };
+            Failure::new(format!(
+                "--set: expected a value of {count} {unit} ({kind}) for \"{name}\", got \"{value}\"{most}"
+            ))
+        })?;
+        Ok((number, bits))
     }
 
     /// What the cycles do, and what they show.
@@ -138,26 +175,19 @@ impl EniNetwork {
         let mut image =
             EniImage::new(&self.file.configuration, directory).map_err(|error| Failure::new(error.to_string()))?;
         for text in &self.set {
-            let (name, value) = assignment(text)?;
-            let variable = image.variable(name).cloned();
-            let variable = variable.ok_or_else(|| Failure::new(format!("there is no variable \"{name}\"")))?;
-            if variable.direction == Direction::Inputs {
-                return Err(Failure::new(format!("--set: \"{name}\" is an input")));
-            }
-            let bits = u16::try_from(variable.bits).ok().filter(|bits| *bits <= 64);
-            let value = bits.and_then(|bits| variable.data_type.parse(value, bits)).ok_or_else(|| {
-                Failure::new(format!(
-                    "--set: expected a value of {} bits for \"{name}\", got \"{value}\"",
-                    variable.bits
-                ))
-            })?;
-            image.write(&variable, value);
+            let (number, bits) = self.assignment(text)?;
+            let variable = image.variables()[number].clone();
+            image.write(&variable, bits);
         }
         for subdevice in image.unplaced() {
             let name = self.names().0.get(*subdevice).cloned().unwrap_or_default();
             eprintln!("ringcat: SubDevice {subdevice} \"{name}\" has places in the file's image and no process data");
         }
-        let watched: Vec<EniVariable> = self.watch.iter().filter_map(|name| image.variable(name).cloned()).collect();
+        let watched = self.watch.iter().map(|name| {
+            let (number, _) = self.variable("--watch", name, Direction::Inputs)?;
+            Ok(image.variables()[number].clone())
+        });
+        let watched: Vec<EniVariable> = watched.collect::<Result<_, Failure>>()?;
         let values: Arc<[AtomicU64]> = watched.iter().map(|_| AtomicU64::new(0)).collect();
         let work = Work { image, watched: watched.clone(), values: values.clone() };
         let told = vec![None; watched.len()];
@@ -165,9 +195,18 @@ impl EniNetwork {
     }
 }
 
-fn assignment(text: &str) -> Result<(&str, &str), Failure> {
-    // Names may have an equals sign, values have none.
-    text.rsplit_once('=').ok_or_else(|| Failure::new(format!("--set: expected NAME=VALUE, got \"{text}\"")))
+/// Names that look like one that is not there, the likest first, in quotation marks.
+fn near<'a>(wanted: &str, names: impl Iterator<Item = &'a str>) -> Vec<String> {
+    let wanted = wanted.to_lowercase();
+    let likeness = |name: &str| {
+        let name = name.to_lowercase();
+        if name.contains(&wanted) { 1.0 } else { strsim::normalized_damerau_levenshtein(&wanted, &name) }
+    };
+    let mut near: Vec<(f64, &str)> =
+        names.map(|name| (likeness(name), name)).filter(|(like, _)| *like >= LIKE).collect();
+    near.sort_by(|a, b| b.0.total_cmp(&a.0));
+    near.dedup_by_key(|(_, name)| *name);
+    near.into_iter().take(NEAR).map(|(_, name)| format!("\"{name}\"")).collect()
 }
 
 /// What is done in each cycle; it neither allocates nor waits.
@@ -267,13 +306,46 @@ mod tests {
         assert_eq!(watched.news(Instant(2)), [""; 0], "at most once a second");
         assert_eq!(watched.news(Instant(2_000_000_000)), [""; 0], "when it changes");
 
-        let unknown = network(&["Lamp=1"], &[]).check_variables().unwrap_err().to_string();
-        assert!(unknown.contains("no variable \"Lamp\""), "{unknown}");
-        assert!(network(&[], &["Lamp"]).check_variables().is_err());
-        let refused = |set: &str| network(&[set], &[]).work(application.directory()).unwrap_err().to_string();
+        assert!(network(&["Lamps.Channel 2=on"], &["Lamp"]).check_variables().is_err());
+    }
+
+    #[test]
+    fn what_is_wrong_with_variables_shows_before_anything_is_sent_with_names_that_are_near() {
+        let refused = |set: &str| network(&[set], &[]).check_variables().unwrap_err().to_string();
+        let unknown = refused("Lamp.Channel 2=1");
+        let expected = "--set: the file has no variable \"Lamp.Channel 2\", near it are \"Lamps.Channel 2\", ";
+        assert!(unknown.starts_with(expected), "{unknown}");
+        assert!(unknown.ends_with("; `ringcat eni --details FILE` lists its 16 variables"), "{unknown}");
+        let part = refused("velocity=1");
+        assert!(part.contains("near it are \"Drive.Target velocity\";"), "{part}");
+        assert!(refused("completely different=1").contains("\"completely different\"; `ringcat eni"));
         assert!(refused("Buttons.Channel 1=1").contains("is an input"));
-        assert!(refused("Lamps.Channel 1=2").contains("expected a value of 1 bits"));
+        let value = refused("Drive.Target velocity=fast");
+        assert!(value.contains("a value of 32 bits (DINT) for \"Drive.Target velocity\", got \"fast\""), "{value}");
+        assert!(refused("Lamps.Channel 1=2").contains("expected a value of 1 bit (BOOL)"));
         assert!(refused("Lamps.Channel 1").contains("expected NAME=VALUE"));
+    }
+
+    #[test]
+    fn variables_of_nobody_are_refused_and_one_name_for_input_and_output_means_the_right_one() {
+        let changed = |from: &str, to: &str, set: &[&str], watch: &[&str]| {
+            let text = std::str::from_utf8(MACHINE).unwrap();
+            assert!(text.contains(from));
+            let file = EniFile::from_bytes(text.replace(from, to).as_bytes()).unwrap();
+            let strings = |texts: &[&str]| texts.iter().map(|text| (*text).to_owned()).collect();
+            EniNetwork { file, split_lrw: false, set: strings(set), watch: strings(watch) }
+        };
+        // Byte 1 of the images belongs to nobody.
+        let nobodys = "<BitOffs>8</BitOffs>";
+        let free = changed("<BitOffs>0</BitOffs>", nobodys, &["Lamps.Channel 1=1"], &[]);
+        assert!(free.check_variables().unwrap_err().to_string().contains("nobody's process data"));
+        let free = changed("<BitOffs>0</BitOffs>", nobodys, &[], &["Buttons.Channel 1"]);
+        assert!(free.check_variables().unwrap_err().to_string().contains("nobody's process data"));
+        let same = changed("Lamps.Channel 1", "Buttons.Channel 1", &["Buttons.Channel 1=1"], &["Buttons.Channel 1"]);
+        let (number, bits) = same.assignment("Buttons.Channel 1=1").unwrap();
+        assert_eq!((same.file.configuration.image.variables[number].direction, bits), (Direction::Outputs, 1));
+        let (_, watched) = same.variable("--watch", "Buttons.Channel 1", Direction::Inputs).unwrap();
+        assert_eq!(watched.direction, Direction::Inputs);
     }
 
     #[test]

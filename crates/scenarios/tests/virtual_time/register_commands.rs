@@ -186,3 +186,17 @@ fn a_command_may_have_a_time_limit_of_its_own_facts_8_2() {
     assert!(text.starts_with("start-up command 0 (PREOP to SAFEOP): SDO 0x2001:01: "), "{text}");
     assert!(text.contains("25 ms"), "{text}");
 }
+
+#[test]
+fn a_look_that_may_take_an_hour_does_not_outlive_the_power_of_its_subdevice_facts_8_2() {
+    let mut world = world(&[check(Transition::Ps, map::AL_STATUS, &[8, 0], &[0x0F, 0], 3_600_000)]);
+    world.run_cycles(400);
+    let state = |world: &World| world.network().device(DeviceIndex(DRIVE)).al_status().al_state();
+    assert_eq!(state(&world), Some(AlState::PreOp), "it is looked at");
+    world.power_off(DeviceIndex(DRIVE));
+    world.run_cycles(100);
+    world.power_on(DeviceIndex(DRIVE));
+    assert_eq!(state(&world), Some(AlState::Init), "its power is back");
+    world.run_cycles(400);
+    assert_eq!(state(&world), Some(AlState::PreOp), "and is brought up anew, to the same look");
+}

@@ -1,5 +1,7 @@
 //! What an ENI says of cycles and of the process image (facts 8.1).
 
+use std::fmt;
+
 use super::{Datagram, Place};
 
 /// A state in which a cyclic command is sent (facts 8.2: numbers count states, they are no AL codes).
@@ -13,6 +15,17 @@ pub enum CyclicState {
     SafeOp,
     /// 4, OP.
     Op,
+}
+
+impl fmt::Display for CyclicState {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            CyclicState::Init => "INIT",
+            CyclicState::PreOp => "PREOP",
+            CyclicState::SafeOp => "SAFEOP",
+            CyclicState::Op => "OP",
+        })
+    }
 }
 
 /// `Cyclic`.

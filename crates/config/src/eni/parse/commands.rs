@@ -10,11 +10,17 @@ use crate::eni::model::{Datagram, EcatCommand, Requires, Target, Transition, Val
 /// Bytes of a datagram at most (facts 1.3).
 const MAX_DATA: u16 = 1486;
 
-/// The commands in `InitCmds` of an element.
+/// The commands in `InitCmds` of an element, but for those that are switched off as mailbox commands can be.
 pub(super) fn list(parent: Element<'_>) -> Result<Vec<EcatCommand>, EniError> {
     let Some(commands) = parent.child("InitCmds") else { return Ok(Vec::new()) };
     commands.knows(&["InitCmd"]);
-    commands.children("InitCmd").map(command).collect()
+    let mut found = Vec::new();
+    for element in commands.children("InitCmd") {
+        if !element.flag_of("Disabled")? {
+            found.push(command(element)?);
+        }
+    }
+    Ok(found)
 }
 
 /// One command.
@@ -34,6 +40,7 @@ pub(super) fn command(element: Element<'_>) -> Result<EcatCommand, EniError> {
         "Retries",
         "Validate",
         "Timeout",
+        "Disabled",
     ]);
     let requires = match element.child("Requires") {
         None => None,

@@ -8,6 +8,8 @@ use crate::eni::model::{
 
 /// PDOs that can be assigned to a SyncManager: subindices of an object (facts 6.3).
 const ASSIGNED: usize = 255;
+/// PDOs that a SubDevice can describe: 0x1600 to 0x17FF and 0x1A00 to 0x1BFF (facts 6.3).
+const PDOS: usize = 1024;
 /// SyncManagers that a controller can have.
 const SYNC_MANAGERS: u8 = 16;
 
@@ -25,6 +27,9 @@ pub(super) fn process_data(element: Element<'_>) -> Result<ProcessData, EniError
                 _ => child.note_unknown(),
             },
         }
+    }
+    if found.pdos.len() > PDOS {
+        return Err(element.error(Problem::TooMuch { what: "PDOs of a SubDevice", limit: PDOS }));
     }
     found.sync_managers.sort_by_key(|sync_manager| sync_manager.index);
     Ok(found)
