@@ -15,6 +15,8 @@ use ringcat_wire::sii::Identity;
 pub use cyclic::CyclicEvent;
 pub use log::EventLog;
 
+pub use crate::ring_status::Occupant;
+
 use crate::domain::DomainStatus;
 use crate::info::IdentityField;
 use crate::link::Link;
@@ -29,6 +31,16 @@ pub struct TimedEvent {
     pub at: Instant,
     /// What happened.
     pub event: Event,
+    /// Who was at the positions of the cabling that the event names when it was seen, where that is known: for a cable at
+    /// its near end and at its far one.
+    pub whom: [Option<Occupant>; 2],
+}
+
+impl TimedEvent {
+    /// An event that names nobody by a position of the cabling, or of whom nothing is known.
+    pub const fn new(at: Instant, event: Event) -> TimedEvent {
+        TimedEvent { at, event, whom: [None; 2] }
+    }
 }
 
 /// What can happen. SubDevices that were declared are named by their index in the declaration, others by position.
@@ -351,4 +363,16 @@ pub enum Event {
         /// OR of all |0x092C| in nanoseconds: at most twice the largest.
         spread_ns: u32,
     },
+}
+
+impl Event {
+    /// Positions of the cabling that it names; those of a scan and of a look since are others.
+    fn positions(&self) -> [Option<usize>; 2] {
+        match self {
+            Event::BreakLocated { cable }
+            | Event::CableErrors { cable, .. }
+            | Event::RingClosed { place: Some(cable), .. } => cable.positions(),
+            _ => [None; 2],
+        }
+    }
 }

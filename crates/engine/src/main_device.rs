@@ -232,6 +232,7 @@ impl MainDevice {
             junction_controls: Vec::new(),
             statistics: book.clone(),
         };
+        bus.set_occupants(fleet.occupants());
         let fleet = SharedFleet::new(fleet, board.clone(), clocks);
         self.supervisor.attach(board);
         let start = if self.has_visited() { Start::Doubtful } else { Start::Cleared };
@@ -362,7 +363,7 @@ impl MainDevice {
             return Some(event);
         }
         let words = self.cyclic_events.as_mut()?.pop()?;
-        CyclicEvent::unpack(words).map(|event| TimedEvent { at: now, event: event.event() })
+        CyclicEvent::unpack(words).map(|event| TimedEvent::new(now, event.event()))
     }
 
     /// Takes in a frame of the acyclic half.
@@ -437,6 +438,8 @@ impl MainDevice {
         let board = self.fleet.as_ref().map(|fleet| &fleet.board);
         let seen = board.and_then(|board| board.supervision()).map(|(_, seen)| seen).unwrap_or_default();
         let carriers = self.supervisor.bus().carriers();
+        let positions = status.place.map_or([None; 2], |cable| cable.positions());
+        status.place_ends = self.supervisor.bus().occupants(positions);
         for (at, answering) in [seen.main.0, seen.redundant.0].into_iter().enumerate() {
             let al_states = seen.al_status[at] & 0x0F;
             status.links[at] = LinkStatus { carrier: carriers[at], answering, al_states };

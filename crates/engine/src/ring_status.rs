@@ -7,6 +7,7 @@ mod cables;
 
 use core::fmt;
 
+use ringcat_wire::address::StationAddress;
 use ringcat_wire::al::AlState;
 
 pub use cables::{CableErrors, cables, port_errors};
@@ -38,6 +39,18 @@ impl fmt::Display for Cable {
             None => f.write_str("the REDUNDANT interface"),
         }
     }
+}
+
+/// Who is at a position of the cabling.
+///
+/// Positions are not indices of the declaration: declared SubDevices may be missing, in another order, or behind a hot
+/// connect group, and others may be between them.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Occupant {
+    /// Station address.
+    pub station: StationAddress,
+    /// Index in the declaration; `None` where nobody declared it.
+    pub declared: Option<usize>,
 }
 
 /// Whether another break would be survived.
@@ -101,6 +114,13 @@ impl LinkStatus {
     }
 }
 
+impl Cable {
+    /// Positions at the near and at the far end.
+    pub fn positions(&self) -> [Option<usize>; 2] {
+        [self.near, self.far].map(|end| end.map(|at| at.node))
+    }
+}
+
 /// The ring and both links.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct RingStatus {
@@ -112,6 +132,8 @@ pub struct RingStatus {
     pub links: [LinkStatus; 2],
     /// Where the ring is broken, once that is known.
     pub place: Option<Cable>,
+    /// Who is at the near and at the far end of that cable.
+    pub place_ends: [Option<Occupant>; 2],
     /// How often the ring opened and closed since activation, also where that was too often to be told each time.
     pub changes: u32,
     /// It changes too often to be told each time.

@@ -43,7 +43,7 @@ fn main() -> Result<(), Box<dyn Error>> {
             image.give_outputs(data);
         });
         while let Some(event) = application.pop_event() {
-            println!("{:>9.3} ms  {}", event.at.0 as f64 / 1e6, describe(&event.event, &file.names()));
+            println!("{:>9.3} ms  {}", event.at.0 as f64 / 1e6, describe(&event, &file.names()));
         }
         cycle += 1;
         if cycle > 60_000 {

@@ -59,7 +59,7 @@ fn main() -> Result<(), ringcat::Error> {
             }
         });
         while let Some(event) = application.pop_event() {
-            println!("{:>9.3} ms  {}", event.at.0 as f64 / 1e6, describe(&event.event, &Names::default()));
+            println!("{:>9.3} ms  {}", event.at.0 as f64 / 1e6, describe(&event, &Names::default()));
         }
     }
     let status = application.exchange_mut().status(DomainId(0));

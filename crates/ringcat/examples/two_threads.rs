@@ -55,7 +55,7 @@ fn run<L: Links + Send + 'static>(cyclic: L, acyclic: L) -> Result<(), Error> {
     let end = Instant::now() + Duration::from_secs(1);
     while Instant::now() < end {
         while let Some(event) = supervisor.pop_event() {
-            println!("{}", describe(&event.event, &Names::default()));
+            println!("{}", describe(&event, &Names::default()));
         }
         sleep(Duration::from_millis(10));
     }

@@ -211,7 +211,7 @@ impl<L: Links, H: AcyclicHalf> Application<L, H> {
         let now = self.links.now();
         if let Some(foreign) = self.cyclic.exchange.pop_foreign() {
             let event = Event::ForeignFrame { arrived_on: foreign.arrived_on, bytes: foreign.bytes.to_vec() };
-            return Some(TimedEvent { at: now, event });
+            return Some(TimedEvent::new(now, event));
         }
         self.acyclic.pop_event(now)
     }

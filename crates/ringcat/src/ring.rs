@@ -5,7 +5,7 @@ use std::time::Duration;
 
 use clap::Args;
 use ringcat::text::Names;
-use ringcat::{CableErrors, Link, MainDevice, RingLook, RingState};
+use ringcat::{Cable, CableErrors, Link, MainDevice, Occupant, RingLook, RingState};
 
 use crate::interfaces::{Failure, InterfaceArguments, ThreadArguments};
 use crate::output::say;
@@ -74,6 +74,12 @@ fn gained(before: CableErrors, now: CableErrors) -> CableErrors {
     }
 }
 
+/// Who is at both ends of a cable: nobody is declared, but whoever operates the segment has given station addresses.
+fn ends(look: &RingLook, cable: Cable) -> [Option<Occupant>; 2] {
+    let station = |node: usize| look.stations.get(node).copied().filter(|station| station.0 != 0);
+    cable.positions().map(|node| Some(Occupant { station: station(node?)?, declared: None }))
+}
+
 fn lines(look: &RingLook, two_links: bool) -> Vec<String> {
     let names = Names::default();
     let (main, redundant) = look.counts;
@@ -94,20 +100,27 @@ fn lines(look: &RingLook, two_links: bool) -> Vec<String> {
         lines.push(format!("cabling     {}", if look.topology.main_count == 0 { swapped } else { crossed }));
     }
     if let Some(place) = look.place {
-        lines.push(format!("line break  {}", names.cable(place)));
+        lines.push(format!("line break  {}", names.cable(place, ends(look, place))));
     }
     lines.push(String::from("damaged frames, lost links of each cable:"));
     for (cable, errors) in &look.cables {
         let mark = if look.place == Some(*cable) { "  <- line break" } else { "" };
-        lines.push(format!("{:>6} {:>6}  {}{mark}", errors.invalid_frames, errors.lost_links, names.cable(*cable)));
+        lines.push(format!(
+            "{:>6} {:>6}  {}{mark}",
+            errors.invalid_frames,
+            errors.lost_links,
+            names.cable(*cable, ends(look, *cable))
+        ));
     }
     lines
 }
 
 fn json(look: &RingLook) -> serde_json::Value {
-    let end =
-        |port: Option<ringcat::PortOf>| port.map(|at| serde_json::json!({ "position": at.node, "port": at.port }));
-    let cable = |cable: ringcat::Cable| serde_json::json!({ "near": end(cable.near), "far": end(cable.far) });
+    let end = |port: Option<ringcat::PortOf>| {
+        let station = |node: usize| look.stations.get(node).map(|station| station.0);
+        port.map(|at| serde_json::json!({ "position": at.node, "station": station(at.node), "port": at.port }))
+    };
+    let cable = |cable: Cable| serde_json::json!({ "near": end(cable.near), "far": end(cable.far) });
     let cables: Vec<_> = look
         .cables
         .iter()

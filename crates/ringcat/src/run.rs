@@ -240,7 +240,7 @@ fn tell_events(supervisor: &SupervisorThread, surroundings: &mut Surroundings) {
         | Event::UnconnectedPort0 { .. }
         | Event::CannotDisconnect { .. } = event.event
         {
-            say!("{}", describe(&event.event, &Names::default()));
+            say!("{}", describe(&event, &Names::default()));
         }
         surroundings.note(&event.event).iter().flatten().for_each(|words| eprintln!("ringcat: {words}"));
     }
@@ -318,7 +318,10 @@ impl Run {
         let clocks = self.cycles.supervisor().with(|engine| engine.clocks()).unwrap_or_default();
         for clock in clocks.iter().filter(|clock| !clock.is_locked && !clock.is_reference) {
             let difference = clock.difference_ns.map_or_else(|| "unknown".to_owned(), |ns| format!("{ns} ns"));
-            say!("  the clock of position {} is not locked: its difference is {difference}", clock.position);
+            let name = clock.subdevice.and_then(|subdevice| self.telling.names().0.get(subdevice));
+            let name = name.map_or_else(String::new, |name| format!(" \"{name}\""));
+            let position = clock.position;
+            say!("  the clock of position {position}{name} is not locked: its difference is {difference}");
         }
     }
 

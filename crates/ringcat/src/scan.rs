@@ -41,7 +41,7 @@ pub fn run(arguments: &ScanArguments) -> Result<(), Failure> {
     let mut main_device = MainDevice::request(links, &arguments.interfaces.options());
     let result = main_device.scan_with(|event| match &event.event {
         Event::ScanProgress { .. } | Event::ScanFailed { .. } => {}
-        event => match surroundings.note(event) {
+        _ => match surroundings.note(&event.event) {
             None => eprintln!("{}", describe(event, &Names::default())),
             Some(words) => words.into_iter().for_each(|words| eprintln!("ringcat: {words}")),
         },

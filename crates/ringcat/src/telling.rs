@@ -91,7 +91,7 @@ impl Telling {
         }
         let all = self.one_by_one;
         while let Some(event) = cycles.supervisor().pop_event() {
-            let words = describe(&event.event, &self.names);
+            let words = describe(&event, &self.names);
             let is_told = match &event.event {
                 Event::ForeignFrame { arrived_on, bytes } => {
                     let words = address_of_sender(bytes).and_then(|it| self.surroundings.note_sender(*arrived_on, it));

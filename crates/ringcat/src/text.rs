@@ -3,14 +3,14 @@
 use std::fmt;
 
 use ringcat_engine::domain::DomainState;
-use ringcat_engine::event::Event;
+use ringcat_engine::event::{Event, TimedEvent};
 use ringcat_engine::link::Link;
-use ringcat_engine::ring_status::Cable;
+use ringcat_engine::ring_status::{Cable, Occupant};
 use ringcat_engine::topology::PortOf;
 use ringcat_wire::address::Position;
 use ringcat_wire::frame::MacAddress;
 
-/// Names of declared SubDevices, by their index in the declaration.
+/// Names of declared SubDevices, by their index in the declaration. Positions are none: who is at one is told with it.
 #[derive(Clone, Debug, Default)]
 pub struct Names(pub Vec<String>);
 
@@ -22,37 +22,37 @@ impl Names {
         }
     }
 
-    fn at(&self, position: Position) -> impl fmt::Display {
-        match self.0.get(usize::from(position.0)) {
-            Some(name) => format!("position {position} \"{name}\""),
-            None => format!("position {position}"),
-        }
+    /// A position, and who is there, as far as that is known.
+    fn at(&self, position: Position, who: Option<Occupant>) -> impl fmt::Display {
+        let station = who.map_or_else(String::new, |who| format!(" ({})", who.station));
+        format!("position {position}{}{station}", self.called(who.and_then(|who| who.declared)))
     }
 
-    fn port(&self, at: PortOf) -> String {
-        let number = at.node;
-        match self.0.get(number) {
-            Some(name) => format!("SubDevice {number} \"{name}\" port {}", at.port),
-            None => format!("SubDevice {number} port {}", at.port),
-        }
+    /// The name of a declared SubDevice behind a space, if there is one.
+    fn called(&self, declared: Option<usize>) -> String {
+        declared.and_then(|index| self.0.get(index)).map_or_else(String::new, |name| format!(" \"{name}\""))
     }
 
-    /// A port of a SubDevice of which it is known who it is in the declaration, by its place.
-    fn port_of(&self, at: PortOf, declared: Option<usize>) -> String {
-        match declared.and_then(|index| self.0.get(index)) {
-            Some(name) => format!("SubDevice {} \"{name}\" port {}", at.node, at.port),
-            None => at.to_string(),
-        }
+    /// A port of a SubDevice, by its position and by who it is in the declaration.
+    fn port(&self, at: PortOf, declared: Option<usize>) -> String {
+        format!("SubDevice {}{} port {}", at.node, self.called(declared), at.port)
     }
 
-    /// End of a cable: a SubDevice with its port, or the interface of the host.
-    fn end(&self, port: Option<PortOf>, link: Link) -> String {
-        port.map_or_else(|| format!("the {link} interface"), |at| self.port(at))
-    }
-
-    /// A cable by its ends.
-    pub fn cable(&self, cable: Cable) -> String {
-        format!("between {} and {}", self.end(cable.near, Link::Main), self.end(cable.far, Link::Redundant))
+    /// A cable by its ends, and by who is there: the station address is that of the last SubDevice.
+    pub fn cable(&self, cable: Cable, ends: [Option<Occupant>; 2]) -> String {
+        let station = |who: Option<Occupant>| who.map_or_else(String::new, |who| format!(" ({})", who.station));
+        let port = |at: PortOf, who: Option<Occupant>| self.port(at, who.and_then(|who| who.declared));
+        let [near, far] = ends;
+        let is_last = cable.far.is_none();
+        let before = cable.near.map_or_else(
+            || format!("the {} interface", Link::Main),
+            |at| format!("{}{}", port(at, near), station(near.filter(|_| is_last))),
+        );
+        let behind = cable.far.map_or_else(
+            || format!("the {} interface", Link::Redundant),
+            |at| format!("{}{}", port(at, far), station(far)),
+        );
+        format!("between {before} and {behind}")
     }
 }
 
@@ -68,17 +68,18 @@ pub fn address(mac: MacAddress) -> String {
 }
 
 /// An event in one line.
-pub fn describe(event: &Event, names: &Names) -> String {
-    match event {
+pub fn describe(timed: &TimedEvent, names: &Names) -> String {
+    let whom = timed.whom;
+    match &timed.event {
         Event::Counted { main, redundant } => format!("SubDevices answering: {main} on MAIN, {redundant} on REDUNDANT"),
         Event::ScanProgress { done, total } => format!("scanning: {done} of {total} SubDevices read"),
         Event::ScanFinished { subdevices } => format!("scan finished: {subdevices} SubDevices"),
         Event::ScanFailed { reason } => format!("scan failed: {reason}"),
-        Event::SiiOddity { position, what } => format!("{}: SII: {what}", names.at(*position)),
-        Event::CablingOddity { position, what } => format!("{}: {what}", names.at(*position)),
-        Event::UnconnectedPort0 { position } => format!("{}: port 0 is not connected", names.at(*position)),
+        Event::SiiOddity { position, what } => format!("{}: SII: {what}", names.at(*position, whom[0])),
+        Event::CablingOddity { position, what } => format!("{}: {what}", names.at(*position, whom[0])),
+        Event::UnconnectedPort0 { position } => format!("{}: port 0 is not connected", names.at(*position, whom[0])),
         Event::LineCrossed { position: Some(position), entry_port: Some(port) } => {
-            format!("{}: line crossed, frames enter at port {port}", names.at(*position))
+            format!("{}: line crossed, frames enter at port {port}", names.at(*position, whom[0]))
         }
         Event::CannotDisconnect { link } => {
             format!(
@@ -93,27 +94,27 @@ pub fn describe(event: &Event, names: &Names) -> String {
             "interfaces swapped: MAIN is plugged in at the end of the ring, REDUNDANT at its beginning".to_owned()
         }
         Event::DuplicateAlias { alias, first, second } => {
-            format!("alias {alias} is used twice: {} and {}", names.at(*first), names.at(*second))
+            format!("alias {alias} is used twice: {} and {}", names.at(*first, None), names.at(*second, None))
         }
         Event::RingOpened { main, redundant } => {
             format!("ring open: {main} SubDevices on MAIN, {redundant} on REDUNDANT")
         }
-        Event::BreakLocated { cable } => format!("Line break {}", names.cable(*cable)),
+        Event::BreakLocated { cable } => format!("Line break {}", names.cable(*cable, whom)),
         Event::RingClosed { main, place, .. } => {
-            let place = place.map_or_else(String::new, |cable| format!(" {}", names.cable(cable)));
+            let place = place.map_or_else(String::new, |cable| format!(" {}", names.cable(cable, whom)));
             format!("Line is fixed{place}: ring closed, {main} SubDevices on MAIN")
         }
         Event::RingUnsteady { changes } => {
             format!("ring unsteady: {changes} changes so far, the next is told when it has held for a second")
         }
         Event::JunctionLearned { closing } => {
-            let (head, tail) = (names.port(closing.head), names.port(closing.tail));
+            let (head, tail) = (names.port(closing.head, None), names.port(closing.tail, None));
             format!("ring behind a junction: from {tail} back to {head}")
         }
         Event::JunctionChanged { near, far, station, declared: [before, behind], broken, breaks } => {
-            let before = near.map_or_else(|| "an unknown SubDevice".to_owned(), |near| names.port_of(near, *before));
+            let before = near.map_or_else(|| "an unknown SubDevice".to_owned(), |near| names.port(near, *before));
             let station = station.map_or_else(String::new, |station| format!(" ({station})"));
-            let place = format!("between {before} and {}{station}", names.port_of(*far, *behind));
+            let place = format!("between {before} and {}{station}", names.port(*far, *behind));
             match (broken, breaks) {
                 (true, 0 | 1) => format!("Line break {place}: the ring behind the junction goes on without this cable"),
                 (true, _) => {
@@ -140,7 +141,7 @@ pub fn describe(event: &Event, names: &Names) -> String {
         Event::JunctionsBlocked { blocked: false, .. } => "frames come back again".to_owned(),
         Event::RedundancyLost { cause } => format!("redundancy lost: {cause}"),
         Event::RedundancyRegained => "redundancy regained: the ring stands a break".to_owned(),
-        Event::CableErrors { cable, errors } => format!("CRC errors rise {}: {errors}", names.cable(*cable)),
+        Event::CableErrors { cable, errors } => format!("CRC errors rise {}: {errors}", names.cable(*cable, whom)),
         Event::LinkDown { link } => format!("{link}: no carrier"),
         Event::LinkUp { link } => format!("{link}: the carrier is back"),
         Event::StateReached { subdevice, state } => format!("{}: {state}", names.of(*subdevice)),
@@ -167,7 +168,7 @@ pub fn describe(event: &Event, names: &Names) -> String {
         }
         Event::Unexpected { position, identity } => format!(
             "{}: not declared: vendor {:#010x}, product {:#010x}",
-            names.at(*position),
+            names.at(*position, whom[0]),
             identity.vendor_id,
             identity.product_code
         ),
@@ -175,7 +176,7 @@ pub fn describe(event: &Event, names: &Names) -> String {
             format!("{}: moved from position {} to {}", names.of(*subdevice), from.0, to.0)
         }
         Event::Mismatch { subdevice, position, field, expected, got } => {
-            let (name, place) = (names.of(*subdevice), names.at(*position));
+            let (name, place) = (names.of(*subdevice), names.at(*position, whom[0]));
             format!("{name}: expected {field} {expected:#010x}, {place} has {got:#010x}: it is left alone")
         }
         Event::GroupJoined { group } => format!("group {group}: all of it is there and in its state"),
@@ -199,7 +200,7 @@ pub fn describe(event: &Event, names: &Names) -> String {
         Event::Skipped { domain } => format!("domain {domain}: skipped, its frames are still out"),
         Event::ClocksLocked { largest_ns } => format!("all clocks are locked, within {largest_ns} ns"),
         Event::ReferenceClock { position: Some(position) } => {
-            format!("the clock of position {position} is the reference")
+            format!("the clock of {} is the reference", names.at(*position, whom[0]))
         }
         Event::ReferenceClock { position: None } => "no clock is left that could be the reference".into(),
         Event::DelaysChanged { clocks, largest_ns } => {

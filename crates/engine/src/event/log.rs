@@ -1,9 +1,10 @@
 //! The events of one half until somebody fetches them: bounded, the oldest are dropped and counted.
 
 use alloc::collections::VecDeque;
+use alloc::vec::Vec;
 
 use super::history::History;
-use super::{Event, TimedEvent};
+use super::{Event, Occupant, TimedEvent};
 use crate::time::Instant;
 
 /// Frames of other MainDevices among them: a collision must be seen, not archived.
@@ -18,11 +19,28 @@ pub struct EventLog {
     foreign: usize,
     dropped: u64,
     history: History,
+    occupants: Vec<Occupant>,
 }
 
 impl EventLog {
-    /// Appends an event.
+    /// From now on these are at the positions of the cabling, in its order.
+    pub fn set_occupants(&mut self, occupants: Vec<Occupant>) {
+        self.occupants = occupants;
+    }
+
+    /// Who is at positions of the cabling.
+    pub fn occupants(&self, positions: [Option<usize>; 2]) -> [Option<Occupant>; 2] {
+        positions.map(|position| self.occupants.get(position?).copied())
+    }
+
+    /// Appends an event, with those who are at the positions of the cabling that it names.
     pub fn push(&mut self, at: Instant, event: Event) {
+        let whom = self.occupants(event.positions());
+        self.push_of(at, event, whom);
+    }
+
+    /// Appends an event about somebody.
+    pub fn push_of(&mut self, at: Instant, event: Event, whom: [Option<Occupant>; 2]) {
         self.history.note(at, &event);
         if matches!(event, Event::ForeignFrame { .. }) {
             if self.foreign >= FOREIGN_KEPT {
@@ -35,7 +53,7 @@ impl EventLog {
             self.pop();
             self.dropped += 1;
         }
-        self.events.push_back(TimedEvent { at, event });
+        self.events.push_back(TimedEvent { at, event, whom });
     }
 
     /// What is remembered of them, whoever takes them.
@@ -60,8 +78,6 @@ impl EventLog {
 
 #[cfg(test)]
 mod tests {
-    use alloc::vec::Vec;
-
     use super::*;
     use crate::link::Link;
 

@@ -313,7 +313,11 @@ fn tell(bus: &Bus, fleet: &SharedFleet, found: &Cabling, told: &Cabling) {
             let member = access.members.iter().find(|member| member.station == station);
             member.and_then(|member| member.node).map_or(now, |node| Position(node as u16))
         });
-        bus.report(Event::LineCrossed { position, entry_port: crossing.entry_port });
+        let event = Event::LineCrossed { position, entry_port: crossing.entry_port };
+        match crossing.who {
+            Some((station, _)) => bus.report_of(event, fleet.access().occupant(station)),
+            None => bus.report(event),
+        }
     }
 }
 

@@ -22,7 +22,7 @@ use crate::info::{Direction, SubDeviceInfo};
 use crate::layout::Layout;
 use crate::mail::Mailbox;
 use crate::plan::{self, AreaPlan, PlanError, SubDevicePlan};
-use crate::ring_status::{Cable, CableErrors, RingStatus};
+use crate::ring_status::{Cable, CableErrors, Occupant, RingStatus};
 use crate::topology::{NodeStatus, Topology};
 
 /// How far a SubDevice is.
@@ -253,6 +253,20 @@ pub struct Fleet {
     pub(crate) junction_controls: Vec<Told>,
     /// Error counters.
     pub(crate) statistics: Book,
+}
+
+impl Fleet {
+    /// Who is at each position of the cabling.
+    pub fn occupants(&self) -> Vec<Occupant> {
+        let declared = |node: usize| self.members.iter().position(|member| member.node == Some(node));
+        let at = |(node, station): (usize, &StationAddress)| Occupant { station: *station, declared: declared(node) };
+        self.stations.iter().enumerate().map(at).collect()
+    }
+
+    /// The one with a station address.
+    pub fn occupant(&self, station: StationAddress) -> Occupant {
+        Occupant { station, declared: self.members.iter().position(|member| member.station == station) }
+    }
 }
 
 /// What SubDevices said about their ports, by position in the cabling of that number ([`Fleet::recablings`]).

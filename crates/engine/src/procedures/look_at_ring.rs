@@ -3,7 +3,7 @@
 
 use alloc::vec::Vec;
 
-use ringcat_wire::address::Position;
+use ringcat_wire::address::{Position, StationAddress};
 use ringcat_wire::al::AlStatus;
 use ringcat_wire::register::{DlStatus, ErrorCounters, Information, map};
 
@@ -21,6 +21,8 @@ pub struct RingLook {
     pub state: RingState,
     /// SubDevices on the main and on the redundant link.
     pub counts: (u16, u16),
+    /// Station addresses by position, as whoever operates the segment has given them; 0 where nobody has.
+    pub stations: Vec<StationAddress>,
     /// AL states by position.
     pub states: Vec<AlStatus>,
     /// How they are cabled.
@@ -47,9 +49,10 @@ pub async fn look_at_ring(bus: Bus) -> Result<RingLook, ScanError> {
     let positions = (0..counted.wkc().0).map(Position);
     let looks = bus.gather_in_turns(positions.collect(), look_at).await;
     let mut statuses = Vec::with_capacity(looks.len());
-    let (mut states, mut counters) = (Vec::new(), Vec::new());
+    let (mut stations, mut states, mut counters) = (Vec::new(), Vec::new(), Vec::new());
     for look in looks {
-        let (status, state, counted) = look.map_err(ScanError::Bus)?;
+        let (station, status, state, counted) = look.map_err(ScanError::Bus)?;
+        stations.push(station);
         statuses.push(status);
         states.push(state);
         counters.push(counted);
@@ -64,18 +67,23 @@ pub async fn look_at_ring(bus: Bus) -> Result<RingLook, ScanError> {
     };
     let cables = cables(&topology, bus.links());
     let cables = cables.into_iter().map(|cable| (cable, errors(cable.near).plus(errors(cable.far)))).collect();
-    Ok(RingLook { state, counts, states, topology, counters, cables, place })
+    Ok(RingLook { state, counts, stations, states, topology, counters, cables, place })
 }
 
-async fn look_at(bus: Bus, position: Position) -> Result<(NodeStatus, AlStatus, ErrorCounters), BusError> {
-    let (ports, (state, (dl_status, counters))) = bus
+type Seen = (StationAddress, NodeStatus, AlStatus, ErrorCounters);
+
+async fn look_at(bus: Bus, position: Position) -> Result<Seen, BusError> {
+    let (station, (ports, (state, (dl_status, counters)))) = bus
         .both(
-            bus.aprd(position, map::TYPE, Information::LEN),
+            bus.aprd(position, map::STATION_ADDRESS, 2),
             bus.both(
-                bus.aprd(position, map::AL_STATUS, AlStatus::LEN),
+                bus.aprd(position, map::TYPE, Information::LEN),
                 bus.both(
-                    bus.aprd(position, map::DL_STATUS, DlStatus::LEN),
-                    bus.aprd(position, map::RX_ERROR_COUNTER, ErrorCounters::LEN),
+                    bus.aprd(position, map::AL_STATUS, AlStatus::LEN),
+                    bus.both(
+                        bus.aprd(position, map::DL_STATUS, DlStatus::LEN),
+                        bus.aprd(position, map::RX_ERROR_COUNTER, ErrorCounters::LEN),
+                    ),
                 ),
             ),
         )
@@ -86,7 +94,8 @@ async fn look_at(bus: Bus, position: Position) -> Result<(NodeStatus, AlStatus, 
         receive_times: None,
         ports: Information::decode(&array(&ports?)).port_descriptor.ports,
     };
-    Ok((status, AlStatus::decode(&array(&state?)), ErrorCounters::decode(&array(&counters?))))
+    let station = StationAddress(u16::from_le_bytes(array(&station?)));
+    Ok((station, status, AlStatus::decode(&array(&state?)), ErrorCounters::decode(&array(&counters?))))
 }
 
 fn array<const N: usize>(bytes: &[u8]) -> [u8; N] {

@@ -400,7 +400,7 @@ async fn admit(bus: &Bus, fleet: &SharedFleet, stranger: &Stranger, info: &SubDe
     }
     {
         let access = &mut *fleet.access();
-        recabling::take_place(access, stranger.station, index);
+        recabling::take_place(bus, access, stranger.station, index);
         let member = &mut access.members[index];
         member.setup = Some(Rc::new(setup));
         member.info = Some(info);

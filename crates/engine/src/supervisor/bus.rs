@@ -20,8 +20,8 @@ use super::signal::Signal;
 use super::stray::Stray;
 use super::transfer::{Request, Stage, TransferId};
 use crate::board::Board;
-use crate::event::Event;
 use crate::event::history::History;
+use crate::event::{Event, Occupant};
 use crate::link::LinkSet;
 use crate::ring::RingState;
 use crate::time::Instant;
@@ -176,6 +176,22 @@ impl Bus {
     pub fn report(&self, event: Event) {
         let shared = &mut *self.shared.borrow_mut();
         shared.events.push(shared.now, event);
+    }
+
+    /// Reports an event about a SubDevice of which it is known who it is.
+    pub(crate) fn report_of(&self, event: Event, who: Occupant) {
+        let shared = &mut *self.shared.borrow_mut();
+        shared.events.push_of(shared.now, event, [Some(who), None]);
+    }
+
+    /// Says who is at the positions of the cabling: events that name some of these say whom they mean.
+    pub(crate) fn set_occupants(&self, occupants: Vec<Occupant>) {
+        self.shared.borrow_mut().events.set_occupants(occupants);
+    }
+
+    /// Who is at positions of the cabling.
+    pub(crate) fn occupants(&self, positions: [Option<usize>; 2]) -> [Option<Occupant>; 2] {
+        self.shared.borrow().events.occupants(positions)
     }
 
     /// What is remembered of the events.

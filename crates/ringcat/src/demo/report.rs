@@ -47,7 +47,7 @@ impl Reporter {
 
     /// An event of the scan; progress stays on one line of a terminal.
     pub fn scan_event(&mut self, event: &TimedEvent) {
-        let text = describe(&event.event, &Names::default());
+        let text = describe(event, &Names::default());
         if matches!(event.event, Event::ScanProgress { .. }) && self.terminal {
             write(format_args!("\r{:>10.3} ms   {text}", event.at.0 as f64 / 1e6));
             self.line_open = true;
@@ -58,7 +58,7 @@ impl Reporter {
 
     /// Any other event.
     pub fn event(&mut self, event: &TimedEvent, names: &Names) {
-        self.timed(event.at, " ", &describe(&event.event, names));
+        self.timed(event.at, " ", &describe(event, names));
     }
 
     /// Something the demonstration does.

@@ -123,7 +123,7 @@ fn ring_lines(status: &RingStatus, names: &Names) -> Vec<String> {
         RingState::Open => "OPEN",
     };
     let more = match (status.place, status.redundancy) {
-        (Some(cable), _) => format!(", break {}", names.cable(cable)),
+        (Some(cable), _) => format!(", break {}", names.cable(cable, status.place_ends)),
         (None, Redundancy::Lost { cause: cause @ RedundancyLoss::OneWay(_), .. }) => format!(", {cause}"),
         (None, _) if status.unsteady => format!(", unsteady: {} changes", status.changes),
         (None, _) => String::new(),

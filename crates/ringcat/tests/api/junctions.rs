@@ -5,8 +5,8 @@ use std::time::Duration;
 use ringcat::simulated::SimulatedSegment;
 use ringcat::text::{Names, describe};
 use ringcat::{
-    ActivateError, Declaration, Error, Event, JunctionConnection, JunctionError, JunctionMode, MainDevice, Options,
-    Refused, automatic,
+    ActivateError, Declaration, Error, Event, Instant, JunctionConnection, JunctionError, JunctionMode, MainDevice,
+    Options, Refused, TimedEvent, automatic,
 };
 use ringcat_engine::topology::{Closing, PortOf};
 use ringcat_wire::address::StationAddress;
@@ -95,6 +95,7 @@ fn load_add_apply_and_each_misuse_is_an_error_of_its_own_jr_05_jr_06_jr_08() {
 fn breaks_of_rings_behind_junctions_are_told_in_the_words_of_seed_001() {
     let names = Names(vec!["head".into(), "junction".into(), "first".into(), "second".into()]);
     let port = |node, port| PortOf { node, port };
+    let words = |event| describe(&TimedEvent::new(Instant(0), event), &names);
     // The places of the scan are not those of the declaration.
     let changed = |broken, breaks| Event::JunctionChanged {
         near: Some(port(5, 1)),
@@ -105,16 +106,14 @@ fn breaks_of_rings_behind_junctions_are_told_in_the_words_of_seed_001() {
         breaks,
     };
     let place = "between SubDevice 5 \"first\" port 1 and SubDevice 6 \"second\" port 0 (0x1004)";
-    assert!(describe(&changed(true, 1), &names).starts_with(&format!("Line break {place}")));
-    assert_eq!(describe(&changed(false, 0), &names), format!("Line is fixed {place}"));
-    assert!(describe(&changed(true, 2), &names).contains("2 cables"));
+    assert!(words(changed(true, 1)).starts_with(&format!("Line break {place}")));
+    assert_eq!(words(changed(false, 0)), format!("Line is fixed {place}"));
+    assert!(words(changed(true, 2)).contains("2 cables"));
     let learned = Event::JunctionLearned { closing: Closing { head: port(1, 1), tail: port(3, 1) } };
-    assert!(
-        describe(&learned, &names)
-            .contains("from SubDevice 3 \"second\" port 1 back to SubDevice 1 \"junction\" port 1")
-    );
-    let blocked = |breaks| describe(&Event::JunctionsBlocked { blocked: true, breaks }, &names);
+    // A scan knows no declaration.
+    assert!(words(learned).contains("from SubDevice 3 port 1 back to SubDevice 1 port 1"));
+    let blocked = |breaks| words(Event::JunctionsBlocked { blocked: true, breaks });
     assert!(blocked(1).contains("no frame comes back while a ring behind a junction is open"));
     assert!(blocked(0).contains("no frame comes back: two rings behind junctions broke at once"));
-    assert!(describe(&Event::JunctionUnknown { rings: 1 }, &names).starts_with("1 rings behind junctions closed"));
+    assert!(words(Event::JunctionUnknown { rings: 1 }).starts_with("1 rings behind junctions closed"));
 }

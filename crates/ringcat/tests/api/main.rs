@@ -5,6 +5,7 @@ mod demo;
 mod ethernet;
 mod gateway;
 mod junctions;
+mod names;
 mod services;
 mod states;
 mod stop;

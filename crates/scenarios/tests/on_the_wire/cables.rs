@@ -5,6 +5,8 @@
 
 use std::time::{Duration, Instant};
 
+use ringcat_wire::address::StationAddress;
+
 use crate::bench::{Bench, SimulatorLateness, await_op};
 use crate::said::Said;
 use crate::{RING_OF_16, states};
@@ -96,11 +98,12 @@ fn check_words(edge: &Edge, device: usize, is_cut: bool) {
     let places: Vec<&String> = edge.told.iter().filter(|told| told.starts_with("Line")).collect();
     let [place] = places[..] else { panic!("{}: {places:?}", edge.what) };
     let ends = [format!("between SubDevice {device} "), format!("port 1 and SubDevice {} ", device + 1)];
+    let station = StationAddress(0x1001 + device as u16 + 1);
     let (begin, end) = match is_cut {
-        true => ("Line break ", "port 0"),
-        false => ("Line is fixed ", "port 0: ring closed, 16 SubDevices on MAIN"),
+        true => ("Line break ", format!("port 0 ({station})")),
+        false => ("Line is fixed ", format!("port 0 ({station}): ring closed, 16 SubDevices on MAIN")),
     };
-    let is_right = ends.iter().all(|end| place.contains(end)) && place.starts_with(begin) && place.ends_with(end);
+    let is_right = ends.iter().all(|end| place.contains(end)) && place.starts_with(begin) && place.ends_with(&end);
     assert!(is_right, "{}: {place}", edge.what);
 }
 

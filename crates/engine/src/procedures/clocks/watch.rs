@@ -364,11 +364,15 @@ fn elect(bus: &Bus, fleet: &SharedFleet) -> bool {
 }
 
 fn tell_reference(bus: &Bus, fleet: &SharedFleet) {
-    let position = {
+    let reference = {
         let clocks = fleet.clocks.access();
-        clocks.reference.map(|index| Position(clocks.nodes[index].position))
+        clocks.reference.map(|index| (Position(clocks.nodes[index].position), clocks.nodes[index].station))
     };
-    bus.report(Event::ReferenceClock { position });
+    let event = Event::ReferenceClock { position: reference.map(|(position, _)| position) };
+    match reference {
+        Some((_, station)) => bus.report_of(event, fleet.access().occupant(station)),
+        None => bus.report(event),
+    }
 }
 
 /// Whose time the copies are to distribute.

@@ -49,6 +49,7 @@ pub(super) fn adopt(bus: &Bus, shared: &SharedFleet, rescan: &Rescan) -> bool {
     fleet.cables = cables;
     fleet.topology = rescan.topology.clone();
     fleet.stations = stations;
+    bus.set_occupants(fleet.occupants());
     let end = |at: PortOf| Some((*fleet.stations.get(at.node)?, at.port));
     let rings = fleet.topology.local_rings.iter().map(|ring| ring.closing);
     let closings = rings.filter_map(|closing| Some([end(closing.head)?, end(closing.tail)?])).collect();
@@ -59,7 +60,7 @@ pub(super) fn adopt(bus: &Bus, shared: &SharedFleet, rescan: &Rescan) -> bool {
 }
 
 /// A stranger that has a place in the cabling and becomes a member has that place as a member.
-pub(super) fn take_place(fleet: &mut Fleet, stranger: StationAddress, index: usize) {
+pub(super) fn take_place(bus: &Bus, fleet: &mut Fleet, stranger: StationAddress, index: usize) {
     let Some(at) = fleet.stations.iter().position(|station| *station == stranger) else { return };
     let member = &mut fleet.members[index];
     // Nobody answers at its temporary address any more, nor is anybody where the member was.
@@ -68,6 +69,7 @@ pub(super) fn take_place(fleet: &mut Fleet, stranger: StationAddress, index: usi
     }
     fleet.stations[at] = member.station;
     member.node = Some(at);
+    bus.set_occupants(fleet.occupants());
     fleet.recablings = fleet.recablings.wrapping_add(1);
 }
 

@@ -3,7 +3,8 @@
 use std::time::Duration;
 
 use ringcat::{
-    Declaration, DomainMember, Event, JunctionConnection, JunctionMode, Options, Scan, SubDeviceConfig, Who, automatic,
+    Declaration, DomainMember, Event, JunctionConnection, JunctionMode, Options, Scan, SubDeviceConfig, TimedEvent,
+    Who, automatic,
 };
 use ringcat_engine::topology::PortOf;
 use ringcat_sim::cable::{CableId, DeviceIndex, Endpoint};
@@ -170,12 +171,17 @@ fn own_with_group(cable: usize, broken: bool) -> Event {
     own(near, far, broken)
 }
 
-/// Changes name who is where with the group: station address, indices in the declaration (JR-07).
+/// Events name who is where with the group: station address, indices in the declaration (JR-07, CR-12).
 fn names_fit(world: &World, mark: Mark) -> bool {
     let stations = world.application().engine().stations();
     world.events(mark).iter().all(|timed| match timed.event {
         Event::JunctionChanged { near: Some(near), far, station, declared, .. } => {
             declared == [WITH_GROUP[near.node], WITH_GROUP[far.node]] && station == declared[1].map(|it| stations[it])
+        }
+        Event::BreakLocated { cable } | Event::RingClosed { place: Some(cable), .. } => {
+            let expected = |node: usize| WITH_GROUP[node].map(|it| (Some(it), stations[it]));
+            let whom = timed.whom.map(|who| who.map(|who| (who.declared, who.station)));
+            whom == cable.positions().map(|node| expected(node?))
         }
         _ => true,
     })
@@ -211,6 +217,14 @@ fn after_a_rescan_a_group_in_a_local_ring_is_a_piece_of_it_and_after_another_one
                     assert_eq!((told(&world, mark), crossed(&world, mark)), (expected, 0), "{what}, cable {cable}");
                     assert!(names_fit(&world, mark), "{what}, cable {cable}");
                 }
+            }
+            if two_links && round == 0 {
+                // The cable behind the junction, of the ring of two links.
+                let mark = edge(&mut world, &what, |world| world.cut(CableId(7)));
+                edge(&mut world, &what, |world| world.heal(CableId(7)));
+                let places = |timed: &&TimedEvent| timed.whom.iter().all(Option::is_some);
+                assert_eq!(world.events(mark).iter().filter(places).count(), 2, "{what}: broken, and whole");
+                assert!(names_fit(&world, mark), "{what}");
             }
             let mark = world.mark();
             GROUP.iter().rev().for_each(|device| world.power_off(*device));
