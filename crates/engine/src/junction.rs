@@ -83,6 +83,41 @@ pub enum JunctionError {
     },
     /// The mode is strict and there is no connection.
     NoConnection,
+    /// The closing cable is not there: the segment showed it when both of its ends were closed for a moment.
+    NotThere {
+        /// The connection.
+        connection: JunctionConnection,
+        /// What showed it.
+        shown: Shown,
+    },
+}
+
+/// What showed that no cable closes a ring where it was declared, when its ends were closed for a moment. Closed like that,
+/// a ring that is whole loses nobody, and one that is broken elsewhere those behind its break.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Shown {
+    /// A SubDevice did not answer that would have.
+    CutOff {
+        /// Its position, the first one of them.
+        position: usize,
+    },
+    /// A SubDevice behind the break did answer.
+    StillThere {
+        /// Its position, the first one of them.
+        position: usize,
+    },
+    /// No frame came back.
+    NoFrame,
+}
+
+impl fmt::Display for Shown {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Shown::CutOff { position } => write!(f, "the SubDevice at position {position} is cut off"),
+            Shown::StillThere { position } => write!(f, "the SubDevice at position {position} still answers"),
+            Shown::NoFrame => f.write_str("no frame comes back"),
+        }
+    }
 }
 
 impl fmt::Display for JunctionError {
@@ -101,6 +136,14 @@ impl fmt::Display for JunctionError {
             JunctionError::NotBehind(connection) => write!(f, "{connection}: its tail does not lie behind its head"),
             JunctionError::NoSuchPort { connection, subdevice, port } => {
                 write!(f, "{connection}: SubDevice {subdevice} has no port {port}")
+            }
+            JunctionError::NotThere { connection, shown } => {
+                let JunctionConnection { head, head_port, tail, tail_port } = connection;
+                write!(
+                    f,
+                    "{connection}: SubDevice {tail} port {tail_port} does not lead back to SubDevice {head} port "
+                )?;
+                write!(f, "{head_port}: with these ports closed {shown}")
             }
             JunctionError::NoConnection => f.write_str("strict junction redundancy needs at least one connection"),
         }

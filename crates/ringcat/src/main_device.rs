@@ -258,11 +258,13 @@ impl<L: Links> MainDevice<L> {
     /// Last step: lays out process data, starts the configuration of all SubDevices, and hands out the running application.
     ///
     /// # Errors
-    /// Nothing is loaded, or it does not fit what was scanned. The MainDevice comes back with the error, and what was
-    /// loaded with it.
+    /// Nothing is loaded, or it does not fit what was scanned. A ring that was declared is tried: one that does not close there
+    /// is refused. The MainDevice comes back with the error, and what was loaded with it.
     pub fn apply(mut self) -> Result<Application<L>, Box<Refused<MainDevice<L>>>> {
         let window = Arc::new(Window::new(self.acyclic_bytes));
-        match self.engine.apply() {
+        let check = self.engine.start_connection_check();
+        let checked = self.finish(check).map_err(ActivateError::Junction);
+        match checked.and_then(|()| self.engine.apply()) {
             Ok(active) => Ok(Application::new(self.links, Inline(self.engine), active, window)),
             Err(error) => Err(Box::new(Refused { error: error.into(), main_device: self })),
         }

@@ -223,15 +223,25 @@ impl SupervisorThread {
     /// # Errors
     /// Nothing is loaded, or it does not fit what was scanned.
     pub fn apply<C: Links>(self, links: C) -> Activated<C> {
-        // From now on the windows of the cyclic half count, so its first cycle must not be long in coming.
-        let active = self.with(move |engine| engine.apply());
-        match active.and_then(|result| result.map_err(Error::from)) {
+        // From then on the windows of the cyclic half count, so its first cycle must not be long in coming.
+        let apply = || self.with(move |engine| engine.apply())?.map_err(Error::from);
+        match self.check_connections().and_then(|()| apply()) {
             Ok(active) => {
                 let window = self.0.window.clone();
                 Ok(Application::new(links, self, active, window))
             }
             Err(error) => Err(Box::new(Refused { error, main_device: (self, links) })),
         }
+    }
+
+    /// Whether rings that were declared close where they are said to.
+    fn check_connections(&self) -> Result<(), Error> {
+        let ticket = self.with(|engine| {
+            let check = engine.start_connection_check();
+            engine.park(check)
+        })?;
+        let checked = self.ask(move |engine, _| engine.collect(&ticket))?.ok_or(Error::Gone)?;
+        Ok(checked.map_err(ActivateError::Junction)?)
     }
 
     /// Takes all SubDevices down to a state.

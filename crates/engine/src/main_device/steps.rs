@@ -6,11 +6,14 @@ use alloc::vec::Vec;
 
 use super::activate_error::ActivateError;
 use super::declaration::{Declaration, check};
+use super::pending::Pending;
 use super::{Active, MainDevice};
+use crate::config::{Resolution, resolve};
 use crate::event::Event;
 use crate::info::SubDeviceInfo;
 use crate::junction::{JunctionConnection, JunctionError, JunctionMode, START_PORT};
 use crate::procedures::fleet::Member;
+use crate::procedures::junction::refute;
 use crate::procedures::scan::{Scan, node_status, report_cabling};
 use crate::supervisor::Bus;
 use crate::topology::{Closing, NodeStatus, PortOf, Topology};
@@ -49,6 +52,47 @@ impl MainDevice {
         connection.check(&loaded.connections, loaded.declaration.subdevices.len())?;
         loaded.connections.push(connection);
         Ok(())
+    }
+
+    /// Before the last step, where connections were added: tries whether the rings close where they are said to, which takes
+    /// some frames, and about two seconds where one does not. A ring whose closing cable is open at both ends, or whose
+    /// SubDevices are not all there, is believed. What [`MainDevice::apply`] finds by itself is left to it.
+    ///
+    /// The result is [`JunctionError::NotThere`] where one does not.
+    pub fn start_connection_check(&mut self) -> Pending<Result<(), JunctionError>> {
+        let bus = self.supervisor.bus();
+        let declared = self.declared_closings().unwrap_or_default();
+        let own = bus.clone();
+        Pending::start(&own, async move {
+            if declared.closings.is_empty() {
+                return Ok(());
+            }
+            let closings: Vec<Closing> = declared.closings.iter().map(|(_, closing)| *closing).collect();
+            match refute(&bus, &declared.nodes, declared.main_count, &closings).await {
+                Some((number, shown)) => {
+                    Err(JunctionError::NotThere { connection: declared.closings[number].0, shown })
+                }
+                None => Ok(()),
+            }
+        })
+    }
+
+    /// What was declared of rings, where it is in what was scanned; `None` where nothing can be said of that.
+    fn declared_closings(&self) -> Option<DeclaredClosings> {
+        let loaded = self.loaded.as_ref().filter(|_| self.fleet.is_none())?;
+        let scan = self.scan.borrow().as_ref()?.as_ref().ok()?.clone();
+        let mut found: Vec<Option<SubDeviceInfo>> = alloc::vec![None; loaded.declaration.subdevices.len()];
+        for resolution in resolve(&loaded.declaration.subdevices, &scan.subdevices) {
+            if let Resolution::Found { config, info } = resolution {
+                found[config] = Some(scan.subdevices[info].clone());
+            }
+        }
+        let placed = |connection: &JunctionConnection| Some((*connection, closing(connection, &found).ok()?.ok()?));
+        Some(DeclaredClosings {
+            closings: loaded.connections.iter().filter_map(placed).collect(),
+            nodes: scan.subdevices.iter().map(node_status).collect(),
+            main_count: scan.main_count,
+        })
     }
 
     /// Last step: lays out process data, starts configuration and supervision, and hands out the cyclic half. What was
@@ -93,7 +137,13 @@ impl Loaded {
         }
         let mut closings = Vec::new();
         for connection in &self.connections {
-            closings.extend(closing(bus, connection, found).map_err(ActivateError::Junction)?);
+            match closing(connection, found).map_err(ActivateError::Junction)? {
+                Ok(closing) => closings.push(closing),
+                Err(subdevice) => {
+                    let what = alloc::format!("not there: its {connection} is not watched until a rescan finds it");
+                    bus.report(Event::PlanOddity { subdevice, what });
+                }
+            }
         }
         let nodes: Vec<NodeStatus> = scan.subdevices.iter().map(node_status).collect();
         let topology = Topology::with_local_rings(&nodes, scan.main_count, &closings);
@@ -125,18 +175,23 @@ impl Loaded {
     }
 }
 
-/// Where a declared connection is in the segment; `None` where one of its SubDevices is optional and not there.
+/// Rings that were declared and whose SubDevices are there, among those that were scanned.
+#[derive(Default)]
+struct DeclaredClosings {
+    closings: Vec<(JunctionConnection, Closing)>,
+    nodes: Vec<NodeStatus>,
+    main_count: usize,
+}
+
+/// Where a declared connection is in the segment; otherwise who of its SubDevices is optional and not there.
 fn closing(
-    bus: &Bus,
     connection: &JunctionConnection,
     found: &[Option<SubDeviceInfo>],
-) -> Result<Option<Closing>, JunctionError> {
+) -> Result<Result<Closing, usize>, JunctionError> {
     let JunctionConnection { head, head_port, tail, tail_port } = *connection;
     for (subdevice, port) in [(head, head_port), (head, START_PORT), (tail, tail_port)] {
         let Some(info) = found.get(subdevice).and_then(Option::as_ref) else {
-            let what = alloc::format!("not there: its {connection} is not watched until a rescan finds it");
-            bus.report(Event::PlanOddity { subdevice, what });
-            return Ok(None);
+            return Ok(Err(subdevice));
         };
         let ports = &info.controller.ports;
         if ports[usize::from(port)] == PortKind::NotImplemented && *ports != [PortKind::NotImplemented; 4] {
@@ -151,5 +206,5 @@ fn closing(
     if closing.tail.node <= closing.head.node {
         return Err(JunctionError::NotBehind(*connection));
     }
-    Ok(Some(closing))
+    Ok(Ok(closing))
 }

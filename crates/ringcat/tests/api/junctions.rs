@@ -81,6 +81,17 @@ fn load_add_apply_and_each_misuse_is_an_error_of_its_own_jr_05_jr_06_jr_08() {
         assert_eq!(got, ActivateError::Junction(expected));
         main_device = back;
     }
+    // Open ports allow this one as well; it was tried.
+    let wrong = JunctionConnection { tail: 3, ..GOOD };
+    main_device.load(declaration.clone()).expect("it is what was found");
+    main_device.add_junction_connection(wrong).expect("it looks as it should");
+    let (got, mut main_device) = refused(main_device.apply());
+    assert!(
+        matches!(got, ActivateError::Junction(JunctionError::NotThere { connection, .. }) if connection == wrong),
+        "{got:?}"
+    );
+    let text = got.to_string();
+    assert!(text.contains("SubDevice 3 port 1 does not lead back to SubDevice 1 port 1"), "{text}");
     main_device.load(declaration).expect("it is what was found");
     main_device.add_junction_connection(GOOD).expect("it fits");
     let mut application = main_device.apply().expect("it fits");

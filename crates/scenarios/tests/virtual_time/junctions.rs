@@ -1,6 +1,7 @@
 //! Rings behind junctions on one link (facts 9.4): every cable cut and healed, in every mode.
 
 mod closed_ports;
+mod declared;
 mod explorer;
 mod groups;
 mod learning;

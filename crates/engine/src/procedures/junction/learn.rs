@@ -58,20 +58,32 @@ pub(in super::super) async fn learn(
 /// Whether a ring closes here.
 async fn attempt(bus: &Bus, nodes: &[NodeStatus], topology: &Topology, closing: Closing) -> Result<bool, BusError> {
     let Closing { head, tail } = closing;
-    let ring = topology.local_rings.iter().find(|ring| ring.closing == closing);
-    let first = ring.and_then(|ring| ring.cables.first()).filter(|cable| cable.near.is_none());
-    let is_open = |node: &usize| !nodes[*node].dl_status.ports[0].communication;
-    let broken = first.map(|cable| cable.far.node).filter(is_open);
+    let broken = first_behind_break(nodes, topology, closing);
     // Behind a break all is reached through the closing cable.
     let silent = |node: usize| broken.is_some_and(|first| topology.hangs_behind(node, first));
     let ports = if broken.is_some() { Vec::from([head]) } else { Vec::from([head, tail]) };
+    let expected = |answers: &Vec<bool>| answers.iter().enumerate().all(|(node, is)| *is != silent(node));
+    let answers = with_closed(bus, &ports, nodes.len()).await?;
+    Ok(answers.as_ref().is_some_and(expected))
+}
+
+/// The member behind the break of a ring that is open elsewhere than at its closing cable.
+pub(super) fn first_behind_break(nodes: &[NodeStatus], topology: &Topology, closing: Closing) -> Option<usize> {
+    let ring = topology.local_rings.iter().find(|ring| ring.closing == closing)?;
+    let first = ring.cables.first().filter(|cable| cable.near.is_none())?;
+    let is_open = |node: &usize| !nodes[*node].dl_status.ports[0].communication;
+    Some(first.far.node).filter(is_open)
+}
+
+/// Who of so many answers, by position, while these ports are closed; `None` where frames do not come back then.
+pub(super) async fn with_closed(bus: &Bus, ports: &[PortOf], count: usize) -> Result<Option<Vec<bool>>, BusError> {
     let mut controls = Vec::new();
-    for port in &ports {
+    for port in ports {
         controls.push(DlControl::decode(&bus.fprd_array(station(*port), map::DL_CONTROL).await?));
     }
     let close = ports.iter().zip(&controls).map(|(port, control)| (*port, closed(*control, port.port)));
     let result = match write(bus, close.collect()).await {
-        Ok(()) => answering(bus, nodes.len()).await,
+        Ok(()) => answering(bus, count).await,
         Err(error) => Err(error),
     };
     let before = |control: &DlControl| DlControl { temporary: false, ..*control };
@@ -80,8 +92,7 @@ async fn attempt(bus: &Bus, nodes: &[NodeStatus], topology: &Topology, closing: 
         // Frames get lost, or one of the two does not answer: the settings end by themselves.
         bus.sleep(TEMPORARY).await;
     }
-    let expected = |answers: &Vec<bool>| answers.iter().enumerate().all(|(node, is)| *is != silent(node));
-    Ok(result.as_ref().is_ok_and(expected))
+    Ok(result.ok())
 }
 
 /// Who answers, by position.

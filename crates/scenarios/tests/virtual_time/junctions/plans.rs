@@ -1,8 +1,11 @@
 //! Random segments with rings behind junctions and a hot connect group, put together port by port.
 
-use ringcat::{Declaration, DomainMember, JunctionConnection, JunctionMode, Options, Scan, SubDeviceConfig, automatic};
+use ringcat::{
+    Declaration, DomainMember, Error, JunctionConnection, JunctionMode, Options, Scan, SubDeviceConfig, automatic,
+};
 use ringcat_sim::cable::{DeviceIndex, Endpoint};
 use ringcat_sim::frame::Port::{self, A, B, C, D};
+use ringcat_sim::network::Network;
 use scenarios::dice::Dice;
 use scenarios::segments::{MAIN, REDUNDANT, at, descriptions, wired_with};
 use scenarios::world::{CYCLE, World};
@@ -160,16 +163,28 @@ impl Plan {
     }
 
     pub fn world(&self, seed: u64, strict: bool, group_is_on: bool) -> World {
+        self.try_world(seed, strict, group_is_on, |_| ()).unwrap_or_else(|error| panic!("{error}"))
+    }
+
+    /// A world in which something was done before power-on, if the declaration is taken.
+    pub fn try_world(
+        &self,
+        seed: u64,
+        strict: bool,
+        group_is_on: bool,
+        before: impl FnOnce(&mut Network),
+    ) -> Result<World, Error> {
         let devices = descriptions(&self.kinds).into_iter().chain(if self.has_group { tool() } else { Vec::new() });
         let mut network = wired_with(devices.collect(), &self.cables);
         if self.has_group && !group_is_on {
             self.group().iter().for_each(|device| network.power_off(*device));
         }
+        before(&mut network);
         let junctions = if strict { JunctionMode::Strict } else { JunctionMode::Automatic };
         let options = Options { junctions, ..Options::default() };
         let connections: &[JunctionConnection] = if strict { &self.connections } else { &[] };
         let declare = |_: &Scan| self.declaration();
-        World::with_junctions(seed, network, &options, declare, connections).unwrap_or_else(|error| panic!("{error}"))
+        World::with_junctions(seed, network, &options, declare, connections)
     }
 
     fn declaration(&self) -> Declaration {

@@ -1,0 +1,93 @@
+//! Whether a ring that was declared closes where it is said to (JR-05, JR-06), before anybody is configured.
+//!
+//! Open ports do not tell: whatever follows the junction could as well hang on the last member of its ring. So it is tried, as
+//! [`super::learn()`] does: with both ends of the closing cable closed for a moment nobody is out of reach, and with the end
+//! at the junction alone, those behind a break of the ring are and nobody else. Where one end only has communication it is
+//! no cable between the two. Where neither has, the closing cable may be broken, which shows nothing: such a ring is believed.
+//!
+//! A segment that changes meanwhile shows nothing either, and what is found wrong is tried again.
+
+use alloc::vec::Vec;
+use core::time::Duration;
+
+use ringcat_wire::address::Position;
+use ringcat_wire::register::{DlStatus, map};
+
+use super::super::scan::station_at;
+use super::learn::{first_behind_break, with_closed};
+use crate::junction::Shown;
+use crate::supervisor::Bus;
+use crate::topology::{Closing, NodeStatus, PortOf, Topology};
+
+/// What is wrong has to be so each time.
+const TRIES: usize = 2;
+/// Looks until everybody answers, and the pause between two of them.
+const LOOKS: u8 = 5;
+const PAUSE: Duration = Duration::from_millis(2);
+
+/// A closing cable that is not where it was declared, by its number, and what shows it. Every SubDevice has the station address
+/// of its position.
+pub(crate) async fn refute(
+    bus: &Bus,
+    scanned: &[NodeStatus],
+    main_count: usize,
+    closings: &[Closing],
+) -> Option<(usize, Shown)> {
+    let mut last = None;
+    for _ in 0..TRIES {
+        let nodes = look(bus, scanned).await?;
+        last = Some(attempt(bus, &nodes, main_count, closings).await?);
+        if look(bus, scanned).await? != nodes {
+            return None;
+        }
+    }
+    last
+}
+
+async fn attempt(bus: &Bus, nodes: &[NodeStatus], main_count: usize, closings: &[Closing]) -> Option<(usize, Shown)> {
+    let topology = Topology::with_local_rings(nodes, main_count, closings);
+    let mut numbers: Vec<usize> = (0..closings.len()).collect();
+    // Who is behind a break depends on the rings that are in it.
+    numbers.sort_by_key(|number| core::cmp::Reverse(closings[*number].head.node));
+    for number in numbers {
+        let closing = closings[number];
+        let has_link = |at: &PortOf| nodes[at.node].dl_status.ports[usize::from(at.port & 3)].communication;
+        let ends = [closing.head, closing.tail];
+        let linked: Vec<PortOf> = ends.into_iter().filter(has_link).collect();
+        if linked.is_empty() {
+            continue;
+        }
+        let broken = if linked.len() == 2 { first_behind_break(nodes, &topology, closing) } else { None };
+        let silent = |node: usize| broken.is_some_and(|first| topology.hangs_behind(node, first));
+        let ports = if broken.is_some() { &linked[..1] } else { &linked[..] };
+        let shown = match with_closed(bus, ports, nodes.len()).await.ok()? {
+            Some(answers) => {
+                let odd = answers.iter().enumerate().find(|(node, answers)| **answers == silent(*node));
+                match odd.map(|(node, answers)| (node, *answers)) {
+                    Some((position, false)) => Shown::CutOff { position },
+                    Some((position, true)) => Shown::StillThere { position },
+                    None => continue,
+                }
+            }
+            None => Shown::NoFrame,
+        };
+        return Some((number, shown));
+    }
+    None
+}
+
+/// Ports as they are now; `None` where not everybody answers.
+async fn look(bus: &Bus, scanned: &[NodeStatus]) -> Option<Vec<NodeStatus>> {
+    // Where frames of a link got lost for a while nobody waits for them, until one has come back.
+    for _ in 0..LOOKS {
+        if bus.brd(map::TYPE, 1).await.is_ok_and(|counted| usize::from(counted.wkc().0) == scanned.len()) {
+            break;
+        }
+        bus.sleep(PAUSE).await;
+    }
+    let read = bus.gather(scanned.iter().copied().enumerate(), |bus, (node, before)| async move {
+        let bytes = bus.fprd_array(station_at(Position(node as u16)), map::DL_STATUS).await.ok()?;
+        Some(NodeStatus { dl_status: DlStatus::decode(&bytes), receive_times: None, ..before })
+    });
+    read.await.into_iter().collect()
+}

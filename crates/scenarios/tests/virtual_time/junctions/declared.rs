@@ -1,0 +1,124 @@
+//! Connections that are declared and are not there (JR-05, JR-06): they are refused, whatever open ports allow, and those that
+//! are there are not.
+
+use ringcat::{ActivateError, Error, JunctionConnection, JunctionError, JunctionMode, Options, automatic};
+use ringcat_sim::cable::{CableId, Endpoint};
+use ringcat_sim::frame::Port::{A, B, C, D};
+use ringcat_sim::network::Network;
+use scenarios::dice::Dice;
+use scenarios::segments::{MAIN, REDUNDANT, RING_OF_THREE, TWO_RINGS, at, wired};
+use scenarios::world::{CYCLE, World};
+
+use super::plans::Plan;
+use super::{ONE, STRICT, changed, edge, in_op, one_ring, told};
+
+fn connection((head, tail, tail_port): (usize, usize, u8)) -> JunctionConnection {
+    JunctionConnection { head, head_port: 1, tail, tail_port }
+}
+
+/// Which connection is refused as one that is not there.
+fn refused(seed: u64, network: Network, connections: &[JunctionConnection]) -> Option<JunctionConnection> {
+    let options = Options { junctions: JunctionMode::Strict, ..Options::default() };
+    let declare = |scan: &ringcat::Scan| automatic(&scan.subdevices, CYCLE);
+    not_there(World::with_junctions(seed, network, &options, declare, connections))
+}
+
+fn not_there(result: Result<World, Error>) -> Option<JunctionConnection> {
+    match result {
+        Ok(_) => None,
+        Err(Error::Activate(ActivateError::Junction(JunctionError::NotThere { connection, .. }))) => Some(connection),
+        Err(error) => panic!("{error}"),
+    }
+}
+
+#[test]
+fn a_ring_that_is_declared_to_close_elsewhere_is_refused_whole_and_broken_jr_05_jr_06() {
+    // All but the last open ports allow as well as the truth.
+    for wrong in [(1, 2, 1), (1, 3, 1), (1, 5, 1), (1, 6, 1)].map(connection) {
+        for broken in [None, Some(2), Some(3), Some(4), Some(5)] {
+            let mut network = one_ring();
+            broken.into_iter().for_each(|cable| network.cut(CableId(cable)));
+            // With the closing cable out nothing shows where another one would be that is out as well.
+            let is_hidden = broken == Some(5) && wrong.tail == 6;
+            let expected = (!is_hidden).then_some(wrong);
+            assert_eq!(refused(20, network, &[wrong]), expected, "{wrong}, cable {broken:?}");
+        }
+    }
+    for broken in RING_OF_THREE {
+        let mut network = one_ring();
+        network.cut(CableId(broken));
+        assert_eq!(refused(21, network, &[STRICT]), None, "cable {broken}");
+    }
+    let mut world = in_op(22, one_ring(), (JunctionMode::Strict, &[STRICT]));
+    assert_eq!(told(&world, world.beginning()), [], "what was tried is no break");
+    let mark = edge(&mut world, "cut", |world| world.cut(CableId(3)));
+    assert_eq!(told(&world, mark), [changed(3, true)]);
+}
+
+#[test]
+fn connections_of_two_rings_that_are_exchanged_or_of_a_line_are_refused_jr_05_jr_06() {
+    const KINDS: [&str; 7] =
+        ["junction", "digital-output-8", "servo", "junction", "digital-input-8", "block", "analog-input-4"];
+    let two = || wired(&KINDS, &TWO_RINGS);
+    let right = [(0, 2, 1), (3, 5, 1)].map(connection);
+    assert_eq!(refused(23, two(), &right), None);
+    let [first, second] = [(0, 5, 1), (3, 6, 1)].map(connection);
+    assert_eq!(refused(23, two(), &[first]), Some(first), "the tail of the other ring");
+    assert_eq!(refused(23, two(), &[right[0], second]), Some(second));
+    assert!(refused(23, two(), &[(0, 1, 1), (3, 5, 1)].map(connection)).is_some());
+    // No ring at all: a line through port 1, with a branch on port 3, and with a second interface at its end.
+    let line = [(MAIN, at(0, A)), (at(0, D), at(1, A)), (at(0, B), at(2, A)), (at(2, B), at(3, A))];
+    let kinds = ["junction", "digital-output-8", "servo", "digital-input-8"];
+    let wrong = connection((0, 1, 1));
+    assert_eq!(refused(24, wired(&kinds, &line), &[wrong]), Some(wrong));
+    let ring: Vec<(Endpoint, Endpoint)> = line.into_iter().chain([(at(3, B), REDUNDANT)]).collect();
+    assert_eq!(refused(25, wired(&kinds, &ring), &[wrong]), Some(wrong));
+    // In a ring of two links, whole and broken in front of the junction.
+    let cables = [
+        (MAIN, at(0, A)),
+        (at(0, B), at(1, A)),
+        (at(1, D), at(2, A)),
+        (at(2, B), at(3, A)),
+        (at(3, B), at(4, A)),
+        (at(4, B), at(1, B)),
+        (at(1, C), at(5, A)),
+        (at(5, B), at(6, A)),
+        (at(6, B), REDUNDANT),
+    ];
+    for broken in [None, Some(1), Some(6), Some(7)] {
+        for (tail, is_right) in [(2, false), (3, false), (4, true), (5, false), (6, false)] {
+            let mut network = wired(&ONE, &cables);
+            broken.into_iter().for_each(|cable| network.cut(CableId(cable)));
+            let declared = connection((1, tail, 1));
+            let got = refused(26, network, &[declared]);
+            assert_eq!(got, (!is_right).then_some(declared), "cable {broken:?}, tail {tail}");
+        }
+    }
+}
+
+#[test]
+fn of_random_segments_the_right_connections_are_taken_and_wrong_ones_refused_jr_05_jr_06() {
+    let (mut taken, mut wrong) = (0, 0);
+    for seed in 0..16 {
+        let dice = &mut Dice::new(900 + seed);
+        let plan = Plan::random(dice);
+        if plan.connections.iter().any(|it| it.head_port != 1) {
+            continue;
+        }
+        let what = |of: &Plan| format!("seed {seed}: {:?}", of.connections);
+        let broken = dice.one_in(2).then(|| *dice.pick(&plan.local));
+        let cut = |network: &mut Network| broken.into_iter().for_each(|cable| network.cut(CableId(cable)));
+        assert_eq!(not_there(plan.try_world(seed, true, true, cut)), None, "{}, cable {broken:?}", what(&plan));
+        taken += 1;
+        // One of them comes from another member.
+        let number = dice.below(plan.connections.len() as u64) as usize;
+        let tails = (0..plan.kinds.len()).filter(|node| plan.connections.iter().all(|it| it.tail != *node));
+        let tails: Vec<usize> = tails.filter(|node| *node > plan.connections[number].head).collect();
+        let Some(tail) = (!tails.is_empty()).then(|| *dice.pick(&tails)) else { continue };
+        let mut other = Plan { connections: plan.connections.clone(), ..plan };
+        other.connections[number] = connection((other.connections[number].head, tail, 1));
+        assert!(not_there(other.try_world(seed, true, true, |_| ())).is_some(), "{}", what(&other));
+        wrong += 1;
+    }
+    assert!(taken > 8 && wrong > 5, "{taken}, {wrong}");
+}
