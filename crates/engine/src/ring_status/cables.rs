@@ -50,7 +50,7 @@ pub fn port_errors(counters: &ErrorCounters, port: u8) -> CableErrors {
 }
 
 /// All cables: those that lead to the SubDevices, in their order, then those that close rings behind junctions, that of the
-/// redundant link last. A broken one is among them.
+/// redundant link last. A broken one is among them, but for one of a ring behind a junction of which an end is not known.
 pub fn cables(topology: &Topology, links: LinkSet) -> Vec<Cable> {
     let port = |node: usize| PortOf { node, port: topology.nodes[node].entry_port };
     let mut cables = Vec::with_capacity(topology.nodes.len() + 1);
@@ -65,6 +65,7 @@ pub fn cables(topology: &Topology, links: LinkSet) -> Vec<Cable> {
                 cables.push(Cable { near: Some(port(node)), far: None });
                 continue;
             }
+            None if topology.is_behind_unknown_cable(node) => continue,
             None => None,
         };
         cables.push(Cable { near, far: Some(port(node)) });

@@ -97,6 +97,12 @@ pub(super) fn unconnected(status: &NodeStatus) -> bool {
 }
 
 impl Topology {
+    /// Whether a SubDevice is a member of a local ring that is broken before it, from where is not known.
+    pub(crate) fn is_behind_unknown_cable(&self, node: usize) -> bool {
+        let mut cables = self.local_rings.iter().flat_map(|ring| &ring.cables);
+        cables.any(|cable| cable.near.is_none() && cable.far.node == node)
+    }
+
     /// Hangs a member of a broken local ring where the cable begins that is broken: as it hangs when the ring is whole.
     pub fn hang_behind_break(&mut self, near: PortOf, node: usize) {
         let port = usize::from(near.port & 3);

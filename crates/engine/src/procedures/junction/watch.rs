@@ -13,6 +13,7 @@ use ringcat_wire::address::StationAddress;
 
 use crate::event::Event;
 use crate::link::{Link, LinkSet};
+use crate::ring_status::{Cable, CableErrors};
 use crate::supervisor::Bus;
 use crate::time::Instant;
 use crate::topology::{Closing, LocalRing, NodeStatus, PortOf, RingCable, Topology};
@@ -119,9 +120,16 @@ impl JunctionWatch {
     pub fn complete_cabling(&mut self, fleet: &mut Fleet) {
         for (near, node) in self.completed.drain(..) {
             fleet.topology.hang_behind_break(near, node);
-            let far = fleet.topology.nodes.get(node).map(|it| PortOf { node, port: it.entry_port });
-            let known = fleet.cables.iter_mut().map(|(cable, _)| cable);
-            known.filter(|cable| cable.near.is_none() && cable.far == far).for_each(|cable| cable.near = Some(near));
+            let known = fleet.topology.connection_to(node).map(|it| Cable { near: Some(it.near), far: Some(it.far) });
+            if let Some(cable) = known.filter(|known| fleet.cables.iter().all(|(cable, _)| cable != known)) {
+                // Those that lead to SubDevices come first, in their order.
+                let closes = |it: &Cable| {
+                    self.closings.iter().any(|closing| (it.near, it.far) == (Some(closing.tail), Some(closing.head)))
+                };
+                let is_behind = |it: &Cable| it.far.is_none_or(|far| far.node > node) || closes(it);
+                let at = fleet.cables.iter().position(|(it, _)| is_behind(it)).unwrap_or(fleet.cables.len());
+                fleet.cables.insert(at, (cable, CableErrors::default()));
+            }
             fleet.recablings = fleet.recablings.wrapping_add(1);
         }
     }

@@ -1,13 +1,14 @@
-//! Rings in mode automatic that a scan finds though open ports allow many answers: several of them, one in another, one of
-//! them broken (JR-03).
+//! What a scan knows of rings behind junctions: in mode automatic several of them, one in another, one of them broken, though
+//! open ports allow many answers (JR-03); of one that is broken, all but an end of the broken cable.
 
-use ringcat::{Event, JunctionMode};
+use ringcat::{Cable, Event, JunctionMode};
 use ringcat_engine::topology::{Closing, PortOf};
 use ringcat_sim::cable::CableId;
 use ringcat_sim::frame::Port::{A, B, C, D};
 use scenarios::segments::{MAIN, REDUNDANT, at, wired};
+use scenarios::world::World;
 
-use super::{crossed, edge, in_op, told};
+use super::{STRICT, crossed, edge, in_op, one_ring, told};
 
 /// Junction 0 has a ring with two more of them, 1 and 3, with a ring each, and behind it another one, 5.
 const KINDS: [&str; 8] = [
@@ -68,5 +69,30 @@ fn four_rings_one_in_another_are_learned_whole_and_with_any_one_broken_jr_03() {
                 assert_eq!(told(&world, mark).len(), 1, "{what}");
             }
         }
+    }
+}
+
+/// A cable that was broken at the scan has an end that nobody knows: it is no cable of an interface, and is among the others
+/// once it has been whole.
+#[test]
+fn a_cable_of_a_local_ring_that_was_broken_at_the_scan_is_listed_with_its_ends_once_it_is_whole_jr_07() {
+    let cables = |world: &World| -> Vec<Cable> {
+        world.application().engine().cable_errors().into_iter().map(|(cable, _)| cable).collect()
+    };
+    let whole = cables(&in_op(60, one_ring(), (JunctionMode::Strict, &[STRICT])));
+    for broken in [2, 3, 4] {
+        let what = format!("cable {broken}");
+        let mut network = one_ring();
+        network.cut(CableId(broken));
+        let mut world = in_op(61, network, (JunctionMode::Strict, &[STRICT]));
+        let others: Vec<Cable> = whole.iter().enumerate().filter(|(at, _)| *at != broken).map(|(_, it)| *it).collect();
+        assert_eq!(cables(&world), others, "{what}");
+        edge(&mut world, &what, |world| world.heal(CableId(broken)));
+        assert_eq!(cables(&world), whole, "{what}");
+        // Errors are counted for it like for any other.
+        world.corrupt(CableId(broken), 30);
+        world.run_cycles(1_600);
+        let told = |timed: &&ringcat::TimedEvent| matches!(timed.event, Event::CableErrors { cable, .. } if cable == whole[broken]);
+        assert_eq!(world.events(world.beginning()).iter().filter(told).count(), 1, "{what}");
     }
 }
