@@ -262,7 +262,9 @@ impl MainDevice {
             let (enhanced, rings) = (self.options.enhanced_line_crossed, self.options.junctions);
             self.supervisor.spawn(supervise(bus.clone(), fleet.clone(), enhanced, rings));
         }
-        self.supervisor.spawn(watch_groups(bus.clone(), fleet.clone()));
+        // Without supervision nobody finds out who strangers are.
+        let follow = self.options.follow_groups && self.options.supervision;
+        self.supervisor.spawn(watch_groups(bus.clone(), fleet.clone(), follow));
         self.supervisor.spawn(watch_mail(bus.clone(), fleet.clone()));
         self.supervisor.spawn(serve_requests(bus.clone(), fleet.clone(), self.requests.clone()));
         self.supervisor.spawn(collect(bus, fleet.clone(), book.clone()));

@@ -97,8 +97,8 @@ impl SupervisorThread {
     /// gone. New ones are read, but left alone; those that have moved are events, too. Waits until the segment holds still
     /// and it is known of everybody who it is, for so long at most.
     ///
-    /// Places of breaks, errors of cables and positions in events go by the new cabling from then on, unless a ring is open,
-    /// a mandatory SubDevice does not answer, or rings behind junctions are known.
+    /// Places of breaks, errors of cables and positions in events go by the new cabling from then on, unless the ring of two
+    /// links is open or a mandatory SubDevice does not answer.
     ///
     /// # Errors
     /// Nothing is declared yet, the segment does not hold still or the bus fails at the end of the time, or as

@@ -7,7 +7,7 @@ use ringcat_wire::address::StationAddress;
 
 use super::rescan::{Rescan, Who};
 use crate::link::LinkSet;
-use crate::procedures::fleet::{Fleet, SharedFleet, stations_by_position};
+use crate::procedures::fleet::{Fleet, Member, Phase, SharedFleet, stations_by_position};
 use crate::ring::RingState;
 use crate::ring_status::{Cable, CableErrors, cables};
 use crate::supervisor::Bus;
@@ -15,6 +15,14 @@ use crate::topology::PortOf;
 
 /// The ends of a cable, by who is there.
 type Ends = [Option<(StationAddress, u8)>; 2];
+
+/// Whether a look could be taken over: nothing is broken or missing that would be forgotten.
+pub(super) fn is_whole(bus: &Bus, shared: &SharedFleet) -> bool {
+    let access = shared.access();
+    let closed = shared.board.ring().state == RingState::Closed && access.ring.state == RingState::Closed;
+    let is_missed = |member: &Member| !member.config.optional && member.phase == Phase::Absent;
+    (bus.links() == LinkSet::Single || closed) && !access.members.iter().any(is_missed)
+}
 
 /// Takes over the cabling, unless the ring of two links is open, or a mandatory SubDevice does not answer: what is broken
 /// would be forgotten. A ring behind a junction may be broken, for it is known where it closes, and what was told of it goes

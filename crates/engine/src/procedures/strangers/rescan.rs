@@ -82,6 +82,30 @@ impl Rescan {
 /// Looks until the segment holds still and it is known of everybody who it is, for so long at most. Then what is known is
 /// the result. Those that have moved are reported.
 pub(crate) async fn rescan(bus: &Bus, fleet: &SharedFleet, limit: Duration) -> Result<Rescan, ServiceError> {
+    let (rescan, _) = look_until(bus, fleet, limit).await?;
+    report_moved(bus, &rescan);
+    Ok(rescan)
+}
+
+/// A look nobody has asked for, because the segment is known to be another one. True where the cabling was taken over; where
+/// that cannot be nothing is sent, and nothing told.
+pub(crate) async fn follow_segment(bus: &Bus, fleet: &SharedFleet, limit: Duration) -> bool {
+    if !recabling::is_whole(bus, fleet) {
+        return false;
+    }
+    let Ok((rescan, true)) = look_until(bus, fleet, limit).await else { return false };
+    report_moved(bus, &rescan);
+    true
+}
+
+fn report_moved(bus: &Bus, rescan: &Rescan) {
+    for (subdevice, from, to) in rescan.moved() {
+        bus.report(Event::Moved { subdevice, from, to });
+    }
+}
+
+/// With whether the cabling was taken over.
+async fn look_until(bus: &Bus, fleet: &SharedFleet, limit: Duration) -> Result<(Rescan, bool), ServiceError> {
     let until = bus.now() + limit;
     fleet.note_news();
     loop {
@@ -91,13 +115,8 @@ pub(crate) async fn rescan(bus: &Bus, fleet: &SharedFleet, limit: Duration) -> R
         let is_last = bus.now() >= until;
         match looked {
             Ok(Some(rescan)) if is_last || rescan.is_complete() => {
-                if rescan.is_complete() {
-                    recabling::adopt(bus, fleet, &rescan);
-                }
-                for (subdevice, from, to) in rescan.moved() {
-                    bus.report(Event::Moved { subdevice, from, to });
-                }
-                return Ok(rescan);
+                let is_adopted = rescan.is_complete() && recabling::adopt(bus, fleet, &rescan);
+                return Ok((rescan, is_adopted));
             }
             Ok(None) if is_last => return Err(ServiceError::Unsteady),
             Err(error) if is_last => return Err(error.into()),

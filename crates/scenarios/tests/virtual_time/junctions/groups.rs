@@ -38,8 +38,13 @@ fn declare(_: &Scan) -> Declaration {
     declaration
 }
 
-fn world(seed: u64, network: Network, (mode, connections): Setting<'_>) -> World {
-    let options = Options { junctions: mode, ..Options::default() };
+fn world(seed: u64, network: Network, setting: Setting<'_>) -> World {
+    world_that(true, seed, network, setting)
+}
+
+/// `follow`: the cabling is looked at anew with each group that joins or leaves.
+fn world_that(follow: bool, seed: u64, network: Network, (mode, connections): Setting<'_>) -> World {
+    let options = Options { junctions: mode, follow_groups: follow, ..Options::default() };
     let mut world = World::with_junctions(seed, network, &options, declare, connections).expect("it fits");
     world.until(LIMIT, "all that are there settled", |world| world.application().all_settled());
     world.run_cycles(60);
@@ -140,10 +145,10 @@ const PIECE: [(Endpoint, Endpoint); 8] = [
     (at(1, C), at(4, A)),
 ];
 
-fn piece(seed: u64, two_links: bool, setting: Setting<'_>) -> World {
+fn piece(follow: bool, seed: u64, two_links: bool, setting: Setting<'_>) -> World {
     let mut network = network(&PIECE, two_links);
     GROUP.iter().for_each(|device| network.power_off(*device));
-    world(seed, network, setting)
+    world_that(follow, seed, network, setting)
 }
 
 /// Looks at the whole segment; the places of the declared ones.
@@ -199,16 +204,24 @@ fn power_on_group(world: &mut World) {
 const WITH_GROUP: [Option<usize>; 7] = [Some(0), Some(1), Some(2), Some(5), Some(6), Some(3), Some(4)];
 const WITHOUT_GROUP: [Option<usize>; 5] = [Some(0), Some(1), Some(2), Some(3), Some(4)];
 
+/// By itself, and otherwise when somebody asks for a rescan.
 #[test]
-fn after_a_rescan_a_group_in_a_local_ring_is_a_piece_of_it_and_after_another_one_no_more_jr_07_cr_17() {
-    for (seed, (two_links, setting)) in (20..).zip(SETTINGS) {
-        let mut world = piece(seed, two_links, setting);
-        let what = format!("{setting:?}, two links: {two_links}");
+fn a_group_in_a_local_ring_is_a_piece_of_it_and_when_it_has_left_no_more_jr_07_cr_17() {
+    let asked = SETTINGS.map(|setting| (false, setting));
+    for (seed, (follow, (two_links, setting))) in
+        (20..).zip(asked.into_iter().chain([1, 2].map(|it| (true, SETTINGS[it]))))
+    {
+        let mut world = piece(follow, seed, two_links, setting);
+        let what = format!("{setting:?}, two links: {two_links}, by itself: {follow}");
+        let look = |world: &mut World, expected: &[Option<usize>]| match follow {
+            true => world.run_cycles(150),
+            false => assert_eq!(rescan(world), expected, "{what}"),
+        };
         for round in 0..2 {
             let mark = world.mark();
             power_on_group(&mut world);
             assert_eq!(told(&world, mark).len(), 1, "{what}: the gap is closed");
-            assert_eq!(rescan(&mut world), WITH_GROUP, "{what}");
+            look(&mut world, &WITH_GROUP);
             for cable in [2, 3, 4, 5, 6] {
                 for broken in [true, false] {
                     let fault = if broken { Fault::Cut } else { Fault::Heal };
@@ -235,10 +248,10 @@ fn after_a_rescan_a_group_in_a_local_ring_is_a_piece_of_it_and_after_another_one
             }];
             assert_eq!(told(&world, mark), ends, "{what}: both of its ends are open");
             // What is behind the gap is known: it is one cable now.
-            assert_eq!(rescan(&mut world), WITHOUT_GROUP, "{what}");
+            look(&mut world, &WITHOUT_GROUP);
             world.run_cycles(60);
             assert_eq!(told(&world, mark).len(), 2, "{what}: which was told");
-            if round == 0 {
+            if round == 0 && !follow {
                 let mark = world.mark();
                 power_on_group(&mut world);
                 assert_eq!(told(&world, mark), [own((2, 1), (3, 0), false)], "{what}");
@@ -259,7 +272,7 @@ fn a_break_at_the_moment_of_a_groups_join_is_told_once_jr_07() {
     for (number, cable) in [4, 3, 5, 4, 6, 2].into_iter().enumerate() {
         let (two_links, setting) = SETTINGS[number % SETTINGS.len()];
         let what = format!("{setting:?}, two links: {two_links}, cable {cable}");
-        let mut world = piece(30 + number as u64, two_links, setting);
+        let mut world = piece(number % 2 == 0, 30 + number as u64, two_links, setting);
         power_on_group(&mut world);
         let mark = world.mark();
         // Before the look, while it goes on, and right behind it.
@@ -347,7 +360,7 @@ fn a_group_that_leaves_while_a_ring_is_broken_elsewhere_is_no_piece_of_it_once_t
         [(6, SETTINGS[0]), (2, SETTINGS[1]), (8, SETTINGS[2]), (7, SETTINGS[3])].into_iter().enumerate()
     {
         let what = format!("{setting:?}, two links: {two_links}, cable {cable}");
-        let mut world = piece(40 + number as u64, two_links, setting);
+        let mut world = piece(false, 40 + number as u64, two_links, setting);
         power_on_group(&mut world);
         rescan(&mut world);
         edge(&mut world, &what, |world| world.cut(CableId(cable)));
@@ -372,9 +385,9 @@ fn a_group_that_leaves_while_a_ring_is_broken_elsewhere_is_no_piece_of_it_once_t
 }
 
 #[test]
-fn a_group_that_is_a_piece_of_a_local_ring_joins_and_leaves() {
+fn a_group_that_is_a_piece_of_a_local_ring_joins_and_leaves_without_anybody_looking() {
     for (seed, (two_links, setting)) in (10..).zip(SETTINGS) {
-        let mut world = piece(seed, two_links, setting);
+        let mut world = piece(false, seed, two_links, setting);
         let what = format!("{setting:?}, two links: {two_links}");
         let changes = |world: &World, mark| -> Vec<bool> {
             let is = |event: &Event| matches!(event, Event::JunctionChanged { broken: true, .. });
