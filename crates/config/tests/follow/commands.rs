@@ -302,3 +302,23 @@ fn an_idn_is_written_where_the_command_has_its_value_and_nothing_else() {
     assert_eq!(idns(&several), 0);
     assert!(has_notice(&several, &["SoE/InitCmd \"cycle time\"", "Elements 0x48", "only values (0x40)"]));
 }
+
+/// Facts 8.2: document order within a transition, mailbox commands and registers alike.
+#[test]
+fn registers_and_mailbox_commands_of_a_transition_are_in_document_order_facts_8_2() {
+    let at_ps = |configuration: &ringcat_config::Configuration| -> Vec<Option<String>> {
+        let startup = drive(configuration).startup.into_iter();
+        startup.filter(|command| command.transition == Transition::Ps).map(|command| command.comment).collect()
+    };
+    let expected = ["clear assignment", "assign", "look", "own register"].map(|text| Some(text.to_owned()));
+    assert_eq!(at_ps(&configured(SMALL)), expected);
+    // The mailbox of the drive behind its commands, as no schema has it and some tools may.
+    let begin = SMALL.find("      <Mailbox ").expect("it is there");
+    let end = SMALL.find("</Mailbox>\n").expect("it is there") + "</Mailbox>\n".len();
+    let mailbox = &SMALL[begin..end];
+    let behind = SMALL.rfind("</InitCmds>\n").expect("it is there") + "</InitCmds>\n".len();
+    let moved = format!("{}{}{mailbox}{}", &SMALL[..begin], &SMALL[end..behind], &SMALL[behind..]);
+    let mut expected = expected;
+    expected.rotate_right(1);
+    assert_eq!(at_ps(&configured(&moved)), expected);
+}

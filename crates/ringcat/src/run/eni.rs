@@ -135,8 +135,9 @@ impl EniNetwork {
         let first = named.clone().next();
         let found = named.find(|(_, variable)| variable.direction == wanted).or(first);
         let (number, variable) = found.ok_or_else(|| {
-            let near = near(name, variables.iter().map(|variable| variable.name.as_str()));
-            let near = if near.is_empty() { String::new() } else { format!(", near it are {}", near.join(", ")) };
+            let useful = variables.iter().filter(|variable| variable.subdevice.is_some());
+            let near = near(name, useful.map(|variable| variable.name.as_str()));
+            let near = if near.is_empty() { String::new() } else { format!("; similar: {}", near.join(", ")) };
             let all = format!("`ringcat eni --details FILE` lists its {} variables", variables.len());
             Failure::new(format!("{option}: the file has no variable \"{name}\"{near}; {all}"))
         })?;
@@ -313,11 +314,11 @@ mod tests {
     fn what_is_wrong_with_variables_shows_before_anything_is_sent_with_names_that_are_near() {
         let refused = |set: &str| network(&[set], &[]).check_variables().unwrap_err().to_string();
         let unknown = refused("Lamp.Channel 2=1");
-        let expected = "--set: the file has no variable \"Lamp.Channel 2\", near it are \"Lamps.Channel 2\", ";
+        let expected = "--set: the file has no variable \"Lamp.Channel 2\"; similar: \"Lamps.Channel 2\", ";
         assert!(unknown.starts_with(expected), "{unknown}");
         assert!(unknown.ends_with("; `ringcat eni --details FILE` lists its 16 variables"), "{unknown}");
         let part = refused("velocity=1");
-        assert!(part.contains("near it are \"Drive.Target velocity\";"), "{part}");
+        assert!(part.contains("; similar: \"Drive.Target velocity\";"), "{part}");
         assert!(refused("completely different=1").contains("\"completely different\"; `ringcat eni"));
         assert!(refused("Buttons.Channel 1=1").contains("is an input"));
         let value = refused("Drive.Target velocity=fast");
@@ -341,6 +342,9 @@ mod tests {
         assert!(free.check_variables().unwrap_err().to_string().contains("nobody's process data"));
         let free = changed("<BitOffs>0</BitOffs>", nobodys, &[], &["Buttons.Channel 1"]);
         assert!(free.check_variables().unwrap_err().to_string().contains("nobody's process data"));
+        let free = changed("<BitOffs>0</BitOffs>", nobodys, &["uttons.Channel 1=1"], &[]);
+        let text = free.check_variables().unwrap_err().to_string();
+        assert!(text.contains("similar: ") && !text.contains("\"Buttons.Channel 1\""), "{text}");
         let same = changed("Lamps.Channel 1", "Buttons.Channel 1", &["Buttons.Channel 1=1"], &["Buttons.Channel 1"]);
         let (number, bits) = same.assignment("Buttons.Channel 1=1").unwrap();
         assert_eq!((same.file.configuration.image.variables[number].direction, bits), (Direction::Outputs, 1));
