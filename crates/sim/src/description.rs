@@ -161,6 +161,9 @@ impl Default for TransitionTimes {
 pub struct DeviceDescription {
     /// Name of this device in the segment.
     pub name: String,
+    /// Name in the SII, where that is to be told from those of others: with it SIIs of the same structure differ in their
+    /// fixed area. `None`: `name`, and they do not.
+    pub name_in_sii: Option<String>,
     /// Order code, string of the SII.
     pub order_code: String,
     /// Group, string of the SII.
@@ -239,6 +242,7 @@ impl DeviceDescription {
     pub fn plain(name: &str, identity: Identity) -> DeviceDescription {
         DeviceDescription {
             name: name.into(),
+            name_in_sii: None,
             order_code: name.into(),
             group: String::from("RingCAT"),
             identity,

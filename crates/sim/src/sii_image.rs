@@ -152,10 +152,32 @@ fn write(description: &DeviceDescription, image: &mut [u8]) -> Result<usize, Sii
     writer.finish()
 }
 
+/// The name that a MainDevice reads.
+fn name(description: &DeviceDescription) -> &str {
+    description.name_in_sii.as_ref().unwrap_or(&description.name)
+}
+
+/// Reserved words 0x20 to 0x23, among those from 0x1D on.
+const IMPRINT: core::ops::Range<usize> = 3..7;
+
+/// Tells the contents of one device from those of others of its kind that have another name: what follows the fixed area is
+/// not the same then, and MainDevices that read the rest once for all with the same fixed area would not see it. In many
+/// real images these words differ, too. 64 bits of FNV-1a.
+fn imprint(description: &DeviceDescription) -> [u16; 4] {
+    let Some(name) = &description.name_in_sii else { return [0; 4] };
+    let hash = name
+        .bytes()
+        .fold(0xCBF2_9CE4_8422_2325_u64, |hash, byte| (hash ^ u64::from(byte)).wrapping_mul(0x0000_0100_0000_01B3));
+    [0, 16, 32, 48].map(|shift| (hash >> shift) as u16)
+}
+
 fn header(description: &DeviceDescription, size_bytes: usize) -> SiiHeader {
     let kbit = u16::try_from(size_bytes / BYTES_PER_KBIT - 1).unwrap_or(u16::MAX);
     let mailbox = description.mailbox;
+    let mut reserved_1d = SiiHeader::default().reserved_1d;
+    reserved_1d[IMPRINT].copy_from_slice(&imprint(description));
     SiiHeader {
+        reserved_1d,
         pdi_control: u16::from_le_bytes([description.pdi_type, u8::from(description.emulation)]),
         alias: description.alias,
         identity: description.identity,
@@ -186,7 +208,7 @@ fn general<'a>(description: &'a DeviceDescription, strings: &mut StringTable<'a>
     General {
         group,
         order,
-        name: strings.number(&description.name),
+        name: strings.number(name(description)),
         coe: description.mailbox.map(|mailbox| mailbox.coe_details).unwrap_or_default(),
         foe: u8::from(protocols.foe()),
         eoe: u8::from(protocols.eoe()),

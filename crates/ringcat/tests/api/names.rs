@@ -65,3 +65,15 @@ fn positions_of_which_it_is_not_known_who_is_there_have_no_names() {
         ringcat::TimedEvent { whom: [Some(who), None], ..ringcat::TimedEvent::new(ringcat::Instant(0), crossed) };
     assert_eq!(describe(&timed, &names), "position 1 \"pump\" (0x1002): line crossed, frames enter at port 1");
 }
+
+/// As on real devices: those of one kind have one name in their SIIs, whose contents are read once for all of them. Whoever
+/// has a name of his own is told by it, though nothing else is different.
+#[test]
+fn simulated_devices_have_the_names_of_their_segment_file_and_copies_one_for_all() {
+    let text = "[[device]]\ntype = \"block\"\nname = \"member\"\ncount = 3\n[[device]]\ntype = \"block\"\n\
+                name = \"pump-1\"\n[[device]]\ntype = \"block\"\nname = \"pump-2\"\n";
+    let segment = SimulatedSegment::from_toml(text).expect("it is a segment");
+    let found = MainDevice::request(segment, &Options::default()).scan().expect("it is whole").subdevices;
+    let names: Vec<&str> = found.iter().map(|info| info.name.as_str()).collect();
+    assert_eq!(names, ["member", "member", "member", "pump-1", "pump-2"]);
+}

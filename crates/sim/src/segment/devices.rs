@@ -50,6 +50,7 @@ pub(super) fn describe(
         }
         for copy in 0..count {
             let mut description = template.clone();
+            description.name_in_sii = Some(name.clone());
             description.name = if count > 1 { format!("{name}-{}", copy + 1) } else { name.clone() };
             check_name(&description.name, &plan)
                 .map_err(|message| error(message, entry.name.as_ref().map_or(here, |name| line(text, &name.span()))))?;
