@@ -208,6 +208,19 @@ mod tests {
     }
 
     #[test]
+    fn interfaces_that_are_joined_without_any_subdevice_are_no_closed_ring() {
+        use ringcat_sim::cable::{Endpoint, HostLink};
+        let builder = ringcat_sim::network::builder::SegmentBuilder::new();
+        let joined = builder.cable(Endpoint::Host(HostLink::Main), Endpoint::Host(HostLink::Redundant)).build();
+        let mut segment = SimulatedSegment::new(joined.unwrap());
+        segment.network_mut().advance_by(Duration::from_millis(20));
+        let error = MainDevice::request(segment, &Options::default()).look_at_ring().unwrap_err();
+        let text = Failure::from(error).to_string();
+        assert!(text.contains("frames return, but no SubDevice processes them"), "{text}");
+        assert!(text.ends_with("something sends the frames back unchanged: is this the cable to the SubDevices?"));
+    }
+
+    #[test]
     fn the_place_of_a_break_and_damaged_frames_are_shown_wherever_they_are() {
         for cable in 0..=3 {
             let look = look(Some(cable), None);
