@@ -59,7 +59,10 @@ pub fn cables(topology: &Topology, links: LinkSet) -> Vec<Cable> {
     for (node, it) in topology.nodes.iter().enumerate() {
         let near = match it.parent {
             Some((parent, port)) => Some(PortOf { node: parent, port }),
-            None if is_headed(node) => last_leaf(topology, topology.main_count).map(|last| loose_end(topology, last)),
+            None if is_headed(node) => {
+                let usual = || last_leaf(topology, topology.main_count).map(|last| loose_end(topology, last));
+                topology.main_end.or_else(usual)
+            }
             // The interfaces are swapped: frames of the redundant link meet everybody.
             None if is_swapped => {
                 cables.push(Cable { near: Some(port(node)), far: None });
@@ -76,7 +79,8 @@ pub fn cables(topology: &Topology, links: LinkSet) -> Vec<Cable> {
         return cables;
     };
     let open = topology.open_ports.first().copied();
-    let end = Some(open.unwrap_or_else(|| loose_end(topology, last)));
+    let is_main_whole = topology.main_count == topology.nodes.len();
+    let end = open.or(topology.main_end.filter(|_| is_main_whole)).or_else(|| Some(loose_end(topology, last)));
     cables.push(if is_swapped { Cable { near: None, far: end } } else { Cable { near: end, far: None } });
     cables
 }

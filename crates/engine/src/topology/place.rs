@@ -81,7 +81,8 @@ pub(super) fn build(status: &[NodeStatus], main_count: usize, rings: &Rings) -> 
     }
     let is_open = redundant_head.is_some() || walk.open_ports.is_empty();
     let answering = if main_count == 0 && redundant_head.is_none() { status.len() } else { main_count };
-    let main_end = walk.loose_end(0..answering).filter(|_| is_open);
+    let towards = redundant_head.map_or(PortKind::Mii, |head| walk.kind(PortOf { node: head, port: 0 }));
+    let main_end = if is_open { walk.certain_end(0..answering, towards) } else { None };
     let Walk { nodes, open_ports, mut findings, .. } = walk;
     findings.sort_by_key(Finding::node);
     let local_rings = Vec::new();
@@ -132,6 +133,40 @@ impl<'s> Walk<'s> {
             }
         }
         end.filter(|at| self.exists(at.node, at.port))
+    }
+
+    /// Where a stub ends: at the end of its usual way, or at a port without a link that this has passed, where what was taken
+    /// for the line is a branch, as the terminals of a coupler are. Cables join ports of one kind, and `towards` is that of
+    /// the other end. `None` where several ports may be it.
+    pub(super) fn certain_end(&self, stub: core::ops::Range<usize>, towards: PortKind) -> Option<PortOf> {
+        let is_loose = |at: &PortOf| self.exists(at.node, at.port) && !self.is_open(at.node, at.port);
+        let ports = |node: usize| (0..4).map(move |port| PortOf { node, port });
+        let fits = |at: &PortOf| self.kind(*at) == towards;
+        let usual = self.loose_end(stub.clone());
+        let of_others = || stub.clone().filter(|node| usual.is_none_or(|end| end.node != *node)).flat_map(ports);
+        if !self.joins_like_kinds() || (usual.is_some() && !of_others().any(|at| is_loose(&at))) {
+            // Kinds say nothing, or there is no choice but that of the last one's ports.
+            return usual;
+        }
+        let own = usual.and_then(|end| [end].into_iter().chain(ports(end.node).filter(is_loose)).find(fits));
+        let mut others = of_others().filter(is_loose).filter(fits);
+        match (own, others.next(), others.next()) {
+            (Some(own), None, _) => Some(own),
+            (None, Some(other), None) => Some(other),
+            _ => None,
+        }
+    }
+
+    /// Whether all cables that are known join ports of one kind, as real ones do.
+    fn joins_like_kinds(&self) -> bool {
+        let kind_above =
+            |node: &Node| node.parent.map_or(PortKind::Mii, |(node, port)| self.kind(PortOf { node, port }));
+        let mut nodes = self.nodes.iter().enumerate();
+        nodes.all(|(at, node)| self.kind(PortOf { node: at, port: node.entry_port }) == kind_above(node))
+    }
+
+    pub(super) fn kind(&self, at: PortOf) -> PortKind {
+        self.status[at.node].ports[usize::from(at.port & 3)]
     }
 
     /// Whether the controller has the port. One that claims to have none is not believed.

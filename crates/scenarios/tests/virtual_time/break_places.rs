@@ -4,7 +4,7 @@
 use std::time::Duration;
 
 use ringcat::{Cable, Event, PortOf};
-use ringcat_sim::cable::{CableId, DeviceIndex};
+use ringcat_sim::cable::{CableId, DeviceIndex, Endpoint};
 use ringcat_sim::frame::Port;
 use ringcat_sim::network::Network;
 use scenarios::check::ring_events;
@@ -69,6 +69,41 @@ fn a_branch_that_is_not_there_is_never_taken_for_the_break_of_the_ring_cr_12() {
             matches!(told.last(), Some(Event::RingClosed { place: Some(it), .. }) if *it == cable(number)),
             "{told:?}"
         );
+    }
+}
+
+/// A ring of couplers that goes on from their port 2, as it does on real ones, with two terminals on port 1 of each.
+fn ring_of_couplers(couplers: usize) -> (Vec<&'static str>, Vec<(Endpoint, Endpoint)>) {
+    use Port::{A, B, C};
+    let mut kinds = vec!["coupler"; couplers];
+    let mut cables: Vec<(Endpoint, Endpoint)> = vec![(MAIN, at(0, A))];
+    cables.extend((1..couplers).map(|number| (at(number - 1, C), at(number, A))));
+    cables.push((at(couplers - 1, C), REDUNDANT));
+    for coupler in 0..couplers {
+        cables.extend([(at(coupler, B), at(kinds.len(), A)), (at(kinds.len(), B), at(kinds.len() + 1, A))]);
+        kinds.extend(["digital-output-8", "digital-input-8"]);
+    }
+    (kinds, cables)
+}
+
+#[test]
+fn a_ring_of_couplers_with_terminals_that_is_broken_from_the_start_has_its_place_cr_12() {
+    for (couplers, number) in (1..4).flat_map(|couplers| (0..=couplers).map(move |number| (couplers, number))) {
+        let (kinds, cables) = ring_of_couplers(couplers);
+        let mut network = wired(&kinds, &cables);
+        network.advance_by(Duration::from_millis(10));
+        network.cut(CableId(number));
+        let mut world = World::in_op(number as u64, network);
+        world.run_cycles(60);
+        let end = |end: Endpoint| match end {
+            Endpoint::Device(device, port) => {
+                let node = (0..kinds.len()).find(|it| world.device_of(*it) == Some(device)).expect("scanned");
+                Some(PortOf { node, port: port.index() as u8 })
+            }
+            Endpoint::Host(_) => None,
+        };
+        let truth = Cable { near: end(cables[number].0), far: end(cables[number].1) };
+        assert_eq!(places(&world, world.beginning()), [truth], "{couplers} couplers, cable {number}");
     }
 }
 

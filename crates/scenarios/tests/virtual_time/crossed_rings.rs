@@ -132,10 +132,6 @@ fn random_ring(dice: &mut Dice) -> (Vec<(Endpoint, Endpoint)>, usize, usize) {
     for (device, ports) in free.iter_mut().enumerate().take(trunk) {
         let way_on = if dice.one_in(2) { 1 } else { dice.below(3) as usize };
         let mut ends = [at(device, Port::A), at(device, ports.remove(way_on))];
-        if way_on != 1 {
-            // A branch on the usual way on would be taken for it where the ring is broken from the start.
-            ports.retain(|port| *port != Port::B);
-        }
         if dice.one_in(4) {
             ends.reverse();
         }
