@@ -23,7 +23,7 @@ use crate::info::SubDeviceInfo;
 pub(crate) use ends::{are_doubtful, ends_of_break, seam};
 use local_ring::Rings;
 pub use local_ring::{Closing, LocalRing, RingCable, candidates};
-pub(crate) use local_ring::{candidates_with, rings_shown};
+pub(crate) use local_ring::{candidates_with, rings_shown, with_longer_rings};
 
 /// What a SubDevice reported about its ports.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]

@@ -25,7 +25,7 @@ use crate::junction::JunctionMode;
 use crate::link::{Link, LinkSet};
 use crate::ring::RingState;
 use crate::supervisor::{Bus, BusError};
-use crate::topology::{Closing, Finding, NodeStatus, Topology, rings_shown};
+use crate::topology::{Closing, Finding, NodeStatus, Topology, rings_shown, with_longer_rings};
 
 /// From a change of ports until the segment is looked at: a plug that is pushed in bounces.
 const SETTLE: Duration = Duration::from_millis(5);
@@ -141,7 +141,7 @@ async fn look(bus: &Bus, known: &impl Known) -> Result<Option<Cabling>, BusError
     });
     let nodes: Vec<NodeStatus> = nodes.collect();
     let closings = known.closings(&before.stations);
-    let topology = Topology::with_local_rings(&nodes, usize::from(before.counts.0.0), &closings);
+    let topology = with_longer_rings(&nodes, usize::from(before.counts.0.0), &closings);
     let mut found: Vec<Crossing> = topology
         .findings
         .iter()

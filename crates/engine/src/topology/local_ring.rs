@@ -7,7 +7,7 @@
 use alloc::vec::Vec;
 
 use super::place::Walk;
-use super::{NodeStatus, PortOf, Topology};
+use super::{Finding, NodeStatus, PortOf, Topology};
 
 /// The cable through which a local ring comes back to its junction.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
@@ -170,6 +170,71 @@ pub(crate) fn rings_shown(nodes: &[NodeStatus], ring_closed: bool) -> usize {
     open_ports.saturating_sub(usize::from(ring_closed) + hanging) / 2
 }
 
+/// The cabling with these rings, also where one has been made longer behind its known tail and is broken: frames come from
+/// where it closes though somebody behind the tail has nothing on port 0. Members that nobody knows of are entered from behind then, and
+/// not crossed.
+pub(crate) fn with_longer_rings(nodes: &[NodeStatus], main_count: usize, closings: &[Closing]) -> Topology {
+    let mut topology = Topology::with_local_rings(nodes, main_count, closings);
+    let mut closings = closings.to_vec();
+    // Broken where it closes now, it is a line that leads on behind its known tail.
+    let is_line = |it: &Closing| {
+        let head = nodes.get(it.head.node).map(|node| node.dl_status.ports[usize::from(it.head.port & 3)]);
+        head.is_some_and(|port| !port.communication)
+            && nodes.get(it.tail.node).is_some_and(|node| open(node, it.tail.port))
+    };
+    let rings: Vec<Closing> = closings.iter().filter(|closing| !is_line(closing)).copied().collect();
+    if rings.len() < closings.len() && crossed(&topology).next().is_some() {
+        let without = Topology::with_local_rings(nodes, main_count, &rings);
+        if crossed(&without).count() < crossed(&topology).count() {
+            (topology, closings) = (without, rings);
+        }
+    }
+    for at in 0..closings.len() {
+        let Closing { head, tail } = closings[at];
+        let Some(first) = nodes.get(head.node) else { continue };
+        let met = nodes.get(tail.node + 1..main_count.min(nodes.len())).unwrap_or_default();
+        let is_longer = open(first, head.port) && met.iter().any(unconnected);
+        if !is_longer || crossed(&topology).next().is_none() {
+            continue;
+        }
+        let ends = (tail.node + 1..nodes.len()).take(MOST_LONGER);
+        let ends = ends.flat_map(|node| [1, 3, 2].map(|port| PortOf { node, port }));
+        for tail in ends.filter(|end| open(&nodes[end.node], end.port)) {
+            closings[at].tail = tail;
+            let longer = Topology::with_local_rings(nodes, main_count, &closings);
+            let is_explained = crossed(&longer).all(|node| node <= head.node || node > tail.node);
+            // No more is left open than what leads to the redundant link.
+            let is_explained = is_explained && longer.open_ports.len() <= 1;
+            if is_explained && crossed(&longer).count() < crossed(&topology).count() {
+                topology = longer;
+                break;
+            }
+        }
+        closings[at].tail = tail_of(&topology, head).unwrap_or(tail);
+    }
+    topology
+}
+
+/// Who is entered at another port than 0, as it seems.
+fn crossed(topology: &Topology) -> impl Iterator<Item = usize> + '_ {
+    topology.findings.iter().filter_map(|finding| match finding {
+        Finding::CrossedLine { node, .. } | Finding::UnconnectedPort0 { node } => Some(*node),
+        _ => None,
+    })
+}
+
+/// The end of the ring that closes at a port.
+fn tail_of(topology: &Topology, head: PortOf) -> Option<PortOf> {
+    topology
+        .local_rings
+        .iter()
+        .map(|ring| ring.closing)
+        .find(|closing| closing.head == head)
+        .map(|closing| closing.tail)
+}
+
+/// SubDevices by which a ring may have been made longer.
+const MOST_LONGER: usize = 64;
 /// Steps of a search: enough for all places where a ring of a thousand SubDevices may close.
 const STEPS: usize = 200_000;
 /// Local rings that are looked for.

@@ -425,3 +425,31 @@ fn a_group_that_is_a_piece_of_a_local_ring_joins_and_leaves_without_anybody_look
         }
     }
 }
+
+/// Nobody knows that it is a piece of the ring; but what is entered from where the ring closes is not crossed.
+#[test]
+fn a_group_that_was_never_seen_at_the_end_of_a_local_ring_is_no_crossed_line_when_the_ring_breaks_jr_04() {
+    let cables = [
+        (MAIN, at(0, A)),
+        (at(0, B), at(1, A)),
+        (at(1, D), at(2, A)),
+        (at(2, B), at(3, A)),
+        (at(3, B), at(5, A)),
+        (at(5, B), at(6, A)),
+        (at(6, B), at(1, B)),
+        (at(1, C), at(4, A)),
+    ];
+    for (seed, two_links) in [(70, false), (71, true)] {
+        let mut network = network(&cables, two_links);
+        GROUP.iter().for_each(|device| network.power_off(*device));
+        let mut world = world(seed, network, SETTINGS[1].1);
+        power_on_group(&mut world);
+        for cable in [4, 5, 6, 3, 2] {
+            let what = format!("two links: {two_links}, cable {cable}");
+            edge(&mut world, &what, |world| world.cut(CableId(cable)));
+            edge(&mut world, &what, |world| world.heal(CableId(cable)));
+            assert_eq!(crossed(&world, world.beginning()), 0, "{what}");
+        }
+        others_stay(&world, "cut and healed");
+    }
+}
