@@ -48,15 +48,8 @@ pub(super) fn startup(
         let subject = named("CoE/InitCmd", &command.comment);
         match sdo(command, bus.ccs_is_reversed) {
             Ok(action) => {
-                add(
-                    command.place,
-                    &command.transitions,
-                    &subject,
-                    command.timeout_ms,
-                    &command.comment,
-                    action,
-                    notices,
-                );
+                let CoeCommand { place, transitions, timeout_ms, comment, .. } = command;
+                add(*place, transitions, &subject, *timeout_ms, comment, action, notices);
             }
             Err(reason) => {
                 let what = format!("{subject} of object {:#06x}:{:02x}", command.index, command.sub_index);
@@ -66,37 +59,18 @@ pub(super) fn startup(
     }
     for command in mailbox.soe.iter().filter(|command| !command.disabled) {
         let subject = named("SoE/InitCmd", &command.comment);
+        let SoeCommand { place, transitions, timeout_ms, comment, .. } = command;
         match idn(command) {
-            Ok(action) => {
-                add(
-                    command.place,
-                    &command.transitions,
-                    &subject,
-                    command.timeout_ms,
-                    &command.comment,
-                    action,
-                    notices,
-                );
-            }
-            Err(reason) => notices.add(Some(command.place), Some(index), subject, reason),
+            Ok(action) => add(*place, transitions, &subject, *timeout_ms, comment, action, notices),
+            Err(reason) => notices.add(Some(*place), Some(index), subject, reason),
         }
     }
     for command in mailbox.eoe.iter().filter(|command| !command.disabled) {
         let subject = named("EoE/InitCmd", &command.comment);
-        match ip(command) {
-            Ok(settings) => {
-                let action = StartupAction::Ip(settings);
-                add(
-                    command.place,
-                    &command.transitions,
-                    &subject,
-                    command.timeout_ms,
-                    &command.comment,
-                    action,
-                    notices,
-                );
-            }
-            Err(reason) => notices.add(Some(command.place), Some(index), subject, reason),
+        let EoeCommand { place, transitions, timeout_ms, comment, .. } = command;
+        match ip(command).map(StartupAction::Ip) {
+            Ok(action) => add(*place, transitions, &subject, *timeout_ms, comment, action, notices),
+            Err(reason) => notices.add(Some(*place), Some(index), subject, reason),
         }
     }
     for command in mailbox.others.iter().filter(|command| !command.disabled) {

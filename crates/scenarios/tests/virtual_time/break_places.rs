@@ -6,27 +6,11 @@ use std::time::Duration;
 use ringcat::{Cable, Event, PortOf};
 use ringcat_sim::cable::{CableId, DeviceIndex, Endpoint};
 use ringcat_sim::frame::Port;
-use ringcat_sim::network::Network;
 use scenarios::check::ring_events;
 use scenarios::segments::{MAIN, REDUNDANT, at, cable_of_ring, ring_of_16, wired};
 use scenarios::world::{Mark, World};
 
-/// A ring of five with a branch of two on port 3 of its second device. Cables 0 to 5 are the ring's, 6 leads to the branch.
-fn ring_with_branch() -> Network {
-    use Port::{A, B, D};
-    let kinds = ["digital-output-8", "junction", "servo", "coupler", "digital-input-8", "block", "analog-input-4"];
-    let cables = [
-        (MAIN, at(0, A)),
-        (at(0, B), at(1, A)),
-        (at(1, B), at(2, A)),
-        (at(2, B), at(3, A)),
-        (at(3, B), at(4, A)),
-        (at(4, B), REDUNDANT),
-        (at(1, D), at(5, A)),
-        (at(5, B), at(6, A)),
-    ];
-    wired(&kinds, &cables)
-}
+use crate::topologies::ring_with_branch;
 
 /// A cable of its ring, by positions: those of the branch are met behind the second one.
 fn cable(number: usize) -> Cable {
@@ -46,7 +30,7 @@ fn places(world: &World, mark: Mark) -> Vec<Cable> {
 #[test]
 fn a_branch_that_is_not_there_is_never_taken_for_the_break_of_the_ring_cr_12() {
     for number in 0..=5 {
-        let mut world = World::in_op(number as u64, ring_with_branch());
+        let mut world = World::in_op(number as u64, ring_with_branch(Port::D));
         world.cut(CableId(6));
         world.run_cycles(200);
         let mark = world.mark();

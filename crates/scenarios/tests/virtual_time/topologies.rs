@@ -100,8 +100,8 @@ fn a_subdevice_with_one_port_leaves_the_ring_open_and_that_is_told_cr_22() {
     assert_eq!(world.left_op(mark).iter().filter(|device| device.0 != 2).count(), 0);
 }
 
-/// A ring of five with a branch on a port of its second device.
-fn ring_with_branch(port: Port) -> Network {
+/// A ring of five with a branch of two on a port of its second device. Cables 0 to 5 are the ring's, 6 leads to the branch.
+pub(crate) fn ring_with_branch(port: Port) -> Network {
     use Port::{A, B};
     let kinds = ["digital-output-8", "junction", "servo", "coupler", "digital-input-8", "block", "analog-input-4"];
     let cables = [

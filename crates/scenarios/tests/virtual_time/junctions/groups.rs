@@ -1,5 +1,7 @@
 //! Hot connect groups in rings behind junctions and behind their members, on one link and on two, whole and broken.
 
+mod at_the_end;
+
 use std::time::Duration;
 
 use ringcat::{
@@ -291,68 +293,6 @@ fn a_break_at_the_moment_of_a_groups_join_is_told_once_jr_07() {
     }
 }
 
-/// The group is the end of the ring. Where it is away the ring ends at the one before it; until it is known who comes back it
-/// is nobody's, and the ring must be taken neither for another one nor for crossed lines.
-#[test]
-fn a_group_that_is_the_end_of_a_local_ring_comes_back_as_what_it_was_jr_03_jr_04() {
-    let cables = [
-        (MAIN, at(0, A)),
-        (at(0, B), at(1, A)),
-        (at(1, D), at(2, A)),
-        (at(2, B), at(3, A)),
-        (at(3, B), at(5, A)),
-        (at(5, B), at(6, A)),
-        (at(6, B), at(1, B)),
-        (at(1, C), at(4, A)),
-    ];
-    let strict = [JunctionConnection { head: 1, head_port: 1, tail: 6, tail_port: 1 }];
-    let settings = [(JunctionMode::Automatic, &[][..]), (JunctionMode::Strict, &strict)];
-    for (number, (setting, looks)) in [(0, false), (1, true), (0, true), (1, true)].into_iter().enumerate() {
-        let setting = settings[setting];
-        let what = format!("{setting:?}, looks: {looks}, run {number}");
-        let mut network = network(&cables, number == 2);
-        let closing = |node: usize, broken| own((node, 1), (1, 1), broken);
-        let mut world = if number == 3 {
-            // It has not been there yet: the connection is watched from the look on that finds it.
-            GROUP.iter().for_each(|device| network.power_off(*device));
-            let mut world = world(60 + number as u64, network, setting);
-            power_on_group(&mut world);
-            assert_eq!(rescan(&mut world).len(), 7, "{what}");
-            world
-        } else {
-            let mut world = world(60 + number as u64, network, setting);
-            until_joined(&mut world);
-            world
-        };
-        GROUP.iter().rev().for_each(|device| world.power_off(*device));
-        until_left(&mut world);
-        if looks {
-            assert_eq!(rescan(&mut world), WITHOUT_GROUP, "{what}");
-        }
-        power_on_group(&mut world);
-        for cable in [3, 4, 5, 6] {
-            let mark = edge(&mut world, &what, |world| world.cut(CableId(cable)));
-            assert!(told(&world, mark).len() <= 1, "{what}, cable {cable}");
-            edge(&mut world, &what, |world| world.heal(CableId(cable)));
-        }
-        assert_eq!(rescan(&mut world)[..6], [Some(0), Some(1), Some(2), Some(3), Some(5), Some(6)], "{what}");
-        for cable in [3, 4, 5, 6] {
-            let ends = |broken| match cable {
-                6 => closing(5, broken),
-                cable => own((cable - 1, 1), (cable, 0), broken),
-            };
-            for broken in [true, false] {
-                let fault = if broken { Fault::Cut } else { Fault::Heal };
-                let mark = edge(&mut world, &what, |world| world.fault(fault(CableId(cable))));
-                assert_eq!(told(&world, mark), [ends(broken)], "{what}, cable {cable}");
-            }
-        }
-        assert_eq!(crossed(&world, world.beginning()), 0, "{what}");
-        assert!(!world.saw(world.beginning(), |event| matches!(event, Event::JunctionUnknown { .. })), "{what}");
-        others_stay(&world, &what);
-    }
-}
-
 /// Two breaks of one ring, or one of each ring: nothing is taken over until the segment is whole but for the gap.
 #[test]
 fn a_group_that_leaves_while_a_ring_is_broken_elsewhere_is_no_piece_of_it_once_that_is_mended() {
@@ -423,33 +363,5 @@ fn a_group_that_is_a_piece_of_a_local_ring_joins_and_leaves_without_anybody_look
             assert_eq!(told(&world, mark), [own((2, 1), (3, 0), true)], "{what}");
             others_stay(&world, &what);
         }
-    }
-}
-
-/// Nobody knows that it is a piece of the ring; but what is entered from where the ring closes is not crossed.
-#[test]
-fn a_group_that_was_never_seen_at_the_end_of_a_local_ring_is_no_crossed_line_when_the_ring_breaks_jr_04() {
-    let cables = [
-        (MAIN, at(0, A)),
-        (at(0, B), at(1, A)),
-        (at(1, D), at(2, A)),
-        (at(2, B), at(3, A)),
-        (at(3, B), at(5, A)),
-        (at(5, B), at(6, A)),
-        (at(6, B), at(1, B)),
-        (at(1, C), at(4, A)),
-    ];
-    for (seed, two_links) in [(70, false), (71, true)] {
-        let mut network = network(&cables, two_links);
-        GROUP.iter().for_each(|device| network.power_off(*device));
-        let mut world = world(seed, network, SETTINGS[1].1);
-        power_on_group(&mut world);
-        for cable in [4, 5, 6, 3, 2] {
-            let what = format!("two links: {two_links}, cable {cable}");
-            edge(&mut world, &what, |world| world.cut(CableId(cable)));
-            edge(&mut world, &what, |world| world.heal(CableId(cable)));
-            assert_eq!(crossed(&world, world.beginning()), 0, "{what}");
-        }
-        others_stay(&world, "cut and healed");
     }
 }
