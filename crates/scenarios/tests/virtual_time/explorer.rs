@@ -3,6 +3,7 @@
 //!
 //! `SEED=17 cargo test -p scenarios --test virtual_time explorer::environment -- --nocapture` runs one seed, `SEED=1000..2000` many.
 
+use std::ops::Range;
 use std::time::Duration;
 
 use ringcat::{Event, Options, RingState, automatic};
@@ -158,7 +159,7 @@ fn run(seed: u64) {
     assert_eq!(world.application().cyclic_counters().late, links.outdated(), "old frames, and no others, are late");
 }
 
-fn runs(seeds: std::ops::Range<u64>) {
+fn runs(seeds: Range<u64>) {
     println!("seeds {} to {}", seeds.start, seeds.end - 1);
     let failed: Vec<u64> = seeds.filter(|seed| std::panic::catch_unwind(|| run(*seed)).is_err()).collect();
     assert_eq!(failed, [], "seeds that fail");
@@ -181,6 +182,11 @@ fn whatever_happens_all_come_back_seeds_200_to_299() {
 
 #[test]
 fn seeds_from_the_environment() {
+    from_environment(run, runs);
+}
+
+/// One seed or a range of them from the environment variable SEED.
+pub(crate) fn from_environment(run: impl FnOnce(u64), runs: impl FnOnce(Range<u64>)) {
     let Ok(text) = std::env::var("SEED") else { return println!("skipped: no SEED given") };
     let (first, last) = text.split_once("..").unwrap_or((&text, ""));
     let first = first.parse().expect("SEED=17 or SEED=1000..2000");

@@ -346,11 +346,5 @@ fn what_is_told_of_rings_groups_and_looks_at_random_is_what_was_done_jr_07_cr_17
 
 #[test]
 fn seeds_from_the_environment() {
-    let Ok(text) = std::env::var("SEED") else { return println!("skipped: no SEED given") };
-    let (first, last) = text.split_once("..").unwrap_or((&text, ""));
-    let first = first.parse().expect("SEED=17 or SEED=1000..2000");
-    match last.parse() {
-        Ok(last) => runs(first..last),
-        Err(_) => run(first),
-    }
+    crate::explorer::from_environment(run, runs);
 }
