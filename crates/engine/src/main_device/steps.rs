@@ -153,9 +153,7 @@ impl Loaded {
         }
         Ok(topology)
     }
-}
 
-impl Loaded {
     /// Both ends of the closing cables of the rings that were declared, if any were, wherever their SubDevices are;
     /// otherwise of those of the topology.
     pub(super) fn closings(
