@@ -29,4 +29,5 @@ pub mod short_runs;
 pub mod start_lists;
 pub mod tap;
 pub mod terminals;
+pub mod truth;
 pub mod world;

@@ -58,12 +58,16 @@ pub struct Tap {
     cyclic_sent: Instant,
     /// Frames of the exchange that it sent last.
     out: Vec<Out>,
+    /// Marks of the frames of the exchange that left, until they are taken.
+    departed: Vec<(u8, u8)>,
     /// Copies that came back when newer frames had been sent, or twice.
     outdated: u64,
     /// Whether links can be taken down.
     can_disconnect: bool,
     /// Frames that are to be lost.
     losses: Vec<Loss>,
+    /// Of a thousand frames so many are lost, at random.
+    lost_per_mille: u64,
     /// Waits end by up to so much too late, at random.
     oversleep_ns: u64,
     /// Each frame leaves up to so much after it was handed over, at random.
@@ -84,9 +88,11 @@ impl Tap {
             idle: 0,
             cyclic_sent: Instant::default(),
             out: Vec::new(),
+            departed: Vec::new(),
             outdated: 0,
             can_disconnect: true,
             losses: Vec::new(),
+            lost_per_mille: 0,
             oversleep_ns: 0,
             late_sending_ns: 0,
             random: FNV_OFFSET,
@@ -124,7 +130,16 @@ impl Tap {
         self.can_disconnect = false;
     }
 
+    /// From now on so many of a thousand frames get lost, on their way out or back, at random from a seed.
+    pub fn lose_per_mille(&mut self, lost: u64, seed: u64) {
+        self.lost_per_mille = lost;
+        self.random = FNV_OFFSET ^ seed.wrapping_mul(FNV_PRIME);
+    }
+
     fn is_lost(&mut self, outward: bool, bytes: &[u8]) -> bool {
+        if self.lost_per_mille > 0 && self.random(999) < self.lost_per_mille {
+            return true;
+        }
         self.losses.iter_mut().any(|loss| loss.hits(outward, bytes))
     }
 
@@ -168,6 +183,11 @@ impl Tap {
         self.outdated
     }
 
+    /// Frames of the exchange that have left since the last call: byte 1 of the source address, and Idx.
+    pub fn take_departed(&mut self) -> Vec<(u8, u8)> {
+        std::mem::take(&mut self.departed)
+    }
+
     /// Measures flights anew.
     pub fn measure_flights(&mut self) {
         self.flight_ns = 0;
@@ -195,6 +215,7 @@ impl Tap {
             self.cyclic_sent = now;
             if link == Link::Main {
                 self.out.push(Out { frame, back: 0 });
+                self.departed.push(frame);
             }
         } else {
             self.flight_ns = self.flight_ns.max(now.since(self.cyclic_sent).as_nanos() as u64);

@@ -28,9 +28,12 @@ pub use self::journal::Step;
 use crate::check::{Delivery, Judged, Mirror};
 use crate::loss::Loss;
 use crate::tap::{Fingerprint, Tap};
+use crate::truth::Truth;
 
 /// Cycle time of scenarios that do not say otherwise.
 pub const CYCLE: Duration = Duration::from_millis(1);
+/// Segments of up to so many devices are judged from inside the devices.
+const MOST_LOGGED: usize = 80;
 /// Virtual time that a scan may take.
 const SCAN_LIMIT: Duration = Duration::from_secs(20);
 
@@ -51,6 +54,7 @@ pub struct World {
     pub scan: Scan,
     devices: Vec<Option<DeviceIndex>>,
     mirror: Mirror,
+    truth: Truth,
     journal: Journal,
     /// Bytes of outputs, by domain.
     outputs: Vec<Vec<Range<usize>>>,
@@ -102,6 +106,11 @@ impl World {
         declare: impl FnOnce(&Scan) -> Declaration,
         connections: &[JunctionConnection],
     ) -> Result<World, Error> {
+        let mut network = network;
+        if network.devices().len() <= MOST_LOGGED {
+            let devices = (0..network.devices().len()).map(DeviceIndex);
+            devices.for_each(|device| network.device_mut(device).controller.log_logical());
+        }
         let mut tap = Tap::new(network);
         tap.set_limit(tap.now() + SCAN_LIMIT);
         let mut main_device = MainDevice::request(tap, options);
@@ -109,6 +118,7 @@ impl World {
         let scan = main_device.scan_with(|event| journal.event(event.clone()))?;
         main_device.links_mut().set_limit(Instant::NEVER);
         let declaration = declare(&scan);
+        let under_way = declaration.domains.iter().map(|domain| domain.under_way).max().unwrap_or(1);
         let (domains, declared) = (declaration.domains.len(), declaration.subdevices.len());
         main_device.load(declaration)?;
         connections.iter().try_for_each(|connection| main_device.add_junction_connection(*connection))?;
@@ -116,9 +126,10 @@ impl World {
         let network = application.links().network();
         let devices: Vec<Option<DeviceIndex>> = Vec::new();
         let mirror = Mirror::new(application.directory(), &devices, domains);
+        let truth = Truth::new(application.directory(), &devices, domains, under_way.into());
         journal.status = network.devices().map(|device| device.al_status()).collect();
         let outputs = output_ranges(application.directory(), domains, declared);
-        let mut world = World { seed, application, scan, devices, mirror, journal, outputs, domains, cycles: 0 };
+        let mut world = World { seed, application, scan, devices, mirror, truth, journal, outputs, domains, cycles: 0 };
         world.recognise();
         Ok(world)
     }
@@ -135,6 +146,7 @@ impl World {
         let strict = self.mirror.strict;
         self.mirror = Mirror::new(self.application.directory(), &self.devices, self.domains);
         self.mirror.strict = strict;
+        self.truth.follow(self.application.directory(), &self.devices);
     }
 
     /// Runs until all declared SubDevices are settled and all domains complete.
@@ -171,8 +183,10 @@ impl World {
         });
         self.cycles += 1;
         let at = self.application.now();
+        let departed = self.application.links_mut().take_departed();
         let network = self.application.links().network();
         for (domain, status) in due {
+            self.truth.judge(status, domain, self.application.exchange(), network);
             let exchange = self.application.exchange();
             let delivery = self.mirror.judge(status, domain, exchange, network);
             if delivery != Delivery::None {
@@ -181,6 +195,7 @@ impl World {
             }
             if exchange.status(domain).skipped == status.skipped {
                 self.mirror.depart(domain, exchange, network);
+                self.truth.depart(domain, &departed);
             }
         }
         self.journal.watch(at, network);
@@ -349,6 +364,11 @@ impl World {
     /// Bytes of process data that were compared with what devices had or latched.
     pub fn compared(&self) -> u64 {
         self.mirror.compared()
+    }
+
+    /// Inputs that counted as fresh, and outputs of complete cycles, that were found in a device's own log.
+    pub fn proven(&self) -> u64 {
+        self.truth.proven()
     }
 
     /// Time of the simulation.

@@ -16,6 +16,7 @@ mod config;
 mod counters;
 mod events;
 mod fmmu;
+mod logical_log;
 mod memory;
 mod pass;
 mod pdi;
@@ -31,6 +32,7 @@ mod watchdog;
 pub use clock::{ClockErrors, Wander};
 pub use clock_registers::LatchPin;
 pub use config::{ControllerConfig, MAX_UNITS};
+pub use logical_log::LogicalAccess;
 
 use ringcat_wire::address::RegisterAddress;
 use ringcat_wire::register::{LoopControl, map};
@@ -41,6 +43,7 @@ use clock::Clock;
 use compiled::Compiled;
 use events::EVENT_PROCESS_DATA_WATCHDOG;
 use fmmu::Fmmus;
+use logical_log::LogicalLog;
 use memory::Memory;
 use pass::Pass;
 use ports::Ports;
@@ -107,6 +110,8 @@ pub struct Controller {
     deadline: SimTime,
     /// Counts how often that was found out.
     schedules: u32,
+    /// Logical datagrams that were answered, where a checker wants to know.
+    logical_log: LogicalLog,
 }
 
 impl Controller {
@@ -136,6 +141,7 @@ impl Controller {
             irq: 0,
             deadline: SimTime::NEVER,
             schedules: 0,
+            logical_log: LogicalLog::default(),
             config,
         }
     }
@@ -143,6 +149,21 @@ impl Controller {
     /// What the controller is made of.
     pub fn config(&self) -> &ControllerConfig {
         &self.config
+    }
+
+    /// From now on logical datagrams that the SubDevice answers are logged.
+    pub fn log_logical(&mut self) {
+        self.logical_log.turn_on();
+    }
+
+    /// Whether they are logged.
+    pub fn logs_logical(&self) -> bool {
+        self.logical_log.is_on()
+    }
+
+    /// The newest logical datagrams that the SubDevice answered, oldest first; none where they are not logged.
+    pub fn logical_accesses(&self) -> impl Iterator<Item = &LogicalAccess> {
+        self.logical_log.accesses()
     }
 
     /// Tells what the port's link detection found. Without power nothing is detected.

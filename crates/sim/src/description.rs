@@ -180,6 +180,8 @@ pub struct DeviceDescription {
     pub ports: [PortKind; 4],
     /// Usage of the FMMUs, also their number in the SII.
     pub fmmus: Vec<FmmuUsage>,
+    /// FMMUs that the controller has; `None`: 8.
+    pub controller_fmmus: Option<u8>,
     /// SyncManagers in order.
     pub sync_managers: Vec<SyncManagerDescription>,
     /// Process data objects, inputs and outputs.
@@ -251,6 +253,7 @@ impl DeviceDescription {
             id_switch_address: None,
             ports: [PortKind::Mii, PortKind::Mii, PortKind::NotImplemented, PortKind::NotImplemented],
             fmmus: Vec::new(),
+            controller_fmmus: None,
             sync_managers: Vec::new(),
             pdos: Vec::new(),
             objects: Vec::new(),

@@ -25,6 +25,7 @@ mod ethernet;
 mod explorer;
 mod failures;
 mod fairness;
+mod freshness;
 mod hot_connect;
 mod junctions;
 mod mail;

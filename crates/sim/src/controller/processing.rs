@@ -14,6 +14,7 @@ use ringcat_wire::register::map;
 use super::Controller;
 use super::events::{EVENT_AL_STATUS, EVENT_DL_STATUS};
 use super::fmmu::Direction;
+use super::logical_log::{LogicalAccess, frame_id};
 use super::memory::Side;
 use super::pass::Pass;
 use crate::frame::{DatagramPlace, Fcs, FrameKind, SimFrame, UDP_CHECKSUM, is_udp};
@@ -86,6 +87,7 @@ impl Controller {
     }
 
     fn datagram(&mut self, bytes: &mut [u8], place: DatagramPlace) {
+        let frame_id = self.logical_log.is_on().then(|| frame_id(bytes));
         let Some(datagram) = bytes.get_mut(usize::from(place.header)..place.end()) else { return };
         let (header, rest) = datagram.split_at_mut(place.data() - usize::from(place.header));
         let (data, wkc) = rest.split_at_mut(usize::from(place.length));
@@ -102,7 +104,11 @@ impl Controller {
             }
             Command::Lrd | Command::Lwr | Command::Lrw => {
                 let address = u32::from_le_bytes([header[2], header[3], header[4], header[5]]);
-                self.logical(command, address, data)
+                let added = self.logical(command, address, data);
+                if let Some(frame_id) = frame_id {
+                    self.log_access((frame_id, header[1]), command, address, added, data);
+                }
+                added
             }
             Command::Aprd | Command::Apwr | Command::Aprw | Command::Armw => {
                 let adp = u16::from_le_bytes([header[2], header[3]]);
@@ -194,6 +200,17 @@ impl Controller {
             Command::Lwr => u16::from(written),
             _ => u16::from(read) + 2 * u16::from(written),
         }
+    }
+
+    fn log_access(&mut self, frame: (u8, u8), command: Command, address: u32, added: u16, data: &[u8]) {
+        if added == 0 {
+            return;
+        }
+        let (read, written) = match command {
+            Command::Lwr => (false, true),
+            _ => (added & 1 != 0, added & 2 != 0),
+        };
+        self.logical_log.note(LogicalAccess { frame, command, address, read, written, data: data.to_vec() });
     }
 
     fn logical_read(&mut self, first: u64, end: u64, data: &mut [u8]) -> bool {

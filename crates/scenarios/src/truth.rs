@@ -1,0 +1,145 @@
+//! What the devices themselves say of process data, held against what the engine says: at all times, whatever faults are
+//! active.
+//!
+//! Inputs that count as fresh were put into a frame of the judged cycle by that SubDevice, byte for byte; outputs of a
+//! complete cycle were taken by every SubDevice from a frame of it. Both are read from the log that each simulated
+//! controller keeps of the logical datagrams that it answered.
+
+use std::collections::VecDeque;
+use std::ops::Range;
+
+use ringcat::{Direction, DomainId, DomainState, DomainStatus, Freshness};
+use ringcat_engine::exchange::Exchange;
+use ringcat_engine::main_device::Directory;
+use ringcat_sim::cable::DeviceIndex;
+use ringcat_sim::controller::LogicalAccess;
+use ringcat_sim::network::Network;
+
+/// Process data of a SubDevice in one SyncManager.
+#[derive(Debug)]
+struct Area {
+    subdevice: usize,
+    device: DeviceIndex,
+    domain: DomainId,
+    direction: Direction,
+    in_image: Range<usize>,
+    logical: u32,
+}
+
+/// Marks of the frames that left in one cycle: byte 1 of the source address, and Idx.
+pub type Departure = Vec<(u8, u8)>;
+
+/// Holds what counts as fresh and complete against the logs of the devices.
+#[derive(Debug)]
+pub struct Truth {
+    areas: Vec<Area>,
+    /// Cycles that may be under way.
+    under_way: usize,
+    /// Of the last cycles of each domain, oldest first.
+    departures: Vec<VecDeque<Departure>>,
+    proven: u64,
+}
+
+impl Truth {
+    /// For declared SubDevices, `devices` being theirs.
+    pub fn new(directory: &Directory, devices: &[Option<DeviceIndex>], domains: usize, under_way: usize) -> Truth {
+        let departures = vec![VecDeque::new(); domains];
+        let mut truth = Truth { areas: Vec::new(), under_way, departures, proven: 0 };
+        truth.follow(directory, devices);
+        truth
+    }
+
+    /// SubDevices are these devices from now on.
+    pub fn follow(&mut self, directory: &Directory, devices: &[Option<DeviceIndex>]) {
+        self.areas.clear();
+        for (subdevice, device) in devices.iter().enumerate() {
+            let Some(device) = *device else { continue };
+            for entries in directory.areas(subdevice).iter().filter(|entries| entries.placed.area.length > 0) {
+                let start = entries.placed.image_offset as usize;
+                self.areas.push(Area {
+                    subdevice,
+                    device,
+                    domain: entries.domain,
+                    direction: entries.direction,
+                    in_image: start..start + usize::from(entries.placed.area.length),
+                    logical: entries.placed.logical.0,
+                });
+            }
+        }
+    }
+
+    /// Areas of process data that were found in a log.
+    pub fn proven(&self) -> u64 {
+        self.proven
+    }
+
+    /// Judges a domain behind [`Exchange::process`].
+    ///
+    /// # Panics
+    /// When inputs count as fresh that the SubDevice did not put into a frame of the cycle.
+    pub fn judge(&mut self, status: DomainStatus, domain: DomainId, exchange: &Exchange, network: &Network) {
+        let Some(departures) = self.departures.get(domain.0).filter(|_| !status.pending) else { return };
+        let is_of_cycle = |access: &LogicalAccess| departures.iter().flatten().any(|frame| *frame == access.frame);
+        let image = exchange.image(domain);
+        for area in self.areas.iter().filter(|area| area.domain == domain) {
+            let controller = &network.device(area.device).controller;
+            if !controller.logs_logical() {
+                continue;
+            }
+            match area.direction {
+                Direction::Inputs => {
+                    if exchange.freshness(domain, area.subdevice) != Freshness::Fresh {
+                        continue;
+                    }
+                    let value = &image[area.in_image.clone()];
+                    let is_own = |access: &LogicalAccess| {
+                        access.read && is_of_cycle(access) && area.bytes_of(access) == Some(value)
+                    };
+                    assert!(
+                        controller.logical_accesses().any(is_own),
+                        "inputs of SubDevice {} in domain {} are called fresh ({value:02x?}), device {} put none such into \
+                         the frames {:02x?}; it answered last: {:02x?}",
+                        area.subdevice,
+                        domain.0,
+                        area.device.0,
+                        departures,
+                        controller.logical_accesses().filter(|it| area.bytes_of(it).is_some()).collect::<Vec<_>>(),
+                    );
+                }
+                Direction::Outputs => {
+                    if status.state != DomainState::Complete || status.wkc != status.expected {
+                        continue;
+                    }
+                    let is_own = |access: &LogicalAccess| {
+                        access.written && is_of_cycle(access) && area.bytes_of(access).is_some()
+                    };
+                    assert!(
+                        controller.logical_accesses().any(is_own),
+                        "domain {} is called complete, device {} took no outputs from {:02x?}",
+                        domain.0,
+                        area.device.0,
+                        departures,
+                    );
+                }
+            }
+            self.proven += 1;
+        }
+    }
+
+    /// A domain left with these frames, those of other domains among them.
+    pub fn depart(&mut self, domain: DomainId, frames: &Departure) {
+        let Some(departures) = self.departures.get_mut(domain.0).filter(|_| !frames.is_empty()) else { return };
+        if departures.len() == self.under_way {
+            departures.pop_front();
+        }
+        departures.push_back(frames.clone());
+    }
+}
+
+impl Area {
+    /// The part of a datagram's data that is this area's.
+    fn bytes_of<'a>(&self, access: &'a LogicalAccess) -> Option<&'a [u8]> {
+        let at = usize::try_from(self.logical.checked_sub(access.address)?).ok()?;
+        access.data.get(at..at + self.in_image.len())
+    }
+}

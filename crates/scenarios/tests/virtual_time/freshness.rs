@@ -1,0 +1,245 @@
+//! What counts as fresh was put into this very frame by that SubDevice, whatever is cut, healed, lost or without power.
+//!
+//! Every world judges that from the logs of the devices (`scenarios::truth`); here are segments and faults that are made to
+//! confuse a sum of working counters.
+//!
+//! `SEED=17 cargo test -p scenarios --test virtual_time freshness::seeds -- --nocapture` runs one seed,
+//! `SEED=0..10000` many.
+
+use std::ops::Range;
+use std::time::Duration;
+
+use ringcat::{DomainId, DomainState, Freshness, JunctionMode, Options, automatic};
+use ringcat_sim::cable::{CableId, DeviceIndex, Endpoint};
+use ringcat_sim::description::DeviceDescription;
+use ringcat_sim::fault::Fault;
+use ringcat_sim::frame::Port;
+use ringcat_sim::network::Network;
+use ringcat_wire::register::PortKind;
+use scenarios::check::Delivery;
+use scenarios::dice::Dice;
+use scenarios::segments::{
+    MAIN, REDUNDANT, RING_BEHIND_JUNCTION, RING_IN_RING, TWO_RINGS, at, descriptions, wired_with,
+};
+use scenarios::world::{CYCLE, World};
+
+const KINDS: [&str; 8] = [
+    "digital-input-8",
+    "digital-input-8",
+    "digital-output-8",
+    "emulated-input-8",
+    "emulated-output-8",
+    "analog-input-4",
+    "servo",
+    "block",
+];
+const DOMAIN: DomainId = DomainId(0);
+
+/// Devices of these kinds with four MII ports each.
+fn with_four_ports(kinds: &[&str]) -> Vec<DeviceDescription> {
+    let mut described = descriptions(kinds);
+    described.iter_mut().for_each(|it| it.ports = [PortKind::Mii; 4]);
+    described
+}
+
+fn junctions() -> Options {
+    Options { junctions: JunctionMode::Automatic, ..Options::default() }
+}
+
+/// A ring behind a junction that breaks at one cable while the break at another is healed: the sum of the working counters
+/// is the one that was expected before, from other SubDevices.
+#[test]
+fn an_absent_subdevice_keeps_its_last_inputs_when_a_break_moves() {
+    let kinds = ["digital-input-8", "junction", "digital-input-8", "digital-input-8"];
+    let cables = [
+        (MAIN, at(0, Port::A)),
+        (at(0, Port::B), at(1, Port::A)),
+        (at(1, Port::D), at(2, Port::A)),
+        (at(1, Port::B), at(3, Port::A)),
+    ];
+    let network = wired_with(with_four_ports(&kinds), &cables);
+    let declare = |scan: &ringcat::Scan| automatic(&scan.subdevices, CYCLE);
+    let mut world = World::with(1, network, &junctions(), declare).expect("it fits");
+    world.settle();
+    world.cut(CableId(3));
+    world.run_cycles(150);
+    world.heal(CableId(3));
+    world.cut(CableId(2));
+    world.run_cycles(2);
+    let exchange = world.application().exchange();
+    let freshness: Vec<Freshness> = (0..4).map(|subdevice| exchange.freshness(DOMAIN, subdevice)).collect();
+    let of = |device: usize| (0..4).find(|it| world.device_of(*it) == Some(DeviceIndex(device))).expect("it was scanned");
+    assert_eq!(freshness[of(0)], Freshness::Fresh);
+    assert_ne!(freshness[of(2)], Freshness::Fresh, "it is not there");
+    assert_eq!(exchange.image(DOMAIN), [0xAA; 3], "the absent one keeps its last value");
+    assert_eq!(freshness[of(3)], Freshness::Fresh, "it is there again and says so in this frame");
+}
+
+/// A tree on the main link, with the redundant link at a free port or not.
+fn random_tree(dice: &mut Dice) -> (usize, Vec<(Endpoint, Endpoint)>) {
+    let count = 2 + dice.below(9) as usize;
+    let mut free: Vec<(usize, Port)> = Vec::new();
+    let mut cables = Vec::new();
+    for device in 0..count {
+        let parent = if device == 0 {
+            MAIN
+        } else if dice.one_in(2) {
+            // Lines are what is built.
+            let last = free.iter().position(|(parent, _)| *parent + 1 == device).unwrap_or(0);
+            let (parent, port) = free.remove(last);
+            at(parent, port)
+        } else {
+            let (parent, port) = free.remove(dice.below(free.len() as u64) as usize);
+            at(parent, port)
+        };
+        cables.push((parent, at(device, Port::A)));
+        free.extend([Port::B, Port::C, Port::D].map(|port| (device, port)));
+    }
+    if !dice.one_in(3) {
+        let (device, port) = free.iter().copied().rfind(|(device, _)| *device + 1 == count).expect("the last has free ports");
+        cables.push((at(device, port), REDUNDANT));
+    }
+    (count, cables)
+}
+
+/// A random segment, and its cables.
+fn random_segment(dice: &mut Dice) -> (Network, usize) {
+    let mut kinds = |count: usize, dice: &mut Dice| -> Vec<&str> { (0..count).map(|_| *dice.pick(&KINDS)).collect() };
+    let (kinds, cables) = match dice.below(6) {
+        0 => {
+            let mut kinds = kinds(7, dice);
+            kinds[1] = "junction";
+            (kinds, RING_BEHIND_JUNCTION.to_vec())
+        }
+        1 => {
+            let mut kinds = kinds(7, dice);
+            (kinds[0], kinds[3]) = ("junction", "junction");
+            (kinds, TWO_RINGS.to_vec())
+        }
+        2 => {
+            let mut kinds = kinds(5, dice);
+            kinds[1] = "junction";
+            (kinds, RING_IN_RING.to_vec())
+        }
+        _ => {
+            let (count, cables) = random_tree(dice);
+            (kinds(count, dice), cables)
+        }
+    };
+    let mut described = with_four_ports(&kinds);
+    for description in &mut described {
+        // Few FMMUs leave none to spare.
+        description.controller_fmmus = *dice.pick(&[None, None, Some(3), Some(2)]);
+    }
+    (wired_with(described, &cables), cables.len())
+}
+
+struct Run {
+    world: World,
+    dice: Dice,
+    cables: usize,
+    cut: Vec<CableId>,
+    off: Vec<DeviceIndex>,
+}
+
+impl Run {
+    /// A cable is cut or healed, a device loses its power or gets it back: two of each at most at a time.
+    fn fault(&mut self) {
+        let dice = &mut self.dice;
+        let delay = Duration::from_nanos(dice.below(1_000_000));
+        let fault = if dice.one_in(4) {
+            let device = DeviceIndex(dice.below(self.world.network().devices().len() as u64) as usize);
+            match self.off.iter().position(|off| *off == device) {
+                Some(place) => Fault::PowerOn(self.off.remove(place)),
+                None if self.off.len() < 2 => {
+                    self.off.push(device);
+                    Fault::PowerOff(device)
+                }
+                None => Fault::PowerOn(self.off.remove(0)),
+            }
+        } else {
+            let cable = CableId(dice.below(self.cables as u64) as usize);
+            match self.cut.iter().position(|cut| *cut == cable) {
+                Some(place) => Fault::Heal(self.cut.remove(place)),
+                None if self.cut.len() < 2 => {
+                    self.cut.push(cable);
+                    Fault::Cut(cable)
+                }
+                None => Fault::Heal(self.cut.remove(0)),
+            }
+        };
+        self.world.fault_in(delay, fault);
+    }
+
+    /// All that is broken is mended.
+    fn mend(&mut self) {
+        self.cut.drain(..).for_each(|cable| self.world.heal(cable));
+        self.off.drain(..).for_each(|device| self.world.power_on(device));
+    }
+}
+
+/// Runs a seed; areas of process data that were proven.
+fn run(seed: u64) -> u64 {
+    let mut dice = Dice::new(seed);
+    let (network, cables) = random_segment(&mut dice);
+    let under_way = 1 + dice.below(3) as u8;
+    let declare = |scan: &ringcat::Scan| automatic(&scan.subdevices, CYCLE).with_under_way(under_way);
+    let mut world = World::with(seed, network, &junctions(), declare).unwrap_or_else(|error| panic!("seed {seed}: {error}"));
+    // What was latched last is judged elsewhere; here from the logs alone.
+    world.set_strict(false);
+    world.settle();
+    let lost = *dice.pick(&[0, 0, 0, 1, 10, 50, 200]);
+    world.application_mut().links_mut().lose_per_mille(lost, seed);
+    let mut run = Run { world, dice, cables, cut: Vec::new(), off: Vec::new() };
+    for _ in 0..6 + run.dice.below(20) {
+        run.fault();
+        if run.dice.one_in(2) {
+            // A break that moves.
+            run.fault();
+        }
+        let cycles = if run.dice.one_in(3) { 40 + run.dice.below(200) } else { 1 + run.dice.below(12) };
+        run.world.run_cycles(cycles);
+    }
+    run.world.application_mut().links_mut().lose_per_mille(0, seed);
+    run.mend();
+    run.world.until(Duration::from_secs(25), "all back", |world| {
+        let last = world.judged(world.beginning()).last().map(|judged| judged.delivery);
+        world.all_in_op() && last == Some(Delivery::Complete)
+    });
+    run.world.run_cycles(20);
+    let status = run.world.application().exchange().status(DOMAIN);
+    assert_eq!(status.state, DomainState::Complete);
+    run.world.proven()
+}
+
+fn runs(seeds: Range<u64>) {
+    let (mut proven, mut failed) = (0, Vec::new());
+    for seed in seeds.clone() {
+        match std::panic::catch_unwind(|| run(seed)) {
+            Ok(areas) => proven += areas,
+            Err(_) => failed.push(seed),
+        }
+    }
+    println!(
+        "freshness, seeds {} to {}: {proven} areas of process data found in the logs of their devices, {} seeds failed",
+        seeds.start,
+        seeds.end - 1,
+        failed.len()
+    );
+    assert_eq!(failed, [], "seeds that fail");
+}
+
+#[test]
+fn what_is_called_fresh_was_put_into_this_frame_seeds_0_to_99() {
+    runs(0..100);
+}
+
+#[test]
+fn what_is_called_fresh_was_put_into_this_frame_seeds_100_to_199() {
+    runs(100..200);
+}
+
+#[test]
+fn seeds_from_the_environment() {
+    crate::explorer::from_environment(|seed| drop(run(seed)), runs);
+}

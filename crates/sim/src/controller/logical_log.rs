@@ -1,0 +1,64 @@
+//! A log of the logical datagrams in which a SubDevice took part: the evidence from inside of it, for checkers.
+//!
+//! In: each logical datagram that the processing unit answered, with the marks by which a MainDevice knows its frame.
+//! Out: what the data of that datagram was when it left the SubDevice. The log is off unless a checker asks for it, and
+//! holds the newest accesses only.
+
+use std::collections::VecDeque;
+
+use ringcat_wire::command::Command;
+
+/// Accesses that are kept.
+const KEPT: usize = 64;
+/// Offset of the second byte of the source address, where a MainDevice keeps the number of a frame (facts 9.7.1).
+const FRAME_ID_AT: usize = 7;
+
+/// A logical datagram in which a SubDevice took part.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct LogicalAccess {
+    /// Byte 1 of the frame's source address, and Idx of the datagram.
+    pub frame: (u8, u8),
+    /// LRD, LWR or LRW.
+    pub command: Command,
+    /// Logical address of the first byte.
+    pub address: u32,
+    /// The SubDevice put its inputs in.
+    pub read: bool,
+    /// The SubDevice took outputs.
+    pub written: bool,
+    /// The data as it left the SubDevice.
+    pub data: Vec<u8>,
+}
+
+/// The newest accesses of a SubDevice.
+#[derive(Clone, Debug, Default)]
+pub(super) struct LogicalLog {
+    kept: Option<Box<VecDeque<LogicalAccess>>>,
+}
+
+impl LogicalLog {
+    pub fn is_on(&self) -> bool {
+        self.kept.is_some()
+    }
+
+    pub fn turn_on(&mut self) {
+        self.kept.get_or_insert_default();
+    }
+
+    pub fn note(&mut self, access: LogicalAccess) {
+        let Some(kept) = &mut self.kept else { return };
+        if kept.len() == KEPT {
+            kept.pop_front();
+        }
+        kept.push_back(access);
+    }
+
+    pub fn accesses(&self) -> impl Iterator<Item = &LogicalAccess> {
+        self.kept.iter().flat_map(|kept| kept.iter())
+    }
+}
+
+/// Byte 1 of a frame's source address.
+pub(super) fn frame_id(frame: &[u8]) -> u8 {
+    frame.get(FRAME_ID_AT).copied().unwrap_or(0)
+}
