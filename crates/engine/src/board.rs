@@ -134,6 +134,8 @@ pub struct Board {
     optional: Vec<bool>,
     /// One bit per SubDevice: it is away on purpose.
     excused: Vec<AtomicU64>,
+    /// One bit per SubDevice: its FMMUs are set, and it was not seen yet to give its inputs.
+    unproven: Vec<AtomicU64>,
     /// Distributed clocks.
     pub clocks: clocks::ClockWords,
 }
@@ -150,6 +152,7 @@ impl Board {
             wkc_errors: (0..subdevices).map(|_| AtomicU32::new(0)).collect(),
             taking_part: (0..subdevices.div_ceil(64)).map(|_| AtomicU64::new(0)).collect(),
             excused: (0..subdevices.div_ceil(64)).map(|_| AtomicU64::new(0)).collect(),
+            unproven: (0..subdevices.div_ceil(64)).map(|_| AtomicU64::new(0)).collect(),
             taking_part_changes: AtomicU32::new(0),
             optional: Vec::new(),
             clocks: clocks::ClockWords::default(),
@@ -171,6 +174,17 @@ impl Board {
     /// Says whether a SubDevice is away on purpose, so that no domain is incomplete without it.
     pub fn set_excused(&self, subdevice: usize, excused: bool) {
         self.set(&self.excused, subdevice, excused);
+    }
+
+    /// Says whether a SubDevice, whose FMMUs are set, has still to be seen to give its inputs: until then it is not counted on
+    /// for what its state lets it add to a working counter.
+    pub fn set_unproven(&self, subdevice: usize, unproven: bool) {
+        self.set(&self.unproven, subdevice, unproven);
+    }
+
+    /// Whether a SubDevice has still to be seen to give its inputs.
+    pub fn is_unproven(&self, subdevice: usize) -> bool {
+        bit(&self.unproven, subdevice)
     }
 
     pub(crate) fn post_supervision(&self, supervision: Supervision) {

@@ -4,8 +4,8 @@
 //! domain, work on the images, [`Exchange::queue`] for each domain that is due, [`Exchange::send`]. None of them
 //! allocates, locks or waits; the work is bounded by what was planned at activation.
 //!
-//! A frame is delivered when its working counters are as expected, or all its copies are in, or at its deadline. Inputs
-//! are delivered per SubDevice: see [`domain`].
+//! A frame is over when its working counters are as expected, or all its copies are in, or at its deadline. Inputs are
+//! delivered as copies come, per SubDevice: see [`place`].
 
 mod access;
 mod clocks;
@@ -18,6 +18,7 @@ mod flight;
 pub mod foreign;
 mod image;
 mod place;
+mod presence;
 
 use alloc::sync::Arc;
 use alloc::vec::Vec;
@@ -42,6 +43,7 @@ use copy::Copies;
 use evidence::Evidence;
 use flight::{CyclicFrame, Step};
 use foreign::ForeignFrames;
+use image::InputNumber;
 
 /// No frame has this id.
 const NO_FRAME: u16 = u16::MAX;
@@ -93,10 +95,11 @@ impl Exchange {
         for (index, planned) in layout.domains.iter().enumerate() {
             let first = frames.len();
             for _ in 0..planned.under_way.max(1) {
-                let mut datagrams = 0;
+                let mut next = InputNumber { datagram: 0, part: 0 };
                 for frame in &planned.frames {
-                    let whole = CyclicFrame::new(&identity, links.mask(), index, frame, datagrams);
-                    datagrams += whole.datagrams();
+                    let whole = CyclicFrame::new(&identity, links.mask(), index, frame, next);
+                    next.datagram += whole.datagrams();
+                    next.part += whole.parts();
                     frames.push(whole.vacant(&identity, frame));
                     others.push(whole);
                 }
@@ -179,7 +182,7 @@ impl Exchange {
                 wkc += frame.wkc();
                 left = frame.left();
             }
-            if waiting && give_up_overdue(domain, &mut self.frames, set.clone(), now, self.cycle, &mut self.counters) {
+            if waiting && give_up_overdue(domain, &mut self.frames, set.clone(), now, &mut self.counters) {
                 return domain.status(!judged);
             }
             judged = true;
@@ -229,7 +232,7 @@ impl Exchange {
         }
         let changes = self.board.taking_part_changes();
         if !frames.iter().all(|frame| frame.is_ready(changes)) {
-            self.follow_board(id, set, changes);
+            self.follow_board(set, changes);
         }
         true
     }
@@ -272,16 +275,13 @@ impl Exchange {
     /// out. A frame gets its process data with the first SubDevice, and keeps it: whoever comes back with its FMMUs is
     /// served at once.
     #[cold]
-    fn follow_board(&mut self, id: DomainId, set: Range<usize>, changes: u32) {
+    fn follow_board(&mut self, set: Range<usize>, changes: u32) {
         let board = &self.board;
         for (frame, other) in self.frames[set.clone()].iter_mut().zip(&mut self.others[set]) {
             if frame.is_vacant() && frame.concerns(|s| board.takes_part(s)) {
                 core::mem::swap(frame, other);
             }
-            frame.recount(changes, |s| board.takes_part(s), |s| board.is_optional(s));
-        }
-        if let Some(domain) = self.domains.get_mut(id.0) {
-            domain.follow(self.cycle, |subdevice| board.takes_part(subdevice));
+            frame.follow(changes, board);
         }
     }
 }
@@ -314,21 +314,19 @@ fn count_errors(frames: &[CyclicFrame], board: &Board) {
 /// Gives up those frames of a domain's oldest cycle that are overdue. True where others are still waited for.
 #[cold]
 fn give_up_overdue(
-    domain: &mut Domain,
+    domain: &Domain,
     frames: &mut [CyclicFrame],
     set: Range<usize>,
     now: Instant,
-    cycle: u64,
     counters: &mut CyclicCounters,
 ) -> bool {
     // What was overtaken does not come any more, whatever time it is.
     let now = if domain.is_overtaken(frames) { Instant::NEVER } else { now };
-    let (frames, image) = (&mut frames[set], domain.inputs_mut());
     let mut pending = false;
-    for frame in frames.iter_mut().filter(|frame| frame.is_waiting()) {
+    for frame in frames[set].iter_mut().filter(|frame| frame.is_waiting()) {
         if !frame.overdue(now) {
             pending = true;
-        } else if frame.give_up(image, cycle) {
+        } else if frame.give_up() {
             counters.lost += 1;
         } else {
             counters.half += 1;

@@ -4,6 +4,12 @@
 //! 3.11: an access must cover start and end). A chunk is one LRW, or an LWR and an LRD, over
 //! `[outputs of the chunk][inputs of the chunk]`; image and logical addresses follow the same order. Areas are aligned to
 //! bytes (facts 3.10: bitwise FMMUs work in few places).
+//!
+//! A working counter is a sum: where several SubDevices add to one, it does not say which of them did. So each of them
+//! shows its AL status in a presence datagram of the same frame, through an FMMU that it has to spare; one without has its
+//! inputs in a datagram of its own ([`Witness`]).
+
+mod chunk;
 
 use alloc::vec::Vec;
 use core::fmt;
@@ -41,6 +47,37 @@ pub enum LrwPolicy {
     /// One datagram per SubDevice, with LRW where it has outputs and inputs. Allowed with two links too, because one copy
     /// meets all that a datagram addresses.
     PerSubDevice,
+}
+
+/// How a frame shows whether a SubDevice put its inputs into it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Witness {
+    /// By its AL status, which an FMMU of it maps into the frame: in these states its inputs are there.
+    Mapped(Delivers),
+    /// By the working counter of a datagram that no other SubDevice answers.
+    Alone,
+}
+
+/// In which AL states a SubDevice whose FMMUs and SyncManagers are set gives its inputs.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Delivers {
+    /// In SAFEOP and OP.
+    FromSafeOp,
+    /// In OP only (facts 4.4).
+    InOp,
+}
+
+/// What a layout has to follow.
+#[derive(Clone, Copy, Debug)]
+pub struct Rules<'a> {
+    /// Links that frames leave on.
+    pub links: LinkSet,
+    /// Adds the supervision datagram to the domain with the shortest period.
+    pub supervision: bool,
+    /// Where LRW is used.
+    pub lrw: LrwPolicy,
+    /// By SubDevice; those behind the end have an FMMU to spare.
+    pub witnesses: &'a [Witness],
 }
 
 /// What a domain exchanges.
@@ -86,11 +123,22 @@ pub struct PlannedDatagram {
     pub input_areas: Vec<PlacedArea>,
 }
 
+/// A presence datagram: an LRD of one byte per SubDevice, its AL status.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct PlannedPresence {
+    /// Logical address of the first byte.
+    pub logical: LogicalAddress,
+    /// Index of the SubDevice of each byte, and when it gives its inputs.
+    pub members: Vec<(usize, Delivers)>,
+}
+
 /// A frame of a domain.
 #[derive(Clone, Debug, Default)]
 pub struct PlannedFrame {
     /// Process data datagrams.
     pub datagrams: Vec<PlannedDatagram>,
+    /// The presence datagram behind them, where a working counter has several SubDevices.
+    pub presence: Option<PlannedPresence>,
     /// Whether the supervision datagram rides in this frame.
     pub supervision: bool,
     /// Whether the datagrams of distributed clocks ride in this frame.
@@ -165,35 +213,43 @@ pub(crate) const SUPERVISION_LEN: usize = 2;
 /// Distributed clocks take three datagrams of four bytes.
 const CLOCKS_LEN: usize = 3 * (OVERHEAD + 4);
 
+/// Where presence bytes lie: beyond all process data, which ends at 2 GiB, and below the mail bits.
+const PRESENCE_AT: LogicalAddress = LogicalAddress(0xE000_0000);
+
 impl Layout {
-    /// As [`Layout::with_lrw`], with LRW where it is of use.
+    /// As [`Layout::with`], with LRW where it is of use, and every SubDevice with an FMMU to spare.
     pub fn new(specs: &[DomainSpec], links: LinkSet, supervision: bool) -> Result<Layout, LayoutError> {
-        Layout::with_lrw(specs, links, supervision, LrwPolicy::Automatic)
+        Layout::with(specs, Rules { links, supervision, lrw: LrwPolicy::Automatic, witnesses: &[] })
     }
 
-    /// Lays out domains. `supervision` adds the supervision datagram to the domain with the shortest period.
-    pub fn with_lrw(
-        specs: &[DomainSpec],
-        links: LinkSet,
-        supervision: bool,
-        policy: LrwPolicy,
-    ) -> Result<Layout, LayoutError> {
+    /// Lays out domains.
+    pub fn with(specs: &[DomainSpec], rules: Rules<'_>) -> Result<Layout, LayoutError> {
         let mut layout = Layout::default();
         let mut logical = 0u32;
+        let mut witnesses = chunk::Witnesses::new(rules.witnesses, PRESENCE_AT);
         for spec in specs {
-            let each = policy == LrwPolicy::PerSubDevice;
-            let lrw = spec.lrw && (links == LinkSet::Single || each);
-            let domain = lay_out(spec, lrw, each, LogicalAddress(logical))?;
+            let each = rules.lrw == LrwPolicy::PerSubDevice;
+            let lrw = spec.lrw && (rules.links == LinkSet::Single || each);
+            let domain = lay_out(spec, lrw, each, LogicalAddress(logical), &mut witnesses)?;
             // Domains start at multiples of four bytes: easier to read in a capture.
             let end = logical.checked_add(domain.image_len).filter(|end| *end < 1 << 31);
             logical = end.ok_or(LayoutError::TooLarge)?.next_multiple_of(4);
             layout.domains.push(domain);
         }
-        if supervision {
+        if rules.supervision {
             layout.add_supervision();
         }
         layout.check_in_flight()?;
         Ok(layout)
+    }
+
+    /// Logical address of the byte in which a SubDevice shows its AL status; `None` where it shows it nowhere.
+    pub fn presence(&self, subdevice: usize) -> Option<LogicalAddress> {
+        let presences = self.domains.iter().flat_map(|domain| &domain.frames).filter_map(|frame| frame.presence.as_ref());
+        presences.into_iter().find_map(|presence| {
+            let at = presence.members.iter().position(|(member, _)| *member == subdevice)?;
+            Some(LogicalAddress(presence.logical.0 + at as u32))
+        })
     }
 
     fn check_in_flight(&self) -> Result<(), LayoutError> {
@@ -234,39 +290,22 @@ impl Layout {
 }
 
 impl PlannedFrame {
-    /// Bytes of all datagrams with their overhead.
+    /// Bytes of all datagrams of process data and presence with their overhead.
     fn used(&self) -> usize {
         let data = |d: &PlannedDatagram| OVERHEAD + usize::from(d.outputs) + usize::from(d.inputs);
-        self.datagrams.iter().map(data).sum::<usize>()
-    }
-}
-
-/// Areas that travel in one frame.
-#[derive(Default)]
-struct Chunk {
-    outputs: Vec<AreaSpec>,
-    inputs: Vec<AreaSpec>,
-    bytes: usize,
-}
-
-impl Chunk {
-    fn fits(&self, bytes: usize, lrw: bool) -> bool {
-        // LWR + LRD have one more overhead than a single datagram.
-        let limit = if lrw { MAX_DATA } else { MAX_DATA - OVERHEAD };
-        self.bytes == 0 || self.bytes + bytes <= limit
-    }
-
-    fn add(&mut self, area: AreaSpec) {
-        self.bytes += usize::from(area.length);
-        match area.direction {
-            Direction::Outputs => self.outputs.push(area),
-            Direction::Inputs => self.inputs.push(area),
-        }
+        let presence = self.presence.as_ref().map_or(0, |presence| OVERHEAD + presence.members.len());
+        self.datagrams.iter().map(data).sum::<usize>() + presence
     }
 }
 
 /// `each`: every SubDevice has datagrams of its own.
-fn lay_out(spec: &DomainSpec, lrw: bool, each: bool, base: LogicalAddress) -> Result<PlannedDomain, LayoutError> {
+fn lay_out(
+    spec: &DomainSpec,
+    lrw: bool,
+    each: bool,
+    base: LogicalAddress,
+    witnesses: &mut chunk::Witnesses<'_>,
+) -> Result<PlannedDomain, LayoutError> {
     let mut domain = PlannedDomain {
         period: spec.period,
         under_way: spec.under_way,
@@ -274,8 +313,8 @@ fn lay_out(spec: &DomainSpec, lrw: bool, each: bool, base: LogicalAddress) -> Re
         areas: Vec::new(),
         frames: Vec::new(),
     };
-    for chunk in chunks(spec, lrw, each)? {
-        let frame = domain.place(&chunk, lrw, base)?;
+    for chunk in chunk::chunks(spec, lrw, each, witnesses)? {
+        let frame = domain.place(&chunk, base, witnesses)?;
         match domain.frames.last_mut() {
             Some(last) if each && last.used() + frame.used() <= MAX_DATA + OVERHEAD => {
                 last.datagrams.extend(frame.datagrams);
@@ -286,45 +325,38 @@ fn lay_out(spec: &DomainSpec, lrw: bool, each: bool, base: LogicalAddress) -> Re
     Ok(domain)
 }
 
-fn chunks(spec: &DomainSpec, lrw: bool, each: bool) -> Result<Vec<Chunk>, LayoutError> {
-    let mut chunks = Vec::new();
-    let mut chunk = Chunk::default();
-    let used = spec.areas.iter().filter(|area| area.length > 0);
-    let areas: Vec<AreaSpec> = used.copied().collect();
-    for group in areas.chunk_by(|a, b| a.subdevice == b.subdevice) {
-        if let Some(long) = group.iter().find(|area| usize::from(area.length) > MAX_DATA) {
-            let AreaSpec { subdevice, sync_manager, length, .. } = *long;
-            return Err(LayoutError::AreaTooLong { subdevice, sync_manager, length });
-        }
-        // A SubDevice's areas stay together where they can: fewer working counters to look at.
-        let total = group.iter().map(|area| usize::from(area.length)).sum();
-        if !chunk.fits(total, lrw) || (each && chunk.bytes > 0) {
-            chunks.push(core::mem::take(&mut chunk));
-        }
-        for area in group {
-            if !chunk.fits(usize::from(area.length), lrw) {
-                chunks.push(core::mem::take(&mut chunk));
-            }
-            chunk.add(*area);
-        }
-    }
-    if chunk.bytes > 0 {
-        chunks.push(chunk);
-    }
-    Ok(chunks)
-}
-
 impl PlannedDomain {
     /// Gives a chunk its place in the image; returns its frame.
-    fn place(&mut self, chunk: &Chunk, lrw: bool, base: LogicalAddress) -> Result<PlannedFrame, LayoutError> {
+    fn place(
+        &mut self,
+        chunk: &chunk::Chunk,
+        base: LogicalAddress,
+        witnesses: &mut chunk::Witnesses<'_>,
+    ) -> Result<PlannedFrame, LayoutError> {
+        let mut frame = PlannedFrame::default();
+        for group in chunk.groups() {
+            self.place_group(&mut frame, group, base)?;
+        }
+        let is_shared = frame.datagrams.iter().any(|datagram| datagram.contributions.len() > 1);
+        frame.presence = is_shared.then(|| witnesses.presence(chunk.witnessed())).flatten();
+        Ok(frame)
+    }
+
+    /// Gives areas that share their datagrams their place.
+    fn place_group(
+        &mut self,
+        frame: &mut PlannedFrame,
+        group: &chunk::Group,
+        base: LogicalAddress,
+    ) -> Result<(), LayoutError> {
         let start = self.image_len;
         let mut placed = Vec::new();
-        for area in chunk.outputs.iter().chain(&chunk.inputs) {
+        for area in group.outputs.iter().chain(&group.inputs) {
             let logical = LogicalAddress(base.0.checked_add(self.image_len).ok_or(LayoutError::TooLarge)?);
             placed.push(PlacedArea { area: *area, image_offset: self.image_len, logical });
             self.image_len += u32::from(area.length);
         }
-        let (outputs, inputs) = placed.split_at(chunk.outputs.len());
+        let (outputs, inputs) = placed.split_at(group.outputs.len());
         let bytes = |areas: &[PlacedArea]| areas.iter().map(|a| a.area.length).sum::<u16>();
         let (out_len, in_len) = (bytes(outputs), bytes(inputs));
         let datagram = |command, image_offset: u32, out_len, in_len, reads: &[PlacedArea], writes: &[PlacedArea]| {
@@ -338,8 +370,7 @@ impl PlannedDomain {
                 input_areas: reads.to_vec(),
             }
         };
-        let mut frame = PlannedFrame::default();
-        if lrw && out_len > 0 && in_len > 0 {
+        if group.lrw && out_len > 0 && in_len > 0 {
             frame.datagrams.push(datagram(Command::Lrw, start, out_len, in_len, inputs, outputs));
         } else {
             if out_len > 0 {
@@ -350,7 +381,7 @@ impl PlannedDomain {
             }
         }
         self.areas.extend(placed);
-        Ok(frame)
+        Ok(())
     }
 }
 

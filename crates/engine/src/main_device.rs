@@ -45,7 +45,7 @@ use crate::config::ClockConfig;
 use crate::event::{CyclicEvent, Event, TimedEvent};
 use crate::exchange::{ClockSetup, Exchange};
 use crate::info::SubDeviceInfo;
-use crate::layout::Layout;
+use crate::layout::{Layout, Rules};
 use crate::link::{Link, LinkSet};
 use crate::mail::Mailbox;
 use crate::mail::eoe::EthernetPort;
@@ -69,7 +69,9 @@ use crate::ring_status::{Cable, CableErrors, LinkStatus, Redundancy, RingStatus,
 use crate::supervisor::{AcyclicCounters, Bus, Received, Supervisor, UnderWay};
 use crate::time::Instant;
 use crate::topology::Topology;
-use declaration::{check_clocks, domain_specs, match_declaration, members, plan_all, report_oddities, with_domain};
+use declaration::{
+    check_clocks, domain_specs, match_declaration, members, plan_all, report_oddities, with_domain, witnesses,
+};
 use lrw::check_lrw;
 use steps::Loaded;
 
@@ -199,8 +201,9 @@ impl MainDevice {
         let lrw = lrw::policy(declaration.lrw, &declaration.explicit_lrw, links)?;
         let specs = domain_specs(&declaration, &plans, lrw, links)?;
         check_lrw(lrw, &specs, links)?;
-        let mut layout =
-            Layout::with_lrw(&specs, links, self.options.supervision, lrw).map_err(ActivateError::Layout)?;
+        let witnesses = witnesses(&plans, &found);
+        let rules = Rules { links, supervision: self.options.supervision, lrw, witnesses: &witnesses };
+        let mut layout = Layout::with(&specs, rules).map_err(ActivateError::Layout)?;
         if clock_config.is_some() {
             layout.add_clocks().map_err(ActivateError::Layout)?;
         }

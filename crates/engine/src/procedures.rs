@@ -14,6 +14,7 @@ pub(crate) mod junction;
 pub mod look_at_ring;
 pub mod mail_watch;
 pub(crate) mod own_objects;
+pub(crate) mod presence;
 pub mod recover;
 pub(crate) mod request_state;
 mod ring_watch;

@@ -1,7 +1,7 @@
 //! A segment that does nothing but answer cyclic frames: a stand-in where only the MainDevice's cost is of interest.
 //!
 //! In: the frames that a MainDevice put on its in-memory links. Out: the same frames, with the working counters that
-//! SubDevices would have written and the bit that controllers set in the source address (facts 2.6), on the link where
+//! SubDevices would have written, their AL status in presence datagrams, and the bit that controllers set in the source address (facts 2.6), on the link where
 //! the cabling brings them back (facts 9.2.1). Inputs stay as they were sent.
 
 use ringcat::memory::FrameRing;
@@ -18,6 +18,8 @@ const DATAGRAMS_AT: usize = ETHERNET_HEADER_LEN + ETHERCAT_HEADER_LEN;
 const KEY_AT: usize = DATAGRAMS_AT + 2;
 /// Offset of the source address.
 const SOURCE_AT: usize = 6;
+/// AL status of a SubDevice in OP.
+const IN_OP: u8 = 0x08;
 /// Bytes of AL status, which the supervision datagram reads.
 const AL_STATUS_LEN: usize = 2;
 
@@ -63,10 +65,19 @@ struct Patch {
     wkc: [u16; 2],
 }
 
+/// Bytes of a presence datagram to be written, its working counter behind them.
+#[derive(Clone, Debug)]
+struct Shown {
+    at: usize,
+    /// By the link on which the copy was sent.
+    bytes: [Vec<u8>; 2],
+}
+
 #[derive(Debug)]
 struct Answer {
     key: [u8; 4],
     patches: Vec<Patch>,
+    presence: Option<Shown>,
 }
 
 /// The double.
@@ -94,6 +105,10 @@ impl AnsweringDouble {
             for patch in &answer.patches {
                 frame[patch.at..patch.at + WKC_LEN].copy_from_slice(&patch.wkc[link.index()].to_le_bytes());
             }
+            if let Some(Shown { at, bytes }) = &answer.presence {
+                let bytes = &bytes[link.index()];
+                frame[*at..*at + bytes.len()].copy_from_slice(bytes);
+            }
             arriving.push(self.cabling.arrives_on(link), frame);
         }
     }
@@ -114,6 +129,19 @@ impl Answer {
             patches.push(Patch { at, wkc });
             at += WKC_LEN;
         }
+        let presence = frame.presence.as_ref().map(|presence| {
+            let data_at = at + HEADER_LEN;
+            at = data_at + presence.members.len() + WKC_LEN;
+            let bytes = Link::ALL.map(|link| {
+                let is_met = |subdevice: usize| cabling.met_on(subdevice) == link;
+                let status = |(subdevice, _): &(usize, _)| if is_met(*subdevice) { IN_OP } else { 0 };
+                let mut bytes: Vec<u8> = presence.members.iter().map(status).collect();
+                let met = bytes.iter().filter(|status| **status != 0).count() as u16;
+                bytes.extend(met.to_le_bytes());
+                bytes
+            });
+            Shown { at: data_at, bytes }
+        });
         if frame.supervision {
             let mut wkc = [0; 2];
             for subdevice in 0..subdevices {
@@ -121,6 +149,6 @@ impl Answer {
             }
             patches.push(Patch { at: at + HEADER_LEN + AL_STATUS_LEN, wkc });
         }
-        Answer { key: first.raw().to_le_bytes(), patches }
+        Answer { key: first.raw().to_le_bytes(), patches, presence }
     }
 }

@@ -49,11 +49,11 @@ impl Truth {
         truth
     }
 
-    /// SubDevices are these devices from now on.
+    /// SubDevices are these devices from now on; what is not there now stays what it was.
     pub fn follow(&mut self, directory: &Directory, devices: &[Option<DeviceIndex>]) {
-        self.areas.clear();
         for (subdevice, device) in devices.iter().enumerate() {
             let Some(device) = *device else { continue };
+            self.areas.retain(|area| area.subdevice != subdevice);
             for entries in directory.areas(subdevice).iter().filter(|entries| entries.placed.area.length > 0) {
                 let start = entries.placed.image_offset as usize;
                 self.areas.push(Area {

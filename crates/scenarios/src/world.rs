@@ -136,17 +136,22 @@ impl World {
 
     /// Finds out which device each declared SubDevice is, by its station address, and looks at them from now on.
     pub fn recognise(&mut self) {
-        let network = self.application.links().network();
-        let by_station: Vec<u16> = network.devices().map(station).collect();
-        let found = self.application.engine().stations();
-        let of = |wanted: &ringcat_wire::address::StationAddress| {
-            by_station.iter().position(|station| *station == wanted.0).map(DeviceIndex)
-        };
-        self.devices = found.iter().map(of).collect();
+        self.devices = self.by_station(|_| true);
         let strict = self.mirror.strict;
         self.mirror = Mirror::new(self.application.directory(), &self.devices, self.domains);
         self.mirror.strict = strict;
         self.truth.follow(self.application.directory(), &self.devices);
+    }
+
+    /// Which of these devices each declared SubDevice is, by its station address.
+    fn by_station(&self, counts: impl Fn(&Device) -> bool) -> Vec<Option<DeviceIndex>> {
+        let network = self.application.links().network();
+        let by_station: Vec<Option<u16>> = network.devices().map(|it| counts(it).then(|| station(it))).collect();
+        let found = self.application.engine().stations();
+        let of = |wanted: &ringcat_wire::address::StationAddress| {
+            by_station.iter().position(|station| *station == Some(wanted.0)).map(DeviceIndex)
+        };
+        found.iter().map(of).collect()
     }
 
     /// Runs until all declared SubDevices are settled and all domains complete.
@@ -199,8 +204,14 @@ impl World {
             }
         }
         self.journal.watch(at, network);
+        let mut has_news = false;
         while let Some(event) = self.application.pop_event() {
+            has_news = true;
             self.journal.event(event);
+        }
+        if has_news {
+            let devices = self.by_station(|device| device.controller.is_powered());
+            self.truth.follow(self.application.directory(), &devices);
         }
         result
     }
@@ -361,12 +372,12 @@ impl World {
         self.mirror.strict = strict;
     }
 
-    /// Bytes of process data that were compared with what devices had or latched.
+    /// How much process data was held against the devices: bytes that they latched, areas that are in their logs.
     pub fn compared(&self) -> u64 {
-        self.mirror.compared()
+        self.mirror.compared() + self.truth.proven()
     }
 
-    /// Inputs that counted as fresh, and outputs of complete cycles, that were found in a device's own log.
+    /// Areas of process data, inputs that counted as fresh and outputs of complete cycles, that were found in a device's own log.
     pub fn proven(&self) -> u64 {
         self.truth.proven()
     }

@@ -39,6 +39,18 @@ impl Exchange {
         domain.freshness(subdevice)
     }
 
+    /// The AL status (register 0x0130, lower byte) that a SubDevice showed in the cycle of its domain that was judged last; zero
+    /// where it did not answer. `None` before the first, and where its frames show it nowhere ([`crate::layout::Witness`]).
+    pub fn al_status(&self, subdevice: usize) -> Option<u8> {
+        let judged = |frame: &&CyclicFrame| {
+            let judged = self.domains.get(frame.domain()).map_or(0, Domain::judged);
+            (1..=judged).contains(&frame.left())
+        };
+        let shown = self.frames.iter().filter(judged);
+        let newest = shown.filter_map(|frame| Some((frame.left(), frame.al_status(subdevice)?))).max_by_key(|it| it.0);
+        newest.map(|(_, status)| status)
+    }
+
     /// Sets the inputs that are copied to outputs in every cycle, in place of those that were before: when a domain is
     /// queued, behind everything that the application wrote. Not for the cyclic path: this allocates.
     ///

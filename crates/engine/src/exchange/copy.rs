@@ -12,6 +12,7 @@ use core::ops::Range;
 use super::domain::Domain;
 use super::entry::Entry;
 use super::flight::CyclicFrame;
+use super::image::InputNumber;
 
 /// What outputs show while their source is stale.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -89,16 +90,14 @@ impl fmt::Display for CopyError {
 
 impl core::error::Error for CopyError {}
 
-/// Inputs of one SubDevice, and where their deliveries are noted.
+/// Inputs of one SubDevice, and where it is noted when they came.
 #[derive(Debug)]
 struct Source {
     domain: usize,
     subdevice: usize,
-    /// The member of the domain.
-    member: usize,
-    /// The deliveries of datagrams that bring inputs of the SubDevice.
-    deliveries: Box<[usize]>,
-    /// Cycles since the oldest of these deliveries, as of the copying that is under way.
+    /// All its inputs.
+    inputs: Box<[InputNumber]>,
+    /// Cycles since the oldest of these came, as of the copying that is under way.
     age: u64,
 }
 
@@ -211,20 +210,19 @@ impl Copies {
 impl Source {
     fn look(&mut self, domains: &[Domain], cycle: u64) {
         let domain = &domains[self.domain];
-        let delivered = self.deliveries.iter().map(|delivery| domain.came(self.member, *delivery));
-        // Deliveries are counted from 1; 0 is none.
-        let oldest = delivered.min().unwrap_or(0);
+        // Cycles are counted from 1; 0 is none.
+        let oldest = self.inputs.iter().map(|input| domain.came(*input)).min().unwrap_or(0);
         self.age = if oldest == 0 { u64::MAX } else { (cycle + 1).saturating_sub(oldest) };
     }
 }
 
 fn find(domain: usize, subdevice: usize, domains: &[Domain], frames: &[CyclicFrame]) -> Option<Source> {
     let of = domains.get(domain)?;
-    let mut deliveries: Vec<usize> = of.frames().flat_map(|frame| frames[frame].deliveries_of(subdevice)).collect();
+    let mut inputs: Vec<InputNumber> = of.frames().flat_map(|frame| frames[frame].inputs_of(subdevice)).collect();
     // Each is there once per cycle that may be under way.
-    deliveries.sort_unstable();
-    deliveries.dedup();
-    Some(Source { domain, subdevice, member: of.member(subdevice)?, deliveries: deliveries.into(), age: u64::MAX })
+    inputs.sort_unstable_by_key(|input| (input.datagram, input.part));
+    inputs.dedup();
+    Some(Source { domain, subdevice, inputs: inputs.into(), age: u64::MAX })
 }
 
 /// Bytes of an image that an entry touches.

@@ -1,14 +1,15 @@
 //! A domain: image, judgement of its working counters, freshness of its SubDevices, and which of its cycles are under way.
 //!
-//! When all SubDevices answered, all inputs are new. When just those answered that are known to take part, theirs are
-//! new and those of the missing ones keep their last value. While it is not known who is missing, nothing is new.
+//! Inputs of a SubDevice are fresh where it put them into frames of the cycle that was judged last, all of them; those of one
+//! that did not keep their last value.
 
+use alloc::boxed::Box;
 use alloc::vec::Vec;
 use core::ops::Range;
 use core::time::Duration;
 
 use super::flight::CyclicFrame;
-use super::image::Image;
+use super::image::{Image, InputNumber};
 use crate::domain::{DomainState, DomainStatus, Freshness};
 use crate::layout::PlannedDomain;
 
@@ -16,13 +17,8 @@ use crate::layout::PlannedDomain;
 #[derive(Debug)]
 struct Member {
     subdevice: usize,
-    takes_part: bool,
-    /// Number of the delivery of the first datagram with inputs of it.
-    delivery: Option<usize>,
-    /// Flights that left earlier, by the cycle plus one, brought those taking part without this one.
-    part_since: u64,
-    /// When, as a cycle plus one, what was delivered last before it stopped taking part had left.
-    delivered_before: u64,
+    /// Numbers of all its inputs.
+    inputs: Box<[InputNumber]>,
 }
 
 /// A domain of the exchange.
@@ -63,13 +59,11 @@ impl Domain {
         let one = &frames[first..first + set];
         let member = |subdevice| Member {
             subdevice,
-            takes_part: false,
-            delivery: one.iter().find_map(|frame| frame.deliveries_of(subdevice).next()),
-            part_since: u64::MAX,
-            delivered_before: 0,
+            inputs: one.iter().flat_map(|frame| frame.inputs_of(subdevice)).collect(),
         };
+        let datagrams = one.iter().map(CyclicFrame::datagrams).sum();
         Domain {
-            image: Image::new(planned.image_len as usize, one.iter().map(CyclicFrame::datagrams).sum()),
+            image: Image::new(planned.image_len as usize, datagrams, one.iter().map(CyclicFrame::parts).sum()),
             frames: first..frames.len(),
             set,
             oldest: first,
@@ -206,55 +200,25 @@ impl Domain {
         core::mem::replace(&mut self.status.state, state) != state
     }
 
-    /// Takes over who takes part in what leaves from this cycle on.
-    pub(crate) fn follow(&mut self, cycle: u64, takes_part: impl Fn(usize) -> bool) {
-        for member in &mut self.members {
-            let now = takes_part(member.subdevice);
-            if now == member.takes_part {
-                continue;
-            }
-            if now {
-                // Flights that are under way do not bring it with those that take part.
-                member.part_since = cycle + 1;
-            } else {
-                member.delivered_before = member.delivered(&self.image);
-                member.part_since = u64::MAX;
-            }
-            member.takes_part = now;
-        }
+    /// When these inputs came last: a cycle, plus one.
+    pub(crate) fn came(&self, input: InputNumber) -> u64 {
+        self.image.moment(input).came
     }
 
-    /// Number of a SubDevice among those of the domain.
-    pub(crate) fn member(&self, subdevice: usize) -> Option<usize> {
-        self.members.binary_search_by_key(&subdevice, |member| member.subdevice).ok()
-    }
-
-    /// When inputs of a member came last in a datagram, by the number of its delivery: a cycle, plus one.
-    pub(crate) fn came(&self, member: usize, delivery: usize) -> u64 {
-        let (Some(member), Some(delivery)) = (self.members.get(member), self.image.deliveries.get(delivery)) else {
-            return 0;
-        };
-        let (all, part) = (delivery.all, delivery.part);
-        if part.left >= member.part_since { all.came.max(part.came) } else { all.came }
+    /// When, as a cycle plus one, the flight had left that was judged last.
+    pub(crate) fn judged(&self) -> u64 {
+        self.judged
     }
 
     pub(crate) fn freshness(&self, subdevice: usize) -> Freshness {
-        let Some(member) = self.member(subdevice) else { return Freshness::Never };
-        match self.members[member].delivered(&self.image) {
+        let found = self.members.binary_search_by_key(&subdevice, |member| member.subdevice);
+        let Some(member) = found.ok().and_then(|number| self.members.get(number)) else { return Freshness::Never };
+        // When, as a cycle plus one, the oldest of its inputs had left.
+        match member.inputs.iter().map(|input| self.image.moment(*input).left).min().unwrap_or(0) {
             0 => Freshness::Never,
-            delivered if delivered >= self.judged => Freshness::Fresh,
-            delivered => Freshness::Stale { cycles: self.judged - delivered },
+            left if left >= self.judged => Freshness::Fresh,
+            left => Freshness::Stale { cycles: self.judged - left },
         }
-    }
-}
-
-impl Member {
-    /// When, as a cycle plus one, what brought this SubDevice's inputs last had left.
-    fn delivered(&self, image: &Image) -> u64 {
-        let Some(delivery) = self.delivery.and_then(|number| image.deliveries.get(number)) else { return 0 };
-        let (all, part) = (delivery.all.left, delivery.part.left);
-        let part = if part >= self.part_since { part } else { 0 };
-        all.max(part).max(self.delivered_before)
     }
 }
 

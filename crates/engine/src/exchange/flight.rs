@@ -2,7 +2,8 @@
 //!
 //! What is here is out at most once, so its bytes are built once: a flight changes the frame id, the Idx bytes and the
 //! outputs. Reads leave as zeros and working counters as zero, because what comes back is never written here. A domain
-//! with several cycles under way has each of its frames as many times; they share image and deliveries.
+//! with several cycles under way has each of its frames as many times; they share the image. Each copy is judged by itself,
+//! and its inputs are delivered when it comes ([`super::place`]).
 //! While no SubDevice could answer its process data, a frame leaves without it: see [`CyclicFrame::vacant`].
 
 use alloc::boxed::Box;
@@ -18,12 +19,12 @@ use ringcat_wire::register::map;
 
 use super::clocks::{CLOCK_DATA, Places, Seen};
 use super::counters::CyclicCounters;
-use super::image::{Image, Moment};
+use super::image::{Image, InputNumber, Moment};
 use super::place::Place;
+use super::presence::Presence;
 use crate::board::{Board, Supervision};
 use crate::layout::{PlannedFrame, SUPERVISION_LEN};
 use crate::link::Link;
-use crate::ring::merge::or_into;
 use crate::ring::{Arrivals, Class, FrameCopy, Identity, Sequence};
 use crate::time::Instant;
 
@@ -93,32 +94,59 @@ pub(crate) struct CyclicFrame {
     clocks_seen: Seen,
     headers: Box<[Header]>,
     places: Box<[Place]>,
-    /// Number of the first of them among the domain's deliveries.
-    first_delivery: usize,
+    presence: Option<Presence>,
+    /// Number of the first inputs in the image.
+    first: InputNumber,
+    /// What is known of copies, as they were looked at last.
+    views: Views,
+    /// Newer inputs were there when this flight came.
+    is_overtaken: bool,
     tx: Box<[u8]>,
-    /// First copy of a flight that was not complete by itself.
-    merged: Box<[u8]>,
+}
+
+/// What is known of copies by the link they were sent on. It holds for the next flight too, while copies come back as before.
+#[derive(Clone, Copy, Debug, Default)]
+struct Views {
+    /// They were looked at since something changed on the board.
+    looked: [bool; 2],
+    /// The copy is complete by itself.
+    is_enough: [bool; 2],
+    /// Both copies together are complete.
+    are_enough: bool,
+    /// Some SubDevice processed both.
+    are_doubled: bool,
 }
 
 impl CyclicFrame {
-    /// `first_delivery`: number of process data datagrams in the frames of the domain before this one.
+    /// `first`: numbers of the first datagram and of the first inputs in the domain's image.
     pub(crate) fn new(
         identity: &Identity,
         all_links: u8,
         domain: usize,
         planned: &PlannedFrame,
-        first_delivery: usize,
+        first: InputNumber,
     ) -> CyclicFrame {
         let mut buffer = vec![0; MAX_FRAME];
         let (mut places, mut headers_at, mut supervision_at, mut clocks) = (Vec::new(), Vec::new(), None, None);
-        let mut length = 0;
+        let (mut length, mut next, mut presence) = (0, first, None);
         if let Some(mut builder) = FrameBuilder::ethernet(&mut buffer, MacAddress::ETHERCAT_GROUP, identity.source()) {
             for datagram in &planned.datagrams {
                 let bytes = usize::from(datagram.outputs) + usize::from(datagram.inputs);
                 let target = Target::Logical(datagram.logical);
                 if let Some(data_at) = builder.datagram(datagram.command, 0, target, bytes) {
                     headers_at.push(data_at - HEADER_LEN);
-                    places.push(Place::new(datagram, data_at));
+                    let place = Place::new(datagram, data_at, next);
+                    next = InputNumber { datagram: next.datagram + 1, part: next.part + place.parts() };
+                    places.push(place);
+                }
+            }
+            if let Some(planned) = &planned.presence {
+                let target = Target::Logical(planned.logical);
+                if let Some(data_at) = builder.datagram(Command::Lrd, 0, target, planned.members.len()) {
+                    headers_at.push(data_at - HEADER_LEN);
+                    let shown = Presence::new(planned, data_at);
+                    places.iter_mut().for_each(|place| place.witness(&shown));
+                    presence = Some(shown);
                 }
             }
             if planned.clocks {
@@ -166,8 +194,10 @@ impl CyclicFrame {
             clocks_seen: Seen::default(),
             headers: headers_at.into_iter().map(|at| Header { at, sent: header_at(&buffer, at) }).collect(),
             places: places.into_boxed_slice(),
-            first_delivery,
-            merged: vec![0; length].into_boxed_slice(),
+            presence,
+            first,
+            views: Views::default(),
+            is_overtaken: false,
             tx: buffer.into_boxed_slice(),
         }
     }
@@ -175,9 +205,9 @@ impl CyclicFrame {
     /// A frame that takes the place of this one while no SubDevice of it has its FMMUs: without process data, which
     /// nobody could answer. Its working counters are zero, and it answers for the same inputs and outputs.
     pub(crate) fn vacant(&self, identity: &Identity, planned: &PlannedFrame) -> CyclicFrame {
-        let bare = PlannedFrame { datagrams: Vec::new(), ..*planned };
+        let bare = PlannedFrame { datagrams: Vec::new(), presence: None, ..*planned };
         let places = self.places.iter().map(Place::outside).collect();
-        CyclicFrame { places, ..CyclicFrame::new(identity, self.all_links, self.domain, &bare, self.first_delivery) }
+        CyclicFrame { places, ..CyclicFrame::new(identity, self.all_links, self.domain, &bare, self.first) }
     }
 
     /// Whether it leaves without its process data.
@@ -231,7 +261,22 @@ impl CyclicFrame {
     }
 
     pub(crate) fn close(&mut self) {
+        if self.arrivals.arrived & self.all_links != self.all_links {
+            self.forget_missing();
+        }
         self.stage = Stage::Idle;
+    }
+
+    /// What copies showed before that did not come back this time counts no longer.
+    #[cold]
+    fn forget_missing(&mut self) {
+        for link in Link::ALL.into_iter().filter(|link| self.arrivals.arrived & link.bit() == 0) {
+            if core::mem::take(&mut self.views.looked[link.index()])
+                && let Some(presence) = &mut self.presence
+            {
+                presence.forget(link.index());
+            }
+        }
     }
 
     /// Sum of the working counters of process data.
@@ -247,7 +292,8 @@ impl CyclicFrame {
 
     /// Counts the wrong working counters of this flight.
     pub(crate) fn count_errors(&self, board: &Board) {
-        self.places.iter().for_each(|place| place.count_errors(board));
+        let links = Link::ALL.map(|link| self.arrivals.arrived & link.bit() != 0);
+        self.places.iter().for_each(|place| place.count_errors(board, links));
     }
 
     /// What the supervision datagram of this flight saw, if it has one and anything came back.
@@ -261,9 +307,9 @@ impl CyclicFrame {
         self.left = cycle + 1;
         for place in &mut self.places {
             place.outputs.load(image, &mut self.tx);
-            place.wkc = Wkc(0);
         }
         self.wkc = 0;
+        self.is_overtaken = false;
         self.complete = self.places.is_empty();
         self.arrivals = Arrivals::default();
         self.seen = Supervision::default();
@@ -331,67 +377,40 @@ impl CyclicFrame {
         }
         let first = self.arrivals.arrived == copy.sent_on.bit();
         let finished = self.arrivals.arrived & self.all_links == self.all_links;
-        let complete = self.count(copy.sent_on, bytes);
+        let complete = self.count(copy.sent_on, bytes, first);
         if self.stage == Stage::Waiting {
-            if first && !(complete || finished) {
-                self.merged.copy_from_slice(&bytes[..self.tx.len()]);
-                return Step::Waiting;
-            }
-            if !first {
-                self.merge(bytes);
-            }
-            let merged = if first { bytes } else { &self.merged };
             let moment = Moment { left: self.left, came: cycle + 1 };
-            if moment.left >= image.newest {
-                self.deliver(merged, image, moment);
-            } else if !self.deliver_behind(merged, image, moment) {
-                counters.overtaken += 1;
+            let link = copy.sent_on.index();
+            if moment.left >= image.newest && (first || !self.views.are_doubled) {
+                image.newest = moment.left;
+                self.places.iter().for_each(|place| place.deliver(link, bytes, image, moment));
+            } else {
+                self.deliver_singly(link, bytes, image, moment, counters);
             }
-            self.stage = Stage::Delivered;
-        } else if !complete {
-            self.withdraw(image, cycle);
+            if complete || finished {
+                self.stage = Stage::Delivered;
+            }
         }
         if finished { Step::Finished } else { Step::Waiting }
     }
 
-    /// The second copy met somebody whom the first one had met: the ring closed meanwhile. What was delivered is not new
-    /// any more.
+    /// Puts inputs into the image one by one: a newer flight has perhaps not brought everything, or the other copy has.
     #[cold]
-    fn withdraw(&self, image: &mut Image, cycle: u64) {
-        for (place, delivery) in self.places.iter().zip(&mut image.deliveries[self.first_delivery..]) {
-            if place.wkc.0 > place.expected.0 {
-                delivery.withdraw(self.left, cycle);
-            }
-        }
-    }
-
-    /// Puts inputs into the image, of the newest flight of which anything came.
-    fn deliver(&self, bytes: &[u8], image: &mut Image, moment: Moment) {
-        image.newest = moment.left;
-        let Some(deliveries) = image.deliveries.get_mut(self.first_delivery..) else { return };
-        for (place, delivery) in self.places.iter().zip(deliveries) {
-            if place.inputs.length > 0 {
-                place.deliver(bytes, &mut image.bytes, delivery, moment);
-            }
-        }
-    }
-
-    /// The same of any flight: a newer one has perhaps not brought everything. False where newer inputs were there.
-    #[cold]
-    fn deliver_behind(&self, bytes: &[u8], image: &mut Image, moment: Moment) -> bool {
-        image.newest = image.newest.max(moment.left);
+    fn deliver_singly(
+        &mut self,
+        link: usize,
+        bytes: &[u8],
+        image: &mut Image,
+        moment: Moment,
+        counters: &mut CyclicCounters,
+    ) {
         let mut newest = true;
-        for (place, delivery) in self.places.iter().zip(&mut image.deliveries[self.first_delivery..]) {
-            if place.inputs.length == 0 {
-                continue;
-            }
-            if delivery.is_newer_than(moment) {
-                newest = false;
-            } else {
-                place.deliver(bytes, &mut image.bytes, delivery, moment);
-            }
+        for place in &self.places {
+            newest &= place.deliver_singly(link, bytes, image, moment);
         }
-        newest
+        if !newest && !core::mem::replace(&mut self.is_overtaken, true) {
+            counters.overtaken += 1;
+        }
     }
 
     fn is_what_was_sent(&self, bytes: &[u8]) -> bool {
@@ -399,14 +418,20 @@ impl CyclicFrame {
     }
 
     /// Adds the working counters of a copy; true where every process data datagram has just what it should.
-    fn count(&mut self, sent_on: Link, bytes: &[u8]) -> bool {
-        let (mut complete, mut sum) = (true, self.wkc);
-        for place in &mut self.places {
+    fn count(&mut self, sent_on: Link, bytes: &[u8], first: bool) -> bool {
+        let link = sent_on.index();
+        let mut as_seen = self.views.looked[link]
+            && self.presence.as_ref().is_none_or(|presence| presence.is_as_seen(link, bytes));
+        let mut sum = self.wkc;
+        for place in &self.places {
             let wkc = u16_at(bytes, place.wkc_at);
-            place.wkc = place.wkc.plus(Wkc(wkc));
             sum += u32::from(wkc);
-            complete &= place.is_complete();
+            as_seen &= place.is_as_seen(link, wkc);
         }
+        if !as_seen {
+            self.look(link, bytes);
+        }
+        let complete = if first { self.views.is_enough[link] } else { self.views.are_enough };
         self.wkc = sum;
         self.complete = complete;
         if let Some(clocks) = self.clocks {
@@ -427,43 +452,47 @@ impl CyclicFrame {
         complete
     }
 
-    /// ORs the inputs of the second copy into the first (facts 9.3: sent as zeros, every bit belongs to one SubDevice).
-    fn merge(&mut self, bytes: &[u8]) {
-        for place in &self.places {
-            let inputs = place.inputs.frame_at..place.inputs.frame_at + place.inputs.length;
-            if let (Some(merged), Some(bytes)) = (self.merged.get_mut(inputs.clone()), bytes.get(inputs)) {
-                or_into(merged, bytes);
-            }
+    /// Finds out what a copy brought that is not like the one before it.
+    #[cold]
+    fn look(&mut self, link: usize, bytes: &[u8]) {
+        let once = self.presence.as_mut().is_some_and(|presence| presence.look(link, bytes));
+        for place in &mut self.places {
+            let wkc = Wkc(u16_at(bytes, place.wkc_at));
+            place.look(link, wkc, self.presence.as_ref(), once);
         }
+        let only = [link == 0, link == 1];
+        self.views.looked[link] = true;
+        self.views.is_enough[link] = self.places.iter().all(|place| place.is_complete(only));
+        self.views.are_enough = self.places.iter().all(|place| place.is_complete([true; 2]));
+        self.views.are_doubled = self.places.iter().any(Place::is_doubled);
     }
 
-    /// The deadline is over: delivers what is there. True where nothing at all came back.
-    pub(crate) fn give_up(&mut self, image: &mut Image, cycle: u64) -> bool {
-        if self.arrivals.arrived != 0 {
-            let moment = Moment { left: self.left, came: cycle + 1 };
-            self.deliver_behind(&self.merged, image, moment);
-        }
+    /// The deadline is over. True where nothing at all came back.
+    pub(crate) fn give_up(&mut self) -> bool {
         self.stage = Stage::GivenUp;
         self.arrivals.arrived == 0
     }
 
-    /// Counts anew what those that take part add. Those that are optional may be missing.
-    pub(crate) fn recount(
-        &mut self,
-        changes: u32,
-        takes_part: impl Fn(usize) -> bool,
-        optional: impl Fn(usize) -> bool,
-    ) {
+    /// Takes over who takes part, and who may be missing. What is out has come back or is given up.
+    pub(crate) fn follow(&mut self, changes: u32, board: &Board) {
         self.followed = changes;
-        for place in &mut self.places {
-            place.recount(&takes_part, &optional);
-        }
+        self.views = Views::default();
+        self.places.iter_mut().for_each(|place| place.follow(board));
     }
 
-    /// The datagrams with inputs of a SubDevice, by their numbers among the domain's deliveries.
-    pub(crate) fn deliveries_of(&self, subdevice: usize) -> impl Iterator<Item = usize> {
-        let numbered = (self.first_delivery..).zip(&self.places);
-        numbered.filter(move |(_, place)| place.has_inputs_of(subdevice)).map(|(number, _)| number)
+    /// Inputs of a SubDevice, by their numbers in the image.
+    pub(crate) fn inputs_of(&self, subdevice: usize) -> impl Iterator<Item = InputNumber> {
+        self.places.iter().flat_map(move |place| place.inputs_of(subdevice))
+    }
+
+    /// The AL status that a SubDevice showed in the last flight.
+    pub(crate) fn al_status(&self, subdevice: usize) -> Option<u8> {
+        self.presence.as_ref()?.al_status(subdevice)
+    }
+
+    /// Number of parts: inputs of one SyncManager each.
+    pub(crate) fn parts(&self) -> usize {
+        self.places.iter().map(Place::parts).sum()
     }
 
     /// Number of process data datagrams.

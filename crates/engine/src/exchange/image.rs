@@ -1,4 +1,4 @@
-//! A domain's image, and when the inputs of each of its datagrams came into it.
+//! A domain's image, and when inputs came into it.
 //!
 //! With several cycles under way, flights of the same datagram share this: inputs of an older cycle never overwrite
 //! those of a newer one.
@@ -15,46 +15,39 @@ pub(crate) struct Moment {
     pub came: u64,
 }
 
-/// The last deliveries of a datagram's inputs.
-#[derive(Clone, Copy, Debug, Default)]
-pub(crate) struct Delivery {
-    /// Of all inputs.
-    pub all: Moment,
-    /// Of the inputs of those that took part.
-    pub part: Moment,
+/// Inputs of a SubDevice in a datagram, by their numbers in the image.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct InputNumber {
+    /// Of the datagram.
+    pub datagram: usize,
+    /// Of the part of it.
+    pub part: usize,
 }
 
-/// The image and the deliveries of all datagrams, in the order of the domain's frames.
+/// The image, and when what came into it: by datagram where all its inputs came together, and by their parts.
 #[derive(Debug)]
 pub(crate) struct Image {
     pub bytes: Box<[u8]>,
-    pub deliveries: Box<[Delivery]>,
+    pub datagrams: Box<[Moment]>,
+    pub parts: Box<[Moment]>,
     /// When, as a cycle plus one, the newest flight of which anything came had left.
     pub newest: u64,
 }
 
 impl Image {
-    pub fn new(bytes: usize, datagrams: usize) -> Image {
+    pub fn new(bytes: usize, datagrams: usize, parts: usize) -> Image {
         Image {
             bytes: vec![0; bytes].into_boxed_slice(),
-            deliveries: vec![Delivery::default(); datagrams].into_boxed_slice(),
+            datagrams: vec![Moment::default(); datagrams].into_boxed_slice(),
+            parts: vec![Moment::default(); parts].into_boxed_slice(),
             newest: 0,
         }
     }
-}
 
-impl Delivery {
-    /// Whether a flight that left later has brought inputs, by the moment of this one.
-    pub fn is_newer_than(&self, moment: Moment) -> bool {
-        self.all.left > moment.left || self.part.left > moment.left
-    }
-
-    /// What a flight brought, by the cycle in which it left, does not count as new in this cycle.
-    pub fn withdraw(&mut self, left: u64, cycle: u64) {
-        for moment in [&mut self.all, &mut self.part] {
-            if moment.left == left {
-                *moment = Moment { left: left - 1, came: moment.came.min(cycle) };
-            }
-        }
+    /// When inputs came last.
+    pub fn moment(&self, input: InputNumber) -> Moment {
+        let of = |moments: &[Moment], number: usize| moments.get(number).copied().unwrap_or_default();
+        let (whole, part) = (of(&self.datagrams, input.datagram), of(&self.parts, input.part));
+        if whole.left >= part.left { whole } else { part }
     }
 }

@@ -1,19 +1,27 @@
-//! A process data datagram within a frame: where its bytes lie, who adds what to its working counter, whose inputs are
-//! new when it comes back.
+//! A process data datagram within a frame: where its bytes lie, who adds what to its working counter, whose inputs a copy
+//! brought.
+//!
+//! A working counter that only one SubDevice adds to is exact. Where several do, the presence datagram of the same copy tells
+//! who processed it; the working counter has to be what they add. Each copy is judged by itself: in a ring that closes or
+//! breaks both may have been processed by the same SubDevice.
 
 use alloc::boxed::Box;
 use alloc::vec::Vec;
 use core::ops::Range;
 
 use ringcat_wire::address::Wkc;
+use ringcat_wire::command::Command;
 use ringcat_wire::frame::MAX_FRAME;
 
-use super::image::{Delivery, Moment};
+use super::image::{Image, InputNumber, Moment};
+use super::presence::{Passed, Presence};
 use crate::board::Board;
 use crate::layout::{PlacedArea, PlannedDatagram};
 
 /// Offsets of what is in no frame lie behind this.
 const OUTSIDE: usize = 2 * MAX_FRAME;
+/// What an LRW adds for inputs alone, where a SubDevice has both.
+const INPUTS_OF_LRW: Wkc = Wkc(1);
 
 /// Bytes that are copied between frame and image.
 #[derive(Clone, Copy, Debug)]
@@ -24,52 +32,93 @@ pub(crate) struct Span {
 }
 
 /// Inputs of one SubDevice within a datagram.
-#[derive(Debug)]
+#[derive(Clone, Copy, Debug)]
 struct Segment {
     subdevice: usize,
+    /// Place of the SubDevice among the contributions.
+    contribution: usize,
     span: Span,
+}
+
+/// What a SubDevice adds, and what is known of it.
+#[derive(Clone, Debug)]
+struct Contribution {
+    subdevice: usize,
+    wkc: Wkc,
+    /// Place in the presence datagram.
+    witness: Option<usize>,
+    /// It takes part in process data, and was seen to give its inputs.
+    is_proven: bool,
+    /// Without it the datagram is not complete.
+    required: bool,
+    /// By link: the copy brought its inputs, or was taken by it.
+    met: [bool; 2],
+}
+
+/// What a copy brought, by the link it was sent on.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(crate) enum Brought {
+    /// No inputs.
+    #[default]
+    Nothing,
+    /// Those of some SubDevices.
+    Part,
+    /// All inputs.
+    All,
+}
+
+/// What is known of the copies sent on a link.
+#[derive(Debug, Default)]
+struct View {
+    wkc: Wkc,
+    brought: Brought,
+    /// Working counter and presence fit together.
+    is_sure: bool,
+    /// The inputs that came, neighbours joined. Room for all of them is there from the beginning.
+    runs: Vec<Span>,
 }
 
 /// A process data datagram.
 #[derive(Debug)]
 pub(crate) struct Place {
     pub wkc_at: usize,
-    /// Sum over the copies received so far.
-    pub wkc: Wkc,
+    command: Command,
+    /// Number of the datagram in the image.
+    datagram: usize,
+    /// Number of its first part in the image.
+    first_part: usize,
     /// Working counter with all SubDevices.
-    pub expected: Wkc,
-    /// Working counter with those that take part now.
-    expected_part: Wkc,
-    /// All others are optional: their part is enough.
-    part_suffices: bool,
+    expected: Wkc,
     pub outputs: Span,
     pub inputs: Span,
-    contributions: Box<[(usize, Wkc)]>,
+    contributions: Box<[Contribution]>,
     segments: Box<[Segment]>,
-    /// Segments of those that take part, neighbours joined. Room for all of them is there from the beginning.
-    part: Vec<Span>,
+    views: [View; 2],
 }
 
 impl Place {
-    pub fn new(datagram: &PlannedDatagram, data_at: usize) -> Place {
+    pub fn new(datagram: &PlannedDatagram, data_at: usize, number: InputNumber) -> Place {
         let (outputs, inputs) = (usize::from(datagram.outputs), usize::from(datagram.inputs));
         let start = datagram.image_offset as usize;
         let span = |image_at: usize, length| Span { frame_at: data_at + image_at - start, image_at, length };
+        let contribution = |subdevice: usize| datagram.contributions.iter().position(|(other, _)| *other == subdevice);
         let segment = |placed: &PlacedArea| Segment {
             subdevice: placed.area.subdevice,
+            contribution: contribution(placed.area.subdevice).unwrap_or_default(),
             span: span(placed.image_offset as usize, usize::from(placed.area.length)),
         };
+        let view = || View { runs: Vec::with_capacity(datagram.input_areas.len()), ..View::default() };
         Place {
             wkc_at: data_at + outputs + inputs,
-            wkc: Wkc(0),
+            command: datagram.command,
+            datagram: number.datagram,
+            first_part: number.part,
             expected: datagram.contributions.iter().fold(Wkc(0), |sum, (_, wkc)| sum.plus(*wkc)),
-            expected_part: Wkc(0),
-            part_suffices: false,
             outputs: span(start, outputs),
             inputs: span(start + outputs, inputs),
-            contributions: datagram.contributions.iter().copied().collect(),
-            part: Vec::with_capacity(datagram.input_areas.len()),
+            contributions: datagram.contributions.iter().map(|(subdevice, wkc)| Contribution::new(*subdevice, *wkc)).collect(),
             segments: datagram.input_areas.iter().map(segment).collect(),
+            views: [view(), view()],
         }
     }
 
@@ -77,13 +126,14 @@ impl Place {
     pub fn outside(&self) -> Place {
         let span = |span: Span| Span { frame_at: span.frame_at + OUTSIDE, ..span };
         let segment = |segment: &Segment| Segment { span: span(segment.span), ..*segment };
+        let view = || View { runs: Vec::with_capacity(self.segments.len()), ..View::default() };
         Place {
             wkc_at: self.wkc_at + OUTSIDE,
             outputs: span(self.outputs),
             inputs: span(self.inputs),
             contributions: self.contributions.clone(),
-            part: Vec::with_capacity(self.part.capacity()),
             segments: self.segments.iter().map(segment).collect(),
+            views: [view(), view()],
             ..*self
         }
     }
@@ -93,63 +143,215 @@ impl Place {
         self.wkc_at >= OUTSIDE
     }
 
+    /// Its SubDevices show their AL status in this datagram.
+    pub fn witness(&mut self, presence: &Presence) {
+        for contribution in &mut self.contributions {
+            contribution.witness = presence.place(contribution.subdevice);
+        }
+    }
+
+    /// Number of parts: inputs of one SyncManager each.
+    pub fn parts(&self) -> usize {
+        self.segments.len()
+    }
+
     /// Whether process data of a SubDevice that takes part belongs into it.
     pub fn concerns(&self, takes_part: impl Fn(usize) -> bool) -> bool {
-        self.contributions.iter().any(|(subdevice, _)| takes_part(*subdevice))
+        self.contributions.iter().any(|it| takes_part(it.subdevice))
     }
 
-    /// Whether the working counter is just what it should be.
-    pub fn is_complete(&self) -> bool {
-        self.wkc == self.expected || (self.part_suffices && self.wkc == self.expected_part)
+    /// Whether a copy's working counter is that of the last one that was looked at.
+    #[inline]
+    pub fn is_as_seen(&self, link: usize, wkc: u16) -> bool {
+        self.views[link].wkc.0 == wkc
     }
 
-    /// Counts a wrong working counter for each SubDevice that takes part: which of them has not answered is not known.
-    pub fn count_errors(&self, board: &Board) {
-        if self.wkc == self.expected || self.wkc == self.expected_part {
+    /// Looks at a copy: whose inputs are in it, and who took it. `once`: no SubDevice processed it more than once.
+    pub fn look(&mut self, link: usize, wkc: Wkc, presence: Option<&Presence>, once: bool) {
+        self.views[link].wkc = wkc;
+        self.views[link].is_sure = match &mut self.contributions[..] {
+            // No SubDevice can have processed what was not there.
+            all if self.wkc_at >= OUTSIDE => {
+                all.iter_mut().for_each(|it| it.met[link] = false);
+                true
+            }
+            [alone] => alone.meet_alone(link, wkc, self.command),
+            all if all.iter().all(|it| it.witness.is_some()) => {
+                once && presence.is_some_and(|presence| meet(all, link, wkc, presence))
+            }
+            // Outputs of SubDevices that cannot show themselves: the sum over both copies counts.
+            all => {
+                all.iter_mut().for_each(|it| it.met[link] = false);
+                true
+            }
+        };
+        if !self.views[link].is_sure {
+            self.contributions.iter_mut().for_each(|it| it.met[link] = false);
+        }
+        self.gather(link);
+    }
+
+    /// Puts the inputs together that a copy brought.
+    fn gather(&mut self, link: usize) {
+        let Place { views, segments, contributions, .. } = self;
+        let view = &mut views[link];
+        view.runs.clear();
+        let mut count = 0;
+        for segment in segments.iter().filter(|segment| contributions[segment.contribution].met[link]) {
+            count += 1;
+            match view.runs.last_mut() {
+                Some(run) if run.reaches(&segment.span) => run.length += segment.span.length,
+                _ => view.runs.push(segment.span),
+            }
+        }
+        view.brought = match count {
+            0 => Brought::Nothing,
+            _ if count == segments.len() => Brought::All,
+            _ => Brought::Part,
+        };
+    }
+
+    /// Whether copies on these links, as they were looked at, bring just what they should: each required SubDevice processed
+    /// one of them, and none processed both.
+    pub fn is_complete(&self, links: [bool; 2]) -> bool {
+        let arrived = || self.views.iter().zip(links).filter(|(_, arrived)| *arrived).map(|(view, _)| view);
+        let sum = arrived().fold(0, |sum, view| sum + u32::from(view.wkc.0));
+        if self.is_summed() {
+            let needed = self.contributions.iter().filter(|it| it.required).map(|it| u32::from(it.wkc.0)).sum();
+            return (needed..=u32::from(self.expected.0)).contains(&sum);
+        }
+        let is_met = |it: &Contribution| {
+            let copies = it.met.iter().zip(links).filter(|(met, arrived)| **met && *arrived).count();
+            copies == 1 || (copies == 0 && !it.required)
+        };
+        arrived().all(|view| view.is_sure) && self.contributions.iter().all(is_met)
+    }
+
+    /// Whether some SubDevice processed the copies on both links, as they were looked at.
+    pub fn is_doubled(&self) -> bool {
+        self.contributions.iter().any(|it| it.met == [true; 2])
+    }
+
+    /// Whether only the sum over both copies tells who took it.
+    fn is_summed(&self) -> bool {
+        self.contributions.len() > 1 && self.contributions.iter().any(|it| it.witness.is_none())
+    }
+
+    /// Counts an error for each SubDevice that was counted on and processed none of the copies that came, or both.
+    pub fn count_errors(&self, board: &Board, links: [bool; 2]) {
+        if self.is_complete(links) {
             return;
         }
-        for (subdevice, _) in self.contributions.iter().filter(|(subdevice, _)| board.takes_part(*subdevice)) {
-            board.count_wkc_error(*subdevice);
-        }
+        let is_summed = self.is_summed();
+        let processed = |it: &Contribution| it.met.iter().zip(links).filter(|(met, arrived)| **met && *arrived).count();
+        let expected = self.contributions.iter().filter(|it| it.is_proven);
+        expected.filter(|it| is_summed || processed(it) != 1).for_each(|it| board.count_wkc_error(it.subdevice));
     }
 
-    /// All inputs where everybody answered; those of the ones that take part where just they answered; else nothing,
-    /// because it is not known whose bytes are zeros.
-    pub fn deliver(&self, bytes: &[u8], image: &mut [u8], delivery: &mut Delivery, moment: Moment) {
-        if self.wkc == self.expected {
-            self.inputs.deliver(bytes, image);
-            delivery.all = moment;
-        } else if self.wkc == self.expected_part && self.wkc.0 > 0 {
-            for run in &self.part {
-                run.deliver(bytes, image);
+    /// Puts the inputs that a copy brought into the image, where nothing newer is.
+    #[inline]
+    pub fn deliver(&self, link: usize, bytes: &[u8], image: &mut Image, moment: Moment) {
+        match self.views[link].brought {
+            Brought::Nothing => {}
+            Brought::All => {
+                self.inputs.deliver(bytes, &mut image.bytes);
+                if let Some(whole) = image.datagrams.get_mut(self.datagram) {
+                    *whole = moment;
+                }
             }
-            delivery.part = moment;
-        }
-    }
-
-    /// Counts anew what those that take part add. Those that are optional may be missing.
-    pub fn recount(&mut self, takes_part: impl Fn(usize) -> bool, optional: impl Fn(usize) -> bool) {
-        let part = self.contributions.iter().filter(|(subdevice, _)| takes_part(*subdevice));
-        self.expected_part = part.fold(Wkc(0), |sum, (_, wkc)| sum.plus(*wkc));
-        self.part_suffices = self.contributions.iter().all(|(s, _)| takes_part(*s) || optional(*s));
-        self.part.clear();
-        for segment in self.segments.iter().filter(|segment| takes_part(segment.subdevice)) {
-            match self.part.last_mut() {
-                Some(run) if run.reaches(&segment.span) => run.length += segment.span.length,
-                _ => self.part.push(segment.span),
+            Brought::Part => {
+                self.views[link].runs.iter().for_each(|run| run.deliver(bytes, &mut image.bytes));
+                for (segment, part) in self.segments.iter().zip(image.parts.iter_mut().skip(self.first_part)) {
+                    if self.contributions[segment.contribution].met[link] {
+                        *part = moment;
+                    }
+                }
             }
         }
     }
 
-    /// Whether inputs of a SubDevice are in it.
-    pub fn has_inputs_of(&self, subdevice: usize) -> bool {
-        self.segments.iter().any(|segment| segment.subdevice == subdevice)
+    /// As [`Place::deliver`], for inputs one by one: those are left out that came later or with the other copy of the flight.
+    /// False where something newer was there.
+    #[cold]
+    pub fn deliver_singly(&self, link: usize, bytes: &[u8], image: &mut Image, moment: Moment) -> bool {
+        let mut newest = true;
+        for (number, segment) in self.segments.iter().enumerate() {
+            if !self.contributions[segment.contribution].met[link] {
+                continue;
+            }
+            let input = self.number_of(number);
+            let before = image.moment(input);
+            newest &= before.left <= moment.left;
+            if before.left < moment.left {
+                segment.span.deliver(bytes, &mut image.bytes);
+                if let Some(part) = image.parts.get_mut(input.part) {
+                    *part = moment;
+                }
+            }
+        }
+        newest
+    }
+
+    fn number_of(&self, segment: usize) -> InputNumber {
+        InputNumber { datagram: self.datagram, part: self.first_part + segment }
+    }
+
+    /// Takes over who takes part, and without whom it is complete.
+    pub fn follow(&mut self, board: &Board) {
+        for contribution in &mut self.contributions {
+            let takes_part = board.takes_part(contribution.subdevice);
+            contribution.is_proven = takes_part && !board.is_unproven(contribution.subdevice);
+            contribution.required = takes_part || !board.is_optional(contribution.subdevice);
+        }
+    }
+
+    /// Inputs of a SubDevice in it.
+    pub fn inputs_of(&self, subdevice: usize) -> impl Iterator<Item = InputNumber> {
+        let numbered = self.segments.iter().enumerate();
+        numbered.filter(move |(_, segment)| segment.subdevice == subdevice).map(|(number, _)| self.number_of(number))
     }
 
     /// The SubDevice in whose inputs bytes of the image lie, all of them.
     pub fn whose_inputs(&self, bytes: &Range<usize>) -> Option<usize> {
         self.segments.iter().find(|segment| segment.span.holds(bytes)).map(|segment| segment.subdevice)
     }
+}
+
+impl Contribution {
+    fn new(subdevice: usize, wkc: Wkc) -> Contribution {
+        Contribution { subdevice, wkc, witness: None, is_proven: false, required: true, met: [false; 2] }
+    }
+
+    /// The only SubDevice of a datagram. False where it processed a copy twice.
+    fn meet_alone(&mut self, link: usize, wkc: Wkc, command: Command) -> bool {
+        let has_both = command == Command::Lrw && self.wkc == Wkc(3);
+        self.met[link] = wkc == self.wkc || (has_both && wkc == INPUTS_OF_LRW);
+        wkc.0 <= self.wkc.0
+    }
+}
+
+/// Who of several processed a copy. Those that take part and are in a state in which they give their inputs did so; the
+/// working counter has to hold what they add, and no more than the others that are there can have added. False where it
+/// does not.
+fn meet(all: &mut [Contribution], link: usize, wkc: Wkc, presence: &Presence) -> bool {
+    let (mut sure, mut others) = (0, 0);
+    for contribution in all.iter_mut() {
+        let passed = contribution.witness.map_or(Passed::Not, |place| presence.passed(link, place));
+        contribution.met[link] = passed == Passed::Delivering && contribution.is_proven;
+        match passed {
+            Passed::Not => {}
+            Passed::Delivering if contribution.is_proven => sure += u32::from(contribution.wkc.0),
+            Passed::Delivering | Passed::Somehow => others += u32::from(contribution.wkc.0),
+        }
+    }
+    let wkc = u32::from(wkc.0);
+    if wkc == sure + others {
+        // Everyone that is there did all that it does.
+        for contribution in all.iter_mut() {
+            contribution.met[link] = contribution.witness.is_some_and(|place| presence.passed(link, place) != Passed::Not);
+        }
+    }
+    (sure..=sure + others).contains(&wkc)
 }
 
 impl Span {

@@ -19,13 +19,15 @@ use ringcat_wire::address::Wkc;
 
 const DOMAIN: DomainId = DomainId(0);
 const PERIOD: Duration = Duration::from_millis(1);
-/// Places in the frame: LWR with three bytes, LRD with three bytes, BRD with two.
+/// Places in the frame: LWR with three bytes, LRD with three bytes, LRD of presence with three, BRD with two.
 const OUTPUTS_AT: usize = 26;
 const LWR_WKC_AT: usize = 29;
 const INPUTS_AT: usize = 41;
 const LRD_WKC_AT: usize = 44;
-const AL_STATUS_AT: usize = 56;
-const BRD_WKC_AT: usize = 58;
+const PRESENCE_AT: usize = 56;
+const PRESENCE_WKC_AT: usize = 59;
+const AL_STATUS_AT: usize = 71;
+const BRD_WKC_AT: usize = 73;
 /// Inputs in the image lie behind the outputs.
 const IMAGE_INPUTS: core::ops::Range<usize> = 3..6;
 
@@ -67,7 +69,7 @@ impl Ring {
         let mut unmarked = copies[1].clone();
         assert_eq!(unmarked[6], 0x08);
         unmarked[6] = 0;
-        assert_eq!((copies[0].len(), &unmarked), (60, &copies[0]));
+        assert_eq!((copies[0].len(), &unmarked), (75, &copies[0]));
         copies
     }
 
@@ -95,7 +97,8 @@ fn meet(frame: &mut [u8], subdevices: &[usize], base: u8) {
     frame[6] |= 0x02;
     for subdevice in subdevices {
         frame[INPUTS_AT + subdevice] |= base + *subdevice as u8;
-        for at in [LWR_WKC_AT, LRD_WKC_AT, BRD_WKC_AT] {
+        frame[PRESENCE_AT + subdevice] |= 0x08;
+        for at in [LWR_WKC_AT, LRD_WKC_AT, PRESENCE_WKC_AT, BRD_WKC_AT] {
             frame[at] += 1;
         }
         frame[AL_STATUS_AT] |= 0x08;
@@ -123,19 +126,20 @@ fn in_a_closed_ring_the_complete_copy_is_delivered_without_waiting_for_the_other
 }
 
 #[test]
-fn a_second_copy_that_met_somebody_again_makes_the_cycle_incomplete_and_the_inputs_stale() {
+fn a_second_copy_that_a_subdevice_processed_again_makes_the_cycle_incomplete_and_leaves_the_inputs_of_the_first() {
     let mut ring = Ring::new();
     for again in [false, true] {
         let [mut main, mut redundant] = ring.send();
         meet(&mut main, &[0, 1, 2], 0x40);
-        meet(&mut redundant, if again { &[2] } else { &[] }, 0x40);
+        meet(&mut redundant, if again { &[2] } else { &[] }, 0x50);
         assert_eq!(ring.receive(Link::Redundant, &main), Received::Taken);
         assert_eq!(ring.receive(Link::Redundant, &redundant), Received::Taken);
+        assert_eq!(ring.inputs(), [0x40, 0x41, 0x42]);
         let status = ring.judge();
         assert_eq!(status.state, if again { DomainState::Incomplete } else { DomainState::Complete });
         assert_eq!(status.wkc, 6 + 2 * u32::from(again));
+        assert_eq!(ring.freshness(), [Freshness::Fresh; 3]);
     }
-    assert_eq!(ring.freshness(), [Freshness::Stale { cycles: 1 }; 3]);
 }
 
 #[test]
@@ -169,7 +173,7 @@ fn in_a_cut_ring_both_copies_make_one_answer() {
 }
 
 #[test]
-fn while_it_is_not_known_who_is_missing_no_inputs_are_new() {
+fn a_missing_subdevice_keeps_its_last_inputs_and_those_of_the_others_are_new_at_once() {
     let mut ring = Ring::new();
     for (who, base) in [(&[0, 1, 2][..], 0x10), (&[0, 2][..], 0x20)] {
         let [mut main, redundant] = ring.send();
@@ -178,8 +182,9 @@ fn while_it_is_not_known_who_is_missing_no_inputs_are_new() {
         ring.receive(Link::Main, &redundant);
         ring.judge();
     }
-    assert_eq!((ring.inputs(), ring.exchange.status(DOMAIN).state), (&[0x10, 0x11, 0x12][..], DomainState::Incomplete));
-    assert_eq!(ring.freshness(), [Freshness::Stale { cycles: 1 }; 3]);
+    assert_eq!((ring.inputs(), ring.exchange.status(DOMAIN).state), (&[0x20, 0x11, 0x22][..], DomainState::Incomplete));
+    assert_eq!(ring.freshness(), [Freshness::Fresh, Freshness::Stale { cycles: 1 }, Freshness::Fresh]);
+    assert_eq!([0, 1, 2].map(|subdevice| ring.exchange.al_status(subdevice)), [Some(8), Some(0), Some(8)]);
 }
 
 #[test]
@@ -204,6 +209,83 @@ fn inputs_of_those_that_take_part_are_new_and_the_missing_one_keeps_its_last() {
     }
 }
 
+/// The copies of a frame that one SubDevice with an input did not process, and another one that is not counted on did.
+#[test]
+fn a_sum_that_fits_by_chance_makes_no_inputs_fresh() {
+    let mut ring = Ring::new();
+    for (who, base) in [(&[0, 1, 2][..], 0x10), (&[0, 2][..], 0x20)] {
+        // The engine still believes that 2 is not there, and 1 is.
+        ring.board.set_taking_part(2, who.len() == 3);
+        let [mut main, redundant] = ring.send();
+        meet(&mut main, who, base);
+        ring.receive(Link::Redundant, &main);
+        ring.receive(Link::Main, &redundant);
+        ring.judge();
+    }
+    assert_eq!(ring.inputs(), [0x20, 0x11, 0x22]);
+    assert_eq!(ring.freshness(), [Freshness::Fresh, Freshness::Stale { cycles: 1 }, Freshness::Fresh]);
+}
+
+/// A SubDevice processes both copies while another one loses its power: the sum is that of all.
+#[test]
+fn a_subdevice_that_processed_both_copies_does_not_stand_for_one_that_is_gone() {
+    let mut ring = Ring::new();
+    let [mut main, mut redundant] = ring.send();
+    meet(&mut main, &[0, 1], 0x10);
+    meet(&mut redundant, &[1], 0x40);
+    ring.receive(Link::Main, &main);
+    ring.receive(Link::Redundant, &redundant);
+    let status = ring.judge();
+    assert_eq!((status.wkc, status.expected, status.state), (6, 6, DomainState::Incomplete));
+    assert_eq!(ring.inputs(), [0x10, 0x11, 0]);
+    assert_eq!(ring.freshness(), [Freshness::Fresh, Freshness::Fresh, Freshness::Never]);
+}
+
+/// One SubDevice on its way to SAFEOP takes outputs and may give inputs: those of the others stay fresh, its own are not
+/// taken for fresh unless the sum says so.
+#[test]
+fn a_subdevice_below_safeop_costs_the_others_nothing_and_is_fresh_only_where_it_answered() {
+    for gives in [false, true] {
+        let mut ring = Ring::new();
+        ring.board.set_taking_part(1, false);
+        ring.board.set_unproven(1, true);
+        let [mut main, redundant] = ring.send();
+        meet(&mut main, &[0, 2], 0x10);
+        frame_of_one_in_preop(&mut main, 1, gives);
+        ring.receive(Link::Redundant, &main);
+        ring.receive(Link::Main, &redundant);
+        ring.judge();
+        let own = if gives { Freshness::Fresh } else { Freshness::Never };
+        assert_eq!(ring.freshness(), [Freshness::Fresh, own, Freshness::Fresh], "gives inputs: {gives}");
+        assert_eq!(ring.exchange.al_status(1), Some(2));
+    }
+}
+
+/// What a SubDevice in PREOP whose FMMUs are set makes of a frame.
+fn frame_of_one_in_preop(frame: &mut [u8], subdevice: usize, gives_inputs: bool) {
+    frame[PRESENCE_AT + subdevice] |= 0x02;
+    for at in [LWR_WKC_AT, PRESENCE_WKC_AT, BRD_WKC_AT] {
+        frame[at] += 1;
+    }
+    if gives_inputs {
+        frame[INPUTS_AT + subdevice] = 0x77;
+        frame[LRD_WKC_AT] += 1;
+    }
+}
+
+/// The presence bytes and their working counter disagree: a SubDevice processed one copy twice.
+#[test]
+fn a_copy_that_a_subdevice_processed_twice_makes_nothing_fresh() {
+    let mut ring = Ring::new();
+    let [mut main, redundant] = ring.send();
+    meet(&mut main, &[0, 1], 0x10);
+    meet(&mut main, &[1], 0x10);
+    ring.receive(Link::Redundant, &main);
+    ring.receive(Link::Main, &redundant);
+    ring.judge();
+    assert_eq!((ring.inputs(), ring.freshness()), (&[0; 3][..], [Freshness::Never; 3]));
+}
+
 // Facts CR-06.
 #[test]
 fn one_lost_copy_of_a_closed_ring_costs_nothing_and_both_lost_cost_a_cycle() {
@@ -219,7 +301,7 @@ fn one_lost_copy_of_a_closed_ring_costs_nothing_and_both_lost_cost_a_cycle() {
 }
 
 #[test]
-fn one_copy_that_is_not_complete_is_given_up_at_the_deadline() {
+fn one_copy_that_is_not_complete_is_given_up_at_the_deadline_and_its_inputs_are_new() {
     let mut ring = Ring::new();
     let [mut main, _] = ring.send();
     meet(&mut main, &[0], 0x10);
@@ -228,7 +310,8 @@ fn one_copy_that_is_not_complete_is_given_up_at_the_deadline() {
     assert!(early.pending && !ring.exchange.queue(DOMAIN, ring.now + PERIOD / 2));
     let status = ring.judge();
     assert_eq!((status.wkc, status.state, status.skipped), (2, DomainState::Incomplete, 1));
-    assert_eq!((ring.exchange.counters().half, ring.inputs()), (1, &[0; 3][..]));
+    assert_eq!((ring.exchange.counters().half, ring.inputs()), (1, &[0x10, 0, 0][..]));
+    assert_eq!(ring.freshness(), [Freshness::Fresh, Freshness::Never, Freshness::Never]);
 }
 
 #[test]
@@ -252,13 +335,13 @@ fn late_double_and_corrupt_copies_change_nothing() {
     meet(&mut old, &[0, 1, 2], 0x70);
     assert_eq!(ring.receive(Link::Redundant, &old), Received::Late);
     // Command, Idx behind the first, length, M bit.
-    for (at, bit) in [(16, 1), (32, 1), (37, 1), (22, 1), (23, 0x80), (52, 4)] {
+    for (at, bit) in [(16, 1), (32, 1), (37, 1), (22, 1), (23, 0x80), (52, 4), (67, 4)] {
         let mut wrong = main.clone();
         meet(&mut wrong, &[0, 1, 2], 0x70);
         wrong[at] ^= bit;
         assert_eq!(ring.receive(Link::Redundant, &wrong), Received::Corrupt, "byte {at}");
     }
-    assert_eq!(ring.receive(Link::Redundant, &main[..59]), Received::Corrupt);
+    assert_eq!(ring.receive(Link::Redundant, &main[..74]), Received::Corrupt);
     // The C bit is the controllers' to set.
     main[23] |= 0x40;
     meet(&mut main, &[0, 1, 2], 0x10);
@@ -268,7 +351,7 @@ fn late_double_and_corrupt_copies_change_nothing() {
     assert_eq!(ring.judge().wkc, 6);
     assert_eq!(ring.inputs(), [0x10, 0x11, 0x12]);
     let counters = ring.exchange.counters();
-    assert_eq!((counters.late, counters.corrupt), (2, 7));
+    assert_eq!((counters.late, counters.corrupt), (2, 8));
 }
 
 #[test]
@@ -284,7 +367,7 @@ fn frames_of_more_than_256_flights_are_told_apart() {
     }
     let [now, _] = ring.send();
     assert_eq!(first[7].wrapping_add(1), now[7]);
-    assert!([17, 32, 47].iter().all(|at| (first[*at], now[*at]) == (0, 1)), "every Idx");
+    assert!([17, 32, 47, 62].iter().all(|at| (first[*at], now[*at]) == (0, 1)), "every Idx");
     let mut same_id = first.clone();
     same_id[7] = now[7];
     meet(&mut same_id, &[0, 1, 2], 0x70);

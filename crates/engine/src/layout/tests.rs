@@ -15,6 +15,11 @@ fn spec(areas: Vec<AreaSpec>) -> DomainSpec {
     DomainSpec { period: Duration::from_millis(1), under_way: 1, lrw: true, areas }
 }
 
+/// Two links, and datagrams of its own for each SubDevice.
+fn each(supervision: bool) -> Rules<'static> {
+    Rules { links: LinkSet::Ring, supervision, lrw: LrwPolicy::PerSubDevice, witnesses: &[] }
+}
+
 #[test]
 fn one_link_uses_lrw_and_two_links_use_lwr_and_lrd() {
     let areas =
@@ -37,7 +42,7 @@ fn one_link_uses_lrw_and_two_links_use_lwr_and_lrd() {
 fn one_lrw_per_subdevice_is_allowed_on_two_links_facts_9_2_2() {
     let pair = |n: usize, out, inp| [area(n, 2, Direction::Outputs, out), area(n, 3, Direction::Inputs, inp)];
     let areas: Vec<_> = (0..3).flat_map(|n| pair(n, 4, 6)).chain([area(3, 3, Direction::Inputs, 2)]).collect();
-    let layout = Layout::with_lrw(&[spec(areas)], LinkSet::Ring, true, LrwPolicy::PerSubDevice).unwrap();
+    let layout = Layout::with(&[spec(areas)], each(true)).unwrap();
     let frames = &layout.domains[0].frames;
     assert_eq!(frames.len(), 1, "datagrams share a frame");
     let datagrams: Vec<_> =
@@ -52,7 +57,7 @@ fn one_lrw_per_subdevice_is_allowed_on_two_links_facts_9_2_2() {
         ]
     );
     let large: Vec<_> = (0..4).flat_map(|n| pair(n, 700, 700)).collect();
-    let layout = Layout::with_lrw(&[spec(large)], LinkSet::Ring, false, LrwPolicy::PerSubDevice).unwrap();
+    let layout = Layout::with(&[spec(large)], each(false)).unwrap();
     assert_eq!(layout.domains[0].frames.len(), 4);
     assert!(layout.domains[0].frames.iter().all(|frame| frame.used() <= MAX_DATA + OVERHEAD));
 }

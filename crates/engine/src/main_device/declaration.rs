@@ -20,11 +20,12 @@ use super::lrw::ExplicitLrw;
 use crate::config::{ClockConfig, ConfigError, Group, Resolution, SubDeviceConfig, can_lead, groups, resolve};
 use crate::event::Event;
 use crate::info::SubDeviceInfo;
-use crate::layout::{AreaSpec, DomainSpec, Layout, LrwPolicy};
+use crate::layout::{AreaSpec, DomainSpec, Layout, LrwPolicy, Witness};
 use crate::link::LinkSet;
 use crate::mail::Mailbox;
 use crate::plan::plan;
 use crate::procedures::fleet::{Member, Setup, SetupError, declared_areas};
+use crate::procedures::presence;
 use crate::procedures::request_state::exchanges;
 use crate::procedures::scan::{Scan, station_at};
 use crate::procedures::strangers::{Owners, Stranger};
@@ -184,6 +185,16 @@ pub(super) fn plan_all(
             None => Ok(Areas::Declared(declared_areas(config).unwrap_or_default(), Box::new(config.clone()))),
         })
         .collect()
+}
+
+/// How each SubDevice shows whether its inputs came. Of one that is not there it is not known whether it has an FMMU to spare.
+pub(super) fn witnesses(plans: &[Areas], found: &[Option<SubDeviceInfo>]) -> Vec<Witness> {
+    let pairs = plans.iter().zip(found).enumerate();
+    let witness = |(subdevice, (areas, info)): (usize, (&Areas, &Option<SubDeviceInfo>))| match (areas, info) {
+        (Areas::Planned(Some(plan)), Some(info)) => presence::witness(subdevice, plan, info),
+        _ => Witness::Alone,
+    };
+    pairs.map(witness).collect()
 }
 
 /// What needs no SubDevice to be found wrong.

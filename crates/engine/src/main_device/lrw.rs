@@ -7,7 +7,7 @@ use ringcat_wire::address::LogicalAddress;
 use ringcat_wire::command::Command;
 
 use super::activate_error::ActivateError;
-use crate::layout::{DomainSpec, Layout, LrwPolicy};
+use crate::layout::{DomainSpec, Layout, LrwPolicy, Rules};
 use crate::link::LinkSet;
 
 /// A datagram with LRW as a configuration file names it. What leaves is laid out by the MainDevice.
@@ -40,7 +40,8 @@ pub(super) fn check_lrw(lrw: LrwPolicy, specs: &[DomainSpec], links: LinkSet) ->
         return Ok(());
     }
     let specs: Vec<DomainSpec> = specs.iter().map(|spec| DomainSpec { lrw: true, ..spec.clone() }).collect();
-    let asked = Layout::with_lrw(&specs, LinkSet::Single, false, lrw).map_err(ActivateError::Layout)?;
+    let rules = Rules { links: LinkSet::Single, supervision: false, lrw, witnesses: &[] };
+    let asked = Layout::with(&specs, rules).map_err(ActivateError::Layout)?;
     for (domain, planned) in asked.domains.iter().enumerate() {
         let datagrams = planned.frames.iter().flat_map(|frame| &frame.datagrams);
         if let Some(datagram) = datagrams.clone().find(|datagram| datagram.command == Command::Lrw) {

@@ -17,6 +17,7 @@ use ringcat_wire::register::{Fmmu, SyncManager, map};
 use super::al_state;
 use super::clocks;
 use super::fleet::{Setup, SharedFleet};
+use super::presence;
 use super::sii;
 use crate::config::{SdoDownload, SubDeviceConfig, Transition};
 use crate::mail::Mailbox;
@@ -56,7 +57,7 @@ pub(super) struct BringUp<'a> {
 }
 
 impl BringUp<'_> {
-    /// The whole way. Process data counts on the SubDevice from the moment its FMMUs are written.
+    /// The whole way. Process data counts on the SubDevice from SAFEOP on.
     pub(super) async fn run(&self, start: Start) -> Result<(), ConfigureError> {
         self.fleet.board.set_taking_part(self.index, false);
         self.fleet.set_configured(self.index, false);
@@ -93,6 +94,7 @@ impl BringUp<'_> {
 
     /// The FMMUs go first: a SubDevice that leaves OP may take part in process data by halves on its way.
     async fn back_to_init(&self) -> Result<(), ConfigureError> {
+        self.fleet.board.set_unproven(self.index, false);
         let (status, _) = al_state::read_status(self.bus, self.station).await?;
         let fmmus = vec![0; Fmmu::LEN * usize::from(self.setup.fmmu_count)];
         self.bus.fpwr(self.station, map::FMMU_BASE, &fmmus).await?;
@@ -145,7 +147,7 @@ impl BringUp<'_> {
         Ok(())
     }
 
-    /// Maps the bit of a SyncManager that says whether there is mail; the other FMMUs follow in SAFEOP.
+    /// Maps the bit of a SyncManager that says whether there is mail; the other FMMUs follow on the way to SAFEOP.
     async fn show_mail(&self, sync_manager: u8) -> Result<(), BusError> {
         let mail = self.setup.fmmus.iter().find(|(number, _)| Some(*number) == self.setup.mail_fmmu);
         let Some((number, register)) = mail else { return Ok(()) };
@@ -154,9 +156,9 @@ impl BringUp<'_> {
         self.bus.fpwr(self.station, map::fmmu(*number), &register.encode()).await
     }
 
-    /// Commands of PS, PDO assignment and mapping, watchdog, process data SyncManagers, SAFEOP, FMMUs. The FMMUs come
-    /// last and all at once: before SAFEOP a SubDevice takes outputs and gives no inputs, so that nobody could tell from a
-    /// working counter whose inputs are missing, and the others' would count as stale for as long as it takes.
+    /// Commands of PS, PDO assignment and mapping, watchdog, process data SyncManagers, FMMUs, SAFEOP (facts 5.2). From its FMMUs
+    /// on a SubDevice may take outputs and give inputs, one before the other; what it adds to a working counter is not counted on
+    /// before it was seen to give its inputs, so that those of the others stay fresh meanwhile.
     async fn safeop(&self) -> Result<(), ConfigureError> {
         let plan = &self.setup.plan;
         self.command(Transition::Ps).await?;
@@ -173,26 +175,37 @@ impl BringUp<'_> {
             self.bus.sleep(self.config.wait_before_safeop).await;
         }
         self.start_clock().await?;
+        self.map().await?;
         let reached = self.request(AlState::PreOp, AlState::SafeOp).await;
         if let Err(error) = &reached {
+            // Nobody has to reckon with it until the next attempt.
+            self.part().await?;
             self.explain(error).await;
         }
         reached?;
         if !plan.is_op_only() {
-            self.join().await?;
+            self.join();
         }
         self.fleet.set_configured(self.index, true);
         Ok(())
     }
 
-    /// Process data counts on it from now on.
-    async fn join(&self) -> Result<(), BusError> {
+    /// Maps process data, all of it at once with what shows whether the SubDevice processed a frame.
+    async fn map(&self) -> Result<(), BusError> {
+        self.fleet.board.set_unproven(self.index, self.setup.shows_presence);
         let fmmus = self.setup.fmmu_registers();
-        if !fmmus.is_empty() {
-            self.bus.fpwr(self.station, map::FMMU_BASE, &fmmus).await?;
+        if fmmus.is_empty() {
+            return Ok(());
         }
+        self.bus.fpwr(self.station, map::FMMU_BASE, &fmmus).await
+    }
+
+    /// Process data counts on it from now on, on its inputs as soon as they were seen.
+    pub(super) fn join(&self) {
         self.fleet.board.set_taking_part(self.index, true);
-        Ok(())
+        if self.fleet.board.is_unproven(self.index) {
+            presence::prove(self.bus, self.fleet, self.index, self.station, self.setup.clone());
+        }
     }
 
     /// The SYNC signals that are declared, or what is left of others.
@@ -218,7 +231,9 @@ impl BringUp<'_> {
             self.write_sync_manager(area.sync_manager, &area.register).await?;
         }
         if self.setup.plan.is_op_only() {
-            self.join().await?;
+            // They went when OP was left.
+            self.map().await?;
+            self.join();
         }
         let cycles = self.fleet.board.cycles() + CYCLES_BEFORE_OP;
         while self.fleet.board.cycles() < cycles {

@@ -12,6 +12,7 @@ use ringcat_wire::register::Fmmu;
 use super::clocks::SharedClocks;
 use super::junction::{End, Told};
 use super::mail_watch;
+use super::presence;
 use super::services::ports::BlockedPort;
 use super::services::statistics::Book;
 use super::sii::SiiCache;
@@ -107,6 +108,8 @@ pub struct Setup {
     pub fmmus: Vec<(u8, Fmmu)>,
     /// Of these, the number of the one that shows whether there is mail.
     pub mail_fmmu: Option<u8>,
+    /// Its AL status is shown in the frames of its process data.
+    pub shows_presence: bool,
     /// FMMUs that the controller has.
     pub fmmu_count: u8,
     /// SyncManagers that the controller has.
@@ -129,6 +132,8 @@ pub enum SetupError {
         /// Bytes of the SubDevice.
         got: u16,
     },
+    /// The process image wants its AL status through an FMMU, and of these it has none to spare.
+    NoSpareFmmu(u8),
 }
 
 impl core::fmt::Display for SetupError {
@@ -139,6 +144,9 @@ impl core::fmt::Display for SetupError {
                 f,
                 "SyncManager {sync_manager}: the process image has {expected} bytes for it, the SubDevice {got}"
             ),
+            SetupError::NoSpareFmmu(count) => {
+                write!(f, "expected an FMMU to spare for the AL status, all {count} are in use")
+            }
         }
     }
 }
@@ -167,10 +175,16 @@ impl Setup {
         let mail = mail_watch::fmmu(index, &plan, info);
         let mail_fmmu = mail.map(|(number, _)| number);
         fmmus.extend(mail);
+        let presence = layout.presence(index);
+        if let Some(logical) = presence {
+            let number = presence::number(index, &plan, info).ok_or(SetupError::NoSpareFmmu(info.controller.fmmu_count))?;
+            fmmus.push((number, presence::fmmu(logical)));
+        }
         Ok(Setup {
             plan,
             fmmus,
             mail_fmmu,
+            shows_presence: presence.is_some(),
             fmmu_count: info.controller.fmmu_count,
             sync_manager_count: info.controller.sync_manager_count,
             emulated: info.device_emulation,

@@ -172,7 +172,7 @@ async fn quick(bring_up: &BringUp<'_>) -> Result<bool, ConfigureError> {
     if status.al_state() != Some(AlState::SafeOp) || *target != AlState::Op || !fleet.is_configured(*index) {
         return Ok(false);
     }
-    fleet.board.set_taking_part(*index, true);
+    bring_up.join();
     mailbox.resume();
     if status.error {
         bus.report(Event::StateError { subdevice: *index, requested: None, status, code });

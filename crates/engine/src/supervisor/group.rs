@@ -14,8 +14,8 @@ use core::time::Duration;
 use super::bus::Bus;
 use super::executor::TaskId;
 
-/// So many SubDevices are asked at a time where there is no hurry: a frame of 30 us where each is asked for three FMMUs.
-pub(crate) const TURN: usize = 6;
+/// So many SubDevices are asked at a time where there is no hurry: a frame of 32 us where each is asked for four FMMUs.
+pub(crate) const TURN: usize = 5;
 /// Pause between two such turns.
 pub(crate) const TURN_PAUSE: Duration = Duration::from_micros(250);
 

@@ -10,6 +10,7 @@ use std::ops::Range;
 use std::time::Duration;
 
 use ringcat::{DomainId, DomainState, Freshness, JunctionMode, Options, automatic};
+use ringcat_sim::application::{Behaviour, InputSource};
 use ringcat_sim::cable::{CableId, DeviceIndex, Endpoint};
 use ringcat_sim::description::DeviceDescription;
 use ringcat_sim::fault::Fault;
@@ -38,7 +39,12 @@ const DOMAIN: DomainId = DomainId(0);
 /// Devices of these kinds with four MII ports each.
 fn with_four_ports(kinds: &[&str]) -> Vec<DeviceDescription> {
     let mut described = descriptions(kinds);
-    described.iter_mut().for_each(|it| it.ports = [PortKind::Mii; 4]);
+    for it in &mut described {
+        it.ports = [PortKind::Mii; 4];
+        if let Behaviour::Terminal(source @ InputSource::Constant(_)) = &mut it.behaviour {
+            *source = InputSource::Constant(vec![0xAA; 2]);
+        }
+    }
     described
 }
 
@@ -127,7 +133,9 @@ fn random_segment(dice: &mut Dice) -> (Network, usize) {
         }
     };
     let mut described = with_four_ports(&kinds);
-    for description in &mut described {
+    for (number, description) in described.iter_mut().enumerate() {
+        // Which of two alike came back is another matter.
+        description.identity.product_code += 0x1000 * number as u32;
         // Few FMMUs leave none to spare.
         description.controller_fmmus = *dice.pick(&[None, None, Some(3), Some(2)]);
     }
@@ -173,8 +181,10 @@ impl Run {
 
     /// All that is broken is mended.
     fn mend(&mut self) {
-        self.cut.drain(..).for_each(|cable| self.world.heal(cable));
-        self.off.drain(..).for_each(|device| self.world.power_on(device));
+        self.world.run_cycles(2);
+        (0..self.cables).for_each(|cable| self.world.heal(CableId(cable)));
+        let devices = self.world.network().devices().len();
+        (0..devices).for_each(|device| self.world.power_on(DeviceIndex(device)));
     }
 }
 

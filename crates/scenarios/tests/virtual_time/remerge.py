@@ -17,6 +17,8 @@ import struct
 import sys
 
 LRD = 10
+# Logical addresses from here on show AL status, and are no inputs.
+PRESENCE = 0xE0000000
 CLASS_BIT = 0x80
 REDUNDANT_BIT = 0x08
 OUTBOUND = 2
@@ -58,6 +60,10 @@ def datagrams(frame):
         at += 12 + size
 
 
+def is_input(command, address):
+    return command == LRD and address < PRESENCE
+
+
 class Flight:
     """A frame that is out: the reads of its copies, by the link they were sent on."""
 
@@ -89,10 +95,10 @@ def cycles(path):
                 out, sent_at = {}, time
             if not redundant:
                 out[key] = Flight()
-                out[key].asked = {address: len(data) for command, _, address, data, _ in found if command == LRD}
+                out[key].asked = {address: len(data) for command, _, address, data, _ in found if is_input(command, address)}
         elif key in out and redundant not in out[key].copies:
             out[key].copies[redundant] = {
-                address: (data, counter) for command, _, address, data, counter in found if command == LRD
+                address: (data, counter) for command, _, address, data, counter in found if is_input(command, address)
             }
     # What was sent last is judged by nobody.
     return collected

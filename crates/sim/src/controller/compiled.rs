@@ -2,7 +2,7 @@
 //!
 //! In: a datagram's command, address and length, and the FMMUs and SyncManagers as they are. Out: the pieces of memory
 //! that it touches, which are then moved without a search. Only what is plain is compiled: whole bytes, each piece in one
-//! area of process RAM, nothing read where something is written. Everything else goes the way of [`super::processing`].
+//! area of process RAM or the AL status, nothing read where something is written. Everything else goes the way of [`super::processing`].
 //! A write to a register that matters throws everything away.
 
 use ringcat_wire::command::Command;
@@ -19,12 +19,14 @@ const REMEMBERED: usize = 4;
 const PIECES: usize = 4;
 /// In place of a SyncManager's number: none is there.
 const FREE: u8 = u8::MAX;
+/// In place of a SyncManager's number: it is the first byte of AL_STATUS, which MainDevices like to have with process data.
+const AL_STATUS: u8 = u8::MAX - 1;
 
 /// A piece of a datagram's data and where it lies.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 struct Move {
     write: bool,
-    /// SyncManager whose area it lies in, or [`FREE`].
+    /// SyncManager whose area it lies in, [`FREE`] or [`AL_STATUS`].
     sync_manager: u8,
     /// Offset in the datagram's data.
     at: u16,
@@ -102,7 +104,8 @@ impl Controller {
     #[inline]
     fn piece_address(&mut self, piece: Move) -> Option<u32> {
         let (start, end) = (u32::from(piece.physical), u32::from(piece.physical) + u32::from(piece.len));
-        if piece.sync_manager == FREE {
+        if piece.sync_manager >= AL_STATUS {
+            self.pass.read_al_status |= piece.sync_manager == AL_STATUS;
             return Some(start);
         }
         let n = usize::from(piece.sync_manager);
@@ -149,11 +152,13 @@ impl Controller {
             return None;
         }
         let (start, end) = (piece.physical / 8, (piece.physical + piece.len) / 8);
-        if start < u64::from(PROCESS_RAM) || end > u64::from(self.memory.len()) {
+        let is_al_status = !write && (start, end) == (u64::from(map::AL_STATUS.0), u64::from(map::AL_STATUS.0) + 1);
+        if (start < u64::from(PROCESS_RAM) && !is_al_status) || end > u64::from(self.memory.len()) {
             return None;
         }
         let end = u32::try_from(end).ok()?;
         let sync_manager = match self.sync_managers.claim(start as u32, end) {
+            _ if is_al_status => AL_STATUS,
             Claim::Free(until) if until == end => FREE,
             Claim::Area(n, until) if until == end => n as u8,
             Claim::Free(_) | Claim::Area(..) | Claim::Locked(_) => return None,

@@ -46,8 +46,9 @@ impl BringUp<'_> {
     }
 
     /// Process data ends for all of it at once, before the SubDevice ends it by halves. Mail goes on.
-    async fn part(&self) -> Result<(), BusError> {
+    pub(super) async fn part(&self) -> Result<(), BusError> {
         self.fleet.board.set_taking_part(self.index, false);
+        self.fleet.board.set_unproven(self.index, false);
         let mut fmmus = alloc::vec![0; self.setup.fmmu_registers().len()];
         for (number, register) in self.setup.fmmus.iter().filter(|(number, _)| Some(*number) == self.setup.mail_fmmu) {
             let at = Fmmu::LEN * usize::from(*number);

@@ -1,0 +1,89 @@
+//! The presence datagram of a frame: the AL status of each SubDevice whose process data shares a working counter (facts 1.4,
+//! 3.4, 3.10).
+//!
+//! In: a copy of the frame that came back. Out: which SubDevices processed it, once each, and in which state. A byte that
+//! stayed zero belongs to a SubDevice that is not there or has lost its FMMUs, because no AL status is zero. What a copy shows
+//! is mostly what the one before on the same link showed: then nothing is looked at anew.
+
+use alloc::boxed::Box;
+use alloc::vec;
+
+use ringcat_wire::al::{AlState, AlStatus};
+use ringcat_wire::datagram::WKC_LEN;
+
+use crate::layout::{Delivers, PlannedPresence};
+
+/// The presence datagram.
+#[derive(Debug)]
+pub(crate) struct Presence {
+    /// Offset of its data in the frame.
+    at: usize,
+    members: Box<[(usize, Delivers)]>,
+    /// Data and working counter of the last copy that was looked at, by the link it was sent on.
+    seen: [Box<[u8]>; 2],
+}
+
+/// How a SubDevice processed a copy.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Passed {
+    /// Not at all, as far as its FMMUs show.
+    Not,
+    /// In a state in which it may or may not give its inputs and take outputs.
+    Somehow,
+    /// In a state in which it gives its inputs.
+    Delivering,
+}
+
+impl Presence {
+    pub fn new(planned: &PlannedPresence, at: usize) -> Presence {
+        let length = planned.members.len() + WKC_LEN;
+        let seen = || vec![0; length].into_boxed_slice();
+        Presence { at, members: planned.members.iter().copied().collect(), seen: [seen(), seen()] }
+    }
+
+    /// Place of a SubDevice among the bytes.
+    pub fn place(&self, subdevice: usize) -> Option<usize> {
+        self.members.iter().position(|(member, _)| *member == subdevice)
+    }
+
+    /// Whether a copy shows just what the last one showed that was looked at.
+    #[inline]
+    pub fn is_as_seen(&self, link: usize, frame: &[u8]) -> bool {
+        frame.get(self.at..self.at + self.seen[link].len()).is_some_and(|now| *now == *self.seen[link])
+    }
+
+    /// Looks at a copy. False where SubDevices processed it more than once: its working counter is not the number of bytes.
+    pub fn look(&mut self, link: usize, frame: &[u8]) -> bool {
+        let length = self.seen[link].len();
+        let Some(now) = frame.get(self.at..self.at + length) else { return false };
+        self.seen[link].copy_from_slice(now);
+        let (data, wkc) = now.split_at(length - WKC_LEN);
+        let present = data.iter().filter(|status| **status != 0).count();
+        usize::from(u16::from_le_bytes([wkc[0], wkc[1]])) == present
+    }
+
+    /// A copy did not come back: it showed nothing.
+    pub fn forget(&mut self, link: usize) {
+        self.seen[link].fill(0);
+    }
+
+    /// How the SubDevice at a place processed the copy that was looked at last.
+    pub fn passed(&self, link: usize, place: usize) -> Passed {
+        let (Some((_, delivers)), Some(status)) = (self.members.get(place), self.seen[link].get(place)) else {
+            return Passed::Not;
+        };
+        if *status == 0 {
+            return Passed::Not;
+        }
+        match (AlStatus::from_bits(u16::from(*status)).al_state(), delivers) {
+            (Some(AlState::Op), _) | (Some(AlState::SafeOp), Delivers::FromSafeOp) => Passed::Delivering,
+            _ => Passed::Somehow,
+        }
+    }
+
+    /// The AL status that a SubDevice showed last on either link; `None` where it is not one of these.
+    pub fn al_status(&self, subdevice: usize) -> Option<u8> {
+        let place = self.place(subdevice)?;
+        Some(self.seen.iter().fold(0, |status, seen| status | seen.get(place).copied().unwrap_or(0)))
+    }
+}

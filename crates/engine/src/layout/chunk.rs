@@ -1,0 +1,195 @@
+//! Which areas travel in one frame, and which of them share their datagrams.
+//!
+//! In: the areas of a domain in order, and how each SubDevice is witnessed. Out: chunks that fit a frame. Within one, areas of
+//! witnessed SubDevices share datagrams; those of the others have their own where a shared working counter would hide whether
+//! their inputs came.
+
+use alloc::collections::BTreeSet;
+use alloc::vec;
+use alloc::vec::Vec;
+
+use ringcat_wire::address::LogicalAddress;
+use ringcat_wire::datagram::{MAX_DATA, OVERHEAD};
+
+use super::{AreaSpec, Delivers, DomainSpec, LayoutError, PlannedPresence, Witness};
+use crate::direction::Direction;
+
+/// Room for datagrams in a frame.
+const ROOM: usize = MAX_DATA + OVERHEAD;
+
+/// How SubDevices are witnessed. Each shows its AL status in one frame: in another one it is alone.
+pub(super) struct Witnesses<'a> {
+    known: &'a [Witness],
+    shown: BTreeSet<usize>,
+    /// Logical address of the next presence byte.
+    next: LogicalAddress,
+}
+
+impl<'a> Witnesses<'a> {
+    pub fn new(known: &'a [Witness], first: LogicalAddress) -> Witnesses<'a> {
+        Witnesses { known, shown: BTreeSet::new(), next: first }
+    }
+
+    fn of(&self, subdevice: usize) -> Witness {
+        match self.known.get(subdevice) {
+            Some(witness) if !self.shown.contains(&subdevice) => *witness,
+            None if !self.shown.contains(&subdevice) => Witness::Mapped(Delivers::FromSafeOp),
+            _ => Witness::Alone,
+        }
+    }
+
+    /// A presence datagram of these SubDevices, which show themselves nowhere else from now on.
+    pub fn presence(&mut self, subdevices: &[usize]) -> Option<PlannedPresence> {
+        let member = |subdevice: usize| match self.of(subdevice) {
+            Witness::Mapped(delivers) => Some((subdevice, delivers)),
+            Witness::Alone => None,
+        };
+        let members: Vec<(usize, Delivers)> = subdevices.iter().filter_map(|it| member(*it)).collect();
+        let logical = self.next;
+        self.next = LogicalAddress(logical.0 + members.len() as u32);
+        self.shown.extend(members.iter().map(|(subdevice, _)| *subdevice));
+        (!members.is_empty()).then_some(PlannedPresence { logical, members })
+    }
+}
+
+/// Areas that share their datagrams: one LRW, or an LWR and an LRD.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Group {
+    pub outputs: Vec<AreaSpec>,
+    pub inputs: Vec<AreaSpec>,
+    pub lrw: bool,
+}
+
+impl Group {
+    fn add(&mut self, area: AreaSpec) {
+        match area.direction {
+            Direction::Outputs => self.outputs.push(area),
+            Direction::Inputs => self.inputs.push(area),
+        }
+    }
+
+    fn is_empty(&self) -> bool {
+        self.outputs.is_empty() && self.inputs.is_empty()
+    }
+
+    /// Bytes of its datagrams.
+    fn used(&self) -> usize {
+        let bytes = |areas: &[AreaSpec]| areas.iter().map(|area| usize::from(area.length)).sum::<usize>();
+        let (outputs, inputs) = (bytes(&self.outputs), bytes(&self.inputs));
+        let datagrams = usize::from(outputs > 0) + usize::from(inputs > 0);
+        let datagrams = if self.lrw { datagrams.min(1) } else { datagrams };
+        outputs + inputs + datagrams * OVERHEAD
+    }
+}
+
+/// Areas that travel in one frame.
+#[derive(Clone, Debug)]
+pub(super) struct Chunk {
+    /// First those that share their datagrams, behind them outputs of SubDevices that are not witnessed, then one group for
+    /// each other SubDevice.
+    groups: Vec<Group>,
+    /// SubDevices that can show their AL status, in the order of their areas.
+    witnessed: Vec<usize>,
+}
+
+const SHARED: usize = 0;
+const PLAIN: usize = 1;
+
+impl Chunk {
+    fn new(lrw: bool) -> Chunk {
+        Chunk { groups: vec![Group { lrw, ..Group::default() }, Group::default()], witnessed: Vec::new() }
+    }
+
+    /// The groups that have areas.
+    pub fn groups(&self) -> impl Iterator<Item = &Group> {
+        self.groups.iter().filter(|group| !group.is_empty())
+    }
+
+    /// SubDevices that can show their AL status.
+    pub fn witnessed(&self) -> &[usize] {
+        &self.witnessed
+    }
+
+    fn is_empty(&self) -> bool {
+        self.groups.iter().all(Group::is_empty)
+    }
+
+    /// Bytes of all datagrams at most.
+    fn used(&self) -> usize {
+        let presence = if self.witnessed.len() > 1 { OVERHEAD + self.witnessed.len() } else { 0 };
+        self.groups.iter().map(Group::used).sum::<usize>() + presence
+    }
+
+    /// Adds areas of a SubDevice.
+    fn add(&mut self, areas: &[AreaSpec], witness: Witness) {
+        let Some(subdevice) = areas.first().map(|area| area.subdevice) else { return };
+        let lrw = self.groups[SHARED].lrw;
+        let has_inputs = areas.iter().any(|area| area.direction == Direction::Inputs);
+        if matches!(witness, Witness::Mapped(_)) {
+            areas.iter().for_each(|area| self.groups[SHARED].add(*area));
+            if !self.witnessed.contains(&subdevice) {
+                self.witnessed.push(subdevice);
+            }
+            return;
+        }
+        let mut own = Group { lrw, ..Group::default() };
+        for area in areas {
+            // Outputs alone are no secret: a sum tells whether all took them.
+            let is_plain = area.direction == Direction::Outputs && !(lrw && has_inputs);
+            if is_plain { self.groups[PLAIN].add(*area) } else { own.add(*area) }
+        }
+        if !own.is_empty() {
+            self.groups.push(own);
+        }
+    }
+
+    fn with(&self, areas: &[AreaSpec], witness: Witness) -> Chunk {
+        let mut with = self.clone();
+        with.add(areas, witness);
+        with
+    }
+}
+
+/// Cuts the areas of a domain into chunks. `each`: every SubDevice has one of its own.
+pub(super) fn chunks(
+    spec: &DomainSpec,
+    lrw: bool,
+    each: bool,
+    witnesses: &Witnesses<'_>,
+) -> Result<Vec<Chunk>, LayoutError> {
+    let mut chunks = Vec::new();
+    let mut chunk = Chunk::new(lrw);
+    let mut shown: BTreeSet<usize> = BTreeSet::new();
+    let areas: Vec<AreaSpec> = spec.areas.iter().filter(|area| area.length > 0).copied().collect();
+    for group in areas.chunk_by(|a, b| a.subdevice == b.subdevice) {
+        if let Some(long) = group.iter().find(|area| usize::from(area.length) > MAX_DATA) {
+            let AreaSpec { subdevice, sync_manager, length, .. } = *long;
+            return Err(LayoutError::AreaTooLong { subdevice, sync_manager, length });
+        }
+        let subdevice = group[0].subdevice;
+        let witness = |shown: &BTreeSet<usize>| if shown.contains(&subdevice) { Witness::Alone } else { witnesses.of(subdevice) };
+        // A SubDevice's areas stay together where they can: fewer working counters to look at.
+        let mut whole = chunk.with(group, witness(&shown));
+        if !chunk.is_empty() && (each || whole.used() > ROOM) {
+            shown.extend(chunk.witnessed.iter().copied());
+            chunks.push(core::mem::replace(&mut chunk, Chunk::new(lrw)));
+            whole = chunk.with(group, witness(&shown));
+        }
+        if whole.used() <= ROOM {
+            chunk = whole;
+            continue;
+        }
+        for area in group {
+            let next = chunk.with(core::slice::from_ref(area), witness(&shown));
+            if !chunk.is_empty() && next.used() > ROOM {
+                shown.extend(chunk.witnessed.iter().copied());
+                chunks.push(core::mem::replace(&mut chunk, Chunk::new(lrw)));
+            }
+            chunk.add(core::slice::from_ref(area), witness(&shown));
+        }
+    }
+    if !chunk.is_empty() {
+        chunks.push(chunk);
+    }
+    Ok(chunks)
+}
