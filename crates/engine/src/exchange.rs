@@ -99,7 +99,7 @@ impl Exchange {
                 for frame in &planned.frames {
                     let whole = CyclicFrame::new(&identity, links.mask(), index, frame, next);
                     next.datagram += whole.datagrams();
-                    next.part += whole.parts();
+                    next.part += whole.parts().sum::<usize>();
                     frames.push(whole.vacant(&identity, frame));
                     others.push(whole);
                 }

@@ -137,7 +137,7 @@ pub struct PlannedPresence {
 pub struct PlannedFrame {
     /// Process data datagrams.
     pub datagrams: Vec<PlannedDatagram>,
-    /// The presence datagram behind them, where a working counter has several SubDevices.
+    /// The presence datagram behind them, where a working counter of inputs has several SubDevices.
     pub presence: Option<PlannedPresence>,
     /// Whether the supervision datagram rides in this frame.
     pub supervision: bool,
@@ -245,7 +245,8 @@ impl Layout {
 
     /// Logical address of the byte in which a SubDevice shows its AL status; `None` where it shows it nowhere.
     pub fn presence(&self, subdevice: usize) -> Option<LogicalAddress> {
-        let presences = self.domains.iter().flat_map(|domain| &domain.frames).filter_map(|frame| frame.presence.as_ref());
+        let presences =
+            self.domains.iter().flat_map(|domain| &domain.frames).filter_map(|frame| frame.presence.as_ref());
         presences.into_iter().find_map(|presence| {
             let at = presence.members.iter().position(|(member, _)| *member == subdevice)?;
             Some(LogicalAddress(presence.logical.0 + at as u32))
@@ -289,11 +290,24 @@ impl Layout {
     }
 }
 
+impl PlannedPresence {
+    /// Bytes of the datagram with its overhead.
+    pub fn bytes(&self) -> usize {
+        OVERHEAD + self.members.len()
+    }
+}
+
 impl PlannedFrame {
+    /// Bytes of all datagrams with their overhead.
+    pub fn bytes(&self) -> usize {
+        let supervision = if self.supervision { OVERHEAD + SUPERVISION_LEN } else { 0 };
+        self.used() + supervision + if self.clocks { CLOCKS_LEN } else { 0 }
+    }
+
     /// Bytes of all datagrams of process data and presence with their overhead.
     fn used(&self) -> usize {
         let data = |d: &PlannedDatagram| OVERHEAD + usize::from(d.outputs) + usize::from(d.inputs);
-        let presence = self.presence.as_ref().map_or(0, |presence| OVERHEAD + presence.members.len());
+        let presence = self.presence.as_ref().map_or(0, PlannedPresence::bytes);
         self.datagrams.iter().map(data).sum::<usize>() + presence
     }
 }
@@ -337,7 +351,7 @@ impl PlannedDomain {
         for group in chunk.groups() {
             self.place_group(&mut frame, group, base)?;
         }
-        let is_shared = frame.datagrams.iter().any(|datagram| datagram.contributions.len() > 1);
+        let is_shared = frame.datagrams.iter().any(|datagram| datagram.inputs > 0 && datagram.contributions.len() > 1);
         frame.presence = is_shared.then(|| witnesses.presence(chunk.witnessed())).flatten();
         Ok(frame)
     }

@@ -51,6 +51,21 @@ pub struct LoadSpec {
     pub cabling: Cabling,
 }
 
+impl LoadSpec {
+    /// Frames of a cycle, bytes of their datagrams, and how many of these are presence datagrams.
+    ///
+    /// # Errors
+    /// Process data that cannot be laid out.
+    pub fn bytes(&self) -> Result<(usize, usize, usize), LayoutError> {
+        let links = if self.cabling == Cabling::Line { LinkSet::Single } else { LinkSet::Ring };
+        let layout = Layout::new(&domains(self), links, self.supervision)?;
+        let frames: Vec<_> = layout.domains.iter().flat_map(|domain| &domain.frames).collect();
+        let bytes = frames.iter().map(|frame| frame.bytes()).sum();
+        let presence = frames.iter().filter_map(|frame| frame.presence.as_ref()).map(|it| it.bytes()).sum();
+        Ok((frames.len(), bytes, presence))
+    }
+}
+
 /// The exchange with everything around it.
 #[derive(Debug)]
 pub struct CyclicLoad {

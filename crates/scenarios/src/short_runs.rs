@@ -38,7 +38,7 @@ pub fn run(seed: u64) {
     let options = NetworkOptions { seed, ..NetworkOptions::default() }.with_detection_delay(detection);
     let mut world = World::in_op(seed, ring(descriptions(&kinds), options));
     // Late and doubled frames leave their own traces in the devices.
-    world.set_strict(false);
+    world.judge_latched(false);
     let mut cut: Option<CableId> = None;
     let mut off: Option<DeviceIndex> = None;
     let cables = count as u64 + 1;
@@ -80,7 +80,7 @@ pub fn run(seed: u64) {
     });
     // What was delayed has come, and what changed twice has held.
     world.run_cycles(40);
-    world.set_strict(true);
+    world.judge_latched(true);
     let mark = world.mark();
     world.run_cycles(15);
     assert_eq!((world.incomplete(mark), world.left_op(mark)), (0, Vec::new()));

@@ -137,9 +137,9 @@ impl World {
     /// Finds out which device each declared SubDevice is, by its station address, and looks at them from now on.
     pub fn recognise(&mut self) {
         self.devices = self.by_station(|_| true);
-        let strict = self.mirror.strict;
+        let judged = self.mirror.judges_latched;
         self.mirror = Mirror::new(self.application.directory(), &self.devices, self.domains);
-        self.mirror.strict = strict;
+        self.mirror.judges_latched = judged;
         self.truth.follow(self.application.directory(), &self.devices);
     }
 
@@ -367,9 +367,10 @@ impl World {
         station(self.network().device(DeviceIndex(device)))
     }
 
-    /// Compares images with devices or not.
-    pub fn set_strict(&mut self, strict: bool) {
-        self.mirror.strict = strict;
+    /// Whether outputs that devices have latched are held against the image, too. Frames that come late or twice leave their
+    /// own traces there; the devices' logs are judged at all times.
+    pub fn judge_latched(&mut self, judged: bool) {
+        self.mirror.judges_latched = judged;
     }
 
     /// How much process data was held against the devices: bytes that they latched, areas that are in their logs.

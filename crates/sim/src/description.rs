@@ -182,6 +182,8 @@ pub struct DeviceDescription {
     pub fmmus: Vec<FmmuUsage>,
     /// FMMUs that the controller has; `None`: 8.
     pub controller_fmmus: Option<u8>,
+    /// FMMUs work as they are written on the way from PREOP to SAFEOP, until that state is left: later writes are not noticed.
+    pub latches_fmmus: bool,
     /// SyncManagers in order.
     pub sync_managers: Vec<SyncManagerDescription>,
     /// Process data objects, inputs and outputs.
@@ -254,6 +256,7 @@ impl DeviceDescription {
             ports: [PortKind::Mii, PortKind::Mii, PortKind::NotImplemented, PortKind::NotImplemented],
             fmmus: Vec::new(),
             controller_fmmus: None,
+            latches_fmmus: false,
             sync_managers: Vec::new(),
             pdos: Vec::new(),
             objects: Vec::new(),

@@ -167,6 +167,7 @@ fn controller_config(description: &DeviceDescription) -> ControllerConfig {
         clock_errors: description.clock_errors(),
         clock_start: description.clock_start_ns,
         receive_time_latch_mode: description.latches_processing_only,
+        latches_fmmus: description.latches_fmmus,
         fmmu_count: description.controller_fmmus.unwrap_or(ControllerConfig::default().fmmu_count),
         ..ControllerConfig::default()
     }

@@ -57,13 +57,10 @@ impl Domain {
         subdevices.dedup();
         let set = planned.frames.len();
         let one = &frames[first..first + set];
-        let member = |subdevice| Member {
-            subdevice,
-            inputs: one.iter().flat_map(|frame| frame.inputs_of(subdevice)).collect(),
-        };
-        let datagrams = one.iter().map(CyclicFrame::datagrams).sum();
+        let member =
+            |subdevice| Member { subdevice, inputs: one.iter().flat_map(|frame| frame.inputs_of(subdevice)).collect() };
         Domain {
-            image: Image::new(planned.image_len as usize, datagrams, one.iter().map(CyclicFrame::parts).sum()),
+            image: Image::new(planned.image_len as usize, one.iter().flat_map(CyclicFrame::parts)),
             frames: first..frames.len(),
             set,
             oldest: first,

@@ -383,7 +383,7 @@ impl CyclicFrame {
             let link = copy.sent_on.index();
             if moment.left >= image.newest && (first || !self.views.are_doubled) {
                 image.newest = moment.left;
-                self.places.iter().for_each(|place| place.deliver(link, bytes, image, moment));
+                self.places.iter_mut().for_each(|place| place.deliver(link, bytes, image, moment));
             } else {
                 self.deliver_singly(link, bytes, image, moment, counters);
             }
@@ -420,8 +420,8 @@ impl CyclicFrame {
     /// Adds the working counters of a copy; true where every process data datagram has just what it should.
     fn count(&mut self, sent_on: Link, bytes: &[u8], first: bool) -> bool {
         let link = sent_on.index();
-        let mut as_seen = self.views.looked[link]
-            && self.presence.as_ref().is_none_or(|presence| presence.is_as_seen(link, bytes));
+        let mut as_seen =
+            self.views.looked[link] && self.presence.as_ref().is_none_or(|presence| presence.is_as_seen(link, bytes));
         let mut sum = self.wkc;
         for place in &self.places {
             let wkc = u16_at(bytes, place.wkc_at);
@@ -490,9 +490,9 @@ impl CyclicFrame {
         self.presence.as_ref()?.al_status(subdevice)
     }
 
-    /// Number of parts: inputs of one SyncManager each.
-    pub(crate) fn parts(&self) -> usize {
-        self.places.iter().map(Place::parts).sum()
+    /// Number of parts of each process data datagram: inputs of one SyncManager each.
+    pub(crate) fn parts(&self) -> impl Iterator<Item = usize> {
+        self.places.iter().map(Place::parts)
     }
 
     /// Number of process data datagrams.

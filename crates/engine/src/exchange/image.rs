@@ -5,6 +5,7 @@
 
 use alloc::boxed::Box;
 use alloc::vec;
+use alloc::vec::Vec;
 
 /// When inputs came. Cycles are counted from 1 here, so that zero is never.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -24,22 +25,48 @@ pub(crate) struct InputNumber {
     pub part: usize,
 }
 
-/// The image, and when what came into it: by datagram where all its inputs came together, and by their parts.
+/// The image, and when what came into it: by datagram where all its inputs came together, by datagram and link where some did,
+/// and by their parts.
 #[derive(Debug)]
 pub(crate) struct Image {
     pub bytes: Box<[u8]>,
     pub datagrams: Box<[Moment]>,
     pub parts: Box<[Moment]>,
+    shares: Box<[[Share; 2]]>,
+    /// Shares that were found so far.
+    found: u32,
     /// When, as a cycle plus one, the newest flight of which anything came had left.
     pub newest: u64,
 }
 
+/// The inputs of a datagram that come with the copies on a link, as long as these bring the same ones: in an open ring.
+#[derive(Clone, Debug, Default)]
+struct Share {
+    /// Number of this share, by which it is known again; 0 is none.
+    number: u32,
+    moment: Moment,
+    /// Number of the datagram's first part.
+    first: usize,
+    /// Which of the datagram's parts.
+    parts: Box<[bool]>,
+}
+
 impl Image {
-    pub fn new(bytes: usize, datagrams: usize, parts: usize) -> Image {
+    /// `parts`: how many each datagram has.
+    pub fn new(bytes: usize, parts: impl Iterator<Item = usize>) -> Image {
+        let mut first = 0;
+        let mut shares = Vec::new();
+        for count in parts {
+            let share = || Share { first, parts: vec![false; count].into_boxed_slice(), ..Share::default() };
+            shares.push([share(), share()]);
+            first += count;
+        }
         Image {
             bytes: vec![0; bytes].into_boxed_slice(),
-            datagrams: vec![Moment::default(); datagrams].into_boxed_slice(),
-            parts: vec![Moment::default(); parts].into_boxed_slice(),
+            datagrams: vec![Moment::default(); shares.len()].into_boxed_slice(),
+            parts: vec![Moment::default(); first].into_boxed_slice(),
+            shares: shares.into_boxed_slice(),
+            found: 0,
             newest: 0,
         }
     }
@@ -47,7 +74,36 @@ impl Image {
     /// When inputs came last.
     pub fn moment(&self, input: InputNumber) -> Moment {
         let of = |moments: &[Moment], number: usize| moments.get(number).copied().unwrap_or_default();
-        let (whole, part) = (of(&self.datagrams, input.datagram), of(&self.parts, input.part));
-        if whole.left >= part.left { whole } else { part }
+        let shares = self.shares.get(input.datagram).into_iter().flatten();
+        let shared = shares.filter(|share| share.parts.get(input.part - share.first).copied().unwrap_or(false));
+        let moments = [of(&self.datagrams, input.datagram), of(&self.parts, input.part)];
+        moments.into_iter().chain(shared.map(|share| share.moment)).max_by_key(|moment| moment.left).unwrap_or_default()
+    }
+
+    /// Inputs of a share, by its number, came again. False where the copies on this link brought others the last time.
+    #[inline]
+    pub fn note_share(&mut self, datagram: usize, link: usize, number: u32, moment: Moment) -> bool {
+        let Some(share) = self.shares.get_mut(datagram).map(|shares| &mut shares[link]) else { return true };
+        let is_same = number != 0 && share.number == number;
+        if is_same {
+            share.moment = moment;
+        }
+        is_same
+    }
+
+    /// Copies on a link bring these inputs from now on; the number by which they are known.
+    #[cold]
+    pub fn take_share(&mut self, datagram: usize, link: usize, is_part: impl Fn(usize) -> bool, moment: Moment) -> u32 {
+        let Some(share) = self.shares.get_mut(datagram).map(|shares| &mut shares[link]) else { return 0 };
+        let is_same = share.number != 0 && share.parts.iter().enumerate().all(|(part, has)| *has == is_part(part));
+        if !is_same {
+            let before = self.parts.iter_mut().skip(share.first).zip(&share.parts).filter(|(_, has)| **has);
+            before.filter(|(part, _)| part.left < share.moment.left).for_each(|(part, _)| *part = share.moment);
+            share.parts.iter_mut().enumerate().for_each(|(part, has)| *has = is_part(part));
+            self.found = self.found.wrapping_add(1).max(1);
+            share.number = self.found;
+        }
+        share.moment = moment;
+        share.number
     }
 }

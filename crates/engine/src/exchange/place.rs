@@ -76,6 +76,8 @@ struct View {
     is_sure: bool,
     /// The inputs that came, neighbours joined. Room for all of them is there from the beginning.
     runs: Vec<Span>,
+    /// Number of this share of the inputs in the image, 0 before it is known.
+    share: u32,
 }
 
 /// A process data datagram.
@@ -116,7 +118,11 @@ impl Place {
             expected: datagram.contributions.iter().fold(Wkc(0), |sum, (_, wkc)| sum.plus(*wkc)),
             outputs: span(start, outputs),
             inputs: span(start + outputs, inputs),
-            contributions: datagram.contributions.iter().map(|(subdevice, wkc)| Contribution::new(*subdevice, *wkc)).collect(),
+            contributions: datagram
+                .contributions
+                .iter()
+                .map(|(subdevice, wkc)| Contribution::new(*subdevice, *wkc))
+                .collect(),
             segments: datagram.input_areas.iter().map(segment).collect(),
             views: [view(), view()],
         }
@@ -196,6 +202,7 @@ impl Place {
         let Place { views, segments, contributions, .. } = self;
         let view = &mut views[link];
         view.runs.clear();
+        view.share = 0;
         let mut count = 0;
         for segment in segments.iter().filter(|segment| contributions[segment.contribution].met[link]) {
             count += 1;
@@ -250,8 +257,9 @@ impl Place {
 
     /// Puts the inputs that a copy brought into the image, where nothing newer is.
     #[inline]
-    pub fn deliver(&self, link: usize, bytes: &[u8], image: &mut Image, moment: Moment) {
-        match self.views[link].brought {
+    pub fn deliver(&mut self, link: usize, bytes: &[u8], image: &mut Image, moment: Moment) {
+        let view = &self.views[link];
+        match view.brought {
             Brought::Nothing => {}
             Brought::All => {
                 self.inputs.deliver(bytes, &mut image.bytes);
@@ -260,11 +268,10 @@ impl Place {
                 }
             }
             Brought::Part => {
-                self.views[link].runs.iter().for_each(|run| run.deliver(bytes, &mut image.bytes));
-                for (segment, part) in self.segments.iter().zip(image.parts.iter_mut().skip(self.first_part)) {
-                    if self.contributions[segment.contribution].met[link] {
-                        *part = moment;
-                    }
+                view.runs.iter().for_each(|run| run.deliver(bytes, &mut image.bytes));
+                if !image.note_share(self.datagram, link, view.share, moment) {
+                    let is_met = |part: usize| self.contributions[self.segments[part].contribution].met[link];
+                    self.views[link].share = image.take_share(self.datagram, link, is_met, moment);
                 }
             }
         }
@@ -348,7 +355,8 @@ fn meet(all: &mut [Contribution], link: usize, wkc: Wkc, presence: &Presence) ->
     if wkc == sure + others {
         // Everyone that is there did all that it does.
         for contribution in all.iter_mut() {
-            contribution.met[link] = contribution.witness.is_some_and(|place| presence.passed(link, place) != Passed::Not);
+            contribution.met[link] =
+                contribution.witness.is_some_and(|place| presence.passed(link, place) != Passed::Not);
         }
     }
     (sure..=sure + others).contains(&wkc)

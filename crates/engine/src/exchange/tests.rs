@@ -126,7 +126,7 @@ fn in_a_closed_ring_the_complete_copy_is_delivered_without_waiting_for_the_other
 }
 
 #[test]
-fn a_second_copy_that_a_subdevice_processed_again_makes_the_cycle_incomplete_and_leaves_the_inputs_of_the_first() {
+fn inputs_of_the_first_copy_stay_where_a_second_one_was_processed_again() {
     let mut ring = Ring::new();
     for again in [false, true] {
         let [mut main, mut redundant] = ring.send();
@@ -301,7 +301,7 @@ fn one_lost_copy_of_a_closed_ring_costs_nothing_and_both_lost_cost_a_cycle() {
 }
 
 #[test]
-fn one_copy_that_is_not_complete_is_given_up_at_the_deadline_and_its_inputs_are_new() {
+fn a_copy_that_is_not_complete_is_given_up_at_the_deadline_and_its_inputs_are_new() {
     let mut ring = Ring::new();
     let [mut main, _] = ring.send();
     meet(&mut main, &[0], 0x10);

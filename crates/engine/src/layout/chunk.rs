@@ -167,7 +167,8 @@ pub(super) fn chunks(
             return Err(LayoutError::AreaTooLong { subdevice, sync_manager, length });
         }
         let subdevice = group[0].subdevice;
-        let witness = |shown: &BTreeSet<usize>| if shown.contains(&subdevice) { Witness::Alone } else { witnesses.of(subdevice) };
+        let witness =
+            |shown: &BTreeSet<usize>| if shown.contains(&subdevice) { Witness::Alone } else { witnesses.of(subdevice) };
         // A SubDevice's areas stay together where they can: fewer working counters to look at.
         let mut whole = chunk.with(group, witness(&shown));
         if !chunk.is_empty() && (each || whole.used() > ROOM) {

@@ -62,6 +62,57 @@ fn one_lrw_per_subdevice_is_allowed_on_two_links_facts_9_2_2() {
     assert!(layout.domains[0].frames.iter().all(|frame| frame.used() <= MAX_DATA + OVERHEAD));
 }
 
+/// Two inputs and outputs each of SubDevices that are witnessed like this, one frame.
+fn witnessed(witnesses: &[Witness], links: LinkSet) -> PlannedFrame {
+    let pair = |n: usize| [area(n, 2, Direction::Outputs, 2), area(n, 3, Direction::Inputs, 2)];
+    let areas: Vec<_> = (0..witnesses.len()).flat_map(pair).collect();
+    let rules = Rules { links, supervision: false, lrw: LrwPolicy::Automatic, witnesses };
+    let layout = Layout::with(&[spec(areas)], rules).unwrap();
+    assert_eq!(layout.domains[0].frames.len(), 1);
+    layout.domains[0].frames[0].clone()
+}
+
+const MAPPED: Witness = Witness::Mapped(Delivers::FromSafeOp);
+
+#[test]
+fn several_subdevices_of_a_datagram_show_their_al_status_behind_it() {
+    for links in [LinkSet::Single, LinkSet::Ring] {
+        let frame = witnessed(&[MAPPED, Witness::Mapped(Delivers::InOp), MAPPED], links);
+        let presence = frame.presence.unwrap();
+        assert_eq!(presence.logical, LogicalAddress(0xE000_0000));
+        let members = [(0, Delivers::FromSafeOp), (1, Delivers::InOp), (2, Delivers::FromSafeOp)];
+        assert_eq!(presence.members, members);
+    }
+    assert_eq!(witnessed(&[MAPPED], LinkSet::Single).presence, None, "its working counter is exact");
+}
+
+#[test]
+fn inputs_of_a_subdevice_without_an_fmmu_to_spare_have_a_datagram_of_their_own() {
+    let found = |links| {
+        let frame = witnessed(&[MAPPED, Witness::Alone, MAPPED, Witness::Alone], links);
+        let members: Vec<usize> = frame.presence.unwrap().members.iter().map(|(subdevice, _)| *subdevice).collect();
+        assert_eq!(members, [0, 2]);
+        let of = |d: &PlannedDatagram| (d.command, d.contributions.iter().map(|(s, _)| *s).collect::<Vec<_>>());
+        frame.datagrams.iter().map(of).collect::<Vec<_>>()
+    };
+    let (lrw, lrd, lwr) = (Command::Lrw, Command::Lrd, Command::Lwr);
+    assert_eq!(found(LinkSet::Single), [(lrw, vec![0, 2]), (lrw, vec![1]), (lrw, vec![3])]);
+    let ring = [(lwr, vec![0, 2]), (lrd, vec![0, 2]), (lwr, vec![1, 3]), (lrd, vec![1]), (lrd, vec![3])];
+    assert_eq!(found(LinkSet::Ring), ring);
+}
+
+#[test]
+fn subdevices_show_themselves_where_their_inputs_share_a_working_counter_and_in_one_domain() {
+    let outputs = spec((0..2).map(|n| area(n, 2, Direction::Outputs, 2)).collect());
+    let inputs = spec((0..2).map(|n| area(n, 3, Direction::Inputs, 2)).collect());
+    let others = spec((0..2).map(|n| area(n, 4, Direction::Inputs, 2)).collect());
+    let layout = Layout::new(&[outputs, inputs, others], LinkSet::Single, false).unwrap();
+    let frames = layout.domains.iter().map(|domain| &domain.frames[0]);
+    let shape: Vec<_> = frames.map(|frame| (frame.datagrams.len(), frame.presence.is_some())).collect();
+    assert_eq!(shape, [(1, false), (1, true), (2, false)]);
+    assert_eq!(layout.presence(1), Some(LogicalAddress(0xE000_0001)));
+}
+
 #[test]
 fn two_areas_of_one_subdevice_count_once_per_direction() {
     let areas = vec![area(0, 3, Direction::Inputs, 2), area(0, 4, Direction::Inputs, 2)];
@@ -91,15 +142,17 @@ fn an_area_beyond_a_datagram_is_refused_with_its_name() {
 proptest! {
     #[test]
     fn areas_are_disjoint_and_frames_fit(
-        lengths in proptest::collection::vec((0u16..1000, 0u16..1000), 1..40), ring: bool, lrw: bool,
+        lengths in proptest::collection::vec((0u16..1000, 0u16..1000, any::<bool>()), 1..40), ring: bool, lrw: bool,
     ) {
-        let mut areas = Vec::new();
-        for (n, (out, inp)) in lengths.iter().enumerate() {
+        let (mut areas, mut witnesses) = (Vec::new(), Vec::new());
+        for (n, (out, inp, alone)) in lengths.iter().enumerate() {
             areas.push(area(n, 2, Direction::Outputs, *out));
             areas.push(area(n, 3, Direction::Inputs, *inp));
+            witnesses.push(if *alone { Witness::Alone } else { MAPPED });
         }
         let links = if ring { LinkSet::Ring } else { LinkSet::Single };
-        let layout = Layout::new(&[DomainSpec { lrw, ..spec(areas) }], links, true).unwrap();
+        let rules = Rules { links, supervision: true, lrw: LrwPolicy::Automatic, witnesses: &witnesses };
+        let layout = Layout::with(&[DomainSpec { lrw, ..spec(areas) }], rules).unwrap();
         let domain = &layout.domains[0];
         let mut end = 0;
         for placed in &domain.areas {
@@ -108,11 +161,16 @@ proptest! {
             end += u32::from(placed.area.length);
         }
         prop_assert_eq!(end, domain.image_len);
-        let total: u32 = lengths.iter().map(|(o, i)| u32::from(*o) + u32::from(*i)).sum();
+        let total: u32 = lengths.iter().map(|(o, i, _)| u32::from(*o) + u32::from(*i)).sum();
         prop_assert_eq!(end, total);
         for frame in &domain.frames {
             let supervision = if frame.supervision { OVERHEAD + SUPERVISION_LEN } else { 0 };
             prop_assert!(frame.used() + supervision <= MAX_DATA + OVERHEAD);
+            // No sum of working counters hides whose inputs came.
+            for datagram in frame.datagrams.iter().filter(|d| d.inputs > 0 && d.contributions.len() > 1) {
+                let shown = |subdevice| frame.presence.iter().flat_map(|it| &it.members).any(|(s, _)| *s == subdevice);
+                prop_assert!(datagram.contributions.iter().all(|(subdevice, _)| shown(*subdevice)));
+            }
             if ring {
                 prop_assert!(frame.datagrams.iter().all(|d| d.command != Command::Lrw));
             }

@@ -177,7 +177,8 @@ impl Setup {
         fmmus.extend(mail);
         let presence = layout.presence(index);
         if let Some(logical) = presence {
-            let number = presence::number(index, &plan, info).ok_or(SetupError::NoSpareFmmu(info.controller.fmmu_count))?;
+            let number =
+                presence::number(index, &plan, info).ok_or(SetupError::NoSpareFmmu(info.controller.fmmu_count))?;
             fmmus.push((number, presence::fmmu(logical)));
         }
         Ok(Setup {

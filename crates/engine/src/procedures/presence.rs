@@ -79,7 +79,10 @@ pub(super) fn prove(bus: &Bus, fleet: &SharedFleet, index: usize, station: Stati
             }
             if bus.now() >= late && !core::mem::replace(&mut is_reported, true) {
                 let sync_manager = left[0].sync_manager;
-                let what = alloc::format!("SyncManager {sync_manager} gives no inputs yet, {} ms after its FMMU", LATE.as_millis());
+                let what = alloc::format!(
+                    "SyncManager {sync_manager} gives no inputs yet, {} ms after its FMMU",
+                    LATE.as_millis()
+                );
                 bus.report(Event::PlanOddity { subdevice: index, what });
             }
             missing = left;

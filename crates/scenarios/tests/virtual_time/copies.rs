@@ -30,7 +30,7 @@ fn world(seed: u64) -> World {
     let network = ring(descriptions(&KINDS), options);
     let mut world = World::with(seed, network, &Options::default(), declare).expect("activation");
     // Inputs are changed behind its back.
-    world.set_strict(false);
+    world.judge_latched(false);
     world
 }
 

@@ -61,7 +61,7 @@ fn a_frame_that_comes_back_late_or_twice_is_counted_and_never_taken_for_a_new_on
     for (seed, delay_us) in (0..).zip(delays_us) {
         let mut world = World::in_op(seed, ring_of_16(FAST));
         // Outputs and inputs of the devices that a late frame passes are those of the late frame.
-        world.set_strict(false);
+        world.judge_latched(false);
         for cable in [0, 7, 16] {
             for direction in [Direction::AToB, Direction::BToA] {
                 let mark = world.mark();
@@ -96,7 +96,7 @@ fn a_domain_whose_frames_are_still_out_is_skipped_and_counted() {
     let mut world = World::in_op(3, line(descriptions(&SIXTEEN), NetworkOptions::default()));
     patient(&mut world);
     world.run_cycles(5);
-    world.set_strict(false);
+    world.judge_latched(false);
     let mark = world.mark();
     let by = 3 * CYCLE + CYCLE / 2;
     world.fault(Fault::Delay { cable: CableId(3), direction: Some(Direction::AToB), count: 1, by });

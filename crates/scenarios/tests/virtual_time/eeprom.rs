@@ -26,7 +26,7 @@ fn world(target: AlState, prepare: impl FnOnce(&mut ringcat_sim::network::Networ
         declaration
     })
     .expect("scan and activation");
-    world.set_strict(false);
+    world.judge_latched(false);
     world
 }
 

@@ -131,7 +131,7 @@ fn run(seed: u64) {
     let mut world = World::with(seed, network, &options, |scan| automatic(&scan.subdevices, CYCLE))
         .unwrap_or_else(|error| panic!("seed {seed}: {error}"));
     // Late and doubled frames leave their own traces in the devices.
-    world.set_strict(false);
+    world.judge_latched(false);
     let (cables, devices) = (world.network().cables().len(), world.network().devices().len());
     let mut broken = Broken::default();
     for _ in 0..10 + dice.below(40) {
@@ -151,7 +151,7 @@ fn run(seed: u64) {
     // Frames that were delayed for long are still to come.
     world.run_cycles(500);
     let mark = world.mark();
-    world.set_strict(true);
+    world.judge_latched(true);
     world.run_cycles(100);
     assert_eq!((world.incomplete(mark), world.left_op(mark)), (0, Vec::new()));
     assert_eq!(troubles(world.events(mark)), Vec::<&Event>::new());

@@ -167,7 +167,7 @@ fn run(seed: u64, tally: &Rc<Tally>) {
     plant[ALL[0]].services.eoe.address = Some(DEVICE.into());
     plant[ALL[0]].services.eoe.mask = Some([255, 255, 255, 0].into());
     let mut world = World::in_op(seed, ring(plant, options));
-    world.set_strict(false);
+    world.judge_latched(false);
     let before = quiet_moment(&mut world);
     let stop = Rc::new(Cell::new(false));
     let mut works = Vec::new();

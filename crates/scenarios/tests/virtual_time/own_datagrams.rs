@@ -102,7 +102,7 @@ fn positions_of_an_application_are_those_of_a_rescan_that_took_over_the_cabling_
     };
     let mut world = World::with(6, movable(), &Options::default(), declare).expect("scan and activation");
     world.settle();
-    world.set_strict(false);
+    world.judge_latched(false);
     let are = |world: &mut World, devices: &[usize], what: &str| {
         // Not before the second junction: whoever is plugged in the wrong way round uses the one turn that a frame has.
         for broken in [None, Some(CableId(3)), Some(CableId(4))] {

@@ -157,7 +157,7 @@ fn the_main_device_tells_what_was_declared_found_and_how_each_is_facts_10_2() {
 #[test]
 fn what_the_objects_say_follows_a_break_damaged_frames_and_a_loss_until_it_is_reset_facts_10_2() {
     let mut world = world();
-    world.set_strict(false);
+    world.judge_latched(false);
     world.corrupt(CableId(2), 20);
     world.run_cycles(40);
     assert!(number(&mut world, 0xA002, 10) > 0, "at the port that sees them first");
@@ -190,7 +190,7 @@ fn what_the_objects_say_follows_a_break_damaged_frames_and_a_loss_until_it_is_re
 #[test]
 fn what_goes_wrong_with_a_subdevice_is_counted_and_kept_in_the_history_facts_10_2() {
     let mut world = world();
-    world.set_strict(false);
+    world.judge_latched(false);
     let seen = |world: &mut World| [14, 17, 18, 19].map(|sub_index| number(world, 0xA002, sub_index));
     let mailbox = world.mailbox(2);
     let limits = (LIMIT, LIMIT);
@@ -243,7 +243,7 @@ fn detection_looks_at_the_whole_segment_and_lists_go_in_segments_and_fragments_f
     // So many that their addresses need two lists.
     let inputs = descriptions(&["digital-input-8"; COUNT]);
     let mut world = World::in_op(2, ring(inputs, NetworkOptions::default()));
-    world.set_strict(false);
+    world.judge_latched(false);
     let stations: Vec<u8> = (0..255_u16).flat_map(|at| (0x1001 + at).to_le_bytes()).collect();
     assert_eq!(read(&mut world, 0xF020, 1, true), Ok(stations.clone()));
     assert_eq!(number(&mut world, 0xF021, 0), 5);

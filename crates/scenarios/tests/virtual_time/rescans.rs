@@ -64,7 +64,7 @@ fn a_rescan_finds_who_is_new_has_moved_or_is_gone_and_costs_no_working_counter()
     };
     let mut world = World::with(1, workshop(), &Options::default(), declare).expect("scan and activation");
     world.settle();
-    world.set_strict(false);
+    world.judge_latched(false);
     let calm = rescan(&mut world);
     assert_eq!(declared(&calm), (0..7).map(Some).collect::<Vec<_>>());
     assert_eq!((calm.moved().count(), calm.missing.len(), calm.topology.nodes.len()), (0, 0, 7));
@@ -166,7 +166,7 @@ fn after_a_rescan_breaks_and_errors_of_cables_are_told_by_the_cabling_as_it_is()
     };
     let mut world = World::with(3, network, &Options::default(), declare).expect("scan and activation");
     world.settle();
-    world.set_strict(false);
+    world.judge_latched(false);
     let damage = |world: &mut World| {
         for _ in 0..3 {
             world.corrupt(BETWEEN, 1);
@@ -259,7 +259,7 @@ fn after_a_rescan_of_a_closed_ring_with_a_branch_on_port_2_places_are_those_of_t
         };
         let mut world = World::with(4, network, &Options::default(), declare).expect("scan and activation");
         world.settle();
-        world.set_strict(false);
+        world.judge_latched(false);
         open_at_scan.into_iter().for_each(|cable| world.heal(cable));
         world.run_cycles(60);
         let mark = world.mark();
@@ -312,7 +312,7 @@ fn a_stranger_that_becomes_a_member_has_the_place_that_a_rescan_found_him_at_cr_
     };
     let mut world = World::with(5, network, &Options::default(), declare).expect("scan and activation");
     world.settle();
-    world.set_strict(false);
+    world.judge_latched(false);
     world.power_on(SPARE);
     world.until(LIMIT, "told", |world| world.saw(world.beginning(), |event| matches!(event, Event::Unexpected { .. })));
     assert_eq!(declared(&rescan(&mut world)), [Some(0), Some(1), None]);

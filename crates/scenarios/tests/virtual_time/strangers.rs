@@ -29,7 +29,7 @@ fn world(network: Network, declared: usize) -> World {
     let declare = |scan: &ringcat::Scan| automatic(&scan.subdevices[..declared], CYCLE);
     let mut world = World::with(1, network, &Options::default(), declare).expect("scan and activation");
     world.settle();
-    world.set_strict(false);
+    world.judge_latched(false);
     world
 }
 
@@ -93,7 +93,7 @@ fn one_with_the_address_of_a_member_gets_another_and_the_member_stays_in_op() {
         };
         let mut world = World::with(2, six(true), &Options::default(), declare).expect("scan and activation");
         world.settle();
-        world.set_strict(false);
+        world.judge_latched(false);
         let mark = world.mark();
         let before = stations(&world);
         let bus = world.application().engine().bus();
@@ -161,7 +161,7 @@ fn neighbours_alike_keep_their_places_whichever_side_they_come_back_from() {
         for order in [[2, 3], [3, 2]] {
             for pause in [0, 1, 30] {
                 let mut world = World::in_op(4, ring(descriptions(&kinds), NetworkOptions::default()));
-                world.set_strict(false);
+                world.judge_latched(false);
                 cut.into_iter().for_each(|cable| world.cut(CableId(cable)));
                 world.run_cycles(100);
                 let before = stations(&world);
@@ -188,7 +188,7 @@ fn neighbours_alike_keep_their_places_when_the_ring_closes_while_one_is_recognis
     for step in 0..60 {
         let options = NetworkOptions::default().with_detection_delay(Duration::from_micros(1_500));
         let mut world = World::in_op(7, ring(descriptions(&kinds), options));
-        world.set_strict(false);
+        world.judge_latched(false);
         let before = stations(&world);
         [2, 3].into_iter().for_each(|device| world.power_off(DeviceIndex(device)));
         world.run_cycles(20);
@@ -206,7 +206,7 @@ fn neighbours_alike_keep_their_places_when_the_ring_closes_while_one_is_recognis
 fn a_segment_that_loses_its_power_as_a_whole_comes_back_with_everybody_in_his_place() {
     let kinds = ["digital-output-8"; 100];
     let mut world = World::in_op(6, ring(descriptions(&kinds), NetworkOptions::default()));
-    world.set_strict(false);
+    world.judge_latched(false);
     let before = stations(&world);
     (0..kinds.len()).for_each(|device| world.power_off(DeviceIndex(device)));
     world.run_cycles(100);
@@ -231,7 +231,7 @@ fn an_optional_subdevice_that_was_never_there_does_not_take_the_place_of_its_twi
         declaration
     })
     .expect("scan and activation");
-    world.set_strict(false);
+    world.judge_latched(false);
     world.run_cycles(300);
     let before = stations(&world);
     world.power_off(DeviceIndex(1));
@@ -296,7 +296,7 @@ fn torture(seed: u64) {
     let detection = Duration::from_micros(*dice.pick(&[10, 200, 1000, 5000]));
     let options = NetworkOptions::default().with_detection_delay(detection);
     let mut world = World::in_op(seed, ring(descriptions(&kinds), options));
-    world.set_strict(false);
+    world.judge_latched(false);
     let before = stations(&world);
     let cables = kinds.len() + 1;
     for _ in 0..30 {

@@ -82,7 +82,7 @@ impl Stamped {
         let mut world = World::with(seed, network, &options, declare).expect("it fits");
         world.settle();
         // Its checks know of one cycle under way.
-        world.set_strict(false);
+        world.judge_latched(false);
         let directory = world.application().directory();
         let all = (0..world.scan.subdevices.len()).flat_map(|subdevice| directory.areas(subdevice));
         let inputs = all.filter(|area| area.direction == Inputs && area.placed.area.length > 0);

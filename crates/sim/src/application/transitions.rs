@@ -146,6 +146,9 @@ impl Application {
         if (from, pending.to) == (AlState::Init, AlState::PreOp) {
             self.preop_since = now;
         }
+        if from != AlState::SafeOp && from != AlState::Op || matches!(pending.to, AlState::Init | AlState::PreOp) {
+            controller.latch_fmmus(pending.to == AlState::SafeOp);
+        }
         match (from, pending.to) {
             (_, AlState::Init) => {
                 self.process_data.stop(now);

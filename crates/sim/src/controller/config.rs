@@ -22,6 +22,8 @@ pub struct ControllerConfig {
     pub build: u16,
     /// FMMU_COUNT (0x0004), at most [`MAX_UNITS`].
     pub fmmu_count: u8,
+    /// FMMUs work as they were written when the application last asked for it, instead of at once.
+    pub latches_fmmus: bool,
     /// SYNC_MANAGER_COUNT (0x0005), at most [`MAX_UNITS`].
     pub sync_manager_count: u8,
     /// RAM_SIZE (0x0006): KiB of process RAM from 0x1000, at most 60.
@@ -56,6 +58,7 @@ impl Default for ControllerConfig {
             revision: 0,
             build: 2,
             fmmu_count: 8,
+            latches_fmmus: false,
             sync_manager_count: 8,
             ram_kib: 8,
             ports: [PortKind::Mii, PortKind::Mii, PortKind::NotImplemented, PortKind::NotImplemented],

@@ -33,7 +33,7 @@ pub struct LogicalAccess {
 /// The newest accesses of a SubDevice.
 #[derive(Clone, Debug, Default)]
 pub(super) struct LogicalLog {
-    kept: Option<Box<VecDeque<LogicalAccess>>>,
+    kept: Option<VecDeque<LogicalAccess>>,
 }
 
 impl LogicalLog {

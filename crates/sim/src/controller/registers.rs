@@ -62,7 +62,7 @@ impl Controller {
                 self.configure_watchdogs();
             }
             0x05 => self.sii_written(side, at, bytes, now),
-            0x06 => self.configure_fmmus(),
+            0x06 if !self.config.latches_fmmus => self.configure_fmmus(),
             0x08 => self.sync_managers_written(touched),
             0x09 => self.clock_written(at, bytes, self.pass.start, now),
             _ => {}
@@ -171,6 +171,15 @@ impl Controller {
         self.process_data_watchdog.trigger(now);
         self.refresh_watchdog_status();
         self.schedule();
+    }
+
+    /// FMMUs that are latched take over their registers now; `active`: or are switched off.
+    pub(crate) fn latch_fmmus(&mut self, active: bool) {
+        if !self.config.latches_fmmus {
+            return;
+        }
+        self.compiled.forget();
+        if active { self.configure_fmmus() } else { self.fmmus.clear() }
     }
 
     fn configure_fmmus(&mut self) {

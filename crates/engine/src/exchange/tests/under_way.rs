@@ -153,7 +153,7 @@ struct Copy {
 
 proptest! {
     #[test]
-    fn whatever_comes_back_and_when_inputs_are_those_of_the_newest_copy_that_a_subdevice_processed(
+    fn inputs_are_those_of_the_newest_copy_that_a_subdevice_processed(
         cycles in 1u8..=4,
         steps in list((way(), any::<[bool; 2]>(), any::<bool>(), list(any::<usize>(), 0..6), 1u32..12), 1..60),
     ) {
