@@ -113,6 +113,7 @@ impl Application {
         self.machine = StateMachine::default();
         self.dictionary = Dictionary::new(description);
         self.process_data.stop(now);
+        self.process_data.power_on(now);
         self.mailbox = None;
         self.servers = Servers::default();
         self.servers_due = None;
@@ -222,7 +223,7 @@ impl Application {
             }
         }
         let operating = self.machine.state() == AlState::Op && self.machine.pending().is_none();
-        self.process_data.exchange(controller, events, operating, now);
+        self.process_data.exchange(&self.dictionary, controller, events, operating, now);
         self.check_watchdog(controller, events, now);
         self.run_mailbox(description, controller, events, now);
         if let Some(pending) = self.machine.pending()
@@ -297,7 +298,7 @@ impl Application {
         if !operating && self.process_data.outputs().iter().any(|byte| *byte != 0) {
             self.process_data.make_safe(controller, now);
         }
-        self.process_data.exchange(controller, events, operating, now);
+        self.process_data.exchange(&self.dictionary, controller, events, operating, now);
         self.emulated_state = state;
     }
 

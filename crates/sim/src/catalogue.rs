@@ -2,11 +2,12 @@
 //!
 //! In: a name as segment files use it. Out: a [`DeviceDescription`] to be changed at will before a device is made of it.
 //! Vendor and product numbers are the simulator's own; SyncManager settings are like those of real terminals (facts
-//! 3.11). Terminals are in `terminals`, drive, block and junctions in `machines`, devices for
-//! the mailbox in `protocols`.
+//! 3.11). Terminals are in `terminals`, the servo drive in `drive`, block and junctions in `machines`, devices for the
+//! mailbox in `protocols`.
 
+mod drive;
 mod machines;
-mod parts;
+pub(crate) mod parts;
 mod protocols;
 mod terminals;
 
@@ -34,7 +35,7 @@ const DEVICES: &[(&str, Maker)] = &[
     ("emulated-output-8", |name| terminals::emulated(terminals::digital_output(name, 8))),
     ("analog-input-4", |name| terminals::analog_input(name, 4)),
     ("analog-output-4", |name| terminals::analog_output(name, 4)),
-    ("servo", machines::servo),
+    ("servo", drive::servo),
     ("block", machines::block),
     ("all-protocols", protocols::all_protocols),
     ("ethernet-terminal", protocols::ethernet_terminal),

@@ -2,16 +2,17 @@
 //!
 //! In: the device's description, from which the standard objects, the PDO mappings (0x16xx, 0x1Axx), the PDO
 //! assignments (0x1C10 + SyncManager) and the mapped objects follow; reads and writes by index and sub index.
-//! Out: bytes or an abort code. What an entry is says `entry`, the diagnosis history is in `history`. The SDO services
+//! Out: bytes or an abort code. What an entry is says `entry`, the diagnosis history is in `history`, synchronisation in `sync`. The SDO services
 //! around it are in [`coe`](super::coe), what the process data looks like with a given assignment in
 //! [`process_data`](super::process_data).
 
 mod entry;
 mod history;
 mod objects;
+mod sync;
 
 use ringcat_wire::al::AlState;
-use ringcat_wire::mailbox::coe::{DataType, ObjectCode};
+use ringcat_wire::mailbox::coe::{AccessRights, DataType, ObjectCode};
 use ringcat_wire::mailbox::sdo::AbortCode;
 use ringcat_wire::sii::PdoDirection;
 
@@ -20,6 +21,8 @@ use history::check_acknowledge;
 
 pub use entry::{Access, Entry};
 pub use history::history;
+pub use objects::type_name;
+pub use sync::SyncParameters;
 
 /// Index of the PDO assignment of SyncManager 0; that of SyncManager n is n further on.
 pub const ASSIGNMENT_BASE: u16 = 0x1C10;
@@ -137,12 +140,14 @@ pub struct Dictionary {
     objects: Vec<Object>,
     /// Messages of the diagnosis history that were not acknowledged.
     unacknowledged: u8,
+    /// Counts changes of values.
+    revision: u32,
 }
 
 impl Dictionary {
     /// The dictionary that follows from a description; it has PDO lists even where no CoE makes them visible.
     pub fn new(description: &DeviceDescription) -> Dictionary {
-        Dictionary { objects: objects::build(description), unacknowledged: 0 }
+        Dictionary { objects: objects::build(description), unacknowledged: 0, revision: 0 }
     }
 
     /// All objects, indices ascending.
@@ -155,7 +160,22 @@ impl Dictionary {
         self.objects.binary_search_by_key(&index, |object| object.index).ok().map(|place| &self.objects[place])
     }
 
+    /// As long as this stays the same, all values do.
+    pub const fn revision(&self) -> u32 {
+        self.revision
+    }
+
+    /// Index, sub index and value of all entries of these objects, numbers sign-extended.
+    pub fn numbers(&self, indices: core::ops::RangeInclusive<u16>) -> impl Iterator<Item = (u16, u8, u64)> {
+        let objects = self.objects.iter().filter(move |object| indices.contains(&object.index));
+        objects.flat_map(|object| {
+            object.entries.iter().map(|entry| (object.index, entry.sub_index, entry.number(&entry.value) as u64))
+        })
+    }
+
+    /// An object that is about to change.
     fn object_mut(&mut self, index: u16) -> Option<&mut Object> {
+        self.revision = self.revision.wrapping_add(1);
         let place = self.objects.binary_search_by_key(&index, |object| object.index).ok()?;
         self.objects.get_mut(place)
     }
@@ -281,12 +301,13 @@ impl Dictionary {
                 let known = self.object(pdo).is_some_and(|pdo| pdo.role == ObjectRole::Mapping(direction));
                 if known { Ok(()) } else { Err(AbortCode::VALUE_RANGE) }
             }
-            ObjectRole::Mapping(_) => self.check_mapped(data),
+            ObjectRole::Mapping(direction) => self.check_mapped(direction, data),
             ObjectRole::Plain | ObjectRole::History => Ok(()),
         }
     }
 
-    fn check_mapped(&self, data: &[u8]) -> Result<(), AbortCode> {
+    /// Whether an entry may be mapped in this direction. One that says nothing about directions may in both.
+    fn check_mapped(&self, direction: PdoDirection, data: &[u8]) -> Result<(), AbortCode> {
         let mapped = MappedEntry::decode(data).ok_or(AbortCode::LENGTH_TOO_SHORT)?;
         if mapped.bit_length == 0 {
             return Err(AbortCode::CANNOT_BE_MAPPED);
@@ -295,8 +316,15 @@ impl Dictionary {
             return Ok(());
         }
         let value = self.read(mapped.index, mapped.sub_index)?;
+        let rights = self.object(mapped.index).and_then(|object| object.entry(mapped.sub_index)).map(Entry::rights);
+        let may = |right| rights.is_some_and(|rights| rights.has(right));
+        let (rx, tx) = (may(AccessRights::RX_MAPPABLE), may(AccessRights::TX_MAPPABLE));
+        let directed = match direction {
+            PdoDirection::Rx => rx || !tx,
+            PdoDirection::Tx => tx || !rx,
+        };
         let fits = usize::from(mapped.bit_length).div_ceil(8) == value.len();
-        if mapped.index >= 0x2000 && fits { Ok(()) } else { Err(AbortCode::CANNOT_BE_MAPPED) }
+        if mapped.index >= 0x2000 && fits && directed { Ok(()) } else { Err(AbortCode::CANNOT_BE_MAPPED) }
     }
 
     /// Sets a value from inside the device; a value of another length is cut or filled with zeros.

@@ -109,6 +109,7 @@ impl Application {
         mailbox.send(controller, now);
         let servers = &mut self.servers;
         if let Some(message) = mailbox.take(controller, events, &self.faults, now) {
+            self.process_data.advance(now);
             let mut surroundings = Surroundings {
                 description,
                 declared,

@@ -48,6 +48,11 @@ impl Mapping {
         Mapping(placed)
     }
 
+    /// The entries, in order.
+    pub fn entries(&self) -> impl Iterator<Item = MappedEntry> {
+        self.0.iter().map(|placed| placed.entry)
+    }
+
     /// Finds an object.
     pub fn find(&self, index: u16, sub_index: u8) -> Option<PlacedEntry> {
         self.0.iter().copied().find(|placed| placed.entry.index == index && placed.entry.sub_index == sub_index)
@@ -177,10 +182,11 @@ impl ProcessData {
         }
     }
 
-    /// Value of a mapped object as it is in the process data now.
+    /// Value of a mapped object as it is in the process data now, or of one that the drive knows.
     pub fn value(&self, index: u16, sub_index: u8) -> Option<u64> {
         let output = || self.output_mapping.value(index, sub_index, &self.outputs);
-        self.input_mapping.value(index, sub_index, &self.inputs).or_else(output)
+        let mapped = self.input_mapping.value(index, sub_index, &self.inputs).or_else(output);
+        mapped.or_else(|| self.servo().and_then(|servo| servo.value(index, sub_index)))
     }
 
     /// The object is part of the outputs.
@@ -243,6 +249,20 @@ impl ProcessData {
         self.refresh(controller, now);
     }
 
+    /// Power comes, or goes: a drive starts anew.
+    pub fn power_on(&mut self, now: SimTime) {
+        if let Source::Servo(servo) = &mut self.source {
+            servo.power_on(now);
+        }
+    }
+
+    /// A drive moves up to now, whether or not there is process data.
+    pub fn advance(&mut self, now: SimTime) {
+        if let Source::Servo(servo) = &mut self.source {
+            servo.advance(now);
+        }
+    }
+
     fn release_drive(&mut self, now: SimTime) {
         match &mut self.source {
             Source::Servo(servo) => servo.release(now),
@@ -251,19 +271,26 @@ impl ProcessData {
     }
 
     /// What was received last becomes valid: OP begins.
-    pub fn operate(&mut self, controller: &mut Controller, now: SimTime) {
+    pub fn operate(&mut self, dictionary: &Dictionary, controller: &mut Controller, now: SimTime) {
         if self.outputs.is_empty() {
             return;
         }
-        self.latch(now);
+        self.latch(dictionary, now);
         self.refresh(controller, now);
     }
 
     /// Takes new outputs and makes new inputs, after AL `events`.
-    pub fn exchange(&mut self, controller: &mut Controller, events: u32, operating: bool, now: SimTime) {
+    pub fn exchange(
+        &mut self,
+        dictionary: &Dictionary,
+        controller: &mut Controller,
+        events: u32,
+        operating: bool,
+        now: SimTime,
+    ) {
         let fresh = self.receive(controller, events, now);
         if fresh && operating {
-            self.latch(now);
+            self.latch(dictionary, now);
         }
         let read = self.layout.inputs.iter().any(|area| !area.event || events & event_bit(area.sync_manager) != 0);
         let due = match &self.source {
@@ -297,11 +324,11 @@ impl ProcessData {
         fresh
     }
 
-    fn latch(&mut self, now: SimTime) {
+    fn latch(&mut self, dictionary: &Dictionary, now: SimTime) {
         self.outputs.copy_from_slice(&self.received);
         self.latched += 1;
         match &mut self.source {
-            Source::Servo(servo) => servo.command(now, &self.output_mapping, &self.outputs),
+            Source::Servo(servo) => servo.command(now, &self.output_mapping, &self.outputs, dictionary),
             Source::Terminal(_) => {}
         }
     }

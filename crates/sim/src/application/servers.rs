@@ -9,7 +9,7 @@ use ringcat_wire::mailbox::{ErrorReply, Protocol};
 
 use super::aoe::AoeServer;
 use super::coe::{CoeServer, Objects};
-use super::dictionary::Dictionary;
+use super::dictionary::{Dictionary, type_name};
 use super::eoe::EoeServer;
 use super::foe::files::FileStore;
 use super::foe::{Files, FoeServer};
@@ -63,7 +63,7 @@ impl Servers {
             foe: FoeServer::default(),
             eoe: announced.eoe().then(|| EoeServer::new(&services.eoe)),
             soe: announced.soe().then(|| SoeServer::new(&services.soe)),
-            aoe: announced.aoe().then(|| AoeServer::new(&services.aoe, &description.name)),
+            aoe: announced.aoe().then(|| AoeServer::new(&services.aoe, type_name(description))),
         }
     }
 

@@ -1,123 +1,125 @@
-//! A CiA 402 drive: the power state machine behind controlword and statusword, and a position that follows.
+//! A CiA 402 drive with a motor and a load that have inertia: profile and cyclic modes, homing, brake, fault reactions.
 //!
-//! In: controlword (0x6040), mode (0x6060), target position (0x607A) and target velocity (0x60FF) from the valid
-//! outputs. Out: statusword (0x6041), mode display (0x6061), actual position (0x6064), actual velocity (0x606C) and
-//! error code (0x603F). Modes: cyclic synchronous position (8) and cyclic synchronous velocity (9). Units are
-//! increments and increments per second. The motor is ideal but for a speed limit.
+//! In: objects of the outputs and of the dictionary (`parameters`), virtual time. Out: the objects that [`Servo::value`]
+//! knows, among them statusword, position, velocity and torque. The drive computes in steps of [`STEP_NS`], whose times do
+//! not depend on frames. Units are increments, seconds and thousandths of the rated torque.
+//!
+//! A step asks the power state machine ([`power`]) what to do (`Order`), lets the mode move the set-point, makes the
+//! torque with a position loop around a velocity loop (`motion`), and moves the motor. `homing` looks for the origin,
+//! `status` says what the application sees. Position and velocity of the motor are those of
+//! the machine, whose position 0 is where it first got power; `origin` is what homing adds to that.
 
+mod homing;
+mod motion;
+mod parameters;
+pub mod power;
+mod status;
+
+use super::dictionary::Dictionary;
 use super::process_data::Mapping;
 use crate::time::SimTime;
+use homing::Homing;
+use motion::Motor;
+use parameters::Parameters;
 
-/// Highest speed in increments per second.
-pub const MAX_SPEED: i64 = 10_000_000;
+pub use power::{DriveCommand, DriveState};
+
+/// Time from one step to the next.
+pub const STEP_NS: u64 = 125_000;
+const STEP: f64 = STEP_NS as f64 / 1e9;
+/// Increments of the encoder.
+pub const INCREMENTS_PER_REVOLUTION: i32 = 131_072;
+/// Acceleration that one thousandth of the rated torque gives to motor and load: increments per second squared.
+pub const ACCELERATION: f64 = 50_000.0;
+/// Friction in thousandths of the rated torque at one increment per second.
+pub const FRICTION: f64 = 1e-5;
+/// Torque of the closed brake.
+pub const BRAKE_TORQUE: f64 = 1_000.0;
+/// Torque that the motor cannot exceed.
+pub const PEAK_TORQUE: f64 = 3_000.0;
+/// Where the limit switches are on the machine; both are cams that the axis can pass.
+pub const LIMIT_SWITCH: f64 = 2_000_000.0;
+/// Where the index pulse of a revolution is.
+pub const INDEX_PULSE: f64 = 12_345.0;
+/// Below this speed the motor stands still.
+pub const STANDSTILL: f64 = 1_000.0;
+/// Error code: process data was lost while the drive had torque.
+pub const ERROR_COMMUNICATION: u16 = 0x7500;
+/// Error code: the following error was too large for too long.
+pub const ERROR_FOLLOWING: u16 = 0x8611;
+
+/// Mode of operation: profile position.
+pub const MODE_PROFILE_POSITION: i8 = 1;
+/// Mode of operation: profile velocity.
+pub const MODE_PROFILE_VELOCITY: i8 = 3;
+/// Mode of operation: profile torque.
+pub const MODE_PROFILE_TORQUE: i8 = 4;
+/// Mode of operation: homing.
+pub const MODE_HOMING: i8 = 6;
 /// Mode of operation: cyclic synchronous position.
 pub const MODE_CSP: i8 = 8;
 /// Mode of operation: cyclic synchronous velocity.
 pub const MODE_CSV: i8 = 9;
-/// Error code after process data was lost while the drive was enabled: communication.
-pub const ERROR_COMMUNICATION: u16 = 0x7500;
+/// Mode of operation: cyclic synchronous torque.
+pub const MODE_CST: i8 = 10;
+/// What 0x6060 takes; 0 is none: the drive stops.
+pub const MODES: &[i64] = &[0, 1, 3, 4, 6, 8, 9, 10];
+/// What 0x6098 takes.
+pub const HOMING_METHODS: &[i64] = &[17, 18, 33, 34, 35, 37];
 
-const NS_PER_S: i64 = 1_000_000_000;
-const VOLTAGE_ENABLED: u16 = 0x0010;
-const REMOTE: u16 = 0x0200;
-const TARGET_REACHED: u16 = 0x0400;
-const FOLLOWS: u16 = 0x1000;
+/// The drive tests itself for so long after power-on.
+const SELF_TEST_NS: u64 = 10_000_000;
+/// Steps that are made up for at most after a time in which nothing looked at the drive.
+const MAX_STEPS: u64 = 80_000;
 
-/// State of the power state machine.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum DriveState {
-    /// Power cannot be switched on yet.
-    #[default]
-    SwitchOnDisabled,
-    /// Waits for switch on.
-    ReadyToSwitchOn,
-    /// Power is on, no torque.
-    SwitchedOn,
-    /// The drive follows its target.
-    OperationEnabled,
-    /// Stands still after a quick stop.
-    QuickStopActive,
-    /// Waits for a fault reset.
-    Fault,
-}
+const NEW_SET_POINT: u16 = 0x0010;
+const IMMEDIATE: u16 = 0x0020;
+const RELATIVE: u16 = 0x0040;
+const FAULT_RESET: u16 = 0x0080;
+const HALT: u16 = 0x0100;
 
-impl DriveState {
-    /// Its bits in the statusword.
-    pub const fn status_bits(self) -> u16 {
-        match self {
-            DriveState::SwitchOnDisabled => 0x0040,
-            DriveState::ReadyToSwitchOn => 0x0021,
-            DriveState::SwitchedOn => 0x0023,
-            DriveState::OperationEnabled => 0x0027,
-            DriveState::QuickStopActive => 0x0007,
-            DriveState::Fault => 0x0008,
-        }
-    }
-}
-
-/// What a controlword asks for.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum DriveCommand {
-    DisableVoltage,
-    QuickStop,
-    Shutdown,
-    SwitchOn,
-    EnableOperation,
-}
-
-impl DriveCommand {
-    const fn from_controlword(word: u16) -> DriveCommand {
-        match word & 0x0F {
-            bits if bits & 0x02 == 0 => DriveCommand::DisableVoltage,
-            bits if bits & 0x04 == 0 => DriveCommand::QuickStop,
-            bits if bits & 0x01 == 0 => DriveCommand::Shutdown,
-            bits if bits & 0x08 == 0 => DriveCommand::SwitchOn,
-            _ => DriveCommand::EnableOperation,
-        }
-    }
-}
-
-/// One step of the power state machine.
-const fn next(state: DriveState, command: DriveCommand) -> DriveState {
-    use DriveCommand as C;
-    use DriveState as S;
-    match (state, command) {
-        (S::Fault, _) => S::Fault,
-        (S::SwitchOnDisabled, C::Shutdown) => S::ReadyToSwitchOn,
-        (S::SwitchOnDisabled, C::DisableVoltage | C::QuickStop | C::SwitchOn | C::EnableOperation) => {
-            S::SwitchOnDisabled
-        }
-        (S::ReadyToSwitchOn, C::SwitchOn | C::EnableOperation) => S::SwitchedOn,
-        (S::ReadyToSwitchOn, C::Shutdown) => S::ReadyToSwitchOn,
-        (S::SwitchedOn, C::EnableOperation) => S::OperationEnabled,
-        (S::SwitchedOn, C::SwitchOn) => S::SwitchedOn,
-        (S::SwitchedOn, C::Shutdown) => S::ReadyToSwitchOn,
-        (S::OperationEnabled, C::EnableOperation) => S::OperationEnabled,
-        (S::OperationEnabled, C::SwitchOn) => S::SwitchedOn,
-        (S::OperationEnabled, C::Shutdown) => S::ReadyToSwitchOn,
-        (S::OperationEnabled, C::QuickStop) => S::QuickStopActive,
-        (S::QuickStopActive, C::EnableOperation) => S::OperationEnabled,
-        (S::QuickStopActive, C::QuickStop | C::Shutdown | C::SwitchOn) => S::QuickStopActive,
-        (_, C::DisableVoltage) => S::SwitchOnDisabled,
-        (S::ReadyToSwitchOn | S::SwitchedOn, C::QuickStop) => S::SwitchOnDisabled,
-    }
+/// What the power stage does in a step.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Order {
+    /// No torque, brake closed.
+    Off,
+    /// Slow down with so much per second, and hold the position then; infinite: with all torque.
+    Stop(f64),
+    /// Do what the mode says.
+    Follow,
 }
 
 /// State of a drive.
-#[derive(Clone, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct Servo {
     state: DriveState,
-    fault_reset: bool,
+    command: DriveCommand,
+    controlword: u16,
+    /// Outputs are valid.
     remote: bool,
     mode: i8,
-    target_position: i32,
-    target_velocity: i32,
-    position: i32,
-    velocity: i64,
-    /// Part of an increment not yet moved, in increments per second times nanoseconds.
-    remainder: i64,
+    parameters: Parameters,
+    /// Revision of the dictionary that the parameters have.
+    revision: Option<u32>,
+    motor: Motor,
+    /// Position of the application where that of the machine is 0.
+    origin: f64,
+    set_position: f64,
+    set_velocity: f64,
+    set_torque: f64,
+    /// Where the set-point goes to, how many steps it has for that (cyclic), and where to next (profile).
+    goal: Option<f64>,
+    steps_left: u32,
+    next_goal: Option<f64>,
+    acknowledged: bool,
+    homing: Homing,
+    limited: bool,
+    /// Since when the following error is too large, and the target reached, in seconds.
+    lagging: f64,
+    settled: f64,
     error_code: u16,
     at: SimTime,
+    ready_at: SimTime,
 }
 
 impl Servo {
@@ -126,178 +128,207 @@ impl Servo {
         self.state
     }
 
-    /// Actual position in increments.
-    pub const fn position(&self) -> i32 {
-        self.position
+    /// Power comes: the load stands where it is, what homing found is lost.
+    pub fn power_on(&mut self, now: SimTime) {
+        let motor = Motor { velocity: 0.0, torque: 0.0, ..self.motor };
+        let ready_at = SimTime(now.0.saturating_add(SELF_TEST_NS));
+        *self = Servo { motor, set_position: motor.position, at: now, ready_at, ..Servo::default() };
     }
 
-    /// New outputs: the motor moves up to now, then takes the new command.
-    pub fn command(&mut self, now: SimTime, mapping: &Mapping, outputs: &[u8]) {
+    /// New outputs: the motor moves up to now, then the drive takes the new command.
+    pub fn command(&mut self, now: SimTime, mapping: &Mapping, outputs: &[u8], dictionary: &Dictionary) {
         self.advance(now);
-        let value = |index| mapping.value(index, 0, outputs);
+        self.take_parameters(mapping, outputs, dictionary);
         self.remote = true;
-        if let Some(mode) = value(0x6060) {
-            self.mode = mode as u8 as i8;
-        }
-        if let Some(position) = value(0x607A) {
-            self.target_position = position as u32 as i32;
-        }
-        if let Some(velocity) = value(0x60FF) {
-            self.target_velocity = velocity as u32 as i32;
-        }
-        self.control(value(0x6040).unwrap_or(0) as u16);
-    }
-
-    fn control(&mut self, word: u16) {
-        let reset = word & 0x80 != 0;
-        if self.state == DriveState::Fault && reset && !self.fault_reset {
-            self.state = DriveState::SwitchOnDisabled;
-            self.error_code = 0;
+        let word = self.parameters.controlword;
+        let rising = word & !core::mem::replace(&mut self.controlword, word);
+        self.command = DriveCommand::from_controlword(word);
+        if self.state == DriveState::Fault && rising & FAULT_RESET != 0 {
+            (self.state, self.error_code) = (DriveState::SwitchOnDisabled, 0);
         } else {
-            self.state = next(self.state, DriveCommand::from_controlword(word));
+            self.state = power::next(self.state, self.command);
         }
-        self.fault_reset = reset;
+        let mode = self.parameters.mode;
+        if mode != self.mode && MODES.contains(&mode.into()) {
+            (self.mode, self.homing, self.set_torque, self.settled) =
+                (mode, Homing::NotStarted, self.motor.torque, 0.0);
+            (self.goal, self.next_goal, self.acknowledged) = (None, None, false);
+        }
+        match self.mode {
+            _ if self.state != DriveState::OperationEnabled => {}
+            MODE_PROFILE_POSITION => self.take_set_point(word),
+            MODE_HOMING if rising & NEW_SET_POINT != 0 => self.begin_homing(),
+            MODE_HOMING if word & NEW_SET_POINT == 0 && self.is_homing() => self.homing = Homing::NotStarted,
+            MODE_CSP => {
+                let target = self.parameters.target_position.wrapping_add(self.parameters.position_offset);
+                self.goal = Some(self.on_machine(target));
+                self.steps_left = (self.parameters.interpolation_time() / STEP).round() as u32;
+            }
+            _ => {}
+        }
     }
 
-    /// Outputs are no longer valid: an enabled drive goes to fault, any other switches off.
+    fn take_parameters(&mut self, mapping: &Mapping, outputs: &[u8], dictionary: &Dictionary) {
+        if self.revision.replace(dictionary.revision()) != Some(dictionary.revision()) {
+            for (index, sub_index, value) in dictionary.numbers(0x6000..=0x6FFF) {
+                self.parameters.set(index, sub_index, value);
+            }
+        }
+        for entry in mapping.entries() {
+            if let Some(value) = mapping.value(entry.index, entry.sub_index, outputs) {
+                self.parameters.set(entry.index, entry.sub_index, value);
+            }
+        }
+    }
+
+    /// Handshake of profile position: bit 4 of the controlword against bit 12 of the statusword.
+    fn take_set_point(&mut self, word: u16) {
+        if word & NEW_SET_POINT == 0 {
+            self.acknowledged = false;
+            return;
+        }
+        let free = self.goal.is_none_or(|goal| goal == self.set_position) && self.next_goal.is_none();
+        if self.acknowledged || (!free && word & IMMEDIATE == 0 && self.next_goal.is_some()) {
+            return;
+        }
+        let target = self.parameters.target_position;
+        let goal = match word & RELATIVE {
+            0 => self.on_machine(target),
+            _ => self.next_goal.or(self.goal).unwrap_or(self.set_position) + f64::from(target),
+        };
+        (self.acknowledged, self.settled) = (true, 0.0);
+        if free || word & IMMEDIATE != 0 {
+            (self.goal, self.next_goal) = (Some(goal), None);
+        } else {
+            self.next_goal = Some(goal);
+        }
+    }
+
+    /// Outputs are no longer valid: 0x6007 says what an enabled drive does, any other switches off.
     pub fn release(&mut self, now: SimTime) {
         self.advance(now);
         self.remote = false;
-        match self.state {
-            DriveState::OperationEnabled | DriveState::QuickStopActive => {
-                self.state = DriveState::Fault;
-                self.error_code = ERROR_COMMUNICATION;
+        match (self.state, self.parameters.abort_connection_option) {
+            (state, 0) if state.has_torque() => {}
+            (DriveState::OperationEnabled | DriveState::QuickStopActive, 2) => {
+                self.state = DriveState::SwitchOnDisabled
             }
-            DriveState::Fault => {}
-            DriveState::SwitchOnDisabled | DriveState::ReadyToSwitchOn | DriveState::SwitchedOn => {
-                self.state = DriveState::SwitchOnDisabled;
-            }
+            (DriveState::OperationEnabled | DriveState::QuickStopActive, 3) => self.state = DriveState::QuickStopActive,
+            (DriveState::OperationEnabled | DriveState::QuickStopActive, _) => self.fail(ERROR_COMMUNICATION),
+            (DriveState::ReadyToSwitchOn | DriveState::SwitchedOn, _) => self.state = DriveState::SwitchOnDisabled,
+            _ => {}
         }
-        self.velocity = 0;
     }
 
-    /// Fills in the inputs as they are now.
-    pub fn report(&mut self, now: SimTime, mapping: &Mapping, inputs: &mut [u8]) {
-        self.advance(now);
-        let mut set = |index, value: i64| mapping.set_value(index, 0, value as u64, inputs);
-        set(0x6041, i64::from(self.statusword()));
-        set(0x6061, i64::from(self.mode));
-        set(0x6064, i64::from(self.position));
-        set(0x606C, self.velocity);
-        set(0x603F, i64::from(self.error_code));
-    }
-
-    /// The statusword.
-    pub const fn statusword(&self) -> u16 {
-        let mut word = self.state.status_bits() | VOLTAGE_ENABLED;
-        if self.remote {
-            word |= REMOTE;
-        }
-        if matches!(self.state, DriveState::OperationEnabled) {
-            word |= FOLLOWS;
-            if self.position == self.target_position {
-                word |= TARGET_REACHED;
-            }
-        }
-        word
+    fn fail(&mut self, code: u16) {
+        self.error_code = code;
+        self.state = if self.stands_still() { DriveState::Fault } else { DriveState::FaultReactionActive };
+        // It stops from where it is, not on the way to where it should be.
+        self.track_motor(self.motor.velocity);
     }
 
     /// Moves the motor up to `now`.
-    fn advance(&mut self, now: SimTime) {
-        let elapsed_ns = i64::try_from(now.since(self.at).as_nanos()).unwrap_or(i64::MAX).min(NS_PER_S);
+    pub fn advance(&mut self, now: SimTime) {
+        let steps = (now.0 / STEP_NS).saturating_sub(self.at.0 / STEP_NS).min(MAX_STEPS);
         self.at = now;
-        if self.state != DriveState::OperationEnabled || elapsed_ns == 0 {
-            if self.state != DriveState::OperationEnabled {
-                self.velocity = 0;
+        if self.state == DriveState::NotReadyToSwitchOn && now >= self.ready_at {
+            self.state = DriveState::SwitchOnDisabled;
+        }
+        for _ in 0..steps {
+            if !self.state.has_torque() && self.motor.velocity == 0.0 && self.motor.torque == 0.0 {
+                return;
             }
+            self.step();
+        }
+    }
+
+    fn step(&mut self) {
+        let order = self.order();
+        self.limited = false;
+        let before = self.motor.position;
+        let torque = match order {
+            Order::Off => {
+                self.track_motor(self.motor.velocity);
+                0.0
+            }
+            Order::Stop(rate) => {
+                self.ramp_to(0.0, rate, rate);
+                if rate.is_infinite() {
+                    self.track_motor(0.0);
+                }
+                self.position_loop(0.0)
+            }
+            Order::Follow => self.follow(),
+        };
+        if self.state != DriveState::OperationEnabled {
+            (self.goal, self.next_goal, self.homing) = (None, None, Homing::NotStarted);
+        }
+        let p = &self.parameters;
+        let most = |limit: f64| limit.min(p.max_torque).min(PEAK_TORQUE);
+        let limited = torque.clamp(-most(p.negative_torque), most(p.positive_torque));
+        self.limited |= limited != torque;
+        self.motor.step(limited, order == Order::Off);
+        self.look_for_home(before);
+        self.watch();
+        self.leave(order);
+    }
+
+    fn order(&self) -> Order {
+        let p = &self.parameters;
+        let by_option = |option: i16| match option {
+            0 => Order::Off,
+            1 | 5 => Order::Stop(p.deceleration),
+            3 | 7 => Order::Stop(f64::INFINITY),
+            _ => Order::Stop(p.quick_stop_deceleration),
+        };
+        match (self.state, self.command) {
+            (DriveState::OperationEnabled, DriveCommand::SwitchOn) => by_option(p.disable_operation_option),
+            (DriveState::OperationEnabled, DriveCommand::Shutdown) => by_option(p.shutdown_option),
+            (DriveState::OperationEnabled, _) if self.controlword & HALT != 0 => by_option(p.halt_option),
+            (DriveState::OperationEnabled, _) => Order::Follow,
+            (DriveState::QuickStopActive, _) => by_option(p.quick_stop_option),
+            (DriveState::FaultReactionActive, _) => by_option(p.fault_reaction_option),
+            _ => Order::Off,
+        }
+    }
+
+    /// Transitions that wait for the motor, or for nothing where the drive function is off.
+    fn leave(&mut self, order: Order) {
+        if order != Order::Off && !self.stands_still() {
             return;
         }
-        let position = i64::from(self.position);
-        let moved = match self.mode {
-            MODE_CSP => {
-                let reach = MAX_SPEED * elapsed_ns / NS_PER_S;
-                let moved = (i64::from(self.target_position) - position).clamp(-reach, reach);
-                self.velocity = moved * NS_PER_S / elapsed_ns;
-                moved
-            }
-            MODE_CSV => {
-                self.velocity = i64::from(self.target_velocity).clamp(-MAX_SPEED, MAX_SPEED);
-                let travel = self.velocity * elapsed_ns + self.remainder;
-                self.remainder = travel % NS_PER_S;
-                travel / NS_PER_S
-            }
-            _ => {
-                self.velocity = 0;
-                0
-            }
+        self.state = match (self.state, self.command) {
+            (DriveState::OperationEnabled, DriveCommand::SwitchOn) => DriveState::SwitchedOn, // 5
+            (DriveState::OperationEnabled, DriveCommand::Shutdown) => DriveState::ReadyToSwitchOn, // 8
+            (DriveState::QuickStopActive, _) if self.parameters.quick_stop_option < 5 => DriveState::SwitchOnDisabled, // 12
+            (DriveState::FaultReactionActive, _) => DriveState::Fault, // 14
+            (state, _) => state,
         };
-        // An encoder wraps.
-        self.position = (position + moved) as i32;
     }
-}
 
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    fn enabled(mode: i8) -> Servo {
-        let mut servo = Servo { mode, remote: true, ..Servo::default() };
-        for word in [0x06, 0x07, 0x0F] {
-            servo.control(word);
+    /// Supervises the following error, and how long the target is reached.
+    fn watch(&mut self) {
+        let window = self.parameters.following_window;
+        let lags = window.is_some_and(|window| self.following_error().abs() > window);
+        self.lagging = if lags { self.lagging + STEP } else { 0.0 };
+        self.settled = if self.is_in_window() { self.settled + STEP } else { 0.0 };
+        let supervised = matches!(self.state, DriveState::OperationEnabled | DriveState::QuickStopActive);
+        if supervised && lags && self.lagging > self.parameters.following_timeout {
+            self.fail(ERROR_FOLLOWING);
         }
-        assert_eq!(servo.state(), DriveState::OperationEnabled);
-        servo
     }
 
-    #[test]
-    fn shutdown_switch_on_enable_lead_to_operation() {
-        let mut servo = Servo::default();
-        let words = [(0x0000, 0x0040), (0x0006, 0x0021), (0x0007, 0x0023), (0x000F, 0x0027), (0x0002, 0x0007)];
-        for (control, status) in words {
-            servo.control(control);
-            assert_eq!(servo.statusword() & 0x006F, status, "controlword {control:#06x}");
-        }
-        servo.control(0x0000);
-        assert_eq!(servo.state(), DriveState::SwitchOnDisabled);
+    /// The place on the machine of a position of the application that is less than half a range of the encoder away.
+    fn on_machine(&self, position: i32) -> f64 {
+        let here = (self.set_position + self.origin).round();
+        here - self.origin + f64::from(position.wrapping_sub(here as i64 as i32))
     }
 
-    #[test]
-    fn enable_in_switch_on_disabled_does_nothing() {
-        let mut servo = Servo::default();
-        servo.control(0x000F);
-        assert_eq!(servo.state(), DriveState::SwitchOnDisabled);
+    fn stands_still(&self) -> bool {
+        self.set_velocity == 0.0 && self.motor.velocity.abs() < STANDSTILL
     }
 
-    #[test]
-    fn lost_process_data_is_a_fault_that_a_rising_reset_bit_clears() {
-        let mut servo = enabled(MODE_CSP);
-        servo.release(SimTime(0));
-        assert_eq!((servo.state(), servo.error_code), (DriveState::Fault, ERROR_COMMUNICATION));
-        servo.control(0x000F);
-        assert_eq!(servo.state(), DriveState::Fault);
-        servo.control(0x0080);
-        assert_eq!((servo.state(), servo.error_code), (DriveState::SwitchOnDisabled, 0));
-    }
-
-    #[test]
-    fn csp_follows_the_target_within_its_speed() {
-        let mut servo = enabled(MODE_CSP);
-        servo.target_position = 15_000;
-        servo.advance(SimTime::from_millis(1));
-        assert_eq!((servo.position(), servo.velocity), (10_000, MAX_SPEED));
-        assert_eq!(servo.statusword() & TARGET_REACHED, 0);
-        servo.advance(SimTime::from_millis(2));
-        assert_eq!((servo.position(), servo.velocity), (15_000, 5_000_000));
-        assert_eq!(servo.statusword() & TARGET_REACHED, TARGET_REACHED);
-    }
-
-    #[test]
-    fn csv_loses_no_part_of_an_increment() {
-        let mut servo = enabled(MODE_CSV);
-        servo.target_velocity = -333;
-        for ms in 1..=3000 {
-            servo.advance(SimTime::from_millis(ms));
-        }
-        assert_eq!(servo.position(), -999);
+    fn following_error(&self) -> f64 {
+        self.set_position - self.motor.position
     }
 }

@@ -202,7 +202,7 @@ pub fn timing(
     layout: &Layout,
     controller: &mut Controller,
     now: SimTime,
-) -> Result<(), AlStatusCode> {
+) -> Result<Option<u32>, AlStatusCode> {
     if description.watchdog_required && !layout.outputs.is_empty() {
         let time = read_u16(controller, map::WATCHDOG_TIME_PROCESS_DATA, now);
         if time == 0 || layout.outputs.iter().all(|area| !area.watchdog) {
@@ -210,14 +210,14 @@ pub fn timing(
         }
     }
     let Some(dc) = &description.dc else {
-        return Ok(());
+        return Ok(None);
     };
     let mut activation = [0];
     controller.pdi_read(map::DC_ACTIVATION, &mut activation, now);
     // Cyclic unit and the two SYNC signals.
     let signals = activation[0] & 0x07;
     if signals == 0 {
-        return Ok(());
+        return Ok(None);
     }
     if !dc.modes.iter().any(|mode| mode.assign_activate.to_le_bytes()[1] & 0x07 == signals) {
         return Err(AlStatusCode::INVALID_DC_SYNC_CONFIGURATION);
@@ -228,7 +228,7 @@ pub fn timing(
     if cycle_ns == 0 || cycle_ns < dc.minimum_cycle_ns {
         return Err(AlStatusCode::DC_INVALID_SYNC_CYCLE_TIME);
     }
-    Ok(())
+    Ok(Some(cycle_ns))
 }
 
 /// A 16-bit register through the PDI.

@@ -83,7 +83,8 @@ impl Application {
                 let actual = settings::sync_managers(controller, now);
                 let ram_kib = controller.config().ram_kib;
                 let layout = settings::process_data(description, &self.dictionary, &actual, ram_kib)?;
-                settings::timing(description, &layout, controller, now)?;
+                let sync0_cycle_ns = settings::timing(description, &layout, controller, now)?;
+                self.dictionary.note_sync0(sync0_cycle_ns);
                 self.layout = layout;
                 Ok(())
             }
@@ -158,7 +159,7 @@ impl Application {
             (AlState::PreOp, AlState::SafeOp) => {
                 self.process_data.start(self.layout.clone(), &self.dictionary, controller, now);
             }
-            (_, AlState::Op) => self.process_data.operate(controller, now),
+            (_, AlState::Op) => self.process_data.operate(&self.dictionary, controller, now),
             _ => {}
         }
         self.report(controller, now);

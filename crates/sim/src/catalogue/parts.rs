@@ -2,10 +2,11 @@
 
 use core::time::Duration;
 
+use ringcat_wire::mailbox::coe::AccessRights;
 use ringcat_wire::register::PortKind;
 use ringcat_wire::sii::{CoeDetails, MailboxLayout, MailboxProtocols, PdoDirection, SyncManagerKind};
 
-use crate::application::dictionary::{Access, Entry, Object, ObjectRole};
+use crate::application::dictionary::{Access, Entry, Object, SyncParameters};
 use crate::description::{MailboxDescription, PdoDescription, PdoEntryDescription, SyncManagerDescription, data_type};
 
 /// SyncManager enable byte: to be activated.
@@ -17,6 +18,10 @@ pub const FLEXIBLE: u16 = 0x0000;
 /// Two E-bus ports.
 pub const EBUS_PORTS: [PortKind; 4] =
     [PortKind::Ebus, PortKind::Ebus, PortKind::NotImplemented, PortKind::NotImplemented];
+
+/// Units of ETG.1004: prefix and unit.
+pub const MILLISECONDS: u16 = 0xFD03;
+const NANOSECONDS: u16 = 0xF703;
 
 const MAILBOX_START: u16 = 0x1000;
 const MAILBOX_SIZE: u16 = 128;
@@ -80,10 +85,32 @@ pub fn pdo(
 /// Settings of one channel: a record with a number that can be written and a text too long for an expedited transfer.
 pub fn channel_settings(index: u16) -> Object {
     let entries = vec![
-        Entry::new(0, data_type::U8, Access::ReadOnly, &[3]),
-        Entry::new(1, data_type::U16, Access::ReadWrite, &0u16.to_le_bytes()),
-        Entry::new(2, data_type::U32, Access::ReadWritePreOp, &50_000u32.to_le_bytes()),
-        Entry::new(3, data_type::VISIBLE_STRING, Access::ReadWrite, b"channel text 16b"),
+        Entry::new(1, data_type::U16, Access::ReadWrite, &0u16.to_le_bytes()).named("User value"),
+        Entry::new(2, data_type::U32, Access::ReadWritePreOp, &50_000u32.to_le_bytes()).named("User time"),
+        Entry::new(3, data_type::VISIBLE_STRING, Access::ReadWrite, b"channel text 16b").named("User text"),
     ];
-    Object { index, name: "Settings".into(), role: ObjectRole::Plain, entries }
+    let entries = entries.into_iter().map(|entry| entry.allow(AccessRights::SETTING)).collect();
+    Object::record(index, "Settings", entries)
+}
+
+/// Synchronisation of a SyncManager (ETG.1020): free running or with its event, and with SYNC0 or not. Type and cycle are what the
+/// MainDevice sets, and what distributed clocks say when SAFEOP is entered.
+pub fn sync_parameters(index: u16, name: &str, minimum_cycle_ns: u32, sync0: bool) -> Object {
+    let sync0 = if sync0 { SyncParameters::SYNC0 } else { 0 };
+    let types = SyncParameters::FREE_RUN | SyncParameters::SYNCHRONOUS | sync0;
+    let time = |sub_index, access, ns: u32, name: &str| {
+        Entry::new(sub_index, data_type::U32, access, &ns.to_le_bytes()).named(name).in_unit(NANOSECONDS)
+    };
+    let entries = vec![
+        Entry::new(SyncParameters::TYPE, data_type::U16, Access::ReadWrite, &[1, 0])
+            .named("Synchronization type")
+            .one_of(&[0, 1, 2, 0x22]),
+        time(SyncParameters::CYCLE, Access::ReadWrite, 0, "Cycle time"),
+        Entry::new(4, data_type::U16, Access::ReadOnly, &types.to_le_bytes()).named("Synchronization types supported"),
+        time(5, Access::ReadOnly, minimum_cycle_ns, "Minimum cycle time"),
+        time(6, Access::ReadOnly, 0, "Calc and copy time"),
+        time(9, Access::ReadOnly, 0, "Delay time"),
+        time(SyncParameters::SYNC0_CYCLE, Access::ReadOnly, 0, "Sync0 cycle time"),
+    ];
+    Object::record(index, name, entries)
 }

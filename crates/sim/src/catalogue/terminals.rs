@@ -5,7 +5,7 @@ use ringcat_wire::sii::{CoeDetails, FmmuUsage, Identity, PdoDirection, SyncManag
 use super::VENDOR_ID;
 use super::parts::{
     EBUS_PORTS, FIXED_MANDATORY, FLEXIBLE, OUTPUTS_START, channel_settings, coe_mailbox, entry, four_sync_managers,
-    pdo, sync_manager,
+    pdo, sync_manager, sync_parameters,
 };
 use crate::application::behaviours::sawtooth_16;
 use crate::application::{Behaviour, InputSource};
@@ -16,6 +16,10 @@ const DIGITAL_START: u16 = 0x1000;
 const DIGITAL_OUTPUT_REGISTER: u16 = 0x0F00;
 const PDI_DIGITAL_IO: u8 = 0x04;
 const SPI: u8 = 0x05;
+/// What CoE of an analogue terminal can do.
+const ANALOGUE_COE: u8 = CoeDetails::SDO_INFORMATION | CoeDetails::PDO_ASSIGN | CoeDetails::COMPLETE_ACCESS;
+/// Smallest cycle of an analogue terminal.
+const ANALOGUE_CYCLE_NS: u32 = 100_000;
 
 fn terminal(name: &str, kind: u32, channels: u8) -> DeviceDescription {
     let product_code = kind << 16 | u32::from(channels);
@@ -85,7 +89,7 @@ pub fn analog_input(name: &str, channels: u8) -> DeviceDescription {
     description.pdi_type = SPI;
     description.group = "Analogue inputs".into();
     description.fmmus = vec![FmmuUsage::Outputs, FmmuUsage::Inputs, FmmuUsage::MailboxStatus];
-    description.mailbox = Some(coe_mailbox(CoeDetails::PDO_ASSIGN | CoeDetails::COMPLETE_ACCESS));
+    description.mailbox = Some(coe_mailbox(ANALOGUE_COE));
     let inputs = 4 * u16::from(channels);
     description.sync_managers = four_sync_managers(0, 0x24, OUTPUTS_START + 0x80, inputs);
     for channel in 0..channels {
@@ -99,6 +103,7 @@ pub fn analog_input(name: &str, channels: u8) -> DeviceDescription {
         description.pdos.push(pdo(PdoDirection::Tx, mapping + 1, "Compact", None, FLEXIBLE, vec![value]));
         description.objects.push(channel_settings(0x8000 + 0x10 * u16::from(channel)));
     }
+    description.objects.push(sync_parameters(0x1C33, "SM input parameter", ANALOGUE_CYCLE_NS, false));
     description.behaviour = Behaviour::Terminal(InputSource::Function(sawtooth_16));
     description.sii_size_bytes = 512;
     description
@@ -110,7 +115,7 @@ pub fn analog_output(name: &str, channels: u8) -> DeviceDescription {
     description.pdi_type = SPI;
     description.group = "Analogue outputs".into();
     description.fmmus = vec![FmmuUsage::Outputs, FmmuUsage::Inputs, FmmuUsage::MailboxStatus];
-    description.mailbox = Some(coe_mailbox(CoeDetails::PDO_ASSIGN | CoeDetails::COMPLETE_ACCESS));
+    description.mailbox = Some(coe_mailbox(ANALOGUE_COE));
     let outputs = 2 * u16::from(channels);
     description.sync_managers = four_sync_managers(outputs, 0x64, OUTPUTS_START + 0x80, 0);
     for channel in 0..channels {
@@ -120,6 +125,7 @@ pub fn analog_output(name: &str, channels: u8) -> DeviceDescription {
         description.pdos.push(pdo(PdoDirection::Rx, mapping, &name, Some(2), FLEXIBLE, vec![value]));
         description.objects.push(channel_settings(0x8000 + 0x10 * u16::from(channel)));
     }
+    description.objects.push(sync_parameters(0x1C32, "SM output parameter", ANALOGUE_CYCLE_NS, false));
     description.sii_size_bytes = 512;
     description
 }

@@ -11,6 +11,8 @@ mod mail_faults;
 mod mailbox;
 mod process_data;
 mod robustness;
+mod servo;
+mod servo_objects;
 mod soe;
 mod state_machine;
 mod voe;

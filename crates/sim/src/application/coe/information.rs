@@ -98,6 +98,7 @@ fn entry(request: EntryRequest, dictionary: &Dictionary) -> Data {
     let default = entry.default_bytes().map(<[u8]>::to_vec);
     let parts =
         [part(ValueInfo::DEFAULT, default), part(ValueInfo::MINIMUM, minimum), part(ValueInfo::MAXIMUM, maximum)];
+    let unit = entry.unit().filter(|_| wanted.has(ValueInfo::UNIT));
     let [default, minimum, maximum] = parts.each_ref().map(Option::as_deref);
     let name = if entry.name.is_empty() { &object.name } else { &entry.name };
     let description = EntryDescription {
@@ -107,7 +108,7 @@ fn entry(request: EntryRequest, dictionary: &Dictionary) -> Data {
         data_type: entry.data_type(),
         bit_length: entry.bit_length(),
         access: entry.rights(),
-        unit: None,
+        unit,
         default,
         minimum,
         maximum,

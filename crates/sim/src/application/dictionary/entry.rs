@@ -39,6 +39,10 @@ pub struct Entry {
     more_rights: u16,
     /// Smallest and largest value of a number.
     range: Option<(i64, i64)>,
+    /// The only numbers that it takes, where these are few.
+    choices: &'static [i64],
+    /// Unit for SDO information.
+    unit: Option<u16>,
     default: Option<Vec<u8>>,
 }
 
@@ -47,7 +51,23 @@ impl Entry {
     pub fn new(sub_index: u8, data_type: u8, access: Access, value: &[u8]) -> Entry {
         let default = (1..=MAX_NUMBER).contains(&value.len()).then(|| value.to_vec());
         let value = value.into();
-        Entry { sub_index, data_type, access, value, name: String::new(), more_rights: 0, range: None, default }
+        Entry {
+            sub_index,
+            data_type,
+            access,
+            value,
+            name: String::new(),
+            more_rights: 0,
+            range: None,
+            choices: &[],
+            unit: None,
+            default,
+        }
+    }
+
+    /// The same at another sub index.
+    pub fn at(self, sub_index: u8) -> Entry {
+        Entry { sub_index, ..self }
     }
 
     /// The same with a name.
@@ -63,6 +83,21 @@ impl Entry {
     /// The same, a number that is only written within this range.
     pub fn within(self, minimum: i64, maximum: i64) -> Entry {
         Entry { range: Some((minimum, maximum)), ..self }
+    }
+
+    /// The same, a number that is only written where it is one of these.
+    pub fn one_of(self, choices: &'static [i64]) -> Entry {
+        Entry { choices, ..self }
+    }
+
+    /// The same with a unit: prefix (a power of ten) and unit of ETG.1004, as in 0xFD03 for milliseconds.
+    pub fn in_unit(self, unit: u16) -> Entry {
+        Entry { unit: Some(unit), ..self }
+    }
+
+    /// The unit, where there is one.
+    pub const fn unit(&self) -> Option<u16> {
+        self.unit
     }
 
     /// Data type.
@@ -119,18 +154,21 @@ impl Entry {
 
     /// Whether the value is one of those that the entry takes.
     pub(super) fn check_value(&self, data: &[u8]) -> Result<(), AbortCode> {
+        let value = self.number(data);
+        if !self.choices.is_empty() && !self.choices.contains(&value) {
+            return Err(AbortCode::VALUE_RANGE);
+        }
         let Some((minimum, maximum)) = self.range else {
             return Ok(());
         };
-        let value = self.number(data);
         if value > maximum {
             return Err(AbortCode::VALUE_TOO_HIGH);
         }
         if value < minimum { Err(AbortCode::VALUE_TOO_LOW) } else { Ok(()) }
     }
 
-    /// The number that the bytes are.
-    fn number(&self, data: &[u8]) -> i64 {
+    /// The number that the bytes are, its first eight bytes where it is longer.
+    pub(super) fn number(&self, data: &[u8]) -> i64 {
         let signed = matches!(
             self.data_type(),
             DataType::INTEGER8 | DataType::INTEGER16 | DataType::INTEGER24 | DataType::INTEGER32 | DataType::INTEGER64

@@ -22,6 +22,11 @@ pub(super) fn build(description: &DeviceDescription) -> Vec<Object> {
     objects.into_values().collect()
 }
 
+/// What the device is called by its maker: the order code, not the name that this one has in its segment.
+pub fn type_name(description: &DeviceDescription) -> &str {
+    if description.order_code.is_empty() { &description.name } else { &description.order_code }
+}
+
 fn identity(description: &DeviceDescription) -> [Object; 6] {
     use data_type::{U8, U32, VISIBLE_STRING};
     let text =
@@ -35,7 +40,7 @@ fn identity(description: &DeviceDescription) -> [Object; 6] {
     [
         Object::variable(0x1000, "Device type", U32, Access::ReadOnly, &0x0000_1389u32.to_le_bytes()),
         Object::variable(0x1001, "Error register", U8, Access::ReadOnly, &[0]),
-        text(0x1008, "Device name", &description.name),
+        text(0x1008, "Device name", type_name(description)),
         text(0x1009, "Hardware version", "1.0"),
         text(0x100A, "Software version", "1.0"),
         Object { index: 0x1018, name: "Identity".into(), role: ObjectRole::Plain, entries },
@@ -119,7 +124,9 @@ fn mapped_objects(description: &DeviceDescription) -> Vec<Object> {
             let zeros = vec![0; usize::from(entry.bit_length).div_ceil(8)];
             let value = Entry::new(entry.sub_index, entry.data_type, access, &zeros).named(&entry.name).allow(mappable);
             found.entry(entry.index).or_default().entry(entry.sub_index).or_insert(value);
-            names.entry(entry.index).or_insert_with(|| entry.name.clone());
+            // An object of several entries has the name of their PDO.
+            let name = if entry.sub_index == 0 { &entry.name } else { &pdo.name };
+            names.entry(entry.index).or_insert_with(|| name.clone());
         }
     }
     found

@@ -5,9 +5,11 @@ use ringcat_wire::mailbox::coe::{CoeHeader, CoeService};
 use ringcat_wire::mailbox::sdo::{AbortCode, SdoRequest, SdoResponse};
 use ringcat_wire::mailbox::{ErrorReply, Header, Protocol};
 use ringcat_wire::register::{SyncManager, map};
+use ringcat_wire::sii::CoeDetails;
 
 use super::bench::Bench;
 use super::client::{ANSWER, Client};
+use crate::catalogue;
 
 #[test]
 fn identity_and_names_are_uploaded() {
@@ -219,7 +221,10 @@ fn requests_in_a_row_are_answered_in_order_and_a_full_queue_leaves_the_mailbox_f
 
 #[test]
 fn other_protocols_services_and_broken_headers_get_an_error_reply() {
-    let mut client = Client::new("analog-input-4", AlState::PreOp);
+    let mut described = catalogue::by_name("analog-input-4").unwrap();
+    let mailbox = described.mailbox.as_mut().unwrap();
+    mailbox.coe_details.0 &= !CoeDetails::SDO_INFORMATION;
+    let mut client = Client::of(described, AlState::PreOp);
     let mut refused = |header: Header, payload: &[u8]| {
         assert!(client.bench.send_mail(header, payload));
         let (header, payload) = client.answer();

@@ -141,6 +141,10 @@ fn a_servo_walks_its_state_machine_and_follows_the_target() {
     for step in 1..=10 {
         cycle(&mut bench, 0x000F, 100 * step);
     }
+    // The load has inertia and needs a moment to settle.
+    for _ in 0..50 {
+        cycle(&mut bench, 0x000F, 1000);
+    }
     let (word, position) = cycle(&mut bench, 0x000F, 1000);
     assert_eq!((word & 0x1427, position), (0x1427, 1000), "enabled, follows, target reached");
 }

@@ -1,0 +1,69 @@
+//! Homing: looks for a limit switch or an index pulse and makes the origin of the positions from it.
+
+use super::{INCREMENTS_PER_REVOLUTION, INDEX_PULSE, LIMIT_SWITCH, Servo};
+
+/// How far homing has come. Directions are -1.0 and 1.0.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(super) enum Homing {
+    #[default]
+    NotStarted,
+    ToSwitch(f64),
+    FromSwitch(f64),
+    ToIndex(f64),
+    Stopping,
+    Done,
+    Failed,
+}
+
+impl Servo {
+    pub(super) fn begin_homing(&mut self) {
+        let p = &self.parameters;
+        let (to_switch, to_zero) = (p.homing_speed_switch > 0.0, p.homing_speed_zero > 0.0);
+        let side = if matches!(p.homing_method, 18 | 34) { 1.0 } else { -1.0 };
+        self.homing = match p.homing_method {
+            17 | 18 if to_switch && to_zero && self.on_switch(side) => Homing::FromSwitch(side),
+            17 | 18 if to_switch && to_zero => Homing::ToSwitch(side),
+            33 | 34 if to_zero => Homing::ToIndex(side),
+            35 | 37 => self.found(self.motor.position),
+            _ => Homing::Failed,
+        };
+    }
+
+    pub(super) fn found(&mut self, home: f64) -> Homing {
+        self.origin = self.parameters.home_offset - home;
+        Homing::Stopping
+    }
+
+    pub(super) fn on_switch(&self, side: f64) -> bool {
+        self.motor.position * side >= LIMIT_SWITCH
+    }
+
+    /// Speed of the set-point.
+    pub(super) fn homing_velocity(&self) -> f64 {
+        let p = &self.parameters;
+        match self.homing {
+            Homing::ToSwitch(side) => side * p.homing_speed_switch,
+            Homing::FromSwitch(side) => -side * p.homing_speed_zero,
+            Homing::ToIndex(side) => side * p.homing_speed_zero,
+            Homing::NotStarted | Homing::Stopping | Homing::Done | Homing::Failed => 0.0,
+        }
+    }
+
+    /// It is on its way to where home is.
+    pub(super) const fn is_homing(&self) -> bool {
+        matches!(self.homing, Homing::ToSwitch(_) | Homing::FromSwitch(_) | Homing::ToIndex(_))
+    }
+
+    pub(super) fn look_for_home(&mut self, before: f64) {
+        let revolution = f64::from(INCREMENTS_PER_REVOLUTION);
+        let turn = |position: f64| ((position - INDEX_PULSE) / revolution).floor();
+        let (last, now) = (turn(before), turn(self.motor.position));
+        self.homing = match self.homing {
+            Homing::ToSwitch(side) if self.on_switch(side) => Homing::FromSwitch(side),
+            Homing::FromSwitch(side) if !self.on_switch(side) => self.found(side * LIMIT_SWITCH),
+            Homing::ToIndex(_) if last != now => self.found(INDEX_PULSE + revolution * last.max(now)),
+            Homing::Stopping if self.stands_still() => Homing::Done,
+            stage => stage,
+        };
+    }
+}

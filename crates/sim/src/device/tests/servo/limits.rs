@@ -1,0 +1,121 @@
+//! Limits of position, speed and torque, and the following error.
+
+use super::*;
+use crate::application::servo::{
+    ERROR_FOLLOWING, INCREMENTS_PER_REVOLUTION, MODE_CSP, MODE_CST, MODE_CSV, MODE_PROFILE_POSITION,
+    MODE_PROFILE_TORQUE, MODE_PROFILE_VELOCITY,
+};
+
+const LOW: i32 = -200_000;
+const HIGH: i32 = 300_000;
+/// Beyond a software limit for as long as the loops take to come back.
+const OVERRUN: i32 = 60;
+
+fn limited(mode: i8) -> Axis {
+    let objects = [(0x607D, 1, LOW.into(), 4), (0x607D, 2, HIGH.into(), 4), (0x6065, 0, -1, 4)];
+    Axis::enabled(mode, &objects)
+}
+
+#[test]
+fn no_mode_leaves_the_software_limits() {
+    for mode in [MODE_CSP, MODE_CSV, MODE_CST, MODE_PROFILE_POSITION, MODE_PROFILE_VELOCITY, MODE_PROFILE_TORQUE] {
+        for (direction, limit) in [(1, HIGH), (-1, LOW)] {
+            let mut axis = limited(mode);
+            axis.velocity = direction * 3_000_000;
+            axis.torque = direction as i16 * 1_000;
+            axis.position = direction * 2_000_000;
+            axis.control = ENABLE | NEW_SET_POINT;
+            let seen = axis.run(1_500);
+            let (low, high) = bounds(&seen, |seen| seen.position);
+            // In CSP the set-point stands at the limit at once, and the motor that could not follow runs past it.
+            let overrun = if mode == MODE_CSP { 60_000 } else { OVERRUN };
+            assert!(low >= LOW - overrun && high <= HIGH + overrun, "mode {mode}: {low} to {high}");
+            let beside = if mode == MODE_CSP || mode == MODE_PROFILE_POSITION { 0 } else { OVERRUN };
+            assert!((axis.last.position - limit).abs() <= beside, "mode {mode}: it goes to the limit, {:?}", axis.last);
+            assert!(axis.last.has(INTERNAL_LIMIT) && axis.last.velocity.abs() <= 1_000, "mode {mode}: {:?}", axis.last);
+            assert_eq!(axis.last.state(), OPERATION_ENABLED, "mode {mode}");
+        }
+    }
+}
+
+#[test]
+fn a_limit_lets_the_axis_back() {
+    for mode in [MODE_CSV, MODE_CST, MODE_PROFILE_VELOCITY, MODE_PROFILE_TORQUE] {
+        let mut axis = limited(mode);
+        (axis.velocity, axis.torque) = (2_000_000, 500);
+        axis.run(1_000);
+        (axis.velocity, axis.torque) = (-100_000, -100);
+        axis.run(150);
+        assert!(axis.last.position < HIGH - 1_000 && !axis.last.has(INTERNAL_LIMIT), "mode {mode}: {:?}", axis.last);
+    }
+}
+
+#[test]
+fn torque_stays_below_0x6072_and_the_limits_of_each_direction() {
+    let objects = [(0x6072, 0, 800, 2), (0x60E0, 0, 500, 2), (0x60E1, 0, 1_500, 2)];
+    for mode in [MODE_CSV, MODE_CST, MODE_PROFILE_TORQUE] {
+        let mut axis = Axis::enabled(mode, &objects);
+        (axis.velocity, axis.torque) = (4_000_000, 2_000);
+        let up = axis.run(80);
+        assert_eq!(bounds(&up, |seen| seen.torque.into()).1, 500, "mode {mode}");
+        assert!(up[79].has(INTERNAL_LIMIT), "mode {mode}");
+        (axis.velocity, axis.torque) = (-5_000_000, -2_000);
+        let seen = axis.run(600);
+        let down = bounds(&seen, |seen| seen.torque.into());
+        assert_eq!(down.0, -800, "mode {mode}: the smaller of 800 and 1,500");
+    }
+}
+
+#[test]
+fn speed_stays_below_0x6080_in_every_mode() {
+    // 1,200 revolutions per minute are 20 per second.
+    let most = 20 * INCREMENTS_PER_REVOLUTION;
+    for mode in [MODE_CSP, MODE_CSV, MODE_CST, MODE_PROFILE_POSITION, MODE_PROFILE_VELOCITY] {
+        let objects = [(0x6080, 0, 1_200, 4), (0x6081, 0, 9_000_000, 4), (0x6065, 0, -1, 4)];
+        let mut axis = Axis::enabled(mode, &objects);
+        (axis.velocity, axis.torque, axis.position) = (9_000_000, 1_000, 9_000_000);
+        axis.control = ENABLE | NEW_SET_POINT;
+        let seen = axis.run(800);
+        let (_, fastest) = bounds(&seen, |seen| seen.velocity);
+        assert!((most - 200..=most + 20_000).contains(&fastest), "mode {mode}: {fastest} of {most}");
+    }
+}
+
+#[test]
+fn profile_modes_stay_below_0x607f() {
+    for mode in [MODE_PROFILE_POSITION, MODE_PROFILE_VELOCITY] {
+        let mut axis = Axis::enabled(mode, &[(0x607F, 0, 300_000, 4)]);
+        (axis.velocity, axis.position) = (9_000_000, 9_000_000);
+        axis.control = ENABLE | NEW_SET_POINT;
+        let (_, fastest) = bounds(&axis.run(400), |seen| seen.velocity);
+        assert!((299_900..=305_000).contains(&fastest), "mode {mode}: {fastest}");
+    }
+}
+
+#[test]
+fn a_following_error_is_a_fault_after_its_time_out() {
+    for (window, time_out) in [(5_000, 0), (5_000, 20), (5_000, 60)] {
+        let objects = [(0x6065, 0, window, 4), (0x6066, 0, time_out, 2)];
+        let mut axis = Axis::enabled(MODE_CSP, &objects);
+        axis.position = 2_000_000;
+        let seen = axis.until(200, "a fault", |seen| seen.error == ERROR_FOLLOWING);
+        let beyond = seen.iter().filter(|seen| i64::from(seen.following_error.abs()) > window).count() as i64;
+        assert!((time_out..=time_out + 3).contains(&beyond), "{beyond} ms beyond the window, allowed {time_out}");
+        assert!(seen.iter().filter(|seen| i64::from(seen.following_error) > window).all(|seen| seen.has(BIT_13)));
+        axis.until(300, "in fault", |seen| seen.state() == FAULT);
+        assert_eq!(axis.client.upload(0x1001, 0), Ok(vec![0x21]), "error register");
+    }
+}
+
+#[test]
+fn a_following_error_that_ends_in_time_is_none_and_all_ones_supervise_nothing() {
+    let mut axis = Axis::enabled(MODE_CSP, &[(0x6065, 0, 5_000, 4), (0x6066, 0, 100, 2)]);
+    axis.position = 100_000;
+    let seen = axis.run(300);
+    assert!(bounds(&seen, |seen| seen.following_error).1 > 5_000, "it was beyond");
+    assert_eq!((axis.last.state(), axis.last.position), (OPERATION_ENABLED, 100_000));
+    let mut axis = Axis::enabled(MODE_CSP, &[(0x6065, 0, -1, 4), (0x6066, 0, 0, 2)]);
+    axis.position = 3_000_000;
+    axis.run(1_000);
+    assert_eq!((axis.last.state(), axis.last.position), (OPERATION_ENABLED, 3_000_000));
+}
