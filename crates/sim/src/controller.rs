@@ -2,7 +2,7 @@
 //!
 //! In: frames at ports, link changes, accesses of the application, virtual time. Out: frames at ports, events for the
 //! application, deadlines. The network carries frames between controllers; the application behind the PDI makes a device
-//! of it. Not modelled: MII management.
+//! of it. Not modelled: MII management, emulated EEPROMs, loops that enhanced link detection closes (see docs/segments.md).
 //!
 //! A frame is handled when its last bit has come in. It makes its whole way inside at once: along 0-(EPU)-3-1-2 to the
 //! next open port. What happens by itself (watchdogs, busy EEPROM, temporary loops) is brought up to date at the next

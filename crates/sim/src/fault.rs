@@ -145,6 +145,16 @@ pub enum Fault {
         /// How often it refuses.
         times: u32,
     },
+    /// Accesses of the application to its controller go wrong, as on a disturbed bus between both: they are counted, and
+    /// done all the same.
+    PdiErrors {
+        /// Which device.
+        device: DeviceIndex,
+        /// What PDI_ERROR_CODE shows of the last one.
+        code: u8,
+        /// How many.
+        count: u32,
+    },
     /// Something goes wrong with the mail of a device.
     Mail(DeviceIndex, MailFault),
 }

@@ -7,6 +7,8 @@ use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command};
 
+use ringcat_sim::catalogue;
+
 use crate::bench::{Bench, Client, finish, is_asked_for, program, target_directory};
 use crate::captures::{CaptureFile, PAUSE, interrupt};
 use crate::{PLANTS, Plant, RING_OF_16, input, states};
@@ -137,6 +139,39 @@ fn pysoem_moves_objects_files_and_firmware_of_a_simulated_subdevice() {
             for step in ["objects ok", "dictionary ok", "files ok", "firmware ok"] {
                 assert!(said.contains(step), "{step}");
             }
+            return;
+        }
+        failures.push(String::from_utf8_lossy(&output.stderr).into_owned());
+    }
+    panic!("{failures:?}");
+}
+
+#[test]
+fn pysoem_lists_the_objects_of_every_device_that_offers_sdo_information() {
+    if !is_asked_for(FOREIGN) {
+        return;
+    }
+    let Some(mut bench) = Bench::new(1) else { return };
+    let Some(python) = python() else { return };
+    let kinds: Vec<&str> = catalogue::names().collect();
+    let offers = |kind: &str| {
+        let mailbox = catalogue::by_name(kind).and_then(|described| described.mailbox);
+        mailbox.is_some_and(|mailbox| mailbox.coe_details.sdo_information())
+    };
+    let positions: Vec<usize> = (0..kinds.len()).filter(|position| offers(kinds[*position])).collect();
+    assert!(positions.len() >= 4, "analogue terminals, servo, all-protocols: {positions:?}");
+    let segment: String = kinds.iter().map(|kind| format!("[[device]]\ntype = \"{kind}\"\n")).collect();
+    let script = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/on_the_wire/pysoem_dictionary.py");
+    let mut arguments = [NO_CACHE, script, "main0", &kinds.len().to_string()].map(str::to_owned).to_vec();
+    arguments.extend(positions.iter().map(usize::to_string));
+    let mut failures = Vec::new();
+    while failures.len() < TRIES {
+        bench.simulate(&segment, false);
+        let output = finish(start(&bench, &python, &arguments));
+        let said = String::from_utf8_lossy(&output.stdout).into_owned();
+        println!("{said}");
+        if output.status.success() {
+            assert!(said.contains(&format!("{} described", positions.len())), "{said}");
             return;
         }
         failures.push(String::from_utf8_lossy(&output.stderr).into_owned());

@@ -28,7 +28,7 @@ def step(text):
 
 def objects(device):
     check("identity", struct.unpack("<I", device.sdo_read(0x1018, 1))[0], device.man)
-    check("device name", device.sdo_read(0x1008, 0), b"all-protocols-1")
+    check("device name", device.sdo_read(0x1008, 0), b"all-protocols")
     device.sdo_write(SETTINGS, 1, struct.pack("<h", -42))
     check("expedited", device.sdo_read(SETTINGS, 1), struct.pack("<h", -42))
     large = bytes(place % 251 for place in range(100_000))

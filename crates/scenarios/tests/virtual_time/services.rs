@@ -68,6 +68,10 @@ fn error_counters_are_kept_beyond_255_on_a_period_and_read_and_cleared_on_demand
     let read = world.application_mut().engine_mut().start_statistics_read(2);
     let ports = world.finish(LIMIT, read).expect("it answers").ports;
     assert_eq!(ports.map(|port| (port.rx_errors, port.invalid_frames)), [(7, 0), (0, 0), (0, 0), (0, 0)]);
+    world.fault(Fault::PdiErrors { device: DeviceIndex(2), code: 0x21, count: 3 });
+    let read = world.application_mut().engine_mut().start_statistics_read(2);
+    let read = world.finish(LIMIT, read).expect("it answers");
+    assert_eq!((read.pdi, read.registers.pdi_code, read.is_clean()), (3, 0x21, false));
     let read = world.application_mut().engine_mut().start_statistics_read(99);
     assert!(world.finish(LIMIT, read).is_err() && world.application().engine().statistics(99).is_none());
 }

@@ -1,6 +1,6 @@
 //! Error and lost-link counters (facts 2.5).
 //!
-//! In: damaged frames and writes. Out: counters that stay at 0xFF and are cleared in groups by any write of EtherCAT.
+//! In: damaged frames, PDI errors and writes. Out: counters that stay at 0xFF and are cleared in groups by any write of EtherCAT.
 
 use core::ops::Range;
 
@@ -48,6 +48,12 @@ impl Controller {
     /// Counts what is no symbol, within a frame or between two.
     pub fn count_symbol_error(&mut self, port: Port) {
         self.memory.count(map::RX_ERROR_COUNTER.offset(2 * port.index() as u16 + 1));
+    }
+
+    /// Counts an access of the PDI that went wrong, as on a disturbed SPI bus; `code` is what the kind of PDI says of it.
+    pub fn count_pdi_error(&mut self, code: u8) {
+        self.memory.count(map::PDI_ERROR_COUNTER);
+        self.memory.set_u8(map::PDI_ERROR_CODE, code);
     }
 
     /// Clears the groups that a write to `address..end` touches.

@@ -68,6 +68,10 @@ impl Network {
                 self.device_mut(device).controller.spoil_sii_writes(how, times);
             }
             Fault::SlowSii { device, busy, times } => self.device_mut(device).controller.slow_sii(busy, times),
+            Fault::PdiErrors { device, code, count } => {
+                let controller = &mut self.device_mut(device).controller;
+                (0..count.min(u8::MAX.into())).for_each(|_| controller.count_pdi_error(code));
+            }
             Fault::RefuseTransition { device, to, code, times } => {
                 self.device_mut(device).refuse_transition(to, code, times);
             }
@@ -123,6 +127,7 @@ impl Network {
             | Fault::Mail(device, _)
             | Fault::SlowSii { device, .. }
             | Fault::SpoilSiiWrites { device, .. }
+            | Fault::PdiErrors { device, .. }
             | Fault::RefuseTransition { device, .. } => self.check_device(device),
             Fault::CorruptSii { device, offset, .. } => {
                 self.check_device(device);

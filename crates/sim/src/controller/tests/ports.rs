@@ -270,6 +270,44 @@ fn groups_of_counters_are_cleared_apart_facts_2_5() {
 }
 
 #[test]
+fn pdi_errors_count_beside_their_code_and_go_with_any_write_facts_2_5() {
+    let mut bench = with_links(&[Port::A]);
+    bench.controller.count_pdi_error(0x04);
+    bench.controller.count_pdi_error(0x21);
+    assert_eq!(bench.read(0x030D, 2), (vec![2, 0x21], 1));
+    bench.write(0x0300, &[0; 13]);
+    assert_eq!(bench.register(0x030D), [2, 0x21], "another group");
+    bench.write(0x030E, &[0xFF]);
+    assert_eq!(bench.register(0x030D), [0, 0]);
+    (0..300).for_each(|_| bench.controller.count_pdi_error(0x01));
+    assert_eq!(bench.register(0x030D), [0xFF, 0x01]);
+}
+
+#[test]
+fn dl_status_shows_enhanced_link_detection_as_the_eeprom_says_and_until_it_is_loaded_facts_2_8() {
+    for (configuration, shown) in [(0x00, 0), (0x01, 0), (0x02, 4), (0x10, 4), (0x80, 4), (0x0C, 0)] {
+        let mut sii = image();
+        sii[1] = configuration;
+        sign(&mut sii);
+        let mut bench = Bench::with(ControllerConfig { sii, ..config() });
+        assert_eq!(bench.register(0x0141), [configuration]);
+        assert_eq!(bench.register::<1>(0x0110)[0] & 4, shown, "configuration {configuration:#04x}");
+        bench.controller.power_on(bench.now);
+        assert_eq!(bench.register::<1>(0x0110)[0] & 4, 4, "by default");
+        bench.wait(Duration::from_millis(2));
+        assert_eq!(bench.register::<1>(0x0110)[0] & 4, shown);
+    }
+}
+
+#[test]
+fn registers_that_are_not_modelled_are_not_there_facts_3_9() {
+    let mut bench = with_links(&[Port::A]);
+    assert_eq!(bench.read(0x0510, 12).1, 0, "MII management");
+    assert_eq!(bench.write(0x0510, &[0, 1]), 0);
+    assert_eq!(bench.register::<1>(0x0502)[0] & 0x20, 0, "no emulated EEPROM");
+}
+
+#[test]
 fn without_power_frames_end_and_links_are_gone() {
     let mut bench = with_links(&[Port::A, Port::B]);
     bench.controller.power_off(bench.now);
