@@ -1,9 +1,9 @@
 """The objects of simulated SubDevices as another project's MainDevice (SOEM, through pysoem) lists them.
 
-pysoem_dictionary.py INTERFACE COUNT POSITION...: reads from the SubDevices at these positions, which offer SDO information,
-the object list, the description of each object and of each of its entries, and every value that may be read, as
-`slaveinfo -sdo -map` of SOEM does; then the assignment and mapping of PDOs, against which the sizes of the process data
-are held. Prints one line per SubDevice; ends with an error where a description and a value do not fit each other.
+pysoem_dictionary.py INTERFACE COUNT: reads from all SubDevices, which offer SDO information, the object list, the
+description of each object and of each of its entries, and every value that may be read, as `slaveinfo -sdo -map` of SOEM
+does; then the assignment and mapping of PDOs, against which the sizes of the process data are held. Prints one line per
+SubDevice; ends with an error where a description and a value do not fit each other.
 """
 
 import struct
@@ -14,18 +14,6 @@ import pysoem
 from pysoem_bus import end, find
 
 READ_PREOP = 0x0001
-# Sub index does not exist: records may have gaps.
-NO_ENTRY = 0x0609_0011
-
-
-def value(device, index, sub):
-    """The bytes of an entry; None where there is none."""
-    try:
-        return device.sdo_read(index, sub, 200_000)
-    except pysoem.SdoError as error:
-        if error.abort_code == NO_ENTRY:
-            return None
-        raise
 
 
 def describe(device):
@@ -36,16 +24,14 @@ def describe(device):
         place = f"{device.name} {described.index:#06x}"
         if not described.name:
             sys.exit(f"{place} has no name")
-        listed = described.entries
-        if not listed:
-            sys.exit(f"{place} has no entries")
+        # A variable is described by itself.
+        listed = described.entries or [described]
         for sub, entry in enumerate(listed):
             entries += 1
+            # A gap of a record has no type and no rights.
             if not entry.obj_access & READ_PREOP:
                 continue
-            got = value(device, described.index, sub)
-            if got is None:
-                continue
+            got = device.sdo_read(described.index, sub, 200_000)
             values += 1
             if entry.bit_length and len(got) != (entry.bit_length + 7) // 8:
                 sys.exit(f"{place}:{sub} has {entry.bit_length} bits and {len(got)} bytes")
@@ -68,7 +54,7 @@ def mapped_bits(device, assignment):
 
 def main():
     main_device = find(sys.argv[1], int(sys.argv[2]))
-    devices = [main_device.slaves[int(position)] for position in sys.argv[3:]]
+    devices = main_device.slaves
     for device in devices:
         objects, entries, values = describe(device)
         out, back = mapped_bits(device, 0x1C12), mapped_bits(device, 0x1C13)

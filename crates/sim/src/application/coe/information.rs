@@ -3,8 +3,8 @@
 //! In: a request. Out: one message per fragment, or an error with an abort code.
 
 use ringcat_wire::mailbox::coe::{
-    AccessRights, EntryDescription, EntryRequest, InformationOpcode, ListType, ObjectDescription, SdoInformation,
-    ValueInfo,
+    AccessRights, DataType, EntryDescription, EntryRequest, InformationOpcode, ListType, ObjectDescription,
+    SdoInformation, ValueInfo,
 };
 use ringcat_wire::mailbox::sdo::AbortCode;
 use ringcat_wire::mailbox::{ErrorReply, PayloadError};
@@ -92,7 +92,10 @@ fn object(index: u16, dictionary: &Dictionary) -> Data {
 fn entry(request: EntryRequest, dictionary: &Dictionary) -> Data {
     let EntryRequest { index, sub_index, value_info: wanted } = request;
     let object = dictionary.object(index).ok_or(AbortCode::OBJECT_DOES_NOT_EXIST)?;
-    let entry = object.entry(sub_index).ok_or(AbortCode::SUB_INDEX_DOES_NOT_EXIST)?;
+    let Some(entry) = object.entry(sub_index) else {
+        let last = object.entries.last().map_or(0, |entry| entry.sub_index);
+        return if sub_index < last { gap(request) } else { Err(AbortCode::SUB_INDEX_DOES_NOT_EXIST) };
+    };
     let (minimum, maximum) = entry.range_bytes().unzip();
     let part = |bit, value| if wanted.has(bit) { value } else { None };
     let default = entry.default_bytes().map(<[u8]>::to_vec);
@@ -116,6 +119,30 @@ fn entry(request: EntryRequest, dictionary: &Dictionary) -> Data {
     };
     let values: usize = parts.iter().flatten().map(Vec::len).sum();
     let mut bytes = vec![0; DESCRIPTION_ROOM + values + name.len()];
+    let length = description.encode(&mut bytes).ok_or(AbortCode::OUT_OF_MEMORY)?;
+    bytes.truncate(length);
+    Ok(bytes)
+}
+
+/// Between two entries of a record lies one without type and bits: who lists an object asks for each sub index up to the
+/// last, and takes an error as one of the device.
+fn gap(request: EntryRequest) -> Data {
+    let EntryRequest { index, sub_index, value_info } = request;
+    let name = format!("SubIndex {sub_index:03}");
+    let description = EntryDescription {
+        index,
+        sub_index,
+        value_info: ValueInfo(value_info.0 & ValueInfo::ACCESS),
+        data_type: DataType(0),
+        bit_length: 0,
+        access: AccessRights(0),
+        unit: None,
+        default: None,
+        minimum: None,
+        maximum: None,
+        name: name.as_bytes(),
+    };
+    let mut bytes = vec![0; DESCRIPTION_ROOM + name.len()];
     let length = description.encode(&mut bytes).ok_or(AbortCode::OUT_OF_MEMORY)?;
     bytes.truncate(length);
     Ok(bytes)

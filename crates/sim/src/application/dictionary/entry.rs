@@ -105,9 +105,12 @@ impl Entry {
         DataType(self.data_type.into())
     }
 
-    /// Length of the value in bits.
+    /// Length of the value in bits; 0 where it changes (domains) or SDO information has no room for it.
     pub fn bit_length(&self) -> u16 {
-        let bits = u16::try_from(self.value.len() * 8).unwrap_or(u16::MAX);
+        if self.data_type() == DataType::DOMAIN {
+            return 0;
+        }
+        let bits = u16::try_from(self.value.len() * 8).unwrap_or(0);
         self.data_type().bits().unwrap_or(bits)
     }
 

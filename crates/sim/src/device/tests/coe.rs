@@ -250,6 +250,8 @@ fn objects_and_entries_are_described_facts_6_3() {
     assert!(!ramp.access.has(AccessRights::WRITE_OP));
     let (_, bytes, _) = entry(0x2003, 2, ValueInfo(0));
     assert_eq!(EntryDescription::decode(&bytes).unwrap().default, None, "only what was asked for");
+    let (_, bytes, _) = entry(LARGE, 0, ValueInfo::ALL);
+    assert_eq!(EntryDescription::decode(&bytes).unwrap().bit_length, 0, "a domain has any length");
     let (_, bytes, _) = entry(0x7000, 1, ValueInfo::ALL);
     assert!(EntryDescription::decode(&bytes).unwrap().access.has(AccessRights::RX_MAPPABLE));
 }

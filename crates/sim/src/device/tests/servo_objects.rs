@@ -191,6 +191,9 @@ fn analogue_terminals_describe_their_objects_as_real_ones_do() {
         [("analog-input-4", 0x6000u16, "Channel 1"), ("analog-output-4", 0x7010, "Channel 2")]
     {
         let mut client = Client::new(name, AlState::PreOp);
+        let beyond = EntryRequest { index: 0x1018, sub_index: 5, value_info: ValueInfo::ALL }.encode();
+        let (opcode, data) = information(&mut client, InformationOpcode::EntryRequest, &beyond);
+        assert_eq!((opcode, data), (InformationOpcode::Error, vec![0x11, 0, 0x09, 0x06]), "behind the last entry");
         let (opcode, list) = information(&mut client, InformationOpcode::ListRequest, &[1, 0]);
         assert_eq!(opcode, InformationOpcode::ListResponse, "{name}");
         let objects: Vec<u16> = list[2..].chunks(2).map(|pair| u16::from_le_bytes([pair[0], pair[1]])).collect();
@@ -204,11 +207,13 @@ fn analogue_terminals_describe_their_objects_as_real_ones_do() {
             for sub_index in 0..=described.max_sub_index {
                 let request = EntryRequest { index: object, sub_index, value_info: ValueInfo::ALL }.encode();
                 let (opcode, data) = information(&mut client, InformationOpcode::EntryRequest, &request);
-                if client.upload(object, sub_index).is_err() {
-                    assert_eq!((opcode, data), (InformationOpcode::Error, vec![0x11, 0, 0x09, 0x06]), "no such entry");
+                assert_eq!(opcode, InformationOpcode::EntryResponse, "{name} {object:#06x}:{sub_index}");
+                let entry = EntryDescription::decode(&data).unwrap();
+                if client.upload(object, sub_index) == Err(AbortCode::SUB_INDEX_DOES_NOT_EXIST) {
+                    let gap = (entry.data_type, entry.bit_length, entry.access);
+                    assert_eq!(gap, (DataType(0), 0, AccessRights(0)), "{name} {object:#06x}:{sub_index}");
                     continue;
                 }
-                let entry = EntryDescription::decode(&data).unwrap();
                 assert!(entry.access.has(AccessRights::READ_PREOP) && !entry.name.is_empty(), "{object:#06x}");
             }
         }
