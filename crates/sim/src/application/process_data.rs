@@ -104,7 +104,7 @@ impl PlacedEntry {
 #[derive(Clone, Debug)]
 enum Source {
     Terminal(InputSource),
-    Servo(Servo),
+    Servo(Box<Servo>),
 }
 
 /// Images, areas and what happened to them.
@@ -128,7 +128,7 @@ impl ProcessData {
     pub fn new(behaviour: &Behaviour) -> ProcessData {
         let source = match behaviour {
             Behaviour::Terminal(source) => Source::Terminal(source.clone()),
-            Behaviour::Servo => Source::Servo(Servo::default()),
+            Behaviour::Servo => Source::Servo(Box::default()),
         };
         ProcessData {
             layout: Layout::default(),

@@ -6,8 +6,8 @@
 //!
 //! A step asks the power state machine ([`power`]) what to do (`Order`), lets the mode move the set-point, makes the
 //! torque with a position loop around a velocity loop (`motion`), and moves the motor. `homing` looks for the origin,
-//! `status` says what the application sees. Position and velocity of the motor are those of
-//! the machine, whose position 0 is where it first got power; `origin` is what homing adds to that.
+//! `status` says what the application sees. Position and velocity of the motor are those of the machine, whose position 0
+//! is where it first got power; `origin` is what homing adds to that.
 
 mod homing;
 mod motion;
@@ -148,11 +148,13 @@ impl Servo {
         } else {
             self.state = power::next(self.state, self.command);
         }
+        if self.state != DriveState::OperationEnabled {
+            self.forget_targets();
+        }
         let mode = self.parameters.mode;
         if mode != self.mode && MODES.contains(&mode.into()) {
-            (self.mode, self.homing, self.set_torque, self.settled) =
-                (mode, Homing::NotStarted, self.motor.torque, 0.0);
-            (self.goal, self.next_goal, self.acknowledged) = (None, None, false);
+            (self.mode, self.set_torque, self.settled) = (mode, self.motor.torque, 0.0);
+            self.forget_targets();
         }
         match self.mode {
             _ if self.state != DriveState::OperationEnabled => {}
@@ -166,6 +168,12 @@ impl Servo {
             }
             _ => {}
         }
+    }
+
+    /// What was commanded before is not taken up again when the drive is enabled, or comes back to a mode.
+    fn forget_targets(&mut self) {
+        (self.goal, self.next_goal, self.acknowledged) = (None, None, false);
+        self.homing = Homing::NotStarted;
     }
 
     fn take_parameters(&mut self, mapping: &Mapping, outputs: &[u8], dictionary: &Dictionary) {
@@ -260,9 +268,6 @@ impl Servo {
             }
             Order::Follow => self.follow(),
         };
-        if self.state != DriveState::OperationEnabled {
-            (self.goal, self.next_goal, self.homing) = (None, None, Homing::NotStarted);
-        }
         let p = &self.parameters;
         let most = |limit: f64| limit.min(p.max_torque).min(PEAK_TORQUE);
         let limited = torque.clamp(-most(p.negative_torque), most(p.positive_torque));

@@ -170,5 +170,6 @@ impl Servo {
 /// The highest speed from which a set-point that moves in steps stops within a distance.
 fn braking_speed(distance: f64, deceleration: f64) -> f64 {
     let step = deceleration * STEP;
-    (distance / STEP).min((step * step / 4.0 + 2.0 * deceleration * distance).sqrt() - step / 2.0)
+    let speed = (step * step / 4.0 + 2.0 * deceleration * distance).sqrt() - step / 2.0;
+    speed.clamp(0.0, distance / STEP)
 }

@@ -87,8 +87,8 @@ impl Servo {
             (0x6064, 0) => number(self.motor.position + self.origin),
             (0x606B, 0) => number(self.set_velocity),
             (0x606C, 0) => number(self.motor.velocity),
-            (0x6074, 0) => number(self.set_torque),
-            (0x6077 | 0x6078, 0) => number(self.motor.torque),
+            // The current loop is ideal.
+            (0x6074 | 0x6077 | 0x6078, 0) => number(self.motor.torque),
             (0x60F4, 0) => number(self.following_error()),
             (0x60FD, 0) => u64::from(self.on_switch(-1.0)) | u64::from(self.on_switch(1.0)) << 1,
             (0x60FE, 1) => u64::from(brake),

@@ -119,3 +119,52 @@ fn a_following_error_that_ends_in_time_is_none_and_all_ones_supervise_nothing() 
     axis.run(1_000);
     assert_eq!((axis.last.state(), axis.last.position), (OPERATION_ENABLED, 3_000_000));
 }
+
+/// Numbers from a seed.
+fn random(state: &mut u64) -> u64 {
+    *state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+    *state >> 24
+}
+
+#[test]
+fn any_outputs_and_objects_leave_motor_and_load_within_their_physics() {
+    use crate::application::servo::{ACCELERATION, BRAKE_TORQUE, PEAK_TORQUE};
+    // Speed, where the motor has the highest of its limits, and what a cycle can add to it.
+    let fastest = 10_200_000;
+    let most = ((PEAK_TORQUE + BRAKE_TORQUE) * ACCELERATION / 1_000.0) as i32;
+    for seed in 0..40 {
+        let mut state = seed;
+        let mut axis = Axis::with(&[]);
+        for cycle in 0..600 {
+            if random(&mut state) % 8 == 0 {
+                axis.control = [ENABLE, SHUTDOWN, SWITCH_ON, QUICK_STOP, ENABLE | NEW_SET_POINT, 0x80]
+                    [random(&mut state) as usize % 6]
+                    | (random(&mut state) as u16 & 0x0160);
+            }
+            if random(&mut state) % 40 == 0 {
+                axis.mode = [1, 3, 4, 6, 8, 9, 10, random(&mut state) as i8][random(&mut state) as usize % 8];
+            }
+            if random(&mut state) % 16 == 0 {
+                let range = random(&mut state) % 32;
+                axis.position = random(&mut state) as u32 as i32 >> range;
+                axis.velocity = random(&mut state) as u32 as i32 >> range;
+                axis.torque = random(&mut state) as i16;
+            }
+            if random(&mut state) % 16 == 0 {
+                let objects = axis.client.bench.device.application.dictionary().objects();
+                let object = &objects[random(&mut state) as usize % objects.len()];
+                let entry = &object.entries[random(&mut state) as usize % object.entries.len()];
+                let (index, sub_index, length) = (object.index, entry.sub_index, entry.value.len().min(4));
+                let value = (random(&mut state) as u32 >> (random(&mut state) % 32)).to_le_bytes();
+                let _ = axis.client.download(index, sub_index, &value[..length]);
+            }
+            let before = axis.last;
+            let seen = axis.cycle();
+            assert!(seen.velocity.abs() <= fastest, "seed {seed}, cycle {cycle}: {seen:?}");
+            assert!(f64::from(seen.torque.abs()) <= PEAK_TORQUE, "seed {seed}, cycle {cycle}: {seen:?}");
+            // A mail takes two more milliseconds of the cycle at most.
+            let gained = (seen.velocity - before.velocity).abs();
+            assert!(gained <= 4 * most, "seed {seed}, cycle {cycle}: {before:?} {seen:?}");
+        }
+    }
+}

@@ -162,6 +162,23 @@ fn profile_position_goes_on_after_a_halt() {
 }
 
 #[test]
+fn a_target_from_before_is_not_taken_up_when_the_drive_is_enabled_again() {
+    let mut axis = Axis::enabled(MODE_PROFILE_POSITION, &[]);
+    axis.position = 800_000;
+    axis.control = ENABLE | NEW_SET_POINT;
+    axis.run(50);
+    axis.control = ENABLE | HALT;
+    axis.until(300, "at rest", |seen| seen.velocity == 0 && seen.torque == 0);
+    axis.run(100);
+    let at = axis.last.position;
+    axis.control = 0;
+    axis.cycle();
+    axis.enable();
+    axis.run(200);
+    assert_eq!(axis.last.position, at);
+}
+
+#[test]
 fn profile_velocity_ramps_and_says_when_it_is_there() {
     let objects = [(0x6083, 0, 4_000_000, 4), (0x6084, 0, 1_000_000, 4)];
     let mut axis = Axis::enabled(MODE_PROFILE_VELOCITY, &objects);
