@@ -146,6 +146,29 @@ fn profile_position_keeps_one_set_point_and_takes_another_at_once_if_told() {
 }
 
 #[test]
+fn a_target_is_reached_when_it_was_in_its_window_for_the_window_time() {
+    // Cycles in the window before the bit.
+    let waited = |seen: &[Feedback], inside: &dyn Fn(&Feedback) -> bool| {
+        assert!(seen.iter().all(|seen| !seen.has(TARGET_REACHED) || inside(seen)), "reached outside of the window");
+        seen.iter().rev().skip(1).take_while(|seen| inside(seen)).count()
+    };
+    let mut axis = Axis::enabled(MODE_PROFILE_POSITION, &[(0x6067, 0, 100, 4), (0x6068, 0, 50, 2)]);
+    axis.run(3);
+    axis.position = 100_000;
+    axis.control = ENABLE | NEW_SET_POINT;
+    axis.cycle();
+    let seen = axis.until(1_000, "at its target", |seen| seen.has(TARGET_REACHED));
+    let cycles = waited(&seen, &|seen| (seen.position - 100_000).abs() <= 100);
+    assert!((49..=51).contains(&cycles), "{cycles} ms");
+    let mut axis = Axis::enabled(MODE_PROFILE_VELOCITY, &[(0x606D, 0, 500, 2), (0x606E, 0, 30, 2)]);
+    axis.velocity = 400_000;
+    axis.cycle();
+    let seen = axis.until(500, "at speed", |seen| seen.has(TARGET_REACHED));
+    let cycles = waited(&seen, &|seen| (seen.velocity - 400_000).abs() <= 500);
+    assert!((29..=31).contains(&cycles), "{cycles} ms");
+}
+
+#[test]
 fn profile_position_goes_on_after_a_halt() {
     let mut axis = Axis::enabled(MODE_PROFILE_POSITION, &[]);
     axis.position = 800_000;
