@@ -2,9 +2,9 @@
 //!
 //! In: the device's description, from which the standard objects, the PDO mappings (0x16xx, 0x1Axx), the PDO
 //! assignments (0x1C10 + SyncManager) and the mapped objects follow; reads and writes by index and sub index.
-//! Out: bytes or an abort code. What an entry is says `entry`, the diagnosis history is in `history`, synchronisation in `sync`. The SDO services
-//! around it are in [`coe`](super::coe), what the process data looks like with a given assignment in
-//! [`process_data`](super::process_data).
+//! Out: bytes or an abort code. What an entry is says `entry`, the diagnosis history is in `history`,
+//! synchronisation in `sync`. The SDO services around it are in [`coe`](super::coe), what the process data looks like
+//! with a given assignment in [`process_data`](super::process_data).
 
 mod entry;
 mod history;

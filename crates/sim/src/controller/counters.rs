@@ -1,6 +1,7 @@
 //! Error and lost-link counters (facts 2.5).
 //!
-//! In: damaged frames, PDI errors and writes. Out: counters that stay at 0xFF and are cleared in groups by any write of EtherCAT.
+//! In: damaged frames, PDI errors and writes. Out: counters that stay at 0xFF and are cleared in groups by any write of
+//! EtherCAT.
 
 use core::ops::Range;
 

@@ -10,7 +10,6 @@ const VELOCITY_GAIN: f64 = 2_000.0;
 const POSITION_GAIN: f64 = 250.0;
 /// Part of the torque that the position loop counts on when it comes near its set-point.
 const BRAKING_RESERVE: f64 = 0.8;
-
 /// Part of the deceleration that is counted on before a software limit.
 const LIMIT_RESERVE: f64 = 0.9;
 

@@ -269,8 +269,9 @@ fn groups_of_counters_are_cleared_apart_facts_2_5() {
     assert_eq!((bench.register(0x030C), bench.register(0x0310)), ([0], [1, 0, 0, 0]));
 }
 
+// covers: facts 2.5
 #[test]
-fn pdi_errors_count_beside_their_code_and_go_with_any_write_facts_2_5() {
+fn pdi_errors_count_beside_their_code_and_any_write_clears_both() {
     let mut bench = with_links(&[Port::A]);
     bench.controller.count_pdi_error(0x04);
     bench.controller.count_pdi_error(0x21);
@@ -283,8 +284,9 @@ fn pdi_errors_count_beside_their_code_and_go_with_any_write_facts_2_5() {
     assert_eq!(bench.register(0x030D), [0xFF, 0x01]);
 }
 
+// covers: facts 2.8
 #[test]
-fn dl_status_shows_enhanced_link_detection_as_the_eeprom_says_and_until_it_is_loaded_facts_2_8() {
+fn dl_status_shows_enhanced_link_detection_as_the_eeprom_says() {
     for (configuration, shown) in [(0x00, 0), (0x01, 0), (0x02, 4), (0x10, 4), (0x80, 4), (0x0C, 0)] {
         let mut sii = image();
         sii[1] = configuration;
@@ -299,8 +301,9 @@ fn dl_status_shows_enhanced_link_detection_as_the_eeprom_says_and_until_it_is_lo
     }
 }
 
+// covers: facts 3.9
 #[test]
-fn registers_that_are_not_modelled_are_not_there_facts_3_9() {
+fn registers_that_are_not_modelled_do_not_answer() {
     let mut bench = with_links(&[Port::A]);
     assert_eq!(bench.read(0x0510, 12).1, 0, "MII management");
     assert_eq!(bench.write(0x0510, &[0, 1]), 0);

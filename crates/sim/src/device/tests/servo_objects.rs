@@ -83,7 +83,8 @@ fn the_drive_has_the_objects_that_drivers_ask_for() {
 fn values_are_checked_with_the_abort_code_of_what_is_wrong() {
     use AbortCode as A;
     let mut client = Client::new("servo", AlState::PreOp);
-    let table: [(u16, u8, i64, usize, Result<(), AbortCode>); 20] = [
+    type Row = (u16, u8, i64, usize, Result<(), AbortCode>);
+    let table: [Row; 20] = [
         (0x6060, 0, 8, 1, Ok(())),
         (0x6060, 0, 2, 1, Err(A::VALUE_RANGE)),
         (0x6060, 0, -1, 1, Err(A::VALUE_RANGE)),

@@ -115,7 +115,7 @@ fn profile_position_is_a_trapezoid_and_ends_exactly_at_its_target() {
 }
 
 #[test]
-fn profile_position_keeps_one_set_point_and_takes_another_at_once_if_told() {
+fn profile_position_buffers_one_set_point_or_takes_it_at_once() {
     let mut axis = Axis::enabled(MODE_PROFILE_POSITION, &[]);
     let give = |axis: &mut Axis, position: i32, bits: u16| {
         axis.position = position;

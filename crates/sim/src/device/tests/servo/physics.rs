@@ -16,7 +16,7 @@ fn energies(seen: &[Feedback]) -> (f64, f64, f64) {
 }
 
 #[test]
-fn the_work_of_the_torque_is_the_energy_of_the_load_and_the_heat_of_friction() {
+fn work_of_the_torque_is_energy_of_the_load_and_heat_of_friction() {
     for torque in [100, 500, -1_500, 3_000] {
         let mut axis = Axis::enabled(MODE_CST, &[]);
         axis.torque = torque;
@@ -61,7 +61,7 @@ fn acceleration_never_exceeds_what_the_torque_gives() {
 }
 
 #[test]
-fn what_the_drive_does_does_not_depend_on_who_looks_at_it() {
+fn the_motion_does_not_depend_on_reads_of_the_inputs() {
     let course = |looks: usize| {
         let mut axis = Axis::enabled(MODE_CSV, &[]);
         let mut course = Vec::new();
