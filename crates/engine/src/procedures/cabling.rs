@@ -4,10 +4,15 @@
 //! More rings behind junctions than are known are told too: whoever asked for junction redundancy must know that one of
 //! them is not watched.
 //!
+//! One look proves little: cables that are cut and healed within milliseconds, and frames that get lost meanwhile, make a
+//! straight ring look crossed. So a look counts only if the segment was the same before and behind it, and what it shows
+//! beyond what was told is believed when the next one shows the same.
+//!
 //! In a closed ring that shows only that something is crossed (LC-02). In *enhanced* mode the redundant link is
 //! disconnected under control meanwhile: the segment is an open line then, and each crossing has its place (LC-03). That
 //! costs what a cut of that cable costs, and what mending it does; it is not told as a break.
 
+use alloc::collections::BTreeSet;
 use alloc::rc::Rc;
 use alloc::vec::Vec;
 use core::cell::{Cell, RefCell};
@@ -29,8 +34,8 @@ use crate::topology::{Closing, Finding, NodeStatus, Topology, rings_shown, with_
 
 /// From a change of ports until the segment is looked at: a plug that is pushed in bounces.
 const SETTLE: Duration = Duration::from_millis(5);
-/// Looks at a segment that changes meanwhile.
-const ATTEMPTS: u8 = 3;
+/// Looks at a segment that changes meanwhile, or of which they show different things.
+const ATTEMPTS: u8 = 5;
 /// Pause between two of them.
 const PAUSE: Duration = Duration::from_millis(10);
 /// Until both ends of a link have noticed that it went or came, and frames have shown it. Interfaces take seconds to
@@ -71,20 +76,19 @@ pub(super) struct Cabling {
     pub unknown_rings: usize,
 }
 
-/// Who is crossed, and which rings are not known; `None` where the segment changes too much to tell. With `enhanced` and
-/// a closed ring the redundant link is taken down meanwhile; where it cannot be, that is reported, and the ring is looked
-/// at as it is.
-pub(super) async fn cabling(bus: &Bus, known: &impl Known, enhanced: bool) -> Option<Cabling> {
-    let in_control = enhanced && bus.links() == LinkSet::Ring && bus.ring() == RingState::Closed;
+/// Who is crossed, and which rings are not known; `None` where the segment changes too much to tell. `told` is what was told
+/// of it before. With `in_control`, for a ring that [`stays_closed`], the redundant link is taken down meanwhile; where it
+/// cannot be, that is reported, and the ring is looked at as it is.
+pub(super) async fn cabling(bus: &Bus, known: &impl Known, in_control: bool, told: &Cabling) -> Option<Cabling> {
     if in_control && !bus.force_disconnect(Link::Redundant, true).await {
         bus.report(Event::CannotDisconnect { link: Link::Redundant });
-        return look_often(bus, known).await;
+        return look_often(bus, known, told).await;
     }
     if !in_control {
-        return look_often(bus, known).await;
+        return look_often(bus, known, told).await;
     }
     wait_for(bus, RingState::Open).await;
-    let found = look_often(bus, known).await;
+    let found = look_often(bus, known, told).await;
     bus.force_disconnect(Link::Redundant, false).await;
     wait_for(bus, RingState::Closed).await;
     // Carriers are looked at less often than frames come.
@@ -104,40 +108,70 @@ async fn wait_for(bus: &Bus, state: RingState) {
     }
 }
 
-async fn look_often(bus: &Bus, known: &impl Known) -> Option<Cabling> {
+/// Whether a ring of two links is closed, and still is a moment later, with the same SubDevices in the same places: a link
+/// that is taken down in a ring that breaks costs those in between.
+pub(super) async fn stays_closed(bus: &Bus) -> bool {
+    if bus.links() != LinkSet::Ring || bus.ring() != RingState::Closed {
+        return false;
+    }
+    let Ok(Some(before)) = view(bus).await else { return false };
+    bus.sleep(PAUSE).await;
+    matches!(view(bus).await, Ok(Some(after)) if after == before) && bus.ring() == RingState::Closed
+}
+
+/// Looks until one shows what was told already, or two in a row show the same.
+async fn look_often(bus: &Bus, known: &impl Known, told: &Cabling) -> Option<Cabling> {
+    let mut before = None;
     for attempt in 0..ATTEMPTS {
         if attempt > 0 {
             bus.sleep(PAUSE).await;
         }
-        if let Ok(Some(found)) = look(bus, known).await {
-            return Some(found);
+        let found = look(bus, known).await.ok().flatten();
+        if found.as_ref().is_some_and(|found| found.says_the_same_as(told) || before.as_ref() == Some(found)) {
+            return found;
         }
+        before = found;
     }
     None
 }
 
+/// What DL_STATUS says of all stations; `None` where one does not answer.
+async fn ports_of(bus: &Bus, stations: &[StationAddress]) -> Result<Option<Vec<DlStatus>>, BusError> {
+    let read = bus.gather(stations.to_vec(), |bus, station| async move {
+        bus.fprd_array(station, map::DL_STATUS).await.map(|bytes| DlStatus::decode(&bytes))
+    });
+    match read.await.into_iter().collect::<Result<Vec<_>, BusError>>() {
+        Ok(read) => Ok(Some(read)),
+        Err(BusError::Wkc { .. }) => Ok(None),
+        Err(error) => Err(error),
+    }
+}
+
+/// One look; `None` where something changed meanwhile.
 async fn look(bus: &Bus, known: &impl Known) -> Result<Option<Cabling>, BusError> {
+    let closed_before = bus.ring() == RingState::Closed;
     let Some(before) = view(bus).await?.filter(|view| known.are_known(&view.stations)) else { return Ok(None) };
+    let Some(ports) = ports_of(bus, &before.stations).await? else { return Ok(None) };
     bus.bwr(map::DC_RECEIVE_TIME, &[0; 4]).await?;
     let read = bus.gather(before.stations.clone(), |bus, station| async move {
-        let dl_status = DlStatus::decode(&bus.fprd_array(station, map::DL_STATUS).await?);
         // Without a clock nobody answers.
-        let receive_times = match bus.fprd_array(station, map::DC_RECEIVE_TIME).await {
-            Ok(bytes) => Some(DcReceiveTimes::decode(&bytes).ports.map(|time| time.0)),
-            Err(BusError::Wkc { .. }) => None,
-            Err(error) => return Err(error),
-        };
-        Ok((station, dl_status, receive_times))
+        match bus.fprd_array(station, map::DC_RECEIVE_TIME).await {
+            Ok(bytes) => Ok(Some(DcReceiveTimes::decode(&bytes).ports.map(|time| time.0))),
+            Err(BusError::Wkc { .. }) => Ok(None),
+            Err(error) => Err(error),
+        }
     });
-    let read = match read.await.into_iter().collect::<Result<Vec<_>, BusError>>() {
-        Ok(read) => read,
-        Err(BusError::Wkc { .. }) => return Ok(None),
-        Err(error) => return Err(error),
-    };
-    let nodes = read.into_iter().map(|(station, dl_status, receive_times)| NodeStatus {
-        dl_status,
-        receive_times,
-        ports: known.ports(station),
+    let receive_times = read.await.into_iter().collect::<Result<Vec<_>, BusError>>()?;
+    // A cable that went or came meanwhile has moved frames, ports or SubDevices to another place.
+    let bits = |ports: &[DlStatus]| ports.iter().map(|it| it.bits() & PORT_BITS).collect::<Vec<_>>();
+    let same_ports = ports_of(bus, &before.stations).await?.is_some_and(|now| bits(&now) == bits(&ports));
+    let is_closed = bus.links() == LinkSet::Ring && bus.ring() == RingState::Closed;
+    let same_ring = bus.links() == LinkSet::Single || is_closed == closed_before;
+    if !same_ports || !same_ring || view(bus).await?.as_ref() != Some(&before) {
+        return Ok(None);
+    }
+    let nodes = before.stations.iter().zip(ports).zip(receive_times).map(|((station, dl_status), receive_times)| {
+        NodeStatus { dl_status, receive_times, ports: known.ports(*station) }
     });
     let nodes: Vec<NodeStatus> = nodes.collect();
     let closings = known.closings(&before.stations);
@@ -155,7 +189,6 @@ async fn look(bus: &Bus, known: &impl Known) -> Result<Option<Cabling>, BusError
         .collect();
     // In a closed ring only branches on port 2 and crossed SubDevices work on the redundant copy (LC-04).
     let on_redundant = before.counts.1.0 > 0;
-    let is_closed = bus.links() == LinkSet::Ring && bus.ring() == RingState::Closed;
     if found.is_empty() && is_closed && on_redundant {
         found.push(Crossing { who: None, entry_port: None });
     }
@@ -244,9 +277,10 @@ impl CablingWatch {
         bus.clone().spawn(async move {
             bus.sleep(SETTLE).await;
             // Only where the link is really taken down: a ring that breaks or closes meanwhile has to be told.
-            let in_control = enhanced && bus.links() == LinkSet::Ring && bus.ring() == RingState::Closed;
+            let in_control = enhanced && stays_closed(&bus).await;
             fleet.set_controlled_break(in_control);
-            let found = cabling(&bus, &fleet, enhanced).await;
+            let known = told.borrow().clone();
+            let found = cabling(&bus, &fleet, in_control, &known).await;
             fleet.set_controlled_break(false);
             // Whose ports changed in between has told it to this look.
             fleet.note_news();
@@ -269,6 +303,12 @@ impl CablingWatch {
 const PORT_BITS: u16 = 0xFFF0;
 
 impl Cabling {
+    /// Whether it adds nothing to what was told of a segment and takes nothing back.
+    fn says_the_same_as(&self, told: &Cabling) -> bool {
+        let who = |cabling: &Cabling| cabling.crossings.iter().map(Crossing::station).collect::<BTreeSet<_>>();
+        who(self) == who(told) && self.swapped == told.swapped && self.unknown_rings <= told.unknown_rings
+    }
+
     /// What was told and still stands, with what is new. A closed ring takes nothing back that an open one has shown, and
     /// an open one shows nothing of those who do not answer.
     fn and(mut self, found: Cabling) -> Cabling {

@@ -7,7 +7,7 @@ use core::pin::pin;
 use core::task::Poll;
 use core::time::Duration;
 
-use ringcat_wire::al::AlState;
+use ringcat_wire::al::{AlState, AlStatus, AlStatusCode};
 
 use super::al_state;
 use super::configure::{BringUp, ConfigureError, RegisterFailure, Start, StartupError};
@@ -30,13 +30,17 @@ const LOOKS: usize = 3;
 /// Pause between two of them, and before a configuration that the bus disturbed is tried again for the first time.
 const LOOK_PAUSE: Duration = Duration::from_millis(3);
 
-/// Brings a SubDevice to its target state, again and again until it works or it no longer answers.
-pub(super) async fn keep_up(bus: Bus, fleet: SharedFleet, index: usize, start: Start) {
-    let mut start = start;
+/// AL status and code that a SubDevice showed.
+pub(super) type Shown = (AlStatus, AlStatusCode);
+
+/// Brings a SubDevice to its target state, again and again until it works or it no longer answers. `told`: the error of its
+/// that was told and still stands.
+pub(super) async fn keep_up(bus: Bus, fleet: SharedFleet, index: usize, start: Start, told: Option<Shown>) {
+    let (mut start, mut told) = (start, told);
     let mut pause = FIRST_PAUSE;
     let mut disturbed = false;
     loop {
-        let result = attempt(&bus, &fleet, index, start).await;
+        let result = attempt(&bus, &fleet, index, start, &mut told).await;
         // A short way that did not lead there is followed by the whole one, and that by the short one.
         start = if start == Start::Unknown { Start::Doubtful } else { Start::Unknown };
         match result {
@@ -145,10 +149,17 @@ pub(super) fn bring_up<'a>(bus: &'a Bus, fleet: &'a SharedFleet, index: usize) -
     })
 }
 
-async fn attempt(bus: &Bus, fleet: &SharedFleet, index: usize, start: Start) -> Result<AlState, ConfigureError> {
+async fn attempt(
+    bus: &Bus,
+    fleet: &SharedFleet,
+    index: usize,
+    start: Start,
+    told: &mut Option<Shown>,
+) -> Result<AlState, ConfigureError> {
     let bring_up = bring_up(bus, fleet, index)?;
-    let quickly = start == Start::Unknown && quick(&bring_up).await?;
-    let result = if quickly { Ok(()) } else { bring_up.run(start).await };
+    let quickly = start == Start::Unknown && quick(&bring_up, told).await?;
+    // The whole way begins with an acknowledgement: what it shows behind that is new.
+    let result = if quickly { Ok(()) } else { bring_up.run(start).await.inspect_err(|_| *told = None) };
     // An attempt that ended on the way to PREOP, this one or one before, leaves the EEPROM to the PDI.
     let is_left = match &result {
         Ok(()) => quickly && bring_up.target == AlState::PreOp,
@@ -160,8 +171,9 @@ async fn attempt(bus: &Bus, fleet: &SharedFleet, index: usize, start: Start) -> 
     result.map(|()| bring_up.target)
 }
 
-/// A SubDevice that only fell from OP to SAFEOP still has its configuration: acknowledged, it may go back to OP.
-async fn quick(bring_up: &BringUp<'_>) -> Result<bool, ConfigureError> {
+/// A SubDevice that only fell from OP to SAFEOP still has its configuration: acknowledged, it may go back to OP. Its error is
+/// told, unless it is the one that was.
+async fn quick(bring_up: &BringUp<'_>, told: &mut Option<Shown>) -> Result<bool, ConfigureError> {
     let BringUp { bus, fleet, index, station, setup, target, mailbox, .. } = bring_up;
     let (status, code) = al_state::read_status(bus, *station).await?;
     if !status.error && status.al_state() == Some(*target) {
@@ -175,20 +187,24 @@ async fn quick(bring_up: &BringUp<'_>) -> Result<bool, ConfigureError> {
     bring_up.join();
     mailbox.resume();
     if status.error {
-        bus.report(Event::StateError { subdevice: *index, requested: None, status, code });
+        if told.replace((status, code)) != Some((status, code)) {
+            bus.report(Event::StateError { subdevice: *index, requested: None, status, code });
+        }
         al_state::acknowledge(bus, *station, setup.emulated).await?;
     }
+    *told = None;
     bring_up.op().await?;
     Ok(true)
 }
 
-/// Starts the configuration of a SubDevice that answers.
-pub(super) fn start(bus: &Bus, fleet: &SharedFleet, index: usize, from: Start) {
+/// Starts the configuration of a SubDevice that answers. `told`: its error that was told.
+pub(super) fn start(bus: &Bus, fleet: &SharedFleet, index: usize, from: Start, told: Option<Shown>) {
     fleet.set_phase(index, Phase::Configuring);
     let attempt = fleet.next_attempt(index);
     let (own_bus, own_fleet) = (bus.clone(), fleet.clone());
     bus.spawn(async move {
-        while_current(&own_fleet, index, attempt, keep_up(own_bus.clone(), own_fleet.clone(), index, from)).await;
+        let procedure = keep_up(own_bus.clone(), own_fleet.clone(), index, from, told);
+        while_current(&own_fleet, index, attempt, procedure).await;
     });
 }
 
@@ -201,7 +217,7 @@ pub(super) fn welcome(bus: &Bus, fleet: &SharedFleet, index: usize) {
     bus.clone().spawn(async move {
         let checked = async {
             if is_same(&bus, &fleet, index).await {
-                return keep_up(bus.clone(), fleet.clone(), index, Start::Unknown).await;
+                return keep_up(bus.clone(), fleet.clone(), index, Start::Unknown, None).await;
             }
             let station = fleet.access().members[index].station;
             // Where that fails, the next look finds the address again.
@@ -255,6 +271,6 @@ pub(crate) fn start_all(bus: &Bus, fleet: &SharedFleet, from: Start) {
         members.filter(|(_, member)| member.setup.is_some()).map(|(index, _)| index).collect()
     };
     for index in found {
-        start(bus, fleet, index, from);
+        start(bus, fleet, index, from, None);
     }
 }

@@ -112,7 +112,7 @@ async fn go(bus: &Bus, fleet: &SharedFleet, index: usize, before: AlState, resul
                 fleet.board.set_excused(index, !fleet.exchanges(index, before));
             }
             *result.borrow_mut() = Some(Err(error));
-            keep_up(bus.clone(), fleet.clone(), index, Start::Unknown).await;
+            keep_up(bus.clone(), fleet.clone(), index, Start::Unknown, None).await;
         }
     }
 }

@@ -24,7 +24,7 @@ use ringcat_wire::register::{DcReceiveTimes, DlStatus, EcatEvent, Fmmu, Informat
 
 use self::count::Count;
 pub use self::error::ScanError;
-use super::cabling::{Known, cabling, is_swapped};
+use super::cabling::{Cabling, Known, cabling, is_swapped, stays_closed};
 use super::dictionary::{ReadPdos, complete};
 use super::junction::learn;
 use super::sii::{self, SiiCache, SiiContents};
@@ -363,10 +363,10 @@ fn report_findings(bus: &Bus, scan: &Scan) {
 
 /// Finds out who is crossed while the redundant link is down; false where the ring is not closed or changes meanwhile.
 async fn locate_crossings(bus: &Bus, scan: &mut Scan) -> bool {
-    if bus.links() != LinkSet::Ring || bus.ring() != RingState::Closed {
+    if !stays_closed(bus).await {
         return false;
     }
-    let Some(found) = cabling(bus, scan, true).await.map(|seen| seen.crossings) else { return false };
+    let Some(found) = cabling(bus, scan, true, &Cabling::default()).await.map(|seen| seen.crossings) else { return false };
     let node = |station: StationAddress| scan.subdevices.iter().position(|info| info.station == station);
     let exact = found.iter().filter_map(|crossing| {
         Some(Finding::CrossedLine { node: node(crossing.who?.0)?, entry_port: crossing.entry_port? })

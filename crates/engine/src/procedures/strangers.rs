@@ -408,7 +408,7 @@ async fn admit(bus: &Bus, fleet: &SharedFleet, stranger: &Stranger, info: &SubDe
     }
     bus.report(Event::Returned { subdevice: index });
     // Whatever state it is in, it is not one that we brought it to.
-    start(bus, fleet, index, Start::Doubtful);
+    start(bus, fleet, index, Start::Doubtful, None);
     true
 }
 

@@ -281,7 +281,7 @@ impl Watch {
         };
         self.bus.report(event);
         self.suspended[index] = false;
-        start(&self.bus, &self.fleet, index, Start::Unknown);
+        start(&self.bus, &self.fleet, index, Start::Unknown, Some((status, code)));
     }
 
     /// Strangers that no longer answer are gone.

@@ -68,5 +68,5 @@ fn configure_anew(bus: &Bus, fleet: &SharedFleet, suspect: &Suspect) {
     let count = expected.len() / Fmmu::LEN;
     let _ = write!(reason, "registers from {} on: the {count} FMMUs that were written are not there", map::FMMU_BASE);
     bus.report(Event::ConfigurationFailed { subdevice: index, reason });
-    start(bus, fleet, index, Start::Doubtful);
+    start(bus, fleet, index, Start::Doubtful, None);
 }

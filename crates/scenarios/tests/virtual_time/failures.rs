@@ -57,6 +57,32 @@ fn an_application_that_stands_still_for_longer_than_the_watchdog_finds_all_back_
 }
 
 #[test]
+fn every_fall_of_a_watchdog_is_told_once() {
+    for network in [ring_of_16(FAST), line(descriptions(&SIXTEEN), NetworkOptions::default())] {
+        let mut world = World::in_op(10, network);
+        world.run_cycles(50);
+        for round in 0..3 {
+            let mark = world.mark();
+            world.stall(Duration::from_millis(150));
+            world.until(LIMIT, "all back in OP", all_well);
+            world.run_cycles(1_100);
+            let mut fell: Vec<usize> = world.left_op(mark).iter().map(|device| device.0).collect();
+            fell.sort_unstable();
+            let told = troubles(world.events(mark)).into_iter().map(|event| match event {
+                Event::StateError { subdevice, requested: None, code: AlStatusCode::SYNC_MANAGER_WATCHDOG, .. } => {
+                    *subdevice
+                }
+                other => panic!("{other:?}"),
+            });
+            let mut told: Vec<usize> = told.collect();
+            told.sort_unstable();
+            assert_eq!(told, fell, "round {round}");
+            assert!(!fell.is_empty());
+        }
+    }
+}
+
+#[test]
 fn an_application_of_a_subdevice_that_hangs_in_op_costs_nobody_else_anything() {
     let mut world = World::in_op(2, ring_of_16(FAST));
     let mark = world.mark();

@@ -26,6 +26,7 @@ mod explorer;
 mod failures;
 mod fairness;
 mod freshness;
+mod false_crossings;
 mod hot_connect;
 mod junctions;
 mod mail;
