@@ -60,7 +60,7 @@ use crate::procedures::scan::{Scan, ScanError, ScanOptions, scan};
 use crate::procedures::serve_requests::{Requests, serve_requests};
 use crate::procedures::services::statistics::{Book, collect};
 use crate::procedures::sii::SiiCache;
-use crate::procedures::stop::{StopError, stop};
+use crate::procedures::stop::{StopError, all_known, stop};
 use crate::procedures::supervise::supervise;
 use crate::procedures::watch_groups::{counts, watch_groups};
 use crate::queue::{Consumer, queue};
@@ -279,9 +279,10 @@ impl MainDevice {
         Ok(Active { exchange, directory, periods, under_way })
     }
 
-    /// Ends supervision and all other procedures, and takes all SubDevices down to a state. The exchange must not send
-    /// any more. Afterwards a new scan may start.
+    /// Ends supervision and all other procedures, and takes all SubDevices down to a state; those in a lower one stay there.
+    /// The exchange must not send any more. Afterwards a new scan may start.
     pub fn start_stop(&mut self, state: AlState, limit: Duration, now: Instant) {
+        let led = self.fleet.as_ref().map(|fleet| all_known(&fleet.access())).unwrap_or_default();
         self.counted = self.counters();
         self.supervisor = Supervisor::new(self.identity, self.options.links(), now);
         // Whoever would have brought it back is gone.
@@ -298,7 +299,7 @@ impl MainDevice {
         *self.stopped.borrow_mut() = None;
         let (bus, slot) = (self.supervisor.bus(), self.stopped.clone());
         self.supervisor.spawn(async move {
-            let result = stop(&bus, state, limit).await;
+            let result = stop(&bus, led, state, limit).await;
             *slot.borrow_mut() = Some(result);
         });
     }

@@ -5,7 +5,7 @@ use core::time::Duration;
 
 use ringcat_wire::address::StationAddress;
 use ringcat_wire::al::{AlControl, AlState, AlStatus, AlStatusCode};
-use ringcat_wire::register::map;
+use ringcat_wire::register::{EscConfiguration, map};
 
 use crate::supervisor::{Bus, BusError};
 
@@ -102,6 +102,17 @@ pub async fn identification(bus: &Bus, station: StationAddress) -> Result<Option
     };
     bus.fpwr(station, map::AL_CONTROL, &plain.encode()).await?;
     Ok(value)
+}
+
+/// Asks for a state, once. A SubDevice with an error gets the acknowledgement with it, unless it copies AL control into AL
+/// status.
+pub(super) async fn ask(bus: &Bus, station: StationAddress, state: AlState, error: bool) -> Result<(), BusError> {
+    let copies = error && {
+        let bytes = bus.fprd_array(station, map::ESC_CONFIGURATION).await?;
+        EscConfiguration::decode(&bytes).device_emulation
+    };
+    let control = if error && !copies { AlControl::with_acknowledge(state) } else { AlControl::new(state) };
+    bus.fpwr(station, map::AL_CONTROL, &control.encode()).await
 }
 
 /// Clears an error by acknowledging it in the present state. Devices that copy AL control into AL status must not be

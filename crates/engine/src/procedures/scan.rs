@@ -24,6 +24,7 @@ use ringcat_wire::register::{DcReceiveTimes, DlStatus, EcatEvent, Fmmu, Informat
 
 use self::count::Count;
 pub use self::error::ScanError;
+use super::al_state;
 use super::cabling::{Cabling, Known, cabling, is_swapped, stays_closed};
 use super::dictionary::{ReadPdos, complete};
 use super::junction::learn;
@@ -199,8 +200,11 @@ type Said = (SiiContents, Option<u16>);
 /// Common ground, station addresses, and what each SubDevice says about itself.
 async fn identify(bus: &Bus, count: u16, cache: &SiiCache) -> Result<Vec<Said>, ScanError> {
     level(bus).await?;
-    to_init(bus, count).await?;
+    let are_clean = to_init(bus, count).await?;
     assign_addresses(bus, count).await?;
+    if !are_clean {
+        clear_errors(bus, count).await?;
+    }
     read_all(bus, count, cache).await
 }
 
@@ -236,25 +240,38 @@ pub(super) fn event_mask() -> EcatEvent {
     EcatEvent { dl_status: true, ..EcatEvent::default() }
 }
 
-/// Waits until all are in INIT. Devices that copy AL control into AL status show the acknowledge bit as an error: they
-/// get the bare state.
-async fn to_init(bus: &Bus, count: u16) -> Result<(), BusError> {
+/// Waits until all are in INIT, as the OR of their AL status shows it; false where they are not in time. Devices that copy AL
+/// control into AL status show the acknowledge bit as an error: they get the bare state.
+async fn to_init(bus: &Bus, count: u16) -> Result<bool, BusError> {
     let until = bus.now() + INIT_LIMIT;
     loop {
         let reply = bus.brd(map::AL_STATUS, AlStatus::LEN).await?;
         let status = AlStatus::decode(&[reply.data[0], reply.data[1]]);
         if reply.wkc() == Wkc(count) && status.state == AlState::Init.code() {
             if !status.error {
-                return Ok(());
+                return Ok(true);
             }
             bus.bwr(map::AL_CONTROL, &AlControl::new(AlState::Init).encode()).await?;
         }
         if bus.now() >= until {
-            // Whoever is not there yet is dealt with when it is configured.
-            return Ok(());
+            return Ok(false);
         }
         bus.sleep(INIT_PAUSE).await;
     }
+}
+
+/// Clears errors that are left, each for itself: one that stays out of INIT hides in the OR what the others need. It is
+/// dealt with when it is configured.
+async fn clear_errors(bus: &Bus, count: u16) -> Result<(), BusError> {
+    let cleared = bus.gather((0..count).map(Position), |bus, position| async move {
+        let station = station_at(position);
+        match al_state::read_status(&bus, station).await {
+            Ok((status, _)) if status.error => al_state::ask(&bus, station, AlState::Init, true).await,
+            Ok(_) => Ok(()),
+            Err(error) => Err(error),
+        }
+    });
+    cleared.await.into_iter().collect()
 }
 
 async fn assign_addresses(bus: &Bus, count: u16) -> Result<(), BusError> {
@@ -366,7 +383,9 @@ async fn locate_crossings(bus: &Bus, scan: &mut Scan) -> bool {
     if !stays_closed(bus).await {
         return false;
     }
-    let Some(found) = cabling(bus, scan, true, &Cabling::default()).await.map(|seen| seen.crossings) else { return false };
+    let Some(found) = cabling(bus, scan, true, &Cabling::default()).await.map(|seen| seen.crossings) else {
+        return false;
+    };
     let node = |station: StationAddress| scan.subdevices.iter().position(|info| info.station == station);
     let exact = found.iter().filter_map(|crossing| {
         Some(Finding::CrossedLine { node: node(crossing.who?.0)?, entry_port: crossing.entry_port? })

@@ -58,6 +58,7 @@ mod slow_eeprom;
 mod start_up;
 mod startup_commands;
 mod states;
+mod stops;
 mod strangers;
 mod topologies;
 mod under_way;
