@@ -20,6 +20,7 @@ pub use crate::ring_status::Occupant;
 use crate::domain::DomainStatus;
 use crate::info::IdentityField;
 use crate::link::Link;
+use crate::ring::FrameLimit;
 use crate::ring_status::{Cable, CableErrors, RedundancyLoss};
 use crate::time::Instant;
 use crate::topology::{Closing, PortOf};
@@ -321,6 +322,12 @@ pub enum Event {
         arrived_on: Link,
         /// Its bytes without FCS.
         bytes: Vec<u8>,
+    },
+    /// Frames that hold more datagrams do not bring them back processed: a gateway or simulator takes fewer than fit. Told
+    /// once.
+    FrameLimit {
+        /// How many may be in a frame, and what becomes of more.
+        limit: FrameLimit,
     },
     /// The judgement of a domain changed.
     Domain {

@@ -22,6 +22,7 @@ use ringcat_wire::datagram::{MAX_DATA, OVERHEAD};
 use crate::direction::Direction;
 use crate::domain::DomainId;
 use crate::link::LinkSet;
+use crate::ring::MIN_DATAGRAMS_PER_FRAME;
 
 /// One SyncManager's process data that takes part in a domain.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -78,6 +79,8 @@ pub struct Rules<'a> {
     pub lrw: LrwPolicy,
     /// By SubDevice; those behind the end have an FMMU to spare.
     pub witnesses: &'a [Witness],
+    /// Datagrams that a frame may hold, [`MIN_DATAGRAMS_PER_FRAME`] at least; `None`: as many as fit.
+    pub max_datagrams: Option<usize>,
 }
 
 /// What a domain exchanges.
@@ -165,6 +168,8 @@ pub struct PlannedDomain {
 pub struct Layout {
     /// By [`DomainId`].
     pub domains: Vec<PlannedDomain>,
+    /// Datagrams that a frame may hold.
+    most: Option<usize>,
 }
 
 /// Why domains cannot be laid out.
@@ -211,26 +216,30 @@ impl core::error::Error for LayoutError {}
 /// Data of the supervision datagram: AL status.
 pub(crate) const SUPERVISION_LEN: usize = 2;
 /// Distributed clocks take three datagrams of four bytes.
-const CLOCKS_LEN: usize = 3 * (OVERHEAD + 4);
-
+const CLOCKS_LEN: usize = CLOCKS * (OVERHEAD + 4);
+const CLOCKS: usize = 3;
+const _: () = assert!(CLOCKS <= MIN_DATAGRAMS_PER_FRAME as usize);
 /// Where presence bytes lie: beyond all process data, which ends at 2 GiB, and below the mail bits.
 const PRESENCE_AT: LogicalAddress = LogicalAddress(0xE000_0000);
 
 impl Layout {
     /// As [`Layout::with`], with LRW where it is of use, and every SubDevice with an FMMU to spare.
     pub fn new(specs: &[DomainSpec], links: LinkSet, supervision: bool) -> Result<Layout, LayoutError> {
-        Layout::with(specs, Rules { links, supervision, lrw: LrwPolicy::Automatic, witnesses: &[] })
+        let lrw = LrwPolicy::Automatic;
+        Layout::with(specs, Rules { links, supervision, lrw, witnesses: &[], max_datagrams: None })
     }
 
     /// Lays out domains.
     pub fn with(specs: &[DomainSpec], rules: Rules<'_>) -> Result<Layout, LayoutError> {
-        let mut layout = Layout::default();
+        let most = rules.max_datagrams;
+        let mut layout = Layout { most, ..Layout::default() };
         let mut logical = 0u32;
         let mut witnesses = chunk::Witnesses::new(rules.witnesses, PRESENCE_AT);
         for spec in specs {
             let each = rules.lrw == LrwPolicy::PerSubDevice;
             let lrw = spec.lrw && (rules.links == LinkSet::Single || each);
-            let domain = lay_out(spec, lrw, each, LogicalAddress(logical), &mut witnesses)?;
+            let cut = Cut { lrw, each, most };
+            let domain = lay_out(spec, cut, LogicalAddress(logical), &mut witnesses)?;
             // Domains start at multiples of four bytes: easier to read in a capture.
             let end = logical.checked_add(domain.image_len).filter(|end| *end < 1 << 31);
             logical = end.ok_or(LayoutError::TooLarge)?.next_multiple_of(4);
@@ -261,7 +270,9 @@ impl Layout {
 
     fn add_supervision(&mut self) {
         let Some(domain) = self.domains.iter_mut().min_by_key(|domain| domain.period) else { return };
-        let room = |frame: &PlannedFrame| frame.used() + OVERHEAD + SUPERVISION_LEN <= MAX_DATA + OVERHEAD;
+        let room = |frame: &PlannedFrame| {
+            frame.used() + OVERHEAD + SUPERVISION_LEN <= MAX_DATA + OVERHEAD && frame.takes(1, self.most)
+        };
         match domain.frames.iter_mut().find(|frame| room(frame)) {
             Some(frame) => frame.supervision = true,
             None => domain.frames.push(PlannedFrame { supervision: true, ..PlannedFrame::default() }),
@@ -272,7 +283,9 @@ impl Layout {
     pub fn add_clocks(&mut self) -> Result<(), LayoutError> {
         let Some(domain) = self.domains.iter_mut().min_by_key(|domain| domain.period) else { return Ok(()) };
         let others = |frame: &PlannedFrame| if frame.supervision { OVERHEAD + SUPERVISION_LEN } else { 0 };
-        let room = |frame: &PlannedFrame| frame.used() + others(frame) + CLOCKS_LEN <= MAX_DATA + OVERHEAD;
+        let room = |frame: &PlannedFrame| {
+            frame.used() + others(frame) + CLOCKS_LEN <= MAX_DATA + OVERHEAD && frame.takes(CLOCKS, self.most)
+        };
         match domain.frames.iter_mut().find(|frame| room(frame)) {
             Some(frame) => frame.clocks = true,
             None => domain.frames.push(PlannedFrame { clocks: true, ..PlannedFrame::default() }),
@@ -310,13 +323,29 @@ impl PlannedFrame {
         let presence = self.presence.as_ref().map_or(0, PlannedPresence::bytes);
         self.datagrams.iter().map(data).sum::<usize>() + presence
     }
+
+    /// Whether it may hold so many datagrams more.
+    fn takes(&self, more: usize, most: Option<usize>) -> bool {
+        let clocks = if self.clocks { CLOCKS } else { 0 };
+        let others = usize::from(self.presence.is_some()) + usize::from(self.supervision) + clocks;
+        most.is_none_or(|most| self.datagrams.len() + others + more <= most)
+    }
 }
 
-/// `each`: every SubDevice has datagrams of its own.
+/// How the areas of a domain are cut into frames.
+#[derive(Clone, Copy, Debug)]
+struct Cut {
+    /// One LRW in the place of an LWR and an LRD.
+    lrw: bool,
+    /// Every SubDevice has datagrams of its own.
+    each: bool,
+    /// Datagrams that a frame may hold.
+    most: Option<usize>,
+}
+
 fn lay_out(
     spec: &DomainSpec,
-    lrw: bool,
-    each: bool,
+    cut: Cut,
     base: LogicalAddress,
     witnesses: &mut chunk::Witnesses<'_>,
 ) -> Result<PlannedDomain, LayoutError> {
@@ -327,10 +356,14 @@ fn lay_out(
         areas: Vec::new(),
         frames: Vec::new(),
     };
-    for chunk in chunk::chunks(spec, lrw, each, witnesses)? {
+    for chunk in chunk::chunks(spec, cut, witnesses)? {
         let frame = domain.place(&chunk, base, witnesses)?;
         match domain.frames.last_mut() {
-            Some(last) if each && last.used() + frame.used() <= MAX_DATA + OVERHEAD => {
+            Some(last)
+                if cut.each
+                    && last.used() + frame.used() <= MAX_DATA + OVERHEAD
+                    && last.takes(frame.datagrams.len(), cut.most) =>
+            {
                 last.datagrams.extend(frame.datagrams);
             }
             _ => domain.frames.push(frame),

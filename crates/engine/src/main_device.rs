@@ -118,7 +118,7 @@ impl MainDevice {
     pub fn new(options: Options, now: Instant) -> MainDevice {
         let identity = Identity::new(options.codec, options.main, options.redundant);
         MainDevice {
-            supervisor: Supervisor::new(identity, options.links(), now),
+            supervisor: supervisor(identity, &options, now),
             counted: AcyclicCounters::default(),
             identity,
             cache: SiiCache::new(options.sii_cache),
@@ -202,7 +202,8 @@ impl MainDevice {
         let specs = domain_specs(&declaration, &plans, lrw, links)?;
         check_lrw(lrw, &specs, links)?;
         let witnesses = witnesses(&plans, &found);
-        let rules = Rules { links, supervision: self.options.supervision, lrw, witnesses: &witnesses };
+        let (supervision, max_datagrams) = (self.options.supervision, self.options.most_datagrams());
+        let rules = Rules { links, supervision, lrw, witnesses: &witnesses, max_datagrams };
         let mut layout = Layout::with(&specs, rules).map_err(ActivateError::Layout)?;
         if clock_config.is_some() {
             layout.add_clocks().map_err(ActivateError::Layout)?;
@@ -284,7 +285,7 @@ impl MainDevice {
     pub fn start_stop(&mut self, state: AlState, limit: Duration, now: Instant) {
         let led = self.fleet.as_ref().map(|fleet| all_known(&fleet.access())).unwrap_or_default();
         self.counted = self.counters();
-        self.supervisor = Supervisor::new(self.identity, self.options.links(), now);
+        self.supervisor = supervisor(self.identity, &self.options, now);
         // Whoever would have brought it back is gone.
         self.supervisor.order_link(self.disconnected.take());
         self.scanning.set(false);
@@ -470,6 +471,15 @@ impl MainDevice {
     pub fn ring(&self) -> crate::ring::RingState {
         self.supervisor.bus().ring()
     }
+}
+
+/// The acyclic half without procedures.
+fn supervisor(identity: Identity, options: &Options, now: Instant) -> Supervisor {
+    let mut supervisor = Supervisor::new(identity, options.links(), now);
+    if let Some(most) = options.most_datagrams() {
+        supervisor.set_max_datagrams(most);
+    }
+    supervisor
 }
 
 /// Clocks of everybody that was scanned.

@@ -9,6 +9,7 @@ pub mod configure;
 pub mod dictionary;
 mod error_watch;
 pub mod fleet;
+mod frame_limit;
 pub mod inspect;
 pub(crate) mod junction;
 pub mod look_at_ring;

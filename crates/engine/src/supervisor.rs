@@ -85,6 +85,11 @@ impl Supervisor {
         self.shared.borrow_mut().board = Some(board);
     }
 
+    /// How many datagrams a frame may hold.
+    pub fn set_max_datagrams(&mut self, most: usize) {
+        self.shared.borrow_mut().max_datagrams = most;
+    }
+
     /// What the links tell of their carriers.
     pub fn set_carriers(&mut self, carriers: [Option<bool>; 2]) {
         self.shared.borrow_mut().carriers = carriers;

@@ -7,7 +7,7 @@ use std::time::{Duration, Instant};
 
 use clap::{Args, ValueEnum};
 use ringcat::packet::PacketLinks;
-use ringcat::{Error, Link, MacCodec, Options, ScanError};
+use ringcat::{Error, Link, MIN_DATAGRAMS_PER_FRAME, MacCodec, Options, ScanError};
 use ringcat_link::interface::{self, exclusive_use};
 use ringcat_link::realtime::{self, CpuLatency};
 use ringcat_link::{LinkError, ReceiveMode};
@@ -155,6 +155,9 @@ pub struct InterfaceArguments {
     /// How frames are marked in their source address: flags-first, or id-last as older MainDevices with two interfaces do.
     #[arg(long, value_name = "HOW", value_enum, default_value_t = SourceAddress::FlagsFirst)]
     pub source_address: SourceAddress,
+    /// Put at most so many datagrams into a frame: some gateways and simulators take no more (often 15).
+    #[arg(long, value_name = "COUNT", value_parser = clap::value_parser!(u16).range(i64::from(MIN_DATAGRAMS_PER_FRAME)..))]
+    pub max_datagrams: Option<u16>,
 }
 
 /// Marks in the source address (facts 9.7.1).
@@ -174,7 +177,7 @@ impl InterfaceArguments {
             SourceAddress::FlagsFirst => MacCodec::FlagsFirst,
             SourceAddress::IdLast => MacCodec::IdLast,
         };
-        Options { source_address, ..Options::default() }
+        Options { source_address, max_datagrams_per_frame: self.max_datagrams, ..Options::default() }
     }
 
     /// Opens the interfaces; warns of who else uses them, and fails where no cable is plugged in.

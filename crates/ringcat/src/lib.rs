@@ -99,7 +99,7 @@ pub use ringcat_engine::procedures::strangers::rescan::{Found, Rescan, Who};
 pub use ringcat_engine::request::{
     RegisterRequest, Request, RequestFailure, RequestRefused, RequestState, SdoRequest, SoeRequest, VoeHandler,
 };
-pub use ringcat_engine::ring::RingState;
+pub use ringcat_engine::ring::{FrameLimit, MIN_DATAGRAMS_PER_FRAME, RingState};
 pub use ringcat_engine::ring_status::{Cable, CableErrors, LinkStatus, Redundancy, RedundancyLoss, RingStatus};
 pub use ringcat_engine::supervisor::AcyclicCounters;
 pub use ringcat_engine::time::Instant;

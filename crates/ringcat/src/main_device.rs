@@ -50,6 +50,9 @@ pub struct Options {
     /// Whether the redundant link may be taken down for a moment, when ports have changed, to find out where a line is
     /// crossed ([`Links::force_disconnect`]). Without, a closed ring shows only that there is a crossing.
     pub enhanced_line_crossed: bool,
+    /// Datagrams that a frame may hold, cyclic and acyclic; `None`: as many as fit. Some gateways and simulators take fewer
+    /// (often 15): a scan that fails for that says so ([`ScanError::FrameLimit`](crate::ScanError)). Less than 3 counts as 3.
+    pub max_datagrams_per_frame: Option<u16>,
     /// Bytes that everything but process data may send in a cycle, on each link; never more than what is left of the
     /// cycle's time on the wire, and a longest frame at least. SubDevices share it fairly.
     pub acyclic_bytes: usize,
@@ -67,6 +70,7 @@ impl Default for Options {
             junctions: JunctionMode::Disabled,
             follow_groups: true,
             enhanced_line_crossed: false,
+            max_datagrams_per_frame: None,
             acyclic_bytes: DEFAULT_BUDGET,
         }
     }
@@ -86,6 +90,7 @@ impl Options {
             junctions: self.junctions,
             follow_groups: self.follow_groups,
             enhanced_line_crossed: self.enhanced_line_crossed,
+            max_datagrams_per_frame: self.max_datagrams_per_frame,
             ..Engineering::new(main, redundant)
         };
         Engine::new(options, links.now())

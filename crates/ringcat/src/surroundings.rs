@@ -136,6 +136,7 @@ mod tests {
                 main: "eth1".to_owned(),
                 redundant: None,
                 source_address: crate::interfaces::SourceAddress::default(),
+                max_datagrams: None,
             },
             elsewhere: Arc::new(elsewhere.map_or_else(OnceLock::new, |name| OnceLock::from(name.to_owned()))),
             senders: Vec::new(),

@@ -185,6 +185,7 @@ pub fn describe(timed: &TimedEvent, names: &Names) -> String {
             let what = if *optional { "optional, not there" } else { "missing" };
             format!("{}: {what}", names.of(*subdevice))
         }
+        Event::FrameLimit { limit } => limit.to_string(),
         Event::ForeignFrame { arrived_on, bytes } => {
             let source = address_of_sender(bytes).map_or_else(String::new, |mac| format!(" from {}", address(mac)));
             format!("another MainDevice sends: {} bytes on {arrived_on}{source}", bytes.len())

@@ -93,13 +93,16 @@ pub struct SimFrame {
     pub symbol_error: bool,
     /// Unique number: for logs, and to tell the frame when it comes back to a controller.
     pub id: u64,
+    /// Datagrams behind so many are passed on as they are.
+    pub most_datagrams: usize,
 }
 
 impl SimFrame {
     /// Takes the bytes of a frame and finds its datagrams. Any bytes will do.
     pub fn new(id: u64, bytes: Vec<u8>) -> SimFrame {
         let (kind, malformed, fcs, symbol_error) = (FrameKind::Foreign, false, Fcs::Good, false);
-        let mut frame = SimFrame { bytes, datagrams: Vec::new(), kind, malformed, fcs, symbol_error, id };
+        let (datagrams, most_datagrams) = (Vec::new(), usize::MAX);
+        let mut frame = SimFrame { bytes, datagrams, kind, malformed, fcs, symbol_error, id, most_datagrams };
         frame.parse();
         frame
     }
@@ -107,6 +110,7 @@ impl SimFrame {
     /// Becomes another frame with these bytes, keeping the buffers: for pools.
     pub fn refill(&mut self, id: u64, bytes: &[u8]) {
         self.id = id;
+        self.most_datagrams = usize::MAX;
         (self.fcs, self.symbol_error) = (Fcs::Good, false);
         self.bytes.clear();
         self.bytes.extend_from_slice(bytes);
@@ -120,7 +124,7 @@ impl SimFrame {
         self.datagrams.clear();
         self.datagrams.extend_from_slice(&other.datagrams);
         (self.kind, self.malformed, self.fcs, self.id) = (other.kind, other.malformed, other.fcs, other.id);
-        self.symbol_error = other.symbol_error;
+        (self.symbol_error, self.most_datagrams) = (other.symbol_error, other.most_datagrams);
     }
 
     /// Keeps the first `len` bytes only, as a cable leaves them that is cut while the frame passes.
@@ -130,6 +134,12 @@ impl SimFrame {
             self.fcs = Fcs::Bad;
             self.parse();
         }
+    }
+
+    /// Has all datagrams behind so many passed on as they are.
+    pub fn process_at_most(&mut self, most: usize) {
+        self.most_datagrams = most;
+        self.datagrams.truncate(most);
     }
 
     /// Whether a controller sees datagrams to process.
@@ -173,7 +183,7 @@ impl SimFrame {
                     return;
                 }
             }
-            if !more {
+            if !more || self.datagrams.len() >= self.most_datagrams {
                 return;
             }
             at = end;
@@ -260,6 +270,15 @@ mod tests {
         let mut frame = SimFrame::new(7, two_datagrams());
         frame.truncate(44);
         assert_eq!((frame.datagrams.len(), frame.malformed, frame.fcs), (1, true, Fcs::Bad));
+    }
+
+    #[test]
+    fn datagrams_behind_the_limit_are_none_also_after_a_cut() {
+        let mut frame = SimFrame::new(7, two_datagrams());
+        frame.process_at_most(1);
+        assert_eq!((frame.datagrams.len(), frame.malformed), (1, false));
+        frame.truncate(50);
+        assert_eq!(frame.datagrams.len(), 1);
     }
 
     #[test]

@@ -39,6 +39,24 @@ pub(crate) use random::Random;
 use route::Route;
 use statistics::Statistics;
 
+/// What becomes of datagrams that are too many for a frame.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Beyond {
+    /// They come back as they were sent.
+    Unprocessed,
+    /// The whole frame does not come back.
+    Dropped,
+}
+
+/// How many datagrams a frame may hold, as other simulators and some gateways have it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct DatagramLimit {
+    /// So many.
+    pub datagrams: u16,
+    /// What becomes of more.
+    pub beyond: Beyond,
+}
+
 /// Properties of a segment that belong to no single device.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct NetworkOptions {
@@ -57,6 +75,8 @@ pub struct NetworkOptions {
     pub transmit_queue: usize,
     /// Frames that an interface of the MainDevice keeps until they are fetched. Default 256.
     pub receive_queue: usize,
+    /// How many datagrams a frame may hold. Default: as many as fit.
+    pub max_datagrams: Option<DatagramLimit>,
     /// Frames fly in one go where nothing else happens, instead of hop by hop. What can be seen is the same, bit for bit;
     /// it takes a fraction of the computing. Default true.
     pub compiled: bool,
@@ -72,6 +92,7 @@ impl Default for NetworkOptions {
             forwarding_delay: Duration::from_nanos(300),
             transmit_queue: 256,
             receive_queue: 256,
+            max_datagrams: None,
             compiled: true,
         }
     }

@@ -11,7 +11,7 @@ use alloc::vec::Vec;
 use ringcat_wire::address::LogicalAddress;
 use ringcat_wire::datagram::{MAX_DATA, OVERHEAD};
 
-use super::{AreaSpec, Delivers, DomainSpec, LayoutError, PlannedPresence, Witness};
+use super::{AreaSpec, Cut, Delivers, DomainSpec, LayoutError, PlannedPresence, Witness};
 use crate::direction::Direction;
 
 /// Room for datagrams in a frame.
@@ -72,13 +72,16 @@ impl Group {
         self.outputs.is_empty() && self.inputs.is_empty()
     }
 
+    /// Its datagrams.
+    fn datagrams(&self) -> usize {
+        let datagrams = usize::from(!self.outputs.is_empty()) + usize::from(!self.inputs.is_empty());
+        if self.lrw { datagrams.min(1) } else { datagrams }
+    }
+
     /// Bytes of its datagrams.
     fn used(&self) -> usize {
-        let bytes = |areas: &[AreaSpec]| areas.iter().map(|area| usize::from(area.length)).sum::<usize>();
-        let (outputs, inputs) = (bytes(&self.outputs), bytes(&self.inputs));
-        let datagrams = usize::from(outputs > 0) + usize::from(inputs > 0);
-        let datagrams = if self.lrw { datagrams.min(1) } else { datagrams };
-        outputs + inputs + datagrams * OVERHEAD
+        let areas = self.outputs.iter().chain(&self.inputs);
+        areas.map(|area| usize::from(area.length)).sum::<usize>() + self.datagrams() * OVERHEAD
     }
 }
 
@@ -112,6 +115,13 @@ impl Chunk {
 
     fn is_empty(&self) -> bool {
         self.groups.iter().all(Group::is_empty)
+    }
+
+    /// Whether a frame takes it.
+    fn fits(&self, most: Option<usize>) -> bool {
+        let presence = usize::from(self.witnessed.len() > 1);
+        let datagrams = self.groups.iter().map(Group::datagrams).sum::<usize>() + presence;
+        self.used() <= ROOM && most.is_none_or(|most| datagrams <= most)
     }
 
     /// Bytes of all datagrams at most.
@@ -150,11 +160,10 @@ impl Chunk {
     }
 }
 
-/// Cuts the areas of a domain into chunks. `each`: every SubDevice has one of its own.
+/// Cuts the areas of a domain into chunks.
 pub(super) fn chunks(
     spec: &DomainSpec,
-    lrw: bool,
-    each: bool,
+    Cut { lrw, each, most }: Cut,
     witnesses: &Witnesses<'_>,
 ) -> Result<Vec<Chunk>, LayoutError> {
     let mut chunks = Vec::new();
@@ -171,18 +180,18 @@ pub(super) fn chunks(
             |shown: &BTreeSet<usize>| if shown.contains(&subdevice) { Witness::Alone } else { witnesses.of(subdevice) };
         // A SubDevice's areas stay together where they can: fewer working counters to look at.
         let mut whole = chunk.with(group, witness(&shown));
-        if !chunk.is_empty() && (each || whole.used() > ROOM) {
+        if !chunk.is_empty() && (each || !whole.fits(most)) {
             shown.extend(chunk.witnessed.iter().copied());
             chunks.push(core::mem::replace(&mut chunk, Chunk::new(lrw)));
             whole = chunk.with(group, witness(&shown));
         }
-        if whole.used() <= ROOM {
+        if whole.fits(most) {
             chunk = whole;
             continue;
         }
         for area in group {
             let next = chunk.with(core::slice::from_ref(area), witness(&shown));
-            if !chunk.is_empty() && next.used() > ROOM {
+            if !chunk.is_empty() && !next.fits(most) {
                 shown.extend(chunk.witnessed.iter().copied());
                 chunks.push(core::mem::replace(&mut chunk, Chunk::new(lrw)));
             }

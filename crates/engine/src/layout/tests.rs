@@ -17,7 +17,7 @@ fn spec(areas: Vec<AreaSpec>) -> DomainSpec {
 
 /// Two links, and datagrams of its own for each SubDevice.
 fn each(supervision: bool) -> Rules<'static> {
-    Rules { links: LinkSet::Ring, supervision, lrw: LrwPolicy::PerSubDevice, witnesses: &[] }
+    Rules { links: LinkSet::Ring, supervision, lrw: LrwPolicy::PerSubDevice, witnesses: &[], max_datagrams: None }
 }
 
 #[test]

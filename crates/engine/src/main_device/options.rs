@@ -8,6 +8,7 @@ use ringcat_wire::source_address::MacCodec;
 use crate::junction::JunctionMode;
 use crate::link::LinkSet;
 use crate::procedures::dictionary::ReadPdos;
+use crate::ring::MIN_DATAGRAMS_PER_FRAME;
 
 /// What a MainDevice needs to know before it sends its first frame.
 #[derive(Clone, Debug)]
@@ -36,6 +37,9 @@ pub struct Options {
     pub follow_groups: bool,
     /// Whether the redundant link may be taken down for a moment to find out where a line is crossed.
     pub enhanced_line_crossed: bool,
+    /// Datagrams that a frame may hold, cyclic and acyclic; `None`: as many as fit. For segments behind gateways, and
+    /// simulators, that take fewer (often 15). Less than [`MIN_DATAGRAMS_PER_FRAME`] counts as that.
+    pub max_datagrams_per_frame: Option<u16>,
 }
 
 impl Options {
@@ -53,7 +57,13 @@ impl Options {
             junctions: JunctionMode::Disabled,
             follow_groups: true,
             enhanced_line_crossed: false,
+            max_datagrams_per_frame: None,
         }
+    }
+
+    /// Datagrams that a frame may hold.
+    pub(super) fn most_datagrams(&self) -> Option<usize> {
+        self.max_datagrams_per_frame.map(|most| usize::from(most.max(MIN_DATAGRAMS_PER_FRAME)))
     }
 
     /// Which links these are.

@@ -295,6 +295,8 @@ pub struct SharedFleet {
     news: Rc<Cell<u32>>,
     /// The redundant link is down on our own order.
     controlled_break: Rc<Cell<bool>>,
+    /// It was told how many datagrams a frame may hold.
+    frame_limit_told: Rc<Cell<bool>>,
     /// Looks into rings behind junctions.
     inside: Rc<Inside>,
     /// Who takes part in process data.
@@ -321,6 +323,7 @@ impl SharedFleet {
             fleet: Rc::new(RefCell::new(fleet)),
             news: Rc::default(),
             controlled_break: Rc::default(),
+            frame_limit_told: Rc::default(),
             inside: Rc::default(),
             board,
             clocks,
@@ -340,6 +343,16 @@ impl SharedFleet {
     /// Whether a ring that opens does so on our own order.
     pub(super) fn is_controlled_break(&self) -> bool {
         self.controlled_break.get()
+    }
+
+    /// Whether it was told how many datagrams a frame may hold.
+    pub(super) fn is_frame_limit_told(&self) -> bool {
+        self.frame_limit_told.get()
+    }
+
+    /// It is being told.
+    pub(super) fn tell_frame_limit(&self) {
+        self.frame_limit_told.set(true);
     }
 
     /// From now on SubDevices are put out of reach on purpose.

@@ -12,6 +12,7 @@ use ringcat_wire::al::{AlState, AlStatus, AlStatusCode};
 use super::al_state;
 use super::configure::{BringUp, ConfigureError, RegisterFailure, Start, StartupError};
 use super::fleet::{Phase, SharedFleet};
+use super::frame_limit;
 use super::sii;
 use super::strangers::take_away;
 use crate::event::Event;
@@ -61,6 +62,7 @@ pub(super) async fn keep_up(bus: Bus, fleet: SharedFleet, index: usize, start: S
                     bus.sleep(LOOK_PAUSE).await;
                     continue;
                 }
+                frame_limit::explain(&bus, &fleet).await;
                 bus.report(failure(index, &error));
             }
             Err(error) => bus.report(failure(index, &error)),

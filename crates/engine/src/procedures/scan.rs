@@ -27,6 +27,7 @@ pub use self::error::ScanError;
 use super::al_state;
 use super::cabling::{Cabling, Known, cabling, is_swapped, stays_closed};
 use super::dictionary::{ReadPdos, complete};
+use super::frame_limit::probe;
 use super::junction::learn;
 use super::sii::{self, SiiCache, SiiContents};
 use crate::config::duplicate_aliases;
@@ -100,6 +101,10 @@ pub async fn scan(bus: &Bus, options: &ScanOptions) -> Result<Scan, ScanError> {
                 return Ok(scan);
             }
             Err(Failure::Unsettled(now)) => {
+                // SubDevices that appear or go are counted; none at all where there were some is another matter.
+                if now.is_none_or(|now| now.total() == 0) {
+                    explain(bus).await?;
+                }
                 if bus.now().since(begin) >= options.patience {
                     let total = |count: Option<Count>| count.map_or(0, |count| count.total() as u16);
                     return Err(ScanError::Unsettled { counts: [total(Some(expected)), total(now)] });
@@ -109,13 +114,21 @@ pub async fn scan(bus: &Bus, options: &ScanOptions) -> Result<Scan, ScanError> {
                     None => count::first(bus, options, begin).await?,
                 }
             }
-            Err(Failure::Scan(error)) if error.is_passing() && attempts < ATTEMPTS => {
+            Err(Failure::Scan(error)) => {
+                explain(bus).await?;
+                if !error.is_passing() || attempts >= ATTEMPTS {
+                    return Err(error);
+                }
                 attempts += 1;
                 count::first(bus, options, bus.now()).await?
             }
-            Err(Failure::Scan(error)) => return Err(error),
         }
     }
+}
+
+/// What did not come back may have been too much for a frame of this segment.
+async fn explain(bus: &Bus) -> Result<(), ScanError> {
+    probe(bus).await.map_or(Ok(()), |limit| Err(ScanError::FrameLimit(limit)))
 }
 
 /// Why an attempt to scan came to nothing.

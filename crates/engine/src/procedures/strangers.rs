@@ -27,6 +27,7 @@ pub(crate) use self::owners::Owners;
 use self::owners::{owners_of, ranks};
 use super::configure::Start;
 use super::fleet::{Fleet, Phase, Setup, SharedFleet};
+use super::frame_limit;
 use super::recover::start;
 use super::scan::{ScanError, read_one};
 use crate::config::ConfigAddress;
@@ -43,6 +44,8 @@ const LONGEST_PAUSE: Duration = Duration::from_secs(5);
 const HOLD: Duration = Duration::from_secs(1);
 /// Searches without success in a row before that is reported.
 const PATIENCE: u32 = 100;
+/// Searches without success in a row before it is tried whether frames hold too many datagrams.
+const DOUBT: u32 = 3;
 /// Failures of the bus in a row before they are reported.
 const BUS_PATIENCE: u32 = 3;
 
@@ -130,6 +133,9 @@ impl Search {
             return true;
         }
         self.failures = self.failures.saturating_add(1);
+        if self.failures == DOUBT {
+            frame_limit::explain(bus, fleet).await;
+        }
         if self.failures == PATIENCE {
             bus.report(Event::ScanFailed { reason });
         }

@@ -19,6 +19,7 @@ use super::cabling::CablingWatch;
 use super::configure::Start;
 use super::error_watch::watch_errors;
 use super::fleet::{Phase, SharedFleet};
+use super::frame_limit;
 use super::inspect::{Look, is_broken, locate_breaks, look_at_all, look_at_strangers};
 use super::junction::{JunctionWatch, note_controls, watch_blocked};
 use super::recover::{lose, start, welcome};
@@ -49,6 +50,9 @@ const BREAK_LOOK_PAUSE: Duration = Duration::from_millis(10);
 const FIRST_BREAK_LOOKS: u8 = 5;
 const FIRST_BREAK_LOOK_PAUSE: Duration = Duration::from_millis(1);
 
+/// Checks in a row in which frames of looks were lost again and again, before it is tried whether they hold too many
+/// datagrams.
+const BLIND_CHECKS: u8 = 2;
 /// A supervision result that so many came before since a look ended was not out when somebody was looked at.
 const SURELY_LATER: u32 = 8;
 /// Looks in a row because of a request that stands.
@@ -82,6 +86,7 @@ pub(crate) async fn supervise(bus: Bus, fleet: SharedFleet, enhanced_line_crosse
         seen_reported: RingState::Unknown,
         break_looks: 0,
         breaks: Vec::new(),
+        blind: 0,
         next_routine: Instant::default(),
         is_awaited: false,
         is_routine: false,
@@ -121,6 +126,8 @@ struct Watch {
     break_looks: u8,
     /// Broken cables of the open ring that were told.
     breaks: Vec<Cable>,
+    /// Checks in a row in which looks were lost.
+    blind: u8,
     next_routine: Instant,
     /// The next check was asked for before its time.
     is_awaited: bool,
@@ -198,6 +205,11 @@ impl Watch {
             return self.again_in(SECOND_LOOK_PAUSE);
         }
         let Some((_, seen)) = self.fleet.board.supervision() else { return };
+        // Frames of process data come back, those of looks do not.
+        self.blind = if seen.returned && looks.contains(&Look::Unknown) { self.blind.saturating_add(1) } else { 0 };
+        if self.blind == BLIND_CHECKS {
+            frame_limit::explain(&self.bus, &self.fleet).await;
+        }
         let (count, answering) = (usize::from(seen.total().0), answers(&looks) + stranger_answers);
         // When the count and the answers agree, a silent SubDevice is certainly not there.
         let needed = if count == answering { 1 } else { SILENT_LOOKS };

@@ -228,6 +228,22 @@ impl Bus {
         self.submit(Request { expected: Some(Wkc(1)), ..Request::once(command, target, data) })
     }
 
+    /// So many datagrams that read one byte of a register of all SubDevices, once, in a frame that holds nothing else. The
+    /// reply is that of the last one.
+    pub(crate) fn fill_frame(
+        &self,
+        register: RegisterAddress,
+        datagrams: usize,
+    ) -> impl Future<Output = Result<Reply, BusError>> {
+        let before = datagrams.saturating_sub(1);
+        self.submit(Request { before, ..Request::once(Command::Brd, Target::Broadcast(register), vec![0; 1]) })
+    }
+
+    /// How many datagrams a frame may hold as this MainDevice was told.
+    pub(crate) fn max_datagrams(&self) -> usize {
+        self.shared.borrow().max_datagrams
+    }
+
     /// A datagram of the application's own: its answer is that of all copies, whatever its working counter. Where it may
     /// be sent again when its frame is lost, `resend` says so.
     pub fn datagram(

@@ -5,8 +5,9 @@ use alloc::vec;
 use alloc::vec::Vec;
 use core::time::Duration;
 
+use ringcat_wire::address::Wkc;
 use ringcat_wire::command::Command;
-use ringcat_wire::datagram::{HEADER_LEN, OVERHEAD};
+use ringcat_wire::datagram::HEADER_LEN;
 use ringcat_wire::frame::{FrameBuilder, MAX_FRAME, MIN_FRAME, MacAddress};
 
 use super::Received;
@@ -151,7 +152,7 @@ impl Shared {
         let length = {
             let source = self.identity.source();
             let mut builder = FrameBuilder::ethernet(&mut flight.bytes, MacAddress::ETHERCAT_GROUP, source)?;
-            let mut total = DATAGRAMS_AT;
+            let (mut total, mut datagrams, mut is_alone) = (DATAGRAMS_AT, 0, false);
             let reads = self.outbox.may_read(self.now);
             while let Some((id, rank)) = self.outbox.front(reads, self.now) {
                 let Some(transfer) = self.transfers.find(id) else {
@@ -164,8 +165,11 @@ impl Shared {
                     continue;
                 }
                 let request = &transfer.request;
-                let lead = request.lead.as_ref().map_or(0, |(_, _, data)| OVERHEAD + data.len());
-                let bytes = lead + OVERHEAD + request.data.len();
+                let bytes = request.bytes();
+                let fills_up = is_alone || request.before > 0 || datagrams + request.datagrams() > self.max_datagrams;
+                if fills_up && !flight.places.is_empty() {
+                    break;
+                }
                 // Only the first datagram of a frame may be longer than the window.
                 if (total + bytes).max(MIN_FRAME) > limit
                     && (!flight.places.is_empty() || !Shared::is_starved(&mut self.blocked, id, self.now))
@@ -179,6 +183,10 @@ impl Shared {
                         data.copy_from_slice(lead);
                     }
                 }
+                is_alone = request.before > 0;
+                for _ in 0..request.before {
+                    builder.datagram(request.command, index, request.target, request.data.len());
+                }
                 let Some(data_at) = builder.datagram(request.command, index, request.target, request.data.len()) else {
                     break;
                 };
@@ -186,6 +194,7 @@ impl Shared {
                     data.copy_from_slice(&request.data);
                 }
                 total += bytes;
+                datagrams += request.datagrams();
                 retry = retry.max(transfer.retries);
                 flight.places.push(Place::new(id, request, data_at));
                 transfer.stage = Stage::InFlight;
@@ -280,8 +289,10 @@ impl Shared {
 
     /// A broadcast shows how many SubDevices the main copy meets (facts CR-09).
     fn learn_main_count(&mut self, flight: &Flight) {
-        let broadcast = flight.places.iter().rfind(|place| matches!(place.command, Command::Brd | Command::Bwr));
-        if let Some(place) = broadcast {
+        let is_broadcast = |place: &&Place| matches!(place.command, Command::Brd | Command::Bwr);
+        // One that no SubDevice has processed shows nothing.
+        let met = |place: &&Place| place.total() != Wkc(0);
+        if let Some(place) = flight.places.iter().rfind(is_broadcast).filter(met) {
             self.main_count = place.wkc[Link::Main.index()].0;
         }
     }

@@ -4,7 +4,7 @@ use alloc::collections::{BinaryHeap, VecDeque};
 use alloc::sync::Arc;
 use core::cmp::Reverse;
 
-use ringcat_wire::datagram::{MAX_DATA, OVERHEAD};
+use ringcat_wire::datagram::MAX_DATA;
 
 use super::bus::BusError;
 use super::counters::AcyclicCounters;
@@ -43,6 +43,8 @@ pub(crate) struct Shared {
     /// The first datagram of the outbox where it was too long for the send window, and since when.
     pub(crate) blocked: Option<(TransferId, Instant)>,
     pub(crate) link_order: LinkOrder,
+    /// Datagrams that a frame may hold.
+    pub(crate) max_datagrams: usize,
     pub(crate) current: TaskId,
     pub(crate) spawned: VecDeque<Task>,
     ready: VecDeque<TaskId>,
@@ -69,6 +71,7 @@ impl Shared {
             main_count: 0,
             blocked: None,
             link_order: LinkOrder::default(),
+            max_datagrams: usize::MAX,
             current: TaskId(0),
             spawned: VecDeque::new(),
             ready: VecDeque::new(),
@@ -123,7 +126,7 @@ impl Shared {
             if fits { Stage::Queued } else { Stage::Done(Err(BusError::TooLong { target: request.target, length })) };
         let rank = if request.mail.is_some() { Rank::Read } else { Rank::First };
         let target = request.target;
-        let bytes = OVERHEAD + length + request.lead.as_ref().map_or(0, |(_, _, data)| OVERHEAD + data.len());
+        let bytes = request.bytes();
         let id = self.transfers.insert(Transfer { request, stage, task: self.current, retries: 0, abandoned: false });
         if fits {
             self.outbox.push(id, rank, target, bytes, self.now);

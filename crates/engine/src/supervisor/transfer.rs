@@ -29,6 +29,8 @@ pub(crate) struct Request {
     pub lead: Option<(Command, Target, Vec<u8>)>,
     /// A read of this SubDevice's mailbox: what each copy reads matters, also when it comes late.
     pub mail: Option<StationAddress>,
+    /// So many more of the same go before it, in a frame that holds nothing else.
+    pub before: usize,
 }
 
 impl Request {
@@ -44,7 +46,19 @@ impl Request {
             resend: false,
             lead: None,
             mail: None,
+            before: 0,
         }
+    }
+
+    /// Datagrams that it takes.
+    pub(super) fn datagrams(&self) -> usize {
+        1 + usize::from(self.lead.is_some()) + self.before
+    }
+
+    /// Bytes of a frame that it takes.
+    pub(super) fn bytes(&self) -> usize {
+        let lead = self.lead.as_ref().map_or(0, |(_, _, data)| OVERHEAD + data.len());
+        lead + (1 + self.before) * (OVERHEAD + self.data.len())
     }
 
     /// A read of the SubDevice that ARMW and FRMW address: which copy meets it, their own working counters do not tell,
@@ -88,11 +102,7 @@ pub(crate) struct Transfer {
 impl Transfer {
     /// A datagram to nobody.
     pub(crate) fn for_test() -> Transfer {
-        let (command, target) = (Command::Nop, Target::None);
-        let (redundant, expected, resend, lead, mail) = (None, None, false, None, None);
-        let redundant_station = None;
-        let request =
-            Request { command, target, data: Vec::new(), redundant, redundant_station, expected, resend, lead, mail };
+        let request = Request::once(Command::Nop, Target::None, Vec::new());
         Transfer { request, stage: Stage::Queued, task: TaskId(0), retries: 0, abandoned: false }
     }
 }

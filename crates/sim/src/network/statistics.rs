@@ -9,6 +9,8 @@ pub enum LossCause {
     NoCarrier,
     /// It was longer than an interface sends.
     Oversized,
+    /// It held more datagrams than the segment takes ([`NetworkOptions::max_datagrams`](super::NetworkOptions::max_datagrams)).
+    TooManyDatagrams,
     /// The transmit queue of the interface was full.
     TransmitQueueFull,
     /// The cable was cut, or an end of it had no power, while the frame was on it.
@@ -33,9 +35,10 @@ pub enum LossCause {
 
 impl LossCause {
     /// All causes.
-    pub const ALL: [LossCause; 12] = [
+    pub const ALL: [LossCause; 13] = [
         LossCause::NoCarrier,
         LossCause::Oversized,
+        LossCause::TooManyDatagrams,
         LossCause::TransmitQueueFull,
         LossCause::DeadCable,
         LossCause::OpenPort,

@@ -6,7 +6,7 @@ use ringcat_wire::frame::{BYTE_TIME_NS, MAX_FRAME_VLAN, MIN_FRAME};
 
 use super::route::leaves_ways;
 use super::statistics::LossCause;
-use super::{Event, Network, Slot};
+use super::{Beyond, Event, Network, Slot};
 use crate::cable::{Endpoint, Fate, HostLink, LegFaults, LegId};
 use crate::controller::Passage;
 use crate::frame::{Fcs, Port, SimFrame};
@@ -35,6 +35,14 @@ impl Network {
             return self.statistics.lose(LossCause::NoCarrier);
         };
         let slot = self.frames.put(bytes);
+        if let Some(limit) = self.options.max_datagrams
+            && self.frames.frame(slot).datagrams.len() > usize::from(limit.datagrams)
+        {
+            match limit.beyond {
+                Beyond::Unprocessed => self.frames.frame_mut(slot).process_at_most(usize::from(limit.datagrams)),
+                Beyond::Dropped => return self.lose(slot, LossCause::TooManyDatagrams),
+            }
+        }
         let Some(last_bit) = self.hosts[link as usize].transmit(self.now, self.frames.frame(slot)) else {
             return self.lose(slot, LossCause::TransmitQueueFull);
         };
@@ -172,7 +180,9 @@ impl Network {
         }
         // The bit may be one of a datagram's length: the datagrams have to be found anew.
         let fcs = if frame.fcs == Fcs::Good { Fcs::Bad } else { frame.fcs };
+        let most = frame.most_datagrams;
         *frame = SimFrame { fcs, ..SimFrame::new(frame.id, bytes) };
+        frame.process_at_most(most);
     }
 
     fn lose(&mut self, slot: Slot, cause: LossCause) {

@@ -7,7 +7,7 @@ use serde::Deserialize;
 use toml::{Spanned, Table, Value};
 
 use super::SegmentError;
-use crate::network::NetworkOptions;
+use crate::network::{Beyond, DatagramLimit, NetworkOptions};
 
 /// A whole file.
 #[derive(Debug, Deserialize)]
@@ -34,6 +34,8 @@ pub(super) struct Options {
     hop_ns: Option<u64>,
     processing_ns: Option<u64>,
     forwarding_ns: Option<u64>,
+    max_datagrams: Option<Spanned<u16>>,
+    more_datagrams: Option<Spanned<String>>,
 }
 
 /// One table of `[[device]]`.
@@ -126,7 +128,32 @@ impl File {
         if let Some(forwarding) = given.forwarding_ns {
             options.forwarding_delay = Duration::from_nanos(forwarding);
         }
+        options.max_datagrams = given.datagram_limit(text)?;
         Ok(options)
+    }
+}
+
+impl Options {
+    /// How many datagrams a frame may hold, and what becomes of more.
+    fn datagram_limit(&self, text: &str) -> Result<Option<DatagramLimit>, SegmentError> {
+        let wrong = |span, message: &str| Err(SegmentError::new(message).at_line(line(text, &span)));
+        let beyond = match &self.more_datagrams {
+            None => Beyond::Unprocessed,
+            Some(name) => match name.get_ref().as_str() {
+                "unprocessed" => Beyond::Unprocessed,
+                "dropped" => Beyond::Dropped,
+                other => {
+                    let message = format!("more_datagrams: expected \"unprocessed\" or \"dropped\", got \"{other}\"");
+                    return wrong(name.span(), &message);
+                }
+            },
+        };
+        match (&self.max_datagrams, &self.more_datagrams) {
+            (Some(most), _) if *most.get_ref() == 0 => wrong(most.span(), "max_datagrams: expected 1 or more, got 0"),
+            (Some(most), _) => Ok(Some(DatagramLimit { datagrams: *most.get_ref(), beyond })),
+            (None, Some(more)) => wrong(more.span(), "more_datagrams: expected max_datagrams beside it"),
+            (None, None) => Ok(None),
+        }
     }
 }
 

@@ -4,7 +4,7 @@ use super::*;
 use crate::cable::{DeviceIndex, Endpoint, HostLink};
 use crate::description::EoeEnd;
 use crate::frame::Port;
-use crate::network::Network;
+use crate::network::{Beyond, DatagramLimit, Network};
 
 fn read(text: &str) -> Result<Segment, SegmentError> {
     Segment::from_toml(text, Path::new("nowhere"))
@@ -353,4 +353,28 @@ fn what_is_not_ideal_about_a_clock_is_written_in_the_file() {
     assert!(wrong("clock_bits = 48").contains("expected 0, 32 or 64, got 48"));
     assert!(wrong("wander_ppm = 20000").contains("wander_ppm"));
     assert!(read("[[device]]\ntype = \"servo\"\nclock_bits = 0").unwrap().devices[0].dc.is_none());
+}
+
+#[test]
+fn how_many_datagrams_a_frame_may_hold_is_written_in_the_file() {
+    let limit = |keys: &str| {
+        let text = format!("[segment]\n{keys}\n[[device]]\ntype = \"coupler\"\n");
+        read(&text).map(|segment| segment.options.max_datagrams).map_err(|error| error.to_string())
+    };
+    let of = |datagrams, beyond| Ok(Some(DatagramLimit { datagrams, beyond }));
+    assert_eq!(limit(""), Ok(None));
+    assert_eq!(limit("max_datagrams = 15"), of(15, Beyond::Unprocessed));
+    assert_eq!(limit("max_datagrams = 15\nmore_datagrams = \"unprocessed\""), of(15, Beyond::Unprocessed));
+    assert_eq!(limit("max_datagrams = 3\nmore_datagrams = \"dropped\""), of(3, Beyond::Dropped));
+    for (keys, expected) in [
+        ("max_datagrams = 0", "2: max_datagrams: expected 1 or more, got 0"),
+        (
+            "max_datagrams = 5\nmore_datagrams = \"cut\"",
+            "3: more_datagrams: expected \"unprocessed\" or \"dropped\", got",
+        ),
+        ("more_datagrams = \"dropped\"", "2: more_datagrams: expected max_datagrams beside it"),
+    ] {
+        let message = limit(keys).expect_err(keys);
+        assert!(message.contains(expected), "{message}");
+    }
 }

@@ -6,6 +6,7 @@ use ringcat_wire::address::Position;
 
 use super::MAX_SUBDEVICES;
 use crate::procedures::sii::SiiReadError;
+use crate::ring::FrameLimit;
 use crate::supervisor::BusError;
 
 /// Why a scan ended without a result.
@@ -27,6 +28,8 @@ pub enum ScanError {
         /// And at the end.
         after: (u16, u16),
     },
+    /// Frames with as many datagrams as fit do not bring them back processed.
+    FrameLimit(FrameLimit),
     /// More SubDevices than station addresses.
     TooMany {
         /// SubDevices counted.
@@ -59,6 +62,7 @@ impl fmt::Display for ScanError {
                  {} and {}",
                 before.0, before.1, after.0, after.1
             ),
+            ScanError::FrameLimit(limit) => limit.fmt(f),
             ScanError::TooMany { count } => write!(f, "{count} SubDevices, at most {MAX_SUBDEVICES} are possible"),
             ScanError::Bus(error) => error.fmt(f),
             ScanError::Sii { position, error } => write!(f, "SubDevice at position {position}: {error}"),
@@ -80,9 +84,11 @@ impl ScanError {
         match self {
             ScanError::Bus(_) | ScanError::Changed { .. } => true,
             ScanError::Sii { error, .. } => error.is_passing(),
-            ScanError::NoSubDevices | ScanError::NoAnswer | ScanError::Unsettled { .. } | ScanError::TooMany { .. } => {
-                false
-            }
+            ScanError::NoSubDevices
+            | ScanError::NoAnswer
+            | ScanError::Unsettled { .. }
+            | ScanError::FrameLimit(_)
+            | ScanError::TooMany { .. } => false,
         }
     }
 }
