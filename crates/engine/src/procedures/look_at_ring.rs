@@ -7,7 +7,7 @@ use ringcat_wire::address::{Position, StationAddress};
 use ringcat_wire::al::AlStatus;
 use ringcat_wire::register::{DlStatus, ErrorCounters, Information, map};
 
-use super::scan::ScanError;
+use super::scan::{ScanError, explain};
 use crate::link::LinkSet;
 use crate::ring::RingState;
 use crate::ring_status::{Cable, CableErrors, cables, port_errors};
@@ -51,7 +51,13 @@ pub async fn look_at_ring(bus: Bus) -> Result<RingLook, ScanError> {
     let mut statuses = Vec::with_capacity(looks.len());
     let (mut stations, mut states, mut counters) = (Vec::new(), Vec::new(), Vec::new());
     for look in looks {
-        let (station, status, state, counted) = look.map_err(ScanError::Bus)?;
+        let (station, status, state, counted) = match look {
+            Ok(seen) => seen,
+            Err(error) => {
+                explain(&bus).await?;
+                return Err(ScanError::Bus(error));
+            }
+        };
         stations.push(station);
         statuses.push(status);
         states.push(state);

@@ -127,7 +127,7 @@ pub async fn scan(bus: &Bus, options: &ScanOptions) -> Result<Scan, ScanError> {
 }
 
 /// What did not come back may have been too much for a frame of this segment.
-async fn explain(bus: &Bus) -> Result<(), ScanError> {
+pub(super) async fn explain(bus: &Bus) -> Result<(), ScanError> {
     probe(bus).await.map_or(Ok(()), |limit| Err(ScanError::FrameLimit(limit)))
 }
 

@@ -72,6 +72,20 @@ fn a_scan_that_fails_for_too_many_datagrams_says_how_many_to_set() {
 }
 
 #[test]
+fn a_look_at_the_ring_that_fails_for_too_many_datagrams_says_so() {
+    for beyond in BOTH {
+        let look = |options: &Options| {
+            let mut tap = Tap::new(limited(12, true, 15, beyond));
+            tap.set_limit(tap.now() + Duration::from_secs(20));
+            MainDevice::request(tap, options).look_at_ring()
+        };
+        let error = look(&Options::default()).expect_err("more than 15 in a frame").to_string();
+        assert!(error.contains("set max_datagrams_per_frame to 15"), "{error}");
+        assert_eq!(look(&told(15)).expect("it is whole").counts, (12, 0));
+    }
+}
+
+#[test]
 fn a_limit_that_was_set_too_high_is_said_too() {
     for beyond in BOTH {
         let error = scan(limited(40, false, 15, beyond), &told(16)).expect_err("one too many");
