@@ -24,6 +24,7 @@ use crate::layout::Layout;
 use crate::mail::Mailbox;
 use crate::plan::{self, AreaPlan, PlanError, SubDevicePlan};
 use crate::ring_status::{Cable, CableErrors, Occupant, RingStatus};
+use crate::time::Instant;
 use crate::topology::{NodeStatus, Topology};
 
 /// How far a SubDevice is.
@@ -295,8 +296,8 @@ pub struct SharedFleet {
     news: Rc<Cell<u32>>,
     /// The redundant link is down on our own order.
     controlled_break: Rc<Cell<bool>>,
-    /// It was told how many datagrams a frame may hold.
-    frame_limit_told: Rc<Cell<bool>>,
+    /// Before then it is not tried how many datagrams a frame may hold.
+    next_frame_trial: Rc<Cell<Instant>>,
     /// Looks into rings behind junctions.
     inside: Rc<Inside>,
     /// Who takes part in process data.
@@ -323,7 +324,7 @@ impl SharedFleet {
             fleet: Rc::new(RefCell::new(fleet)),
             news: Rc::default(),
             controlled_break: Rc::default(),
-            frame_limit_told: Rc::default(),
+            next_frame_trial: Rc::default(),
             inside: Rc::default(),
             board,
             clocks,
@@ -345,14 +346,14 @@ impl SharedFleet {
         self.controlled_break.get()
     }
 
-    /// Whether it was told how many datagrams a frame may hold.
-    pub(super) fn is_frame_limit_told(&self) -> bool {
-        self.frame_limit_told.get()
+    /// Before when it is not tried how many datagrams a frame may hold.
+    pub(super) fn next_frame_trial(&self) -> Instant {
+        self.next_frame_trial.get()
     }
 
-    /// It is being told.
-    pub(super) fn tell_frame_limit(&self) {
-        self.frame_limit_told.set(true);
+    /// It is not tried again before then.
+    pub(super) fn set_next_frame_trial(&self, at: Instant) {
+        self.next_frame_trial.set(at);
     }
 
     /// From now on SubDevices are put out of reach on purpose.

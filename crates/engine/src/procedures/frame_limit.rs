@@ -5,6 +5,8 @@
 //! explained by trying: a frame of many reads of one byte, which any SubDevice answers, and then the number in the middle
 //! between one that works and one that does not.
 
+use core::time::Duration;
+
 use ringcat_wire::address::Wkc;
 use ringcat_wire::register::map;
 
@@ -12,11 +14,15 @@ use super::fleet::SharedFleet;
 use crate::event::Event;
 use crate::ring::FrameLimit;
 use crate::supervisor::{Bus, BusError};
+use crate::time::Instant;
 
 /// Most datagrams that are tried: a byte of data each, they nearly fill a frame.
 const MOST: usize = 110;
 /// A frame that is lost so often in a row is not lost by chance.
 const TRIES: u8 = 3;
+
+/// Between two trials in operation.
+const PAUSE: Duration = Duration::from_secs(10);
 
 /// What came of a frame.
 #[derive(Clone, Copy, PartialEq, Eq)]
@@ -61,13 +67,16 @@ async fn attempt(bus: &Bus, datagrams: usize) -> Outcome {
     Outcome::Lost
 }
 
-/// In operation: has the limit told, once, where there is one.
+/// In operation: has the limit told, once, where there is one. Long frames delay a cycle, so it is tried now and then only,
+/// whatever else disturbs the segment.
 pub(super) async fn explain(bus: &Bus, fleet: &SharedFleet) {
-    if fleet.is_frame_limit_told() {
+    if bus.now() < fleet.next_frame_trial() {
         return;
     }
+    // At once: the procedure that asks may end before it is answered.
+    fleet.set_next_frame_trial(bus.now() + PAUSE);
     if let Some(limit) = probe(bus).await {
-        fleet.tell_frame_limit();
+        fleet.set_next_frame_trial(Instant::NEVER);
         bus.report(Event::FrameLimit { limit });
     }
 }
