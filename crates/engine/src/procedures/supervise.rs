@@ -11,7 +11,7 @@ use alloc::vec::Vec;
 use core::cell::Cell;
 use core::time::Duration;
 
-use ringcat_wire::address::StationAddress;
+use ringcat_wire::address::{StationAddress, Wkc};
 use ringcat_wire::al::{AlStatus, AlStatusCode};
 use ringcat_wire::register::{DlStatus, EcatEvent, map};
 
@@ -50,8 +50,8 @@ const BREAK_LOOK_PAUSE: Duration = Duration::from_millis(10);
 const FIRST_BREAK_LOOKS: u8 = 5;
 const FIRST_BREAK_LOOK_PAUSE: Duration = Duration::from_millis(1);
 
-/// Checks in a row in which frames of looks were lost again and again, before it is tried whether they hold too many
-/// datagrams.
+/// Checks in a row in which looks do not come back though process data does, or the other way round, before it is tried
+/// whether frames hold too many datagrams.
 const BLIND_CHECKS: u8 = 2;
 /// A supervision result that so many came before since a look ended was not out when somebody was looked at.
 const SURELY_LATER: u32 = 8;
@@ -204,12 +204,17 @@ impl Watch {
             // Some were out of reach on purpose meanwhile.
             return self.again_in(SECOND_LOOK_PAUSE);
         }
-        let Some((_, seen)) = self.fleet.board.supervision() else { return };
-        // Frames of process data come back, those of looks do not.
-        self.blind = if seen.returned && looks.contains(&Look::Unknown) { self.blind.saturating_add(1) } else { 0 };
+        let supervision = self.fleet.board.supervision();
+        // Either frames of looks do not come back though SubDevices process those of the exchange, or the other way round.
+        let is_blind = match supervision {
+            Some((_, seen)) if seen.total() != Wkc(0) => looks.contains(&Look::Unknown),
+            Some(_) | None => answers(&looks) > 0,
+        };
+        self.blind = if is_blind { self.blind.saturating_add(1) } else { 0 };
         if self.blind == BLIND_CHECKS {
             frame_limit::explain(&self.bus, &self.fleet).await;
         }
+        let Some((_, seen)) = supervision else { return };
         let (count, answering) = (usize::from(seen.total().0), answers(&looks) + stranger_answers);
         // When the count and the answers agree, a silent SubDevice is certainly not there.
         let needed = if count == answering { 1 } else { SILENT_LOOKS };
