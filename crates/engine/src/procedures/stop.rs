@@ -22,6 +22,8 @@ use crate::time::Instant;
 const PAUSE: Duration = Duration::from_millis(1);
 /// A SubDevice that is silent so many times in a row is not there: at the edge of a cut a copy may have met none.
 const SILENT_LOOKS: u8 = 3;
+/// Pause between two of them: ends of a cable may notice late that it is cut.
+const SILENT_PAUSE: Duration = Duration::from_millis(10);
 /// From a request until one that shows an error is asked again: applications take milliseconds to clear it.
 const ASKED_AGAIN: Duration = Duration::from_millis(20);
 
@@ -90,7 +92,7 @@ pub(crate) fn all_known(fleet: &Fleet) -> Vec<Led> {
 }
 
 /// Takes SubDevices to a state that lies below the one they are in. Those that are in a lower one stay there, and so do those
-/// in BOOT, unless INIT is asked for. Without any that is known, asking all at once is what is left.
+/// in BOOT, unless INIT is asked for. Where none is known, only INIT is asked for, of all at once.
 pub(crate) async fn stop(bus: &Bus, led: Vec<Led>, state: AlState, limit: Duration) -> Result<(), StopError> {
     let until = bus.now() + limit;
     if state == AlState::Init {
@@ -155,6 +157,7 @@ async fn lead(bus: &Bus, station: StationAddress, state: AlState, until: Instant
                 if silent >= SILENT_LOOKS {
                     return End::Silent;
                 }
+                bus.sleep(SILENT_PAUSE).await;
             }
             Err(error) => return End::Failed(error),
         }
