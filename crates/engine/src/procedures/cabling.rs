@@ -61,6 +61,8 @@ pub(super) trait Known {
     fn closings(&self, stations: &[StationAddress]) -> Vec<Closing>;
     /// Of all of these it is known who they are.
     fn are_known(&self, stations: &[StationAddress]) -> bool;
+    /// Ports were read: those that have changed in between have told it to this look.
+    fn note_look(&self);
 }
 
 /// What a look at the segment shows.
@@ -127,6 +129,7 @@ async fn look_often(bus: &Bus, known: &impl Known, told: &Cabling) -> Option<Cab
             bus.sleep(PAUSE).await;
         }
         let found = look(bus, known).await.ok().flatten();
+        known.note_look();
         if found.as_ref().is_some_and(|found| found.says_the_same_as(told) || before.as_ref() == Some(found)) {
             return found;
         }
@@ -362,6 +365,10 @@ fn tell(bus: &Bus, fleet: &SharedFleet, found: &Cabling, told: &Cabling) {
 }
 
 impl Known for SharedFleet {
+    fn note_look(&self) {
+        self.note_news();
+    }
+
     fn ports(&self, station: StationAddress) -> [PortKind; 4] {
         let access = self.access();
         let member = access.members.iter().find(|member| member.station == station);

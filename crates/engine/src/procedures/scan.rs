@@ -416,6 +416,8 @@ async fn locate_crossings(bus: &Bus, scan: &mut Scan) -> bool {
 }
 
 impl Known for Scan {
+    fn note_look(&self) {}
+
     fn ports(&self, station: StationAddress) -> [PortKind; 4] {
         let info = self.subdevices.iter().find(|info| info.station == station);
         info.map(|info| info.controller.ports).unwrap_or_default()
