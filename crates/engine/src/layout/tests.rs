@@ -66,7 +66,7 @@ fn one_lrw_per_subdevice_is_allowed_on_two_links_facts_9_2_2() {
 fn witnessed(witnesses: &[Witness], links: LinkSet) -> PlannedFrame {
     let pair = |n: usize| [area(n, 2, Direction::Outputs, 2), area(n, 3, Direction::Inputs, 2)];
     let areas: Vec<_> = (0..witnesses.len()).flat_map(pair).collect();
-    let rules = Rules { links, supervision: false, lrw: LrwPolicy::Automatic, witnesses };
+    let rules = Rules { links, supervision: false, lrw: LrwPolicy::Automatic, witnesses, max_datagrams: None };
     let layout = Layout::with(&[spec(areas)], rules).unwrap();
     assert_eq!(layout.domains[0].frames.len(), 1);
     layout.domains[0].frames[0].clone()
@@ -151,7 +151,7 @@ proptest! {
             witnesses.push(if *alone { Witness::Alone } else { MAPPED });
         }
         let links = if ring { LinkSet::Ring } else { LinkSet::Single };
-        let rules = Rules { links, supervision: true, lrw: LrwPolicy::Automatic, witnesses: &witnesses };
+        let rules = Rules { witnesses: &witnesses, links, supervision: true, lrw: LrwPolicy::Automatic, max_datagrams: None };
         let layout = Layout::with(&[DomainSpec { lrw, ..spec(areas) }], rules).unwrap();
         let domain = &layout.domains[0];
         let mut end = 0;

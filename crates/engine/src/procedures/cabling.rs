@@ -63,6 +63,8 @@ pub(super) trait Known {
     fn are_known(&self, stations: &[StationAddress]) -> bool;
     /// Ports were read: those that have changed in between have told it to this look.
     fn note_look(&self);
+    /// Clocks are being measured, which need the receive times of their own frame.
+    fn are_measuring(&self) -> bool;
 }
 
 /// What a look at the segment shows.
@@ -127,6 +129,10 @@ async fn look_often(bus: &Bus, known: &impl Known, told: &Cabling) -> Option<Cab
     for attempt in 0..ATTEMPTS {
         if attempt > 0 {
             bus.sleep(PAUSE).await;
+        }
+        if known.are_measuring() {
+            before = None;
+            continue;
         }
         let found = look(bus, known).await.ok().flatten();
         known.note_look();
@@ -367,6 +373,10 @@ fn tell(bus: &Bus, fleet: &SharedFleet, found: &Cabling, told: &Cabling) {
 impl Known for SharedFleet {
     fn note_look(&self) {
         self.note_news();
+    }
+
+    fn are_measuring(&self) -> bool {
+        self.clocks.are_measuring()
     }
 
     fn ports(&self, station: StationAddress) -> [PortKind; 4] {

@@ -418,6 +418,10 @@ async fn locate_crossings(bus: &Bus, scan: &mut Scan) -> bool {
 impl Known for Scan {
     fn note_look(&self) {}
 
+    fn are_measuring(&self) -> bool {
+        false
+    }
+
     fn ports(&self, station: StationAddress) -> [PortKind; 4] {
         let info = self.subdevices.iter().find(|info| info.station == station);
         info.map(|info| info.controller.ports).unwrap_or_default()

@@ -87,7 +87,7 @@ fn run(seed: u64, course: Course) -> Vec<String> {
     let mut world =
         World::with(seed, network, &options, |scan| automatic(&scan.subdevices, CYCLE)).expect("activation");
     // Copies that are lost leave their own traces in the devices; what is fresh is the matter of others.
-    world.set_strict(false);
+    world.judge_latched(false);
     if course == Course::Scan {
         world.run_cycles(80);
     } else {

@@ -75,7 +75,8 @@ fn an_absent_subdevice_keeps_its_last_inputs_when_a_break_moves() {
     world.run_cycles(2);
     let exchange = world.application().exchange();
     let freshness: Vec<Freshness> = (0..4).map(|subdevice| exchange.freshness(DOMAIN, subdevice)).collect();
-    let of = |device: usize| (0..4).find(|it| world.device_of(*it) == Some(DeviceIndex(device))).expect("it was scanned");
+    let of =
+        |device: usize| (0..4).find(|it| world.device_of(*it) == Some(DeviceIndex(device))).expect("it was scanned");
     assert_eq!(freshness[of(0)], Freshness::Fresh);
     assert_ne!(freshness[of(2)], Freshness::Fresh, "it is not there");
     assert_eq!(exchange.image(DOMAIN), [0xAA; 3], "the absent one keeps its last value");
@@ -143,7 +144,8 @@ fn random_tree(dice: &mut Dice) -> (usize, Vec<(Endpoint, Endpoint)>) {
         free.extend([Port::B, Port::C, Port::D].map(|port| (device, port)));
     }
     if !dice.one_in(3) {
-        let (device, port) = free.iter().copied().rfind(|(device, _)| *device + 1 == count).expect("the last has free ports");
+        let (device, port) =
+            free.iter().copied().rfind(|(device, _)| *device + 1 == count).expect("the last has free ports");
         cables.push((at(device, port), REDUNDANT));
     }
     (count, cables)
@@ -235,7 +237,8 @@ fn run(seed: u64) -> u64 {
     let (network, cables) = random_segment(&mut dice);
     let under_way = 1 + dice.below(3) as u8;
     let declare = |scan: &ringcat::Scan| automatic(&scan.subdevices, CYCLE).with_under_way(under_way);
-    let mut world = World::with(seed, network, &junctions(), declare).unwrap_or_else(|error| panic!("seed {seed}: {error}"));
+    let mut world =
+        World::with(seed, network, &junctions(), declare).unwrap_or_else(|error| panic!("seed {seed}: {error}"));
     // What was latched last is judged elsewhere; here from the logs alone.
     world.judge_latched(false);
     world.settle();

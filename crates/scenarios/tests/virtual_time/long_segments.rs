@@ -43,9 +43,9 @@ fn declared(network: Network, clocks: bool) -> World {
     };
     let mut world = World::with(7, network, &Options::default(), declare).expect("it fits");
     // A drive that gets to OP while frames are on their way has other inputs than when they left.
-    world.set_strict(false);
+    world.judge_latched(false);
     world.settle();
-    world.set_strict(true);
+    world.judge_latched(true);
     world
 }
 
