@@ -15,7 +15,7 @@ use alloc::vec::Vec;
 use ringcat_wire::address::{Position, StationAddress};
 use ringcat_wire::register::{DlStatus, Features, Information, PortKind};
 use ringcat_wire::sii::{
-    CategoryKind, CoeDetails, DcMode, FmmuUsage, GeneralFlags, Identity, MailboxLayout, MailboxProtocols, SiiHeader,
+    Category, CoeDetails, DcMode, FmmuUsage, GeneralFlags, Identity, MailboxLayout, MailboxProtocols, SiiHeader,
     SiiSyncManager, SyncManagerKind,
 };
 
@@ -160,7 +160,7 @@ pub struct SubDeviceInfo {
     pub physical_ports: u16,
     /// Current from the EBUS in milliamperes; negative where it feeds.
     pub ebus_current_ma: i16,
-    /// SyncManagers, SM 0 first.
+    /// SyncManagers, SM 0 first. The type of one that the SII gives none is what its PDOs or its control byte say.
     pub sync_managers: Vec<SiiSyncManager>,
     /// What each FMMU is meant for, FMMU 0 first.
     pub fmmu_usages: Vec<FmmuUsage>,
@@ -175,15 +175,25 @@ pub struct SubDeviceInfo {
 }
 
 impl SubDeviceInfo {
-    /// Puts together what was read. `categories` are those that the scan fetched, in any order, each without its
-    /// header; a category that the image does not have is not there. Bytes that make no sense become warnings.
+    /// Puts together what was read. `categories` are those that the scan fetched, in any order; a category that the image
+    /// does not have is not there. Bytes that make no sense become warnings.
     pub fn from_parts<'a>(
         readout: Readout,
         header: &SiiHeader,
-        categories: impl IntoIterator<Item = (CategoryKind, &'a [u8])>,
+        categories: impl IntoIterator<Item = Category<'a>>,
     ) -> SubDeviceInfo {
         let parts: Vec<_> = categories.into_iter().collect();
         collect::collect(readout, header, &parts)
+    }
+
+    /// The EEPROM was never written, or does not give its contents: nothing is known of the SubDevice.
+    pub fn is_blank(&self) -> bool {
+        self.warnings.iter().any(|it| matches!(it.problem, SiiProblem::Blank | SiiProblem::Unreadable))
+    }
+
+    /// What the SII says cannot be trusted: it is blank, cut short, or its checksum is wrong.
+    pub fn is_doubtful(&self) -> bool {
+        self.warnings.iter().any(|warning| warning.problem.is_grave())
     }
 
     /// Takes over the PDOs that were read online when the same SubDevice was met before.

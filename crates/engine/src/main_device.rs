@@ -208,7 +208,7 @@ impl MainDevice {
         if clock_config.is_some() {
             layout.add_clocks().map_err(ActivateError::Layout)?;
         }
-        let members = members(&bus, declaration, found, &layout)?;
+        let members = members(&bus, declaration, found, &plans, &layout)?;
         let clocks = clocks_of(clock_config.clone(), &scan, &topology, &members);
         let directory = Directory::new(&plans, &layout);
         report_oddities(&bus, &members, &layout);
@@ -249,7 +249,7 @@ impl MainDevice {
                     sync_window_ns: config.sync_window_ns,
                 });
                 // Whoever answers while clocks are measured has not come back: its configuration begins afterwards.
-                for member in fleet.access().members.iter_mut().filter(|member| member.setup.is_some()) {
+                for member in fleet.access().members.iter_mut().filter(|member| member.is_there()) {
                     member.phase = Phase::Configuring;
                 }
                 let (bus, fleet) = (bus.clone(), fleet.clone());

@@ -21,7 +21,7 @@ use ringcat_wire::sii::{MailboxLayout, SyncManagerKind};
 use crate::config::{SdoDownload, SubDeviceConfig};
 use crate::info::{Direction, SubDeviceInfo};
 
-pub use error::{PlanError, PlanProblem, PlanWarning};
+pub use error::{PlanError, PlanFault, PlanProblem, PlanWarning};
 
 /// Control byte of the mailbox that the MainDevice writes, where the SII gives none (facts 3.11).
 const MAILBOX_OUT_CONTROL: u8 = 0x26;
@@ -124,12 +124,29 @@ impl SubDevicePlan {
     }
 }
 
-/// Plans one SubDevice. The error names SubDevice, SyncManager, PDO or object, what was expected and what came.
+/// Plans one SubDevice. The error names SubDevice, SyncManager, PDO or object, what was expected and what came, and whether
+/// declaration or SII have to be mended.
 pub fn plan(config: &SubDeviceConfig, info: &SubDeviceInfo) -> Result<SubDevicePlan, PlanError> {
-    plan_inner(config, info).map_err(|problem| PlanError { position: info.position, station: info.station, problem })
+    plan_inner(config, info).map_err(|problem| {
+        let fault = fault(config, info);
+        PlanError { position: info.position, station: info.station, problem, fault }
+    })
+}
+
+/// Where a file declares the SyncManagers the SII has no part in it. Otherwise it is the SII where that alone does not do
+/// either, or is not what its maker wrote.
+fn fault(config: &SubDeviceConfig, info: &SubDeviceInfo) -> PlanFault {
+    let is_unfit = || plan_inner(&SubDeviceConfig::from_info(info), info).is_err();
+    if config.declared.is_none() && (info.is_doubtful() || is_unfit()) {
+        return PlanFault::Sii;
+    }
+    PlanFault::Declaration
 }
 
 fn plan_inner(config: &SubDeviceConfig, info: &SubDeviceInfo) -> Result<SubDevicePlan, PlanProblem> {
+    if info.is_blank() && config.declared.is_none() && config.pdos.is_none() {
+        return Err(PlanProblem::NoSii);
+    }
     let of_sii = || info.bootstrap.map_or(Vec::new(), |layout| mailbox_pair(info, &layout, info.boot_sync_managers()));
     let bootstrap = config.declared_bootstrap.as_ref().map_or_else(of_sii, |pair| declared::managers(pair).collect());
     let mut warnings = Vec::new();
@@ -192,7 +209,7 @@ fn mailbox_wanted(info: &SubDeviceInfo) -> bool {
 fn mailbox_pair(info: &SubDeviceInfo, layout: &MailboxLayout, (out, inward): (u8, u8)) -> Vec<SmPlan> {
     let control = |index: u8, kind, default| {
         let described = info.sync_managers.get(usize::from(index));
-        described.filter(|sm| sm.kind == kind && sm.control != 0).map_or(default, |sm| sm.control)
+        described.filter(|sm| sm.kind == kind && sm.kind_of_control() == kind).map_or(default, |sm| sm.control)
     };
     let out_control = control(out, SyncManagerKind::MailboxOut, MAILBOX_OUT_CONTROL);
     let in_control = control(inward, SyncManagerKind::MailboxIn, MAILBOX_IN_CONTROL);

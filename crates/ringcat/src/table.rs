@@ -1,22 +1,17 @@
 //! What a scan found, as a table for people and as JSON for programs.
 
-use ringcat::{Direction, Scan, SubDeviceInfo};
-use ringcat_wire::sii::{SiiSyncManager, SyncManagerKind};
+use ringcat::{Direction, Scan, SubDeviceConfig, SubDeviceInfo};
+use ringcat_engine::plan::plan;
 use serde_json::{Value, json};
 
-/// Bytes of process data in one direction as the SII says: of the assigned PDOs, or of the SyncManagers where it
-/// describes no PDOs.
-fn sii_bytes(info: &SubDeviceInfo, direction: Direction) -> u32 {
-    let kind = match direction {
-        Direction::Outputs => SyncManagerKind::Outputs,
-        Direction::Inputs => SyncManagerKind::Inputs,
+/// Bytes of outputs and inputs that a MainDevice exchanges without any declaration; `None` where the SII cannot be followed.
+fn bytes(info: &SubDeviceInfo) -> Option<[u32; 2]> {
+    let plan = plan(&SubDeviceConfig::from_info(info), info).ok()?;
+    let of = |direction: Direction| {
+        let areas = plan.process_data.iter().filter(|area| area.direction == direction);
+        areas.map(|area| u32::from(area.length)).sum()
     };
-    let bytes = |(number, sync_manager): (u8, &SiiSyncManager)| {
-        let bits: Vec<u32> = info.assigned_pdos(number).map(|pdo| pdo.bit_length()).collect();
-        if bits.is_empty() { u32::from(sync_manager.length) } else { bits.iter().sum::<u32>().div_ceil(8) }
-    };
-    let of_kind = (0..).zip(&info.sync_managers).filter(|(_, sync_manager)| sync_manager.kind == kind);
-    of_kind.map(bytes).sum()
+    Some([of(Direction::Outputs), of(Direction::Inputs)])
 }
 
 /// One line per SubDevice, below a heading.
@@ -29,6 +24,7 @@ pub fn lines(scan: &Scan) -> Vec<String> {
             None if position == 0 && scan.topology.main_count > 0 => "MAIN".to_owned(),
             None => "REDUNDANT".to_owned(),
         };
+        let bytes = bytes(info).map_or(["?".to_owned(), "?".to_owned()], |both| both.map(|bytes| bytes.to_string()));
         format!(
             "{:>3}  {}  {:>5}  {:#010x}  {:#010x} {:>4} {:>4}  {parent:<17}  {}",
             position,
@@ -36,8 +32,8 @@ pub fn lines(scan: &Scan) -> Vec<String> {
             info.alias,
             info.identity.vendor_id,
             info.identity.product_code,
-            sii_bytes(info, Direction::Outputs),
-            sii_bytes(info, Direction::Inputs),
+            bytes[0],
+            bytes[1],
             info.name
         )
     };
@@ -57,8 +53,8 @@ pub fn json(scan: &Scan) -> Value {
             "product_code": info.identity.product_code,
             "revision": info.identity.revision,
             "serial": info.identity.serial,
-            "output_bytes": sii_bytes(info, Direction::Outputs),
-            "input_bytes": sii_bytes(info, Direction::Inputs),
+            "output_bytes": bytes(info).map(|both| both[0]),
+            "input_bytes": bytes(info).map(|both| both[1]),
             "connected_to": connection.map(|c| json!({ "position": c.near.node, "port": c.near.port })),
         })
     };

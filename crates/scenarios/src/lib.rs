@@ -22,6 +22,7 @@ pub mod mail_beside;
 pub mod mail_questions;
 pub mod meddler;
 pub mod namespaces;
+pub mod odd_images;
 pub mod phases;
 pub mod ring_matrix;
 pub mod segments;

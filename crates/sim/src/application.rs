@@ -309,7 +309,7 @@ impl Application {
     /// Which events matter from now on.
     fn watch(&mut self, description: &DeviceDescription) {
         if description.emulation {
-            self.polled = !description.pdos.is_empty();
+            self.polled = description.has_process_data();
             self.interest = 0;
             return;
         }

@@ -8,14 +8,15 @@ mod services;
 
 use core::time::Duration;
 
-use ringcat_wire::register::PortKind;
+use ringcat_wire::register::{PortKind, SyncManagerControl, SyncManagerMode, map};
 use ringcat_wire::sii::{
-    CoeDetails, DcMode, FmmuUsage, Identity, MailboxLayout, MailboxProtocols, PdoDirection, SyncManagerKind,
+    CoeDetails, DcMode, FmmuUsage, Identity, MailboxLayout, MailboxProtocols, PdoDirection, SiiSyncManager,
+    SyncManagerKind,
 };
 
 use crate::application::Behaviour;
 use crate::application::dictionary::Object;
-use crate::controller::{ClockErrors, Wander};
+use crate::controller::{ClockErrors, ControllerConfig, MAX_UNITS, Wander};
 
 pub use services::{AoeDescription, EoeDescription, EoeEnd, FoeDescription, Services, SoeDescription};
 
@@ -113,7 +114,7 @@ pub struct MailboxDescription {
 impl MailboxDescription {
     /// The device answers SDO requests.
     pub fn has_coe(&self) -> bool {
-        self.protocols.coe() || self.coe_details.sdo()
+        self.protocols.coe()
     }
 }
 
@@ -198,6 +199,10 @@ pub struct DeviceDescription {
     pub dc: Option<DcDescription>,
     /// PDI type of register 0x0140.
     pub pdi_type: u8,
+    /// Register 0x0141 but for bit 0, which is [`DeviceDescription::emulation`].
+    pub esc_configuration: u8,
+    /// Registers 0x0150 to 0x0153.
+    pub pdi_configuration: [u8; 4],
     /// AL control is copied to AL status by the controller; no application checks anything (facts 3.4).
     pub emulation: bool,
     /// Process data is refused without a running watchdog (0x001F).
@@ -264,6 +269,8 @@ impl DeviceDescription {
             services: Services::default(),
             dc: None,
             pdi_type: 0x05,
+            esc_configuration: 0,
+            pdi_configuration: [0; 4],
             emulation: false,
             watchdog_required: false,
             outputs_timeout: Duration::from_secs(1),
@@ -290,14 +297,42 @@ impl DeviceDescription {
         self.pdos.iter().filter(move |pdo| pdo.sync_manager == Some(number))
     }
 
-    /// Length that SyncManager `number` must have with the default assignment: the PDOs decide where there are any,
-    /// the entry of the SyncManager otherwise.
+    /// Length that SyncManager `number` must have with the default assignment: the PDOs decide where there are any, also
+    /// such without bits, otherwise the entry of the SyncManager where that is switched on.
     pub fn default_length(&self, number: u8) -> u16 {
-        let bits: u32 = self.default_assignment(number).map(PdoDescription::bit_length).sum();
-        if bits > 0 {
+        if self.default_assignment(number).next().is_some() {
+            let bits: u32 = self.default_assignment(number).map(PdoDescription::bit_length).sum();
             return u16::try_from(bits.div_ceil(8)).unwrap_or(u16::MAX);
         }
-        self.sync_managers.get(usize::from(number)).map_or(0, |entry| entry.length)
+        let entry = self.sync_managers.get(usize::from(number));
+        entry.filter(|entry| entry.enable & SiiSyncManager::ENABLE != 0).map_or(0, |entry| entry.length)
+    }
+
+    /// KiB of process RAM in which all mailboxes and SyncManagers have room, with three buffers where they need them; the
+    /// usual 8 where that is enough.
+    pub fn ram_kib(&self) -> u8 {
+        /// As an ET1100 has.
+        const USUAL: u32 = 8;
+        /// What the address space has room for.
+        const MOST: u32 = 60;
+        let managers = (0u8..).zip(&self.sync_managers).map(|(number, entry)| {
+            let buffered = SyncManagerControl::from_bits(entry.control).mode == SyncManagerMode::Buffered;
+            let length = u32::from(self.default_length(number).max(entry.length));
+            u32::from(entry.start) + length * if buffered { 3 } else { 1 }
+        });
+        let mailboxes = self.mailbox.iter().flat_map(|mailbox| [mailbox.standard, mailbox.bootstrap]).flat_map(|it| {
+            let end = |start: u16, size: u16| u32::from(start) + u32::from(size);
+            [end(it.receive_offset, it.receive_size), end(it.send_offset, it.send_size)]
+        });
+        let end = managers.chain(mailboxes).max().unwrap_or(0);
+        let needed = end.saturating_sub(u32::from(map::PROCESS_RAM.0)).div_ceil(1024);
+        needed.clamp(USUAL, MOST) as u8
+    }
+
+    /// SyncManagers of the controller: as many as are described, and those of an ET1100 at the least.
+    pub fn sync_manager_count(&self) -> u8 {
+        let described = u8::try_from(self.sync_managers.len()).unwrap_or(u8::MAX);
+        described.clamp(ControllerConfig::default().sync_manager_count, MAX_UNITS)
     }
 
     /// Gives both mailboxes another size and moves the process data behind them; false for a device without a mailbox and
@@ -319,6 +354,11 @@ impl DeviceDescription {
             }
         }
         true
+    }
+
+    /// Some SyncManager is for process data, whether or not PDOs describe it.
+    pub fn has_process_data(&self) -> bool {
+        self.sync_managers.iter().any(|it| matches!(it.kind, SyncManagerKind::Outputs | SyncManagerKind::Inputs))
     }
 
     /// Number of the first SyncManager of a kind.

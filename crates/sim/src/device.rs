@@ -160,6 +160,8 @@ fn controller_config(description: &DeviceDescription) -> ControllerConfig {
     };
     ControllerConfig {
         ports: description.ports,
+        ram_kib: description.ram_kib(),
+        sync_manager_count: description.sync_manager_count(),
         features: Features::from_bits(FEATURES_PLAIN | clock),
         sii: sii_image::build(description),
         sii_busy: description.sii_busy,

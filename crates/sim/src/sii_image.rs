@@ -176,9 +176,13 @@ fn header(description: &DeviceDescription, size_bytes: usize) -> SiiHeader {
     let mailbox = description.mailbox;
     let mut reserved_1d = SiiHeader::default().reserved_1d;
     reserved_1d[IMPRINT].copy_from_slice(&imprint(description));
+    let esc_configuration = description.esc_configuration & !1 | u8::from(description.emulation);
+    let [a, b, c, d] = description.pdi_configuration;
     SiiHeader {
         reserved_1d,
-        pdi_control: u16::from_le_bytes([description.pdi_type, u8::from(description.emulation)]),
+        pdi_control: u16::from_le_bytes([description.pdi_type, esc_configuration]),
+        pdi_configuration: u16::from_le_bytes([a, b]),
+        extended_pdi_configuration: u16::from_le_bytes([c, d]),
         alias: description.alias,
         identity: description.identity,
         bootstrap_mailbox: mailbox.map(|mailbox| mailbox.bootstrap).unwrap_or_default(),

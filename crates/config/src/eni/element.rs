@@ -113,9 +113,10 @@ impl<'a> Element<'a> {
         texts.collect::<String>().trim().to_owned()
     }
 
-    /// Text of a child; empty where there is none.
+    /// Text of a child on one line, so that no name splits a message; empty where there is none.
     pub fn text_of(&self, name: &str) -> String {
-        self.child(name).map(|child| child.text()).unwrap_or_default()
+        let text = self.child(name).map(|child| child.text()).unwrap_or_default();
+        text.chars().map(|character| if character.is_control() { ' ' } else { character }).collect()
     }
 
     /// The element's text as a number.

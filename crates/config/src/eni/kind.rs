@@ -19,6 +19,8 @@ pub enum FileKind {
     TwinCatProject,
     /// A configuration of the LinuxCNC driver.
     LinuxCnc,
+    /// An encrypted file, with what shows it.
+    Encrypted(&'static str),
     /// Not XML at all: no `<` at its beginning.
     NotXml,
     /// Another XML file, with the name of its root.
@@ -26,9 +28,30 @@ pub enum FileKind {
 }
 
 impl FileKind {
+    /// What bytes are that are no XML.
+    pub(super) fn of_bytes(bytes: &[u8]) -> FileKind {
+        let known: [(&[u8], &'static str); 5] = [
+            (b"Salted__", "encrypted with a password (OpenSSL)"),
+            (b"-----BEGIN", "a PEM container"),
+            (&[0x30, 0x82], "a PKCS container"),
+            (b"PK\x03\x04", "a ZIP archive"),
+            (&[0x1F, 0x8B], "compressed with gzip"),
+        ];
+        let found = known.iter().find(|(magic, _)| bytes.starts_with(magic)).map(|(_, what)| *what);
+        match found {
+            Some(what) => FileKind::Encrypted(what),
+            None if is_random(bytes) => FileKind::Encrypted("bytes without any order"),
+            None => FileKind::NotXml,
+        }
+    }
+
     /// What the root element tells; `None` for an ENI.
     pub(super) fn of(root: Node<'_, '_>) -> Option<FileKind> {
         let name = root.tag_name().name();
+        let is_cipher = |node: &Node<'_, '_>| matches!(node.tag_name().name(), "EncryptedData" | "CipherData");
+        if root.children().chain([root]).any(|node| is_cipher(&node)) {
+            return Some(FileKind::Encrypted("XML encryption"));
+        }
         match name {
             "EtherCATConfig" if is_beremiz(root) => Some(FileKind::BeremizProject),
             "EtherCATConfig" => None,
@@ -39,6 +62,20 @@ impl FileKind {
             other => Some(FileKind::OtherXml(other.to_owned())),
         }
     }
+}
+
+/// As many different bytes as chance makes, which neither text nor tables have.
+fn is_random(bytes: &[u8]) -> bool {
+    /// Bytes that are looked at; fewer tell nothing.
+    const LOOKED_AT: std::ops::RangeInclusive<usize> = 256..=4096;
+    let bytes = &bytes[..bytes.len().min(*LOOKED_AT.end())];
+    let mut counts = [0_u32; 256];
+    bytes.iter().for_each(|byte| counts[usize::from(*byte)] += 1);
+    let total = bytes.len() as f64;
+    let entropy = |count: &u32| f64::from(*count) / total * (total / f64::from(*count)).log2();
+    let bits: f64 = counts.iter().filter(|count| **count > 0).map(entropy).sum();
+    // 256 bytes of chance have 7.2 bits each, text has less than 6.
+    LOOKED_AT.contains(&bytes.len()) && bits > 6.8
 }
 
 /// A root `EtherCATConfig` that names the schema of device descriptions.
@@ -74,6 +111,11 @@ impl fmt::Display for FileKind {
             ),
             FileKind::TwinCatProject => write!(f, "a TwinCAT project, not an ENI. {eni}"),
             FileKind::LinuxCnc => write!(f, "a configuration of LinuxCNC's EtherCAT driver, not an ENI. {eni}"),
+            FileKind::Encrypted(what) => write!(
+                f,
+                "an encrypted or packed file ({what}), perhaps an encrypted ENI as EC-Engineer of acontis exports it for \
+                 MainDevices that have its key. RingCAT reads plain ENIs only: export it without encryption. {eni}"
+            ),
             FileKind::NotXml => write!(f, "no XML file. {eni}"),
             FileKind::OtherXml(root) => write!(f, "an XML file with the root {}, not an ENI. {eni}", shown(root)),
         }

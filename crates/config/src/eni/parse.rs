@@ -27,6 +27,7 @@ pub(super) fn parse(text: &str) -> Result<Eni, EniError> {
     }
     let mut eni = configuration(Element::new(root, &file))?;
     let comments = document.root().children().filter(|node| node.is_comment()).filter_map(|node| node.text());
+    let comments = comments.map(|text| text.replace(char::is_control, " "));
     eni.made_by = comments.map(|text| text.trim().to_owned()).find(|text| text.to_lowercase().contains("created"));
     (eni.unknown, eni.more_unknown) = file.into_unknown();
     Ok(eni)
@@ -34,7 +35,7 @@ pub(super) fn parse(text: &str) -> Result<Eni, EniError> {
 
 fn not_xml(text: &str, error: &roxmltree::Error) -> EniError {
     if !text.trim_start().starts_with('<') {
-        return EniError::of_file(Problem::WrongFile { kind: FileKind::NotXml });
+        return EniError::of_file(Problem::WrongFile { kind: FileKind::of_bytes(text.as_bytes()) });
     }
     if matches!(error, roxmltree::Error::NodesLimitReached) {
         return EniError::of_file(Problem::TooMuch { what: "XML nodes", limit: MAX_NODES as usize });

@@ -58,7 +58,7 @@ fn declared(bytes: &[u8]) -> Option<String> {
 /// The first line that is not in the encoding.
 fn not_in(encoding: &'static Encoding, bytes: &[u8]) -> EniError {
     if bytes.trim_ascii_start().first() != Some(&b'<') {
-        return EniError::of_file(Problem::WrongFile { kind: FileKind::NotXml });
+        return EniError::of_file(Problem::WrongFile { kind: FileKind::of_bytes(bytes) });
     }
     let reason = format!(
         "the bytes are not in {}: save the file as UTF-8, or declare the encoding that it has (windows-1252?)",

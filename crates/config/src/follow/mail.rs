@@ -1,5 +1,6 @@
 //! Commands through mailboxes: CoE, SoE and EoE become start-up commands (facts 6, 8.1).
 
+use std::borrow::Cow;
 use std::net::Ipv4Addr;
 use std::time::Duration;
 
@@ -111,10 +112,35 @@ fn idn(command: &SoeCommand) -> Result<StartupAction, String> {
     Ok(StartupAction::Idn(IdnWrite { drive: command.drive, idn: Idn(command.idn), data: command.data.clone() }))
 }
 
+/// The message of a command that sets addresses. Some tools write what follows the EoE header (facts 6.5) and leave the header
+/// to the MainDevice: flags and fields that are as long as they say.
+fn with_header(data: &[u8]) -> Cow<'_, [u8]> {
+    /// Type 2, port 0, no result.
+    const HEADER: [u8; 4] = [EOE_SET_IP, 0, 0, 0];
+    let is_whole =
+        data.first().is_some_and(|kind| kind & 0x0F == EOE_SET_IP) && data.get(4..).is_some_and(are_addresses);
+    if is_whole || !are_addresses(data) {
+        return Cow::Borrowed(data);
+    }
+    Cow::Owned([&HEADER, data].concat())
+}
+
+/// Flags, then all fields, or those that the flags name.
+fn are_addresses(data: &[u8]) -> bool {
+    /// Bytes of MAC address, address, mask, gateway, DNS server, name.
+    const FIELDS: [usize; 6] = [6, 4, 4, 4, 4, EOE_NAME];
+    let Some((flags, fields)) = data.split_first_chunk() else { return false };
+    let flags = u32::from_le_bytes(*flags);
+    let named = FIELDS.iter().enumerate().filter(|(bit, _)| flags >> bit & 1 != 0);
+    let packed: usize = named.map(|(_, bytes)| bytes).sum();
+    let all: usize = FIELDS.iter().sum();
+    flags != 0 && flags < 1 << FIELDS.len() && (fields.len() == packed || fields.len() == all)
+}
+
 /// Addresses, by elements of their own or as the message that is sent.
 fn ip(command: &EoeCommand) -> Result<IpSettings, &'static str> {
     if !command.data.is_empty() {
-        return match EoeMessage::decode(&command.data) {
+        return match EoeMessage::decode(&with_header(&command.data)) {
             Ok(EoeMessage { body: EoeBody::SetIp(found), .. }) => Ok(IpSettings {
                 mac: found.mac,
                 address: found.address,
@@ -123,7 +149,7 @@ fn ip(command: &EoeCommand) -> Result<IpSettings, &'static str> {
                 dns: found.dns,
                 name: found.name.map(<[u8]>::to_vec),
             }),
-            Ok(_) | Err(_) => Err("a message that does not set addresses is not sent"),
+            Ok(_) | Err(_) => Err("a message that does not set addresses (EoE type 2) is not sent"),
         };
     }
     if command.kind.is_some_and(|kind| kind != EOE_SET_IP) {

@@ -255,7 +255,12 @@ fn addresses_are_hexadecimal_have_points_or_are_the_message_itself_facts_6_5() {
     assert_eq!(ip(&changed(&[(elements, &points)])), Some(expected.clone()));
     // Type 2, last fragment; flags for MAC, address and mask; addresses little-endian, all fields at their places.
     let message = format!("<Data>0201 0000 07000000 020000000004 0401a8c0 00ffffff {}</Data>", "00".repeat(40));
-    assert_eq!(ip(&changed(&[(elements, &message)])), Some(expected));
+    assert_eq!(ip(&changed(&[(elements, &message)])).as_ref(), Some(&expected));
+    // Without the header of the message, all fields or only those that the flags name.
+    let bare = message.replace("0201 0000 ", "");
+    assert_eq!(ip(&changed(&[(elements, &bare)])).as_ref(), Some(&expected));
+    let packed = bare.replace(&"00".repeat(40), "");
+    assert_eq!(ip(&changed(&[(elements, &packed)])), Some(expected));
     let filter = changed(&[(elements, "<Data>04010000</Data>")]);
     assert!(ip(&filter).is_none() && has_notice(&filter, &["EoE/InitCmd \"addresses\"", "does not set addresses"]));
     assert!(

@@ -200,3 +200,37 @@ fn a_file_that_was_cut_off_is_told_as_such_with_its_end() {
         assert!(text.starts_with(&line), "{text}");
     }
 }
+
+#[test]
+fn an_encrypted_file_is_called_so_with_the_tool_that_makes_such_files() {
+    let mut state = 1_u64;
+    let mut chance = || {
+        state = state.wrapping_mul(0x5851_F42D_4C95_7F2D).wrapping_add(1);
+        (state >> 56) as u8
+    };
+    let random: Vec<u8> = (0..4000).map(|_| chance()).collect();
+    let xml = br#"<?xml version="1.0"?><EncryptedData xmlns="http://www.w3.org/2001/04/xmlenc#"><CipherData/></EncryptedData>"#;
+    let salted = [&b"Salted__"[..], &random].concat();
+    for (bytes, what) in [
+        (&random[..], "bytes without any order"),
+        (&salted[..], "encrypted with a password (OpenSSL)"),
+        (&xml[..], "XML encryption"),
+        (b"PK\x03\x04\x14\x00", "a ZIP archive"),
+    ] {
+        let error = eni::read(bytes).expect_err("it is no ENI").to_string();
+        assert!(error.contains(&format!("this is an encrypted or packed file ({what})")), "{error}");
+        assert!(error.contains("EC-Engineer of acontis") && error.contains("export it without encryption"), "{error}");
+    }
+    let text = "Just some words of a person, many of them. ".repeat(40);
+    assert!(eni::read(text.as_bytes()).expect_err("it is no ENI").to_string().contains("this is no XML file"));
+}
+
+#[test]
+fn names_and_comments_are_on_one_line() {
+    let text = SMALL.replacen("</Name>", "\n\tleft</Name>", 3).replacen("</Comment>", "\r\nmore</Comment>", 9);
+    let model = model(&text);
+    let names = model.subdevices.iter().map(|subdevice| &subdevice.name);
+    let all: String =
+        names.chain(model.subdevices.iter().flat_map(|it| &it.init_commands).map(|it| &it.comment)).cloned().collect();
+    assert!(all.contains("left") && all.contains("more") && !all.contains(char::is_control), "{all:?}");
+}

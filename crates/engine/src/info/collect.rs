@@ -1,47 +1,69 @@
 //! From the bytes of an SII to a [`SubDeviceInfo`], leniently (facts 4.1 to 4.6).
 
+mod mailboxes;
+mod sync_managers;
+
 use alloc::string::String;
 use alloc::vec::Vec;
 
 use ringcat_wire::register::EscConfiguration;
 use ringcat_wire::sii::{
-    CategoryKind, DcMode, DcModes, FmmuUsages, General, MailboxLayout, Pdo, PdoDirection, PdoEntry, Pdos, SiiHeader,
-    SiiSyncManager, SiiSyncManagers, Strings, SyncManagerKind,
+    Category, CategoryKind, DcMode, DcModes, FmmuUsages, General, Pdo, PdoDirection, PdoEntry, Pdos, SiiHeader,
+    Strings, SyncManagerKind,
 };
 
 use super::{Direction, InfoWarning, PdoEntryInfo, PdoInfo, Readout, SiiProblem, SubDeviceInfo};
 
 /// Byte offsets in the fixed area, for warnings.
 const CHECKSUM_AT: usize = 2 * 0x07;
-const BOOTSTRAP_AT: usize = 2 * 0x14;
-const STANDARD_AT: usize = 2 * 0x18;
-const PROTOCOLS_AT: usize = 2 * 0x1C;
 /// Bytes of the fixed area that a scan reads without a gap.
 const READ_BYTES: usize = 2 * 0x24;
 
+/// Erased bytes at the end of a category that are more than padding.
+const ERASED: usize = 4;
+
 /// The categories that were read.
 struct Parts<'p, 'a> {
-    parts: &'p [(CategoryKind, &'a [u8])],
+    parts: &'p [Category<'a>],
 }
 
 impl<'a> Parts<'_, 'a> {
-    fn all(&self, kind: CategoryKind) -> impl Iterator<Item = &'a [u8]> {
-        self.parts.iter().filter(move |part| part.0 == kind).map(|part| part.1)
+    fn all(&self, kind: CategoryKind) -> impl Iterator<Item = Category<'a>> {
+        self.parts.iter().filter(move |part| part.kind == kind).copied()
     }
 
     /// The first category of a kind; more of them are odd.
-    fn first(&self, kind: CategoryKind, warnings: &mut Vec<InfoWarning>) -> Option<&'a [u8]> {
+    fn first(&self, kind: CategoryKind, warnings: &mut Vec<InfoWarning>) -> Option<Category<'a>> {
         let mut all = self.all(kind);
         let first = all.next();
-        if all.next().is_some() {
-            warnings.push(InfoWarning { category: Some(kind), offset: 0, problem: SiiProblem::Repeated });
+        if let Some(again) = all.next() {
+            warnings.push(InfoWarning {
+                category: Some(kind),
+                offset: Some(again.offset),
+                problem: SiiProblem::Repeated,
+            });
         }
         first
+    }
+
+    /// Categories that end erased: an image that was cut short ends so, with the rest of an empty EEPROM behind it.
+    fn erased(&self) -> impl Iterator<Item = InfoWarning> {
+        let has_text = |kind| {
+            matches!(kind, CategoryKind::Strings | CategoryKind::General | CategoryKind::SyncManager | CategoryKind::Dc)
+                || matches!(kind, CategoryKind::TxPdo | CategoryKind::RxPdo)
+        };
+        self.parts.iter().filter(move |part| has_text(part.kind)).filter_map(|part| {
+            let kept = part.data.iter().rposition(|byte| *byte != 0xFF).map_or(0, |last| last + 1);
+            let bytes = part.data.len() - kept;
+            let offset = Some(part.data_offset() + kept);
+            let problem = SiiProblem::Erased { bytes };
+            (bytes >= ERASED).then_some(InfoWarning { category: Some(part.kind), offset, problem })
+        })
     }
 }
 
 /// See [`SubDeviceInfo::from_parts`].
-pub(super) fn collect(readout: Readout, header: &SiiHeader, parts: &[(CategoryKind, &[u8])]) -> SubDeviceInfo {
+pub(super) fn collect(readout: Readout, header: &SiiHeader, parts: &[Category<'_>]) -> SubDeviceInfo {
     let parts = Parts { parts };
     // The high byte of the first word is what the controller loads into ESC_CONFIGURATION.
     let esc_configuration = (header.pdi_control >> 8) as u8;
@@ -59,40 +81,46 @@ pub(super) fn collect(readout: Readout, header: &SiiHeader, parts: &[(CategoryKi
     // Reserved words behind are not read.
     let bytes = &header.encode()[..READ_BYTES];
     if [0x00, 0xFF].iter().any(|erased| bytes.iter().all(|byte| byte == erased)) {
-        info.warnings.push(fixed_area(0, SiiProblem::Blank));
+        info.warnings.push(InfoWarning { category: None, offset: None, problem: SiiProblem::Blank });
         return info;
     }
+    info.warnings.extend(parts.erased());
     collect_header(&mut info, header);
-    let strings = Strings::new(parts.first(CategoryKind::Strings, &mut info.warnings).unwrap_or_default());
+    let strings = parts.first(CategoryKind::Strings, &mut info.warnings);
+    let strings = Strings::new(strings.map_or(&[], |category| category.data));
     collect_general(&mut info, &parts, &strings);
-    info.fmmu_usages = parts.all(CategoryKind::Fmmu).flat_map(FmmuUsages::new).collect();
-    collect_sync_managers(&mut info, &parts);
+    info.fmmu_usages = parts.all(CategoryKind::Fmmu).flat_map(|category| FmmuUsages::new(category.data)).collect();
+    sync_managers::collect(&mut info, &parts);
+    mailboxes::collect(&mut info, header);
     for direction in [PdoDirection::Rx, PdoDirection::Tx] {
-        for data in parts.all(direction.category()) {
-            collect_pdos(&mut info, direction, data, &strings);
+        for category in parts.all(direction.category()) {
+            collect_pdos(&mut info, direction, &category, &strings);
         }
     }
-    for data in parts.all(CategoryKind::Dc) {
-        info.dc_modes.extend(DcModes::new(data));
-        whole(data, DcMode::LEN, CategoryKind::Dc, &mut info.warnings);
+    for category in parts.all(CategoryKind::Dc) {
+        info.dc_modes.extend(DcModes::new(category.data));
+        whole(&category, DcMode::LEN, &mut info.warnings);
     }
+    sync_managers::check_completeness(&mut info, &parts);
     info
 }
 
 fn fixed_area(offset: usize, problem: SiiProblem) -> InfoWarning {
-    InfoWarning { category: None, offset, problem }
+    InfoWarning { category: None, offset: Some(offset), problem }
+}
+
+/// A warning about what begins at a byte of a category's data.
+fn within(category: &Category<'_>, at: usize, problem: SiiProblem) -> InfoWarning {
+    InfoWarning { category: Some(category.kind), offset: Some(category.data_offset() + at), problem }
 }
 
 /// Warns about a category that does not end with a whole entry. Padding to a word is no entry.
-fn whole(data: &[u8], entry: usize, kind: CategoryKind, warnings: &mut Vec<InfoWarning>) {
+fn whole(category: &Category<'_>, entry: usize, warnings: &mut Vec<InfoWarning>) {
+    let data = category.data;
     let got = data.len() % entry;
     let offset = data.len() - got;
     if data[offset..].iter().any(|byte| *byte != 0 && *byte != 0xFF) {
-        warnings.push(InfoWarning {
-            category: Some(kind),
-            offset,
-            problem: SiiProblem::Short { expected: entry, got },
-        });
+        warnings.push(within(category, offset, SiiProblem::Short { expected: entry, got }));
     }
 }
 
@@ -102,41 +130,26 @@ fn collect_header(info: &mut SubDeviceInfo, header: &SiiHeader) {
         info.warnings.push(fixed_area(CHECKSUM_AT, problem));
     }
     info.protocols = header.protocols;
-    info.bootstrap = mailbox(&header.bootstrap_mailbox, BOOTSTRAP_AT, &mut info.warnings);
-    info.mailbox = mailbox(&header.standard_mailbox, STANDARD_AT, &mut info.warnings);
-    let protocols = header.protocols.0;
-    if protocols != 0 && info.mailbox.is_none() {
-        info.warnings.push(fixed_area(PROTOCOLS_AT, SiiProblem::NoMailbox { protocols }));
-    }
-}
-
-/// A mailbox pair, `None` where it has no size. Vendors leave 0xFFFF in fields that they do not use.
-fn mailbox(layout: &MailboxLayout, offset: usize, warnings: &mut Vec<InfoWarning>) -> Option<MailboxLayout> {
-    let none = |size: u16| size == 0 || size == 0xFFFF;
-    let MailboxLayout { receive_size, send_size, .. } = *layout;
-    match (none(receive_size), none(send_size)) {
-        (false, false) => Some(*layout),
-        (true, true) => None,
-        _ => {
-            warnings.push(fixed_area(offset, SiiProblem::HalfMailbox { receive_size, send_size }));
-            None
-        }
-    }
 }
 
 fn collect_general(info: &mut SubDeviceInfo, parts: &Parts<'_, '_>, strings: &Strings<'_>) {
     let kind = CategoryKind::General;
-    let Some(data) = parts.first(kind, &mut info.warnings) else { return };
+    let Some(category) = parts.first(kind, &mut info.warnings) else {
+        // Where there are no categories at all, that is told.
+        if !parts.parts.is_empty() {
+            info.warnings.push(InfoWarning { category: Some(kind), offset: None, problem: SiiProblem::Missing });
+        }
+        return;
+    };
     // A short category counts as far as it goes; what is missing is zero.
     let mut bytes = [0; General::LEN];
-    let got = data.len().min(General::LEN);
-    bytes[..got].copy_from_slice(&data[..got]);
+    let got = category.data.len().min(General::LEN);
+    bytes[..got].copy_from_slice(&category.data[..got]);
     if got < General::LEN {
-        let problem = SiiProblem::Short { expected: General::LEN, got };
-        info.warnings.push(InfoWarning { category: Some(kind), offset: 0, problem });
+        info.warnings.push(within(&category, 0, SiiProblem::Short { expected: General::LEN, got }));
     }
     let Some(general) = General::decode(&bytes) else { return };
-    let mut named = |index, offset| text(strings, index, kind, offset, &mut info.warnings);
+    let mut named = |index, at| text(strings, index, &category, at, &mut info.warnings);
     info.group = named(general.group, 0);
     info.image = named(general.image, 1);
     info.order_code = named(general.order, 2);
@@ -148,77 +161,60 @@ fn collect_general(info: &mut SubDeviceInfo, parts: &Parts<'_, '_>, strings: &St
     info.ebus_current_ma = general.ebus_current_ma;
 }
 
-fn collect_sync_managers(info: &mut SubDeviceInfo, parts: &Parts<'_, '_>) {
-    let kind = CategoryKind::SyncManager;
-    for data in parts.all(kind) {
-        info.sync_managers.extend(SiiSyncManagers::new(data));
-        whole(data, SiiSyncManager::LEN, kind, &mut info.warnings);
-    }
-    let available = usize::from(info.controller.sync_manager_count);
-    let got = info.sync_managers.len();
-    if got > available {
-        let problem = SiiProblem::SyncManagers { expected: available, got };
-        info.warnings.push(InfoWarning { category: Some(kind), offset: available * SiiSyncManager::LEN, problem });
-        info.sync_managers.truncate(available);
-    }
-    for (index, sm) in info.sync_managers.iter().enumerate() {
-        let write = sm.control & 0x0C == 0x04;
-        let wrong = match sm.kind {
-            SyncManagerKind::MailboxOut | SyncManagerKind::Outputs => !write,
-            SyncManagerKind::MailboxIn | SyncManagerKind::Inputs => sm.control & 0x0C != 0,
-            SyncManagerKind::Unused | SyncManagerKind::Other(_) => false,
-        };
-        if wrong {
-            let problem = SiiProblem::ControlDirection { sync_manager: index as u8, control: sm.control };
-            let offset = index * SiiSyncManager::LEN;
-            info.warnings.push(InfoWarning { category: Some(kind), offset, problem });
-        }
-    }
-}
-
-fn collect_pdos(info: &mut SubDeviceInfo, direction: PdoDirection, data: &[u8], strings: &Strings<'_>) {
+fn collect_pdos(info: &mut SubDeviceInfo, direction: PdoDirection, category: &Category<'_>, strings: &Strings<'_>) {
+    let data = category.data;
     let mut pdos = Pdos::new(data);
     loop {
         let offset = data.len() - pdos.rest().len();
         let Some(pdo) = pdos.next() else { break };
-        push_pdo(info, direction, &pdo, offset, strings);
+        push_pdo(info, direction, &pdo, (category, offset), strings);
     }
     let rest = pdos.rest();
     let offset = data.len() - rest.len();
-    let kind = direction.category();
     if rest.len() < Pdo::HEADER_LEN {
-        return whole(data, Pdo::HEADER_LEN, kind, &mut info.warnings);
+        return whole(category, Pdo::HEADER_LEN, &mut info.warnings);
+    }
+    // What is erased is no PDO, and was told.
+    if rest.iter().all(|byte| *byte == 0xFF) {
+        return;
     }
     // Entries beyond the end of the category: those that are there count.
     let got = (rest.len() - Pdo::HEADER_LEN) / PdoEntry::LEN;
     let mut cut = Vec::from(rest);
     let expected = usize::from(core::mem::replace(&mut cut[2], got as u8));
     if let Some(pdo) = Pdos::new(&cut).next() {
-        let problem = SiiProblem::PdoEntries { pdo: pdo.index, expected, got };
-        info.warnings.push(InfoWarning { category: Some(kind), offset, problem });
-        push_pdo(info, direction, &pdo, offset, strings);
+        info.warnings.push(within(category, offset, SiiProblem::PdoEntries { pdo: pdo.index, expected, got }));
+        push_pdo(info, direction, &pdo, (category, offset), strings);
     }
 }
 
-fn push_pdo(info: &mut SubDeviceInfo, direction: PdoDirection, pdo: &Pdo<'_>, offset: usize, strings: &Strings<'_>) {
-    let kind = direction.category();
+/// Takes over the PDO that begins at a byte of a category's data.
+fn push_pdo(
+    info: &mut SubDeviceInfo,
+    direction: PdoDirection,
+    pdo: &Pdo<'_>,
+    (category, offset): (&Category<'_>, usize),
+    strings: &Strings<'_>,
+) {
     let own = Direction::from(direction);
-    if let Some(problem) = sync_manager_problem(info, own, pdo) {
-        info.warnings.push(InfoWarning { category: Some(kind), offset, problem });
-    }
-    let name = text(strings, pdo.name, kind, offset + 5, &mut info.warnings);
+    let problem = sync_manager_problem(info, own, pdo);
+    // One that is assigned to where it cannot be is not assigned.
+    let sync_manager = pdo.sync_manager.filter(|_| problem.is_none());
+    info.warnings.extend(problem.map(|problem| within(category, offset, problem)));
+    let name = text(strings, pdo.name, category, offset + 5, &mut info.warnings);
     let mut entries = Vec::with_capacity(usize::from(pdo.entry_count));
-    for (number, entry) in pdo.entries().enumerate() {
+    // What is erased is no entry, and was told.
+    for (number, entry) in pdo.entries().enumerate().filter(|(_, entry)| !entry.is_erased()) {
         let name_at = offset + Pdo::HEADER_LEN + number * PdoEntry::LEN + 3;
         entries.push(PdoEntryInfo {
             index: entry.index,
             sub_index: entry.sub_index,
             bit_length: entry.bit_length,
             data_type: entry.data_type,
-            name: text(strings, entry.name, kind, name_at, &mut info.warnings),
+            name: text(strings, entry.name, category, name_at, &mut info.warnings),
         });
     }
-    let Pdo { index, sync_manager, flags, .. } = *pdo;
+    let Pdo { index, flags, .. } = *pdo;
     info.pdos.push(PdoInfo { index, direction: own, sync_manager, name, flags, entries });
 }
 
@@ -237,23 +233,25 @@ fn sync_manager_problem(info: &SubDeviceInfo, own: Direction, pdo: &Pdo<'_>) -> 
     (!fits).then_some(SiiProblem::PdoDirection { pdo: pdo.index, sync_manager: number })
 }
 
-/// A string by index, empty for none. Bytes that are not UTF-8 are taken as Latin-1.
+/// A string by index, empty for none. Bytes that are not UTF-8 are taken as Latin-1; what is no printable character, such
+/// as a line break, becomes a space.
 fn text(
     strings: &Strings<'_>,
     index: u8,
-    kind: CategoryKind,
-    offset: usize,
+    category: &Category<'_>,
+    at: usize,
     warnings: &mut Vec<InfoWarning>,
 ) -> String {
     let Some(bytes) = strings.string(index) else {
         if index != 0 {
-            warnings.push(InfoWarning { category: Some(kind), offset, problem: SiiProblem::NoString { index } });
+            warnings.push(within(category, at, SiiProblem::NoString { index }));
         }
         return String::new();
     };
     let bytes = bytes.split(|byte| *byte == 0).next().unwrap_or_default();
+    let printable = |character: char| if character.is_control() { ' ' } else { character };
     match core::str::from_utf8(bytes) {
-        Ok(text) => String::from(text),
-        Err(_) => bytes.iter().map(|byte| char::from(*byte)).collect(),
+        Ok(text) => text.chars().map(printable).collect(),
+        Err(_) => bytes.iter().map(|byte| printable(char::from(*byte))).collect(),
     }
 }

@@ -6,7 +6,7 @@ use std::{format, fs, println};
 
 use proptest::prelude::*;
 use ringcat_wire::address::Position;
-use ringcat_wire::sii::{Categories, Category, PdoDirection, Sii, SiiWriter, SyncManagerKind};
+use ringcat_wire::sii::{CategoryHeader, CategoryKind, General, PdoDirection, Sii, SiiWriter, SyncManagerKind};
 
 use super::*;
 
@@ -61,12 +61,28 @@ fn general() -> Vec<u8> {
     general
 }
 
+/// Categories one behind the other, from the end of the fixed area on.
+fn placed<'a>(categories: &[(CategoryKind, &'a [u8])]) -> Vec<Category<'a>> {
+    let mut offset = SiiHeader::LEN;
+    let mut place = |(kind, data): &(CategoryKind, &'a [u8])| {
+        let category = Category { kind: *kind, offset, data };
+        offset += CategoryHeader::LEN + data.len().next_multiple_of(2);
+        category
+    };
+    categories.iter().map(&mut place).collect()
+}
+
 fn info(categories: &[(CategoryKind, &[u8])]) -> SubDeviceInfo {
-    SubDeviceInfo::from_parts(readout(), &header(), categories.iter().copied())
+    // Every image has a general category.
+    let mut categories = categories.to_vec();
+    if !categories.iter().any(|(kind, _)| *kind == CategoryKind::General) {
+        categories.push((CategoryKind::General, &[0; General::LEN]));
+    }
+    SubDeviceInfo::from_parts(readout(), &header(), placed(&categories))
 }
 
 fn warning(category: CategoryKind, offset: usize, problem: SiiProblem) -> InfoWarning {
-    InfoWarning { category: Some(category), offset, problem }
+    InfoWarning { category: Some(category), offset: Some(offset), problem }
 }
 
 #[test]
@@ -100,11 +116,81 @@ fn every_category_finds_its_place() {
 }
 
 #[test]
+fn mailboxes_that_cannot_be_there_are_not_believed() {
+    let spoil: [fn(&mut MailboxLayout); 5] = [
+        |layout| (layout.receive_offset, layout.receive_size) = (0x7878, 10_616),
+        |layout| layout.send_offset = 0x0F80,
+        |layout| layout.send_offset = 0x2FC0,
+        |layout| layout.send_offset = 0x107F,
+        |layout| layout.send_size = 5,
+    ];
+    for spoil in spoil {
+        let mut header = header();
+        spoil(&mut header.standard_mailbox);
+        let layout = header.standard_mailbox;
+        let read = |parts: &[(CategoryKind, &[u8])]| SubDeviceInfo::from_parts(readout(), &header, placed(parts));
+        let alone = read(&[]);
+        let problem = SiiProblem::Mailbox { layout, memory_end: 0x3000 };
+        assert_eq!(alone.warnings[0], InfoWarning { category: None, offset: Some(0x30), problem });
+        assert_eq!(alone.mailbox, None);
+        let told = read(&[(CategoryKind::SyncManager, SYNC_MANAGERS)]);
+        assert_eq!(told.mailbox.map(|it| (it.receive_offset, it.send_offset)), Some((0x1000, 0x1080)));
+    }
+}
+
+#[test]
+fn a_sync_manager_without_a_type_is_for_what_its_pdos_or_its_control_byte_say() {
+    let mut data = SYNC_MANAGERS.to_vec();
+    (8..32).step_by(8).for_each(|at| data[at + 7] = 0);
+    // PDOs count before the control byte.
+    data[3 * 8 + 4] = 0x64;
+    let info = info(&[(CategoryKind::SyncManager, &data), (CategoryKind::TxPdo, TX_PDO)]);
+    use SyncManagerKind::{Inputs, MailboxIn, MailboxOut, Outputs};
+    let kinds: Vec<_> = info.sync_managers.iter().map(|manager| manager.kind).collect();
+    assert_eq!(kinds, [MailboxOut, MailboxIn, Outputs, Inputs]);
+    let told: Vec<_> = info.warnings.iter().map(ToString::to_string).filter(|words| words.contains("type")).collect();
+    assert_eq!(told[1], "byte 0x0094, category SYNCM: SM 2 has type 0, taken for outputs");
+    assert_eq!(told.len(), 3);
+}
+
+#[test]
+fn an_image_that_was_cut_short_is_told_wherever_it_ends() {
+    let whole = SYNC_MANAGERS.to_vec();
+    let cut = |bytes: usize| [&whole[..bytes], &vec![0xFF; whole.len() - bytes]].concat();
+    for bytes in [0, 8, 12, 28] {
+        let data = cut(bytes);
+        let info = info(&[(CategoryKind::SyncManager, &data)]);
+        let problem = SiiProblem::Erased { bytes: 32 - bytes };
+        assert!(info.warnings.contains(&warning(CategoryKind::SyncManager, 132 + bytes, problem)), "{bytes}");
+        assert_eq!(info.sync_managers.len(), bytes.div_ceil(8), "{bytes}");
+        assert!(info.is_doubtful());
+    }
+    let general = general();
+    let without = SubDeviceInfo::from_parts(readout(), &header(), placed(&[(CategoryKind::Strings, STRINGS)]));
+    assert_eq!(
+        without.warnings[0].to_string(),
+        "category GENERAL: expected in every image, there is none: is the image cut short?"
+    );
+    let ends = info(&[(CategoryKind::Strings, STRINGS), (CategoryKind::General, &general)]);
+    assert_eq!(ends.warnings.len(), 1, "{:?}", ends.warnings);
+    assert_eq!(ends.warnings[0].problem, SiiProblem::NoSyncManagers);
+}
+
+#[test]
+fn what_is_not_printable_in_a_name_is_a_space() {
+    let strings = [1, 9, b'T', b'w', b'o', b'\n', b'l', 0x1B, b'n', b'e', b's', 0];
+    let mut general = general();
+    general[..4].copy_from_slice(&[0, 0, 1, 1]);
+    let info = info(&[(CategoryKind::Strings, &strings), (CategoryKind::General, &general)]);
+    assert_eq!((info.name.as_str(), info.order_code.as_str()), ("Two l nes", "Two l nes"));
+}
+
+#[test]
 fn a_blank_eeprom_is_one_warning() {
     for erased in [0xFF, 0x00] {
         let header = SiiHeader::decode(&[erased; 128]);
         let info = SubDeviceInfo::from_parts(readout(), &header, []);
-        assert_eq!(info.warnings, [InfoWarning { category: None, offset: 0, problem: SiiProblem::Blank }]);
+        assert_eq!(info.warnings, [InfoWarning { category: None, offset: None, problem: SiiProblem::Blank }]);
         assert_eq!((info.mailbox, info.protocols), (None, MailboxProtocols(0)));
     }
 }
@@ -116,7 +202,7 @@ fn a_wrong_checksum_is_a_warning() {
     header.checksum ^= 0xFF;
     let info = SubDeviceInfo::from_parts(readout(), &header, []);
     let problem = SiiProblem::Checksum { expected, got: header.checksum };
-    assert_eq!(info.warnings, [InfoWarning { category: None, offset: 14, problem }]);
+    assert_eq!(info.warnings, [InfoWarning { category: None, offset: Some(14), problem }]);
     assert_eq!(info.identity, header.identity);
 }
 
@@ -128,7 +214,7 @@ fn half_a_mailbox_is_no_mailbox() {
     assert_eq!(info.mailbox, None);
     let problems: Vec<_> = info.warnings.iter().map(|warning| (warning.offset, warning.problem)).collect();
     let half = SiiProblem::HalfMailbox { receive_size: 128, send_size: 0 };
-    assert_eq!(problems, [(0x30, half), (0x38, SiiProblem::NoMailbox { protocols: 4 })]);
+    assert_eq!(problems, [(Some(0x30), half), (Some(0x38), SiiProblem::NoMailbox { protocols: 4 })]);
 }
 
 #[test]
@@ -138,10 +224,11 @@ fn a_pdo_with_more_entries_than_the_category_holds_keeps_those_there() {
     let info = info(&[(CategoryKind::SyncManager, SYNC_MANAGERS), (CategoryKind::TxPdo, &data)]);
     assert_eq!(info.pdos[0].entries.len(), 1);
     let problem = SiiProblem::PdoEntries { pdo: 0x1A00, expected: 3, got: 1 };
-    assert!(info.warnings.contains(&warning(CategoryKind::TxPdo, 0, problem)));
+    // Behind 128 bytes, four SyncManagers and two headers.
+    assert!(info.warnings.contains(&warning(CategoryKind::TxPdo, 168, problem)));
     assert_eq!(
-        warning(CategoryKind::TxPdo, 0, problem).to_string(),
-        "SII category TXPDO at byte 0: PDO 0x1a00 announces 3 entries, 1 are there"
+        warning(CategoryKind::TxPdo, 168, problem).to_string(),
+        "byte 0x00a8, category TXPDO: PDO 0x1a00 announces 3 entries, 1 are there"
     );
 }
 
@@ -154,10 +241,11 @@ fn a_pdo_of_the_wrong_sync_manager_is_a_warning() {
     nowhere[3] = 7;
     let info = info(&[(CategoryKind::SyncManager, SYNC_MANAGERS), (CategoryKind::TxPdo, &[outputs, nowhere].concat())]);
     let expected = [
-        warning(CategoryKind::TxPdo, 0, SiiProblem::PdoDirection { pdo: 0x1A00, sync_manager: 2 }),
-        warning(CategoryKind::TxPdo, 16, SiiProblem::PdoSyncManager { pdo: 0x1A00, sync_manager: 7 }),
+        warning(CategoryKind::TxPdo, 168, SiiProblem::PdoDirection { pdo: 0x1A00, sync_manager: 2 }),
+        warning(CategoryKind::TxPdo, 184, SiiProblem::PdoSyncManager { pdo: 0x1A00, sync_manager: 7 }),
     ];
     assert_eq!(info.warnings, expected);
+    assert!(info.pdos.iter().all(|pdo| pdo.sync_manager.is_none()), "they are assigned nowhere");
 }
 
 #[test]
@@ -170,7 +258,7 @@ fn an_unassigned_pdo_is_nothing_odd() {
 
 #[test]
 fn missing_strings_and_a_short_general_category_are_warnings() {
-    let info = info(&[(CategoryKind::General, &general()[..16])]);
+    let info = info(&[(CategoryKind::General, &general()[..16]), (CategoryKind::SyncManager, SYNC_MANAGERS)]);
     let problems: Vec<_> = info.warnings.iter().map(|warning| warning.problem).collect();
     let missing = |index| SiiProblem::NoString { index };
     assert_eq!(problems, [SiiProblem::Short { expected: 32, got: 16 }, missing(1), missing(2), missing(3)]);
@@ -182,7 +270,7 @@ fn sync_managers_beyond_those_of_the_controller_are_left_out() {
     let info = info(&[(CategoryKind::SyncManager, &SYNC_MANAGERS.repeat(3))]);
     assert_eq!(info.sync_managers.len(), 8);
     let problem = SiiProblem::SyncManagers { expected: 8, got: 12 };
-    assert_eq!(info.warnings, [warning(CategoryKind::SyncManager, 64, problem)]);
+    assert_eq!(info.warnings, [warning(CategoryKind::SyncManager, 132 + 64, problem)]);
 }
 
 #[test]
@@ -190,8 +278,8 @@ fn a_sync_manager_with_the_wrong_direction_is_a_warning() {
     let mut data = SYNC_MANAGERS.to_vec();
     data[2 * 8 + 4] = 0x20;
     let info = info(&[(CategoryKind::SyncManager, &data)]);
-    let problem = SiiProblem::ControlDirection { sync_manager: 2, control: 0x20 };
-    assert_eq!(info.warnings, [warning(CategoryKind::SyncManager, 16, problem)]);
+    let problem = SiiProblem::Control { sync_manager: 2, control: 0x20 };
+    assert_eq!(info.warnings, [warning(CategoryKind::SyncManager, 132 + 16, problem)]);
 }
 
 #[test]
@@ -204,8 +292,7 @@ fn what_a_writer_wrote_is_found_without_warnings() {
     writer.category(CategoryKind::TxPdo, TX_PDO).unwrap();
     writer.finish().unwrap();
     let sii = Sii::parse(&image).unwrap();
-    let parts = sii.categories().map(|Category { kind, data, .. }| (kind, data));
-    let info = SubDeviceInfo::from_parts(readout(), sii.header(), parts);
+    let info = SubDeviceInfo::from_parts(readout(), sii.header(), sii.categories());
     assert_eq!((info.name.as_str(), info.warnings), ("Name", vec![]));
 }
 
@@ -220,8 +307,7 @@ fn real_images_are_listed() {
     for path in entries.map(|entry| entry.unwrap().path()).filter(|path| path.extension().is_some_and(|e| e == "bin")) {
         let image = fs::read(&path).unwrap();
         let Ok(sii) = Sii::parse(&image) else { continue };
-        let categories: Categories<'_> = sii.categories();
-        let info = SubDeviceInfo::from_parts(readout(), sii.header(), categories.map(|c| (c.kind, c.data)));
+        let info = SubDeviceInfo::from_parts(readout(), sii.header(), sii.categories());
         let whole = sii.pdos(PdoDirection::Rx).count() + sii.pdos(PdoDirection::Tx).count();
         let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
         assert!(info.pdos.len() >= whole, "{name}");
@@ -239,7 +325,7 @@ proptest! {
         let header = SiiHeader::decode(header.as_slice().try_into().unwrap());
         let parts: Vec<_> =
             parts.iter().map(|(code, data)| (CategoryKind::from_code(*code / 10 * 10 + *code % 2), &data[..])).collect();
-        let info = SubDeviceInfo::from_parts(readout(), &header, parts);
+        let info = SubDeviceInfo::from_parts(readout(), &header, placed(&parts));
         info.warnings.iter().for_each(|warning| drop(warning.to_string()));
     }
 }

@@ -2,15 +2,18 @@
 
 use core::fmt;
 
-use ringcat_wire::sii::CategoryKind;
+use ringcat_wire::sii::{CategoryKind, MailboxLayout, SyncManagerKind};
+
+/// A mailbox holds at least the header of a message (facts 6.1).
+pub(super) const MAILBOX_HEADER: u16 = 6;
 
 /// Something odd in the SII of a SubDevice.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct InfoWarning {
     /// Category; `None` for the fixed area.
     pub category: Option<CategoryKind>,
-    /// Byte offset in the category's data or in the fixed area.
-    pub offset: usize,
+    /// Byte of the EEPROM from which on it is odd; `None` where it is no matter of one place.
+    pub offset: Option<usize>,
     /// What is odd.
     pub problem: SiiProblem,
 }
@@ -18,8 +21,56 @@ pub struct InfoWarning {
 /// What is odd.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum SiiProblem {
-    /// The fixed area is all 0xFF or all zero: nobody has written the EEPROM.
+    /// The fixed area is all 0xFF or all zero: the EEPROM was never written.
     Blank,
+    /// The EEPROM does not give its contents.
+    Unreadable,
+    /// Nothing follows the fixed area.
+    NoCategories,
+    /// There is no category of this kind, which every device has.
+    Missing,
+    /// A category goes on beyond the end of the EEPROM; it is left out.
+    Beyond {
+        /// Bytes that it announces.
+        announced: usize,
+        /// Bytes that are left.
+        left: usize,
+    },
+    /// The categories go on beyond the size that the EEPROM says it has; they count.
+    Size {
+        /// Bytes that it says.
+        size: usize,
+        /// Where the categories end.
+        end: usize,
+    },
+    /// The end of a category is erased (0xFF): the image was cut short. Entries that are erased are left out.
+    Erased {
+        /// Erased bytes.
+        bytes: usize,
+    },
+    /// The mailboxes cannot be where the SII puts them; they are left unused.
+    Mailbox {
+        /// Where the SII puts them.
+        layout: MailboxLayout,
+        /// First byte behind the memory of the controller.
+        memory_end: u32,
+    },
+    /// Something needs SyncManagers, and the SII describes none.
+    NoSyncManagers,
+    /// Process data without a mailbox in which a dictionary could describe it, and without PDOs.
+    NoPdos {
+        /// The SyncManager.
+        sync_manager: u8,
+    },
+    /// A SyncManager without a type; its PDOs or its control byte say what it is for.
+    NoType {
+        /// The SyncManager.
+        sync_manager: u8,
+        /// The type in the SII.
+        got: u8,
+        /// What it is taken for.
+        taken: SyncManagerKind,
+    },
     /// The low byte of word 7 does not fit the first seven words.
     Checksum {
         /// The checksum that belongs to the first seven words.
@@ -94,8 +145,8 @@ pub enum SiiProblem {
         /// Bits of process data in the dictionary.
         dictionary: u32,
     },
-    /// The direction in the control byte of a SyncManager is not that of its type; the type counts.
-    ControlDirection {
+    /// Mode or direction in the control byte of a SyncManager are not those of its type; the type counts.
+    Control {
         /// The SyncManager.
         sync_manager: u8,
         /// Its control byte.
@@ -103,14 +154,80 @@ pub enum SiiProblem {
     },
 }
 
+impl SiiProblem {
+    /// The image is not what its maker wrote.
+    pub(super) const fn is_grave(&self) -> bool {
+        match self {
+            SiiProblem::Blank
+            | SiiProblem::Unreadable
+            | SiiProblem::NoCategories
+            | SiiProblem::Missing
+            | SiiProblem::Beyond { .. }
+            | SiiProblem::Erased { .. }
+            | SiiProblem::Checksum { .. }
+            | SiiProblem::NoEndMarker
+            | SiiProblem::NoSyncManagers => true,
+            SiiProblem::Short { .. }
+            | SiiProblem::Size { .. }
+            | SiiProblem::Mailbox { .. }
+            | SiiProblem::NoPdos { .. }
+            | SiiProblem::NoType { .. }
+            | SiiProblem::Repeated
+            | SiiProblem::HalfMailbox { .. }
+            | SiiProblem::NoMailbox { .. }
+            | SiiProblem::NoString { .. }
+            | SiiProblem::SyncManagers { .. }
+            | SiiProblem::PdoEntries { .. }
+            | SiiProblem::PdoSyncManager { .. }
+            | SiiProblem::PdoDirection { .. }
+            | SiiProblem::Dictionary { .. }
+            | SiiProblem::Control { .. } => false,
+        }
+    }
+}
+
 impl fmt::Display for InfoWarning {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self.category {
-            Some(category) => write!(f, "SII category {category} at byte {}: ", self.offset)?,
-            None => write!(f, "SII at byte {}: ", self.offset)?,
+        match (self.category, self.offset) {
+            (Some(category), Some(offset)) => write!(f, "byte {offset:#06x}, category {category}: ")?,
+            (Some(category), None) => write!(f, "category {category}: ")?,
+            (None, Some(offset)) => write!(f, "byte {offset:#06x}: ")?,
+            (None, None) => {}
         }
         match self.problem {
             SiiProblem::Blank => f.write_str("the EEPROM is blank"),
+            SiiProblem::Unreadable => f.write_str("the EEPROM cannot be read: nothing is known of this SubDevice"),
+            SiiProblem::NoCategories => f.write_str("nothing follows the fixed area: the image is cut short"),
+            SiiProblem::Missing => f.write_str("expected in every image, there is none: is the image cut short?"),
+            SiiProblem::Beyond { announced, left } => {
+                write!(f, "announces {announced} bytes, {left} are left: it is left out, no end marker follows")
+            }
+            SiiProblem::Size { size, end } => {
+                write!(f, "the EEPROM says that it has {size} bytes, its categories end at byte {end:#06x}")
+            }
+            SiiProblem::Erased { bytes } => {
+                write!(f, "its last {bytes} bytes are erased (0xff): the image is cut short")
+            }
+            SiiProblem::Mailbox { layout, memory_end } => write!(
+                f,
+                "mailboxes of {} bytes at {:#06x} and {} bytes at {:#06x} are not believed: expected at least {MAILBOX_HEADER} bytes \
+                 each, apart from each other, between 0x1000 and {memory_end:#06x}",
+                layout.receive_size, layout.receive_offset, layout.send_size, layout.send_offset
+            ),
+            SiiProblem::NoSyncManagers => f.write_str("no SyncManager is described: is the image cut short?"),
+            SiiProblem::NoPdos { sync_manager } => {
+                write!(f, "SM {sync_manager} is for process data, and no PDO describes it")
+            }
+            SiiProblem::NoType { sync_manager, got, taken } => {
+                let what = match taken {
+                    SyncManagerKind::MailboxOut => "the mailbox to the SubDevice",
+                    SyncManagerKind::MailboxIn => "the mailbox from the SubDevice",
+                    SyncManagerKind::Outputs => "outputs",
+                    SyncManagerKind::Inputs => "inputs",
+                    SyncManagerKind::Unused | SyncManagerKind::Other(_) => "nothing",
+                };
+                write!(f, "SM {sync_manager} has type {got}, taken for {what}")
+            }
             SiiProblem::Checksum { expected, got } => {
                 write!(f, "checksum: expected {expected:#04x}, word 7 is {got:#06x}")
             }
@@ -140,8 +257,8 @@ impl fmt::Display for InfoWarning {
                 f,
                 "SM {sync_manager}: {sii} bits of process data, the dictionary has other PDOs with {dictionary} bits, which count"
             ),
-            SiiProblem::ControlDirection { sync_manager, control } => {
-                write!(f, "SM {sync_manager}: direction in control byte {control:#04x} is not that of its type")
+            SiiProblem::Control { sync_manager, control } => {
+                write!(f, "SM {sync_manager}: control byte {control:#04x} is not one of its type, which counts")
             }
         }
     }

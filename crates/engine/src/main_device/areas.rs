@@ -7,10 +7,10 @@ use alloc::vec::Vec;
 use crate::config::{PdoEntry, PdoMapping, SubDeviceConfig};
 use crate::domain::DomainId;
 use crate::exchange::Entry;
-use crate::info::Direction;
+use crate::info::{Direction, SubDeviceInfo};
 use crate::layout::{Layout, PlacedArea};
 use crate::plan::{MappedEntry, SubDevicePlan};
-use crate::procedures::fleet::planned_areas;
+use crate::procedures::fleet::{SetupError, declared_areas, planned_areas};
 
 /// Where the PDO entries of all declared SubDevices lie in the domains' images.
 #[derive(Clone, Debug, Default)]
@@ -68,25 +68,57 @@ impl Directory {
     }
 }
 
-/// Process data of a declared SubDevice: planned from what it is, or from the declaration while it is not there.
+/// Process data of a declared SubDevice: planned from what it is, or from the declaration while it is not there or its SII
+/// cannot be followed.
 pub(super) enum Areas {
     /// Planned; `None` where its target state exchanges nothing.
     Planned(Option<SubDevicePlan>),
-    Declared(Vec<(u8, Direction, u16)>, Box<SubDeviceConfig>),
+    Declared(Declared),
+}
+
+/// What a declaration fixes by itself.
+pub(super) struct Declared {
+    areas: Vec<(u8, Direction, u16)>,
+    config: Box<SubDeviceConfig>,
+    /// LRW reaches it.
+    lrw: bool,
+    /// Why it is not planned though it is there.
+    unfit: Option<SetupError>,
+}
+
+impl Declared {
+    /// Of one that is not there: LRW may not reach it.
+    pub fn absent(config: &SubDeviceConfig) -> Declared {
+        let areas = declared_areas(config).unwrap_or_default();
+        Declared { areas, config: Box::new(config.clone()), lrw: false, unfit: None }
+    }
+
+    /// Of one that is there and cannot be set up.
+    pub fn unfit(config: &SubDeviceConfig, info: &SubDeviceInfo, error: SetupError) -> Declared {
+        Declared { lrw: info.lrw_supported(), unfit: Some(error), ..Declared::absent(config) }
+    }
 }
 
 impl Areas {
     pub(super) fn list(&self) -> Vec<(u8, Direction, u16)> {
         match self {
             Areas::Planned(plan) => plan.as_ref().map(planned_areas).unwrap_or_default(),
-            Areas::Declared(areas, _) => areas.clone(),
+            Areas::Declared(declared) => declared.areas.clone(),
+        }
+    }
+
+    /// Why a SubDevice that is there is not planned.
+    pub(super) fn unfit(&self) -> Option<&SetupError> {
+        match self {
+            Areas::Planned(_) => None,
+            Areas::Declared(declared) => declared.unfit.as_ref(),
         }
     }
 
     pub(super) fn lrw(&self) -> bool {
         match self {
             Areas::Planned(plan) => plan.as_ref().is_none_or(|plan| plan.lrw_supported),
-            Areas::Declared(..) => false,
+            Areas::Declared(declared) => declared.lrw,
         }
     }
 
@@ -112,7 +144,7 @@ impl Areas {
                 let pdos = areas.filter(|area| area.sync_manager == sync_manager).flat_map(|area| &area.pdos);
                 pdos.flat_map(|pdo| &pdo.entries).copied().collect()
             }
-            Areas::Declared(_, config) => {
+            Areas::Declared(Declared { config, .. }) => {
                 let pdos: &[PdoMapping] = match &config.declared {
                     Some(all) => all.iter().find(|sm| sm.index == sync_manager).map_or(&[], |sm| &sm.pdos),
                     None => {

@@ -1,7 +1,6 @@
 //! What the application declares, held against what the scan found, and turned into domains and members.
 
 use alloc::borrow::ToOwned;
-use alloc::boxed::Box;
 use alloc::format;
 use alloc::rc::Rc;
 use alloc::string::ToString;
@@ -15,7 +14,7 @@ use ringcat_wire::al::AlState;
 use ringcat_wire::register::{WatchdogDivider, WatchdogTime};
 
 use super::activate_error::ActivateError;
-use super::areas::Areas;
+use super::areas::{Areas, Declared};
 use super::lrw::ExplicitLrw;
 use crate::config::{ClockConfig, ConfigError, Group, Resolution, SubDeviceConfig, can_lead, groups, resolve};
 use crate::event::Event;
@@ -23,7 +22,7 @@ use crate::info::SubDeviceInfo;
 use crate::layout::{AreaSpec, DomainSpec, Layout, LrwPolicy, Witness};
 use crate::link::LinkSet;
 use crate::mail::Mailbox;
-use crate::plan::plan;
+use crate::plan::{PlanFault, plan};
 use crate::procedures::fleet::{Member, Setup, SetupError, declared_areas};
 use crate::procedures::presence;
 use crate::procedures::request_state::exchanges;
@@ -179,10 +178,15 @@ pub(super) fn plan_all(
     let pairs = declaration.subdevices.iter().zip(found).enumerate();
     pairs
         .map(|(subdevice, (config, info))| match info {
-            Some(info) => plan(config, info)
-                .map(|plan| Areas::Planned(exchanges(config.target).then_some(plan)))
-                .map_err(|error| ActivateError::Setup { subdevice, error: SetupError::Plan(error) }),
-            None => Ok(Areas::Declared(declared_areas(config).unwrap_or_default(), Box::new(config.clone()))),
+            Some(info) => match plan(config, info) {
+                Ok(plan) => Ok(Areas::Planned(exchanges(config.target).then_some(plan))),
+                // A bad EEPROM is a matter of its SubDevice alone.
+                Err(error) if error.fault == PlanFault::Sii => {
+                    Ok(Areas::Declared(Declared::unfit(config, info, SetupError::Plan(error))))
+                }
+                Err(error) => Err(ActivateError::Setup { subdevice, error: SetupError::Plan(error) }),
+            },
+            None => Ok(Areas::Declared(Declared::absent(config))),
         })
         .collect()
 }
@@ -284,7 +288,7 @@ pub(super) fn report_oddities(bus: &Bus, members: &[Member], layout: &Layout) {
             let what = format!("its outputs come every {period} ms, its watchdog expires after {watchdog} ms");
             bus.report(Event::PlanOddity { subdevice, what });
         }
-        if member.setup.is_none() && declared_areas(&member.config).is_none() {
+        if member.info.is_none() && declared_areas(&member.config).is_none() {
             let what = "not there, and its PDOs are not declared: when it comes, it has no place in the process image";
             bus.report(Event::PlanOddity { subdevice, what: what.to_owned() });
         }
@@ -309,22 +313,24 @@ pub(super) fn members(
     bus: &Bus,
     declaration: Declaration,
     found: Vec<Option<SubDeviceInfo>>,
+    plans: &[Areas],
     layout: &Layout,
 ) -> Result<Vec<Member>, ActivateError> {
     let count = found.len();
     let mut members = Vec::with_capacity(count);
     for (index, (config, info)) in declaration.subdevices.into_iter().zip(found).enumerate() {
+        let unfit = plans.get(index).and_then(Areas::unfit).cloned();
         let setup = match &info {
-            Some(info) => Some(Rc::new(
+            Some(info) if unfit.is_none() => Some(Rc::new(
                 Setup::new(index, &config, info, layout)
                     .map_err(|error| ActivateError::Setup { subdevice: index, error })?,
             )),
-            None => None,
+            Some(_) | None => None,
         };
         // One that is not there yet gets an address behind those of the scan.
         let absent = station_at(Position((0x4000 + index) as u16));
         let station = info.as_ref().map_or(absent, |info| info.station);
-        members.push(Member::new(config, info, station, setup, Mailbox::new(bus, index)));
+        members.push(Member { unfit, ..Member::new(config, info, station, setup, Mailbox::new(bus, index)) });
     }
     Ok(members)
 }

@@ -76,7 +76,9 @@ fn area(config: &SubDeviceConfig, info: &SubDeviceInfo, index: u8) -> Result<Opt
         None => sii_pdos(info.assigned_pdos(index).filter(|pdo| pdo.direction == direction)),
     };
     let bits: u64 = pdos.iter().flat_map(|pdo| &pdo.entries).map(|entry| u64::from(entry.bit_length)).sum();
-    let length = if assignment.is_some() || !pdos.is_empty() {
+    // A dictionary that was read and names none has none: then the default length of the SII is not meant.
+    let is_known = assignment.is_some() || !pdos.is_empty() || info.read_online.contains(&index);
+    let length = if is_known {
         let too_long = PlanProblem::TooLong { sync_manager: index, bits };
         u16::try_from(bits.div_ceil(8)).map_err(|_| too_long)?
     } else if sii.is_enabled() {
@@ -86,6 +88,8 @@ fn area(config: &SubDeviceConfig, info: &SubDeviceInfo, index: u8) -> Result<Opt
     };
     let override_ = config.sync_managers.iter().find(|declared| declared.index == index);
     let mut register = sync_manager(sii.start, length, sii.control);
+    // Process data has three buffers, whatever the control byte says of the mode.
+    register.control.mode = SyncManagerMode::Buffered;
     register.control.direction = match direction {
         Direction::Outputs => SyncManagerDirection::Write,
         Direction::Inputs => SyncManagerDirection::Read,
@@ -106,7 +110,7 @@ fn area(config: &SubDeviceConfig, info: &SubDeviceInfo, index: u8) -> Result<Opt
     }))
 }
 
-/// Declarations count before the PDOs of the SII, these before its type, that before its control byte.
+/// Declarations count before the type in the SII, that before its PDOs, these before its control byte.
 fn direction(
     config: &SubDeviceConfig,
     info: &SubDeviceInfo,
@@ -123,7 +127,7 @@ fn direction(
     }
     let by_pdo = || info.assigned_pdos(index).map(|pdo| pdo.direction).next();
     let by_control = || if sii.control & 0x0C == 0x04 { Direction::Outputs } else { Direction::Inputs };
-    let described = || by_pdo().or_else(|| kind_direction(sii)).unwrap_or_else(by_control);
+    let described = || kind_direction(sii).or_else(by_pdo).unwrap_or_else(by_control);
     Ok(directions.0.or(directions.1).unwrap_or_else(described))
 }
 

@@ -2,7 +2,7 @@
 
 use alloc::vec::Vec;
 
-use ringcat_wire::register::SyncManager;
+use ringcat_wire::register::{SyncManager, SyncManagerDirection};
 
 use super::areas::{PROCESS_RAM, occupied};
 use super::error::PlanProblem;
@@ -89,26 +89,53 @@ pub(super) fn command(speaks: Speaks, action: &StartupAction) -> Result<(), Plan
     }
 }
 
+/// Memory below the process RAM, and what can be exchanged there.
+struct Memory {
+    start: u32,
+    end: u32,
+    directions: &'static [SyncManagerDirection],
+}
+
+const WRITTEN: &[SyncManagerDirection] = &[SyncManagerDirection::Write];
+const READ: &[SyncManagerDirection] = &[SyncManagerDirection::Read];
+const BOTH: &[SyncManagerDirection] = &[SyncManagerDirection::Write, SyncManagerDirection::Read];
+
+/// Digital outputs, general purpose outputs and inputs, user RAM (facts 3.13). All else is registers.
+const BELOW_PROCESS_RAM: [Memory; 4] = [
+    Memory { start: 0x0F00, end: 0x0F04, directions: WRITTEN },
+    Memory { start: 0x0F10, end: 0x0F18, directions: WRITTEN },
+    Memory { start: 0x0F18, end: 0x0F20, directions: READ },
+    Memory { start: 0x0F80, end: 0x1000, directions: BOTH },
+];
+
 /// Bytes of a SyncManager, all buffers included.
 struct Span {
     index: u8,
     start: u16,
     end: u32,
+    direction: SyncManagerDirection,
 }
 
 impl Span {
     fn of(index: u8, register: &SyncManager) -> Span {
-        Span { index, start: register.start, end: u32::from(register.start) + occupied(register) }
+        let end = u32::from(register.start) + occupied(register);
+        Span { index, start: register.start, end, direction: register.control.direction }
     }
 }
 
 fn inside(info: &SubDeviceInfo, span: &Span) -> Result<(), PlanProblem> {
-    let process_ram = u32::from(PROCESS_RAM);
+    let start = u32::from(span.start);
     let memory_end = match (span.start < PROCESS_RAM, info.controller.ram_kib) {
-        (true, _) => process_ram,
+        (true, _) => {
+            let holds = |memory: &&Memory| {
+                (memory.start..memory.end).contains(&start) && memory.directions.contains(&span.direction)
+            };
+            let no_memory = PlanProblem::NoMemory { sync_manager: span.index, start: span.start };
+            BELOW_PROCESS_RAM.iter().find(holds).ok_or(no_memory)?.end
+        }
         // A controller that does not say how much it has.
         (false, 0) => 0x1_0000,
-        (false, kib) => process_ram + 1024 * u32::from(kib),
+        (false, kib) => u32::from(PROCESS_RAM) + 1024 * u32::from(kib),
     };
     if span.end <= memory_end {
         return Ok(());

@@ -16,11 +16,24 @@ pub struct PlanError {
     pub station: StationAddress,
     /// What is wrong.
     pub problem: PlanProblem,
+    /// With what.
+    pub fault: PlanFault,
+}
+
+/// What has to be mended.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum PlanFault {
+    /// The declaration.
+    Declaration,
+    /// The SII: without any declaration the SubDevice cannot be set up either, or its image is damaged.
+    Sii,
 }
 
 /// What is wrong.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum PlanProblem {
+    /// Nothing is declared, and the EEPROM says nothing.
+    NoSii,
     /// A SyncManager that the controller does not have.
     NoSuchSyncManager {
         /// Its number.
@@ -102,6 +115,13 @@ pub enum PlanProblem {
         bytes: u32,
         /// First byte behind the memory.
         memory_end: u32,
+    },
+    /// An area among the registers, where there is no memory for its direction.
+    NoMemory {
+        /// The SyncManager.
+        sync_manager: u8,
+        /// First byte.
+        start: u16,
     },
     /// Two areas share bytes; one with three buffers takes three times its length.
     Overlap {
@@ -205,7 +225,11 @@ pub enum PlanWarning {
 
 impl fmt::Display for PlanError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "SubDevice {} ({}): {}", self.position, self.station, self.problem)
+        write!(f, "SubDevice {} ({}): ", self.position, self.station)?;
+        match self.fault {
+            PlanFault::Declaration => self.problem.fmt(f),
+            PlanFault::Sii => write!(f, "its SII cannot be followed: {}", self.problem),
+        }
     }
 }
 
@@ -214,6 +238,7 @@ impl core::error::Error for PlanError {}
 impl fmt::Display for PlanProblem {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
+            PlanProblem::NoSii => f.write_str("the EEPROM is blank or cannot be read, and nothing is declared"),
             PlanProblem::NoSuchSyncManager { sync_manager, available } => {
                 write!(f, "SM {sync_manager} is declared, the controller has {available} SyncManagers")
             }
@@ -240,6 +265,9 @@ impl fmt::Display for PlanProblem {
             }
             PlanProblem::TooLong { sync_manager, bits } => {
                 write!(f, "SM {sync_manager}: {bits} bits of process data, expected at most 524280")
+            }
+            PlanProblem::NoMemory { sync_manager, start } => {
+                write!(f, "SM {sync_manager}: there is no memory of its direction at {start:#06x}")
             }
             PlanProblem::OutsideMemory { sync_manager, start, bytes, memory_end } => {
                 write!(f, "SM {sync_manager}: {bytes} bytes (all buffers) at {start:#06x} leave the memory, ")?;

@@ -8,13 +8,11 @@ use std::{fs, println};
 
 use ringcat_wire::address::Position;
 use ringcat_wire::register::Information;
-use ringcat_wire::sii::{
-    CategoryKind, CoeDetails, GeneralFlags, MailboxLayout, MailboxProtocols, Sii, SiiHeader, SiiSyncManager,
-};
+use ringcat_wire::sii::{CoeDetails, GeneralFlags, MailboxLayout, MailboxProtocols, Sii, SiiHeader, SiiSyncManager};
 
 use super::*;
 use crate::config::{PdoEntry, PdoMapping, Watchdog};
-use crate::info::{PdoEntryInfo, PdoInfo, Readout};
+use crate::info::{InfoWarning, PdoEntryInfo, PdoInfo, Readout, SiiProblem};
 
 /// An ET1100: 8 FMMUs, 8 SyncManagers, 8 KiB, four MII ports, DC.
 const INFORMATION: [u8; Information::LEN] = [0x11, 0x01, 0x02, 0x00, 8, 8, 8, 0xFF, 0x0C, 0x00];
@@ -349,6 +347,53 @@ fn an_sdo_needs_coe() {
     assert_eq!(problem(&config, &terminal()), PlanProblem::NoCoe { index: 0x8000, sub_index: 1 });
 }
 
+#[test]
+fn a_dictionary_that_names_no_pdos_counts_before_the_default_length() {
+    let mut info = device();
+    info.pdos.retain(|pdo| pdo.sync_manager != Some(2));
+    assert_eq!(plan(&any(), &info).unwrap().process_data[0].length, 3);
+    info.read_online = vec![2];
+    assert_eq!(plan(&any(), &info).unwrap().process_data[0].length, 0);
+}
+
+#[test]
+fn the_type_of_a_sync_manager_goes_before_its_pdos() {
+    let mut info = device();
+    info.pdos.retain(|pdo| pdo.sync_manager != Some(3));
+    info.pdos[0].sync_manager = Some(3);
+    let plan = plan(&any(), &info).unwrap();
+    assert_eq!((plan.process_data[1].direction, plan.process_data[1].pdos.len()), (Direction::Inputs, 0));
+}
+
+#[test]
+fn an_error_says_whether_declaration_or_sii_have_to_be_mended() {
+    let fault = |config: &SubDeviceConfig, info: &SubDeviceInfo| plan(config, info).unwrap_err().fault;
+    let wrong = any().assign(9, Direction::Inputs, vec![]);
+    assert_eq!(fault(&wrong, &device()), PlanFault::Declaration);
+    let mut unfit = device();
+    unfit.sync_managers[2].start = 0x2FFF;
+    assert_eq!(fault(&any(), &unfit), PlanFault::Sii);
+    assert_eq!(
+        plan(&any(), &unfit).unwrap_err().to_string(),
+        "SubDevice 4 (0x1005): its SII cannot be followed: SM 2: 9 bytes (all buffers) at 0x2fff leave the memory, which \
+         ends at 0x3000"
+    );
+    let problem = SiiProblem::Checksum { expected: 1, got: 2 };
+    let mut damaged = SubDeviceInfo { sync_managers: vec![], ..device() };
+    damaged.warnings.push(InfoWarning { category: None, offset: Some(14), problem });
+    let declared = any().assign(3, Direction::Inputs, vec![PdoMapping::from_sii(0x1A00)]);
+    assert_eq!(fault(&declared, &damaged), PlanFault::Sii);
+}
+
+#[test]
+fn nothing_is_made_of_a_blank_eeprom_unless_process_data_is_declared() {
+    let mut blank = SubDeviceInfo { sync_managers: vec![], pdos: vec![], mailbox: None, ..device() };
+    blank.warnings.push(InfoWarning { category: None, offset: None, problem: SiiProblem::Blank });
+    assert_eq!(problem(&any(), &blank), PlanProblem::NoSii);
+    let declared = SubDeviceConfig { declared: Some(vec![]), ..any() };
+    assert!(plan(&declared, &blank).is_ok());
+}
+
 /// Every real image that parses gives a plan on a large controller.
 #[test]
 fn real_images_can_be_planned() {
@@ -363,8 +408,7 @@ fn real_images_can_be_planned() {
         let image = fs::read(&path).unwrap();
         let Ok(sii) = Sii::parse(&image) else { continue };
         let header: &SiiHeader = sii.header();
-        let parts: Vec<(CategoryKind, &[u8])> = sii.categories().map(|c| (c.kind, c.data)).collect();
-        let info = SubDeviceInfo::from_parts(Readout { information, ..Readout::default() }, header, parts);
+        let info = SubDeviceInfo::from_parts(Readout { information, ..Readout::default() }, header, sii.categories());
         let name = path.file_name().unwrap_or_default().to_string_lossy();
         match plan(&any(), &info) {
             Ok(plan) => {

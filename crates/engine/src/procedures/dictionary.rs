@@ -145,7 +145,7 @@ fn merge(info: &mut SubDeviceInfo, assignment: Assignment) -> Option<InfoWarning
         Direction::Outputs => CategoryKind::RxPdo,
         Direction::Inputs => CategoryKind::TxPdo,
     };
-    warned.then_some(InfoWarning { category: Some(category), offset: 0, problem })
+    warned.then_some(InfoWarning { category: Some(category), offset: None, problem })
 }
 
 /// A PDO as the dictionary has it, with the names of the SII.

@@ -59,6 +59,8 @@ pub struct Member {
     pub node: Option<usize>,
     /// Its configuration, shared with the procedure that applies it.
     pub setup: Option<Rc<Setup>>,
+    /// Why it has none though it is there.
+    pub unfit: Option<SetupError>,
     /// Its mailbox, in use from PREOP on.
     pub mailbox: Mailbox,
     /// What has happened to it since activation.
@@ -75,6 +77,11 @@ pub struct Incidents {
 }
 
 impl Member {
+    /// Whether it was there at the activation, or has come since.
+    pub fn is_there(&self) -> bool {
+        self.setup.is_some() || self.unfit.is_some()
+    }
+
     /// A member of which nothing is known but what the scan found.
     pub fn new(
         config: SubDeviceConfig,
@@ -94,6 +101,7 @@ impl Member {
             configured: false,
             node,
             setup,
+            unfit: None,
             mailbox,
             incidents: Incidents::default(),
         }
@@ -191,6 +199,11 @@ impl Setup {
             sync_manager_count: info.controller.sync_manager_count,
             emulated: info.device_emulation,
         })
+    }
+
+    /// How many areas have an FMMU.
+    pub fn process_data_fmmus(&self) -> usize {
+        self.fmmus.iter().filter(|(number, _)| Some(*number) != self.mail_fmmu).count()
     }
 
     /// The FMMU registers from the first to the last one that is used, to be written at once.

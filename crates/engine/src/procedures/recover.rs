@@ -11,8 +11,9 @@ use ringcat_wire::al::{AlState, AlStatus, AlStatusCode};
 
 use super::al_state;
 use super::configure::{BringUp, ConfigureError, RegisterFailure, Start, StartupError};
-use super::fleet::{Phase, SharedFleet};
+use super::fleet::{Member, Phase, SharedFleet};
 use super::frame_limit;
+use super::request_state::read_again;
 use super::sii;
 use super::strangers::take_away;
 use crate::event::Event;
@@ -65,6 +66,8 @@ pub(super) async fn keep_up(bus: Bus, fleet: SharedFleet, index: usize, start: S
                 frame_limit::explain(&bus, &fleet).await;
                 bus.report(failure(index, &error));
             }
+            // Another try brings nothing new before its EEPROM is another one, which is read when it comes back.
+            Err(error @ ConfigureError::Unfit(_)) => return bus.report(failure(index, &error)),
             Err(error) => bus.report(failure(index, &error)),
         }
         bus.sleep(pause).await;
@@ -92,6 +95,7 @@ pub(super) fn is_of_bus(error: &ConfigureError) -> bool {
         | ConfigureError::State(_)
         | ConfigureError::NotLocked(_)
         | ConfigureError::NoSetup
+        | ConfigureError::Unfit(_)
         | ConfigureError::NoBoot
         | ConfigureError::Absent
         | ConfigureError::Interrupted => false,
@@ -144,11 +148,16 @@ pub(super) fn bring_up<'a>(bus: &'a Bus, fleet: &'a SharedFleet, index: usize) -
         fleet,
         index,
         station: member.station,
-        setup: member.setup.clone().ok_or(ConfigureError::NoSetup)?,
+        setup: member.setup.clone().ok_or_else(|| no_setup(member))?,
         config: member.config.clone(),
         target: member.target,
         mailbox: member.mailbox.clone(),
     })
+}
+
+/// Why there is nothing to write to a SubDevice.
+pub(super) fn no_setup(member: &Member) -> ConfigureError {
+    member.unfit.clone().map_or(ConfigureError::NoSetup, ConfigureError::Unfit)
 }
 
 async fn attempt(
@@ -219,6 +228,9 @@ pub(super) fn welcome(bus: &Bus, fleet: &SharedFleet, index: usize) {
     bus.clone().spawn(async move {
         let checked = async {
             if is_same(&bus, &fleet, index).await {
+                if fleet.access().members[index].unfit.is_some() {
+                    read_again(&bus, &fleet, index).await;
+                }
                 return keep_up(bus.clone(), fleet.clone(), index, Start::Unknown, None).await;
             }
             let station = fleet.access().members[index].station;
@@ -270,7 +282,7 @@ pub(crate) fn start_all(bus: &Bus, fleet: &SharedFleet, from: Start) {
     let found: Vec<usize> = {
         let access = fleet.access();
         let members = access.members.iter().enumerate();
-        members.filter(|(_, member)| member.setup.is_some()).map(|(index, _)| index).collect()
+        members.filter(|(_, member)| member.is_there()).map(|(index, _)| index).collect()
     };
     for index in found {
         start(bus, fleet, index, from, None);

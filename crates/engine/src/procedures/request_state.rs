@@ -14,7 +14,7 @@ use ringcat_wire::al::AlState;
 
 use super::configure::{BringUp, ConfigureError, Start};
 use super::fleet::{Fleet, Phase, Setup, SharedFleet};
-use super::recover::{bring_up, failure, is_of_bus, keep_up, while_current};
+use super::recover::{bring_up, failure, is_of_bus, keep_up, no_setup, while_current};
 use super::scan::read_one;
 use super::sii::{self, SiiCache};
 use crate::event::Event;
@@ -63,6 +63,7 @@ fn check(fleet: &SharedFleet, index: usize, state: AlState) -> Result<(), Config
     let member = access.members.get(index).ok_or(ConfigureError::NoSetup)?;
     match &member.setup {
         Some(setup) if state == AlState::Boot && setup.plan.bootstrap.is_empty() => Err(ConfigureError::NoBoot),
+        None if member.unfit.is_some() => Err(no_setup(member)),
         Some(_) | None => Ok(()),
     }
 }
@@ -127,8 +128,9 @@ async fn travel(bus: &Bus, fleet: &SharedFleet, index: usize, before: AlState) -
     bring_up.travel().await.map(|()| bring_up.target)
 }
 
-/// A boot loader may have written another SII. One that cannot be read leaves everything as it was.
-async fn read_again(bus: &Bus, fleet: &SharedFleet, index: usize) {
+/// A boot loader, or whoever mended one that could not be followed, may have written another SII. One that cannot be read
+/// leaves everything as it was.
+pub(super) async fn read_again(bus: &Bus, fleet: &SharedFleet, index: usize) {
     let Some(known) = fleet.access().members.get(index).and_then(|member| member.info.clone()) else { return };
     let read = async {
         sii::claim(bus, known.station).await?;
@@ -147,9 +149,16 @@ async fn read_again(bus: &Bus, fleet: &SharedFleet, index: usize) {
     let Some(member) = members.get_mut(index) else { return };
     match Setup::new(index, &member.config, &info, layout) {
         Ok(setup) => {
+            if member.unfit.take().is_some() && setup.plan.mapped_areas().count() > setup.process_data_fmmus() {
+                let what =
+                    "its SII can be followed now: it has no place in the process image before the next activation";
+                bus.report(Event::PlanOddity { subdevice: index, what: what.to_string() });
+            }
             member.setup = Some(Rc::new(setup));
             member.info = Some(info);
         }
+        // As before.
+        Err(_) if member.unfit.is_some() => {}
         Err(error) => bus.report(Event::ConfigurationFailed { subdevice: index, reason: error.to_string() }),
     }
 }

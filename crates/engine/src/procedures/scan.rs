@@ -21,6 +21,7 @@ use ringcat_wire::al::{AlControl, AlState, AlStatus};
 use ringcat_wire::command::Command;
 use ringcat_wire::datagram::Target;
 use ringcat_wire::register::{DcReceiveTimes, DlStatus, EcatEvent, Fmmu, Information, PortKind, SyncManager, map};
+use ringcat_wire::sii::SiiHeader;
 
 use self::count::Count;
 pub use self::error::ScanError;
@@ -29,7 +30,7 @@ use super::cabling::{Cabling, Known, cabling, is_swapped, stays_closed};
 use super::dictionary::{ReadPdos, complete};
 use super::frame_limit::probe;
 use super::junction::learn;
-use super::sii::{self, SiiCache, SiiContents};
+use super::sii::{self, ChainEnd, SiiCache, SiiContents};
 use crate::config::duplicate_aliases;
 use crate::event::Event;
 use crate::info::{InfoWarning, Readout, SiiProblem, SubDeviceInfo};
@@ -53,6 +54,9 @@ const INIT_LIMIT: Duration = Duration::from_millis(100);
 const ATTEMPTS: u8 = 3;
 /// Progress is reported in so many steps.
 const PROGRESS_STEPS: usize = 10;
+
+/// Byte of the SII that says how large the EEPROM is.
+const SIZE_AT: usize = 2 * 0x3E;
 
 /// How to scan.
 #[derive(Clone, Debug)]
@@ -318,7 +322,15 @@ async fn read_all(bus: &Bus, count: u16, cache: &SiiCache) -> Result<Vec<Said>, 
 }
 
 async fn ask(bus: &Bus, position: Position, station: StationAddress, cache: &SiiCache) -> Result<Said, ScanError> {
-    let contents = sii::read(bus, station, cache).await.map_err(|error| ScanError::Sii { position, error })?;
+    let contents = match sii::read(bus, station, cache).await {
+        Ok(contents) => contents,
+        Err(error) if error.is_passing() => return Err(ScanError::Sii { position, error }),
+        // A broken EEPROM is a matter of its SubDevice alone.
+        Err(error) => {
+            bus.report(Event::SiiOddity { position, what: error.to_string() });
+            return Ok((SiiContents::unreadable(), None));
+        }
+    };
     let identification = identification::read(bus, station, &contents).await?;
     Ok((contents, identification))
 }
@@ -371,12 +383,29 @@ fn answered<const N: usize, const M: usize>(
 }
 
 fn describe(readout: Readout, (contents, identification): &Said) -> SubDeviceInfo {
-    let categories = contents.categories.iter().map(|(kind, data)| (*kind, data.as_slice()));
-    let mut info = SubDeviceInfo::from_parts(readout, &contents.header, categories);
+    let mut info = SubDeviceInfo::from_parts(readout, &contents.header, contents.categories());
     info.identification = *identification;
-    if !contents.complete {
-        info.warnings.push(InfoWarning { category: None, offset: 0, problem: SiiProblem::NoEndMarker });
-    }
+    let (category, offset, problem) = match contents.end {
+        ChainEnd::Unreadable => {
+            info.warnings.clear();
+            (None, None, SiiProblem::Unreadable)
+        }
+        // A blank one has no categories either.
+        _ if info.is_blank() => return info,
+        ChainEnd::Sound { .. } if contents.categories.is_empty() => {
+            (None, Some(SiiHeader::LEN), SiiProblem::NoCategories)
+        }
+        ChainEnd::Sound { .. } => return info,
+        ChainEnd::BehindSize { at } => {
+            let size = contents.header.size_bytes();
+            (None, Some(SIZE_AT), SiiProblem::Size { size, end: at })
+        }
+        ChainEnd::Open { at } => (None, Some(at), SiiProblem::NoEndMarker),
+        ChainEnd::Beyond { kind, at, announced, left } => {
+            (Some(kind), Some(at), SiiProblem::Beyond { announced, left })
+        }
+    };
+    info.warnings.push(InfoWarning { category, offset, problem });
     info
 }
 

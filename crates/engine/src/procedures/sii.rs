@@ -16,7 +16,7 @@ use ringcat_wire::address::StationAddress;
 use ringcat_wire::command::Command;
 use ringcat_wire::datagram::Target;
 use ringcat_wire::register::{SiiControl, map};
-use ringcat_wire::sii::{CategoryHeader, CategoryKind, Identity, SiiHeader};
+use ringcat_wire::sii::{Category, CategoryHeader, CategoryKind, Identity, SiiHeader};
 
 pub use cache::SiiCache;
 use cache::{FixedArea, Found};
@@ -31,6 +31,8 @@ const MAX_CATEGORIES: usize = 256;
 const MAX_WORDS: u32 = 0x8000;
 /// Where vendor, product, revision and serial number lie.
 const IDENTITY_WORD: u32 = 0x08;
+/// What an EEPROM gives that was never written, or that ends before.
+const ERASED: u8 = 0xFF;
 /// Words before the categories.
 const HEADER_WORDS: u32 = (SiiHeader::LEN / 2) as u32;
 /// What is read of the fixed area: all but reserved words (facts 4.1). Words 0x20 to 0x23 are reserved too, but in many
@@ -107,10 +109,56 @@ impl From<BusError> for SiiReadError {
 pub struct SiiContents {
     /// The fixed area; its reserved words from 0x24 on are not read and zero.
     pub header: SiiHeader,
-    /// The categories that were wanted, with their data.
-    pub categories: Vec<(CategoryKind, Vec<u8>)>,
-    /// Whether the chain of categories ended as it should.
-    pub complete: bool,
+    /// The categories that were wanted, each with the byte of its header and its data.
+    pub categories: Vec<(CategoryKind, usize, Vec<u8>)>,
+    /// How the chain of categories ended.
+    pub end: ChainEnd,
+}
+
+/// How a chain of categories ended.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum ChainEnd {
+    /// With the end marker at this byte, or with the last word of the EEPROM.
+    Sound {
+        /// The first byte that is no category.
+        at: usize,
+    },
+    /// With the end marker at this byte, behind the end of the EEPROM by its own size word.
+    BehindSize {
+        /// The end marker.
+        at: usize,
+    },
+    /// Without an end marker.
+    Open {
+        /// Where it was expected.
+        at: usize,
+    },
+    /// With a category that is longer than what is left of the EEPROM.
+    Beyond {
+        /// What it would have held.
+        kind: CategoryKind,
+        /// Its header.
+        at: usize,
+        /// Bytes that it announces.
+        announced: usize,
+        /// Bytes that are left.
+        left: usize,
+    },
+    /// The EEPROM cannot be read at all.
+    Unreadable,
+}
+
+impl SiiContents {
+    /// Of an EEPROM that cannot be read: as if it were erased.
+    pub(super) fn unreadable() -> SiiContents {
+        let header = SiiHeader::decode(&[0xFF; SiiHeader::LEN]);
+        SiiContents { header, categories: Vec::new(), end: ChainEnd::Unreadable }
+    }
+
+    /// The categories that were wanted, as they lie in the EEPROM.
+    pub fn categories(&self) -> impl Iterator<Item = Category<'_>> {
+        self.categories.iter().map(|(kind, offset, data)| Category { kind: *kind, offset: *offset, data })
+    }
 }
 
 /// Which categories the engine uses.
@@ -178,35 +226,58 @@ async fn categories(
     area: &FixedArea,
     with_data: bool,
 ) -> Result<(Vec<CategoryHeader>, SiiContents), SiiReadError> {
-    let mut contents = SiiContents { header: SiiHeader::decode(area), categories: Vec::new(), complete: false };
+    let header = SiiHeader::decode(area);
+    let mut contents =
+        SiiContents { header, categories: Vec::new(), end: ChainEnd::Open { at: bytes_before(HEADER_WORDS) } };
     let mut chain = Vec::new();
     // An EEPROM that says nothing about its size is followed as far as any goes.
     let size = (contents.header.size_bytes() / 2) as u32;
-    let end = size.clamp(HEADER_WORDS + 2, MAX_WORDS);
+    let mut end = size.clamp(HEADER_WORDS + 2, MAX_WORDS);
+    let mut is_behind_size = false;
     let mut word = HEADER_WORDS;
     while word + 2 <= end && chain.len() < MAX_CATEGORIES {
         let bytes = eeprom.bytes(word, 2, None).await?;
         let category = CategoryHeader::decode(&[bytes[0], bytes[1], bytes[2], bytes[3]]);
         chain.push(category);
+        let at = bytes_before(word);
         if category.kind == CategoryKind::End {
-            contents.complete = true;
-            break;
+            contents.end = if is_behind_size { ChainEnd::BehindSize { at } } else { ChainEnd::Sound { at } };
+            return Ok((chain, contents));
         }
         let words = u32::from(category.words);
         word += 2;
+        if word + words > end && goes_on(eeprom, end, word + words).await? {
+            (end, is_behind_size) = (MAX_WORDS, true);
+        }
         if word + words > end {
-            break;
+            let (announced, left) = (category.data_len(), bytes_before(end - word));
+            contents.end = ChainEnd::Beyond { kind: category.kind, at, announced, left };
+            return Ok((chain, contents));
         }
         if with_data && is_needed(category.kind) {
             let next = word + words;
             let then = (next + 2 <= end && chain.len() < MAX_CATEGORIES).then_some(next);
-            contents.categories.push((category.kind, eeprom.bytes(word, words, then).await?));
+            contents.categories.push((category.kind, at, eeprom.bytes(word, words, then).await?));
         }
         word += words;
     }
-    // A chain that fills the EEPROM to its last word needs no end marker.
-    contents.complete |= word == end;
+    // A chain that fills the EEPROM to its last word needs no end marker, but zeros are no chain.
+    let at = bytes_before(word);
+    let is_zero = chain.last().is_some_and(|last: &CategoryHeader| last.kind == CategoryKind::Nop && last.words == 0);
+    contents.end = if word == end && !is_zero { ChainEnd::Sound { at } } else { ChainEnd::Open { at } };
     Ok((chain, contents))
+}
+
+/// Whether the last words before this one are written, though the size word says that the EEPROM ends earlier. Other
+/// MainDevices (IgH, SOEM) do not look at the size word at all.
+async fn goes_on(eeprom: &mut Eeprom, end: u32, behind: u32) -> Result<bool, SiiReadError> {
+    let first = end.max(behind.saturating_sub(2));
+    Ok(behind <= MAX_WORDS && eeprom.bytes(first, behind - first, None).await?.iter().any(|byte| *byte != ERASED))
+}
+
+/// Byte at which a word begins.
+const fn bytes_before(word: u32) -> usize {
+    2 * word as usize
 }
 
 /// Written to `SII_CONFIGURATION`: takes the EEPROM from the PDI.

@@ -8,6 +8,7 @@ use ringcat_wire::register::{SyncManager, map};
 
 use super::al_state;
 use super::configure::ConfigureError;
+use super::fleet::SetupError;
 use super::sii;
 use crate::config::{SubDeviceConfig, Timeouts};
 use crate::info::SubDeviceInfo;
@@ -43,7 +44,8 @@ pub(crate) async fn visit(
         AlState::Init | AlState::PreOp | AlState::SafeOp | AlState::Op => info.mailbox,
     };
     let (Some(layout), false) = (layout, state == AlState::Init) else { return Ok(()) };
-    let Ok(plan) = plan(&SubDeviceConfig::from_info(info), info) else { return Err(ConfigureError::NoSetup) };
+    let plan = plan(&SubDeviceConfig::from_info(info), info);
+    let plan = plan.map_err(|error| ConfigureError::Unfit(SetupError::Plan(error)))?;
     let managers = if state == AlState::Boot { &plan.bootstrap } else { &plan.mailbox };
     let [_, send] = &managers[..] else { return Err(ConfigureError::NoSetup) };
     for manager in managers {

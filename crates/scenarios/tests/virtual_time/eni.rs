@@ -199,6 +199,65 @@ fn files_of_tools_come_to_op_and_exchange_data_through_their_variables_facts_8()
     }
 }
 
+/// Whatever files there are, beside the ones above: `sim --eni` and `run --eni` of each, as one program.
+#[test]
+fn every_file_there_is_comes_to_op_with_complete_working_counters_or_says_why_not() {
+    let directory = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared/data/eni");
+    let Ok(entries) = std::fs::read_dir(&directory) else {
+        println!("skipped: {} is not there", directory.display());
+        return;
+    };
+    let mut paths: Vec<PathBuf> = entries.filter_map(|entry| Some(entry.ok()?.path())).collect();
+    paths.sort();
+    let mut complete = 0;
+    for path in &paths {
+        let name = path.file_name().unwrap_or_default().to_string_lossy();
+        let outcome = bring_up(path);
+        println!(
+            "{name}: {}",
+            outcome.as_ref().map_or_else(String::clone, |wkc| format!("in OP, working counter {wkc}"))
+        );
+        match outcome {
+            Ok(wkc) => {
+                complete += 1;
+                assert!(wkc > 0, "{name}: something is exchanged");
+            }
+            // A reason names the place in the file, or the SubDevice and what it lacks.
+            Err(reason) => {
+                let is_named = ["line ", "this is ", "SubDevice "].iter().any(|mark| reason.contains(mark));
+                assert!(is_named, "{name}: {reason}");
+            }
+        }
+    }
+    let tools = REAL.iter().filter(|(name, _)| paths.iter().any(|path| path.ends_with(name))).count();
+    assert!(complete >= tools, "{complete} of {} files come to OP", paths.len());
+}
+
+/// The working counter of the process data in OP, or the reason.
+fn bring_up(path: &Path) -> Result<u32, String> {
+    let file = EniFile::load(path).map_err(|error| error.to_string())?;
+    let mut plant = activate(file, false, false).map_err(|error| error.to_string())?;
+    let until = plant.application.now() + Duration::from_secs(30);
+    while !plant.application.all_settled() || !plant.is_complete() {
+        let reason = plant.events.iter().find_map(|event| match event {
+            Event::ConfigurationFailed { subdevice, reason } => Some(format!("SubDevice {subdevice}: {reason}")),
+            Event::StateError { subdevice, code, .. } => Some(format!("SubDevice {subdevice}: {code}")),
+            _ => None,
+        });
+        if let Some(reason) = reason {
+            return Err(reason);
+        }
+        assert!(plant.application.now() < until, "neither in OP nor a reason: {:?}", plant.events);
+        plant.cycle();
+    }
+    plant.run(20);
+    let network = plant.application.links().network();
+    assert!(network.devices().all(|device| device.al_status() == AlStatus::new(AlState::Op)));
+    let status = plant.application.exchange_mut().status(DomainId(0));
+    assert_eq!((status.wkc, status.state), (status.expected, DomainState::Complete));
+    Ok(status.wkc)
+}
+
 #[test]
 fn a_file_with_packed_bits_copies_and_a_mapping_of_its_own_works_on_one_link_and_on_a_ring_facts_8() {
     for ring in [false, true] {

@@ -29,6 +29,7 @@ mod false_crossings;
 mod frame_limits;
 mod freshness;
 mod hot_connect;
+mod image_variants;
 mod junctions;
 mod long_segments;
 mod mail;

@@ -1,5 +1,5 @@
-//! SubDevices whose SII is odd: no PDOs in it, others than the dictionary has, no end marker, SyncManagers in another order,
-//! nothing at all.
+//! SubDevices whose SII is odd: no PDOs in it, others than the dictionary has, no end marker, SyncManagers in another order
+//! or without a type, nothing at all, nothing that can be followed.
 
 use std::time::Duration;
 
@@ -11,7 +11,7 @@ use ringcat_sim::network::NetworkOptions;
 use ringcat_sim::sii_image;
 use ringcat_wire::al::{AlState, AlStatus};
 use ringcat_wire::mailbox::coe::Emergency;
-use ringcat_wire::sii::{FmmuUsage, SyncManagerKind};
+use ringcat_wire::sii::{FmmuUsage, PdoDirection, SyncManagerKind};
 use scenarios::check::troubles;
 use scenarios::loss::Loss;
 use scenarios::segments::{descriptions, line};
@@ -214,6 +214,160 @@ fn one_with_a_blank_eeprom_is_told_and_keeps_nobody_from_op() {
         let others = world.network().devices().enumerate().filter(|(number, _)| *number != ODD);
         assert!(others.into_iter().all(|(_, device)| device.al_status() == AlStatus::new(AlState::Op)));
     }
+}
+
+/// What is told of the odd one, whose reason begins so, while the others exchange process data.
+fn others_run_and_it_says(mut world: World, reason: &str) {
+    world.run_cycles(400);
+    let failed = |event: &Event| matches!(event, Event::ConfigurationFailed { subdevice: ODD, reason: got } if got.contains(reason));
+    assert!(world.saw(world.beginning(), failed), "{:?}", troubles(world.events(world.beginning())));
+    let mark = world.mark();
+    let compared = world.compared();
+    world.run_cycles(50);
+    assert!(world.compared() > compared && world.incomplete(mark) == 0);
+    let others = world.network().devices().enumerate().filter(|(number, _)| *number != ODD);
+    assert!(others.into_iter().all(|(_, device)| device.al_status() == AlStatus::new(AlState::Op)));
+    let told = world.events(mark).iter().filter(|timed| matches!(timed.event, Event::ConfigurationFailed { .. }));
+    assert_eq!(told.count(), 0, "it is told once");
+}
+
+#[test]
+fn an_sii_that_cannot_be_followed_is_a_matter_of_its_subdevice_alone() {
+    // Garbage in the mailbox words, with a checksum that does not fit.
+    let mut devices = descriptions(&KINDS);
+    let mut image = sii_image::build(&devices[ODD]);
+    image[0x30..0x38].copy_from_slice(&[0x78, 0x78, 0x78, 0x29, 0x21, 0x45, 0x4C, 0x32]);
+    image[14] ^= 0xFF;
+    devices[ODD].sii_image = Some(image);
+    let mut garbage = world(devices, ReadPdos::Missing);
+    assert!(told(
+        &garbage,
+        "byte 0x0030: mailboxes of 10616 bytes at 0x7878 and 12876 bytes at 0x4521 are not believed"
+    ));
+    garbage.run_cycles(100);
+    // Process data where there is no memory.
+    let mut devices = descriptions(&KINDS);
+    let mut beyond = devices[ODD].clone();
+    beyond.sync_managers[3].start = 0x2FFE;
+    devices[ODD].sii_image = Some(sii_image::build(&beyond));
+    let reason =
+        "its SII cannot be followed: SM 3: 12 bytes (all buffers) at 0x2ffe leave the memory, which ends at 0x3000";
+    others_run_and_it_says(world(devices, ReadPdos::Missing), reason);
+    // Nothing at all.
+    let mut devices = descriptions(&KINDS);
+    devices[ODD].sii_image = Some(Vec::new());
+    let reason = "its SII cannot be followed: the EEPROM is blank or cannot be read, and nothing is declared";
+    others_run_and_it_says(world(devices, ReadPdos::Missing), reason);
+}
+
+/// Places in the process image that are declared stay, as for one that is not there.
+#[test]
+fn one_whose_damaged_sii_lacks_what_is_declared_keeps_its_places_and_holds_up_nobody() {
+    let mut devices = descriptions(&KINDS);
+    let mut cut = sii_image::build(&devices[ODD]);
+    cut[128..].fill(0xFF);
+    devices[ODD].sii_image = Some(cut);
+    let network = line(devices, NetworkOptions::default());
+    let started = World::with(1, network, &Options::default(), |scan| {
+        let mut declaration = automatic(&scan.subdevices, CYCLE);
+        let config = declaration.subdevices[ODD].clone();
+        let entries = vec![ringcat::PdoEntry::new(0x7000, 1, 32)];
+        let pdos = vec![PdoMapping::of(0x1600, entries)];
+        declaration.subdevices[ODD] = config.assign(2, ringcat::Direction::Outputs, pdos);
+        declaration
+    });
+    let mut world = started.expect("one bad EEPROM stops nobody");
+    assert!(told(&world, "nothing follows the fixed area: the image is cut short"));
+    assert!(world.application().entry(ODD, 0x7000, 1).is_some());
+    world.run_cycles(300);
+    let others = world.network().devices().enumerate().filter(|(number, _)| *number != ODD);
+    assert!(others.into_iter().all(|(_, device)| device.al_status() == AlStatus::new(AlState::Op)));
+    let failed = |event: &Event| {
+        matches!(event, Event::ConfigurationFailed { subdevice: ODD, reason }
+            if reason.contains("SM 2 has process data, the SII describes 0 SyncManagers only"))
+    };
+    assert!(world.saw(world.beginning(), failed));
+}
+
+/// SubDevices that are what their SII says: outputs and inputs with default lengths, and PDOs for one direction or none.
+#[test]
+fn pdos_in_one_direction_or_of_size_0_and_default_lengths_mean_one_thing_to_both_sides() {
+    for kind in ["digital-input-8", "digital-output-8", "analog-input-4", "servo", "all-protocols"] {
+        for change in 0..6 {
+            let mut described = descriptions(&[kind]).remove(0);
+            for manager in described.sync_managers.iter_mut().filter(|it| !is_mailbox(it.kind)) {
+                manager.length = if change < 4 { 4 } else { 0 };
+                manager.enable = u8::from(change != 3);
+            }
+            match change {
+                0 => described.pdos.retain(|pdo| pdo.direction == PdoDirection::Rx),
+                1 => described.pdos.retain(|pdo| pdo.direction == PdoDirection::Tx),
+                2 | 4 => described.pdos.iter_mut().for_each(|pdo| pdo.entries.clear()),
+                3 => described.pdos.clear(),
+                _ => described.pdos.iter_mut().for_each(|pdo| pdo.sync_manager = None),
+            }
+            in_op_as_it_says(&described, &format!("{kind}, change {change}"));
+        }
+    }
+}
+
+#[test]
+fn sync_managers_without_a_type_mean_one_thing_to_scan_run_and_simulator() {
+    for kind in ["digital-input-8", "digital-output-8", "analog-input-4", "servo", "all-protocols"] {
+        for without_pdos in [false, true] {
+            let mut described = descriptions(&[kind]).remove(0);
+            // One that is not switched on is for nothing without a type.
+            let kinds =
+                described.sync_managers.iter().map(|it| if it.enable == 0 { SyncManagerKind::Unused } else { it.kind });
+            let kinds: Vec<SyncManagerKind> = kinds.collect();
+            for manager in &mut described.sync_managers {
+                manager.kind = SyncManagerKind::Unused;
+                manager.length = manager.length.max(1);
+            }
+            if without_pdos {
+                described.pdos.clear();
+            }
+            let world = in_op_as_it_says(&described, &format!("{kind}, without PDOs: {without_pdos}"));
+            let found: Vec<_> = odd(&world).sync_managers.iter().map(|manager| manager.kind).collect();
+            assert_eq!(found, kinds, "{kind}");
+            assert!(told(&world, "has type 0, taken for"));
+        }
+    }
+}
+
+fn is_mailbox(kind: SyncManagerKind) -> bool {
+    matches!(kind, SyncManagerKind::MailboxOut | SyncManagerKind::MailboxIn)
+}
+
+/// A segment with a SubDevice that is what an SII says, in OP with complete working counters whatever dictionaries are read.
+fn in_op_as_it_says(described: &DeviceDescription, what: &str) -> World {
+    let mut devices = descriptions(&KINDS);
+    let mut described = DeviceDescription { emulation: false, ..described.clone() };
+    // With the fixed area of another one it would be taken for its twin, and not be read.
+    described.identity.serial = 1;
+    let image = sii_image::build(&described);
+    devices[ODD] = DeviceDescription::from_sii(image, "odd").expect("it makes a device");
+    let [_, last] = [ReadPdos::Always, ReadPdos::Missing].map(|pdos| {
+        let mut world = world(devices.clone(), pdos);
+        world.run_cycles(300);
+        assert_eq!(troubles(world.events(world.beginning())), Vec::<&Event>::new(), "{what}");
+        let last = world.judged(world.beginning()).last().expect("cycles went by").status;
+        assert!(world.all_in_op() && last.wkc == last.expected, "{what}: {last:?}");
+        world
+    });
+    last
+}
+
+#[test]
+fn process_ram_beyond_eight_kibibytes_is_there_where_the_sii_uses_it() {
+    let mut described = descriptions(&["all-protocols"]).remove(0);
+    described.sync_managers[2].start = 0x4000;
+    described.sync_managers[3].start = 0x7000;
+    let mut world = in_op_as_it_says(&described, "SyncManagers at 0x4000 and 0x7000");
+    assert_eq!(odd(&world).controller.ram_kib, 25);
+    let compared = world.compared();
+    world.run_cycles(50);
+    assert!(world.compared() > compared);
 }
 
 #[test]

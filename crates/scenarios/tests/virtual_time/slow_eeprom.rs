@@ -3,8 +3,7 @@
 
 use std::time::Duration;
 
-use ringcat::{Error, Event, Instant, Links, MainDevice, Options, Scan, ScanError};
-use ringcat_engine::procedures::sii::SiiReadError;
+use ringcat::{Error, Event, Instant, Links, MainDevice, Options, Scan};
 use ringcat_sim::cable::{DeviceIndex, Direction, HostLink};
 use ringcat_sim::description::DeviceDescription;
 use ringcat_sim::fault::Fault;
@@ -42,21 +41,31 @@ fn scan(network: Network) -> (Result<Scan, Error>, Duration, usize) {
 }
 
 #[test]
-fn an_eeprom_that_is_slow_at_every_word_ends_the_scan_after_30_s_and_names_the_word() {
+fn an_eeprom_that_is_slow_at_every_word_is_given_up_after_30_s_and_named_with_the_word() {
     let mut slow = terminal(Duration::from_millis(99));
     let mut image = ringcat_sim::device::Device::new(slow.clone()).controller.sii_image()[..128].to_vec();
     // Strings without end, within the EEPROM's size of 16 KByte.
     image[0x7C..0x7E].copy_from_slice(&127u16.to_le_bytes());
     image.extend([10, 0, 0xFF, 0x0F]);
     slow.sii_image = Some(image);
-    let (result, took, _) = scan(network(vec![terminal(Duration::from_micros(500)), slow]));
-    match result {
-        Err(Error::Scan(ScanError::Sii { position, error: SiiReadError::TooSlow { word } })) => {
-            assert_eq!(position.0, 1);
-            assert!((0x40..0x1000).contains(&word), "{word:#x}");
+    let mut main_device =
+        MainDevice::request(Tap::new(network(vec![terminal(Duration::from_micros(500)), slow])), &Options::default());
+    let mut told = Vec::new();
+    let result = main_device.scan_with(|timed| {
+        if let Event::SiiOddity { position, what } = &timed.event {
+            told.push((position.0, what.clone()));
         }
-        other => panic!("{other:?}"),
-    }
+    });
+    let took = Duration::from_nanos(main_device.links_mut().now().0);
+    // The other one is read all the same.
+    let found = result.expect("a scan").subdevices;
+    assert!(found[0].warnings.is_empty() && found[0].name == "terminal" && !found[0].is_blank());
+    assert!(found[1].is_blank() && found[1].identity.vendor_id == u32::MAX);
+    let (position, what) = &told[0];
+    let word = what.strip_prefix("the EEPROM is slow: at word 0x").and_then(|rest| rest.strip_suffix(" after 30 s"));
+    let word = word.and_then(|word| u32::from_str_radix(word, 16).ok()).unwrap_or_else(|| panic!("{what}"));
+    assert_eq!(*position, 1);
+    assert!((0x40..0x1000).contains(&word), "{word:#x}");
     assert!((Duration::from_secs(30)..Duration::from_secs(31)).contains(&took), "{took:?}");
 }
 

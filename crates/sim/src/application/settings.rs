@@ -5,8 +5,8 @@
 
 use ringcat_wire::address::RegisterAddress;
 use ringcat_wire::al::AlStatusCode;
-use ringcat_wire::register::{SyncManager, SyncManagerControl, SyncManagerDirection, SyncManagerMode, map};
-use ringcat_wire::sii::{MailboxLayout, SyncManagerKind};
+use ringcat_wire::register::{SyncManager, SyncManagerDirection, SyncManagerMode, map};
+use ringcat_wire::sii::{MailboxLayout, SiiSyncManager, SyncManagerKind};
 
 use super::dictionary::Dictionary;
 use crate::controller::Controller;
@@ -77,12 +77,11 @@ pub fn mailbox_numbers(description: &DeviceDescription, layout: &MailboxLayout) 
         let at_place = description.sync_managers.iter().position(|entry| (entry.kind, entry.start) == (kind, start));
         at_place.and_then(|place| u8::try_from(place).ok()).or_else(|| description.sync_manager_of(kind))
     };
-    let out = of(SyncManagerKind::MailboxOut, layout.receive_offset).unwrap_or(0);
-    let back = of(SyncManagerKind::MailboxIn, layout.send_offset).unwrap_or(1);
-    (out, back)
+    let out = of(SyncManagerKind::MailboxOut, layout.receive_offset);
+    out.zip(of(SyncManagerKind::MailboxIn, layout.send_offset)).unwrap_or((0, 1))
 }
 
-/// Checks the SyncManagers of the process data and says where the process data is.
+/// Checks the SyncManagers of the process data and says where the process data is. One for OP only may be off.
 pub fn process_data(
     description: &DeviceDescription,
     dictionary: &Dictionary,
@@ -109,20 +108,23 @@ pub fn process_data(
             | SyncManagerKind::MailboxIn
             | SyncManagerKind::Other(_) => continue,
         };
+        // Behind a virtual one there is no hardware.
+        if entry.enable & SiiSyncManager::VIRTUAL != 0 {
+            continue;
+        }
         if assigned_twice(dictionary, number) {
             return Err(wrong_mapping);
         }
         let manager = actual.get(usize::from(number)).copied().unwrap_or_default();
         let running = manager.activate.enable && manager.length != 0;
         let expected = expected_length(description, dictionary, number);
-        if expected == 0 && !running {
+        if !running && (expected == 0 || entry.enable & SiiSyncManager::OP_ONLY != 0) {
             continue;
         }
         if !running || manager.start != entry.start || u32::from(manager.length) != expected {
             return Err(wrong);
         }
-        let mode = SyncManagerControl::from_bits(entry.control).mode;
-        if manager.control.mode != mode || manager.control.direction != direction {
+        if manager.control.mode != SyncManagerMode::Buffered || manager.control.direction != direction {
             return Err(AlStatusCode::INVALID_SYNC_MANAGER_TYPES);
         }
         areas.push(area(number, &manager));
@@ -162,13 +164,12 @@ fn area(number: u8, manager: &SyncManager) -> Area {
     }
 }
 
-/// Bytes that a SyncManager must have: the assigned PDOs decide; without CoE and PDOs its SII entry does.
+/// Bytes that a SyncManager must have: with CoE those of the PDOs that are assigned now, otherwise those of the SII.
 fn expected_length(description: &DeviceDescription, dictionary: &Dictionary, number: u8) -> u32 {
-    let bits = dictionary.assigned_bits(number);
-    if bits == 0 && !description.has_coe() {
-        return u32::from(description.default_length(number));
+    if description.has_coe() {
+        return dictionary.assigned_bits(number).div_ceil(8);
     }
-    bits.div_ceil(8)
+    u32::from(description.default_length(number))
 }
 
 fn assigned_twice(dictionary: &Dictionary, number: u8) -> bool {

@@ -88,6 +88,17 @@ impl Application {
                 self.layout = layout;
                 Ok(())
             }
+            // SyncManagers for OP only have been switched on since (facts 4.4).
+            (AlState::SafeOp, AlState::Op) => {
+                let actual = settings::sync_managers(controller, now);
+                let ram_kib = controller.config().ram_kib;
+                let layout = settings::process_data(description, &self.dictionary, &actual, ram_kib)?;
+                if layout != self.layout {
+                    self.layout = layout;
+                    self.process_data.start(self.layout.clone(), &self.dictionary, controller, now);
+                }
+                Ok(())
+            }
             _ => Ok(()),
         }
     }

@@ -75,10 +75,11 @@ fn name(entry: &DeviceEntry, number: usize) -> String {
 }
 
 fn check_name(name: &str, plan: &[PlannedDevice]) -> Result<(), String> {
-    if name.is_empty() || name.contains('.') || RESERVED.contains(&name) {
+    if name.is_empty() || name.contains('.') || name.contains(char::is_control) || RESERVED.contains(&name) {
         return Err(format!(
-            "name: expected one without a dot that is not one of {}, got \"{name}\"",
-            RESERVED.join(", ")
+            "name: expected one without a dot that is not one of {}, got \"{}\"",
+            RESERVED.join(", "),
+            name.escape_debug()
         ));
     }
     if let Some(place) = plan.iter().position(|device| device.description.name == name) {

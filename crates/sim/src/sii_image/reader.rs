@@ -4,11 +4,11 @@ use core::time::Duration;
 
 use ringcat_wire::register::PortKind;
 use ringcat_wire::sii::{
-    General, MailboxLayout, PdoDirection, PhysicalPort, Sii, SiiSyncManager, Strings, SyncManagerKind,
+    General, MailboxLayout, PdoDirection, PhysicalPort, Sii, SiiHeader, SiiSyncManager, Strings, SyncManagerKind,
 };
 
 use super::DescriptionError;
-use crate::controller::ControllerConfig;
+use crate::controller::MAX_UNITS;
 use crate::description::{
     DcDescription, DeviceDescription, MailboxDescription, PdoDescription, PdoEntryDescription, SyncManagerDescription,
     data_type,
@@ -16,6 +16,10 @@ use crate::description::{
 
 /// Time from a request to its answer for devices whose real one is not known.
 const RESPONSE_TIME: Duration = Duration::from_micros(200);
+/// A mailbox holds the header of a message (facts 6.1).
+const SMALLEST_MAILBOX: u16 = 6;
+/// Bytes of an entry where an object with an entry per byte would have too many.
+const CHUNK: u16 = 31;
 /// First objects of the PDOs that stand for those an image does not show.
 const SUBSTITUTE_OUTPUTS: u16 = 0x7000;
 const SUBSTITUTE_INPUTS: u16 = 0x6000;
@@ -29,17 +33,20 @@ impl DeviceDescription {
         let strings = sii.strings();
         let text = |number: Option<u8>| number.map(|number| string(&strings, number)).unwrap_or_default();
         let [pdi_type, esc_configuration] = header.pdi_control.to_le_bytes();
+        let sync_managers = sync_managers(&sii);
         let mut description = DeviceDescription {
             order_code: text(general.map(|general| general.order)),
             group: text(general.map(|general| general.group)),
             alias: header.alias,
             ports: ports(general),
             fmmus: sii.fmmu_usages().collect(),
-            sync_managers: sii.sync_managers().map(sync_manager).collect(),
-            pdos: pdos(&sii),
-            mailbox: mailbox(&sii),
+            pdos: pdos(&sii, &sync_managers),
+            mailbox: mailbox(&sii, &sync_managers),
+            sync_managers,
             dc: clock(&sii),
             pdi_type,
+            esc_configuration: esc_configuration & !1,
+            pdi_configuration: pdi_configuration(&header),
             emulation: esc_configuration & 0x01 != 0,
             ebus_current_ma: general.map_or(0, |general| general.ebus_current_ma),
             identification: general
@@ -51,7 +58,7 @@ impl DeviceDescription {
             sii_size_bytes: image.len(),
             ..DeviceDescription::plain(name, header.identity)
         };
-        let expected = usize::from(ControllerConfig::default().sync_manager_count);
+        let expected = usize::from(MAX_UNITS);
         if description.sync_managers.len() > expected {
             return Err(DescriptionError::SyncManagers { got: description.sync_managers.len(), expected });
         }
@@ -60,6 +67,11 @@ impl DeviceDescription {
         description.sii_image = Some(image);
         Ok(description)
     }
+}
+
+fn pdi_configuration(header: &SiiHeader) -> [u8; 4] {
+    let ([a, b], [c, d]) = (header.pdi_configuration.to_le_bytes(), header.extended_pdi_configuration.to_le_bytes());
+    [a, b, c, d]
 }
 
 fn string(strings: &Strings<'_>, number: u8) -> String {
@@ -80,22 +92,48 @@ fn ports(general: Option<General>) -> [PortKind; 4] {
     ports
 }
 
-fn sync_manager(entry: SiiSyncManager) -> SyncManagerDescription {
-    SyncManagerDescription {
+/// The SyncManagers up to the first one that is erased.
+fn sync_managers(sii: &Sii<'_>) -> Vec<SyncManagerDescription> {
+    let described = sii.sync_managers().take_while(|entry| !entry.is_erased());
+    let entries = described.enumerate().map(|(number, entry)| SyncManagerDescription {
         start: entry.start,
         length: entry.length,
         control: entry.control,
         enable: entry.enable,
-        kind: entry.kind,
+        kind: kind(sii, number, &entry),
+    });
+    entries.collect()
+}
+
+/// What a SyncManager is for. Where the image gives no type, its PDOs say so, then the control byte of one that is in use.
+fn kind(sii: &Sii<'_>, number: usize, entry: &SiiSyncManager) -> SyncManagerKind {
+    let has = |direction| sii.pdos(direction).any(|pdo| pdo.sync_manager.map(usize::from) == Some(number));
+    match entry.kind {
+        SyncManagerKind::MailboxOut
+        | SyncManagerKind::MailboxIn
+        | SyncManagerKind::Outputs
+        | SyncManagerKind::Inputs => entry.kind,
+        SyncManagerKind::Unused | SyncManagerKind::Other(_) if has(PdoDirection::Rx) => SyncManagerKind::Outputs,
+        SyncManagerKind::Unused | SyncManagerKind::Other(_) if has(PdoDirection::Tx) => SyncManagerKind::Inputs,
+        SyncManagerKind::Unused | SyncManagerKind::Other(_) if entry.is_enabled() && entry.length > 0 => {
+            entry.kind_of_control()
+        }
+        SyncManagerKind::Unused | SyncManagerKind::Other(_) => SyncManagerKind::Unused,
     }
 }
 
-fn pdos(sii: &Sii<'_>) -> Vec<PdoDescription> {
+/// One that is assigned to a SyncManager for something else is not assigned.
+fn pdos(sii: &Sii<'_>, sync_managers: &[SyncManagerDescription]) -> Vec<PdoDescription> {
     let strings = sii.strings();
     let mut found = Vec::new();
     for direction in [PdoDirection::Rx, PdoDirection::Tx] {
+        let wanted = match direction {
+            PdoDirection::Rx => SyncManagerKind::Outputs,
+            PdoDirection::Tx => SyncManagerKind::Inputs,
+        };
+        let fits = |number: &u8| sync_managers.get(usize::from(*number)).is_some_and(|entry| entry.kind == wanted);
         for pdo in sii.pdos(direction) {
-            let entries = pdo.entries().map(|entry| PdoEntryDescription {
+            let entries = pdo.entries().filter(|entry| !entry.is_erased()).map(|entry| PdoEntryDescription {
                 index: entry.index,
                 sub_index: entry.sub_index,
                 name: string(&strings, entry.name),
@@ -106,7 +144,7 @@ fn pdos(sii: &Sii<'_>) -> Vec<PdoDescription> {
                 direction,
                 index: pdo.index,
                 name: string(&strings, pdo.name),
-                sync_manager: pdo.sync_manager,
+                sync_manager: pdo.sync_manager.filter(fits),
                 flags: pdo.flags,
                 entries: entries.collect(),
             });
@@ -115,27 +153,54 @@ fn pdos(sii: &Sii<'_>) -> Vec<PdoDescription> {
     found
 }
 
-fn mailbox(sii: &Sii<'_>) -> Option<MailboxDescription> {
+/// As the fixed area says, where that is possible; a device that speaks may say it with its SyncManagers alone.
+fn mailbox(sii: &Sii<'_>, sync_managers: &[SyncManagerDescription]) -> Option<MailboxDescription> {
     let header = sii.header();
-    let managers: Vec<SiiSyncManager> = sii.sync_managers().collect();
-    let of = |kind| managers.iter().find(|entry| entry.kind == kind);
-    let mut standard = header.standard_mailbox;
-    if standard.receive_size == 0 || standard.send_size == 0 {
-        let (out, back) = (of(SyncManagerKind::MailboxOut)?, of(SyncManagerKind::MailboxIn)?);
-        standard = MailboxLayout {
-            receive_offset: out.start,
-            receive_size: out.length,
-            send_offset: back.start,
-            send_size: back.length,
-        };
+    let standard = Some(header.standard_mailbox).filter(is_possible);
+    let speaks = header.protocols.0 != 0;
+    let standard =
+        standard.or_else(|| of_sync_managers(sync_managers).filter(|layout| speaks && is_possible(layout)))?;
+    let number = |kind| sync_managers.iter().position(|entry| entry.kind == kind);
+    let numbers = number(SyncManagerKind::MailboxOut).zip(number(SyncManagerKind::MailboxIn));
+    let (out, inward) = numbers.unwrap_or((0, 1));
+    // Without SyncManagers of its own it has the first two, unless they exchange process data.
+    let exchanges = |number: usize| {
+        sync_managers
+            .get(number)
+            .is_some_and(|it| matches!(it.kind, SyncManagerKind::Outputs | SyncManagerKind::Inputs))
+    };
+    if exchanges(out) || exchanges(inward) {
+        return None;
     }
     Some(MailboxDescription {
         standard,
-        bootstrap: header.bootstrap_mailbox,
+        bootstrap: Some(header.bootstrap_mailbox).filter(is_possible).unwrap_or_default(),
         protocols: header.protocols,
         coe_details: sii.general().map(|general| general.coe).unwrap_or_default(),
         response_time: RESPONSE_TIME,
     })
+}
+
+fn of_sync_managers(sync_managers: &[SyncManagerDescription]) -> Option<MailboxLayout> {
+    let of = |kind| sync_managers.iter().find(|entry| entry.kind == kind);
+    let (out, back) = (of(SyncManagerKind::MailboxOut)?, of(SyncManagerKind::MailboxIn)?);
+    Some(MailboxLayout {
+        receive_offset: out.start,
+        receive_size: out.length,
+        send_offset: back.start,
+        send_size: back.length,
+    })
+}
+
+/// Both mailboxes can hold a header, and lie apart in the process RAM. 0xFFFF is a field that was never written.
+fn is_possible(layout: &MailboxLayout) -> bool {
+    let span = |start: u16, size: u16| u32::from(start)..u32::from(start) + u32::from(size);
+    let out = span(layout.receive_offset, layout.receive_size);
+    let back = span(layout.send_offset, layout.send_size);
+    let fits = |span: &core::ops::Range<u32>, size: u16| {
+        size != u16::MAX && size >= SMALLEST_MAILBOX && span.start >= 0x1000 && span.end <= 0x1_0000
+    };
+    fits(&out, layout.receive_size) && fits(&back, layout.send_size) && (out.end <= back.start || back.end <= out.start)
 }
 
 fn clock(sii: &Sii<'_>) -> Option<DcDescription> {
@@ -173,23 +238,35 @@ fn substitute_pdos(description: &mut DeviceDescription) {
             | SyncManagerKind::Other(_) => continue,
         };
         let any = description.pdos.iter().any(|pdo| pdo.direction == direction);
-        if any || entry.length == 0 || entry.length > u16::from(u8::MAX) || !description.has_coe() {
+        let in_use = entry.enable & SiiSyncManager::ENABLE != 0 && entry.enable & SiiSyncManager::VIRTUAL == 0;
+        if any || entry.length == 0 || !in_use || !description.has_coe() {
             continue;
         }
-        let entries = (1..=u8::MAX).take(usize::from(entry.length)).map(|sub_index| PdoEntryDescription {
-            index: base,
-            sub_index,
-            name: String::new(),
-            data_type: data_type::U8,
-            bit_length: 8,
-        });
+        let entries = substitutes(entry.length, base);
         description.pdos.push(PdoDescription {
             direction,
             index: mapping,
             name: String::new(),
             sync_manager: Some(number),
             flags: 0,
-            entries: entries.collect(),
+            entries,
         });
     }
+}
+
+/// Entries of so many bytes in all: one per byte, or as few as it takes.
+fn substitutes(length: u16, index: u16) -> Vec<PdoEntryDescription> {
+    let width = if length < u16::from(u8::MAX) { 1 } else { CHUNK };
+    let starts = (0..length).step_by(usize::from(width));
+    let entries = (1..=u8::MAX).zip(starts).map(|(sub_index, start)| {
+        let bytes = width.min(length - start);
+        PdoEntryDescription {
+            index,
+            sub_index,
+            name: String::new(),
+            data_type: if bytes == 1 { data_type::U8 } else { data_type::OCTET_STRING },
+            bit_length: u8::try_from(8 * bytes).unwrap_or(u8::MAX),
+        }
+    });
+    entries.collect()
 }

@@ -133,6 +133,13 @@ pub struct Category<'a> {
     pub data: &'a [u8],
 }
 
+impl Category<'_> {
+    /// Byte offset of its data in the image.
+    pub const fn data_offset(&self) -> usize {
+        self.offset + CategoryHeader::LEN
+    }
+}
+
 /// Iterator over the categories of an image, in order, without the end marker.
 #[derive(Clone, Debug)]
 pub struct Categories<'a> {

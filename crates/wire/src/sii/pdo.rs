@@ -111,6 +111,11 @@ impl PdoEntry {
         [index[0], index[1], self.sub_index, self.name, self.data_type, self.bit_length, flags[0], flags[1]]
     }
 
+    /// Whether its bytes are those of an erased EEPROM.
+    pub fn is_erased(&self) -> bool {
+        self.encode() == [0xFF; Self::LEN]
+    }
+
     /// Whether it is a gap: bits that map no object.
     pub const fn is_gap(&self) -> bool {
         self.index == 0
@@ -218,7 +223,8 @@ mod tests {
         let boolean = PdoEntry { index: 0x6000, sub_index: 1, name: 6, data_type: 1, bit_length: 1, flags: 0 };
         let gap = PdoEntry { bit_length: 15, ..PdoEntry::default() };
         assert_eq!(entries, [boolean, gap]);
-        assert!(!boolean.is_gap() && gap.is_gap());
+        assert!(!boolean.is_gap() && gap.is_gap() && !gap.is_erased());
+        assert!(PdoEntry::decode(&[0xFF; 8]).is_erased());
         assert_eq!(first.bit_length(), 16);
         assert_eq!((second.index, second.entry_count, second.sync_manager), (0x1A01, 0, None));
         assert_eq!((second.synchronisation, second.flags), (2, 0x0100));

@@ -96,6 +96,23 @@ impl SiiSyncManager {
     pub const fn is_enabled(&self) -> bool {
         self.enable & Self::ENABLE != 0
     }
+
+    /// What its control byte alone says it is for: a mailbox or process data, by its direction (facts 3.11). Some images
+    /// name no type. [`SyncManagerKind::Unused`] where mode or direction are reserved.
+    pub const fn kind_of_control(&self) -> SyncManagerKind {
+        match (self.control & 0x03, self.control & 0x0C) {
+            (0b10, 0x04) => SyncManagerKind::MailboxOut,
+            (0b10, 0x00) => SyncManagerKind::MailboxIn,
+            (0b00, 0x04) => SyncManagerKind::Outputs,
+            (0b00, 0x00) => SyncManagerKind::Inputs,
+            _ => SyncManagerKind::Unused,
+        }
+    }
+
+    /// Whether its bytes are those of an erased EEPROM.
+    pub fn is_erased(&self) -> bool {
+        self.encode() == [0xFF; Self::LEN]
+    }
 }
 
 /// Iterator over the entries of a category, SM 0 first. Bytes that make no whole entry are left out.
@@ -152,7 +169,17 @@ mod tests {
         };
         assert_eq!(SiiSyncManagers::new(&data).collect::<Vec<_>>(), [mailbox, inputs]);
         assert_eq!([mailbox.encode(), inputs.encode()].as_flattened(), &data[..16]);
-        assert!(mailbox.is_enabled());
+        assert!(mailbox.is_enabled() && !mailbox.is_erased());
+        assert!(SiiSyncManager::decode(&[0xFF; 8]).is_erased());
+    }
+
+    #[test]
+    fn a_control_byte_tells_what_a_sync_manager_without_a_type_is_for() {
+        use SyncManagerKind::{Inputs, MailboxIn, MailboxOut, Outputs, Unused};
+        let controls = [0x26, 0x22, 0x64, 0x24, 0x44, 0x20, 0x00, 0x01, 0x28];
+        let kinds = [MailboxOut, MailboxIn, Outputs, Outputs, Outputs, Inputs, Inputs, Unused, Unused];
+        let kind = |control| SiiSyncManager { control, ..SiiSyncManager::default() }.kind_of_control();
+        assert_eq!(controls.map(kind), kinds);
     }
 
     proptest! {

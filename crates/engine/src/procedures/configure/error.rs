@@ -11,6 +11,7 @@ use crate::mail::eoe::EoeError;
 use crate::mail::soe::SoeError;
 use crate::procedures::al_state::StateError;
 use crate::procedures::clocks::{NotLocked, SignalsError};
+use crate::procedures::fleet::SetupError;
 use crate::supervisor::BusError;
 
 /// Why a SubDevice is not configured.
@@ -37,6 +38,8 @@ pub enum ConfigureError {
     NotLocked(NotLocked),
     /// It never was there, so nothing is known to write.
     NoSetup,
+    /// What its SII says cannot be set up.
+    Unfit(SetupError),
     /// It has no boot loader: its SII gives no mailboxes for BOOT.
     NoBoot,
     /// It does not answer. It is brought to the requested state when it comes back.
@@ -80,6 +83,7 @@ impl fmt::Display for ConfigureError {
                 write!(f, "start-up command {number} ({transition}) \"{comment}\": {error}")
             }
             ConfigureError::NotLocked(error) => error.fmt(f),
+            ConfigureError::Unfit(error) => error.fmt(f),
             ConfigureError::NoSetup => f.write_str("nothing is known about this SubDevice yet"),
             ConfigureError::NoBoot => f.write_str("its SII gives no mailboxes for BOOT"),
             ConfigureError::Absent => f.write_str("it does not answer"),

@@ -10,8 +10,8 @@ use crate::supervisor::{Bus, BusError};
 
 /// Reads it; `None` where there is none, or where it is not given.
 pub(super) async fn read(bus: &Bus, station: StationAddress, contents: &SiiContents) -> Result<Option<u16>, BusError> {
-    let general = contents.categories.iter().find(|(kind, _)| *kind == CategoryKind::General);
-    let Some(general) = general.and_then(|(_, data)| General::decode(data.first_chunk::<{ General::LEN }>()?)) else {
+    let general = contents.categories().find(|category| category.kind == CategoryKind::General);
+    let Some(general) = general.and_then(|it| General::decode(it.data.first_chunk::<{ General::LEN }>()?)) else {
         return Ok(None);
     };
     // Behind a controller that copies AL control there is nobody to answer.

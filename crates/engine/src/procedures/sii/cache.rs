@@ -118,6 +118,7 @@ impl Drop for Claim {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::procedures::sii::ChainEnd;
 
     fn area(number: usize) -> FixedArea {
         let mut area = [0; SiiHeader::LEN];
@@ -126,7 +127,7 @@ mod tests {
     }
 
     fn contents(area: &FixedArea) -> SiiContents {
-        SiiContents { header: SiiHeader::decode(area), categories: Vec::new(), complete: true }
+        SiiContents { header: SiiHeader::decode(area), categories: Vec::new(), end: ChainEnd::Sound { at: area.len() } }
     }
 
     fn claim(cache: &SiiCache, area: &FixedArea) -> Option<Claim> {

@@ -3,8 +3,12 @@
 use std::collections::BTreeSet;
 use std::time::Duration;
 
-use ringcat_config::eni::{BitRange, Eni, Mailbox, MailboxBuffer, PdoEntry, SubDevice};
-use ringcat_engine::config::{ConfigAddress, DeclaredSyncManager, SubDeviceConfig, SyncManagerRole};
+use ringcat_config::eni::{BitRange, Eni, Mailbox, MailboxBuffer, PdoEntry, SubDevice, Target};
+use ringcat_engine::config::{
+    ConfigAddress, DeclaredSyncManager, PdoAssignment, PdoEntry as ConfigEntry, PdoMapping, SubDeviceConfig,
+    SyncManagerRole,
+};
+use ringcat_engine::info::Direction;
 use ringcat_sim::application::{Behaviour, InputSource};
 use ringcat_sim::description::{
     DcDescription, DeviceDescription, MailboxDescription, PdoDescription, PdoEntryDescription, SyncManagerDescription,
@@ -28,6 +32,8 @@ const PROCESS_DATA_START: u16 = 0x1800;
 const UNNAMED: [u16; 2] = [0x17F0, 0x1BF0];
 /// Bits of an entry without a name, at most: a multiple of 8 that fits into a byte.
 const GAP: u32 = 248;
+/// Bits of a PDO of which nothing is known.
+const UNKNOWN_PDO: u8 = 16;
 /// The SII of a device with long lists of PDOs.
 const SII_BYTES: usize = 2048;
 
@@ -50,9 +56,10 @@ pub(super) fn describe(subdevice: &SubDevice, config: &SubDeviceConfig) -> Devic
     device.identification = expected.identification.or(device.identification);
     device.ports = ports(&subdevice.physics);
     device.mailbox = mailbox(subdevice, config);
-    let declared = config.declared.clone().unwrap_or_else(|| guessed(subdevice, device.mailbox.as_ref()));
+    let declared = config.declared.clone().unwrap_or_else(|| guessed(subdevice, config, device.mailbox.as_ref()));
     // Outputs that are switched on at SO belong to terminals without a state machine of their own.
     device.emulation = declared.iter().any(|sm| sm.op_only);
+    loaded_registers(subdevice, &mut device);
     device.sync_managers = sync_managers(&declared);
     device.pdos = pdos(subdevice, &declared);
     let areas = declared.iter().filter(|sm| sm.role.direction().is_some()).map(|sm| match sm.role {
@@ -67,6 +74,33 @@ pub(super) fn describe(subdevice: &SubDevice, config: &SubDeviceConfig) -> Devic
     device.behaviour = Behaviour::Terminal(InputSource::Outputs);
     device.sii_size_bytes = SII_BYTES;
     device
+}
+
+/// Registers that a controller loads from its EEPROM are what the file expects them to be. Other registers are those of the
+/// simulated controller, whatever the file expects.
+fn loaded_registers(subdevice: &SubDevice, device: &mut DeviceDescription) {
+    let checks =
+        subdevice.init_commands.iter().filter_map(|command| match (&command.validate, command.datagram.target) {
+            (Some(validate), Target::Register { ado, .. }) => Some((ado.0, validate)),
+            _ => None,
+        });
+    for (first, validate) in checks {
+        for (offset, byte) in (0_u16..).zip(&validate.data) {
+            let mask = validate.mask.as_ref().and_then(|mask| mask.get(usize::from(offset))).copied().unwrap_or(0xFF);
+            let loaded = match first.checked_add(offset) {
+                Some(0x0140) => &mut device.pdi_type,
+                Some(0x0141) => {
+                    if mask & 1 != 0 {
+                        device.emulation = byte & 1 != 0;
+                    }
+                    &mut device.esc_configuration
+                }
+                Some(at @ 0x0150..=0x0153) => &mut device.pdi_configuration[usize::from(at - 0x0150)],
+                Some(_) | None => continue,
+            };
+            *loaded = *loaded & !mask | byte & mask;
+        }
+    }
 }
 
 /// Devices of one name get their station address behind it.
@@ -153,27 +187,30 @@ fn protocols(mailbox: Option<&Mailbox>) -> MailboxProtocols {
     MailboxProtocols(used.into_iter().filter(|(used, _)| *used).fold(named, |all, (_, one)| all | one))
 }
 
-/// What a file without commands to SyncManagers may mean: mailboxes, then outputs and inputs as long as in the image.
-fn guessed(subdevice: &SubDevice, mailbox: Option<&MailboxDescription>) -> Vec<DeclaredSyncManager> {
-    let Some(data) = &subdevice.process_data else { return Vec::new() };
-    let mut declared = Vec::new();
+/// What a file without commands to SyncManagers may mean: mailboxes, then the SyncManagers to which it assigns PDOs, or
+/// outputs and inputs as long as in the image.
+fn guessed(
+    subdevice: &SubDevice,
+    config: &SubDeviceConfig,
+    mailbox: Option<&MailboxDescription>,
+) -> Vec<DeclaredSyncManager> {
+    let mut declared: Vec<DeclaredSyncManager> = Vec::new();
     let mut add = |role, start, length, control| {
         let mut register =
             SyncManager { start, length, control: SyncManagerControl::from_bits(control), ..SyncManager::default() };
         register.activate.enable = true;
-        declared.push(DeclaredSyncManager {
-            index: declared.len() as u8,
-            role,
-            register,
-            op_only: false,
-            pdos: Vec::new(),
-        });
+        let index = declared.len() as u8;
+        declared.push(DeclaredSyncManager { index, role, register, op_only: false, pdos: Vec::new() });
     };
     if let Some(mailbox) = mailbox {
         let MailboxLayout { receive_offset, receive_size, send_offset, send_size } = mailbox.standard;
         add(SyncManagerRole::MailboxOut, receive_offset, receive_size, 0x26);
         add(SyncManagerRole::MailboxIn, send_offset, send_size, 0x22);
     }
+    let Some(data) = &subdevice.process_data else {
+        declared.extend(assigned(config));
+        return declared;
+    };
     let bytes = |ranges: &[BitRange]| {
         let bits: u32 = ranges.iter().map(|range| range.length).fold(0, u32::saturating_add);
         u16::try_from(bits.div_ceil(8)).unwrap_or(u16::MAX / 8)
@@ -188,6 +225,36 @@ fn guessed(subdevice: &SubDevice, mailbox: Option<&MailboxDescription>) -> Vec<D
         add(SyncManagerRole::Inputs, start, inputs, 0x20);
     }
     declared
+}
+
+/// SyncManagers to which commands of the file assign PDOs, one behind the other. Nothing says how long a PDO is that is only
+/// assigned: it gets two bytes.
+fn assigned(config: &SubDeviceConfig) -> Vec<DeclaredSyncManager> {
+    let mut start = PROCESS_DATA_START;
+    let sync_manager = |assignment: &PdoAssignment| {
+        let pdos: Vec<PdoMapping> = assignment
+            .pdos
+            .iter()
+            .map(|pdo| match &pdo.entries {
+                Some(_) => pdo.clone(),
+                None => PdoMapping::of(pdo.index, [ConfigEntry::new(0, 0, UNKNOWN_PDO)]),
+            })
+            .collect();
+        let bits: u32 =
+            pdos.iter().flat_map(|pdo| pdo.entries.iter().flatten()).map(|it| u32::from(it.bit_length)).sum();
+        let length = u16::try_from(bits.div_ceil(8)).unwrap_or(u16::MAX / 8);
+        let (role, control) = match assignment.direction {
+            Direction::Outputs => (SyncManagerRole::Outputs, 0x64),
+            Direction::Inputs => (SyncManagerRole::Inputs, 0x20),
+        };
+        let control = SyncManagerControl::from_bits(control);
+        let mut register = SyncManager { start, length, control, ..SyncManager::default() };
+        register.activate.enable = length > 0;
+        // Three buffers, and the next one begins with a word.
+        start = start.saturating_add(length.saturating_mul(3).saturating_add(7) & !7);
+        DeclaredSyncManager { index: assignment.sync_manager, role, register, op_only: false, pdos }
+    };
+    config.pdos.iter().flatten().map(sync_manager).collect()
 }
 
 fn sync_managers(declared: &[DeclaredSyncManager]) -> Vec<SyncManagerDescription> {
@@ -219,7 +286,7 @@ fn pdos(subdevice: &SubDevice, declared: &[DeclaredSyncManager]) -> Vec<PdoDescr
     let mut pdos: Vec<PdoDescription> = Vec::new();
     for sm in declared {
         let Some((sync_manager, direction, length)) = sm.area() else { continue };
-        let inputs = direction == ringcat_engine::info::Direction::Inputs;
+        let inputs = direction == Direction::Inputs;
         let direction = if inputs { PdoDirection::Tx } else { PdoDirection::Rx };
         let mapped: Vec<PdoDescription> = sm
             .pdos
@@ -247,24 +314,13 @@ fn pdos(subdevice: &SubDevice, declared: &[DeclaredSyncManager]) -> Vec<PdoDescr
                     .collect(),
             })
             .collect();
-        let bits: u32 = mapped.iter().map(PdoDescription::bit_length).sum();
-        if bits.div_ceil(8) == u32::from(length) {
-            pdos.extend(mapped);
-        } else {
-            pdos.push(without_names(sync_manager, direction, length));
-        }
+        let mapped = if mapped.is_empty() { assigned_only(subdevice, sync_manager, direction, &pdos) } else { mapped };
+        pdos.extend(filled(mapped, sync_manager, direction, length));
     }
     for pdo in of_file {
         if pdos.iter().any(|known| known.index == pdo.index) {
             continue;
         }
-        let entry = |entry: &PdoEntry| PdoEntryDescription {
-            index: entry.index,
-            sub_index: entry.sub_index,
-            name: entry.name.clone(),
-            data_type: objects::data_type(entry.bit_length),
-            bit_length: u8::try_from(entry.bit_length).unwrap_or(u8::MAX),
-        };
         pdos.push(PdoDescription {
             direction: if pdo.outputs { PdoDirection::Rx } else { PdoDirection::Tx },
             index: pdo.index,
@@ -277,14 +333,78 @@ fn pdos(subdevice: &SubDevice, declared: &[DeclaredSyncManager]) -> Vec<PdoDescr
     pdos
 }
 
-fn without_names(sync_manager: u8, direction: PdoDirection, length: u16) -> PdoDescription {
-    let mut left = 8 * u32::from(length);
-    let mut entries = Vec::new();
-    while left > 0 {
-        let bit_length = left.min(GAP) as u8;
-        left -= u32::from(bit_length);
-        entries.push(PdoEntryDescription { index: 0, sub_index: 0, name: String::new(), data_type: 0, bit_length });
+/// PDOs that commands assign, with the entries that the file describes, if it does.
+fn assigned_only(
+    subdevice: &SubDevice,
+    sync_manager: u8,
+    direction: PdoDirection,
+    known: &[PdoDescription],
+) -> Vec<PdoDescription> {
+    let of_file = subdevice.process_data.iter().flat_map(|data| &data.pdos);
+    let is_new = |index: &u16| !known.iter().any(|pdo| pdo.index == *index);
+    let describe = |index: u16| {
+        let described = of_file.clone().find(|pdo| pdo.index == index);
+        PdoDescription {
+            direction,
+            index,
+            name: described.map_or(String::new(), |pdo| pdo.name.clone()),
+            sync_manager: Some(sync_manager),
+            flags: 0,
+            entries: described.iter().flat_map(|pdo| &pdo.entries).map(entry).collect(),
+        }
+    };
+    objects::assigned(subdevice, sync_manager).into_iter().filter(is_new).map(describe).collect()
+}
+
+/// An entry as the file describes it.
+fn entry(entry: &PdoEntry) -> PdoEntryDescription {
+    PdoEntryDescription {
+        index: entry.index,
+        sub_index: entry.sub_index,
+        name: entry.name.clone(),
+        data_type: objects::data_type(entry.bit_length),
+        bit_length: u8::try_from(entry.bit_length).unwrap_or(u8::MAX),
     }
+}
+
+/// PDOs as long as their SyncManager. One that the file assigns without saying what it maps, or another one where there is
+/// none, has what is missing; where the file's PDOs are too long, one without names stands for all.
+fn filled(
+    mut mapped: Vec<PdoDescription>,
+    sync_manager: u8,
+    direction: PdoDirection,
+    length: u16,
+) -> Vec<PdoDescription> {
+    let bits: u32 = mapped.iter().map(PdoDescription::bit_length).sum();
+    let Some(missing) = (8 * u32::from(length)).checked_sub(bits) else {
+        return vec![without_names(sync_manager, direction, length)];
+    };
+    // Bits up to the next byte belong to no PDO.
+    if missing < 8 {
+        return mapped;
+    }
+    match mapped.iter_mut().find(|pdo| pdo.entries.is_empty()) {
+        Some(unknown) => unknown.entries = gaps(missing),
+        None => mapped.push(PdoDescription { entries: gaps(missing), ..without_names(sync_manager, direction, 0) }),
+    }
+    mapped
+}
+
+/// Entries without names of so many bits in all.
+fn gaps(bits: u32) -> Vec<PdoEntryDescription> {
+    let starts = (0..bits).step_by(GAP as usize);
+    let entry = |start: u32| PdoEntryDescription {
+        index: 0,
+        sub_index: 0,
+        name: String::new(),
+        data_type: 0,
+        bit_length: (bits - start).min(GAP) as u8,
+    };
+    starts.map(entry).collect()
+}
+
+fn without_names(sync_manager: u8, direction: PdoDirection, length: u16) -> PdoDescription {
+    let entries = gaps(8 * u32::from(length));
     let base = UNNAMED[usize::from(direction == PdoDirection::Tx)];
     let index = base + u16::from(sync_manager);
     PdoDescription { direction, index, name: String::new(), sync_manager: Some(sync_manager), flags: 0, entries }

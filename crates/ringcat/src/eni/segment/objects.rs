@@ -26,6 +26,24 @@ pub(super) const fn data_type(bits: u16) -> u8 {
     }
 }
 
+/// PDOs that the commands of a file assign to a SyncManager, in order.
+pub(super) fn assigned(subdevice: &SubDevice, sync_manager: u8) -> Vec<u16> {
+    let mut places: BTreeMap<u8, u16> = BTreeMap::new();
+    let object = ASSIGNMENT_BASE + u16::from(sync_manager);
+    let commands = subdevice.mailbox.iter().flat_map(|mailbox| &mailbox.coe);
+    for command in commands.filter(|command| command.index == object && !command.disabled) {
+        let (first, data) = match (command.complete_access, command.sub_index) {
+            (true, 0) => (1, command.data.get(2..).unwrap_or_default()),
+            (true, _) => (1, &command.data[..]),
+            (false, 0) => continue,
+            (false, sub_index) => (sub_index, &command.data[..]),
+        };
+        let (pdos, _) = data.as_chunks::<2>();
+        places.extend((first..=u8::MAX).zip(pdos).map(|(place, pdo)| (place, u16::from_le_bytes(*pdo))));
+    }
+    places.into_values().collect()
+}
+
 /// Objects beside those that are mapped.
 pub(super) fn objects(
     subdevice: &SubDevice,

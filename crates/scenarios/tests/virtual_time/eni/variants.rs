@@ -168,3 +168,98 @@ fn outputs_that_a_file_switches_on_at_so_are_off_in_safeop_facts_8_2() {
     }
     plant.settle();
 }
+
+/// The text without those blocks that contain something.
+fn without(text: &str, open: &str, close: &str, containing: &str) -> String {
+    let mut kept = String::new();
+    let mut rest = text;
+    while let Some(start) = rest.find(open) {
+        let end = start + rest[start..].find(close).expect("it is closed") + close.len();
+        kept.push_str(&rest[..start]);
+        if !rest[start..end].contains(containing) {
+            kept.push_str(&rest[start..end]);
+        }
+        rest = &rest[end..];
+    }
+    kept + rest
+}
+
+fn read(text: &str) -> EniFile {
+    EniFile::from_bytes(text.as_bytes()).unwrap_or_else(|error| panic!("{error}"))
+}
+
+/// Puts commands in front of those of the drive.
+fn with_commands_of_the_drive(commands: &str) -> EniFile {
+    let text = String::from_utf8(MACHINE.to_vec()).expect("it is text");
+    let drive = text.find("<Name>Drive</Name>").expect("it is there");
+    let at = drive + text[drive..].find("</Mailbox>").expect("it has one");
+    let at = at + text[at..].find("<InitCmds>").expect("it has some") + "<InitCmds>".len();
+    read(&[&text[..at], commands, &text[at..]].concat())
+}
+
+#[test]
+fn registers_that_a_file_checks_are_those_of_the_simulated_segment_where_an_eeprom_sets_them() {
+    let check = |ado: u16, data: &str, mask: &str| {
+        format!(
+            "<InitCmd><Transition>IP</Transition><Comment>check {ado}</Comment><Cmd>4</Cmd><Adp>1005</Adp><Ado>{ado}</Ado>\
+             <Data>0000</Data><Validate><Data>{data}</Data>{mask}<Timeout>10</Timeout></Validate></InitCmd>"
+        )
+    };
+    let masked = check(0x0150, "0180", "<DataMask>03f0</DataMask>");
+    let mut plant = activate(with_commands_of_the_drive(&(check(0x0140, "0c06", "") + &masked)), false, false).unwrap();
+    plant.settle();
+    // What the file says of a controller of another make is not made true.
+    let mut plant = activate(with_commands_of_the_drive(&check(0x0000, "9900", "")), false, false).unwrap();
+    plant.run(300);
+    let told = |event: &Event| {
+        matches!(event, Event::ConfigurationFailed { subdevice: DRIVE, reason }
+            if reason.contains("\"check 0\": register 0x0000: expected 99 00 within 10 ms, got 11 00"))
+    };
+    assert!(plant.events.iter().any(told), "{:?}", plant.events);
+}
+
+#[test]
+fn pdos_that_a_file_only_assigns_are_as_long_as_their_sync_manager_in_the_simulated_segment() {
+    let text = String::from_utf8(MACHINE.to_vec()).expect("it is text");
+    let text = without(&text, "<TxPdo", "</TxPdo>", "#x6064");
+    let text = without(&text, "<InitCmd>", "</InitCmd>", "<Index>6656<");
+    let mut plant = activate(read(&text), false, false).expect("it fits");
+    plant.settle();
+    set(&mut plant, "Drive.Target velocity", 0x0102_0304);
+    plant.run(4);
+    assert_eq!(get(&plant, "Drive.Position"), 0x0102_0304);
+}
+
+/// The SII of the drive knows nothing of its inputs, and where it does not even have a mailbox for a dictionary.
+#[test]
+fn a_file_that_says_more_than_the_sii_of_its_subdevices_is_followed() {
+    for is_cut in [false, true] {
+        let file = with(&[]);
+        let mut segment = segment(&file.eni, &file.configuration, false);
+        let drive = &mut segment.devices[DRIVE];
+        let mut silent = drive.clone();
+        silent.pdos.clear();
+        silent.sync_managers.truncate(if is_cut { 0 } else { 3 });
+        drive.sii_image = Some(ringcat_sim::sii_image::build(&silent));
+        let network = Network::from_description(segment).expect("cables fit");
+        let mut plant = activate_on(network, file, false).expect("the file says what there is");
+        plant.settle();
+        set(&mut plant, "Drive.Target velocity", 0x0102_0304);
+        plant.run(4);
+        assert_eq!(get(&plant, "Drive.Position"), 0x0102_0304);
+    }
+}
+
+#[test]
+fn process_data_beyond_eight_kibibytes_of_a_file_has_memory_in_the_simulated_segment() {
+    let file = with(&[
+        ("<Data>0014060064000100</Data>", "<Data>0094060064000100</Data>"),
+        ("<Data>02000001060000070014000201000000</Data>", "<Data>02000001060000070094000201000000</Data>"),
+    ]);
+    let mut plant = activate(file, false, false).expect("it fits");
+    plant.settle();
+    set(&mut plant, "Drive.Target velocity", 0x0102_0304);
+    plant.run(4);
+    assert_eq!(get(&plant, "Drive.Position"), 0x0102_0304);
+    assert_eq!(plant.found[DRIVE].controller.ram_kib, 34);
+}

@@ -1,0 +1,77 @@
+//! Where the mailboxes lie, as far as that can be: what the fixed area says, or else the SyncManagers (facts 4.1, 4.4).
+
+use alloc::vec::Vec;
+
+use ringcat_wire::sii::{MailboxLayout, SiiHeader, SyncManagerKind};
+
+use super::super::warning::MAILBOX_HEADER;
+use super::super::{InfoWarning, SiiProblem, SubDeviceInfo};
+use super::fixed_area;
+
+/// Byte offsets in the fixed area, for warnings.
+const BOOTSTRAP_AT: usize = 2 * 0x14;
+const STANDARD_AT: usize = 2 * 0x18;
+const PROTOCOLS_AT: usize = 2 * 0x1C;
+/// Mailboxes lie in process RAM.
+const PROCESS_RAM: u32 = 0x1000;
+
+/// The SyncManagers must have been collected.
+pub(super) fn collect(info: &mut SubDeviceInfo, header: &SiiHeader) {
+    let memory_end = match info.controller.ram_kib {
+        // A controller that does not say how much it has.
+        0 => 0x1_0000,
+        kib => PROCESS_RAM + 1024 * u32::from(kib),
+    };
+    info.bootstrap = pair(&header.bootstrap_mailbox, BOOTSTRAP_AT, memory_end, &mut info.warnings);
+    info.mailbox = pair(&header.standard_mailbox, STANDARD_AT, memory_end, &mut info.warnings);
+    let protocols = header.protocols.0;
+    if protocols == 0 || info.mailbox.is_some() {
+        return;
+    }
+    // One that speaks has mailboxes: its SyncManagers may tell where.
+    let described = of_sync_managers(info).filter(|layout| is_possible(layout, memory_end));
+    info.mailbox = described;
+    if described.is_none() {
+        info.warnings.push(fixed_area(PROTOCOLS_AT, SiiProblem::NoMailbox { protocols }));
+    }
+}
+
+/// A mailbox pair, `None` where it has no size. Vendors leave 0xFFFF in fields that they do not use.
+fn pair(
+    layout: &MailboxLayout,
+    offset: usize,
+    memory_end: u32,
+    warnings: &mut Vec<InfoWarning>,
+) -> Option<MailboxLayout> {
+    let none = |size: u16| size == 0 || size == 0xFFFF;
+    let MailboxLayout { receive_size, send_size, .. } = *layout;
+    let problem = match (none(receive_size), none(send_size)) {
+        (true, true) => return None,
+        (false, false) if is_possible(layout, memory_end) => return Some(*layout),
+        (false, false) => SiiProblem::Mailbox { layout: *layout, memory_end },
+        _ => SiiProblem::HalfMailbox { receive_size, send_size },
+    };
+    warnings.push(fixed_area(offset, problem));
+    None
+}
+
+/// They hold messages, lie in the process RAM, and apart from each other.
+fn is_possible(layout: &MailboxLayout, memory_end: u32) -> bool {
+    let span = |offset: u16, size: u16| (u32::from(offset), u32::from(offset) + u32::from(size));
+    let (out, inward) = (span(layout.receive_offset, layout.receive_size), span(layout.send_offset, layout.send_size));
+    let fits = |(start, end): (u32, u32)| {
+        start >= PROCESS_RAM && end <= memory_end && end - start >= u32::from(MAILBOX_HEADER)
+    };
+    fits(out) && fits(inward) && (out.1 <= inward.0 || inward.1 <= out.0)
+}
+
+fn of_sync_managers(info: &SubDeviceInfo) -> Option<MailboxLayout> {
+    let of = |kind: SyncManagerKind| info.sync_managers.iter().find(|manager| manager.kind == kind);
+    let (out, inward) = (of(SyncManagerKind::MailboxOut)?, of(SyncManagerKind::MailboxIn)?);
+    Some(MailboxLayout {
+        receive_offset: out.start,
+        receive_size: out.length,
+        send_offset: inward.start,
+        send_size: inward.length,
+    })
+}

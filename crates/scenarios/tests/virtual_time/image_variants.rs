@@ -1,0 +1,260 @@
+//! Odd SII images, many of them: made by a seeded generator from those of the catalogue, and from those of real devices
+//! where `../shared/data` lies beside the repository.
+//!
+//! One SubDevice of four has such an image. It comes to OP with complete working counters, or the reason is told of it; all
+//! others are in OP and exchange process data whatever it has. `SEED` and `VARIANTS` choose others, and how many per image.
+
+use std::path::Path;
+use std::time::Duration;
+
+use ringcat::{DomainId, Event, Freshness, Options, automatic};
+use ringcat_sim::application::{Behaviour, InputSource};
+use ringcat_sim::catalogue;
+use ringcat_sim::description::DeviceDescription;
+use ringcat_sim::network::NetworkOptions;
+use ringcat_sim::sii_image;
+use ringcat_wire::al::{AlState, AlStatus};
+use ringcat_wire::sii::{Identity, SiiHeader};
+use scenarios::check::Delivery;
+use scenarios::dice::Dice;
+use scenarios::odd_images::{Change, Variant, variant};
+use scenarios::segments::{describe, line};
+use scenarios::world::{CYCLE, World};
+
+/// The one with the odd image.
+const ODD: usize = 2;
+/// Variants of an image of the catalogue, and of one of a real device.
+const SOME: u64 = 24;
+const MANY: u64 = 50;
+/// Longer than any time limit of a state change.
+const LIMIT: Duration = Duration::from_secs(15);
+
+/// Whose image it is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Truth {
+    /// The SubDevice is what it was before its EEPROM was damaged.
+    Damaged,
+    /// The SubDevice is what its image says.
+    AsItSays,
+}
+
+/// What became of the odd one.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Outcome {
+    /// In OP, everything complete.
+    Complete,
+    /// Told by the MainDevice before anything was written.
+    Refused,
+    /// The SubDevice refused a state.
+    RefusedByDevice,
+}
+
+#[derive(Default, Debug)]
+struct Tally {
+    complete: usize,
+    refused: usize,
+    by_device: usize,
+    no_device: usize,
+    warned: usize,
+    /// SubDevices that are what their image says and refuse what the MainDevice reads in it.
+    disagree: Vec<String>,
+    failures: Vec<String>,
+}
+
+fn number(name: &str, usual: u64) -> u64 {
+    std::env::var(name).ok().and_then(|value| value.parse().ok()).unwrap_or(usual)
+}
+
+/// A segment around the odd one.
+fn around(odd: DeviceDescription) -> Vec<DeviceDescription> {
+    let mut devices = vec![
+        describe("digital-output-8", "before"),
+        describe("all-protocols", "speaks"),
+        odd,
+        describe("digital-input-8", "behind"),
+    ];
+    devices[3].behaviour = Behaviour::Terminal(InputSource::Constant(vec![0xA5]));
+    devices
+}
+
+fn with_image(mut description: DeviceDescription, image: &[u8]) -> DeviceDescription {
+    // The simulator writes these into images.
+    if let Some(header) = image.first_chunk().map(SiiHeader::decode) {
+        (description.alias, description.identity.serial) = (header.alias, header.identity.serial);
+    }
+    description.sii_image = Some(image.to_vec());
+    description
+}
+
+/// What is true at all times, and what became of the odd one.
+fn judge(made: &Variant, odd: DeviceDescription) -> Result<(Outcome, bool), String> {
+    let network = line(around(odd), NetworkOptions::default());
+    // Those with the same fixed area would be taken for twins, and not be read.
+    let options = Options { sii_cache: false, ..Options::default() };
+    let started = World::with(1, network, &options, |scan| automatic(&scan.subdevices, CYCLE));
+    let mut world = started.map_err(|error| format!("the activation fails: {error}"))?;
+    let begin = world.application().now();
+    let reason = |world: &World| {
+        let own = |event: &Event| match event {
+            Event::ConfigurationFailed { subdevice: ODD, .. } => Some(Outcome::Refused),
+            Event::StateError { subdevice: ODD, .. } => Some(Outcome::RefusedByDevice),
+            _ => None,
+        };
+        world.events(world.beginning()).iter().find_map(|timed| own(&timed.event))
+    };
+    let all_complete = |world: &World| {
+        let last = world.judged(world.beginning()).last();
+        world.application().all_settled()
+            && world.all_in_op()
+            && last.is_some_and(|last| last.delivery == Delivery::Complete && last.status.wkc == last.status.expected)
+    };
+    let outcome = loop {
+        if all_complete(&world) {
+            break Outcome::Complete;
+        }
+        if let Some(outcome) = reason(&world) {
+            break outcome;
+        }
+        if world.application().now() >= begin + LIMIT {
+            let states: Vec<_> = world.network().devices().map(|device| device.al_status().al_state()).collect();
+            let status = world.judged(world.beginning()).last().map(|judged| judged.status);
+            return Err(format!("neither in OP nor a reason: {states:?} {status:?}"));
+        }
+        world.run_cycles(10);
+    };
+    world.run_cycles(50);
+    let mark = world.mark();
+    let latched: Vec<u64> = world.network().devices().map(|device| device.outputs_latched()).collect();
+    world.run_cycles(50);
+    for other in [0, 1, 3] {
+        let device = world.network().device(ringcat_sim::cable::DeviceIndex(other));
+        if device.al_status() != AlStatus::new(AlState::Op) {
+            return Err(format!("{} is in {:?}", device.name(), device.al_status()));
+        }
+        let freshness = world.application().exchange().freshness(DomainId(0), other);
+        if !device.inputs().is_empty() && freshness != Freshness::Fresh {
+            return Err(format!("{} is not fresh", device.name()));
+        }
+        if !device.outputs().is_empty() && device.outputs_latched() < latched[other] + 40 {
+            return Err(format!("{} took no outputs", device.name()));
+        }
+    }
+    if world.judged(mark).iter().any(|judged| judged.delivery.is_incomplete()) {
+        return Err(format!("{outcome:?}, and cycles are incomplete"));
+    }
+    if outcome == Outcome::Complete && !all_complete(&world) {
+        return Err("complete only for a while".to_owned());
+    }
+    let oddity = |event: &Event| matches!(event, Event::SiiOddity { position, .. } if usize::from(position.0) == ODD);
+    let warned = world.saw(world.beginning(), oddity);
+    if let Change::Cut { is_inside: true, .. } = made.change
+        && !warned
+    {
+        return Err("cut short, and no warning".to_owned());
+    }
+    let at_byte_0 = |event: &Event| {
+        matches!(event, Event::SiiOddity { position, what } if usize::from(position.0) == ODD
+            && what.contains("byte 0:"))
+    };
+    if world.saw(world.beginning(), at_byte_0) {
+        return Err("a warning that names byte 0".to_owned());
+    }
+    Ok((outcome, warned))
+}
+
+/// Judges all variants of an image.
+fn judge_all(sound: &DeviceDescription, seed: u64, count: u64, tally: &mut Tally) {
+    let image = sii_image::build(sound);
+    let mut dice = Dice::new(seed);
+    for number in 0..count {
+        let made = variant(&image, number, &mut dice);
+        for truth in [Truth::Damaged, Truth::AsItSays] {
+            let odd = match truth {
+                Truth::Damaged => with_image(sound.clone(), &made.image),
+                Truth::AsItSays => match DeviceDescription::from_sii(made.image.clone(), &sound.name) {
+                    Ok(mut odd) => {
+                        // It is plugged in where it was.
+                        (odd.behaviour, odd.ports) = (sound.behaviour.clone(), sound.ports);
+                        odd
+                    }
+                    Err(_) => {
+                        tally.no_device += 1;
+                        continue;
+                    }
+                },
+            };
+            let judged = std::panic::catch_unwind(std::panic::AssertUnwindSafe(|| judge(&made, odd)));
+            let judged = judged.unwrap_or_else(|_| Err("it panics, or image and SubDevice differ".to_owned()));
+            match judged {
+                Ok((outcome, warned)) => {
+                    tally.warned += usize::from(warned);
+                    match outcome {
+                        Outcome::Complete => tally.complete += 1,
+                        Outcome::Refused => tally.refused += 1,
+                        Outcome::RefusedByDevice => {
+                            tally.by_device += 1;
+                            if truth == Truth::AsItSays {
+                                tally.disagree.push(format!("{} number {number}: {}", sound.name, made.change));
+                            }
+                        }
+                    }
+                }
+                Err(what) => {
+                    let line = format!("seed {seed} {} number {number} {truth:?} {}: {what}", sound.name, made.change);
+                    println!("{line}");
+                    tally.failures.push(line);
+                }
+            }
+        }
+    }
+}
+
+fn finish(tally: &Tally, what: &str) {
+    println!(
+        "{what}: {} in OP and complete, {} with the reason from the SII, {} with the reason from the SubDevice, {} make no \
+         device; {} warned of",
+        tally.complete, tally.refused, tally.by_device, tally.no_device, tally.warned
+    );
+    for what in &tally.disagree {
+        println!("MainDevice and simulator read it differently: {what}");
+    }
+    assert!(tally.failures.is_empty(), "{} fail, the first: {}", tally.failures.len(), tally.failures[0]);
+}
+
+#[test]
+fn odd_images_of_the_catalogue_hold_up_nobody_and_are_explained() {
+    let mut tally = Tally::default();
+    for name in catalogue::names() {
+        judge_all(&describe(name, name), number("SEED", 1), number("VARIANTS", SOME), &mut tally);
+    }
+    finish(&tally, "images of the catalogue");
+}
+
+#[test]
+fn odd_images_of_real_devices_hold_up_nobody_and_are_explained() {
+    let directory = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared/data/sii");
+    let Ok(entries) = std::fs::read_dir(&directory) else {
+        println!("skipped: {} is not there", directory.display());
+        return;
+    };
+    let mut paths: Vec<_> = entries.filter_map(|entry| Some(entry.ok()?.path())).collect();
+    paths.retain(|path| path.extension().is_some_and(|extension| extension == "bin"));
+    paths.sort();
+    let mut tally = Tally::default();
+    for path in paths {
+        let name = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
+        let image = std::fs::read(&path).expect("an image can be read");
+        match DeviceDescription::from_sii(image.clone(), &name) {
+            Ok(mut sound) => {
+                sound.behaviour = Behaviour::Terminal(InputSource::Outputs);
+                judge_all(&sound, number("SEED", 1), number("VARIANTS", MANY), &mut tally);
+            }
+            Err(error) => {
+                println!("{name}: {error}");
+                let plain = DeviceDescription::plain(&name, Identity::default());
+                judge_all(&with_image(plain, &image), number("SEED", 1), number("VARIANTS", MANY), &mut tally);
+            }
+        }
+    }
+    finish(&tally, "images of real devices");
+}
