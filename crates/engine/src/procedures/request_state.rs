@@ -128,8 +128,8 @@ async fn travel(bus: &Bus, fleet: &SharedFleet, index: usize, before: AlState) -
     bring_up.travel().await.map(|()| bring_up.target)
 }
 
-/// A boot loader, or whoever mended one that could not be followed, may have written another SII. One that cannot be read
-/// leaves everything as it was.
+/// The SII may be another one since: after a boot loader, or where one that could not be followed was mended. One that
+/// cannot be read leaves everything as it was.
 pub(super) async fn read_again(bus: &Bus, fleet: &SharedFleet, index: usize) {
     let Some(known) = fleet.access().members.get(index).and_then(|member| member.info.clone()) else { return };
     let read = async {
@@ -138,6 +138,8 @@ pub(super) async fn read_again(bus: &Bus, fleet: &SharedFleet, index: usize) {
         read_one(bus, known.position, known.station, &SiiCache::new(false)).await
     };
     let info = match read.await {
+        // The reason was told.
+        Ok(info) if info.is_blank() => return,
         Ok(mut info) => {
             info.keep_read_online(&known);
             info

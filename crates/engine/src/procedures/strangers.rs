@@ -409,6 +409,7 @@ async fn admit(bus: &Bus, fleet: &SharedFleet, stranger: &Stranger, info: &SubDe
         recabling::take_place(bus, access, stranger.station, index);
         let member = &mut access.members[index];
         member.setup = Some(Rc::new(setup));
+        member.unfit = None;
         member.info = Some(info);
         member.configured = false;
     }

@@ -57,9 +57,12 @@ fn a_broken_checksum_is_refused_with_a_reason() {
 #[test]
 fn more_sync_managers_than_the_controller_has_are_refused() {
     let mut description = catalogue::by_name("digital-output-8").unwrap();
-    description.sync_managers = vec![description.sync_managers[0]; 9];
+    description.sync_managers = vec![description.sync_managers[0]; 17];
     let error = DeviceDescription::from_sii(build(&description), "many").unwrap_err();
-    assert_eq!(error.to_string(), "SII declares 9 SyncManagers, expected at most 8");
+    assert_eq!(error.to_string(), "SII declares 17 SyncManagers, expected at most 16");
+    description.sync_managers.truncate(9);
+    let many = DeviceDescription::from_sii(build(&description), "many").unwrap();
+    assert_eq!((many.sync_manager_count(), many.sync_managers.len()), (9, 9));
 }
 
 #[test]

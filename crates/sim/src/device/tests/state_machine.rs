@@ -120,9 +120,9 @@ fn overlapping_buffers_are_0x0017() {
 
 #[test]
 fn buffers_beyond_the_ram_are_0x0017() {
-    let mut description = catalogue::by_name("block").unwrap();
-    description.sync_managers[1].start = 0x2C00;
-    let mut bench = Bench::up_to(description, AlState::PreOp);
+    // The controller was made with the usual RAM.
+    let mut bench = Bench::up_to(catalogue::by_name("block").unwrap(), AlState::PreOp);
+    bench.device.description.sync_managers[1].start = 0x2C00;
     bench.set_process_data();
     assert_eq!(bench.request(AlState::SafeOp), error(AlState::PreOp, 0x0017));
 }
