@@ -51,6 +51,11 @@ pub fn switch(name: &str, up: bool) -> bool {
     kernel::question_socket().is_ok_and(|questions| kernel::switch(questions.as_raw_fd(), name, up).is_ok())
 }
 
+/// Number of the other end of a veth pair, where that is in this namespace.
+pub(crate) fn peer(name: &str) -> Option<u32> {
+    netlink::membership(kernel::index_of(name)?)?.peer
+}
+
 /// Names of all interfaces.
 pub(crate) fn names() -> Vec<String> {
     indexed_names().into_iter().map(|(_, name)| name).collect()

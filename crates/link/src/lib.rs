@@ -7,6 +7,7 @@
 //! * [`interface`], [`carrier`]: what interfaces there are, who else uses them, whether a cable is plugged in;
 //! * [`tap`]: network interfaces of the host whose other end is this process;
 //! * [`monotonic`], [`realtime`]: the host's clock, scheduling, memory locking, processor latency;
+//! * [`signals`]: those that ask a program to end;
 //! * [`pcapng`]: captures that Wireshark reads; [`recorder`]: writing them while frames go on; [`sniffer`]: seeing what
 //!   passes on an interface without taking part.
 //!
@@ -27,6 +28,7 @@ pub mod pcapng;
 pub mod realtime;
 pub mod recorder;
 mod ring;
+pub mod signals;
 pub mod sniffer;
 pub mod tap;
 pub mod waiting;
@@ -37,6 +39,7 @@ pub use filter::ClassFilter;
 pub use listener::{Listener, Sender};
 pub use packet_socket::{LinkCounters, PacketOptions, PacketSocket};
 pub use recorder::{Recorder, RecorderError, Tap};
+pub use signals::{HeldSignals, Signal};
 pub use sniffer::Sniffer;
 pub use tap::{TapError, TapInterface};
 pub use waiting::{ReceiveMode, wait};

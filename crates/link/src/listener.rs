@@ -2,8 +2,9 @@
 //!
 //! In go a source address with a mask and the interfaces that are in use; out come the first bytes of EtherCAT frames
 //! with that source that arrive on any other interface, and its name. One socket listens on all of them, whatever comes
-//! or goes; the kernel sorts out all else, so nobody is woken by the traffic of other segments. What is stacked on
-//! another interface (bridge, bond, macvlan) is left out: it shows what arrived below it once more.
+//! or goes; the kernel sorts out all else, so no thread is woken by the traffic of other segments. What is stacked on
+//! another interface (bridge, bond, macvlan) is left out: it shows what arrived below it once more. So is the other end
+//! of a veth pair in the same namespace.
 
 use std::mem::{size_of, zeroed};
 use std::os::fd::{AsFd, AsRawFd, OwnedFd, RawFd};
@@ -67,7 +68,9 @@ impl Listener {
         let raw = fd.as_raw_fd();
         // Before Linux 4.20 the filter alone leaves them out.
         let _ = kernel::set_option(raw, libc::SOL_PACKET, kernel::PACKET_IGNORE_OUTGOING, &1);
-        let left_out = interface::indices(|name| except.contains(&name) || is_stacked(name));
+        let mut left_out = interface::indices(|name| except.contains(&name) || is_stacked(name));
+        // What is sent on one end of a pair arrives at the other: that is its purpose.
+        left_out.extend(except.iter().filter_map(|name| interface::peer(name)));
         let mut program = program(sender, &left_out);
         packet_socket::attach(raw, &mut program).map_err(failed("attaching the filter"))?;
         packet_socket::bind(raw, ALL_INTERFACES, filter::ETHERCAT).map_err(failed("binding to all interfaces"))?;

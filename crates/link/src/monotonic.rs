@@ -4,9 +4,19 @@
 
 /// Now.
 pub fn now_ns() -> u64 {
+    read(libc::CLOCK_MONOTONIC)
+}
+
+/// When it was this Unix time, as far as that is past and nobody has set that clock since.
+pub fn of_unix_ns(unix_ns: u64) -> u64 {
+    let age = read(libc::CLOCK_REALTIME).saturating_sub(unix_ns);
+    now_ns().saturating_sub(age)
+}
+
+fn read(clock: libc::clockid_t) -> u64 {
     let mut time = libc::timespec { tv_sec: 0, tv_nsec: 0 };
     // SAFETY: the pointer is to a live timespec; the call writes nothing else.
-    unsafe { libc::clock_gettime(libc::CLOCK_MONOTONIC, &mut time) };
+    unsafe { libc::clock_gettime(clock, &mut time) };
     time.tv_sec as u64 * 1_000_000_000 + time.tv_nsec as u64
 }
 
@@ -27,6 +37,18 @@ pub(crate) fn timespec(ns: u64) -> libc::timespec {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_unix_time_of_a_moment_ago_is_found_on_the_monotonic_clock() {
+        let before = now_ns();
+        let unix_ns = read(libc::CLOCK_REALTIME);
+        let after = now_ns();
+        sleep_until_ns(after + 2_000_000);
+        let found = of_unix_ns(unix_ns);
+        // The two clocks are not read in one instant.
+        assert!((before.saturating_sub(100_000)..=after + 1_000_000).contains(&found), "{before} {found} {after}");
+        assert!(of_unix_ns(u64::MAX) >= found, "a time to come counts as now");
+    }
 
     #[test]
     fn a_sleep_ends_at_its_time_or_later_and_one_in_the_past_at_once() {

@@ -12,6 +12,7 @@ use crate::error::LinkError;
 use crate::filter::{self, ClassFilter};
 use crate::interface;
 use crate::kernel::{self, Membership, Statistics};
+use crate::monotonic;
 use crate::ring::{self, Ring, Seen, Taken};
 use crate::waiting::ReceiveMode;
 
@@ -182,6 +183,11 @@ impl PacketSocket {
                 Taken::Outgoing => {}
             }
         }
+    }
+
+    /// When the kernel received the frame that was handed out last, on the monotonic clock. No system call.
+    pub fn received_at_ns(&self) -> u64 {
+        monotonic::of_unix_ns(self.ring.stamp_unix_ns())
     }
 
     /// Hands whatever passed the interface to `take`, oldest first; false where there is nothing. No system call.

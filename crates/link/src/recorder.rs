@@ -47,15 +47,20 @@ pub struct RecorderError {
 
 impl fmt::Display for RecorderError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let advice = match self.error.kind() {
-            io::ErrorKind::StorageFull | io::ErrorKind::QuotaExceeded => "make room or take a file on another disk",
-            io::ErrorKind::NotFound => "make its directory first",
-            io::ErrorKind::PermissionDenied | io::ErrorKind::ReadOnlyFilesystem => "take a file that you may write",
-            io::ErrorKind::IsADirectory => "name a file in it",
-            _ => "what was written until then can be read",
-        };
-        write!(f, "the capture {} cannot be written: {}; {advice}", self.path.display(), self.error)
+        f.write_str(&words(&self.path, &self.error))
     }
+}
+
+/// Why a capture cannot be written, and what to do about it.
+fn words(path: &Path, error: &io::Error) -> String {
+    let advice = match error.kind() {
+        io::ErrorKind::StorageFull | io::ErrorKind::QuotaExceeded => "make room or take a file on another disk",
+        io::ErrorKind::NotFound => "make its directory first",
+        io::ErrorKind::PermissionDenied | io::ErrorKind::ReadOnlyFilesystem => "take a file that you may write",
+        io::ErrorKind::IsADirectory => "name a file in it",
+        _ => "what was written until then can be read",
+    };
+    format!("the capture {} cannot be written: {error}; {advice}", path.display())
 }
 
 impl Error for RecorderError {
@@ -73,6 +78,8 @@ struct Shared {
     clock: OnceLock<u64>,
     lost_by_kernel: Vec<AtomicU64>,
     end: AtomicBool,
+    /// Why writing ended early.
+    failure: OnceLock<String>,
 }
 
 /// A capture in the making. Dropped, it completes the file.
@@ -102,14 +109,17 @@ impl Recorder {
             clock: OnceLock::new(),
             lost_by_kernel: interfaces.iter().map(|_| AtomicU64::new(0)).collect(),
             end: AtomicBool::new(false),
+            failure: OnceLock::new(),
         });
         let file = BufWriter::with_capacity(1 << 18, File::create(path).map_err(failed)?);
         let mut writer = Writer::new(file, interfaces).map_err(failed)?;
         writer.flush().map_err(failed)?;
         let seen = shared.clone();
+        let file_path = path.to_owned();
         let write = move || {
             realtime::leave();
-            Scribe { writer, shared: seen, queues: Vec::new(), frame: Vec::new(), recorded: Vec::new() }.write()
+            let in_words = |error: &io::Error| words(&file_path, error);
+            Scribe { writer, shared: seen, queues: Vec::new(), frame: Vec::new(), recorded: Vec::new() }.write(in_words)
         };
         let thread = thread::Builder::new().name("capture".to_owned()).spawn(write).map_err(failed)?;
         Ok(Recorder { shared, path: path.to_owned(), thread: Some(thread) })
@@ -131,6 +141,11 @@ impl Recorder {
         if let Some(lost) = self.shared.lost_by_kernel.get(interface) {
             lost.store(frames, Ordering::Relaxed);
         }
+    }
+
+    /// Why nothing is written any more, as soon as that is so. Not for the cyclic path.
+    pub fn failure(&self) -> Option<&str> {
+        self.shared.failure.get().map(String::as_str)
     }
 
     /// Completes the file: everything that was put into taps until now is in it. What there was, by interface.
@@ -197,7 +212,7 @@ struct Scribe<W: Write> {
 }
 
 impl<W: Write> Scribe<W> {
-    fn write(mut self) -> io::Result<Vec<Recorded>> {
+    fn write(mut self, in_words: impl Fn(&io::Error) -> String) -> io::Result<Vec<Recorded>> {
         self.recorded = vec![Recorded::default(); self.shared.interfaces];
         let mut result = Ok(());
         loop {
@@ -205,6 +220,10 @@ impl<W: Write> Scribe<W> {
             self.queues
                 .extend(self.shared.new.lock().unwrap_or_else(PoisonError::into_inner).drain(..).map(|q| (q, 0)));
             let written = self.empty(end, result.is_ok());
+            if let (Ok(()), Err(error)) = (&result, &written) {
+                // Only this thread sets it, and once.
+                let _ = self.shared.failure.set(in_words(error));
+            }
             result = result.and(written);
             if end {
                 break;

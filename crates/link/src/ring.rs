@@ -57,6 +57,8 @@ pub struct Ring {
     base: NonNull<u8>,
     slots: usize,
     head: usize,
+    /// When the kernel received the frame that was handed out last.
+    stamp_unix_ns: u64,
 }
 
 // SAFETY: the mapping belongs to this value alone; nothing about it is bound to a thread.
@@ -88,7 +90,7 @@ impl Ring {
         if base == libc::MAP_FAILED {
             return Err(io::Error::last_os_error().raw_os_error().unwrap_or(0));
         }
-        NonNull::new(base.cast()).map(|base| Ring { base, slots, head: 0 }).ok_or(libc::ENOMEM)
+        NonNull::new(base.cast()).map(|base| Ring { base, slots, head: 0, stamp_unix_ns: 0 }).ok_or(libc::ENOMEM)
     }
 
     /// Whether a frame waits.
@@ -100,7 +102,18 @@ impl Ring {
     /// Hands the oldest frame to `take` and gives its slot back to the kernel.
     #[inline]
     pub fn take(&mut self, take: &mut dyn FnMut(&[u8])) -> Taken {
-        self.take_slot(|status, slot| hand_out(status, slot, take))
+        let mut stamp_unix_ns = self.stamp_unix_ns;
+        let taken = self.take_slot(|status, slot| {
+            stamp_unix_ns = stamp(slot);
+            hand_out(status, slot, take)
+        });
+        self.stamp_unix_ns = stamp_unix_ns;
+        taken
+    }
+
+    /// When the kernel received the frame that was handed out last, in nanoseconds since 1970.
+    pub fn stamp_unix_ns(&self) -> u64 {
+        self.stamp_unix_ns
     }
 
     /// As [`Ring::take`], of all frames, those that this host sent and the beginnings of long ones included; false where
@@ -174,11 +187,16 @@ fn put_tag_back(status: u32, slot: &mut [u8], start: usize) -> (usize, usize) {
     (start - TAG, TAG)
 }
 
+/// When the kernel saw the frame of a slot.
+fn stamp(slot: &[u8]) -> u64 {
+    let u32_at = |at: usize| u32::from_ne_bytes([slot[at], slot[at + 1], slot[at + 2], slot[at + 3]]);
+    u64::from(u32_at(16)) * 1_000_000_000 + u64::from(u32_at(20))
+}
+
 /// Shows whatever the slot that is ours holds.
 fn show(status: u32, slot: &mut [u8], take: &mut dyn FnMut(Seen<'_>)) -> Taken {
     let Some(Place { length, start, captured }) = place(slot) else { return Taken::Truncated };
-    let u32_at = |at: usize| u32::from_ne_bytes([slot[at], slot[at + 1], slot[at + 2], slot[at + 3]]);
-    let unix_time_ns = u64::from(u32_at(16)) * 1_000_000_000 + u64::from(u32_at(20));
+    let unix_time_ns = stamp(slot);
     let outgoing = slot[PACKET_TYPE] == PACKET_OUTGOING;
     let (start, tag) = put_tag_back(status, slot, start);
     let bytes = &slot[start..start + captured + tag];

@@ -1,6 +1,7 @@
-//! Which bridge or bond an interface is a member of, asked of the kernel through netlink.
+//! Which bridge or bond an interface is a member of, and where the other end of a veth pair is, asked of the kernel
+//! through netlink.
 //!
-//! In go the index of an interface, out comes its controller with its kind. `/sys` would tell too, but is tied to the
+//! In go the index of an interface, out come its controller, its kind and its other end. `/sys` would tell too, but is tied to the
 //! namespace that it was mounted in.
 
 use std::os::fd::AsRawFd;
@@ -21,6 +22,8 @@ pub struct Membership {
     pub controller: Option<u32>,
     /// What the interface itself is: "bridge", "bond", "veth"; empty for a plain one.
     pub kind: String,
+    /// Index of the other end of a pair (veth), where that is in the same namespace.
+    pub peer: Option<u32>,
 }
 
 /// Asks about one interface; None where the kernel does not answer.
@@ -55,8 +58,11 @@ fn parse(answer: &[u8]) -> Option<Membership> {
         return None;
     }
     let mut membership = Membership::default();
+    let (mut link, mut is_elsewhere) = (None, false);
     for (kind, value) in attributes(answer.get(ATTRIBUTES..)?) {
         match kind {
+            libc::IFLA_LINK => link = value.try_into().ok().map(u32::from_ne_bytes),
+            libc::IFLA_LINK_NETNSID => is_elsewhere = true,
             libc::IFLA_MASTER => membership.controller = value.try_into().ok().map(u32::from_ne_bytes),
             libc::IFLA_LINKINFO => {
                 if let Some((_, name)) = attributes(value).find(|(kind, _)| *kind == libc::IFLA_INFO_KIND) {
@@ -66,6 +72,7 @@ fn parse(answer: &[u8]) -> Option<Membership> {
             _ => {}
         }
     }
+    membership.peer = link.filter(|_| membership.kind == "veth" && !is_elsewhere);
     Some(membership)
 }
 
@@ -103,8 +110,22 @@ mod tests {
 
     #[test]
     fn controller_and_kind_are_found_among_other_attributes() {
-        let expected = Membership { controller: Some(7), kind: "bridge".to_owned() };
+        let expected = Membership { controller: Some(7), kind: "bridge".to_owned(), peer: None };
         assert_eq!(parse(&answer()), Some(expected));
+    }
+
+    #[test]
+    fn the_other_end_of_a_pair_is_told_where_it_is_in_the_same_namespace() {
+        let mut pair = vec![0; ATTRIBUTES];
+        pair.extend(attribute(libc::IFLA_LINK, &9u32.to_ne_bytes()));
+        pair.extend(attribute(libc::IFLA_LINKINFO, &attribute(libc::IFLA_INFO_KIND, b"veth\0")));
+        assert_eq!(parse(&pair).expect("an answer").peer, Some(9));
+        pair.extend(attribute(libc::IFLA_LINK_NETNSID, &0u32.to_ne_bytes()));
+        assert_eq!(parse(&pair).expect("an answer").peer, None);
+        let mut above = vec![0; ATTRIBUTES];
+        above.extend(attribute(libc::IFLA_LINK, &9u32.to_ne_bytes()));
+        above.extend(attribute(libc::IFLA_LINKINFO, &attribute(libc::IFLA_INFO_KIND, b"macvlan\0")));
+        assert_eq!(parse(&above).expect("an answer").peer, None, "it lies on top of the other one");
     }
 
     #[test]

@@ -55,6 +55,7 @@ fn frames_of_two_threads_are_in_one_file_in_the_order_of_time() {
         clock: OnceLock::new(),
         lost_by_kernel: Vec::new(),
         end: AtomicBool::new(false),
+        failure: OnceLock::new(),
     });
     let (mut producers, queues): (Vec<Producer>, Vec<(Consumer, u64)>) = (0..2)
         .map(|_| {

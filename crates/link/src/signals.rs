@@ -1,0 +1,102 @@
+//! Signals that ask a program to end, taken by a thread that waits for them.
+//!
+//! A handler runs in a thread that the kernel chooses, usually the first one of the process. That thread may never run while
+//! another one spins with a real-time priority. So the signals are held back in all threads, and one thread with a priority
+//! above all others waits for them.
+
+use std::fmt;
+use std::mem::zeroed;
+use std::time::Duration;
+
+use crate::monotonic::timespec;
+
+/// A signal that asks for the end.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Signal {
+    /// The terminal or session is gone.
+    Hangup,
+    /// Ctrl-C.
+    Interrupt,
+    /// The system, or `kill`.
+    Terminate,
+}
+
+impl Signal {
+    /// All of them.
+    pub const ALL: [Signal; 3] = [Signal::Hangup, Signal::Interrupt, Signal::Terminate];
+
+    /// Its number.
+    pub const fn number(self) -> i32 {
+        match self {
+            Signal::Hangup => libc::SIGHUP,
+            Signal::Interrupt => libc::SIGINT,
+            Signal::Terminate => libc::SIGTERM,
+        }
+    }
+}
+
+impl fmt::Display for Signal {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Signal::Hangup => "SIGHUP",
+            Signal::Interrupt => "SIGINT",
+            Signal::Terminate => "SIGTERM",
+        })
+    }
+}
+
+/// The signals that are held back.
+#[derive(Clone, Copy)]
+pub struct HeldSignals(libc::sigset_t);
+
+impl HeldSignals {
+    /// Holds them back in the calling thread and in those that it starts from now on. SIGHUP is left alone where it is
+    /// ignored, as `nohup` has it.
+    pub fn hold() -> HeldSignals {
+        // SAFETY: all bytes zero is a valid set and a valid action; the pointers are to live values.
+        unsafe {
+            let mut set: libc::sigset_t = zeroed();
+            libc::sigemptyset(&mut set);
+            for signal in Signal::ALL {
+                let mut action: libc::sigaction = zeroed();
+                libc::sigaction(signal.number(), std::ptr::null(), &mut action);
+                if signal != Signal::Hangup || action.sa_sigaction != libc::SIG_IGN {
+                    libc::sigaddset(&mut set, signal.number());
+                }
+            }
+            libc::pthread_sigmask(libc::SIG_BLOCK, &set, std::ptr::null_mut());
+            HeldSignals(set)
+        }
+    }
+
+    /// Waits for one of them, at most so long.
+    pub fn wait(&self, limit: Duration) -> Option<Signal> {
+        let limit = timespec(u64::try_from(limit.as_nanos()).unwrap_or(u64::MAX));
+        // SAFETY: the pointers are to a live set and a live time; what else the kernel knows of the signal is not asked for.
+        let number = unsafe { libc::sigtimedwait(&self.0, std::ptr::null_mut(), &limit) };
+        Signal::ALL.into_iter().find(|signal| signal.number() == number)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_signal_that_is_held_back_waits_for_the_thread_that_asks() {
+        // In a thread of its own: the mask of the others stays as it is.
+        let seen = std::thread::spawn(|| {
+            let held = HeldSignals::hold();
+            assert_eq!(held.wait(Duration::ZERO), None);
+            // SAFETY: the signal is blocked in this thread, which is the one that it is sent to.
+            unsafe { libc::pthread_kill(libc::pthread_self(), libc::SIGTERM) };
+            (held.wait(Duration::from_secs(5)), held.wait(Duration::ZERO))
+        });
+        assert_eq!(seen.join().expect("no panic"), (Some(Signal::Terminate), None));
+    }
+
+    #[test]
+    fn signals_have_the_names_of_the_manual() {
+        assert_eq!(Signal::ALL.map(|signal| signal.to_string()), ["SIGHUP", "SIGINT", "SIGTERM"]);
+    }
+}
