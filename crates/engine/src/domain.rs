@@ -7,7 +7,7 @@ pub struct DomainId(pub usize);
 /// Judgement of a domain's working counters.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub enum DomainState {
-    /// No SubDevice answered.
+    /// No SubDevice answered, or no frame came back in time ([`DomainStatus::returned`]).
     #[default]
     Zero,
     /// Some answered, or one was met twice.
@@ -25,6 +25,8 @@ pub struct DomainStatus {
     pub expected: u32,
     /// The judgement: every datagram by its own working counter; SubDevices declared optional may be missing.
     pub state: DomainState,
+    /// Whether a frame of the judged cycle came back in time, whatever its working counters were.
+    pub returned: bool,
     /// Frames are still out and not overdue: the other fields are those of the last judgement.
     pub pending: bool,
     /// How often the domain was due while its frames were still out.
@@ -43,4 +45,16 @@ pub enum Freshness {
         /// Cycles of the exchange.
         cycles: u64,
     },
+}
+
+impl DomainStatus {
+    /// The judgement in words, as an operator is told.
+    pub const fn in_words(&self) -> &'static str {
+        match self.state {
+            DomainState::Zero if self.returned => "no SubDevice answers",
+            DomainState::Zero => "no frame came back in time",
+            DomainState::Incomplete => "incomplete",
+            DomainState::Complete => "complete",
+        }
+    }
 }

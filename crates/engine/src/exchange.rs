@@ -17,6 +17,7 @@ mod evidence;
 mod flight;
 pub mod foreign;
 mod image;
+mod missed;
 mod place;
 mod presence;
 
@@ -44,6 +45,7 @@ use evidence::Evidence;
 use flight::{CyclicFrame, Step};
 use foreign::ForeignFrames;
 use image::InputNumber;
+use missed::Missed;
 
 /// No frame has this id.
 const NO_FRAME: u16 = u16::MAX;
@@ -81,6 +83,7 @@ pub struct Exchange {
     evidence: Evidence,
     counters: CyclicCounters,
     foreign: ForeignFrames,
+    missed: Missed,
     copies: Copies,
     /// The frame of which a copy was taken last.
     taken: u16,
@@ -119,6 +122,7 @@ impl Exchange {
             evidence: Evidence::default(),
             counters: CyclicCounters::default(),
             foreign: ForeignFrames::new(),
+            missed: Missed::default(),
             copies: Copies::default(),
             taken: NO_FRAME,
             cycle: 0,
@@ -142,7 +146,7 @@ impl Exchange {
         };
         let index = self.by_id[usize::from(copy.sequence.frame_id())];
         let Some(frame) = self.frames.get_mut(usize::from(index)) else {
-            self.counters.late += 1;
+            self.missed.late(copy.sequence, &mut self.counters);
             return Received::Late;
         };
         let Some(domain) = self.domains.get_mut(frame.domain()) else { return Received::Other };
@@ -158,11 +162,12 @@ impl Exchange {
                 Received::Taken
             }
             Step::Late => {
-                self.counters.late += 1;
+                self.missed.late(copy.sequence, &mut self.counters);
                 Received::Late
             }
             Step::Corrupt => {
                 self.counters.corrupt += 1;
+                self.missed.damaged(copy.sequence);
                 Received::Corrupt
             }
         }
@@ -182,12 +187,14 @@ impl Exchange {
                 wkc += frame.wkc();
                 left = frame.left();
             }
-            if waiting && give_up_overdue(domain, &mut self.frames, set.clone(), now, &mut self.counters) {
+            let missed = &mut self.missed;
+            if waiting && give_up_overdue(domain, &mut self.frames, set.clone(), now, missed, &mut self.counters) {
                 return domain.status(!judged);
             }
             judged = true;
             if !domain.judge(wkc, complete, left) {
-                note_change(id, domain, wkc, complete, &mut self.counters, &mut self.events);
+                let returned = self.frames[set.clone()].iter().any(|frame| frame.arrivals().arrived != 0);
+                note_change(id, domain, (wkc, complete, returned), &mut self.counters, &mut self.events);
                 if !complete {
                     count_errors(&self.frames[set], &self.board);
                 }
@@ -291,12 +298,11 @@ impl Exchange {
 fn note_change(
     id: DomainId,
     domain: &mut Domain,
-    wkc: u32,
-    complete: bool,
+    (wkc, complete, returned): (u32, bool, bool),
     counters: &mut CyclicCounters,
     events: &mut Producer,
 ) {
-    let changed = domain.change_state(wkc, complete);
+    let changed = domain.change_state(wkc, complete, returned);
     if domain.state() != DomainState::Complete {
         counters.incomplete += 1;
     }
@@ -318,6 +324,7 @@ fn give_up_overdue(
     frames: &mut [CyclicFrame],
     set: Range<usize>,
     now: Instant,
+    missed: &mut Missed,
     counters: &mut CyclicCounters,
 ) -> bool {
     // What was overtaken does not come any more, whatever time it is.
@@ -327,7 +334,7 @@ fn give_up_overdue(
         if !frame.overdue(now) {
             pending = true;
         } else if frame.give_up() {
-            counters.lost += 1;
+            missed.give_up(frame.sequence(), counters);
         } else {
             counters.half += 1;
         }

@@ -70,7 +70,8 @@ use crate::supervisor::{AcyclicCounters, Bus, Received, Supervisor, UnderWay};
 use crate::time::Instant;
 use crate::topology::Topology;
 use declaration::{
-    check_clocks, domain_specs, match_declaration, members, plan_all, report_oddities, with_domain, witnesses,
+    check_clocks, check_domains, domain_specs, match_declaration, members, plan_all, report_oddities, with_domain,
+    witnesses,
 };
 use lrw::check_lrw;
 use steps::Loaded;
@@ -197,6 +198,7 @@ impl MainDevice {
         check_clocks(&declaration, &found)?;
         let clock_config = declaration.clocks.clone();
         let plans = plan_all(&declaration, &found)?;
+        check_domains(&loaded.declaration, &plans)?;
         let links = self.options.links();
         let lrw = lrw::policy(declaration.lrw, &declaration.explicit_lrw, links)?;
         let specs = domain_specs(&declaration, &plans, lrw, links)?;

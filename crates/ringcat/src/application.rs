@@ -67,23 +67,25 @@ impl<L: Links, H: AcyclicHalf> Application<L, H> {
 
     /// Waits for the next cycle, judges what is due, runs `work`, sends.
     pub fn cycle<R>(&mut self, work: impl FnOnce(&mut ProcessData<'_>) -> R) -> R {
-        let now = self.wait_for_cycle();
-        self.cyclic.begin(now);
+        let (now, looked_at) = self.wait_for_cycle();
+        self.cyclic.begin(now, looked_at);
         let result = work(&mut self.cyclic.data(now));
         self.cyclic.end(now, &mut self.links);
         result
     }
 
-    /// Receives, and lets the acyclic half work if it does so here, until the cycle begins. Returns the time.
-    fn wait_for_cycle(&mut self) -> Instant {
+    /// Receives, and lets the acyclic half work if it does so here, until the cycle begins. Returns the time, and when the
+    /// look for frames began that was the last one.
+    fn wait_for_cycle(&mut self) -> (Instant, Instant) {
         loop {
+            let looked_at = self.links.now();
             self.receive();
             let now = self.links.now();
             if self.cyclic.begins(now) {
-                return now;
+                return (now, looked_at);
             }
             let wake = self.cyclic.wake().min(self.acyclic.wake());
-            if H::SHARES_LINKS || self.cyclic.exchange.in_flight() {
+            if H::SHARES_LINKS || self.cyclic.exchange.awaits_copies() {
                 self.links.wait(wake.max(now));
             } else {
                 self.links.sleep(wake);
@@ -97,12 +99,16 @@ impl<L: Links, H: AcyclicHalf> Application<L, H> {
         let Application { links, acyclic, cyclic, window } = self;
         loop {
             let now = links.now();
+            let mut left_at = None;
             let any = links.receive(&mut |link, frame| match class_of(frame) {
                 Some(Class::Acyclic) if H::SHARES_LINKS => acyclic.receive(link, frame, now),
-                _ => cyclic.receive(link, frame, now),
+                _ => left_at = cyclic.receive(link, frame, now),
             });
             if !any {
                 break;
+            }
+            if let Some(left_at) = left_at {
+                cyclic.note_round_trip(left_at, links.received_at().unwrap_or(now));
             }
         }
         acyclic.work(links, window);
@@ -176,7 +182,8 @@ impl<L: Links, H: AcyclicHalf> Application<L, H> {
         self.cyclic.pace
     }
 
-    /// Times from the sending of a cycle's frames to the arrival of their copies.
+    /// Times from the sending of a cycle's frames to the arrival of each of their copies at the interface, whenever the copy
+    /// was read ([`Links::received_at`]).
     pub fn round_trips(&self) -> &Histogram {
         self.cyclic.news.round_trips()
     }

@@ -95,11 +95,15 @@ impl Cyclic {
         self.exchange.set_copies(&rules)
     }
 
-    /// Takes in a frame of the cyclic class or of nobody known.
-    pub fn receive(&mut self, link: Link, frame: &[u8], now: Instant) {
-        if self.exchange.receive(link, frame, now) == Received::Taken {
-            self.news.round_trips().record(now.since(self.exchange.taken_left_at()));
-        }
+    /// Takes in a frame of the cyclic class or of an unknown sender. When it left, if it is a copy that was waited for.
+    pub fn receive(&mut self, link: Link, frame: &[u8], now: Instant) -> Option<Instant> {
+        let taken = self.exchange.receive(link, frame, now) == Received::Taken;
+        taken.then(|| self.exchange.taken_left_at())
+    }
+
+    /// Notes when a copy arrived at the interface that had left then.
+    pub fn note_round_trip(&self, left_at: Instant, received_at: Instant) {
+        self.news.round_trips().record(received_at.since(left_at));
     }
 
     /// Whether a cycle begins now.
@@ -116,13 +120,14 @@ impl Cyclic {
         matches!(self.trigger, Trigger::FramesReturned { .. }) && !self.exchange.is_full()
     }
 
-    /// A cycle begins: notes how late it is, judges what is due.
-    pub fn begin(&mut self, now: Instant) {
+    /// A cycle begins: notes how late it is, judges what is due. All frames were taken in that had arrived at `looked_at`;
+    /// only what was overdue by then is given up, however long this thread was held up since.
+    pub fn begin(&mut self, now: Instant, looked_at: Instant) {
         self.begun_at = now;
         self.keep_pace(now);
         for (number, rate) in self.rates.iter_mut().enumerate() {
             if self.cycle.is_multiple_of(rate.divider) {
-                rate.status = self.exchange.process(DomainId(number), now);
+                rate.status = self.exchange.process(DomainId(number), looked_at);
             }
         }
     }
@@ -193,8 +198,9 @@ impl Cyclic {
                 self.exchange.queue(DomainId(number), now);
             }
         }
-        // Readings of the reference clock count from the time at which the frame leaves, not from the beginning of the work.
-        let now = if self.follower.is_some() { links.now() } else { now };
+        // Round trips, deadlines and readings of the reference clock count from the time at which the frames leave, not from
+        // the beginning of the work.
+        let now = links.now();
         let next = match self.trigger {
             Trigger::Time | Trigger::ReferenceClock { .. } => self.next_cycle,
             Trigger::FramesReturned { at_least } if at_least >= SHORTEST => self.earliest,

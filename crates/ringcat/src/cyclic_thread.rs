@@ -1,9 +1,15 @@
 //! Cycles in a thread of their own, beside the supervisor's.
 //!
-//! What the application computes in a cycle is a closure that this thread runs. Everybody else looks at [`News`], and asks
+//! What the application computes in a cycle is a closure that this thread runs. Other threads look at [`News`], and ask
 //! the supervisor's thread.
+//!
+//! A panic of that closure does not take the bus down: cycles go on with outputs zero until [`CyclicThread::end`] hands the
+//! application back with the panic's message, to be stopped in order.
 
+use std::any::Any;
+use std::fmt;
 use std::ops::ControlFlow;
+use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread::JoinHandle;
@@ -21,13 +27,46 @@ pub struct CyclicThread<L> {
     supervisor: SupervisorThread,
     news: Arc<News>,
     end: Arc<AtomicBool>,
-    thread: Option<JoinHandle<Application<L, SupervisorThread>>>,
+    panicked: Arc<AtomicBool>,
+    thread: Option<JoinHandle<Result<Application<L, SupervisorThread>, Box<Panicked<L>>>>>,
+}
+
+/// The closure of the cycles has panicked. The application is as it was, with all outputs zero: it can be stopped in order,
+/// or run cycles with another closure.
+#[derive(Debug)]
+pub struct Panicked<L> {
+    /// The panic's message.
+    pub message: String,
+    /// The application.
+    pub application: Application<L, SupervisorThread>,
+}
+
+impl<L> fmt::Display for Panicked<L> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "the application's closure has panicked: {}", self.message)
+    }
+}
+
+impl<L: fmt::Debug> std::error::Error for Panicked<L> {}
+
+/// The application is dropped without an orderly stop: SubDevices with watchdogs leave OP by themselves.
+impl<L> From<Box<Panicked<L>>> for Error {
+    fn from(panicked: Box<Panicked<L>>) -> Error {
+        Error::Panicked(panicked.message)
+    }
+}
+
+/// What a panic says.
+fn message(payload: &(dyn Any + Send)) -> String {
+    let text = payload.downcast_ref::<&str>().map(|text| (*text).to_owned());
+    let text = text.or_else(|| payload.downcast_ref::<String>().cloned());
+    text.unwrap_or_else(|| "without a message".to_owned())
 }
 
 impl<L: Links + Send + 'static> Application<L, SupervisorThread> {
     /// Runs the cycles in a thread of their own, each with `work`, until that breaks or [`CyclicThread::end`] is called.
     /// `prepare` runs in the thread first: the place to set its priority and processor. `work` is in the cyclic path: it
-    /// must not allocate, lock or wait.
+    /// must not allocate, lock or wait. Should it panic, it is not called any more, and cycles go on with outputs zero.
     ///
     /// # Errors
     /// The system has no more threads.
@@ -37,16 +76,31 @@ impl<L: Links + Send + 'static> Application<L, SupervisorThread> {
         mut work: impl FnMut(&mut ProcessData<'_>) -> ControlFlow<()> + Send + 'static,
     ) -> Result<CyclicThread<L>, Error> {
         let end = Arc::new(AtomicBool::new(false));
-        let (supervisor, news, ended) = (self.acyclic.clone(), self.news().clone(), end.clone());
+        let panicked = Arc::new(AtomicBool::new(false));
+        let (supervisor, news) = (self.acyclic.clone(), self.news().clone());
+        let (ended, has_panicked) = (end.clone(), panicked.clone());
         let body = move || {
             prepare();
-            while !ended.load(Ordering::Relaxed) && self.cycle(&mut work).is_continue() {
-                self.cyclic.publish_foreign();
+            while !ended.load(Ordering::Relaxed) {
+                // The closure is not called again after a panic. What it has left half done is the image, which is zeroed.
+                match catch_unwind(AssertUnwindSafe(|| self.cycle(&mut work))) {
+                    Ok(ControlFlow::Continue(())) => self.cyclic.publish_foreign(),
+                    Ok(ControlFlow::Break(())) => break,
+                    Err(payload) => {
+                        let message = message(&*payload);
+                        has_panicked.store(true, Ordering::Release);
+                        while !ended.load(Ordering::Relaxed) {
+                            self.cycle(|data| data.zero_outputs());
+                            self.cyclic.publish_foreign();
+                        }
+                        return Err(Box::new(Panicked { message, application: self }));
+                    }
+                }
             }
-            self
+            Ok(self)
         };
         let thread = std::thread::Builder::new().name("cycles".into()).spawn(body).map_err(Error::Thread)?;
-        Ok(CyclicThread { supervisor, news, end, thread: Some(thread) })
+        Ok(CyclicThread { supervisor, news, end, panicked, thread: Some(thread) })
     }
 }
 
@@ -56,24 +110,35 @@ impl<L> CyclicThread<L> {
         &self.news
     }
 
+    /// The same, to be looked at when the cycles have ended too.
+    pub fn news_handle(&self) -> Arc<News> {
+        self.news.clone()
+    }
+
     /// The acyclic half.
     pub fn supervisor(&self) -> &SupervisorThread {
         &self.supervisor
     }
 
-    /// Whether the cycles have ended by themselves.
+    /// Whether the closure runs no more: it has asked for the end, or has panicked.
     pub fn has_ended(&self) -> bool {
-        self.thread.as_ref().is_none_or(JoinHandle::is_finished)
+        self.panicked.load(Ordering::Acquire) || self.thread.as_ref().is_none_or(JoinHandle::is_finished)
     }
 
     /// Ends the cycles after the one that runs, and hands back the application, to be stopped or to go on.
     ///
     /// # Errors
-    /// The closure has panicked.
-    pub fn end(mut self) -> Result<Application<L, SupervisorThread>, Error> {
+    /// The closure has panicked; the application comes with the error.
+    ///
+    /// # Panics
+    /// The thread itself has: a fault of this crate, with the message of that panic.
+    pub fn end(mut self) -> Result<Application<L, SupervisorThread>, Box<Panicked<L>>> {
         self.end.store(true, Ordering::Relaxed);
-        let thread = self.thread.take().ok_or(Error::Gone)?;
-        thread.join().map_err(|_| Error::Gone)
+        match self.thread.take().map(JoinHandle::join) {
+            Some(Ok(ended)) => ended,
+            Some(Err(payload)) => std::panic::resume_unwind(payload),
+            None => unreachable!("only this and the drop take the thread"),
+        }
     }
 }
 

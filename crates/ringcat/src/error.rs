@@ -8,6 +8,7 @@ use ringcat_engine::procedures::configure::ConfigureError;
 use ringcat_engine::procedures::scan::ScanError;
 use ringcat_engine::procedures::services::ServiceError;
 use ringcat_engine::procedures::stop::StopError;
+use ringcat_engine::supervisor::BusError;
 use ringcat_sim::segment::SegmentError;
 
 /// An error of the public API.
@@ -36,6 +37,8 @@ pub enum Error {
         /// The system's answer.
         cause: std::io::Error,
     },
+    /// The closure that the cycles ran has panicked, with this message.
+    Panicked(String),
     /// The thread of the acyclic half has ended.
     Gone,
 }
@@ -48,10 +51,15 @@ impl fmt::Display for Error {
             Error::Configure(error) => error.fmt(f),
             Error::Sdo(error) => error.fmt(f),
             Error::Service(error) => error.fmt(f),
+            Error::Stop(StopError::Bus(BusError::Lost { .. })) => f.write_str(
+                "stop: no frame comes back on any interface, so SubDevices were not taken to INIT: they keep their state \
+                 until their watchdogs expire. Are the cables of the host unplugged?",
+            ),
             Error::Stop(error) => write!(f, "stop: {error}"),
             Error::Segment(error) => error.fmt(f),
             Error::Thread(error) => write!(f, "a thread cannot be started: {error}"),
             Error::Gateway { address, cause } => write!(f, "mailbox gateway on {address}: {cause}"),
+            Error::Panicked(message) => write!(f, "the application's closure has panicked: {message}"),
             Error::Gone => f.write_str("the supervisor thread has ended"),
         }
     }

@@ -58,7 +58,7 @@ pub mod window;
 
 pub use acyclic::{AcyclicHalf, Inline};
 pub use application::{Application, LastOutputs};
-pub use cyclic_thread::CyclicThread;
+pub use cyclic_thread::{CyclicThread, Panicked};
 pub use error::Error;
 pub use jobs::Job;
 pub use links::Links;

@@ -21,6 +21,12 @@ pub trait Links {
     /// Hands the oldest frame that has arrived to `take`; false where there is none.
     fn receive(&mut self, take: &mut dyn FnMut(Link, &[u8])) -> bool;
 
+    /// When the frame that was handed out last arrived at the interface, where these links know that better than by the
+    /// time at which it was taken. Without a system call.
+    fn received_at(&self) -> Option<Instant> {
+        None
+    }
+
     /// Whether an interface has a carrier; `None` where these links do not tell. Cheap: an atomic or two.
     fn carrier(&self, _link: Link) -> Option<bool> {
         None

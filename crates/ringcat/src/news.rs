@@ -36,7 +36,7 @@ pub struct News {
 }
 
 /// Fields of [`CyclicCounters`].
-const COUNTERS: usize = 14;
+const COUNTERS: usize = 16;
 
 fn zeros<const N: usize>() -> [AtomicU64; N] {
     [const { AtomicU64::new(0) }; N]
@@ -83,6 +83,8 @@ impl News {
             bytes,
             received,
             lost,
+            lost_late,
+            lost_damaged,
             half,
             copies_lost,
             overtaken,
@@ -99,6 +101,8 @@ impl News {
             bytes,
             received,
             lost,
+            lost_late,
+            lost_damaged,
             half,
             copies_lost,
             overtaken,
@@ -120,13 +124,14 @@ impl News {
         DomainStatus {
             wkc: counted as u32,
             expected: (counted >> 32) as u32,
-            state: states[(state as usize & 0xFF).min(2)],
+            state: states[(state as usize & 0x7F).min(2)],
+            returned: state >> 7 & 1 != 0,
             pending: false,
             skipped: state >> 8,
         }
     }
 
-    /// Times from the sending of a cycle's frames to the arrival of their copies.
+    /// Times from the sending of a cycle's frames to the arrival of each of their copies at the interface.
     pub fn round_trips(&self) -> &Histogram {
         &self.round_trips
     }
@@ -211,6 +216,8 @@ impl News {
             bytes,
             received,
             lost,
+            lost_late,
+            lost_damaged,
             half,
             copies_lost,
             overtaken,
@@ -227,6 +234,8 @@ impl News {
             bytes,
             received,
             lost,
+            lost_late,
+            lost_damaged,
             half,
             copies_lost,
             overtaken,
@@ -246,7 +255,8 @@ impl News {
                 DomainState::Complete => 2,
             };
             let counted = u64::from(rate.status.wkc) | u64::from(rate.status.expected) << 32;
-            store(words, &[counted, state | rate.status.skipped << 8]);
+            let returned = u64::from(rate.status.returned) << 7;
+            store(words, &[counted, state | returned | rate.status.skipped << 8]);
         }
         if self.restart.load(Ordering::Relaxed) {
             self.restart.store(false, Ordering::Relaxed);

@@ -18,6 +18,8 @@ use crate::links::Links;
 pub struct PacketLinks {
     main: PacketSocket,
     redundant: Option<PacketSocket>,
+    /// Where the last frame was taken from.
+    taken_from: Link,
     mode: ReceiveMode,
     /// Polls the carriers; not for the cyclic half, which goes by what comes back.
     carriers: Option<CarrierWatch>,
@@ -73,7 +75,15 @@ impl PacketLinks {
         let names = [Some(main.to_owned()), redundant.map(str::to_owned)];
         let redundant = redundant.map(|name| PacketSocket::open(name, &options)).transpose()?;
         let main = PacketSocket::open(main, &options)?;
-        Ok(PacketLinks { main, redundant, mode, carriers: None, names, disconnected: [false; 2] })
+        Ok(PacketLinks {
+            main,
+            redundant,
+            taken_from: Link::Main,
+            mode,
+            carriers: None,
+            names,
+            disconnected: [false; 2],
+        })
     }
 
     fn watch_carriers(mut self, main: &str, redundant: Option<&str>) -> Result<PacketLinks, LinkError> {
@@ -109,8 +119,21 @@ impl Links for PacketLinks {
     }
 
     fn receive(&mut self, take: &mut dyn FnMut(Link, &[u8])) -> bool {
-        self.main.receive(&mut |frame| take(Link::Main, frame))
-            || self.redundant.as_mut().is_some_and(|socket| socket.receive(&mut |frame| take(Link::Redundant, frame)))
+        if self.main.receive(&mut |frame| take(Link::Main, frame)) {
+            self.taken_from = Link::Main;
+            return true;
+        }
+        self.taken_from = Link::Redundant;
+        self.redundant.as_mut().is_some_and(|socket| socket.receive(&mut |frame| take(Link::Redundant, frame)))
+    }
+
+    /// The kernel's receive time.
+    fn received_at(&self) -> Option<Instant> {
+        let socket = match self.taken_from {
+            Link::Main => Some(&self.main),
+            Link::Redundant => self.redundant.as_ref(),
+        };
+        socket.map(|socket| Instant(socket.received_at_ns()))
     }
 
     fn carrier(&self, link: Link) -> Option<bool> {

@@ -65,6 +65,10 @@ impl<L: Links> Links for Tee<L> {
         })
     }
 
+    fn received_at(&self) -> Option<Instant> {
+        self.links.received_at()
+    }
+
     fn carrier(&self, link: Link) -> Option<bool> {
         self.links.carrier(link)
     }

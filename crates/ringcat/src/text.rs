@@ -2,7 +2,6 @@
 
 use std::fmt;
 
-use ringcat_engine::domain::DomainState;
 use ringcat_engine::event::{Event, TimedEvent};
 use ringcat_engine::link::Link;
 use ringcat_engine::ring_status::{Cable, Occupant};
@@ -191,11 +190,7 @@ pub fn describe(timed: &TimedEvent, names: &Names) -> String {
             format!("another MainDevice sends: {} bytes on {arrived_on}{source}", bytes.len())
         }
         Event::Domain { domain, status } => {
-            let state = match status.state {
-                DomainState::Zero => "nobody answers",
-                DomainState::Incomplete => "incomplete",
-                DomainState::Complete => "complete",
-            };
+            let state = status.in_words();
             format!("domain {domain}: {state}, working counter {} of {}", status.wkc, status.expected)
         }
         Event::Skipped { domain } => format!("domain {domain}: skipped, its frames are still out"),
@@ -210,6 +205,13 @@ pub fn describe(timed: &TimedEvent, names: &Names) -> String {
         Event::ClocksFailed { reason } => format!("distributed clocks: {reason}"),
         Event::SyncWindow { inside: true, spread_ns } => format!("clocks came into their window: {spread_ns} ns"),
         Event::SyncWindow { inside: false, spread_ns } => format!("clocks left their window: {spread_ns} ns"),
-        other => format!("{other:?}"),
+        Event::Emergency { subdevice, emergency } => {
+            let data: Vec<String> = emergency.data.iter().map(|byte| format!("{byte:02x}")).collect();
+            let (code, register) = (emergency.error_code, emergency.error_register);
+            let data = data.join(" ");
+            format!("{}: emergency {code:#06x}, error register {register:#04x}, data {data}", names.of(*subdevice))
+        }
+        // Events that this crate does not know yet: it is built with the engine whose events it knows.
+        _ => "an event without a description".to_owned(),
     }
 }

@@ -100,9 +100,14 @@ fn check_direction(
         return Ok(());
     }
     let what = format!("direction of SyncManager {number}");
-    let expected = format!("{expected:?} (its Type)");
+    let in_words = |direction| match direction {
+        SyncManagerDirection::Write => "Write".to_owned(),
+        SyncManagerDirection::Read => "Read".to_owned(),
+        SyncManagerDirection::Reserved(bits) => format!("reserved ({bits})"),
+    };
+    let expected = format!("{} (its Type)", in_words(expected));
     let hint = "Type in ProcessData and the control byte of the command must agree";
-    Err(contradiction(eni, index, place, what, expected, format!("{got:?}"), hint))
+    Err(contradiction(eni, index, place, what, expected, in_words(got), hint))
 }
 
 /// From `Sm0` to `Sm15` alone.

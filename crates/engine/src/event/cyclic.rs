@@ -33,7 +33,7 @@ const KIND_SKIPPED: u64 = 2;
 const KIND_SYNC_WINDOW: u64 = 3;
 
 impl CyclicEvent {
-    /// As two words: kind 8 bits, state 8, domain 16, then the working counters.
+    /// As two words: kind 8 bits, state 7, whether a frame returned 1, domain 16, then the working counters.
     pub const fn pack(self) -> [u64; WORDS] {
         match self {
             CyclicEvent::Domain { domain, status } => {
@@ -43,7 +43,11 @@ impl CyclicEvent {
                     DomainState::Complete => 2,
                 };
                 [
-                    KIND_DOMAIN | state << 8 | (domain as u64) << 16 | (status.skipped << 32),
+                    KIND_DOMAIN
+                        | state << 8
+                        | (status.returned as u64) << 15
+                        | (domain as u64) << 16
+                        | (status.skipped << 32),
                     status.wkc as u64 | (status.expected as u64) << 32,
                 ]
             }
@@ -59,7 +63,7 @@ impl CyclicEvent {
         let domain = (words[0] >> 16) as u16;
         match words[0] & 0xFF {
             KIND_DOMAIN => {
-                let state = match (words[0] >> 8) & 0xFF {
+                let state = match (words[0] >> 8) & 0x7F {
                     0 => DomainState::Zero,
                     1 => DomainState::Incomplete,
                     2 => DomainState::Complete,
@@ -69,6 +73,7 @@ impl CyclicEvent {
                     wkc: words[1] as u32,
                     expected: (words[1] >> 32) as u32,
                     state,
+                    returned: words[0] >> 15 & 1 != 0,
                     pending: false,
                     skipped: words[0] >> 32,
                 };
@@ -98,8 +103,14 @@ mod tests {
 
     #[test]
     fn cyclic_events_survive_the_words() {
-        let status =
-            DomainStatus { wkc: 3, expected: 70_000, state: DomainState::Incomplete, pending: false, skipped: 9 };
+        let status = DomainStatus {
+            wkc: 3,
+            expected: 70_000,
+            state: DomainState::Incomplete,
+            returned: true,
+            skipped: 9,
+            ..DomainStatus::default()
+        };
         let window = CyclicEvent::SyncWindow { inside: true, spread_ns: u32::MAX };
         for event in [CyclicEvent::Domain { domain: 7, status }, CyclicEvent::Skipped { domain: 65_535 }, window] {
             assert_eq!(CyclicEvent::unpack(event.pack()), Some(event));

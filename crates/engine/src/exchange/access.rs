@@ -102,6 +102,11 @@ impl Exchange {
         self.frames.iter().any(CyclicFrame::is_waiting)
     }
 
+    /// Whether copies of frames are out that may still come: also second ones, of frames whose inputs are delivered.
+    pub fn awaits_copies(&self) -> bool {
+        self.frames.iter().any(|frame| frame.is_waiting() || frame.is_delivered())
+    }
+
     /// State of the ring as the cyclic frames show it.
     pub fn ring(&self) -> RingState {
         self.evidence.monitor.state()

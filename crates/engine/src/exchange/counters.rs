@@ -9,8 +9,12 @@ pub struct CyclicCounters {
     pub bytes: u64,
     /// Frames whose copies all came back.
     pub received: u64,
-    /// Frames of which no copy came back in time.
+    /// Frames of which no copy came back in time: late, damaged or missing ([`CyclicCounters::missing`]), each only one.
     pub lost: u64,
+    /// Of the lost ones, those of which a copy came afterwards.
+    pub lost_late: u64,
+    /// Of the lost ones, those of which a damaged copy came.
+    pub lost_damaged: u64,
     /// Frames of which one copy of two came back in time, and not complete.
     pub half: u64,
     /// Frames that were complete without their second copy, which did not come before the frame was to leave again.
@@ -31,4 +35,11 @@ pub struct CyclicCounters {
     pub incomplete: u64,
     /// Words that were not copied from inputs to outputs because their source was stale.
     pub stale_copies: u64,
+}
+
+impl CyclicCounters {
+    /// Of the lost frames, those of which nothing has come.
+    pub const fn missing(&self) -> u64 {
+        self.lost.saturating_sub(self.lost_late).saturating_sub(self.lost_damaged)
+    }
 }

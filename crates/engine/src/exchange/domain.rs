@@ -187,8 +187,9 @@ impl Domain {
         complete && wkc > 0 && self.status.state == DomainState::Complete
     }
 
-    /// The state of what was judged. True where it is another one than before.
-    pub(crate) fn change_state(&mut self, wkc: u32, complete: bool) -> bool {
+    /// The state of what was judged, of which any copy returned or none. True where it is another one than before.
+    pub(crate) fn change_state(&mut self, wkc: u32, complete: bool, returned: bool) -> bool {
+        self.status.returned = returned;
         let state = match (wkc, complete) {
             (0, _) if self.status.expected > 0 => DomainState::Zero,
             (_, true) => DomainState::Complete,

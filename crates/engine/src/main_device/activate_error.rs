@@ -71,6 +71,20 @@ pub enum ActivateError {
         /// The shortest period.
         shortest: Duration,
     },
+    /// There is no domain, and a SubDevice has process data: it would reach OP without ever exchanging any.
+    NoDomain {
+        /// Index in the declaration.
+        subdevice: usize,
+    },
+    /// SYNC0 does not go with the cycle: it would come at another time of each cycle.
+    SyncCycle {
+        /// Index in the declaration.
+        subdevice: usize,
+        /// Cycle of SYNC0.
+        sync0: Duration,
+        /// The shortest period.
+        period: Duration,
+    },
     /// No cycle of a domain may be under way, or more than [`MAX_UNDER_WAY`].
     UnderWay {
         /// Number of the domain.
@@ -144,6 +158,18 @@ impl fmt::Display for ActivateError {
                 shortest.as_micros(),
                 period.as_micros()
             ),
+            ActivateError::NoDomain { subdevice } => write!(
+                f,
+                "declaration {subdevice} has process data and there is no domain to exchange it: declare a domain, or PREOP \
+                 as the target"
+            ),
+            ActivateError::SyncCycle { subdevice, sync0, period } => write!(
+                f,
+                "declaration {subdevice}: SYNC0 every {} us does not go with cycles of {} us: one must be a multiple of the \
+                 other",
+                in_us(*sync0),
+                in_us(*period)
+            ),
             ActivateError::UnderWay { domain, under_way } => {
                 write!(f, "domain {domain}: expected 1 to {MAX_UNDER_WAY} cycles under way, got {under_way}")
             }
@@ -172,6 +198,15 @@ impl fmt::Display for ActivateError {
             }
         }
     }
+}
+
+/// Microseconds, with a fraction where there is one.
+fn in_us(time: Duration) -> impl fmt::Display {
+    let ns = time.as_nanos();
+    core::fmt::from_fn(move |f| match ns % 1_000 {
+        0 => write!(f, "{}", ns / 1_000),
+        rest => write!(f, "{}.{rest:03}", ns / 1_000),
+    })
 }
 
 impl core::error::Error for ActivateError {}

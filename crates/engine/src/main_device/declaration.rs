@@ -224,7 +224,30 @@ pub(super) fn check(declaration: &Declaration) -> Result<(), ActivateError> {
             return Err(ActivateError::UnderWay { domain, under_way: config.under_way });
         }
     }
+    check_sync_cycles(declaration, shortest)
+}
+
+/// SYNC0 comes as often as cycles, or a whole number of times more or less often. A single pulse goes with everything.
+fn check_sync_cycles(declaration: &Declaration, period: Duration) -> Result<(), ActivateError> {
+    let period_ns = period.as_nanos();
+    for (subdevice, config) in declaration.subdevices.iter().enumerate() {
+        let sync0_ns = config.sync.map_or(0, |signals| u128::from(signals.sync0_cycle_ns));
+        let fits = sync0_ns == 0 || period_ns == 0 || sync0_ns % period_ns == 0 || period_ns % sync0_ns == 0;
+        if !fits {
+            let sync0 = Duration::from_nanos(config.sync.map_or(0, |signals| signals.sync0_cycle_ns.into()));
+            return Err(ActivateError::SyncCycle { subdevice, sync0, period });
+        }
+    }
     Ok(())
+}
+
+/// Process data without any domain would never be exchanged.
+pub(super) fn check_domains(declaration: &Declaration, plans: &[Areas]) -> Result<(), ActivateError> {
+    let has_data = |areas: &Areas| areas.list().iter().any(|(.., length)| *length > 0);
+    match plans.iter().position(has_data) {
+        Some(subdevice) if declaration.domains.is_empty() => Err(ActivateError::NoDomain { subdevice }),
+        _ => Ok(()),
+    }
 }
 
 pub(super) fn domain_specs(

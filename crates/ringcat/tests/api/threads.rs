@@ -3,6 +3,8 @@
 
 use std::ops::ControlFlow;
 use std::path::Path;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread::sleep;
 use std::time::{Duration, Instant};
 
@@ -126,5 +128,46 @@ fn who_asks_one_thing_after_the_other_does_not_wait_a_millisecond_for_each() -> 
     }
     println!("{:?} for a question", best / QUESTIONS);
     assert!(best < QUESTIONS * Duration::from_micros(600), "{best:?}");
+    Ok(())
+}
+
+#[test]
+fn a_panic_of_the_closure_is_an_error_of_its_own_and_the_bus_is_stopped_in_order() -> Result<(), Error> {
+    let (cyclic, acyclic) = SharedSegment::halves(network());
+    let plant = cyclic.plant();
+    let supervisor = SupervisorThread::start(acyclic, &Options::default(), || ())?;
+    let scan = supervisor.scan()?;
+    let application = supervisor.activate(automatic(&scan.subdevices, PERIOD), cyclic)?;
+    let output = application.entry(1, 0x7000, 1).expect("the terminal's first channel");
+    let panics = Arc::new(AtomicBool::new(false));
+    let asked = panics.clone();
+    let cycles = application.start_cycles(
+        || (),
+        move |data| {
+            data.write(&output, 1);
+            assert!(!asked.load(Ordering::Relaxed), "the recipe has no step {}", 7);
+            ControlFlow::Continue(())
+        },
+    )?;
+    until("all are in OP", || cycles.supervisor().all_settled());
+    until("outputs arrive", || plant.with_network(|network| outputs(network)[0] == [1]));
+    assert!(!cycles.has_ended());
+    panics.store(true, Ordering::Relaxed);
+    until("the closure runs no more", || cycles.has_ended());
+    until("outputs are zero", || plant.with_network(|network| outputs(network)[0] == [0]));
+    // Longer than any watchdog: cycles go on, so the SubDevices stay in OP until they are stopped.
+    let before = cycles.news().pace().cycles;
+    sleep(Duration::from_millis(300));
+    assert!(cycles.news().pace().cycles > before && cycles.supervisor().all_settled());
+
+    let panicked = cycles.end().expect_err("the closure has panicked");
+    assert_eq!(panicked.message, "the recipe has no step 7");
+    let words = "the application's closure has panicked: the recipe has no step 7";
+    assert_eq!(panicked.to_string(), words);
+    panicked.application.stop(LastOutputs::Zero, AlState::Init, LIMIT)?;
+    plant.with_network(|network| {
+        assert!(network.devices().all(|device| device.al_status() == AlStatus::new(AlState::Init)));
+    });
+    assert_eq!(Error::Panicked(panicked.message).to_string(), words);
     Ok(())
 }

@@ -1,5 +1,7 @@
 //! Counters of a segment: what the MainDevice's links carried and why frames did not come back.
 
+use std::fmt;
+
 use crate::cable::HostLink;
 
 /// Why a frame went no further.
@@ -31,6 +33,25 @@ pub enum LossCause {
     BadCheckSequence,
     /// Nobody fetched the received frames, and their queue was full.
     ReceiveQueueFull,
+}
+
+impl fmt::Display for LossCause {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            LossCause::NoCarrier => "interface without carrier",
+            LossCause::Oversized => "longer than an interface sends",
+            LossCause::TransmitQueueFull => "transmit queue of the interface full",
+            LossCause::DeadCable => "on a cable that was cut or lost its power",
+            LossCause::OpenPort => "out of an open port without cable",
+            LossCause::NoLink => "link not detected yet",
+            LossCause::LoopChanged => "a port opened or closed meanwhile",
+            LossCause::Blocked => "direction blocked",
+            LossCause::Dropped => "dropped on order",
+            LossCause::Destroyed => "destroyed by a SubDevice",
+            LossCause::BadCheckSequence => "wrong check sequence",
+            LossCause::ReceiveQueueFull => "receive queue of the interface full",
+        })
+    }
 }
 
 impl LossCause {

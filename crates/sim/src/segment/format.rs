@@ -93,7 +93,7 @@ impl File {
     /// Reads the keys.
     pub(super) fn parse(text: &str) -> Result<File, SegmentError> {
         toml::from_str(text).map_err(|error| {
-            let message = SegmentError::new(error.message().replace('\n', ", "));
+            let message = SegmentError::new(in_words(error.message()));
             match error.span() {
                 Some(span) => {
                     let at = message.at_line(line(text, &span));
@@ -187,4 +187,14 @@ fn device_around(text: &str, offset: usize) -> Option<String> {
         Some(entry.get("name").or(entry.get("type"))?.as_str()?.to_owned())
     });
     Some(named.unwrap_or_else(|| format!("number {number}")))
+}
+
+/// What the reader of the file says, in one line and without names of Rust types.
+fn in_words(message: &str) -> String {
+    const TYPES: [&str; 12] = ["usize", "u8", "u16", "u32", "u64", "isize", "i8", "i16", "i32", "i64", "f32", "f64"];
+    let words = message.split('\n').map(|line| {
+        let words = line.split(' ').map(|word| if TYPES.contains(&word) { "a number of its range" } else { word });
+        words.collect::<Vec<_>>().join(" ")
+    });
+    words.collect::<Vec<_>>().join(", ")
 }

@@ -1,0 +1,102 @@
+//! What became of frames of which no copy came back in time: they came too late, came damaged, or never came.
+//!
+//! Known by their sequence for as long as 256 newer frames take. Nothing here is in the way of a frame that comes back in
+//! time.
+
+use alloc::boxed::Box;
+
+use super::counters::CyclicCounters;
+use crate::ring::Sequence;
+
+/// What is known of a frame.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+enum Fate {
+    /// Nothing, or it came in time.
+    #[default]
+    None,
+    /// A damaged copy of it came.
+    Damaged,
+    /// It was given up.
+    GivenUp,
+}
+
+/// Frames by their ids, each with its last fate.
+#[derive(Debug)]
+pub(crate) struct Missed(Box<[(Sequence, Fate); 256]>);
+
+impl Default for Missed {
+    fn default() -> Missed {
+        Missed(Box::new([(Sequence::default(), Fate::None); 256]))
+    }
+}
+
+impl Missed {
+    fn at(&mut self, sequence: Sequence) -> &mut (Sequence, Fate) {
+        &mut self.0[usize::from(sequence.frame_id())]
+    }
+
+    /// A copy came with other datagrams than were sent.
+    #[cold]
+    pub(crate) fn damaged(&mut self, sequence: Sequence) {
+        *self.at(sequence) = (sequence, Fate::Damaged);
+    }
+
+    /// No copy came in time, at least none that was intact.
+    #[cold]
+    pub(crate) fn give_up(&mut self, sequence: Sequence, counters: &mut CyclicCounters) {
+        counters.lost += 1;
+        let place = self.at(sequence);
+        if *place == (sequence, Fate::Damaged) {
+            counters.lost_damaged += 1;
+        } else {
+            *place = (sequence, Fate::GivenUp);
+        }
+    }
+
+    /// A copy came too late, or twice.
+    #[cold]
+    pub(crate) fn late(&mut self, sequence: Sequence, counters: &mut CyclicCounters) {
+        counters.late += 1;
+        let place = self.at(sequence);
+        if *place == (sequence, Fate::GivenUp) {
+            *place = (sequence, Fate::None);
+            counters.lost_late += 1;
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_frame_that_was_given_up_is_late_damaged_or_missing_and_only_one_of_these() {
+        let (mut missed, mut counters) = (Missed::default(), CyclicCounters::default());
+        let mut sequence = Sequence::default();
+        let mut next = || {
+            sequence = sequence.next();
+            sequence
+        };
+        let (missing, late, damaged, in_time) = (next(), next(), next(), next());
+        missed.damaged(damaged);
+        for given_up in [missing, late, damaged] {
+            missed.give_up(given_up, &mut counters);
+        }
+        // Both copies of one, another one's that was in time, and one's that was damaged.
+        [late, late, in_time, damaged].into_iter().for_each(|sequence| missed.late(sequence, &mut counters));
+        let expected = CyclicCounters { lost: 3, lost_late: 1, lost_damaged: 1, late: 4, ..CyclicCounters::default() };
+        assert_eq!(counters, expected);
+        assert_eq!(counters.missing(), 1);
+    }
+
+    #[test]
+    fn a_copy_of_a_frame_with_the_same_id_and_another_sequence_is_another_frame() {
+        let (mut missed, mut counters) = (Missed::default(), CyclicCounters::default());
+        let old = Sequence::default().next();
+        let new = (0..256).fold(old, |sequence, _| sequence.next());
+        assert_eq!(old.frame_id(), new.frame_id());
+        missed.give_up(new, &mut counters);
+        missed.late(old, &mut counters);
+        assert_eq!((counters.lost, counters.lost_late), (1, 0));
+    }
+}
