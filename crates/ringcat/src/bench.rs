@@ -11,6 +11,7 @@ mod round_trip;
 use clap::{Args, Subcommand};
 
 use crate::interfaces::Failure;
+use crate::verdict::Verdict;
 
 /// Options of `ringcat bench`.
 #[derive(Args, Debug)]
@@ -32,8 +33,8 @@ enum What {
     Rate(rate::RateArguments),
 }
 
-/// Runs a measurement; true where nothing was lost.
-pub fn run(arguments: &BenchArguments) -> Result<bool, Failure> {
+/// Runs a measurement. It has held where nothing was lost.
+pub fn run(arguments: &BenchArguments) -> Result<Verdict, Failure> {
     match &arguments.what {
         What::Echo(arguments) => echo::run(arguments),
         What::RoundTrip(arguments) => round_trip::run(arguments),

@@ -9,10 +9,12 @@ use std::time::Duration;
 use clap::Args;
 use ringcat_link::{PacketSocket, ReceiveMode, Recorder, Sniffer, Tap, interface, monotonic};
 
-use crate::interfaces::{Failure, InterfaceArguments, describe_down, end_request, is_asked};
+use crate::ending::EndRequest;
+use crate::interfaces::{Failure, describe_down, two_interfaces};
 use crate::output::{say, write};
 use crate::recording::{DESCRIPTIONS, lines};
 use crate::times::time;
+use crate::verdict::Verdict;
 
 /// The user's wish to end, and the live line, are looked at so often.
 const LOOK: Duration = Duration::from_millis(200);
@@ -28,8 +30,12 @@ Where the MainDevice is `ringcat scan` or `ringcat run`, --capture of these does
 #[derive(Args, Debug)]
 #[command(after_help = ABOUT_CAPTURE)]
 pub struct CaptureArguments {
-    #[command(flatten)]
-    interfaces: InterfaceArguments,
+    /// Network interface that the first SubDevice is plugged into.
+    #[arg(long, value_name = "IF")]
+    main: String,
+    /// Network interface at the other end of a ring.
+    #[arg(long, value_name = "IF")]
+    redundant: Option<String>,
     /// File to write, for Wireshark. An older one is overwritten.
     #[arg(long, value_name = "FILE.pcapng")]
     out: PathBuf,
@@ -42,9 +48,11 @@ pub struct CaptureArguments {
 }
 
 /// Records, and says how many frames there were.
-pub fn run(arguments: &CaptureArguments) -> Result<(), Failure> {
-    let end = end_request();
-    let names: Vec<&str> = arguments.interfaces.names().collect();
+pub fn run(arguments: &CaptureArguments) -> Result<Verdict, Failure> {
+    let end = EndRequest::watch(None)?;
+    let (main, redundant) = (arguments.main.as_str(), arguments.redundant.as_deref());
+    two_interfaces(main, redundant)?;
+    let names: Vec<&str> = std::iter::once(main).chain(redundant).collect();
     let mut sniffers = Vec::new();
     for name in &names {
         sniffers.push(Sniffer::open(name, arguments.all)?);
@@ -61,7 +69,7 @@ pub fn run(arguments: &CaptureArguments) -> Result<(), Failure> {
     let until = lasts.map_or(u64::MAX, |lasts| monotonic::now_ns().saturating_add(lasts));
     let terminal = stdout().is_terminal();
     let (mut frames, mut shown) = (0, 0);
-    while !is_asked(&end) && monotonic::now_ns() < until {
+    while !end.is_asked() && monotonic::now_ns() < until && recorder.failure().is_none() {
         let sockets: Vec<&PacketSocket> = sniffers.iter().map(Sniffer::socket).collect();
         let look = monotonic::now_ns() + LOOK.as_nanos() as u64;
         ringcat_link::wait(&sockets, look.min(until), ReceiveMode::Blocking);
@@ -75,7 +83,7 @@ pub fn run(arguments: &CaptureArguments) -> Result<(), Failure> {
     if terminal {
         say!();
     }
-    drain(&mut sniffers, &mut tap);
+    frames += drain(&mut sniffers, &mut tap);
     for (number, sniffer) in sniffers.iter().enumerate() {
         recorder.set_lost_by_kernel(number, sniffer.lost());
     }
@@ -83,7 +91,9 @@ pub fn run(arguments: &CaptureArguments) -> Result<(), Failure> {
     for line in lines(names.into_iter(), &recorded) {
         say!("{line}");
     }
-    Ok(())
+    let lacking: u64 = recorded.iter().map(|frames| frames.lost + frames.lost_by_kernel).sum();
+    let lacking = (lacking > 0).then(|| format!("the capture lacks {lacking} frames"));
+    Ok(Verdict::Held(format!("{frames} frames")).and(lacking).and(end.cut_short(arguments.lasts)))
 }
 
 /// Records what has passed so far; how many frames that is. Bounded, however fast they come.

@@ -6,9 +6,10 @@
 mod plot;
 mod table;
 
+use std::fs::File;
+use std::io::Write;
 use std::ops::ControlFlow;
-use std::path::PathBuf;
-use std::sync::atomic::AtomicBool;
+use std::path::{Path, PathBuf};
 use std::thread::sleep;
 use std::time::Duration;
 
@@ -16,16 +17,18 @@ use clap::Args;
 use ringcat::packet::PacketLinks;
 use ringcat::tee::Tee;
 use ringcat::text::Names;
-use ringcat::{ClockConfig, CyclicThread, Instant, LastOutputs, Options, SupervisorThread, SyncSignals, automatic};
+use ringcat::{ClockConfig, ClockStatus, CyclicThread, Instant, LastOutputs, SupervisorThread, SyncSignals, automatic};
 use ringcat_wire::al::AlState;
 
-use crate::clock_options::ClockOptions;
-use crate::interfaces::{Failure, InterfaceArguments, ThreadArguments, end_request, is_asked, now};
-use crate::output::say;
+use crate::clock_options::{ClockOptions, farthest};
+use crate::ending::EndRequest;
+use crate::interfaces::{Failure, InterfaceArguments, ThreadArguments, now};
+use crate::output::{counted, say};
 use crate::recording::RecordingArguments;
 use crate::surroundings::Surroundings;
 use crate::telling::{Telling, Told};
-use crate::times::time;
+use crate::times::{cycle, time};
+use crate::verdict::Verdict;
 use plot::{Course, plot};
 use table::{json, lines};
 
@@ -44,7 +47,7 @@ const TABLE_HELP: &str = "\
   now, worst  its difference to the reference (0x092C): when it was read last, and the largest since it was locked
   SYNC        signals in microseconds: cycle, and shift with its sign
 
-Exit status: 0 all clocks locked and stayed within 1 us, 1 they did not.";
+Exit status: 0 all clocks locked and stayed within 1 us, and all SubDevices were in OP in the end, 1 they did not.";
 
 /// Options of `ringcat clocks`.
 #[derive(Args, Debug)]
@@ -58,8 +61,8 @@ pub struct ClocksArguments {
     recording: RecordingArguments,
     #[command(flatten)]
     options: ClockOptions,
-    /// Cycle time, with its unit: 250us, 1ms.
-    #[arg(long, value_name = "TIME", default_value = "1ms", value_parser = time)]
+    /// Cycle time, with its unit: 250us, 1ms; 10us to 1s.
+    #[arg(long, value_name = "TIME", default_value = "1ms", value_parser = cycle)]
     cycle: Duration,
     /// How long to watch once all clocks are locked, such as 10s; until Ctrl-C with a time that long.
     #[arg(long = "for", value_name = "TIME", default_value = "5s", value_parser = time)]
@@ -69,20 +72,24 @@ pub struct ClocksArguments {
     plot: Option<PathBuf>,
     /// Print JSON instead of a table; what happens meanwhile goes to the standard error output.
     #[arg(long)]
-    json: bool,
+    pub json: bool,
 }
 
-/// Runs; true where all clocks locked and stayed together.
-pub fn run(arguments: &ClocksArguments) -> Result<bool, Failure> {
-    let end = end_request();
+/// Runs. It has held where all clocks locked and stayed together.
+pub fn run(arguments: &ClocksArguments) -> Result<Verdict, Failure> {
+    arguments.interfaces.check_names()?;
+    // Nothing is measured in vain.
+    let mut picture = arguments.plot.as_ref().map(|path| Picture::create(path)).transpose()?;
     let thread = arguments.thread;
+    let end = EndRequest::watch(thread.priority)?;
     let (cyclic, acyclic) = arguments.interfaces.open_halves(thread)?;
     let surroundings = Surroundings::watch(&arguments.interfaces, &cyclic);
     let recording = arguments.recording.start(&arguments.interfaces)?;
     let (cyclic, acyclic) = (recording.tee(cyclic), recording.tee(acyclic));
     let _awake = thread.prepare_process();
     let begin = now();
-    let supervisor = SupervisorThread::start(acyclic, &Options::default(), move || thread.prepare_supervisor())?;
+    let supervisor =
+        SupervisorThread::start(acyclic, &arguments.interfaces.options(), move || thread.prepare_supervisor())?;
     let scan = supervisor.scan().map_err(|error| surroundings.explain(error, supervisor.counters().foreign))?;
     let names = Names(scan.subdevices.iter().map(|info| info.name.clone()).collect());
     let mut declaration = automatic(&scan.subdevices, arguments.cycle);
@@ -90,7 +97,12 @@ pub fn run(arguments: &ClocksArguments) -> Result<bool, Failure> {
     let signals: Vec<Option<SyncSignals>> = declaration.subdevices.iter().map(|config| config.sync).collect();
     let mut application = supervisor.activate(declaration, cyclic).map_err(ringcat::Error::from)?;
     application.set_trigger(arguments.options.trigger(arguments.options.bus_shift));
-    let cycles = application.start_cycles(move || thread.prepare_cycles(), |_| ControlFlow::Continue(()))?;
+    let asked = end.clone();
+    let cycles = application.start_cycles(
+        move || thread.prepare_cycles(),
+        // Here too: this thread runs whatever starves.
+        move |_| if asked.is_asked() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) },
+    )?;
     let telling = Telling::new(begin, names, surroundings);
     let mut watch = Watch { begin, telling, end: &end, json: arguments.json };
     let mut course = Course::default();
@@ -99,32 +111,81 @@ pub fn run(arguments: &ClocksArguments) -> Result<bool, Failure> {
     if locked {
         watch.until(&cycles, &mut course, now() + arguments.lasts, false)?;
     }
+    end.no_limit();
     let clocks = cycles.supervisor().with(|engine| engine.clocks())?;
     let settled = cycles.supervisor().all_settled();
-    let phase_errors = cycles.news().phase_errors();
+    let mut reasons = reasons(&clocks, locked, settled);
+    reasons.extend(end.cut_short(Some(arguments.lasts)));
+    let news = cycles.news_handle();
+    if let Some(picture) = &mut picture {
+        reasons.extend(picture.draw(&plot(&course, &clocks)).err());
+        tell(arguments.json, &format!("differences over time: {}", picture.path.display()));
+    }
+    let application = cycles.end().unwrap_or_else(|panicked| {
+        reasons.push(panicked.to_string());
+        panicked.application
+    });
+    reasons.extend(application.stop(LastOutputs::Zero, AlState::Init, STOP_LIMIT).err().map(|error| error.to_string()));
+    reasons.extend(recording.finish());
+    let verdict = Verdict::of(reasons, format!("{} locked and together", counted(clocks.len(), "clock", "clocks")));
+    let phase_errors = news.phase_errors();
     if arguments.json {
-        say!("{:#}", json(&clocks, watch.telling.names(), &signals, locked, phase_errors));
+        let mut json = json(&clocks, watch.telling.names(), &signals, locked, phase_errors);
+        json["result"] = verdict.words().into();
+        say!("{json:#}");
     } else {
         lines(&clocks, watch.telling.names(), &signals).iter().for_each(|line| say!("{line}"));
         if phase_errors.count() > 0 {
-            say!("cycles from their phase, by the reference clock: {phase_errors}");
+            say!("cycles from their phase: {phase_errors}");
         }
     }
-    if let Some(path) = &arguments.plot {
-        std::fs::write(path, plot(&course, &clocks))
-            .map_err(|error| Failure::new(format!("{} cannot be written: {error}", path.display())))?;
-        tell(arguments.json, &format!("differences over time: {}", path.display()));
+    Ok(verdict)
+}
+
+/// What did not hold.
+fn reasons(clocks: &[ClockStatus], locked: bool, settled: bool) -> Vec<String> {
+    let mut reasons = Vec::new();
+    if !locked {
+        let count = clocks.iter().filter(|clock| !clock.is_locked && !clock.is_reference).count();
+        reasons.push(format!("{count} of {} clocks not locked", clocks.len()));
     }
-    let application = cycles.end()?;
-    application.stop(LastOutputs::Zero, AlState::Init, STOP_LIMIT)?;
-    let kept = clocks.iter().all(|clock| clock.worst_ns <= ClockConfig::default().sync_window_ns);
-    Ok(locked && kept && settled)
+    let window = ClockConfig::default().sync_window_ns;
+    if let Some(clock) = farthest(clocks).filter(|clock| clock.worst_ns > window) {
+        let (position, worst) = (clock.position, clock.worst_ns);
+        reasons
+            .push(format!("the clock of position {position} was {worst} ns from the reference, {window} ns allowed"));
+    }
+    if !settled {
+        reasons.push("not all SubDevices are in OP".to_owned());
+    }
+    reasons
+}
+
+/// The file for the picture, made before anything is measured.
+struct Picture {
+    path: PathBuf,
+    file: File,
+}
+
+impl Picture {
+    fn create(path: &Path) -> Result<Picture, Failure> {
+        let file = File::create(path).map_err(|error| Failure::new(Picture::failed(path, &error)))?;
+        Ok(Picture { path: path.to_owned(), file })
+    }
+
+    fn draw(&mut self, picture: &str) -> Result<(), String> {
+        self.file.write_all(picture.as_bytes()).map_err(|error| Picture::failed(&self.path, &error))
+    }
+
+    fn failed(path: &Path, error: &std::io::Error) -> String {
+        format!("{} cannot be written: {error}", path.display())
+    }
 }
 
 struct Watch<'a> {
     begin: Instant,
     telling: Telling,
-    end: &'a AtomicBool,
+    end: &'a EndRequest,
     /// The standard output belongs to the JSON.
     json: bool,
 }
@@ -144,6 +205,7 @@ impl Watch<'_> {
         until: Instant,
         ends_with_lock: bool,
     ) -> Result<bool, Failure> {
+        self.end.limit(until);
         loop {
             self.telling.news(cycles, now(), |told| match told {
                 Told::Line(line) => tell(self.json, &line),
@@ -152,7 +214,7 @@ impl Watch<'_> {
             let supervisor = cycles.supervisor();
             let (locked, clocks) = supervisor.with(|engine| (engine.clocks_locked(), engine.clocks()))?;
             course.note(now().since(self.begin), &clocks);
-            if (locked && ends_with_lock && supervisor.all_settled()) || now() >= until || is_asked(self.end) {
+            if (locked && ends_with_lock && supervisor.all_settled()) || now() >= until || self.end.is_asked() {
                 return Ok(locked);
             }
             sleep(LOOK);

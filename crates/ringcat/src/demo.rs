@@ -17,6 +17,8 @@ use ringcat::{Application, Error, Event, MainDevice, Options, Scan, automatic};
 use ringcat_sim::network::Network;
 use ringcat_sim::segment::Segment;
 
+use crate::interfaces::Failure;
+use crate::verdict::Verdict;
 use plan::{Incident, Plan};
 use report::Reporter;
 use watch::Watch;
@@ -48,8 +50,12 @@ pub struct DemoArguments {
     fast: bool,
 }
 
-/// Runs the demonstration; true where everything held.
-pub fn run(arguments: &DemoArguments) -> Result<bool, Error> {
+/// Runs the demonstration.
+pub fn run(arguments: &DemoArguments) -> Result<Verdict, Failure> {
+    Ok(show(arguments)?)
+}
+
+fn show(arguments: &DemoArguments) -> Result<Verdict, Error> {
     let segment = load(arguments)?;
     let title = segment_title(arguments);
     let mut links = SimulatedSegment::new(Network::from_description(segment)?);
@@ -112,9 +118,9 @@ impl Demo {
         Demo { application, names, cycle, plan, watch, reporter }
     }
 
-    fn run(mut self) -> bool {
+    fn run(mut self) -> Verdict {
         if !self.reach_op() {
-            return false;
+            return Verdict::Failed(format!("not all SubDevices reached OP within {} s", OP_LIMIT.as_secs()));
         }
         let steps = self.plan.steps.clone();
         for step in &steps {

@@ -14,7 +14,8 @@ use ringcat_engine::config::{ConfigAddress, ReferenceClock, StartupAction, SubDe
 use ringcat_engine::info::Direction;
 
 use crate::interfaces::Failure;
-use crate::output::say;
+use crate::output::{counted, say};
+use crate::verdict::Verdict;
 
 /// How to read what it prints.
 const ABOUT_ENI: &str = "\
@@ -23,7 +24,8 @@ SubDevice says otherwise. What RingCAT does in its own way (state changes, addre
 held against the file and not listed. What is not followed is listed at the end, with the reason. An ENI comes from the tool
 that configured the network: TwinCAT (EtherCAT device, \"Export Configuration File\"), EC-Engineer (\"Export ENI\").
 
-Exit status: 0 the file can be followed, 2 it cannot, and why is on the standard error output.";
+Exit status: 0 the file can be followed, 1 it describes no SubDevice, 2 it cannot be followed, and why is on the standard
+error output.";
 
 /// Options of `ringcat eni`.
 #[derive(Args, Debug)]
@@ -36,23 +38,37 @@ pub struct EniArguments {
     details: bool,
     /// Print JSON, always with the details.
     #[arg(long)]
-    json: bool,
+    pub json: bool,
 }
 
 /// Reads the file and prints what follows.
-pub fn run(arguments: &EniArguments) -> Result<(), Failure> {
+pub fn run(arguments: &EniArguments) -> Result<Verdict, Failure> {
     let EniFile { eni: model, configuration } =
         EniFile::load(&arguments.file).map_err(|error| Failure::new(error.to_string()))?;
     if arguments.json {
         say!("{:#}", json::json(&model, &configuration));
-        return Ok(());
+        return Ok(verdict(&configuration));
     }
     summary(&model, &configuration).iter().for_each(|line| say!("{line}"));
     if arguments.details {
         details::lines(&model, &configuration).iter().for_each(|line| say!("{line}"));
     }
     not_followed(&configuration).iter().for_each(|line| say!("{line}"));
-    Ok(())
+    Ok(verdict(&configuration))
+}
+
+/// A file that describes no network cannot be followed. What is done in another way was told.
+fn verdict(configuration: &Configuration) -> Verdict {
+    let subdevices = configuration.declaration.subdevices.len();
+    if subdevices == 0 {
+        return Verdict::Failed("the file describes no SubDevice".to_owned());
+    }
+    let notices = configuration.notices.len();
+    let subdevices = counted(subdevices, "SubDevice", "SubDevices");
+    Verdict::Held(match notices {
+        0 => format!("{subdevices}, everything is followed"),
+        _ => format!("{subdevices}, {} done in another way", counted(notices, "thing", "things")),
+    })
 }
 
 fn summary(model: &Eni, configuration: &Configuration) -> Vec<String> {
@@ -183,8 +199,11 @@ fn hex(bytes: &[u8]) -> String {
 }
 
 fn not_followed(configuration: &Configuration) -> Vec<String> {
-    if configuration.notices.is_empty() {
+    if configuration.notices.is_empty() && !configuration.declaration.subdevices.is_empty() {
         return vec![String::new(), "everything in the file is followed".to_owned()];
+    }
+    if configuration.notices.is_empty() {
+        return Vec::new();
     }
     let mut lines = vec![String::new(), "not followed as written:".to_owned()];
     for notice in &configuration.notices {
@@ -195,11 +214,6 @@ fn not_followed(configuration: &Configuration) -> Vec<String> {
         lines.push(format!("  {}{whom}", one_line(&notice.to_string())));
     }
     lines
-}
-
-/// `1 copy`, `2 copies`.
-fn counted(count: usize, one: &str, more: &str) -> String {
-    format!("{count} {}", if count == 1 { one } else { more })
 }
 
 /// Ascending numbers, with rows of them as ranges: `0-3, 5`.

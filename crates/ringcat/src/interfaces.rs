@@ -1,17 +1,19 @@
-//! What the commands on network interfaces share: how to wait, what is wrong with an interface, when to end.
+//! What the commands on network interfaces share: how to wait, what is wrong with an interface, who else uses it.
 
 use std::fmt;
-use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::Once;
+use std::thread::available_parallelism;
 use std::time::{Duration, Instant};
 
 use clap::{Args, ValueEnum};
 use ringcat::packet::PacketLinks;
 use ringcat::{Error, Link, MIN_DATAGRAMS_PER_FRAME, MacCodec, Options, ScanError};
-use ringcat_link::interface::{self, exclusive_use};
+use ringcat_link::interface;
 use ringcat_link::realtime::{self, CpuLatency};
 use ringcat_link::{LinkError, ReceiveMode};
 use ringcat_sim::segment::SegmentError;
+
+use crate::others::{check_frames, check_sockets};
 
 /// A hybrid wait spins for so long: most segments answer within.
 const SPIN: Duration = Duration::from_micros(200);
@@ -82,9 +84,10 @@ pub struct ThreadArguments {
     #[arg(long, value_enum, default_value = "busy")]
     receive: Receive,
     /// Real-time priority (SCHED_FIFO) of the thread that sends and receives; memory is locked and processors kept awake
-    /// with it. A spinning thread with a priority leaves its processor to nobody.
-    #[arg(long, value_name = "1-99", value_parser = clap::value_parser!(i32).range(1..=99))]
-    priority: Option<i32>,
+    /// with it. A spinning thread with a priority leaves its processor to no other one. 99 is left to the kernel and to the
+    /// thread that takes signals.
+    #[arg(long, value_name = "1-98", value_parser = clap::value_parser!(i32).range(1..=98))]
+    pub priority: Option<i32>,
     /// Processor to keep that thread on.
     #[arg(long, value_name = "NUMBER")]
     cpu: Option<usize>,
@@ -93,11 +96,34 @@ pub struct ThreadArguments {
 impl ThreadArguments {
     /// As the links take it.
     pub fn mode(self) -> ReceiveMode {
-        match self.receive {
+        match self.receive() {
             Receive::Busy => ReceiveMode::BusyPoll,
             Receive::Block => ReceiveMode::Blocking,
             Receive::Hybrid => ReceiveMode::Hybrid { spin: SPIN },
         }
+    }
+
+    /// The same in words.
+    pub fn mode_in_words(self) -> &'static str {
+        match self.receive() {
+            Receive::Busy => "waiting busy",
+            Receive::Block => "waiting blocked",
+            Receive::Hybrid => "waiting hybrid",
+        }
+    }
+
+    /// How frames are really waited for. A thread that spins needs a processor of its own: on the only one it would keep
+    /// everything else in this program from running, and with a priority for ever.
+    fn receive(self) -> Receive {
+        static TOLD: Once = Once::new();
+        let processors = available_parallelism().map_or(1, usize::from);
+        if self.receive == Receive::Block || processors > 1 {
+            return self.receive;
+        }
+        TOLD.call_once(|| {
+            tell("this process may use one processor only, so no thread spins on it: as with --receive block");
+        });
+        Receive::Block
     }
 
     /// Gives the calling thread and the process what was asked for. The result keeps processors awake while it lives.
@@ -115,7 +141,7 @@ impl ThreadArguments {
         }
         if let Some(priority) = self.priority
             && realtime::fifo(priority).map_err(tell).is_ok()
-            && self.receive == Receive::Busy
+            && self.receive() == Receive::Busy
             && let Some(warning) = realtime::throttling()
         {
             tell(warning);
@@ -158,6 +184,9 @@ pub struct InterfaceArguments {
     /// Put at most so many datagrams into a frame: some gateways and simulators take no more (often 15).
     #[arg(long, value_name = "COUNT", value_parser = clap::value_parser!(u16).range(i64::from(MIN_DATAGRAMS_PER_FRAME)..))]
     pub max_datagrams: Option<u16>,
+    /// Go on although another MainDevice uses the interface. SubDevices then leave its OP.
+    #[arg(long)]
+    pub force: bool,
 }
 
 /// Marks in the source address (facts 9.7.1).
@@ -180,28 +209,33 @@ impl InterfaceArguments {
         Options { source_address, max_datagrams_per_frame: self.max_datagrams, ..Options::default() }
     }
 
-    /// Opens the interfaces; warns of who else uses them, and fails where no cable is plugged in.
+    /// Opens the interfaces. Refuses where another MainDevice uses one of them, and fails where no cable is plugged in.
     pub fn open(&self, thread: ThreadArguments) -> Result<PacketLinks, Failure> {
-        self.warn_of_others();
+        self.check_names()?;
         let links = PacketLinks::open(&self.main, self.redundant.as_deref(), thread.mode())?;
-        self.await_carrier()?;
+        self.check()?;
         Ok(links)
     }
 
     /// As [`InterfaceArguments::open`], for a thread of the cycles and one of the supervisor.
     pub fn open_halves(&self, thread: ThreadArguments) -> Result<(PacketLinks, PacketLinks), Failure> {
-        self.warn_of_others();
+        self.check_names()?;
         let halves = PacketLinks::open_halves(&self.main, self.redundant.as_deref(), thread.mode())?;
-        self.await_carrier()?;
+        self.check()?;
         Ok(halves)
     }
 
-    fn warn_of_others(&self) {
-        for name in self.names() {
-            for warning in exclusive_use(name) {
-                tell(warning);
-            }
-        }
+    /// Refuses one interface for two links.
+    pub fn check_names(&self) -> Result<(), Failure> {
+        two_interfaces(&self.main, self.redundant.as_deref())
+    }
+
+    /// What there is to find before anything is sent. The sockets are open: of two commands that begin at one time at least
+    /// one sees the other.
+    fn check(&self) -> Result<(), Failure> {
+        check_sockets(self.names(), self.force)?;
+        self.await_carrier()?;
+        if self.force { Ok(()) } else { check_frames(self.names()) }
     }
 
     /// Name of the interface of a link.
@@ -263,18 +297,10 @@ pub fn now() -> ringcat::Instant {
     ringcat::Instant(ringcat_link::monotonic::now_ns())
 }
 
-/// Becomes true when the user or the system asks this program to end.
-pub fn end_request() -> Arc<AtomicBool> {
-    let asked = Arc::new(AtomicBool::new(false));
-    for signal in [signal_hook::consts::SIGINT, signal_hook::consts::SIGTERM] {
-        if let Err(error) = signal_hook::flag::register(signal, asked.clone()) {
-            eprintln!("ringcat: signal {signal} will end this program without an orderly stop: {error}");
-        }
+/// Refuses one interface for both ends of a ring.
+pub fn two_interfaces(main: &str, redundant: Option<&str>) -> Result<(), Failure> {
+    if redundant != Some(main) {
+        return Ok(());
     }
-    asked
-}
-
-/// Whether that has happened.
-pub fn is_asked(end: &AtomicBool) -> bool {
-    end.load(Ordering::Relaxed)
+    Err(Failure::new(format!("--main and --redundant name one interface, {main}: a ring has its ends at two of them")))
 }

@@ -5,8 +5,10 @@ mod capture;
 mod clock_options;
 mod clocks;
 mod demo;
+mod ending;
 mod eni_summary;
 mod interfaces;
+mod others;
 mod output;
 mod recording;
 mod ring;
@@ -17,12 +19,13 @@ mod surroundings;
 mod table;
 mod telling;
 mod times;
+mod verdict;
 
 use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
 
-use interfaces::Failure;
+use verdict::{LastLine, conclude};
 
 /// What a newcomer wants to know first.
 const FIRST_STEPS: &str = "\
@@ -37,7 +40,8 @@ First steps:
 The interface must be for EtherCAT alone: no IP address, no bridge, no NetworkManager. Raw frames need root, or once:
   sudo setcap cap_net_raw,cap_net_admin,cap_ipc_lock,cap_sys_nice=ep $(which ringcat)
 
-Exit status: 0 all went well, 1 it ran and something did not hold, 2 it could not do what was asked.
+Exit status: 0 all went well, 1 it ran and something did not hold, 2 it could not do what was asked. The last line says
+what: `result: ok: ...` or `result: FAILED: ...`. Commands that send refuse to begin beside another MainDevice.
 `ringcat COMMAND --help` explains a command.";
 
 /// RingCAT: an EtherCAT MainDevice for Linux.
@@ -71,26 +75,50 @@ enum Command {
 }
 
 fn main() -> ExitCode {
-    let command = Arguments::parse().command.unwrap_or_else(|| Command::Demo(demo::DemoArguments::default()));
-    let held = match command {
-        Command::Demo(arguments) => demo::run(&arguments).map_err(Failure::from),
-        Command::Scan(arguments) => scan::run(&arguments).map(|()| true),
+    let arguments = match Arguments::try_parse() {
+        Ok(arguments) => arguments,
+        Err(error) => return explain(&error),
+    };
+    let command = arguments.command.unwrap_or_else(|| Command::Demo(demo::DemoArguments::default()));
+    let last_line = if command.prints_json() { LastLine::Beside } else { LastLine::StandardOutput };
+    let outcome = match command {
+        Command::Demo(arguments) => demo::run(&arguments),
+        Command::Scan(arguments) => scan::run(&arguments),
         Command::Run(arguments) => run::run(&arguments),
         Command::Ring(arguments) => ring::run(&arguments),
         Command::Clocks(arguments) => clocks::run(&arguments),
-        Command::Capture(arguments) => capture::run(&arguments).map(|()| true),
-        Command::Sim(arguments) => sim::run(&arguments).map(|()| true),
-        Command::Eni(arguments) => eni_summary::run(&arguments).map(|()| true),
+        Command::Capture(arguments) => capture::run(&arguments),
+        Command::Sim(arguments) => sim::run(&arguments),
+        Command::Eni(arguments) => eni_summary::run(&arguments),
         Command::Bench(arguments) => bench::run(&arguments),
     };
-    match held {
-        Ok(true) => ExitCode::SUCCESS,
-        Ok(false) => ExitCode::FAILURE,
-        Err(error) => {
-            eprintln!("ringcat: {error}");
-            ExitCode::from(2)
+    conclude(outcome, last_line)
+}
+
+impl Command {
+    /// Whether the standard output is for JSON.
+    fn prints_json(&self) -> bool {
+        match self {
+            Command::Scan(arguments) => arguments.json,
+            Command::Ring(arguments) => arguments.json,
+            Command::Clocks(arguments) => arguments.json,
+            Command::Eni(arguments) => arguments.json,
+            Command::Demo(_) | Command::Run(_) | Command::Capture(_) | Command::Sim(_) | Command::Bench(_) => false,
         }
     }
+}
+
+/// Help, the version, or what is wrong with the command line.
+fn explain(error: &clap::Error) -> ExitCode {
+    // The only error that is likely is that nothing reads it any more.
+    let _ = error.print();
+    if !error.use_stderr() {
+        return ExitCode::SUCCESS;
+    }
+    let text = error.to_string();
+    let first = text.lines().next().unwrap_or_default();
+    eprintln!("result: FAILED: {}", first.strip_prefix("error: ").unwrap_or(first));
+    ExitCode::from(2)
 }
 
 #[cfg(test)]

@@ -26,7 +26,7 @@ impl RecordingArguments {
     pub fn start(&self, interfaces: &InterfaceArguments) -> Result<Recording, Failure> {
         let names: Vec<(&str, &str)> = interfaces.names().zip(DESCRIPTIONS).collect();
         let recorder = self.capture.as_ref().map(|path| Recorder::start(path, &names)).transpose()?;
-        Ok(Recording { recorder, arguments: self.clone(), interfaces: interfaces.clone() })
+        Ok(Recording { recorder, arguments: self.clone(), interfaces: interfaces.clone(), is_told: false })
     }
 }
 
@@ -45,6 +45,8 @@ pub struct Recording {
     recorder: Option<Recorder>,
     arguments: RecordingArguments,
     interfaces: InterfaceArguments,
+    /// That it has failed is told.
+    is_told: bool,
 }
 
 impl Recording {
@@ -54,17 +56,37 @@ impl Recording {
     }
 }
 
-impl Drop for Recording {
-    fn drop(&mut self) {
-        let (Some(recorder), Some(path)) = (self.recorder.take(), &self.arguments.capture) else { return };
+impl Recording {
+    /// Why nothing is recorded any more; once.
+    pub fn failure(&mut self) -> Option<String> {
+        let failure = self.recorder.as_ref()?.failure()?.to_owned();
+        (!std::mem::replace(&mut self.is_told, true)).then_some(failure)
+    }
+
+    /// Completes the file and says what is in it. Why it is not everything.
+    pub fn finish(mut self) -> Option<String> {
+        self.end()
+    }
+
+    fn end(&mut self) -> Option<String> {
+        let (recorder, path) = (self.recorder.take()?, self.arguments.capture.as_ref()?);
         match recorder.finish() {
             Ok(recorded) => {
                 for line in lines(self.interfaces.names(), &recorded) {
                     eprintln!("{}: {line}", path.display());
                 }
+                let lacking: u64 = recorded.iter().map(|frames| frames.lost + frames.lost_by_kernel).sum();
+                (lacking > 0).then(|| format!("the capture lacks {lacking} frames"))
             }
-            Err(error) => eprintln!("ringcat: {error}"),
+            Err(error) => Some(error.to_string()),
         }
+    }
+}
+
+impl Drop for Recording {
+    fn drop(&mut self) {
+        // A command that failed for another reason; that one is told last.
+        self.end().iter().for_each(|reason| eprintln!("ringcat: {reason}"));
     }
 }
 

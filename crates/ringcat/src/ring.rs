@@ -8,9 +8,10 @@ use ringcat::text::Names;
 use ringcat::{Cable, CableErrors, Link, MainDevice, Occupant, RingLook, RingState};
 
 use crate::interfaces::{Failure, InterfaceArguments, ThreadArguments};
-use crate::output::say;
+use crate::output::{counted, say};
 use crate::recording::RecordingArguments;
 use crate::times::time;
+use crate::verdict::Verdict;
 
 /// How to read what it prints.
 const ABOUT_RING: &str = "\
@@ -21,7 +22,8 @@ whose counter rises has a bad plug, or is bent, or lies beside something that di
 It knows nobody who does not answer: with two breaks, those between them are missing in the counts, the positions of those
 behind are lower, and the line break is named as if they did not exist. Compare the counts with what should be there.
 
-Exit status: 0 the ring is closed (or there is one link), 1 it is open, 2 it could not be looked at.";
+Exit status: 0 the ring is closed (or there is one link), 1 it is open or copies of frames are lost, 2 it could not be
+looked at.";
 
 /// Options of `ringcat ring`.
 #[derive(Args, Debug)]
@@ -38,11 +40,11 @@ pub struct RingArguments {
     lasts: Option<Duration>,
     /// Print JSON instead of a table.
     #[arg(long)]
-    json: bool,
+    pub json: bool,
 }
 
-/// Looks and prints; true where the ring is not open.
-pub fn run(arguments: &RingArguments) -> Result<bool, Failure> {
+/// Looks and prints; it has not held where the ring is open.
+pub fn run(arguments: &RingArguments) -> Result<Verdict, Failure> {
     let links = arguments.interfaces.open(arguments.thread)?;
     let recording = arguments.recording.start(&arguments.interfaces)?;
     let links = recording.tee(links);
@@ -59,12 +61,27 @@ pub fn run(arguments: &RingArguments) -> Result<bool, Failure> {
         }
     }
     let two_links = arguments.interfaces.redundant.is_some();
+    drop(main_device);
+    let verdict = verdict(&look, two_links).and(recording.finish());
     if arguments.json {
-        say!("{:#}", json(&look));
+        let mut json = json(&look);
+        json["result"] = verdict.words().into();
+        say!("{json:#}");
     } else {
         lines(&look, two_links).iter().for_each(|line| say!("{line}"));
     }
-    Ok(!two_links || look.state != RingState::Open)
+    Ok(verdict)
+}
+
+/// Whether there is a ring where two links are to make one.
+fn verdict(look: &RingLook, two_links: bool) -> Verdict {
+    let count = counted(usize::from(look.counts.0) + usize::from(look.counts.1), "SubDevice", "SubDevices");
+    match look.state {
+        _ if !two_links => Verdict::Held(format!("one link, {count}")),
+        RingState::Closed => Verdict::Held(format!("the ring is closed, {count}")),
+        RingState::Open => Verdict::Failed(format!("the ring is open, {count}")),
+        RingState::Unknown => Verdict::Failed(format!("not all copies of frames come back, {count}")),
+    }
 }
 
 fn gained(before: CableErrors, now: CableErrors) -> CableErrors {

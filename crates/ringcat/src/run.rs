@@ -8,10 +8,10 @@ mod beside;
 mod eni;
 mod junction;
 mod live;
+mod reasons;
 mod summary;
 
 use std::ops::ControlFlow;
-use std::sync::atomic::AtomicBool;
 use std::thread::sleep;
 use std::time::Duration;
 
@@ -20,26 +20,29 @@ use ringcat::packet::PacketLinks;
 use ringcat::tee::Tee;
 use ringcat::text::{Names, address_of_sender, describe};
 use ringcat::{
-    CyclicThread, Declaration, Event, Instant, LastOutputs, Links, MAX_UNDER_WAY, Options, ReadPdos, SubDeviceInfo,
-    SupervisorThread, automatic,
+    CyclicThread, Declaration, DomainId, DomainState, Event, Instant, LastOutputs, Links, MAX_UNDER_WAY, Options,
+    ReadPdos, SubDeviceInfo, SubDeviceState, SupervisorThread, automatic,
 };
 use ringcat_wire::al::AlState;
 
 use crate::clock_options::ClockOptions;
-use crate::interfaces::{Failure, InterfaceArguments, ThreadArguments, end_request, is_asked, now};
-use crate::output::say;
-use crate::recording::RecordingArguments;
+use crate::ending::EndRequest;
+use crate::interfaces::{Failure, InterfaceArguments, ThreadArguments, now};
+use crate::output::{counted, say};
+use crate::recording::{Recording, RecordingArguments};
 use crate::surroundings::Surroundings;
 use crate::telling::{Telling, Told};
-use crate::times::time;
+use crate::times::{cycle, in_words, time};
+use crate::verdict::Verdict;
 use beside::{Beside, BesideArguments};
 use eni::{EniArguments, EniNetwork, Watched};
 use junction::{Junctions, junctions};
 use live::Live;
+use reasons::{Exchanged, Seen};
 use summary::{clock_account, final_account, summary};
 
-/// From activation to OP of the last SubDevice at the most.
-const OP_LIMIT: Duration = Duration::from_secs(60);
+/// From then to complete process data at the most, before that is told.
+const COMPLETE_LIMIT: Duration = Duration::from_secs(1);
 /// SubDevices have this long to get to INIT in the end.
 const STOP_LIMIT: Duration = Duration::from_secs(5);
 /// Pause between two looks at what the threads do.
@@ -50,8 +53,9 @@ const SUMMARY_HELP: &str = "\
 All outputs stay zero. Watchdogs, process data and mailboxes are set up as each SubDevice's EEPROM (SII) says; with
 --eni as the file says, and outputs as --set does.
 
-Ctrl-C ends it in order: outputs zero, all SubDevices to INIT. Exit status 0: all reached OP, no frame was lost, and all
-clocks are locked where there are any.
+Ctrl-C ends it in order: outputs zero, all SubDevices to INIT; so do SIGTERM and SIGHUP. Exit status 0: all reached OP
+and stayed there, every cycle was complete, with two interfaces the ring is closed, and all clocks are locked where there
+are any. Otherwise 1, and the last line says what did not hold.
 
 Distributed clocks are brought together with --clocks, or with any of --phase, --bus-shift, --reference and --sync; --for
 then counts from their lock. SubDevices with SYNC signals wait for it before OP. `ringcat clocks` tells more about them.
@@ -59,8 +63,10 @@ then counts from their lock. SubDevices with SYNC signals wait for it before OP.
 The summary tells three things apart:
   this machine   wake-ups that came late and cycles that were left out for that. Nothing on the cable is wrong: try
                  --priority 80, a --cpu of its own, a real-time kernel
-  the wire       frames that did not come back, came back late, or damaged: cables, plugs, power, other MainDevices
-  round trips    from sending a frame to its return: what is left of the cycle is yours";
+  the wire       frames that did not come back in time: missing, too late or damaged, each counted once. Cables, plugs,
+                 power, other MainDevices; too late they are also where the computer of a simulated segment stalls
+  round trips    from sending a frame to the arrival of each of its copies at the interface, by the kernel's receive
+                 time: what is left of the cycle is yours";
 
 /// Options of `ringcat run`.
 #[derive(Args, Debug)]
@@ -74,8 +80,8 @@ pub struct RunArguments {
     recording: RecordingArguments,
     #[command(flatten)]
     beside: BesideArguments,
-    /// Cycle time, with its unit: 250us, 1ms.
-    #[arg(long, value_name = "TIME", default_value = "1ms", value_parser = time)]
+    /// Cycle time, with its unit: 250us, 1ms; 10us to 1s.
+    #[arg(long, value_name = "TIME", default_value = "1ms", value_parser = cycle)]
     cycle: Duration,
     #[command(flatten)]
     eni: EniArguments,
@@ -89,6 +95,9 @@ pub struct RunArguments {
     /// How long to exchange process data once all are in OP, such as 10s or 5min; until Ctrl-C by default.
     #[arg(long = "for", value_name = "TIME", value_parser = time)]
     lasts: Option<Duration>,
+    /// How long all SubDevices may take to OP, and all clocks to their lock; then everything is stopped.
+    #[arg(long, value_name = "TIME", default_value = "60s", value_parser = time)]
+    within: Duration,
     /// Bring the distributed clocks together.
     #[arg(long)]
     clocks: bool,
@@ -102,11 +111,12 @@ pub struct RunArguments {
     enhanced_line_crossed: bool,
 }
 
-/// Runs cycles; true where all SubDevices reached OP and no frame was lost afterwards.
-pub fn run(arguments: &RunArguments) -> Result<bool, Failure> {
-    let end = end_request();
+/// Runs cycles. It has held where all SubDevices reached OP and stayed there, and every cycle afterwards was complete.
+pub fn run(arguments: &RunArguments) -> Result<Verdict, Failure> {
+    arguments.interfaces.check_names()?;
     let network = arguments.eni.load()?;
     let thread = arguments.thread;
+    let end = EndRequest::watch(thread.priority)?;
     let (cyclic, acyclic) = arguments.interfaces.open_halves(thread)?;
     let mut surroundings = Surroundings::watch(&arguments.interfaces, &cyclic);
     let recording = arguments.recording.start(&arguments.interfaces)?;
@@ -133,10 +143,12 @@ pub fn run(arguments: &RunArguments) -> Result<bool, Failure> {
         None => Names(scan.subdevices.iter().map(|info| info.name.clone()).collect()),
     };
     let declaration = declare(arguments, network.as_ref(), &scan.subdevices)?;
-    if let Some(network) = &network {
+    let undeclared = network.as_ref().map_or(0, |network| {
         network.tell_cables(&scan);
-    }
+        network.undeclared(&scan.subdevices)
+    });
     let period = declaration.domains.iter().map(|domain| domain.period).min().unwrap_or(arguments.cycle);
+    let domains = declaration.domains.len();
     say!("{} SubDevices; cycle {} us", scan.subdevices.len(), period.as_micros());
     let trigger = declaration.clocks.as_ref().map(|clocks| arguments.clock_options.trigger(clocks.bus_shift));
     let clocks = trigger.is_some();
@@ -161,38 +173,58 @@ pub fn run(arguments: &RunArguments) -> Result<bool, Failure> {
         }
         None => (None, Watched::default()),
     };
+    let asked = end.clone();
     let cycles = application.start_cycles(
         move || thread.prepare_cycles(),
         move |data| {
             if let Some(work) = &mut work {
                 work.cycle(data);
             }
-            ControlFlow::Continue(())
+            // Here too: this thread runs whatever starves.
+            if asked.is_asked() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
         },
     )?;
-    let live = Live::new(arguments.interfaces.redundant.is_some(), clocks);
+    let ring = arguments.interfaces.redundant.is_some();
+    let live = Live::new(ring, clocks);
     let telling = Telling::new(begin, names, surroundings).one_by_one(arguments.tell_all);
-    let mut run = Run { cycles, telling, live, clocks, beside, watched };
-    let in_op = run.reach_op(&end);
-    let before = run.cycles.news().counters();
-    if in_op {
+    let mut run = Run { cycles, telling, live, clocks, domains, beside, watched, recording };
+    let reached = run.reach_op(arguments.within, &end);
+    let before = Seen::of(run.cycles.news());
+    if reached.is_ok() {
         let until = arguments.lasts.map_or(Instant::NEVER, |lasts| now() + lasts);
         run.exchange(until, &end);
     }
+    end.no_limit();
     let status = if clocks { run.cycles.supervisor().with(|engine| engine.clocks())? } else { Vec::new() };
-    let locked = status.iter().all(|clock| clock.is_locked || clock.is_reference);
-    let application = run.cycles.end()?;
+    let mut reasons = match reached {
+        Ok(()) => Exchanged::look(&run, &before, ring, &status).reasons(run.telling.names()),
+        Err(reason) => vec![reason],
+    };
+    reasons.extend(end.cut_short(arguments.lasts).filter(|_| reasons.is_empty()));
+    if undeclared > 0 {
+        reasons.push(format!("the file lacks {} of the bus", counted(undeclared, "SubDevice", "SubDevices")));
+    }
+    let application = run.cycles.end().unwrap_or_else(|panicked| {
+        reasons.push(panicked.to_string());
+        panicked.application
+    });
     summary(&application, run.telling.surroundings());
     if clocks {
         clock_account(&status, application.news(), run.telling.names());
     }
     run.watched.account();
     run.beside.account();
-    let lost = application.cyclic_counters().lost - before.lost;
-    let (supervisor, mut links) = application.stop(LastOutputs::Zero, AlState::Init, STOP_LIMIT)?;
-    final_account(&mut links, &supervisor);
-    say!("  stopped: outputs zero, all SubDevices in INIT");
-    Ok(in_op && lost == 0 && locked)
+    match application.stop(LastOutputs::Zero, AlState::Init, STOP_LIMIT) {
+        Ok((supervisor, mut links)) => {
+            final_account(&mut links, &supervisor);
+            say!("  stopped: outputs zero, all SubDevices in INIT");
+        }
+        Err(error) => reasons.push(error.to_string()),
+    }
+    reasons.extend(run.recording.finish());
+    let lasted = arguments.lasts.map_or_else(String::new, |lasts| format!(" for {}", in_words(lasts)));
+    let subdevices = counted(scan.subdevices.len(), "SubDevice", "SubDevices");
+    Ok(Verdict::of(reasons, format!("{subdevices} in OP{lasted}, every cycle complete")))
 }
 
 /// What is to be activated: the file's network, or what was found as its SIIs say.
@@ -226,9 +258,12 @@ struct Run {
     live: Live,
     /// Distributed clocks are in use.
     clocks: bool,
+    /// How many domains there are.
+    domains: usize,
     beside: Beside,
     /// Variables of a file.
     watched: Watched,
+    recording: Recording,
 }
 
 /// Tells of other MainDevices and of the cabling among the events of a scan.
@@ -272,6 +307,10 @@ impl Run {
             self.live.clear();
             eprintln!("ringcat: {words}");
         }
+        if let Some(words) = self.recording.failure() {
+            self.live.clear();
+            eprintln!("ringcat: {words}");
+        }
         for line in self.watched.news(now()) {
             self.live.clear();
             say!("{line}");
@@ -282,20 +321,32 @@ impl Run {
         !self.clocks || self.cycles.supervisor().with(|engine| engine.clocks_locked()).unwrap_or(false)
     }
 
-    /// Until all SubDevices are in OP and all clocks are locked; false where that does not come, or the user does not want
-    /// it.
-    fn reach_op(&mut self, end: &AtomicBool) -> bool {
-        let until = now() + OP_LIMIT;
-        while !self.cycles.supervisor().all_settled() || !self.clocks_locked() {
-            if is_asked(end) || self.cycles.has_ended() {
-                return false;
-            }
-            if now() >= until {
+    /// Until all SubDevices are in OP and all clocks are locked, and then until process data is complete, for a moment.
+    ///
+    /// # Errors
+    /// Why that does not come, in words.
+    fn reach_op(&mut self, limit: Duration, end: &EndRequest) -> Result<(), String> {
+        let until = now() + limit;
+        end.limit(until);
+        let (mut in_op, mut complete_until) = (false, until);
+        while !in_op || (!self.is_complete() && now() < complete_until) {
+            if let Some(by) = end.by() {
                 self.live.clear();
-                self.tell_states();
-                return false;
+                return Err(format!("ended by {by} before all SubDevices were in OP"));
+            }
+            if self.cycles.has_ended() {
+                return Err("the cycles ended before all SubDevices were in OP".to_owned());
+            }
+            if !in_op && now() >= until {
+                self.look();
+                self.live.clear();
+                self.tell_states(limit);
+                return Err(self.what_is_missing(limit));
             }
             self.look();
+            if !in_op && self.cycles.supervisor().all_settled() && self.clocks_locked() {
+                (in_op, complete_until) = (true, now() + COMPLETE_LIMIT);
+            }
             self.live.show(now(), self.cycles.news(), self.cycles.supervisor(), self.telling.names());
             sleep(LOOK);
         }
@@ -303,13 +354,43 @@ impl Run {
         self.look();
         self.live.clear();
         say!("{}", self.telling.line(reached, "all SubDevices are in OP"));
+        for words in self.incomplete() {
+            say!("{}", self.telling.line(reached, &format!("process data is not exchanged as declared: {words}")));
+        }
         self.cycles.news().restart_histograms();
-        true
+        Ok(())
     }
 
-    fn tell_states(&self) {
+    /// Domains whose last judgement is not complete, in words.
+    fn incomplete(&self) -> Vec<String> {
+        let judged = (0..self.domains).map(|domain| (domain, self.cycles.news().status(DomainId(domain))));
+        let incomplete = judged.filter(|(_, status)| status.state != DomainState::Complete);
+        incomplete
+            .map(|(domain, status)| {
+                let (wkc, expected) = (status.wkc, status.expected);
+                format!("domain {domain}: {}, working counter {wkc} of {expected}", status.in_words())
+            })
+            .collect()
+    }
+
+    fn is_complete(&self) -> bool {
+        self.incomplete().is_empty()
+    }
+
+    /// Why OP was not reached.
+    fn what_is_missing(&self, limit: Duration) -> String {
+        let limit = in_words(limit);
+        let states = self.cycles.supervisor().states();
+        let late = states.iter().filter(|state| **state != SubDeviceState::Settled(AlState::Op)).count();
+        if late == 0 {
+            return format!("not all clocks are locked within {limit}");
+        }
+        format!("{} of {} SubDevices not in OP within {limit}", late, states.len())
+    }
+
+    fn tell_states(&self, limit: Duration) {
         let what = if self.clocks_locked() { "reached OP" } else { "reached OP with all clocks locked" };
-        say!("not all SubDevices {what} within {} s:", OP_LIMIT.as_secs());
+        say!("not all SubDevices {what} within {}:", in_words(limit));
         for (subdevice, state) in self.cycles.supervisor().states().iter().enumerate() {
             let state = live::word(*state);
             let name = self.telling.names().0.get(subdevice).map_or("", String::as_str);
@@ -325,8 +406,9 @@ impl Run {
         }
     }
 
-    fn exchange(&mut self, until: Instant, end: &AtomicBool) {
-        while now() < until && !is_asked(end) && !self.cycles.has_ended() {
+    fn exchange(&mut self, until: Instant, end: &EndRequest) {
+        end.limit(until);
+        while now() < until && !end.is_asked() && !self.cycles.has_ended() {
             self.look();
             self.live.show(now(), self.cycles.news(), self.cycles.supervisor(), self.telling.names());
             sleep(LOOK.min(until.since(now())));

@@ -5,10 +5,11 @@ use ringcat::text::{Names, describe};
 use ringcat::{Event, MainDevice};
 
 use crate::interfaces::{Failure, InterfaceArguments, ThreadArguments};
-use crate::output::say;
+use crate::output::{counted, say};
 use crate::recording::RecordingArguments;
 use crate::surroundings::Surroundings;
 use crate::table;
+use crate::verdict::Verdict;
 
 /// What else there is to know.
 const ABOUT_SCAN: &str = "\
@@ -28,11 +29,11 @@ pub struct ScanArguments {
     recording: RecordingArguments,
     /// Print JSON instead of a table.
     #[arg(long)]
-    json: bool,
+    pub json: bool,
 }
 
 /// Scans and prints what was found; what happens meanwhile goes to the standard error output.
-pub fn run(arguments: &ScanArguments) -> Result<(), Failure> {
+pub fn run(arguments: &ScanArguments) -> Result<Verdict, Failure> {
     let links = arguments.interfaces.open(arguments.thread)?;
     let mut surroundings = Surroundings::watch(&arguments.interfaces, &links);
     let recording = arguments.recording.start(&arguments.interfaces)?;
@@ -58,5 +59,6 @@ pub fn run(arguments: &ScanArguments) -> Result<(), Failure> {
             say!("{line}");
         }
     }
-    Ok(())
+    drop(main_device);
+    Ok(Verdict::Held(counted(scan.subdevices.len(), "SubDevice", "SubDevices")).and(recording.finish()))
 }

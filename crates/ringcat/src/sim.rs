@@ -17,8 +17,11 @@ use ringcat_sim::cable::HostLink;
 use ringcat_sim::network::Network;
 use ringcat_sim::segment::Segment;
 
-use crate::interfaces::{Failure, ThreadArguments, end_request, is_asked};
-use crate::output::say;
+use crate::ending::EndRequest;
+use crate::interfaces::{Failure, ThreadArguments, two_interfaces};
+use crate::others::check_sockets;
+use crate::output::{counted, say};
+use crate::verdict::Verdict;
 use doors::Doors;
 use orders::{Outcome, carry_out};
 use plant::Plant;
@@ -50,16 +53,23 @@ pub struct SimArguments {
     /// compute the answer. Timers of SubDevices then run a little ahead of the clock, never behind it.
     #[arg(long, value_enum, default_value = "real-time")]
     pace: Pace,
+    /// Go on although another program answers or sends EtherCAT frames on the interface.
+    #[arg(long)]
+    force: bool,
     #[command(flatten)]
     thread: ThreadArguments,
 }
 
 /// Runs the simulator until it is told to end.
-pub fn run(arguments: &SimArguments) -> Result<(), Failure> {
+pub fn run(arguments: &SimArguments) -> Result<Verdict, Failure> {
+    two_interfaces(&arguments.main, arguments.redundant.as_deref())?;
+    let end = EndRequest::watch(arguments.thread.priority)?;
     let mut plant = Plant::new(load(arguments)?);
     let mut wires =
         Wires::open(&arguments.main, arguments.redundant.as_deref(), arguments.thread.mode(), arguments.pace)?;
     let names: Vec<&str> = std::iter::once(arguments.main.as_str()).chain(arguments.redundant.as_deref()).collect();
+    // Two simulators would both answer each frame.
+    check_sockets(names.iter().copied(), arguments.force)?;
     let carriers = CarrierWatch::start(&names, CARRIER_PERIOD)?;
     if arguments.redundant.is_none() {
         // A ring without its second interface is one whose last cable is not plugged in.
@@ -68,7 +78,6 @@ pub fn run(arguments: &SimArguments) -> Result<(), Failure> {
     let doors = Doors::open(arguments.control.as_deref()).map_err(|error| {
         Failure::new(format!("the control socket cannot be made: {error}; is its directory there?"))
     })?;
-    let end = end_request();
     // The threads above stay ordinary ones.
     let _awake = arguments.thread.apply();
     let begin = monotonic::now_ns();
@@ -94,18 +103,24 @@ pub fn run(arguments: &SimArguments) -> Result<(), Failure> {
             let _ = order.answer.send(text);
             if quit {
                 say(now, &wires.summary());
-                return Ok(());
+                return Ok(ended(&plant, "quit"));
             }
         }
-        if is_asked(&end) {
+        if let Some(by) = end.by() {
             say(now, &wires.summary());
-            return Ok(());
+            return Ok(ended(&plant, &by));
         }
         if let Some(line) = wires.lateness.line(now) {
             say(now, &line);
         }
         wires.wait(plant.network(), now);
     }
+}
+
+/// A simulator ends when it is told to.
+fn ended(plant: &Plant, by: &str) -> Verdict {
+    let count = counted(plant.network().devices().len(), "SubDevice", "SubDevices");
+    Verdict::Held(format!("{count} simulated until {by}"))
 }
 
 fn load(arguments: &SimArguments) -> Result<Network, Failure> {

@@ -137,6 +137,7 @@ mod tests {
                 redundant: None,
                 source_address: crate::interfaces::SourceAddress::default(),
                 max_datagrams: None,
+                force: false,
             },
             elsewhere: Arc::new(elsewhere.map_or_else(OnceLock::new, |name| OnceLock::from(name.to_owned()))),
             senders: Vec::new(),

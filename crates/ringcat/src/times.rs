@@ -1,11 +1,40 @@
 //! Times on the command line.
 
+use std::ops::RangeInclusive;
 use std::time::Duration;
+
+/// Units that times have.
+const UNITS: [&str; 4] = ["us", "ms", "s", "min"];
+/// Cycles that a MainDevice on network interfaces can run: no interface is faster, and no SubDevice waits for longer.
+const CYCLES: RangeInclusive<Duration> = Duration::from_micros(10)..=Duration::from_secs(1);
+
+/// A cycle time with its unit.
+pub fn cycle(text: &str) -> Result<Duration, String> {
+    let cycle = time(text)?;
+    if CYCLES.contains(&cycle) {
+        return Ok(cycle);
+    }
+    Err(format!("expected {} to {}", in_words(*CYCLES.start()), in_words(*CYCLES.end())))
+}
+
+/// As the command line has it: `1ms`, `250us`, `1min`.
+pub fn in_words(time: Duration) -> String {
+    let us = time.as_micros();
+    match us {
+        _ if us >= 60_000_000 && us.is_multiple_of(60_000_000) => format!("{}min", us / 60_000_000),
+        _ if us >= 1_000_000 && us.is_multiple_of(1_000_000) => format!("{}s", us / 1_000_000),
+        _ if us >= 1_000 && us.is_multiple_of(1_000) => format!("{}ms", us / 1_000),
+        _ => format!("{us}us"),
+    }
+}
 
 /// A time with its unit.
 pub fn time(text: &str) -> Result<Duration, String> {
     let at = text.find(|c: char| !c.is_ascii_digit()).unwrap_or(text.len());
     let (number, unit) = text.split_at(at);
+    if !number.is_empty() && number.bytes().all(|digit| digit == b'0') && UNITS.contains(&unit) {
+        return Err("expected more than zero".into());
+    }
     let unit_ns = match unit {
         "us" => 1_000,
         "ms" => 1_000_000,
@@ -38,6 +67,18 @@ mod tests {
         assert_eq!((shift("0us"), shift("-0")), (Ok(0), Ok(0)));
         for wrong in ["", "-", "--1ms", "1", "+5", "-18446744073s"] {
             assert!(shift(wrong).is_err(), "{wrong}");
+        }
+    }
+
+    #[test]
+    fn cycles_are_what_an_interface_and_the_watchdogs_of_subdevices_allow() {
+        assert_eq!((cycle("10us"), cycle("1s")), (Ok(Duration::from_micros(10)), Ok(Duration::from_secs(1))));
+        for wrong in ["1us", "9us", "1001ms", "100s"] {
+            assert_eq!(cycle(wrong), Err("expected 10us to 1s".to_owned()), "{wrong}");
+        }
+        assert_eq!(cycle("0ms"), Err("expected more than zero".to_owned()));
+        for time in ["250us", "1ms", "1500us", "10s", "90s", "5min"] {
+            assert_eq!(super::time(time).map(in_words), Ok(time.to_owned()));
         }
     }
 

@@ -15,8 +15,10 @@ use ringcat_link::monotonic;
 use ringcat_wire::al::AlState;
 
 use super::quantile_us;
+use crate::ending::EndRequest;
 use crate::interfaces::{Failure, InterfaceArguments, ThreadArguments};
 use crate::output::say;
+use crate::verdict::Verdict;
 
 /// The domain that `automatic` declares.
 pub const DOMAIN: DomainId = DomainId(0);
@@ -50,10 +52,11 @@ pub struct CyclesArguments {
     one_thread: bool,
 }
 
-/// Measures; true where every cycle was complete.
-pub fn run(arguments: &CyclesArguments) -> Result<bool, Failure> {
+/// Measures. It has held where every cycle was complete and SubDevices were stopped in order.
+pub fn run(arguments: &CyclesArguments) -> Result<Verdict, Failure> {
     let thread = arguments.thread;
-    let options = Options { supervision: !arguments.unsupervised, ..Options::default() };
+    let end = EndRequest::watch(thread.priority)?;
+    let options = Options { supervision: !arguments.unsupervised, ..arguments.interfaces.options() };
     if arguments.one_thread {
         let links = arguments.interfaces.open(thread)?;
         let _awake = thread.apply();
@@ -62,9 +65,8 @@ pub fn run(arguments: &CyclesArguments) -> Result<bool, Failure> {
         let scan = main_device.scan()?;
         let declaration = declare(&scan, begin).with_under_way(arguments.under_way);
         let mut application = main_device.activate(declaration).map_err(ringcat::Error::from)?;
-        let incomplete = exchange(&mut application, arguments.count, begin)?;
-        application.stop(LastOutputs::Zero, AlState::Init, STOP_LIMIT)?;
-        Ok(incomplete == 0)
+        let reasons = exchange(&mut application, arguments.count, begin, &end);
+        Ok(verdict(reasons, application.stop(LastOutputs::Zero, AlState::Init, STOP_LIMIT).err(), arguments.count))
     } else {
         let (cyclic, acyclic) = arguments.interfaces.open_halves(thread)?;
         let begin = monotonic::now_ns();
@@ -73,10 +75,14 @@ pub fn run(arguments: &CyclesArguments) -> Result<bool, Failure> {
         let scan = supervisor.scan()?;
         let declaration = declare(&scan, begin).with_under_way(arguments.under_way);
         let mut application = supervisor.activate(declaration, cyclic).map_err(ringcat::Error::from)?;
-        let incomplete = exchange(&mut application, arguments.count, begin)?;
-        application.stop(LastOutputs::Zero, AlState::Init, STOP_LIMIT)?;
-        Ok(incomplete == 0)
+        let reasons = exchange(&mut application, arguments.count, begin, &end);
+        Ok(verdict(reasons, application.stop(LastOutputs::Zero, AlState::Init, STOP_LIMIT).err(), arguments.count))
     }
+}
+
+fn verdict(mut reasons: Vec<String>, stop: Option<ringcat::Error>, count: u32) -> Verdict {
+    reasons.extend(stop.map(|error| error.to_string()));
+    Verdict::of(reasons, format!("{count} cycles, all complete"))
 }
 
 /// Everything as its SII says; tells of the scan.
@@ -87,27 +93,40 @@ pub fn declare(scan: &Scan, begin: u64) -> Declaration {
 }
 
 /// Cycles until all are in OP.
-pub fn reach_op<H: AcyclicHalf>(application: &mut Application<PacketLinks, H>, begin: u64) -> Result<(), Failure> {
+///
+/// # Errors
+/// Why that does not come, in words.
+pub fn reach_op<H: AcyclicHalf>(
+    application: &mut Application<PacketLinks, H>,
+    begin: u64,
+    end: &EndRequest,
+) -> Result<(), String> {
     let until = application.now() + OP_LIMIT;
     while !application.all_settled() {
         application.cycle(|_| ());
+        if let Some(by) = end.by() {
+            return Err(format!("ended by {by} before all SubDevices were in OP"));
+        }
         if application.now() >= until {
-            return Err(Failure::new("not all SubDevices get to OP; `ringcat run` tells which, and why"));
+            return Err("not all SubDevices get to OP; `ringcat run` tells which, and why".to_owned());
         }
     }
     say!("all in OP after: {:.1} ms", (application.now().0 - begin) as f64 / 1e6);
     Ok(())
 }
 
-/// To OP, then cycles back to back; how many of them were not complete.
+/// To OP, then cycles back to back; what did not hold.
 fn exchange<H: AcyclicHalf>(
     application: &mut Application<PacketLinks, H>,
     count: u32,
     begin: u64,
-) -> Result<u64, Failure> {
-    reach_op(application, begin)?;
+    end: &EndRequest,
+) -> Vec<String> {
+    if let Err(reason) = reach_op(application, begin, end) {
+        return vec![reason];
+    }
     if count == 0 {
-        return Ok(0);
+        return Vec::new();
     }
     application.set_trigger(Trigger::FramesReturned { at_least: Duration::ZERO });
     for _ in 0..WARM_UP {
@@ -117,7 +136,7 @@ fn exchange<H: AcyclicHalf>(
     let before = application.cyclic_counters();
     let first = one_cycle(application);
     let mut last = first;
-    for _ in 0..count {
+    for _ in (0..count).take_while(|_| !end.is_asked()) {
         let now = one_cycle(application);
         times_ns.push(now - last);
         last = now;
@@ -125,12 +144,18 @@ fn exchange<H: AcyclicHalf>(
     let after = application.cyclic_counters();
     // A cycle that was skipped sent nothing.
     let incomplete = after.incomplete - before.incomplete + after.skipped - before.skipped;
+    let cycles = times_ns.len();
     times_ns.sort_unstable();
-    say!("cycles per second: {:.0}", f64::from(count) * 1e9 / (last - first) as f64);
+    say!("cycles per second: {:.0}", cycles as f64 * 1e9 / (last - first).max(1) as f64);
     say!("cycle median: {:.2} us", quantile_us(&times_ns, 50));
     say!("cycle minimum: {:.2} us", quantile_us(&times_ns, 0));
-    say!("incomplete: {incomplete} of {count}");
-    Ok(incomplete)
+    say!("incomplete: {incomplete} of {cycles}");
+    let mut reasons = Vec::new();
+    if incomplete > 0 {
+        reasons.push(format!("{incomplete} of {cycles} cycles incomplete"));
+    }
+    reasons.extend(end.by().map(|by| format!("ended by {by} after {cycles} of {count} cycles")));
+    reasons
 }
 
 /// A cycle with an application's part: an output changes, and answers to an input. Returns when it began, in nanoseconds.

@@ -3,8 +3,6 @@
 //! Every datagram's working counter grows by what its command makes one such SubDevice add (facts 1.4), and the source
 //! address gets the bit that controllers set (facts 2.6). The data stays as it came.
 
-use std::sync::atomic::AtomicBool;
-
 use clap::Args;
 use ringcat_link::{PacketOptions, PacketSocket, monotonic, wait};
 use ringcat_wire::command::Command;
@@ -12,8 +10,11 @@ use ringcat_wire::datagram::{HEADER_LEN, Header, WKC_LEN};
 use ringcat_wire::frame::{ETHERCAT_HEADER_LEN, ETHERNET_HEADER_LEN, MAX_FRAME_VLAN};
 use ringcat_wire::source_address::PROCESSED;
 
-use crate::interfaces::{Failure, ThreadArguments, end_request, is_asked};
+use crate::ending::EndRequest;
+use crate::interfaces::{Failure, ThreadArguments};
+use crate::others::check_sockets;
 use crate::output::say;
+use crate::verdict::Verdict;
 
 /// Offset of the source address.
 const SOURCE: usize = 6;
@@ -26,25 +27,31 @@ pub struct EchoArguments {
     /// Network interface at whose other end frames come from.
     #[arg(long, value_name = "IF")]
     main: String,
+    /// Go on although another program answers or sends EtherCAT frames on the interface.
+    #[arg(long)]
+    force: bool,
     #[command(flatten)]
     thread: ThreadArguments,
 }
 
 /// Answers until it is told to end.
-pub fn run(arguments: &EchoArguments) -> Result<bool, Failure> {
+pub fn run(arguments: &EchoArguments) -> Result<Verdict, Failure> {
+    let end = EndRequest::watch(arguments.thread.priority)?;
     let options = PacketOptions { receive: arguments.thread.mode(), ..PacketOptions::default() };
     let socket = PacketSocket::open(&arguments.main, &options)?;
-    let end = end_request();
+    check_sockets(std::iter::once(arguments.main.as_str()), arguments.force)?;
     let _awake = arguments.thread.apply();
     say!("echo on {}", arguments.main);
-    answer_all(socket, &end);
-    Ok(true)
+    let answered = answer_all(socket, &end);
+    Ok(Verdict::Held(format!("{answered} frames answered")))
 }
 
-fn answer_all(mut socket: PacketSocket, end: &AtomicBool) {
+/// Answers until the end is asked for; how many frames.
+fn answer_all(mut socket: PacketSocket, end: &EndRequest) -> u64 {
     let mode = socket.mode();
+    let mut answered = 0;
     let mut answer = [0; MAX_FRAME_VLAN];
-    while !is_asked(end) {
+    while !end.is_asked() {
         if !wait(&[&socket], monotonic::now_ns() + LOOK_NS, mode) {
             continue;
         }
@@ -56,9 +63,10 @@ fn answer_all(mut socket: PacketSocket, end: &AtomicBool) {
         process(&mut answer[..length]);
         if length > 0 {
             // A frame that finds the interface down is lost, as on a cable.
-            socket.send(&answer[..length]);
+            answered += u64::from(socket.send(&answer[..length]));
         }
     }
+    answered
 }
 
 /// What one SubDevice does to a frame. Any bytes are allowed.

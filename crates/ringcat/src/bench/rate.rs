@@ -9,13 +9,15 @@ use std::time::Duration;
 
 use clap::Args;
 use ringcat::packet::PacketLinks;
-use ringcat::{Application, Instant, LastOutputs, Links, Options, SupervisorThread};
+use ringcat::{Application, Instant, LastOutputs, Links, SupervisorThread};
 use ringcat_link::monotonic;
 use ringcat_wire::al::AlState;
 
 use super::cycles::{DOMAIN, STOP_LIMIT, declare, reach_op};
+use crate::ending::EndRequest;
 use crate::interfaces::{Failure, InterfaceArguments, ThreadArguments};
 use crate::output::say;
+use crate::verdict::Verdict;
 
 /// Cycle times that are tried, in microseconds.
 const PERIODS_US: [u64; 17] = [1000, 500, 250, 200, 150, 125, 100, 80, 70, 60, 50, 40, 35, 30, 25, 20, 15];
@@ -46,35 +48,49 @@ struct Seen {
     shortest_round_trip: Duration,
 }
 
-/// Measures.
-pub fn run(arguments: &RateArguments) -> Result<bool, Failure> {
+/// Measures. It has held where a rate was kept and SubDevices were stopped in order.
+pub fn run(arguments: &RateArguments) -> Result<Verdict, Failure> {
     let thread = arguments.thread;
+    let end = EndRequest::watch(thread.priority)?;
     let (cyclic, acyclic) = arguments.interfaces.open_halves(thread)?;
     let begin = monotonic::now_ns();
-    let supervisor = SupervisorThread::start(acyclic, &Options::default(), move || thread.prepare_supervisor())?;
+    let options = arguments.interfaces.options();
+    let supervisor = SupervisorThread::start(acyclic, &options, move || thread.prepare_supervisor())?;
     let _awake = thread.apply();
     let declaration = declare(&supervisor.scan()?, begin);
     let mut application = supervisor.activate(declaration, cyclic).map_err(ringcat::Error::from)?;
-    reach_op(&mut application, begin)?;
+    let mut reasons = Vec::new();
     let mut shortest = None;
-    for period in PERIODS_US.map(Duration::from_micros) {
-        if tries(&mut application, period).is_continue() {
-            break;
+    match reach_op(&mut application, begin, &end) {
+        Ok(()) => {
+            for period in PERIODS_US.map(Duration::from_micros) {
+                if end.is_asked() || tries(&mut application, period, &end).is_continue() {
+                    break;
+                }
+                shortest = Some(period);
+            }
+            reasons.extend(end.by().map(|by| format!("ended by {by} before all rates were tried")));
         }
-        shortest = Some(period);
+        Err(reason) => reasons.push(reason),
     }
-    application.stop(LastOutputs::Zero, AlState::Init, STOP_LIMIT)?;
-    match shortest {
-        Some(period) => say!("largest rate without a skipped cycle: {:.0} Hz", 1.0 / period.as_secs_f64()),
-        None => say!("no rate was held without a skipped cycle"),
+    reasons.extend(application.stop(LastOutputs::Zero, AlState::Init, STOP_LIMIT).err().map(|error| error.to_string()));
+    let rate = shortest.map(|period| format!("{:.0} Hz", 1.0 / period.as_secs_f64()));
+    match &rate {
+        Some(rate) => say!("largest rate without a skipped cycle: {rate}"),
+        None if reasons.is_empty() => reasons.push("no rate was held without a skipped cycle".to_owned()),
+        None => {}
     }
-    Ok(shortest.is_some())
+    Ok(Verdict::of(reasons, rate.unwrap_or_default()))
 }
 
 /// Breaks where the period is held.
-fn tries(application: &mut Application<PacketLinks, SupervisorThread>, period: Duration) -> ControlFlow<()> {
-    for attempt in 1..=TRIES {
-        let Seen { cycles, skipped, stalled, latest, .. } = hold(application, period);
+fn tries(
+    application: &mut Application<PacketLinks, SupervisorThread>,
+    period: Duration,
+    end: &EndRequest,
+) -> ControlFlow<()> {
+    for attempt in (1..=TRIES).take_while(|_| !end.is_asked()) {
+        let Seen { cycles, skipped, stalled, latest, .. } = hold(application, period, end);
         say!(
             "every {} us, try {attempt}: {cycles} cycles, {skipped} skipped, {stalled} more in stalls of the machine, the latest by {:.1} us",
             period.as_micros(),
@@ -88,14 +104,14 @@ fn tries(application: &mut Application<PacketLinks, SupervisorThread>, period: D
 }
 
 /// Cycles on a grid, for a while.
-fn hold(application: &mut Application<PacketLinks, SupervisorThread>, period: Duration) -> Seen {
+fn hold(application: &mut Application<PacketLinks, SupervisorThread>, period: Duration, asked: &EndRequest) -> Seen {
     let mut seen =
         Seen { cycles: 0, skipped: 0, stalled: 0, latest: Duration::ZERO, shortest_round_trip: Duration::MAX };
     let end = application.now() + HELD;
     let mut next = application.now() + period;
     // When frames left that are out, and how many cycles have found them so.
     let (mut out, mut waiting) = (None, 0);
-    while next < end {
+    while next < end && !asked.is_asked() {
         let now = wait_until(application, next, |now| {
             if let Some(sent) = out.take() {
                 seen.returned(now.since(sent), waiting);

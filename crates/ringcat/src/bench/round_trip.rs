@@ -24,8 +24,11 @@ use ringcat_wire::frame::{ETHERCAT_HEADER_LEN, ETHERNET_HEADER_LEN};
 use ringcat_wire::source_address::{MacCodec, PROCESSED};
 
 use super::quantile_us;
+use crate::ending::EndRequest;
 use crate::interfaces::{Failure, ThreadArguments};
+use crate::others::{check_frames, check_sockets};
 use crate::output::say;
+use crate::verdict::Verdict;
 
 /// Cycles before the measured ones of a block.
 const WARM_UP: usize = 200;
@@ -57,37 +60,60 @@ pub struct RoundTripArguments {
     /// Pairs of blocks that these are divided into. With 0 the MainDevice runs alone, without blocks.
     #[arg(long, value_name = "PAIRS", default_value = "20", value_parser = clap::value_parser!(u32).range(0..=1000))]
     blocks: u32,
+    /// Go on although another MainDevice uses the interface.
+    #[arg(long)]
+    force: bool,
     #[command(flatten)]
     thread: ThreadArguments,
 }
 
-/// Measures; true where no frame was lost or came back wrong.
-pub fn run(arguments: &RoundTripArguments) -> Result<bool, Failure> {
+/// Measures. It has held where no frame was lost or came back wrong.
+pub fn run(arguments: &RoundTripArguments) -> Result<Verdict, Failure> {
+    let end = EndRequest::watch(arguments.thread.priority)?;
+    let main = || std::iter::once(arguments.main.as_str());
+    check_sockets(main(), arguments.force)?;
+    if !arguments.force {
+        check_frames(main())?;
+    }
     let _awake = arguments.thread.apply();
     let (mode, size, count) = (arguments.thread.mode(), usize::from(arguments.size), arguments.count as usize);
     let mut whole = Measured::default();
     if arguments.blocks == 0 {
-        measure(&mut Cyclic::open(&arguments.main, mode, size)?, count, &mut whole);
+        measure(&mut Cyclic::open(&arguments.main, mode, size)?, count, &mut whole, &end);
         whole.print("MainDevice");
-        return Ok(whole.failed == 0);
+        return Ok(verdict(&[&whole], &end));
     }
     let (mut bare, mut ratios) = (Measured::default(), Vec::new());
     for _ in 0..arguments.blocks {
         let block = count.div_ceil(arguments.blocks as usize);
         // A socket of its own for each block, so that no other one takes copies of its frames.
         let mut cyclic = Cyclic::open(&arguments.main, mode, size)?;
-        let of_whole = measure(&mut cyclic, block, &mut whole);
+        let of_whole = measure(&mut cyclic, block, &mut whole, &end);
         let shape = cyclic.shape();
         drop(cyclic);
-        let of_bare = measure(&mut Bare::open(&arguments.main, mode, shape)?, block, &mut bare);
+        let of_bare = measure(&mut Bare::open(&arguments.main, mode, shape)?, block, &mut bare, &end);
         ratios.push(of_whole / of_bare);
+        if end.is_asked() {
+            break;
+        }
     }
     ratios.sort_unstable_by(f64::total_cmp);
-    say!("{size} bytes, {:?}, {} pairs of blocks", mode, arguments.blocks);
+    say!("{size} bytes, {}, {} pairs of blocks", arguments.thread.mode_in_words(), ratios.len());
     bare.print("bare echo client");
     whole.print("MainDevice");
     say!("median ratio: {:.3}", ratios[ratios.len() / 2]);
-    Ok(bare.failed + whole.failed == 0)
+    Ok(verdict(&[&bare, &whole], &end))
+}
+
+fn verdict(measured: &[&Measured], end: &EndRequest) -> Verdict {
+    let failed: usize = measured.iter().map(|measured| measured.failed).sum();
+    let cycles: usize = measured.iter().map(|measured| measured.times_ns.len()).sum();
+    let mut reasons = Vec::new();
+    if failed > 0 {
+        reasons.push(format!("{failed} of {cycles} frames lost or wrong"));
+    }
+    reasons.extend(end.by().map(|by| format!("ended by {by} after {cycles} cycles")));
+    Verdict::of(reasons, format!("{cycles} cycles, none lost"))
 }
 
 /// Somebody who sends frames and waits for each.
@@ -114,18 +140,18 @@ impl Measured {
 }
 
 /// A block of cycles; their median in nanoseconds.
-fn measure(client: &mut impl Client, count: usize, measured: &mut Measured) -> f64 {
+fn measure(client: &mut impl Client, count: usize, measured: &mut Measured, end: &EndRequest) -> f64 {
     let mut now = monotonic::now_ns();
-    for _ in 0..WARM_UP {
+    for _ in (0..WARM_UP).take_while(|_| !end.is_asked()) {
         (now, _) = client.cycle(now);
     }
     let first = measured.times_ns.len();
     measured.times_ns.reserve(count);
-    for _ in 0..count {
-        let (end, right) = client.cycle(now);
-        measured.times_ns.push(end - now);
+    for _ in (0..count).take_while(|_| !end.is_asked()) {
+        let (ended, right) = client.cycle(now);
+        measured.times_ns.push(ended - now);
         measured.failed += usize::from(!right);
-        now = end;
+        now = ended;
     }
     let mut block = measured.times_ns[first..].to_vec();
     block.sort_unstable();

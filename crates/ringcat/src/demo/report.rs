@@ -11,6 +11,7 @@ use super::plan::{Incident, Plan};
 use super::watch::{Account, Watch};
 use crate::output::{say, write};
 use crate::table;
+use crate::verdict::Verdict;
 
 /// Writes lines with the time before them.
 #[derive(Debug)]
@@ -94,14 +95,14 @@ impl Reporter {
         }
     }
 
-    /// The closing summary; true where everything held.
+    /// The closing summary, with what did not hold.
     pub fn summary(
         &mut self,
         application: &Application<SimulatedSegment>,
         watch: &Watch,
         plan: &Plan,
         names: &Names,
-    ) -> bool {
+    ) -> Verdict {
         self.say("\nsummary");
         self.totals(application);
         if let Some(remark) = plan.remark {
@@ -146,12 +147,14 @@ impl Reporter {
         }
     }
 
-    fn verdicts(&mut self, application: &Application<SimulatedSegment>, watch: &Watch, plan: &Plan) -> bool {
+    fn verdicts(&mut self, application: &Application<SimulatedSegment>, watch: &Watch, plan: &Plan) -> Verdict {
         let cycled = watch.accounts.iter().any(|account| matches!(account.incident, Incident::PowerOff { .. }));
         let within = |account: &Account| account.incomplete <= account.incident.edges(plan.cables_of_device);
-        let mut all = true;
+        let mut failed = Vec::new();
         let mut verdict = |reporter: &mut Reporter, held: bool, text: String| {
-            all &= held;
+            if !held {
+                failed.push(text.clone());
+            }
             reporter.say(&format!("  {} {text}", if held { "ok    " } else { "FAILED" }));
         };
         let left: Vec<String> =
@@ -168,11 +171,15 @@ impl Reporter {
         }
         let held = watch.accounts.iter().all(within);
         verdict(self, held, "at most one incomplete cycle per edge of a cable".to_owned());
-        let text = format!(
-            "outputs and inputs agree with the simulated devices: {} comparisons, {} failed",
-            watch.compared, watch.disagreements
-        );
-        verdict(self, watch.compared > 0 && watch.disagreements == 0, text);
+        if watch.has_process_data() {
+            let text = format!(
+                "outputs and inputs agree with the simulated devices: {} comparisons, {} failed",
+                watch.compared, watch.disagreements
+            );
+            verdict(self, watch.compared > 0 && watch.disagreements == 0, text);
+        } else {
+            verdict(self, true, "no SubDevice has process data, so none was compared".to_owned());
+        }
         for text in &watch.described {
             self.say(&format!("         {text}"));
         }
@@ -183,6 +190,6 @@ impl Reporter {
             );
             verdict(self, drive.follows(), text);
         }
-        all
+        Verdict::of(failed, "everything held")
     }
 }

@@ -86,6 +86,11 @@ impl Watch {
         }
     }
 
+    /// Whether there is anything to compare.
+    pub fn has_process_data(&self) -> bool {
+        self.places.iter().any(|place| !(place.outputs.is_empty() && place.inputs.is_empty()))
+    }
+
     /// The simulated device at a position.
     pub fn device(&self, position: usize) -> DeviceIndex {
         self.places[position].device

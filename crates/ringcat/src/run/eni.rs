@@ -54,6 +54,9 @@ impl EniArguments {
     pub fn load(&self) -> Result<Option<EniNetwork>, Failure> {
         let Some(path) = &self.eni else { return Ok(None) };
         let file = EniFile::load(path).map_err(|error| Failure::new(error.to_string()))?;
+        if file.configuration.declaration.subdevices.is_empty() {
+            return Err(Failure::new(format!("{}: the file describes no SubDevice", path.display())));
+        }
         if !file.configuration.notices.is_empty() {
             say!("{}: not followed, or done in another way:", path.display());
             file.configuration.notices.iter().for_each(|notice| say!("  {notice}"));
@@ -93,6 +96,11 @@ impl EniNetwork {
             return Err(Failure::new("the network is not the one of the file: correct the file, or the network"));
         }
         Ok(self.file.declaration(self.split_lrw))
+    }
+
+    /// How many SubDevices are there and not in the file. [`EniNetwork::declaration`] tells each; they stay in INIT.
+    pub fn undeclared(&self, found: &[SubDeviceInfo]) -> usize {
+        self.file.compare(found).iter().filter(|difference| difference.subdevice.is_none()).count()
     }
 
     /// Cables that are not where the file says. The network works all the same.

@@ -9,8 +9,8 @@ use std::time::Duration;
 use ringcat::news::News;
 use ringcat::text::Names;
 use ringcat::{
-    ClockStatus, DomainId, DomainState, Instant, Link, Redundancy, RedundancyLoss, RingState, RingStatus,
-    SubDeviceState, SupervisorThread,
+    ClockStatus, DomainId, Instant, Link, Redundancy, RedundancyLoss, RingState, RingStatus, SubDeviceState,
+    SupervisorThread,
 };
 use ringcat_wire::al::AlState;
 
@@ -78,15 +78,16 @@ fn table(
 ) -> Vec<String> {
     let (pace, counters, status) = (news.pace(), news.counters(), news.status(DomainId(0)));
     let us = |time: Duration| time.as_nanos() as f64 / 1e3;
-    let judgement = match status.state {
-        DomainState::Zero => "nobody answers",
-        DomainState::Incomplete => "incomplete",
-        DomainState::Complete => "complete",
-    };
+    let judgement = status.in_words();
     let (trips, wake_ups) = (news.round_trips(), news.wake_ups());
     let mut lines = vec![
         format!("{} cycles   wkc {} of {}, {judgement}", pace.cycles, status.wkc, status.expected),
-        format!("the wire      {} frames lost, {} late, {} corrupt", counters.lost, counters.late, counters.corrupt),
+        format!(
+            "the wire      {} frames missing, {} too late, {} damaged",
+            counters.missing(),
+            counters.lost_late,
+            counters.lost_damaged
+        ),
         format!("this machine  {} late wake-ups, {} cycles left out", pace.late, pace.skipped),
     ];
     for (title, times) in [("round trips", trips), ("wake-ups", wake_ups)] {

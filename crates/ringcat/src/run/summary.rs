@@ -20,17 +20,22 @@ const LAST_FRAMES: Duration = Duration::from_millis(20);
 pub fn summary(application: &Application<Tee<PacketLinks>, SupervisorThread>, surroundings: &Surroundings) {
     let (pace, cyclic, acyclic) = (application.pace(), application.cyclic_counters(), application.acyclic_counters());
     say!("\nsummary");
-    say!("  cycles: {}, judged not complete: {}, frames still out: {}", pace.cycles, cyclic.incomplete, cyclic.skipped);
+    say!("  cycles: {}, incomplete: {}, frames still out: {}", pace.cycles, cyclic.incomplete, cyclic.skipped);
     say!(
-        "  this machine: {} late wake-ups (more than a tenth of the cycle), {} cycles left out, the latest by {:.3} ms",
+        "  this machine: {} late wake-ups, the latest by {:.3} ms; {} cycles left out",
         pace.late,
-        pace.skipped,
-        pace.longest_delay.as_secs_f64() * 1e3
+        pace.longest_delay.as_secs_f64() * 1e3,
+        pace.skipped
     );
     say!(
-        "  the wire: {} frames sent, {} lost, {} copies lost, {} late, {} corrupt",
+        "  the wire: {} frames sent; {} missing, {} too late, {} damaged",
         cyclic.sent,
-        cyclic.lost,
+        cyclic.missing(),
+        cyclic.lost_late,
+        cyclic.lost_damaged
+    );
+    say!(
+        "  copies: {} lost of frames that came, {} late, {} corrupt",
         cyclic.copies_lost + cyclic.half,
         cyclic.late,
         cyclic.corrupt
@@ -39,8 +44,8 @@ pub fn summary(application: &Application<Tee<PacketLinks>, SupervisorThread>, su
         let (frames, senders) = (cyclic.foreign + acyclic.foreign, surroundings.senders());
         say!("  other MainDevices: {frames} frames, {senders}");
     }
-    say!("  round trips of process data: {}", application.round_trips());
-    say!("  wake-ups after their time: {}", application.news().wake_ups());
+    say!("  round trips: {}", application.round_trips());
+    say!("  wake-ups: {}", application.news().wake_ups());
 }
 
 /// How the clocks kept together.
@@ -56,7 +61,7 @@ pub fn clock_account(clocks: &[ClockStatus], news: &News, names: &Names) {
         );
     }
     if news.phase_errors().count() > 0 {
-        say!("  cycles from their phase, by the reference clock: {}", news.phase_errors());
+        say!("  cycles from their phase: {}", news.phase_errors());
     }
 }
 
@@ -70,23 +75,23 @@ pub fn final_account(links: &mut Tee<PacketLinks>, supervisor: &SupervisorThread
     for link in [Link::Main, Link::Redundant] {
         let Some(counters) = links.links().counters(link) else { continue };
         say!(
-            "  process data on {link}: {} sent, {} received; not sent: {} interface down, {} queue full, {} refused; {} overrun",
+            "  process data on {link}: {} sent, {} received, {} overrun",
             counters.sent,
             counters.received,
-            counters.down,
-            counters.busy,
-            counters.refused,
             counters.overrun
         );
+        let (down, busy, refused) = (counters.down, counters.busy, counters.refused);
+        if down + busy + refused > 0 {
+            say!("    not sent: {down} interface down, {busy} queue full, {refused} refused");
+        }
     }
     let acyclic = supervisor.counters();
     say!(
-        "  everything else: {} frames sent with {} datagrams, {} lost, {} copies lost, {} late; {} datagrams sent again",
+        "  everything else: {} frames sent, {} lost, {} copies lost, {} late",
         acyclic.sent,
-        acyclic.datagrams,
         acyclic.lost,
         acyclic.half,
-        acyclic.late,
-        acyclic.resent
+        acyclic.late
     );
+    say!("    {} datagrams, {} of them sent again", acyclic.datagrams, acyclic.resent);
 }

@@ -103,7 +103,7 @@ impl Plant {
         for cause in LossCause::ALL {
             let lost = self.network.statistics().lost(cause);
             if lost > 0 {
-                let _ = writeln!(text, "lost, {cause:?}: {lost}");
+                let _ = writeln!(text, "lost, {cause}: {lost}");
             }
         }
         text.truncate(text.trim_end().len());

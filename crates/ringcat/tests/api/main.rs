@@ -3,6 +3,7 @@
 mod declarations;
 mod demo;
 mod ethernet;
+mod exit_codes;
 mod gateway;
 mod junctions;
 mod names;
