@@ -15,8 +15,8 @@ use crate::verdict::Verdict;
 
 /// How to read what it prints.
 const ABOUT_RING: &str = "\
-It only reads, so that a segment in operation stays in operation; but do not run it beside another MainDevice that counts
-its frames. Counters end at 255, and nothing here clears them: look at them twice (--for) to see which ones rise. A cable
+It only reads, so that a segment without a MainDevice stays as it is. Beside another MainDevice it refuses to begin: reading
+clears what that one waits for. Counters end at 255, and nothing here clears them: look at them twice (--for) to see which ones rise. A cable
 whose counter rises has a bad plug, or is bent, or lies beside something that disturbs it.
 
 It knows nobody who does not answer: with two breaks, those between them are missing in the counts, the positions of those

@@ -13,9 +13,10 @@ use crate::verdict::Verdict;
 
 /// What else there is to know.
 const ABOUT_SCAN: &str = "\
-A scan takes a segment that is in operation out of it: all SubDevices go to INIT. It waits up to 5 s for the first one to
-answer. What is odd about the cables and EEPROMs goes to the standard error output, the table or JSON to the standard
-output.";
+A scan takes a segment that is in operation out of it: all SubDevices go to INIT. So it refuses to begin where another
+MainDevice uses the interface or sends into the segment; --force goes on all the same. It waits up to 5 s for the first
+SubDevice to answer. What is odd about the cables and EEPROMs goes to the standard error output, the table or JSON to the
+standard output.";
 
 /// Options of `ringcat scan`.
 #[derive(Args, Debug)]

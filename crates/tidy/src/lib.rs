@@ -8,7 +8,8 @@
 //! * [`modules`]: allowed arrows between the modules of the engine;
 //! * [`safety`]: where `unsafe` may be written;
 //! * [`features`]: every row of `docs/FEATURES.md` names tests that exist;
-//! * [`paths`]: the places that `docs/ARCHITECTURE.md` names exist.
+//! * [`paths`]: the places that `docs/ARCHITECTURE.md` names exist;
+//! * [`toolchain`]: one minimum Rust version in all places that name it.
 //!
 //! [`tokens`] is the little Rust lexer under them, so that words in comments and strings are not taken for code.
 #![forbid(unsafe_code)]
@@ -20,6 +21,7 @@ pub mod modules;
 pub mod paths;
 pub mod safety;
 pub mod tokens;
+pub mod toolchain;
 pub mod tree;
 
 use std::fmt;

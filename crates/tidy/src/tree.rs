@@ -1,4 +1,4 @@
-//! The files that are checked: everything below `crates/`, `ci/` and `docs/`, read once.
+//! The files that are checked: everything below `crates/`, `ci/` and `docs/`, and some at the root, read once.
 //!
 //! In goes the root of the repository, out come paths and texts, sorted. Build output is left out.
 
@@ -37,6 +37,9 @@ pub struct Tree {
 /// Directories of the repository that are read.
 const ROOTS: [&str; 3] = ["crates", "ci", "docs"];
 
+/// Files at the root that are read.
+const AT_THE_ROOT: [&str; 3] = [".ci/run", "Cargo.toml", "README.md"];
+
 /// Kinds of files that are read.
 const EXTENSIONS: [&str; 3] = ["rs", "toml", "md"];
 
@@ -53,6 +56,11 @@ impl Tree {
             let path = root.join(directory);
             if path.is_dir() {
                 collect(root, &path, &mut files)?;
+            }
+        }
+        for path in AT_THE_ROOT {
+            if let Ok(text) = fs::read_to_string(root.join(path)) {
+                files.push(File::new(path, &text));
             }
         }
         files.sort_by(|a, b| a.path.cmp(&b.path));

@@ -1,7 +1,7 @@
 //! The rules, applied to this repository.
 
 use tidy::tree::Tree;
-use tidy::{Finding, crates, features, files, modules, paths, safety};
+use tidy::{Finding, crates, features, files, modules, paths, safety, toolchain};
 
 fn tree() -> Tree {
     Tree::of_this_repository().expect("the repository can be read")
@@ -70,4 +70,9 @@ fn every_feature_has_a_test() {
 #[test]
 fn the_map_leads_somewhere() {
     none(paths::leading_nowhere(&tree()));
+}
+
+#[test]
+fn one_minimum_rust_version_is_named_everywhere() {
+    none(toolchain::disagreements(&tree()));
 }

@@ -5,7 +5,7 @@ use std::time::Duration;
 use ringcat::simulated::SimulatedSegment;
 use ringcat::{
     Application, Declaration, Direction, DomainConfig, DomainId, DomainMember, DomainState, Error, Event, MainDevice,
-    Options, PdoEntry, PdoMapping, SubDeviceConfig, SubDeviceState, automatic,
+    Options, PdoEntry, PdoMapping, SubDeviceConfig, SubDeviceState, SyncSignals, automatic,
 };
 use ringcat_wire::al::AlState;
 
@@ -82,6 +82,16 @@ fn what_is_wrong_is_named_and_the_main_device_is_there_for_another_try() -> Resu
     wrong.subdevices[1] = SubDeviceConfig::at_position(1).expect_product(0xC47, 0x1234);
     let (text, main_device) = refusal(main_device, wrong);
     assert!(text.contains("SubDevice 1: expected product code 0x00001234, got 0x07d80008"), "{text}");
+
+    let (text, main_device) = refusal(main_device, Declaration { domains: Vec::new(), ..good.clone() });
+    assert!(text.contains("declaration 1 has process data and there is no domain to exchange it"), "{text}");
+
+    let mut sync = good.clone();
+    sync.subdevices[1].sync = Some(SyncSignals::sync0(300_000, 0));
+    let (text, main_device) = refusal(main_device, sync);
+    let expected = "activation: declaration 1: SYNC0 every 300 us does not go with cycles of 1000 us: one must be a \
+                    multiple of the other";
+    assert_eq!(text, expected);
 
     let mut application = main_device.activate(good)?;
     run(&mut application, 100);

@@ -9,10 +9,11 @@ use std::thread::sleep;
 use std::time::{Duration, Instant};
 
 use ringcat::shared_segment::SharedSegment;
-use ringcat::{DomainId, Error, LastOutputs, Links, Options, SupervisorThread, automatic};
+use ringcat::{DomainId, Error, LastOutputs, Link, Links, Options, SupervisorThread, automatic};
 use ringcat_sim::network::Network;
 use ringcat_sim::segment::Segment;
 use ringcat_wire::al::{AlState, AlStatus};
+use ringcat_wire::frame::MacAddress;
 
 const SEGMENT: &str = "[segment]\nring = true\n[[device]]\ntype = \"coupler\"\n[[device]]\ntype = \"digital-output-8\"\n\
                        [[device]]\ntype = \"servo\"\n";
@@ -169,5 +170,70 @@ fn a_panic_of_the_closure_is_an_error_of_its_own_and_the_bus_is_stopped_in_order
         assert!(network.devices().all(|device| device.al_status() == AlStatus::new(AlState::Init)));
     });
     assert_eq!(Error::Panicked(panicked.message).to_string(), words);
+    Ok(())
+}
+
+/// Links that are deaf while they sleep, as those on network interfaces are. Of two copies the one comes first that has
+/// passed all SubDevices, and the other one after it was taken.
+struct Deaf {
+    links: SharedSegment,
+    arrived: Vec<(Link, Vec<u8>)>,
+    has_taken: bool,
+}
+
+impl Links for Deaf {
+    fn now(&self) -> ringcat::Instant {
+        self.links.now()
+    }
+
+    fn addresses(&self) -> (MacAddress, Option<MacAddress>) {
+        self.links.addresses()
+    }
+
+    fn send(&mut self, link: Link, frame: &[u8]) {
+        self.links.send(link, frame);
+    }
+
+    fn receive(&mut self, take: &mut dyn FnMut(Link, &[u8])) -> bool {
+        let Deaf { links, arrived, has_taken } = self;
+        while links.receive(&mut |link, frame| arrived.push((link, frame.to_vec()))) {}
+        if std::mem::replace(has_taken, false) || arrived.is_empty() {
+            return false;
+        }
+        let first = arrived.iter().position(|(link, _)| *link == Link::Redundant).unwrap_or(0);
+        let (link, frame) = arrived.remove(first);
+        take(link, &frame);
+        *has_taken = true;
+        true
+    }
+
+    fn wait(&mut self, until: ringcat::Instant) {
+        if self.arrived.is_empty() {
+            self.links.wait(until);
+        }
+    }
+
+    fn sleep(&mut self, until: ringcat::Instant) {
+        sleep(until.since(self.now()));
+    }
+}
+
+#[test]
+fn second_copies_are_waited_for_and_no_round_trip_is_as_long_as_a_cycle() -> Result<(), Error> {
+    // Long beside the way of a frame, and beside what a busy machine adds to it.
+    const LONG: Duration = Duration::from_millis(40);
+    let (cyclic, acyclic) = SharedSegment::halves(network());
+    let supervisor = SupervisorThread::start(acyclic, &Options::default(), || ())?;
+    let scan = supervisor.scan()?;
+    let application = supervisor
+        .activate(automatic(&scan.subdevices, LONG), Deaf { links: cyclic, arrived: Vec::new(), has_taken: false })?;
+    let cycles = application.start_cycles(|| (), |_| ControlFlow::Continue(()))?;
+    until("all are in OP", || cycles.supervisor().all_settled());
+    cycles.news().restart_histograms();
+    let before = cycles.news().counters().received;
+    until("frames return", || cycles.news().counters().received > before + 20);
+    let trips = cycles.news().round_trips();
+    assert!(trips.count() > 20 && trips.quantile(800_000) < LONG / 4, "{trips}");
+    cycles.end()?.stop(LastOutputs::Zero, AlState::Init, LIMIT)?;
     Ok(())
 }

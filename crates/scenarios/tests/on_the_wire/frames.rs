@@ -78,12 +78,12 @@ fn a_ring_of_16_at_1_khz_loses_no_frame_that_the_simulator_did_not_drop() {
 
     let links = [Link::read(&output, &status, "MAIN", "main"), Link::read(&output, &status, "REDUNDANT", "redundant")];
     let sum = |figure: fn(&Link) -> u64| links.iter().map(figure).sum::<u64>();
-    let wire = line(&output, "the wire:");
+    let copies = line(&output, "copies:");
     let other = line(&output, "everything else:");
     let acyclic = figure(other, " frames sent");
     let acyclic_missing = 2 * figure(other, " lost") + figure(other, " copies lost");
     let missing = sum(|link| link.sent) - sum(|link| link.received);
-    let (late, overrun) = (figure(wire, " late"), sum(|link| link.overrun));
+    let (late, overrun) = (figure(copies, " late"), sum(|link| link.overrun));
     println!(
         "copies of process data: {} sent, {missing} not received, {overrun} of them in a full ring; {late} late\n\
          simulator: {} frames into the segment, {lost_inside} dropped, {} out of it",

@@ -13,6 +13,7 @@ mod clocks_in_a_ring;
 mod cuts_beside;
 mod eni;
 mod ethernet;
+mod exit_codes;
 mod foreign;
 mod frames;
 mod gateway;

@@ -8,7 +8,7 @@ use crate::{Plant, RING_OF_16, said};
 
 const TERMINAL: Plant = Plant { outputs: 1, inputs: 0, servos: 0, coupler: false };
 /// Sends frames back as they came, as a cable into a switch or a loop does.
-const MIRROR: &str = "
+pub const MIRROR: &str = "
 import socket
 s = socket.socket(socket.AF_PACKET, socket.SOCK_RAW, socket.htons(0x88A4))
 s.bind(('sim0', 0x88A4))
@@ -129,7 +129,7 @@ fn a_main_device_at_the_other_end_of_the_segment_is_told_once_and_counted() {
     let run = bench.start_ringcat(&["run", "--main", "main0", "--for", "3s"]);
     await_op(&bench, 1);
     bench.set_link("sim1", "up");
-    let other = bench.start_other_ringcat(&["scan", "--main", "main1"]);
+    let other = bench.start_other_ringcat(&["scan", "--main", "main1", "--force"]);
     // It cannot get an answer: the segment leads its frames to us, and ours to it.
     let (_, errors) = said(&finish(other));
     assert_eq!(errors.matches(OTHER_MAIN_DEVICE).count(), 1, "{errors}");
@@ -140,4 +140,23 @@ fn a_main_device_at_the_other_end_of_the_segment_is_told_once_and_counted() {
     assert_eq!(errors.matches(OTHER_MAIN_DEVICE).count(), 1, "{errors}");
     assert!(errors.contains("arrive on main0 (MAIN)"), "{errors}");
     assert!(output.contains("  other MainDevices: "), "{output}");
+}
+
+#[test]
+fn both_ends_of_a_veth_pair_in_one_namespace_are_no_cable_that_was_plugged_in_wrong() {
+    let Some(bench) = Bench::new(1) else { return };
+    bench.ip_main("link add near type veth peer name far");
+    for interface in ["near", "far"] {
+        bench.ip_main(&format!("link set {interface} addrgenmode none"));
+        bench.ip_main(&format!("link set {interface} up"));
+    }
+    let segment = concat!(env!("CARGO_MANIFEST_DIR"), "/../sim/segments/demo.toml");
+    let simulator = bench.run_ringcat(&["sim", "--main", "far", "--segment", segment]);
+    while !simulator.said().so_far().contains("SubDevices are on the wire") {
+        std::thread::sleep(Duration::from_millis(20));
+    }
+    let output = bench.ringcat(&["scan", "--main", "near"]);
+    let (listed, errors) = said(&output);
+    assert_eq!(output.status.code(), Some(0), "{listed}{errors}");
+    assert!(listed.contains("result: ok: 19 SubDevices") && !errors.contains("arrive on"), "{listed}{errors}");
 }
