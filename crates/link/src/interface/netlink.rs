@@ -116,13 +116,14 @@ mod tests {
 
     #[test]
     fn the_other_end_of_a_pair_is_told_where_it_is_in_the_same_namespace() {
-        let mut pair = vec![0; ATTRIBUTES];
+        let empty = || answer()[..ATTRIBUTES].to_vec();
+        let mut pair = empty();
         pair.extend(attribute(libc::IFLA_LINK, &9u32.to_ne_bytes()));
         pair.extend(attribute(libc::IFLA_LINKINFO, &attribute(libc::IFLA_INFO_KIND, b"veth\0")));
         assert_eq!(parse(&pair).expect("an answer").peer, Some(9));
         pair.extend(attribute(libc::IFLA_LINK_NETNSID, &0u32.to_ne_bytes()));
         assert_eq!(parse(&pair).expect("an answer").peer, None);
-        let mut above = vec![0; ATTRIBUTES];
+        let mut above = empty();
         above.extend(attribute(libc::IFLA_LINK, &9u32.to_ne_bytes()));
         above.extend(attribute(libc::IFLA_LINKINFO, &attribute(libc::IFLA_INFO_KIND, b"macvlan\0")));
         assert_eq!(parse(&above).expect("an answer").peer, None, "it lies on top of the other one");
