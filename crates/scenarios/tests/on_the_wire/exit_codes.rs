@@ -312,3 +312,29 @@ fn a_bus_with_more_than_the_eni_says_runs_and_fails_with_what_the_file_lacks() {
     std::fs::remove_file(&file).expect("it was written");
     findings.assert_none();
 }
+
+#[test]
+fn on_one_processor_no_thread_spins_limits_hold_and_signals_are_obeyed() {
+    let Some(mut bench) = Bench::new(1) else { return };
+    bench.simulate(&PLANT.segment(), false);
+    let program = crate::bench::program("ringcat").display().to_string();
+    let on_one = |line: &str| {
+        let program = [&["-c", "0", &program][..], &words(line)].concat();
+        bench.start(Path::new("taskset"), &program)
+    };
+    let run = "run --main main0 --receive busy --priority 40";
+    for signal in [None, Some("-TERM"), Some("-INT"), Some("-HUP")] {
+        let child = on_one(&if signal.is_some() { run.to_owned() } else { format!("{run} --for 500ms") });
+        if let Some(signal) = signal {
+            await_op(&bench, SUBDEVICES);
+            std::thread::sleep(PAUSE);
+            let process = child.id().to_string();
+            assert!(Command::new("kill").args([signal, &process]).status().is_ok_and(|status| status.success()));
+        }
+        let (output, errors) = said(&finish(child));
+        assert!(errors.contains("this process may use one processor only, so no thread spins"), "{errors}");
+        assert!(output.contains("stopped: outputs zero, all SubDevices in INIT"), "{signal:?}: {output}{errors}");
+        assert!(output.trim_end().lines().last().is_some_and(|line| line.starts_with("result: ")), "{output}");
+        assert_eq!(states(&bench, "INIT"), SUBDEVICES, "{signal:?}");
+    }
+}
