@@ -1,8 +1,8 @@
 //! Signals that ask a program to end, taken by a thread that waits for them.
 //!
-//! A handler runs in a thread that the kernel chooses, usually the first one of the process. That thread may never run while
-//! another one spins with a real-time priority. So the signals are held back in all threads, and one thread with a priority
-//! above all others waits for them.
+//! A handler runs in a thread that the kernel chooses, usually the first one of the process. That thread may never run
+//! while another one spins with a real-time priority. So the signals are held back in all threads, and one thread with
+//! a priority above all others waits for them.
 
 use std::fmt;
 use std::mem::zeroed;

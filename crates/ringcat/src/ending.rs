@@ -1,9 +1,10 @@
-//! How commands end that go on until they are asked to: by a signal, or at a time that passes while the command is held up.
+//! How commands end that go on until they are asked to: by a signal, or at a time that passes while the command is held
+//! up.
 //!
-//! A thread of its own waits for the signals, with a real-time priority above that of the cycles where they have one: it runs
-//! whatever starves. Cycles look at the request themselves ([`EndRequest::is_asked`] is an atomic), so they end, and then
-//! there is a processor for the orderly stop. A second signal ends the program at once, and so does a stop that takes too
-//! long.
+//! A thread of its own waits for the signals, with a real-time priority above that of the cycles where they have one:
+//! it runs whatever starves. Cycles look at the request themselves ([`EndRequest::is_asked`] is an atomic), so they
+//! end, and then there is a processor for the orderly stop. A second signal ends the program at once, and so does a
+//! stop that takes too long.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicI32, AtomicU64, Ordering};
@@ -40,8 +41,8 @@ struct Shared {
 }
 
 impl EndRequest {
-    /// SIGINT, SIGTERM and SIGHUP ask for an orderly end from now on. `priority` is the one that cycles have. To be called
-    /// before there are other threads.
+    /// SIGINT, SIGTERM and SIGHUP ask for an orderly end from now on. `priority` is the one that cycles have. To be
+    /// called before there are other threads.
     pub fn watch(priority: Option<i32>) -> Result<EndRequest, Failure> {
         let held = HeldSignals::hold();
         let shared = Arc::new(Shared { asked: AtomicI32::new(0), limit: AtomicU64::new(u64::MAX) });

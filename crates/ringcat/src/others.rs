@@ -1,9 +1,9 @@
 //! Another MainDevice on the interface: commands that send refuse to begin beside it.
 //!
 //! Two MainDevices on one segment take each other's SubDevices down: a scan brings all of them to INIT, and reading a
-//! register such as 0x0110 clears what its owner waits for. Another one shows by its socket, on this host, or by its frames,
-//! wherever it is. Nothing is sent before both were looked for. What sees nothing here: a MainDevice that takes its frames
-//! from the interface below the packet sockets (AF_XDP) and is silent while it is listened to.
+//! register such as 0x0110 clears what its owner waits for. Another one shows by its socket, on this host, or by its
+//! frames, wherever it is. Nothing is sent before both were looked for. What sees nothing here: a MainDevice that takes
+//! its frames from the interface below the packet sockets (AF_XDP) and is silent while it is listened to.
 
 use std::fmt;
 use std::time::{Duration, Instant};

@@ -1,7 +1,7 @@
 //! What became of frames of which no copy came back in time: they came too late, came damaged, or never came.
 //!
-//! Known by their sequence for as long as 256 newer frames take. Nothing here is in the way of a frame that comes back in
-//! time.
+//! Known by their sequence for as long as 256 newer frames take. Nothing here is in the way of a frame that comes back
+//! in time.
 
 use alloc::boxed::Box;
 
