@@ -28,8 +28,11 @@ pub struct CyclicThread<L> {
     news: Arc<News>,
     end: Arc<AtomicBool>,
     panicked: Arc<AtomicBool>,
-    thread: Option<JoinHandle<Result<Application<L, SupervisorThread>, Box<Panicked<L>>>>>,
+    thread: Option<JoinHandle<Ended<L>>>,
 }
+
+/// The application when its cycles have ended.
+pub type Ended<L> = Result<Application<L, SupervisorThread>, Box<Panicked<L>>>;
 
 /// The closure of the cycles has panicked. The application is as it was, with all outputs zero: it can be stopped in order,
 /// or run cycles with another closure.
@@ -132,7 +135,7 @@ impl<L> CyclicThread<L> {
     ///
     /// # Panics
     /// The thread itself has: a fault of this crate, with the message of that panic.
-    pub fn end(mut self) -> Result<Application<L, SupervisorThread>, Box<Panicked<L>>> {
+    pub fn end(mut self) -> Ended<L> {
         self.end.store(true, Ordering::Relaxed);
         match self.thread.take().map(JoinHandle::join) {
             Some(Ok(ended)) => ended,

@@ -232,7 +232,7 @@ fn check_sync_cycles(declaration: &Declaration, period: Duration) -> Result<(), 
     let period_ns = period.as_nanos();
     for (subdevice, config) in declaration.subdevices.iter().enumerate() {
         let sync0_ns = config.sync.map_or(0, |signals| u128::from(signals.sync0_cycle_ns));
-        let fits = sync0_ns == 0 || period_ns == 0 || sync0_ns % period_ns == 0 || period_ns % sync0_ns == 0;
+        let fits = sync0_ns == 0 || period_ns == 0 || sync0_ns % period_ns == 0 || period_ns.is_multiple_of(sync0_ns);
         if !fits {
             let sync0 = Duration::from_nanos(config.sync.map_or(0, |signals| signals.sync0_cycle_ns.into()));
             return Err(ActivateError::SyncCycle { subdevice, sync0, period });
