@@ -41,6 +41,7 @@ impl fmt::Display for LossCause {
             LossCause::NoCarrier => "interface without carrier",
             LossCause::Oversized => "longer than an interface sends",
             LossCause::TransmitQueueFull => "transmit queue of the interface full",
+            LossCause::TooManyDatagrams => "more datagrams than the segment takes",
             LossCause::DeadCable => "on a cable that was cut or lost its power",
             LossCause::OpenPort => "out of an open port without cable",
             LossCause::NoLink => "link not detected yet",
