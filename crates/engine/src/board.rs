@@ -4,6 +4,7 @@
 //! take part in process data. Readers look at the latest value, so nothing is lost when they are slow.
 
 pub mod clocks;
+pub mod traffic;
 
 use alloc::vec::Vec;
 use core::sync::atomic::{AtomicU32, AtomicU64, Ordering};
@@ -121,7 +122,7 @@ pub struct CyclicFrames {
 pub struct Board {
     supervision: AtomicU64,
     /// Counts supervision results; 0 = none yet.
-    supervision_count: AtomicU32,
+    supervision_count: AtomicU64,
     ring: AtomicU64,
     cycles: AtomicU64,
     frames: [AtomicU64; 2],
@@ -138,6 +139,8 @@ pub struct Board {
     unproven: Vec<AtomicU64>,
     /// Distributed clocks.
     pub clocks: clocks::ClockWords,
+    /// Frames of the cyclic half on the wire.
+    pub traffic: traffic::Traffic,
 }
 
 impl Board {
@@ -145,7 +148,7 @@ impl Board {
     pub fn new(subdevices: usize) -> Board {
         Board {
             supervision: AtomicU64::new(0),
-            supervision_count: AtomicU32::new(0),
+            supervision_count: AtomicU64::new(0),
             ring: AtomicU64::new(0),
             cycles: AtomicU64::new(0),
             frames: [AtomicU64::new(0), AtomicU64::new(0)],
@@ -156,6 +159,7 @@ impl Board {
             taking_part_changes: AtomicU32::new(0),
             optional: Vec::new(),
             clocks: clocks::ClockWords::default(),
+            traffic: traffic::Traffic::default(),
         }
     }
 
@@ -191,13 +195,13 @@ impl Board {
         self.supervision.store(supervision.pack(), Ordering::Relaxed);
         // Single writer: a plain store of the next number is enough, and cheaper than a read-modify-write.
         let count = self.supervision_count.load(Ordering::Relaxed);
-        self.supervision_count.store(count.wrapping_add(1).max(1), Ordering::Release);
+        self.supervision_count.store(count + 1, Ordering::Release);
     }
 
     /// The latest supervision result and its number; `None` before the first.
     pub fn supervision(&self) -> Option<(u32, Supervision)> {
         let count = self.supervision_count.load(Ordering::Acquire);
-        (count != 0).then(|| (count, Supervision::unpack(self.supervision.load(Ordering::Relaxed))))
+        (count != 0).then(|| (count as u32, Supervision::unpack(self.supervision.load(Ordering::Relaxed))))
     }
 
     /// The state of the ring; its changes are counted here.
@@ -212,12 +216,15 @@ impl Board {
         RingWord::unpack(self.ring.load(Ordering::Acquire))
     }
 
-    /// A cycle was sent; the frames so far.
-    pub(crate) fn post_cycle(&self, frames: CyclicFrames) {
-        self.frames[0].store(frames.sent, Ordering::Relaxed);
-        self.frames[1].store(frames.lost, Ordering::Relaxed);
-        let cycles = self.cycles.load(Ordering::Relaxed);
-        self.cycles.store(cycles + 1, Ordering::Release);
+    /// So many cycles were sent, with so many frames.
+    pub(crate) fn post_cycle(&self, cycles: u64, frames: u64) {
+        self.frames[0].store(frames, Ordering::Relaxed);
+        self.cycles.store(cycles, Ordering::Release);
+    }
+
+    /// So many frames were lost.
+    pub(crate) fn post_lost(&self, frames: u64) {
+        self.frames[1].store(frames, Ordering::Relaxed);
     }
 
     /// Cycles that the exchange has sent: 0 until the application runs it.

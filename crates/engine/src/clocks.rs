@@ -14,13 +14,15 @@ pub mod delay;
 pub mod follow;
 pub mod measurement;
 pub mod start;
+mod window;
 pub mod wiring;
 
 pub use cables::Cables;
 pub use delay::{Delays, Passage, PortTimes, Segment};
 pub use follow::{Follower, phase_error};
-pub use measurement::{Latched, Measurements};
+pub use measurement::{Disagreement, Latched, Measurements};
 pub use start::first_pulse;
+pub(crate) use window::SyncWindow;
 pub use wiring::Wiring;
 
 /// Fractional bits of times in nanoseconds here: halves add up over hundreds of hops.

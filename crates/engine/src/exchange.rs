@@ -32,7 +32,7 @@ pub use domain::Domain;
 pub use entry::Entry;
 pub use foreign::ForeignFrame;
 
-use crate::board::{Board, CyclicFrames};
+use crate::board::Board;
 use crate::domain::{DomainId, DomainState, DomainStatus};
 use crate::event::CyclicEvent;
 use crate::layout::Layout;
@@ -153,10 +153,12 @@ impl Exchange {
         self.taken = index;
         match frame.receive(copy, arrived_on, bytes, domain.inputs_mut(), self.cycle, &mut self.counters) {
             Step::Waiting => {
+                self.board.traffic.post_half_home(copy.sent_on, frame.sequence());
                 self.evidence.hear_early(frame, &self.board);
                 Received::Taken
             }
             Step::Finished => {
+                self.board.traffic.post_home(frame.sequence());
                 self.counters.received += 1;
                 self.evidence.close(frame, &self.board, &mut self.events);
                 Received::Taken
@@ -187,9 +189,13 @@ impl Exchange {
                 wkc += frame.wkc();
                 left = frame.left();
             }
-            let missed = &mut self.missed;
-            if waiting && give_up_overdue(domain, &mut self.frames, set.clone(), now, missed, &mut self.counters) {
-                return domain.status(!judged);
+            if waiting {
+                let (missed, counters) = (&mut self.missed, &mut self.counters);
+                let pending = give_up_overdue(domain, &mut self.frames, set.clone(), now, missed, counters);
+                self.board.post_lost(counters.lost);
+                if pending {
+                    return domain.status(!judged);
+                }
             }
             judged = true;
             if !domain.judge(wkc, complete, left) {
@@ -246,6 +252,7 @@ impl Exchange {
 
     /// Sends what was queued, every frame on all links, and ends the cycle.
     pub fn send(&mut self, now: Instant, transmit: &mut impl FnMut(Link, &[u8])) {
+        self.board.traffic.post_departure(self.cycle);
         for domain in &mut self.domains {
             let Some(set) = domain.leave() else { continue };
             let deadline = Instant(now.0.saturating_add(domain.timeout_ns()));
@@ -275,7 +282,7 @@ impl Exchange {
             }
         }
         self.cycle += 1;
-        self.board.post_cycle(CyclicFrames { sent: self.counters.sent, lost: self.counters.lost });
+        self.board.post_cycle(self.cycle, self.counters.sent);
     }
 
     /// Takes over who takes part in process data, which the supervisor has changed, for frames of a domain that are not

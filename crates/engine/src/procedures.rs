@@ -12,6 +12,7 @@ pub mod fleet;
 mod frame_limit;
 pub mod inspect;
 pub(crate) mod junction;
+mod latch;
 pub mod look_at_ring;
 pub mod mail_watch;
 pub(crate) mod own_objects;

@@ -4,6 +4,7 @@
 //! what they asked for within a byte budget, [`Supervisor::next_deadline`] says when it wants to be polled at the latest.
 //! Procedures see time only through the `now` of these calls.
 
+mod alone;
 pub mod bus;
 mod counters;
 mod executor;
@@ -25,6 +26,7 @@ use alloc::sync::Arc;
 use core::cell::RefCell;
 use core::future::Future;
 
+pub(crate) use alone::Turn;
 pub use bus::{Bus, BusError, Elapsed, Reply};
 pub use counters::AcyclicCounters;
 pub use group::Group;
@@ -117,6 +119,7 @@ impl Supervisor {
             let shared = &mut *self.shared.borrow_mut();
             shared.now = now;
             shared.expire_flights();
+            shared.expire_alone();
             shared.fire_timers();
         }
         self.executor.run();

@@ -84,7 +84,7 @@ impl<L: Links, H: AcyclicHalf> Application<L, H> {
             if self.cyclic.begins(now) {
                 return (now, looked_at);
             }
-            let wake = self.cyclic.wake().min(self.acyclic.wake());
+            let wake = self.cyclic.wake(now).min(self.acyclic.wake());
             if H::SHARES_LINKS || self.cyclic.exchange.awaits_copies() {
                 self.links.wait(wake.max(now));
             } else {

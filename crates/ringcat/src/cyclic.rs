@@ -20,6 +20,8 @@ use crate::window::{Half, SHORTEST, Window};
 
 /// A cycle is late when it begins this part of its period after its time.
 const LATE_FRACTION: u32 = 10;
+/// Between two looks whether a pause has ended.
+const PAUSE_LOOK: Duration = Duration::from_micros(20);
 /// Period of an application without domains.
 const IDLE_PERIOD: Duration = Duration::from_millis(1);
 
@@ -45,6 +47,8 @@ pub(crate) struct Cyclic {
     cycle: u64,
     /// Most cycles of a domain that may be under way at once.
     under_way: u32,
+    /// A cycle was due and waits because the acyclic half has asked for a pause.
+    held: bool,
     window: Arc<Window>,
 }
 
@@ -73,6 +77,7 @@ impl Cyclic {
             earliest: next_cycle,
             cycle: 0,
             under_way: active.under_way.into(),
+            held: false,
             window,
         }
     }
@@ -106,13 +111,24 @@ impl Cyclic {
         self.news.round_trips().record(received_at.since(left_at));
     }
 
-    /// Whether a cycle begins now.
-    pub fn begins(&self, now: Instant) -> bool {
-        now >= self.next_cycle || (self.may_begin_early() && now >= self.earliest)
+    /// Whether a cycle begins now. One that is due waits where the acyclic half has asked for a pause.
+    pub fn begins(&mut self, now: Instant) -> bool {
+        let is_due = now >= self.next_cycle || (self.may_begin_early() && now >= self.earliest);
+        let pause_until = self.exchange.pause_until();
+        let is_paused = is_due && now < pause_until;
+        if is_paused {
+            self.held = true;
+            self.window.expect_cycle(pause_until);
+        }
+        is_due && !is_paused
     }
 
     /// When to look again whether a cycle begins, unless a frame arrives before.
-    pub fn wake(&self) -> Instant {
+    pub fn wake(&self, now: Instant) -> Instant {
+        if now < self.exchange.pause_until() {
+            // A pause may end earlier than was asked for.
+            return now + PAUSE_LOOK;
+        }
         if self.may_begin_early() { self.earliest.min(self.next_cycle) } else { self.next_cycle }
     }
 
@@ -134,17 +150,24 @@ impl Cyclic {
 
     /// Notes how late the cycle is, and when the next one begins; leaves out those whose time has passed meanwhile.
     fn keep_pace(&mut self, now: Instant) {
+        let is_held = core::mem::take(&mut self.held);
         let delay = now.since(self.next_cycle);
         self.pace.cycles += 1;
+        if is_held {
+            self.pace.paused += 1;
+            self.pass_over(now, delay);
+            return;
+        }
         self.pace.last_delay = delay;
         self.pace.longest_delay = self.pace.longest_delay.max(delay);
         self.pace.late += u64::from(delay > self.period / LATE_FRACTION);
         self.news.wake_ups().record(delay);
-        let mut passed_over = 0;
-        if delay >= self.period {
-            passed_over = (delay.as_nanos() / self.period.as_nanos()) as u64;
-            self.pace.skipped += passed_over;
-        }
+        self.pace.skipped += self.pass_over(now, delay);
+    }
+
+    /// Notes when the next cycle begins; returns how many are left out because their time has passed.
+    fn pass_over(&mut self, now: Instant, delay: Duration) -> u64 {
+        let passed_over = (delay.as_nanos() / self.period.as_nanos()) as u64;
         match self.trigger {
             Trigger::Time | Trigger::ReferenceClock { .. } => {
                 let periods = (self.period.as_nanos() as u64).saturating_mul(passed_over + 1);
@@ -156,6 +179,7 @@ impl Cyclic {
                 self.next_cycle = now + self.period * self.under_way;
             }
         }
+        passed_over
     }
 
     /// Moves the next cycle after the reference clock, once for each reading of it.

@@ -18,7 +18,7 @@ use crate::process_data::Rate;
 /// News of the cyclic half.
 #[derive(Debug)]
 pub struct News {
-    pace: [AtomicU64; 5],
+    pace: [AtomicU64; 6],
     counters: [AtomicU64; COUNTERS],
     /// Working counter and what was expected; state and how often the domain was skipped.
     domains: Box<[[AtomicU64; 2]]>,
@@ -71,9 +71,9 @@ impl News {
 
     /// How well the cycles keep to their times.
     pub fn pace(&self) -> Pace {
-        let [cycles, late, skipped, last_delay, longest_delay] = load(&self.pace);
+        let [cycles, late, skipped, paused, last_delay, longest_delay] = load(&self.pace);
         let [last_delay, longest_delay] = [last_delay, longest_delay].map(Duration::from_nanos);
-        Pace { cycles, late, skipped, last_delay, longest_delay }
+        Pace { cycles, late, skipped, paused, last_delay, longest_delay }
     }
 
     /// Counters of process data.
@@ -210,7 +210,7 @@ impl News {
         self.ring.store(ring, Ordering::Relaxed);
         let ns = |time: Duration| u64::try_from(time.as_nanos()).unwrap_or(u64::MAX);
         let delays = [ns(pace.last_delay), ns(pace.longest_delay)];
-        store(&self.pace, &[pace.cycles, pace.late, pace.skipped, delays[0], delays[1]]);
+        store(&self.pace, &[pace.cycles, pace.late, pace.skipped, pace.paused, delays[0], delays[1]]);
         let CyclicCounters {
             sent,
             bytes,

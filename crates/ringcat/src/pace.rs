@@ -32,6 +32,8 @@ pub struct Pace {
     pub late: u64,
     /// Cycles that were left out because their time and that of the next had passed.
     pub skipped: u64,
+    /// Cycles that began later because the wire had to be empty while propagation delays were measured.
+    pub paused: u64,
     /// How late the last cycle began.
     pub last_delay: Duration,
     /// How late the latest cycle began.

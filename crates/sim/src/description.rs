@@ -233,6 +233,8 @@ pub struct DeviceDescription {
     pub receive_jitter: Duration,
     /// The controller latches receive times of frames in processing direction only, unless 0x0936 says otherwise.
     pub latches_processing_only: bool,
+    /// The controller does not tell frames apart when it latches receive times: other frames on the wire spoil them.
+    pub latches_any_frame: bool,
     /// Local clock at power-on.
     pub clock_start_ns: u64,
     /// Where the inputs come from.
@@ -286,6 +288,7 @@ impl DeviceDescription {
             clock_wander: Wander::default(),
             receive_jitter: Duration::ZERO,
             latches_processing_only: false,
+            latches_any_frame: false,
             clock_start_ns: 0,
             behaviour: Behaviour::default(),
             sii_image: None,

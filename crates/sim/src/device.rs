@@ -171,6 +171,7 @@ fn controller_config(description: &DeviceDescription) -> ControllerConfig {
         receive_time_latch_mode: description.latches_processing_only,
         latches_fmmus: description.latches_fmmus,
         fmmu_count: description.controller_fmmus.unwrap_or(ControllerConfig::default().fmmu_count),
+        latches_any_frame: description.latches_any_frame,
         ..ControllerConfig::default()
     }
 }

@@ -49,6 +49,7 @@ pub struct ClockWords {
     spread: AtomicU32,
     is_window_watched: AtomicBool,
     is_reference_led: AtomicBool,
+    are_some_in_front: AtomicBool,
     spread_count: AtomicU32,
     are_ports_guarded: AtomicBool,
     /// How often the exchange stopped handing out a time, and how many of these times the supervisor has answered.
@@ -125,6 +126,16 @@ impl ClockWords {
 
     pub(crate) fn is_reference_led(&self) -> bool {
         self.is_reference_led.load(Ordering::Relaxed)
+    }
+
+    /// Whether there are clocks that frames meet before the reference they follow: they are told what the host believes.
+    pub(crate) fn post_in_front(&self, some: bool) {
+        self.are_some_in_front.store(some, Ordering::Relaxed);
+    }
+
+    /// Whether some difference shows how punctual the host is, so that the OR of all says nothing.
+    pub(crate) fn is_host_told(&self) -> bool {
+        self.is_reference_led() || self.are_some_in_front.load(Ordering::Relaxed)
     }
 
     pub(crate) fn post_spread(&self, spread_ns: u32) {

@@ -16,7 +16,11 @@ use super::{FRACTION, round};
 use crate::topology::PortOf;
 
 /// Longer than this no frame is on its way: a thousand SubDevices take 2 ms.
-const MOST_NS: i64 = 20_000_000;
+pub(super) const MOST_NS: i64 = 20_000_000;
+
+/// Cables that take as long together as they are known to, to within this and so much for each, are those that are known.
+const SAME: i64 = 30 << FRACTION;
+const SAME_CABLE: i64 = 10 << FRACTION;
 
 /// Times at which the frame came in at port 0..3 after it came in at the port of entry, with fraction
 /// ([`super::FRACTION`]). Those of ports that it did not come in at say nothing.
@@ -32,6 +36,8 @@ pub struct Delays {
     pub trees: Vec<usize>,
     /// Some way between two clocks is neither measured nor remembered.
     pub is_guessed: bool,
+    /// Several cables share a time that was measured of them together: the members of a whole ring whose cables nobody knows.
+    pub is_shared: bool,
     /// Some time between two arrivals cannot be: the frame has taken another way.
     pub is_implausible: bool,
 }
@@ -81,8 +87,7 @@ impl Segment<'_> {
     /// What was measured of cables is learned.
     pub fn propagation(&self, times: &[Option<PortTimes>], cables: &mut Cables) -> Delays {
         let count = self.wiring.count();
-        let mut delays =
-            Delays { units: vec![None; count], trees: vec![0; count], is_guessed: false, is_implausible: false };
+        let mut delays = Delays { units: vec![None; count], trees: vec![0; count], ..Delays::default() };
         for tree in 0..TREES {
             let way = self.wiring.way(tree);
             let processed = processed_in(&way, count);
@@ -155,7 +160,7 @@ impl<'a, C: Fn(usize) -> Option<PortTimes>> Walk<'a, C> {
                 let from = if is_first { 0 } else { at(port) };
                 let took = at(self.way[next].at.port) - from;
                 delays.is_implausible |= !(0..=MOST_NS << FRACTION).contains(&took);
-                self.branch(place, next, took, delay + from, cables, &mut entered);
+                delays.is_shared |= self.branch(place, next, took, delay + from, cables, &mut entered);
             }
         }
     }
@@ -189,12 +194,29 @@ impl<'a, C: Fn(usize) -> Option<PortTimes>> Walk<'a, C> {
     }
 
     /// Shares the time from one arrival at a SubDevice to its next one among the cables of the branch. `begin` is the
-    /// delay at the first one.
-    fn branch(&self, from: usize, to: usize, took: i64, begin: i64, cables: &mut Cables, entered: &mut [Option<i64>]) {
+    /// delay at the first one. Returns whether it is not known which of several cables takes what.
+    fn branch(
+        &self,
+        from: usize,
+        to: usize,
+        took: i64,
+        begin: i64,
+        cables: &mut Cables,
+        entered: &mut [Option<i64>],
+    ) -> bool {
         let mut gaps = self.gaps(from, to, &|one, other| cables.measured(one, other));
         let in_passages: i64 = gaps.iter().flat_map(|gap| gap.from..gap.to).map(|hop| self.passage(hop)).sum();
         let total = (took - in_passages - gaps.iter().map(|gap| gap.span).sum::<i64>()).max(0);
         let known = |gaps: &[Gap]| gaps.iter().filter_map(|gap| gap.known).sum::<i64>();
+        let fits = |gaps: &[Gap]| {
+            let all: Option<i64> = gaps.iter().map(|gap| gap.known).sum();
+            all.is_some_and(|all| (all - total).abs() <= SAME + gaps.len() as i64 * SAME_CABLE)
+        };
+        if gaps.iter().any(|gap| gap.known.is_none()) {
+            // Cables that were away are those from before where all of them take as long together.
+            let before = self.gaps(from, to, &|one, other| cables.remembered(one, other));
+            gaps = if fits(&before) { before } else { gaps };
+        }
         if known(&gaps) > total && gaps.iter().any(|gap| gap.known.is_none()) {
             // What is known cannot be right.
             gaps.iter_mut().for_each(|gap| gap.known = None);
@@ -204,6 +226,7 @@ impl<'a, C: Fn(usize) -> Option<PortTimes>> Walk<'a, C> {
         let takes_rest = |gap: &Gap| all_known || gap.known.is_none();
         let rest = total - known(&gaps);
         let sharing: i64 = gaps.iter().filter(|gap| takes_rest(gap)).map(Gap::hops).sum();
+        let is_shared = if all_known { !fits(&gaps) } else { self.are_several(&gaps) };
         let is_one_cable = gaps.len() == 2 && gaps.iter().all(|gap| gap.hops() == 1);
         let (mut spent, mut shared, mut done) = (begin, 0, 0);
         for gap in &gaps {
@@ -219,12 +242,24 @@ impl<'a, C: Fn(usize) -> Option<PortTimes>> Walk<'a, C> {
                 entered[self.way[gap.to].at.node] = Some(spent);
             }
             spent += gap.span;
-            if gap.known.is_none() || is_one_cable {
+            if (gap.known.is_none() && !is_shared) || is_one_cable {
                 for (one, other) in (gap.from..gap.to).filter_map(|hop| self.cable(hop)) {
                     cables.learn(one, other, on_cables / gap.hops().max(1));
                 }
             }
         }
+        is_shared
+    }
+
+    /// Whether the gaps that are not known are several, and some of a cable on which the frame goes one way only: there and back
+    /// the same cable takes as long.
+    fn are_several(&self, gaps: &[Gap]) -> bool {
+        let unknown = || gaps.iter().filter(|gap| gap.known.is_none());
+        let sorted = |(one, other): (End, End)| (one.min(other), one.max(other));
+        let mut cables: Vec<_> =
+            unknown().flat_map(|gap| gap.from..gap.to).filter_map(|hop| self.cable(hop)).map(sorted).collect();
+        cables.sort_unstable();
+        unknown().count() > 1 && cables.chunk_by(|one, other| one == other).any(|same| same.len() == 1)
     }
 
     /// What is known of the passage behind an arrival.

@@ -4,9 +4,10 @@
 //! 200 us until the frame is back, in which clocks that differ by 100 ppm come apart by 20 ns. How much they differ shows
 //! in how far each got from the first measurement to the last.
 
-use alloc::vec;
 use alloc::vec::Vec;
 
+use super::delay::MOST_NS;
+use super::wiring::Wiring;
 use super::{FRACTION, PortTimes};
 
 /// What one SubDevice has latched of one frame, on its local clock.
@@ -18,112 +19,218 @@ pub struct Latched {
     pub unit: u64,
 }
 
-#[derive(Clone, Copy, Debug, Default)]
-struct Sum {
-    /// Times after that of the port of entry.
-    ports: [i64; 4],
-    first: u32,
-    last: u32,
+/// Times of one port that differ by more than this do not come of the same way: receive times are exact to some tens of
+/// nanoseconds, and frames follow each other by microseconds at least.
+const SAME_NS: i64 = 500;
+/// Clocks run apart by no more than this part of the time.
+const MOST_DRIFT: i64 = 1_000;
+
+/// Something that was latched does not fit the other measurements.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Disagreement {
+    /// Position of the SubDevice.
+    pub node: usize,
+    /// The port; `None`: its clock, from frame to frame.
+    pub port: Option<u8>,
+    /// What the others show, in nanoseconds.
+    pub expected_ns: i64,
+    /// What it showed.
+    pub got_ns: i64,
+}
+
+impl Disagreement {
+    /// Whether the others show what a frame may take.
+    pub fn is_possible(&self) -> bool {
+        (0..=MOST_NS).contains(&self.expected_ns) || self.port.is_none()
+    }
 }
 
 /// Several measurements of all SubDevices.
 #[derive(Clone, Debug)]
 pub struct Measurements {
     entries: Vec<u8>,
-    sums: Vec<Option<Sum>>,
-    count: u32,
+    /// Ports at which the frame comes in.
+    arrivals: Vec<[bool; 4]>,
+    /// Which copy of the frame latches. Copies leave one after the other.
+    trees: Vec<usize>,
+    samples: Vec<Vec<Option<Latched>>>,
+}
+
+/// What a SubDevice has latched in all measurements, if it was there in each.
+struct Series<'a> {
+    of: &'a Measurements,
+    node: usize,
+}
+
+impl Series<'_> {
+    fn all(&self) -> impl Iterator<Item = Latched> {
+        self.of.samples.iter().filter_map(|sample| sample.get(self.node).copied().flatten())
+    }
+
+    /// How far its clock got since the first measurement.
+    fn advances(&self) -> impl Iterator<Item = i64> {
+        let first = self.all().next().map_or(0, |latched| latched.unit as u32);
+        self.all().map(move |latched| i64::from((latched.unit as u32).wrapping_sub(first)))
+    }
+
+    fn passed(&self) -> i64 {
+        self.advances().last().unwrap_or(0)
+    }
+
+    /// Times of a port after that of the port of entry.
+    fn after_entry(&self, port: usize) -> impl Iterator<Item = i64> {
+        let entry = usize::from(self.of.entries.get(self.node).copied().unwrap_or(0) & 3);
+        self.all().map(move |Latched { ports, .. }| i64::from(ports[port].wrapping_sub(ports[entry]) as i32))
+    }
 }
 
 impl Measurements {
-    /// Of SubDevices with these ports of entry.
-    pub fn new(entries: Vec<u8>) -> Measurements {
-        Measurements { sums: vec![None; entries.len()], entries, count: 0 }
+    /// Of the SubDevices on these cables.
+    pub fn new(wiring: &Wiring) -> Measurements {
+        let (arrivals, trees) = wiring.arrival_ports();
+        Measurements { entries: wiring.entry_ports(), arrivals, trees, samples: Vec::new() }
     }
 
-    /// Adds a measurement: what each SubDevice has latched of the same frame. One that is missing here, or was before,
-    /// counts as one without a clock. All must be taken within two seconds.
-    pub fn add(&mut self, latched: &[Option<Latched>]) {
-        for (number, (sum, entry)) in self.sums.iter_mut().zip(&self.entries).enumerate() {
-            let Some(latched) = latched.get(number).copied().flatten() else {
-                *sum = None;
-                continue;
-            };
-            let unit = latched.unit as u32;
-            if self.count == 0 {
-                *sum = Some(Sum { ports: [0; 4], first: unit, last: unit });
-            }
-            let Some(sum) = sum else { continue };
-            let from = latched.ports[usize::from(*entry & 3)];
-            for (total, port) in sum.ports.iter_mut().zip(latched.ports) {
-                *total += i64::from(port.wrapping_sub(from) as i32);
-            }
-            sum.last = unit;
-        }
-        self.count += 1;
+    /// Adds a measurement: what each SubDevice has latched of the same frame. One that is missing in any counts as one without
+    /// a clock. All must be taken within two seconds.
+    pub fn add(&mut self, latched: Vec<Option<Latched>>) {
+        self.samples.push(latched);
     }
 
     /// How many measurements there are.
-    pub const fn count(&self) -> u32 {
-        self.count
+    pub fn count(&self) -> u32 {
+        self.samples.len() as u32
+    }
+
+    fn series(&self, node: usize) -> Option<Series<'_>> {
+        let is_there = |sample: &Vec<Option<Latched>>| sample.get(node).is_some_and(Option::is_some);
+        (!self.samples.is_empty() && self.samples.iter().all(is_there)).then_some(Series { of: self, node })
+    }
+
+    /// What does not fit the other measurements, if anything: a port whose time is another one than usual, a clock that has
+    /// not gone on like that of the reference, so that it has not latched the same frame.
+    pub fn disagreement(&self, reference: usize) -> Option<Disagreement> {
+        let nodes = || (0..self.entries.len()).filter_map(|node| self.series(node));
+        nodes().find_map(|series| self.odd_port(&series)).or_else(|| {
+            nodes().find_map(|series| {
+                let reference = self.reference_for(series.node, reference)?;
+                let mut both = series.advances().zip(reference.advances());
+                let (got_ns, expected_ns) =
+                    both.find(|(own, passed)| (own - passed).abs() > SAME_NS + passed / MOST_DRIFT)?;
+                Some(Disagreement { node: series.node, port: None, expected_ns, got_ns })
+            })
+        })
+    }
+
+    /// Whose clock that of a SubDevice is compared with: the reference's, or the first one that latches the same copy.
+    fn reference_for(&self, node: usize, reference: usize) -> Option<Series<'_>> {
+        let tree = self.trees.get(node);
+        let first =
+            || (0..self.trees.len()).find(|other| self.trees.get(*other) == tree && self.series(*other).is_some());
+        let own =
+            Some(reference).filter(|reference| self.trees.get(*reference) == tree && self.series(*reference).is_some());
+        self.series(own.or_else(first)?)
+    }
+
+    fn odd_port(&self, series: &Series<'_>) -> Option<Disagreement> {
+        let arrivals = self.arrivals.get(series.node)?;
+        (0..4).filter(|port| arrivals[*port]).find_map(|port| {
+            let mut sorted: Vec<i64> = series.after_entry(port).collect();
+            sorted.sort_unstable();
+            let expected_ns = sorted[sorted.len() / 2];
+            let got_ns = series.after_entry(port).find(|time| (time - expected_ns).abs() > SAME_NS)?;
+            Some(Disagreement { node: series.node, port: Some(port as u8), expected_ns, got_ns })
+        })
     }
 
     /// How much faster than the reference's each clock runs, in parts per billion.
     pub fn drift_ppb(&self, reference: usize) -> Vec<Option<i64>> {
         let passed = self.passed(reference);
-        let of = |sum: &Sum| {
-            let own = i64::from(sum.last.wrapping_sub(sum.first));
-            passed.map(|passed| ((i128::from(own - passed) * 1_000_000_000) / i128::from(passed)) as i64)
+        let of = |series: Series<'_>| {
+            passed.map(|passed| ((i128::from(series.passed() - passed) * 1_000_000_000) / i128::from(passed)) as i64)
         };
-        self.sums.iter().map(|sum| sum.as_ref().and_then(of)).collect()
+        (0..self.entries.len()).map(|node| self.series(node).and_then(of)).collect()
     }
 
     fn passed(&self, node: usize) -> Option<i64> {
-        let sum = self.sums.get(node)?.as_ref()?;
-        Some(i64::from(sum.last.wrapping_sub(sum.first))).filter(|passed| *passed > 0)
+        Some(self.series(node)?.passed()).filter(|passed| *passed > 0)
     }
 
-    /// Mean times on the clock of the reference, with [`FRACTION`].
+    /// Mean times on the clock of the reference, or of the first one that latches the same copy, with [`FRACTION`].
     pub fn mean(&self, reference: usize) -> Vec<Option<PortTimes>> {
-        let passed = self.passed(reference);
-        let count = i128::from(self.count.max(1));
-        let of = |sum: &Sum| {
-            let own = i64::from(sum.last.wrapping_sub(sum.first));
+        let count = i128::from(self.count().max(1));
+        let of = |series: Series<'_>| {
+            let own = series.passed();
+            let passed = self.reference_for(series.node, reference).map(|reference| reference.passed());
             let (up, down) = match passed {
-                Some(passed) if own > 0 => (i128::from(passed), i128::from(own)),
+                Some(passed) if own > 0 && passed > 0 => (i128::from(passed), i128::from(own)),
                 _ => (1, 1),
             };
-            PortTimes(sum.ports.map(|total| ((i128::from(total) << FRACTION) * up / (count * down)) as i64))
+            let total = |port: usize| i128::from(series.after_entry(port).sum::<i64>());
+            PortTimes([0, 1, 2, 3].map(|port| ((total(port) << FRACTION) * up / (count * down)) as i64))
         };
-        self.sums.iter().map(|sum| sum.as_ref().map(of)).collect()
+        (0..self.entries.len()).map(|node| self.series(node).map(of)).collect()
     }
 }
 
 #[cfg(test)]
 mod tests {
+    use alloc::vec;
+
     use super::*;
 
     fn latched(unit: u64, back: u32) -> Option<Latched> {
         Some(Latched { ports: [unit as u32, (unit as u32).wrapping_add(back), 0, 0], unit })
     }
 
+    fn empty(count: usize) -> Measurements {
+        let arrivals = vec![[true, true, false, false]; count];
+        Measurements { entries: vec![0; count], arrivals, trees: vec![0; count], samples: Vec::new() }
+    }
+
+    fn of<const N: usize>(count: usize, samples: [[Option<Latched>; N]; 2]) -> Measurements {
+        let mut measurements = empty(count);
+        samples.into_iter().for_each(|sample| measurements.add(sample.to_vec()));
+        measurements
+    }
+
     #[test]
     fn the_mean_is_on_the_clock_of_the_reference_and_survives_wraps_facts_7_1() {
-        let mut measurements = Measurements::new(vec![0, 0]);
         // The second clock runs 100 ppm fast and wraps between the measurements.
-        measurements.add(&[latched(1_000, 200_000), latched(0xFFFF_FF00, 100_010)]);
-        measurements.add(&[latched(10_001_000, 200_001), latched(0x1_0000_0000 + 10_001_000 - 256, 100_010)]);
+        let first = [latched(1_000, 200_000), latched(0xFFFF_FF00, 100_010)];
+        let second = [latched(10_001_000, 200_001), latched(0x1_0000_0000 + 10_001_000 - 256, 100_010)];
+        let measurements = of(2, [first, second]);
         assert_eq!(measurements.drift_ppb(0), [Some(0), Some(100_000)]);
         let mean = measurements.mean(0);
         assert_eq!(mean[0].unwrap().0[1], 200_000 * 256 + 128);
         assert_eq!(mean[1].unwrap().0[1] >> FRACTION, 100_000);
+        assert_eq!(measurements.disagreement(0), None);
     }
 
     #[test]
-    fn who_misses_one_measurement_counts_as_without_a_clock() {
-        let mut measurements = Measurements::new(vec![0, 0, 0]);
-        measurements.add(&[latched(1_000, 5), None, latched(7, 5)]);
-        measurements.add(&[latched(2_000, 5), latched(2_000, 5), None]);
+    fn a_subdevice_that_misses_one_measurement_counts_as_without_a_clock() {
+        let measurements =
+            of(3, [[latched(1_000, 5), None, latched(7, 5)], [latched(2_000, 5), latched(2_000, 5), None]]);
         assert_eq!(measurements.mean(0).iter().map(Option::is_some).collect::<Vec<_>>(), [true, false, false]);
-        assert_eq!(Measurements::new(vec![0]).mean(3), [None]);
+        assert_eq!(measurements.disagreement(0), None);
+        assert_eq!(empty(1).mean(3), [None]);
+    }
+
+    #[test]
+    fn a_port_that_latched_another_frame_and_a_clock_that_latched_none_are_found_facts_7_1() {
+        let first = [latched(1_000, 700), latched(5_000, 300)];
+        let mut measurements = of(2, [first, [latched(2_000_000, 690), latched(2_004_100, 320)]]);
+        assert_eq!(measurements.disagreement(0), None);
+        let mut spoiled = measurements.clone();
+        spoiled.add(vec![latched(4_000_000, 700), latched(4_004_200, 7_020)]);
+        let odd = Disagreement { node: 1, port: Some(1), expected_ns: 320, got_ns: 7_020 };
+        assert_eq!(spoiled.disagreement(0), Some(odd));
+        // Copies leave one after the other: what is on the other one has a clock of its own to be compared with.
+        let mut apart = Measurements { trees: vec![0, 1], ..measurements.clone() };
+        apart.add(vec![latched(4_000_000, 700), latched(4_054_100, 320)]);
+        assert_eq!(apart.disagreement(0), None);
+        measurements.add(vec![latched(4_000_000, 700), latched(2_004_100, 320)]);
+        let odd = Disagreement { node: 1, port: None, expected_ns: 3_999_000, got_ns: 1_999_100 };
+        assert_eq!(measurements.disagreement(0), Some(odd));
     }
 }

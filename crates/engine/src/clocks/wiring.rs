@@ -132,6 +132,25 @@ impl Wiring {
     }
 }
 
+impl Wiring {
+    /// The ports at which the frame that a SubDevice processes comes in, by position, and of which link that is (0 or 1).
+    pub fn arrival_ports(&self) -> (Vec<[bool; 4]>, Vec<usize>) {
+        let mut ports = vec![[false; 4]; self.far.len()];
+        let mut trees = vec![0; self.far.len()];
+        let mut is_seen = vec![false; self.far.len()];
+        for tree in 0..TREES {
+            let way = self.way(tree);
+            let here = processed_in(&way, self.far.len());
+            for Arrival { at, .. } in way.iter().filter(|arrival| here[arrival.at.node] && !is_seen[arrival.at.node]) {
+                ports[at.node][usize::from(at.port & 3)] = true;
+                trees[at.node] = tree;
+            }
+            is_seen.iter_mut().zip(here).for_each(|(seen, here)| *seen |= here);
+        }
+        (ports, trees)
+    }
+}
+
 /// Which SubDevices process the frame, by position.
 pub(super) fn processed_in(way: &[Arrival], count: usize) -> Vec<bool> {
     let mut processed = vec![false; count];

@@ -53,6 +53,10 @@ pub struct ClockConfig {
     /// The broadcast read of 0x092C beyond which clocks count as out of their window. It is the OR of all magnitudes: at
     /// most twice the largest.
     pub sync_window_ns: u32,
+    /// Where process data is on the wire all the time, the cyclic half may be asked to begin a cycle later while propagation
+    /// delays are measured: once for each of [`ClockConfig::measurements`], by about two round trips. Otherwise they are
+    /// not measured there, which is told.
+    pub pauses: bool,
 }
 
 impl Default for ClockConfig {
@@ -68,6 +72,7 @@ impl Default for ClockConfig {
             lock_samples: 100,
             lock_limit: Duration::from_secs(10),
             sync_window_ns: 1_000,
+            pauses: true,
         }
     }
 }

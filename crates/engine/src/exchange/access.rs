@@ -107,6 +107,13 @@ impl Exchange {
         self.frames.iter().any(|frame| frame.is_waiting() || frame.is_delivered())
     }
 
+    /// Cycles that begin earlier than this disturb a measurement of propagation delays that found no time without frames on
+    /// the wire; long ago where nothing of the kind is asked for. It may be taken back at any time. Applications that send
+    /// all the time in a loop of their own look at this before they send.
+    pub fn pause_until(&self) -> Instant {
+        self.board.traffic.pause_until()
+    }
+
     /// State of the ring as the cyclic frames show it.
     pub fn ring(&self) -> RingState {
         self.evidence.monitor.state()

@@ -14,7 +14,7 @@ mod lead;
 
 use crate::board::Board;
 use crate::board::clocks::References;
-use crate::clocks::extend;
+use crate::clocks::{SyncWindow, extend};
 use crate::event::CyclicEvent;
 use crate::link::Link;
 use crate::queue::Producer;
@@ -26,8 +26,6 @@ use lead::Lead;
 pub(crate) const CLOCK_DATA: usize = 4;
 /// Event requests in the header of a datagram.
 const IRQ_AT: usize = HEADER_LEN - 2;
-/// Results in a row inside or outside of the window until that is reported.
-const WINDOW_RESULTS: u8 = 3;
 
 /// What the application chose.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -148,9 +146,7 @@ pub(crate) struct Clocks {
     /// The reference is to have this time when the next frame passes it.
     wanted: Option<u64>,
     spread_ns: Option<u32>,
-    inside: Option<bool>,
-    /// Results in a row that contradict `inside`.
-    contrary: u8,
+    window: SyncWindow,
 }
 
 impl Clocks {
@@ -273,7 +269,7 @@ impl Clocks {
         let mut is_closed = false;
         // One that left before others were posted has read clocks that are references no more.
         if seen.references == self.changes {
-            let steered = self.observe_references(seen);
+            let steered = self.observe_references(seen, board.clocks.is_window_watched());
             is_closed = steered && arrivals.verdict() == Some(RingState::Closed);
         }
         let ports_changed = EcatEvent::from_bits(seen.events).dl_status;
@@ -286,16 +282,16 @@ impl Clocks {
         }
         self.ports_changed = ports_changed;
         if seen.spread_wkc > 0 {
-            // While nobody is told a time, differences are those of a frame that came another way. A reference that is steered
-            // shows how punctual the host is; there the supervisor looks at each of the others.
-            let is_steered = self.references.leader().1.is_some() || board.clocks.is_reference_led();
+            // While nobody is told a time, differences are those of a frame that came another way. A reference that is steered,
+            // and clocks in front of one, show how punctual the host is; there the supervisor looks at each of the others.
+            let is_steered = self.references.leader().1.is_some() || board.clocks.is_host_told();
             let is_meant = !is_held && !is_steered;
             self.judge_spread(seen.spread, is_meant, board, events);
         }
     }
 
     /// What the references showed; whether one of them is steered towards the other.
-    fn observe_references(&mut self, seen: &Seen) -> bool {
+    fn observe_references(&mut self, seen: &Seen, together: bool) -> bool {
         let (leader, steered) = self.references.leader();
         let mut fresh = 0;
         for link in Link::ALL {
@@ -315,7 +311,8 @@ impl Clocks {
             let leader = if steered == Link::Main { Link::Redundant } else { Link::Main };
             let time = |link: Link| self.times[link.index()].map_or(0, |time| time.time);
             let difference = time(steered).wrapping_sub(time(leader)) as i64;
-            let begin = Lead::begin(difference, seen.sent_at);
+            // Clocks that were all locked have followed one until now.
+            let begin = Lead::begin(difference, together, seen.sent_at);
             self.lead = Some(self.lead.map_or(begin, |lead| lead.go_on(difference, seen.sent_at)));
         }
         true
@@ -337,14 +334,9 @@ impl Clocks {
         self.spread_ns = Some(spread_ns);
         board.clocks.post_spread(spread_ns);
         let inside = spread_ns <= self.setup.sync_window_ns;
-        // Before they have been inside there is nothing to leave.
-        if self.inside.unwrap_or(false) == inside || !is_meant || !board.clocks.is_window_watched() {
-            self.contrary = 0;
-            return;
-        }
-        self.contrary += 1;
-        if self.contrary >= WINDOW_RESULTS {
-            (self.inside, self.contrary) = (Some(inside), 0);
+        if !is_meant || !board.clocks.is_window_watched() {
+            self.window.skip();
+        } else if self.window.take(inside) {
             events.push(CyclicEvent::SyncWindow { inside, spread_ns }.pack());
         }
     }

@@ -241,6 +241,11 @@ impl CyclicFrame {
         now >= self.deadline
     }
 
+    /// The flight that is out, or was.
+    pub(crate) fn sequence(&self) -> Sequence {
+        self.sequence
+    }
+
     /// Until when it is waited for.
     pub(crate) fn deadline(&self) -> Instant {
         self.deadline

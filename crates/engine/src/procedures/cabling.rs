@@ -24,6 +24,7 @@ use ringcat_wire::register::{DcReceiveTimes, DlStatus, PortKind, map};
 use super::fleet::{Phase, SharedFleet};
 use super::inspect::Look;
 use super::junction::closings;
+use super::latch::latch_anyway;
 use super::strangers::{Stranger, view};
 use crate::event::Event;
 use crate::junction::JunctionMode;
@@ -161,7 +162,7 @@ async fn look(bus: &Bus, known: &impl Known) -> Result<Option<Cabling>, BusError
     let closed_before = bus.ring() == RingState::Closed;
     let Some(before) = view(bus).await?.filter(|view| known.are_known(&view.stations)) else { return Ok(None) };
     let Some(ports) = ports_of(bus, &before.stations).await? else { return Ok(None) };
-    bus.bwr(map::DC_RECEIVE_TIME, &[0; 4]).await?;
+    let _latches = latch_anyway(bus).await?;
     let read = bus.gather(before.stations.clone(), |bus, station| async move {
         // Without a clock nobody answers.
         match bus.fprd_array(station, map::DC_RECEIVE_TIME).await {

@@ -20,8 +20,8 @@ use core::cell::{RefCell, RefMut};
 use ringcat_wire::address::StationAddress;
 use ringcat_wire::register::PortKind;
 
-use crate::clocks::Cables;
 use crate::clocks::cables::End;
+use crate::clocks::{Cables, SyncWindow};
 use crate::config::{ClockConfig, Passage, ReferenceClock, SubDeviceConfig};
 use crate::info::SubDeviceInfo;
 use crate::link::Link;
@@ -31,6 +31,9 @@ use crate::topology::{PortOf, Topology};
 pub use signals::NotLocked;
 pub(super) use signals::{SignalsError, restore, start_signals, wait_for_lock};
 pub(crate) use watch::{begin, keep};
+
+/// Depth of the mean of differences of clocks that are told what the host believes.
+const AVERAGE: u32 = 5;
 
 /// A SubDevice of the scan, or a declared one that came later, as far as clocks are concerned.
 #[derive(Clone, Debug)]
@@ -65,6 +68,8 @@ pub(super) struct Node {
     pub drift_ppb: i64,
     /// DC_SYSTEM_TIME_DIFFERENCE, when it answered last.
     pub difference_ns: Option<i32>,
+    /// Where frames meet it before its reference: a mean of that, with [`AVERAGE`] fractional bits.
+    pub average: Option<i64>,
     /// Largest magnitude of that since it was locked.
     pub worst_ns: u32,
     /// Samples in a row within the window.
@@ -88,6 +93,8 @@ pub(super) struct Clocks {
     pub cables: Cables,
     /// Measurements so far.
     pub measured: u32,
+    /// On which links SubDevices answered at the last look, by index, where these are others than before.
+    pub moving: Option<Vec<Option<Option<Link>>>>,
     /// Since when delays may not be what they were.
     pub is_doubtful: Option<Instant>,
     /// Delays and offsets are written.
@@ -100,9 +107,8 @@ pub(super) struct Clocks {
     pub is_drifting: bool,
     /// All clocks were within the window for long enough.
     pub is_locked: bool,
-    /// While a reference is steered: differences have left their window, and looks in a row that contradict that.
-    pub is_outside: bool,
-    pub contrary: u8,
+    /// While some are told what the host believes: whether differences have left their window.
+    pub window: SyncWindow,
     /// System time when host time is zero, as the reference clock has it.
     pub epoch: u64,
 }
@@ -219,6 +225,7 @@ impl Node {
             offset_ns: 0,
             drift_ppb: 0,
             difference_ns: None,
+            average: None,
             worst_ns: 0,
             good: 0,
             link: None,
@@ -226,7 +233,27 @@ impl Node {
     }
 }
 
+impl Node {
+    /// The mean of differences with one more of them: those of a clock that is told what the host believes have its jitter.
+    pub(super) fn average(&mut self, ahead_ns: i32) -> i32 {
+        let before = self.average.unwrap_or(i64::from(ahead_ns) << AVERAGE);
+        let now = before + i64::from(ahead_ns) - (before >> AVERAGE);
+        self.average = Some(now);
+        (now >> AVERAGE) as i32
+    }
+}
+
 impl Clocks {
+    /// Whether frames meet a clock before the reference of its link.
+    pub fn is_in_front(&self, index: usize, reference: usize) -> bool {
+        let (node, reference) = (&self.nodes[index], &self.nodes[reference]);
+        node.has_clock
+            && !node.is_unset
+            && node.link == reference.link
+            && node.unit.is_some()
+            && node.unit < reference.unit
+    }
+
     /// The reference among those that `can` be it: the chosen one, or the first as the configuration wants it.
     pub fn elect(&self, can: impl Fn(usize, &Node) -> bool) -> Option<usize> {
         let choice = self.config.as_ref()?.reference;

@@ -61,7 +61,14 @@ async fn attempt(bus: &Bus, datagrams: usize) -> Outcome {
         match bus.fill_frame(map::TYPE, datagrams).await {
             Ok(reply) if reply.wkc() == Wkc(0) => return Outcome::Unprocessed,
             Ok(_) => return Outcome::Answered,
-            Err(BusError::Lost { .. } | BusError::Wkc { .. } | BusError::TooLong { .. } | BusError::Split { .. }) => {}
+            Err(
+                BusError::Lost { .. }
+                | BusError::Wkc { .. }
+                | BusError::TooLong { .. }
+                | BusError::Busy { .. }
+                | BusError::Disturbed { .. }
+                | BusError::Split { .. },
+            ) => {}
         }
     }
     Outcome::Lost

@@ -76,7 +76,13 @@ async fn look_at(bus: &Bus, station: StationAddress) -> Look {
         Ok(look) => look,
         Err(BusError::Wkc { got: Wkc(0), .. }) => Look::Silent,
         Err(BusError::Wkc { .. }) => Look::Doubled,
-        Err(BusError::Lost { .. } | BusError::TooLong { .. } | BusError::Split { .. }) => Look::Unknown,
+        Err(
+            BusError::Lost { .. }
+            | BusError::TooLong { .. }
+            | BusError::Busy { .. }
+            | BusError::Disturbed { .. }
+            | BusError::Split { .. },
+        ) => Look::Unknown,
     }
 }
 

@@ -45,6 +45,16 @@ impl Sequence {
         Sequence((self.0 + 1) & 0x7FFF)
     }
 
+    /// That of the frame with this count, from 1 on: before the first one it is 0.
+    pub const fn of_frame(count: u64) -> Sequence {
+        Sequence(count as u16 & 0x7FFF)
+    }
+
+    /// The number.
+    pub const fn number(self) -> u16 {
+        self.0
+    }
+
     /// The lower 8 bits, RedFrameId of the seeds.
     pub const fn frame_id(self) -> u8 {
         self.0 as u8

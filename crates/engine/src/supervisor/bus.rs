@@ -23,7 +23,7 @@ use crate::board::Board;
 use crate::event::history::History;
 use crate::event::{Event, Occupant};
 use crate::link::LinkSet;
-use crate::ring::RingState;
+use crate::ring::{RingState, Sequence};
 use crate::time::Instant;
 
 /// What a datagram brought back, merged from all copies.
@@ -37,6 +37,10 @@ pub struct Reply {
     pub redundant: Wkc,
     /// OR of the ECAT event requests.
     pub irq: u16,
+    /// The frame that it came with: datagrams of one frame were met at the same time.
+    pub frame: Sequence,
+    /// When that was handed to the links.
+    pub sent_at: Instant,
 }
 
 impl Reply {
@@ -72,6 +76,16 @@ pub enum BusError {
         /// Came.
         got: Wkc,
     },
+    /// It was to be alone on the wire, and that was never empty.
+    Busy {
+        /// Whom it addressed.
+        target: Target,
+    },
+    /// It was to be alone on the wire, and the cyclic half sent meanwhile.
+    Disturbed {
+        /// Whom it addressed.
+        target: Target,
+    },
     /// An LRW of which both copies met somebody: neither has what the other one read (facts 9.2.2).
     Split {
         /// Whom it addressed.
@@ -86,6 +100,8 @@ impl BusError {
         let (BusError::Lost { target, .. }
         | BusError::TooLong { target, .. }
         | BusError::Wkc { target, .. }
+        | BusError::Busy { target }
+        | BusError::Disturbed { target }
         | BusError::Split { target }) = &mut self;
         *target = asked;
         self
@@ -115,6 +131,14 @@ impl fmt::Display for BusError {
             BusError::Wkc { target: whom, expected, got } => {
                 target(f, *whom)?;
                 write!(f, ": expected working counter {expected}, got {got}")
+            }
+            BusError::Busy { target: whom } => {
+                target(f, *whom)?;
+                f.write_str(": other frames are on the wire all the time")
+            }
+            BusError::Disturbed { target: whom } => {
+                target(f, *whom)?;
+                f.write_str(": process data was on the wire beside the frame")
             }
             BusError::Split { target: whom } => {
                 target(f, *whom)?;
@@ -272,18 +296,20 @@ impl Bus {
     }
 
     /// Hands the time of one SubDevice's clock to all others, once: on each link that of a station of its own. Where nobody
-    /// on a link has the station, `time` is what the others get. `expected` as for [`Bus::transfer`].
+    /// on a link has the station, or before it does, SubDevices get `time`, which is right at `at`, as what it is when the frame
+    /// leaves. `expected` as for [`Bus::transfer`].
     pub fn distribute_time(
         &self,
         stations: [StationAddress; 2],
         register: RegisterAddress,
-        time: u32,
+        (time, at): (u32, Instant),
         expected: Wkc,
     ) -> impl Future<Output = Result<Reply, BusError>> {
         let [main, redundant] = stations;
         self.submit(Request {
             redundant_station: Some(redundant),
             expected: Some(expected),
+            time_at: Some(at),
             ..Request::once(Command::Frmw, Target::Station(main, register), time.to_le_bytes().to_vec())
         })
     }
@@ -342,7 +368,7 @@ impl Bus {
         Signal::new(self.shared.clone())
     }
 
-    fn submit(&self, mut request: Request) -> TransferFuture {
+    pub(super) fn submit(&self, mut request: Request) -> TransferFuture {
         // Clocks of both stubs are distributed on purpose: neither copy is the right one.
         if self.links() == LinkSet::Ring && request.redundant_station.is_none() && request.lead.is_none() {
             request.lead = request.witness();
@@ -518,7 +544,7 @@ fn ready<T>(poll: Poll<T>) -> Option<T> {
 }
 
 /// Waits for the reply to a datagram. Dropped before, the reply is thrown away when it comes.
-struct TransferFuture {
+pub(super) struct TransferFuture {
     shared: Rc<RefCell<Shared>>,
     request: Option<Request>,
     id: Option<TransferId>,

@@ -48,6 +48,8 @@ pub(super) struct Flight {
     pub reads: usize,
     /// Answered already; kept so that the second copy is recognised.
     pub answered: bool,
+    /// Links on which copies are known not to come home, a bit each.
+    pub deaf: u8,
     /// No copy is waited for, because the link is silent on which the missing one was sent; no room is kept for it.
     pub released: bool,
 }
@@ -64,6 +66,7 @@ impl Default for Flight {
             deadline: Instant::NEVER,
             reads: 0,
             answered: false,
+            deaf: 0,
             released: false,
         }
     }
@@ -78,7 +81,7 @@ impl Flight {
         self.arrivals = Arrivals::default();
         self.reads = 0;
         self.answered = false;
-        self.released = false;
+        (self.released, self.deaf) = (false, 0);
     }
 
     /// Everything controllers never change is as sent (facts 1.5): command, Idx, length, M bit of every datagram.
@@ -142,6 +145,11 @@ impl Flight {
         self.arrivals.arrived & links.mask() == links.mask()
     }
 
+    /// The links on which a copy has not come home, a bit each.
+    pub fn misses(&self, links: LinkSet) -> u8 {
+        links.mask() & !self.arrivals.arrived
+    }
+
     /// One copy crossed the ring and one returned: it opened or closed meanwhile, and SubDevices were met twice or not
     /// at all.
     pub fn straddled_a_change(&self) -> bool {
@@ -189,13 +197,16 @@ impl Place {
         self.expected.is_some_and(|expected| self.total() == expected)
     }
 
-    pub fn reply(&self, bytes: &[u8]) -> Reply {
+    /// What the frame of this number, sent at this time, brought back.
+    pub fn reply(&self, bytes: &[u8], (frame, sent_at): (Sequence, Instant)) -> Reply {
         let data_at = self.header_at + HEADER_LEN;
         Reply {
             data: bytes[data_at..data_at + self.length].to_vec(),
             main: self.wkc[0],
             redundant: self.wkc[1],
             irq: u16::from_le_bytes([bytes[data_at - 2], bytes[data_at - 1]]),
+            frame,
+            sent_at,
         }
     }
 }

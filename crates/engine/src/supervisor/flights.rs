@@ -74,6 +74,12 @@ impl Flights {
         room && self.slots[Self::slot(self.sequence.next())].is_none()
     }
 
+    /// Whether frames are under way of which a copy may still come home, but for those on links that are silent.
+    pub(super) fn are_under_way(&self, links: LinkSet, silent: u8) -> bool {
+        let is_waited_for = |flight: &Flight| !flight.released && flight.misses(links) & !silent != 0;
+        self.in_flight > self.released && self.slots.iter().flatten().any(is_waited_for)
+    }
+
     fn release(&mut self, slot: usize) {
         if let Some(flight) = self.slots[slot].as_mut().filter(|flight| !flight.released) {
             flight.released = true;
@@ -100,9 +106,14 @@ impl Shared {
     /// Packs what waits in the outbox into frames and sends them, within the budget and the window.
     pub(super) fn transmit(&mut self, budget: usize, transmit: &mut impl FnMut(Link, &[u8])) -> usize {
         let mut used = 0;
-        while self.outbox.is_ready(self.now) && self.flights.has_room() && used < budget {
+        while self.flights.has_room() && used < budget {
             let limit = (budget - used).min(MAX_FRAME);
-            let Some(flight) = self.pack(limit) else { break };
+            let flight = match self.alone.is_held() {
+                true => self.next_alone().and_then(|(id, deaf)| self.pack_alone(id, deaf)),
+                false if self.outbox.is_ready(self.now) => self.pack(limit),
+                false => None,
+            };
+            let Some(flight) = flight else { break };
             self.blocked = None;
             used += flight.bytes.len();
             self.counters.sent += 1;
@@ -192,6 +203,7 @@ impl Shared {
                 };
                 if let Some(data) = builder.data_mut(data_at, request.data.len()) {
                     data.copy_from_slice(&request.data);
+                    request.let_run(data, self.now);
                 }
                 total += bytes;
                 datagrams += request.datagrams();
@@ -206,6 +218,32 @@ impl Shared {
             }
             builder.finish()
         };
+        self.launch(flight, length, retry)
+    }
+
+    /// Builds a frame that holds one datagram.
+    fn pack_alone(&mut self, id: TransferId, deaf: u8) -> Option<Flight> {
+        let sequence = self.flights.sequence.next();
+        let mut flight = self.flights.fresh(sequence);
+        flight.bytes.resize(MAX_FRAME, 0);
+        flight.deaf = deaf;
+        let length = {
+            let source = self.identity.source();
+            let mut builder = FrameBuilder::ethernet(&mut flight.bytes, MacAddress::ETHERCAT_GROUP, source)?;
+            let transfer = self.transfers.find(id)?;
+            let (request, index) = (&transfer.request, sequence.index(Class::Acyclic));
+            let data_at = builder.datagram(request.command, index, request.target, request.data.len())?;
+            builder.data_mut(data_at, request.data.len())?.copy_from_slice(&request.data);
+            flight.places.push(Place::new(id, request, data_at));
+            transfer.stage = Stage::InFlight;
+            builder.finish()
+        };
+        self.launch(flight, length, 0)
+    }
+
+    /// A frame of so many bytes is ready to leave; `None` where nothing is in it.
+    fn launch(&mut self, mut flight: Flight, length: usize, retry: u8) -> Option<Flight> {
+        let sequence = flight.sequence;
         flight.bytes.truncate(length);
         self.identity.stamp(&mut flight.bytes, sequence, retry);
         if flight.places.is_empty() {
@@ -248,7 +286,7 @@ impl Shared {
         }
         flight.take(copy.sent_on, bytes, first);
         let finished = flight.has_all(self.links);
-        let enough = finished || flight.has_all_but(self.silence.mask(self.now), self.links);
+        let enough = finished || flight.has_all_but(self.silence.mask(self.now) | flight.deaf, self.links);
         self.answer(slot, enough);
         if finished {
             self.end(slot);
@@ -263,6 +301,7 @@ impl Shared {
     fn answer(&mut self, slot: usize, enough: bool) {
         let Some(mut flight) = self.flights.slots[slot].take() else { return };
         let straddled = flight.straddled_a_change();
+        let stamp = (flight.sequence, flight.sent_at);
         if enough && !straddled {
             self.learn_main_count(&flight);
         }
@@ -273,7 +312,7 @@ impl Shared {
             }
             place.answered = true;
             if satisfied || !straddled {
-                let reply = place.reply(&flight.bytes);
+                let reply = place.reply(&flight.bytes, stamp);
                 self.finish(place.transfer, Ok(reply));
             } else {
                 self.lost(place.transfer);
@@ -303,7 +342,8 @@ impl Shared {
         self.flights.spare.push(flight);
     }
 
-    fn finish(&mut self, id: TransferId, result: Result<Reply, BusError>) {
+    pub(super) fn finish(&mut self, id: TransferId, result: Result<Reply, BusError>) {
+        let result = self.judge_alone(id, result);
         let Some(transfer) = self.transfers.find(id) else { return };
         if transfer.abandoned {
             self.transfers.remove(id);
@@ -346,7 +386,7 @@ impl Shared {
             }
             for place in flight.places.iter().filter(|place| !place.answered) {
                 if enough || (place.is_answered_by_one() && !self.is_apart(place.transfer)) {
-                    let reply = place.reply(&flight.bytes);
+                    let reply = place.reply(&flight.bytes, (flight.sequence, flight.sent_at));
                     self.finish(place.transfer, Ok(reply));
                 } else {
                     self.lost(place.transfer);

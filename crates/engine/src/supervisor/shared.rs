@@ -6,6 +6,7 @@ use core::cmp::Reverse;
 
 use ringcat_wire::datagram::MAX_DATA;
 
+use super::alone::Alone;
 use super::bus::BusError;
 use super::counters::AcyclicCounters;
 use super::executor::{Task, TaskId};
@@ -32,6 +33,7 @@ pub(crate) struct Shared {
     pub(crate) events: EventLog,
     pub(crate) transfers: Transfers,
     pub(crate) outbox: Outbox,
+    pub(crate) alone: Alone,
     pub(crate) flights: Flights,
     pub(crate) silence: Silence,
     /// By link, where the links tell.
@@ -63,6 +65,7 @@ impl Shared {
             events: EventLog::default(),
             transfers: Transfers::default(),
             outbox: Outbox::default(),
+            alone: Alone::default(),
             flights: Flights::new(),
             silence: Silence::default(),
             carriers: [None; 2],
@@ -111,11 +114,19 @@ impl Shared {
             return Some(self.now);
         }
         let timer = self.timers.peek().map(|Reverse((at, _))| *at);
-        [timer, self.flights.next_deadline(), self.outbox.next_deadline(self.now)].into_iter().flatten().min()
+        let flights = self.flights.next_deadline();
+        let queue = match self.alone.is_held() {
+            true => self.alone.next_deadline(self.now),
+            false => self.outbox.next_deadline(self.now),
+        };
+        [timer, flights, queue].into_iter().flatten().min()
     }
 
     pub(crate) fn wants_to_send(&self) -> bool {
-        self.outbox.is_ready(self.now)
+        match self.alone.is_held() {
+            true => self.alone.next_deadline(self.now).is_some(),
+            false => self.outbox.is_ready(self.now),
+        }
     }
 
     /// Queues a datagram for the current task. One that no frame can carry fails at once.
@@ -125,13 +136,13 @@ impl Shared {
         let stage =
             if fits { Stage::Queued } else { Stage::Done(Err(BusError::TooLong { target: request.target, length })) };
         let rank = if request.mail.is_some() { Rank::Read } else { Rank::First };
-        let target = request.target;
+        let (target, alone) = (request.target, request.alone);
         let bytes = request.bytes();
         let id = self.transfers.insert(Transfer { request, stage, task: self.current, retries: 0, abandoned: false });
-        if fits {
-            self.outbox.push(id, rank, target, bytes, self.now);
-        } else {
-            self.wake(self.current);
+        match alone {
+            _ if !fits => self.wake(self.current),
+            Some(deaf) => self.push_alone(id, deaf),
+            None => self.outbox.push(id, rank, target, bytes, self.now),
         }
         id
     }

@@ -9,6 +9,7 @@ use ringcat_wire::register::map;
 
 use super::bus::{BusError, Reply};
 use super::executor::TaskId;
+use crate::time::Instant;
 
 /// What is asked of the bus.
 #[derive(Clone, Debug)]
@@ -31,6 +32,10 @@ pub(crate) struct Request {
     pub mail: Option<StationAddress>,
     /// So many more of the same go before it, in a frame that holds nothing else.
     pub before: usize,
+    /// No other frame is to be on the wire while it is; the links on which copies are known not to come home, a bit each.
+    pub alone: Option<u8>,
+    /// The data is a system time of 32 bits that was right then; it leaves as what it is when the frame does.
+    pub time_at: Option<Instant>,
 }
 
 impl Request {
@@ -47,6 +52,15 @@ impl Request {
             lead: None,
             mail: None,
             before: 0,
+            alone: None,
+            time_at: None,
+        }
+    }
+
+    /// Sets a time in the data forward to now.
+    pub(super) fn let_run(&self, data: &mut [u8], now: Instant) {
+        if let (Some(at), Some(bytes)) = (self.time_at, data.first_chunk_mut::<4>()) {
+            *bytes = u32::from_le_bytes(*bytes).wrapping_add(now.0.wrapping_sub(at.0) as u32).to_le_bytes();
         }
     }
 

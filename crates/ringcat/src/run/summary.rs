@@ -27,6 +27,12 @@ pub fn summary(application: &Application<Tee<PacketLinks>, SupervisorThread>, su
         pace.longest_delay.as_secs_f64() * 1e3,
         pace.skipped
     );
+    if pace.paused > 0 {
+        say!(
+            "  clocks: {} cycles began later, so that propagation delays could be measured on an empty wire",
+            pace.paused
+        );
+    }
     say!(
         "  the wire: {} frames sent; {} missing, {} too late, {} damaged",
         cyclic.sent,

@@ -9,6 +9,8 @@ mod captures;
 mod clock_captures;
 mod clock_changes;
 mod clock_delays;
+mod clock_disturbances;
+mod clock_jitter;
 mod clock_shifts;
 mod clocks;
 mod configuration;

@@ -42,6 +42,10 @@ pub(super) struct Clock {
     arrivals: [Option<(u64, SimTime)>; 4],
     /// The frame whose further arrivals are latched.
     latching: Option<u64>,
+    /// Ports at which the next arrival is latched whatever frame it is, where frames are not told apart.
+    armed: [bool; 4],
+    /// The last frame that latched, and when the processing unit met it.
+    latched: Option<(u64, SimTime)>,
 }
 
 impl Clock {
@@ -56,6 +60,8 @@ impl Clock {
             anchor: (0, 0),
             arrivals: [None; 4],
             latching: None,
+            armed: [false; 4],
+            latched: None,
         }
     }
 
@@ -63,7 +69,7 @@ impl Clock {
         self.started = now;
         self.restart_loop(now);
         self.anchor = (0, 0);
-        (self.arrivals, self.latching) = ([None; 4], None);
+        (self.arrivals, self.latching, self.armed) = ([None; 4], None, [false; 4]);
     }
 
     /// Local time in nanoseconds.
@@ -134,20 +140,32 @@ impl Clock {
         at
     }
 
-    /// Notes the first bit of a frame at a port. Returns whether it is a latching frame that came back.
+    /// Notes the first bit of a frame at a port. Returns whether it is latched: a latching frame that came back, or what is
+    /// taken for one.
     pub fn arrived(&mut self, port: Port, frame: u64, first_bit: SimTime) -> bool {
         self.arrivals[port.index()] = Some((frame, first_bit));
-        self.latching == Some(frame)
+        core::mem::take(&mut self.armed[port.index()]) || self.latching == Some(frame)
     }
 
-    /// Starts latching `frame`; yields the arrivals it has had so far.
-    pub fn latch(&mut self, frame: u64) -> impl Iterator<Item = (Port, SimTime)> + use<> {
-        self.latching = Some(frame);
+    /// Starts latching `frame`, which the processing unit meets at `at_unit`; yields the arrivals it has had so far. Where
+    /// frames are not told apart (`any`) it yields the last arrival at each port, and the next one at the others counts.
+    pub fn latch(&mut self, frame: u64, at_unit: SimTime, any: bool) -> impl Iterator<Item = (Port, SimTime)> + use<> {
         let arrivals = self.arrivals;
+        self.latched = Some((frame, at_unit));
+        // It has come in here before, or another one after it.
+        let since = arrivals.iter().flatten().filter(|(id, _)| *id == frame).map(|(_, at)| *at).min();
+        let is_in = move |id: u64, at: SimTime| id == frame || (any && since.is_none_or(|since| at >= since));
+        self.latching = (!any).then_some(frame);
+        self.armed = arrivals.map(|arrival| any && !arrival.is_some_and(|(id, at)| is_in(id, at)));
         Port::ALL.into_iter().filter_map(move |port| match arrivals[port.index()] {
-            Some((id, at)) if id == frame => Some((port, at)),
+            Some((id, at)) if any || is_in(id, at) => Some((port, at)),
             _ => None,
         })
+    }
+
+    /// The last frame that latched, and when the processing unit met it.
+    pub const fn latched(&self) -> Option<(u64, SimTime)> {
+        self.latched
     }
 }
 

@@ -49,6 +49,9 @@ pub struct ControllerConfig {
     /// The controller has DC_LATCH_MODE (0x0936) and, while it is 0, does not latch the receive time of frames that come
     /// in at another port than 0 before the processing unit has seen them (facts 3.12, 7.5).
     pub receive_time_latch_mode: bool,
+    /// The controller does not tell frames apart when it latches receive times: a port has the time of the frame that came
+    /// in there last when the latching one reaches the processing unit, or next where that has not come in yet (facts 7.1).
+    pub latches_any_frame: bool,
 }
 
 impl Default for ControllerConfig {
@@ -71,6 +74,7 @@ impl Default for ControllerConfig {
             clock_errors: ClockErrors::default(),
             clock_start: 0,
             receive_time_latch_mode: false,
+            latches_any_frame: false,
         }
     }
 }

@@ -210,7 +210,7 @@ impl Controller {
     /// Latches the receive times of the ports at which the frame has come in, and of the processing unit (facts 3.12).
     pub(super) fn latch_receive_times(&mut self, frame: u64, at_unit: SimTime) {
         let forwarding = !self.config.receive_time_latch_mode || self.memory.u8(map::DC_LATCH_MODE) & 1 != 0;
-        for (port, at) in self.clock.latch(frame) {
+        for (port, at) in self.clock.latch(frame, at_unit, self.config.latches_any_frame) {
             if forwarding || port == Port::A {
                 self.store_receive_time(port, at);
             }
@@ -221,6 +221,12 @@ impl Controller {
         } else {
             self.memory.set_u32(map::DC_RECEIVE_TIME_EPU, local as u32);
         }
+    }
+
+    /// The frame that latched receive times last, by its number in the simulation, and when the processing unit met it: the
+    /// truth that no MainDevice can see.
+    pub const fn latched(&self) -> Option<(u64, SimTime)> {
+        self.clock.latched()
     }
 
     pub(super) fn store_receive_time(&mut self, port: Port, at: SimTime) {

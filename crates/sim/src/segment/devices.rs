@@ -185,6 +185,9 @@ fn clock(entry: &DeviceEntry, description: &mut DeviceDescription) -> Result<(),
     if let Some(only) = entry.latches_processing_only {
         description.latches_processing_only = only;
     }
+    if let Some(any) = entry.latches_any_frame {
+        description.latches_any_frame = any;
+    }
     let Some(bits) = &entry.clock_bits else { return Ok(()) };
     description.dc = match *bits.get_ref() {
         0 => None,

@@ -56,6 +56,7 @@ pub(super) struct DeviceEntry {
     pub(super) wander_s: Option<Spanned<f64>>,
     pub(super) receive_jitter_ns: Option<Spanned<f64>>,
     pub(super) latches_processing_only: Option<bool>,
+    pub(super) latches_any_frame: Option<bool>,
     pub(super) processing_ns: Option<u64>,
     pub(super) forwarding_ns: Option<u64>,
     pub(super) eight_byte_sii: Option<bool>,

@@ -12,8 +12,30 @@
 
 use crate::time::Instant;
 
-/// Cycles of which the mean says by how much the ways from the host to both references differ.
+/// Cycles of which the mean says by how much the ways from the host to both references differ, at the least. Of references
+/// that have followed one clock until now, so many that the mean is as exact as [`EXACT_NS`].
 const GAP_CYCLES: u32 = 16;
+/// And at the most: clocks that are left alone come apart meanwhile.
+const MOST_GAP_CYCLES: u32 = 4_096;
+/// How exact means are to be though the host sends late at random.
+const EXACT_NS: i64 = 300;
+/// The longest mean, as a depth: what clocks that are left alone do within it is not to be more than the jitter.
+const MOST_DEPTH: u32 = 10;
+/// The jitter is a mean of this depth.
+const NOISE_DEPTH: u32 = 9;
+/// Jitter counts for at most so much: a stall of the host is none.
+const MOST_NOISE_NS: i64 = 100_000;
+/// Where there is much jitter, difference and change per cycle are estimated that slowly, as shifts.
+const CALM_DEPTH: u32 = 8;
+const CALM_CHANGE_DEPTH: u32 = 2 * CALM_DEPTH + 1;
+/// The clock is told of this part of the difference, as a shift, and of its change in so many cycles: a loop in the
+/// controller takes out a 64th of what it is told, and adds to its speed what it was told.
+const CALM_SHARE: u32 = 5;
+const CALM_AHEAD: i64 = 32;
+/// There it is far away only beyond so many times the usual limit.
+const CALM_FAR: i64 = 4;
+/// Fractional bits of the change per cycle.
+const CHANGE_FRACTION: u32 = 24;
 /// Fractional bits of nanoseconds.
 const FRACTION: u32 = 8;
 /// Parts of what was not expected by which the difference and its change are corrected, as shifts.
@@ -74,11 +96,21 @@ pub(super) struct Lead {
     law: Law,
     /// What it differs when both show the same: their ways from the host are not equally long.
     gap: i64,
-    /// Differences so far, up to [`GAP_CYCLES`].
+    /// Sum of the differences that this is the mean of, and how many they are to be at the most.
+    sum: i64,
+    most_cycles: u32,
+    /// Differences so far, as long as they say what the gap is; then [`MOST_GAP_CYCLES`].
     cycles: u32,
+    /// How far differences are from their mean, in the mean; while the gap is not known, the sum of that.
+    noise: i64,
+    /// Filter depth of the difference that decides what to do.
+    depth: u32,
     /// Nanoseconds that it is ahead, with fraction, and how fast this changes.
     ahead: i64,
     change_ppb: i64,
+    /// Where there is much jitter: nanoseconds that it is ahead and how this changes per cycle, with [`CHANGE_FRACTION`].
+    calm_ahead: i64,
+    calm_change: i64,
     /// A longer mean, with as many fractional bits as its depth.
     slow: i64,
     seen_at: Instant,
@@ -88,15 +120,35 @@ pub(super) struct Lead {
 }
 
 impl Lead {
-    /// A second reference and the first one, which show the same.
-    pub const fn begin(difference: i64, seen_at: Instant) -> Lead {
-        let (law, gap, cycles, mode) = (SECOND, difference, 1, Mode::Free);
-        Lead { law, gap, cycles, ahead: 0, change_ppb: 0, slow: 0, seen_at, mode, calm: 0 }
+    /// A second reference and the first one, which show the same: because they have followed one clock until now
+    /// (`together`), or because nothing better is known.
+    pub const fn begin(difference: i64, together: bool, seen_at: Instant) -> Lead {
+        let most_cycles = if together { MOST_GAP_CYCLES } else { GAP_CYCLES };
+        let (gap, sum, cycles, noise) = (difference, difference, 1, 0);
+        let (law, depth, mode) = (SECOND, SECOND.slow_depth, Mode::Free);
+        Lead {
+            law,
+            gap,
+            sum,
+            most_cycles,
+            cycles,
+            noise,
+            depth,
+            ahead: 0,
+            change_ppb: 0,
+            calm_ahead: 0,
+            calm_change: 0,
+            slow: 0,
+            seen_at,
+            mode,
+            calm: 0,
+        }
     }
 
     /// A reference that is to show what the host does, which it has never followed.
     pub const fn behind_host(seen_at: Instant) -> Lead {
-        Lead { law: HOST, gap: 0, cycles: GAP_CYCLES, mode: Mode::Far, ..Lead::begin(0, seen_at) }
+        let (law, depth, mode) = (HOST, HOST.slow_depth, Mode::Far);
+        Lead { law, depth, cycles: MOST_GAP_CYCLES, mode, ..Lead::begin(0, false, seen_at) }
     }
 
     /// Whether what was seen still holds.
@@ -106,10 +158,8 @@ impl Lead {
 
     /// Another difference was seen.
     pub fn go_on(self, difference: i64, seen_at: Instant) -> Lead {
-        if self.cycles < GAP_CYCLES {
-            let cycles = self.cycles + 1;
-            let gap = self.gap.saturating_add(difference.saturating_sub(self.gap) / i64::from(cycles));
-            return Lead { gap, cycles, seen_at, ..self };
+        if self.cycles < MOST_GAP_CYCLES {
+            return self.find_gap(difference.clamp(-ABSURD_NS, ABSURD_NS), seen_at);
         }
         let passed = seen_at.0.saturating_sub(self.seen_at.0).clamp(1, LONGEST_NS) as i64;
         let expected = self.ahead + ((self.change_ppb * passed) << FRACTION) / 1_000_000_000;
@@ -119,30 +169,76 @@ impl Lead {
         let ahead = expected + (unexpected >> DIFFERENCE_DEPTH);
         let change = (unexpected * 1_000_000_000 / passed) >> (CHANGE_DEPTH + FRACTION);
         let change_ppb = (self.change_ppb + change).clamp(-MOST_PPB, MOST_PPB);
-        let Law { slow_depth, outlier_ns, far_ns, settled_ns, share } = self.law;
-        let mean = self.slow >> slow_depth;
-        let told = seen.clamp(mean - outlier_ns, mean + outlier_ns);
-        let slow = self.slow + told - (self.slow >> slow_depth);
-        let far = (slow >> slow_depth).abs();
+        let Law { outlier_ns, far_ns, settled_ns, share, .. } = self.law;
+        let mean = self.slow >> self.depth;
+        let told = seen.clamp(mean - self.outlier(outlier_ns), mean + self.outlier(outlier_ns));
+        let Lead { noise, depth, slow, .. } = self.hear(seen - mean);
+        let slow = slow + told - (slow >> depth);
+        let is_noisy = depth > self.law.slow_depth;
+        let expected = self.calm_ahead + self.calm_change;
+        let calm_seen = ((seen.clamp(-MOST_NOISE_NS, MOST_NOISE_NS) << CHANGE_FRACTION) - expected) >> CALM_DEPTH;
+        let calm_ahead = expected + calm_seen;
+        let calm_change = self.calm_change + (calm_seen >> (CALM_CHANGE_DEPTH - CALM_DEPTH));
+        let far_ns = if is_noisy { CALM_FAR * far_ns } else { far_ns };
+        let far = (slow >> depth).abs();
         let enough = if self.mode == Mode::Far { settled_ns } else { CALM_NS };
         let calm = if far < enough { self.calm.saturating_add(1) } else { 0 };
         let (mode, calm) = match self.mode {
             _ if far > far_ns => (Mode::Far, 0),
             Mode::Far if calm >= CALM_CYCLES => (Mode::Near, 0),
-            Mode::Near if share.is_none() && calm >= CALM_CYCLES => (Mode::Free, 0),
+            // Clocks that are left alone come apart by more than can be seen soon enough.
+            Mode::Free if is_noisy => (Mode::Near, 0),
+            Mode::Near if share.is_none() && !is_noisy && calm >= CALM_CYCLES => (Mode::Free, 0),
             Mode::Free if far > FREE_NS => (Mode::Near, 0),
             mode => (mode, calm),
         };
-        Lead { ahead, change_ppb, slow, seen_at, mode, calm, ..self }
+        Lead { ahead, change_ppb, slow, seen_at, mode, calm, noise, depth, calm_ahead, calm_change, ..self }
+    }
+
+    /// Takes a difference into the gap, as long as that is not known well enough.
+    fn find_gap(self, difference: i64, seen_at: Instant) -> Lead {
+        let cycles = self.cycles + 1;
+        let sum = self.sum.saturating_add(difference);
+        let gap = sum / i64::from(cycles);
+        let noise = self.noise.saturating_add((difference - gap).saturating_abs().min(MOST_NOISE_NS));
+        let mean = noise / i64::from(cycles);
+        let enough = (mean / EXACT_NS).saturating_mul(mean / EXACT_NS).max(i64::from(GAP_CYCLES));
+        if i64::from(cycles) < enough.min(self.most_cycles.into()) {
+            return Lead { gap, sum, noise, cycles, seen_at, ..self };
+        }
+        let known = Lead { gap, sum, cycles: MOST_GAP_CYCLES, noise: mean << NOISE_DEPTH, seen_at, ..self };
+        known.hear(mean)
+    }
+
+    /// Jitter of this size: the more there is, the longer means have to be. They never get shorter.
+    fn hear(self, jitter: i64) -> Lead {
+        if self.law.share.is_some() || self.mode == Mode::Far {
+            return self;
+        }
+        let noise = self.noise - (self.noise >> NOISE_DEPTH) + jitter.saturating_abs().min(MOST_NOISE_NS);
+        let ratio = ((noise >> NOISE_DEPTH) / EXACT_NS).unsigned_abs();
+        // A mean of depth d has a 2^(d + 1)th of the square of the jitter.
+        let wanted = (2 * ratio.max(1).ilog2()).min(MOST_DEPTH);
+        let depth = self.depth.max(wanted);
+        Lead { noise, depth, slow: self.slow << (depth - self.depth), ..self }
+    }
+
+    /// A difference is at most so far from the mean; jitter is no outlier.
+    fn outlier(&self, least: i64) -> i64 {
+        least.max(4 * (self.noise >> NOISE_DEPTH))
     }
 
     /// By how much it is to be told that it is ahead; `None`: nothing.
     pub fn steering_ns(&self) -> Option<i64> {
         let ahead = self.ahead >> FRACTION;
-        let told = match self.mode {
-            Mode::Free => return None,
-            Mode::Near => self.law.share.map_or(ahead, |share| self.slow / (1 << (self.law.slow_depth + share))),
-            Mode::Far => ahead + self.change_ppb * (FORESIGHT_NS / 1_000) / 1_000_000,
+        let told = match (self.mode, self.law.share) {
+            (Mode::Free, _) => return None,
+            (Mode::Near, Some(share)) => self.slow / (1 << (self.depth + share)),
+            (Mode::Near, None) if self.depth > self.law.slow_depth => {
+                (self.calm_ahead / (1 << CALM_SHARE) + self.calm_change * CALM_AHEAD) >> CHANGE_FRACTION
+            }
+            (Mode::Near, None) => ahead,
+            (Mode::Far, _) => ahead + self.change_ppb * (FORESIGHT_NS / 1_000) / 1_000_000,
         };
         Some(told.clamp(-MOST_NS, MOST_NS))
     }
@@ -168,7 +264,7 @@ mod tests {
 
     #[test]
     fn jitter_of_the_host_is_no_reason_to_steer_facts_7_5() {
-        let lead = after(Lead::begin(7_100, Instant(0)), jitter(5_000));
+        let lead = after(Lead::begin(7_100, true, Instant(0)), jitter(5_000));
         assert_eq!((lead.mode, lead.steering_ns()), (Mode::Free, None));
         assert!((lead.gap - 9_500).abs() < 800, "{lead:?}");
     }
@@ -177,13 +273,13 @@ mod tests {
     fn a_stall_between_both_copies_is_no_reason_to_steer() {
         let stalls = jitter(5_000).enumerate();
         let stalled = stalls.map(|(number, late)| if number % 50 == 49 { late + 1_000_000 } else { late });
-        let lead = after(Lead::begin(9_500, Instant(0)), stalled);
+        let lead = after(Lead::begin(9_500, true, Instant(0)), stalled);
         assert_eq!((lead.mode, lead.steering_ns()), (Mode::Free, None));
     }
 
     #[test]
     fn one_that_strays_is_told_of_a_mean_and_left_alone_when_it_is_back() {
-        let strayed = after(Lead::begin(0, Instant(0)), [0; 20].into_iter().chain([1_500; 200]));
+        let strayed = after(Lead::begin(0, true, Instant(0)), [0; 20].into_iter().chain([1_500; 200]));
         assert_eq!(strayed.mode, Mode::Near);
         let told = strayed.steering_ns().expect("it strayed");
         assert!((1_400..=1_500).contains(&told), "{told}");
@@ -209,7 +305,7 @@ mod tests {
     #[test]
     fn one_that_is_far_away_is_told_where_it_will_be() {
         // 100 ppm fast, seen from the beginning.
-        let lead = after(Lead::begin(0, Instant(0)), (1..400).map(|cycle| cycle * 100));
+        let lead = after(Lead::begin(0, true, Instant(0)), (1..400).map(|cycle| cycle * 100));
         assert_eq!(lead.mode, Mode::Far);
         let told = lead.steering_ns().expect("it is far away");
         assert!(told > 39_000, "{told}");

@@ -5,8 +5,8 @@
 //! by itself. Of the ring of two links the last port is closed, of one behind a junction both ends of its closing cable.
 //! What was measured of cables then holds afterwards, whatever is plugged where.
 
+use alloc::format;
 use alloc::string::{String, ToString};
-use alloc::vec;
 use alloc::vec::Vec;
 use core::time::Duration;
 
@@ -17,8 +17,9 @@ use ringcat_wire::register::{DlControl, DlStatus, LoopControl, map};
 
 use super::{Clocks, SharedClocks};
 use crate::clocks::wiring::Wiring;
-use crate::clocks::{Delays, FRACTION, Latched, Measurements, Passage, Segment};
-use crate::link::LinkSet;
+use crate::clocks::{Delays, Disagreement, FRACTION, Latched, Measurements, Passage, Segment};
+use crate::link::{Link, LinkSet};
+use crate::procedures::latch::{self as frames, Pauses};
 use crate::procedures::strangers::view;
 use crate::ring::RingState;
 use crate::supervisor::{Bus, BusError};
@@ -26,7 +27,7 @@ use crate::topology::{Closing, NodeStatus, PortOf, Topology};
 
 /// Bytes from DC_RECEIVE_TIME to the end of DC_RECEIVE_TIME_EPU.
 const LATCHED_LEN: usize = 32;
-/// A measurement whose frames were lost is taken again so often in all.
+/// A latch of which something was lost is taken again so often in all.
 const MOST_FAILURES: u32 = 16;
 /// Looks at a segment that changes meanwhile.
 const LOOKS: u32 = 3;
@@ -45,6 +46,8 @@ struct Survey {
     topology: Topology,
     wiring: Wiring,
     is_closed: bool,
+    /// The link on which copies do not come home, because the ring is opened.
+    deaf: Option<Link>,
 }
 
 /// What was measured.
@@ -65,12 +68,26 @@ pub(super) async fn measure(bus: &Bus, clocks: &SharedClocks, opening: bool) -> 
         measure_open(bus, clocks, &survey, &rings).await?;
     }
     let measured = take(bus, clocks, &survey).await?;
-    if !(measured.delays.is_guessed && survey.is_closed && !opening) {
-        return Ok(measured);
+    // A ring of two links that was broken until now has a cable that was never measured, and one behind a junction that came
+    // as a whole, or came back with other cables, has several.
+    let is_open_question = measured.delays.is_shared || (measured.delays.is_guessed && survey.is_closed);
+    if !is_open_question || opening || rings.is_empty() {
+        return measured.exact();
     }
-    // A ring of two links that was broken until now has a cable that nobody has measured.
     measure_open(bus, clocks, &survey, &rings).await?;
-    take(bus, clocks, &survey).await
+    take(bus, clocks, &survey).await?.exact()
+}
+
+impl Measured {
+    /// Nothing where cables share a time.
+    fn exact(self) -> Result<Measured, String> {
+        if self.delays.is_shared {
+            return Err(
+                "which of the cables of a ring takes how long cannot be told, although it was opened".to_string()
+            );
+        }
+        Ok(self)
+    }
 }
 
 /// Opens rings, measures what cables take, closes the rings again.
@@ -84,6 +101,8 @@ async fn measure_open(bus: &Bus, clocks: &SharedClocks, survey: &Survey, rings: 
         Ok(()) => {
             let mut open = survey.clone();
             open.wiring.open(rings);
+            // The port at the end of a ring of two links is closed: what comes to it ends there.
+            open.deaf = survey.is_closed.then_some(Link::Redundant);
             take(bus, clocks, &open).await.map(drop)
         }
         Err(error) => Err(text(error)),
@@ -148,7 +167,7 @@ async fn look_once(bus: &Bus, clocks: &SharedClocks) -> Result<Option<Survey>, B
     let Some(before) = view(bus).await? else { return Ok(None) };
     let is_closed = bus.links() == LinkSet::Ring && bus.ring() == RingState::Closed;
     // Receive times say who is entered at which port.
-    let latched = match latch(bus, clocks, &before.stations).await {
+    let latched = match latch(bus, clocks, &before.stations, None).await {
         Err(BusError::Wkc { .. }) => return Ok(None),
         other => other?,
     };
@@ -179,7 +198,7 @@ async fn look_once(bus: &Bus, clocks: &SharedClocks) -> Result<Option<Survey>, B
         port.communication && !port.loop_closed
     };
     let wiring = Wiring::new(&topology, is_closed, is_open);
-    Ok(Some(Survey { stations: before.stations, dl_status, topology, wiring, is_closed }))
+    Ok(Some(Survey { stations: before.stations, dl_status, topology, wiring, is_closed, deaf: None }))
 }
 
 /// Several latches of a segment as it is.
@@ -187,11 +206,12 @@ async fn take(bus: &Bus, clocks: &SharedClocks, survey: &Survey) -> Result<Measu
     let count = clocks.access().config.as_ref().map_or(1, |config| config.measurements.clamp(1, 64));
     let entries = survey.wiring.entry_ports();
     enter_backwards(bus, clocks, &survey.stations, &entries).await;
-    let mut measurements = Measurements::new(entries);
+    let mut measurements = Measurements::new(&survey.wiring);
     let mut failures = 0;
     while measurements.count() < count {
-        match latch(bus, clocks, &survey.stations).await {
-            Ok(latched) => measurements.add(&latched),
+        match latch(bus, clocks, &survey.stations, survey.deaf).await {
+            Ok(latched) => measurements.add(latched),
+            Err(error @ (BusError::Busy { .. } | BusError::Disturbed { .. })) => return Err(error.to_string()),
             Err(error) if failures >= MOST_FAILURES => return Err(error.to_string()),
             Err(_) => failures += 1,
         }
@@ -204,13 +224,32 @@ async fn take(bus: &Bus, clocks: &SharedClocks, survey: &Survey) -> Result<Measu
     let reference = reference.or_else(|| access.elect(|_, node| is_there(node)));
     let on_clock = reference.and_then(|index| at(access.nodes[index].station)).unwrap_or(0);
     let passages: Vec<Passage> = survey.stations.iter().map(|station| access.passage_of(*station)).collect();
+    let unfit = "receive times do not fit the cabling: a ring behind a junction may be unknown".to_string();
+    if let Some(odd) = measurements.disagreement(on_clock) {
+        // Where a port shows times that cannot be in most of them, no frame comes in there.
+        return Err(if odd.is_possible() { told(&odd, survey.stations[odd.node]) } else { unfit });
+    }
     let segment = Segment { wiring: &survey.wiring, stations: &survey.stations, passages: &passages };
     segment.see(&mut access.cables);
     let delays = segment.propagation(&measurements.mean(on_clock), &mut access.cables);
     if delays.is_implausible {
-        return Err("receive times do not fit the cabling: a ring behind a junction may be unknown".to_string());
+        return Err(unfit);
     }
     Ok(Measured { stations: survey.stations.clone(), delays, drift_ppb: measurements.drift_ppb(on_clock) })
+}
+
+/// What is said of measurements that do not agree. No figures: the same is told once.
+fn told(odd: &Disagreement, station: StationAddress) -> String {
+    match odd.port {
+        Some(port) => format!(
+            "receive times of station {station} at port {port} differ from measurement to measurement: frames of another \
+             sender on the wire spoil them"
+        ),
+        None => format!(
+            "the clock of station {station} does not go on from measurement to measurement like others: another sender \
+             has receive times latched too"
+        ),
+    }
 }
 
 impl Clocks {
@@ -243,20 +282,23 @@ async fn enter_backwards(bus: &Bus, clocks: &SharedClocks, stations: &[StationAd
     let _ = bus.gather(modes, write).await;
 }
 
-/// Lets all clocks latch one frame and reads what these SubDevices have.
+/// Lets all clocks latch one frame and reads what these SubDevices have. Copies on the link that is `deaf` do not come home.
 pub(super) async fn latch(
     bus: &Bus,
     clocks: &SharedClocks,
     stations: &[StationAddress],
+    deaf: Option<Link>,
 ) -> Result<Vec<Option<Latched>>, BusError> {
     let asked: Vec<(StationAddress, bool)> = {
         let clocks = clocks.access();
         let lacks = |station| clocks.nodes.iter().any(|node| node.station == station && !node.has_clock);
         stations.iter().map(|station| (*station, !lacks(*station))).collect()
     };
-    let with_clock = asked.iter().filter(|(_, asked)| *asked).count() as u16;
-    let target = Target::Broadcast(map::DC_RECEIVE_TIME);
-    bus.transfer(Command::Bwr, target, vec![0; 4], Some(Wkc(with_clock))).await?;
+    let pauses = match clocks.access().config.as_ref().is_none_or(|config| config.pauses) {
+        true => Pauses::Allowed,
+        false => Pauses::Forbidden,
+    };
+    let latches = frames::latch(bus, pauses, deaf).await?;
     let read = bus.gather(asked, |bus, (station, asked)| async move {
         if !asked {
             return Ok(None);
@@ -271,7 +313,14 @@ pub(super) async fn latch(
         let unit = u64::from(word(24)) | u64::from(word(28)) << 32;
         Ok(Some(Latched { ports: [word(0), word(4), word(8), word(12)], unit }))
     });
-    read.await.into_iter().collect()
+    let read: Vec<Option<Latched>> = read.await.into_iter().collect::<Result<_, _>>()?;
+    // One that it has not met has what it latched before.
+    let answered = Wkc(read.iter().flatten().count() as u16);
+    if latches.met.0 < answered.0 {
+        let target = Target::Broadcast(map::DC_RECEIVE_TIME);
+        return Err(BusError::Wkc { target, expected: answered, got: latches.met });
+    }
+    Ok(read)
 }
 
 /// The present loop settings of the SubDevices that have these ports.

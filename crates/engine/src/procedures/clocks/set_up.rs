@@ -43,7 +43,7 @@ pub(super) async fn set_up(bus: &Bus, clocks: &SharedClocks) -> Result<(), Strin
     take_over(&mut clocks.access(), &measured);
     let stations = clocks.access().stations();
     let wanted = bus.now().0.wrapping_add(clocks.access().epoch);
-    let latched = latch(bus, clocks, &stations).await.map_err(text)?;
+    let latched = latch(bus, clocks, &stations, None).await.map_err(text)?;
     set_offsets(&mut clocks.access(), &latched, wanted);
     set_filters(bus, clocks).await;
     write_all(bus, clocks).await.map_err(text)?;
@@ -239,7 +239,7 @@ pub(super) async fn write_delays(bus: &Bus, clocks: &SharedClocks, link: Link) -
 pub(super) async fn set_up_one(bus: &Bus, clocks: &SharedClocks, index: usize) -> Result<(), BusError> {
     let host = bus.now().0;
     let stations = clocks.access().stations();
-    let latched = latch(bus, clocks, &stations).await?;
+    let latched = latch(bus, clocks, &stations, None).await?;
     let (station, registers) = {
         let mut clocks = clocks.access();
         let link = clocks.nodes[index].link.unwrap_or(Link::Main);
@@ -252,7 +252,7 @@ pub(super) async fn set_up_one(bus: &Bus, clocks: &SharedClocks, index: usize) -
         };
         let node = &mut clocks.nodes[index];
         node.offset_ns = system.wrapping_add_signed(node.delay_ns).wrapping_sub(own) as i64;
-        (node.good, node.difference_ns, node.worst_ns) = (0, None, 0);
+        (node.good, node.difference_ns, node.average, node.worst_ns) = (0, None, None, 0);
         (node.station, registers(node))
     };
     write(bus, station, registers).await?;

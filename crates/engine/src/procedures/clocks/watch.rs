@@ -21,11 +21,11 @@ use ringcat_wire::register::{DcSpeedCounterDifference, DcSpeedCounterStart, map}
 use super::set_up::{measure_again, set_filters, set_up, write_delays};
 use super::signals::difference;
 use crate::board::clocks::References;
-use crate::clocks::extend;
+use crate::clocks::{SyncWindow, extend};
 use crate::event::Event;
 use crate::link::Link;
 use crate::procedures::fleet::SharedFleet;
-use crate::supervisor::Bus;
+use crate::supervisor::{Bus, Reply};
 use crate::time::Instant;
 
 /// Between two looks at the board, and at the differences before all are locked.
@@ -45,8 +45,8 @@ const EXPLAINED: Duration = Duration::from_millis(20);
 const AGAIN: Duration = Duration::from_millis(20);
 /// A segment that cannot be measured for so long has its clocks followed as they were.
 const PATIENCE: Duration = Duration::from_secs(1);
-/// Looks in a row inside or outside of the window until that is reported.
-const WINDOW_LOOKS: u8 = 3;
+/// Clocks in front of a reference that are read with it in one frame.
+const IN_A_FRAME: usize = 32;
 /// Distributions in a row; then the bus belongs to others for [`BURST_PAUSE`].
 const BURST: u32 = 8;
 const BURST_PAUSE: Duration = Duration::from_micros(100);
@@ -111,7 +111,8 @@ pub(crate) async fn keep(bus: Bus, fleet: SharedFleet) {
         let is_explained = bus.now() < explained_until;
         if changed || bus.now() >= next_look || (is_explained && fleet.board.clocks.is_held()) {
             look(&bus, &fleet, is_explained).await;
-            next_look = if is_locked && !is_anybody_open(&fleet) { bus.now() + ROUTINE } else { bus.now() };
+            let is_open = !is_locked || is_anybody_open(&fleet) || fleet.clocks.access().moving.is_some();
+            next_look = if is_open { bus.now() } else { bus.now() + ROUTINE };
         }
         let doubtful = fleet.clocks.access().is_doubtful;
         if let Some(since) = doubtful.filter(|since| bus.now() >= next_measurement.max(*since + SETTLE)) {
@@ -187,7 +188,7 @@ pub(super) async fn drift_phase(bus: Bus, fleet: SharedFleet) {
         clocks.config.as_ref().map_or(0, |config| config.drift_distributions)
     };
     let followers = fleet.clocks.access().nodes.iter().filter(|node| node.has_clock).count() as u16;
-    let mut next = bus.now();
+    let (mut next, mut reading) = (bus.now(), None);
     for number in 0..count {
         let (references, _) = fleet.board.clocks.references();
         // With a ring that opens or closes right now, the wrong clocks would follow.
@@ -199,9 +200,16 @@ pub(super) async fn drift_phase(bus: Bus, fleet: SharedFleet) {
             continue;
         }
         // A link without a reference has nobody who takes a time.
-        let near = bus.now().0.wrapping_add(fleet.clocks.access().epoch) as u32;
-        if bus.distribute_time(stations, map::DC_SYSTEM_TIME, near, Wkc(followers)).await.is_err() {
-            bus.sleep(PAUSE).await;
+        let time = reading.unwrap_or_else(|| (bus.now().0.wrapping_add(fleet.clocks.access().epoch) as u32, bus.now()));
+        reading = None;
+        match bus.distribute_time(stations, map::DC_SYSTEM_TIME, time, Wkc(followers)).await {
+            // Clocks in front of the reference are told what it showed last, and what has passed since: by how late this host
+            // sent one frame comes back with the other sign in the next one.
+            Ok(reply) if reply.redundant == Wkc(0) => {
+                reading = reply.data.first_chunk().map(|bytes| (u32::from_le_bytes(*bytes), reply.sent_at));
+            }
+            Ok(_) => {}
+            Err(_) => bus.sleep(PAUSE).await,
         }
         if number % BURST == BURST - 1 {
             next += BURST_TIME;
@@ -245,7 +253,8 @@ async fn look(bus: &Bus, fleet: &SharedFleet, is_explained: bool) {
         let deviation_ppb = DcSpeedCounterDifference(i16::from_le_bytes([*e, *f])).deviation_ppb(start);
         Some(Answer { link: Some(link), difference_ns: Some(difference([*a, *b, *c, *d])), deviation_ppb })
     });
-    let answers: Vec<Option<Answer>> = answers.await;
+    let mut answers: Vec<Option<Answer>> = answers.await;
+    look_in_front(bus, fleet, &mut answers).await;
     // While nobody is told a time, differences are those of a frame that came another way.
     if !fleet.board.clocks.is_held() {
         judge(bus, fleet, &answers);
@@ -255,6 +264,48 @@ async fn look(bus: &Bus, fleet: &SharedFleet, is_explained: bool) {
         set_filters(bus, &fleet.clocks).await;
     }
     follow_reference(bus, fleet).await;
+}
+
+/// Clocks that frames meet before the reference are told what the host believes, and what they show of that is by how late it
+/// sends. How they differ is seen in what they and the reference show to one and the same frame.
+async fn look_in_front(bus: &Bus, fleet: &SharedFleet, answers: &mut [Option<Answer>]) {
+    let groups: Vec<(usize, Vec<usize>)> = {
+        let clocks = fleet.clocks.access();
+        let group = |link| {
+            let reference = clocks.reference_on(link)?;
+            let in_front = |index: &usize| clocks.is_in_front(*index, reference);
+            Some((reference, (0..clocks.nodes.len()).filter(in_front).collect::<Vec<usize>>()))
+        };
+        Link::ALL.into_iter().filter_map(group).filter(|(_, some)| !some.is_empty()).collect()
+    };
+    fleet.board.clocks.post_in_front(!groups.is_empty());
+    for (reference, in_front) in groups {
+        for some in in_front.chunks(IN_A_FRAME) {
+            let stations: Vec<StationAddress> = {
+                let clocks = fleet.clocks.access();
+                some.iter().chain([&reference]).map(|index| clocks.nodes[*index].station).collect()
+            };
+            let read = |station| (Command::Fprd, Target::Station(station, map::DC_SYSTEM_TIME), vec![0; 4]);
+            let replies = bus.transfer_all(stations.into_iter().map(read), Some(Wkc(1))).await;
+            let Ok(replies) = replies else { continue };
+            let Some((of_reference, others)) = replies.split_last() else { continue };
+            let time = |reply: &Reply| reply.data.first_chunk().map_or(0, |bytes| u32::from_le_bytes(*bytes));
+            let clocks = &mut *fleet.clocks.access();
+            for (index, reply) in some.iter().zip(others) {
+                let Some(answer) = answers[*index].as_mut().filter(|answer| answer.link.is_some()) else { continue };
+                // Another frame was met at another time.
+                let is_same = reply.frame == of_reference.frame && [reply, of_reference].map(Reply::wkc) == [Wkc(1); 2];
+                answer.difference_ns = is_same.then(|| {
+                    let delay = clocks.nodes[*index].delay_ns - clocks.nodes[reference].delay_ns;
+                    let ahead = time(reply).wrapping_sub(time(of_reference)).wrapping_sub(delay as u32) as i32;
+                    clocks.nodes[*index].average(ahead)
+                });
+                if !is_same {
+                    answers[*index] = None;
+                }
+            }
+        }
+    }
 }
 
 /// Notes the differences; all locked is an event.
@@ -285,16 +336,16 @@ fn judge(bus: &Bus, fleet: &SharedFleet, answers: &[Option<Answer>]) {
         largest = largest.max(magnitude);
     }
     // Where a reference is steered, the exchange does not see how far the others are from theirs.
-    let is_steered = references.iter().all(Option::is_some) || fleet.board.clocks.is_reference_led();
-    let is_outside = largest > config.sync_window_ns;
-    let is_contrary = clocks.is_locked && is_outside != clocks.is_outside && (is_steered || clocks.is_outside);
-    clocks.contrary = if is_contrary { clocks.contrary + 1 } else { 0 };
-    if clocks.contrary >= WINDOW_LOOKS {
-        (clocks.is_outside, clocks.contrary) = (is_outside, 0);
-        bus.report(Event::SyncWindow { inside: !is_outside, spread_ns: largest });
+    let is_steered = references.iter().all(Option::is_some) || fleet.board.clocks.is_host_told();
+    let inside = largest <= config.sync_window_ns;
+    if !clocks.is_locked || !(is_steered || clocks.window.is_outside()) {
+        clocks.window.skip();
+    } else if clocks.window.take(inside) {
+        bus.report(Event::SyncWindow { inside, spread_ns: largest });
     }
     if all && !clocks.is_locked {
         clocks.is_locked = true;
+        clocks.window = SyncWindow::inside();
         fleet.board.clocks.watch_window();
         bus.report(Event::ClocksLocked { largest_ns: largest });
         if is_steered {
@@ -308,6 +359,17 @@ fn judge(bus: &Bus, fleet: &SharedFleet, answers: &[Option<Answer>]) {
 async fn follow_links(bus: &Bus, fleet: &SharedFleet, answers: &[Option<Answer>], is_explained: bool) -> bool {
     let moved = {
         let mut clocks = fleet.clocks.access();
+        // Answers that came while a ring opened or closed are of both states: another look has to say the same.
+        let links: Vec<Option<Option<Link>>> = answers.iter().map(|answer| answer.map(|answer| answer.link)).collect();
+        let before = clocks.moving.take();
+        let is_certain = |(index, link): (usize, &Option<Option<Link>>)| {
+            let has_moved = link.is_some_and(|link| clocks.nodes[index].has_clock && link != clocks.nodes[index].link);
+            !has_moved || before.as_ref().is_some_and(|before| before.get(index) == Some(link))
+        };
+        if !links.iter().enumerate().all(is_certain) {
+            clocks.moving = Some(links);
+            return false;
+        }
         let mut moved = false;
         for (node, answer) in clocks.nodes.iter_mut().zip(answers) {
             let Some(answer) = answer.filter(|_| node.has_clock) else { continue };
@@ -394,9 +456,10 @@ async fn follow_reference(bus: &Bus, fleet: &SharedFleet) {
         clocks.reference.map(|position| clocks.nodes[position].station)
     };
     let Some(station) = station else { return };
-    let Ok(bytes) = bus.fprd_array::<4>(station, map::DC_SYSTEM_TIME).await else { return };
+    let target = Target::Station(station, map::DC_SYSTEM_TIME);
+    let Ok(reply) = bus.transfer(Command::Fprd, target, vec![0; 4], Some(Wkc(1))).await else { return };
+    let (Some(bytes), Wkc(1)) = (reply.data.first_chunk(), reply.wkc()) else { return };
     let mut clocks = fleet.clocks.access();
-    let host = bus.now().0;
-    let near = host.wrapping_add(clocks.epoch);
-    clocks.epoch = extend(u32::from_le_bytes(bytes), near).wrapping_sub(host);
+    let near = reply.sent_at.0.wrapping_add(clocks.epoch);
+    clocks.epoch = extend(u32::from_le_bytes(*bytes), near).wrapping_sub(reply.sent_at.0);
 }

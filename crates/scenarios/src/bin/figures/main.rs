@@ -2,6 +2,7 @@
 //! would be linked with everything.
 
 mod clocks;
+mod delays;
 mod ethernet;
 mod files;
 mod phases;
@@ -14,7 +15,7 @@ use std::process::ExitCode;
 /// A subject and what shows its figures.
 type Subject = (&'static str, fn() -> ExitCode);
 
-const SUBJECTS: [Subject; 7] = [
+const SUBJECTS: [Subject; 8] = [
     ("ring", ring::main),
     ("startup", startup::main),
     ("phases", phases::main),
@@ -22,6 +23,7 @@ const SUBJECTS: [Subject; 7] = [
     ("ethernet", ethernet::main),
     ("files", files::main),
     ("clocks", clocks::main),
+    ("delays", delays::main),
 ];
 
 fn main() -> ExitCode {

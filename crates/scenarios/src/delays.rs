@@ -1,0 +1,344 @@
+//! Propagation delays that are written while process data goes on, against the truth.
+//!
+//! A run takes a segment of random shape to a state in which its delays are known, cuts and heals cables of it, and looks at
+//! every delay that is written then, in every cycle. The truth is when the processing units met one frame, which only the
+//! simulator knows. A delay is right or it is not written, and then there is a reason ([`Outcome`]).
+
+use std::collections::BTreeMap;
+use std::time::Duration;
+
+use ringcat::{ClockConfig, Event, JunctionConnection, JunctionMode, Options};
+use ringcat_engine::main_device::RawDatagram;
+use ringcat_sim::cable::{CableId, DeviceIndex, Endpoint};
+use ringcat_sim::controller::Wander;
+use ringcat_sim::description::DeviceDescription;
+use ringcat_sim::frame::Port::{self, A, B, C, D};
+use ringcat_sim::network::Network;
+use ringcat_wire::command::Command;
+use ringcat_wire::datagram::Target;
+use ringcat_wire::register::map;
+
+use crate::clocks::{clocked, config, delay, wired, with_clocks};
+use crate::dice::Dice;
+use crate::segments::{MAIN, REDUNDANT, at};
+use crate::world::{Mark, World};
+
+/// A delay that is further than this from the truth, for each hop to the reference, is wrong.
+pub const HOP_NS: i64 = 20;
+/// Cycles in which delays are to be right again, or it is to be told why they are not written.
+const LIMIT_CYCLES: u64 = 1_500;
+/// Cycles after which a look at them is worth the effort.
+const LOOK_CYCLES: u64 = 60;
+/// Cycles in which it must stay so.
+const CALM_CYCLES: u64 = 20;
+
+/// What a segment looks like.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Shape {
+    /// A ring of two links with so many.
+    Ring(usize),
+    /// A ring behind a junction, with so many members, and one SubDevice in front of and one behind it.
+    LocalRing(usize),
+    /// Anything with branches and rings behind junctions, with one link or two.
+    Tree,
+}
+
+/// What became of changes of a segment.
+#[derive(Clone, Debug, Default)]
+pub struct Outcome {
+    /// Cables that were cut or healed.
+    pub changes: u64,
+    /// Delays that were written meanwhile.
+    pub written: u64,
+    /// Changes after which all delays were right.
+    pub right: u64,
+    /// Changes after which some were not written, by the reason that was told.
+    pub not_written: BTreeMap<String, u64>,
+    /// Delays that were written and wrong, or not written without a reason.
+    pub wrong: Vec<String>,
+    /// Largest error of what was written, in nanoseconds for each hop.
+    pub largest_ns: f64,
+}
+
+impl Outcome {
+    /// Takes in another one.
+    pub fn add(&mut self, other: Outcome) {
+        (self.changes, self.written) = (self.changes + other.changes, self.written + other.written);
+        self.right += other.right;
+        other.not_written.into_iter().for_each(|(reason, count)| *self.not_written.entry(reason).or_default() += count);
+        self.wrong.extend(other.wrong);
+        self.largest_ns = self.largest_ns.max(other.largest_ns);
+    }
+}
+
+/// Cables of a segment, those that may be cut, and how many devices it has.
+struct Plan {
+    cables: Vec<(Endpoint, Endpoint)>,
+    cut: Vec<usize>,
+    devices: usize,
+    /// Where rings behind junctions close.
+    connections: Vec<JunctionConnection>,
+}
+
+impl Plan {
+    fn new(shape: Shape, dice: &mut Dice) -> Plan {
+        let mut plan = Plan { cables: Vec::new(), cut: Vec::new(), devices: 0, connections: Vec::new() };
+        match shape {
+            Shape::Ring(count) => {
+                let end = plan.chain(MAIN, count);
+                plan.connect(end, REDUNDANT);
+                plan.cut = (0..plan.cables.len()).collect();
+            }
+            Shape::LocalRing(members) => {
+                let first = plan.hang(MAIN);
+                let junction = plan.hang(at(first, B));
+                let begin = plan.cables.len();
+                plan.local_ring(junction, members);
+                plan.cut = (begin..plan.cables.len()).collect();
+                plan.hang(at(junction, C));
+            }
+            Shape::Tree => plan.tree(dice),
+        }
+        plan
+    }
+
+    fn connect(&mut self, one: Endpoint, other: Endpoint) {
+        self.cables.push((one, other));
+    }
+
+    fn hang(&mut self, from: Endpoint) -> usize {
+        self.connect(from, at(self.devices, A));
+        self.devices += 1;
+        self.devices - 1
+    }
+
+    /// So many in a row; returns where it goes on.
+    fn chain(&mut self, from: Endpoint, count: usize) -> Endpoint {
+        (0..count).fold(from, |from, _| at(self.hang(from), B))
+    }
+
+    fn local_ring(&mut self, junction: usize, members: usize) {
+        let end = self.chain(at(junction, D), members);
+        self.connect(end, at(junction, B));
+        let port = |port: Port| port.index() as u8;
+        let tail = self.devices - 1;
+        self.connections.push(JunctionConnection { head: junction, head_port: port(B), tail, tail_port: port(B) });
+    }
+
+    /// A trunk with branches and rings behind junctions; the trunk may be closed to a ring of two links.
+    fn tree(&mut self, dice: &mut Dice) {
+        let mut end = MAIN;
+        for _ in 0..2 + dice.below(5) {
+            let device = self.hang(end);
+            end = match dice.below(4) {
+                0 => {
+                    self.local_ring(device, 1 + dice.below(12) as usize);
+                    at(device, C)
+                }
+                1 => {
+                    self.branch(at(device, D), dice, 2);
+                    at(device, B)
+                }
+                _ => at(device, B),
+            };
+            end = if dice.one_in(3) { self.chain(end, dice.below(8) as usize) } else { end };
+        }
+        if dice.one_in(2) {
+            self.connect(end, REDUNDANT);
+        }
+        self.cut = (1..self.cables.len()).collect();
+    }
+
+    fn branch(&mut self, from: Endpoint, dice: &mut Dice, depth: u32) {
+        let mut end = from;
+        for _ in 0..1 + dice.below(4) {
+            let device = self.hang(end);
+            end = at(device, B);
+            if depth > 0 && dice.one_in(4) {
+                self.branch(at(device, D), dice, depth - 1);
+            } else if dice.one_in(5) {
+                self.local_ring(device, 1 + dice.below(6) as usize);
+                end = at(device, C);
+            }
+        }
+    }
+}
+
+/// Clocks of a run: ideal ones for a third of the seeds; a third of the others does not tell frames apart when it latches.
+fn devices(count: usize, dice: &mut Dice) -> Vec<DeviceDescription> {
+    let is_ideal = dice.one_in(3);
+    let any = dice.one_in(3);
+    let mut all = clocked(count, 50);
+    for device in &mut all {
+        device.latches_any_frame = any;
+        if is_ideal {
+            (device.clock_drift_ppb, device.clock_wander) = (0, Wander::default());
+            device.receive_jitter = Duration::ZERO;
+        }
+    }
+    all
+}
+
+/// Runs a seed: a segment of this shape, and so many changes of it.
+///
+/// # Panics
+/// When the segment does not come up.
+pub fn run(shape: Shape, seed: u64, changes: u64) -> Outcome {
+    let mut dice = Dice::new(seed);
+    let plan = Plan::new(shape, &mut dice);
+    let network = wired(devices(plan.devices, &mut dice), &plan.cables);
+    let junctions = if plan.connections.is_empty() { JunctionMode::Disabled } else { JunctionMode::Strict };
+    let options = Options { junctions, ..Options::default() };
+    let config = ClockConfig { drift_distributions: 500, ..config() };
+    let mut world = World::with_junctions(seed, network, &options, |scan| with_clocks(scan, config), &plan.connections)
+        .unwrap_or_else(|error| panic!("seed {seed}, {shape:?}: {error}"));
+    world.until(Duration::from_secs(8), "everything in OP", World::all_in_op);
+    let mut outcome = Outcome::default();
+    let what = |text: &str| format!("{shape:?}, seed {seed}, {text}");
+    Watch::new(&world, world.beginning()).settle(&mut world, &mut outcome, &what("at the start"));
+    for _ in 0..changes.div_ceil(2) {
+        let cable = *dice.pick(&plan.cut);
+        world.run_cycles(dice.below(10));
+        for heal in [false, true] {
+            let watch = Watch::new(&world, world.mark());
+            let (act, name) =
+                if heal { (World::heal as fn(&mut World, CableId), "heal") } else { (World::cut as _, "cut") };
+            act(&mut world, CableId(cable));
+            watch.settle(&mut world, &mut outcome, &what(&format!("{name} {cable}")));
+        }
+    }
+    outcome
+}
+
+/// Looks at what is written after a change.
+struct Watch {
+    since: Mark,
+    before: Vec<u32>,
+    /// Values that were written, by device.
+    written: Vec<Vec<u32>>,
+}
+
+impl Watch {
+    fn new(world: &World, since: Mark) -> Watch {
+        let before = delays(world.network());
+        Watch { since, written: vec![Vec::new(); before.len()], before }
+    }
+
+    fn cycle(&mut self, world: &mut World) {
+        world.cycle();
+        for ((device, now), written) in delays(world.network()).into_iter().enumerate().zip(&mut self.written) {
+            if *written.last().unwrap_or(&self.before[device]) != now {
+                written.push(now);
+            }
+        }
+    }
+
+    /// Until all delays are right and stay so, or it is told why they are not.
+    fn settle(mut self, world: &mut World, outcome: &mut Outcome, what: &str) {
+        (0..LOOK_CYCLES).for_each(|_| self.cycle(world));
+        let mut cycles = LOOK_CYCLES;
+        let truth = loop {
+            let truth = truth(world);
+            let now = delays(world.network());
+            if truth.iter().all(|place| !place.is_wrong(now[place.device])) {
+                (0..CALM_CYCLES).for_each(|_| self.cycle(world));
+                outcome.right += 1;
+                break truth;
+            }
+            if cycles >= LIMIT_CYCLES {
+                self.explain(world, outcome, what, &truth);
+                break truth;
+            }
+            (0..CALM_CYCLES).for_each(|_| self.cycle(world));
+            cycles += CALM_CYCLES;
+        };
+        outcome.changes += 1;
+        for place in truth {
+            for written in &self.written[place.device] {
+                outcome.written += 1;
+                outcome.largest_ns = outcome.largest_ns.max(place.error(*written).abs() as f64 / place.hops as f64);
+                if place.is_wrong(*written) {
+                    let text =
+                        format!("device {}: expected {} ns, {written} was written", place.device, place.delay_ns);
+                    outcome.wrong.push(format!("{what}: {text}"));
+                }
+            }
+        }
+    }
+
+    /// Delays that are not right at the end: they were not written, for a reason that was told.
+    fn explain(&self, world: &World, outcome: &mut Outcome, what: &str, truth: &[Place]) {
+        let reason = world.events(self.since).iter().rev().find_map(|timed| match &timed.event {
+            Event::ClocksFailed { reason } => Some(reason.clone()),
+            _ => None,
+        });
+        match reason {
+            Some(reason) => *outcome.not_written.entry(reason).or_default() += 1,
+            None => {
+                let now = delays(world.network());
+                let wrong = truth.iter().filter(|place| place.is_wrong(now[place.device]));
+                let text: Vec<String> = wrong
+                    .map(|place| format!("{}: {} instead of {}", place.device, now[place.device], place.delay_ns))
+                    .collect();
+                outcome.wrong.push(format!("{what}: not written, and no reason: {}", text.join(", ")));
+            }
+        }
+    }
+}
+
+/// A device that one frame met.
+#[derive(Clone, Copy, Debug)]
+struct Place {
+    device: usize,
+    /// From the first processing unit that the frame met.
+    delay_ns: i64,
+    hops: i64,
+}
+
+impl Place {
+    fn error(&self, written: u32) -> i64 {
+        i64::from(written as i32) - self.delay_ns
+    }
+
+    fn is_wrong(&self, written: u32) -> bool {
+        self.error(written).abs() > HOP_NS * self.hops
+    }
+}
+
+fn delays(network: &Network) -> Vec<u32> {
+    (0..network.devices().len()).map(|device| delay(network, device)).collect()
+}
+
+/// When the processing units meet a frame, from the first one on its link on.
+fn truth(world: &mut World) -> Vec<Place> {
+    let latched =
+        |world: &World| -> Vec<_> { world.network().devices().map(|device| device.controller.latched()).collect() };
+    let before = latched(world);
+    let datagram = RawDatagram {
+        command: Command::Bwr,
+        target: Target::Broadcast(map::DC_RECEIVE_TIME),
+        data: vec![0; 4],
+        resend: false,
+    };
+    let work = world.application_mut().engine_mut().start_datagrams(vec![datagram]);
+    let _ = world.finish(Duration::from_secs(1), work);
+    let mut met: Vec<(u64, u64, usize)> = Vec::new();
+    for (device, (now, before)) in latched(world).into_iter().zip(before).enumerate() {
+        // What is not reached keeps what it had, what lost its power has nothing.
+        if let Some((frame, at)) =
+            now.filter(|_| now != before && world.network().device(DeviceIndex(device)).controller.is_powered())
+        {
+            met.push((frame, at.0, device));
+        }
+    }
+    met.sort_unstable();
+    let mut places: Vec<Place> = Vec::new();
+    let mut first = (0, 0, 0);
+    for (number, (frame, at, device)) in met.into_iter().enumerate() {
+        if number == 0 || frame != first.0 {
+            first = (frame, at, number);
+        }
+        places.push(Place { device, delay_ns: (at - first.1) as i64, hops: (number - first.2).max(1) as i64 });
+    }
+    places
+}
