@@ -46,6 +46,8 @@ struct Survey {
     topology: Topology,
     wiring: Wiring,
     is_closed: bool,
+    /// What was latched for it, as long as no port has been changed since: a measurement like others.
+    latched: Option<Vec<Option<Latched>>>,
     /// The link on which copies do not come home, because the ring is opened.
     deaf: Option<Link>,
 }
@@ -62,9 +64,10 @@ pub(super) struct Measured {
 
 /// Measures; `opening` says that rings are opened for it.
 pub(super) async fn measure(bus: &Bus, clocks: &SharedClocks, opening: bool) -> Result<Measured, String> {
-    let survey = look(bus, clocks).await?;
+    let mut survey = look(bus, clocks).await?;
     let rings = survey.whole_rings();
     if opening && !rings.is_empty() {
+        survey.latched = None;
         measure_open(bus, clocks, &survey, &rings).await?;
     }
     let measured = take(bus, clocks, &survey).await?;
@@ -74,6 +77,7 @@ pub(super) async fn measure(bus: &Bus, clocks: &SharedClocks, opening: bool) -> 
     if !is_open_question || opening || rings.is_empty() {
         return measured.exact();
     }
+    survey.latched = None;
     measure_open(bus, clocks, &survey, &rings).await?;
     take(bus, clocks, &survey).await?.exact()
 }
@@ -101,6 +105,7 @@ async fn measure_open(bus: &Bus, clocks: &SharedClocks, survey: &Survey, rings: 
         Ok(()) => {
             let mut open = survey.clone();
             open.wiring.open(rings);
+            open.latched = None;
             // The port at the end of a ring of two links is closed: what comes to it ends there.
             open.deaf = survey.is_closed.then_some(Link::Redundant);
             take(bus, clocks, &open).await.map(drop)
@@ -198,15 +203,27 @@ async fn look_once(bus: &Bus, clocks: &SharedClocks) -> Result<Option<Survey>, B
         port.communication && !port.loop_closed
     };
     let wiring = Wiring::new(&topology, is_closed, is_open);
-    Ok(Some(Survey { stations: before.stations, dl_status, topology, wiring, is_closed, deaf: None }))
+    Ok(Some(Survey {
+        stations: before.stations,
+        dl_status,
+        topology,
+        wiring,
+        is_closed,
+        latched: Some(latched),
+        deaf: None,
+    }))
 }
 
 /// Several latches of a segment as it is.
 async fn take(bus: &Bus, clocks: &SharedClocks, survey: &Survey) -> Result<Measured, String> {
     let count = clocks.access().config.as_ref().map_or(1, |config| config.measurements.clamp(1, 64));
     let entries = survey.wiring.entry_ports();
-    enter_backwards(bus, clocks, &survey.stations, &entries).await;
+    let is_as_before = enter_backwards(bus, clocks, &survey.stations, &entries).await;
     let mut measurements = Measurements::new(&survey.wiring);
+    if let Some(latched) = survey.latched.as_ref().filter(|_| is_as_before) {
+        measurements.add(latched.clone());
+    }
+    let count = count + measurements.count();
     let mut failures = 0;
     while measurements.count() < count {
         match latch(bus, clocks, &survey.stations, survey.deaf).await {
@@ -264,7 +281,8 @@ impl Clocks {
 }
 
 /// Controllers that latch in one direction only are told in which the frame comes (facts 3.12, 7.5).
-async fn enter_backwards(bus: &Bus, clocks: &SharedClocks, stations: &[StationAddress], entries: &[u8]) {
+/// Returns whether none had to be.
+async fn enter_backwards(bus: &Bus, clocks: &SharedClocks, stations: &[StationAddress], entries: &[u8]) -> bool {
     let modes: Vec<(StationAddress, u8)> = {
         let mut clocks = clocks.access();
         let mut mode = |station: &StationAddress, entry: &u8| {
@@ -278,8 +296,10 @@ async fn enter_backwards(bus: &Bus, clocks: &SharedClocks, stations: &[StationAd
     let write = |bus: Bus, (station, mode): (StationAddress, u8)| async move {
         bus.fpwr(station, map::DC_LATCH_MODE, &[mode]).await
     };
+    let is_as_before = modes.is_empty();
     // Those without the register do not answer.
     let _ = bus.gather(modes, write).await;
+    is_as_before
 }
 
 /// Lets all clocks latch one frame and reads what these SubDevices have. Copies on the link that is `deaf` do not come home.
