@@ -261,10 +261,6 @@ impl CyclicFrame {
         self.left
     }
 
-    pub(crate) fn sequence(&self) -> Sequence {
-        self.sequence
-    }
-
     pub(crate) fn arrivals(&self) -> Arrivals {
         self.arrivals
     }
