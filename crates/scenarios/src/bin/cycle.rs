@@ -109,8 +109,10 @@ fn run(name: &str, part: &str, cycles: &str) -> io::Result<()> {
                 load.exchange_once();
             }
             let counters = load.exchange.counters();
+            let (frames, ..) = case.spec.bytes().map_err(io::Error::other)?;
+            let frames = frames as u64;
             let disturbed = counters.lost + counters.late + counters.corrupt + counters.skipped + counters.copies_lost;
-            if disturbed != 0 || counters.incomplete != 0 || counters.received != cycles {
+            if disturbed != 0 || counters.incomplete != 0 || counters.received != cycles * frames {
                 return Err(io::Error::other(format!("first {incomplete:?}, then {counters:?}")));
             }
         }
