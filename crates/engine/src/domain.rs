@@ -33,12 +33,13 @@ pub struct DomainStatus {
     pub skipped: u64,
 }
 
-/// How old a SubDevice's inputs are.
+/// How old a SubDevice's inputs are. It put them into a frame itself: shared working counters are not trusted alone (decision
+/// 0023).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Freshness {
     /// They never came.
     Never,
-    /// They came with the last judgement of the domain.
+    /// The SubDevice put them into a frame of the cycle that was judged last, or of a newer one.
     Fresh,
     /// They are this many cycles older than the last judgement.
     Stale {
