@@ -192,7 +192,7 @@ impl BringUp<'_> {
 
     /// Maps process data, all of it at once with what shows whether the SubDevice processed a frame.
     async fn map(&self) -> Result<(), BusError> {
-        self.fleet.board.set_unproven(self.index, self.setup.shows_presence);
+        self.fleet.board.set_unproven(self.index, self.setup.presence_fmmu.is_some());
         let fmmus = self.setup.fmmu_registers();
         if fmmus.is_empty() {
             return Ok(());

@@ -117,8 +117,8 @@ pub struct Setup {
     pub fmmus: Vec<(u8, Fmmu)>,
     /// Of these, the number of the one that shows whether there is mail.
     pub mail_fmmu: Option<u8>,
-    /// Its AL status is shown in the frames of its process data.
-    pub shows_presence: bool,
+    /// Of these, the number of the one that shows its AL status in the frames of its process data.
+    pub presence_fmmu: Option<u8>,
     /// FMMUs that the controller has.
     pub fmmu_count: u8,
     /// SyncManagers that the controller has.
@@ -184,17 +184,18 @@ impl Setup {
         let mail = mail_watch::fmmu(index, &plan, info);
         let mail_fmmu = mail.map(|(number, _)| number);
         fmmus.extend(mail);
-        let presence = layout.presence(index);
-        if let Some(logical) = presence {
+        let mut presence_fmmu = None;
+        if let Some(logical) = layout.presence(index) {
             let number =
                 presence::number(index, &plan, info).ok_or(SetupError::NoSpareFmmu(info.controller.fmmu_count))?;
             fmmus.push((number, presence::fmmu(logical)));
+            presence_fmmu = Some(number);
         }
         Ok(Setup {
             plan,
             fmmus,
             mail_fmmu,
-            shows_presence: presence.is_some(),
+            presence_fmmu,
             fmmu_count: info.controller.fmmu_count,
             sync_manager_count: info.controller.sync_manager_count,
             emulated: info.device_emulation,
@@ -203,7 +204,8 @@ impl Setup {
 
     /// How many areas have an FMMU.
     pub fn process_data_fmmus(&self) -> usize {
-        self.fmmus.iter().filter(|(number, _)| Some(*number) != self.mail_fmmu).count()
+        let others = [self.mail_fmmu, self.presence_fmmu];
+        self.fmmus.iter().filter(|(number, _)| !others.contains(&Some(*number))).count()
     }
 
     /// The FMMU registers from the first to the last one that is used, to be written at once.
