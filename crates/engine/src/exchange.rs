@@ -5,7 +5,7 @@
 //! allocates, locks or waits; the work is bounded by what was planned at activation.
 //!
 //! A frame is over when its working counters are as expected, or all its copies are in, or at its deadline. Inputs are
-//! delivered as copies come, per SubDevice: see [`place`].
+//! delivered as copies come, per SubDevice: see `place`.
 
 mod access;
 mod clocks;

@@ -1,7 +1,7 @@
 //! What the exchange posts about its frames on the wire, so that a frame of the other half can be alone there (facts 7.1).
 //!
 //! Single writer: the exchange. It posts a departure before it hands the first frame to a link, the cycle when it has handed
-//! over the last one ([`Board::post_cycle`]), and the last frame of which a copy came home, by link. A link hands frames over
+//! over the last one (`Board::post_cycle`), and the last frame of which a copy came home, by link. A link hands frames over
 //! in their order, so when a copy of the last one is home, those before it are home or lost.
 
 use core::sync::atomic::{AtomicU16, AtomicU32, AtomicU64, Ordering};

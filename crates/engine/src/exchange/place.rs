@@ -51,8 +51,12 @@ struct Contribution {
     is_proven: bool,
     /// Without it the datagram is not complete.
     required: bool,
-    /// By link: the copy brought its inputs, or was taken by it.
+    /// It is on its way, with its FMMUs set: it takes outputs, which must not stand for those of another one.
+    is_mapped: bool,
+    /// By link: the copy brought its inputs.
     met: [bool; 2],
+    /// By link: it did to the copy all that it does, in whatever state it is.
+    did: [bool; 2],
 }
 
 /// What a copy brought, by the link it was sent on.
@@ -178,7 +182,7 @@ impl Place {
         self.views[link].is_sure = match &mut self.contributions[..] {
             // No SubDevice can have processed what was not there.
             all if self.wkc_at >= OUTSIDE => {
-                all.iter_mut().for_each(|it| it.met[link] = false);
+                all.iter_mut().for_each(|it| it.forget(link));
                 true
             }
             [alone] => alone.meet_alone(link, wkc, self.command),
@@ -187,12 +191,12 @@ impl Place {
             }
             // Outputs of SubDevices that cannot show themselves: the sum over both copies counts.
             all => {
-                all.iter_mut().for_each(|it| it.met[link] = false);
+                all.iter_mut().for_each(|it| it.forget(link));
                 true
             }
         };
         if !self.views[link].is_sure {
-            self.contributions.iter_mut().for_each(|it| it.met[link] = false);
+            self.contributions.iter_mut().for_each(|it| it.forget(link));
         }
         self.gather(link);
     }
@@ -224,11 +228,15 @@ impl Place {
         let arrived = || self.views.iter().zip(links).filter(|(_, arrived)| *arrived).map(|(view, _)| view);
         let sum = arrived().fold(0, |sum, view| sum + u32::from(view.wkc.0));
         if self.is_summed() {
-            let needed = self.contributions.iter().filter(|it| it.required).map(|it| u32::from(it.wkc.0)).sum();
+            let needed = self.contributions.iter().filter(|it| it.required || it.is_mapped);
+            let needed = needed.map(|it| u32::from(it.wkc.0)).sum();
             return (needed..=u32::from(self.expected.0)).contains(&sum);
         }
+        if let [alone] = &self.contributions[..] {
+            return sum == u32::from(alone.wkc.0) || (!alone.required && sum < u32::from(alone.wkc.0));
+        }
         let is_met = |it: &Contribution| {
-            let copies = it.met.iter().zip(links).filter(|(met, arrived)| **met && *arrived).count();
+            let copies = it.did.iter().zip(links).filter(|(did, arrived)| **did && *arrived).count();
             copies == 1 || (copies == 0 && !it.required)
         };
         arrived().all(|view| view.is_sure) && self.contributions.iter().all(is_met)
@@ -236,7 +244,7 @@ impl Place {
 
     /// Whether some SubDevice processed the copies on both links, as they were looked at.
     pub fn is_doubled(&self) -> bool {
-        self.contributions.iter().any(|it| it.met == [true; 2])
+        self.contributions.iter().any(|it| it.did == [true; 2])
     }
 
     /// Whether only the sum over both copies tells who took it.
@@ -250,7 +258,7 @@ impl Place {
             return;
         }
         let is_summed = self.is_summed();
-        let processed = |it: &Contribution| it.met.iter().zip(links).filter(|(met, arrived)| **met && *arrived).count();
+        let processed = |it: &Contribution| it.did.iter().zip(links).filter(|(did, arrived)| **did && *arrived).count();
         let expected = self.contributions.iter().filter(|it| it.is_proven);
         expected.filter(|it| is_summed || processed(it) != 1).for_each(|it| board.count_wkc_error(it.subdevice));
     }
@@ -309,6 +317,7 @@ impl Place {
             let takes_part = board.takes_part(contribution.subdevice);
             contribution.is_proven = takes_part && !board.is_unproven(contribution.subdevice);
             contribution.required = takes_part || !board.is_optional(contribution.subdevice);
+            contribution.is_mapped = board.is_unproven(contribution.subdevice);
         }
     }
 
@@ -326,13 +335,28 @@ impl Place {
 
 impl Contribution {
     fn new(subdevice: usize, wkc: Wkc) -> Contribution {
-        Contribution { subdevice, wkc, witness: None, is_proven: false, required: true, met: [false; 2] }
+        Contribution {
+            subdevice,
+            wkc,
+            witness: None,
+            is_proven: false,
+            required: true,
+            is_mapped: false,
+            met: [false; 2],
+            did: [false; 2],
+        }
+    }
+
+    fn forget(&mut self, link: usize) {
+        (self.met[link], self.did[link]) = (false, false);
     }
 
     /// The only SubDevice of a datagram. False where it processed a copy twice.
     fn meet_alone(&mut self, link: usize, wkc: Wkc, command: Command) -> bool {
         let has_both = command == Command::Lrw && self.wkc == Wkc(3);
-        self.met[link] = wkc == self.wkc || (has_both && wkc == INPUTS_OF_LRW);
+        self.did[link] = wkc == self.wkc;
+        // Below SAFEOP its inputs are whatever its memory holds.
+        self.met[link] = self.is_proven && (wkc == self.wkc || (has_both && wkc == INPUTS_OF_LRW));
         wkc.0 <= self.wkc.0
     }
 }
@@ -345,6 +369,7 @@ fn meet(all: &mut [Contribution], link: usize, wkc: Wkc, presence: &Presence) ->
     for contribution in all.iter_mut() {
         let passed = contribution.witness.map_or(Passed::Not, |place| presence.passed(link, place));
         contribution.met[link] = passed == Passed::Delivering && contribution.is_proven;
+        contribution.did[link] = contribution.met[link];
         match passed {
             Passed::Not => {}
             Passed::Delivering if contribution.is_proven => sure += u32::from(contribution.wkc.0),
@@ -353,10 +378,11 @@ fn meet(all: &mut [Contribution], link: usize, wkc: Wkc, presence: &Presence) ->
     }
     let wkc = u32::from(wkc.0);
     if wkc == sure + others {
-        // Everyone that is there did all that it does.
+        // Everyone that is there did all that it does. Below SAFEOP inputs are whatever the memory holds.
         for contribution in all.iter_mut() {
-            contribution.met[link] =
-                contribution.witness.is_some_and(|place| presence.passed(link, place) != Passed::Not);
+            let passed = contribution.witness.map_or(Passed::Not, |place| presence.passed(link, place));
+            contribution.met[link] = passed == Passed::Delivering;
+            contribution.did[link] = passed != Passed::Not;
         }
     }
     (sure..=sure + others).contains(&wkc)

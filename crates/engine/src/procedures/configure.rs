@@ -192,7 +192,8 @@ impl BringUp<'_> {
 
     /// Maps process data, all of it at once with what shows whether the SubDevice processed a frame.
     async fn map(&self) -> Result<(), BusError> {
-        self.fleet.board.set_unproven(self.index, self.setup.presence_fmmu.is_some());
+        // SyncManagers for OP only are still off.
+        self.fleet.board.set_unproven(self.index, self.setup.presence_fmmu.is_some() || !self.setup.plan.is_op_only());
         let fmmus = self.setup.fmmu_registers();
         if fmmus.is_empty() {
             return Ok(());
@@ -202,8 +203,10 @@ impl BringUp<'_> {
 
     /// Process data counts on it from now on, on its inputs as soon as they were seen.
     pub(super) fn join(&self) {
+        let is_unproven = self.setup.presence_fmmu.is_some();
+        self.fleet.board.set_unproven(self.index, is_unproven);
         self.fleet.board.set_taking_part(self.index, true);
-        if self.fleet.board.is_unproven(self.index) {
+        if is_unproven {
             presence::prove(self.bus, self.fleet, self.index, self.station, self.setup.clone());
         }
     }

@@ -123,6 +123,7 @@ pub(super) fn lose(bus: &Bus, fleet: &SharedFleet, index: usize) {
         bus.report(Event::Lost { subdevice: index });
     }
     fleet.board.set_taking_part(index, false);
+    fleet.board.set_unproven(index, false);
     // One that was on its way to process data is missed from now on.
     fleet.board.set_excused(index, !fleet.exchanges(index, fleet.target(index)));
     if let Some(mailbox) = fleet.mailbox(index) {
@@ -188,7 +189,11 @@ async fn quick(bring_up: &BringUp<'_>, told: &mut Option<Shown>) -> Result<bool,
     let BringUp { bus, fleet, index, station, setup, target, mailbox, .. } = bring_up;
     let (status, code) = al_state::read_status(bus, *station).await?;
     if !status.error && status.al_state() == Some(*target) {
-        fleet.board.set_taking_part(*index, fleet.exchanges(*index, *target));
+        if fleet.exchanges(*index, *target) {
+            bring_up.join();
+        } else {
+            fleet.board.set_taking_part(*index, false);
+        }
         mailbox.resume();
         return Ok(true);
     }

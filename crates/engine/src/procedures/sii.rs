@@ -192,7 +192,7 @@ pub(super) async fn read(bus: &Bus, station: StationAddress, cache: &SiiCache) -
     }
     let mut own_chain = None;
     loop {
-        match cache.find(&area) {
+        match cache.find(&area, station) {
             Found::Nothing(claim) => {
                 let (chain, contents) = categories(&mut eeprom, &area, true).await?;
                 claim.settle(chain, contents.clone());
@@ -207,7 +207,9 @@ pub(super) async fn read(bus: &Bus, station: StationAddress, cache: &SiiCache) -
             Found::BeingRead => bus.sleep(CACHE_PAUSE).await,
             Found::Contents(chain, contents) if own_chain.as_ref() == Some(&chain) => return Ok(contents),
             // Another SubDevice than its fixed area says.
-            Found::Contents(..) => return categories(&mut eeprom, &area, true).await.map(|(_, contents)| contents),
+            Found::Contents(..) | Found::Disputed => {
+                return categories(&mut eeprom, &area, true).await.map(|(_, contents)| contents);
+            }
         }
     }
 }

@@ -17,7 +17,7 @@ use ringcat_sim::fault::Fault;
 use ringcat_sim::frame::Port;
 use ringcat_sim::network::{Network, NetworkOptions};
 use ringcat_wire::al::AlState;
-use ringcat_wire::register::PortKind;
+use ringcat_wire::register::{PortKind, map};
 use scenarios::check::Delivery;
 use scenarios::dice::Dice;
 use scenarios::segments::{
@@ -121,6 +121,84 @@ fn a_subdevice_on_its_slow_way_to_safeop_leaves_the_inputs_of_all_others_fresh()
             world.settle();
         }
     }
+}
+
+/// FMMUs and SyncManagers are set before SAFEOP: a buffer of one byte is read from then on, though nothing has written it yet.
+#[test]
+fn inputs_of_a_subdevice_below_safeop_are_not_fresh() {
+    for (count, fmmus) in [(1, None), (3, None), (3, Some(1))] {
+        let mut described = descriptions(&["digital-input-8"; 3][..count]);
+        for it in &mut described {
+            it.controller_fmmus = fmmus;
+            it.transitions = TransitionTimes::all(Duration::from_millis(100));
+            it.behaviour = Behaviour::Terminal(InputSource::Constant(vec![0xAA]));
+        }
+        let mut world = World::in_op(1, line(described, NetworkOptions::default()));
+        let last = DeviceIndex(count - 1);
+        world.power_off(last);
+        world.run_cycles(60);
+        world.power_on(last);
+        for _ in 0..600 {
+            world.cycle();
+            let state = world.network().device(last).al_status().al_state();
+            let is_fresh = world.application().exchange().freshness(DOMAIN, count - 1) == Freshness::Fresh;
+            assert!(
+                !is_fresh || !matches!(state, Some(AlState::Init | AlState::PreOp)),
+                "{count}, {fmmus:?}: {state:?}"
+            );
+            assert_eq!(world.application().exchange().image(DOMAIN), vec![0xAA; count], "{count}, {fmmus:?}");
+        }
+        world.settle();
+    }
+}
+
+/// One link, LRW: inputs come, outputs are not taken.
+#[test]
+fn a_domain_is_not_complete_while_outputs_are_not_taken() {
+    for kinds in [&["servo"][..], &["servo", "analog-input-4"]] {
+        for fmmus in [None, Some(3), Some(2)] {
+            let mut described = descriptions(kinds);
+            described[0].controller_fmmus = fmmus;
+            let mut world = World::in_op(1, line(described, NetworkOptions::default()));
+            world.judge_latched(false);
+            world.run_cycles(20);
+            let write = world.application_mut().engine_mut().start_register_write(0, map::fmmu(0), vec![0; 16]);
+            world.finish(Duration::from_secs(1), write).expect("it is there");
+            world.run_cycles(3);
+            let mark = world.mark();
+            world.run_cycles(60);
+            let wrong = world
+                .judged(mark)
+                .iter()
+                .filter(|it| it.status.state == DomainState::Complete && it.status.wkc < it.status.expected);
+            assert_eq!(wrong.count(), 0, "{kinds:?}, FMMUs: {fmmus:?}");
+        }
+    }
+}
+
+/// One with outputs is on its way from INIT, as was asked for, while another one loses its power: the sum is the same.
+#[test]
+fn outputs_that_one_takes_on_its_way_do_not_stand_for_those_of_one_without_power() {
+    let mut described = descriptions(&["digital-output-8"; 2]);
+    for it in &mut described {
+        it.controller_fmmus = Some(1);
+        it.transitions = TransitionTimes::all(Duration::from_millis(100));
+    }
+    let mut world = World::in_op(1, line(described, NetworkOptions::default()));
+    world.judge_latched(false);
+    let request = world.application_mut().request_state(0, AlState::Init);
+    world.finish(Duration::from_secs(5), request).expect("it goes there");
+    world.run_cycles(50);
+    drop(world.application_mut().request_state(0, AlState::Op));
+    world.until(Duration::from_secs(1), "it takes outputs", |world| {
+        world.judged(world.beginning()).last().is_some_and(|it| it.status.wkc == 2)
+    });
+    world.power_off(DeviceIndex(1));
+    world.run_cycles(2);
+    let mark = world.mark();
+    world.run_cycles(300);
+    let complete = world.judged(mark).iter().filter(|it| it.status.state == DomainState::Complete);
+    assert_eq!(complete.count(), 0);
 }
 
 /// A tree on the main link, with the redundant link at a free port or not.

@@ -89,9 +89,7 @@ fn with_image(mut description: DeviceDescription, image: &[u8]) -> DeviceDescrip
 /// What is true at all times, and what became of the odd one.
 fn judge(made: &Variant, odd: DeviceDescription) -> Result<(Outcome, bool), String> {
     let network = line(around(odd), NetworkOptions::default());
-    // Those with the same fixed area would be taken for twins, and not be read.
-    let options = Options { sii_cache: false, ..Options::default() };
-    let started = World::with(1, network, &options, |scan| automatic(&scan.subdevices, CYCLE));
+    let started = World::with(1, network, &Options::default(), |scan| automatic(&scan.subdevices, CYCLE));
     let mut world = started.map_err(|error| format!("the activation fails: {error}"))?;
     let begin = world.application().now();
     let reason = |world: &World| {

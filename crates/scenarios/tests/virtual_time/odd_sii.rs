@@ -290,6 +290,30 @@ fn one_whose_damaged_sii_lacks_what_is_declared_keeps_its_places_and_holds_up_no
 }
 
 /// SubDevices that are what their SII says: outputs and inputs with default lengths, and PDOs for one direction or none.
+/// Three alike, which share what was read of their SIIs: one with damage inside of a category, whichever it is.
+#[test]
+fn damage_inside_a_category_does_not_spread_to_subdevices_alike() {
+    for damaged in 1..4 {
+        let mut devices = descriptions(&["coupler", "digital-input-16", "digital-input-16", "digital-input-16"]);
+        let mut other = devices[damaged].clone();
+        other.sync_managers[0].start += 0x0100;
+        let mut image = sii_image::build(&devices[damaged]);
+        let wrong = sii_image::build(&other);
+        // The first SyncManager entry, in place.
+        let at = image.iter().zip(&wrong).position(|(one, other)| one != other).expect("they differ");
+        image[at] ^= 0x40;
+        devices[damaged].sii_image = Some(image);
+        let mut world = world(devices, ReadPdos::Never);
+        world.run_cycles(300);
+        for index in (1..4).filter(|index| *index != damaged) {
+            let info = &world.scan.subdevices[index];
+            assert_eq!(info.sync_managers[0].start, 0x1000, "{damaged} is damaged, {index} is not");
+            assert_eq!(info.pdos.len(), 16, "{damaged} is damaged, {index} is not");
+            assert_eq!(world.network().device(DeviceIndex(index)).al_status(), AlStatus::new(AlState::Op));
+        }
+    }
+}
+
 #[test]
 fn pdos_in_one_direction_or_of_size_0_and_default_lengths_mean_one_thing_to_both_sides() {
     for kind in ["digital-input-8", "digital-output-8", "analog-input-4", "servo", "all-protocols"] {

@@ -1,13 +1,16 @@
 //! SII contents that were read before, for SubDevices with the same fixed area and the same category headers.
 //!
-//! The checksum of the SII covers 14 bytes and tells nothing about the rest, so that equal headers are asked for.
+//! The checksum of the SII covers 14 bytes and tells nothing about the rest, so that equal headers are asked for, and two
+//! SubDevices have to be read alike before others are spared: one bad EEPROM is a matter of its SubDevice alone. Where two
+//! differ each is read for itself.
 
 use alloc::rc::Rc;
 use alloc::vec::Vec;
 use core::cell::{Cell, RefCell};
 use core::time::Duration;
 
-use ringcat_wire::sii::{CategoryHeader, SiiHeader};
+use ringcat_wire::address::StationAddress;
+use ringcat_wire::sii::{CategoryHeader, CategoryKind, SiiHeader};
 
 use super::SiiContents;
 
@@ -17,21 +20,45 @@ const MAX_ENTRIES: usize = 1024;
 /// The fixed area as far as it is read, zero elsewhere.
 pub(super) type FixedArea = [u8; SiiHeader::LEN];
 
+/// What was read of a SubDevice.
+type Read = (Vec<CategoryHeader>, SiiContents);
+
+/// Whether two say the same but for names, which nothing depends on.
+fn agree(one: &Read, other: &Read) -> bool {
+    let facts = |read: &Read| {
+        let categories = read.1.categories.iter().filter(|(kind, ..)| *kind != CategoryKind::Strings);
+        categories.cloned().collect::<Vec<_>>()
+    };
+    one.0 == other.0 && one.1.end == other.1.end && facts(one) == facts(other)
+}
+
+/// What is known of a fixed area.
+#[derive(Debug)]
+enum Known {
+    /// One SubDevice was read, or is being read; how many are.
+    Once { read: Option<(StationAddress, Read)>, readers: usize },
+    /// Two were read alike.
+    Twice(Read),
+    /// Two differ.
+    Disputed,
+}
+
 #[derive(Debug)]
 struct Entry {
     area: FixedArea,
-    /// `None` while it is being read.
-    read: Option<(Vec<CategoryHeader>, SiiContents)>,
+    known: Known,
 }
 
 /// What the cache has for a fixed area.
 pub(super) enum Found {
-    /// Nobody has read it; whoever holds the claim does.
+    /// Too few have read it; whoever holds the claim does.
     Nothing(Claim),
-    /// Somebody reads it now.
+    /// Others read it now.
     BeingRead,
     /// It was read, with these category headers.
     Contents(Vec<CategoryHeader>, SiiContents),
+    /// SubDevices with it differ.
+    Disputed,
 }
 
 /// SII contents of SubDevices that were read before.
@@ -61,21 +88,29 @@ impl SiiCache {
 
     /// Forgets everything: an EEPROM was written.
     pub fn clear(&self) {
-        self.entries.borrow_mut().retain(|entry| entry.read.is_none());
+        self.entries.borrow_mut().retain(|entry| matches!(entry.known, Known::Once { read: None, .. }));
     }
 
-    /// What there is, or the right to read it.
-    pub(super) fn find(&self, area: &FixedArea) -> Found {
+    /// What there is, or the right to read it for the SubDevice with this address.
+    pub(super) fn find(&self, area: &FixedArea, station: StationAddress) -> Found {
+        /// So many read at once: as many as have to agree.
+        const READERS: usize = 2;
+        let claim = || Claim { entries: self.entries.clone(), area: *area, station };
         let mut entries = self.entries.borrow_mut();
-        match entries.iter().find(|entry| entry.area == *area) {
-            Some(Entry { read: Some((chain, contents)), .. }) => Found::Contents(chain.clone(), contents.clone()),
-            Some(Entry { read: None, .. }) => Found::BeingRead,
+        match entries.iter_mut().find(|entry| entry.area == *area).map(|entry| &mut entry.known) {
+            Some(Known::Twice((chain, contents))) => Found::Contents(chain.clone(), contents.clone()),
+            Some(Known::Disputed) => Found::Disputed,
+            Some(Known::Once { read, readers }) if *readers + usize::from(read.is_some()) < READERS => {
+                *readers += 1;
+                Found::Nothing(claim())
+            }
+            Some(Known::Once { .. }) => Found::BeingRead,
             None => {
                 if entries.len() >= MAX_ENTRIES {
                     entries.remove(0);
                 }
-                entries.push(Entry { area: *area, read: None });
-                Found::Nothing(Claim { entries: self.entries.clone(), area: *area })
+                entries.push(Entry { area: *area, known: Known::Once { read: None, readers: 1 } });
+                Found::Nothing(claim())
             }
         }
     }
@@ -93,25 +128,44 @@ impl SiiCache {
     }
 }
 
-/// Somebody reads the SII with this fixed area; whoever has the same one waits. Dropped, also with the procedure that
-/// reads, the next one may try.
+/// The right to read an SII with this fixed area; further SubDevices with the same one wait. Dropped, also with the procedure
+/// that reads, another one may try.
 pub(super) struct Claim {
     entries: Rc<RefCell<Vec<Entry>>>,
     area: FixedArea,
+    station: StationAddress,
 }
 
 impl Claim {
     pub(super) fn settle(self, chain: Vec<CategoryHeader>, contents: SiiContents) {
         let mut entries = self.entries.borrow_mut();
-        if let Some(entry) = entries.iter_mut().find(|entry| entry.area == self.area) {
-            entry.read = Some((chain, contents));
-        }
+        let Some(entry) = entries.iter_mut().find(|entry| entry.area == self.area) else { return };
+        let now = (chain, contents);
+        let next = match &entry.known {
+            Known::Once { read: Some((station, read)), .. } if *station != self.station => {
+                if agree(read, &now) {
+                    Known::Twice(now)
+                } else {
+                    Known::Disputed
+                }
+            }
+            // The reader is counted until the claim is dropped.
+            Known::Once { readers, .. } => Known::Once { read: Some((self.station, now)), readers: *readers },
+            Known::Twice(_) | Known::Disputed => return,
+        };
+        entry.known = next;
     }
 }
 
 impl Drop for Claim {
     fn drop(&mut self) {
-        self.entries.borrow_mut().retain(|entry| entry.area != self.area || entry.read.is_some());
+        self.entries.borrow_mut().retain_mut(|entry| match &mut entry.known {
+            Known::Once { read, readers } if entry.area == self.area => {
+                *readers = readers.saturating_sub(1);
+                read.is_some() || *readers > 0
+            }
+            _ => true,
+        });
     }
 }
 
@@ -130,30 +184,43 @@ mod tests {
         SiiContents { header: SiiHeader::decode(area), categories: Vec::new(), end: ChainEnd::Sound { at: area.len() } }
     }
 
-    fn claim(cache: &SiiCache, area: &FixedArea) -> Option<Claim> {
-        match cache.find(area) {
+    fn claim(cache: &SiiCache, area: &FixedArea, station: u16) -> Option<Claim> {
+        match cache.find(area, StationAddress(station)) {
             Found::Nothing(claim) => Some(claim),
-            Found::BeingRead | Found::Contents(..) => None,
+            Found::BeingRead | Found::Contents(..) | Found::Disputed => None,
         }
     }
 
     #[test]
-    fn a_reader_that_goes_away_ends_its_claim_and_one_that_ends_keeps_what_it_read() {
+    fn two_read_and_when_they_agree_others_are_spared() {
         let cache = SiiCache::new(true);
-        let first = claim(&cache, &area(1)).expect("nobody reads");
-        assert!(claim(&cache, &area(1)).is_none(), "somebody does");
-        drop(first);
-        assert!(cache.is_empty());
-        claim(&cache, &area(1)).expect("free again").settle(Vec::new(), contents(&area(1)));
-        assert!(matches!(cache.find(&area(1)), Found::Contents(..)));
+        let claims = [1, 2].map(|station| claim(&cache, &area(1), station).expect("two may read"));
+        assert!(claim(&cache, &area(1), 3).is_none(), "two do");
+        drop(claims);
+        assert!(cache.is_empty(), "both have gone away");
+        for station in [1, 2] {
+            claim(&cache, &area(1), station).expect("free again").settle(Vec::new(), contents(&area(1)));
+        }
+        assert!(matches!(cache.find(&area(1), StationAddress(3)), Found::Contents(..)));
         assert_eq!(cache.len(), 1);
+    }
+
+    #[test]
+    fn one_subdevice_does_not_confirm_itself_and_two_that_differ_are_read_each_for_itself() {
+        let cache = SiiCache::new(true);
+        for _ in 0..3 {
+            claim(&cache, &area(1), 1).expect("one is not enough").settle(Vec::new(), contents(&area(1)));
+        }
+        let other = SiiContents { end: ChainEnd::Unreadable, ..contents(&area(1)) };
+        claim(&cache, &area(1), 2).expect("another one").settle(Vec::new(), other);
+        assert!(matches!(cache.find(&area(1), StationAddress(3)), Found::Disputed));
     }
 
     #[test]
     fn the_cache_is_bounded() {
         let cache = SiiCache::new(true);
         for number in 0..2 * MAX_ENTRIES {
-            claim(&cache, &area(number)).expect("another one").settle(Vec::new(), contents(&area(number)));
+            claim(&cache, &area(number), 1).expect("another one").settle(Vec::new(), contents(&area(number)));
         }
         assert_eq!(cache.len(), MAX_ENTRIES);
     }
