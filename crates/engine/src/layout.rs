@@ -79,6 +79,9 @@ pub struct Rules<'a> {
     pub lrw: LrwPolicy,
     /// By SubDevice; those behind the end have an FMMU to spare.
     pub witnesses: &'a [Witness],
+    /// Number of the session, modulo [`SESSIONS`]: each has logical addresses of its own, so that a SubDevice that was out of
+    /// reach since an earlier one and still has its FMMUs does not answer for another one.
+    pub session: u32,
     /// Datagrams that a frame may hold, [`MIN_DATAGRAMS_PER_FRAME`] at least; `None`: as many as fit.
     pub max_datagrams: Option<usize>,
 }
@@ -221,20 +224,27 @@ const CLOCKS: usize = 3;
 const _: () = assert!(CLOCKS <= MIN_DATAGRAMS_PER_FRAME as usize);
 /// Where presence bytes lie: beyond all process data, which ends at 2 GiB, and below the mail bits.
 const PRESENCE_AT: LogicalAddress = LogicalAddress(0xE000_0000);
+/// Sessions with logical addresses of their own: process data of the last one begins below 1 GiB.
+pub const SESSIONS: u32 = 1024;
+/// Process data of sessions is 1 MiB apart, their presence bytes 64 KiB: as many as SubDevices can be.
+const DATA_BITS: u32 = 20;
+const PRESENCE_BITS: u32 = 16;
 
 impl Layout {
     /// As [`Layout::with`], with LRW where it is of use, and every SubDevice with an FMMU to spare.
     pub fn new(specs: &[DomainSpec], links: LinkSet, supervision: bool) -> Result<Layout, LayoutError> {
         let lrw = LrwPolicy::Automatic;
-        Layout::with(specs, Rules { links, supervision, lrw, witnesses: &[], max_datagrams: None })
+        Layout::with(specs, Rules { links, supervision, lrw, witnesses: &[], session: 0, max_datagrams: None })
     }
 
     /// Lays out domains.
     pub fn with(specs: &[DomainSpec], rules: Rules<'_>) -> Result<Layout, LayoutError> {
         let most = rules.max_datagrams;
         let mut layout = Layout { most, ..Layout::default() };
-        let mut logical = 0u32;
-        let mut witnesses = chunk::Witnesses::new(rules.witnesses, PRESENCE_AT);
+        let session = rules.session % SESSIONS;
+        let mut logical = session << DATA_BITS;
+        let presence = LogicalAddress(PRESENCE_AT.0 + (session << PRESENCE_BITS));
+        let mut witnesses = chunk::Witnesses::new(rules.witnesses, presence);
         for spec in specs {
             let each = rules.lrw == LrwPolicy::PerSubDevice;
             let lrw = spec.lrw && (rules.links == LinkSet::Single || each);

@@ -89,6 +89,8 @@ pub struct MainDevice {
     supervisor: Supervisor,
     /// What supervisors before this one have counted.
     counted: AcyclicCounters,
+    /// Activations so far.
+    activations: u32,
     identity: Identity,
     cache: SiiCache,
     scan: ScanSlot,
@@ -120,6 +122,7 @@ impl MainDevice {
         let identity = Identity::new(options.codec, options.main, options.redundant);
         MainDevice {
             supervisor: supervisor(identity, &options, now),
+            activations: 0,
             counted: AcyclicCounters::default(),
             identity,
             cache: SiiCache::new(options.sii_cache),
@@ -205,7 +208,8 @@ impl MainDevice {
         check_lrw(lrw, &specs, links)?;
         let witnesses = witnesses(&plans, &found);
         let (supervision, max_datagrams) = (self.options.supervision, self.options.most_datagrams());
-        let rules = Rules { links, supervision, lrw, witnesses: &witnesses, max_datagrams };
+        let session = self.next_session(bus.now());
+        let rules = Rules { links, supervision, lrw, witnesses: &witnesses, session, max_datagrams };
         let mut layout = Layout::with(&specs, rules).map_err(ActivateError::Layout)?;
         if clock_config.is_some() {
             layout.add_clocks().map_err(ActivateError::Layout)?;
@@ -280,6 +284,14 @@ impl MainDevice {
         let periods = specs.iter().map(|spec| spec.period).collect();
         let under_way = specs.iter().map(|spec| spec.under_way).max().unwrap_or(1);
         Ok(Active { exchange, directory, periods, under_way })
+    }
+
+    /// Number of a session that begins now: another one than before, and hardly that of a program that ran here a while ago.
+    fn next_session(&mut self, now: Instant) -> u32 {
+        /// About four seconds.
+        const STEP_BITS: u32 = 32;
+        self.activations = self.activations.wrapping_add(1);
+        (self.activations - 1).wrapping_add((now.0 >> STEP_BITS) as u32)
     }
 
     /// Ends supervision and all other procedures, and takes all SubDevices down to a state; those in a lower one stay there.

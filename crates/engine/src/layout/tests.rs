@@ -17,7 +17,14 @@ fn spec(areas: Vec<AreaSpec>) -> DomainSpec {
 
 /// Two links, and datagrams of its own for each SubDevice.
 fn each(supervision: bool) -> Rules<'static> {
-    Rules { links: LinkSet::Ring, supervision, lrw: LrwPolicy::PerSubDevice, witnesses: &[], max_datagrams: None }
+    Rules {
+        links: LinkSet::Ring,
+        supervision,
+        lrw: LrwPolicy::PerSubDevice,
+        witnesses: &[],
+        session: 0,
+        max_datagrams: None,
+    }
 }
 
 #[test]
@@ -66,7 +73,8 @@ fn one_lrw_per_subdevice_is_allowed_on_two_links_facts_9_2_2() {
 fn witnessed(witnesses: &[Witness], links: LinkSet) -> PlannedFrame {
     let pair = |n: usize| [area(n, 2, Direction::Outputs, 2), area(n, 3, Direction::Inputs, 2)];
     let areas: Vec<_> = (0..witnesses.len()).flat_map(pair).collect();
-    let rules = Rules { links, supervision: false, lrw: LrwPolicy::Automatic, witnesses, max_datagrams: None };
+    let rules =
+        Rules { links, supervision: false, lrw: LrwPolicy::Automatic, witnesses, session: 0, max_datagrams: None };
     let layout = Layout::with(&[spec(areas)], rules).unwrap();
     assert_eq!(layout.domains[0].frames.len(), 1);
     layout.domains[0].frames[0].clone()
@@ -114,6 +122,21 @@ fn subdevices_show_themselves_where_their_inputs_share_a_working_counter_and_in_
 }
 
 #[test]
+fn sessions_have_logical_addresses_of_their_own() {
+    let of = |session| {
+        let areas = (0..2).map(|n| area(n, 3, Direction::Inputs, 2)).collect();
+        let (links, lrw) = (LinkSet::Single, LrwPolicy::Automatic);
+        let rules = Rules { links, supervision: false, lrw, witnesses: &[], session, max_datagrams: None };
+        let layout = Layout::with(&[spec(areas)], rules).unwrap();
+        (layout.area(1, 3).unwrap().1.logical.0, layout.presence(1).unwrap().0, layout.domains[0].image_len)
+    };
+    assert_eq!(of(0), (2, 0xE000_0001, 4));
+    assert_eq!(of(3), (0x0030_0002, 0xE003_0001, 4));
+    assert_eq!(of(SESSIONS + 3), of(3));
+    assert!(of(SESSIONS - 1).0 < 1 << 30);
+}
+
+#[test]
 fn two_areas_of_one_subdevice_count_once_per_direction() {
     let areas = vec![area(0, 3, Direction::Inputs, 2), area(0, 4, Direction::Inputs, 2)];
     let layout = Layout::new(&[spec(areas)], LinkSet::Single, false).unwrap();
@@ -151,7 +174,7 @@ proptest! {
             witnesses.push(if *alone { Witness::Alone } else { MAPPED });
         }
         let links = if ring { LinkSet::Ring } else { LinkSet::Single };
-        let rules = Rules { witnesses: &witnesses, links, supervision: true, lrw: LrwPolicy::Automatic, max_datagrams: None };
+        let rules = Rules { witnesses: &witnesses, links, supervision: true, lrw: LrwPolicy::Automatic, session: 0, max_datagrams: None };
         let layout = Layout::with(&[DomainSpec { lrw, ..spec(areas) }], rules).unwrap();
         let domain = &layout.domains[0];
         let mut end = 0;

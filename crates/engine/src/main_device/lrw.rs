@@ -40,7 +40,8 @@ pub(super) fn check_lrw(lrw: LrwPolicy, specs: &[DomainSpec], links: LinkSet) ->
         return Ok(());
     }
     let specs: Vec<DomainSpec> = specs.iter().map(|spec| DomainSpec { lrw: true, ..spec.clone() }).collect();
-    let rules = Rules { links: LinkSet::Single, supervision: false, lrw, witnesses: &[], max_datagrams: None };
+    let rules =
+        Rules { links: LinkSet::Single, supervision: false, lrw, witnesses: &[], session: 0, max_datagrams: None };
     let asked = Layout::with(&specs, rules).map_err(ActivateError::Layout)?;
     for (domain, planned) in asked.domains.iter().enumerate() {
         let datagrams = planned.frames.iter().flat_map(|frame| &frame.datagrams);

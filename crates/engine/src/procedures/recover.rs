@@ -226,9 +226,15 @@ pub(super) fn start(bus: &Bus, fleet: &SharedFleet, index: usize, from: Start, t
 
 /// A lost SubDevice's station address answers again: it comes back, if it is the same one.
 pub(super) fn welcome(bus: &Bus, fleet: &SharedFleet, index: usize) {
+    bus.report(Event::Returned { subdevice: index });
+    start_if_same(bus, fleet, index, Start::Unknown);
+}
+
+/// Starts the configuration of what answers at a member's station address, if it is that member; otherwise takes the address
+/// away.
+pub(super) fn start_if_same(bus: &Bus, fleet: &SharedFleet, index: usize, from: Start) {
     fleet.set_phase(index, Phase::Configuring);
     let attempt = fleet.next_attempt(index);
-    bus.report(Event::Returned { subdevice: index });
     let (bus, fleet) = (bus.clone(), fleet.clone());
     bus.clone().spawn(async move {
         let checked = async {
@@ -236,7 +242,7 @@ pub(super) fn welcome(bus: &Bus, fleet: &SharedFleet, index: usize) {
                 if fleet.access().members[index].unfit.is_some() {
                     read_again(&bus, &fleet, index).await;
                 }
-                return keep_up(bus.clone(), fleet.clone(), index, Start::Unknown, None).await;
+                return keep_up(bus.clone(), fleet.clone(), index, from, None).await;
             }
             let station = fleet.access().members[index].station;
             // Where that fails, the next look finds the address again.

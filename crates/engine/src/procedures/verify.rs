@@ -12,7 +12,7 @@ use ringcat_wire::register::{Fmmu, map};
 
 use super::configure::Start;
 use super::fleet::{Phase, SharedFleet};
-use super::recover::start;
+use super::recover::start_if_same;
 use crate::event::Event;
 use crate::supervisor::Bus;
 
@@ -68,5 +68,6 @@ fn configure_anew(bus: &Bus, fleet: &SharedFleet, suspect: &Suspect) {
     let count = expected.len() / Fmmu::LEN;
     let _ = write!(reason, "registers from {} on: the {count} FMMUs that were written are not there", map::FMMU_BASE);
     bus.report(Event::ConfigurationFailed { subdevice: index, reason });
-    start(bus, fleet, index, Start::Doubtful, None);
+    // Another SubDevice may answer at its address: one that was out of reach since an earlier session.
+    start_if_same(bus, fleet, index, Start::Doubtful);
 }

@@ -9,7 +9,7 @@
 use std::ops::Range;
 use std::time::Duration;
 
-use ringcat::{DomainId, DomainState, Freshness, JunctionMode, Options, automatic};
+use ringcat::{DomainId, DomainState, Freshness, JunctionMode, LastOutputs, MainDevice, Options, automatic};
 use ringcat_sim::application::{Behaviour, InputSource};
 use ringcat_sim::cable::{CableId, DeviceIndex, Endpoint};
 use ringcat_sim::description::{DeviceDescription, TransitionTimes};
@@ -23,6 +23,7 @@ use scenarios::dice::Dice;
 use scenarios::segments::{
     MAIN, REDUNDANT, RING_BEHIND_JUNCTION, RING_IN_RING, TWO_RINGS, at, descriptions, line, ring, wired_with,
 };
+use scenarios::tap::Tap;
 use scenarios::world::{CYCLE, World};
 
 const KINDS: [&str; 8] = [
@@ -120,6 +121,44 @@ fn a_subdevice_on_its_slow_way_to_safeop_leaves_the_inputs_of_all_others_fresh()
             assert_eq!(world.incomplete(mark), 0, "ring: {closed}, {kind} comes back");
             world.settle();
         }
+    }
+}
+
+/// A SubDevice is out of reach while the MainDevice starts anew, and keeps its station address, FMMUs and state. In the new
+/// session another one has this address; it loses its power as the old one comes into reach again.
+#[test]
+fn a_subdevice_of_an_earlier_session_is_not_taken_for_another_one() {
+    let mut described = with_four_ports(&["digital-input-16"; 3]);
+    for (number, it) in described.iter_mut().enumerate() {
+        it.identity.product_code += 0x1000 * number as u32;
+        it.behaviour = Behaviour::Terminal(InputSource::Constant(vec![0xA0 + number as u8; 2]));
+    }
+    let cables = [(MAIN, at(0, Port::A)), (at(0, Port::B), at(1, Port::A)), (at(0, Port::D), at(2, Port::A))];
+    let mut main_device = MainDevice::request(Tap::new(wired_with(described, &cables)), &Options::default());
+    let scan = main_device.scan().expect("three are there");
+    let mut application =
+        main_device.activate(automatic(&scan.subdevices, CYCLE)).map_err(|it| it.error).expect("fits");
+    (0..1_000).for_each(|_| application.cycle(|_| ()));
+    assert!(application.all_settled());
+    let named = |device: usize| scan.subdevices.iter().position(|it| it.name.ends_with(&device.to_string()));
+    // In the order of frames the branch at port D comes first: the one there has the second address.
+    assert_eq!((named(2), named(1)), (Some(1), Some(2)));
+    application.links_mut().network_mut().cut(CableId(2));
+    let mut main_device = application.stop(LastOutputs::Zero, AlState::Init, Duration::from_secs(1)).expect("it stops");
+    let scan = main_device.scan().expect("two are there");
+    assert_eq!(scan.subdevices.len(), 2);
+    let mut application =
+        main_device.activate(automatic(&scan.subdevices, CYCLE)).map_err(|it| it.error).expect("fits");
+    (0..1_000).for_each(|_| application.cycle(|_| ()));
+    let network = application.links_mut().network_mut();
+    network.power_off(DeviceIndex(1));
+    network.heal(CableId(2));
+    for cycle in 0..5_000 {
+        application.cycle(|_| ());
+        let exchange = application.exchange();
+        // What left before may still come.
+        assert!(cycle < 2 || exchange.freshness(DOMAIN, 1) != Freshness::Fresh, "cycle {cycle}");
+        assert_eq!(exchange.image(DOMAIN), [0xA0, 0xA0, 0xA1, 0xA1], "cycle {cycle}");
     }
 }
 
