@@ -342,11 +342,11 @@ fn delays_that_were_tampered_with_are_found_when_crossed_behind_forks_without_a_
     let mut cases = Cases::default();
     // Stations are numbered in the order in which the frame is processed: device 1 is the last.
     let tampering = Tampering::with(crossed(), |_| ());
-    // More than what rounding may cost to either side (`--within`).
-    tampering.add_longer(&mut cases, "ns is what was measured", &[0x1006], 0x0920, 6);
+    // Away from what was measured: towards it, rounding may hide as much.
+    tampering.add_longer(&mut cases, "ns is what was measured", &[0x1006], 0x0920, -4);
     let tampering = Tampering::with(fork(), |_| ());
     // The second of a branch against its first; a branch as a whole between what is in front of it and behind it.
-    tampering.add_longer(&mut cases, "ns is what was measured", &[0x1004], 0x0920, 6);
+    tampering.add_longer(&mut cases, "ns is what was measured", &[0x1004], 0x0920, 4);
     tampering.add_longer(&mut cases, "before what is in front of it has ended", &[0x1005, 0x1006], 0x0920, -2_000);
     tampering.add_longer(&mut cases, "after the frame was back", &[0x1007], 0x0920, 2_000);
     // Of a ring that was broken from the start and is whole later.
