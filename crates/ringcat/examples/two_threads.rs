@@ -8,14 +8,12 @@ use std::path::Path;
 use std::thread::sleep;
 use std::time::{Duration, Instant};
 
-use ringcat::packet::PacketLinks;
+use ringcat::packet::{PacketLinks, ReceiveMode};
 use ringcat::shared_segment::SharedSegment;
+use ringcat::sim::network::Network;
+use ringcat::sim::segment::Segment;
 use ringcat::text::{Names, describe};
-use ringcat::{DomainId, Error, LastOutputs, Links, Options, SupervisorThread, automatic};
-use ringcat_link::ReceiveMode;
-use ringcat_sim::network::Network;
-use ringcat_sim::segment::Segment;
-use ringcat_wire::al::AlState;
+use ringcat::{AlState, DomainId, Error, LastOutputs, Links, Options, SupervisorThread, automatic};
 
 const SEGMENT: &str = "[segment]\n[[device]]\ntype = \"coupler\"\n[[device]]\ntype = \"digital-output-8\"\n";
 const LAMPS: usize = 1;
@@ -42,8 +40,8 @@ fn run<L: Links + Send + 'static>(cyclic: L, acyclic: L) -> Result<(), Error> {
     let application = supervisor.clone().activate(automatic(&scan.subdevices, Duration::from_millis(1)), cyclic)?;
     let lamps: Vec<_> = (0..8).filter_map(|channel| application.entry(LAMPS, 0x7000 + 0x10 * channel, 1)).collect();
 
-    // The cycles: no allocation, no lock, no waiting in here. `prepare` is the place for `ringcat_link::realtime`.
-    let prepare = ringcat_link::realtime::precise_timers;
+    // The cycles: no allocation, no lock, no waiting in here. `prepare` is the place for `ringcat::realtime`.
+    let prepare = ringcat::realtime::precise_timers;
     let cycles = application.start_cycles(prepare, move |data| {
         let lit = (data.cycle() / 50) as usize;
         for (channel, lamp) in lamps.iter().enumerate() {

@@ -6,10 +6,12 @@
 mod cables;
 mod file;
 mod image;
+#[cfg(feature = "sim")]
 mod segment;
 mod value;
 
 pub use file::{Difference, EniFile, LoadError, LoadFailure};
 pub use image::{EniImage, EniVariable, ImageError};
+#[cfg(feature = "sim")]
 pub use segment::segment;
 pub use value::{Value, VariableType};

@@ -9,10 +9,12 @@ use ringcat_engine::procedures::scan::ScanError;
 use ringcat_engine::procedures::services::ServiceError;
 use ringcat_engine::procedures::stop::StopError;
 use ringcat_engine::supervisor::BusError;
+#[cfg(feature = "sim")]
 use ringcat_sim::segment::SegmentError;
 
 /// An error of the public API.
 #[derive(Debug)]
+#[non_exhaustive]
 pub enum Error {
     /// The scan failed.
     Scan(ScanError),
@@ -27,10 +29,12 @@ pub enum Error {
     /// The segment could not be stopped in order.
     Stop(StopError),
     /// The simulated segment cannot be built.
+    #[cfg(feature = "sim")]
     Segment(SegmentError),
     /// The system has no more threads.
     Thread(std::io::Error),
     /// The mailbox gateway cannot listen.
+    #[cfg(feature = "gateway")]
     Gateway {
         /// Where.
         address: std::net::SocketAddr,
@@ -56,8 +60,10 @@ impl fmt::Display for Error {
                  until their watchdogs expire. Are the cables of the host unplugged?",
             ),
             Error::Stop(error) => write!(f, "stop: {error}"),
+            #[cfg(feature = "sim")]
             Error::Segment(error) => error.fmt(f),
             Error::Thread(error) => write!(f, "a thread cannot be started: {error}"),
+            #[cfg(feature = "gateway")]
             Error::Gateway { address, cause } => write!(f, "mailbox gateway on {address}: {cause}"),
             Error::Panicked(message) => write!(f, "the application's closure has panicked: {message}"),
             Error::Gone => f.write_str("the supervisor thread has ended"),
@@ -103,6 +109,7 @@ impl From<StopError> for Error {
     }
 }
 
+#[cfg(feature = "sim")]
 impl From<SegmentError> for Error {
     fn from(error: SegmentError) -> Error {
         Error::Segment(error)

@@ -27,15 +27,31 @@
 //! ```
 //!
 //! Frames, time and waiting come from the [`Links`]; everything that EtherCAT is lives in [`ringcat_engine`].
+//!
+//! # Features
+//!
+//! | feature | what it adds |
+//! |---|---|
+//! | `packet` (default) | [`packet`](crate::packet::PacketLinks): network interfaces; [`tee`](crate::tee::Tee): captures; `realtime` |
+//! | `sim` | links into a simulated segment, in virtual time or at the pace of the clock; the simulator itself as `sim` |
+//! | `eni` | networks from an ENI, its variables by name; what a file says as `config` |
+//! | `gateway` | the mailbox gateway over UDP and TCP |
+//! | `eoe` | network interfaces of the host for SubDevices that speak Ethernet over EtherCAT |
+//!
+//! Without any of them an application brings its own [`Links`].
 
 pub mod acyclic;
 pub mod application;
 mod cyclic;
 pub mod cyclic_thread;
 mod device_services;
+#[cfg(feature = "eni")]
 pub mod eni;
+#[cfg(feature = "eoe")]
 pub mod eoe;
 mod error;
+pub mod event_log;
+#[cfg(feature = "gateway")]
 pub mod gateway;
 pub mod histogram;
 mod jobs;
@@ -44,14 +60,18 @@ pub mod main_device;
 pub mod memory;
 pub mod news;
 mod pace;
+#[cfg(feature = "packet")]
 pub mod packet;
 mod process_data;
 mod services;
+#[cfg(feature = "sim")]
 pub mod shared_segment;
+#[cfg(feature = "sim")]
 pub mod simulated;
 mod states;
 pub mod supervisor_thread;
 pub mod system_time;
+#[cfg(feature = "packet")]
 pub mod tee;
 pub mod text;
 pub mod window;
@@ -85,13 +105,14 @@ pub use ringcat_engine::link::Link;
 pub use ringcat_engine::mail::coe::{SdoAddress, SdoError, SdoFailure};
 pub use ringcat_engine::mail::{Limits, Mailbox};
 pub use ringcat_engine::main_device::{
-    ActivateError, Declaration, DomainConfig, DomainMember, ExplicitLrw, GroupState, MAX_UNDER_WAY, RawDatagram,
-    Required, SubDeviceState,
+    ActivateError, Declaration, Directory, DomainConfig, DomainMember, ExplicitLrw, GroupState, MAX_UNDER_WAY,
+    RawDatagram, Required, SubDeviceState,
 };
+pub use ringcat_engine::plan::{AreaPlan, MappedEntry, MappedPdo, PlanError, SubDevicePlan, plan};
 pub use ringcat_engine::procedures::clocks::ClockStatus;
 pub use ringcat_engine::procedures::dictionary::ReadPdos;
 pub use ringcat_engine::procedures::look_at_ring::RingLook;
-pub use ringcat_engine::procedures::scan::{Scan, ScanError};
+pub use ringcat_engine::procedures::scan::{FIRST_STATION, Scan, ScanError};
 pub use ringcat_engine::procedures::services::ServiceError;
 pub use ringcat_engine::procedures::services::statistics::{PortErrors, Statistics};
 pub use ringcat_engine::procedures::stop::StopError;
@@ -99,9 +120,19 @@ pub use ringcat_engine::procedures::strangers::rescan::{Found, Rescan, Who};
 pub use ringcat_engine::request::{
     RegisterRequest, Request, RequestFailure, RequestRefused, RequestState, SdoRequest, SoeRequest, VoeHandler,
 };
+pub use ringcat_engine::ring::identity::{Classified, Identity};
 pub use ringcat_engine::ring::{FrameLimit, MIN_DATAGRAMS_PER_FRAME, RingState};
 pub use ringcat_engine::ring_status::{Cable, CableErrors, LinkStatus, Redundancy, RedundancyLoss, RingStatus};
 pub use ringcat_engine::supervisor::AcyclicCounters;
 pub use ringcat_engine::time::Instant;
 pub use ringcat_engine::topology::PortOf;
+pub use ringcat_wire::al::AlState;
 pub use ringcat_wire::source_address::MacCodec;
+
+#[cfg(feature = "eni")]
+pub use ringcat_config as config;
+#[cfg(feature = "packet")]
+pub use ringcat_link::realtime;
+#[cfg(feature = "sim")]
+pub use ringcat_sim as sim;
+pub use ringcat_wire as wire;

@@ -6,10 +6,10 @@
 use ringcat_engine::link::Link;
 use ringcat_engine::time::Instant;
 use ringcat_link::interface;
-use ringcat_link::{
-    CarrierWatch, ClassFilter, LinkCounters, LinkError, PacketOptions, PacketSocket, ReceiveMode, monotonic,
-};
+use ringcat_link::{CarrierWatch, ClassFilter, PacketOptions, PacketSocket, monotonic};
 use ringcat_wire::frame::MacAddress;
+
+pub use ringcat_link::{LinkCounters, LinkError, ReceiveMode};
 
 use crate::links::Links;
 

@@ -143,6 +143,7 @@ impl SupervisorThread {
         }
     }
 
+    #[cfg(any(feature = "eoe", feature = "gateway"))]
     /// Has the thread do something with its engine in each of its turns, until it says true.
     pub(crate) fn attend(&self, work: impl FnMut(&mut Engine, Instant) -> bool + Send + 'static) -> Result<(), Error> {
         let requests = self.0.requests.as_ref().ok_or(Error::Gone)?;

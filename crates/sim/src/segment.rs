@@ -18,6 +18,9 @@ use crate::network::NetworkOptions;
 
 pub use error::SegmentError;
 
+/// The segment file of the demonstration: a ring of couplers, terminals and a servo drive.
+pub const DEMO: &str = include_str!("../segments/demo.toml");
+
 /// A segment as a file describes it.
 ///
 /// Cable `n` is the one that attaches device `n`; behind these come the one that closes the ring, if there is one, and

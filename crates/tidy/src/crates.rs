@@ -45,7 +45,20 @@ const ROOMS: &[Room] = &[
     Room { directory: "link", internal: Internal::Only(&[]), external: External::Only(&["libc"]) },
     Room {
         directory: "ringcat",
-        internal: Internal::Only(&["ringcat-config", "ringcat-engine", "ringcat-link", "ringcat-sim", "ringcat-wire"]),
+        // Itself: tests and examples have all features.
+        internal: Internal::Only(&[
+            "ringcat",
+            "ringcat-config",
+            "ringcat-engine",
+            "ringcat-link",
+            "ringcat-sim",
+            "ringcat-wire",
+        ]),
+        external: External::Only(&["mio"]),
+    },
+    Room {
+        directory: "cli",
+        internal: Internal::Only(&["ringcat", "ringcat-engine", "ringcat-link"]),
         external: External::Any,
     },
     Room { directory: "scenarios", internal: Internal::Any, external: External::Any },

@@ -1,7 +1,9 @@
 //! The rules, applied to this repository.
 
+use std::process::Command;
+
 use tidy::tree::Tree;
-use tidy::{Finding, crates, features, files, modules, paths, safety, toolchain};
+use tidy::{Finding, crates, dependencies, features, files, modules, paths, safety, toolchain};
 
 fn tree() -> Tree {
     Tree::of_this_repository().expect("the repository can be read")
@@ -45,6 +47,26 @@ fn nothing_is_unfinished() {
 #[test]
 fn crates_depend_on_each_other_as_the_map_says() {
     none(crates::forbidden_arrows(&tree()));
+}
+
+#[test]
+fn an_application_on_interfaces_takes_in_few_crates() {
+    for features in dependencies::FEATURE_SETS {
+        let mut cargo = Command::new(env!("CARGO"));
+        cargo.args(["tree", "--offline", "--package", "ringcat", "--edges", "normal", "--prefix", "none"]);
+        cargo.args(["--no-default-features", "--features", features]);
+        let output = cargo.current_dir(env!("CARGO_MANIFEST_DIR")).output().expect("cargo starts");
+        assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+        let tree = String::from_utf8_lossy(&output.stdout);
+        let (others, ours) = dependencies::crates_in(&tree);
+        println!("ringcat with \"{features}\": {} crates from the registry, {} of ours", others.len(), ours.len());
+        none(dependencies::not_in(features, &tree));
+    }
+}
+
+#[test]
+fn examples_of_the_library_use_the_library_alone() {
+    none(dependencies::examples_beside_the_library(&tree()));
 }
 
 #[test]

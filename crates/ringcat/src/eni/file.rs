@@ -10,10 +10,13 @@ use ringcat_config::{Configuration, follow};
 use ringcat_engine::config::{ConfigError, Resolution, resolve};
 use ringcat_engine::info::SubDeviceInfo;
 use ringcat_engine::main_device::Declaration;
+#[cfg(feature = "sim")]
 use ringcat_sim::network::Network;
+#[cfg(feature = "sim")]
 use ringcat_sim::segment::SegmentError;
 use ringcat_wire::address::Position;
 
+#[cfg(feature = "sim")]
 use super::segment::segment;
 use crate::text::Names;
 
@@ -165,6 +168,7 @@ impl EniFile {
     ///
     /// # Errors
     /// [`SegmentError`]: cables that do not fit.
+    #[cfg(feature = "sim")]
     pub fn simulated(&self, ring: bool) -> Result<Network, SegmentError> {
         Network::from_description(segment(&self.eni, &self.configuration, ring))
     }

@@ -1,9 +1,7 @@
 //! The public API as an application uses it, on the embedded simulator.
 
 mod declarations;
-mod demo;
 mod ethernet;
-mod exit_codes;
 mod gateway;
 mod junctions;
 mod names;

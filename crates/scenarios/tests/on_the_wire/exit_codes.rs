@@ -1,5 +1,5 @@
 //! Situations on interfaces in which something does not hold, and what the program says last. None exits with 0. Those
-//! that need no interface are in `crates/ringcat/tests/api/exit_codes.rs`.
+//! that need no interface are in `crates/cli/tests/program/exit_codes.rs`.
 
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command};

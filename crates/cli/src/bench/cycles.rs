@@ -1,0 +1,170 @@
+//! All SubDevices to OP, and process data as fast as the frames come back.
+//!
+//! A cycle is receive, judge, work, queue, send; it begins when all frames of the last one are back, or, with several
+//! cycles under way, those of the oldest one. The halves run as in `ringcat run`, the cycles in the thread that measures.
+
+use std::time::Duration;
+
+use clap::Args;
+use ringcat::AlState;
+use ringcat::packet::PacketLinks;
+use ringcat::{
+    AcyclicHalf, Application, Declaration, DomainId, LastOutputs, MAX_UNDER_WAY, MainDevice, Options, Scan,
+    SupervisorThread, Trigger, automatic,
+};
+use ringcat_link::monotonic;
+
+use super::quantile_us;
+use crate::ending::EndRequest;
+use crate::interfaces::{Failure, InterfaceArguments, ThreadArguments};
+use crate::output::say;
+use crate::verdict::Verdict;
+
+/// The domain that `automatic` declares.
+pub const DOMAIN: DomainId = DomainId(0);
+/// Cycle time until all are in OP.
+const START_UP_CYCLE: Duration = Duration::from_millis(1);
+/// From activation to OP of the last SubDevice at the most.
+const OP_LIMIT: Duration = Duration::from_secs(60);
+/// SubDevices have this long to get to INIT in the end.
+pub const STOP_LIMIT: Duration = Duration::from_secs(5);
+/// Cycles back to back before the measured ones.
+const WARM_UP: u32 = 1000;
+
+/// Options of `ringcat bench cycles`.
+#[derive(Args, Debug)]
+pub struct CyclesArguments {
+    #[command(flatten)]
+    interfaces: InterfaceArguments,
+    #[command(flatten)]
+    thread: ThreadArguments,
+    /// Cycles to be measured; 0 for the start-up alone.
+    #[arg(long, value_name = "CYCLES", default_value = "20000", value_parser = clap::value_parser!(u32).range(0..=10_000_000))]
+    count: u32,
+    /// Cycles that may be under way at once: one begins when the oldest is back.
+    #[arg(long, value_name = "CYCLES", default_value = "1", value_parser = clap::value_parser!(u8).range(1..=i64::from(MAX_UNDER_WAY)))]
+    under_way: u8,
+    /// Leaves the supervision datagram out, for a comparison with those that send process data alone.
+    #[arg(long)]
+    unsupervised: bool,
+    /// Both halves in one thread, as small applications have them.
+    #[arg(long)]
+    one_thread: bool,
+}
+
+/// Measures. It has held where every cycle was complete and SubDevices were stopped in order.
+pub fn run(arguments: &CyclesArguments) -> Result<Verdict, Failure> {
+    let thread = arguments.thread;
+    let end = EndRequest::watch(thread.priority)?;
+    let options = Options { supervision: !arguments.unsupervised, ..arguments.interfaces.options() };
+    if arguments.one_thread {
+        let links = arguments.interfaces.open(thread)?;
+        let _awake = thread.apply();
+        let begin = monotonic::now_ns();
+        let mut main_device = MainDevice::request(links, &options);
+        let scan = main_device.scan()?;
+        let declaration = declare(&scan, begin).with_under_way(arguments.under_way);
+        let mut application = main_device.activate(declaration).map_err(ringcat::Error::from)?;
+        let reasons = exchange(&mut application, arguments.count, begin, &end);
+        Ok(verdict(reasons, application.stop(LastOutputs::Zero, AlState::Init, STOP_LIMIT).err(), arguments.count))
+    } else {
+        let (cyclic, acyclic) = arguments.interfaces.open_halves(thread)?;
+        let begin = monotonic::now_ns();
+        let supervisor = SupervisorThread::start(acyclic, &options, move || thread.prepare_supervisor())?;
+        let _awake = thread.apply();
+        let scan = supervisor.scan()?;
+        let declaration = declare(&scan, begin).with_under_way(arguments.under_way);
+        let mut application = supervisor.activate(declaration, cyclic).map_err(ringcat::Error::from)?;
+        let reasons = exchange(&mut application, arguments.count, begin, &end);
+        Ok(verdict(reasons, application.stop(LastOutputs::Zero, AlState::Init, STOP_LIMIT).err(), arguments.count))
+    }
+}
+
+fn verdict(mut reasons: Vec<String>, stop: Option<ringcat::Error>, count: u32) -> Verdict {
+    reasons.extend(stop.map(|error| error.to_string()));
+    Verdict::of(reasons, format!("{count} cycles, all complete"))
+}
+
+/// Everything as its SII says; tells of the scan.
+pub fn declare(scan: &Scan, begin: u64) -> Declaration {
+    say!("SubDevices: {}", scan.subdevices.len());
+    say!("scanned after: {:.1} ms", (monotonic::now_ns() - begin) as f64 / 1e6);
+    automatic(&scan.subdevices, START_UP_CYCLE)
+}
+
+/// Cycles until all are in OP.
+///
+/// # Errors
+/// Why that does not come, in words.
+pub fn reach_op<H: AcyclicHalf>(
+    application: &mut Application<PacketLinks, H>,
+    begin: u64,
+    end: &EndRequest,
+) -> Result<(), String> {
+    let until = application.now() + OP_LIMIT;
+    while !application.all_settled() {
+        application.cycle(|_| ());
+        if let Some(by) = end.by() {
+            return Err(format!("ended by {by} before all SubDevices were in OP"));
+        }
+        if application.now() >= until {
+            return Err("not all SubDevices get to OP; `ringcat run` tells which, and why".to_owned());
+        }
+    }
+    say!("all in OP after: {:.1} ms", (application.now().0 - begin) as f64 / 1e6);
+    Ok(())
+}
+
+/// To OP, then cycles back to back; what did not hold.
+fn exchange<H: AcyclicHalf>(
+    application: &mut Application<PacketLinks, H>,
+    count: u32,
+    begin: u64,
+    end: &EndRequest,
+) -> Vec<String> {
+    if let Err(reason) = reach_op(application, begin, end) {
+        return vec![reason];
+    }
+    if count == 0 {
+        return Vec::new();
+    }
+    application.set_trigger(Trigger::FramesReturned { at_least: Duration::ZERO });
+    for _ in 0..WARM_UP {
+        one_cycle(application);
+    }
+    let mut times_ns = Vec::with_capacity(count as usize);
+    let before = application.cyclic_counters();
+    let first = one_cycle(application);
+    let mut last = first;
+    for _ in (0..count).take_while(|_| !end.is_asked()) {
+        let now = one_cycle(application);
+        times_ns.push(now - last);
+        last = now;
+    }
+    let after = application.cyclic_counters();
+    // A cycle that was skipped sent nothing.
+    let incomplete = after.incomplete - before.incomplete + after.skipped - before.skipped;
+    let cycles = times_ns.len();
+    times_ns.sort_unstable();
+    say!("cycles per second: {:.0}", cycles as f64 * 1e9 / (last - first).max(1) as f64);
+    say!("cycle median: {:.2} us", quantile_us(&times_ns, 50));
+    say!("cycle minimum: {:.2} us", quantile_us(&times_ns, 0));
+    say!("incomplete: {incomplete} of {cycles}");
+    let mut reasons = Vec::new();
+    if incomplete > 0 {
+        reasons.push(format!("{incomplete} of {cycles} cycles incomplete"));
+    }
+    reasons.extend(end.by().map(|by| format!("ended by {by} after {cycles} of {count} cycles")));
+    reasons
+}
+
+/// A cycle with an application's part: an output changes, and answers to an input. Returns when it began, in nanoseconds.
+fn one_cycle<H: AcyclicHalf>(application: &mut Application<PacketLinks, H>) -> u64 {
+    application.cycle(|data| {
+        if let [first, second, .., last] = data.image_mut(DOMAIN) {
+            *first = first.wrapping_add(1);
+            *second = *last;
+        }
+        data.now().0
+    })
+}

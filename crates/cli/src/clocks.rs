@@ -1,0 +1,225 @@
+//! `ringcat clocks`: brings the distributed clocks of a segment together and shows how well they keep.
+//!
+//! Everything on the wire goes to OP as its SII says, with SYNC signals where they are asked for. Once all clocks are locked
+//! their differences are watched for a while; then comes a table, and a picture if one is wanted.
+
+mod plot;
+mod table;
+
+use std::fs::File;
+use std::io::Write;
+use std::ops::ControlFlow;
+use std::path::{Path, PathBuf};
+use std::thread::sleep;
+use std::time::Duration;
+
+use clap::Args;
+use ringcat::event_log::EventLog;
+use ringcat::packet::PacketLinks;
+use ringcat::tee::Tee;
+use ringcat::text::Names;
+use ringcat::{
+    AlState, ClockConfig, ClockStatus, CyclicThread, Instant, LastOutputs, SupervisorThread, SyncSignals, automatic,
+};
+
+use crate::clock_options::{ClockOptions, farthest};
+use crate::ending::EndRequest;
+use crate::interfaces::{Failure, InterfaceArguments, ThreadArguments, now};
+use crate::output::{counted, say};
+use crate::recording::RecordingArguments;
+use crate::run_log::{RunLog, Shown};
+use crate::surroundings::Surroundings;
+use crate::times::{cycle, time};
+use crate::verdict::Verdict;
+use plot::{Course, plot};
+use table::{json, lines};
+
+/// From activation to the lock at the most.
+const LOCK_LIMIT: Duration = Duration::from_secs(60);
+/// SubDevices have this long to get to INIT in the end.
+const STOP_LIMIT: Duration = Duration::from_secs(5);
+/// Pause between two looks.
+const LOOK: Duration = Duration::from_millis(10);
+
+/// How to read what it prints.
+const TABLE_HELP: &str = "\
+  delay       nanoseconds from the reference clock, as measured (register 0x0928)
+  offset      from the clock's own time to system time (0x0920)
+  drift       how much faster than the reference it would run by itself (0x0932)
+  now, worst  its difference to the reference (0x092C): when it was read last, and the largest since it was locked
+  SYNC        signals in microseconds: cycle, and shift with its sign
+
+Exit status: 0 all clocks locked and stayed within 1 us, and all SubDevices were in OP in the end, 1 they did not.";
+
+/// Options of `ringcat clocks`.
+#[derive(Args, Debug)]
+#[command(after_help = TABLE_HELP)]
+pub struct ClocksArguments {
+    #[command(flatten)]
+    interfaces: InterfaceArguments,
+    #[command(flatten)]
+    thread: ThreadArguments,
+    #[command(flatten)]
+    recording: RecordingArguments,
+    #[command(flatten)]
+    options: ClockOptions,
+    /// Cycle time, with its unit: 250us, 1ms; 10us to 1s.
+    #[arg(long, value_name = "TIME", default_value = "1ms", value_parser = cycle)]
+    cycle: Duration,
+    /// How long to watch once all clocks are locked, such as 10s; until Ctrl-C with a time that long.
+    #[arg(long = "for", value_name = "TIME", default_value = "5s", value_parser = time)]
+    lasts: Duration,
+    /// Draw the differences over time into this file.
+    #[arg(long, value_name = "FILE.svg")]
+    plot: Option<PathBuf>,
+    /// Print JSON instead of a table; what happens meanwhile goes to the standard error output.
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// Runs. It has held where all clocks locked and stayed together.
+pub fn run(arguments: &ClocksArguments) -> Result<Verdict, Failure> {
+    arguments.interfaces.check_names()?;
+    // Nothing is measured in vain.
+    let mut picture = arguments.plot.as_ref().map(|path| Picture::create(path)).transpose()?;
+    let thread = arguments.thread;
+    let end = EndRequest::watch(thread.priority)?;
+    let (cyclic, acyclic) = arguments.interfaces.open_halves(thread)?;
+    let surroundings = Surroundings::watch(&arguments.interfaces, &cyclic);
+    let recording = arguments.recording.start(&arguments.interfaces)?;
+    let (cyclic, acyclic) = (recording.tee(cyclic), recording.tee(acyclic));
+    let _awake = thread.prepare_process();
+    let begin = now();
+    let supervisor =
+        SupervisorThread::start(acyclic, &arguments.interfaces.options(), move || thread.prepare_supervisor())?;
+    let scan = supervisor.scan().map_err(|error| surroundings.explain(error, supervisor.counters().foreign))?;
+    let names = Names(scan.subdevices.iter().map(|info| info.name.clone()).collect());
+    let mut declaration = automatic(&scan.subdevices, arguments.cycle);
+    arguments.options.declare(&mut declaration, &scan.subdevices)?;
+    let signals: Vec<Option<SyncSignals>> = declaration.subdevices.iter().map(|config| config.sync).collect();
+    let mut application = supervisor.activate(declaration, cyclic).map_err(ringcat::Error::from)?;
+    application.set_trigger(arguments.options.trigger(arguments.options.bus_shift));
+    let asked = end.clone();
+    let cycles = application.start_cycles(
+        move || thread.prepare_cycles(),
+        // Here too: this thread runs whatever starves.
+        move |_| if asked.is_asked() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) },
+    )?;
+    let log = RunLog::new(EventLog::new(begin, names), surroundings);
+    let mut watch = Watch { begin, log, end: &end, json: arguments.json };
+    let mut course = Course::default();
+    let locked = watch.until(&cycles, &mut course, now() + LOCK_LIMIT, true)?;
+    cycles.news().restart_histograms();
+    if locked {
+        watch.until(&cycles, &mut course, now() + arguments.lasts, false)?;
+    }
+    end.no_limit();
+    let clocks = cycles.supervisor().with(|engine| engine.clocks())?;
+    let settled = cycles.supervisor().all_settled();
+    let mut reasons = reasons(&clocks, locked, settled);
+    reasons.extend(end.cut_short(Some(arguments.lasts)));
+    let news = cycles.news_handle();
+    if let Some(picture) = &mut picture {
+        reasons.extend(picture.draw(&plot(&course, &clocks)).err());
+        tell(arguments.json, &format!("differences over time: {}", picture.path.display()));
+    }
+    let application = cycles.end().unwrap_or_else(|panicked| {
+        reasons.push(panicked.to_string());
+        panicked.application
+    });
+    reasons.extend(application.stop(LastOutputs::Zero, AlState::Init, STOP_LIMIT).err().map(|error| error.to_string()));
+    reasons.extend(recording.finish());
+    let verdict = Verdict::of(reasons, format!("{} locked and together", counted(clocks.len(), "clock", "clocks")));
+    let phase_errors = news.phase_errors();
+    if arguments.json {
+        let mut json = json(&clocks, watch.log.events().names(), &signals, locked, phase_errors);
+        json["result"] = verdict.words().into();
+        say!("{json:#}");
+    } else {
+        lines(&clocks, watch.log.events().names(), &signals).iter().for_each(|line| say!("{line}"));
+        if phase_errors.count() > 0 {
+            say!("cycles from their phase: {phase_errors}");
+        }
+    }
+    Ok(verdict)
+}
+
+/// What did not hold.
+fn reasons(clocks: &[ClockStatus], locked: bool, settled: bool) -> Vec<String> {
+    let mut reasons = Vec::new();
+    if !locked {
+        let count = clocks.iter().filter(|clock| !clock.is_locked && !clock.is_reference).count();
+        reasons.push(format!("{count} of {} clocks not locked", clocks.len()));
+    }
+    let window = ClockConfig::default().sync_window_ns;
+    if let Some(clock) = farthest(clocks).filter(|clock| clock.worst_ns > window) {
+        let (position, worst) = (clock.position, clock.worst_ns);
+        reasons
+            .push(format!("the clock of position {position} was {worst} ns from the reference, {window} ns allowed"));
+    }
+    if !settled {
+        reasons.push("not all SubDevices are in OP".to_owned());
+    }
+    reasons
+}
+
+/// The file for the picture, made before anything is measured.
+struct Picture {
+    path: PathBuf,
+    file: File,
+}
+
+impl Picture {
+    fn create(path: &Path) -> Result<Picture, Failure> {
+        let file = File::create(path).map_err(|error| Failure::new(Picture::failed(path, &error)))?;
+        Ok(Picture { path: path.to_owned(), file })
+    }
+
+    fn draw(&mut self, picture: &str) -> Result<(), String> {
+        self.file.write_all(picture.as_bytes()).map_err(|error| Picture::failed(&self.path, &error))
+    }
+
+    fn failed(path: &Path, error: &std::io::Error) -> String {
+        format!("{} cannot be written: {error}", path.display())
+    }
+}
+
+struct Watch<'a> {
+    begin: Instant,
+    log: RunLog,
+    end: &'a EndRequest,
+    /// The standard output belongs to the JSON.
+    json: bool,
+}
+
+/// Says it, beside the JSON where the standard output is for that.
+fn tell(json: bool, line: &str) {
+    if json { eprintln!("{line}") } else { say!("{line}") }
+}
+
+impl Watch<'_> {
+    /// Tells events and notes differences until a time, or until all clocks are locked and all SubDevices, which may wait
+    /// for that, are where they belong; whether clocks are locked.
+    fn until(
+        &mut self,
+        cycles: &CyclicThread<Tee<PacketLinks>>,
+        course: &mut Course,
+        until: Instant,
+        ends_with_lock: bool,
+    ) -> Result<bool, Failure> {
+        self.end.limit(until);
+        loop {
+            self.log.news(cycles, now(), |shown| match shown {
+                Shown::Line(line) => tell(self.json, &line),
+                Shown::Warning(words) => eprintln!("ringcat: {words}"),
+            });
+            let supervisor = cycles.supervisor();
+            let (locked, clocks) = supervisor.with(|engine| (engine.clocks_locked(), engine.clocks()))?;
+            course.note(now().since(self.begin), &clocks);
+            if (locked && ends_with_lock && supervisor.all_settled()) || now() >= until || self.end.is_asked() {
+                return Ok(locked);
+            }
+            sleep(LOOK);
+        }
+    }
+}

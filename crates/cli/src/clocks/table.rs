@@ -1,0 +1,134 @@
+//! Clocks as a table for people and as JSON for programs.
+
+use ringcat::histogram::Histogram;
+use ringcat::text::Names;
+use ringcat::{ClockStatus, SyncSignals};
+use serde_json::{Value, json};
+
+use crate::clock_options::signals_in_words;
+
+fn name<'a>(clock: &ClockStatus, names: &'a Names) -> &'a str {
+    clock.subdevice.and_then(|subdevice| names.0.get(subdevice)).map_or("", String::as_str)
+}
+
+fn signals_of(clock: &ClockStatus, signals: &[Option<SyncSignals>]) -> Option<SyncSignals> {
+    clock.subdevice.and_then(|subdevice| signals.get(subdevice).copied().flatten())
+}
+
+/// One line per clock, below a heading. `signals` by SubDevice.
+pub fn lines(clocks: &[ClockStatus], names: &Names, signals: &[Option<SyncSignals>]) -> Vec<String> {
+    let heading =
+        "pos  station  delay/ns  drift/ppm   now/ns  worst/ns  locked              offset/ns  name  SYNC/us".to_owned();
+    let line = |clock: &ClockStatus| {
+        let difference = clock.difference_ns.map_or_else(|| "-".to_owned(), |ns| ns.to_string());
+        let state = match (clock.is_reference, clock.is_locked) {
+            (true, _) => "reference",
+            (false, true) => "yes",
+            (false, false) => "no",
+        };
+        let words = signals_of(clock, signals).map(|signals| format!("  {}", signals_in_words(&signals)));
+        format!(
+            "{:>3}  {}  {:>8}  {:>9.3}  {:>7}  {:>8}  {:<9}  {:>20}  {}{}",
+            clock.position,
+            clock.station,
+            clock.delay_ns,
+            clock.drift_ppb as f64 / 1e3,
+            difference,
+            clock.worst_ns,
+            state,
+            clock.offset_ns,
+            name(clock, names),
+            words.unwrap_or_default()
+        )
+    };
+    std::iter::once(heading).chain(clocks.iter().map(line)).collect()
+}
+
+/// The same as JSON, with how far cycles were from their phase.
+pub fn json(
+    clocks: &[ClockStatus],
+    names: &Names,
+    signals: &[Option<SyncSignals>],
+    locked: bool,
+    phase_errors: &Histogram,
+) -> Value {
+    let clock = |clock: &ClockStatus| {
+        let sync = signals_of(clock, signals).map(|signals| {
+            json!({
+                "assign_activate": signals.assign_activate,
+                "sync0_cycle_ns": signals.sync0_cycle_ns,
+                "sync0_shift_ns": signals.sync0_shift_ns,
+                "sync1_cycle_ns": signals.sync1_cycle_ns,
+                "sync1_shift_ns": signals.sync1_shift_ns,
+            })
+        });
+        json!({
+            "position": clock.position,
+            "station": clock.station.0,
+            "name": name(clock, names),
+            "reference": clock.is_reference,
+            "locked": clock.is_locked,
+            "delay_ns": clock.delay_ns,
+            "offset_ns": clock.offset_ns,
+            "drift_ppb": clock.drift_ppb,
+            "difference_ns": clock.difference_ns,
+            "worst_ns": clock.worst_ns,
+            "sync": sync,
+        })
+    };
+    let ns = |parts_per_million| phase_errors.quantile(parts_per_million).as_nanos() as u64;
+    let phase = (phase_errors.count() > 0).then(|| {
+        json!({
+            "readings": phase_errors.count(),
+            "median_ns": ns(500_000),
+            "most_99_ns": ns(990_000),
+            "largest_ns": phase_errors.longest().as_nanos() as u64,
+        })
+    });
+    json!({ "locked": locked, "phase_errors": phase, "clocks": clocks.iter().map(clock).collect::<Vec<_>>() })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use ringcat::wire::address::StationAddress;
+
+    fn clock() -> ClockStatus {
+        ClockStatus {
+            position: 3,
+            station: StationAddress(0x1004),
+            subdevice: Some(0),
+            is_reference: false,
+            delay_ns: 1_050,
+            offset_ns: -7,
+            drift_ppb: -12_345,
+            difference_ns: Some(-9),
+            worst_ns: 31,
+            is_locked: true,
+        }
+    }
+
+    #[test]
+    fn a_line_says_what_is_known_of_a_clock() {
+        let signals = [Some(SyncSignals::sync0(1_000_000, 250_000))];
+        let lines = lines(&[clock()], &Names(vec!["servo".to_owned()]), &signals);
+        let words: Vec<&str> = lines[1].split_whitespace().collect();
+        let expected = ["3", "0x1004", "1050", "-12.345", "-9", "31", "yes", "-7", "servo", "SYNC0", "1000+250"];
+        assert_eq!(words, expected);
+    }
+
+    #[test]
+    fn json_has_the_same_figures() {
+        let phase_errors = Histogram::default();
+        let value = json(&[clock()], &Names::default(), &[None], true, &phase_errors);
+        let one = &value["clocks"][0];
+        assert_eq!(
+            (one["delay_ns"].as_i64(), one["sync"].is_null(), &value["locked"]),
+            (Some(1_050), true, &Value::Bool(true))
+        );
+        assert!(value["phase_errors"].is_null());
+        phase_errors.record(std::time::Duration::from_micros(3));
+        let value = json(&[], &Names::default(), &[], false, &phase_errors);
+        assert_eq!(value["phase_errors"]["largest_ns"], 3_000);
+    }
+}

@@ -1,0 +1,167 @@
+//! `ringcat demo`: a simulated segment goes from power-on to OP, exchanges process data at 1 kHz, loses and regains a
+//! cable, loses and regains a SubDevice's power; the program looks into the simulated devices and checks that all of it
+//! held.
+
+mod drive;
+mod plan;
+mod report;
+mod watch;
+
+use std::path::{Path, PathBuf};
+use std::time::Duration;
+
+use clap::Args;
+use ringcat::sim::network::Network;
+use ringcat::sim::segment::{DEMO, Segment};
+use ringcat::simulated::SimulatedSegment;
+use ringcat::text::Names;
+use ringcat::{Application, Error, Event, MainDevice, Options, Scan, automatic};
+
+use crate::interfaces::Failure;
+use crate::verdict::Verdict;
+use plan::{Incident, Plan};
+use report::Reporter;
+use watch::Watch;
+
+/// Above this number of SubDevices a frame takes longer than a millisecond to come back.
+const SLOW_ABOVE: usize = 200;
+/// Cycle of such a segment.
+const SLOW_CYCLE: Duration = Duration::from_millis(4);
+/// Cycle of any other.
+const CYCLE: Duration = Duration::from_millis(1);
+/// Up to this number of SubDevices, each one's way to OP is printed.
+const LISTED: usize = 64;
+/// From activation to OP of the last SubDevice at the most.
+const OP_LIMIT: Duration = Duration::from_secs(30);
+
+/// Options of `ringcat demo`.
+#[derive(Args, Debug, Default)]
+pub struct DemoArguments {
+    /// Segment file to run on (see docs/segments.md); the embedded ring of 19 SubDevices by default.
+    #[arg(long, value_name = "FILE.toml")]
+    segment: Option<PathBuf>,
+    /// Cycle time in microseconds; 1000 by default, 4000 above 200 SubDevices.
+    #[arg(long, value_name = "US", value_parser = clap::value_parser!(u64).range(50..=1_000_000))]
+    cycle_us: Option<u64>,
+    /// Run in virtual time, as fast as the machine can.
+    #[arg(long)]
+    fast: bool,
+}
+
+/// Runs the demonstration.
+pub fn run(arguments: &DemoArguments) -> Result<Verdict, Failure> {
+    Ok(show(arguments)?)
+}
+
+fn show(arguments: &DemoArguments) -> Result<Verdict, Error> {
+    let segment = load(arguments)?;
+    let title = segment_title(arguments);
+    let mut links = SimulatedSegment::new(Network::from_description(segment)?);
+    if !arguments.fast {
+        links.pace();
+    }
+    let mut reporter = Reporter::new();
+    reporter.say(&format!("RingCAT demo on {title}, {}", pace(arguments)));
+    let mut main_device = MainDevice::request(links, &Options::default());
+    let scan = main_device.scan_with(|event| reporter.scan_event(event))?;
+    let names = Names(scan.subdevices.iter().map(|info| info.name.clone()).collect());
+    reporter.table(&scan);
+    let cycle = cycle(arguments, &scan);
+    let application = main_device.activate(automatic(&scan.subdevices, cycle))?;
+    Ok(Demo::new(application, scan, names, cycle, reporter).run())
+}
+
+fn load(arguments: &DemoArguments) -> Result<Segment, Error> {
+    Ok(match &arguments.segment {
+        Some(path) => Segment::load(path)?,
+        None => Segment::from_toml(DEMO, Path::new("."))?,
+    })
+}
+
+fn segment_title(arguments: &DemoArguments) -> String {
+    arguments.segment.as_ref().map_or_else(|| "its embedded ring".to_owned(), |path| path.display().to_string())
+}
+
+fn pace(arguments: &DemoArguments) -> &'static str {
+    if arguments.fast { "in virtual time" } else { "in real time" }
+}
+
+fn cycle(arguments: &DemoArguments, scan: &Scan) -> Duration {
+    match arguments.cycle_us {
+        Some(us) => Duration::from_micros(us),
+        None if scan.subdevices.len() > SLOW_ABOVE => SLOW_CYCLE,
+        None => CYCLE,
+    }
+}
+
+struct Demo {
+    application: Application<SimulatedSegment>,
+    names: Names,
+    cycle: Duration,
+    plan: Plan,
+    watch: Watch,
+    reporter: Reporter,
+}
+
+impl Demo {
+    fn new(
+        application: Application<SimulatedSegment>,
+        scan: Scan,
+        names: Names,
+        cycle: Duration,
+        reporter: Reporter,
+    ) -> Demo {
+        let watch = Watch::new(&application, scan.subdevices.len());
+        let plan = Plan::new(&scan, &watch, application.links().network());
+        Demo { application, names, cycle, plan, watch, reporter }
+    }
+
+    fn run(mut self) -> Verdict {
+        if !self.reach_op() {
+            return Verdict::Failed(format!("not all SubDevices reached OP within {} s", OP_LIMIT.as_secs()));
+        }
+        let steps = self.plan.steps.clone();
+        for step in &steps {
+            if step.incident != Incident::Calm {
+                self.reporter.incident(self.application.now(), &step.incident.describe(&self.names));
+            }
+            self.watch.begin(step.incident.clone());
+            self.plan.bring_about(&step.incident, self.application.links_mut().network_mut());
+            let until = self.application.now() + step.lasts;
+            while self.application.now() < until {
+                self.one_cycle();
+            }
+        }
+        self.reporter.summary(&self.application, &self.watch, &self.plan, &self.names)
+    }
+
+    /// Cycles until all SubDevices are in OP.
+    fn reach_op(&mut self) -> bool {
+        let until = self.application.now() + OP_LIMIT;
+        while !self.application.all_settled() {
+            if self.application.now() >= until {
+                self.reporter.say(&format!("not all SubDevices reached OP within {} s:", OP_LIMIT.as_secs()));
+                self.reporter.states(&self.application, &self.names);
+                return false;
+            }
+            self.one_cycle();
+        }
+        // A few more cycles, so that the outputs of the last one to reach OP have arrived.
+        for _ in 0..3 {
+            self.one_cycle();
+        }
+        self.reporter.reached_op(self.application.now(), self.cycle);
+        true
+    }
+
+    fn one_cycle(&mut self) {
+        self.watch.cycle(&mut self.application);
+        while let Some(event) = self.application.pop_event() {
+            // A thousand SubDevices reaching OP are counted, not listed.
+            let listed = self.names.0.len() <= LISTED || !matches!(event.event, Event::StateReached { .. });
+            if listed || !self.watch.accounts.is_empty() {
+                self.reporter.event(&event, &self.names);
+            }
+        }
+    }
+}

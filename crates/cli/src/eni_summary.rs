@@ -1,0 +1,302 @@
+//! `ringcat eni FILE`: what an ENI says and what follows from it, without any bus.
+
+mod details;
+mod json;
+
+use std::path::PathBuf;
+use std::time::Duration;
+
+use clap::Args;
+use ringcat::Direction;
+use ringcat::config::Configuration;
+use ringcat::config::eni::{Eni, SubDevice};
+use ringcat::eni::EniFile;
+use ringcat::{ConfigAddress, ReferenceClock, StartupAction, SubDeviceConfig, SyncManagerRole};
+
+use crate::interfaces::Failure;
+use crate::output::{counted, say};
+use crate::verdict::Verdict;
+
+/// How to read what it prints.
+const ABOUT_ENI: &str = "\
+The file counts: SyncManagers, start-up commands, watchdogs and clocks are those of the file, also where the SII of a
+SubDevice says otherwise. What RingCAT does in its own way (state changes, addresses on the wire, FMMUs, delays of clocks) is
+held against the file and not listed. What is not followed is listed at the end, with the reason. An ENI comes from the tool
+that configured the network: TwinCAT (EtherCAT device, \"Export Configuration File\"), EC-Engineer (\"Export ENI\").
+
+Exit status: 0 the file can be followed, 1 it describes no SubDevice, 2 it cannot be followed, and why is on the standard
+error output.";
+
+/// Options of `ringcat eni`.
+#[derive(Args, Debug)]
+#[command(after_help = ABOUT_ENI)]
+pub struct EniArguments {
+    /// The ENI.
+    file: PathBuf,
+    /// List SyncManagers, PDOs, start-up commands and variables too.
+    #[arg(long)]
+    details: bool,
+    /// Print JSON, always with the details.
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// Reads the file and prints what follows.
+pub fn run(arguments: &EniArguments) -> Result<Verdict, Failure> {
+    let EniFile { eni: model, configuration } =
+        EniFile::load(&arguments.file).map_err(|error| Failure::new(error.to_string()))?;
+    if arguments.json {
+        say!("{:#}", json::json(&model, &configuration));
+        return Ok(verdict(&configuration));
+    }
+    summary(&model, &configuration).iter().for_each(|line| say!("{line}"));
+    if arguments.details {
+        details::lines(&model, &configuration).iter().for_each(|line| say!("{line}"));
+    }
+    not_followed(&configuration).iter().for_each(|line| say!("{line}"));
+    Ok(verdict(&configuration))
+}
+
+/// A file that describes no network cannot be followed. What is done in another way was told.
+fn verdict(configuration: &Configuration) -> Verdict {
+    let subdevices = configuration.declaration.subdevices.len();
+    if subdevices == 0 {
+        return Verdict::Failed("the file describes no SubDevice".to_owned());
+    }
+    let notices = configuration.notices.len();
+    let subdevices = counted(subdevices, "SubDevice", "SubDevices");
+    Verdict::Held(match notices {
+        0 => format!("{subdevices}, everything is followed"),
+        _ => format!("{subdevices}, {} done in another way", counted(notices, "thing", "things")),
+    })
+}
+
+fn summary(model: &Eni, configuration: &Configuration) -> Vec<String> {
+    let declaration = &configuration.declaration;
+    let count = declaration.subdevices.len();
+    let subdevices = counted(count, "SubDevice", "SubDevices");
+    let mut lines = vec![format!("network     \"{}\", {subdevices}", one_line(&model.main_device.name))];
+    if let Some(made_by) = &model.made_by {
+        lines.push(format!("made by     {}", one_line(made_by)));
+    }
+    let image = &configuration.image;
+    lines.push(format!(
+        "image       inputs {}, outputs {}, {}, {}",
+        counted(image.inputs_len, "byte", "bytes"),
+        counted(image.outputs_len, "byte", "bytes"),
+        counted(image.variables.len(), "variable", "variables"),
+        counted(image.copies.len(), "copy", "copies")
+    ));
+    for domain in &declaration.domains {
+        let members: Vec<usize> = domain.members.iter().map(|member| member.subdevice).collect();
+        let period = time(domain.period);
+        let assumed = if configuration.cycle.is_none() { " (the file has no cycle time)" } else { "" };
+        lines.push(format!("task        every {period}{assumed}: SubDevices {}", ranges(&members)));
+    }
+    for lrw in &declaration.explicit_lrw {
+        lines.push(format!("LRW         {}: SubDevices {}", lrw.name, ranges(&lrw.subdevices)));
+    }
+    if let Some(clocks) = &declaration.clocks {
+        let reference = match clocks.reference {
+            ReferenceClock::Declared(index) => format!("SubDevice {index}"),
+            ReferenceClock::FirstWithClock | ReferenceClock::FirstConfigured => "the first one with a clock".to_owned(),
+        };
+        let follows = if clocks.bus_shift { "follows this computer (bus shift)" } else { "runs free" };
+        lines.push(format!("clocks      {reference} is the reference and {follows}"));
+    }
+    for (number, name) in configuration.groups.iter().enumerate() {
+        let of_group = |index: &usize| declaration.subdevices[*index].group == Some(number);
+        let members: Vec<usize> = (0..count).filter(of_group).collect();
+        lines.push(format!("group       \"{}\": SubDevices {}", one_line(name), ranges(&members)));
+    }
+    lines.push(String::new());
+    lines.push(
+        " nr  PhysAddr  at                vendor      product       out bits  in bits  mailbox  start-up  clock    name"
+            .to_owned(),
+    );
+    let pairs = declaration.subdevices.iter().zip(&model.subdevices).enumerate();
+    lines.extend(pairs.map(|(index, (config, subdevice))| row(index, config, subdevice, configuration)));
+    lines
+}
+
+fn row(index: usize, config: &SubDeviceConfig, subdevice: &SubDevice, configuration: &Configuration) -> String {
+    let id = |expected: Option<u32>, said: Option<u32>| match expected.or(said) {
+        // In brackets: said, but not compared.
+        Some(id) if expected.is_none() => format!("({id:#x})"),
+        Some(id) => format!("{id:#010x}"),
+        None => "-".to_owned(),
+    };
+    let mailbox = config.declared.iter().flatten().find(|sm| sm.role == SyncManagerRole::MailboxOut);
+    let mailbox = mailbox.map_or("-".to_owned(), |sm| sm.register.length.to_string());
+    format!(
+        "{index:>3}  {:>8}  {:<16}  {:<10}  {:<12} {:>9} {:>8} {mailbox:>8} {:>9}  {:<7}  {}",
+        subdevice.station.map_or("-".to_owned(), |station| station.to_string()),
+        place(config.address),
+        id(config.expected.vendor_id, subdevice.vendor_id),
+        id(config.expected.product_code, subdevice.product_code),
+        bits(index, Direction::Outputs, configuration),
+        bits(index, Direction::Inputs, configuration),
+        config.startup.len(),
+        config.sync.map_or("-".to_owned(), |signals| time(Duration::from_nanos(signals.sync0_cycle_ns.into()))),
+        one_line(&subdevice.name),
+    )
+}
+
+/// Bits of process data in the image.
+fn bits(subdevice: usize, direction: Direction, configuration: &Configuration) -> u64 {
+    let areas = configuration.image.areas.iter();
+    areas.filter(|a| a.subdevice == subdevice && a.direction == direction).map(|area| u64::from(area.bits)).sum()
+}
+
+fn place(address: ConfigAddress) -> String {
+    match address {
+        ConfigAddress::Position(position) => format!("position {position}"),
+        ConfigAddress::Alias { alias, offset } => format!("alias {alias} + {offset}"),
+        ConfigAddress::Identification { value, offset } => format!("id {value} + {offset}"),
+    }
+}
+
+/// What a start-up command does.
+fn action(action: &StartupAction) -> String {
+    use ringcat::RegisterAccess;
+    let all = |complete: bool| if complete { ", complete access" } else { "" };
+    match action {
+        StartupAction::Sdo(sdo) => {
+            let object = format!("{:#06x}:{:02x}{}", sdo.index, sdo.sub_index, all(sdo.complete_access));
+            format!("SDO {object} = {}", hex(&sdo.data))
+        }
+        StartupAction::Upload(sdo) => {
+            let object = format!("{:#06x}:{:02x}{}", sdo.index, sdo.sub_index, all(sdo.complete_access));
+            match &sdo.expected {
+                Some(expected) => format!("SDO {object} must be {}", hex(expected)),
+                None => format!("SDO {object} is read"),
+            }
+        }
+        StartupAction::Idn(idn) => format!("drive {} {} = {}", idn.drive, idn.idn, hex(&idn.data)),
+        StartupAction::Ip(settings) => match settings.address {
+            Some(address) => format!("IP address {address}"),
+            None => "addresses for EoE".to_owned(),
+        },
+        StartupAction::Register(register) => match &register.access {
+            RegisterAccess::Write(data) => format!("register {} = {}", register.address, hex(data)),
+            RegisterAccess::Check { data, mask: None, .. } => {
+                format!("register {} must be {}", register.address, hex(data))
+            }
+            RegisterAccess::Check { data, mask: Some(mask), .. } => {
+                format!("register {} & {} must be {}", register.address, hex(mask), hex(data))
+            }
+        },
+    }
+}
+
+/// Bytes that are shown of longer data.
+const SHOWN_BYTES: usize = 16;
+
+fn hex(bytes: &[u8]) -> String {
+    let shown: Vec<String> = bytes.iter().take(SHOWN_BYTES).map(|byte| format!("{byte:02x}")).collect();
+    let more = if bytes.len() > SHOWN_BYTES { format!(" ... ({} bytes)", bytes.len()) } else { String::new() };
+    format!("{}{more}", shown.join(" "))
+}
+
+fn not_followed(configuration: &Configuration) -> Vec<String> {
+    if configuration.notices.is_empty() && !configuration.declaration.subdevices.is_empty() {
+        return vec![String::new(), "everything in the file is followed".to_owned()];
+    }
+    if configuration.notices.is_empty() {
+        return Vec::new();
+    }
+    let mut lines = vec![String::new(), "not followed as written:".to_owned()];
+    for notice in &configuration.notices {
+        let whom = match &notice.subdevices[..] {
+            [] => String::new(),
+            some => format!(" [SubDevice {}]", ranges(some)),
+        };
+        lines.push(format!("  {}{whom}", one_line(&notice.to_string())));
+    }
+    lines
+}
+
+/// Ascending numbers, with rows of them as ranges: `0-3, 5`.
+fn ranges(numbers: &[usize]) -> String {
+    let mut texts: Vec<String> = Vec::new();
+    for row in numbers.chunk_by(|a, b| a + 1 == *b) {
+        texts.push(match row {
+            [first, .., last] => format!("{first}-{last}"),
+            [first] => first.to_string(),
+            [] => continue,
+        });
+    }
+    texts.join(", ")
+}
+
+/// What a file calls something, without what would disturb a terminal.
+fn one_line(text: &str) -> String {
+    text.chars().map(|c| if c.is_control() { ' ' } else { c }).collect()
+}
+
+/// `1 ms`, `250 us`.
+fn time(duration: Duration) -> String {
+    format!("{duration:?}").replace('\u{b5}', "u")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const SMALL: &str = include_str!("../../config/tests/files/small.xml");
+
+    fn small() -> (Eni, Configuration) {
+        let EniFile { eni, configuration } = EniFile::from_bytes(SMALL.as_bytes()).unwrap();
+        (eni, configuration)
+    }
+
+    #[test]
+    fn a_file_is_shown_in_a_table_with_what_is_not_followed_facts_8_1() {
+        let (model, configuration) = small();
+        let lines = summary(&model, &configuration);
+        assert_eq!(lines[0], "network     \"Small\", 4 SubDevices");
+        assert!(
+            lines.contains(&"image       inputs 8 bytes, outputs 10 bytes, 6 variables, 2 copies".to_owned()),
+            "{lines:#?}"
+        );
+        assert!(lines.contains(&"task        every 2ms: SubDevices 1-3".to_owned()));
+        assert!(lines.contains(&"clocks      SubDevice 3 is the reference and runs free".to_owned()));
+        let drive = lines.last().unwrap();
+        let columns: Vec<&str> = drive.split_whitespace().collect();
+        let expected = ["3", "1004", "position", "3", "(0x9a)", "(0x30924)", "48", "48", "128", "8", "1ms", "Drive"];
+        assert_eq!(columns, expected);
+        let notices = not_followed(&configuration);
+        assert!(notices.iter().any(|line| line.contains("not sent at OI") && line.ends_with("[SubDevice 3]")));
+        let details = details::lines(&model, &configuration);
+        assert!(
+            details
+                .iter()
+                .any(|line| line.contains("SDO 0x1c12:00, complete access = 01 00 00 16") && line.contains("assign"))
+        );
+        assert!(details.iter().any(|line| line.contains("outputs  0x1100      6 bytes")), "{details:#?}");
+        // Four bits, of which two belong to each terminal.
+        let copies = details.iter().skip_while(|line| !line.starts_with("copies: "));
+        let copies: Vec<Vec<&str>> = copies.skip(1).map(|line| line.split_whitespace().collect()).collect();
+        assert_eq!(copies, [["2", "8", "18"], ["2", "10", "20"]]);
+    }
+
+    #[test]
+    fn the_same_is_there_as_json() {
+        let (model, configuration) = small();
+        let json = json::json(&model, &configuration);
+        assert_eq!(json["subdevices"][3]["station"], 1004);
+        assert_eq!(json["subdevices"][3]["sync_managers"][2]["length"], 6);
+        assert_eq!(json["subdevices"][3]["startup"].as_array().unwrap().len(), 8);
+        assert_eq!(json["image"]["areas"][1]["image_bit"], 20);
+        assert_eq!(json["image"]["copies"][1]["output_bit"], 20);
+        assert_eq!(json["tasks"][0]["period_ns"], 2_000_000);
+        assert_eq!(json["lrw"][0]["subdevices"][0], 3);
+        assert_eq!(json["not_followed"].as_array().unwrap().len(), configuration.notices.len());
+    }
+
+    #[test]
+    fn rows_of_numbers_are_shown_as_ranges_and_names_cannot_disturb_a_terminal() {
+        assert_eq!(ranges(&[0, 1, 2, 5, 7, 8]), "0-2, 5, 7-8");
+        assert_eq!(one_line("a\u{1b}[31m\nb"), "a [31m b");
+    }
+}

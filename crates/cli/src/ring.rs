@@ -1,0 +1,259 @@
+//! `ringcat ring`: how a ring is, without changing anything: who answers on which link, where it is broken, what the
+//! ports at the ends of each cable have counted.
+
+use std::time::Duration;
+
+use clap::Args;
+use ringcat::text::Names;
+use ringcat::{Cable, CableErrors, Link, MainDevice, Occupant, RingLook, RingState};
+
+use crate::interfaces::{Failure, InterfaceArguments, ThreadArguments};
+use crate::output::{counted, say};
+use crate::recording::RecordingArguments;
+use crate::times::time;
+use crate::verdict::Verdict;
+
+/// How to read what it prints.
+const ABOUT_RING: &str = "\
+It only reads, so that a segment without a MainDevice stays as it is. Beside another MainDevice it refuses to begin: reading
+clears what that one waits for. Counters end at 255, and nothing here clears them: look at them twice (--for) to see which ones rise. A cable
+whose counter rises has a bad plug, or is bent, or lies beside something that disturbs it.
+
+It knows nobody who does not answer: with two breaks, those between them are missing in the counts, the positions of those
+behind are lower, and the line break is named as if they did not exist. Compare the counts with what should be there.
+
+Exit status: 0 the ring is closed (or there is one link), 1 it is open or copies of frames are lost, 2 it could not be
+looked at.";
+
+/// Options of `ringcat ring`.
+#[derive(Args, Debug)]
+#[command(after_help = ABOUT_RING)]
+pub struct RingArguments {
+    #[command(flatten)]
+    interfaces: InterfaceArguments,
+    #[command(flatten)]
+    thread: ThreadArguments,
+    #[command(flatten)]
+    recording: RecordingArguments,
+    /// Look again after this time, such as 10s, and show what the counters have gained.
+    #[arg(long = "for", value_name = "TIME", value_parser = time)]
+    lasts: Option<Duration>,
+    /// Print JSON instead of a table.
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// Looks and prints; it has not held where the ring is open.
+pub fn run(arguments: &RingArguments) -> Result<Verdict, Failure> {
+    let links = arguments.interfaces.open(arguments.thread)?;
+    let recording = arguments.recording.start(&arguments.interfaces)?;
+    let links = recording.tee(links);
+    let _awake = arguments.thread.apply();
+    let mut main_device = MainDevice::request(links, &arguments.interfaces.options());
+    let mut look = main_device.look_at_ring()?;
+    if let Some(lasts) = arguments.lasts {
+        std::thread::sleep(lasts);
+        let before = std::mem::replace(&mut look, main_device.look_at_ring()?);
+        for ((cable, errors), (same, earlier)) in look.cables.iter_mut().zip(&before.cables) {
+            if cable == same {
+                *errors = gained(*earlier, *errors);
+            }
+        }
+    }
+    let two_links = arguments.interfaces.redundant.is_some();
+    drop(main_device);
+    let verdict = verdict(&look, two_links).and(recording.finish());
+    if arguments.json {
+        let mut json = json(&look);
+        json["result"] = verdict.words().into();
+        say!("{json:#}");
+    } else {
+        lines(&look, two_links).iter().for_each(|line| say!("{line}"));
+    }
+    Ok(verdict)
+}
+
+/// Whether there is a ring where two links are to make one.
+fn verdict(look: &RingLook, two_links: bool) -> Verdict {
+    let count = counted(usize::from(look.counts.0) + usize::from(look.counts.1), "SubDevice", "SubDevices");
+    match look.state {
+        _ if !two_links => Verdict::Held(format!("one link, {count}")),
+        RingState::Closed => Verdict::Held(format!("the ring is closed, {count}")),
+        RingState::Open => Verdict::Failed(format!("the ring is open, {count}")),
+        RingState::Unknown => Verdict::Failed(format!("not all copies of frames come back, {count}")),
+    }
+}
+
+fn gained(before: CableErrors, now: CableErrors) -> CableErrors {
+    CableErrors {
+        invalid_frames: now.invalid_frames.saturating_sub(before.invalid_frames),
+        lost_links: now.lost_links.saturating_sub(before.lost_links),
+    }
+}
+
+/// Who is at both ends of a cable: nobody is declared, but whoever operates the segment has given station addresses.
+fn ends(look: &RingLook, cable: Cable) -> [Option<Occupant>; 2] {
+    let station = |node: usize| look.stations.get(node).copied().filter(|station| station.0 != 0);
+    cable.positions().map(|node| Some(Occupant { station: station(node?)?, declared: None }))
+}
+
+fn lines(look: &RingLook, two_links: bool) -> Vec<String> {
+    let names = Names::default();
+    let (main, redundant) = look.counts;
+    let state = match look.state {
+        _ if !two_links => "one link",
+        RingState::Closed => "closed",
+        RingState::Open => "OPEN: the next break isolates somebody",
+        RingState::Unknown => "unknown: not all copies come back",
+    };
+    let mut lines = vec![format!("ring        {state}")];
+    for (link, count) in [(Link::Main, main), (Link::Redundant, redundant)].into_iter().take(1 + usize::from(two_links))
+    {
+        lines.push(format!("{:<11} {count} SubDevices", link.to_string()));
+    }
+    if two_links && look.topology.is_assumed() {
+        let swapped = "interfaces swapped: MAIN is plugged in at the end of the ring";
+        let crossed = "line crossed, or a branch on port 2: which SubDevices are neighbours is assumed below";
+        lines.push(format!("cabling     {}", if look.topology.main_count == 0 { swapped } else { crossed }));
+    }
+    if let Some(place) = look.place {
+        lines.push(format!("line break  {}", names.cable(place, ends(look, place))));
+    }
+    lines.push(String::from("damaged frames, lost links of each cable:"));
+    for (cable, errors) in &look.cables {
+        let mark = if look.place == Some(*cable) { "  <- line break" } else { "" };
+        lines.push(format!(
+            "{:>6} {:>6}  {}{mark}",
+            errors.invalid_frames,
+            errors.lost_links,
+            names.cable(*cable, ends(look, *cable))
+        ));
+    }
+    lines
+}
+
+fn json(look: &RingLook) -> serde_json::Value {
+    let end = |port: Option<ringcat::PortOf>| {
+        let station = |node: usize| look.stations.get(node).map(|station| station.0);
+        port.map(|at| serde_json::json!({ "position": at.node, "station": station(at.node), "port": at.port }))
+    };
+    let cable = |cable: Cable| serde_json::json!({ "near": end(cable.near), "far": end(cable.far) });
+    let cables: Vec<_> = look
+        .cables
+        .iter()
+        .map(|(it, errors)| {
+            serde_json::json!({
+                "cable": cable(*it),
+                "damaged_frames": errors.invalid_frames,
+                "lost_links": errors.lost_links,
+            })
+        })
+        .collect();
+    serde_json::json!({
+        "state": match look.state {
+            RingState::Unknown => "unknown",
+            RingState::Closed => "closed",
+            RingState::Open => "open",
+        },
+        "main": look.counts.0,
+        "redundant": look.counts.1,
+        "line_break": look.place.map(cable),
+        "cables": cables,
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use ringcat::Options;
+    use ringcat::simulated::SimulatedSegment;
+
+    use super::*;
+
+    const RING: &str = "[segment]\nring = true\n[[device]]\ntype = \"coupler\"\n[[device]]\ntype = \"digital-output-8\"\n\
+                        [[device]]\ntype = \"digital-input-8\"\n";
+
+    fn look(cut: Option<usize>, corrupt: Option<usize>) -> RingLook {
+        let mut segment = SimulatedSegment::from_toml(RING).unwrap();
+        let network = segment.network_mut();
+        network.advance_by(Duration::from_millis(20));
+        if let Some(cable) = cut {
+            network.cut(ringcat::sim::cable::CableId(cable));
+        }
+        if let Some(cable) = corrupt {
+            let cable = ringcat::sim::cable::CableId(cable);
+            network.apply(ringcat::sim::fault::Fault::Corrupt { cable, direction: None, count: 2 });
+        }
+        network.advance_by(Duration::from_millis(20));
+        MainDevice::request(segment, &Options::default()).look_at_ring().unwrap()
+    }
+
+    #[test]
+    fn a_closed_ring_is_shown_with_every_cable() {
+        let look = look(None, None);
+        assert_eq!((look.state, look.counts, look.place), (RingState::Closed, (3, 0), None));
+        let lines = lines(&look, true);
+        assert_eq!(lines[0], "ring        closed");
+        assert_eq!(lines[2], "REDUNDANT   0 SubDevices");
+        assert_eq!(lines[4], "     0      0  between the MAIN interface and SubDevice 0 port 0");
+        assert_eq!(lines.len(), 8);
+    }
+
+    #[test]
+    fn a_ring_with_swapped_interfaces_is_shown_as_such_and_one_that_nobody_answers_in_is_none() {
+        use ringcat::sim::cable::{CableId, DeviceIndex, Endpoint, HostLink};
+        use ringcat::sim::frame::Port;
+        let device = || ringcat::sim::device::Device::new(ringcat::sim::catalogue::by_name("coupler").unwrap());
+        let port = |device, port| Endpoint::Device(DeviceIndex(device), port);
+        let builder = ringcat::sim::network::builder::SegmentBuilder::new().device(device()).device(device());
+        let network = builder
+            .cable(Endpoint::Host(HostLink::Redundant), port(0, Port::A))
+            .cable(port(0, Port::B), port(1, Port::A))
+            .cable(port(1, Port::B), Endpoint::Host(HostLink::Main))
+            .build();
+        let mut segment = SimulatedSegment::new(network.unwrap());
+        segment.network_mut().advance_by(Duration::from_millis(20));
+        let mut main_device = MainDevice::request(segment, &Options::default());
+        let look = main_device.look_at_ring().unwrap();
+        assert_eq!((look.state, look.counts), (RingState::Closed, (0, 2)));
+        let lines = lines(&look, true);
+        assert!(lines[3].contains("interfaces swapped"), "{lines:?}");
+        assert!(lines[5].ends_with("between SubDevice 0 port 0 and the REDUNDANT interface"), "{lines:?}");
+        assert!(lines[7].ends_with("between the MAIN interface and SubDevice 1 port 1"), "{lines:?}");
+        [0, 2].map(CableId).into_iter().for_each(|cable| main_device.links_mut().network_mut().cut(cable));
+        let error = main_device.look_at_ring().unwrap_err().to_string();
+        assert!(error.contains("no frame returns"), "{error}");
+    }
+
+    #[test]
+    fn interfaces_that_are_joined_without_any_subdevice_are_no_closed_ring() {
+        use ringcat::sim::cable::{Endpoint, HostLink};
+        let builder = ringcat::sim::network::builder::SegmentBuilder::new();
+        let joined = builder.cable(Endpoint::Host(HostLink::Main), Endpoint::Host(HostLink::Redundant)).build();
+        let mut segment = SimulatedSegment::new(joined.unwrap());
+        segment.network_mut().advance_by(Duration::from_millis(20));
+        let error = MainDevice::request(segment, &Options::default()).look_at_ring().unwrap_err();
+        let text = Failure::from(error).to_string();
+        assert!(text.contains("frames return, but no SubDevice processes them"), "{text}");
+        assert!(text.ends_with("something sends the frames back unchanged: is this the cable to the SubDevices?"));
+    }
+
+    #[test]
+    fn the_place_of_a_break_and_damaged_frames_are_shown_wherever_they_are() {
+        for cable in 0..=3 {
+            let look = look(Some(cable), None);
+            assert_eq!((look.state, look.counts), (RingState::Open, (cable as u16, 3 - cable as u16)));
+            assert_eq!(look.place, Some(look.cables[cable].0), "cable {cable}");
+            assert!(lines(&look, true).iter().any(|line| line.ends_with("<- line break")));
+            assert_eq!(json(&look)["state"], "open");
+        }
+        for cable in 0..=3 {
+            let look = look(None, Some(cable));
+            let counted: Vec<u64> = look.cables.iter().map(|(_, errors)| errors.invalid_frames).collect();
+            let at_the_host = cable == 0 || cable == 3;
+            // What is damaged on the way to the host is counted by nobody.
+            let expected = if at_the_host { 1..=2 } else { 2..=4 };
+            assert!(expected.contains(&counted[cable]), "cable {cable}: {counted:?}");
+            assert_eq!(counted.iter().sum::<u64>(), counted[cable], "cable {cable}: {counted:?}");
+        }
+    }
+}

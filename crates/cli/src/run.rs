@@ -1,0 +1,420 @@
+//! `ringcat run`: everything on the wire to OP as its SII says, or as an ENI says, process data in a fixed cycle, and an orderly stop.
+//!
+//! Cycles have a thread of their own, and so has everything else; this one only tells. Outputs stay zero, or what was asked
+//! for with an ENI: this command knows of no application. What keeps the cycle from its time is told apart: wake-ups
+//! that came late and cycles that were left out are this machine's, lost frames are the wire's.
+
+mod beside;
+mod eni;
+mod junction;
+mod live;
+mod reasons;
+mod summary;
+
+use std::ops::ControlFlow;
+use std::thread::sleep;
+use std::time::Duration;
+
+use clap::Args;
+use ringcat::AlState;
+use ringcat::event_log::EventLog;
+use ringcat::packet::PacketLinks;
+use ringcat::tee::Tee;
+use ringcat::text::{Names, address_of_sender, describe};
+use ringcat::{
+    CyclicThread, Declaration, DomainId, DomainState, Event, Instant, LastOutputs, Links, MAX_UNDER_WAY, Options,
+    ReadPdos, SubDeviceInfo, SubDeviceState, SupervisorThread, automatic,
+};
+
+use crate::clock_options::ClockOptions;
+use crate::ending::EndRequest;
+use crate::interfaces::{Failure, InterfaceArguments, ThreadArguments, now};
+use crate::output::{counted, say};
+use crate::recording::{Recording, RecordingArguments};
+use crate::run_log::{RunLog, Shown};
+use crate::surroundings::Surroundings;
+use crate::times::{cycle, in_words, time};
+use crate::verdict::Verdict;
+use beside::{Beside, BesideArguments};
+use eni::{EniArguments, EniNetwork, Watched};
+use junction::{Junctions, junctions};
+use live::Live;
+use reasons::{Exchanged, Seen};
+use summary::{clock_account, final_account, summary};
+
+/// From then to complete process data at the most, before that is told.
+const COMPLETE_LIMIT: Duration = Duration::from_secs(1);
+/// SubDevices have this long to get to INIT in the end.
+const STOP_LIMIT: Duration = Duration::from_secs(5);
+/// Pause between two looks at what the threads do.
+const LOOK: Duration = Duration::from_millis(1);
+
+/// How to read what it prints.
+const SUMMARY_HELP: &str = "\
+All outputs stay zero. Watchdogs, process data and mailboxes are set up as each SubDevice's EEPROM (SII) says; with
+--eni as the file says, and outputs as --set does.
+
+Ctrl-C ends it in order: outputs zero, all SubDevices to INIT; so do SIGTERM and SIGHUP. Exit status 0: all reached OP
+and stayed there, every cycle was complete, with two interfaces the ring is closed, and all clocks are locked where there
+are any. Otherwise 1, and the last line says what did not hold.
+
+Distributed clocks are brought together with --clocks, or with any of --phase, --bus-shift, --reference and --sync; --for
+then counts from their lock. SubDevices with SYNC signals wait for it before OP. `ringcat clocks` tells more about them.
+
+The summary tells three things apart:
+  this machine   wake-ups that came late and cycles that were left out for that. Nothing on the cable is wrong: try
+                 --priority 80, a --cpu of its own, a real-time kernel
+  the wire       frames that did not come back in time: missing, too late or damaged, each counted once. Cables, plugs,
+                 power, other MainDevices; too late they are also where the computer of a simulated segment stalls
+  round trips    from sending a frame to the arrival of each of its copies at the interface, by the kernel's receive
+                 time: what is left of the cycle is yours";
+
+/// Options of `ringcat run`.
+#[derive(Args, Debug)]
+#[command(after_help = SUMMARY_HELP)]
+pub struct RunArguments {
+    #[command(flatten)]
+    interfaces: InterfaceArguments,
+    #[command(flatten)]
+    thread: ThreadArguments,
+    #[command(flatten)]
+    recording: RecordingArguments,
+    #[command(flatten)]
+    beside: BesideArguments,
+    /// Cycle time, with its unit: 250us, 1ms; 10us to 1s.
+    #[arg(long, value_name = "TIME", default_value = "1ms", value_parser = cycle)]
+    cycle: Duration,
+    #[command(flatten)]
+    eni: EniArguments,
+    /// Cycles that may be under way at once, for a cycle time that is shorter than the way of a frame through segment and
+    /// host. Inputs are then as many cycles old as their way takes.
+    #[arg(long, value_name = "CYCLES", default_value = "1", value_parser = clap::value_parser!(u8).range(1..=i64::from(MAX_UNDER_WAY)))]
+    under_way: u8,
+    /// Tell everything one by one, however often it comes. Otherwise what a bad time makes many of is counted.
+    #[arg(long)]
+    tell_all: bool,
+    /// How long to exchange process data once all are in OP, such as 10s or 5min; until Ctrl-C by default.
+    #[arg(long = "for", value_name = "TIME", value_parser = time)]
+    lasts: Option<Duration>,
+    /// How long all SubDevices may take to OP, and all clocks to their lock; then everything is stopped.
+    #[arg(long, value_name = "TIME", default_value = "60s", value_parser = time)]
+    within: Duration,
+    /// Bring the distributed clocks together.
+    #[arg(long)]
+    clocks: bool,
+    #[command(flatten)]
+    clock_options: ClockOptions,
+    #[arg(long, value_name = "MODE", default_value = "disabled", value_parser = junctions, help = junction::HELP)]
+    junction: Junctions,
+    /// Take the redundant interface down for a moment, when cables have changed, to find out where IN and OUT of a
+    /// SubDevice are swapped. Needs the permission to configure interfaces (CAP_NET_ADMIN).
+    #[arg(long)]
+    enhanced_line_crossed: bool,
+}
+
+/// Runs cycles. It has held where all SubDevices reached OP and stayed there, and every cycle afterwards was complete.
+pub fn run(arguments: &RunArguments) -> Result<Verdict, Failure> {
+    arguments.interfaces.check_names()?;
+    let network = arguments.eni.load()?;
+    let thread = arguments.thread;
+    let end = EndRequest::watch(thread.priority)?;
+    let (cyclic, acyclic) = arguments.interfaces.open_halves(thread)?;
+    let mut surroundings = Surroundings::watch(&arguments.interfaces, &cyclic);
+    let recording = arguments.recording.start(&arguments.interfaces)?;
+    let (mut cyclic, acyclic) = (recording.tee(cyclic), recording.tee(acyclic));
+    let _awake = thread.prepare_process();
+    let begin = now();
+    let options = Options {
+        junctions: arguments.junction.mode,
+        enhanced_line_crossed: arguments.enhanced_line_crossed,
+        // A file that declares all SyncManagers says what PDOs there are.
+        pdos: if network.as_ref().is_some_and(EniNetwork::is_complete) { ReadPdos::Never } else { ReadPdos::default() },
+        ..arguments.interfaces.options()
+    };
+    let supervisor = SupervisorThread::start(acyclic, &options, move || thread.prepare_supervisor())?;
+    let beside = arguments.beside.start(&supervisor, &arguments.interfaces)?;
+    let mut others = 0;
+    let result = supervisor.scan_while(|| {
+        tell_events(&supervisor, &mut surroundings);
+        others += tell_of_others(&mut cyclic, &mut surroundings);
+    });
+    let scan = result.map_err(|error| surroundings.explain(error, others + supervisor.counters().foreign))?;
+    let names = match &network {
+        Some(network) => network.names(),
+        None => Names(scan.subdevices.iter().map(|info| info.name.clone()).collect()),
+    };
+    let declaration = declare(arguments, network.as_ref(), &scan.subdevices)?;
+    let undeclared = network.as_ref().map_or(0, |network| {
+        network.tell_cables(&scan);
+        network.undeclared(&scan.subdevices)
+    });
+    let period = declaration.domains.iter().map(|domain| domain.period).min().unwrap_or(arguments.cycle);
+    let domains = declaration.domains.len();
+    say!("{} SubDevices; cycle {} us", scan.subdevices.len(), period.as_micros());
+    let trigger = declaration.clocks.as_ref().map(|clocks| arguments.clock_options.trigger(clocks.bus_shift));
+    let clocks = trigger.is_some();
+    supervisor.load(declaration)?;
+    let at_station = |station| network.as_ref().and_then(|network| network.at_station(station));
+    for connection in &arguments.junction.connections {
+        let connection = connection.resolve(at_station).map_err(Failure::new)?;
+        supervisor.add_junction_connection(connection)?;
+    }
+    let mut application = supervisor.apply(cyclic).map_err(|error| match &network {
+        Some(network) => network.explain(error.into()),
+        None => Failure::from(ringcat::Error::from(error)),
+    })?;
+    if let Some(trigger) = trigger {
+        application.set_trigger(trigger);
+    }
+    let (mut work, watched) = match &network {
+        Some(network) => {
+            let (work, watched) = network.work(application.directory())?;
+            application.set_copies(work.copies()).map_err(|error| Failure::new(error.to_string()))?;
+            (Some(work), watched)
+        }
+        None => (None, Watched::default()),
+    };
+    let asked = end.clone();
+    let cycles = application.start_cycles(
+        move || thread.prepare_cycles(),
+        move |data| {
+            if let Some(work) = &mut work {
+                work.cycle(data);
+            }
+            // Here too: this thread runs whatever starves.
+            if asked.is_asked() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+        },
+    )?;
+    let ring = arguments.interfaces.redundant.is_some();
+    let live = Live::new(ring, clocks);
+    let log = RunLog::new(EventLog::new(begin, names).one_by_one(arguments.tell_all), surroundings);
+    let mut run = Run { cycles, log, live, clocks, domains, beside, watched, recording };
+    let reached = run.reach_op(arguments.within, &end);
+    let before = Seen::of(run.cycles.news());
+    if reached.is_ok() {
+        let until = arguments.lasts.map_or(Instant::NEVER, |lasts| now() + lasts);
+        run.exchange(until, &end);
+    }
+    end.no_limit();
+    let status = if clocks { run.cycles.supervisor().with(|engine| engine.clocks())? } else { Vec::new() };
+    let mut reasons = match reached {
+        Ok(()) => Exchanged::look(&run, &before, ring, &status).reasons(run.log.events().names()),
+        Err(reason) => vec![reason],
+    };
+    reasons.extend(end.cut_short(arguments.lasts).filter(|_| reasons.is_empty()));
+    if undeclared > 0 {
+        reasons.push(format!("the file lacks {} of the bus", counted(undeclared, "SubDevice", "SubDevices")));
+    }
+    let application = run.cycles.end().unwrap_or_else(|panicked| {
+        reasons.push(panicked.to_string());
+        panicked.application
+    });
+    summary(&application, run.log.surroundings());
+    if clocks {
+        clock_account(&status, application.news(), run.log.events().names());
+    }
+    run.watched.account();
+    run.beside.account();
+    match application.stop(LastOutputs::Zero, AlState::Init, STOP_LIMIT) {
+        Ok((supervisor, mut links)) => {
+            final_account(&mut links, &supervisor);
+            say!("  stopped: outputs zero, all SubDevices in INIT");
+        }
+        Err(error) => reasons.push(error.to_string()),
+    }
+    reasons.extend(run.recording.finish());
+    let lasted = arguments.lasts.map_or_else(String::new, |lasts| format!(" for {}", in_words(lasts)));
+    let subdevices = counted(scan.subdevices.len(), "SubDevice", "SubDevices");
+    Ok(Verdict::of(reasons, format!("{subdevices} in OP{lasted}, every cycle complete")))
+}
+
+/// What is to be activated: the file's network, or what was found as its SIIs say.
+fn declare(
+    arguments: &RunArguments,
+    network: Option<&EniNetwork>,
+    found: &[SubDeviceInfo],
+) -> Result<Declaration, Failure> {
+    let options = &arguments.clock_options;
+    let asked = arguments.clocks || options.are_given();
+    let declaration = match network {
+        Some(network) => {
+            let mut declaration = network.declaration(found)?;
+            options.adapt(&mut declaration, asked)?;
+            declaration
+        }
+        None => {
+            let mut declaration = automatic(found, arguments.cycle);
+            if asked {
+                options.declare(&mut declaration, found)?;
+            }
+            declaration
+        }
+    };
+    Ok(declaration.with_under_way(arguments.under_way))
+}
+
+struct Run {
+    cycles: CyclicThread<Tee<PacketLinks>>,
+    log: RunLog,
+    live: Live,
+    /// Distributed clocks are in use.
+    clocks: bool,
+    /// How many domains there are.
+    domains: usize,
+    beside: Beside,
+    /// Variables of a file.
+    watched: Watched,
+    recording: Recording,
+}
+
+/// Tells of other MainDevices and of the cabling among the events of a scan.
+fn tell_events(supervisor: &SupervisorThread, surroundings: &mut Surroundings) {
+    while let Some(event) = supervisor.pop_event() {
+        if let Event::JunctionLearned { .. }
+        | Event::LineCrossed { .. }
+        | Event::InterfacesSwapped
+        | Event::UnconnectedPort0 { .. }
+        | Event::CannotDisconnect { .. } = event.event
+        {
+            say!("{}", describe(&event, &Names::default()));
+        }
+        surroundings.note(&event.event).iter().flatten().for_each(|words| eprintln!("ringcat: {words}"));
+    }
+}
+
+/// Frames that arrive for the cyclic half before it sends any are those of other MainDevices. Returns how many.
+fn tell_of_others(links: &mut impl Links, surroundings: &mut Surroundings) -> u64 {
+    let mut count = 0;
+    while links.receive(&mut |link, frame| {
+        count += 1;
+        if let Some(source) = address_of_sender(frame) {
+            surroundings.tell_sender(link, source);
+        }
+    }) {}
+    count
+}
+
+impl Run {
+    /// Tells what has happened since the last look.
+    fn look(&mut self) {
+        self.log.news(&self.cycles, now(), |shown| {
+            self.live.clear();
+            match shown {
+                Shown::Line(line) => say!("{line}"),
+                Shown::Warning(words) => eprintln!("ringcat: {words}"),
+            }
+        });
+        for words in self.beside.news() {
+            self.live.clear();
+            eprintln!("ringcat: {words}");
+        }
+        if let Some(words) = self.recording.failure() {
+            self.live.clear();
+            eprintln!("ringcat: {words}");
+        }
+        for line in self.watched.news(now()) {
+            self.live.clear();
+            say!("{line}");
+        }
+    }
+
+    fn clocks_locked(&self) -> bool {
+        !self.clocks || self.cycles.supervisor().with(|engine| engine.clocks_locked()).unwrap_or(false)
+    }
+
+    /// Until all SubDevices are in OP and all clocks are locked, and then until process data is complete, for a moment.
+    ///
+    /// # Errors
+    /// Why that does not come, in words.
+    fn reach_op(&mut self, limit: Duration, end: &EndRequest) -> Result<(), String> {
+        let until = now() + limit;
+        end.limit(until);
+        let (mut in_op, mut complete_until) = (false, until);
+        while !in_op || (!self.is_complete() && now() < complete_until) {
+            if let Some(by) = end.by() {
+                self.live.clear();
+                return Err(format!("ended by {by} before all SubDevices were in OP"));
+            }
+            if self.cycles.has_ended() {
+                return Err("the cycles ended before all SubDevices were in OP".to_owned());
+            }
+            if !in_op && now() >= until {
+                self.look();
+                self.live.clear();
+                self.tell_states(limit);
+                return Err(self.what_is_missing(limit));
+            }
+            self.look();
+            if !in_op && self.cycles.supervisor().all_settled() && self.clocks_locked() {
+                (in_op, complete_until) = (true, now() + COMPLETE_LIMIT);
+            }
+            self.live.show(now(), self.cycles.news(), self.cycles.supervisor(), self.log.events().names());
+            sleep(LOOK);
+        }
+        let reached = now();
+        self.look();
+        self.live.clear();
+        say!("{}", self.log.events().line(reached, "all SubDevices are in OP"));
+        for words in self.incomplete() {
+            say!("{}", self.log.events().line(reached, &format!("process data is not exchanged as declared: {words}")));
+        }
+        self.cycles.news().restart_histograms();
+        Ok(())
+    }
+
+    /// Domains whose last judgement is not complete, in words.
+    fn incomplete(&self) -> Vec<String> {
+        let judged = (0..self.domains).map(|domain| (domain, self.cycles.news().status(DomainId(domain))));
+        let incomplete = judged.filter(|(_, status)| status.state != DomainState::Complete);
+        incomplete
+            .map(|(domain, status)| {
+                let (wkc, expected) = (status.wkc, status.expected);
+                format!("domain {domain}: {}, working counter {wkc} of {expected}", status.in_words())
+            })
+            .collect()
+    }
+
+    fn is_complete(&self) -> bool {
+        self.incomplete().is_empty()
+    }
+
+    /// Why OP was not reached.
+    fn what_is_missing(&self, limit: Duration) -> String {
+        let limit = in_words(limit);
+        let states = self.cycles.supervisor().states();
+        let late = states.iter().filter(|state| **state != SubDeviceState::Settled(AlState::Op)).count();
+        if late == 0 {
+            return format!("not all clocks are locked within {limit}");
+        }
+        format!("{} of {} SubDevices not in OP within {limit}", late, states.len())
+    }
+
+    fn tell_states(&self, limit: Duration) {
+        let what = if self.clocks_locked() { "reached OP" } else { "reached OP with all clocks locked" };
+        say!("not all SubDevices {what} within {}:", in_words(limit));
+        for (subdevice, state) in self.cycles.supervisor().states().iter().enumerate() {
+            let state = live::word(*state);
+            let name = self.log.events().names().0.get(subdevice).map_or("", String::as_str);
+            say!("  SubDevice {subdevice} \"{name}\": {state}");
+        }
+        let clocks = self.cycles.supervisor().with(|engine| engine.clocks()).unwrap_or_default();
+        for clock in clocks.iter().filter(|clock| !clock.is_locked && !clock.is_reference) {
+            let difference = clock.difference_ns.map_or_else(|| "unknown".to_owned(), |ns| format!("{ns} ns"));
+            let name = clock.subdevice.and_then(|subdevice| self.log.events().names().0.get(subdevice));
+            let name = name.map_or_else(String::new, |name| format!(" \"{name}\""));
+            let position = clock.position;
+            say!("  the clock of position {position}{name} is not locked: its difference is {difference}");
+        }
+    }
+
+    fn exchange(&mut self, until: Instant, end: &EndRequest) {
+        end.limit(until);
+        while now() < until && !end.is_asked() && !self.cycles.has_ended() {
+            self.look();
+            self.live.show(now(), self.cycles.news(), self.cycles.supervisor(), self.log.events().names());
+            sleep(LOOK.min(until.since(now())));
+        }
+        self.look();
+        self.live.clear();
+    }
+}

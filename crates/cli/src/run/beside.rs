@@ -1,0 +1,125 @@
+//! What runs beside process data where it is asked for: network interfaces for EoE, the mailbox gateway.
+
+use std::net::{IpAddr, SocketAddr};
+
+use clap::Args;
+use ringcat::SupervisorThread;
+use ringcat::eoe::{Ethernet, EthernetInterface, EthernetOptions};
+use ringcat::gateway::{Gateway, GatewayOptions};
+use ringcat::wire::mailbox::gateway::PORT;
+use ringcat_link::interface;
+
+use crate::interfaces::{Failure, InterfaceArguments};
+use crate::output::say;
+
+/// Options for it.
+#[derive(Args, Clone, Debug)]
+pub struct BesideArguments {
+    /// Make a network interface for each SubDevice that speaks Ethernet over EtherCAT: eoeXsY with this MainDevice's number
+    /// X and the position Y, or eoeXaY with the alias Y. Needs cap_net_admin.
+    #[arg(long)]
+    eoe: bool,
+    /// Number of this MainDevice in the names of those interfaces.
+    #[arg(long, value_name = "NUMBER", default_value_t = 0)]
+    index: u16,
+    /// Open the mailbox gateway (ETG.8200, UDP and TCP) on this address, 127.0.0.1:34980 by default. It knows no password:
+    /// whoever reaches it may change SubDevices.
+    #[arg(long, value_name = "ADDR[:PORT]", num_args = 0..=1, default_missing_value = "127.0.0.1", value_parser = address)]
+    gateway: Option<SocketAddr>,
+}
+
+/// An address with the usual port or another one.
+fn address(text: &str) -> Result<SocketAddr, String> {
+    let with_port = text.parse().ok();
+    let address = with_port.or_else(|| Some(SocketAddr::new(text.parse::<IpAddr>().ok()?, PORT)));
+    address.ok_or_else(|| format!("expected an address such as 127.0.0.1 or 192.168.1.5:34980, got {text:?}"))
+}
+
+impl BesideArguments {
+    /// Starts what was asked for.
+    pub fn start(&self, supervisor: &SupervisorThread, interfaces: &InterfaceArguments) -> Result<Beside, Failure> {
+        let mut beside = Beside { ethernet: None, gateway: None };
+        if self.eoe {
+            let main = interface::list().into_iter().find(|found| found.name == interfaces.main);
+            let main = main.map(|found| found.mac).unwrap_or_default();
+            beside.ethernet = Some(supervisor.start_ethernet(EthernetOptions { index: self.index, main })?);
+        }
+        if let Some(address) = self.gateway {
+            let gateway = supervisor.start_gateway(GatewayOptions { address, ..GatewayOptions::default() })?;
+            say!("mailbox gateway on {} (UDP and TCP)", gateway.address());
+            if !address.ip().is_loopback() {
+                eprintln!(
+                    "ringcat: the mailbox gateway has no password: whoever reaches {address} may change SubDevices"
+                );
+            }
+            beside.gateway = Some(gateway);
+        }
+        Ok(beside)
+    }
+}
+
+/// What was started; it ends when this is dropped.
+#[derive(Debug)]
+pub struct Beside {
+    ethernet: Option<Ethernet>,
+    gateway: Option<Gateway>,
+}
+
+impl Beside {
+    /// What has happened since this was asked last.
+    pub fn news(&self) -> Vec<String> {
+        let news = self.ethernet.iter().flat_map(Ethernet::take_news);
+        news.map(|news| news.to_string()).collect()
+    }
+
+    /// What passed, for the summary.
+    pub fn account(&self) {
+        if let Some(ethernet) = &self.ethernet {
+            let interfaces = ethernet.interfaces();
+            if interfaces.is_empty() {
+                say!("  EoE: no network interface");
+            }
+            for EthernetInterface { name, subdevice, status, refused } in interfaces {
+                let counters = status.counters;
+                say!(
+                    "  {name} (SubDevice {}): to it {} frames, {} bytes, {} dropped; from it {} frames, {} bytes; {} incomplete, {} overrun, {refused} not taken by the host",
+                    subdevice.subdevice,
+                    counters.tx_frames,
+                    counters.tx_bytes,
+                    counters.tx_dropped,
+                    counters.rx_frames,
+                    counters.rx_bytes,
+                    counters.rx_lost + counters.malformed,
+                    counters.rx_overruns,
+                );
+            }
+        }
+        if let Some(gateway) = &self.gateway {
+            let counters = gateway.counters();
+            let relay = counters.relay;
+            say!(
+                "  gateway: {} connections, {} ended by us; {} messages, {} answered, {} refused, {} without an answer, {} transfers ended",
+                counters.connections,
+                counters.ended,
+                relay.messages,
+                relay.answers,
+                relay.refused + relay.malformed,
+                relay.unanswered,
+                relay.ended,
+            );
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_address_for_the_gateway_may_leave_out_the_port() {
+        assert_eq!(address("127.0.0.1"), Ok(SocketAddr::from(([127, 0, 0, 1], 34_980))));
+        assert_eq!(address("10.0.0.1:5000"), Ok(SocketAddr::from(([10, 0, 0, 1], 5000))));
+        assert_eq!(address("::1").map(|address| address.port()), Ok(PORT));
+        assert!(address("nowhere").is_err());
+    }
+}

@@ -1,0 +1,371 @@
+//! `ringcat run --eni FILE`: the network is the one of the file, outputs are what `--set` says.
+
+use std::path::PathBuf;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::time::Duration;
+
+use clap::Args;
+use ringcat::Directory;
+use ringcat::config::Variable;
+use ringcat::eni::{EniFile, EniImage, EniVariable, Value, VariableType};
+use ringcat::text::Names;
+use ringcat::{ActivateError, Declaration, Direction, Error, Instant, ProcessData, Scan, SubDeviceInfo};
+
+use crate::interfaces::Failure;
+use crate::output::say;
+
+/// Values of a variable are told so often at most.
+const TELL_PERIOD: Duration = Duration::from_secs(1);
+/// Names that are told where one is not known: as many, and so like it (1 is equal).
+const NEAR: usize = 3;
+const LIKE: f64 = 0.6;
+
+/// Options about an ENI.
+#[derive(Args, Debug, Default)]
+pub struct EniArguments {
+    /// Bring the network of this ENI to OP (TwinCAT, EC-Engineer and others export it) instead of whatever is there; see
+    /// docs/eni.md, and `ringcat eni FILE` for what of it is followed.
+    #[arg(long, value_name = "FILE", conflicts_with = "cycle")]
+    eni: Option<PathBuf>,
+    /// Send LRD and LWR where the file has an LRW over several SubDevices, which two interfaces cannot have.
+    #[arg(long, requires = "eni")]
+    split_lrw: bool,
+    /// Output variable of the file with the value that it has from the first cycle on; may be given several times.
+    #[arg(long, value_name = "NAME=VALUE", requires = "eni")]
+    set: Vec<String>,
+    /// Variable of the file whose value is told when it changes, at most once a second, and in the end; may be given
+    /// several times.
+    #[arg(long, value_name = "NAME", requires = "eni")]
+    watch: Vec<String>,
+}
+
+/// A network from a file.
+#[derive(Debug)]
+pub struct EniNetwork {
+    file: EniFile,
+    split_lrw: bool,
+    set: Vec<String>,
+    watch: Vec<String>,
+}
+
+impl EniArguments {
+    /// Reads the file, if there is one, and tells what of it is not followed.
+    pub fn load(&self) -> Result<Option<EniNetwork>, Failure> {
+        let Some(path) = &self.eni else { return Ok(None) };
+        let file = EniFile::load(path).map_err(|error| Failure::new(error.to_string()))?;
+        if file.configuration.declaration.subdevices.is_empty() {
+            return Err(Failure::new(format!("{}: the file describes no SubDevice", path.display())));
+        }
+        if !file.configuration.notices.is_empty() {
+            say!("{}: not followed, or done in another way:", path.display());
+            file.configuration.notices.iter().for_each(|notice| say!("  {notice}"));
+        }
+        if file.configuration.declaration.clocks.as_ref().is_some_and(|clocks| clocks.bus_shift) {
+            say!("  the reference clock follows this host (bus shift); with --phase 0us the cycles follow it instead");
+        }
+        let network = EniNetwork { file, split_lrw: self.split_lrw, set: self.set.clone(), watch: self.watch.clone() };
+        network.check_variables()?;
+        Ok(Some(network))
+    }
+}
+
+impl EniNetwork {
+    /// What people call the SubDevices.
+    pub fn names(&self) -> Names {
+        self.file.names()
+    }
+
+    /// Whether nothing about process data is left to the SubDevices themselves.
+    pub fn is_complete(&self) -> bool {
+        self.file.configuration.declaration.subdevices.iter().all(|config| config.declared.is_some())
+    }
+
+    /// Index in the declaration of the SubDevice with this station address in the file.
+    pub fn at_station(&self, station: u16) -> Option<usize> {
+        self.file.configuration.at_station(station)
+    }
+
+    /// What is activated, where the SubDevices that were found are those of the file. Each that is not is told.
+    pub fn declaration(&self, found: &[SubDeviceInfo]) -> Result<Declaration, Failure> {
+        let differences = self.file.compare(found);
+        for difference in &differences {
+            eprintln!("ringcat: {difference}");
+        }
+        if differences.iter().any(|difference| difference.is_grave) {
+            return Err(Failure::new("the network is not the one of the file: correct the file, or the network"));
+        }
+        Ok(self.file.declaration(self.split_lrw))
+    }
+
+    /// How many SubDevices are there and not in the file. [`EniNetwork::declaration`] tells each; they stay in INIT.
+    pub fn undeclared(&self, found: &[SubDeviceInfo]) -> usize {
+        self.file.compare(found).iter().filter(|difference| difference.subdevice.is_none()).count()
+    }
+
+    /// Cables that are not where the file says. The network works all the same.
+    pub fn tell_cables(&self, scan: &Scan) {
+        for difference in self.file.compare_cables(&scan.subdevices, &scan.topology) {
+            eprintln!("ringcat: {difference}");
+        }
+    }
+
+    /// Why it cannot be activated, in terms of the file and of this program.
+    pub fn explain(&self, error: Error) -> Failure {
+        match error {
+            Error::Activate(ActivateError::NamedLrwOnTwoLinks(lrw)) => {
+                let names = self.names().0;
+                let who: Vec<&str> = lrw.subdevices.iter().filter_map(|at| Some(names.get(*at)?.as_str())).collect();
+                Failure::new(format!(
+                    "{}: an LRW of {} bytes over {} SubDevices ({}) cannot be used with two interfaces, because a break of \
+                     the ring would divide it: add --split-lrw to have it sent as LRD and LWR, or leave --redundant out",
+                    lrw.name,
+                    lrw.length,
+                    who.len(),
+                    who.join(", ")
+                ))
+            }
+            other => Failure::from(other),
+        }
+    }
+
+    /// All that can be wrong with variables shows before anything is sent.
+    fn check_variables(&self) -> Result<(), Failure> {
+        self.set.iter().try_for_each(|text| self.assignment(text).map(|_| ()))?;
+        self.watch.iter().try_for_each(|name| self.variable("--watch", name, Direction::Inputs).map(|_| ()))
+    }
+
+    /// Number of a variable in document order, and what the file says of it. Where an input and an output have one name, it
+    /// is the one of this direction.
+    fn variable(&self, option: &str, name: &str, wanted: Direction) -> Result<(usize, &Variable), Failure> {
+        let variables = &self.file.configuration.image.variables;
+        let mut named = variables.iter().enumerate().filter(|(_, variable)| variable.name == name);
+        let first = named.clone().next();
+        let found = named.find(|(_, variable)| variable.direction == wanted).or(first);
+        let (number, variable) = found.ok_or_else(|| {
+            let useful = variables.iter().filter(|variable| variable.subdevice.is_some());
+            let near = near(name, useful.map(|variable| variable.name.as_str()));
+            let near = if near.is_empty() { String::new() } else { format!("; similar: {}", near.join(", ")) };
+            let all = format!("`ringcat eni --details FILE` lists its {} variables", variables.len());
+            Failure::new(format!("{option}: the file has no variable \"{name}\"{near}; {all}"))
+        })?;
+        if variable.subdevice.is_none() {
+            return Err(Failure::new(format!(
+                "{option}: \"{name}\" is nobody's process data: nothing writes or reads it"
+            )));
+        }
+        Ok((number, variable))
+    }
+
+    /// Number of the variable in `NAME=VALUE`, and the bits that it gets.
+    fn assignment(&self, text: &str) -> Result<(usize, u64), Failure> {
+        // Names may have an equals sign, values have none.
+        let pair = text.rsplit_once('=');
+        let (name, value) = pair.ok_or_else(|| Failure::new(format!("--set: expected NAME=VALUE, got \"{text}\"")))?;
+        let (number, variable) = self.variable("--set", name, Direction::Outputs)?;
+        if variable.direction == Direction::Inputs {
+            return Err(Failure::new(format!("--set: \"{name}\" is an input: the SubDevice gives it its value")));
+        }
+        let length = u16::try_from(variable.bits).ok().filter(|length| *length <= 64);
+        let bits = length.and_then(|length| VariableType::named(&variable.data_type).parse(value, length));
+        let bits = bits.ok_or_else(|| {
+            let (count, kind) = (variable.bits, &variable.data_type);
+            let unit = if count == 1 { "bit" } else { "bits" };
+            let most = if length.is_none() { ": only up to 64 bits can be set" } else { "" };
+            Failure::new(format!(
+                "--set: expected a value of {count} {unit} ({kind}) for \"{name}\", got \"{value}\"{most}"
+            ))
+        })?;
+        Ok((number, bits))
+    }
+
+    /// What the cycles do, and what they show.
+    pub fn work(&self, directory: &Directory) -> Result<(Work, Watched), Failure> {
+        let mut image =
+            EniImage::new(&self.file.configuration, directory).map_err(|error| Failure::new(error.to_string()))?;
+        for text in &self.set {
+            let (number, bits) = self.assignment(text)?;
+            let variable = image.variables()[number].clone();
+            image.write(&variable, bits);
+        }
+        for subdevice in image.unplaced() {
+            let name = self.names().0.get(*subdevice).cloned().unwrap_or_default();
+            eprintln!("ringcat: SubDevice {subdevice} \"{name}\" has places in the file's image and no process data");
+        }
+        let watched = self.watch.iter().map(|name| {
+            let (number, _) = self.variable("--watch", name, Direction::Inputs)?;
+            Ok(image.variables()[number].clone())
+        });
+        let watched: Vec<EniVariable> = watched.collect::<Result<_, Failure>>()?;
+        let values: Arc<[AtomicU64]> = watched.iter().map(|_| AtomicU64::new(0)).collect();
+        let work = Work { image, watched: watched.clone(), values: values.clone() };
+        let told = vec![None; watched.len()];
+        Ok((work, Watched { watched, values, told, next: Instant(0) }))
+    }
+}
+
+/// Names that look like one that is not there, the likest first, in quotation marks.
+fn near<'a>(wanted: &str, names: impl Iterator<Item = &'a str>) -> Vec<String> {
+    let wanted = wanted.to_lowercase();
+    let likeness = |name: &str| {
+        let name = name.to_lowercase();
+        if name.contains(&wanted) { 1.0 } else { strsim::normalized_damerau_levenshtein(&wanted, &name) }
+    };
+    let mut near: Vec<(f64, &str)> =
+        names.map(|name| (likeness(name), name)).filter(|(like, _)| *like >= LIKE).collect();
+    near.sort_by(|a, b| b.0.total_cmp(&a.0));
+    near.dedup_by_key(|(_, name)| *name);
+    near.into_iter().take(NEAR).map(|(_, name)| format!("\"{name}\"")).collect()
+}
+
+/// What is done in each cycle; it neither allocates nor waits.
+#[derive(Debug)]
+pub struct Work {
+    image: EniImage,
+    watched: Vec<EniVariable>,
+    values: Arc<[AtomicU64]>,
+}
+
+impl Work {
+    /// One cycle.
+    pub fn cycle(&mut self, data: &mut ProcessData<'_>) {
+        self.image.take_inputs(data);
+        for (variable, value) in self.watched.iter().zip(self.values.iter()) {
+            value.store(self.image.read(variable), Ordering::Relaxed);
+        }
+        self.image.give_outputs(data);
+    }
+
+    /// What the file copies from inputs to outputs.
+    pub fn copies(&self) -> &[ringcat::CopyRule] {
+        self.image.copies()
+    }
+}
+
+/// Variables that are told.
+#[derive(Debug, Default)]
+pub struct Watched {
+    watched: Vec<EniVariable>,
+    values: Arc<[AtomicU64]>,
+    told: Vec<Option<u64>>,
+    next: Instant,
+}
+
+impl Watched {
+    /// Lines about what has changed since the last ones, where it is time for them.
+    pub fn news(&mut self, now: Instant) -> Vec<String> {
+        if now < self.next || self.watched.is_empty() {
+            return Vec::new();
+        }
+        self.next = now + TELL_PERIOD;
+        let mut lines = Vec::new();
+        for ((variable, value), told) in self.watched.iter().zip(self.values.iter()).zip(&mut self.told) {
+            let value = value.load(Ordering::Relaxed);
+            if told.replace(value) != Some(value) {
+                lines.push(line(variable, value));
+            }
+        }
+        lines
+    }
+
+    /// The last values.
+    pub fn account(&self) {
+        for (variable, value) in self.watched.iter().zip(self.values.iter()) {
+            say!("  {}", line(variable, value.load(Ordering::Relaxed)));
+        }
+    }
+}
+
+fn line(variable: &EniVariable, value: u64) -> String {
+    let bits = u16::try_from(variable.bits.min(64)).unwrap_or(64);
+    let value: Value = variable.data_type.value(value, bits);
+    format!("{} = {value}", variable.name)
+}
+
+#[cfg(test)]
+mod tests {
+    use ringcat::simulated::SimulatedSegment;
+    use ringcat::{MainDevice, Options};
+
+    use super::*;
+
+    const MACHINE: &[u8] = include_bytes!("../../../ringcat/examples/machine.eni.xml");
+
+    fn network(set: &[&str], watch: &[&str]) -> EniNetwork {
+        let strings = |texts: &[&str]| texts.iter().map(|text| (*text).to_owned()).collect();
+        let file = EniFile::from_bytes(MACHINE).unwrap();
+        EniNetwork { file, split_lrw: false, set: strings(set), watch: strings(watch) }
+    }
+
+    #[test]
+    fn variables_are_set_and_told_and_what_cannot_be_is_refused_with_its_name() {
+        let segment = SimulatedSegment::new(network(&[], &[]).file.simulated(false).unwrap());
+        let mut main_device = MainDevice::request(segment, &Options::default());
+        let found = main_device.scan().unwrap().subdevices;
+        let declaration = network(&[], &[]).declaration(&found).unwrap();
+        let mut application = main_device.activate(declaration).map_err(Error::from).unwrap();
+        let good = network(&["Lamps.Channel 2=on", "Drive.Target velocity=-5"], &["Drive.Position"]);
+        good.check_variables().unwrap();
+        let (mut work, mut watched) = good.work(application.directory()).unwrap();
+        for _ in 0..400 {
+            application.cycle(|data| work.cycle(data));
+        }
+        assert_eq!(application.links().network().device(ringcat::sim::cable::DeviceIndex(1)).outputs(), [2]);
+        assert_eq!(watched.news(Instant(1)), ["Drive.Position = -5"]);
+        assert_eq!(watched.news(Instant(2)), [""; 0], "at most once a second");
+        assert_eq!(watched.news(Instant(2_000_000_000)), [""; 0], "when it changes");
+
+        assert!(network(&["Lamps.Channel 2=on"], &["Lamp"]).check_variables().is_err());
+    }
+
+    #[test]
+    fn what_is_wrong_with_variables_shows_before_anything_is_sent_with_names_that_are_near() {
+        let refused = |set: &str| network(&[set], &[]).check_variables().unwrap_err().to_string();
+        let unknown = refused("Lamp.Channel 2=1");
+        let expected = "--set: the file has no variable \"Lamp.Channel 2\"; similar: \"Lamps.Channel 2\", ";
+        assert!(unknown.starts_with(expected), "{unknown}");
+        assert!(unknown.ends_with("; `ringcat eni --details FILE` lists its 16 variables"), "{unknown}");
+        let part = refused("velocity=1");
+        assert!(part.contains("; similar: \"Drive.Target velocity\";"), "{part}");
+        assert!(refused("completely different=1").contains("\"completely different\"; `ringcat eni"));
+        assert!(refused("Buttons.Channel 1=1").contains("is an input"));
+        let value = refused("Drive.Target velocity=fast");
+        assert!(value.contains("a value of 32 bits (DINT) for \"Drive.Target velocity\", got \"fast\""), "{value}");
+        assert!(refused("Lamps.Channel 1=2").contains("expected a value of 1 bit (BOOL)"));
+        assert!(refused("Lamps.Channel 1").contains("expected NAME=VALUE"));
+    }
+
+    #[test]
+    fn variables_of_nobody_are_refused_and_one_name_for_input_and_output_means_the_right_one() {
+        let changed = |from: &str, to: &str, set: &[&str], watch: &[&str]| {
+            let text = std::str::from_utf8(MACHINE).unwrap();
+            assert!(text.contains(from));
+            let file = EniFile::from_bytes(text.replace(from, to).as_bytes()).unwrap();
+            let strings = |texts: &[&str]| texts.iter().map(|text| (*text).to_owned()).collect();
+            EniNetwork { file, split_lrw: false, set: strings(set), watch: strings(watch) }
+        };
+        // Byte 1 of the images belongs to nobody.
+        let nobodys = "<BitOffs>8</BitOffs>";
+        let free = changed("<BitOffs>0</BitOffs>", nobodys, &["Lamps.Channel 1=1"], &[]);
+        assert!(free.check_variables().unwrap_err().to_string().contains("nobody's process data"));
+        let free = changed("<BitOffs>0</BitOffs>", nobodys, &[], &["Buttons.Channel 1"]);
+        assert!(free.check_variables().unwrap_err().to_string().contains("nobody's process data"));
+        let free = changed("<BitOffs>0</BitOffs>", nobodys, &["uttons.Channel 1=1"], &[]);
+        let text = free.check_variables().unwrap_err().to_string();
+        assert!(text.contains("similar: ") && !text.contains("\"Buttons.Channel 1\""), "{text}");
+        let same = changed("Lamps.Channel 1", "Buttons.Channel 1", &["Buttons.Channel 1=1"], &["Buttons.Channel 1"]);
+        let (number, bits) = same.assignment("Buttons.Channel 1=1").unwrap();
+        assert_eq!((same.file.configuration.image.variables[number].direction, bits), (Direction::Outputs, 1));
+        let (_, watched) = same.variable("--watch", "Buttons.Channel 1", Direction::Inputs).unwrap();
+        assert_eq!(watched.direction, Direction::Inputs);
+    }
+
+    #[test]
+    fn an_lrw_that_is_refused_is_explained_with_subdevices_and_the_way_out_cr_16() {
+        let network = network(&[], &[]);
+        let lrw = network.file.configuration.declaration.explicit_lrw[0].clone();
+        let text = network.explain(Error::Activate(ActivateError::NamedLrwOnTwoLinks(lrw))).to_string();
+        let who = "(Lamps (1002), Valves (1003), Buttons (1004), Drive (1005))";
+        assert!(text.contains(who) && text.contains("add --split-lrw"), "{text}");
+    }
+}

@@ -1,0 +1,223 @@
+//! A table on a terminal that is drawn anew over itself: how the cycles go, and which SubDevice is how far.
+//!
+//! Where the standard output is no terminal, nothing is drawn.
+
+use std::fmt::Write as _;
+use std::io::{IsTerminal, stdout};
+use std::time::Duration;
+
+use ringcat::news::News;
+use ringcat::text::Names;
+use ringcat::{
+    AlState, ClockStatus, DomainId, Instant, Link, Redundancy, RedundancyLoss, RingState, RingStatus, SubDeviceState,
+    SupervisorThread,
+};
+
+use crate::clock_options::us;
+use crate::output::write;
+
+/// It is drawn anew so often.
+const PERIOD: Duration = Duration::from_millis(500);
+/// SubDevices that are listed; of more of them, first those that are not in OP.
+const LISTED: usize = 16;
+/// Lines must not break on any terminal, or there would be more of them than are drawn over.
+const WIDTH: usize = 79;
+
+/// The table.
+#[derive(Debug)]
+pub struct Live {
+    terminal: bool,
+    /// Whether there is a ring whose state is worth a word.
+    ring: bool,
+    /// Whether there are distributed clocks.
+    clocks: bool,
+    next: Instant,
+    /// Lines on the terminal that will be drawn over.
+    drawn: usize,
+}
+
+impl Live {
+    /// A table on the standard output, if that is a terminal, of a MainDevice with two links or one, with distributed
+    /// clocks or without.
+    pub fn new(ring: bool, clocks: bool) -> Live {
+        Live { terminal: stdout().is_terminal(), ring, clocks, next: Instant(0), drawn: 0 }
+    }
+
+    /// Draws it where it is time to.
+    pub fn show(&mut self, now: Instant, news: &News, supervisor: &SupervisorThread, names: &Names) {
+        if !self.terminal || now < self.next {
+            return;
+        }
+        self.next = now + PERIOD;
+        self.clear();
+        let ring = self.ring.then(|| supervisor.ring_status());
+        let clocks = if self.clocks { supervisor.with(|engine| engine.clocks()).ok() } else { None };
+        let clocks = clocks.map(|clocks| clock_line(&clocks, news.clock_spread_ns(), news.phase()));
+        let lines = table(news, ring.as_ref(), clocks, &supervisor.states(), names);
+        self.drawn = lines.len();
+        write(format_args!("{}\n", lines.join("\n")));
+    }
+
+    /// Takes it off the terminal, so that something else can be told.
+    pub fn clear(&mut self) {
+        if self.drawn > 0 {
+            // To the first line of the table, then clear to the end of the screen (ECMA-48: CPL, ED).
+            write(format_args!("\x1b[{}F\x1b[J", self.drawn));
+            self.drawn = 0;
+        }
+    }
+}
+
+fn table(
+    news: &News,
+    ring: Option<&RingStatus>,
+    clocks: Option<String>,
+    states: &[SubDeviceState],
+    names: &Names,
+) -> Vec<String> {
+    let (pace, counters, status) = (news.pace(), news.counters(), news.status(DomainId(0)));
+    let us = |time: Duration| time.as_nanos() as f64 / 1e3;
+    let judgement = status.in_words();
+    let (trips, wake_ups) = (news.round_trips(), news.wake_ups());
+    let mut lines = vec![
+        format!("{} cycles   wkc {} of {}, {judgement}", pace.cycles, status.wkc, status.expected),
+        format!(
+            "the wire      {} frames missing, {} too late, {} damaged",
+            counters.missing(),
+            counters.lost_late,
+            counters.lost_damaged
+        ),
+        format!("this machine  {} late wake-ups, {} cycles left out", pace.late, pace.skipped),
+    ];
+    for (title, times) in [("round trips", trips), ("wake-ups", wake_ups)] {
+        let (half, most, longest) = (times.quantile(500_000), times.quantile(990_000), times.longest());
+        lines.push(format!("{title:<13} 50 % {:.1}, 99 % {:.1}, longest {:.1} us", us(half), us(most), us(longest)));
+    }
+    lines.extend(ring.into_iter().flat_map(|ring| ring_lines(ring, names)));
+    lines.extend(clocks);
+    lines.push(count(states));
+    lines.extend(list(states, names));
+    for line in &mut lines {
+        if let Some((at, _)) = line.char_indices().nth(WIDTH) {
+            line.truncate(at);
+        }
+    }
+    lines
+}
+
+/// The clocks: how many are locked, how far they are apart, how far cycles are from their phase.
+fn clock_line(clocks: &[ClockStatus], spread_ns: Option<u32>, (phase_ns, follows): (i64, bool)) -> String {
+    let locked = clocks.iter().filter(|clock| clock.is_locked || clock.is_reference).count();
+    let reference = clocks.iter().find(|clock| clock.is_reference);
+    let reference = reference.map_or_else(String::new, |clock| format!(", reference {}", clock.position));
+    let spread = spread_ns.map_or_else(String::new, |ns| format!(", spread {ns} ns"));
+    let phase = if follows { format!(", cycles {} us from their phase", us(phase_ns)) } else { String::new() };
+    format!("{:<13} {locked} of {} locked{spread}{reference}{phase}", "clocks", clocks.len())
+}
+
+/// The ring and both links.
+fn ring_lines(status: &RingStatus, names: &Names) -> Vec<String> {
+    let state = match status.state {
+        RingState::Unknown => "unknown",
+        RingState::Closed => "closed",
+        RingState::Open => "OPEN",
+    };
+    let more = match (status.place, status.redundancy) {
+        (Some(cable), _) => format!(", break {}", names.cable(cable, status.place_ends)),
+        (None, Redundancy::Lost { cause: cause @ RedundancyLoss::OneWay(_), .. }) => format!(", {cause}"),
+        (None, _) if status.unsteady => format!(", unsteady: {} changes", status.changes),
+        (None, _) => String::new(),
+    };
+    let mut lines = vec![format!("{:<13} {state}{more}", "ring")];
+    for link in [Link::Main, Link::Redundant] {
+        let it = status.link(link);
+        let carrier = match it.carrier {
+            Some(true) => "",
+            Some(false) => ", no carrier",
+            None => ", carrier unknown",
+        };
+        lines.push(format!("{:<13} {} SubDevices{carrier}", link.to_string(), it.answering));
+    }
+    lines
+}
+
+/// How far a SubDevice is, in words.
+pub fn word(state: SubDeviceState) -> String {
+    match state {
+        SubDeviceState::Absent => "does not answer".to_owned(),
+        SubDeviceState::Configuring => "is being configured".to_owned(),
+        SubDeviceState::Settled(state) => state.to_string(),
+    }
+}
+
+/// How many are how far.
+fn count(states: &[SubDeviceState]) -> String {
+    let mut kinds: Vec<(SubDeviceState, usize)> = Vec::new();
+    for state in states {
+        match kinds.iter_mut().find(|(kind, _)| kind == state) {
+            Some((_, count)) => *count += 1,
+            None => kinds.push((*state, 1)),
+        }
+    }
+    let mut line = format!("{:<13}", "SubDevices");
+    for (at, (state, count)) in kinds.iter().enumerate() {
+        // Writing into a String cannot fail.
+        let _ = write!(line, "{}{count} {}", if at == 0 { " " } else { ", " }, word(*state));
+    }
+    line
+}
+
+/// One line each, as far as there is room.
+fn list(states: &[SubDeviceState], names: &Names) -> Vec<String> {
+    let in_op = |state: &SubDeviceState| *state == SubDeviceState::Settled(AlState::Op);
+    let all = states.len() <= LISTED;
+    let shown = states.iter().enumerate().filter(|(_, state)| all || !in_op(state)).take(LISTED);
+    let line = |(number, state): (usize, &SubDeviceState)| {
+        let name = names.0.get(number).map_or("", String::as_str);
+        format!("{number:>13} {:<24.24} {}", name, word(*state))
+    };
+    shown.map(line).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use ringcat::{Cable, PortOf};
+
+    use super::*;
+
+    #[test]
+    fn the_ring_is_shown_with_its_break_and_both_links() {
+        let mut status = RingStatus { state: RingState::Closed, ..RingStatus::default() };
+        status.links[0].answering = 3;
+        status.links[1].carrier = Some(false);
+        let names = Names::default();
+        let expected = ["ring          closed", "MAIN          3 SubDevices, carrier unknown"];
+        assert_eq!(ring_lines(&status, &names)[..2], expected);
+        assert_eq!(ring_lines(&status, &names)[2], "REDUNDANT     0 SubDevices, no carrier");
+        status.state = RingState::Open;
+        status.place = Some(Cable { near: Some(PortOf { node: 2, port: 1 }), far: None });
+        let expected = "ring          OPEN, break between SubDevice 2 port 1 and the REDUNDANT interface";
+        assert_eq!(ring_lines(&status, &names)[0], expected);
+    }
+
+    #[test]
+    fn clocks_have_a_line() {
+        let clock = ClockStatus { position: 3, is_reference: true, ..ClockStatus::default() };
+        let clocks = [clock, ClockStatus { is_reference: false, ..clock }];
+        let expected = "clocks        1 of 2 locked, spread 31 ns, reference 3, cycles -1.5 us from their phase";
+        assert_eq!(clock_line(&clocks, Some(31), (-1_500, true)), expected);
+        assert_eq!(clock_line(&[], None, (7, false)), "clocks        0 of 0 locked");
+    }
+
+    #[test]
+    fn of_many_subdevices_those_that_are_not_in_op_are_listed() {
+        let mut states = vec![SubDeviceState::Settled(AlState::Op); 40];
+        states[7] = SubDeviceState::Absent;
+        let names = Names((0..40).map(|n| format!("a name that is longer than its column {n}")).collect());
+        assert_eq!(count(&states), "SubDevices    39 OP, 1 does not answer");
+        assert_eq!(list(&states, &names), ["            7 a name that is longer th does not answer"]);
+        assert_eq!(list(&states[..16], &names).len(), 16);
+        states.fill(SubDeviceState::Configuring);
+        assert_eq!(list(&states, &names).len(), LISTED);
+    }
+}

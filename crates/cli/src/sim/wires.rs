@@ -1,0 +1,172 @@
+//! Between network interfaces and a segment in virtual time.
+//!
+//! Virtual time follows `CLOCK_MONOTONIC`: before anything else, each turn lets everything happen in the segment that is
+//! due by now. A frame that has arrived on an interface then begins its way at the segment's host interface, and one
+//! that has come back there leaves on the network interface.
+//!
+//! The segment's host interface takes a frame's wire time at 100 Mbit/s once, when the frame enters; the way out adds
+//! nothing, because what comes out is due when its last bit is. On a veth pair, which takes no time itself, a round trip
+//! is thus as long as on a real segment. On a real cable the wire time of both its directions comes on top.
+//!
+//! As fast as possible ([`Pace::AsFastAsPossible`]), virtual time leaps to the end of each frame's way, and keeps the lead
+//! that it gains so over the monotonic clock: nothing in the segment runs backwards or waits for the clock to catch up.
+
+use std::time::Duration;
+
+use clap::ValueEnum;
+use ringcat::sim::cable::HostLink;
+use ringcat::sim::network::Network;
+use ringcat::sim::time::SimTime;
+use ringcat_link::{LinkCounters, LinkError, PacketOptions, PacketSocket, ReceiveMode, monotonic};
+
+use super::lateness::Lateness;
+
+/// Orders are looked for at least this often while the simulator spins.
+const SPIN: Duration = Duration::from_micros(50);
+/// And this often while it sleeps: a stall of this machine that is not longer goes unnoticed.
+const NAP: Duration = Duration::from_micros(500);
+
+/// Time that frames under way may take at most in one leap.
+const LONGEST_LEAP: Duration = Duration::from_millis(100);
+
+/// How long frames take.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum Pace {
+    /// As long as in a real segment.
+    RealTime,
+    /// As long as this machine needs to compute their way.
+    AsFastAsPossible,
+}
+
+/// What time it is in the segment.
+#[derive(Clone, Copy, Debug)]
+struct Clock {
+    /// The monotonic time at which virtual time began.
+    begin_ns: u64,
+    /// What virtual time has gained since by leaps.
+    lead_ns: u64,
+}
+
+impl Clock {
+    /// Virtual time has gone on by so much while no real time passed.
+    fn leap(&mut self, by: Duration) {
+        let by_ns = u64::try_from(by.as_nanos()).unwrap_or(u64::MAX);
+        self.lead_ns = self.lead_ns.saturating_add(by_ns);
+    }
+
+    /// What time it is in the segment at a monotonic time.
+    fn virtual_time(self, now_ns: u64) -> SimTime {
+        SimTime(now_ns.saturating_sub(self.begin_ns).saturating_add(self.lead_ns))
+    }
+
+    /// The monotonic time of a moment in the segment.
+    fn monotonic_time(self, at: SimTime) -> u64 {
+        at.0.saturating_sub(self.lead_ns).saturating_add(self.begin_ns)
+    }
+}
+
+/// The network interfaces of a simulated segment.
+#[derive(Debug)]
+pub struct Wires {
+    sockets: Vec<(HostLink, PacketSocket)>,
+    mode: ReceiveMode,
+    pace: Pace,
+    clock: Clock,
+    /// When the next turn is asked for.
+    asked_ns: u64,
+    /// How well that is kept.
+    pub lateness: Lateness,
+}
+
+impl Wires {
+    /// Opens the interfaces; virtual time, which is at zero, goes on from now.
+    ///
+    /// # Errors
+    /// An interface that is not there or carries no Ethernet, or a missing permission.
+    pub fn open(main: &str, redundant: Option<&str>, mode: ReceiveMode, pace: Pace) -> Result<Wires, LinkError> {
+        let options = PacketOptions { receive: mode, ring_frames: 1024, ..PacketOptions::default() };
+        let names = [(HostLink::Main, Some(main)), (HostLink::Redundant, redundant)];
+        let named = names.into_iter().filter_map(|(link, name)| Some((link, name?)));
+        let open = |(link, name)| Ok((link, PacketSocket::open(name, &options)?));
+        let now = monotonic::now_ns();
+        Ok(Wires {
+            sockets: named.map(open).collect::<Result<_, LinkError>>()?,
+            mode,
+            pace,
+            clock: Clock { begin_ns: now, lead_ns: 0 },
+            asked_ns: u64::MAX,
+            lateness: Lateness::default(),
+        })
+    }
+
+    /// One turn: what is due happens, frames go in and out. Returns the monotonic time of the turn.
+    pub fn turn(&mut self, network: &mut Network) -> u64 {
+        let now = monotonic::now_ns();
+        self.lateness.note(self.asked_ns, now);
+        network.advance(self.clock.virtual_time(now));
+        for (link, socket) in &mut self.sockets {
+            while socket.receive(&mut |frame| network.send(*link, frame)) {}
+        }
+        if self.pace == Pace::AsFastAsPossible {
+            let before = network.now();
+            network.advance_until_quiet(before + LONGEST_LEAP);
+            self.clock.leap(network.now() - before);
+        }
+        for (link, socket) in &mut self.sockets {
+            while let Some(received) = network.receive(*link) {
+                // An interface that is down loses the frame, as a cable does.
+                socket.send(&received.bytes);
+                network.give_back(received.bytes);
+            }
+        }
+        network.settle_all();
+        now
+    }
+
+    /// Waits until a frame arrives or something is due in the segment, but not for long.
+    pub fn wait(&mut self, network: &Network, now: u64) {
+        let pause = if self.mode == ReceiveMode::BusyPoll { SPIN } else { NAP };
+        let longest = now + pause.as_nanos() as u64;
+        let due = network.next_event().map_or(u64::MAX, |at| self.clock.monotonic_time(at));
+        self.asked_ns = longest.min(due.max(now));
+        let mut sockets = self.sockets.iter().map(|(_, socket)| socket);
+        match (sockets.next(), sockets.next()) {
+            (Some(main), Some(redundant)) => ringcat_link::wait(&[main, redundant], self.asked_ns, self.mode),
+            (Some(main), None) => ringcat_link::wait(&[main], self.asked_ns, self.mode),
+            (None, _) => false,
+        };
+    }
+
+    /// What the interfaces have carried, and how well this simulator has kept up.
+    pub fn summary(&self) -> String {
+        let line = |(link, socket): &(HostLink, PacketSocket)| {
+            let LinkCounters { sent, received, down, busy, refused, overrun, truncated } = socket.counters();
+            let unsent = down + busy + refused;
+            format!(
+                "{link} interface: {received} frames received, {overrun} lost in a full ring, {truncated} too long, {sent} \
+                 sent, {unsent} not sent\n"
+            )
+        };
+        self.sockets.iter().map(line).collect::<String>() + &self.lateness.summary()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn virtual_time_keeps_what_it_has_gained_and_never_goes_back() {
+        let mut clock = Clock { begin_ns: 1_000, lead_ns: 0 };
+        let mut before = clock.virtual_time(1_000);
+        assert_eq!(before, SimTime(0));
+        for now_ns in (1_000..5_000).step_by(100) {
+            let arrives = clock.virtual_time(now_ns);
+            assert!(arrives >= before, "at {now_ns}");
+            clock.leap(Duration::from_nanos(60));
+            before = arrives + Duration::from_nanos(60);
+        }
+        assert_eq!(clock.virtual_time(5_000), SimTime(4_000 + 40 * 60));
+        assert_eq!(clock.monotonic_time(SimTime(4_000 + 40 * 60)), 5_000);
+    }
+}

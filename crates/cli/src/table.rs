@@ -1,0 +1,65 @@
+//! What a scan found, as a table for people and as JSON for programs.
+
+use ringcat::{Direction, Scan, SubDeviceConfig, SubDeviceInfo, plan};
+use serde_json::{Value, json};
+
+/// Bytes of outputs and inputs that a MainDevice exchanges without any declaration; `None` where the SII cannot be followed.
+fn bytes(info: &SubDeviceInfo) -> Option<[u32; 2]> {
+    let plan = plan(&SubDeviceConfig::from_info(info), info).ok()?;
+    let of = |direction: Direction| {
+        let areas = plan.process_data.iter().filter(|area| area.direction == direction);
+        areas.map(|area| u32::from(area.length)).sum()
+    };
+    Some([of(Direction::Outputs), of(Direction::Inputs)])
+}
+
+/// One line per SubDevice, below a heading.
+pub fn lines(scan: &Scan) -> Vec<String> {
+    let heading = "pos  station  alias  vendor      product     out   in  connected to       name".to_owned();
+    let line = |info: &SubDeviceInfo| {
+        let position = usize::from(info.position.0);
+        let parent = match scan.topology.connection_to(position) {
+            Some(connection) => format!("{} port {}", connection.near.node, connection.near.port),
+            None if position == 0 && scan.topology.main_count > 0 => "MAIN".to_owned(),
+            None => "REDUNDANT".to_owned(),
+        };
+        let bytes = bytes(info).map_or(["?".to_owned(), "?".to_owned()], |both| both.map(|bytes| bytes.to_string()));
+        format!(
+            "{:>3}  {}  {:>5}  {:#010x}  {:#010x} {:>4} {:>4}  {parent:<17}  {}",
+            position,
+            info.station,
+            info.alias,
+            info.identity.vendor_id,
+            info.identity.product_code,
+            bytes[0],
+            bytes[1],
+            info.name
+        )
+    };
+    std::iter::once(heading).chain(scan.subdevices.iter().map(line)).collect()
+}
+
+/// The same as JSON.
+pub fn json(scan: &Scan) -> Value {
+    let subdevice = |info: &SubDeviceInfo| {
+        let connection = scan.topology.connection_to(usize::from(info.position.0));
+        json!({
+            "position": info.position.0,
+            "station": info.station.0,
+            "alias": info.alias,
+            "name": info.name,
+            "vendor_id": info.identity.vendor_id,
+            "product_code": info.identity.product_code,
+            "revision": info.identity.revision,
+            "serial": info.identity.serial,
+            "output_bytes": bytes(info).map(|both| both[0]),
+            "input_bytes": bytes(info).map(|both| both[1]),
+            "connected_to": connection.map(|c| json!({ "position": c.near.node, "port": c.near.port })),
+        })
+    };
+    json!({
+        "main_count": scan.main_count,
+        "redundant_count": scan.redundant_count,
+        "subdevices": scan.subdevices.iter().map(subdevice).collect::<Vec<_>>(),
+    })
+}

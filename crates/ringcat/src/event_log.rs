@@ -1,0 +1,251 @@
+//! Events as lines of a log, condensed: the first of a kind one by one, then how many there were.
+//!
+//! A machine that is too slow for its cycle leaves cycles out and misses frames all the time. A line for each of them
+//! buries everything else; lines up to some number hide the next break. So the first twenty of a kind have a line each,
+//! then their number has one, at pauses that grow while it lasts. After a quiet time it begins anew. Only kinds that come
+//! by the thousand are condensed: judgements of process data, skipped and left out cycles, frames of other MainDevices.
+//!
+//! ```
+//! use ringcat::event_log::EventLog;
+//! use ringcat::text::Names;
+//! use ringcat::{AcyclicHalf, Application, Links};
+//!
+//! fn log<L: Links, H: AcyclicHalf>(application: &mut Application<L, H>, log: &mut EventLog) {
+//!     while let Some(event) = application.pop_event() {
+//!         log.event(&event).iter().for_each(|line| println!("{line}"));
+//!     }
+//!     let (now, skipped) = (application.links().now(), application.pace().skipped);
+//!     log.left_out(skipped, now).iter().for_each(|line| println!("{line}"));
+//!     log.counts(now).iter().for_each(|line| println!("{line}"));
+//! }
+//! ```
+
+use std::time::Duration;
+
+use ringcat_engine::event::{Event, TimedEvent};
+use ringcat_engine::time::Instant;
+
+use crate::text::{Names, describe};
+
+/// So many of a kind have a line each.
+const ONE_BY_ONE: u32 = 20;
+/// Then they are counted for so long before the count has a line, and for twice as long each time.
+const FIRST_PAUSE: Duration = Duration::from_secs(1);
+const LONGEST_PAUSE: Duration = Duration::from_secs(60);
+/// Without any for so long, the next ones have a line each again.
+const QUIET: Duration = Duration::from_secs(10);
+
+/// A condensed log of events. It makes lines; the application prints or stores them.
+#[derive(Debug)]
+pub struct EventLog {
+    begin: Instant,
+    names: Names,
+    /// Changes of how process data is judged, and the last of them in words.
+    judgements: Crowd,
+    judged: String,
+    /// Cycles whose frames were still out when the next one was due.
+    still_out: Crowd,
+    /// Cycles that this machine was too late for, and how many of them the log knows of.
+    left_out: Crowd,
+    left_out_before: u64,
+    /// Frames of other MainDevices.
+    foreign: Crowd,
+    /// Nothing is condensed.
+    one_by_one: bool,
+}
+
+impl EventLog {
+    /// An empty log; times count from `begin`.
+    pub fn new(begin: Instant, names: Names) -> EventLog {
+        let [judgements, still_out, left_out, foreign] = Default::default();
+        EventLog {
+            begin,
+            names,
+            judgements,
+            judged: String::new(),
+            still_out,
+            left_out,
+            left_out_before: 0,
+            foreign,
+            one_by_one: false,
+        }
+    }
+
+    /// The same, with a line for each event, however often it comes, or not.
+    pub fn one_by_one(self, one_by_one: bool) -> EventLog {
+        EventLog { one_by_one, ..self }
+    }
+
+    /// Names of the SubDevices.
+    pub fn names(&self) -> &Names {
+        &self.names
+    }
+
+    /// A line of something that happened at a time: milliseconds since the beginning, and the words.
+    pub fn line(&self, at: Instant, words: &str) -> String {
+        format!("{:>12.3} ms  {words}", at.since(self.begin).as_secs_f64() * 1e3)
+    }
+
+    /// The line of an event, unless it is one of many and is counted.
+    pub fn event(&mut self, event: &TimedEvent) -> Option<String> {
+        let words = describe(event, &self.names);
+        let crowd = match &event.event {
+            Event::Domain { .. } => {
+                self.judged.clone_from(&words);
+                Some(&mut self.judgements)
+            }
+            Event::Skipped { .. } => Some(&mut self.still_out),
+            Event::ForeignFrame { .. } => Some(&mut self.foreign),
+            _ => None,
+        };
+        let is_shown = self.one_by_one || crowd.is_none_or(|crowd| crowd.note(1, event.at));
+        is_shown.then(|| self.line(event.at, &words))
+    }
+
+    /// The line of cycles that were left out since the last call, unless they are counted; `skipped` is their number so far
+    /// ([`Pace::skipped`](crate::Pace::skipped)).
+    pub fn left_out(&mut self, skipped: u64, now: Instant) -> Option<String> {
+        let more = skipped.saturating_sub(std::mem::replace(&mut self.left_out_before, skipped));
+        let is_shown = more > 0 && (self.one_by_one || self.left_out.note(more, now));
+        is_shown.then(|| self.line(now, &format!("this machine: {more} cycles left out")))
+    }
+
+    /// Lines for what was counted, as far as they are due; to be asked for every now and then.
+    pub fn counts(&mut self, now: Instant) -> Vec<String> {
+        let judged = &self.judged;
+        let words = [
+            self.left_out
+                .count(now)
+                .map(|(count, within)| format!("this machine: {count} cycles left out within {within:.0?}")),
+            self.still_out.count(now).map(|(count, within)| {
+                format!("process data: {count} cycles skipped within {within:.0?}, frames were still out")
+            }),
+            self.judgements.count(now).map(|(count, within)| {
+                format!("process data: judged anew {count} times within {within:.0?}, now {judged}")
+            }),
+            self.foreign
+                .count(now)
+                .map(|(count, within)| format!("{count} frames of another MainDevice within {within:.0?}")),
+        ];
+        words.iter().flatten().map(|words| self.line(now, words)).collect()
+    }
+}
+
+/// Events of one kind that may come by the thousand.
+#[derive(Debug, Default)]
+struct Crowd {
+    /// How many had a line each.
+    shown: u32,
+    /// How many have not been in a line yet, and since when they are counted.
+    held: u64,
+    since: Instant,
+    pause: Duration,
+    /// When the last one came.
+    last: Instant,
+}
+
+impl Crowd {
+    /// Takes note of some more; whether they have a line of their own.
+    fn note(&mut self, more: u64, now: Instant) -> bool {
+        if self.held == 0 && now.since(self.last) >= QUIET {
+            *self = Crowd::default();
+        }
+        self.last = now;
+        if self.shown < ONE_BY_ONE {
+            self.shown += 1;
+            return true;
+        }
+        if self.held == 0 {
+            self.since = now;
+            self.pause = (self.pause * 2).clamp(FIRST_PAUSE, LONGEST_PAUSE);
+        }
+        self.held += more;
+        false
+    }
+
+    /// How many had no line of their own, and within how long, if a line for their number is due.
+    fn count(&mut self, now: Instant) -> Option<(u64, Duration)> {
+        let within = now.since(self.since);
+        if self.held == 0 || within < self.pause {
+            return None;
+        }
+        Some((std::mem::take(&mut self.held), within))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Something every millisecond from one second to another: how many have a line each, and the counts.
+    fn storm(crowd: &mut Crowd, from: u64, to: u64) -> (usize, Vec<u64>) {
+        let (mut one_by_one, mut counts) = (0, Vec::new());
+        for ms in from * 1_000..to * 1_000 {
+            let now = Instant(ms * 1_000_000);
+            one_by_one += usize::from(crowd.note(1, now));
+            counts.extend(crowd.count(now).map(|(count, _)| count));
+        }
+        (one_by_one, counts)
+    }
+
+    #[test]
+    fn a_crowd_has_a_line_each_first_then_counts_at_pauses_that_grow() {
+        let mut crowd = Crowd::default();
+        let (one_by_one, counts) = storm(&mut crowd, 1, 601);
+        assert_eq!(one_by_one, ONE_BY_ONE as usize);
+        assert_eq!(counts[..4], [1_001, 2_001, 4_001, 8_001]);
+        assert!(counts.len() < 20 && counts.iter().all(|count| *count <= 60_001), "{counts:?}");
+        // What is held has its line, however long it is quiet.
+        let held = crowd.held;
+        assert!(held > 0);
+        assert_eq!(crowd.count(Instant(700_000_000_000)).map(|(count, _)| count), Some(held));
+        assert_eq!(crowd.count(Instant(800_000_000_000)), None);
+    }
+
+    #[test]
+    fn after_a_quiet_time_events_have_a_line_each_again() {
+        let mut crowd = Crowd::default();
+        storm(&mut crowd, 1, 5);
+        crowd.count(Instant(10_000_000_000));
+        assert_eq!(storm(&mut crowd, 6, 7).0, 0);
+        crowd.count(Instant(20_000_000_000));
+        assert_eq!(storm(&mut crowd, 30, 31).0, ONE_BY_ONE as usize);
+    }
+
+    fn at(ms: u64, event: Event) -> TimedEvent {
+        TimedEvent { at: Instant(ms * 1_000_000), event, whom: [None; 2] }
+    }
+
+    fn foreign() -> Event {
+        Event::ForeignFrame { arrived_on: crate::Link::Main, bytes: vec![0; 60] }
+    }
+
+    #[test]
+    fn a_break_has_its_line_in_the_middle_of_a_storm() {
+        let mut log = EventLog::new(Instant(0), Names::default());
+        let shown = (0..1_000).filter(|ms| log.event(&at(*ms, foreign())).is_some()).count();
+        assert_eq!(shown, ONE_BY_ONE as usize);
+        let open = log.event(&at(1_000, Event::RingOpened { main: 2, redundant: 1 })).expect("a line");
+        assert_eq!(open, "    1000.000 ms  ring open: 2 SubDevices on MAIN, 1 on REDUNDANT");
+        assert_eq!(log.counts(Instant(1_010_000_000)), Vec::<String>::new());
+        let counts = log.counts(Instant(2_000_000_000));
+        assert_eq!(counts, ["    2000.000 ms  980 frames of another MainDevice within 2s"]);
+    }
+
+    #[test]
+    fn one_by_one_nothing_is_condensed() {
+        let mut log = EventLog::new(Instant(0), Names::default()).one_by_one(true);
+        assert!((0..1_000).all(|ms| log.event(&at(ms, foreign())).is_some()));
+        assert_eq!(log.counts(Instant(9_000_000_000)), Vec::<String>::new());
+        assert!((1..100).all(|cycle| log.left_out(cycle, Instant(cycle)).is_some()));
+    }
+
+    #[test]
+    fn cycles_left_out_are_those_since_the_last_call() {
+        let mut log = EventLog::new(Instant(0), Names::default());
+        assert_eq!(log.left_out(0, Instant(1)), None);
+        assert_eq!(log.left_out(7, Instant(0)).as_deref(), Some("       0.000 ms  this machine: 7 cycles left out"));
+        assert_eq!(log.left_out(7, Instant(1)), None);
+        assert_eq!(log.left_out(3, Instant(1)), None, "counters begin anew with another application");
+    }
+}
