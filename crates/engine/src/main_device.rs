@@ -17,7 +17,6 @@ mod pending;
 mod services;
 mod states;
 mod steps;
-mod ticket;
 
 use alloc::rc::Rc;
 use alloc::sync::Arc;
@@ -38,7 +37,6 @@ pub use lrw::ExplicitLrw;
 pub use options::Options;
 pub use pending::Pending;
 pub use states::{GroupState, SubDeviceState};
-pub use ticket::Ticket;
 
 use crate::board::Board;
 use crate::config::ClockConfig;
@@ -104,7 +102,6 @@ pub struct MainDevice {
     /// Error counters, once active.
     statistics: Option<Book>,
     statistics_period: Option<Duration>,
-    parked: ticket::Cloakroom,
     loaded: Option<Loaded>,
     /// Ethernet of declared SubDevices, where it was asked for.
     ports: Vec<Option<EthernetPort>>,
@@ -135,7 +132,6 @@ impl MainDevice {
             requests: Requests::default(),
             statistics: None,
             statistics_period: None,
-            parked: ticket::Cloakroom::default(),
             loaded: None,
             ports: Vec::new(),
             desk: None,

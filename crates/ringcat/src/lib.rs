@@ -44,7 +44,6 @@ pub mod acyclic;
 pub mod application;
 mod cyclic;
 pub mod cyclic_thread;
-mod device_services;
 #[cfg(feature = "eni")]
 pub mod eni;
 #[cfg(feature = "eoe")]
@@ -54,7 +53,7 @@ pub mod event_log;
 #[cfg(feature = "gateway")]
 pub mod gateway;
 pub mod histogram;
-mod jobs;
+mod job;
 pub mod links;
 pub mod main_device;
 pub mod memory;
@@ -63,7 +62,7 @@ mod pace;
 #[cfg(feature = "packet")]
 pub mod packet;
 mod process_data;
-mod services;
+pub mod services;
 #[cfg(feature = "sim")]
 pub mod shared_segment;
 #[cfg(feature = "sim")]
@@ -80,11 +79,12 @@ pub use acyclic::{AcyclicHalf, Inline};
 pub use application::{Application, LastOutputs};
 pub use cyclic_thread::{CyclicThread, Panicked};
 pub use error::Error;
-pub use jobs::Job;
+pub use job::Job;
 pub use links::Links;
 pub use main_device::{MainDevice, Options, Refused, automatic};
 pub use pace::{Pace, Trigger};
 pub use process_data::ProcessData;
+pub use services::Services;
 pub use supervisor_thread::SupervisorThread;
 
 pub use ringcat_engine::clocks::{Follower, phase_error};
@@ -110,11 +110,14 @@ pub use ringcat_engine::main_device::{
 };
 pub use ringcat_engine::plan::{AreaPlan, MappedEntry, MappedPdo, PlanError, SubDevicePlan, plan};
 pub use ringcat_engine::procedures::clocks::ClockStatus;
+pub use ringcat_engine::procedures::configure::ConfigureError;
 pub use ringcat_engine::procedures::dictionary::ReadPdos;
 pub use ringcat_engine::procedures::look_at_ring::RingLook;
 pub use ringcat_engine::procedures::scan::{FIRST_STATION, Scan, ScanError};
 pub use ringcat_engine::procedures::services::ServiceError;
+pub use ringcat_engine::procedures::services::ports::BlockedPort;
 pub use ringcat_engine::procedures::services::statistics::{PortErrors, Statistics};
+pub use ringcat_engine::procedures::sii::program::SiiWritten;
 pub use ringcat_engine::procedures::stop::StopError;
 pub use ringcat_engine::procedures::strangers::rescan::{Found, Rescan, Who};
 pub use ringcat_engine::request::{
@@ -123,7 +126,7 @@ pub use ringcat_engine::request::{
 pub use ringcat_engine::ring::identity::{Classified, Identity};
 pub use ringcat_engine::ring::{FrameLimit, MIN_DATAGRAMS_PER_FRAME, RingState};
 pub use ringcat_engine::ring_status::{Cable, CableErrors, LinkStatus, Redundancy, RedundancyLoss, RingStatus};
-pub use ringcat_engine::supervisor::AcyclicCounters;
+pub use ringcat_engine::supervisor::{AcyclicCounters, BusError, Reply};
 pub use ringcat_engine::time::Instant;
 pub use ringcat_engine::topology::PortOf;
 pub use ringcat_wire::al::AlState;

@@ -24,6 +24,7 @@ use crate::acyclic::{Inline, carry_out_link_order};
 use crate::application::Application;
 use crate::error::Error;
 use crate::links::Links;
+use crate::services::Services;
 use crate::window::{DEFAULT_BUDGET, Window};
 
 /// How a MainDevice works. The addresses come from the links.
@@ -179,8 +180,7 @@ impl<L: Links> MainDevice<L> {
         limit: usize,
     ) -> Result<Vec<u8>, Error> {
         self.visit(position)?;
-        let transfer = self.engine.start_sdo_upload(position, object, limits, limit);
-        Ok(self.finish(transfer)?)
+        Services::sdo_upload(self, position, object, limits, limit)
     }
 
     /// Writes an object of a scanned SubDevice; as [`MainDevice::sdo_upload`].
@@ -195,17 +195,7 @@ impl<L: Links> MainDevice<L> {
         limits: Limits,
     ) -> Result<(), Error> {
         self.visit(position)?;
-        let transfer = self.engine.start_sdo_download(position, object, data.to_vec(), limits);
-        Ok(self.finish(transfer)?)
-    }
-
-    /// Brings a scanned SubDevice to PREOP, BOOT or back to INIT; in PREOP and BOOT its mailbox may be used.
-    ///
-    /// # Errors
-    /// It has no mailbox for that state, refuses, or does not answer.
-    pub fn bring_to(&mut self, position: usize, state: AlState) -> Result<(), Error> {
-        let visit = self.engine.start_visit(position, state);
-        Ok(self.finish(visit)?)
+        Services::sdo_download(self, position, object, data.to_vec(), limits)
     }
 
     /// The mailbox of a scanned SubDevice, for the functions of [`ringcat_engine::mail`]; see [`MainDevice::run`].
@@ -219,6 +209,10 @@ impl<L: Links> MainDevice<L> {
         self.finish(work)
     }
 
+    pub(crate) fn engine_mut(&mut self) -> &mut Engine {
+        &mut self.engine
+    }
+
     fn visit(&mut self, position: usize) -> Result<(), Error> {
         if self.engine.mailbox(position).is_some_and(|mailbox| mailbox.is_open()) {
             return Ok(());
@@ -227,7 +221,7 @@ impl<L: Links> MainDevice<L> {
     }
 
     /// Waits for the end of work. Nothing here stops the engine meanwhile, so there is one.
-    fn finish<T: 'static>(&mut self, mut work: Pending<T>) -> T {
+    pub(crate) fn finish<T: 'static>(&mut self, mut work: Pending<T>) -> T {
         loop {
             self.work();
             if let Some(result) = work.take() {

@@ -4,8 +4,9 @@
 //! ([`crate::window`]). So neither half waits for the other, and an application that only runs its cycles has a living
 //! bus behind it.
 
+use std::future::Future;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, SyncSender, TryRecvError, channel, sync_channel};
+use std::sync::mpsc::{Receiver, Sender, SyncSender, TryRecvError, channel, sync_channel};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::thread::JoinHandle;
 use std::time::Duration;
@@ -13,7 +14,7 @@ use std::time::Duration;
 use ringcat_engine::event::{Event, TimedEvent};
 use ringcat_engine::junction::JunctionConnection;
 use ringcat_engine::link::Link;
-use ringcat_engine::main_device::{ActivateError, Declaration, MainDevice as Engine, SubDeviceState};
+use ringcat_engine::main_device::{ActivateError, Declaration, MainDevice as Engine, Pending, SubDeviceState};
 use ringcat_engine::procedures::scan::Scan;
 use ringcat_engine::ring_status::RingStatus;
 use ringcat_engine::supervisor::AcyclicCounters;
@@ -23,6 +24,7 @@ use ringcat_wire::al::AlState;
 use crate::acyclic::{AcyclicHalf, work};
 use crate::application::Application;
 use crate::error::Error;
+use crate::job::{Job, job};
 use crate::links::Links;
 use crate::main_device::{Options, Refused};
 use crate::window::Window;
@@ -37,11 +39,13 @@ const ATTENTIVE: Duration = Duration::from_millis(2);
 const PUBLISH: Duration = Duration::from_millis(10);
 /// Events that may wait to be fetched; further ones are dropped and counted.
 const EVENTS: usize = 4096;
-/// Somebody who waits for an answer looks at other things this often.
+/// A thread that waits for a scan looks at other things this often.
 const MEANWHILE: Duration = Duration::from_millis(10);
 
-/// Asked again after each turn of the thread until it says true.
-type Request = Box<dyn FnMut(&mut Engine, Instant) -> bool + Send>;
+/// Work under way in the thread: it has a turn in each of the thread's turns, until it says that it has ended.
+pub(crate) type Task = Box<dyn FnMut(&mut Engine, Instant) -> bool>;
+/// What another thread asks for: it begins work. Work of the engine stays in the thread that made it.
+type Request = Box<dyn FnOnce(&mut Engine, Instant) -> Task + Send>;
 
 /// What the thread makes known.
 #[derive(Debug, Default)]
@@ -97,7 +101,8 @@ impl SupervisorThread {
                 links,
                 engine,
                 window: windows,
-                pending: Vec::new(),
+                asked: Vec::new(),
+                tasks: Vec::new(),
                 events: outgoing,
                 events_dropped: 0,
                 published: shared,
@@ -111,43 +116,34 @@ impl SupervisorThread {
         Ok(SupervisorThread(Arc::new(Handle { requests, events, published, window, thread: Some(thread) })))
     }
 
-    /// Has the thread ask a question of its engine again and again until it has an answer.
-    pub(crate) fn ask<R: Send + 'static>(
-        &self,
-        question: impl FnMut(&mut Engine, Instant) -> Option<R> + Send + 'static,
-    ) -> Result<R, Error> {
-        self.ask_while(question, || ())
-    }
-
-    /// Runs `meanwhile` every now and then until there is an answer.
-    fn ask_while<R: Send + 'static>(
-        &self,
-        mut question: impl FnMut(&mut Engine, Instant) -> Option<R> + Send + 'static,
-        mut meanwhile: impl FnMut(),
-    ) -> Result<R, Error> {
-        let (answer, answers) = channel();
-        let request: Request = Box::new(move |engine, now| match question(engine, now) {
-            // Nobody may want it any more.
-            Some(found) => answer.send(found).map_or(true, |()| true),
-            None => false,
-        });
+    /// Has the thread begin a task.
+    fn begin(&self, begin: impl FnOnce(&mut Engine, Instant) -> Task + Send + 'static) -> Result<(), Error> {
         let requests = self.0.requests.as_ref().ok_or(Error::Gone)?;
-        requests.send(request).map_err(|_| Error::Gone)?;
-        loop {
-            meanwhile();
-            match answers.recv_timeout(MEANWHILE) {
-                Ok(found) => return Ok(found),
-                Err(RecvTimeoutError::Timeout) => {}
-                Err(RecvTimeoutError::Disconnected) => return Err(Error::Gone),
-            }
-        }
+        requests.send(Box::new(begin)).map_err(|_| Error::Gone)
     }
 
-    #[cfg(any(feature = "eoe", feature = "gateway"))]
+    /// Starts work of the engine in the thread. The one way from a thread of the application to the engine's and back.
+    pub(crate) fn start_work<T: Send + 'static>(
+        &self,
+        start: impl FnOnce(&mut Engine) -> Pending<T> + Send + 'static,
+    ) -> Job<T> {
+        let (job, reply) = job(self);
+        // Where the thread is gone the reply is dropped, and the job knows.
+        let _ = self.begin(move |engine, _| reply.follow(start(engine)));
+        job
+    }
+
+    /// Has the thread ask its engine a question again and again until there is an answer.
+    fn ask<R: Send + 'static>(&self, question: impl FnMut(&mut Engine) -> Option<R> + Send + 'static) -> Job<R> {
+        let (job, reply) = job(self);
+        let _ = self.begin(move |_, _| reply.answer(question));
+        job
+    }
+
     /// Has the thread do something with its engine in each of its turns, until it says true.
+    #[cfg(any(feature = "eoe", feature = "gateway"))]
     pub(crate) fn attend(&self, work: impl FnMut(&mut Engine, Instant) -> bool + Send + 'static) -> Result<(), Error> {
-        let requests = self.0.requests.as_ref().ok_or(Error::Gone)?;
-        requests.send(Box::new(work)).map_err(|_| Error::Gone)
+        self.begin(move |_, _| Box::new(work))
     }
 
     /// Has the thread do something with its engine, and waits for what comes out.
@@ -156,18 +152,32 @@ impl SupervisorThread {
     /// The thread is gone.
     pub fn with<R: Send + 'static>(&self, act: impl FnOnce(&mut Engine) -> R + Send + 'static) -> Result<R, Error> {
         let mut act = Some(act);
-        self.ask(move |engine, _| act.take().map(|act| act(engine)))
+        self.ask(move |engine| act.take().map(|act| act(engine))).wait()
     }
 
-    /// Has the thread do something with its engine, without waiting for it.
-    pub(crate) fn post(&self, act: impl FnOnce(&mut Engine) + Send + 'static) {
-        let mut act = Some(act);
-        let request: Request = Box::new(move |engine, _| {
-            act.take().into_iter().for_each(|act| act(engine));
-            true
-        });
-        // A thread that is gone has nothing to do.
-        let _ = self.0.requests.as_ref().map(|requests| requests.send(request));
+    /// Runs an async function of the engine in the thread and waits for its end: `make` gets the engine, whose mailboxes
+    /// it may take. SubDevices are named by their index in the declaration, before activation by their position.
+    ///
+    /// # Errors
+    /// The thread is gone, or the MainDevice was stopped meanwhile.
+    pub fn run<T, W>(&self, make: impl FnOnce(&mut Engine) -> W + Send + 'static) -> Result<T, Error>
+    where
+        T: Send + 'static,
+        W: Future<Output = T> + 'static,
+    {
+        self.start_job(make).wait()
+    }
+
+    /// Starts an async function of the engine in the thread; as [`SupervisorThread::run`], but does not wait for its end.
+    pub fn start_job<T, W>(&self, make: impl FnOnce(&mut Engine) -> W + Send + 'static) -> Job<T>
+    where
+        T: Send + 'static,
+        W: Future<Output = T> + 'static,
+    {
+        self.start_work(move |engine| {
+            let work = make(engine);
+            engine.start(work)
+        })
     }
 
     /// Scans the segment; all SubDevices are in INIT afterwards.
@@ -184,7 +194,13 @@ impl SupervisorThread {
     /// As [`SupervisorThread::scan`].
     pub fn scan_while(&self, mut meanwhile: impl FnMut()) -> Result<Scan, Error> {
         self.with(Engine::start_scan)??;
-        let result = self.ask_while(|engine, _| engine.scan_result(), &mut meanwhile)?;
+        let mut scan = self.ask(|engine| engine.scan_result());
+        let result = loop {
+            meanwhile();
+            if let Some(result) = scan.wait_for(MEANWHILE) {
+                break result?;
+            }
+        };
         meanwhile();
         Ok(result?)
     }
@@ -237,21 +253,18 @@ impl SupervisorThread {
 
     /// Whether rings that were declared close where they are said to.
     fn check_connections(&self) -> Result<(), Error> {
-        let ticket = self.with(|engine| {
-            let check = engine.start_connection_check();
-            engine.park(check)
-        })?;
-        let checked = self.ask(move |engine, _| engine.collect(&ticket))?.ok_or(Error::Gone)?;
+        let checked = self.start_work(|engine| engine.start_connection_check()).wait()?;
         Ok(checked.map_err(ActivateError::Junction)?)
     }
 
     /// Takes all SubDevices down to a state.
     pub(crate) fn stop(&self, state: AlState, limit: Duration) -> Result<(), Error> {
-        self.ask(move |engine, now| {
+        let (begun, reply) = job(self);
+        self.begin(move |engine, now| {
             engine.start_stop(state, limit, now);
-            Some(())
+            reply.answer(|engine| engine.stop_result())
         })?;
-        Ok(self.ask(|engine, _| engine.stop_result())??)
+        Ok(begun.wait()??)
     }
 
     fn rest(&self) -> Rest {
@@ -339,7 +352,8 @@ struct Worker<L> {
     links: L,
     engine: Engine,
     window: Arc<Window>,
-    pending: Vec<Request>,
+    asked: Vec<Request>,
+    tasks: Vec<Task>,
     events: SyncSender<TimedEvent>,
     events_dropped: u64,
     published: Arc<Published>,
@@ -361,7 +375,7 @@ impl<L: Links> Worker<L> {
             loop {
                 match incoming.try_recv() {
                     Ok(request) => {
-                        self.pending.push(request);
+                        self.asked.push(request);
                         asked = true;
                     }
                     Err(TryRecvError::Empty) => break,
@@ -382,13 +396,14 @@ impl<L: Links> Worker<L> {
         }
     }
 
-    /// Answers those whose question has an answer by now; true where there were any.
+    /// Begins what was asked for, and gives all tasks a turn; true where any has ended.
     fn answer(&mut self) -> bool {
         let now = self.links.now();
-        let Worker { pending, engine, .. } = self;
-        let before = pending.len();
-        pending.retain_mut(|request| !request(engine, now));
-        pending.len() < before
+        let Worker { asked, tasks, engine, .. } = self;
+        tasks.extend(asked.drain(..).map(|request| request(engine, now)));
+        let before = tasks.len();
+        tasks.retain_mut(|task| !task(engine, now));
+        tasks.len() < before
     }
 
     /// True where there were any.

@@ -7,7 +7,6 @@ use ringcat_wire::al::AlState;
 
 use super::MainDevice;
 use super::pending::Pending;
-use super::ticket::Ticket;
 use crate::mail::coe::{self, SdoAddress, SdoError, SdoFailure};
 use crate::mail::{Limits, Mailbox, MailboxError};
 use crate::procedures::configure::ConfigureError;
@@ -99,21 +98,6 @@ impl MainDevice {
     /// Starts work of the application's own: any async function over a [`Mailbox`] or the bus.
     pub fn start<T: 'static>(&mut self, work: impl Future<Output = T> + 'static) -> Pending<T> {
         Pending::start(&self.supervisor.bus(), work)
-    }
-
-    /// Keeps work for somebody in another thread, who gets a ticket for its result.
-    pub fn park<T: 'static>(&mut self, pending: Pending<T>) -> Ticket<T> {
-        self.parked.park(pending)
-    }
-
-    /// The result of work that was parked, once: `None` while it goes on, `Some(None)` where it was given up.
-    pub fn collect<T: 'static>(&mut self, ticket: &Ticket<T>) -> Option<Option<T>> {
-        self.parked.collect(ticket)
-    }
-
-    /// Gives up work that was parked.
-    pub fn discard<T: 'static>(&mut self, ticket: Ticket<T>) {
-        self.parked.discard(&ticket);
     }
 
     /// Starts to read an object of at most `limit` bytes.

@@ -9,7 +9,7 @@ use std::time::{Duration, Instant};
 
 use ringcat::gateway::{Gateway, GatewayOptions};
 use ringcat::shared_segment::SharedSegment;
-use ringcat::{CyclicThread, Error, Limits, Options, SdoAddress, SupervisorThread, automatic};
+use ringcat::{CyclicThread, Error, Limits, Options, SdoAddress, Services, SupervisorThread, automatic};
 use ringcat_sim::network::Network;
 use ringcat_sim::segment::Segment;
 use ringcat_wire::mailbox::foe::FoeMessage;

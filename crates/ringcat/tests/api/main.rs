@@ -3,6 +3,7 @@
 mod declarations;
 mod ethernet;
 mod gateway;
+mod jobs;
 mod junctions;
 mod names;
 mod services;

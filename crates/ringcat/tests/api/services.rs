@@ -9,7 +9,7 @@ use std::time::{Duration, Instant};
 
 use ringcat::shared_segment::SharedSegment;
 use ringcat::{
-    Error, LastOutputs, Limits, Options, RawDatagram, RequestState, SdoAddress, SupervisorThread, automatic,
+    Error, LastOutputs, Limits, Options, RawDatagram, RequestState, SdoAddress, Services, SupervisorThread, automatic,
 };
 use ringcat_engine::mail::coe;
 use ringcat_engine::mail::foe::{self, FoeOptions};
@@ -133,10 +133,10 @@ fn services_on_single_subdevices_and_jobs_work_from_any_thread() -> Result<(), E
         })
     };
     let [large, small] = [SdoAddress::new(0x2002, 0), SdoAddress::new(0x2001, 7)];
-    start(large)?.abort()?;
-    drop(start(large)?);
-    assert_eq!(start(small)?.wait()?.map(|value| value.len()), Ok(2));
-    assert_eq!(start(large)?.wait()?.map(|value| value.len()), Ok(100_000));
+    start(large).abort()?;
+    drop(start(large));
+    assert_eq!(start(small).wait()?.map(|value| value.len()), Ok(2));
+    assert_eq!(start(large).wait()?.map(|value| value.len()), Ok(100_000));
     cycles.end()?.stop(LastOutputs::Zero, AlState::Init, LIMIT)?;
     Ok(())
 }

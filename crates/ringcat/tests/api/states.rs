@@ -7,7 +7,7 @@ use std::time::{Duration, Instant};
 
 use ringcat::shared_segment::SharedSegment;
 use ringcat::{
-    DomainMember, Error, Event, Group, GroupState, LastOutputs, Options, SubDeviceConfig, SubDeviceState,
+    DomainMember, Error, Event, Group, GroupState, LastOutputs, Options, Services, SubDeviceConfig, SubDeviceState,
     SupervisorThread, automatic,
 };
 use ringcat_sim::network::Network;

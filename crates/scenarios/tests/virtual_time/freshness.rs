@@ -9,7 +9,7 @@
 use std::ops::Range;
 use std::time::Duration;
 
-use ringcat::{DomainId, DomainState, Freshness, JunctionMode, LastOutputs, MainDevice, Options, automatic};
+use ringcat::{DomainId, DomainState, Freshness, JunctionMode, LastOutputs, MainDevice, Options, Services, automatic};
 use ringcat_sim::application::{Behaviour, InputSource};
 use ringcat_sim::cable::{CableId, DeviceIndex, Endpoint};
 use ringcat_sim::description::{DeviceDescription, TransitionTimes};

@@ -3,7 +3,7 @@
 use std::time::Duration;
 
 use ringcat::{
-    Declaration, DomainConfig, DomainId, DomainMember, DomainState, Event, Group, MainDevice, Options, Scan,
+    Declaration, DomainConfig, DomainId, DomainMember, DomainState, Event, Group, MainDevice, Options, Scan, Services,
     SubDeviceConfig, SubDeviceInfo, automatic,
 };
 use ringcat_sim::cable::{CableId, DeviceIndex};

@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use ringcat::{Limits, MainDevice, Options, RequestFailure, RequestState, SdoAddress, automatic};
+use ringcat::{Limits, MainDevice, Options, RequestFailure, RequestState, SdoAddress, Services, automatic};
 use ringcat_engine::mail::foe::{self, FoeOptions};
 use ringcat_engine::mail::stream::Bytes;
 use ringcat_sim::application::foe::firmware;

@@ -3,7 +3,7 @@
 
 use std::time::Duration;
 
-use ringcat::{Event, MainDevice, Options, PdoMapping, ReadPdos, SubDeviceInfo, automatic};
+use ringcat::{Event, MainDevice, Options, PdoMapping, ReadPdos, Services, SubDeviceInfo, automatic};
 use ringcat_engine::mail::coe::{self, SdoAddress, pdo};
 use ringcat_sim::cable::DeviceIndex;
 use ringcat_sim::description::DeviceDescription;

@@ -2,7 +2,9 @@
 
 use std::time::Duration;
 
-use ringcat::{DomainId, Event, Freshness, Limits, Options, Scan, SdoAddress, SubDeviceState, Transition, automatic};
+use ringcat::{
+    DomainId, Event, Freshness, Limits, Options, Scan, SdoAddress, Services, SubDeviceState, Transition, automatic,
+};
 use ringcat_engine::mail::coe;
 use ringcat_engine::mail::foe::{self, FoeOptions};
 use ringcat_engine::mail::stream::Bytes;

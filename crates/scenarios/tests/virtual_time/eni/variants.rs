@@ -5,7 +5,7 @@ use std::time::Duration;
 
 use ringcat::eni::EniImage;
 use ringcat::simulated::SimulatedSegment;
-use ringcat::{DomainId, Event, JunctionConnection, MainDevice, Options};
+use ringcat::{DomainId, Event, JunctionConnection, MainDevice, Options, Services};
 use ringcat_sim::cable::{CableId, CableSpec, DeviceIndex, Endpoint};
 use ringcat_sim::frame::Port;
 use ringcat_sim::network::Network;
