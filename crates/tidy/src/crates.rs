@@ -42,6 +42,11 @@ const ROOMS: &[Room] = &[
         internal: Internal::Only(&["ringcat-wire"]),
         external: External::Only(&["serde", "smoltcp", "toml"]),
     },
+    Room {
+        directory: "gateway",
+        internal: Internal::Only(&["ringcat-engine", "ringcat-wire"]),
+        external: External::Only(&["mio"]),
+    },
     Room { directory: "link", internal: Internal::Only(&[]), external: External::Only(&["libc"]) },
     Room {
         directory: "ringcat",
@@ -50,11 +55,12 @@ const ROOMS: &[Room] = &[
             "ringcat",
             "ringcat-config",
             "ringcat-engine",
+            "ringcat-gateway",
             "ringcat-link",
             "ringcat-sim",
             "ringcat-wire",
         ]),
-        external: External::Only(&["mio"]),
+        external: External::Only(&[]),
     },
     Room {
         directory: "cli",

@@ -1,4 +1,4 @@
-//! The sockets of the gateway and who is at their other ends.
+//! The sockets of the gateway and the clients at their other ends.
 
 use std::collections::BTreeMap;
 use std::io;
@@ -13,8 +13,8 @@ use mio::{Events, Interest, Poll, Token, Waker};
 use ringcat_engine::mail::relay::Relayed;
 use ringcat_wire::mailbox::gateway::{HEADER_LEN, MAX_LENGTH};
 
-use super::connection::{Connection, Going};
-use super::{FromClient, GatewayOptions, Shared};
+use crate::connection::{Connection, Going};
+use crate::{FromClient, GatewayOptions, Shared};
 
 const LISTENER: Token = Token(0);
 const DATAGRAMS: Token = Token(1);
@@ -60,7 +60,7 @@ pub(super) struct Server {
 }
 
 impl Server {
-    /// Listens; also who wakes it and where it is.
+    /// Listens; also what wakes it and where it is.
     pub(super) fn open(
         options: GatewayOptions,
         to_engine: SyncSender<FromClient>,
@@ -204,7 +204,7 @@ impl Server {
         true
     }
 
-    /// The number of who sends from this address; one who has been silent for longest makes room.
+    /// The number of the client at this address; the one that has been silent for longest makes room.
     fn peer(&mut self, address: SocketAddr, now: Instant) -> u64 {
         if let Some(peer) = self.peers.iter_mut().find(|peer| peer.address == address) {
             peer.seen = now;
@@ -230,7 +230,7 @@ impl Server {
         self.judge(answer.client, going);
     }
 
-    /// Ends what is overdue, and tells the engine who has gone.
+    /// Ends what is overdue, and tells the engine which clients have gone.
     fn tidy(&mut self, now: Instant) {
         let overdue = self.connections.iter().filter(|(_, connection)| connection.is_overdue(now));
         for client in overdue.map(|(client, _)| *client).collect::<Vec<_>>() {
