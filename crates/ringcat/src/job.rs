@@ -44,7 +44,7 @@ struct Slot<T> {
 }
 
 enum State<T> {
-    /// The work goes on; who awaits its end.
+    /// The work goes on; the waker of the task that awaits its end.
     Running(Option<Waker>),
     Done(T),
     /// There will be no result: it was taken, or the work was ended before it had one.

@@ -105,8 +105,8 @@ pub use ringcat_engine::link::Link;
 pub use ringcat_engine::mail::coe::{SdoAddress, SdoError, SdoFailure};
 pub use ringcat_engine::mail::{Limits, Mailbox};
 pub use ringcat_engine::main_device::{
-    ActivateError, Declaration, Directory, DomainConfig, DomainMember, ExplicitLrw, GroupState, MAX_UNDER_WAY,
-    RawDatagram, Required, SubDeviceState,
+    ActivateError, Declaration, Directory, DomainConfig, DomainMember, ExplicitLrw, GroupState, MAX_DATAGRAMS,
+    MAX_UNDER_WAY, Pending, RawDatagram, Required, SubDeviceState,
 };
 pub use ringcat_engine::plan::{AreaPlan, MappedEntry, MappedPdo, PlanError, SubDevicePlan, plan};
 pub use ringcat_engine::procedures::clocks::ClockStatus;

@@ -6,7 +6,7 @@
 use std::collections::BTreeSet;
 
 use crate::Finding;
-use crate::tokens::{Token, tokens};
+use crate::tokens::tokens;
 use crate::tree::Tree;
 
 /// Features of `ringcat`, each by itself.
@@ -19,8 +19,14 @@ pub const MAX_CRATES: usize = 12;
 /// Crates of the program, of the simulator, of files and of the gateway.
 const NOT_IN_SMALL: [&str; 8] = ["clap", "mio", "roxmltree", "serde_json", "signal-hook", "smoltcp", "strsim", "toml"];
 
-/// Where the examples of the library are.
-const EXAMPLES: &str = "crates/ringcat/examples/";
+/// Sources that name the library alone of this repository, and what else of it single ones may.
+const USERS: [(&str, &[&str]); 3] = [
+    ("crates/ringcat/examples/", &[]),
+    // It measures the cyclic half by itself.
+    ("crates/cli/src/bench/", &["ringcat_engine", "ringcat_link"]),
+    // What the kernel says of interfaces is not EtherCAT.
+    ("crates/cli/", &["ringcat_link"]),
+];
 
 /// Names of crates from the registry in what `cargo tree --prefix none` prints, and of ours.
 pub fn crates_in(tree: &str) -> (BTreeSet<&str>, BTreeSet<&str>) {
@@ -52,16 +58,20 @@ pub fn not_in(features: &str, tree: &str) -> Vec<Finding> {
     findings
 }
 
-/// Examples that name another crate of this repository than the library: an application has `ringcat` alone.
-pub fn examples_beside_the_library(tree: &Tree) -> Vec<Finding> {
-    let is_foreign = |token: &Token| token.ident().is_some_and(|name| name.starts_with("ringcat_"));
-    let files = tree.rust().filter(|file| file.path.starts_with(EXAMPLES));
-    let of_file = |file: &crate::tree::File| -> Vec<Finding> {
-        let found = tokens(&file.text).into_iter().filter(is_foreign);
-        let text = |token: Token| format!("names {}: take it from ringcat", token.ident().unwrap_or_default());
-        found.map(|token| Finding::new(&file.path, token.line, text(token))).collect()
-    };
-    files.flat_map(of_file).collect()
+/// Examples and sources of the program that name another crate of this repository than they may: an application has
+/// `ringcat` alone.
+pub fn beside_the_library(tree: &Tree) -> Vec<Finding> {
+    let mut findings = Vec::new();
+    for file in tree.rust() {
+        let Some((_, allowed)) = USERS.iter().find(|(place, _)| file.path.starts_with(place)) else { continue };
+        for token in tokens(&file.text) {
+            let Some(name) = token.ident().filter(|name| name.starts_with("ringcat_")) else { continue };
+            if !allowed.contains(&name) {
+                findings.push(Finding::new(&file.path, token.line, format!("names {name}: take it from ringcat")));
+            }
+        }
+    }
+    findings
 }
 
 #[cfg(test)]
@@ -92,12 +102,14 @@ mod tests {
     }
 
     #[test]
-    fn an_example_that_names_the_engine_is_found() {
-        let example = |text| Tree { files: vec![File::new("crates/ringcat/examples/a.rs", text)] };
-        assert!(examples_beside_the_library(&example("use ringcat::Link; // ringcat_engine")).is_empty());
-        assert_eq!(
-            examples_beside_the_library(&example("use ringcat::Link;\nuse ringcat_engine::link::Link;")).len(),
-            1
-        );
+    fn an_example_or_a_command_that_names_the_engine_is_found() {
+        let found = |path: &str, text| beside_the_library(&Tree { files: vec![File::new(path, text)] }).len();
+        let engine = "use ringcat::Link;\nuse ringcat_engine::link::Link;";
+        assert_eq!(found("crates/ringcat/examples/a.rs", "use ringcat::Link; // ringcat_engine"), 0);
+        assert_eq!(found("crates/ringcat/examples/a.rs", engine), 1);
+        assert_eq!(found("crates/cli/src/scan.rs", engine), 1);
+        assert_eq!(found("crates/cli/src/scan.rs", "use ringcat_link::interface;"), 0);
+        assert_eq!(found("crates/cli/src/bench/round_trip.rs", engine), 0);
+        assert_eq!(found("crates/scenarios/src/lib.rs", engine), 0);
     }
 }

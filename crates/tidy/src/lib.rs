@@ -5,7 +5,7 @@
 //!
 //! * [`files`]: length of files, forbidden names, the opening comment, marks of unfinished work;
 //! * [`crates`]: allowed arrows between crates;
-//! * [`dependencies`]: what an application takes in with the library, and what its examples name;
+//! * [`dependencies`]: what an application takes in with the library; examples and the program use it alone;
 //! * [`modules`]: allowed arrows between the modules of the engine;
 //! * [`safety`]: where `unsafe` may be written;
 //! * [`features`]: every row of `docs/FEATURES.md` names tests that exist;

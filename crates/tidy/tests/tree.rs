@@ -65,8 +65,8 @@ fn an_application_on_interfaces_takes_in_few_crates() {
 }
 
 #[test]
-fn examples_of_the_library_use_the_library_alone() {
-    none(dependencies::examples_beside_the_library(&tree()));
+fn examples_and_the_program_use_the_library_alone() {
+    none(dependencies::beside_the_library(&tree()));
 }
 
 #[test]
