@@ -1,4 +1,5 @@
-//! What happens while cycles run, in lines: the condensed log of the library, and warnings about frames of other MainDevices.
+//! What happens while cycles run, in lines: the condensed log of the library, and warnings about frames of other
+//! MainDevices.
 
 use ringcat::event_log::EventLog;
 use ringcat::{CyclicThread, Instant, Links};

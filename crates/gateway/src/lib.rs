@@ -1,13 +1,14 @@
-//! The mailbox gateway: programs on this host or in the network talk to SubDevices through the MainDevice's mailboxes (facts
-//! 10.1, ETG.8200), over UDP and TCP at once.
+//! The mailbox gateway: programs on this host or in the network talk to SubDevices through the MainDevice's mailboxes
+//! (facts 10.1, ETG.8200), over UDP and TCP at once.
 //!
-//! A thread of its own serves the sockets ([`Gateway`]); messages pass to the engine's thread and answers back through bounded
-//! queues ([`Passage`]). Which message may pass, and which client has its turn, is decided in the engine
-//! ([`ringcat_engine::mail::relay`]), because a client's transfer holds a lane of a mailbox. A client that does not read its
-//! answers, leaves a message unfinished or sends what is no message loses its connection; other clients do not notice.
+//! A thread of its own serves the sockets ([`Gateway`]); messages pass to the engine's thread and answers back through
+//! bounded queues ([`Passage`]). Which message may pass, and which client has its turn, is decided in the engine
+//! ([`ringcat_engine::mail::relay`]), because a client's transfer holds a lane of a mailbox. A client that does not
+//! read its answers, leaves a message unfinished or sends what is no message loses its connection; other clients do not
+//! notice.
 //!
-//! A program that reaches the port may change SubDevices: there is no password in the protocol. So the gateway listens only
-//! where an application opens it, and then only on this host unless another address is named.
+//! A program that reaches the port may change SubDevices: there is no password in the protocol. So the gateway listens
+//! only where an application opens it, and then only on this host unless another address is named.
 #![forbid(unsafe_code)]
 
 mod connection;
@@ -144,8 +145,8 @@ pub struct Passage {
 }
 
 impl Passage {
-    /// Passes messages to the engine and its answers back, a bounded number of them; to be called again and again. True when
-    /// the gateway has gone.
+    /// Passes messages to the engine and its answers back, a bounded number of them; to be called again and again. True
+    /// when the gateway has gone.
     pub fn work(&mut self, engine: &mut Engine) -> bool {
         let mut any = false;
         for _ in 0..TURN {

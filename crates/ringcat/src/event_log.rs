@@ -2,8 +2,9 @@
 //!
 //! A machine that is too slow for its cycle leaves cycles out and misses frames all the time. A line for each of them
 //! buries everything else; lines up to some number hide the next break. So the first twenty of a kind have a line each,
-//! then their number has one, at pauses that grow while it lasts. After a quiet time it begins anew. Only kinds that come
-//! by the thousand are condensed: judgements of process data, skipped and left out cycles, frames of other MainDevices.
+//! then their number has one, at pauses that grow while it lasts. After a quiet time it begins anew. Only kinds that
+//! come by the thousand are condensed: judgements of process data, skipped and left out cycles, frames of other
+//! MainDevices.
 //!
 //! ```
 //! use ringcat::event_log::EventLog;
@@ -102,8 +103,8 @@ impl EventLog {
         is_shown.then(|| self.line(event.at, &words))
     }
 
-    /// The line of cycles that were left out since the last call, unless they are counted; `skipped` is their number so far
-    /// ([`Pace::skipped`](crate::Pace::skipped)).
+    /// The line of cycles that were left out since the last call, unless they are counted; `skipped` is their number so
+    /// far ([`Pace::skipped`](crate::Pace::skipped)).
     pub fn left_out(&mut self, skipped: u64, now: Instant) -> Option<String> {
         let more = skipped.saturating_sub(std::mem::replace(&mut self.left_out_before, skipped));
         let is_shown = more > 0 && (self.one_by_one || self.left_out.note(more, now));

@@ -1,4 +1,5 @@
-//! The mailbox gateway of a MainDevice whose acyclic half has a thread of its own; its clients are [`ringcat_gateway`]'s.
+//! The mailbox gateway of a MainDevice whose acyclic half has a thread of its own; its clients are
+//! [`ringcat_gateway`]'s.
 
 pub use ringcat_gateway::{Gateway, GatewayCounters, GatewayOptions, RelayCounters};
 

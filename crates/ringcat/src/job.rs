@@ -1,7 +1,7 @@
 //! Work in the thread of the acyclic half whose result is asked for from another thread.
 //!
-//! A [`Job`] and the [`Reply`] to it share a slot. The thread fills it, once; the job waits for it, polls it or is awaited
-//! as a future. The type of the result is known at both ends.
+//! A [`Job`] and the [`Reply`] to it share a slot. The thread fills it, once; the job waits for it, polls it or is
+//! awaited as a future. The type of the result is known at both ends.
 
 use std::fmt;
 use std::future::Future;
@@ -15,7 +15,8 @@ use ringcat_engine::main_device::{MainDevice as Engine, Pending};
 use crate::error::Error;
 use crate::supervisor_thread::{SupervisorThread, Task};
 
-/// Work under way in the thread of a [`SupervisorThread`]. Dropped, it is aborted: an SDO transfer at the SubDevice, too.
+/// Work under way in the thread of a [`SupervisorThread`]. Dropped, it is aborted: an SDO transfer at the SubDevice,
+/// too.
 ///
 /// ```
 /// # use std::time::Duration;

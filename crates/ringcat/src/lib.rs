@@ -32,8 +32,8 @@
 //!
 //! | feature | what it adds |
 //! |---|---|
-//! | `packet` (default) | [`packet`](crate::packet::PacketLinks): network interfaces; [`tee`](crate::tee::Tee): captures; `realtime` |
-//! | `sim` | links into a simulated segment, in virtual time or at the pace of the clock; the simulator itself as `sim` |
+//! | `packet` (default) | network interfaces ([`packet::PacketLinks`]), captures ([`tee::Tee`]), `realtime` |
+//! | `sim` | links into a simulated segment, in virtual or in real time; the simulator itself as `sim` |
 //! | `eni` | networks from an ENI, its variables by name; what a file says as `config` |
 //! | `gateway` | the mailbox gateway over UDP and TCP |
 //! | `eoe` | network interfaces of the host for SubDevices that speak Ethernet over EtherCAT |

@@ -44,8 +44,9 @@ pub struct Options {
     pub patience: Duration,
     /// What becomes of rings behind junctions. A connection that is added makes it strict.
     pub junctions: JunctionMode,
-    /// Whether the cabling is looked at anew, as by [`Services::rescan`], when a hot connect group has joined or left, as
-    /// soon as nothing is broken: positions, places of breaks and errors of cables are then those of the segment as it is. Without, a group has none until a rescan is asked for.
+    /// Whether the cabling is looked at anew, as by [`Services::rescan`], when a hot connect group has joined or left,
+    /// as soon as nothing is broken: positions, places of breaks and errors of cables are then those of the segment as
+    /// it is. Without, a group has none until a rescan is asked for.
     pub follow_groups: bool,
     /// Whether the redundant link may be taken down for a moment, when ports have changed, to find out where a line is
     /// crossed ([`Links::force_disconnect`]). Without, a closed ring shows only that there is a crossing.

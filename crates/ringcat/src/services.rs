@@ -1,4 +1,5 @@
-//! What can be asked of the acyclic half: objects, states, registers, EEPROMs, ports, error counters, a look at the segment.
+//! What can be asked of the acyclic half: objects, states, registers, EEPROMs, ports, error counters, a look at the
+//! segment.
 //!
 //! Each service is written once, as a method of [`Services`], and works in four forms:
 //!
@@ -6,7 +7,7 @@
 //! |---|---|---|
 //! | [`MainDevice`] | before activation; receives and sends until the end | `Result<T, Error>` |
 //! | [`SupervisorThread`] | from any thread, before and during process data; waits for the end | `Result<T, Error>` |
-//! | [`SupervisorThread::background`] | the same, without waiting | [`Job`]: to wait for, with a limit, to poll, a future |
+//! | [`SupervisorThread::background`] | the same, without waiting | [`Job`]: to wait for or poll, a future |
 //! | [`Application`] in one thread | goes on while cycles go on | [`Pending`]: polled |
 //!
 //! SubDevices are named by their index in the declaration, before activation by their position in the scan.
@@ -68,8 +69,8 @@ pub trait Services: Sized {
     /// Does something with the engine that takes no time on the bus.
     fn immediately<T: Send + 'static>(self, act: impl FnOnce(&mut Engine) -> T + Send + 'static) -> Self::Immediate<T>;
 
-    /// Reads an object of at most `limit` bytes, by the SubDevice's mailbox in PREOP, SAFEOP or OP. The time limits are: until
-    /// the mailbox takes a message, until its answer is there.
+    /// Reads an object of at most `limit` bytes, by the SubDevice's mailbox in PREOP, SAFEOP or OP. The time limits
+    /// are: until the mailbox takes a message, until its answer is there.
     fn sdo_upload(
         self,
         subdevice: usize,
@@ -97,9 +98,10 @@ pub trait Services: Sized {
         self.call(move |engine| engine.start_visit(position, state))
     }
 
-    /// Brings one declared SubDevice to a state while the others go on: INIT, PREOP, BOOT for new firmware, SAFEOP, OP. Its
-    /// configuration is written again on the way up. The state is kept, also over a loss of power; a SubDevice that refuses is
-    /// brought back to the state before. No working counter waits for one without process data, and its inputs are not fresh.
+    /// Brings one declared SubDevice to a state while the others go on: INIT, PREOP, BOOT for new firmware, SAFEOP, OP.
+    /// Its configuration is written again on the way up. The state is kept, also over a loss of power; a SubDevice that
+    /// refuses is brought back to the state before. No working counter waits for one without process data, and its
+    /// inputs are not fresh.
     fn request_state(self, subdevice: usize, state: AlState) -> Self::Outcome<(), ConfigureError> {
         self.call(move |engine| engine.start_state_request(subdevice, state))
     }
@@ -124,8 +126,8 @@ pub trait Services: Sized {
         self.call(move |engine| engine.start_register_write(subdevice, address, data))
     }
 
-    /// Sends datagrams of the application's own at once, in one frame where they fit. Each brings its answer, whatever its
-    /// working counter. More than [`MAX_DATAGRAMS`](crate::MAX_DATAGRAMS) are refused.
+    /// Sends datagrams of the application's own at once, in one frame where they fit. Each brings its answer, whatever
+    /// its working counter. More than [`MAX_DATAGRAMS`](crate::MAX_DATAGRAMS) are refused.
     fn datagrams(self, datagrams: Vec<RawDatagram>) -> Self::Outcome<Vec<Result<Reply, BusError>>, ServiceError> {
         self.call(move |engine| engine.start_datagrams(datagrams))
     }
@@ -140,14 +142,14 @@ pub trait Services: Sized {
         self.call(move |engine| engine.start_port_set(subdevice, port, control))
     }
 
-    /// Cuts a declared SubDevice off by closing the ports of its neighbours. In a line those behind it go with it. One at
-    /// the main link itself cannot be cut off.
+    /// Cuts a declared SubDevice off by closing the ports of its neighbours. In a line those behind it go with it. One
+    /// at the main link itself cannot be cut off.
     fn block(self, subdevice: usize) -> Self::Outcome<Vec<BlockedPort>, ServiceError> {
         self.call(move |engine| engine.start_block(subdevice))
     }
 
-    /// Opens all ports that [`Services::block`] has closed; the result is how many there were. A port of a neighbour that
-    /// does not answer is kept for the next try.
+    /// Opens all ports that [`Services::block`] has closed; the result is how many there were. A port of a neighbour
+    /// that does not answer is kept for the next try.
     fn open_blocked(self) -> Self::Outcome<usize, ServiceError> {
         self.call(move |engine| engine.start_open_blocked())
     }
@@ -157,12 +159,13 @@ pub trait Services: Sized {
         self.call(move |engine| engine.start_reset(subdevice))
     }
 
-    /// Looks at the whole segment again while process data goes on: which SubDevice is at which place now, which are new,
-    /// have moved or are gone. New ones are read, but left alone; those that have moved are events, too. It ends when the
-    /// segment holds still and every SubDevice is known, within `limit`; the bus may fail, and nothing may be declared yet.
+    /// Looks at the whole segment again while process data goes on: which SubDevice is at which place now, which are
+    /// new, have moved or are gone. New ones are read, but left alone; those that have moved are events, too. It ends
+    /// when the segment holds still and every SubDevice is known, after `limit` at the latest. It fails where nothing is
+    /// declared yet, the segment does not hold still, or the bus fails.
     ///
-    /// Places of breaks, errors of cables and positions in events go by the new cabling from then on, unless the ring of two
-    /// links is open or a mandatory SubDevice does not answer.
+    /// Places of breaks, errors of cables and positions in events go by the new cabling from then on, unless the ring
+    /// of two links is open or a mandatory SubDevice does not answer.
     fn rescan(self, limit: Duration) -> Self::Outcome<Rescan, ServiceError> {
         self.call(move |engine| engine.start_rescan(limit))
     }
@@ -178,8 +181,8 @@ pub trait Services: Sized {
         self.call(move |engine| engine.start_sii_write(subdevice, image, force))
     }
 
-    /// Writes the alias into the EEPROM, with the checksum that belongs to it; one that is wrong already is made right only
-    /// with `force`. The alias counts from the SubDevice's next start on.
+    /// Writes the alias into the EEPROM, with the checksum that belongs to it; one that is wrong already is made right
+    /// only with `force`. The alias counts from the SubDevice's next start on.
     fn write_alias(self, subdevice: usize, alias: u16, force: bool) -> Self::Outcome<SiiWritten, ServiceError> {
         self.call(move |engine| engine.start_alias_write(subdevice, alias, force))
     }
@@ -199,8 +202,8 @@ pub trait Services: Sized {
         self.call(move |engine| engine.start_statistics_clear(subdevice))
     }
 
-    /// Has all SubDevices looked at now, and new ones looked for, as if the segment had changed. False before activation:
-    /// there a scan looks.
+    /// Has all SubDevices looked at now, and new ones looked for, as if the segment had changed. False before
+    /// activation: there a scan looks.
     fn force_topology_change(self) -> Self::Immediate<bool> {
         self.immediately(move |engine| engine.force_topology_change())
     }

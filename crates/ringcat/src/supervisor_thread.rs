@@ -155,8 +155,9 @@ impl SupervisorThread {
         self.ask(move |engine| act.take().map(|act| act(engine))).wait()
     }
 
-    /// Runs an async function of the engine in the thread and waits for its end: `make` gets the engine, whose mailboxes
-    /// it may take. SubDevices are named by their index in the declaration, before activation by their position.
+    /// Runs an async function of the engine in the thread and waits for its end: `make` gets the engine, whose
+    /// mailboxes it may take. SubDevices are named by their index in the declaration, before activation by their
+    /// position.
     ///
     /// # Errors
     /// The thread is gone, or the MainDevice was stopped meanwhile.
@@ -168,7 +169,8 @@ impl SupervisorThread {
         self.start_job(make).wait()
     }
 
-    /// Starts an async function of the engine in the thread; as [`SupervisorThread::run`], but does not wait for its end.
+    /// Starts an async function of the engine in the thread; as [`SupervisorThread::run`], but does not wait for its
+    /// end.
     pub fn start_job<T, W>(&self, make: impl FnOnce(&mut Engine) -> W + Send + 'static) -> Job<T>
     where
         T: Send + 'static,
