@@ -92,8 +92,8 @@ pub trait Services: Sized {
         self.call(move |engine| engine.start_sdo_download(subdevice, object, data, limits))
     }
 
-    /// Before activation: brings a scanned SubDevice to PREOP, BOOT or back to INIT; in PREOP and BOOT its mailbox may be
-    /// used. It fails where there is no mailbox for that state, or the SubDevice refuses or does not answer.
+    /// Before activation: brings a scanned SubDevice to PREOP, BOOT or back to INIT; in PREOP and BOOT its mailbox may
+    /// be used. It fails where there is no mailbox for that state, or the SubDevice refuses or does not answer.
     fn bring_to(self, position: usize, state: AlState) -> Self::Outcome<(), ConfigureError> {
         self.call(move |engine| engine.start_visit(position, state))
     }
@@ -161,8 +161,8 @@ pub trait Services: Sized {
 
     /// Looks at the whole segment again while process data goes on: which SubDevice is at which place now, which are
     /// new, have moved or are gone. New ones are read, but left alone; those that have moved are events, too. It ends
-    /// when the segment holds still and every SubDevice is known, after `limit` at the latest. It fails where nothing is
-    /// declared yet, the segment does not hold still, or the bus fails.
+    /// when the segment holds still and every SubDevice is known, after `limit` at the latest. It fails where nothing
+    /// is declared yet, the segment does not hold still, or the bus fails.
     ///
     /// Places of breaks, errors of cables and positions in events go by the new cabling from then on, unless the ring
     /// of two links is open or a mandatory SubDevice does not answer.
@@ -219,8 +219,8 @@ pub trait Services: Sized {
         self.immediately(move |engine| engine.statistics(subdevice))
     }
 
-    /// A request for objects of a declared SubDevice of up to `size` bytes, to be made from the cyclic thread. It may be
-    /// created before or after activation.
+    /// A request for objects of a declared SubDevice of up to `size` bytes, to be made from the cyclic thread. It may
+    /// be created before or after activation.
     fn create_sdo_request(self, subdevice: usize, size: usize) -> Self::Immediate<SdoRequest> {
         self.immediately(move |engine| engine.create_sdo_request(subdevice, size))
     }
