@@ -4,7 +4,7 @@ use std::fmt;
 
 use roxmltree::Node;
 
-use super::error::shown;
+use super::quoted::shown;
 
 /// What a file looks like.
 #[derive(Clone, Debug, PartialEq, Eq)]

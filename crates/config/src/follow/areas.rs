@@ -1,11 +1,11 @@
-//! Which bits of a SyncManager are which logical bits: FMMUs as the commands leave them, cut at the borders of SyncManagers
-//! (facts 3.10).
+//! Which bits of a SyncManager are which logical bits: FMMUs as the commands leave them, cut at the borders of
+//! SyncManagers (facts 3.10).
 
 use ringcat_engine::config::DeclaredSyncManager;
 use ringcat_engine::info::Direction;
 use ringcat_wire::register::Fmmu;
 
-use super::contradiction;
+use super::messages::contradiction;
 use super::notices::Notices;
 use super::registers::Registers;
 use crate::eni::{Eni, EniError, Place};

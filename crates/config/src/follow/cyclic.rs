@@ -10,8 +10,9 @@ use ringcat_wire::register::map;
 
 use super::areas::Piece;
 use super::bus::Bus;
+use super::messages::{command_name, named};
 use super::notices::Notices;
-use super::subdevice::{command_name, is_complete, named};
+use super::registers::is_complete;
 use crate::eni::{CyclicCommand, CyclicState, Eni, EniError, Problem, Target};
 
 /// Looks at a pair of a logical command and a piece of process data: far more than a segment of 1,000 SubDevices needs.

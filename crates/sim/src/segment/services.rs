@@ -3,8 +3,7 @@
 use core::net::Ipv4Addr;
 use std::path::Path;
 
-use super::devices::Place;
-use super::format::{DeviceEntry, duration};
+use super::format::{DeviceEntry, Place, duration};
 use crate::description::{DeviceDescription, EoeEnd};
 
 /// Sizes of a mailbox: the least that an SDO needs, the most that a datagram carries.
