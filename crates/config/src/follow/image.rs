@@ -129,23 +129,7 @@ fn of_subdevice(
     let pieces: Vec<(&Piece, Option<Cover>)> =
         pieces.iter().zip(covers.iter().copied()).filter(|(piece, _)| piece.direction == direction).collect();
     if pieces.is_empty() {
-        if is_complete(&eni.subdevices[index].init_commands) {
-            if let Some(range) = ranges.iter().find(|range| range.length > 0) {
-                let reason = "no FMMU maps process data there: the bits stay zero";
-                notices.add(Some(range.place), Some(index), side(direction), reason);
-            }
-            return Ok(());
-        }
-        let mut bit_offset: u32 = 0;
-        for range in ranges.iter().filter(|range| range.length > 0) {
-            let (image_bit, bits) = (range.start, range.length);
-            areas.push(ImageArea { subdevice: index, direction, sync_manager: None, bit_offset, image_bit, bits });
-            let what = side(direction);
-            bit_offset = bit_offset.checked_add(bits).ok_or_else(|| {
-                contradiction(eni, index, range.place, what, "fewer than 2^32 bits", "more in all ranges", "")
-            })?;
-        }
-        return Ok(());
+        return unmapped(eni, index, direction, ranges, areas, notices);
     }
     let said: u64 = ranges.iter().map(|range| u64::from(range.length)).sum();
     let mapped: u64 = pieces.iter().map(|(piece, _)| u64::from(piece.bits)).sum();
@@ -183,6 +167,34 @@ fn of_subdevice(
             }
             in_order(eni, index, ranges, &pieces, areas)?;
         }
+    }
+    Ok(())
+}
+
+/// Process data that no FMMU maps: in a file that leaves FMMUs to the SII, the ranges lie one behind the other.
+fn unmapped(
+    eni: &Eni,
+    index: usize,
+    direction: Direction,
+    ranges: &[BitRange],
+    areas: &mut Vec<ImageArea>,
+    notices: &mut Notices,
+) -> Result<(), EniError> {
+    if is_complete(&eni.subdevices[index].init_commands) {
+        if let Some(range) = ranges.iter().find(|range| range.length > 0) {
+            let reason = "no FMMU maps process data there: the bits stay zero";
+            notices.add(Some(range.place), Some(index), side(direction), reason);
+        }
+        return Ok(());
+    }
+    let mut bit_offset: u32 = 0;
+    for range in ranges.iter().filter(|range| range.length > 0) {
+        let (image_bit, bits) = (range.start, range.length);
+        areas.push(ImageArea { subdevice: index, direction, sync_manager: None, bit_offset, image_bit, bits });
+        let what = side(direction);
+        bit_offset = bit_offset.checked_add(bits).ok_or_else(|| {
+            contradiction(eni, index, range.place, what, "fewer than 2^32 bits", "more in all ranges", "")
+        })?;
     }
     Ok(())
 }

@@ -1,11 +1,13 @@
 //! Layouts of literal and random domains.
 
+use core::time::Duration;
 use std::vec;
 use std::vec::Vec;
 
 use proptest::prelude::*;
 
 use super::*;
+use crate::direction::Direction;
 
 fn area(subdevice: usize, sync_manager: u8, direction: Direction, length: u16) -> AreaSpec {
     AreaSpec { subdevice, sync_manager, direction, length }

@@ -6,7 +6,7 @@ use std::vec;
 use std::vec::Vec;
 use std::{fs, println};
 
-use ringcat_wire::address::Position;
+use ringcat_wire::address::{Position, StationAddress};
 use ringcat_wire::register::Information;
 use ringcat_wire::sii::{CoeDetails, GeneralFlags, MailboxLayout, MailboxProtocols, Sii, SiiHeader, SiiSyncManager};
 
