@@ -58,13 +58,30 @@ fn main() -> ExitCode {
     }
 }
 
-async fn run(interface: &str, count: usize, cycles: usize, config: MainDeviceConfig) -> Result<(), String> {
+/// A MainDevice on an interface, whose frames a thread of its own moves.
+fn connect(interface: &str, config: MainDeviceConfig) -> Result<Arc<MainDevice<'static>>, String> {
     let (sender, receiver, pdu_loop) = STORAGE.try_split().map_err(|()| "the storage is in use".to_owned())?;
     let timeouts = Timeouts { pdu: PATIENCE, eeprom: PATIENCE, ..Timeouts::default() };
     let main_device = Arc::new(MainDevice::new(pdu_loop, timeouts, config));
     let task = tx_rx_task(interface, sender, receiver).map_err(|error| format!("{interface}: {error}"))?;
     thread::spawn(move || smol::block_on(task));
+    Ok(main_device)
+}
 
+/// Becomes true when the standard input ends.
+fn end_of_input() -> Arc<AtomicBool> {
+    let ended = Arc::new(AtomicBool::new(false));
+    let end = ended.clone();
+    thread::spawn(move || {
+        // An end and an error of the input both say that nothing more is wanted.
+        let _ = io::copy(&mut io::stdin().lock(), &mut io::sink());
+        end.store(true, Ordering::Relaxed);
+    });
+    ended
+}
+
+async fn run(interface: &str, count: usize, cycles: usize, config: MainDeviceConfig) -> Result<(), String> {
+    let main_device = connect(interface, config)?;
     let begin = Instant::now();
     let failed = |what: &'static str| move |error: ethercrab::error::Error| format!("{what}: {error}");
     let group =
@@ -118,13 +135,7 @@ async fn run(interface: &str, count: usize, cycles: usize, config: MainDeviceCon
         delays.join(","),
         inputs.join(",")
     );
-    let ended = Arc::new(AtomicBool::new(false));
-    let end = ended.clone();
-    thread::spawn(move || {
-        // An end and an error of the input both say that nobody wants more.
-        let _ = io::copy(&mut io::stdin().lock(), &mut io::sink());
-        end.store(true, Ordering::Relaxed);
-    });
+    let ended = end_of_input();
     while !ended.load(Ordering::Relaxed) {
         group.tx_rx(&main_device).await.map_err(failed("process data"))?;
         smol::Timer::after(Duration::from_millis(1)).await;

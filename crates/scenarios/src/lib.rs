@@ -6,6 +6,7 @@
 //! [`counting_allocator`] and print [`figures`]; what is measured on real interfaces runs in [`namespaces`].
 
 pub mod answering_double;
+pub mod areas;
 pub mod callgrind;
 pub mod capture;
 pub mod check;

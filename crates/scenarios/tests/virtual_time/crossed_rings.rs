@@ -147,6 +147,11 @@ fn random_ring(dice: &mut Dice) -> (Vec<(Endpoint, Endpoint)>, usize, usize) {
     (cables, trunk, total)
 }
 
+fn sorted(mut ends: Ends) -> Ends {
+    ends.sort();
+    ends
+}
+
 #[test]
 fn places_in_random_rings_with_branches_and_crossed_subdevices_are_right_or_unknown_cr_12() {
     let seeds = std::env::var("RINGCAT_SEEDS").ok().and_then(|it| it.parse().ok()).unwrap_or(60);
@@ -170,14 +175,7 @@ fn places_in_random_rings_with_branches_and_crossed_subdevices_are_right_or_unkn
             }
             other => Err(if other == MAIN { "MAIN" } else { "REDUNDANT" }),
         };
-        let truth: Vec<Ends> = cables
-            .iter()
-            .map(|(a, b)| {
-                let mut e = vec![end(*a), end(*b)];
-                e.sort();
-                e
-            })
-            .collect();
+        let truth: Vec<Ends> = cables.iter().map(|(a, b)| sorted(vec![end(*a), end(*b)])).collect();
         let nodes = |ends: &Ends| ends.iter().map(|end| end.map(|at| at.node)).collect::<Vec<_>>();
         let mut note = |world: &World, mark, number: usize, what: &str| {
             let told = ring_events(world.events(mark));

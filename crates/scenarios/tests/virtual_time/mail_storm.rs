@@ -211,6 +211,19 @@ fn run(seed: u64, tally: &Rc<Tally>) {
     // question of whoever asks now.
     world.run_cycles(100);
     // What was lost on purpose and never met its frame would meet the next one.
+    all_answer(&mut world, seed);
+    world.run_cycles(90);
+    let after = quiet_moment(&mut world);
+    assert!(
+        after.procedures <= before.procedures && after.datagrams <= before.datagrams,
+        "seed {seed}: {before:?} {after:?}"
+    );
+    each_emergency_came_once(&world, seed, emergencies, tally);
+    mailboxes_are_idle(&world, seed);
+}
+
+/// Every kind of question is answered by every device that serves it.
+fn all_answer(world: &mut World, seed: u64) {
     for (device, kind) in ALL.into_iter().flat_map(|device| KINDS.map(|kind| (device, kind))) {
         if (device, kind) == (ALL[0], Kind::Address) {
             continue;
@@ -219,20 +232,21 @@ fn run(seed: u64, tally: &Rc<Tally>) {
         let result = world.run(async move { asker.ask(0xFFFF).await });
         assert_eq!(result, Ok(()), "seed {seed}, device {device}, {kind:?}");
     }
-    world.run_cycles(90);
-    let after = quiet_moment(&mut world);
-    assert!(
-        after.procedures <= before.procedures && after.datagrams <= before.datagrams,
-        "seed {seed}: {before:?} {after:?}"
-    );
+}
+
+/// Emergencies came as often as they were sent on purpose.
+fn each_emergency_came_once(world: &World, seed: u64, mut left_of: BTreeMap<u16, u32>, tally: &Tally) {
     for event in world.events(world.beginning()) {
         if let Event::Emergency { emergency, .. } = event.event {
             tally.emergencies.set(tally.emergencies.get() + 1);
-            let left = emergencies.get_mut(&emergency.error_code).expect("sent on purpose");
+            let left = left_of.get_mut(&emergency.error_code).expect("sent on purpose");
             assert!(*left > 0, "seed {seed}: {:#06x} came twice", emergency.error_code);
             *left -= 1;
         }
     }
+}
+
+fn mailboxes_are_idle(world: &World, seed: u64) {
     for device in ALL {
         let mailbox = world.mailbox(device);
         let counters = mailbox.counters();

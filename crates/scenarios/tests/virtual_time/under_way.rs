@@ -136,6 +136,17 @@ impl Stamped {
     fn incomplete(&self) -> u64 {
         self.world.application().cyclic_counters().incomplete
     }
+
+    /// Two cables are cut at once and healed one after the other.
+    fn cut_two(&mut self, first: CableId, second: CableId) {
+        self.world.cut(first);
+        self.world.cut(second);
+        self.run(100);
+        self.world.heal(first);
+        self.run(100);
+        self.world.heal(second);
+        self.run(100);
+    }
 }
 
 #[test]
@@ -276,13 +287,7 @@ fn breaks_behind_junctions_cost_at_most_the_cycles_that_are_under_way_and_no_old
             }
             assert_eq!(stamped.world.left_op(mark), []);
             for (first, second) in pairs {
-                stamped.world.cut(CableId(first));
-                stamped.world.cut(CableId(second));
-                stamped.run(100);
-                stamped.world.heal(CableId(first));
-                stamped.run(100);
-                stamped.world.heal(CableId(second));
-                stamped.run(100);
+                stamped.cut_two(CableId(first), CableId(second));
                 let before = stamped.incomplete();
                 stamped.run(50);
                 let oldest = stamped.oldest_fresh;
