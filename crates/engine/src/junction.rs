@@ -92,8 +92,8 @@ pub enum JunctionError {
     },
 }
 
-/// What showed that no cable closes a ring where it was declared, when its ends were closed for a moment. Closed like that,
-/// a ring that is whole loses nobody, and one that is broken elsewhere those behind its break.
+/// What showed that no cable closes a ring where it was declared, when its ends were closed for a moment. Closed like
+/// that, a ring that is whole loses nobody, and one that is broken elsewhere those behind its break.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Shown {
     /// A SubDevice did not answer that would have.

@@ -1,10 +1,11 @@
-//! The MainDevice of another project (ethercrab, from the registry) on a network interface, as a check of our simulator.
+//! The MainDevice of another project (ethercrab, from the registry) on a network interface, as a check of our
+//! simulator.
 //!
-//! `ethercrab_client INTERFACE SUBDEVICES CYCLES [TIMES]`: brings everything to OP and exchanges process data. In cycle i
-//! byte j of the outputs of SubDevice k is i + k + j. As many cycles follow without any work but the exchange, to tell
-//! how many there are in a second. Prints one line of figures, with the propagation delays that it has measured, then keeps
-//! exchanging the last outputs until its standard input ends. Anything unexpected ends it with an error. TIMES is how often
-//! it hands out the reference time before OP, unless it is to be as it likes.
+//! `ethercrab_client INTERFACE SUBDEVICES CYCLES [TIMES]`: brings everything to OP and exchanges process data. In cycle
+//! i byte j of the outputs of SubDevice k is i + k + j. As many cycles follow without any work but the exchange, to
+//! tell how many there are in a second. Prints one line of figures, with the propagation delays that it has measured,
+//! then keeps exchanging the last outputs until its standard input ends. Anything unexpected ends it with an error.
+//! TIMES is how often it hands out the reference time before OP, unless it is to be as it likes.
 
 use std::io;
 use std::process::ExitCode;

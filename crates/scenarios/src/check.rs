@@ -118,7 +118,8 @@ impl Mirror {
                     let inputs = &flight.inputs[area.device.0];
                     (image.get(area.in_image.clone()), inputs.get(area.in_device.clone()))
                 }
-                // Where somebody is missing, which optional ones may be, only fresh inputs show that it is not this one.
+                // Where somebody is missing, which optional ones may be, only fresh inputs show that it is not this
+                // one.
                 Direction::Outputs
                     if ((delivery == Delivery::Complete && status.wkc == status.expected)
                         || exchange.freshness(domain, area.subdevice) == Freshness::Fresh)

@@ -1,5 +1,5 @@
-//! What the devices themselves say of process data, held against what the engine says: at all times, whatever faults are
-//! active.
+//! What the devices themselves say of process data, held against what the engine says: at all times, whatever faults
+//! are active.
 //!
 //! Inputs that count as fresh were put into a frame of the judged cycle by that SubDevice, byte for byte; outputs of a
 //! complete cycle were taken by every SubDevice from a frame of it. Both are read from the log that each simulated
@@ -77,8 +77,8 @@ impl Truth {
                     };
                     assert!(
                         controller.logical_accesses().any(is_own),
-                        "inputs of SubDevice {} in domain {} are called fresh ({value:02x?}), device {} put none such into \
-                         the frames {:02x?}; it answered last: {:02x?}",
+                        "inputs of SubDevice {} in domain {} are called fresh ({value:02x?}), device {} put none such \
+                         into the frames {:02x?}; it answered last: {:02x?}",
                         area.subdevice,
                         domain.0,
                         area.device.0,

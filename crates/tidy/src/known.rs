@@ -80,7 +80,8 @@ impl Known {
 /// The file that lists exactly what was found.
 pub fn file_of(found: &[(&str, Counts)]) -> String {
     let mut text = String::from(
-        "# What is not yet as it should be, by rule: see `src/known.rs`. Written by `cargo run -p tidy -- shrink`, which\n\
+        "# What is not yet as it should be, by rule: see `src/known.rs`. Written by `cargo run -p tidy -- shrink`, \
+         which\n\
          # only lowers it; nothing is added by hand.\n",
     );
     for (rule, counts) in found.iter().filter(|(_, counts)| !counts.is_empty()) {

@@ -92,13 +92,13 @@ fn is_own(eni: &Eni, index: usize, command: &EcatCommand, bus: &Bus, notices: &m
         Addressing::AutoIncrement if bus.groups[index].is_some() => true,
         Addressing::AutoIncrement => match subdevice.auto_increment {
             Some(own) if own != adp && subdevice.station == Some(adp) => note(format!(
-                "{name} counts positions, and Adp {adp} is the PhysAddr: nobody would be reached, so it is not sent (Cmd 4 and \
-                 5 address by PhysAddr)"
+                "{name} counts positions, and Adp {adp} is the PhysAddr: nobody would be reached, so it is not sent \
+                 (Cmd 4 and 5 address by PhysAddr)"
             )),
             Some(own) if own != adp => note(format!("{name} with Adp {adp} goes to another SubDevice: not sent")),
             None if subdevice.station == Some(adp) => note(format!(
-                "{name} counts positions, and Adp {adp} is the PhysAddr: nobody would be reached, so it is not sent (Cmd 4 and \
-                 5 address by PhysAddr)"
+                "{name} counts positions, and Adp {adp} is the PhysAddr: nobody would be reached, so it is not sent \
+                 (Cmd 4 and 5 address by PhysAddr)"
             )),
             Some(_) | None => true,
         },

@@ -101,7 +101,8 @@ fn a_sync_manager_that_is_switched_on_at_so_is_for_op_only() {
     assert!(op_only(&configuration, 1), "left: at SO");
     assert!(!op_only(&configuration, 2), "right: at PS");
     let other = "<InitCmd><Transition>SO</Transition><Comment>set sm 0 of left</Comment>";
-    let both = "<InitCmd><Transition>PS</Transition><Cmd>5</Cmd><Adp>1002</Adp><Ado>2048</Ado><Data>000f010004000100</Data></InitCmd>";
+    let both = "<InitCmd><Transition>PS</Transition><Cmd>5</Cmd><Adp>1002</Adp><Ado>2048</Ado>\
+        <Data>000f010004000100</Data></InitCmd>";
     let changed = changed(&[(other, &format!("{both}{other}"))]);
     assert!(!op_only(&changed, 1), "on in SAFEOP already");
     assert!(has_notice(&changed, &["SyncManager 0 at SO", "SAFEOP already"]));
@@ -110,7 +111,8 @@ fn a_sync_manager_that_is_switched_on_at_so_is_for_op_only() {
 #[test]
 fn long_entries_are_cut_and_pdos_that_do_not_fit_have_no_places() {
     let entry = "<Entry><Index>#x6064</Index><SubIndex>0</SubIndex><BitLen>32</BitLen></Entry>";
-    let array = "<Entry><Index>#x2000</Index><SubIndex>1</SubIndex><BitLen>800</BitLen><DataType>ARRAY [0..99] OF BYTE</DataType></Entry>";
+    let array = "<Entry><Index>#x2000</Index><SubIndex>1</SubIndex><BitLen>800</BitLen>\
+        <DataType>ARRAY [0..99] OF BYTE</DataType></Entry>";
     let lengths = ("<Data>00110600640001008011060020000100</Data>", "<Data>00110600640001008011660020000100</Data>");
     let fmmu = ("<Data>00000010060000078011000101000000</Data>", "<Data>00000010660000078011000101000000</Data>");
     let place = ("<BitStart>0</BitStart><BitLength>48</BitLength>", "<BitStart>0</BitStart><BitLength>816</BitLength>");

@@ -131,7 +131,8 @@ fn a_file_with_nothing_but_coe_commands_says_with_them_how_long_process_data_is_
         command("0x1a05", 0, 0, "01"),
     ];
     let text = format!(
-        "<EtherCATConfig><Config><Slave><Info><Name>A</Name></Info><Mailbox><CoE><InitCmds>{}</InitCmds></CoE></Mailbox>\
+        "<EtherCATConfig><Config><Slave><Info><Name>A</Name></Info><Mailbox><CoE><InitCmds>{}</InitCmds></CoE>\
+         </Mailbox>\
          </Slave></Config></EtherCATConfig>",
         commands.concat()
     );

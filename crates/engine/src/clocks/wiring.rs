@@ -1,8 +1,8 @@
 //! Which port is connected to which, and the way of a frame through that (facts 2.1, 7.1).
 //!
-//! In: a [`Topology`] and which ports are open now. A topology has local rings as branches; here their closing cables are
-//! what they are, cables. Out: the arrivals of a frame of either link, in order, and whether a processing unit meets it
-//! after each.
+//! In: a [`Topology`] and which ports are open now. A topology has local rings as branches; here their closing cables
+//! are what they are, cables. Out: the arrivals of a frame of either link, in order, and whether a processing unit
+//! meets it after each.
 
 use alloc::vec;
 use alloc::vec::Vec;
@@ -35,8 +35,8 @@ pub struct Arrival {
 }
 
 impl Wiring {
-    /// Of a topology whose ring is closed or not. `is_open` says which ports are open: closing cables of local rings with
-    /// both ends open are in use.
+    /// Of a topology whose ring is closed or not. `is_open` says which ports are open: closing cables of local rings
+    /// with both ends open are in use.
     pub fn new(topology: &Topology, ring_closed: bool, is_open: impl Fn(PortOf) -> bool) -> Wiring {
         let mut wiring = Wiring { far: vec![[None; 4]; topology.nodes.len()], entries: entries(topology, ring_closed) };
         for (node, here) in topology.nodes.iter().enumerate() {
@@ -133,7 +133,8 @@ impl Wiring {
 }
 
 impl Wiring {
-    /// The ports at which the frame that a SubDevice processes comes in, by position, and of which link that is (0 or 1).
+    /// The ports at which the frame that a SubDevice processes comes in, by position, and of which link that is (0 or
+    /// 1).
     pub fn arrival_ports(&self) -> (Vec<[bool; 4]>, Vec<usize>) {
         let mut ports = vec![[false; 4]; self.far.len()];
         let mut trees = vec![0; self.far.len()];

@@ -329,7 +329,10 @@ proptest! {
     ) {
         let header = SiiHeader::decode(header.as_slice().try_into().unwrap());
         let parts: Vec<_> =
-            parts.iter().map(|(code, data)| (CategoryKind::from_code(*code / 10 * 10 + *code % 2), &data[..])).collect();
+            parts
+            .iter()
+            .map(|(code, data)| (CategoryKind::from_code(*code / 10 * 10 + *code % 2), &data[..]))
+            .collect();
         let info = SubDeviceInfo::from_parts(readout(), &header, placed(&parts));
         info.warnings.iter().for_each(|warning| drop(warning.to_string()));
     }

@@ -202,8 +202,8 @@ fn fmt_mailboxes(f: &mut fmt::Formatter<'_>, layout: &MailboxLayout, memory_end:
     let MailboxLayout { receive_size, receive_offset, send_size, send_offset } = layout;
     write!(
         f,
-        "mailboxes of {receive_size} bytes at {receive_offset:#06x} and {send_size} bytes at {send_offset:#06x} are not \
-         believed: expected at least {MAILBOX_HEADER} bytes each, apart from each other, between 0x1000 and \
+        "mailboxes of {receive_size} bytes at {receive_offset:#06x} and {send_size} bytes at {send_offset:#06x} are \
+         not believed: expected at least {MAILBOX_HEADER} bytes each, apart from each other, between 0x1000 and \
          {memory_end:#06x}"
     )
 }
@@ -271,7 +271,8 @@ impl fmt::Display for InfoWarning {
             }
             SiiProblem::Dictionary { sync_manager, sii, dictionary } => write!(
                 f,
-                "SM {sync_manager}: {sii} bits of process data, the dictionary has other PDOs with {dictionary} bits, which count"
+                "SM {sync_manager}: {sii} bits of process data, the dictionary has other PDOs with {dictionary} \
+                 bits, which count"
             ),
             SiiProblem::Control { sync_manager, control } => {
                 write!(f, "SM {sync_manager}: control byte {control:#04x} is not one of its type, which counts")

@@ -176,7 +176,14 @@ proptest! {
             witnesses.push(if *alone { Witness::Alone } else { MAPPED });
         }
         let links = if ring { LinkSet::Ring } else { LinkSet::Single };
-        let rules = Rules { witnesses: &witnesses, links, supervision: true, lrw: LrwPolicy::Automatic, session: 0, max_datagrams: None };
+        let rules = Rules {
+            witnesses: &witnesses,
+            links,
+            supervision: true,
+            lrw: LrwPolicy::Automatic,
+            session: 0,
+            max_datagrams: None,
+        };
         let layout = Layout::with(&[DomainSpec { lrw, ..spec(areas) }], rules).unwrap();
         let domain = &layout.domains[0];
         let mut end = 0;

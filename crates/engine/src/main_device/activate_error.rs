@@ -151,17 +151,11 @@ impl fmt::Display for ActivateError {
                 f,
                 "declaration {subdevice}: process data of SyncManager {sync_manager} is in domain {a} and in domain {b}"
             ),
-            ActivateError::Period { domain, period, shortest } => {
-                let [shortest, period] = [shortest, period].map(Duration::as_micros);
-                write!(
-                    f,
-                    "domain {domain}: expected a period that is a multiple of {shortest} us and not zero, got {period} us"
-                )
-            }
+            ActivateError::Period { domain, period, shortest } => fmt_period(f, *domain, *period, *shortest),
             ActivateError::NoDomain { subdevice } => write!(
                 f,
-                "declaration {subdevice} has process data and there is no domain to exchange it: declare a domain, or PREOP \
-                 as the target"
+                "declaration {subdevice} has process data and there is no domain to exchange it: declare a domain, or \
+                 PREOP as the target"
             ),
             ActivateError::SyncCycle { subdevice, sync0, period } => fmt_sync_cycle(f, *subdevice, *sync0, *period),
             ActivateError::UnderWay { domain, under_way } => {
@@ -169,13 +163,13 @@ impl fmt::Display for ActivateError {
             }
             ActivateError::LrwOnTwoLinks { domain, logical, length, subdevices } => write!(
                 f,
-                "domain {domain}: an LRW at logical address {logical} of {length} bytes for declarations {subdevices:?} \
-                 cannot be used with two links: leave it to the MainDevice, or use one LRW per SubDevice"
+                "domain {domain}: an LRW at logical address {logical} of {length} bytes for declarations \
+                 {subdevices:?} cannot be used with two links: leave it to the MainDevice, or use one LRW per SubDevice"
             ),
             ActivateError::NamedLrwOnTwoLinks(ExplicitLrw { name, logical, length, subdevices }) => write!(
                 f,
-                "{name}: an LRW at logical address {logical} of {length} bytes for declarations {subdevices:?} cannot be \
-                 used with two links: let it be split into LRD and LWR, or use one LRW per SubDevice"
+                "{name}: an LRW at logical address {logical} of {length} bytes for declarations {subdevices:?} cannot \
+                 be used with two links: let it be split into LRD and LWR, or use one LRW per SubDevice"
             ),
             ActivateError::LrwUnknown { domain, subdevice } => {
                 write!(f, "domain {domain}: LRW was asked for, declaration {subdevice} does not know it")
@@ -201,6 +195,12 @@ fn in_us(time: Duration) -> impl fmt::Display {
         0 => write!(f, "{}", ns / 1_000),
         rest => write!(f, "{}.{rest:03}", ns / 1_000),
     })
+}
+
+fn fmt_period(f: &mut fmt::Formatter<'_>, domain: usize, period: Duration, shortest: Duration) -> fmt::Result {
+    let [shortest, period] = [shortest, period].map(|time| time.as_micros());
+    write!(f, "domain {domain}: expected a period that is a multiple of {shortest} us and not zero, ")?;
+    write!(f, "got {period} us")
 }
 
 fn fmt_sync_cycle(f: &mut fmt::Formatter<'_>, subdevice: usize, sync0: Duration, period: Duration) -> fmt::Result {

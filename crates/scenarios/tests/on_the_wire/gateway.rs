@@ -1,5 +1,5 @@
-//! Clients of the mailbox gateway that share nothing with it: one in Python, written from the protocol, and the ETG.1510
-//! client of others; tshark judges what the first one exchanged.
+//! Clients of the mailbox gateway that share nothing with it: one in Python, written from the protocol, and the
+//! ETG.1510 client of others; tshark judges what the first one exchanged.
 
 use std::path::Path;
 use std::process::Command;

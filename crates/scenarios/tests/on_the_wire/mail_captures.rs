@@ -1,7 +1,7 @@
 //! Mail in captures, judged from the file alone by `ci/check-mail` on what tshark reads: counters, requests that a
 //! SubDevice could act on twice, and the same start-up list at each of a hundred power cycles. The captures come from
-//! virtual time; those that were tampered with, and one of a SubDevice that sends its mail twice, show that the script sees
-//! what it looks for.
+//! virtual time; those that were tampered with, and one of a SubDevice that sends its mail twice, show that the script
+//! sees what it looks for.
 
 use std::path::{Path, PathBuf};
 use std::process::Command;

@@ -1,5 +1,5 @@
-//! Distributed clocks while the segment changes: rings behind junctions, groups that come and go, trees, clocks that lose
-//! their power (facts 7.1, 7.5, 9.4).
+//! Distributed clocks while the segment changes: rings behind junctions, groups that come and go, trees, clocks that
+//! lose their power (facts 7.1, 7.5, 9.4).
 
 use std::time::Duration;
 
@@ -164,8 +164,8 @@ fn a_ring_that_was_broken_from_the_start_has_the_delay_of_its_missing_cable_afte
     assert!(world.incomplete(mark) <= 1 && world.left_op(mark).is_empty());
 }
 
-/// Nobody looks for rings behind junctions, and there is one: delays cannot be measured. That is told once, and once more
-/// when the segment has changed; with the ring broken all is well.
+/// Nobody looks for rings behind junctions, and there is one: delays cannot be measured. That is told once, and once
+/// more when the segment has changed; with the ring broken all is well.
 #[test]
 fn a_ring_that_nobody_looks_for_is_told_once_for_each_change_and_clocks_begin_when_it_is_open_facts_7_1_9_4() {
     let mut world = World::with(9, junction_ring(), &Options::default(), |scan| with_clocks(scan, config()))
@@ -364,8 +364,8 @@ fn a_group_that_joins_late_and_then_elsewhere_has_the_delays_and_sync_signals_of
     }
 }
 
-/// Three without a clock; a group of three behind port 3 of the second one brings the first clocks of the segment, and one
-/// SubDevice without a clock between them.
+/// Three without a clock; a group of three behind port 3 of the second one brings the first clocks of the segment, and
+/// one SubDevice without a clock between them.
 #[test]
 fn the_first_clocks_of_a_segment_may_come_with_a_group_and_come_again_facts_7_2() {
     let cables = [

@@ -47,7 +47,8 @@ fn largest_error(world: &World, devices: std::ops::Range<usize>) -> i64 {
 }
 
 fn not_measured(event: &Event) -> bool {
-    matches!(event, Event::ClocksFailed { reason } if reason.contains("process data") || reason.contains("other frames"))
+    matches!(event, Event::ClocksFailed { reason }
+        if reason.contains("process data") || reason.contains("other frames"))
 }
 
 /// Frames leave as soon as the last ones are home, or several cycles are under way all the time: the cyclic half pauses

@@ -1,5 +1,5 @@
-//! Distributed clocks with a host that sends tens of microseconds late at random: a reference that loses its power comes
-//! back to OP, and SYNC0 stays together while cables of a ring go and come (facts 7.2, 7.3, 7.5).
+//! Distributed clocks with a host that sends tens of microseconds late at random: a reference that loses its power
+//! comes back to OP, and SYNC0 stays together while cables of a ring go and come (facts 7.2, 7.3, 7.5).
 
 use std::time::Duration;
 

@@ -150,7 +150,8 @@ fn the_first_that_is_configured_is_the_reference_where_that_is_wanted() {
     assert_eq!(references.iter().map(|clock| clock.is_reference).collect::<Vec<_>>(), [false, true, false, false]);
 }
 
-/// The first clock leads all others though nobody declares its SubDevice, which is left in the state in which it was found.
+/// The first clock leads all others though nobody declares its SubDevice, which is left in the state in which it was
+/// found.
 #[test]
 fn a_reference_that_nobody_declares_is_followed_and_left_alone_facts_7_2() {
     let network = line(clocked(3, 30), NetworkOptions::default());

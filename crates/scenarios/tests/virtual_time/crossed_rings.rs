@@ -1,5 +1,5 @@
-//! Rings in which SubDevices are plugged in the wrong way round, all of them where the two interfaces are swapped: what is
-//! told of them and of their breaks (facts 9.5, CR-12).
+//! Rings in which SubDevices are plugged in the wrong way round, all of them where the two interfaces are swapped: what
+//! is told of them and of their breaks (facts 9.5, CR-12).
 
 use std::collections::BTreeMap;
 use std::time::Duration;

@@ -1,8 +1,9 @@
 //! Odd SII images, many of them: made by a seeded generator from those of the catalogue, and from those of real devices
 //! where `../shared/data` lies beside the repository.
 //!
-//! One SubDevice of four has such an image. It comes to OP with complete working counters, or the reason is told of it; all
-//! others are in OP and exchange process data whatever it has. `SEED` and `VARIANTS` choose others, and how many per image.
+//! One SubDevice of four has such an image. It comes to OP with complete working counters, or the reason is told of it;
+//! all others are in OP and exchange process data whatever it has. `SEED` and `VARIANTS` choose others, and how many
+//! per image.
 
 use std::path::Path;
 use std::time::Duration;
@@ -215,8 +216,8 @@ fn judge_all(sound: &DeviceDescription, seed: u64, count: u64, tally: &mut Tally
 
 fn finish(tally: &Tally, what: &str) {
     println!(
-        "{what}: {} in OP and complete, {} with the reason from the SII, {} with the reason from the SubDevice, {} make no \
-         device; {} warned of",
+        "{what}: {} in OP and complete, {} with the reason from the SII, {} with the reason from the SubDevice, {} \
+         make no device; {} warned of",
         tally.complete, tally.refused, tally.by_device, tally.no_device, tally.warned
     );
     for what in &tally.disagree {

@@ -1,8 +1,8 @@
-//! Any interleaving of protocols, losses, faults of mail, cut cables and power cycles, by seed: no answer reaches another
-//! question, everything ends in bounded time, and nothing stays behind, neither in mailboxes nor among procedures and
-//! datagrams. Beside the procedures a request of the cyclic thread, a client of the gateway and a host that downloads through
-//! the Ethernet port use each device. A list of a drive has a check sum in it: of fragments that a device takes and
-//! forgets, nothing else tells.
+//! Any interleaving of protocols, losses, faults of mail, cut cables and power cycles, by seed: no answer reaches
+//! another question, everything ends in bounded time, and nothing stays behind, neither in mailboxes nor among
+//! procedures and datagrams. Beside the procedures a request of the cyclic thread, a client of the gateway and a host
+//! that downloads through the Ethernet port use each device. A list of a drive has a check sum in it: of fragments that
+//! a device takes and forgets, nothing else tells.
 
 use std::cell::Cell;
 use std::collections::BTreeMap;
@@ -110,7 +110,8 @@ fn happen(world: &mut World, beside: &mut Beside, dice: &mut Dice, emergencies: 
     }
 }
 
-/// Questions of one kind, one after the other, until it is time to stop; those that were given up in the middle are gone.
+/// Questions of one kind, one after the other, until it is time to stop; those that were given up in the middle are
+/// gone.
 fn start(world: &mut World, device: usize, at: usize, stop: &Rc<Cell<bool>>, tally: &Rc<Tally>) -> Pending<()> {
     let mailbox = world.mailbox(device);
     let bus = mailbox.bus().clone();
@@ -128,7 +129,8 @@ fn start(world: &mut World, device: usize, at: usize, stop: &Rc<Cell<bool>>, tal
     })
 }
 
-/// Downloads through the Ethernet port of a device, one after the other. What breaks off is no failure, other bytes are.
+/// Downloads through the Ethernet port of a device, one after the other. What breaks off is no failure, other bytes
+/// are.
 fn start_downloads(world: &mut World, device: usize, stop: &Rc<Cell<bool>>, tally: &Rc<Tally>) -> Pending<()> {
     let (mailbox, stop, tally) = (world.mailbox(device), stop.clone(), tally.clone());
     let addresses = Addresses { mac: [2, 0, 0, 0, 0, 9], host: [10, 0, 0, 1], device: DEVICE };
@@ -207,8 +209,8 @@ fn run(seed: u64, tally: &Rc<Tally>) {
     tally.answered.set(tally.answered.get() + beside.answered);
     tally.failed.set(tally.failed.get() + beside.failed);
     tally.beside.set(tally.beside.get() + beside.answered + beside.failed);
-    // An error reply does not say to what it belongs (decision 0007): one that is late on purpose would refuse the first
-    // question of whoever asks now.
+    // An error reply does not say to what it belongs (decision 0007): one that is late on purpose would refuse the
+    // first question of whoever asks now.
     world.run_cycles(100);
     // What was lost on purpose and never met its frame would meet the next one.
     all_answer(&mut world, seed);

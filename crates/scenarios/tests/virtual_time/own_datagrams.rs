@@ -1,5 +1,5 @@
-//! Datagrams of the application's own on two links: positions are those of the scan whatever becomes of the ring, and LRW
-//! over several SubDevices is refused, declared or sent by hand.
+//! Datagrams of the application's own on two links: positions are those of the scan whatever becomes of the ring, and
+//! LRW over several SubDevices is refused, declared or sent by hand.
 
 use std::time::Duration;
 
@@ -92,7 +92,8 @@ fn movable() -> Network {
     network
 }
 
-/// Whoever was unplugged, plugged in elsewhere or is new has the position that a rescan has shown, and nobody another one.
+/// Whoever was unplugged, plugged in elsewhere or is new has the position that a rescan has shown, and nobody another
+/// one.
 #[test]
 fn positions_of_an_application_are_those_of_a_rescan_that_took_over_the_cabling_cr_09_cr_17() {
     let declare = |scan: &Scan| {

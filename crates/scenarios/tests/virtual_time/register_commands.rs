@@ -1,5 +1,5 @@
-//! Start-up commands that a configuration file brings: registers that are written and checked, objects that are read, time
-//! limits and comments (facts 8.2).
+//! Start-up commands that a configuration file brings: registers that are written and checked, objects that are read,
+//! time limits and comments (facts 8.2).
 
 use std::time::Duration;
 

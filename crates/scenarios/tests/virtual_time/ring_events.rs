@@ -234,7 +234,8 @@ fn a_cable_that_flaps_at_any_rate_floods_nobody_and_changes_no_state() {
         assert_eq!(world.left_op(mark), [], "{micros} us");
         assert!(!world.saw(mark, |event| matches!(event, Event::Lost { .. })), "{micros} us");
         let changes = (lasts.as_nanos() / half_period.as_nanos()) as usize + 1;
-        // Ring, place, redundancy and carrier for each of 32 changes and four more a second, or of all if they are fewer.
+        // Ring, place, redundancy and carrier for each of 32 changes and four more a second, or of all if they are
+        // fewer.
         let most = 4 * changes.min(32 + 4 * (lasts.as_millis() as usize / 1000 + 1)) + 2;
         assert!(told <= most, "{micros} us: {told} of {most}");
         assert_eq!(world.application().ring_status().redundancy, Redundancy::Ready);

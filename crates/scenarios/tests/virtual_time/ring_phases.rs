@@ -19,8 +19,8 @@ fn cables(count: usize, cables: impl Iterator<Item = usize> + Clone) -> usize {
         }
     }
     println!(
-        "ring of {count}: {runs} runs, at cut and repair {worst:?} incomplete cycles at the most, {compared} bytes as in \
-         the twin, outputs taken over once per cycle {taken} times"
+        "ring of {count}: {runs} runs, at cut and repair {worst:?} incomplete cycles at the most, {compared} bytes as \
+         in the twin, outputs taken over once per cycle {taken} times"
     );
     assert!(compared > 0 && taken > 0);
     runs

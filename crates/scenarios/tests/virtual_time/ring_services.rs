@@ -1,5 +1,5 @@
-//! Everything goes on while a ring is broken: mailboxes, registers, EEPROMs, state changes, those that lose their power or
-//! appear for the first time, start and stop; LRW where it is allowed.
+//! Everything goes on while a ring is broken: mailboxes, registers, EEPROMs, state changes, those that lose their power
+//! or appear for the first time, start and stop; LRW where it is allowed.
 
 use std::time::Duration;
 
@@ -270,8 +270,8 @@ fn an_lrw_that_a_file_names_is_refused_on_two_links_with_its_name_and_one_per_su
     };
     let several = || declare(vec![named(&[1]), named(&[2, 3])]);
     let error = World::with(0, segment(), &Options::default(), several()).expect_err("it was taken").to_string();
-    let expected = "frame 1, command 2 \"cyclic cmd\": an LRW at logical address 0x01000000 of 12 bytes for declarations [2, 3] \
-                    cannot be used with two links";
+    let expected = "frame 1, command 2 \"cyclic cmd\": an LRW at logical address 0x01000000 of 12 bytes for \
+                    declarations [2, 3] cannot be used with two links";
     assert!(error.contains(expected), "{error}");
     // On one link nothing speaks against it.
     let line = scenarios::segments::line(descriptions(&KINDS), NetworkOptions::default());

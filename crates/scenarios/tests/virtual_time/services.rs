@@ -39,8 +39,8 @@ fn error_counters_are_kept_beyond_255_on_a_period_and_read_and_cleared_on_demand
     world.run_cycles(50);
     let before = world.application().engine().statistics(2).expect("it is declared");
     assert!(before.is_clean() && before.readings >= 2, "{before:?}");
-    // Frames on the cable before the third one, in both directions: it sees those that come, its neighbour those that go
-    // back.
+    // Frames on the cable before the third one, in both directions: it sees those that come, its neighbour those that
+    // go back.
     for _ in 0..40 {
         world.corrupt(CableId(2), 10);
         world.run_cycles(25);

@@ -130,8 +130,8 @@ fn a_command_that_travels_again_because_its_answer_was_lost_is_refused_and_does_
         let mut dice = Dice::new(seed);
         let busy = Duration::from_micros(*dice.pick(&[500, 3_000, 8_000]));
         let mut lost = 0;
-        // One in four answers to frames with a command to the EEPROM is lost: the same command comes once more while the
-        // EEPROM is busy with it or has done it.
+        // One in four answers to frames with a command to the EEPROM is lost: the same command comes once more while
+        // the EEPROM is busy with it or has done it.
         let links = Meddled::new(network(vec![terminal(busy); 2]), LIMIT, |bytes| {
             let is_command = |it: &Header| it.command == Command::Fpwr && it.address >> 16 == map::SII_CONTROL.0.into();
             let frame = Frame::parse(bytes);

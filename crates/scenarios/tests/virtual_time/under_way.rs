@@ -98,8 +98,8 @@ impl Stamped {
         stamped
     }
 
-    /// How old inputs are that count as fresh. Devices compute theirs after each exchange, so whoever was out of reach has
-    /// old ones for the frames that find it again.
+    /// How old inputs are that count as fresh. Devices compute theirs after each exchange, so whoever was out of reach
+    /// has old ones for the frames that find it again.
     fn look_at_all(&mut self, now: u8) {
         let exchange = self.world.application().exchange();
         for input in &mut self.inputs {
@@ -240,8 +240,8 @@ fn whatever_is_lost_or_broken_inputs_never_become_older_and_afterwards_all_is_co
     }
 }
 
-/// Rings behind junctions break and are mended, one cable or two at once, on one link and on two: at most what is under way
-/// is lost, and inputs that count as fresh are no older than that.
+/// Rings behind junctions break and are mended, one cable or two at once, on one link and on two: at most what is under
+/// way is lost, and inputs that count as fresh are no older than that.
 #[test]
 fn breaks_behind_junctions_cost_at_most_the_cycles_that_are_under_way_and_no_old_input_counts_as_fresh_jr_02() {
     let kinds = ["digital-input-8", "junction", "digital-input-8", "digital-input-16", "digital-input-8"];

@@ -260,7 +260,8 @@ impl Servo {
         self.state = match (self.state, self.command) {
             (DriveState::OperationEnabled, DriveCommand::SwitchOn) => DriveState::SwitchedOn, // 5
             (DriveState::OperationEnabled, DriveCommand::Shutdown) => DriveState::ReadyToSwitchOn, // 8
-            (DriveState::QuickStopActive, _) if self.parameters.quick_stop_option < 5 => DriveState::SwitchOnDisabled, // 12
+            // 12
+            (DriveState::QuickStopActive, _) if self.parameters.quick_stop_option < 5 => DriveState::SwitchOnDisabled,
             (DriveState::FaultReactionActive, _) => DriveState::Fault, // 14
             (state, _) => state,
         };

@@ -1,4 +1,5 @@
-//! What comes late: fragments of an answer that nobody waits for any more, and error replies that may be to something else.
+//! What comes late: fragments of an answer that nobody waits for any more, and error replies that may be to something
+//! else.
 
 use alloc::vec;
 use alloc::vec::Vec;

@@ -1,5 +1,5 @@
-//! Connections that are declared and are not there (JR-05, JR-06): they are refused, whatever open ports allow, and those that
-//! are there are not.
+//! Connections that are declared and are not there (JR-05, JR-06): they are refused, whatever open ports allow, and
+//! those that are there are not.
 
 use ringcat::{ActivateError, Error, JunctionConnection, JunctionError, JunctionMode, Options, automatic};
 use ringcat_sim::cable::{CableId, Endpoint};

@@ -268,7 +268,8 @@ fn a_group_in_a_local_ring_is_a_piece_of_it_and_when_it_has_left_no_more_jr_07_c
     }
 }
 
-/// Broken and whole again, once each, the latter with its true place, however the break and the look at the segment meet.
+/// Broken and whole again, once each, the latter with its true place, however the break and the look at the segment
+/// meet.
 #[test]
 fn a_break_at_the_moment_of_a_groups_join_is_told_once_jr_07() {
     for (number, cable) in [4, 3, 5, 4, 6, 2].into_iter().enumerate() {

@@ -74,8 +74,8 @@ pub fn ends_of_two(cable: usize) -> (PortOf, PortOf) {
     (PortOf { node: near, port }, PortOf { node: far, port: 0 })
 }
 
-/// Both breaks of two rings come within one cycle, so that no frame can tell where. Nothing comes back, and that is said;
-/// then each ring is looked into while the other one is left out.
+/// Both breaks of two rings come within one cycle, so that no frame can tell where. Nothing comes back, and that is
+/// said; then each ring is looked into while the other one is left out.
 #[test]
 fn two_rings_that_break_at_once_are_told_as_blocked_and_both_with_their_places_jr_02() {
     let apart = [Duration::ZERO, Duration::from_micros(3), Duration::from_micros(400)];
@@ -280,8 +280,8 @@ fn a_local_ring_in_a_ring_of_two_links_goes_on_with_one_break_anywhere_jr_02() {
     }
 }
 
-/// Enhanced detection opens the ring of two links for a moment whenever ports change, and finds nobody crossed in a local ring
-/// that is entered from behind.
+/// Enhanced detection opens the ring of two links for a moment whenever ports change, and finds nobody crossed in a
+/// local ring that is entered from behind.
 #[test]
 fn a_local_ring_that_breaks_is_no_crossed_line_for_enhanced_detection_either_lc_03_lc_06() {
     let strict = JunctionConnection { head: 1, head_port: 1, tail: 3, tail_port: 1 };
