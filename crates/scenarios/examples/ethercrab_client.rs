@@ -69,6 +69,10 @@ fn connect(interface: &str, config: MainDeviceConfig) -> Result<Arc<MainDevice<'
     Ok(main_device)
 }
 
+fn hex(bytes: &[u8]) -> String {
+    bytes.iter().map(|byte| format!("{byte:02x}")).collect()
+}
+
 /// Becomes true when the standard input ends.
 fn end_of_input() -> Arc<AtomicBool> {
     let ended = Arc::new(AtomicBool::new(false));
@@ -121,10 +125,7 @@ async fn run(interface: &str, count: usize, cycles: usize, config: MainDeviceCon
         group.tx_rx(&main_device).await.map_err(failed("process data"))?;
     }
     let per_second = cycles as f64 / back_to_back.elapsed().as_secs_f64().max(f64::EPSILON);
-    let inputs: Vec<String> = group
-        .iter(&main_device)
-        .map(|subdevice| subdevice.inputs_raw().iter().map(|byte| format!("{byte:02x}")).collect())
-        .collect();
+    let inputs: Vec<String> = group.iter(&main_device).map(|subdevice| hex(&subdevice.inputs_raw())).collect();
     let delays: Vec<String> =
         group.iter(&main_device).map(|subdevice| subdevice.propagation_delay().to_string()).collect();
     round_trips.sort();

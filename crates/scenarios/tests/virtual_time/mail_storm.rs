@@ -201,11 +201,7 @@ fn run(seed: u64, tally: &Rc<Tally>) {
         world.finish(END, work);
     }
     world.settle();
-    let until = world.application().now() + END;
-    while !beside.stop(&mut world) {
-        assert!(world.application().now() < until, "seed {seed}: {beside:?}");
-        world.cycle();
-    }
+    end(&mut beside, &mut world, seed);
     tally.answered.set(tally.answered.get() + beside.answered);
     tally.failed.set(tally.failed.get() + beside.failed);
     tally.beside.set(tally.beside.get() + beside.answered + beside.failed);
@@ -222,6 +218,15 @@ fn run(seed: u64, tally: &Rc<Tally>) {
     );
     each_emergency_came_once(&world, seed, emergencies, tally);
     mailboxes_are_idle(&world, seed);
+}
+
+/// What goes on beside the storm ends.
+fn end(beside: &mut Beside, world: &mut World, seed: u64) {
+    let until = world.application().now() + END;
+    while !beside.stop(world) {
+        assert!(world.application().now() < until, "seed {seed}: {beside:?}");
+        world.cycle();
+    }
 }
 
 /// Every kind of question is answered by every device that serves it.
