@@ -181,8 +181,9 @@ impl JunctionConnection {
 mod tests {
     use super::*;
 
+    // covers: JR-06
     #[test]
-    fn connections_have_their_head_at_port_1_and_their_tail_at_another_port_than_0_jr_06() {
+    fn connections_have_their_head_at_port_1_and_their_tail_at_another_port_than_0() {
         let good = JunctionConnection { head: 1, head_port: 1, tail: 4, tail_port: 1 };
         assert_eq!(good.check(&[], 5), Ok(()));
         let head = |head_port| JunctionConnection { head_port, ..good };

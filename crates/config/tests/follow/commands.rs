@@ -147,8 +147,9 @@ fn sync_signals_come_from_the_registers_and_the_shift_from_the_element_facts_7_3
     assert!(drive(&changed(&[("<Data>0007</Data>", "<Data>0000</Data>")])).sync.is_none());
 }
 
+// covers: facts 8.1
 #[test]
-fn commands_through_the_mailbox_become_start_up_commands_in_document_order_facts_8_1() {
+fn commands_through_the_mailbox_become_start_up_commands_in_document_order() {
     let drive = drive(&configured(SMALL));
     let mail: Vec<_> = drive.startup.iter().filter(|c| !matches!(c.action, StartupAction::Register(_))).collect();
     let sdo = |sub_index, complete_access, data: &[u8]| {
@@ -271,8 +272,9 @@ fn addresses_are_hexadecimal_have_points_or_are_the_message_itself_facts_6_5() {
 }
 
 /// Facts 8.2: PO is among the transitions; OP is reached through SAFEOP.
+// covers: facts 8.2
 #[test]
-fn a_way_over_two_transitions_is_sent_at_the_one_that_is_listed_too_or_noted_facts_8_2() {
+fn a_way_over_two_transitions_is_sent_at_the_one_that_is_listed_too_or_noted() {
     let own = "<Transition>PS</Transition><Transition>OP</Transition>";
     let both = changed(&[(own, "<Transition>PO</Transition><Transition>PS</Transition><Transition>OP</Transition>")]);
     let transitions = |configuration: &ringcat_config::Configuration| -> Vec<Transition> {

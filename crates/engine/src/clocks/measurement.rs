@@ -216,8 +216,9 @@ mod tests {
         assert_eq!(empty(1).mean(3), [None]);
     }
 
+    // covers: facts 7.1
     #[test]
-    fn a_port_that_latched_another_frame_and_a_clock_that_latched_none_are_found_facts_7_1() {
+    fn a_port_that_latched_another_frame_and_a_clock_that_latched_none_are_found() {
         let first = [latched(1_000, 700), latched(5_000, 300)];
         let mut measurements = of(2, [first, [latched(2_000_000, 690), latched(2_004_100, 320)]]);
         assert_eq!(measurements.disagreement(0), None);

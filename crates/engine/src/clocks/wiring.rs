@@ -207,8 +207,9 @@ mod tests {
         wiring.way(tree).iter().map(|arrival| (arrival.at.node, arrival.at.port, arrival.processed)).collect()
     }
 
+    // covers: facts 9.4
     #[test]
-    fn a_frame_goes_round_a_local_ring_once_and_back_and_forth_through_a_broken_one_facts_9_4() {
+    fn a_frame_goes_round_a_local_ring_once_and_back_and_forth_through_a_broken_one() {
         let whole = Wiring::new(&junction(), false, |_| true);
         let round =
             [(0, 0, true), (1, 0, true), (2, 0, true), (3, 0, true), (0, 1, false), (4, 0, true), (0, 2, false)];
@@ -235,8 +236,9 @@ mod tests {
         assert_eq!(broken.entry_ports(), [0, 0, 1, 1, 0]);
     }
 
+    // covers: facts 2.9
     #[test]
-    fn frames_of_both_links_pass_a_closed_ring_and_a_branch_on_port_2_is_met_by_one_facts_2_9() {
+    fn frames_of_both_links_pass_a_closed_ring_and_a_branch_on_port_2_is_met_by_one() {
         // S1, S2 with S5 on port 2, S3.
         let mut topology = Topology { nodes: vec![Node::default(); 4], main_count: 3, ..Topology::default() };
         for (parent, port, child) in [(0, 1, 1), (1, 1, 2), (1, 2, 3)] {

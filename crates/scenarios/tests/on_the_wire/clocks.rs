@@ -201,8 +201,9 @@ fn check_capture(path: &Path, clocks: usize) {
     assert!(output.status.success() && text.contains(&format!("judged: {clocks} delays")), "{text}{errors}");
 }
 
+// covers: facts 7.3, facts 7.4
 #[test]
-fn clocks_on_interfaces_lock_start_their_signals_and_cycles_follow_them_facts_7_3_facts_7_4() {
+fn clocks_on_interfaces_lock_start_their_signals_and_cycles_follow_them() {
     let Some(mut bench) = Bench::new(1) else { return };
     bench.simulate(LINE, false);
     let plot = file("plot.svg");

@@ -58,8 +58,9 @@ fn watch(bench: &Bench, groups: [&[usize]; 3]) -> [i64; 3] {
     worst
 }
 
+// covers: facts 7.5
 #[test]
-fn clocks_of_a_ring_on_two_interfaces_stay_together_when_cables_go_and_come_facts_7_5() {
+fn clocks_of_a_ring_on_two_interfaces_stay_together_when_cables_go_and_come() {
     let Some(mut bench) = Bench::new(2) else { return };
     bench.simulate(RING, true);
     let run = bench.run_ringcat(&["clocks", "--main", "main0", "--redundant", "main1", "--for", "60s"]);

@@ -164,8 +164,9 @@ fn written(capture: &Capture) -> Vec<Vec<(usize, usize)>> {
     mails
 }
 
+// covers: facts 6.1
 #[test]
-fn mail_of_a_hundred_power_cycles_counts_on_and_brings_the_same_list_each_time_facts_6_1() {
+fn mail_of_a_hundred_power_cycles_counts_on_and_brings_the_same_list_each_time() {
     if !has_tshark() {
         return;
     }

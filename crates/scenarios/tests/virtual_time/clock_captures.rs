@@ -127,8 +127,9 @@ impl Drop for Cases {
 }
 
 /// As often as declared (here 100 times), eight at a time, while states change.
+// covers: facts 7.2
 #[test]
-fn the_static_drift_phase_is_as_long_as_declared_in_bursts_beside_the_start_up_facts_7_2() {
+fn the_static_drift_phase_is_as_long_as_declared_in_bursts_beside_the_start_up() {
     let path = file();
     recorded(&Options::default(), line(clocked(3, 50), NetworkOptions::default()), &path, |run| cycles(run, 20));
     let capture = Capture::parse(&std::fs::read(&path).expect("a capture")).expect("a capture");
@@ -180,8 +181,9 @@ fn written_delays_and_offsets_are_those_that_a_capture_gives_facts_7_1_facts_7_2
     cases.judge();
 }
 
+// covers: facts 7.5
 #[test]
-fn clocks_of_a_ring_that_breaks_and_of_a_subdevice_that_returns_keep_their_delays_facts_7_5() {
+fn clocks_of_a_ring_that_breaks_and_of_a_subdevice_that_returns_keep_their_delays() {
     let mut cases = Cases::default();
     let network = ring(clocked(8, 100), NetworkOptions::default());
     cases.fine("ring that breaks", network, "judged: 21 delays", |run| {

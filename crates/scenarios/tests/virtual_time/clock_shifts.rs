@@ -29,8 +29,9 @@ fn with_bus_shift_the_reference_follows_the_host_facts_7_4() {
     assert!(spread(network, &all(5)) <= 200);
 }
 
+// covers: facts 7.4
 #[test]
-fn the_reference_follows_the_time_of_the_application_and_is_led_to_a_given_time_facts_7_4() {
+fn the_reference_follows_the_time_of_the_application_and_is_led_to_a_given_time() {
     // The application's time runs 30 ppm faster than the host's.
     let time = |world: &World| {
         let host = world.application().now().0;

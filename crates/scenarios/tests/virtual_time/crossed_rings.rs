@@ -102,8 +102,9 @@ fn breaks_of_a_ring_with_any_crossed_subdevices_have_their_right_place_and_each_
     }
 }
 
+// covers: CR-19, LC-05
 #[test]
-fn a_ring_with_crossed_subdevices_that_is_broken_from_the_start_is_told_as_it_is_cr_19_lc_05() {
+fn a_ring_with_crossed_subdevices_that_is_broken_from_the_start_is_told_as_it_is() {
     for crossed in 0..=ALL {
         let cables = cables(crossed);
         for (number, cable) in cables.iter().enumerate() {
@@ -152,8 +153,9 @@ fn sorted(mut ends: Ends) -> Ends {
     ends
 }
 
+// covers: CR-12
 #[test]
-fn places_in_random_rings_with_branches_and_crossed_subdevices_are_right_or_unknown_cr_12() {
+fn places_in_random_rings_with_branches_and_crossed_subdevices_are_right_or_unknown() {
     let seeds = std::env::var("RINGCAT_SEEDS").ok().and_then(|it| it.parse().ok()).unwrap_or(60);
     let (mut known, mut unknown, mut wrong) = (0, 0, Vec::new());
     for seed in 0..seeds {

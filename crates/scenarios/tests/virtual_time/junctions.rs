@@ -163,8 +163,9 @@ fn unknown(world: &World, mark: Mark) -> Vec<usize> {
     world.events(mark).iter().filter_map(rings).collect()
 }
 
+// covers: JR-03, JR-09
 #[test]
-fn a_ring_that_closes_after_the_scan_is_told_as_unknown_unless_it_was_declared_jr_03_jr_09() {
+fn a_ring_that_closes_after_the_scan_is_told_as_unknown_unless_it_was_declared() {
     for (setting, expected) in [
         ((JunctionMode::Automatic, &[][..]), vec![1]),
         ((JunctionMode::Strict, &[STRICT]), vec![]),

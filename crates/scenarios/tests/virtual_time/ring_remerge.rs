@@ -122,8 +122,9 @@ fn remerged(capture: &Path, images: &Path, seed: u64) -> Option<(usize, usize)> 
     numbers.next().zip(numbers.next())
 }
 
+// covers: CR-05, CR-06, CR-07, facts 9.3
 #[test]
-fn a_merge_written_apart_comes_to_the_same_inputs_and_the_same_incomplete_cycles_cr_05_cr_06_cr_07_facts_9_3() {
+fn a_merge_written_apart_comes_to_the_same_inputs_and_the_same_incomplete_cycles() {
     let (mut compared, mut incomplete) = (0, 0);
     for seed in 0..12 {
         let capture: PathBuf =

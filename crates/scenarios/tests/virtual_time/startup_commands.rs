@@ -91,8 +91,9 @@ fn expected() -> Vec<(AlState, String, Vec<u8>)> {
     all
 }
 
+// covers: facts 5.2
 #[test]
-fn objects_and_idns_are_written_at_their_transitions_in_the_declared_order_facts_5_2() {
+fn objects_and_idns_are_written_at_their_transitions_in_the_declared_order() {
     let mut world = world(segment(|_| ()), many);
     world.settle();
     assert_eq!(written(&world), expected());

@@ -16,8 +16,9 @@ use super::second_breaks::{ends_of_two, two_rings};
 use super::{change, in_op, told};
 
 /// Junctions are told with one order what to do about all of their ports: one that the application had closed stays so.
+// covers: facts 2.2
 #[test]
-fn a_port_that_is_closed_on_purpose_stays_closed_while_rings_are_looked_into_facts_2_2() {
+fn a_port_that_is_closed_on_purpose_stays_closed_while_rings_are_looked_into() {
     for by_name in [false, true] {
         let mut world = in_op(43, two_rings(), (JunctionMode::Automatic, &[]));
         let engine = world.application_mut().engine_mut();

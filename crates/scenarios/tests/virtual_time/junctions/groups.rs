@@ -207,8 +207,9 @@ const WITH_GROUP: [Option<usize>; 7] = [Some(0), Some(1), Some(2), Some(5), Some
 const WITHOUT_GROUP: [Option<usize>; 5] = [Some(0), Some(1), Some(2), Some(3), Some(4)];
 
 /// By itself, and otherwise when somebody asks for a rescan.
+// covers: JR-07, CR-17
 #[test]
-fn a_group_in_a_local_ring_is_a_piece_of_it_and_when_it_has_left_no_more_jr_07_cr_17() {
+fn a_group_in_a_local_ring_is_a_piece_of_it_and_when_it_has_left_no_more() {
     let asked = SETTINGS.map(|setting| (false, setting));
     for (seed, (follow, (two_links, setting))) in
         (20..).zip(asked.into_iter().chain([1, 2].map(|it| (true, SETTINGS[it]))))
