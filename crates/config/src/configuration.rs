@@ -1,8 +1,8 @@
 //! What follows from a configuration file: a declaration for the engine, the process image as the file lays it out, and
 //! what of the file is not followed.
 //!
-//! The image is the application's view. On the wire process data lies as the engine lays it out, byte-aligned and at its
-//! own logical addresses; [`ImageArea`] says which bits of which SyncManager are which bits of the image.
+//! The image is the application's view. On the wire process data lies as the engine lays it out, byte-aligned and at
+//! its own logical addresses; [`ImageArea`] says which bits of which SyncManager are which bits of the image.
 
 use std::fmt;
 use std::time::Duration;

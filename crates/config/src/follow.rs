@@ -1,9 +1,10 @@
-//! From the model of an ENI to a [`Configuration`]: the file is the authority about what is configured, RingCAT decides how
-//! it gets there (docs/decisions/0022).
+//! From the model of an ENI to a [`Configuration`]: the file is the authority about what is configured, RingCAT decides
+//! how it gets there (docs/decisions/0022).
 //!
-//! The commands of a SubDevice are classified by register. Those that a MainDevice sends by itself (addresses, AL control,
-//! EEPROM, FMMUs, delays and offsets of clocks) are held against the rest of the file and not sent; SyncManagers, watchdogs
-//! and SYNC signals become declarations; what is left is sent as it is, or named in the notices.
+//! The commands of a SubDevice are classified by register. Those that a MainDevice sends by itself (addresses, AL
+//! control, EEPROM, FMMUs, delays and offsets of clocks) are held against the rest of the file and not sent;
+//! SyncManagers, watchdogs and SYNC signals become declarations; what is left is sent as it is, or named in the
+//! notices.
 
 mod areas;
 mod assignment;
@@ -14,24 +15,23 @@ mod groups;
 mod identity;
 mod image;
 mod mail;
+mod messages;
 mod notices;
 mod registers;
 mod subdevice;
 mod sync_managers;
+mod transitions;
 
 use ringcat_engine::main_device::Declaration;
 
 use crate::configuration::{Configuration, SubDeviceFacts};
-use crate::eni::{Contradiction, Eni, EniError, Place, Problem};
+use crate::eni::{Eni, EniError};
 use notices::Notices;
-
-/// Bytes of an image, at most.
-const MAX_IMAGE: usize = 16 << 20;
 
 /// Turns a file into what the engine needs.
 ///
-/// An error names what would make a wrong network: contradictions in the file, or what RingCAT cannot do. What is merely
-/// not followed is in [`Configuration::notices`].
+/// An error names what would make a wrong network: contradictions in the file, or what RingCAT cannot do. What is
+/// merely not followed is in [`Configuration::notices`].
 pub fn follow(eni: &Eni) -> Result<Configuration, EniError> {
     let mut notices = Notices::default();
     let bus = bus::Bus::of(eni, &mut notices)?;
@@ -61,28 +61,4 @@ pub fn follow(eni: &Eni) -> Result<Configuration, EniError> {
     };
     let subdevices = facts.collect();
     Ok(Configuration { declaration, subdevices, groups, image, cycle: cyclic.cycle, notices: notices.into_list(eni) })
-}
-
-/// An error about a SubDevice, or about what is in it.
-fn contradiction(
-    eni: &Eni,
-    subdevice: usize,
-    place: Place,
-    what: impl Into<String>,
-    expected: impl Into<String>,
-    got: impl Into<String>,
-    hint: &str,
-) -> EniError {
-    let contradiction =
-        Contradiction { what: what.into(), expected: expected.into(), got: got.into(), hint: hint.to_owned() };
-    let problem = Problem::Contradiction(Box::new(contradiction));
-    EniError { place: Some(place), element: label(eni, subdevice), problem }
-}
-
-/// A SubDevice in messages: `Slave 2 "EL2008" (PhysAddr 1002)`.
-fn label(eni: &Eni, subdevice: usize) -> String {
-    let number = subdevice + 1;
-    let Some(found) = eni.subdevices.get(subdevice) else { return format!("Slave {number}") };
-    let station = found.station.map(|station| format!(" (PhysAddr {station})")).unwrap_or_default();
-    format!("Slave {number} {}{station}", crate::eni::quoted(&found.name))
 }

@@ -1,9 +1,10 @@
 //! What the two halves of the engine tell each other without a queue: the latest value of a few words.
 //!
-//! The exchange posts what its supervision datagram saw and the state of the ring; the supervisor posts which SubDevices
-//! take part in process data. Readers look at the latest value, so nothing is lost when they are slow.
+//! The exchange posts what its supervision datagram saw and the state of the ring; the supervisor posts which
+//! SubDevices take part in process data. Readers look at the latest value, so nothing is lost when they are slow.
 
 pub mod clocks;
+mod rest;
 pub mod traffic;
 
 use alloc::vec::Vec;
@@ -180,8 +181,8 @@ impl Board {
         self.set(&self.excused, subdevice, excused);
     }
 
-    /// Says whether a SubDevice, whose FMMUs are set, has still to be seen to give its inputs: until then it is not counted on
-    /// for what its state lets it add to a working counter.
+    /// Says whether a SubDevice, whose FMMUs are set, has still to be seen to give its inputs: until then it is not
+    /// counted on for what its state lets it add to a working counter.
     pub fn set_unproven(&self, subdevice: usize, unproven: bool) {
         self.set(&self.unproven, subdevice, unproven);
     }
@@ -237,7 +238,8 @@ impl Board {
         CyclicFrames { sent: self.frames[0].load(Ordering::Relaxed), lost: self.frames[1].load(Ordering::Relaxed) }
     }
 
-    /// A datagram with process data of a SubDevice that takes part came back with a wrong working counter, or not at all.
+    /// A datagram with process data of a SubDevice that takes part came back with a wrong working counter, or not at
+    /// all.
     pub(crate) fn count_wkc_error(&self, subdevice: usize) {
         if let Some(counter) = self.wkc_errors.get(subdevice) {
             // Single writer.
@@ -245,8 +247,8 @@ impl Board {
         }
     }
 
-    /// How many datagrams with process data of a SubDevice, while it took part, came back with a working counter that is
-    /// not that of all who take part, or did not come back; goes on at 0 behind the largest number.
+    /// How many datagrams with process data of a SubDevice, while it took part, came back with a working counter that
+    /// is not that of all who take part, or did not come back; goes on at 0 behind the largest number.
     pub fn wkc_errors(&self, subdevice: usize) -> u32 {
         self.wkc_errors.get(subdevice).map_or(0, |counter| counter.load(Ordering::Relaxed))
     }

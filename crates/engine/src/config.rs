@@ -10,7 +10,10 @@ mod clocks;
 mod declared;
 mod groups;
 mod ip;
+mod matching;
+mod pdo;
 mod register;
+mod resolution;
 mod resolve;
 mod startup;
 mod sync_modes;
@@ -30,12 +33,14 @@ pub use declared::{DeclaredSyncManager, SyncManagerRole};
 pub(crate) use groups::can_lead;
 pub use groups::{Group, groups};
 pub use ip::IpSettings;
+pub use pdo::{PdoAssignment, PdoEntry, PdoMapping};
 pub use register::{RegisterAccess, RegisterCommand};
 pub use startup::{IdnWrite, SdoDownload, SdoUpload, StartupAction, StartupCommand, Transition};
 pub use timeouts::{StateTimeout, Timeouts};
 
 pub use clocks::{ClockConfig, Passage, ReferenceClock, SyncSignals};
-pub use resolve::{ConfigError, DuplicateAlias, Resolution, duplicate_aliases, resolve};
+pub use resolution::{ConfigError, Resolution};
+pub use resolve::{DuplicateAlias, duplicate_aliases, resolve};
 pub use sync_modes::ModeError;
 
 /// Who is expected; `None` matches any value.
@@ -97,37 +102,6 @@ pub struct SyncManagerOverride {
     pub watchdog: Watchdog,
 }
 
-/// An entry of a PDO mapping.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub struct PdoEntry {
-    /// Index of the object; 0 is a gap.
-    pub index: u16,
-    /// Subindex of the object.
-    pub sub_index: u8,
-    /// Bits.
-    pub bit_length: u8,
-}
-
-/// A PDO and what it maps.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct PdoMapping {
-    /// Index of the PDO mapping object.
-    pub index: u16,
-    /// Its entries; `None` takes those of the SII.
-    pub entries: Option<Vec<PdoEntry>>,
-}
-
-/// The PDOs of one SyncManager.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct PdoAssignment {
-    /// The SyncManager.
-    pub sync_manager: u8,
-    /// Its direction.
-    pub direction: Direction,
-    /// Its PDOs in order; none switches it off.
-    pub pdos: Vec<PdoMapping>,
-}
-
 /// What the application declares about one SubDevice. The default expects anybody at position 0, with everything else
 /// from the SII.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -144,11 +118,12 @@ pub struct SubDeviceConfig {
     pub sync_managers: Vec<SyncManagerOverride>,
     /// PDOs of the SyncManagers named here; the others, and all where this is `None`, are as in the SII.
     pub pdos: Option<Vec<PdoAssignment>>,
-    /// All its SyncManagers as a configuration file writes them; `None` takes them from the SII. With them `sync_managers`
-    /// and `pdos` do not count, nothing is assigned or mapped, and the file's mailboxes take the place of the SII's.
+    /// All its SyncManagers as a configuration file writes them; `None` takes them from the SII. With them
+    /// `sync_managers` and `pdos` do not count, nothing is assigned or mapped, and the file's mailboxes take the place
+    /// of the SII's.
     pub declared: Option<Vec<DeclaredSyncManager>>,
-    /// Its mailboxes in BOOT as a configuration file writes them, first the one that the MainDevice writes; `None` takes
-    /// them from the SII.
+    /// Its mailboxes in BOOT as a configuration file writes them, first the one that the MainDevice writes; `None`
+    /// takes them from the SII.
     pub declared_bootstrap: Option<[DeclaredSyncManager; 2]>,
     /// Register WATCHDOG_DIVIDER.
     pub watchdog_divider: Option<u16>,
@@ -197,25 +172,6 @@ impl Default for SubDeviceConfig {
             state_timeouts: Vec::new(),
             target: AlState::Op,
         }
-    }
-}
-
-impl PdoMapping {
-    /// A PDO with the entries that the SII gives it.
-    pub fn from_sii(index: u16) -> PdoMapping {
-        PdoMapping { index, entries: None }
-    }
-
-    /// A PDO with these entries.
-    pub fn of(index: u16, entries: impl Into<Vec<PdoEntry>>) -> PdoMapping {
-        PdoMapping { index, entries: Some(entries.into()) }
-    }
-}
-
-impl PdoEntry {
-    /// An object's bits.
-    pub const fn new(index: u16, sub_index: u8, bit_length: u8) -> PdoEntry {
-        PdoEntry { index, sub_index, bit_length }
     }
 }
 

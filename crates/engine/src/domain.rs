@@ -33,8 +33,8 @@ pub struct DomainStatus {
     pub skipped: u64,
 }
 
-/// How old a SubDevice's inputs are. It put them into a frame itself: shared working counters are not trusted alone (decision
-/// 0023).
+/// How old a SubDevice's inputs are. It put them into a frame itself: shared working counters are not trusted alone
+/// (decision 0023).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Freshness {
     /// They never came.

@@ -32,8 +32,8 @@ pub struct TimedEvent {
     pub at: Instant,
     /// What happened.
     pub event: Event,
-    /// Who was at the positions of the cabling that the event names when it was seen, where that is known: for a cable at
-    /// its near end and at its far one.
+    /// Who was at the positions of the cabling that the event names when it was seen, where that is known: for a cable
+    /// at its near end and at its far one.
     pub whom: [Option<Occupant>; 2],
 }
 
@@ -100,8 +100,8 @@ pub enum Event {
         /// Its closing cable, from the last SubDevice back to the junction; nodes are positions.
         closing: Closing,
     },
-    /// A cable of a ring behind a junction broke or is whole again (JUNCTION_RED_CHANGE of the seeds). Nodes are positions,
-    /// of the cabling as it was found last.
+    /// A cable of a ring behind a junction broke or is whole again (JUNCTION_RED_CHANGE of the seeds). Nodes are
+    /// positions, of the cabling as it was found last.
     JunctionChanged {
         /// The port from which frames come; `None` where the ring has not been seen whole yet.
         near: Option<PortOf>,
@@ -124,9 +124,9 @@ pub enum Event {
         /// How many are not known.
         rings: usize,
     },
-    /// No frame comes back while a ring behind a junction is open: with a second unconnected port 0 in one path, frames are
-    /// destroyed (JR-02). Or the cable of the only link is broken too. Where there are several such rings, each is looked
-    /// into then while its junctions leave the others out for a moment, and what is broken is told by
+    /// No frame comes back while a ring behind a junction is open: with a second unconnected port 0 in one path, frames
+    /// are destroyed (JR-02). Or the cable of the only link is broken too. Where there are several such rings, each is
+    /// looked into then while its junctions leave the others out for a moment, and what is broken is told by
     /// [`Event::JunctionChanged`].
     JunctionsBlocked {
         /// True when it begins, false when frames come back.
@@ -323,8 +323,8 @@ pub enum Event {
         /// Its bytes without FCS.
         bytes: Vec<u8>,
     },
-    /// Frames that hold more datagrams do not bring them back processed: a gateway or simulator takes fewer than fit. Told
-    /// once.
+    /// Frames that hold more datagrams do not bring them back processed: a gateway or simulator takes fewer than fit.
+    /// Told once.
     FrameLimit {
         /// How many may be in a frame, and what becomes of more.
         limit: FrameLimit,

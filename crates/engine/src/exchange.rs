@@ -20,6 +20,7 @@ mod image;
 mod missed;
 mod place;
 mod presence;
+mod template;
 
 use alloc::sync::Arc;
 use alloc::vec::Vec;
@@ -77,7 +78,8 @@ pub struct Exchange {
     sequence: Sequence,
     by_id: [u16; 256],
     frames: Vec<CyclicFrame>,
-    /// For each of the frames the one that takes its place when a SubDevice of it has its FMMUs, or that it has replaced.
+    /// For each of the frames the one that takes its place when a SubDevice of it has its FMMUs, or that it has
+    /// replaced.
     others: Vec<CyclicFrame>,
     domains: Vec<Domain>,
     evidence: Evidence,
@@ -175,8 +177,8 @@ impl Exchange {
         }
     }
 
-    /// Judges a domain: gives up its overdue frames and sums its working counters. With several cycles under way it judges
-    /// each that has come back, in the order in which they left; the newest one's judgement is what stays.
+    /// Judges a domain: gives up its overdue frames and sums its working counters. With several cycles under way it
+    /// judges each that has come back, in the order in which they left; the newest one's judgement is what stays.
     pub fn process(&mut self, id: DomainId, now: Instant) -> DomainStatus {
         let Some(domain) = self.domains.get_mut(id.0) else { return DomainStatus::default() };
         let mut judged = false;

@@ -7,176 +7,21 @@
 
 mod collect;
 mod identity_field;
+mod subdevice;
 mod warning;
 
-use alloc::string::String;
 use alloc::vec::Vec;
 
-use ringcat_wire::address::{Position, StationAddress};
-use ringcat_wire::register::{DlStatus, Features, Information, PortKind};
-use ringcat_wire::sii::{
-    Category, CoeDetails, DcMode, FmmuUsage, GeneralFlags, Identity, MailboxLayout, MailboxProtocols, SiiHeader,
-    SiiSyncManager, SyncManagerKind,
-};
+use ringcat_wire::sii::{Category, SiiHeader};
 
 pub use crate::direction::Direction;
 pub use identity_field::IdentityField;
+pub use subdevice::{ControllerInfo, PdoEntryInfo, PdoInfo, Readout, SubDeviceInfo};
 pub use warning::{InfoWarning, SiiProblem};
 
-/// What the controller of a SubDevice is and can do.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct ControllerInfo {
-    /// TYPE.
-    pub type_code: u8,
-    /// REVISION.
-    pub revision: u8,
-    /// BUILD.
-    pub build: u16,
-    /// Number of FMMUs.
-    pub fmmu_count: u8,
-    /// Number of SyncManagers.
-    pub sync_manager_count: u8,
-    /// Process RAM in KiB, from 0x1000.
-    pub ram_kib: u8,
-    /// Kind of port 0..3.
-    pub ports: [PortKind; 4],
-    /// FEATURES.
-    pub features: Features,
-}
-
-impl From<Information> for ControllerInfo {
-    fn from(information: Information) -> ControllerInfo {
-        ControllerInfo {
-            type_code: information.controller_type,
-            revision: information.revision,
-            build: information.build,
-            fmmu_count: information.fmmu_count,
-            sync_manager_count: information.sync_manager_count,
-            ram_kib: information.ram_kib,
-            ports: information.port_descriptor.ports,
-            features: information.features,
-        }
-    }
-}
-
-/// One entry of a PDO as the SII describes it.
-#[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub struct PdoEntryInfo {
-    /// Index of the object; 0 is a gap.
-    pub index: u16,
-    /// Subindex of the object.
-    pub sub_index: u8,
-    /// Bits.
-    pub bit_length: u8,
-    /// CoE data type (facts 6.3).
-    pub data_type: u8,
-    /// Name; empty where the SII gives none.
-    pub name: String,
-}
-
-/// A PDO as the SII describes it.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct PdoInfo {
-    /// Index of the PDO mapping object.
-    pub index: u16,
-    /// Outputs for a PDO that the SubDevice receives, inputs for one that it sends.
-    pub direction: Direction,
-    /// SyncManager to which it is assigned by default.
-    pub sync_manager: Option<u8>,
-    /// Name; empty where the SII gives none.
-    pub name: String,
-    /// Flags, raw.
-    pub flags: u16,
-    /// Its entries in order, gaps included.
-    pub entries: Vec<PdoEntryInfo>,
-}
-
-impl PdoInfo {
-    /// Sum of the bit lengths of its entries.
-    pub fn bit_length(&self) -> u32 {
-        self.entries.iter().map(|entry| u32::from(entry.bit_length)).sum()
-    }
-}
-
-/// What a scan read from the registers of a controller.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Readout {
-    /// Position in the scan's order, that of the processing units.
-    pub position: Position,
-    /// Station address that the scan gave.
-    pub station: StationAddress,
-    /// Register STATION_ALIAS (0x0012); 0 is none.
-    pub alias: u16,
-    /// Registers 0x0000..0x0009.
-    pub information: Information,
-    /// Register DL_STATUS.
-    pub dl_status: DlStatus,
-    /// Registers DC_RECEIVE_TIME of port 0..3, in nanoseconds of the local clock, where there is one.
-    pub receive_times: Option<[u32; 4]>,
-}
-
-/// What a scan found about one SubDevice.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct SubDeviceInfo {
-    /// Position in the scan's order, that of the processing units.
-    pub position: Position,
-    /// Station address that the scan gave.
-    pub station: StationAddress,
-    /// Alias; 0 is none.
-    pub alias: u16,
-    /// Vendor, product, revision, serial number.
-    pub identity: Identity,
-    /// Explicit device identification, as set at its switches; `None` where it has none (facts 5.3, 4.3).
-    pub identification: Option<u16>,
-    /// The controller.
-    pub controller: ControllerInfo,
-    /// The controller copies AL control into AL status by itself: no application, and no acknowledge bit (facts 3.4).
-    pub device_emulation: bool,
-    /// Register DL_STATUS at the time of the scan.
-    pub dl_status: DlStatus,
-    /// Receive times of port 0..3 in nanoseconds of the local clock.
-    pub receive_times: Option<[u32; 4]>,
-    /// Name of the SubDevice.
-    pub name: String,
-    /// Order code.
-    pub order_code: String,
-    /// Group.
-    pub group: String,
-    /// Image.
-    pub image: String,
-    /// Mailboxes in PREOP, SAFEOP and OP; `None` where it has none.
-    pub mailbox: Option<MailboxLayout>,
-    /// Mailboxes in BOOT; `None` where it has none.
-    pub bootstrap: Option<MailboxLayout>,
-    /// Mailbox protocols that it speaks.
-    pub protocols: MailboxProtocols,
-    /// What its CoE can do.
-    pub coe: CoeDetails,
-    /// Flags of the general category.
-    pub flags: GeneralFlags,
-    /// Physical address of the ID switch, meant where the flags name identification in memory.
-    pub id_switch_address: u16,
-    /// Kind of port 0..3 as the SII says, a nibble per port, raw (facts 4.3).
-    pub physical_ports: u16,
-    /// Current from the EBUS in milliamperes; negative where it feeds.
-    pub ebus_current_ma: i16,
-    /// SyncManagers, SM 0 first. The type of one that the SII gives none is what its PDOs or its control byte say.
-    pub sync_managers: Vec<SiiSyncManager>,
-    /// What each FMMU is meant for, FMMU 0 first.
-    pub fmmu_usages: Vec<FmmuUsage>,
-    /// PDOs of both directions: outputs first, each direction in the order of the SII.
-    pub pdos: Vec<PdoInfo>,
-    /// SyncManagers whose PDOs are those of the dictionary, read online.
-    pub read_online: Vec<u8>,
-    /// Operation modes of the distributed clock.
-    pub dc_modes: Vec<DcMode>,
-    /// What is odd in the SII.
-    pub warnings: Vec<InfoWarning>,
-}
-
 impl SubDeviceInfo {
-    /// Puts together what was read. `categories` are those that the scan fetched, in any order; a category that the image
-    /// does not have is not there. Bytes that make no sense become warnings.
+    /// Puts together what was read. `categories` are those that the scan fetched, in any order; a category that the
+    /// image does not have is not there. Bytes that make no sense become warnings.
     pub fn from_parts<'a>(
         readout: Readout,
         header: &SiiHeader,
@@ -184,60 +29,6 @@ impl SubDeviceInfo {
     ) -> SubDeviceInfo {
         let parts: Vec<_> = categories.into_iter().collect();
         collect::collect(readout, header, &parts)
-    }
-
-    /// The EEPROM was never written, or does not give its contents: nothing is known of the SubDevice.
-    pub fn is_blank(&self) -> bool {
-        self.warnings.iter().any(|it| matches!(it.problem, SiiProblem::Blank | SiiProblem::Unreadable))
-    }
-
-    /// What the SII says cannot be trusted: it is blank, cut short, or its checksum is wrong.
-    pub fn is_doubtful(&self) -> bool {
-        self.warnings.iter().any(|warning| warning.problem.is_grave())
-    }
-
-    /// Takes over the PDOs that were read online when the same SubDevice was met before.
-    pub(crate) fn keep_read_online(&mut self, known: &SubDeviceInfo) {
-        if !known.read_online.is_empty() {
-            self.pdos.clone_from(&known.pdos);
-            self.read_online.clone_from(&known.read_online);
-        }
-    }
-
-    /// The PDO with this index.
-    pub fn pdo(&self, index: u16) -> Option<&PdoInfo> {
-        self.pdos.iter().find(|pdo| pdo.index == index)
-    }
-
-    /// PDOs that the SII assigns to a SyncManager, in its order.
-    pub fn assigned_pdos(&self, sync_manager: u8) -> impl Iterator<Item = &PdoInfo> {
-        self.pdos.iter().filter(move |pdo| pdo.sync_manager == Some(sync_manager))
-    }
-
-    /// SyncManagers of the mailboxes: that of the one which the MainDevice writes, that of the one which it reads. As the
-    /// SII says where it names both, else 0 and 1 (facts 3.11).
-    pub fn mailbox_sync_managers(&self) -> (u8, u8) {
-        self.sync_managers_of(self.mailbox.as_ref())
-    }
-
-    /// SyncManagers of the mailboxes in BOOT: to the SubDevice, and from it. Those at their places where the SII names some,
-    /// else the same as otherwise.
-    pub fn boot_sync_managers(&self) -> (u8, u8) {
-        self.sync_managers_of(self.bootstrap.as_ref())
-    }
-
-    fn sync_managers_of(&self, layout: Option<&MailboxLayout>) -> (u8, u8) {
-        let of = |kind, start: Option<u16>| {
-            let all = || (0u8..).zip(&self.sync_managers).filter(move |(_, sm)| sm.kind == kind);
-            all().find(|(_, sm)| Some(sm.start) == start).or_else(|| all().next()).map(|(index, _)| index)
-        };
-        let out = of(SyncManagerKind::MailboxOut, layout.map(|layout| layout.receive_offset));
-        out.zip(of(SyncManagerKind::MailboxIn, layout.map(|layout| layout.send_offset))).unwrap_or((0, 1))
-    }
-
-    /// Whether LRW reaches it: neither controller nor SII says no.
-    pub fn lrw_supported(&self) -> bool {
-        !self.controller.features.lrw_unsupported && !self.flags.not_lrw()
     }
 }
 

@@ -92,8 +92,8 @@ pub enum JunctionError {
     },
 }
 
-/// What showed that no cable closes a ring where it was declared, when its ends were closed for a moment. Closed like that,
-/// a ring that is whole loses nobody, and one that is broken elsewhere those behind its break.
+/// What showed that no cable closes a ring where it was declared, when its ends were closed for a moment. Closed like
+/// that, a ring that is whole loses nobody, and one that is broken elsewhere those behind its break.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Shown {
     /// A SubDevice did not answer that would have.
@@ -181,8 +181,9 @@ impl JunctionConnection {
 mod tests {
     use super::*;
 
+    // covers: JR-06
     #[test]
-    fn connections_have_their_head_at_port_1_and_their_tail_at_another_port_than_0_jr_06() {
+    fn connections_have_their_head_at_port_1_and_their_tail_at_another_port_than_0() {
         let good = JunctionConnection { head: 1, head_port: 1, tail: 4, tail_port: 1 };
         assert_eq!(good.check(&[], 5), Ok(()));
         let head = |head_port| JunctionConnection { head_port, ..good };

@@ -1,170 +1,33 @@
 //! From who exchanges what to logical addresses, images and frames.
 //!
-//! A domain is cut into chunks of whole areas that fit one frame, so that no SyncManager is spread over datagrams (facts
-//! 3.11: an access must cover start and end). A chunk is one LRW, or an LWR and an LRD, over
-//! `[outputs of the chunk][inputs of the chunk]`; image and logical addresses follow the same order. Areas are aligned to
-//! bytes (facts 3.10: bitwise FMMUs work in few places).
+//! A domain is cut into chunks of whole areas that fit one frame, so that no SyncManager is spread over datagrams
+//! (facts 3.11: an access must cover start and end). A chunk is one LRW, or an LWR and an LRD, over
+//! `[outputs of the chunk][inputs of the chunk]`; image and logical addresses follow the same order. Areas are aligned
+//! to bytes (facts 3.10: bitwise FMMUs work in few places).
 //!
 //! A working counter is a sum: where several SubDevices add to one, it does not say which of them did. So each of them
-//! shows its AL status in a presence datagram of the same frame, through an FMMU that it has to spare; one without has its
-//! inputs in a datagram of its own ([`Witness`]).
+//! shows its AL status in a presence datagram of the same frame, through an FMMU that it has to spare; one without has
+//! its inputs in a datagram of its own ([`Witness`]).
 
 mod chunk;
+mod error;
+mod plan;
+mod spec;
 
 use alloc::vec::Vec;
-use core::fmt;
-use core::time::Duration;
 
 use ringcat_wire::address::{LogicalAddress, Wkc};
 use ringcat_wire::command::Command;
 use ringcat_wire::datagram::{MAX_DATA, OVERHEAD};
 
-use crate::direction::Direction;
 use crate::domain::DomainId;
 use crate::link::LinkSet;
 use crate::ring::MIN_DATAGRAMS_PER_FRAME;
+use spec::Cut;
 
-/// One SyncManager's process data that takes part in a domain.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct AreaSpec {
-    /// Index of the SubDevice among those that were declared.
-    pub subdevice: usize,
-    /// SyncManager number.
-    pub sync_manager: u8,
-    /// Direction.
-    pub direction: Direction,
-    /// Bytes.
-    pub length: u16,
-}
-
-/// Where LRW is used instead of LWR and LRD (facts 9.2.2).
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum LrwPolicy {
-    /// On one link, where every SubDevice of a domain knows it; never on two.
-    #[default]
-    Automatic,
-    /// As the application or its configuration says so: refused with two links, or where a SubDevice does not know it.
-    Explicit,
-    /// One datagram per SubDevice, with LRW where it has outputs and inputs. Allowed with two links too, because one copy
-    /// meets all that a datagram addresses.
-    PerSubDevice,
-}
-
-/// How a frame shows whether a SubDevice put its inputs into it.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Witness {
-    /// By its AL status, which an FMMU of it maps into the frame: in these states its inputs are there.
-    Mapped(Delivers),
-    /// By the working counter of a datagram that no other SubDevice answers.
-    Alone,
-}
-
-/// In which AL states a SubDevice whose FMMUs and SyncManagers are set gives its inputs.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Delivers {
-    /// In SAFEOP and OP.
-    FromSafeOp,
-    /// In OP only (facts 4.4).
-    InOp,
-}
-
-/// What a layout has to follow.
-#[derive(Clone, Copy, Debug)]
-pub struct Rules<'a> {
-    /// Links that frames leave on.
-    pub links: LinkSet,
-    /// Adds the supervision datagram to the domain with the shortest period.
-    pub supervision: bool,
-    /// Where LRW is used.
-    pub lrw: LrwPolicy,
-    /// By SubDevice; those behind the end have an FMMU to spare.
-    pub witnesses: &'a [Witness],
-    /// Number of the session, modulo [`SESSIONS`]: each has logical addresses of its own, so that a SubDevice that was out of
-    /// reach since an earlier one and still has its FMMUs does not answer for another one.
-    pub session: u32,
-    /// Datagrams that a frame may hold, [`MIN_DATAGRAMS_PER_FRAME`] at least; `None`: as many as fit.
-    pub max_datagrams: Option<usize>,
-}
-
-/// What a domain exchanges.
-#[derive(Clone, Debug)]
-pub struct DomainSpec {
-    /// How often the application exchanges it.
-    pub period: Duration,
-    /// How many of its cycles may be under way at once.
-    pub under_way: u8,
-    /// Whether every SubDevice of the domain knows LRW (facts 3.1, features bit 9).
-    pub lrw: bool,
-    /// Areas in the order in which they lie in the image; those of a SubDevice stand together.
-    pub areas: Vec<AreaSpec>,
-}
-
-/// Where an area came to lie.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct PlacedArea {
-    /// The area.
-    pub area: AreaSpec,
-    /// First byte in the domain's image.
-    pub image_offset: u32,
-    /// Logical address of that byte.
-    pub logical: LogicalAddress,
-}
-
-/// A datagram of a cyclic frame.
-#[derive(Clone, Debug)]
-pub struct PlannedDatagram {
-    /// LRW, LWR, LRD, or BRD for supervision.
-    pub command: Command,
-    /// Logical address.
-    pub logical: LogicalAddress,
-    /// First byte in the image of what the datagram covers.
-    pub image_offset: u32,
-    /// Bytes of outputs, at the beginning of the data.
-    pub outputs: u16,
-    /// Bytes of inputs, behind the outputs.
-    pub inputs: u16,
-    /// Working counter that each SubDevice adds.
-    pub contributions: Vec<(usize, Wkc)>,
-    /// Input areas, to deliver them one by one.
-    pub input_areas: Vec<PlacedArea>,
-}
-
-/// A presence datagram: an LRD of one byte per SubDevice, its AL status.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct PlannedPresence {
-    /// Logical address of the first byte.
-    pub logical: LogicalAddress,
-    /// Index of the SubDevice of each byte, and when it gives its inputs.
-    pub members: Vec<(usize, Delivers)>,
-}
-
-/// A frame of a domain.
-#[derive(Clone, Debug, Default)]
-pub struct PlannedFrame {
-    /// Process data datagrams.
-    pub datagrams: Vec<PlannedDatagram>,
-    /// The presence datagram behind them, where a working counter of inputs has several SubDevices.
-    pub presence: Option<PlannedPresence>,
-    /// Whether the supervision datagram rides in this frame.
-    pub supervision: bool,
-    /// Whether the datagrams of distributed clocks ride in this frame.
-    pub clocks: bool,
-}
-
-/// A domain that was laid out.
-#[derive(Clone, Debug)]
-pub struct PlannedDomain {
-    /// From the specification.
-    pub period: Duration,
-    /// From the specification: each frame may be out so many times.
-    pub under_way: u8,
-    /// Bytes of the image.
-    pub image_len: u32,
-    /// All areas with their places.
-    pub areas: Vec<PlacedArea>,
-    /// The frames.
-    pub frames: Vec<PlannedFrame>,
-}
+pub use error::LayoutError;
+pub use plan::{PlacedArea, PlannedDatagram, PlannedDomain, PlannedFrame, PlannedPresence};
+pub use spec::{AreaSpec, Delivers, DomainSpec, LrwPolicy, Rules, Witness};
 
 /// Everything the exchange sends.
 #[derive(Clone, Debug, Default)]
@@ -174,47 +37,6 @@ pub struct Layout {
     /// Datagrams that a frame may hold.
     most: Option<usize>,
 }
-
-/// Why domains cannot be laid out.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum LayoutError {
-    /// An area is longer than a datagram can carry.
-    AreaTooLong {
-        /// Index of the SubDevice.
-        subdevice: usize,
-        /// SyncManager.
-        sync_manager: u8,
-        /// Its bytes.
-        length: u16,
-    },
-    /// Logical addresses or images beyond 2 GiB.
-    TooLarge,
-    /// More frames than may be in flight at once.
-    TooManyFrames {
-        /// Frames that would be needed.
-        frames: usize,
-    },
-}
-
-impl fmt::Display for LayoutError {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            LayoutError::AreaTooLong { subdevice, sync_manager, length } => write!(
-                f,
-                "SubDevice {subdevice}, SyncManager {sync_manager}: {length} bytes of process data, a datagram carries \
-                 at most {MAX_DATA}"
-            ),
-            LayoutError::TooLarge => f.write_str("process data of all domains exceeds 2 GiB"),
-            LayoutError::TooManyFrames { frames } => write!(
-                f,
-                "process data needs {frames} frames at once, at most {} may be in flight",
-                crate::ring::MAX_IN_FLIGHT
-            ),
-        }
-    }
-}
-
-impl core::error::Error for LayoutError {}
 
 /// Data of the supervision datagram: AL status.
 pub(crate) const SUPERVISION_LEN: usize = 2;
@@ -340,17 +162,6 @@ impl PlannedFrame {
         let others = usize::from(self.presence.is_some()) + usize::from(self.supervision) + clocks;
         most.is_none_or(|most| self.datagrams.len() + others + more <= most)
     }
-}
-
-/// How the areas of a domain are cut into frames.
-#[derive(Clone, Copy, Debug)]
-struct Cut {
-    /// One LRW in the place of an LWR and an LRD.
-    lrw: bool,
-    /// Every SubDevice has datagrams of its own.
-    each: bool,
-    /// Datagrams that a frame may hold.
-    most: Option<usize>,
 }
 
 fn lay_out(

@@ -5,8 +5,8 @@
 //!
 //! Two halves share nothing but the wire, a few atomics ([`board`]) and a bounded queue ([`queue`]):
 //!
-//! * [`exchange`]: the cyclic half. Process data and one supervision datagram. After activation it neither allocates nor
-//!   locks nor waits, and its work per call is bounded.
+//! * [`exchange`]: the cyclic half. Process data and one supervision datagram. After activation it neither allocates
+//!   nor locks nor waits, and its work per call is bounded.
 //! * [`supervisor`]: everything else, as async [`procedures`] over an executor with injected time: scan, configuration,
 //!   state changes, recovery. Mailboxes have a router each: [`mail`].
 //!

@@ -4,22 +4,25 @@
 //! takes the application's declaration, lays out process data, starts the configuration of all SubDevices and the
 //! supervision, and hands out the [`Exchange`] for the application's cyclic thread.
 
+mod activate;
 mod activate_error;
+mod active;
 mod areas;
 mod datagrams;
 mod declaration;
 mod ethernet;
 mod gateway;
+mod loaded;
 mod lrw;
 mod mail;
 mod options;
 mod pending;
+mod prepare;
 mod services;
 mod states;
 mod steps;
 
 use alloc::rc::Rc;
-use alloc::sync::Arc;
 use alloc::vec::Vec;
 use core::cell::{Cell, RefCell};
 use core::future::Future;
@@ -29,53 +32,36 @@ use ringcat_wire::address::StationAddress;
 use ringcat_wire::al::AlState;
 
 pub use activate_error::ActivateError;
+pub use active::Active;
 pub use areas::{AreaEntries, Directory};
 pub use datagrams::{MAX_DATAGRAMS, RawDatagram};
-pub use declaration::{Declaration, DomainConfig, DomainMember, MAX_UNDER_WAY, Required};
+pub use declaration::{Declaration, DomainConfig, DomainMember, ExplicitLrw, MAX_UNDER_WAY, Required};
 pub use ethernet::EthernetSubDevice;
-pub use lrw::ExplicitLrw;
 pub use options::Options;
 pub use pending::Pending;
 pub use states::{GroupState, SubDeviceState};
 
-use crate::board::Board;
-use crate::config::ClockConfig;
 use crate::event::{CyclicEvent, Event, TimedEvent};
-use crate::exchange::{ClockSetup, Exchange};
 use crate::info::SubDeviceInfo;
-use crate::layout::{Layout, Rules};
 use crate::link::{Link, LinkSet};
 use crate::mail::Mailbox;
 use crate::mail::eoe::EthernetPort;
 use crate::mail::relay::Desk;
-use crate::procedures::clocks::{self, ClockStatus, SharedClocks};
-use crate::procedures::configure::Start;
-use crate::procedures::fleet::{Fleet, Member, Phase, SharedFleet, stations_by_position};
-use crate::procedures::mail_watch::watch_mail;
+use crate::procedures::clocks::ClockStatus;
+use crate::procedures::fleet::{Phase, SharedFleet};
 use crate::procedures::own_objects::OwnObjects;
-use crate::procedures::recover::start_all;
 use crate::procedures::scan::{Scan, ScanError, ScanOptions, scan};
-use crate::procedures::serve_requests::{Requests, serve_requests};
-use crate::procedures::services::statistics::{Book, collect};
+use crate::procedures::serve_requests::Requests;
+use crate::procedures::services::statistics::Book;
 use crate::procedures::sii::SiiCache;
 use crate::procedures::stop::{StopError, all_known, stop};
-use crate::procedures::supervise::supervise;
-use crate::procedures::watch_groups::{counts, watch_groups};
-use crate::queue::{Consumer, queue};
+use crate::procedures::watch_groups::counts;
+use crate::queue::Consumer;
 use crate::ring::Identity;
-use crate::ring_status::{Cable, CableErrors, LinkStatus, Redundancy, RingStatus, cables};
+use crate::ring_status::{Cable, CableErrors, LinkStatus, Redundancy, RingStatus};
 use crate::supervisor::{AcyclicCounters, Bus, Received, Supervisor, UnderWay};
 use crate::time::Instant;
-use crate::topology::Topology;
-use declaration::{
-    check_clocks, check_domains, domain_specs, match_declaration, members, plan_all, report_oddities, with_domain,
-    witnesses,
-};
-use lrw::check_lrw;
-use steps::Loaded;
-
-/// Messages of the exchange that may wait until somebody fetches events.
-const CYCLIC_EVENTS: usize = 1024;
+use loaded::Loaded;
 
 type StopSlot = Rc<RefCell<Option<Result<(), StopError>>>>;
 type ScanSlot = Rc<RefCell<Option<Result<Scan, ScanError>>>>;
@@ -184,114 +170,8 @@ impl MainDevice {
         }
     }
 
-    /// Starts what was loaded.
-    fn start_loaded(&mut self, loaded: Loaded) -> Result<Active, ActivateError> {
-        let scan = match &*self.scan.borrow() {
-            Some(Ok(scan)) => scan.clone(),
-            Some(Err(_)) | None => return Err(ActivateError::NoScan),
-        };
-        let bus = self.supervisor.bus();
-        let declaration = with_domain(loaded.declaration.clone());
-        let (found, strangers) = match_declaration(&bus, &declaration, &scan)?;
-        let topology = loaded.topology(&bus, self.options.junctions, &scan, &found)?;
-        check_clocks(&declaration, &found)?;
-        let clock_config = declaration.clocks.clone();
-        let plans = plan_all(&declaration, &found)?;
-        check_domains(&loaded.declaration, &plans)?;
-        let links = self.options.links();
-        let lrw = lrw::policy(declaration.lrw, &declaration.explicit_lrw, links)?;
-        let specs = domain_specs(&declaration, &plans, lrw, links)?;
-        check_lrw(lrw, &specs, links)?;
-        let witnesses = witnesses(&plans, &found);
-        let (supervision, max_datagrams) = (self.options.supervision, self.options.most_datagrams());
-        let session = self.next_session(bus.now());
-        let rules = Rules { links, supervision, lrw, witnesses: &witnesses, session, max_datagrams };
-        let mut layout = Layout::with(&specs, rules).map_err(ActivateError::Layout)?;
-        if clock_config.is_some() {
-            layout.add_clocks().map_err(ActivateError::Layout)?;
-        }
-        let members = members(&bus, declaration, found, &plans, &layout)?;
-        let clocks = clocks_of(clock_config.clone(), &scan, &topology, &members);
-        let directory = Directory::new(&plans, &layout);
-        report_oddities(&bus, &members, &layout);
-        let optional = members.iter().map(|member| member.config.optional).collect();
-        let board = Arc::new(Board::new(members.len()).with_optional(optional));
-        let (producer, consumer) = queue(CYCLIC_EVENTS);
-        let mut exchange = Exchange::new(self.identity, self.options.links(), &layout, board.clone(), producer);
-        let stations = stations_by_position(&members, scan.subdevices.iter().map(|info| info.station));
-        let closings = loaded.closings(&topology, &members, &stations);
-        let cables = cables(&topology, self.options.links());
-        let book = Book::new(&bus, members.len(), self.statistics_period);
-        let fleet = Fleet {
-            members,
-            strangers,
-            next_temporary: 0,
-            layout,
-            closings,
-            topology,
-            stations,
-            ring: self.first_ring_status(),
-            cables: cables.into_iter().map(|cable| (cable, CableErrors::default())).collect(),
-            recablings: 0,
-            cache: self.cache.clone(),
-            blocked: Vec::new(),
-            junction_controls: Vec::new(),
-            statistics: book.clone(),
-        };
-        bus.set_occupants(fleet.occupants());
-        let fleet = SharedFleet::new(fleet, board.clone(), clocks);
-        self.supervisor.attach(board);
-        let start = if self.has_visited() { Start::Doubtful } else { Start::Cleared };
-        self.visited.drain(..).for_each(|mailbox| mailbox.close());
-        match clock_config {
-            Some(config) => {
-                exchange.set_up_clocks(ClockSetup {
-                    epoch: config.epoch,
-                    bus_shift: config.bus_shift,
-                    sync_window_ns: config.sync_window_ns,
-                });
-                // Whoever answers while clocks are measured has not come back: its configuration begins afterwards.
-                for member in fleet.access().members.iter_mut().filter(|member| member.is_there()) {
-                    member.phase = Phase::Configuring;
-                }
-                let (bus, fleet) = (bus.clone(), fleet.clone());
-                // Receive times are latched before other frames are on the way (facts 7.1).
-                self.supervisor.spawn(async move {
-                    clocks::begin(&bus, &fleet).await;
-                    start_all(&bus, &fleet, start);
-                    clocks::keep(bus, fleet).await;
-                });
-            }
-            None => start_all(&bus, &fleet, start),
-        }
-        if self.options.supervision {
-            let (enhanced, rings) = (self.options.enhanced_line_crossed, self.options.junctions);
-            self.supervisor.spawn(supervise(bus.clone(), fleet.clone(), enhanced, rings));
-        }
-        // Without supervision nobody finds out who strangers are.
-        let follow = self.options.follow_groups && self.options.supervision;
-        self.supervisor.spawn(watch_groups(bus.clone(), fleet.clone(), follow));
-        self.supervisor.spawn(watch_mail(bus.clone(), fleet.clone()));
-        self.supervisor.spawn(serve_requests(bus.clone(), fleet.clone(), self.requests.clone()));
-        self.supervisor.spawn(collect(bus, fleet.clone(), book.clone()));
-        self.statistics = Some(book);
-        self.fleet = Some(fleet);
-        self.cyclic_events = Some(consumer);
-        let periods = specs.iter().map(|spec| spec.period).collect();
-        let under_way = specs.iter().map(|spec| spec.under_way).max().unwrap_or(1);
-        Ok(Active { exchange, directory, periods, under_way })
-    }
-
-    /// Number of a session that begins now: another one than before, and hardly that of a program that ran here a while ago.
-    fn next_session(&mut self, now: Instant) -> u32 {
-        /// About four seconds.
-        const STEP_BITS: u32 = 32;
-        self.activations = self.activations.wrapping_add(1);
-        (self.activations - 1).wrapping_add((now.0 >> STEP_BITS) as u32)
-    }
-
-    /// Ends supervision and all other procedures, and takes all SubDevices down to a state; those in a lower one stay there.
-    /// The exchange must not send any more. Afterwards a new scan may start.
+    /// Ends supervision and all other procedures, and takes all SubDevices down to a state; those in a lower one stay
+    /// there. The exchange must not send any more. Afterwards a new scan may start.
     pub fn start_stop(&mut self, state: AlState, limit: Duration, now: Instant) {
         let led = self.fleet.as_ref().map(|fleet| all_known(&fleet.access())).unwrap_or_default();
         self.counted = self.counters();
@@ -490,27 +370,4 @@ fn supervisor(identity: Identity, options: &Options, now: Instant) -> Supervisor
         supervisor.set_max_datagrams(most);
     }
     supervisor
-}
-
-/// Clocks of everybody that was scanned.
-fn clocks_of(config: Option<ClockConfig>, scan: &Scan, topology: &Topology, members: &[Member]) -> SharedClocks {
-    let member = |info: &SubDeviceInfo| {
-        let index = members.iter().position(|member| member.station == info.station)?;
-        Some((index, &*members[index].config))
-    };
-    let scanned: &[SubDeviceInfo] = if config.is_some() { &scan.subdevices } else { &[] };
-    SharedClocks::new(config, scanned, topology, member)
-}
-
-/// What activation hands out.
-#[derive(Debug)]
-pub struct Active {
-    /// The cyclic half.
-    pub exchange: Exchange,
-    /// Where PDO entries lie.
-    pub directory: Directory,
-    /// Periods of the domains. There is at least one domain, if only for supervision.
-    pub periods: Vec<Duration>,
-    /// Most cycles of a domain that may be under way at once.
-    pub under_way: u8,
 }

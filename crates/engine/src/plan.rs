@@ -3,129 +3,38 @@
 //!
 //! In go a [`SubDeviceConfig`] and the [`SubDeviceInfo`] to which it belongs; out comes a [`SubDevicePlan`]: mailbox
 //! and process data SyncManagers, the layout of each process data area, watchdog registers, SDO downloads for PDO
-//! assignment and mapping. Where a configuration file declares the SyncManagers, it counts before the SII. Logical addresses are given later, when domains are laid out: [`fmmu`]. Writing all this,
-//! in which order and in which state, is the matter of the procedures.
+//! assignment and mapping. Where a configuration file declares the SyncManagers, it counts before the SII. Logical
+//! addresses are given later, when domains are laid out: [`fmmu`]. Writing all this, in which order and in which state,
+//! is the matter of the procedures.
 
 mod areas;
 mod check;
 mod declared;
 mod error;
 mod sdos;
+mod subdevice;
 
 use alloc::vec::Vec;
 
-use ringcat_wire::address::{LogicalAddress, RegisterAddress, StationAddress};
-use ringcat_wire::register::{Fmmu, SyncManager, SyncManagerControl, map};
+use ringcat_wire::address::{LogicalAddress, RegisterAddress};
+use ringcat_wire::register::{Fmmu, map};
 use ringcat_wire::sii::{MailboxLayout, SyncManagerKind};
 
-use crate::config::{SdoDownload, SubDeviceConfig};
+use crate::config::SubDeviceConfig;
 use crate::info::{Direction, SubDeviceInfo};
 
 pub use error::{PlanError, PlanFault, PlanProblem, PlanWarning};
+pub use subdevice::{AreaPlan, MappedEntry, MappedPdo, SmPlan, SubDevicePlan};
+
+use areas::sync_manager;
 
 /// Control byte of the mailbox that the MainDevice writes, where the SII gives none (facts 3.11).
 const MAILBOX_OUT_CONTROL: u8 = 0x26;
 /// Control byte of the mailbox that the MainDevice reads, where the SII gives none (facts 3.11).
 const MAILBOX_IN_CONTROL: u8 = 0x22;
 
-/// A SyncManager to be written.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct SmPlan {
-    /// Its number.
-    pub index: u8,
-    /// Its registers.
-    pub register: SyncManager,
-}
-
-/// An entry of a PDO and where it lies.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct MappedEntry {
-    /// Index of the object; 0 is a gap.
-    pub index: u16,
-    /// Subindex of the object.
-    pub sub_index: u8,
-    /// First bit, counted from the start of the area.
-    pub bit_offset: u32,
-    /// Bits.
-    pub bit_length: u8,
-}
-
-/// A PDO in an area.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct MappedPdo {
-    /// Index of the PDO mapping object.
-    pub index: u16,
-    /// Its entries in order, gaps included.
-    pub entries: Vec<MappedEntry>,
-}
-
-/// The process data of one SyncManager.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct AreaPlan {
-    /// The SyncManager.
-    pub sync_manager: u8,
-    /// Its direction.
-    pub direction: Direction,
-    /// First physical byte.
-    pub physical: u16,
-    /// Bytes; 0 where the SyncManager is switched off and needs no FMMU.
-    pub length: u16,
-    /// Registers of the SyncManager.
-    pub register: SyncManager,
-    /// To be enabled on the way to OP only, not for SAFEOP (facts 4.4).
-    pub op_only: bool,
-    /// Its PDOs; none where the SII names a length only.
-    pub pdos: Vec<MappedPdo>,
-}
-
-/// What has to be written to a SubDevice.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct SubDevicePlan {
-    /// Its station address.
-    pub station: StationAddress,
-    /// Mailbox SyncManagers for PREOP: first the one that the MainDevice writes. None or two.
-    pub mailbox: Vec<SmPlan>,
-    /// Mailbox SyncManagers for BOOT. None or two.
-    pub bootstrap: Vec<SmPlan>,
-    /// Process data areas by SyncManager number. Each of them gets an FMMU unless its length is 0.
-    pub process_data: Vec<AreaPlan>,
-    /// SyncManagers of the controller to be switched off before SAFEOP: neither mailbox nor process data.
-    pub unused: Vec<u8>,
-    /// SDO downloads that make PDO assignment and mapping what they are planned to be; they come after the start-up
-    /// commands of PREOP.
-    pub assign_sdos: Vec<SdoDownload>,
-    /// LRW reaches the SubDevice.
-    pub lrw_supported: bool,
-    /// Watchdog registers to be written before SAFEOP.
-    pub watchdog: Vec<(RegisterAddress, Vec<u8>)>,
-    /// What the application asked for and the SubDevice may not follow.
-    pub warnings: Vec<PlanWarning>,
-}
-
-impl SubDevicePlan {
-    /// Areas that need an FMMU, with its number: in the order of the SyncManagers.
-    pub fn mapped_areas(&self) -> impl Iterator<Item = (u8, &AreaPlan)> {
-        (0..).zip(self.process_data.iter().filter(|area| area.length > 0))
-    }
-
-    /// Some of its SyncManagers are for OP only: then none of its process data flows before.
-    pub fn is_op_only(&self) -> bool {
-        self.mapped_areas().any(|(_, area)| area.op_only)
-    }
-
-    /// Where the mailboxes lie from PREOP on; `None` where there are none.
-    pub fn mailbox_layout(&self) -> Option<MailboxLayout> {
-        layout_of(&self.mailbox)
-    }
-
-    /// Where the mailboxes lie in BOOT; `None` where there are none.
-    pub fn bootstrap_layout(&self) -> Option<MailboxLayout> {
-        layout_of(&self.bootstrap)
-    }
-}
-
-/// Plans one SubDevice. The error names SubDevice, SyncManager, PDO or object, what was expected and what came, and whether
-/// declaration or SII have to be mended.
+/// Plans one SubDevice. The error names SubDevice, SyncManager, PDO or object, what was expected and what came, and
+/// whether declaration or SII have to be mended.
 pub fn plan(config: &SubDeviceConfig, info: &SubDeviceInfo) -> Result<SubDevicePlan, PlanError> {
     plan_inner(config, info).map_err(|problem| {
         let fault = fault(config, info);
@@ -133,8 +42,8 @@ pub fn plan(config: &SubDeviceConfig, info: &SubDeviceInfo) -> Result<SubDeviceP
     })
 }
 
-/// Where a file declares the SyncManagers the SII has no part in it. Otherwise it is the SII where that alone does not do
-/// either, or is not what its maker wrote.
+/// Where a file declares the SyncManagers the SII has no part in it. Otherwise it is the SII where that alone does not
+/// do either, or is not what its maker wrote.
 fn fault(config: &SubDeviceConfig, info: &SubDeviceInfo) -> PlanFault {
     let is_unfit = || plan_inner(&SubDeviceConfig::from_info(info), info).is_err();
     if config.declared.is_none() && (info.is_doubtful() || is_unfit()) {
@@ -199,7 +108,8 @@ pub fn fmmu(area: &AreaPlan, logical: LogicalAddress) -> Fmmu {
     }
 }
 
-/// Without others that the SII names, SM 0 and 1 belong to the mailbox unless the SII gives one of them to process data.
+/// Without others that the SII names, SM 0 and 1 belong to the mailbox unless the SII gives one of them to process
+/// data.
 fn mailbox_wanted(info: &SubDeviceInfo) -> bool {
     let (out, inward) = info.mailbox_sync_managers();
     let managers = [out, inward].into_iter().filter_map(|index| info.sync_managers.get(usize::from(index)));
@@ -217,23 +127,6 @@ fn mailbox_pair(info: &SubDeviceInfo, layout: &MailboxLayout, (out, inward): (u8
         SmPlan { index: out, register: sync_manager(layout.receive_offset, layout.receive_size, out_control) },
         SmPlan { index: inward, register: sync_manager(layout.send_offset, layout.send_size, in_control) },
     ])
-}
-
-fn layout_of(pair: &[SmPlan]) -> Option<MailboxLayout> {
-    let [out, inward] = pair else { return None };
-    Some(MailboxLayout {
-        receive_offset: out.register.start,
-        receive_size: out.register.length,
-        send_offset: inward.register.start,
-        send_size: inward.register.length,
-    })
-}
-
-fn sync_manager(start: u16, length: u16, control: u8) -> SyncManager {
-    let mut register =
-        SyncManager { start, length, control: SyncManagerControl::from_bits(control), ..SyncManager::default() };
-    register.activate.enable = length > 0;
-    register
 }
 
 fn watchdog(config: &SubDeviceConfig) -> Vec<(RegisterAddress, Vec<u8>)> {

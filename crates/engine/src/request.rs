@@ -1,8 +1,8 @@
 //! Requests that a cyclic thread makes and re-uses (000 5.8, seed 004): no allocation, no lock, no waiting.
 //!
 //! A request has its own memory of a size given at its creation. The cyclic side owns it while it is not busy: it may
-//! change what it is about and its timeout, put in data, start it. The acyclic half takes it up, and gives it back with a
-//! result. One file per kind; what they have in common is in `slot`.
+//! change what it is about and its timeout, put in data, start it. The acyclic half takes it up, and gives it back with
+//! a result. One file per kind; what they have in common is in `slot`.
 
 mod register;
 mod sdo;

@@ -17,7 +17,8 @@ use crate::ring::RingState;
 use crate::time::Instant;
 use crate::topology::PortOf;
 
-/// A cable in the order of the ring. `None` is the interface of the host: MAIN at the near end, REDUNDANT at the far one.
+/// A cable in the order of the ring. `None` is the interface of the host: MAIN at the near end, REDUNDANT at the far
+/// one.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct Cable {
     /// The end that is nearer to MAIN.

@@ -1,8 +1,8 @@
 //! The acyclic half: an executor for [`crate::procedures`], and frames for what they ask of the bus.
 //!
 //! [`Supervisor::receive`] takes in frames, [`Supervisor::poll`] lets procedures go on, [`Supervisor::transmit`] sends
-//! what they asked for within a byte budget, [`Supervisor::next_deadline`] says when it wants to be polled at the latest.
-//! Procedures see time only through the `now` of these calls.
+//! what they asked for within a byte budget, [`Supervisor::next_deadline`] says when it wants to be polled at the
+//! latest. Procedures see time only through the `now` of these calls.
 
 mod alone;
 pub mod bus;
@@ -13,11 +13,14 @@ mod flights;
 mod group;
 mod link_order;
 mod outbox;
+mod received;
+mod reply;
 mod round_trip;
 mod shared;
 mod signal;
 mod silence;
 mod stray;
+mod task;
 mod transfer;
 mod turns;
 
@@ -27,10 +30,12 @@ use core::cell::RefCell;
 use core::future::Future;
 
 pub(crate) use alone::Turn;
-pub use bus::{Bus, BusError, Elapsed, Reply};
+pub use bus::Bus;
 pub use counters::AcyclicCounters;
 pub use group::Group;
 pub(crate) use group::{TURN, TURN_PAUSE};
+pub use received::Received;
+pub use reply::{BusError, Elapsed, Reply};
 pub use signal::Signal;
 pub use stray::Stray;
 
@@ -46,23 +51,6 @@ use shared::Shared;
 pub struct Supervisor {
     shared: Rc<RefCell<Shared>>,
     executor: executor::Executor,
-}
-
-/// What became of a frame that was handed to [`Supervisor::receive`].
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Received {
-    /// A copy of a frame that is in flight.
-    Taken,
-    /// A frame that was given up, or a copy that was there already.
-    Late,
-    /// A frame of ours with other datagrams than were sent.
-    Corrupt,
-    /// A frame of the cyclic half.
-    Cyclic,
-    /// A frame of another MainDevice.
-    Foreign,
-    /// No EtherCAT frame.
-    Other,
 }
 
 impl Supervisor {

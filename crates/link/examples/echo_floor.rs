@@ -125,7 +125,8 @@ fn ping(interface: &str, receive: ReceiveMode, size: usize, count: usize) -> Out
     times_ns.sort_unstable();
     let at = |percent: usize| times_ns.get(times_ns.len() * percent / 100).map_or(0.0, |ns| *ns as f64 / 1e3);
     println!(
-        "{receive:?}, {} bytes: median {:.2} us, minimum {:.2}, 99 % {:.2} ({count} round trips, lost {lost}, wrong {wrong})",
+        "{receive:?}, {} bytes: median {:.2} us, minimum {:.2}, 99 % {:.2} ({count} round trips, lost {lost}, wrong \
+         {wrong})",
         frame.len(),
         at(50),
         at(0),

@@ -13,8 +13,8 @@ use crate::filter::{self, ClassFilter};
 use crate::interface;
 use crate::kernel::{self, Membership, Statistics};
 use crate::monotonic;
+use crate::receive_mode::ReceiveMode;
 use crate::ring::{self, Ring, Seen, Taken};
-use crate::waiting::ReceiveMode;
 
 /// The group that EtherCAT frames may be sent to instead of broadcast.
 pub const GROUP_ADDRESS: [u8; 6] = [0x01, 0x01, 0x05, 0x01, 0x00, 0x00];

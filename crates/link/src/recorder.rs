@@ -1,8 +1,8 @@
 //! Recording frames into a capture file without holding up the threads that send and receive them.
 //!
-//! In go frames, by one [`Tap`] per thread; out comes a pcapng file ([`crate::pcapng`]) that a thread of its own writes.
-//! A tap copies a frame into a queue of fixed size and returns: no allocation, lock, file or system call. Frames that
-//! find the queue full are left out of the file, counted, and told in its statistics (`isb_ifdrop`).
+//! In go frames, by one [`Tap`] per thread; out comes a pcapng file ([`crate::pcapng`]) that a thread of its own
+//! writes. A tap copies a frame into a queue of fixed size and returns: no allocation, lock, file or system call.
+//! Frames that find the queue full are left out of the file, counted, and told in its statistics (`isb_ifdrop`).
 
 mod frame_queue;
 
@@ -169,8 +169,8 @@ impl Drop for Recorder {
 }
 
 impl Tap {
-    /// Tells what the clock shows now that the frames' times are of. The first tap that does so sets it for all; without,
-    /// times are Unix time.
+    /// Tells what the clock shows now that the frames' times are of. The first tap that does so sets it for all;
+    /// without, times are Unix time.
     pub fn set_clock(&mut self, now_ns: u64) {
         self.to_unix_ns = *self.shared.clock.get_or_init(|| unix_now_ns().wrapping_sub(now_ns));
     }

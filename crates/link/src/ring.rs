@@ -116,8 +116,8 @@ impl Ring {
         self.stamp_unix_ns
     }
 
-    /// As [`Ring::take`], of all frames, those that this host sent and the beginnings of long ones included; false where
-    /// there is none.
+    /// As [`Ring::take`], of all frames, those that this host sent and the beginnings of long ones included; false
+    /// where there is none.
     pub fn take_seen(&mut self, take: &mut dyn FnMut(Seen<'_>)) -> bool {
         self.take_slot(|status, slot| show(status, slot, take)) != Taken::Nothing
     }

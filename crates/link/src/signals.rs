@@ -72,7 +72,8 @@ impl HeldSignals {
     /// Waits for one of them, at most so long.
     pub fn wait(&self, limit: Duration) -> Option<Signal> {
         let limit = timespec(u64::try_from(limit.as_nanos()).unwrap_or(u64::MAX));
-        // SAFETY: the pointers are to a live set and a live time; what else the kernel knows of the signal is not asked for.
+        // SAFETY: the pointers are to a live set and a live time; what else the kernel knows of the signal is not asked
+        // for.
         let number = unsafe { libc::sigtimedwait(&self.0, std::ptr::null_mut(), &limit) };
         Signal::ALL.into_iter().find(|signal| signal.number() == number)
     }

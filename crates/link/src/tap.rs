@@ -1,8 +1,8 @@
 //! TAP interfaces: network interfaces of this host whose other end is this process.
 //!
 //! What the host sends into one is read here as an Ethernet frame, what is written here the host receives. An interface
-//! lasts as long as its value. The host decides when it is switched on, what addresses it has and where it is plugged in
-//! (`ip link set NAME up`, a bridge); without a carrier it sends nothing.
+//! lasts as long as its value. The host decides when it is switched on, what addresses it has and where it is plugged
+//! in (`ip link set NAME up`, a bridge); without a carrier it sends nothing.
 //!
 //! Creating one needs CAP_NET_ADMIN; reading and writing do not. Constants are those of `linux/if_tun.h`.
 
@@ -99,8 +99,8 @@ pub struct TapInterface {
 }
 
 impl TapInterface {
-    /// Makes an interface with this name and address, switched off and without a carrier, in the network namespace of the
-    /// calling thread.
+    /// Makes an interface with this name and address, switched off and without a carrier, in the network namespace of
+    /// the calling thread.
     ///
     /// # Errors
     /// A missing permission or device, or a name that is taken.
@@ -160,8 +160,8 @@ impl TapInterface {
         ioctl(&kernel::question_socket()?, libc::SIOCSIFTXQLEN as _, &mut request)
     }
 
-    /// Takes the oldest frame that the host sent into the interface; its length, `None` where there is none. What does not
-    /// fit is cut off.
+    /// Takes the oldest frame that the host sent into the interface; its length, `None` where there is none. What does
+    /// not fit is cut off.
     pub fn receive(&self, room: &mut [u8]) -> Option<usize> {
         // SAFETY: pointer and length describe live memory that the kernel writes.
         let count = unsafe { libc::read(self.fd.as_raw_fd(), room.as_mut_ptr().cast(), room.len()) };

@@ -5,32 +5,17 @@
 //! long as frames usually take to return.
 
 use std::hint::spin_loop;
-use std::time::Duration;
 
 use crate::kernel;
 use crate::monotonic::{now_ns, timespec};
 use crate::packet_socket::PacketSocket;
+use crate::receive_mode::ReceiveMode;
 
 /// At most this many sockets are waited for at once: two classes on two interfaces, and some more for a simulator.
 pub const MAX_SOCKETS: usize = 16;
 
 /// Looks at the rings between two looks at the clock; a look at the clock costs about 20 ns.
 const LOOKS_PER_CLOCK: u32 = 16;
-
-/// How to wait.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum ReceiveMode {
-    /// Asleep in the kernel.
-    #[default]
-    Blocking,
-    /// Spinning on the rings.
-    BusyPoll,
-    /// Spinning for this long, then asleep.
-    Hybrid {
-        /// How long: a little more than frames usually take.
-        spin: Duration,
-    },
-}
 
 /// Waits until a frame is in one of the rings (true) or the monotonic time has come (false).
 ///

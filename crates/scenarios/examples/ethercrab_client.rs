@@ -1,10 +1,11 @@
-//! The MainDevice of another project (ethercrab, from the registry) on a network interface, as a check of our simulator.
+//! The MainDevice of another project (ethercrab, from the registry) on a network interface, as a check of our
+//! simulator.
 //!
-//! `ethercrab_client INTERFACE SUBDEVICES CYCLES [TIMES]`: brings everything to OP and exchanges process data. In cycle i
-//! byte j of the outputs of SubDevice k is i + k + j. As many cycles follow without any work but the exchange, to tell
-//! how many there are in a second. Prints one line of figures, with the propagation delays that it has measured, then keeps
-//! exchanging the last outputs until its standard input ends. Anything unexpected ends it with an error. TIMES is how often
-//! it hands out the reference time before OP, unless it is to be as it likes.
+//! `ethercrab_client INTERFACE SUBDEVICES CYCLES [TIMES]`: brings everything to OP and exchanges process data. In cycle
+//! i byte j of the outputs of SubDevice k is i + k + j. As many cycles follow without any work but the exchange, to
+//! tell how many there are in a second. Prints one line of figures, with the propagation delays that it has measured,
+//! then keeps exchanging the last outputs until its standard input ends. Anything unexpected ends it with an error.
+//! TIMES is how often it hands out the reference time before OP, unless it is to be as it likes.
 
 use std::io;
 use std::process::ExitCode;
@@ -58,13 +59,34 @@ fn main() -> ExitCode {
     }
 }
 
-async fn run(interface: &str, count: usize, cycles: usize, config: MainDeviceConfig) -> Result<(), String> {
+/// A MainDevice on an interface, whose frames a thread of its own moves.
+fn connect(interface: &str, config: MainDeviceConfig) -> Result<Arc<MainDevice<'static>>, String> {
     let (sender, receiver, pdu_loop) = STORAGE.try_split().map_err(|()| "the storage is in use".to_owned())?;
     let timeouts = Timeouts { pdu: PATIENCE, eeprom: PATIENCE, ..Timeouts::default() };
     let main_device = Arc::new(MainDevice::new(pdu_loop, timeouts, config));
     let task = tx_rx_task(interface, sender, receiver).map_err(|error| format!("{interface}: {error}"))?;
     thread::spawn(move || smol::block_on(task));
+    Ok(main_device)
+}
 
+fn hex(bytes: &[u8]) -> String {
+    bytes.iter().map(|byte| format!("{byte:02x}")).collect()
+}
+
+/// Becomes true when the standard input ends.
+fn end_of_input() -> Arc<AtomicBool> {
+    let ended = Arc::new(AtomicBool::new(false));
+    let end = ended.clone();
+    thread::spawn(move || {
+        // An end and an error of the input both say that nothing more is wanted.
+        let _ = io::copy(&mut io::stdin().lock(), &mut io::sink());
+        end.store(true, Ordering::Relaxed);
+    });
+    ended
+}
+
+async fn run(interface: &str, count: usize, cycles: usize, config: MainDeviceConfig) -> Result<(), String> {
+    let main_device = connect(interface, config)?;
     let begin = Instant::now();
     let failed = |what: &'static str| move |error: ethercrab::error::Error| format!("{what}: {error}");
     let group =
@@ -103,10 +125,7 @@ async fn run(interface: &str, count: usize, cycles: usize, config: MainDeviceCon
         group.tx_rx(&main_device).await.map_err(failed("process data"))?;
     }
     let per_second = cycles as f64 / back_to_back.elapsed().as_secs_f64().max(f64::EPSILON);
-    let inputs: Vec<String> = group
-        .iter(&main_device)
-        .map(|subdevice| subdevice.inputs_raw().iter().map(|byte| format!("{byte:02x}")).collect())
-        .collect();
+    let inputs: Vec<String> = group.iter(&main_device).map(|subdevice| hex(&subdevice.inputs_raw())).collect();
     let delays: Vec<String> =
         group.iter(&main_device).map(|subdevice| subdevice.propagation_delay().to_string()).collect();
     round_trips.sort();
@@ -118,13 +137,7 @@ async fn run(interface: &str, count: usize, cycles: usize, config: MainDeviceCon
         delays.join(","),
         inputs.join(",")
     );
-    let ended = Arc::new(AtomicBool::new(false));
-    let end = ended.clone();
-    thread::spawn(move || {
-        // An end and an error of the input both say that nobody wants more.
-        let _ = io::copy(&mut io::stdin().lock(), &mut io::sink());
-        end.store(true, Ordering::Relaxed);
-    });
+    let ended = end_of_input();
     while !ended.load(Ordering::Relaxed) {
         group.tx_rx(&main_device).await.map_err(failed("process data"))?;
         smol::Timer::after(Duration::from_millis(1)).await;

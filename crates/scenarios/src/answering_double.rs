@@ -1,8 +1,8 @@
 //! A segment that does nothing but answer cyclic frames: a stand-in where only the MainDevice's cost is of interest.
 //!
 //! In: the frames that a MainDevice put on its in-memory links. Out: the same frames, with the working counters that
-//! SubDevices would have written, their AL status in presence datagrams, and the bit that controllers set in the source address (facts 2.6), on the link where
-//! the cabling brings them back (facts 9.2.1). Inputs stay as they were sent.
+//! SubDevices would have written, their AL status in presence datagrams, and the bit that controllers set in the source
+//! address (facts 2.6), on the link where the cabling brings them back (facts 9.2.1). Inputs stay as they were sent.
 
 use ringcat::memory::FrameRing;
 use ringcat_engine::layout::{Layout, PlannedFrame};

@@ -1,7 +1,7 @@
 //! Counts instructions and calls of a program with valgrind's callgrind.
 //!
-//! In: a command. Out: the instructions it executed in user mode and how often each function was called. Files go into a
-//! directory of their own, which is removed.
+//! In: a command. Out: the instructions it executed in user mode and how often each function was called. Files go into
+//! a directory of their own, which is removed.
 
 use std::collections::BTreeMap;
 use std::env;

@@ -6,21 +6,22 @@
 //!
 //! What is checked of every frame that was sent:
 //!
-//! 1. **Form** (facts 1.1 to 1.3): EtherType 0x88A4, type 1, 60 to 1,514 bytes, the length in the EtherCAT header is that
-//!    of the datagrams, the M bit is set in all of them but the last, reserved bits and padding are zero.
+//! 1. **Form** (facts 1.1 to 1.3): EtherType 0x88A4, type 1, 60 to 1,514 bytes, the length in the EtherCAT header is
+//!    that of the datagrams, the M bit is set in all of them but the last, reserved bits and padding are zero.
 //! 2. **Circulation** (facts 2.4, CR-25): the C bit of each datagram is 0.
 //! 3. **Fresh datagrams** (facts 1.2): working counters and event requests are 0.
-//! 4. **Reads** (facts 9.3): the data of APRD, FPRD, BRD and LRD is zeros. (What is read by LRW, APRW, FPRW and BRW cannot
-//!    be told apart from what is written; of ARMW and FRMW the data is written to all others.)
+//! 4. **Reads** (facts 9.3): the data of APRD, FPRD, BRD and LRD is zeros. (What is read by LRW, APRW, FPRW and BRW
+//!    cannot be told apart from what is written; of ARMW and FRMW the data is written to all others.)
 //! 5. **Link mark** (SM-01): the RED bit of the source address is set on the redundant link and clear on the main link.
 //! 6. **Pairs** (CR-01, SM-02): with two links each frame leaves once on each; the copies differ in the RED bit, in the
 //!    ADP of auto-increment commands (CR-09) and in station addresses that are set (strangers on two links must not get
 //!    the same one), and in nothing else.
-//! 7. **Ids** (CR-04, SM-02): a frame's number, 15 bits from source address and Idx within its class (bit 7 of the first
-//!    datagram's Idx), is that of the frame before plus 1, or 1 where the MainDevice begins anew (scan, activation, stop);
-//!    all datagrams of a frame carry the same Idx.
+//! 7. **Ids** (CR-04, SM-02): a frame's number, 15 bits from source address and Idx within its class (bit 7 of the
+//!    first datagram's Idx), is that of the frame before plus 1, or 1 where the MainDevice begins anew (scan,
+//!    activation, stop); all datagrams of a frame carry the same Idx.
 //! 8. **Flights** (CR-04, CR-07, SM-03): each copy comes back at most once, and not after the 8 bits of its id in the
-//!    source address were used by another frame of its class: no id is twice in flight. Frames that come back were sent.
+//!    source address were used by another frame of its class: no id is twice in flight. Frames that come back were
+//!    sent.
 //! 9. **Windows**: see [`windows`].
 //!
 //! Copies that do not come back are counted and not judged: cables are cut in tests.
@@ -28,76 +29,17 @@
 pub mod ethercat;
 pub mod flights;
 pub mod pcapng;
+mod verdict;
 pub mod windows;
 
 use std::collections::HashMap;
-use std::fmt;
 use std::time::Duration;
 
 use ethercat::{Frame, READS};
 use flights::Flights;
 use pcapng::Capture;
-use windows::Windows;
 
-/// Findings that are kept in words; all are counted.
-const TOLD: usize = 20;
-
-/// What a capture shows.
-#[derive(Debug, Default)]
-pub struct Verdict {
-    /// Frames sent, by link.
-    pub sent: [u64; 2],
-    /// Frames received, by link.
-    pub received: [u64; 2],
-    /// Datagrams sent whose data was judged to be zeros.
-    pub reads: u64,
-    /// Frames whose copies on both links were compared.
-    pub pairs: u64,
-    /// Copies that came back.
-    pub returned: u64,
-    /// Copies that did not.
-    pub missing: u64,
-    /// Longest time between the copies of a frame on both links.
-    pub longest_pair: Duration,
-    /// How often the numbers of a class began with 1 again.
-    pub anew: u64,
-    /// How cyclic and acyclic frames shared the wire, by link; nothing where there were no cycles.
-    pub windows: Vec<Windows>,
-    /// Promises broken.
-    pub broken: u64,
-    /// The first of them in words.
-    pub findings: Vec<String>,
-}
-
-impl Verdict {
-    fn find(&mut self, frame: usize, text: impl fmt::Display) {
-        self.broken += 1;
-        if self.findings.len() < TOLD {
-            self.findings.push(format!("frame {frame}: {text}"));
-        }
-    }
-}
-
-impl fmt::Display for Verdict {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Verdict { sent, received, reads, pairs, returned, missing, .. } = self;
-        writeln!(
-            f,
-            "frames sent: {} on MAIN, {} on REDUNDANT; received: {}, {}",
-            sent[0], sent[1], received[0], received[1]
-        )?;
-        writeln!(f, "reads sent as zeros: {reads}; pairs alike: {pairs}, at most {:?} apart", self.longest_pair)?;
-        writeln!(f, "copies that came back: {returned}, that did not: {missing}")?;
-        for windows in &self.windows {
-            write!(f, "{windows}")?;
-        }
-        writeln!(f, "promises broken: {}", self.broken)?;
-        for finding in &self.findings {
-            writeln!(f, "  {finding}")?;
-        }
-        Ok(())
-    }
-}
+pub use verdict::Verdict;
 
 /// Judges a capture. `cycle` is the time between cycles; `None` takes the one that is seen.
 ///

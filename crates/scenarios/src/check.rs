@@ -1,8 +1,6 @@
 //! What is checked, apart from the scenarios: what each cycle delivered, whether images agree with what the simulated
 //! devices had and latched, and how many events a change may cause.
 
-use std::ops::Range;
-
 use ringcat::{Direction, DomainId, DomainState, DomainStatus, Event, Freshness, Instant, TimedEvent};
 use ringcat_engine::exchange::Exchange;
 use ringcat_engine::main_device::Directory;
@@ -12,6 +10,8 @@ use ringcat_sim::network::Network;
 use ringcat_sim::time::SimTime;
 use ringcat_wire::al::{AlState, AlStatus};
 use ringcat_wire::register::map;
+
+use crate::areas::{Area, areas_of};
 
 /// What a domain delivered in one cycle.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -64,17 +64,6 @@ struct Flight {
     operating: Vec<bool>,
 }
 
-/// A part of a domain's image and of a device's process data.
-#[derive(Debug)]
-struct Area {
-    subdevice: usize,
-    device: DeviceIndex,
-    domain: DomainId,
-    direction: Direction,
-    in_image: Range<usize>,
-    in_device: Range<usize>,
-}
-
 /// Compares images with devices, cycle by cycle: fresh inputs are what the device had when the frame left, outputs of a
 /// complete cycle are what the device latched.
 #[derive(Debug)]
@@ -91,25 +80,7 @@ impl Mirror {
     pub fn new(directory: &Directory, devices: &[Option<DeviceIndex>], domains: usize) -> Mirror {
         let mut areas = Vec::new();
         for (subdevice, device) in devices.iter().enumerate() {
-            let Some(device) = *device else { continue };
-            let (mut outputs, mut inputs) = (0, 0);
-            for entries in directory.areas(subdevice) {
-                let start = entries.placed.image_offset as usize;
-                let length = usize::from(entries.placed.area.length);
-                let at = match entries.direction {
-                    Direction::Outputs => &mut outputs,
-                    Direction::Inputs => &mut inputs,
-                };
-                areas.push(Area {
-                    subdevice,
-                    device,
-                    domain: entries.domain,
-                    direction: entries.direction,
-                    in_image: start..start + length,
-                    in_device: *at..*at + length,
-                });
-                *at += length;
-            }
+            areas.extend(device.iter().flat_map(|device| areas_of(directory, subdevice, *device)));
         }
         Mirror { areas, flights: (0..domains).map(|_| None).collect(), compared: 0, judges_latched: true }
     }
@@ -147,7 +118,8 @@ impl Mirror {
                     let inputs = &flight.inputs[area.device.0];
                     (image.get(area.in_image.clone()), inputs.get(area.in_device.clone()))
                 }
-                // Where somebody is missing, which optional ones may be, only fresh inputs show that it is not this one.
+                // Where somebody is missing, which optional ones may be, only fresh inputs show that it is not this
+                // one.
                 Direction::Outputs
                     if ((delivery == Delivery::Complete && status.wkc == status.expected)
                         || exchange.freshness(domain, area.subdevice) == Freshness::Fresh)

@@ -1,8 +1,8 @@
 //! Propagation delays that are written while process data goes on, against the truth.
 //!
-//! A run takes a segment of random shape to a state in which its delays are known, cuts and heals cables of it, and looks at
-//! every delay that is written then, in every cycle. The truth is when the processing units met one frame, which only the
-//! simulator knows. A delay is right or it is not written, and then there is a reason ([`Outcome`]).
+//! A run takes a segment of random shape to a state in which its delays are known, cuts and heals cables of it, and
+//! looks at every delay that is written then, in every cycle. The truth is when the processing units met one frame,
+//! which only the simulator knows. A delay is right or it is not written, and then there is a reason ([`Outcome`]).
 
 use std::collections::BTreeMap;
 use std::time::Duration;
@@ -164,7 +164,8 @@ impl Plan {
     }
 }
 
-/// Clocks of a run: ideal ones for a third of the seeds; a third of the others does not tell frames apart when it latches.
+/// Clocks of a run: ideal ones for a third of the seeds; a third of the others does not tell frames apart when it
+/// latches.
 fn devices(count: usize, dice: &mut Dice) -> Vec<DeviceDescription> {
     let is_ideal = dice.one_in(3);
     let any = dice.one_in(3);

@@ -1,11 +1,12 @@
 //! Engine and simulated segment put together in virtual time: [`world`] with its verbs, what it runs on ([`segments`],
-//! [`tap`], [`dice`]) and, apart from the scenarios, what is checked ([`check`]). The scenarios are in `tests/`, one file
-//! per theme.
+//! [`tap`], [`dice`]) and, apart from the scenarios, what is checked ([`check`]). The scenarios are in `tests/`, one
+//! file per theme.
 //!
 //! Benches (`src/bin/`) run on [`cyclic_load`] and [`answering_double`], count with [`callgrind`] and
 //! [`counting_allocator`] and print [`figures`]; what is measured on real interfaces runs in [`namespaces`].
 
 pub mod answering_double;
+pub mod areas;
 pub mod callgrind;
 pub mod capture;
 pub mod check;

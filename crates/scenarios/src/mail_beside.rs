@@ -1,5 +1,5 @@
-//! Who uses the mailboxes of devices beside procedures: a request of the cyclic thread and a client of the gateway each.
-//! Both read elements of an array, whose values show which one was asked for; anything else panics.
+//! Who uses the mailboxes of devices beside procedures: a request of the cyclic thread and a client of the gateway
+//! each. Both read elements of an array, whose values show which one was asked for; anything else panics.
 
 use std::collections::BTreeMap;
 

@@ -1,8 +1,8 @@
 //! Questions to a device that speaks all mailbox protocols, whose answers show whose they are.
 //!
-//! An [`Asker`] writes a value that nobody else writes, reads it back, and knows what it may find: what it wrote last, and
-//! where a write failed what that may have left. Anything else is the answer to somebody else's question, or to an old
-//! one, and panics.
+//! An [`Asker`] writes a value that nobody else writes, reads it back, and knows what it may find: what it wrote last,
+//! and where a write failed what that may have left. Anything else is the answer to somebody else's question, or to an
+//! old one, and panics.
 
 use ringcat::Limits;
 use ringcat_engine::mail::aoe::{self, AoeRoute};

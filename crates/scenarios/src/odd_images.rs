@@ -1,4 +1,5 @@
-//! SII images as they are met beside sound ones: cut short, with flipped bits, odd SyncManagers, PDOs, sizes and checksums.
+//! SII images as they are met beside sound ones: cut short, with flipped bits, odd SyncManagers, PDOs, sizes and
+//! checksums.
 //!
 //! In go a sound image and [`Dice`]; out comes an image with what was done to it. The same seed makes the same one.
 

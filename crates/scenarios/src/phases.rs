@@ -1,8 +1,8 @@
 //! When each phase of a start-up ends, how much of it nothing was on the wire, and how often somebody waited for it.
 //!
-//! In: a segment. Out: [`Phase`]s from power-on to all in OP, taken from the devices' own registers. What counts in real
-//! time besides the time itself is the number of exchanges that follow one another: each costs a round trip through two
-//! hosts.
+//! In: a segment. Out: [`Phase`]s from power-on to all in OP, taken from the devices' own registers. What counts in
+//! real time besides the time itself is the number of exchanges that follow one another: each costs a round trip
+//! through two hosts.
 
 use std::time::Duration;
 

@@ -24,7 +24,7 @@ use crate::check::{Delivery, ring_events, troubles};
 use crate::ethernet_host::{Addresses, download};
 use crate::phases::{End, Phase as StartPhase, start_up};
 use crate::segments::{cable_of_ring, descriptions, ring};
-use crate::world::{CYCLE, World};
+use crate::world::{CYCLE, Mark, World};
 
 const LIMITS: Limits = (Duration::from_millis(500), Duration::from_secs(2));
 const ADDRESSES: Addresses = Addresses { mac: [2, 0, 0, 0, 0, 9], host: [10, 0, 0, 1], device: [10, 0, 0, 2] };
@@ -128,8 +128,8 @@ pub const fn speaker(count: usize) -> usize {
 }
 
 thread_local! {
-    /// When the cycles of the world in this thread begin, in nanoseconds after a whole one: on its own stub a frame may meet a
-    /// SubDevice some hundred microseconds later than in the twin, and that must not be the next cycle.
+    /// When the cycles of the world in this thread begin, in nanoseconds after a whole one: on its own stub a frame may
+    /// meet a SubDevice some hundred microseconds later than in the twin, and that must not be the next cycle.
     static GRID: Cell<u64> = const { Cell::new(0) };
 }
 
@@ -302,7 +302,8 @@ impl Pair<'_> {
         self.compared += image.len() as u64;
     }
 
-    /// Outputs reach each SubDevice once per cycle; at an edge not at all, once or twice. Returns how many they reached.
+    /// Outputs reach each SubDevice once per cycle; at an edge not at all, once or twice. Returns how many they
+    /// reached.
     fn count_latches(&mut self, case: &Case) -> u64 {
         let now: Vec<u64> = self.cut.network().devices().map(Device::outputs_latched).collect();
         let before = std::mem::replace(&mut self.latched, now);
@@ -381,15 +382,7 @@ fn operate(case: &Case, twin: &[Vec<u8>]) -> Outcome {
     let mut pair = Pair { cut, twin: twin.iter(), calm: 0, compared: 0, latched, apart, taken: 0 };
     pair.cut.application_mut().links_mut().measure_flights();
     pair.cycles(case, BEFORE);
-    let fallen = match case.phase {
-        Phase::StateChange => Some(fall(&mut pair, case)),
-        Phase::StateRequest => Some(speaker(case.count)),
-        _ => None,
-    };
-    if case.phase == Phase::StateRequest {
-        // Its inputs are not the twin's while it is in another state.
-        pair.twin = [].iter();
-    }
+    let fallen = disturb(&mut pair, case);
     let work = begin(&mut pair.cut, case);
     pair.cycles(case, if work.is_some() { 8 } else { 0 });
     let flight = Duration::from_nanos(pair.cut.application().links().flight_ns());
@@ -423,9 +416,7 @@ fn operate(case: &Case, twin: &[Vec<u8>]) -> Outcome {
             assert!(outcome.incomplete[at] <= bound, "{case:?}: {} of {bound}", outcome.incomplete[at]);
         }
         if at == 1 {
-            let told = world.events(mark).iter().find(|timed| timed.event == closed[0]).map(|timed| timed.at);
-            let since = world.judged(mark).first().map(|judged| judged.at);
-            outcome.fixed_after = told.zip(since).map_or(Duration::ZERO, |(told, since)| told.since(since));
+            outcome.fixed_after = fixed_after(world, mark, &closed[0]);
         }
     }
     if let Some(work) = work {
@@ -437,6 +428,27 @@ fn operate(case: &Case, twin: &[Vec<u8>]) -> Outcome {
     is_whole(&pair.cut, case);
     (outcome.compared, outcome.taken) = (pair.compared, pair.taken);
     outcome
+}
+
+/// Brings about what the phase is. Returns the SubDevice that is not in OP meanwhile.
+fn disturb(pair: &mut Pair<'_>, case: &Case) -> Option<usize> {
+    let fallen = match case.phase {
+        Phase::StateChange => Some(fall(pair, case)),
+        Phase::StateRequest => Some(speaker(case.count)),
+        _ => None,
+    };
+    if case.phase == Phase::StateRequest {
+        // Its inputs are not the twin's while it is in another state.
+        pair.twin = [].iter();
+    }
+    fallen
+}
+
+/// Time from the first cycle behind a mark to an event.
+fn fixed_after(world: &World, mark: Mark, event: &Event) -> Duration {
+    let told = world.events(mark).iter().find(|timed| timed.event == *event).map(|timed| timed.at);
+    let since = world.judged(mark).first().map(|judged| judged.at);
+    told.zip(since).map_or(Duration::ZERO, |(told, since)| told.since(since))
 }
 
 /// The SubDevice with mailboxes falls out of OP, as in the twin, and is on its way back.

@@ -86,8 +86,8 @@ pub fn wired_with(descriptions: Vec<DeviceDescription>, cables: &[(Endpoint, End
     builder.options(NetworkOptions::default()).build().expect("the cables fit")
 }
 
-/// One, a junction with a ring of three on port 3 that comes back to port 1, and two more on its port 2. The ring's cables
-/// are [`RING_OF_THREE`], its last one closes it.
+/// One, a junction with a ring of three on port 3 that comes back to port 1, and two more on its port 2. The ring's
+/// cables are [`RING_OF_THREE`], its last one closes it.
 pub const RING_BEHIND_JUNCTION: [(Endpoint, Endpoint); 8] = [
     (MAIN, at(0, Port::A)),
     (at(0, Port::B), at(1, Port::A)),
@@ -101,8 +101,8 @@ pub const RING_BEHIND_JUNCTION: [(Endpoint, Endpoint); 8] = [
 /// Cables of the ring in [`RING_BEHIND_JUNCTION`].
 pub const RING_OF_THREE: [usize; 4] = [2, 3, 4, 5];
 
-/// Two junctions in a row, 0 and 3, each with a ring of two behind it, and one more behind both. Cables 1 to 3 are those of
-/// the first ring, 5 to 7 those of the second one.
+/// Two junctions in a row, 0 and 3, each with a ring of two behind it, and one more behind both. Cables 1 to 3 are
+/// those of the first ring, 5 to 7 those of the second one.
 pub const TWO_RINGS: [(Endpoint, Endpoint); 9] = [
     (MAIN, at(0, Port::A)),
     (at(0, Port::D), at(1, Port::A)),
@@ -127,7 +127,8 @@ pub const RING_IN_RING: [(Endpoint, Endpoint); 7] = [
     (at(4, Port::B), REDUNDANT),
 ];
 
-/// A closed ring: cable 0 from the main link, cable `n` between devices `n - 1` and `n`, the last to the redundant link.
+/// A closed ring: cable 0 from the main link, cable `n` between devices `n - 1` and `n`, the last to the redundant
+/// link.
 ///
 /// # Panics
 /// When the segment cannot be built.

@@ -1,5 +1,5 @@
-//! Short seeded runs of small rings: cuts, repairs, losses, delays and power cycles at random, and in the end everything is
-//! back ([`run`]). So short that ten thousand of them fit into a minute.
+//! Short seeded runs of small rings: cuts, repairs, losses, delays and power cycles at random, and in the end
+//! everything is back ([`run`]). So short that ten thousand of them fit into a minute.
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::time::Duration;
@@ -41,25 +41,8 @@ pub fn run(seed: u64) {
     world.judge_latched(false);
     let mut cut: Option<CableId> = None;
     let mut off: Option<DeviceIndex> = None;
-    let cables = count as u64 + 1;
     for _ in 0..3 + dice.below(6) {
-        let cable = CableId(dice.below(cables) as usize);
-        let direction = *dice.pick(&[None, Some(Direction::AToB), Some(Direction::BToA)]);
-        let few = 1 + dice.below(3) as u32;
-        let fault = match dice.below(9) {
-            0..=3 => match cut.take() {
-                Some(cable) => Fault::Heal(cable),
-                None => Fault::Cut(*cut.insert(cable)),
-            },
-            4 => Fault::Drop { cable, direction, count: few },
-            5 => Fault::Corrupt { cable, direction, count: few },
-            6 => Fault::Delay { cable, direction, count: few, by: Duration::from_micros(dice.below(3_000)) },
-            7 => Fault::Duplicate { cable, direction, count: few },
-            _ => match off.take() {
-                Some(device) => Fault::PowerOn(device),
-                None => Fault::PowerOff(*off.insert(DeviceIndex(dice.below(count as u64) as usize))),
-            },
-        };
+        let fault = next_fault(&mut dice, count, &mut cut, &mut off);
         world.fault_in(Duration::from_micros(dice.below(1_000)), fault);
         world.run_cycles(1 + dice.below(10));
     }
@@ -85,6 +68,33 @@ pub fn run(seed: u64) {
     world.run_cycles(15);
     assert_eq!((world.incomplete(mark), world.left_op(mark)), (0, Vec::new()));
     let told = ring_events(world.events(world.beginning()));
+    changes_alternate(told);
+    assert!(world.application().pace().skipped == 0 && world.now().0 > CYCLE.as_nanos() as u64);
+}
+
+/// A fault of the cables or devices, or the end of one that lasts.
+fn next_fault(dice: &mut Dice, count: usize, cut: &mut Option<CableId>, off: &mut Option<DeviceIndex>) -> Fault {
+    let cable = CableId(dice.below(count as u64 + 1) as usize);
+    let direction = *dice.pick(&[None, Some(Direction::AToB), Some(Direction::BToA)]);
+    let few = 1 + dice.below(3) as u32;
+    match dice.below(9) {
+        0..=3 => match cut.take() {
+            Some(cable) => Fault::Heal(cable),
+            None => Fault::Cut(*cut.insert(cable)),
+        },
+        4 => Fault::Drop { cable, direction, count: few },
+        5 => Fault::Corrupt { cable, direction, count: few },
+        6 => Fault::Delay { cable, direction, count: few, by: Duration::from_micros(dice.below(3_000)) },
+        7 => Fault::Duplicate { cable, direction, count: few },
+        _ => match off.take() {
+            Some(device) => Fault::PowerOn(device),
+            None => Fault::PowerOff(*off.insert(DeviceIndex(dice.below(count as u64) as usize))),
+        },
+    }
+}
+
+/// The ring opens and closes in turns, and is closed in the end.
+fn changes_alternate<'a>(told: impl IntoIterator<Item = &'a Event>) {
     // Each change once: never the same twice in a row.
     let (mut is_open, mut edges) = (false, 0);
     for event in told {
@@ -96,7 +106,6 @@ pub fn run(seed: u64) {
         edges += 1;
     }
     assert!(!is_open && edges % 2 == 0);
-    assert!(world.application().pace().skipped == 0 && world.now().0 > CYCLE.as_nanos() as u64);
 }
 
 /// Runs seeds; returns those that fail, each printed with what happened.

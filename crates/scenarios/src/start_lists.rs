@@ -3,10 +3,10 @@
 //! Servo drives hang on one link, each answers its mailbox 1 ms after a request. Time runs from activation, with the
 //! segment scanned and everybody in INIT, until all are in OP and process data is complete.
 //!
-//! Two things bound it. One drive alone takes its time, however many there are beside it. And the mail of all has to pass
-//! the wire: for each object a request, written as header, data and last byte, and a read of the whole send mailbox, with
-//! nothing else in as few frames as hold them. Neither states nor looks whether there is mail are in it, nor the
-//! cyclic frames, which carry process data from the first SubDevice on that can exchange some.
+//! Two things bound it. One drive alone takes its time, however many there are beside it. And the mail of all has to
+//! pass the wire: for each object a request, written as header, data and last byte, and a read of the whole send
+//! mailbox, with nothing else in as few frames as hold them. Neither states nor looks whether there is mail are in it,
+//! nor the cyclic frames, which carry process data from the first SubDevice on that can exchange some.
 
 use std::time::Duration;
 

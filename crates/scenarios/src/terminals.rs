@@ -1,5 +1,5 @@
-//! Segments of many plain terminals, as the figures of issue 2 ask for: SII of 512 bytes that are all in use, 500 us per
-//! EEPROM command, 5 ms per state change, a time of choice per hop.
+//! Segments of many plain terminals, as the figures of issue 2 ask for: SII of 512 bytes that are all in use, 500 us
+//! per EEPROM command, 5 ms per state change, a time of choice per hop.
 
 use std::time::Duration;
 

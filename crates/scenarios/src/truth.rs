@@ -1,12 +1,11 @@
-//! What the devices themselves say of process data, held against what the engine says: at all times, whatever faults are
-//! active.
+//! What the devices themselves say of process data, held against what the engine says: at all times, whatever faults
+//! are active.
 //!
 //! Inputs that count as fresh were put into a frame of the judged cycle by that SubDevice, byte for byte; outputs of a
 //! complete cycle were taken by every SubDevice from a frame of it. Both are read from the log that each simulated
 //! controller keeps of the logical datagrams that it answered.
 
 use std::collections::VecDeque;
-use std::ops::Range;
 
 use ringcat::{Direction, DomainId, DomainState, DomainStatus, Freshness};
 use ringcat_engine::exchange::Exchange;
@@ -15,16 +14,7 @@ use ringcat_sim::cable::DeviceIndex;
 use ringcat_sim::controller::LogicalAccess;
 use ringcat_sim::network::Network;
 
-/// Process data of a SubDevice in one SyncManager.
-#[derive(Debug)]
-struct Area {
-    subdevice: usize,
-    device: DeviceIndex,
-    domain: DomainId,
-    direction: Direction,
-    in_image: Range<usize>,
-    logical: u32,
-}
+use crate::areas::{Area, areas_of};
 
 /// Marks of the frames that left in one cycle: byte 1 of the source address, and Idx.
 pub type Departure = Vec<(u8, u8)>;
@@ -54,17 +44,7 @@ impl Truth {
         for (subdevice, device) in devices.iter().enumerate() {
             let Some(device) = *device else { continue };
             self.areas.retain(|area| area.subdevice != subdevice);
-            for entries in directory.areas(subdevice).iter().filter(|entries| entries.placed.area.length > 0) {
-                let start = entries.placed.image_offset as usize;
-                self.areas.push(Area {
-                    subdevice,
-                    device,
-                    domain: entries.domain,
-                    direction: entries.direction,
-                    in_image: start..start + usize::from(entries.placed.area.length),
-                    logical: entries.placed.logical.0,
-                });
-            }
+            self.areas.extend(areas_of(directory, subdevice, device).filter(|area| !area.in_image.is_empty()));
         }
     }
 
@@ -93,17 +73,17 @@ impl Truth {
                     }
                     let value = &image[area.in_image.clone()];
                     let is_own = |access: &LogicalAccess| {
-                        access.read && is_of_cycle(access) && area.bytes_of(access) == Some(value)
+                        access.read && is_of_cycle(access) && bytes_of(area, access) == Some(value)
                     };
                     assert!(
                         controller.logical_accesses().any(is_own),
-                        "inputs of SubDevice {} in domain {} are called fresh ({value:02x?}), device {} put none such into \
-                         the frames {:02x?}; it answered last: {:02x?}",
+                        "inputs of SubDevice {} in domain {} are called fresh ({value:02x?}), device {} put none such \
+                         into the frames {:02x?}; it answered last: {:02x?}",
                         area.subdevice,
                         domain.0,
                         area.device.0,
                         departures,
-                        controller.logical_accesses().filter(|it| area.bytes_of(it).is_some()).collect::<Vec<_>>(),
+                        controller.logical_accesses().filter(|it| bytes_of(area, it).is_some()).collect::<Vec<_>>(),
                     );
                 }
                 Direction::Outputs => {
@@ -111,7 +91,7 @@ impl Truth {
                         continue;
                     }
                     let is_own = |access: &LogicalAccess| {
-                        access.written && is_of_cycle(access) && area.bytes_of(access).is_some()
+                        access.written && is_of_cycle(access) && bytes_of(area, access).is_some()
                     };
                     assert!(
                         controller.logical_accesses().any(is_own),
@@ -136,10 +116,8 @@ impl Truth {
     }
 }
 
-impl Area {
-    /// The part of a datagram's data that is this area's.
-    fn bytes_of<'a>(&self, access: &'a LogicalAccess) -> Option<&'a [u8]> {
-        let at = usize::try_from(self.logical.checked_sub(access.address)?).ok()?;
-        access.data.get(at..at + self.in_image.len())
-    }
+/// The part of a datagram's data that is an area's.
+fn bytes_of<'a>(area: &Area, access: &'a LogicalAccess) -> Option<&'a [u8]> {
+    let at = usize::try_from(area.logical.checked_sub(access.address)?).ok()?;
+    access.data.get(at..at + area.in_image.len())
 }

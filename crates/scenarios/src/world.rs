@@ -367,8 +367,8 @@ impl World {
         station(self.network().device(DeviceIndex(device)))
     }
 
-    /// Whether outputs that devices have latched are held against the image, too. Frames that come late or twice leave their
-    /// own traces there; the devices' logs are judged at all times.
+    /// Whether outputs that devices have latched are held against the image, too. Frames that come late or twice leave
+    /// their own traces there; the devices' logs are judged at all times.
     pub fn judge_latched(&mut self, judged: bool) {
         self.mirror.judges_latched = judged;
     }
@@ -378,7 +378,8 @@ impl World {
         self.mirror.compared() + self.truth.proven()
     }
 
-    /// Areas of process data, inputs that counted as fresh and outputs of complete cycles, that were found in a device's own log.
+    /// Areas of process data, inputs that counted as fresh and outputs of complete cycles, that were found in a
+    /// device's own log.
     pub fn proven(&self) -> u64 {
         self.truth.proven()
     }

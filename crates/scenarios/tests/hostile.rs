@@ -1,5 +1,6 @@
 //! Segments that lie: EEPROMs with any content, answers with any data, working counters, lengths and bytes. Nothing
-//! panics, nothing hangs, virtual time and memory stay bounded, and when the lies end the next scan finds what is there.
+//! panics, nothing hangs, virtual time and memory stay bounded, and when the lies end the next scan finds what is
+//! there.
 //!
 //! `SEED=17 cargo test -p scenarios --test hostile environment -- --nocapture` runs one seed of each.
 

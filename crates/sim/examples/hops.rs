@@ -1,5 +1,5 @@
-//! Prints how long the simulator takes for a hop of a frame over a device of a long line, and for a frame of process data
-//! through 50 terminals in OP. The best of several blocks counts, for neighbours on the machine only add to it.
+//! Prints how long the simulator takes for a hop of a frame over a device of a long line, and for a frame of process
+//! data through 50 terminals in OP. The best of several blocks counts, for neighbours on the machine only add to it.
 //!
 //! `cargo run --release -p ringcat-sim --example hops [devices] [frames] [--general]`; the last without flights.
 

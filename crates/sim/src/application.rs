@@ -3,9 +3,10 @@
 //! In: AL events and virtual time, through [`Application::run`], and faults. Out: AL status, answers in the mailbox,
 //! inputs and latched outputs. The parts: [`state_machine`] says what a request means, [`settings`] whether the
 //! configuration suits, [`process_data`] moves data, [`mailbox`] carries messages to the [`servers`], of which there is
-//! one per protocol: [`coe`] with its [`dictionary`], [`foe`], [`eoe`], [`soe`], [`aoe`], [`voe`]. [`behaviours`] and [`servo`] make inputs, `transitions` leads from
-//! state to state. Here they are put together.
+//! one per protocol: [`coe`] with its [`dictionary`], [`foe`], [`eoe`], [`soe`], [`aoe`], [`voe`]. [`behaviours`] and
+//! [`servo`] make inputs, `transitions` leads from state to state. Here they are put together.
 
+pub mod answer;
 pub mod aoe;
 pub mod behaviours;
 pub mod coe;
@@ -14,6 +15,7 @@ pub mod eoe;
 pub mod foe;
 mod mail;
 pub mod mailbox;
+pub mod mapping;
 pub mod process_data;
 pub mod servers;
 pub mod servo;
@@ -38,9 +40,8 @@ use servers::Servers;
 use settings::Layout;
 use state_machine::{Pending, StateMachine};
 
-pub use mail::ServedMail;
-
 pub use behaviours::{Behaviour, InputFunction, InputSource};
+pub use mailbox::record::ServedMail;
 
 /// AL_EVENT bits (facts 3.5).
 const EVENT_AL_CONTROL: u32 = 1 << 0;

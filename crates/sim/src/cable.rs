@@ -203,15 +203,15 @@ impl Leg {
         self.faulty = blocked || [drop, duplicate, corrupt, symbol_errors, delay].iter().any(|left| *left > 0);
     }
 
-    /// Frames whose first bit arrives at this time or later arrive whole, as long as nothing changes. `None` where there
-    /// is no signal or a fault waits.
+    /// Frames whose first bit arrives at this time or later arrive whole, as long as nothing changes. `None` where
+    /// there is no signal or a fault waits.
     pub(crate) fn steady_since(&self) -> Option<SimTime> {
         let steady = self.signal && self.detected && !self.faulty;
         steady.then(|| SimTime(self.up_since.0.saturating_add(self.delay_ns)).max(self.detected_at))
     }
 
-    /// Fate of a frame whose first bit was due at the far end at `first_out` and whose last one is due now: the leg must
-    /// have carried a signal from the first bit's entry to the last bit's exit.
+    /// Fate of a frame whose first bit was due at the far end at `first_out` and whose last one is due now: the leg
+    /// must have carried a signal from the first bit's entry to the last bit's exit.
     pub(crate) fn fate(&self, first_out: SimTime) -> Fate {
         let first_in = first_out.back_ns(self.delay_ns);
         if self.signal && self.up_since <= first_in {
@@ -223,6 +223,9 @@ impl Leg {
         }
     }
 }
+
+/// Propagation delay of a cable unless another is asked for: 10 m at 5 ns per metre (facts 1.3).
+pub const DEFAULT_CABLE_DELAY: Duration = Duration::from_nanos(50);
 
 #[cfg(test)]
 mod tests {

@@ -1,7 +1,7 @@
 //! Devices out of the box, by name.
 //!
-//! In: a name as segment files use it. Out: a [`DeviceDescription`] to be changed at will before a device is made of it.
-//! Vendor and product numbers are the simulator's own; SyncManager settings are like those of real terminals (facts
+//! In: a name as segment files use it. Out: a [`DeviceDescription`] to be changed at will before a device is made of
+//! it. Vendor and product numbers are the simulator's own; SyncManager settings are like those of real terminals (facts
 //! 3.11). Terminals are in `terminals`, the servo drive in `drive`, block and junctions in `machines`, devices for the
 //! mailbox in `protocols`.
 
@@ -13,10 +13,8 @@ mod terminals;
 
 use crate::description::DeviceDescription;
 
+pub use parts::VENDOR_ID;
 pub use protocols::LARGE_OBJECT_BYTES;
-
-/// Vendor number of the simulated devices; no vendor has it.
-pub const VENDOR_ID: u32 = 0x0000_0C47;
 
 /// Makes a description.
 type Maker = fn(&str) -> DeviceDescription;

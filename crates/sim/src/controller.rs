@@ -1,8 +1,9 @@
 //! One SubDevice controller (ESC), register by register (facts 2, 3, 4.7, 11.4).
 //!
 //! In: frames at ports, link changes, accesses of the application, virtual time. Out: frames at ports, events for the
-//! application, deadlines. The network carries frames between controllers; the application behind the PDI makes a device
-//! of it. Not modelled: MII management, emulated EEPROMs, loops that enhanced link detection closes (see docs/segments.md).
+//! application, deadlines. The network carries frames between controllers; the application behind the PDI makes a
+//! device of it. Not modelled: MII management, emulated EEPROMs, loops that enhanced link detection closes (see
+//! docs/segments.md).
 //!
 //! A frame is handled when its last bit has come in. It makes its whole way inside at once: along 0-(EPU)-3-1-2 to the
 //! next open port. What happens by itself (watchdogs, busy EEPROM, temporary loops) is brought up to date at the next
@@ -14,6 +15,7 @@ mod clock_registers;
 mod compiled;
 mod config;
 mod counters;
+mod event_bits;
 mod events;
 mod fmmu;
 mod logical_log;
@@ -25,6 +27,7 @@ mod processing;
 mod registers;
 mod reset;
 mod sii;
+mod spoilt_write;
 mod sync_manager;
 mod sync_unit;
 mod watchdog;
@@ -33,6 +36,7 @@ pub use clock::{ClockErrors, Wander};
 pub use clock_registers::LatchPin;
 pub use config::{ControllerConfig, MAX_UNITS};
 pub use logical_log::LogicalAccess;
+pub use spoilt_write::SpoiltWrite;
 
 use ringcat_wire::address::RegisterAddress;
 use ringcat_wire::register::{LoopControl, map};
@@ -41,7 +45,7 @@ use crate::frame::{Fcs, Port, SimFrame};
 use crate::time::SimTime;
 use clock::Clock;
 use compiled::Compiled;
-use events::EVENT_PROCESS_DATA_WATCHDOG;
+use event_bits::EVENT_PROCESS_DATA_WATCHDOG;
 use fmmu::Fmmus;
 use logical_log::LogicalLog;
 use memory::Memory;
@@ -239,7 +243,8 @@ impl Controller {
         }
     }
 
-    /// The way of frames that come in at a port, where they all take the same: not through one that breaks circulations.
+    /// The way of frames that come in at a port, where they all take the same: not through one that breaks
+    /// circulations.
     pub(crate) fn way(&self, entry: Port) -> Option<Way> {
         let open = self.powered && self.ports.link(entry) && self.ports.passes(entry);
         if !open || self.ports.breaks_circulation() || self.fmmus.reach_registers() {

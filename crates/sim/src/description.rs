@@ -18,29 +18,8 @@ use crate::application::Behaviour;
 use crate::application::dictionary::Object;
 use crate::controller::{ClockErrors, ControllerConfig, MAX_UNITS, Wander};
 
+pub use crate::data_type;
 pub use services::{AoeDescription, EoeDescription, EoeEnd, FoeDescription, Services, SoeDescription};
-
-/// Data type codes of CoE that the models use (facts 6.3).
-pub mod data_type {
-    /// One bit.
-    pub const BOOL: u8 = 0x01;
-    /// Signed 8 bits.
-    pub const I8: u8 = 0x02;
-    /// Signed 16 bits.
-    pub const I16: u8 = 0x03;
-    /// Signed 32 bits.
-    pub const I32: u8 = 0x04;
-    /// Unsigned 8 bits.
-    pub const U8: u8 = 0x05;
-    /// Unsigned 16 bits.
-    pub const U16: u8 = 0x06;
-    /// Unsigned 32 bits.
-    pub const U32: u8 = 0x07;
-    /// Characters without an end mark.
-    pub const VISIBLE_STRING: u8 = 0x09;
-    /// Any bytes.
-    pub const OCTET_STRING: u8 = 0x0A;
-}
 
 /// One SyncManager as the SII declares it (facts 4.4).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -162,8 +141,8 @@ impl Default for TransitionTimes {
 pub struct DeviceDescription {
     /// Name of this device in the segment.
     pub name: String,
-    /// Name in the SII, where that is to be told from those of others: with it SIIs of the same structure differ in their
-    /// fixed area. `None`: `name`, and they do not.
+    /// Name in the SII, where that is to be told from those of others: with it SIIs of the same structure differ in
+    /// their fixed area. `None`: `name`, and they do not.
     pub name_in_sii: Option<String>,
     /// Order code, string of the SII.
     pub order_code: String,
@@ -183,7 +162,8 @@ pub struct DeviceDescription {
     pub fmmus: Vec<FmmuUsage>,
     /// FMMUs that the controller has; `None`: 8.
     pub controller_fmmus: Option<u8>,
-    /// FMMUs work as they are written on the way from PREOP to SAFEOP, until that state is left: later writes are not noticed.
+    /// FMMUs work as they are written on the way from PREOP to SAFEOP, until that state is left: later writes are not
+    /// noticed.
     pub latches_fmmus: bool,
     /// SyncManagers in order.
     pub sync_managers: Vec<SyncManagerDescription>,
@@ -300,8 +280,8 @@ impl DeviceDescription {
         self.pdos.iter().filter(move |pdo| pdo.sync_manager == Some(number))
     }
 
-    /// Length that SyncManager `number` must have with the default assignment: the PDOs decide where there are any, also
-    /// such without bits, otherwise the entry of the SyncManager where that is switched on.
+    /// Length that SyncManager `number` must have with the default assignment: the PDOs decide where there are any,
+    /// also such without bits, otherwise the entry of the SyncManager where that is switched on.
     pub fn default_length(&self, number: u8) -> u16 {
         if self.default_assignment(number).next().is_some() {
             let bits: u32 = self.default_assignment(number).map(PdoDescription::bit_length).sum();
@@ -311,8 +291,8 @@ impl DeviceDescription {
         entry.filter(|entry| entry.enable & SiiSyncManager::ENABLE != 0).map_or(0, |entry| entry.length)
     }
 
-    /// KiB of process RAM in which all mailboxes and SyncManagers have room, with three buffers where they need them; the
-    /// usual 8 where that is enough.
+    /// KiB of process RAM in which all mailboxes and SyncManagers have room, with three buffers where they need them;
+    /// the usual 8 where that is enough.
     pub fn ram_kib(&self) -> u8 {
         /// As an ET1100 has.
         const USUAL: u32 = 8;
@@ -338,8 +318,8 @@ impl DeviceDescription {
         described.clamp(ControllerConfig::default().sync_manager_count, MAX_UNITS)
     }
 
-    /// Gives both mailboxes another size and moves the process data behind them; false for a device without a mailbox and
-    /// for one with a real image.
+    /// Gives both mailboxes another size and moves the process data behind them; false for a device without a mailbox
+    /// and for one with a real image.
     pub fn set_mailbox_bytes(&mut self, bytes: u16) -> bool {
         let Some(mailbox) = self.mailbox.as_mut().filter(|_| self.sii_image.is_none()) else {
             return false;

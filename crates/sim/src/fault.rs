@@ -8,16 +8,9 @@ use core::time::Duration;
 use ringcat_wire::al::{AlState, AlStatusCode};
 
 use crate::application::mailbox::faults::MailFault;
-use crate::cable::{CableId, DeviceIndex, Direction};
+pub use crate::controller::SpoiltWrite;
 
-/// How a write to an EEPROM goes wrong.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum SpoiltWrite {
-    /// It is acknowledged, and the word stays as it was: the EEPROM is write-protected.
-    NotStored,
-    /// It is not acknowledged: the EEPROM is still busy inside.
-    NotAcknowledged,
-}
+use crate::cable::{CableId, DeviceIndex, Direction};
 
 /// Something that goes wrong, or is put right again.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -62,8 +55,8 @@ pub enum Fault {
         /// How many frames.
         count: u32,
     },
-    /// The next frames on the cable have something within them that is no symbol (RX_ER): they are damaged, and the port
-    /// that receives them counts that, too.
+    /// The next frames on the cable have something within them that is no symbol (RX_ER): they are damaged, and the
+    /// port that receives them counts that, too.
     SymbolErrors {
         /// Which cable.
         cable: CableId,
@@ -145,8 +138,8 @@ pub enum Fault {
         /// How often it refuses.
         times: u32,
     },
-    /// Accesses of the application to its controller go wrong, as on a disturbed bus between both: they are counted, and
-    /// done all the same.
+    /// Accesses of the application to its controller go wrong, as on a disturbed bus between both: they are counted,
+    /// and done all the same.
     PdiErrors {
         /// Which device.
         device: DeviceIndex,

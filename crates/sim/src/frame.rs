@@ -1,7 +1,8 @@
 //! A frame on its way through the segment (facts 1.1, 1.2, 1.3).
 //!
 //! In: the bytes that a host sends. Out: [`SimFrame`], which carries the offsets of its datagrams so that no controller
-//! parses it again, and the state of its frame check sequence. What happens to it is the controllers' and the network's.
+//! parses it again, and the state of its frame check sequence. What happens to it is the controllers' and the
+//! network's.
 
 use ringcat_wire::datagram::{HEADER_LEN, OVERHEAD, WKC_LEN};
 use ringcat_wire::frame::{

@@ -13,6 +13,7 @@ pub mod application;
 pub mod cable;
 pub mod catalogue;
 pub mod controller;
+pub mod data_type;
 pub mod description;
 pub mod device;
 pub mod fault;

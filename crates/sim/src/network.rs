@@ -17,7 +17,10 @@
 
 pub mod builder;
 mod cabling;
+mod event;
 mod faults;
+mod flight;
+mod options;
 mod pool;
 mod random;
 mod route;
@@ -34,111 +37,13 @@ use crate::host::{HostInterface, Received};
 use crate::queue::EventQueue;
 use crate::segment::{Segment, SegmentError};
 use crate::time::SimTime;
+use event::Event;
 use pool::{FramePool, Slot};
-pub(crate) use random::Random;
 use route::Route;
 use statistics::Statistics;
 
-/// What becomes of datagrams that are too many for a frame.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Beyond {
-    /// They come back as they were sent.
-    Unprocessed,
-    /// The whole frame does not come back.
-    Dropped,
-}
-
-/// How many datagrams a frame may hold, as other simulators and some gateways have it.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct DatagramLimit {
-    /// So many.
-    pub datagrams: u16,
-    /// What becomes of more.
-    pub beyond: Beyond,
-}
-
-/// Properties of a segment that belong to no single device.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct NetworkOptions {
-    /// Where random choices start from (the bit that a fault corrupts).
-    pub seed: u64,
-    /// From the loss of a signal to the moment the ends notice. Default 10 us (fast detection as DS1 demands it,
-    /// facts 2.8); plain PHYs take hundreds of milliseconds.
-    pub link_down_delay: Duration,
-    /// From the return of a signal to the moment the ends notice. Default 10 us.
-    pub link_up_delay: Duration,
-    /// Delay of a passage through a device with its processing unit, for devices that say nothing. Default 300 ns.
-    pub processing_delay: Duration,
-    /// Delay of a passage through a device without its processing unit, for devices that say nothing. Default 300 ns.
-    pub forwarding_delay: Duration,
-    /// Frames that an interface of the MainDevice queues for sending. Default 256.
-    pub transmit_queue: usize,
-    /// Frames that an interface of the MainDevice keeps until they are fetched. Default 256.
-    pub receive_queue: usize,
-    /// How many datagrams a frame may hold. Default: as many as fit.
-    pub max_datagrams: Option<DatagramLimit>,
-    /// Frames fly in one go where nothing else happens, instead of hop by hop. What can be seen is the same, bit for bit;
-    /// it takes a fraction of the computing. Default true.
-    pub compiled: bool,
-}
-
-impl Default for NetworkOptions {
-    fn default() -> Self {
-        NetworkOptions {
-            seed: 0,
-            link_down_delay: Duration::from_micros(10),
-            link_up_delay: Duration::from_micros(10),
-            processing_delay: Duration::from_nanos(300),
-            forwarding_delay: Duration::from_nanos(300),
-            transmit_queue: 256,
-            receive_queue: 256,
-            max_datagrams: None,
-            compiled: true,
-        }
-    }
-}
-
-impl NetworkOptions {
-    /// The same delay for every passage through a device.
-    #[must_use]
-    pub const fn with_hop_delay(mut self, delay: Duration) -> NetworkOptions {
-        self.processing_delay = delay;
-        self.forwarding_delay = delay;
-        self
-    }
-
-    /// The same delay for noticing that a link goes and that it comes.
-    #[must_use]
-    pub const fn with_detection_delay(mut self, delay: Duration) -> NetworkOptions {
-        self.link_down_delay = delay;
-        self.link_up_delay = delay;
-        self
-    }
-
-    /// Delay of a passage through a device, with its processing unit or without.
-    fn passage(&self, device: &Device, processed: bool) -> Duration {
-        if processed {
-            device.description.processing_delay.unwrap_or(self.processing_delay)
-        } else {
-            device.description.forwarding_delay.unwrap_or(self.forwarding_delay)
-        }
-    }
-}
-
-/// Something that is due.
-#[derive(Clone, Copy, Debug)]
-enum Event {
-    /// The last bit of a frame that changes no ways reaches the end of its first leg.
-    Entry { slot: Slot, link: HostLink, leg: LegId },
-    /// The last bit of a frame reaches the end of a leg. `meddled`: the faults of the leg have had their turn.
-    Arrival { slot: Slot, leg: LegId, meddled: bool },
-    /// The end of a leg notices whether there is a signal, unless it has changed again since.
-    Detection { leg: LegId, epoch: u32 },
-    /// A device has something to do by itself.
-    Wake { device: u32 },
-    /// A scheduled fault.
-    Fault { number: u32 },
-}
+pub use options::{Beyond, DatagramLimit, NetworkOptions};
+pub(crate) use random::Random;
 
 /// A device with its place in the segment.
 #[derive(Debug)]
@@ -270,8 +175,8 @@ impl Network {
         self.now = self.now.max(to);
     }
 
-    /// Lets everything happen that is due up to and including the moment at which a frame has arrived at an interface, or
-    /// `to` if none does; or nothing, if one is waiting there already.
+    /// Lets everything happen that is due up to and including the moment at which a frame has arrived at an interface,
+    /// or `to` if none does; or nothing, if one is waiting there already.
     pub fn advance_until_received(&mut self, to: SimTime) {
         let waits = |network: &Network| network.hosts.iter().any(|host| !host.received.is_empty());
         self.until_received = true;

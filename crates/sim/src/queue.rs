@@ -1,9 +1,9 @@
 //! The event queue: what happens next in virtual time (issue 2, part 3).
 //!
 //! In go events with the time at which they are due, out they come in the order of time; events of the same time come
-//! in the order in which they were put in, so that a run is the same every time. Events go into lanes, so that who wants
-//! to go ahead of some kinds of events sees when the others are due. The queue keeps its memory: once it has been as long
-//! as it gets, it allocates no more.
+//! in the order in which they were put in, so that a run is the same every time. Events go into lanes, so that who
+//! wants to go ahead of some kinds of events sees when the others are due. The queue keeps its memory: once it has been
+//! as long as it gets, it allocates no more.
 
 use std::cmp::Ordering;
 use std::collections::BinaryHeap;
@@ -74,8 +74,8 @@ impl<E: Copy> EventQueue<E> {
         self.lanes[lane as usize].push(Entry { at, sequence: self.sequence, event });
     }
 
-    /// Puts in an event and takes out the earliest that is due by `limit`, the new one included: the step of a frame from
-    /// one device to the next, which mostly comes out at once.
+    /// Puts in an event and takes out the earliest that is due by `limit`, the new one included: the step of a frame
+    /// from one device to the next, which mostly comes out at once.
     pub(crate) fn push_pop(&mut self, at: SimTime, event: E, limit: SimTime) -> Option<(SimTime, E)> {
         if self.next_at().is_none_or(|first| at < first) && at <= limit {
             return Some((at, event));

@@ -1,8 +1,8 @@
 //! SII image from a device description, and description from a real SII image (facts 4).
 //!
 //! In and out: [`DeviceDescription`] and the bytes of an EEPROM. A real image is kept byte for byte; the description
-//! made from it says what the device behind it must do. Where an image is silent, as about the mapping of a device whose
-//! PDOs are only in its dictionary, what is missing is filled in so that SyncManagers and dictionary agree.
+//! made from it says what the device behind it must do. Where an image is silent, as about the mapping of a device
+//! whose PDOs are only in its dictionary, what is missing is filled in so that SyncManagers and dictionary agree.
 
 mod reader;
 
@@ -160,9 +160,9 @@ fn name(description: &DeviceDescription) -> &str {
 /// Reserved words 0x20 to 0x23, among those from 0x1D on.
 const IMPRINT: core::ops::Range<usize> = 3..7;
 
-/// Tells the contents of one device from those of others of its kind that have another name: what follows the fixed area is
-/// not the same then, and MainDevices that read the rest once for all with the same fixed area would not see it. In many
-/// real images these words differ, too. 64 bits of FNV-1a.
+/// Tells the contents of one device from those of others of its kind that have another name: what follows the fixed
+/// area is not the same then, and MainDevices that read the rest once for all with the same fixed area would not see
+/// it. In many real images these words differ, too. 64 bits of FNV-1a.
 fn imprint(description: &DeviceDescription) -> [u16; 4] {
     let Some(name) = &description.name_in_sii else { return [0; 4] };
     let hash = name
@@ -194,7 +194,8 @@ fn header(description: &DeviceDescription, size_bytes: usize) -> SiiHeader {
 }
 
 fn general<'a>(description: &'a DeviceDescription, strings: &mut StringTable<'a>) -> General {
-    // String 1 is the order code, as in real images: some MainDevices take it for the name without asking this category.
+    // String 1 is the order code, as in real images: some MainDevices take it for the name without asking this
+    // category.
     let order = strings.number(&description.order_code);
     let group = strings.number(&description.group);
     let protocols = description.mailbox.map(|mailbox| mailbox.protocols).unwrap_or_default();

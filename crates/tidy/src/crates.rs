@@ -68,7 +68,11 @@ const ROOMS: &[Room] = &[
         external: External::Any,
     },
     Room { directory: "scenarios", internal: Internal::Any, external: External::Any },
-    Room { directory: "tidy", internal: Internal::Only(&[]), external: External::Only(&["toml"]) },
+    Room {
+        directory: "tidy",
+        internal: Internal::Only(&[]),
+        external: External::Only(&["proc-macro2", "syn", "toml"]),
+    },
 ];
 
 /// Tables of a manifest that list dependencies; the first two end up in the product.

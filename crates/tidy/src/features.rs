@@ -57,7 +57,7 @@ fn faults(cells: &[&str], tests: &BTreeSet<String>) -> Vec<String> {
 }
 
 /// Names of the functions with `#[test]`, also inside `proptest!`.
-fn test_names(tokens: &[Token]) -> Vec<String> {
+pub fn test_names(tokens: &[Token]) -> Vec<String> {
     let mut names = Vec::new();
     let mut marked = false;
     for (at, token) in tokens.iter().enumerate() {

@@ -43,12 +43,11 @@ pub const ENGINE: &[(&str, &[&str])] = &[
     // acyclic half
     ("supervisor", &["time", "link", "queue", "ring", "board", "event"]),
     ("mail", &["time", "config", "event", "supervisor"]),
-    ("procedures", &["time", "link", "queue", "ring", "board", "info", "topology", "ring_status", "config", "clocks", "plan",
-        "layout",
-        "event", "supervisor", "mail", "request", "junction"]),
+    ("procedures", &["time", "link", "queue", "ring", "board", "info", "topology", "ring_status", "config", "clocks",
+        "plan", "layout", "event", "supervisor", "mail", "request", "junction"]),
     // both together
-    ("main_device", &["time", "link", "queue", "domain", "ring", "board", "info", "topology", "ring_status", "config", "plan",
-        "layout", "event", "exchange", "supervisor", "mail", "request", "junction", "procedures"]),
+    ("main_device", &["time", "link", "queue", "domain", "ring", "board", "info", "topology", "ring_status", "config",
+        "plan", "layout", "event", "exchange", "supervisor", "mail", "request", "junction", "procedures"]),
 ];
 
 /// Where the engine's sources are.

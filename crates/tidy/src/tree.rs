@@ -1,4 +1,4 @@
-//! The files that are checked: everything below `crates/`, `ci/` and `docs/`, and some at the root, read once.
+//! The files that are checked: everything below `crates/`, `ci/`, `docs/` and `fuzz/`, and some at the root, read once.
 //!
 //! In goes the root of the repository, out come paths and texts, sorted. Build output is left out.
 
@@ -35,13 +35,16 @@ pub struct Tree {
 }
 
 /// Directories of the repository that are read.
-const ROOTS: [&str; 3] = ["crates", "ci", "docs"];
+const ROOTS: [&str; 4] = ["crates", "ci", "docs", "fuzz"];
 
 /// Files at the root that are read.
-const AT_THE_ROOT: [&str; 3] = [".ci/run", "Cargo.toml", "README.md"];
+const AT_THE_ROOT: [&str; 5] = [".ci/run", "CHANGELOG.md", "Cargo.toml", "README.md", "rustfmt.toml"];
 
 /// Kinds of files that are read.
-const EXTENSIONS: [&str; 3] = ["rs", "toml", "md"];
+const EXTENSIONS: [&str; 5] = ["rs", "toml", "md", "sh", "py"];
+
+/// Directories whose files without an extension are scripts, which are read too.
+const SCRIPTS: [&str; 1] = ["ci"];
 
 impl Tree {
     /// Reads the repository that this crate lies in.
@@ -83,14 +86,21 @@ fn collect(root: &Path, directory: &Path, files: &mut Vec<File>) -> io::Result<(
         let path = entry?.path();
         let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
         if path.is_dir() {
-            if !name.starts_with("target") && !name.starts_with('.') {
+            if !name.starts_with("target") && !name.starts_with('.') && name != "corpus" {
                 collect(root, &path, files)?;
             }
-        } else if path.extension().is_some_and(|e| EXTENSIONS.iter().any(|known| e == *known)) {
+        } else if is_read(root, &path) {
             files.push(File { path: relative(root, &path), text: fs::read_to_string(&path)? });
         }
     }
     Ok(())
+}
+
+fn is_read(root: &Path, path: &Path) -> bool {
+    match path.extension() {
+        Some(extension) => EXTENSIONS.iter().any(|known| extension == *known),
+        None => SCRIPTS.iter().any(|directory| path.starts_with(root.join(directory))),
+    }
 }
 
 fn relative(root: &Path, path: &Path) -> String {

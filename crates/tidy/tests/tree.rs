@@ -2,6 +2,8 @@
 
 use std::process::Command;
 
+use tidy::known::Known;
+use tidy::rules::RULES;
 use tidy::tree::Tree;
 use tidy::{Finding, crates, dependencies, features, files, modules, paths, safety, toolchain};
 
@@ -97,4 +99,44 @@ fn the_map_leads_somewhere() {
 #[test]
 fn one_minimum_rust_version_is_named_everywhere() {
     none(toolchain::disagreements(&tree()));
+}
+
+/// What [`RULES`] find: nothing but what `known.toml` lists.
+fn only_what_is_known(name: &str) {
+    let tree = tree();
+    let rule = RULES.iter().find(|rule| rule.name == name).expect("a rule of this name");
+    let known = Known::read(&tree).unwrap_or_else(|finding| panic!("{finding}"));
+    let found = (rule.count)(&tree).unwrap_or_else(|finding| panic!("{finding}"));
+    println!("{name}: {} of {} known", found.values().sum::<usize>(), known.total(name));
+    none(known.compare(name, &found, rule.mended));
+}
+
+#[test]
+fn files_of_a_crate_name_each_other_without_circles() {
+    only_what_is_known("circles");
+}
+
+#[test]
+fn functions_fit_a_screen() {
+    only_what_is_known("long-functions");
+}
+
+#[test]
+fn files_are_read_in_one_go() {
+    only_what_is_known("long-files");
+}
+
+#[test]
+fn lines_fit_120_columns() {
+    only_what_is_known("wide-lines");
+}
+
+#[test]
+fn names_of_tests_fit_80_characters() {
+    only_what_is_known("long-test-names");
+}
+
+#[test]
+fn devices_are_not_spoken_of_as_people() {
+    only_what_is_known("words");
 }

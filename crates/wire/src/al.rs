@@ -216,7 +216,10 @@ pub struct AlStatusCode(pub u16);
 macro_rules! al_status_codes {
     ($($name:ident = $code:literal, $text:literal;)*) => {
         impl AlStatusCode {
-            $(#[doc = concat!(stringify!($code), ": ", $text, ".")] pub const $name: AlStatusCode = AlStatusCode($code);)*
+            $(
+                #[doc = concat!(stringify!($code), ": ", $text, ".")]
+                pub const $name: AlStatusCode = AlStatusCode($code);
+            )*
 
             /// The codes that have a name, in ascending order (facts 5.5).
             pub const ALL: &'static [AlStatusCode] = &[$(AlStatusCode::$name),*];

@@ -6,9 +6,10 @@ use std::net::Ipv4Addr;
 
 use roxmltree::Node;
 
-use super::MAX_UNKNOWN;
-use super::error::{EniError, Place, Problem, shown};
+use super::error::{EniError, Place, Problem};
+use super::limits::MAX_UNKNOWN;
 use super::model::Unknown;
+use super::quoted::shown;
 
 /// What all elements of a file share.
 pub(super) struct File<'a> {

@@ -2,7 +2,7 @@
 //! treats in quadratic time. It does not judge well-formedness; whatever it does not understand is left to the reader.
 
 use super::error::{EniError, Place, Problem};
-use super::{MAX_ATTRIBUTES, MAX_DEPTH};
+use super::limits::{MAX_ATTRIBUTES, MAX_DEPTH};
 
 /// Refuses what is deeper or has more attributes than an ENI.
 pub(super) fn check(text: &str) -> Result<(), EniError> {

@@ -4,7 +4,7 @@ use std::fmt;
 
 use roxmltree::Node;
 
-use super::error::shown;
+use super::quoted::shown;
 
 /// What a file looks like.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -98,23 +98,23 @@ impl fmt::Display for FileKind {
         match self {
             FileKind::DeviceDescription => write!(
                 f,
-                "a device description (ESI, root EtherCATInfo), not an ENI: it describes what devices can do, not how a \
-                 network is configured. {eni}"
+                "a device description (ESI, root EtherCATInfo), not an ENI: it describes what devices can do, not how \
+                 a network is configured. {eni}"
             ),
             FileKind::EthercatXml => {
                 write!(f, "what `ethercat xml` prints (a device description made of an SII), not an ENI. {eni}")
             }
             FileKind::BeremizProject => write!(
                 f,
-                "the EtherCATConfig of a Beremiz project, not an ENI: it has neither commands for the transitions nor cyclic \
-                 ones. {eni}"
+                "the EtherCATConfig of a Beremiz project, not an ENI: it has neither commands for the transitions nor \
+                 cyclic ones. {eni}"
             ),
             FileKind::TwinCatProject => write!(f, "a TwinCAT project, not an ENI. {eni}"),
             FileKind::LinuxCnc => write!(f, "a configuration of LinuxCNC's EtherCAT driver, not an ENI. {eni}"),
             FileKind::Encrypted(what) => write!(
                 f,
-                "an encrypted or packed file ({what}), perhaps an encrypted ENI as EC-Engineer of acontis exports it for \
-                 MainDevices that have its key. RingCAT reads plain ENIs only: export it without encryption. {eni}"
+                "an encrypted or packed file ({what}), perhaps an encrypted ENI as EC-Engineer of acontis exports it \
+                 for MainDevices that have its key. RingCAT reads plain ENIs only: export it without encryption. {eni}"
             ),
             FileKind::NotXml => write!(f, "no XML file. {eni}"),
             FileKind::OtherXml(root) => write!(f, "an XML file with the root {}, not an ENI. {eni}", shown(root)),

@@ -9,10 +9,11 @@ mod process_data;
 use roxmltree::{Document, ParsingOptions};
 
 use super::element::{Element, File};
-use super::error::{EniError, Place, Problem, shown};
+use super::error::{EniError, Place, Problem};
 use super::kind::FileKind;
+use super::limits::{MAX_NODES, MAX_SUBDEVICES};
 use super::model::{DistributedClock, Eni, HotConnect, MailboxStates, MainDevice, Port, PreviousPort, SubDevice};
-use super::{MAX_NODES, MAX_SUBDEVICES};
+use super::quoted::shown;
 
 /// The model of a file.
 pub(super) fn parse(text: &str) -> Result<Eni, EniError> {

@@ -6,9 +6,10 @@ use std::borrow::Cow;
 
 use encoding_rs::{Encoding, UTF_8, UTF_16BE, UTF_16LE};
 
-use super::MAX_BYTES;
-use super::error::{EniError, Place, Problem, shown};
+use super::error::{EniError, Place, Problem};
 use super::kind::FileKind;
+use super::limits::MAX_BYTES;
+use super::quoted::shown;
 
 /// Bytes at the beginning in which a declaration is looked for.
 const DECLARATION: usize = 256;

@@ -1,11 +1,11 @@
-//! Which bits of a SyncManager are which logical bits: FMMUs as the commands leave them, cut at the borders of SyncManagers
-//! (facts 3.10).
+//! Which bits of a SyncManager are which logical bits: FMMUs as the commands leave them, cut at the borders of
+//! SyncManagers (facts 3.10).
 
 use ringcat_engine::config::DeclaredSyncManager;
 use ringcat_engine::info::Direction;
 use ringcat_wire::register::Fmmu;
 
-use super::contradiction;
+use super::messages::contradiction;
 use super::notices::Notices;
 use super::registers::Registers;
 use crate::eni::{Eni, EniError, Place};
@@ -49,30 +49,9 @@ pub(super) fn pieces(
         };
         let begin = u64::from(fmmu.physical_start) * 8 + u64::from(fmmu.physical_start_bit);
         let end = begin + u64::from(fmmu.bit_length());
-        let mut mapped = 0;
-        let mut in_part = None;
-        for one in declared {
-            let Some((sync_manager, _, length)) =
-                one.area().filter(|(_, found, length)| *found == direction && *length > 0)
-            else {
-                continue;
-            };
-            let start = u64::from(one.register.start) * 8;
-            let (from, to) = (begin.max(start), end.min(start + u64::from(length) * 8));
-            if from >= to {
-                continue;
-            }
-            in_part = Some((sync_manager, length));
-            mapped += to - from;
-            pieces.push(Piece {
-                direction,
-                sync_manager,
-                bit_offset: (from - start) as u32,
-                bits: (to - from) as u32,
-                logical_bit: logical_bit(&fmmu) + (from - begin),
-                place,
-            });
-        }
+        let first = pieces.len();
+        let in_part = map(&fmmu, direction, declared, place, &mut pieces);
+        let mapped: u64 = pieces[first..].iter().map(|piece| u64::from(piece.bits)).sum();
         match in_part {
             _ if mapped == end - begin => {}
             Some((sync_manager, length)) => {
@@ -92,6 +71,41 @@ pub(super) fn pieces(
     }
     pieces.sort_by_key(|piece| (piece.sync_manager, piece.bit_offset));
     Ok(pieces)
+}
+
+/// Appends what an FMMU maps of the areas of its direction. Returns number and length of the last of them.
+fn map(
+    fmmu: &Fmmu,
+    direction: Direction,
+    declared: &[DeclaredSyncManager],
+    place: Place,
+    pieces: &mut Vec<Piece>,
+) -> Option<(u8, u16)> {
+    let begin = u64::from(fmmu.physical_start) * 8 + u64::from(fmmu.physical_start_bit);
+    let end = begin + u64::from(fmmu.bit_length());
+    let mut in_part = None;
+    for one in declared {
+        let Some((sync_manager, _, length)) =
+            one.area().filter(|(_, found, length)| *found == direction && *length > 0)
+        else {
+            continue;
+        };
+        let start = u64::from(one.register.start) * 8;
+        let (from, to) = (begin.max(start), end.min(start + u64::from(length) * 8));
+        if from >= to {
+            continue;
+        }
+        in_part = Some((sync_manager, length));
+        pieces.push(Piece {
+            direction,
+            sync_manager,
+            bit_offset: (from - start) as u32,
+            bits: (to - from) as u32,
+            logical_bit: logical_bit(fmmu) + (from - begin),
+            place,
+        });
+    }
+    in_part
 }
 
 fn logical_bit(fmmu: &Fmmu) -> u64 {

@@ -1,4 +1,5 @@
-//! Where the SubDevices are: positions, hot connect groups, what is plugged into what; and the commands for the whole bus.
+//! Where the SubDevices are: positions, hot connect groups, what is plugged into what; and the commands for the whole
+//! bus.
 
 use std::collections::{HashMap, HashSet};
 
@@ -6,9 +7,8 @@ use ringcat_engine::config::ConfigAddress;
 use ringcat_wire::address::Position;
 use ringcat_wire::command::Command;
 
+use super::messages::{command_name, contradiction, label, named};
 use super::notices::Notices;
-use super::subdevice::{command_name, named};
-use super::{contradiction, label};
 use crate::eni::{EcatCommand, Eni, EniError, Poll, Port, Target};
 
 /// Places of the SubDevices.
@@ -82,7 +82,8 @@ fn stations(eni: &Eni) -> Result<HashMap<u16, usize>, EniError> {
     Ok(stations)
 }
 
-/// Positions by `AutoIncAddr`; where these are missing, or all the same, by document order. Members of groups have none.
+/// Positions by `AutoIncAddr`; where these are missing, or all the same, by document order. Members of groups have
+/// none.
 fn positions(eni: &Eni, groups: &[Option<usize>], notices: &mut Notices) -> Result<Vec<ConfigAddress>, EniError> {
     let count = eni.subdevices.len();
     let fixed: Vec<usize> = (0..count).filter(|index| groups[*index].is_none()).collect();
@@ -152,8 +153,8 @@ fn plugged_into(eni: &Eni, stations: &HashMap<u16, usize>) -> Result<Vec<Option<
     Ok(plugged_into)
 }
 
-/// Facts 8.2: 1 downloads. A file whose CoE commands all have data and say 2 has it the other way round: nobody configures
-/// a segment by reading only.
+/// Facts 8.2: 1 downloads. A file whose CoE commands all have data and say 2 has it the other way round: nobody
+/// configures a segment by reading only.
 fn ccs_is_reversed(eni: &Eni) -> bool {
     let mut commands = eni.subdevices.iter().flat_map(|subdevice| &subdevice.mailbox).flat_map(|mailbox| &mailbox.coe);
     let is_there = commands.clone().next().is_some();

@@ -1,5 +1,6 @@
 //! Cyclic tasks: domains, where commands put process data into the image, LRW by name, clocks (facts 8.2).
 
+use std::ops::Range;
 use std::time::Duration;
 
 use ringcat_engine::info::Direction;
@@ -10,8 +11,9 @@ use ringcat_wire::register::map;
 
 use super::areas::Piece;
 use super::bus::Bus;
+use super::messages::{command_name, named};
 use super::notices::Notices;
-use super::subdevice::{command_name, is_complete, named};
+use super::registers::is_complete;
 use crate::eni::{CyclicCommand, CyclicState, Eni, EniError, Problem, Target};
 
 /// Looks at a pair of a logical command and a piece of process data: far more than a segment of 1,000 SubDevices needs.
@@ -98,40 +100,7 @@ fn of_process_data(
     let code = command.datagram.command;
     let begin = u64::from(logical.0) * 8;
     let end = begin + command.datagram.data.len() as u64 * 8;
-    let mut met = Vec::new();
-    let mut count = 0_u32;
-    for (subdevice, pieces) in mappings.iter().enumerate() {
-        let (mut reads, mut writes) = (false, false);
-        for (piece, cover) in pieces.iter().zip(&mut cyclic.covers[subdevice]) {
-            let (offset, meets) = match piece.direction {
-                Direction::Outputs => (command.output_offset, code.writes()),
-                Direction::Inputs => (command.input_offset, code.reads()),
-            };
-            let piece_end = piece.logical_bit + u64::from(piece.bits);
-            if !meets || piece.logical_bit >= end || piece_end <= begin {
-                continue;
-            }
-            match piece.direction {
-                Direction::Outputs => writes = true,
-                Direction::Inputs => reads = true,
-            }
-            if piece.logical_bit < begin || piece_end > end {
-                let reason = format!("{} covers a part of it only", name(at, eni.tasks.len(), command));
-                notices.add(Some(piece.place), Some(subdevice), "process data of an FMMU", reason);
-            }
-            if cover.is_none() {
-                let image_bit =
-                    offset.and_then(|offset| (u64::from(offset) * 8 + piece.logical_bit).checked_sub(begin));
-                *cover = Some(Cover { task: at.0, image_bit });
-            }
-        }
-        if reads || writes {
-            met.push(subdevice);
-            // Facts 1.4: LRW counts 1 for what is read and 2 for what is written.
-            let write = if code == Command::Lrw { 2 } else { 1 };
-            count += u32::from(reads) + if writes { write } else { 0 };
-        }
-    }
+    let (met, count) = cover(eni, at, command, begin..end, mappings, &mut cyclic.covers, notices);
     let element = format!("Cyclic {}", name(at, eni.tasks.len(), command));
     let is_mailbox = eni.main_device.mailbox_states.is_some_and(|states| {
         let start = u64::from(states.start.0) * 8;
@@ -158,6 +127,55 @@ fn of_process_data(
         let name = format!("{} ({})", name(at, eni.tasks.len(), command), command.place);
         cyclic.explicit_lrw.push(ExplicitLrw { name, logical, length: command.datagram.data.len(), subdevices: met });
     }
+}
+
+/// Notes which pieces a command exchanges, by their bits in the logical address space. Returns the SubDevices that it
+/// meets, and the working counter that this gives.
+fn cover(
+    eni: &Eni,
+    at: (usize, usize, usize),
+    command: &CyclicCommand,
+    bits: Range<u64>,
+    mappings: &[Vec<Piece>],
+    covers: &mut [Vec<Option<Cover>>],
+    notices: &mut Notices,
+) -> (Vec<usize>, u32) {
+    let code = command.datagram.command;
+    let mut met = Vec::new();
+    let mut count = 0_u32;
+    for (subdevice, (pieces, covers)) in mappings.iter().zip(covers).enumerate() {
+        let (mut reads, mut writes) = (false, false);
+        for (piece, cover) in pieces.iter().zip(covers) {
+            let (offset, meets) = match piece.direction {
+                Direction::Outputs => (command.output_offset, code.writes()),
+                Direction::Inputs => (command.input_offset, code.reads()),
+            };
+            let piece_end = piece.logical_bit + u64::from(piece.bits);
+            if !meets || piece.logical_bit >= bits.end || piece_end <= bits.start {
+                continue;
+            }
+            match piece.direction {
+                Direction::Outputs => writes = true,
+                Direction::Inputs => reads = true,
+            }
+            if piece.logical_bit < bits.start || piece_end > bits.end {
+                let reason = format!("{} covers a part of it only", name(at, eni.tasks.len(), command));
+                notices.add(Some(piece.place), Some(subdevice), "process data of an FMMU", reason);
+            }
+            if cover.is_none() {
+                let image_bit =
+                    offset.and_then(|offset| (u64::from(offset) * 8 + piece.logical_bit).checked_sub(bits.start));
+                *cover = Some(Cover { task: at.0, image_bit });
+            }
+        }
+        if reads || writes {
+            met.push(subdevice);
+            // Facts 1.4: LRW counts 1 for what is read and 2 for what is written.
+            let write = if code == Command::Lrw { 2 } else { 1 };
+            count += u32::from(reads) + if writes { write } else { 0 };
+        }
+    }
+    (met, count)
 }
 
 /// Everything else: clocks and supervision are RingCAT's own matter.

@@ -3,8 +3,8 @@
 use ringcat_engine::config::{ConfigAddress, SubDeviceConfig};
 
 use super::bus::Bus;
-use super::contradiction;
 use super::identity::{Mark, group_mark};
+use super::messages::contradiction;
 use crate::eni::{Eni, EniError};
 
 /// Declares the groups in place; returns their names.

@@ -4,7 +4,7 @@
 use ringcat_engine::config::Expected;
 use ringcat_wire::register::map;
 
-use super::contradiction;
+use super::messages::contradiction;
 use crate::eni::{EcatCommand, Eni, EniError, Place, Target, Transition};
 
 /// What a command that compares is about.

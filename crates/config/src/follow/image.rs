@@ -1,8 +1,8 @@
 //! The process image: which bits of it are which bits of a SyncManager.
 //!
-//! FMMUs give process data logical places, cyclic commands give these a place in the image, `Send` and `Recv` say where it
-//! is by themselves; all three must agree. Offsets of commands count either from the datagram's data (EC-Engineer) or from
-//! its header, ten bytes before (TwinCAT, whose image is the frame): which one it is shows from the file.
+//! FMMUs give process data logical places, cyclic commands give these a place in the image, `Send` and `Recv` say where
+//! it is by themselves; all three must agree. Offsets of commands count either from the datagram's data (EC-Engineer)
+//! or from its header, ten bytes before (TwinCAT, whose image is the frame): which one it is shows from the file.
 
 use std::collections::BTreeSet;
 
@@ -10,11 +10,14 @@ use ringcat_engine::info::Direction;
 
 use super::areas::Piece;
 use super::cyclic::Cover;
+use super::messages::{contradiction, label};
 use super::notices::Notices;
-use super::subdevice::is_complete;
-use super::{MAX_IMAGE, contradiction};
+use super::registers::is_complete;
 use crate::configuration::{ImageArea, ImageCopy, ProcessImage, Variable};
 use crate::eni::{BitRange, Eni, EniError, ImageSide, Problem, SubDevice};
+
+/// Bytes of an image, at most.
+const MAX_IMAGE: usize = 16 << 20;
 
 /// Bits from the offset of a command to its data.
 const HEADERS: [u64; 2] = [0, 80];
@@ -92,8 +95,8 @@ fn range_of(subdevice: &SubDevice, direction: Direction) -> &[BitRange] {
     }
 }
 
-/// Bits from the offset of a command to its data, where one of the ways makes all process data lie where `Send` and `Recv`
-/// say.
+/// Bits from the offset of a command to its data, where one of the ways makes all process data lie where `Send` and
+/// `Recv` say.
 fn header(eni: &Eni, mappings: &[Vec<Piece>], covers: &[Vec<Option<Cover>>]) -> Option<u64> {
     let fits = |header: u64| {
         eni.subdevices.iter().zip(mappings).zip(covers).all(|((subdevice, pieces), covers)| {
@@ -126,23 +129,7 @@ fn of_subdevice(
     let pieces: Vec<(&Piece, Option<Cover>)> =
         pieces.iter().zip(covers.iter().copied()).filter(|(piece, _)| piece.direction == direction).collect();
     if pieces.is_empty() {
-        if is_complete(&eni.subdevices[index].init_commands) {
-            if let Some(range) = ranges.iter().find(|range| range.length > 0) {
-                let reason = "no FMMU maps process data there: the bits stay zero";
-                notices.add(Some(range.place), Some(index), side(direction), reason);
-            }
-            return Ok(());
-        }
-        let mut bit_offset: u32 = 0;
-        for range in ranges.iter().filter(|range| range.length > 0) {
-            let (image_bit, bits) = (range.start, range.length);
-            areas.push(ImageArea { subdevice: index, direction, sync_manager: None, bit_offset, image_bit, bits });
-            let what = side(direction);
-            bit_offset = bit_offset.checked_add(bits).ok_or_else(|| {
-                contradiction(eni, index, range.place, what, "fewer than 2^32 bits", "more in all ranges", "")
-            })?;
-        }
-        return Ok(());
+        return unmapped(eni, index, direction, ranges, areas, notices);
     }
     let said: u64 = ranges.iter().map(|range| u64::from(range.length)).sum();
     let mapped: u64 = pieces.iter().map(|(piece, _)| u64::from(piece.bits)).sum();
@@ -180,6 +167,34 @@ fn of_subdevice(
             }
             in_order(eni, index, ranges, &pieces, areas)?;
         }
+    }
+    Ok(())
+}
+
+/// Process data that no FMMU maps: in a file that leaves FMMUs to the SII, the ranges lie one behind the other.
+fn unmapped(
+    eni: &Eni,
+    index: usize,
+    direction: Direction,
+    ranges: &[BitRange],
+    areas: &mut Vec<ImageArea>,
+    notices: &mut Notices,
+) -> Result<(), EniError> {
+    if is_complete(&eni.subdevices[index].init_commands) {
+        if let Some(range) = ranges.iter().find(|range| range.length > 0) {
+            let reason = "no FMMU maps process data there: the bits stay zero";
+            notices.add(Some(range.place), Some(index), side(direction), reason);
+        }
+        return Ok(());
+    }
+    let mut bit_offset: u32 = 0;
+    for range in ranges.iter().filter(|range| range.length > 0) {
+        let (image_bit, bits) = (range.start, range.length);
+        areas.push(ImageArea { subdevice: index, direction, sync_manager: None, bit_offset, image_bit, bits });
+        let what = side(direction);
+        bit_offset = bit_offset.checked_add(bits).ok_or_else(|| {
+            contradiction(eni, index, range.place, what, "fewer than 2^32 bits", "more in all ranges", "")
+        })?;
     }
     Ok(())
 }
@@ -227,7 +242,7 @@ fn check_overlaps(eni: &Eni, areas: &[ImageArea]) -> Result<(), EniError> {
     let (first, second) = (pair[0], pair[1]);
     let subdevice = &eni.subdevices[second.subdevice];
     let place = range_of(subdevice, second.direction).first().map_or(subdevice.place, |range| range.place);
-    let got = format!("bit {}, which {} has too", second.image_bit, super::label(eni, first.subdevice));
+    let got = format!("bit {}, which {} has too", second.image_bit, label(eni, first.subdevice));
     Err(contradiction(eni, second.subdevice, place, side(second.direction), "bits of its own in the image", got, ""))
 }
 

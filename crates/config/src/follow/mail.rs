@@ -9,9 +9,9 @@ use ringcat_wire::mailbox::eoe::{EoeBody, EoeMessage};
 use ringcat_wire::mailbox::soe::Idn;
 
 use super::bus::Bus;
-use super::contradiction;
+use super::messages::{contradiction, named};
 use super::notices::Notices;
-use super::subdevice::{at_transitions, comment, named};
+use super::transitions::{at_transitions, comment};
 use crate::eni::{CoeCommand, Eni, EniError, EoeCommand, Place, SoeCommand, Transition};
 
 /// SoE: the value of an IDN in the elements, and the code of a write.
@@ -112,8 +112,8 @@ fn idn(command: &SoeCommand) -> Result<StartupAction, String> {
     Ok(StartupAction::Idn(IdnWrite { drive: command.drive, idn: Idn(command.idn), data: command.data.clone() }))
 }
 
-/// The message of a command that sets addresses. Some tools write what follows the EoE header (facts 6.5) and leave the header
-/// to the MainDevice: flags and fields that are as long as they say.
+/// The message of a command that sets addresses. Some tools write what follows the EoE header (facts 6.5) and leave the
+/// header to the MainDevice: flags and fields that are as long as they say.
 fn with_header(data: &[u8]) -> Cow<'_, [u8]> {
     /// Type 2, port 0, no result.
     const HEADER: [u8; 4] = [EOE_SET_IP, 0, 0, 0];

@@ -1,5 +1,5 @@
-//! What the commands of a file leave in the registers of a controller: they are replayed in the order in which they would
-//! be sent, and the result is read. So it does not matter in how many pieces a register is written.
+//! What the commands of a file leave in the registers of a controller: they are replayed in the order in which they
+//! would be sent, and the result is read. So it does not matter in how many pieces a register is written.
 
 use std::collections::BTreeMap;
 
@@ -82,4 +82,15 @@ impl Registers {
             fmmu.active.then_some((index, fmmu, place))
         })
     }
+}
+
+/// Whether the file has the commands with which a MainDevice brings a SubDevice up. Files written by hand have a few
+/// extra ones at most, and leave the rest to the SII.
+pub(super) fn is_complete(commands: &[EcatCommand]) -> bool {
+    commands.iter().any(|command| match command.datagram.target {
+        Target::Register { ado, .. } => {
+            ado == map::AL_CONTROL || (map::FMMU_BASE.0..map::SYNC_MANAGER_BASE.0 + 0x80).contains(&ado.0)
+        }
+        Target::Logical(_) => false,
+    })
 }

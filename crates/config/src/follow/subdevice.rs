@@ -4,7 +4,6 @@ use std::time::Duration;
 
 use ringcat_engine::config::{
     DeclaredSyncManager, RegisterAccess, RegisterCommand, StartupAction, StartupCommand, StateTimeout, SubDeviceConfig,
-    Transition as EngineTransition,
 };
 use ringcat_wire::al::AlState;
 use ringcat_wire::command::{Addressing, Command};
@@ -12,10 +11,12 @@ use ringcat_wire::register::{SyncManager, map};
 
 use super::areas::{self, Piece};
 use super::bus::Bus;
+use super::messages::{command_name, contradiction, named};
 use super::notices::Notices;
-use super::registers::Registers;
-use super::{assignment, clocks, contradiction, identity, mail, sync_managers};
-use crate::eni::{EcatCommand, Eni, EniError, Place, Target, Transition, quoted};
+use super::registers::{Registers, is_complete};
+use super::transitions::{at_transitions, comment};
+use super::{assignment, clocks, identity, mail, sync_managers};
+use crate::eni::{EcatCommand, Eni, EniError, Place, Target, Transition};
 
 /// The way up, in the order in which its commands are sent.
 pub(super) const UP: [Transition; 3] = [Transition::Ip, Transition::Ps, Transition::So];
@@ -75,22 +76,6 @@ pub(super) fn follow(
     Ok((config, pieces))
 }
 
-/// Whether the file has the commands with which a MainDevice brings a SubDevice up. Files written by hand have a few extra
-/// ones at most, and leave the rest to the SII.
-pub(super) fn is_complete(commands: &[EcatCommand]) -> bool {
-    commands.iter().any(|command| match command.datagram.target {
-        Target::Register { ado, .. } => {
-            ado == map::AL_CONTROL || (map::FMMU_BASE.0..map::SYNC_MANAGER_BASE.0 + 0x80).contains(&ado.0)
-        }
-        Target::Logical(_) => false,
-    })
-}
-
-/// An element with what it is for, for messages.
-pub(super) fn named(element: &str, comment: &str) -> String {
-    if comment.is_empty() { element.to_owned() } else { format!("{element} {}", quoted(comment)) }
-}
-
 /// Whether a command goes to the SubDevice below which it stands; another one is noted.
 fn is_own(eni: &Eni, index: usize, command: &EcatCommand, bus: &Bus, notices: &mut Notices) -> bool {
     let subdevice = &eni.subdevices[index];
@@ -107,13 +92,13 @@ fn is_own(eni: &Eni, index: usize, command: &EcatCommand, bus: &Bus, notices: &m
         Addressing::AutoIncrement if bus.groups[index].is_some() => true,
         Addressing::AutoIncrement => match subdevice.auto_increment {
             Some(own) if own != adp && subdevice.station == Some(adp) => note(format!(
-                "{name} counts positions, and Adp {adp} is the PhysAddr: nobody would be reached, so it is not sent (Cmd 4 and \
-                 5 address by PhysAddr)"
+                "{name} counts positions, and Adp {adp} is the PhysAddr: nobody would be reached, so it is not sent \
+                 (Cmd 4 and 5 address by PhysAddr)"
             )),
             Some(own) if own != adp => note(format!("{name} with Adp {adp} goes to another SubDevice: not sent")),
             None if subdevice.station == Some(adp) => note(format!(
-                "{name} counts positions, and Adp {adp} is the PhysAddr: nobody would be reached, so it is not sent (Cmd 4 and \
-                 5 address by PhysAddr)"
+                "{name} counts positions, and Adp {adp} is the PhysAddr: nobody would be reached, so it is not sent \
+                 (Cmd 4 and 5 address by PhysAddr)"
             )),
             Some(_) | None => true,
         },
@@ -125,11 +110,6 @@ fn is_own(eni: &Eni, index: usize, command: &EcatCommand, bus: &Bus, notices: &m
             note(format!("{name} to everybody among the commands of a SubDevice is not sent"))
         }
     }
-}
-
-/// A command's name, as in specifications.
-pub(super) fn command_name(command: Command) -> String {
-    command.to_string()
 }
 
 /// What becomes of a command.
@@ -241,54 +221,6 @@ fn time_limits(eni: &Eni, index: usize, command: &EcatCommand) -> Result<Vec<Sta
     Ok(limits)
 }
 
-/// The engine's transition; `None` where it has no commands.
-pub(super) const fn followed(transition: Transition) -> Option<EngineTransition> {
-    match transition {
-        Transition::Ip => Some(EngineTransition::Ip),
-        Transition::Ps => Some(EngineTransition::Ps),
-        Transition::So => Some(EngineTransition::So),
-        Transition::Os => Some(EngineTransition::Os),
-        Transition::Sp => Some(EngineTransition::Sp),
-        Transition::Ii
-        | Transition::Pp
-        | Transition::Pi
-        | Transition::Po
-        | Transition::Ss
-        | Transition::Si
-        | Transition::Op
-        | Transition::Oi
-        | Transition::Ib
-        | Transition::Bi => None,
-    }
-}
-
-/// Start-up commands for the transitions of a command; transitions at which RingCAT sends none are noted.
-pub(super) fn at_transitions(
-    place: Place,
-    transitions: &[Transition],
-    index: usize,
-    subject: &str,
-    notices: &mut Notices,
-    mut make: impl FnMut(EngineTransition) -> StartupCommand,
-) -> Vec<(Place, StartupCommand)> {
-    let mut commands = Vec::new();
-    let mut left: Vec<&str> = Vec::new();
-    for transition in transitions {
-        match followed(*transition) {
-            Some(found) => commands.push((place, make(found))),
-            // OP is reached and left through SAFEOP: the command is sent on one half of the way.
-            None if *transition == Transition::Op && transitions.contains(&Transition::Sp) => {}
-            None if *transition == Transition::Po && transitions.contains(&Transition::Ps) => {}
-            None => left.push(transition.name()),
-        }
-    }
-    if !left.is_empty() {
-        let reason = format!("not sent at {}: RingCAT sends commands at IP, PS, SO, OS and SP", left.join(", "));
-        notices.add(Some(place), Some(index), subject, reason);
-    }
-    commands
-}
-
 /// A command that is sent as it is.
 fn raw(
     eni: &Eni,
@@ -338,13 +270,8 @@ fn raw(
     Ok(())
 }
 
-/// A comment, if it says something.
-pub(super) fn comment(text: &str) -> Option<String> {
-    (!text.is_empty()).then(|| text.to_owned())
-}
-
-/// SyncManagers of process data that the file switches on at SO are for OP only: outputs that act in SAFEOP already would be
-/// dangerous. Others that differ there are noted.
+/// SyncManagers of process data that the file switches on at SO are for OP only: outputs that act in SAFEOP already
+/// would be dangerous. Others that differ there are noted.
 fn late_sync_managers(
     index: usize,
     commands: &[EcatCommand],

@@ -6,7 +6,7 @@ use ringcat_wire::register::{
     SyncManagerStatus,
 };
 
-use super::contradiction;
+use super::messages::contradiction;
 use super::notices::Notices;
 use super::registers::Registers;
 use crate::eni::{Eni, EniError, MailboxBuffer, Place, ProcessData, SyncManagerKind, SyncManagerSettings, Transition};
@@ -129,8 +129,8 @@ fn from_settings(settings: &SyncManagerSettings, process_data: &ProcessData) -> 
     Some(declare(settings.index, role, register))
 }
 
-/// The PDOs of a SyncManager that the file describes: those that it lists, otherwise those that name it. `None` where one
-/// of the list is not described.
+/// The PDOs of a SyncManager that the file describes: those that it lists, otherwise those that name it. `None` where
+/// one of the list is not described.
 fn mapped<'a>(one: &DeclaredSyncManager, process_data: &'a ProcessData) -> Option<Vec<&'a crate::eni::Pdo>> {
     let settings = process_data.sync_managers.iter().find(|settings| settings.index == one.index);
     let outputs = one.role == SyncManagerRole::Outputs;

@@ -101,7 +101,8 @@ fn a_sync_manager_that_is_switched_on_at_so_is_for_op_only() {
     assert!(op_only(&configuration, 1), "left: at SO");
     assert!(!op_only(&configuration, 2), "right: at PS");
     let other = "<InitCmd><Transition>SO</Transition><Comment>set sm 0 of left</Comment>";
-    let both = "<InitCmd><Transition>PS</Transition><Cmd>5</Cmd><Adp>1002</Adp><Ado>2048</Ado><Data>000f010004000100</Data></InitCmd>";
+    let both = "<InitCmd><Transition>PS</Transition><Cmd>5</Cmd><Adp>1002</Adp><Ado>2048</Ado>\
+        <Data>000f010004000100</Data></InitCmd>";
     let changed = changed(&[(other, &format!("{both}{other}"))]);
     assert!(!op_only(&changed, 1), "on in SAFEOP already");
     assert!(has_notice(&changed, &["SyncManager 0 at SO", "SAFEOP already"]));
@@ -110,7 +111,8 @@ fn a_sync_manager_that_is_switched_on_at_so_is_for_op_only() {
 #[test]
 fn long_entries_are_cut_and_pdos_that_do_not_fit_have_no_places() {
     let entry = "<Entry><Index>#x6064</Index><SubIndex>0</SubIndex><BitLen>32</BitLen></Entry>";
-    let array = "<Entry><Index>#x2000</Index><SubIndex>1</SubIndex><BitLen>800</BitLen><DataType>ARRAY [0..99] OF BYTE</DataType></Entry>";
+    let array = "<Entry><Index>#x2000</Index><SubIndex>1</SubIndex><BitLen>800</BitLen>\
+        <DataType>ARRAY [0..99] OF BYTE</DataType></Entry>";
     let lengths = ("<Data>00110600640001008011060020000100</Data>", "<Data>00110600640001008011660020000100</Data>");
     let fmmu = ("<Data>00000010060000078011000101000000</Data>", "<Data>00000010660000078011000101000000</Data>");
     let place = ("<BitStart>0</BitStart><BitLength>48</BitLength>", "<BitStart>0</BitStart><BitLength>816</BitLength>");
@@ -145,8 +147,9 @@ fn sync_signals_come_from_the_registers_and_the_shift_from_the_element_facts_7_3
     assert!(drive(&changed(&[("<Data>0007</Data>", "<Data>0000</Data>")])).sync.is_none());
 }
 
+// covers: facts 8.1
 #[test]
-fn commands_through_the_mailbox_become_start_up_commands_in_document_order_facts_8_1() {
+fn commands_through_the_mailbox_become_start_up_commands_in_document_order() {
     let drive = drive(&configured(SMALL));
     let mail: Vec<_> = drive.startup.iter().filter(|c| !matches!(c.action, StartupAction::Register(_))).collect();
     let sdo = |sub_index, complete_access, data: &[u8]| {
@@ -269,8 +272,9 @@ fn addresses_are_hexadecimal_have_points_or_are_the_message_itself_facts_6_5() {
 }
 
 /// Facts 8.2: PO is among the transitions; OP is reached through SAFEOP.
+// covers: facts 8.2
 #[test]
-fn a_way_over_two_transitions_is_sent_at_the_one_that_is_listed_too_or_noted_facts_8_2() {
+fn a_way_over_two_transitions_is_sent_at_the_one_that_is_listed_too_or_noted() {
     let own = "<Transition>PS</Transition><Transition>OP</Transition>";
     let both = changed(&[(own, "<Transition>PO</Transition><Transition>PS</Transition><Transition>OP</Transition>")]);
     let transitions = |configuration: &ringcat_config::Configuration| -> Vec<Transition> {

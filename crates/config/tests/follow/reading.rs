@@ -92,8 +92,8 @@ fn errors_name_line_column_element_expected_and_got() {
     let error = refused(&[("<BitStart>20</BitStart>", "<BitStart>twenty</BitStart>")]);
     let line = SMALL[..SMALL.find("<BitStart>20").unwrap()].matches('\n').count() + 1;
     let expected = format!(
-        "line {line}, column 15: Config/Slave[3] \"Right\"/ProcessData/Send/BitStart: expected a number from 0 to 4294967295, \
-         got \"twenty\""
+        "line {line}, column 15: Config/Slave[3] \"Right\"/ProcessData/Send/BitStart: expected a number from 0 to \
+         4294967295, got \"twenty\""
     );
     assert_eq!(error, expected);
     assert!(refused(&[("<Data>c209</Data>", "<Data>c20</Data>")]).contains("pairs of hexadecimal digits, got \"c20\""));
@@ -171,7 +171,8 @@ fn lengths_that_add_up_to_too_much_are_refused_or_left_out() {
     let all = "<Send><BitStart>0</BitStart><BitLength>4294967295</BitLength></Send>".repeat(3);
     let by_hand = |process_data: &str| {
         format!(
-            "<EtherCATConfig><Config><Slave><Info/><ProcessData>{process_data}</ProcessData></Slave></Config></EtherCATConfig>"
+            "<EtherCATConfig><Config><Slave><Info/><ProcessData>{process_data}</ProcessData></Slave></Config>\
+             </EtherCATConfig>"
         )
     };
     let text = refusal(&by_hand(&all));
@@ -209,7 +210,8 @@ fn an_encrypted_file_is_called_so_with_the_tool_that_makes_such_files() {
         (state >> 56) as u8
     };
     let random: Vec<u8> = (0..4000).map(|_| chance()).collect();
-    let xml = br#"<?xml version="1.0"?><EncryptedData xmlns="http://www.w3.org/2001/04/xmlenc#"><CipherData/></EncryptedData>"#;
+    let xml = br#"<?xml version="1.0"?>
+        <EncryptedData xmlns="http://www.w3.org/2001/04/xmlenc#"><CipherData/></EncryptedData>"#;
     let salted = [&b"Salted__"[..], &random].concat();
     for (bytes, what) in [
         (&random[..], "bytes without any order"),

@@ -1,5 +1,5 @@
-//! Real files, where `../shared/data/eni` lies beside the repository: each gives a configuration, or an error that says what
-//! to do. Where they are absent the test says so and passes.
+//! Real files, where `../shared/data/eni` lies beside the repository: each gives a configuration, or an error that says
+//! what to do. Where they are absent the test says so and passes.
 
 use std::fs;
 use std::path::{Path, PathBuf};

@@ -47,8 +47,9 @@ const GROUP: &str = "<HotConnect><GroupName>Gripper</GroupName><GroupMemberCnt>2
 /// Where the second SubDevice has its `PreviousPort`, which becomes a group's head.
 const HEAD: &str = "<PreviousPort Selected=\"1\"><Port>B</Port><PhysAddr>1001</PhysAddr></PreviousPort>";
 
+// covers: facts 8.2
 #[test]
-fn a_hot_connect_group_is_found_by_its_alias_and_its_members_are_behind_it_facts_8_2() {
+fn a_hot_connect_group_is_found_by_its_alias_and_its_members_are_behind_it() {
     let configuration = changed(&[(HEAD, GROUP)]);
     let alias = |offset| ConfigAddress::Alias { alias: 0x1234, offset };
     let expected = [ConfigAddress::Position(0), alias(0), alias(1), ConfigAddress::Position(1)];
@@ -112,8 +113,9 @@ fn a_file_without_commands_leaves_the_rest_to_the_sii_and_expects_what_info_says
 }
 
 /// As users write it who have only start-up lists (users' pain: a mapping that differs from the SII).
+// covers: facts 6.3
 #[test]
-fn a_file_with_nothing_but_coe_commands_says_with_them_how_long_process_data_is_facts_6_3() {
+fn a_file_with_nothing_but_coe_commands_says_with_them_how_long_process_data_is() {
     let command = |object: &str, sub_index: u8, complete: u8, data: &str| {
         format!(
             "<InitCmd CompleteAccess=\"{complete}\"><Transition>PS</Transition><Ccs>1</Ccs><Index>{object}</Index>\
@@ -131,7 +133,8 @@ fn a_file_with_nothing_but_coe_commands_says_with_them_how_long_process_data_is_
         command("0x1a05", 0, 0, "01"),
     ];
     let text = format!(
-        "<EtherCATConfig><Config><Slave><Info><Name>A</Name></Info><Mailbox><CoE><InitCmds>{}</InitCmds></CoE></Mailbox>\
+        "<EtherCATConfig><Config><Slave><Info><Name>A</Name></Info><Mailbox><CoE><InitCmds>{}</InitCmds></CoE>\
+         </Mailbox>\
          </Slave></Config></EtherCATConfig>",
         commands.concat()
     );

@@ -118,8 +118,8 @@ impl ClockWords {
         self.is_window_watched.load(Ordering::Relaxed)
     }
 
-    /// The segment's reference is told the time of the host or of the application: its own difference shows how punctual that
-    /// is, and counts no longer.
+    /// The segment's reference is told the time of the host or of the application: its own difference shows how
+    /// punctual that is, and counts no longer.
     pub(crate) fn lead_reference(&self) {
         self.is_reference_led.store(true, Ordering::Relaxed);
     }
@@ -128,7 +128,8 @@ impl ClockWords {
         self.is_reference_led.load(Ordering::Relaxed)
     }
 
-    /// Whether there are clocks that frames meet before the reference they follow: they are told what the host believes.
+    /// Whether there are clocks that frames meet before the reference they follow: they are told what the host
+    /// believes.
     pub(crate) fn post_in_front(&self, some: bool) {
         self.are_some_in_front.store(some, Ordering::Relaxed);
     }

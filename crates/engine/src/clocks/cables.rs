@@ -1,7 +1,7 @@
 //! What is known about the cables of a segment, so that a delay that cannot be measured now is known from before.
 //!
-//! A frame meets the members of a whole ring only once, and what is between them cannot be measured then. It was while the
-//! ring was open: at the set-up, which opens it for that, or while it was broken.
+//! A frame meets the members of a whole ring only once, and what is between them cannot be measured then. It was while
+//! the ring was open: at the set-up, which opens it for that, or while it was broken.
 
 use alloc::collections::BTreeMap;
 

@@ -2,8 +2,8 @@
 //!
 //! The frame's way is followed port by port ([`Wiring::way`]). Between two arrivals at a SubDevice with a clock lies a
 //! branch: what its clock says the branch took, less what the SubDevices in the branch say that they took, is the time
-//! on cables. What is known about cables ([`Cables`]) counts, and the rest is shared evenly among the others. SubDevices
-//! without a clock are part of the cable.
+//! on cables. What is known about cables ([`Cables`]) counts, and the rest is shared evenly among the others.
+//! SubDevices without a clock are part of the cable.
 
 use alloc::vec;
 use alloc::vec::Vec;
@@ -18,7 +18,8 @@ use crate::topology::PortOf;
 /// Longer than this no frame is on its way: a thousand SubDevices take 2 ms.
 pub(super) const MOST_NS: i64 = 20_000_000;
 
-/// Cables that take as long together as they are known to, to within this and so much for each, are those that are known.
+/// Cables that take as long together as they are known to, to within this and so much for each, are those that are
+/// known.
 const SAME: i64 = 30 << FRACTION;
 const SAME_CABLE: i64 = 10 << FRACTION;
 
@@ -36,7 +37,8 @@ pub struct Delays {
     pub trees: Vec<usize>,
     /// Some way between two clocks is neither measured nor remembered.
     pub is_guessed: bool,
-    /// Several cables share a time that was measured of them together: the members of a whole ring whose cables nobody knows.
+    /// Several cables share a time that was measured of them together: the members of a whole ring whose cables nobody
+    /// knows.
     pub is_shared: bool,
     /// Some time between two arrivals cannot be: the frame has taken another way.
     pub is_implausible: bool,
@@ -83,8 +85,8 @@ impl Segment<'_> {
         cables.see(self.wiring.cables().filter_map(|(near, far)| Some((self.end(near)?, self.end(far)?))));
     }
 
-    /// Propagation delays. `times` by position, on one clock (see [`super::Measurements::mean`]); `None` without a clock.
-    /// What was measured of cables is learned.
+    /// Propagation delays. `times` by position, on one clock (see [`super::Measurements::mean`]); `None` without a
+    /// clock. What was measured of cables is learned.
     pub fn propagation(&self, times: &[Option<PortTimes>], cables: &mut Cables) -> Delays {
         let count = self.wiring.count();
         let mut delays = Delays { units: vec![None; count], trees: vec![0; count], ..Delays::default() };
@@ -251,8 +253,8 @@ impl<'a, C: Fn(usize) -> Option<PortTimes>> Walk<'a, C> {
         is_shared
     }
 
-    /// Whether the gaps that are not known are several, and some of a cable on which the frame goes one way only: there and back
-    /// the same cable takes as long.
+    /// Whether the gaps that are not known are several, and some of a cable on which the frame goes one way only: there
+    /// and back the same cable takes as long.
     fn are_several(&self, gaps: &[Gap]) -> bool {
         let unknown = || gaps.iter().filter(|gap| gap.known.is_none());
         let sorted = |(one, other): (End, End)| (one.min(other), one.max(other));
@@ -276,8 +278,8 @@ impl<'a, C: Fn(usize) -> Option<PortTimes>> Walk<'a, C> {
         Some((self.segment.end(near)?, self.segment.end(far)?))
     }
 
-    /// The gaps between two places of which the first one counts only where it is the beginning of the way or a SubDevice
-    /// with a clock.
+    /// The gaps between two places of which the first one counts only where it is the beginning of the way or a
+    /// SubDevice with a clock.
     fn gaps(&self, from: usize, to: usize, known: &dyn Fn(End, End) -> Option<i64>) -> Vec<Gap> {
         let mut gaps = Vec::new();
         let mut begin = from;

@@ -1,8 +1,8 @@
 //! The mean of several measurements of receive times, corrected for the drift of each clock (facts 7.1).
 //!
 //! Receive times of a SubDevice are differences on its own clock. In a line of 200 SubDevices the first one waits for
-//! 200 us until the frame is back, in which clocks that differ by 100 ppm come apart by 20 ns. How much they differ shows
-//! in how far each got from the first measurement to the last.
+//! 200 us until the frame is back, in which clocks that differ by 100 ppm come apart by 20 ns. How much they differ
+//! shows in how far each got from the first measurement to the last.
 
 use alloc::vec::Vec;
 
@@ -91,8 +91,8 @@ impl Measurements {
         Measurements { entries: wiring.entry_ports(), arrivals, trees, samples: Vec::new() }
     }
 
-    /// Adds a measurement: what each SubDevice has latched of the same frame. One that is missing in any counts as one without
-    /// a clock. All must be taken within two seconds.
+    /// Adds a measurement: what each SubDevice has latched of the same frame. One that is missing in any counts as one
+    /// without a clock. All must be taken within two seconds.
     pub fn add(&mut self, latched: Vec<Option<Latched>>) {
         self.samples.push(latched);
     }
@@ -107,8 +107,8 @@ impl Measurements {
         (!self.samples.is_empty() && self.samples.iter().all(is_there)).then_some(Series { of: self, node })
     }
 
-    /// What does not fit the other measurements, if anything: a port whose time is another one than usual, a clock that has
-    /// not gone on like that of the reference, so that it has not latched the same frame.
+    /// What does not fit the other measurements, if anything: a port whose time is another one than usual, a clock that
+    /// has not gone on like that of the reference, so that it has not latched the same frame.
     pub fn disagreement(&self, reference: usize) -> Option<Disagreement> {
         let nodes = || (0..self.entries.len()).filter_map(|node| self.series(node));
         nodes().find_map(|series| self.odd_port(&series)).or_else(|| {
@@ -216,8 +216,9 @@ mod tests {
         assert_eq!(empty(1).mean(3), [None]);
     }
 
+    // covers: facts 7.1
     #[test]
-    fn a_port_that_latched_another_frame_and_a_clock_that_latched_none_are_found_facts_7_1() {
+    fn a_port_that_latched_another_frame_and_a_clock_that_latched_none_are_found() {
         let first = [latched(1_000, 700), latched(5_000, 300)];
         let mut measurements = of(2, [first, [latched(2_000_000, 690), latched(2_004_100, 320)]]);
         assert_eq!(measurements.disagreement(0), None);

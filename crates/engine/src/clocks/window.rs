@@ -1,7 +1,7 @@
 //! Whether clocks are in their window, as it is told: results one by one in, changes worth telling out.
 //!
-//! A change counts when some results in a row show it. Clocks that leave their window soon after they came back have to be
-//! inside for longer each time, so that those at its edge are not told for ever.
+//! A change counts when some results in a row show it. Clocks that leave their window soon after they came back have to
+//! be inside for longer each time, so that those at its edge are not told for ever.
 
 /// Results in a row until a change is told.
 const RESULTS: u32 = 3;

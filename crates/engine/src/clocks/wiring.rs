@@ -1,8 +1,8 @@
 //! Which port is connected to which, and the way of a frame through that (facts 2.1, 7.1).
 //!
-//! In: a [`Topology`] and which ports are open now. A topology has local rings as branches; here their closing cables are
-//! what they are, cables. Out: the arrivals of a frame of either link, in order, and whether a processing unit meets it
-//! after each.
+//! In: a [`Topology`] and which ports are open now. A topology has local rings as branches; here their closing cables
+//! are what they are, cables. Out: the arrivals of a frame of either link, in order, and whether a processing unit
+//! meets it after each.
 
 use alloc::vec;
 use alloc::vec::Vec;
@@ -35,8 +35,8 @@ pub struct Arrival {
 }
 
 impl Wiring {
-    /// Of a topology whose ring is closed or not. `is_open` says which ports are open: closing cables of local rings with
-    /// both ends open are in use.
+    /// Of a topology whose ring is closed or not. `is_open` says which ports are open: closing cables of local rings
+    /// with both ends open are in use.
     pub fn new(topology: &Topology, ring_closed: bool, is_open: impl Fn(PortOf) -> bool) -> Wiring {
         let mut wiring = Wiring { far: vec![[None; 4]; topology.nodes.len()], entries: entries(topology, ring_closed) };
         for (node, here) in topology.nodes.iter().enumerate() {
@@ -133,7 +133,8 @@ impl Wiring {
 }
 
 impl Wiring {
-    /// The ports at which the frame that a SubDevice processes comes in, by position, and of which link that is (0 or 1).
+    /// The ports at which the frame that a SubDevice processes comes in, by position, and of which link that is (0 or
+    /// 1).
     pub fn arrival_ports(&self) -> (Vec<[bool; 4]>, Vec<usize>) {
         let mut ports = vec![[false; 4]; self.far.len()];
         let mut trees = vec![0; self.far.len()];
@@ -206,8 +207,9 @@ mod tests {
         wiring.way(tree).iter().map(|arrival| (arrival.at.node, arrival.at.port, arrival.processed)).collect()
     }
 
+    // covers: facts 9.4
     #[test]
-    fn a_frame_goes_round_a_local_ring_once_and_back_and_forth_through_a_broken_one_facts_9_4() {
+    fn a_frame_goes_round_a_local_ring_once_and_back_and_forth_through_a_broken_one() {
         let whole = Wiring::new(&junction(), false, |_| true);
         let round =
             [(0, 0, true), (1, 0, true), (2, 0, true), (3, 0, true), (0, 1, false), (4, 0, true), (0, 2, false)];
@@ -234,8 +236,9 @@ mod tests {
         assert_eq!(broken.entry_ports(), [0, 0, 1, 1, 0]);
     }
 
+    // covers: facts 2.9
     #[test]
-    fn frames_of_both_links_pass_a_closed_ring_and_a_branch_on_port_2_is_met_by_one_facts_2_9() {
+    fn frames_of_both_links_pass_a_closed_ring_and_a_branch_on_port_2_is_met_by_one() {
         // S1, S2 with S5 on port 2, S3.
         let mut topology = Topology { nodes: vec![Node::default(); 4], main_count: 3, ..Topology::default() };
         for (parent, port, child) in [(0, 1, 1), (1, 1, 2), (1, 2, 3)] {

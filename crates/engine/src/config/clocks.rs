@@ -17,8 +17,8 @@ pub enum ReferenceClock {
 
 /// What a frame takes through a SubDevice's controller from port to port (facts 7.1). No register tells it, and receive
 /// times show only there and back together. Only differences count, between both ways and between SubDevices: what is
-/// left out of all of them is measured with the cables. By half of what is left out of some the delay to the next one is
-/// wrong.
+/// left out of all of them is measured with the cables. By half of what is left out of some the delay to the next one
+/// is wrong.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub struct Passage {
     /// Nanoseconds of a passage on which its processing unit meets the frame.
@@ -50,12 +50,12 @@ pub struct ClockConfig {
     pub lock_samples: u32,
     /// How long a SubDevice with SYNC signals is held in SAFEOP until all clocks are locked.
     pub lock_limit: Duration,
-    /// The broadcast read of 0x092C beyond which clocks count as out of their window. It is the OR of all magnitudes: at
-    /// most twice the largest.
+    /// The broadcast read of 0x092C beyond which clocks count as out of their window. It is the OR of all magnitudes:
+    /// at most twice the largest.
     pub sync_window_ns: u32,
-    /// Where process data is on the wire all the time, the cyclic half may be asked to begin a cycle later while propagation
-    /// delays are measured: once for each of [`ClockConfig::measurements`], by about two round trips. Otherwise they are
-    /// not measured there, which is told.
+    /// Where process data is on the wire all the time, the cyclic half may be asked to begin a cycle later while
+    /// propagation delays are measured: once for each of [`ClockConfig::measurements`], by about two round trips.
+    /// Otherwise they are not measured there, which is told.
     pub pauses: bool,
 }
 

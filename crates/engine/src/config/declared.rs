@@ -4,7 +4,7 @@ use alloc::vec::Vec;
 
 use ringcat_wire::register::SyncManager;
 
-use super::PdoMapping;
+use super::pdo::PdoMapping;
 use crate::info::Direction;
 
 /// What a SyncManager is for.
@@ -31,8 +31,8 @@ impl SyncManagerRole {
     }
 }
 
-/// A SyncManager as a configuration file writes it. Its registers are written as they are; PDO assignment and mapping are
-/// the matter of the file's own start-up commands.
+/// A SyncManager as a configuration file writes it. Its registers are written as they are; PDO assignment and mapping
+/// are the matter of the file's own start-up commands.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct DeclaredSyncManager {
     /// Its number.

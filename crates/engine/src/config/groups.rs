@@ -1,12 +1,13 @@
 //! Hot connect groups: SubDevices in a row that may be there or not, at any place of the segment.
 //!
-//! The first one, the head, is found by alias or explicit device identification; the others follow it in the order of the
-//! processing units. What the scan found is matched here, those that come later by the procedures.
+//! The first one, the head, is found by alias or explicit device identification; the others follow it in the order of
+//! the processing units. What the scan found is matched here, those that come later by the procedures.
 
 use alloc::collections::BTreeMap;
 use alloc::vec::Vec;
 
-use super::resolve::{Resolution, at_place, bearer, missing};
+use super::matching::{at_place, bearer, missing};
+use super::resolution::Resolution;
 use super::{ConfigAddress, SubDeviceConfig};
 use crate::info::SubDeviceInfo;
 

@@ -7,100 +7,10 @@ use core::fmt;
 use ringcat_wire::address::Position;
 
 use super::groups::{self, groups};
+use super::matching::{at_place, bearer, nobody};
+use super::resolution::{ConfigError, Resolution};
 use super::{ConfigAddress, SubDeviceConfig};
-use crate::info::{IdentityField, SubDeviceInfo};
-
-/// Why a declaration has no SubDevice.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum ConfigError {
-    /// Another SubDevice is at its place.
-    Mismatch {
-        /// Position of the SubDevice.
-        position: Position,
-        /// The field that differs.
-        field: IdentityField,
-        /// Declared value.
-        expected: u32,
-        /// Value of the SubDevice.
-        got: u32,
-    },
-    /// No SubDevice is at its place.
-    Missing {
-        /// The place.
-        address: ConfigAddress,
-        /// SubDevices in the segment.
-        present: usize,
-    },
-    /// Several SubDevices have the alias or the identification.
-    Ambiguous {
-        /// Of the one that they are looked for by.
-        address: ConfigAddress,
-        /// Position of the first one.
-        first: Position,
-        /// Position of the second one.
-        second: Position,
-    },
-    /// An earlier declaration has the SubDevice already.
-    DeclaredTwice {
-        /// Position of the SubDevice.
-        position: Position,
-        /// Number of the earlier declaration.
-        first: usize,
-    },
-}
-
-impl fmt::Display for ConfigError {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            ConfigError::Mismatch { position, field, expected, got } => {
-                write!(f, "SubDevice {position}: expected {field} {expected:#010x}, got {got:#010x}")
-            }
-            ConfigError::Missing { address, present } => {
-                write!(f, "no SubDevice at {address}; {present} are present")
-            }
-            ConfigError::Ambiguous { address, first, second } => {
-                write!(f, "{} belongs to SubDevice {first} and to SubDevice {second}", address.mark())
-            }
-            ConfigError::DeclaredTwice { position, first } => {
-                write!(f, "SubDevice {position} is declared by declaration {first} already")
-            }
-        }
-    }
-}
-
-impl core::error::Error for ConfigError {}
-
-/// What became of a declaration, or of a SubDevice that nobody declared. Both are named by their index in the slices
-/// given to [`resolve`].
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Resolution {
-    /// The declaration has its SubDevice.
-    Found {
-        /// The declaration.
-        config: usize,
-        /// The SubDevice.
-        info: usize,
-    },
-    /// An optional SubDevice is not there.
-    Absent {
-        /// The declaration.
-        config: usize,
-        /// What is there instead, if anything.
-        error: ConfigError,
-    },
-    /// The declaration has no SubDevice though it needs one.
-    Failed {
-        /// The declaration.
-        config: usize,
-        /// Why.
-        error: ConfigError,
-    },
-    /// Nobody declared the SubDevice.
-    Extra {
-        /// The SubDevice.
-        info: usize,
-    },
-}
+use crate::info::SubDeviceInfo;
 
 /// Two SubDevices with one alias.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -237,51 +147,12 @@ impl Skips {
     }
 }
 
-/// The SubDevice with this index, where it is the expected one.
-pub(super) fn at_place(
-    configs: &[SubDeviceConfig],
-    infos: &[SubDeviceInfo],
-    config: usize,
-    place: Option<usize>,
-) -> Resolution {
-    let declared = &configs[config];
-    let Some((index, info)) = place.and_then(|place| Some((place, infos.get(place)?))) else {
-        return missing(declared, config, nobody(declared, infos));
-    };
-    match declared.expected.mismatch(info) {
-        None => Resolution::Found { config, info: index },
-        Some((field, expected, got)) => {
-            let error = ConfigError::Mismatch { position: info.position, field, expected, got };
-            missing(declared, config, error)
-        }
-    }
-}
-
-fn nobody(declared: &SubDeviceConfig, infos: &[SubDeviceInfo]) -> ConfigError {
-    ConfigError::Missing { address: declared.address, present: infos.len() }
-}
-
-pub(super) fn missing(declared: &SubDeviceConfig, config: usize, error: ConfigError) -> Resolution {
-    if declared.optional { Resolution::Absent { config, error } } else { Resolution::Failed { config, error } }
-}
-
 /// Finds one by alias or identification.
 fn by_mark(configs: &[SubDeviceConfig], infos: &[SubDeviceInfo], config: usize) -> Resolution {
     let address = configs[config].address;
     match bearer(address, infos) {
         Ok(place) => at_place(configs, infos, config, place.map(|place| place + address.offset())),
         Err(error) => Resolution::Failed { config, error },
-    }
-}
-
-/// The one SubDevice with the alias or identification of an address.
-pub(super) fn bearer(address: ConfigAddress, infos: &[SubDeviceInfo]) -> Result<Option<usize>, ConfigError> {
-    let mut bearers = infos.iter().enumerate().filter(|(_, info)| address.is_borne_by(info));
-    match (bearers.next(), bearers.next()) {
-        (Some((_, first)), Some((_, second))) => {
-            Err(ConfigError::Ambiguous { address, first: first.position, second: second.position })
-        }
-        (first, _) => Ok(first.map(|(index, _)| index)),
     }
 }
 

@@ -1,5 +1,5 @@
-//! Start-up commands: objects, IDNs, addresses and registers that are written whenever a SubDevice passes a transition (facts 5.1,
-//! 6.3, 6.5, 6.6).
+//! Start-up commands: objects, IDNs, addresses and registers that are written whenever a SubDevice passes a transition
+//! (facts 5.1, 6.3, 6.5, 6.6).
 
 use alloc::string::String;
 use alloc::vec::Vec;
@@ -12,9 +12,9 @@ use ringcat_wire::mailbox::soe::Idn;
 use super::ip::IpSettings;
 use super::register::RegisterCommand;
 
-/// A transition at which start-up commands are sent. Towards OP they come before the upper state is requested, on the way
-/// back before the lower one is. INIT has no mailbox: of the commands of IP those to registers are sent in INIT, before the
-/// mailbox is set up, the others as soon as PREOP is reached.
+/// A transition at which start-up commands are sent. Towards OP they come before the upper state is requested, on the
+/// way back before the lower one is. INIT has no mailbox: of the commands of IP those to registers are sent in INIT,
+/// before the mailbox is set up, the others as soon as PREOP is reached.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Transition {
     /// INIT to PREOP.

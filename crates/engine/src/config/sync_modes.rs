@@ -56,7 +56,8 @@ impl SyncSignals {
 
     /// The signals of an operation mode of the SII, for a MainDevice with this cycle.
     ///
-    /// The cycle of SYNC0 is that of the mode, or the MainDevice's times the factor; a negative factor divides, 0 counts as
+    /// The cycle of SYNC0 is that of the mode, or the MainDevice's times the factor; a negative factor divides, 0
+    /// counts as
     /// 1. That of SYNC1 is that of SYNC0 times its factor. Shifts are signed.
     ///
     /// # Errors

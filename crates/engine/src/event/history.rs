@@ -1,7 +1,7 @@
 //! The history of what happened to SubDevices and cables: what object 0x10F3 of the MainDevice holds (facts 6.3, 10.2).
 //!
-//! In go the events of the acyclic half, out come messages in places that are used in turns, oldest first. Like that of a
-//! SubDevice it is bounded, and says when something was lost.
+//! In go the events of the acyclic half, out come messages in places that are used in turns, oldest first. Like that of
+//! a SubDevice it is bounded, and says when something was lost.
 
 use alloc::vec::Vec;
 

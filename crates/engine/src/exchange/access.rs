@@ -39,8 +39,9 @@ impl Exchange {
         domain.freshness(subdevice)
     }
 
-    /// The AL status (register 0x0130, lower byte) that a SubDevice showed in the cycle of its domain that was judged last; zero
-    /// where it did not answer. `None` before the first, and where its frames show it nowhere ([`crate::layout::Witness`]).
+    /// The AL status (register 0x0130, lower byte) that a SubDevice showed in the cycle of its domain that was judged
+    /// last; zero where it did not answer. `None` before the first, and where its frames show it nowhere
+    /// ([`crate::layout::Witness`]).
     pub fn al_status(&self, subdevice: usize) -> Option<u8> {
         let judged = |frame: &&CyclicFrame| {
             let judged = self.domains.get(frame.domain()).map_or(0, Domain::judged);
@@ -55,8 +56,8 @@ impl Exchange {
     /// queued, behind everything that the application wrote. Not for the cyclic path: this allocates.
     ///
     /// # Errors
-    /// Sources that are no inputs, targets that are no outputs or have two sources, different lengths; nothing is changed
-    /// then.
+    /// Sources that are no inputs, targets that are no outputs or have two sources, different lengths; nothing is
+    /// changed then.
     pub fn set_copies(&mut self, rules: &[CopyRule]) -> Result<(), CopyError> {
         self.copies = Copies::new(rules, &self.domains, &self.frames)?;
         Ok(())
@@ -107,9 +108,9 @@ impl Exchange {
         self.frames.iter().any(|frame| frame.is_waiting() || frame.is_delivered())
     }
 
-    /// Cycles that begin earlier than this disturb a measurement of propagation delays that found no time without frames on
-    /// the wire; long ago where nothing of the kind is asked for. It may be taken back at any time. Applications that send
-    /// all the time in a loop of their own look at this before they send.
+    /// Cycles that begin earlier than this disturb a measurement of propagation delays that found no time without
+    /// frames on the wire; long ago where nothing of the kind is asked for. It may be taken back at any time.
+    /// Applications that send all the time in a loop of their own look at this before they send.
     pub fn pause_until(&self) -> Instant {
         self.board.traffic.pause_until()
     }

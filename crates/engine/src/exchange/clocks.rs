@@ -1,10 +1,10 @@
 //! Distributed clocks in the cyclic frames (facts 7.2, 7.4, 7.5).
 //!
-//! Three datagrams ride in one frame: an FRMW of 0x0910 that hands the reference's time to all others, an FPWR of 0x0910
-//! that steers a clock (the reference towards the host, on the other copy a second one towards the first), a BRD of 0x092C.
-//! What the supervisor posts on the board says whose time each copy distributes. The FRMW leaves with the predicted time
-//! of the reference: whoever the frame meets before the reference, or without one, takes what was sent. When ports have
-//! changed, or a ring has closed, nothing is handed out until the supervisor knows what delays are now.
+//! Three datagrams ride in one frame: an FRMW of 0x0910 that hands the reference's time to all others, an FPWR of
+//! 0x0910 that steers a clock (the reference towards the host, on the other copy a second one towards the first), a BRD
+//! of 0x092C. What the supervisor posts on the board says whose time each copy distributes. The FRMW leaves with the
+//! predicted time of the reference: whoever the frame meets before the reference, or without one, takes what was sent.
+//! When ports have changed, or a ring has closed, nothing is handed out until the supervisor knows what delays are now.
 
 use ringcat_wire::address::{RegisterAddress, StationAddress, Wkc};
 use ringcat_wire::datagram::HEADER_LEN;
@@ -103,8 +103,8 @@ impl Places {
     }
 }
 
-/// Address and data of a datagram. One that is not wanted addresses nobody, at a register that takes nothing: the command
-/// of both copies stays the same.
+/// Address and data of a datagram. One that is not wanted addresses nobody, at a register that takes nothing: the
+/// command of both copies stays the same.
 fn write(bytes: &mut [u8], at: usize, content: Option<(StationAddress, u32)>) {
     let (station, register, data) = match content {
         Some((station, data)) => (station, map::DC_SYSTEM_TIME, data),
@@ -220,8 +220,8 @@ impl Clocks {
         (self.references, self.changes) = (references, changes);
     }
 
-    /// Who is told another time than its own, and which, by the link of the copy: in an open ring each copy meets its own
-    /// reference, and the one that leads may follow the host while the other one follows it.
+    /// Who is told another time than its own, and which, by the link of the copy: in an open ring each copy meets its
+    /// own reference, and the one that leads may follow the host while the other one follows it.
     fn steering(&mut self, board: &Board, now: Instant) -> [Option<(StationAddress, u32)>; 2] {
         let (leader, steered) = self.references.leader();
         let to_host = self.leading(leader, board, now);
@@ -232,8 +232,8 @@ impl Clocks {
         }
     }
 
-    /// What the segment's reference is told: the time of the host or of the application, and once it is known by how much it
-    /// differs from that, what it shows itself, less a part of that.
+    /// What the segment's reference is told: the time of the host or of the application, and once it is known by how
+    /// much it differs from that, what it shows itself, less a part of that.
     fn leading(&mut self, leader: Option<Link>, board: &Board, now: Instant) -> Option<(StationAddress, u32)> {
         let leader = leader?;
         let station = self.references.on(leader)?;
@@ -282,8 +282,9 @@ impl Clocks {
         }
         self.ports_changed = ports_changed;
         if seen.spread_wkc > 0 {
-            // While nobody is told a time, differences are those of a frame that came another way. A reference that is steered,
-            // and clocks in front of one, show how punctual the host is; there the supervisor looks at each of the others.
+            // While nobody is told a time, differences are those of a frame that came another way. A reference that is
+            // steered, and clocks in front of one, show how punctual the host is; there the supervisor looks at each of
+            // the others.
             let is_steered = self.references.leader().1.is_some() || board.clocks.is_host_told();
             let is_meant = !is_held && !is_steered;
             self.judge_spread(seen.spread, is_meant, board, events);

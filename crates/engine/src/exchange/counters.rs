@@ -9,7 +9,8 @@ pub struct CyclicCounters {
     pub bytes: u64,
     /// Frames whose copies all came back.
     pub received: u64,
-    /// Frames of which no copy came back in time: late, damaged or missing ([`CyclicCounters::missing`]), each only one.
+    /// Frames of which no copy came back in time: late, damaged or missing ([`CyclicCounters::missing`]), each only
+    /// one.
     pub lost: u64,
     /// Of the lost ones, those of which a copy came afterwards.
     pub lost_late: u64,

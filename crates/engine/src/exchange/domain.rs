@@ -1,7 +1,8 @@
-//! A domain: image, judgement of its working counters, freshness of its SubDevices, and which of its cycles are under way.
+//! A domain: image, judgement of its working counters, freshness of its SubDevices, and which of its cycles are under
+//! way.
 //!
-//! Inputs of a SubDevice are fresh where it put them into frames of the cycle that was judged last, all of them; those of one
-//! that did not keep their last value.
+//! Inputs of a SubDevice are fresh where it put them into frames of the cycle that was judged last, all of them; those
+//! of one that did not keep their last value.
 
 use alloc::boxed::Box;
 use alloc::vec::Vec;

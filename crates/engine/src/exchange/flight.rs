@@ -2,26 +2,23 @@
 //!
 //! What is here is out at most once, so its bytes are built once: a flight changes the frame id, the Idx bytes and the
 //! outputs. Reads leave as zeros and working counters as zero, because what comes back is never written here. A domain
-//! with several cycles under way has each of its frames as many times; they share the image. Each copy is judged by itself,
-//! and its inputs are delivered when it comes ([`super::place`]).
+//! with several cycles under way has each of its frames as many times; they share the image. Each copy is judged by
+//! itself, and its inputs are delivered when it comes ([`super::place`]).
 //! While no SubDevice could answer its process data, a frame leaves without it: see [`CyclicFrame::vacant`].
 
 use alloc::boxed::Box;
-use alloc::vec;
 use alloc::vec::Vec;
 use core::ops::Range;
 
-use ringcat_wire::address::{LogicalAddress, RegisterAddress, StationAddress, Wkc};
-use ringcat_wire::command::Command;
-use ringcat_wire::datagram::{CIRCULATING, HEADER_LEN, OVERHEAD, Target};
-use ringcat_wire::frame::{FrameBuilder, MAX_FRAME, MacAddress};
-use ringcat_wire::register::map;
+use ringcat_wire::address::Wkc;
+use ringcat_wire::datagram::{CIRCULATING, OVERHEAD};
 
-use super::clocks::{CLOCK_DATA, Places, Seen};
+use super::clocks::{Places, Seen};
 use super::counters::CyclicCounters;
 use super::image::{Image, InputNumber, Moment};
 use super::place::Place;
 use super::presence::Presence;
+use super::template::Template;
 use crate::board::{Board, Supervision};
 use crate::layout::{PlannedFrame, SUPERVISION_LEN};
 use crate::link::Link;
@@ -50,9 +47,6 @@ struct Header {
 
 /// Address and C bit are left out of [`Header`].
 const HEADER_MASK: u64 = 0x0000_0000_0000_FFFF | !(CIRCULATING as u64) << 48;
-
-/// Data of the datagram of a frame that has nothing else to carry.
-const NOTHING_LEN: usize = 2;
 
 /// How far a flight is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -104,7 +98,8 @@ pub(crate) struct CyclicFrame {
     tx: Box<[u8]>,
 }
 
-/// What is known of copies by the link they were sent on. It holds for the next flight too, while copies come back as before.
+/// What is known of copies by the link they were sent on. It holds for the next flight too, while copies come back as
+/// before.
 #[derive(Clone, Copy, Debug, Default)]
 struct Views {
     /// They were looked at since something changed on the board.
@@ -126,56 +121,8 @@ impl CyclicFrame {
         planned: &PlannedFrame,
         first: InputNumber,
     ) -> CyclicFrame {
-        let mut buffer = vec![0; MAX_FRAME];
-        let (mut places, mut headers_at, mut supervision_at, mut clocks) = (Vec::new(), Vec::new(), None, None);
-        let (mut length, mut next, mut presence) = (0, first, None);
-        if let Some(mut builder) = FrameBuilder::ethernet(&mut buffer, MacAddress::ETHERCAT_GROUP, identity.source()) {
-            for datagram in &planned.datagrams {
-                let bytes = usize::from(datagram.outputs) + usize::from(datagram.inputs);
-                let target = Target::Logical(datagram.logical);
-                if let Some(data_at) = builder.datagram(datagram.command, 0, target, bytes) {
-                    headers_at.push(data_at - HEADER_LEN);
-                    let place = Place::new(datagram, data_at, next);
-                    next = InputNumber { datagram: next.datagram + 1, part: next.part + place.parts() };
-                    places.push(place);
-                }
-            }
-            if let Some(planned) = &planned.presence {
-                let target = Target::Logical(planned.logical);
-                if let Some(data_at) = builder.datagram(Command::Lrd, 0, target, planned.members.len()) {
-                    headers_at.push(data_at - HEADER_LEN);
-                    let shown = Presence::new(planned, data_at);
-                    places.iter_mut().for_each(|place| place.witness(&shown));
-                    presence = Some(shown);
-                }
-            }
-            if planned.clocks {
-                let nobody = Target::Station(StationAddress(0), RegisterAddress(0));
-                let spread = Target::Broadcast(map::DC_SYSTEM_TIME_DIFFERENCE);
-                let datagrams = [(Command::Frmw, nobody), (Command::Fpwr, nobody), (Command::Brd, spread)];
-                let at = datagrams.map(|(command, target)| builder.datagram(command, 0, target, CLOCK_DATA));
-                if let [Some(sync), Some(steer), Some(spread)] = at {
-                    let header = [sync, steer, spread].map(|data_at| data_at - HEADER_LEN);
-                    headers_at.extend(header);
-                    clocks = Some(Places { sync_at: header[0], steer_at: header[1], spread_at: header[2] });
-                }
-            }
-            if planned.supervision {
-                let target = Target::Broadcast(map::AL_STATUS);
-                if let Some(data_at) = builder.datagram(Command::Brd, 0, target, SUPERVISION_LEN) {
-                    headers_at.push(data_at - HEADER_LEN);
-                    supervision_at = Some(data_at - HEADER_LEN);
-                }
-            }
-            if headers_at.is_empty()
-                && let Some(data_at) =
-                    builder.datagram(Command::Nop, 0, Target::Logical(LogicalAddress(0)), NOTHING_LEN)
-            {
-                headers_at.push(data_at - HEADER_LEN);
-            }
-            length = builder.finish();
-        }
-        buffer.truncate(length);
+        let Template { bytes, headers, places, presence, clocks, supervision_at } =
+            Template::new(identity, planned, first);
         CyclicFrame {
             all_links,
             domain,
@@ -192,13 +139,13 @@ impl CyclicFrame {
             supervision_at,
             clocks,
             clocks_seen: Seen::default(),
-            headers: headers_at.into_iter().map(|at| Header { at, sent: header_at(&buffer, at) }).collect(),
+            headers: headers.into_iter().map(|at| Header { at, sent: header_at(&bytes, at) }).collect(),
             places: places.into_boxed_slice(),
             presence,
             first,
             views: Views::default(),
             is_overtaken: false,
-            tx: buffer.into_boxed_slice(),
+            tx: bytes.into_boxed_slice(),
         }
     }
 

@@ -25,8 +25,8 @@ pub(crate) struct InputNumber {
     pub part: usize,
 }
 
-/// The image, and when what came into it: by datagram where all its inputs came together, by datagram and link where some did,
-/// and by their parts.
+/// The image, and when what came into it: by datagram where all its inputs came together, by datagram and link where
+/// some did, and by their parts.
 #[derive(Debug)]
 pub(crate) struct Image {
     pub bytes: Box<[u8]>,

@@ -1,9 +1,9 @@
-//! A process data datagram within a frame: where its bytes lie, who adds what to its working counter, whose inputs a copy
-//! brought.
+//! A process data datagram within a frame: where its bytes lie, who adds what to its working counter, whose inputs a
+//! copy brought.
 //!
-//! A working counter that only one SubDevice adds to is exact. Where several do, the presence datagram of the same copy tells
-//! who processed it; the working counter has to be what they add. Each copy is judged by itself: in a ring that closes or
-//! breaks both may have been processed by the same SubDevice.
+//! A working counter that only one SubDevice adds to is exact. Where several do, the presence datagram of the same copy
+//! tells who processed it; the working counter has to be what they add. Each copy is judged by itself: in a ring that
+//! closes or breaks both may have been processed by the same SubDevice.
 
 use alloc::boxed::Box;
 use alloc::vec::Vec;
@@ -132,7 +132,8 @@ impl Place {
         }
     }
 
-    /// The same place in a frame that does not carry it: nothing is copied from or to there, the working counter is zero.
+    /// The same place in a frame that does not carry it: nothing is copied from or to there, the working counter is
+    /// zero.
     pub fn outside(&self) -> Place {
         let span = |span: Span| Span { frame_at: span.frame_at + OUTSIDE, ..span };
         let segment = |segment: &Segment| Segment { span: span(segment.span), ..*segment };
@@ -222,8 +223,8 @@ impl Place {
         };
     }
 
-    /// Whether copies on these links, as they were looked at, bring just what they should: each required SubDevice processed
-    /// one of them, and none processed both.
+    /// Whether copies on these links, as they were looked at, bring just what they should: each required SubDevice
+    /// processed one of them, and none processed both.
     pub fn is_complete(&self, links: [bool; 2]) -> bool {
         let arrived = || self.views.iter().zip(links).filter(|(_, arrived)| *arrived).map(|(view, _)| view);
         let sum = arrived().fold(0, |sum, view| sum + u32::from(view.wkc.0));
@@ -285,8 +286,8 @@ impl Place {
         }
     }
 
-    /// As [`Place::deliver`], for inputs one by one: those are left out that came later or with the other copy of the flight.
-    /// False where something newer was there.
+    /// As [`Place::deliver`], for inputs one by one: those are left out that came later or with the other copy of the
+    /// flight. False where something newer was there.
     #[cold]
     pub fn deliver_singly(&self, link: usize, bytes: &[u8], image: &mut Image, moment: Moment) -> bool {
         let mut newest = true;

@@ -1,9 +1,9 @@
-//! The presence datagram of a frame: the AL status of each SubDevice whose process data shares a working counter (facts 1.4,
-//! 3.4, 3.10).
+//! The presence datagram of a frame: the AL status of each SubDevice whose process data shares a working counter (facts
+//! 1.4, 3.4, 3.10).
 //!
-//! In: a copy of the frame that came back. Out: which SubDevices processed it, once each, and in which state. A byte that
-//! stayed zero belongs to a SubDevice that is not there or has lost its FMMUs, because no AL status is zero. What a copy shows
-//! is mostly what the one before on the same link showed: then nothing is looked at anew.
+//! In: a copy of the frame that came back. Out: which SubDevices processed it, once each, and in which state. A byte
+//! that stayed zero belongs to a SubDevice that is not there or has lost its FMMUs, because no AL status is zero. What
+//! a copy shows is mostly what the one before on the same link showed: then nothing is looked at anew.
 
 use alloc::boxed::Box;
 use alloc::vec;
@@ -52,7 +52,8 @@ impl Presence {
         frame.get(self.at..self.at + self.seen[link].len()).is_some_and(|now| *now == *self.seen[link])
     }
 
-    /// Looks at a copy. False where SubDevices processed it more than once: its working counter is not the number of bytes.
+    /// Looks at a copy. False where SubDevices processed it more than once: its working counter is not the number of
+    /// bytes.
     pub fn look(&mut self, link: usize, frame: &[u8]) -> bool {
         let length = self.seen[link].len();
         let Some(now) = frame.get(self.at..self.at + length) else { return false };

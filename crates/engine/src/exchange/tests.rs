@@ -241,8 +241,8 @@ fn a_subdevice_that_processed_both_copies_does_not_stand_for_one_that_is_gone() 
     assert_eq!(ring.freshness(), [Freshness::Fresh, Freshness::Fresh, Freshness::Never]);
 }
 
-/// One SubDevice on its way to SAFEOP takes outputs and may answer reads with what its memory holds: those of the others stay
-/// fresh, its own are not.
+/// One SubDevice on its way to SAFEOP takes outputs and may answer reads with what its memory holds: those of the
+/// others stay fresh, its own are not.
 #[test]
 fn a_subdevice_below_safeop_costs_the_others_nothing_and_is_not_fresh() {
     for gives in [false, true] {
@@ -471,8 +471,8 @@ impl Starting {
         Starting { exchange, board, now: Instant(0) }
     }
 
-    /// A cycle in which `wkc` comes back in the last datagram of each frame, behind which another may pad it; lengths of
-    /// the frames.
+    /// A cycle in which `wkc` comes back in the last datagram of each frame, behind which another may pad it; lengths
+    /// of the frames.
     fn cycle(&mut self, wkc: u16) -> Vec<usize> {
         self.now += PERIOD;
         let domains = [DomainId(0), DomainId(1)];

@@ -1,6 +1,7 @@
 //! From the bytes of an SII to a [`SubDeviceInfo`], leniently (facts 4.1 to 4.6).
 
 mod mailboxes;
+mod parts;
 mod sync_managers;
 
 use alloc::string::String;
@@ -12,55 +13,15 @@ use ringcat_wire::sii::{
     Strings, SyncManagerKind,
 };
 
-use super::{Direction, InfoWarning, PdoEntryInfo, PdoInfo, Readout, SiiProblem, SubDeviceInfo};
+use super::subdevice::{PdoEntryInfo, PdoInfo, Readout, SubDeviceInfo};
+use super::warning::{InfoWarning, SiiProblem};
+use crate::direction::Direction;
+use parts::{Parts, fixed_area, whole, within};
 
 /// Byte offsets in the fixed area, for warnings.
 const CHECKSUM_AT: usize = 2 * 0x07;
 /// Bytes of the fixed area that a scan reads without a gap.
 const READ_BYTES: usize = 2 * 0x24;
-
-/// Erased bytes at the end of a category that are more than padding.
-const ERASED: usize = 4;
-
-/// The categories that were read.
-struct Parts<'p, 'a> {
-    parts: &'p [Category<'a>],
-}
-
-impl<'a> Parts<'_, 'a> {
-    fn all(&self, kind: CategoryKind) -> impl Iterator<Item = Category<'a>> {
-        self.parts.iter().filter(move |part| part.kind == kind).copied()
-    }
-
-    /// The first category of a kind; more of them are odd.
-    fn first(&self, kind: CategoryKind, warnings: &mut Vec<InfoWarning>) -> Option<Category<'a>> {
-        let mut all = self.all(kind);
-        let first = all.next();
-        if let Some(again) = all.next() {
-            warnings.push(InfoWarning {
-                category: Some(kind),
-                offset: Some(again.offset),
-                problem: SiiProblem::Repeated,
-            });
-        }
-        first
-    }
-
-    /// Categories that end erased: an image that was cut short ends so, with the rest of an empty EEPROM behind it.
-    fn erased(&self) -> impl Iterator<Item = InfoWarning> {
-        let has_text = |kind| {
-            matches!(kind, CategoryKind::Strings | CategoryKind::General | CategoryKind::SyncManager | CategoryKind::Dc)
-                || matches!(kind, CategoryKind::TxPdo | CategoryKind::RxPdo)
-        };
-        self.parts.iter().filter(move |part| has_text(part.kind)).filter_map(|part| {
-            let kept = part.data.iter().rposition(|byte| *byte != 0xFF).map_or(0, |last| last + 1);
-            let bytes = part.data.len() - kept;
-            let offset = Some(part.data_offset() + kept);
-            let problem = SiiProblem::Erased { bytes };
-            (bytes >= ERASED).then_some(InfoWarning { category: Some(part.kind), offset, problem })
-        })
-    }
-}
 
 /// See [`SubDeviceInfo::from_parts`].
 pub(super) fn collect(readout: Readout, header: &SiiHeader, parts: &[Category<'_>]) -> SubDeviceInfo {
@@ -103,25 +64,6 @@ pub(super) fn collect(readout: Readout, header: &SiiHeader, parts: &[Category<'_
     }
     sync_managers::check_completeness(&mut info, &parts);
     info
-}
-
-fn fixed_area(offset: usize, problem: SiiProblem) -> InfoWarning {
-    InfoWarning { category: None, offset: Some(offset), problem }
-}
-
-/// A warning about what begins at a byte of a category's data.
-fn within(category: &Category<'_>, at: usize, problem: SiiProblem) -> InfoWarning {
-    InfoWarning { category: Some(category.kind), offset: Some(category.data_offset() + at), problem }
-}
-
-/// Warns about a category that does not end with a whole entry. Padding to a word is no entry.
-fn whole(category: &Category<'_>, entry: usize, warnings: &mut Vec<InfoWarning>) {
-    let data = category.data;
-    let got = data.len() % entry;
-    let offset = data.len() - got;
-    if data[offset..].iter().any(|byte| *byte != 0 && *byte != 0xFF) {
-        warnings.push(within(category, offset, SiiProblem::Short { expected: entry, got }));
-    }
 }
 
 fn collect_header(info: &mut SubDeviceInfo, header: &SiiHeader) {
@@ -233,8 +175,8 @@ fn sync_manager_problem(info: &SubDeviceInfo, own: Direction, pdo: &Pdo<'_>) -> 
     (!fits).then_some(SiiProblem::PdoDirection { pdo: pdo.index, sync_manager: number })
 }
 
-/// A string by index, empty for none. Bytes that are not UTF-8 are taken as Latin-1; what is no printable character, such
-/// as a line break, becomes a space.
+/// A string by index, empty for none. Bytes that are not UTF-8 are taken as Latin-1; what is no printable character,
+/// such as a line break, becomes a space.
 fn text(
     strings: &Strings<'_>,
     index: u8,

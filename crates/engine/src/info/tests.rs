@@ -1,14 +1,19 @@
 use std::path::Path;
-use std::string::ToString;
+use std::string::{String, ToString};
 use std::vec;
 use std::vec::Vec;
 use std::{format, fs, println};
 
 use proptest::prelude::*;
-use ringcat_wire::address::Position;
-use ringcat_wire::sii::{CategoryHeader, CategoryKind, General, PdoDirection, Sii, SiiWriter, SyncManagerKind};
+use ringcat_wire::address::{Position, StationAddress};
+use ringcat_wire::register::{DlStatus, Information, PortKind};
+use ringcat_wire::sii::{
+    CategoryHeader, CategoryKind, FmmuUsage, General, Identity, MailboxLayout, MailboxProtocols, PdoDirection, Sii,
+    SiiWriter, SyncManagerKind,
+};
 
 use super::*;
+use crate::direction::Direction;
 
 /// An ET1100: 8 FMMUs, 8 SyncManagers, 8 KiB, four MII ports, DC.
 const INFORMATION: [u8; Information::LEN] = [0x11, 0x01, 0x02, 0x00, 8, 8, 8, 0xFF, 0x0C, 0x00];
@@ -324,7 +329,10 @@ proptest! {
     ) {
         let header = SiiHeader::decode(header.as_slice().try_into().unwrap());
         let parts: Vec<_> =
-            parts.iter().map(|(code, data)| (CategoryKind::from_code(*code / 10 * 10 + *code % 2), &data[..])).collect();
+            parts
+            .iter()
+            .map(|(code, data)| (CategoryKind::from_code(*code / 10 * 10 + *code % 2), &data[..]))
+            .collect();
         let info = SubDeviceInfo::from_parts(readout(), &header, placed(&parts));
         info.warnings.iter().for_each(|warning| drop(warning.to_string()));
     }

@@ -186,14 +186,42 @@ impl SiiProblem {
     }
 }
 
+impl InfoWarning {
+    /// The place in the EEPROM that it is about.
+    fn fmt_place(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match (self.category, self.offset) {
+            (Some(category), Some(offset)) => write!(f, "byte {offset:#06x}, category {category}: "),
+            (Some(category), None) => write!(f, "category {category}: "),
+            (None, Some(offset)) => write!(f, "byte {offset:#06x}: "),
+            (None, None) => Ok(()),
+        }
+    }
+}
+
+fn fmt_mailboxes(f: &mut fmt::Formatter<'_>, layout: &MailboxLayout, memory_end: u32) -> fmt::Result {
+    let MailboxLayout { receive_size, receive_offset, send_size, send_offset } = layout;
+    write!(
+        f,
+        "mailboxes of {receive_size} bytes at {receive_offset:#06x} and {send_size} bytes at {send_offset:#06x} are \
+         not believed: expected at least {MAILBOX_HEADER} bytes each, apart from each other, between 0x1000 and \
+         {memory_end:#06x}"
+    )
+}
+
+/// What a SyncManager of a kind is for.
+const fn purpose(kind: SyncManagerKind) -> &'static str {
+    match kind {
+        SyncManagerKind::MailboxOut => "the mailbox to the SubDevice",
+        SyncManagerKind::MailboxIn => "the mailbox from the SubDevice",
+        SyncManagerKind::Outputs => "outputs",
+        SyncManagerKind::Inputs => "inputs",
+        SyncManagerKind::Unused | SyncManagerKind::Other(_) => "nothing",
+    }
+}
+
 impl fmt::Display for InfoWarning {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match (self.category, self.offset) {
-            (Some(category), Some(offset)) => write!(f, "byte {offset:#06x}, category {category}: ")?,
-            (Some(category), None) => write!(f, "category {category}: ")?,
-            (None, Some(offset)) => write!(f, "byte {offset:#06x}: ")?,
-            (None, None) => {}
-        }
+        self.fmt_place(f)?;
         match self.problem {
             SiiProblem::Blank => f.write_str("the EEPROM is blank"),
             SiiProblem::Unreadable => f.write_str("the EEPROM cannot be read: nothing is known of this SubDevice"),
@@ -208,25 +236,13 @@ impl fmt::Display for InfoWarning {
             SiiProblem::Erased { bytes } => {
                 write!(f, "its last {bytes} bytes are erased (0xff): the image is cut short")
             }
-            SiiProblem::Mailbox { layout, memory_end } => write!(
-                f,
-                "mailboxes of {} bytes at {:#06x} and {} bytes at {:#06x} are not believed: expected at least {MAILBOX_HEADER} bytes \
-                 each, apart from each other, between 0x1000 and {memory_end:#06x}",
-                layout.receive_size, layout.receive_offset, layout.send_size, layout.send_offset
-            ),
+            SiiProblem::Mailbox { layout, memory_end } => fmt_mailboxes(f, &layout, memory_end),
             SiiProblem::NoSyncManagers => f.write_str("no SyncManager is described: is the image cut short?"),
             SiiProblem::NoPdos { sync_manager } => {
                 write!(f, "SM {sync_manager} is for process data, and no PDO describes it")
             }
             SiiProblem::NoType { sync_manager, got, taken } => {
-                let what = match taken {
-                    SyncManagerKind::MailboxOut => "the mailbox to the SubDevice",
-                    SyncManagerKind::MailboxIn => "the mailbox from the SubDevice",
-                    SyncManagerKind::Outputs => "outputs",
-                    SyncManagerKind::Inputs => "inputs",
-                    SyncManagerKind::Unused | SyncManagerKind::Other(_) => "nothing",
-                };
-                write!(f, "SM {sync_manager} has type {got}, taken for {what}")
+                write!(f, "SM {sync_manager} has type {got}, taken for {}", purpose(taken))
             }
             SiiProblem::Checksum { expected, got } => {
                 write!(f, "checksum: expected {expected:#04x}, word 7 is {got:#06x}")
@@ -255,7 +271,8 @@ impl fmt::Display for InfoWarning {
             }
             SiiProblem::Dictionary { sync_manager, sii, dictionary } => write!(
                 f,
-                "SM {sync_manager}: {sii} bits of process data, the dictionary has other PDOs with {dictionary} bits, which count"
+                "SM {sync_manager}: {sii} bits of process data, the dictionary has other PDOs with {dictionary} \
+                 bits, which count"
             ),
             SiiProblem::Control { sync_manager, control } => {
                 write!(f, "SM {sync_manager}: control byte {control:#04x} is not one of its type, which counts")

@@ -1,8 +1,8 @@
 //! Which areas travel in one frame, and which of them share their datagrams.
 //!
-//! In: the areas of a domain in order, and how each SubDevice is witnessed. Out: chunks that fit a frame. Within one, areas of
-//! witnessed SubDevices share datagrams; those of the others have their own where a shared working counter would hide whether
-//! their inputs came.
+//! In: the areas of a domain in order, and how each SubDevice is witnessed. Out: chunks that fit a frame. Within one,
+//! areas of witnessed SubDevices share datagrams; those of the others have their own where a shared working counter
+//! would hide whether their inputs came.
 
 use alloc::collections::BTreeSet;
 use alloc::vec;
@@ -11,7 +11,9 @@ use alloc::vec::Vec;
 use ringcat_wire::address::LogicalAddress;
 use ringcat_wire::datagram::{MAX_DATA, OVERHEAD};
 
-use super::{AreaSpec, Cut, Delivers, DomainSpec, LayoutError, PlannedPresence, Witness};
+use super::error::LayoutError;
+use super::plan::PlannedPresence;
+use super::spec::{AreaSpec, Cut, Delivers, DomainSpec, Witness};
 use crate::direction::Direction;
 
 /// Room for datagrams in a frame.
@@ -88,8 +90,8 @@ impl Group {
 /// Areas that travel in one frame.
 #[derive(Clone, Debug)]
 pub(super) struct Chunk {
-    /// First those that share their datagrams, behind them outputs of SubDevices that are not witnessed, then one group for
-    /// each other SubDevice.
+    /// First those that share their datagrams, behind them outputs of SubDevices that are not witnessed, then one group
+    /// for each other SubDevice.
     groups: Vec<Group>,
     /// SubDevices that can show their AL status, in the order of their areas.
     witnessed: Vec<usize>,

@@ -1,11 +1,13 @@
 //! Layouts of literal and random domains.
 
+use core::time::Duration;
 use std::vec;
 use std::vec::Vec;
 
 use proptest::prelude::*;
 
 use super::*;
+use crate::direction::Direction;
 
 fn area(subdevice: usize, sync_manager: u8, direction: Direction, length: u16) -> AreaSpec {
     AreaSpec { subdevice, sync_manager, direction, length }
@@ -174,7 +176,14 @@ proptest! {
             witnesses.push(if *alone { Witness::Alone } else { MAPPED });
         }
         let links = if ring { LinkSet::Ring } else { LinkSet::Single };
-        let rules = Rules { witnesses: &witnesses, links, supervision: true, lrw: LrwPolicy::Automatic, session: 0, max_datagrams: None };
+        let rules = Rules {
+            witnesses: &witnesses,
+            links,
+            supervision: true,
+            lrw: LrwPolicy::Automatic,
+            session: 0,
+            max_datagrams: None,
+        };
         let layout = Layout::with(&[DomainSpec { lrw, ..spec(areas) }], rules).unwrap();
         let domain = &layout.domains[0];
         let mut end = 0;

@@ -156,9 +156,9 @@ fn shelve(state: &mut State, message: &Message<'_>, kind: Unsolicited) -> bool {
 }
 
 /// An error reply does not say to what. It goes to the request that waits; of several, first to one whose protocol the
-/// SubDevice has not shown to know, then to the oldest. Whoever writes a message in parts is told, too. It is certain only
-/// where it can be to nothing else, neither to a request that was given up nor to a message that nobody answers; else the
-/// answer to the request that it ends may still come.
+/// SubDevice has not shown to know, then to the oldest. Whoever writes a message in parts is told, too. It is certain
+/// only where it can be to nothing else, neither to a request that was given up nor to a message that nobody answers;
+/// else the answer to the request that it ends may still come.
 fn refused(state: &mut State, message: &Message<'_>, now: Instant) -> bool {
     let Some(bytes) = message.payload.first_chunk() else {
         state.counters.malformed += 1;

@@ -1,9 +1,9 @@
 //! EoE: Ethernet through a mailbox, and the addresses of the IP stack behind it (facts 6.5).
 //!
 //! An [`EthernetPort`] takes whole Ethernet frames for a SubDevice and gives out those that come from it. Its task cuts
-//! frames into fragments and writes them in a lane of its own, so that they take turns with every other protocol; what is
-//! read is put together as it comes. Nothing in here waits for the application's cycle: fragments follow one another as
-//! fast as the SubDevice takes and gives them. The parts:
+//! frames into fragments and writes them in a lane of its own, so that they take turns with every other protocol; what
+//! is read is put together as it comes. Nothing in here waits for the application's cycle: fragments follow one another
+//! as fast as the SubDevice takes and gives them. The parts:
 //!
 //! * `fragments`, `reassembly`: frames to fragments and back;
 //! * `traffic`: queues and counters of one mailbox; [`port`]: the handle;
@@ -19,7 +19,8 @@ mod traffic;
 pub use crate::config::IpSettings;
 pub use error::{EoeError, EoeFailure};
 pub use port::EthernetPort;
+pub use reassembly::MAX_FRAME;
 pub use settings::{ask_filter, ask_ip, set_filter, set_ip};
-pub use traffic::{EthernetCounters, EthernetFrame, EthernetStatus, MAX_FRAME, QUEUE, QueueError, TimeStamp};
+pub use traffic::{EthernetCounters, EthernetFrame, EthernetStatus, QUEUE, QueueError, TimeStamp};
 
 pub(super) use traffic::Traffic;

@@ -29,8 +29,8 @@ impl Mailbox {
         Mailbox { room: Room::new(bus, subdevice) }
     }
 
-    /// The SubDevice has entered PREOP or BOOT with this mailbox: counters begin anew. `send_manager` is the SyncManager of
-    /// the mailbox that is read.
+    /// The SubDevice has entered PREOP or BOOT with this mailbox: counters begin anew. `send_manager` is the
+    /// SyncManager of the mailbox that is read.
     pub(crate) fn open(&self, station: StationAddress, layout: MailboxLayout, send_manager: u8) {
         self.room.close();
         self.room.open(Session::new(station, layout, send_manager, self.room.bus.now()));
@@ -70,8 +70,8 @@ impl Mailbox {
         self.room.look().open
     }
 
-    /// Whether nothing is under way in it: nobody talks or waits to, nothing waits to be written or to be fetched by whoever
-    /// talks, and nobody writes or reads.
+    /// Whether nothing is under way in it: nobody talks or waits to, nothing waits to be written or to be fetched by
+    /// whoever talks, and nobody writes or reads.
     pub fn is_idle(&self) -> bool {
         let state = self.room.look();
         let at_work = |time: Option<u32>| time == Some(state.time);
@@ -107,8 +107,8 @@ impl Mailbox {
         self.room.look().counters
     }
 
-    /// Code of the last error that the SubDevice has told in any protocol, in the protocol's own numbers: an SDO abort, the
-    /// detail of an error reply, an error of FoE, SoE or AoE; 0 for none.
+    /// Code of the last error that the SubDevice has told in any protocol, in the protocol's own numbers: an SDO abort,
+    /// the detail of an error reply, an error of FoE, SoE or AoE; 0 for none.
     pub fn last_protocol_error(&self) -> u32 {
         self.room.look().last_error
     }

@@ -7,8 +7,8 @@ use ringcat_wire::mailbox::sdo::SdoResponse;
 use ringcat_wire::mailbox::soe::SoeMessage;
 use ringcat_wire::mailbox::{ErrorReply, Message, Protocol};
 
-/// The error that a mail tells, if it tells one: the code of an SDO abort, the detail of an error reply, the code of FoE,
-/// SoE or ADS. Any bytes are allowed.
+/// The error that a mail tells, if it tells one: the code of an SDO abort, the detail of an error reply, the code of
+/// FoE, SoE or ADS. Any bytes are allowed.
 pub(super) fn told_by(message: &Message<'_>) -> Option<u32> {
     let payload = message.payload;
     let code = match message.header.protocol {

@@ -246,8 +246,8 @@ async fn repeat(room: &Rc<Room>, session: &Session) -> Result<bool, MailboxError
     Ok(true)
 }
 
-/// Asks for the last mail again: toggles the repeat request and waits for its acknowledgement (facts 6.2). One that does
-/// not come in time is no matter: what is read next is then what would have come next.
+/// Asks for the last mail again: toggles the repeat request and waits for its acknowledgement (facts 6.2). One that
+/// does not come in time is no matter: what is read next is then what would have come next.
 async fn request_repeat(bus: &Bus, session: &Session) -> Result<(), BusError> {
     let register = map::sync_manager(session.send_manager);
     let at = register.offset(SyncManager::ACTIVATE);

@@ -1,8 +1,8 @@
 //! Mail that comes twice (facts 6.1, 6.2).
 //!
-//! A repeat brings a mail with its old counter, and so does a frame that comes back late; some SubDevices send an answer
-//! twice. A mail is a double when its counter is not zero and counter and content are those of a mail of late. Content
-//! is compared because there are SubDevices whose counter stands still.
+//! A repeat brings a mail with its old counter, and so does a frame that comes back late; some SubDevices send an
+//! answer twice. A mail is a double when its counter is not zero and counter and content are those of a mail of late.
+//! Content is compared because there are SubDevices whose counter stands still.
 
 use alloc::collections::VecDeque;
 use core::time::Duration;
@@ -11,15 +11,17 @@ use crate::time::Instant;
 
 /// Where there was no disturbance, only a SubDevice that sends its mail twice brings doubles: the last mail again.
 const USUAL: usize = 1;
-/// A repeat brings the last mail or the one before; late ones may have come in between. Less than a turn of the counter.
+/// A repeat brings the last mail or the one before; late ones may have come in between. Less than a turn of the
+/// counter.
 const AFTER_REPEAT: usize = 5;
-/// A late read brings what the mailbox held when it was sent: a mail that was accepted by one of so many reads that were
-/// sent before it, after repeats, or after it, by the repeat that healed it. A turn of the counter brings others; a
-/// place or two is uncertain.
+/// A late read brings what the mailbox held when it was sent: a mail that was accepted by one of so many reads that
+/// were sent before it, after repeats, or after it, by the repeat that healed it. A turn of the counter brings others;
+/// a place or two is uncertain.
 const AROUND_LATE: usize = 4;
 /// How long mails are remembered for those that come late; frames come back 100 ms late at most, or count as lost.
 const KEPT_FOR: Duration = Duration::from_millis(400);
-/// Mails that are remembered at most: a mailbox that is read every 100 us fills no more in the time of the longest delay.
+/// Mails that are remembered at most: a mailbox that is read every 100 us fills no more in the time of the longest
+/// delay.
 const KEPT: usize = 1024;
 const FNV_OFFSET: u64 = 0xCBF2_9CE4_8422_2325;
 const FNV_PRIME: u64 = 0x0000_0100_0000_01B3;
@@ -46,8 +48,8 @@ struct Known {
     sent: Instant,
 }
 
-/// The mails that were accepted last, in the order in which their reads were sent: that in which the SubDevice gave them
-/// away, but for those that were repeated.
+/// The mails that were accepted last, in the order in which their reads were sent: that in which the SubDevice gave
+/// them away, but for those that were repeated.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Recent {
     /// Newest first.

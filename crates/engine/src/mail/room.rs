@@ -1,27 +1,25 @@
 //! What the tasks and handles of one mailbox share.
 
+mod work;
+
 use alloc::rc::Rc;
-use alloc::vec::Vec;
 use core::cell::{Ref, RefCell, RefMut};
-use core::time::Duration;
 
 use ringcat_wire::address::{RegisterAddress, StationAddress};
-use ringcat_wire::mailbox::Header;
 use ringcat_wire::register::{SyncManager, map};
 use ringcat_wire::sii::MailboxLayout;
 
 use super::answer_time::ShortestTrip;
 use super::counters::MailCounters;
 use super::eoe::Traffic;
-use super::error::MailboxError;
-use super::lane::{Lane, LaneState, Outgoing};
+use super::lane::{Lane, LaneState};
 use super::recent::Recent;
 use super::unsolicited::Shelves;
-use super::{reader, writer};
 use crate::supervisor::{Bus, Signal};
 use crate::time::Instant;
 
-/// What the SubDevice and we have counted so far. It lasts from PREOP to INIT, also while the SubDevice does not answer.
+/// What the SubDevice and we have counted so far. It lasts from PREOP to INIT, also while the SubDevice does not
+/// answer.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Session {
     pub station: StationAddress,
@@ -133,34 +131,6 @@ impl Room {
         if state.open && state.time == time { state.session } else { None }
     }
 
-    /// Queues a message; returns its number.
-    pub(super) fn queue(
-        self: &Rc<Room>,
-        lane: Lane,
-        payload: Vec<u8>,
-        limit: Duration,
-        (turn, asks): (u32, Option<Duration>),
-    ) -> Result<u32, MailboxError> {
-        let id = {
-            let state = &mut *self.state();
-            let session = state.session.as_ref().filter(|_| state.open).ok_or(MailboxError::Closed)?;
-            let room = usize::from(session.layout.receive_size).saturating_sub(Header::LEN);
-            if payload.len() > room {
-                return Err(MailboxError::TooLong { bytes: payload.len(), limit: room });
-            }
-            let queue = &mut state.lanes[lane.place()];
-            if !queue.has_room() {
-                state.counters.refused += 1;
-                return Err(MailboxError::Full { limit });
-            }
-            state.next_id = state.next_id.wrapping_add(1);
-            queue.outbox.push_back(Outgoing { id: state.next_id, lane, payload, limit, turn, asks });
-            state.next_id
-        };
-        writer::start(self);
-        Ok(id)
-    }
-
     /// The mailbox may be used, with a new session.
     pub(super) fn open(&self, session: Session) {
         {
@@ -185,8 +155,8 @@ impl Room {
         self.tell();
     }
 
-    /// The mailbox cannot be used until it is taken up again; everything under way ends. What was read from it, perhaps in
-    /// vain, has to be asked for again.
+    /// The mailbox cannot be used until it is taken up again; everything under way ends. What was read from it, perhaps
+    /// in vain, has to be asked for again.
     pub(super) fn suspend(&self) {
         {
             let state = &mut *self.state();
@@ -200,39 +170,6 @@ impl Room {
             state.lanes.iter_mut().for_each(|lane| lane.suspend(now));
         }
         self.tell();
-    }
-
-    /// The mailbox may be used as before.
-    pub(super) fn resume(self: &Rc<Room>) {
-        {
-            let state = &mut *self.state();
-            if state.open || state.session.is_none() {
-                return;
-            }
-            let repeat = state.repeat;
-            let now = self.bus.now();
-            state.end_time(true);
-            state.repeat = repeat;
-            state.lanes.iter_mut().for_each(|lane| lane.resume(now));
-        }
-        self.tell();
-        reader::start(self);
-    }
-
-    /// There may be mail.
-    pub(super) fn is_full(self: &Rc<Room>) {
-        {
-            let state = &mut *self.state();
-            state.full = true;
-            state.seen = self.bus.now();
-        }
-        reader::start(self);
-    }
-
-    /// There might be mail: the reader looks once.
-    pub(super) fn look_once(self: &Rc<Room>) {
-        self.state().curious = true;
-        reader::start(self);
     }
 
     pub(super) fn tell(&self) {

@@ -97,8 +97,8 @@ pub async fn read(mailbox: &Mailbox, address: SoeAddress, limits: Limits, limit:
     read_inner(mailbox, address, limits, limit).await.map_err(|cause| SoeError { address, cause })
 }
 
-/// Writes an element. Fragments are not answered, only the last one is: where an error reply comes meanwhile, whatever it
-/// is to, the write has failed, and what the SubDevice has then is not known.
+/// Writes an element. Fragments are not answered, only the last one is: where an error reply comes meanwhile, whatever
+/// it is to, the write has failed, and what the SubDevice has then is not known.
 pub async fn write(mailbox: &Mailbox, address: SoeAddress, data: &[u8], limits: Limits) -> Result<(), SoeError> {
     write_inner(mailbox, address, data, limits).await.map_err(|cause| SoeError { address, cause })
 }

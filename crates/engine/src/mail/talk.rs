@@ -144,8 +144,8 @@ impl Talk {
         let _ = self.with(|lane| lane.pdo = header);
     }
 
-    /// Whatever comes in the protocol of the lane is taken for the answer to the next request, but for what surely comes
-    /// unasked.
+    /// Whatever comes in the protocol of the lane is taken for the answer to the next request, but for what surely
+    /// comes unasked.
     pub(super) fn expect_any(&mut self, any: bool) {
         let _ = self.with(|lane| lane.any = any);
     }
@@ -166,8 +166,8 @@ impl Talk {
         let _ = self.with(|lane| lane.late_from(now, limit));
     }
 
-    /// Waits until the answer to a request that was given up before has come or cannot come any more, all parts of it, in
-    /// protocols whose answers do not say to what they belong.
+    /// Waits until the answer to a request that was given up before has come or cannot come any more, all parts of it,
+    /// in protocols whose answers do not say to what they belong.
     pub async fn settle(&mut self) -> Result<(), MailboxError> {
         for _ in 0..LATE_PARTS {
             let now = self.room.bus.now();

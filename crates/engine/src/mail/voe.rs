@@ -43,8 +43,8 @@ pub async fn exchange(mailbox: &Mailbox, message: &Voe, limits: Limits) -> Resul
     talk.ask(&payload, limits, accept).await
 }
 
-/// Waits for a message that is no answer to [`exchange`], and looks for it at the mailbox's status meanwhile. What cannot
-/// be read is left out.
+/// Waits for a message that is no answer to [`exchange`], and looks for it at the mailbox's status meanwhile. What
+/// cannot be read is left out.
 pub async fn receive(mailbox: &Mailbox, limit: Duration) -> Result<Voe, MailboxError> {
     wait(mailbox, limit, Mailbox::look_for_mail).await
 }

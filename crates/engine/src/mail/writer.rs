@@ -1,7 +1,7 @@
 //! Writing: one message after the other, the lanes in turn (facts 6.1).
 //!
-//! A lost write is sent again with the same counter until the SubDevice takes it, which drops it where the first one had
-//! arrived. No other message goes out meanwhile: one in between would make the old counter look new.
+//! A lost write is sent again with the same counter until the SubDevice takes it, which drops it where the first one
+//! had arrived. No other message goes out meanwhile: one in between would make the old counter look new.
 
 use alloc::rc::Rc;
 use alloc::vec::Vec;

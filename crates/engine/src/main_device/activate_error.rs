@@ -7,8 +7,7 @@ use core::time::Duration;
 use ringcat_wire::address::LogicalAddress;
 use ringcat_wire::al::AlState;
 
-use super::declaration::MAX_UNDER_WAY;
-use super::lrw::ExplicitLrw;
+use super::declaration::{ExplicitLrw, MAX_UNDER_WAY};
 use crate::config::ConfigError;
 use crate::junction::JunctionError;
 use crate::layout::LayoutError;
@@ -92,8 +91,8 @@ pub enum ActivateError {
         /// What was declared.
         under_way: u8,
     },
-    /// LRW was asked for on two links. When the ring breaks, half of its SubDevices would be met by one copy and half by the
-    /// other (facts CR-16, 9.2.2).
+    /// LRW was asked for on two links. When the ring breaks, half of its SubDevices would be met by one copy and half
+    /// by the other (facts CR-16, 9.2.2).
     LrwOnTwoLinks {
         /// Number of the domain.
         domain: usize,
@@ -152,36 +151,25 @@ impl fmt::Display for ActivateError {
                 f,
                 "declaration {subdevice}: process data of SyncManager {sync_manager} is in domain {a} and in domain {b}"
             ),
-            ActivateError::Period { domain, period, shortest } => write!(
-                f,
-                "domain {domain}: expected a period that is a multiple of {} us and not zero, got {} us",
-                shortest.as_micros(),
-                period.as_micros()
-            ),
+            ActivateError::Period { domain, period, shortest } => fmt_period(f, *domain, *period, *shortest),
             ActivateError::NoDomain { subdevice } => write!(
                 f,
-                "declaration {subdevice} has process data and there is no domain to exchange it: declare a domain, or PREOP \
-                 as the target"
+                "declaration {subdevice} has process data and there is no domain to exchange it: declare a domain, or \
+                 PREOP as the target"
             ),
-            ActivateError::SyncCycle { subdevice, sync0, period } => write!(
-                f,
-                "declaration {subdevice}: SYNC0 every {} us does not go with cycles of {} us: one must be a multiple of the \
-                 other",
-                in_us(*sync0),
-                in_us(*period)
-            ),
+            ActivateError::SyncCycle { subdevice, sync0, period } => fmt_sync_cycle(f, *subdevice, *sync0, *period),
             ActivateError::UnderWay { domain, under_way } => {
                 write!(f, "domain {domain}: expected 1 to {MAX_UNDER_WAY} cycles under way, got {under_way}")
             }
             ActivateError::LrwOnTwoLinks { domain, logical, length, subdevices } => write!(
                 f,
-                "domain {domain}: an LRW at logical address {logical} of {length} bytes for declarations {subdevices:?} \
-                 cannot be used with two links: leave it to the MainDevice, or use one LRW per SubDevice"
+                "domain {domain}: an LRW at logical address {logical} of {length} bytes for declarations \
+                 {subdevices:?} cannot be used with two links: leave it to the MainDevice, or use one LRW per SubDevice"
             ),
             ActivateError::NamedLrwOnTwoLinks(ExplicitLrw { name, logical, length, subdevices }) => write!(
                 f,
-                "{name}: an LRW at logical address {logical} of {length} bytes for declarations {subdevices:?} cannot be \
-                 used with two links: let it be split into LRD and LWR, or use one LRW per SubDevice"
+                "{name}: an LRW at logical address {logical} of {length} bytes for declarations {subdevices:?} cannot \
+                 be used with two links: let it be split into LRD and LWR, or use one LRW per SubDevice"
             ),
             ActivateError::LrwUnknown { domain, subdevice } => {
                 write!(f, "domain {domain}: LRW was asked for, declaration {subdevice} does not know it")
@@ -207,6 +195,18 @@ fn in_us(time: Duration) -> impl fmt::Display {
         0 => write!(f, "{}", ns / 1_000),
         rest => write!(f, "{}.{rest:03}", ns / 1_000),
     })
+}
+
+fn fmt_period(f: &mut fmt::Formatter<'_>, domain: usize, period: Duration, shortest: Duration) -> fmt::Result {
+    let [shortest, period] = [shortest, period].map(|time| time.as_micros());
+    write!(f, "domain {domain}: expected a period that is a multiple of {shortest} us and not zero, ")?;
+    write!(f, "got {period} us")
+}
+
+fn fmt_sync_cycle(f: &mut fmt::Formatter<'_>, subdevice: usize, sync0: Duration, period: Duration) -> fmt::Result {
+    let [sync0, period] = [sync0, period].map(in_us);
+    write!(f, "declaration {subdevice}: SYNC0 every {sync0} us does not go with cycles of {period} us: ")?;
+    f.write_str("one must be a multiple of the other")
 }
 
 impl core::error::Error for ActivateError {}

@@ -68,8 +68,8 @@ impl Directory {
     }
 }
 
-/// Process data of a declared SubDevice: planned from what it is, or from the declaration while it is not there or its SII
-/// cannot be followed.
+/// Process data of a declared SubDevice: planned from what it is, or from the declaration while it is not there or its
+/// SII cannot be followed.
 pub(super) enum Areas {
     /// Planned; `None` where its target state exchanges nothing.
     Planned(Option<SubDevicePlan>),

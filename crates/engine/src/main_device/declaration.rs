@@ -1,34 +1,14 @@
-//! What the application declares, held against what the scan found, and turned into domains and members.
+//! What the application declares: SubDevices, domains, clocks.
 
-use alloc::borrow::ToOwned;
-use alloc::format;
-use alloc::rc::Rc;
-use alloc::string::ToString;
-use alloc::vec;
+use alloc::string::String;
 use alloc::vec::Vec;
 use core::ops::Range;
 use core::time::Duration;
 
-use ringcat_wire::address::Position;
-use ringcat_wire::al::AlState;
-use ringcat_wire::register::{WatchdogDivider, WatchdogTime};
+use ringcat_wire::address::LogicalAddress;
 
-use super::activate_error::ActivateError;
-use super::areas::{Areas, Declared};
-use super::lrw::ExplicitLrw;
-use crate::config::{ClockConfig, ConfigError, Group, Resolution, SubDeviceConfig, can_lead, groups, resolve};
-use crate::event::Event;
-use crate::info::SubDeviceInfo;
-use crate::layout::{AreaSpec, DomainSpec, Layout, LrwPolicy, Witness};
-use crate::link::LinkSet;
-use crate::mail::Mailbox;
-use crate::plan::{PlanFault, plan};
-use crate::procedures::fleet::{Member, Setup, SetupError, declared_areas};
-use crate::procedures::presence;
-use crate::procedures::request_state::exchanges;
-use crate::procedures::scan::{Scan, station_at};
-use crate::procedures::strangers::{Owners, Stranger};
-use crate::supervisor::Bus;
+use crate::config::{ClockConfig, Group, SubDeviceConfig};
+use crate::layout::LrwPolicy;
 
 /// Cycles of a domain that may be under way at once, at the most.
 pub const MAX_UNDER_WAY: u8 = 4;
@@ -38,10 +18,10 @@ pub const MAX_UNDER_WAY: u8 = 4;
 pub struct DomainConfig {
     /// How often the application will exchange it.
     pub period: Duration,
-    /// How many of its cycles may be under way at once, 1 to [`MAX_UNDER_WAY`]: 1 where frames come back within a period,
-    /// more where their way through segment and host takes longer. What it costs: inputs are as old as that way, so up to
-    /// as many periods, the answer to an input leaves as many cycles later, a lost cycle is noticed as much later (or
-    /// when the next one comes back), and each cycle under way has buffers of its own.
+    /// How many of its cycles may be under way at once, 1 to [`MAX_UNDER_WAY`]: 1 where frames come back within a
+    /// period, more where their way through segment and host takes longer. What it costs: inputs are as old as that
+    /// way, so up to as many periods, the answer to an input leaves as many cycles later, a lost cycle is noticed as
+    /// much later (or when the next one comes back), and each cycle under way has buffers of its own.
     pub under_way: u8,
     /// What belongs to it.
     pub members: Vec<DomainMember>,
@@ -72,8 +52,8 @@ pub struct Declaration {
     pub domains: Vec<DomainConfig>,
     /// Where LRW is used.
     pub lrw: LrwPolicy,
-    /// Datagrams with LRW that a configuration file names. With two links one over several SubDevices is refused, and where
-    /// each has one SubDevice the policy is [`LrwPolicy::PerSubDevice`]; with one link they change nothing.
+    /// Datagrams with LRW that a configuration file names. With two links one over several SubDevices is refused, and
+    /// where each has one SubDevice the policy is [`LrwPolicy::PerSubDevice`]; with one link they change nothing.
     pub explicit_lrw: Vec<ExplicitLrw>,
     /// Distributed clocks; `None` leaves them alone.
     pub clocks: Option<ClockConfig>,
@@ -114,246 +94,15 @@ impl Declaration {
     }
 }
 
-/// By declaration the SubDevice that was found, and those that nobody declared.
-type Matched = (Vec<Option<SubDeviceInfo>>, Vec<Stranger>);
-
-/// Who is whom.
-pub(super) fn match_declaration(bus: &Bus, declaration: &Declaration, scan: &Scan) -> Result<Matched, ActivateError> {
-    let mut found = vec![None; declaration.subdevices.len()];
-    let mut owners = vec![None; scan.subdevices.len()];
-    let mut extra = Vec::new();
-    for resolution in resolve(&declaration.subdevices, &scan.subdevices) {
-        match resolution {
-            Resolution::Found { config, info } => {
-                owners[info] = Some(config);
-                found[config] = Some(scan.subdevices[info].clone());
-            }
-            Resolution::Absent { config, error } if declaration.required != Required::Everybody => {
-                report_absence(bus, config, true, error);
-            }
-            Resolution::Failed { config, error } if declaration.required == Required::Nobody => {
-                report_absence(bus, config, false, error);
-            }
-            Resolution::Absent { config, error } | Resolution::Failed { config, error } => {
-                return Err(ActivateError::Config { subdevice: config, error });
-            }
-            Resolution::Extra { info } => extra.push(info),
-        }
-    }
-    let owners = Owners::new(owners, |index| declaration.subdevices[index].group.is_some());
-    let strangers = extra.into_iter().map(|at| {
-        let info = scan.subdevices[at].clone();
-        bus.report(Event::Unexpected { position: info.position, identity: info.identity });
-        Stranger::new(info, &owners, scan.main_count, true)
-    });
-    Ok((found, strangers.collect()))
-}
-
-/// SYNC signals need a clock, and clocks that are kept together.
-pub(super) fn check_clocks(declaration: &Declaration, found: &[Option<SubDeviceInfo>]) -> Result<(), ActivateError> {
-    for (subdevice, (config, info)) in declaration.subdevices.iter().zip(found).enumerate() {
-        let has_clock = info.as_ref().is_none_or(|info| info.controller.features.dc);
-        if config.sync.is_some() && (!has_clock || declaration.clocks.is_none()) {
-            return Err(ActivateError::NoClock { subdevice, has_clock });
-        }
-    }
-    Ok(())
-}
-
-fn report_absence(bus: &Bus, subdevice: usize, optional: bool, error: ConfigError) {
-    bus.report(match error {
-        ConfigError::Mismatch { position, field, expected, got } => {
-            Event::Mismatch { subdevice, position, field, expected, got }
-        }
-        ConfigError::Missing { .. } | ConfigError::Ambiguous { .. } | ConfigError::DeclaredTwice { .. } => {
-            Event::Missing { subdevice, optional }
-        }
-    });
-}
-
-pub(super) fn plan_all(
-    declaration: &Declaration,
-    found: &[Option<SubDeviceInfo>],
-) -> Result<Vec<Areas>, ActivateError> {
-    let pairs = declaration.subdevices.iter().zip(found).enumerate();
-    pairs
-        .map(|(subdevice, (config, info))| match info {
-            Some(info) => match plan(config, info) {
-                Ok(plan) => Ok(Areas::Planned(exchanges(config.target).then_some(plan))),
-                // A bad EEPROM is a matter of its SubDevice alone.
-                Err(error) if error.fault == PlanFault::Sii => {
-                    Ok(Areas::Declared(Declared::unfit(config, info, SetupError::Plan(error))))
-                }
-                Err(error) => Err(ActivateError::Setup { subdevice, error: SetupError::Plan(error) }),
-            },
-            None => Ok(Areas::Declared(Declared::absent(config))),
-        })
-        .collect()
-}
-
-/// How each SubDevice shows whether its inputs came. Of one that is not there it is not known whether it has an FMMU to spare.
-pub(super) fn witnesses(plans: &[Areas], found: &[Option<SubDeviceInfo>]) -> Vec<Witness> {
-    let pairs = plans.iter().zip(found).enumerate();
-    let witness = |(subdevice, (areas, info)): (usize, (&Areas, &Option<SubDeviceInfo>))| match (areas, info) {
-        (Areas::Planned(Some(plan)), Some(info)) => presence::witness(subdevice, plan, info),
-        _ => Witness::Alone,
-    };
-    pairs.map(witness).collect()
-}
-
-/// What needs no SubDevice to be found wrong.
-pub(super) fn check(declaration: &Declaration) -> Result<(), ActivateError> {
-    let boot = declaration.subdevices.iter().position(|config| config.target == AlState::Boot);
-    if let Some(subdevice) = boot {
-        return Err(ActivateError::Target { subdevice, target: AlState::Boot });
-    }
-    let headless = groups(&declaration.subdevices).into_iter().find_map(|members| {
-        let head = *members.first()?;
-        (!can_lead(&declaration.subdevices[head])).then_some(head)
-    });
-    if let Some(subdevice) = headless {
-        return Err(ActivateError::Headless { subdevice });
-    }
-    let shortest = declaration.domains.iter().map(|domain| domain.period).min().unwrap_or_default();
-    for (domain, config) in declaration.domains.iter().enumerate() {
-        let period = config.period;
-        if period.is_zero() || period.as_nanos() % shortest.as_nanos() != 0 {
-            return Err(ActivateError::Period { domain, period, shortest });
-        }
-        if !(1..=MAX_UNDER_WAY).contains(&config.under_way) {
-            return Err(ActivateError::UnderWay { domain, under_way: config.under_way });
-        }
-    }
-    check_sync_cycles(declaration, shortest)
-}
-
-/// SYNC0 comes as often as cycles, or a whole number of times more or less often. A single pulse goes with everything.
-fn check_sync_cycles(declaration: &Declaration, period: Duration) -> Result<(), ActivateError> {
-    let period_ns = period.as_nanos();
-    for (subdevice, config) in declaration.subdevices.iter().enumerate() {
-        let sync0_ns = config.sync.map_or(0, |signals| u128::from(signals.sync0_cycle_ns));
-        let fits = sync0_ns == 0 || period_ns == 0 || sync0_ns % period_ns == 0 || period_ns.is_multiple_of(sync0_ns);
-        if !fits {
-            let sync0 = Duration::from_nanos(config.sync.map_or(0, |signals| signals.sync0_cycle_ns.into()));
-            return Err(ActivateError::SyncCycle { subdevice, sync0, period });
-        }
-    }
-    Ok(())
-}
-
-/// Process data without any domain would never be exchanged.
-pub(super) fn check_domains(declaration: &Declaration, plans: &[Areas]) -> Result<(), ActivateError> {
-    let has_data = |areas: &Areas| areas.list().iter().any(|(.., length)| *length > 0);
-    match plans.iter().position(has_data) {
-        Some(subdevice) if declaration.domains.is_empty() => Err(ActivateError::NoDomain { subdevice }),
-        _ => Ok(()),
-    }
-}
-
-pub(super) fn domain_specs(
-    declaration: &Declaration,
-    plans: &[Areas],
-    lrw: LrwPolicy,
-    links: LinkSet,
-) -> Result<Vec<DomainSpec>, ActivateError> {
-    // With two links it is refused whoever knows it ([`super::lrw::check_lrw`]).
-    let is_asked_for = lrw == LrwPolicy::Explicit && links == LinkSet::Single;
-    let mut specs: Vec<DomainSpec> = Vec::new();
-    for (domain, config) in declaration.domains.iter().enumerate() {
-        let mut spec = DomainSpec { period: config.period, under_way: config.under_way, lrw: true, areas: Vec::new() };
-        for member in &config.members {
-            let subdevice = member.subdevice;
-            let Some(areas) = plans.get(subdevice) else {
-                return Err(ActivateError::UnknownMember { domain, subdevice });
-            };
-            if is_asked_for && !areas.lrw() {
-                return Err(ActivateError::LrwUnknown { domain, subdevice });
-            }
-            spec.lrw &= areas.lrw();
-            for (sync_manager, direction, length) in areas.list() {
-                if member.sync_managers.as_ref().is_none_or(|wanted| wanted.contains(&sync_manager)) {
-                    let same = |a: &AreaSpec| a.subdevice == subdevice && a.sync_manager == sync_manager;
-                    let earlier = specs.iter().position(|spec| spec.areas.iter().any(same));
-                    let earlier = earlier.or_else(|| spec.areas.iter().any(same).then_some(domain));
-                    if let Some(other) = earlier {
-                        let domains = [other, domain];
-                        return Err(ActivateError::TwoDomains { subdevice, sync_manager, domains });
-                    }
-                    spec.areas.push(AreaSpec { subdevice, sync_manager, direction, length });
-                }
-            }
-        }
-        specs.push(spec);
-    }
-    Ok(specs)
-}
-
-/// Period of the domain that only carries the supervision datagram.
-const SUPERVISION_PERIOD: Duration = Duration::from_millis(10);
-
-/// An application without domains still has one for the supervision datagram.
-pub(super) fn with_domain(mut declaration: Declaration) -> Declaration {
-    if declaration.domains.is_empty() {
-        declaration.domains.push(DomainConfig::new(SUPERVISION_PERIOD, Vec::new()));
-    }
-    declaration
-}
-
-/// What SubDevices may not follow, and optional ones for which the process image has no place.
-pub(super) fn report_oddities(bus: &Bus, members: &[Member], layout: &Layout) {
-    for (subdevice, member) in members.iter().enumerate() {
-        let warnings = member.setup.iter().flat_map(|setup| &setup.plan.warnings);
-        for warning in warnings {
-            bus.report(Event::PlanOddity { subdevice, what: warning.to_string() });
-        }
-        if let Some((period, watchdog)) = beyond_watchdog(subdevice, member, layout) {
-            let (period, watchdog) = (period.as_millis(), watchdog.as_millis());
-            let what = format!("its outputs come every {period} ms, its watchdog expires after {watchdog} ms");
-            bus.report(Event::PlanOddity { subdevice, what });
-        }
-        if member.info.is_none() && declared_areas(&member.config).is_none() {
-            let what = "not there, and its PDOs are not declared: when it comes, it has no place in the process image";
-            bus.report(Event::PlanOddity { subdevice, what: what.to_owned() });
-        }
-    }
-}
-
-/// Period of a SubDevice's outputs and time of its watchdog, where the watchdog is the shorter one.
-fn beyond_watchdog(subdevice: usize, member: &Member, layout: &Layout) -> Option<(Duration, Duration)> {
-    let plan = &member.setup.as_ref()?.plan;
-    let divider = member.config.watchdog_divider.map_or(WatchdogDivider::default(), WatchdogDivider);
-    let intervals = member.config.watchdog_intervals.map_or(WatchdogTime::default(), WatchdogTime);
-    let watchdog = Duration::from_nanos(intervals.duration_ns(divider)?);
-    let watched = plan.process_data.iter().filter(|area| area.register.control.watchdog);
-    let periods = watched.filter_map(|area| {
-        let (domain, _) = layout.area(subdevice, area.sync_manager)?;
-        Some(layout.domains.get(domain.0)?.period)
-    });
-    periods.max().filter(|period| *period >= watchdog).map(|period| (period, watchdog))
-}
-
-pub(super) fn members(
-    bus: &Bus,
-    declaration: Declaration,
-    found: Vec<Option<SubDeviceInfo>>,
-    plans: &[Areas],
-    layout: &Layout,
-) -> Result<Vec<Member>, ActivateError> {
-    let count = found.len();
-    let mut members = Vec::with_capacity(count);
-    for (index, (config, info)) in declaration.subdevices.into_iter().zip(found).enumerate() {
-        let unfit = plans.get(index).and_then(Areas::unfit).cloned();
-        let setup = match &info {
-            Some(info) if unfit.is_none() => Some(Rc::new(
-                Setup::new(index, &config, info, layout)
-                    .map_err(|error| ActivateError::Setup { subdevice: index, error })?,
-            )),
-            Some(_) | None => None,
-        };
-        // One that is not there yet gets an address behind those of the scan.
-        let absent = station_at(Position((0x4000 + index) as u16));
-        let station = info.as_ref().map_or(absent, |info| info.station);
-        members.push(Member { unfit, ..Member::new(config, info, station, setup, Mailbox::new(bus, index)) });
-    }
-    Ok(members)
+/// A datagram with LRW as a configuration file names it. What leaves is laid out by the MainDevice.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct ExplicitLrw {
+    /// How whoever wrote the file finds it: its frame, its place in it, its comment.
+    pub name: String,
+    /// Its logical address in the file.
+    pub logical: LogicalAddress,
+    /// Its bytes.
+    pub length: usize,
+    /// Indices in the declaration of the SubDevices that it addresses.
+    pub subdevices: Vec<usize>,
 }

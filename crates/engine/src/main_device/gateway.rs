@@ -16,8 +16,8 @@ const OWN_ADDRESS: u16 = 0;
 
 impl MainDevice {
     /// Takes a message of a client, EtherCAT header of type 5 included; its answers come out of
-    /// [`MainDevice::pop_relayed`]. Any bytes are allowed. The address is the station address of a declared SubDevice, or 0
-    /// for the objects of the MainDevice itself (docs/mailbox-gateway.md).
+    /// [`MainDevice::pop_relayed`]. Any bytes are allowed. The address is the station address of a declared SubDevice,
+    /// or 0 for the objects of the MainDevice itself (docs/mailbox-gateway.md).
     pub fn relay(&mut self, client: u64, message: &[u8]) {
         let bus = self.supervisor.bus();
         let (fleet, scan, acyclic) = (self.fleet.clone(), self.scan.clone(), self.counters());

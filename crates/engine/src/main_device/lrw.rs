@@ -1,27 +1,13 @@
 //! Where LRW may be used: never over several SubDevices on two links (facts 9.2.2, CR-16).
 
-use alloc::string::String;
 use alloc::vec::Vec;
 
-use ringcat_wire::address::LogicalAddress;
 use ringcat_wire::command::Command;
 
 use super::activate_error::ActivateError;
+use super::declaration::ExplicitLrw;
 use crate::layout::{DomainSpec, Layout, LrwPolicy, Rules};
 use crate::link::LinkSet;
-
-/// A datagram with LRW as a configuration file names it. What leaves is laid out by the MainDevice.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct ExplicitLrw {
-    /// How whoever wrote the file finds it: its frame, its place in it, its comment.
-    pub name: String,
-    /// Its logical address in the file.
-    pub logical: LogicalAddress,
-    /// Its bytes.
-    pub length: usize,
-    /// Indices in the declaration of the SubDevices that it addresses.
-    pub subdevices: Vec<usize>,
-}
 
 /// The policy with datagrams that a configuration file names.
 pub(super) fn policy(policy: LrwPolicy, named: &[ExplicitLrw], links: LinkSet) -> Result<LrwPolicy, ActivateError> {

@@ -24,8 +24,8 @@ impl MainDevice {
         }
     }
 
-    /// Before activation: starts to bring a scanned SubDevice to PREOP or BOOT, where its mailbox can be used, or back to
-    /// INIT.
+    /// Before activation: starts to bring a scanned SubDevice to PREOP or BOOT, where its mailbox can be used, or back
+    /// to INIT.
     pub fn start_visit(&mut self, position: usize, state: AlState) -> Pending<Result<(), ConfigureError>> {
         let info = match (&self.fleet, &*self.scan.borrow()) {
             (None, Some(Ok(scan))) => scan.subdevices.get(position).cloned(),
@@ -45,8 +45,8 @@ impl MainDevice {
     }
 
     /// Once active: starts to bring one SubDevice to a state, BOOT among them, while the others go on. Its whole
-    /// configuration is written again on the way up. The state is kept: a SubDevice that loses its power comes back to it,
-    /// one that does not answer goes there when it comes. One that refuses is brought back to the state before.
+    /// configuration is written again on the way up. The state is kept: a SubDevice that loses its power comes back to
+    /// it, one that does not answer goes there when it comes. One that refuses is brought back to the state before.
     ///
     /// Without process data its working counters are not expected, and its inputs are not fresh.
     pub fn start_state_request(&mut self, subdevice: usize, state: AlState) -> Pending<Result<(), ConfigureError>> {

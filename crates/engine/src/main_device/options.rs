@@ -31,9 +31,9 @@ pub struct Options {
     pub patience: Duration,
     /// What becomes of rings behind junctions. A connection that is added makes it strict.
     pub junctions: JunctionMode,
-    /// Whether the cabling is looked at anew, as by a rescan, when a hot connect group has joined or left, and as soon as
-    /// nothing is broken. Positions, places of breaks and errors of cables are then those of the segment as it is; otherwise a
-    /// group has none until a rescan is asked for.
+    /// Whether the cabling is looked at anew, as by a rescan, when a hot connect group has joined or left, and as soon
+    /// as nothing is broken. Positions, places of breaks and errors of cables are then those of the segment as it is;
+    /// otherwise a group has none until a rescan is asked for.
     pub follow_groups: bool,
     /// Whether the redundant link may be taken down for a moment to find out where a line is crossed.
     pub enhanced_line_crossed: bool,

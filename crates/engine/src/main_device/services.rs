@@ -93,7 +93,8 @@ impl MainDevice {
         })
     }
 
-    /// Starts to cut a declared SubDevice off, by closing the ports of its neighbours. In a line those behind it go with it.
+    /// Starts to cut a declared SubDevice off, by closing the ports of its neighbours. In a line those behind it go
+    /// with it.
     pub fn start_block(&mut self, subdevice: usize) -> Pending<Result<Vec<BlockedPort>, ServiceError>> {
         let (bus, fleet) = (self.bus(), self.fleet.clone());
         self.start(async move {
@@ -130,8 +131,8 @@ impl MainDevice {
     /// who it is, for so long at most; then the result is what is known.
     ///
     /// Places of breaks, errors of cables and positions in events go by the new cabling from then on, rings behind
-    /// junctions included, unless it is not whole: while the ring of two links is open, or a mandatory SubDevice does not
-    /// answer, they go by the cabling of before.
+    /// junctions included, unless it is not whole: while the ring of two links is open, or a mandatory SubDevice does
+    /// not answer, they go by the cabling of before.
     pub fn start_rescan(&mut self, limit: Duration) -> Pending<Result<Rescan, ServiceError>> {
         let (bus, fleet) = (self.bus(), self.fleet.clone());
         self.start(async move { rescan(&bus, &fleet.ok_or(ServiceError::NotActive)?, limit).await })
@@ -143,7 +144,8 @@ impl MainDevice {
     }
 
     /// Starts to write an EEPROM: each word that is not right already, and read back. What is no SII image is refused
-    /// unless `force` says so. What a SubDevice does with it, it does after its next start or [`MainDevice::start_sii_reload`].
+    /// unless `force` says so. What a SubDevice does with it, it does after its next start or
+    /// [`MainDevice::start_sii_reload`].
     pub fn start_sii_write(
         &mut self,
         subdevice: usize,
@@ -158,8 +160,8 @@ impl MainDevice {
         })
     }
 
-    /// Starts to write the alias into the EEPROM, with the checksum that belongs to it. One that is wrong already is made
-    /// right only with `force`. The alias counts from the SubDevice's next start on.
+    /// Starts to write the alias into the EEPROM, with the checksum that belongs to it. One that is wrong already is
+    /// made right only with `force`. The alias counts from the SubDevice's next start on.
     pub fn start_alias_write(
         &mut self,
         subdevice: usize,

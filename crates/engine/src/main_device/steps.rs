@@ -4,32 +4,23 @@
 
 use alloc::vec::Vec;
 
+use super::MainDevice;
 use super::activate_error::ActivateError;
-use super::declaration::{Declaration, check};
+use super::active::Active;
+use super::declaration::Declaration;
+use super::loaded::{Loaded, closing};
 use super::pending::Pending;
-use super::{Active, MainDevice};
+use super::prepare::check;
 use crate::config::{Resolution, resolve};
-use crate::event::Event;
 use crate::info::SubDeviceInfo;
-use crate::junction::{JunctionConnection, JunctionError, JunctionMode, START_PORT};
-use crate::procedures::fleet::Member;
+use crate::junction::{JunctionConnection, JunctionError};
 use crate::procedures::junction::refute;
-use crate::procedures::scan::{Scan, node_status, report_cabling};
-use crate::supervisor::Bus;
-use crate::topology::{Closing, NodeStatus, PortOf, Topology};
-
-use ringcat_wire::address::StationAddress;
-use ringcat_wire::register::PortKind;
-
-/// What was loaded and is not applied yet.
-#[derive(Clone, Debug)]
-pub(super) struct Loaded {
-    pub declaration: Declaration,
-    connections: Vec<JunctionConnection>,
-}
+use crate::procedures::scan::node_status;
+use crate::topology::{Closing, NodeStatus};
 
 impl MainDevice {
-    /// First step: takes a declaration. It takes the place of one that was loaded before, with all that was added to it.
+    /// First step: takes a declaration. It takes the place of one that was loaded before, with all that was added to
+    /// it.
     ///
     /// # Errors
     /// [`ActivateError::Active`], and what is wrong with the declaration by itself.
@@ -54,9 +45,9 @@ impl MainDevice {
         Ok(())
     }
 
-    /// Before the last step, where connections were added: tries whether the rings close where they are said to, which takes
-    /// some frames, and about two seconds where one does not. A ring whose closing cable is open at both ends, or whose
-    /// SubDevices are not all there, is believed. What [`MainDevice::apply`] finds by itself is left to it.
+    /// Before the last step, where connections were added: tries whether the rings close where they are said to, which
+    /// takes some frames, and about two seconds where one does not. A ring whose closing cable is open at both ends, or
+    /// whose SubDevices are not all there, is believed. What [`MainDevice::apply`] finds by itself is left to it.
     ///
     /// The result is [`JunctionError::NotThere`] where one does not.
     pub fn start_connection_check(&mut self) -> Pending<Result<(), JunctionError>> {
@@ -120,89 +111,10 @@ impl MainDevice {
     }
 }
 
-impl Loaded {
-    /// The topology with the local rings that were declared, if any were; otherwise that of the scan.
-    pub(super) fn topology(
-        &self,
-        bus: &Bus,
-        mode: JunctionMode,
-        scan: &Scan,
-        found: &[Option<SubDeviceInfo>],
-    ) -> Result<Topology, ActivateError> {
-        if self.connections.is_empty() {
-            return match mode {
-                JunctionMode::Strict => Err(ActivateError::Junction(JunctionError::NoConnection)),
-                JunctionMode::Disabled | JunctionMode::Automatic => Ok(scan.topology.clone()),
-            };
-        }
-        let mut closings = Vec::new();
-        for connection in &self.connections {
-            match closing(connection, found).map_err(ActivateError::Junction)? {
-                Ok(closing) => closings.push(closing),
-                Err(subdevice) => {
-                    let what = alloc::format!("not there: its {connection} is not watched until a rescan finds it");
-                    bus.report(Event::PlanOddity { subdevice, what });
-                }
-            }
-        }
-        let nodes: Vec<NodeStatus> = scan.subdevices.iter().map(node_status).collect();
-        let topology = Topology::with_local_rings(&nodes, scan.main_count, &closings);
-        if mode == JunctionMode::Strict {
-            // The scan has kept it back.
-            report_cabling(bus, &Scan { topology: topology.clone(), ..scan.clone() }, false);
-        }
-        Ok(topology)
-    }
-
-    /// Both ends of the closing cables of the rings that were declared, if any were, wherever their SubDevices are;
-    /// otherwise of those of the topology.
-    pub(super) fn closings(
-        &self,
-        topology: &Topology,
-        members: &[Member],
-        stations: &[StationAddress],
-    ) -> Vec<[(StationAddress, u8); 2]> {
-        if self.connections.is_empty() {
-            let end = |at: PortOf| Some((*stations.get(at.node)?, at.port));
-            let rings = topology.local_rings.iter().map(|ring| ring.closing);
-            return rings.filter_map(|closing| Some([end(closing.head)?, end(closing.tail)?])).collect();
-        }
-        let end = |subdevice: usize, port: u8| Some((members.get(subdevice)?.station, port));
-        let ends = |it: &JunctionConnection| Some([end(it.head, it.head_port)?, end(it.tail, it.tail_port)?]);
-        self.connections.iter().filter_map(ends).collect()
-    }
-}
-
 /// Rings that were declared and whose SubDevices are there, among those that were scanned.
 #[derive(Default)]
 struct DeclaredClosings {
     closings: Vec<(JunctionConnection, Closing)>,
     nodes: Vec<NodeStatus>,
     main_count: usize,
-}
-
-/// Where a declared connection is in the segment; otherwise who of its SubDevices is optional and not there.
-fn closing(
-    connection: &JunctionConnection,
-    found: &[Option<SubDeviceInfo>],
-) -> Result<Result<Closing, usize>, JunctionError> {
-    let JunctionConnection { head, head_port, tail, tail_port } = *connection;
-    for (subdevice, port) in [(head, head_port), (head, START_PORT), (tail, tail_port)] {
-        let Some(info) = found.get(subdevice).and_then(Option::as_ref) else {
-            return Ok(Err(subdevice));
-        };
-        let ports = &info.controller.ports;
-        if ports[usize::from(port)] == PortKind::NotImplemented && *ports != [PortKind::NotImplemented; 4] {
-            return Err(JunctionError::NoSuchPort { connection: *connection, subdevice, port });
-        }
-    }
-    let node = |subdevice: usize| found[subdevice].as_ref().map_or(0, |info| usize::from(info.position.0));
-    let closing = Closing {
-        head: PortOf { node: node(head), port: head_port },
-        tail: PortOf { node: node(tail), port: tail_port },
-    };
-    if closing.tail.node <= closing.head.node {
-        return Err(JunctionError::NotBehind(*connection));
-    }
-    Ok(Ok(closing))
 }

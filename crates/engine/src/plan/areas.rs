@@ -3,11 +3,11 @@
 use alloc::collections::BTreeSet;
 use alloc::vec::Vec;
 
-use ringcat_wire::register::{SyncManagerDirection, SyncManagerMode};
+use ringcat_wire::register::{SyncManager, SyncManagerControl, SyncManagerDirection, SyncManagerMode};
 use ringcat_wire::sii::{SiiSyncManager, SyncManagerKind};
 
 use super::error::PlanProblem;
-use super::{AreaPlan, MappedEntry, MappedPdo, SmPlan, sync_manager};
+use super::subdevice::{AreaPlan, MappedEntry, MappedPdo, SmPlan};
 use crate::config::{PdoAssignment, PdoMapping, SubDeviceConfig, Watchdog};
 use crate::info::{Direction, PdoInfo, SubDeviceInfo};
 
@@ -209,3 +209,10 @@ pub(super) fn occupied(register: &ringcat_wire::register::SyncManager) -> u32 {
 
 /// Start of the process RAM; digital outputs and user RAM lie below it and have one buffer.
 pub(super) const PROCESS_RAM: u16 = 0x1000;
+
+pub(super) fn sync_manager(start: u16, length: u16, control: u8) -> SyncManager {
+    let mut register =
+        SyncManager { start, length, control: SyncManagerControl::from_bits(control), ..SyncManager::default() };
+    register.activate.enable = length > 0;
+    register
+}

@@ -6,7 +6,7 @@ use ringcat_wire::register::{SyncManager, SyncManagerDirection};
 
 use super::areas::{PROCESS_RAM, occupied};
 use super::error::PlanProblem;
-use super::{AreaPlan, SmPlan};
+use super::subdevice::{AreaPlan, SmPlan};
 use crate::config::{IdnWrite, SdoDownload, SdoUpload, StartupAction, SubDeviceConfig};
 use crate::info::SubDeviceInfo;
 

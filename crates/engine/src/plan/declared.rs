@@ -5,7 +5,8 @@ use alloc::vec::Vec;
 use ringcat_wire::register::SyncManagerDirection;
 
 use super::areas::place;
-use super::{AreaPlan, MappedPdo, PlanProblem, SmPlan};
+use super::error::PlanProblem;
+use super::subdevice::{AreaPlan, MappedPdo, SmPlan};
 use crate::config::{DeclaredSyncManager, SyncManagerRole};
 use crate::info::{Direction, SubDeviceInfo};
 

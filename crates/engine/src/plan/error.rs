@@ -1,5 +1,7 @@
 //! Why a SubDevice cannot be set up as declared. Most of it is a wrong declaration, some of it a wrong SII.
 
+use alloc::format;
+use alloc::string::String;
 use core::fmt;
 
 use ringcat_wire::address::{Position, RegisterAddress, StationAddress};
@@ -302,11 +304,8 @@ impl fmt::Display for PlanProblem {
                 write!(f, "SM {sync_manager}: its PDO entries have {expected} bits, its length {got}")
             }
             PlanProblem::RegisterCommand { register, data, mask } => {
-                write!(f, "a command to register {register} has {data} bytes of data")?;
-                match mask {
-                    Some(mask) => write!(f, " and {mask} of mask"),
-                    None => Ok(()),
-                }
+                let mask = mask.map_or(String::new(), |mask| format!(" and {mask} of mask"));
+                write!(f, "a command to register {register} has {data} bytes of data{mask}")
             }
         }
     }

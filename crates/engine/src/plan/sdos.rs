@@ -8,7 +8,7 @@ use alloc::vec::Vec;
 
 use super::areas::ASSIGNMENT_BASE;
 use super::error::{PlanProblem, PlanWarning};
-use super::{AreaPlan, MappedPdo};
+use super::subdevice::{AreaPlan, MappedPdo};
 use crate::config::{SdoDownload, SubDeviceConfig};
 use crate::info::SubDeviceInfo;
 

@@ -6,7 +6,7 @@ use std::vec;
 use std::vec::Vec;
 use std::{fs, println};
 
-use ringcat_wire::address::Position;
+use ringcat_wire::address::{Position, StationAddress};
 use ringcat_wire::register::Information;
 use ringcat_wire::sii::{CoeDetails, GeneralFlags, MailboxLayout, MailboxProtocols, Sii, SiiHeader, SiiSyncManager};
 
@@ -375,8 +375,8 @@ fn an_error_says_whether_declaration_or_sii_have_to_be_mended() {
     assert_eq!(fault(&any(), &unfit), PlanFault::Sii);
     assert_eq!(
         plan(&any(), &unfit).unwrap_err().to_string(),
-        "SubDevice 4 (0x1005): its SII cannot be followed: SM 2: 9 bytes (all buffers) at 0x2fff leave the memory, which \
-         ends at 0x3000"
+        "SubDevice 4 (0x1005): its SII cannot be followed: SM 2: 9 bytes (all buffers) at 0x2fff leave the memory, \
+         which ends at 0x3000"
     );
     let problem = SiiProblem::Checksum { expected: 1, got: 2 };
     let mut damaged = SubDeviceInfo { sync_managers: vec![], ..device() };

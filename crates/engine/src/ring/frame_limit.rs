@@ -40,8 +40,8 @@ mod tests {
         let said = |datagrams, returns| FrameLimit { datagrams, returns }.to_string();
         assert_eq!(
             said(15, true),
-            "of the datagrams of a frame only the first 15 are processed on this segment: set max_datagrams_per_frame to \
-             15 (option --max-datagrams 15 of the program)"
+            "of the datagrams of a frame only the first 15 are processed on this segment: set max_datagrams_per_frame \
+             to 15 (option --max-datagrams 15 of the program)"
         );
         assert!(
             said(40, false).starts_with("frames with more than 40 datagrams do not come back on this segment: set")

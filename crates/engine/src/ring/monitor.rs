@@ -143,8 +143,9 @@ mod tests {
         assert_eq!(monitor.state(), RingState::Open);
     }
 
+    // covers: facts 9.2.1
     #[test]
-    fn one_copy_that_keeps_coming_alone_shows_a_dead_direction_and_single_losses_do_not_facts_9_2_1() {
+    fn one_copy_that_keeps_coming_alone_shows_a_dead_direction_and_single_losses_do_not() {
         let mut monitor = RingMonitor::default();
         let closed = arrivals(&[(Link::Main, Link::Redundant), (Link::Redundant, Link::Main)]);
         let main_alone = arrivals(&[(Link::Main, Link::Redundant)]);

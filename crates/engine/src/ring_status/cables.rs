@@ -49,8 +49,9 @@ pub fn port_errors(counters: &ErrorCounters, port: u8) -> CableErrors {
     CableErrors { invalid_frames: counters.rx[at].invalid_frames.into(), lost_links: counters.lost_link[at].into() }
 }
 
-/// All cables: those that lead to the SubDevices, in their order, then those that close rings behind junctions, that of the
-/// redundant link last. A broken one is among them, but for one of a ring behind a junction of which an end is not known.
+/// All cables: those that lead to the SubDevices, in their order, then those that close rings behind junctions, that of
+/// the redundant link last. A broken one is among them, but for one of a ring behind a junction of which an end is not
+/// known.
 pub fn cables(topology: &Topology, links: LinkSet) -> Vec<Cable> {
     let port = |node: usize| PortOf { node, port: topology.nodes[node].entry_port };
     let mut cables = Vec::with_capacity(topology.nodes.len() + 1);
@@ -85,15 +86,15 @@ pub fn cables(topology: &Topology, links: LinkSet) -> Vec<Cable> {
     cables
 }
 
-/// Where the line of the first so many SubDevices ends: the last one that has nobody behind it, since frames meet crossed
-/// SubDevices on their way back.
+/// Where the line of the first so many SubDevices ends: the last one that has nobody behind it, since frames meet
+/// crossed SubDevices on their way back.
 fn last_leaf(topology: &Topology, count: usize) -> Option<usize> {
     let is_leaf = |node: &usize| topology.nodes[*node].children.iter().all(Option::is_none);
     (0..count).rev().find(is_leaf).or(count.checked_sub(1))
 }
 
-/// The port at which a line ends: of those without a neighbour the usual way on, port 1 or for a crossed SubDevice 0, or else
-/// the next in the order of travel.
+/// The port at which a line ends: of those without a neighbour the usual way on, port 1 or for a crossed SubDevice 0,
+/// or else the next in the order of travel.
 fn loose_end(topology: &Topology, node: usize) -> PortOf {
     let it = &topology.nodes[node];
     let is_loose = |port: &u8| *port != it.entry_port && it.children[usize::from(*port)].is_none();

@@ -3,23 +3,13 @@
 //! Procedures wait for nothing but transfers, timers and groups of this engine, and each of these knows the task that
 //! waits: completions carry a task id and wake just that task, so no waker and no synchronisation is needed.
 
-use alloc::boxed::Box;
 use alloc::rc::Rc;
 use alloc::vec::Vec;
 use core::cell::RefCell;
-use core::future::Future;
-use core::pin::Pin;
 use core::task::{Context, Poll, Waker};
 
 use super::shared::Shared;
-
-/// A procedure under way.
-pub(crate) type Task = Pin<Box<dyn Future<Output = ()>>>;
-
-/// Place of a task in the table. Places are re-used: waking a place whose task has ended polls another task once more
-/// than needed, which every future here tolerates.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub(crate) struct TaskId(pub u32);
+use super::task::{Task, TaskId};
 
 pub(crate) struct Executor {
     shared: Rc<RefCell<Shared>>,

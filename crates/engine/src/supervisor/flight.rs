@@ -7,7 +7,7 @@ use ringcat_wire::command::Command;
 use ringcat_wire::datagram::{CIRCULATING, HEADER_LEN, WKC_LEN};
 use ringcat_wire::frame::MAX_FRAME;
 
-use super::bus::Reply;
+use super::reply::Reply;
 use super::stray::Overdue;
 use super::transfer::{Request, TransferId};
 use crate::link::{Link, LinkSet};

@@ -12,7 +12,7 @@ use core::task::Poll;
 use core::time::Duration;
 
 use super::bus::Bus;
-use super::executor::TaskId;
+use super::task::TaskId;
 
 /// So many SubDevices are asked at a time where there is no hurry: a frame of 32 us where each is asked for four FMMUs.
 pub(crate) const TURN: usize = 5;
@@ -41,8 +41,8 @@ impl Bus {
         results.take().into_iter().flatten().collect()
     }
 
-    /// As [`Bus::gather`], a few at a time with pauses: for what is not urgent, so that frames are short and cyclic ones
-    /// hardly ever wait behind them.
+    /// As [`Bus::gather`], a few at a time with pauses: for what is not urgent, so that frames are short and cyclic
+    /// ones hardly ever wait behind them.
     pub async fn gather_in_turns<I, T, F>(&self, items: Vec<I>, procedure: impl Fn(Bus, I) -> F) -> Vec<T>
     where
         T: 'static,

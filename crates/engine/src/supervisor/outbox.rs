@@ -2,8 +2,8 @@
 //!
 //! A SubDevice works while its answer is waited for, and rests until the next request reaches it. So requests go before
 //! reads, which are long: those of a hundred SubDevices would keep the wire busy for a millisecond, in which nobody had
-//! anything to do. What was handed to the interface cannot be overtaken, so only as many reads are under way as keep the
-//! wire busy until the first of them is back.
+//! anything to do. What was handed to the interface cannot be overtaken, so only as many reads are under way as keep
+//! the wire busy until the first of them is back.
 //!
 //! Requests go first as long as whoever makes them has not had more than his part of the wire ([`super::turns`]):
 //! otherwise those who send without pause would keep the answers of all others waiting.

@@ -7,15 +7,15 @@ use core::cmp::Reverse;
 use ringcat_wire::datagram::MAX_DATA;
 
 use super::alone::Alone;
-use super::bus::BusError;
 use super::counters::AcyclicCounters;
-use super::executor::{Task, TaskId};
 use super::flights::Flights;
 use super::link_order::LinkOrder;
 use super::outbox::{Outbox, Rank};
+use super::reply::BusError;
 use super::round_trip::RoundTrip;
 use super::silence::Silence;
 use super::stray::Strays;
+use super::task::{Task, TaskId};
 use super::transfer::{Request, Stage, Transfer, TransferId, Transfers};
 use crate::board::Board;
 use crate::event::EventLog;

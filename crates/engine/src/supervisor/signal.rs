@@ -7,8 +7,8 @@ use core::fmt;
 use core::future::poll_fn;
 use core::task::Poll;
 
-use super::executor::TaskId;
 use super::shared::Shared;
+use super::task::TaskId;
 
 /// Wakes procedures that wait for a condition which other procedures bring about.
 #[derive(Clone)]

@@ -1,8 +1,8 @@
 //! Whether a link is silent: nothing of what is sent on it comes back.
 //!
-//! A reply that needs both copies would wait for the one on a dead link (a cut host cable) until its deadline, again and
-//! again. A link that has been silent for long while the other one proves the ring open is not waited for. Sending on it
-//! goes on, so that it is noticed when copies come back.
+//! A reply that needs both copies would wait for the one on a dead link (a cut host cable) until its deadline, again
+//! and again. A link that has been silent for long while the other one proves the ring open is not waited for. Sending
+//! on it goes on, so that it is noticed when copies come back.
 
 use core::time::Duration;
 

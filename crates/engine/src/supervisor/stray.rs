@@ -1,8 +1,8 @@
 //! Mail that came back when nobody waited for it any more (decision 0007).
 //!
 //! Reading a mailbox empties it, so that what a read brings back must not be thrown away: not when both copies passed
-//! the SubDevice at the edge of a ring's repair and each read another mail, and not when the frame was given up before it
-//! came back.
+//! the SubDevice at the edge of a ring's repair and each read another mail, and not when the frame was given up before
+//! it came back.
 
 use alloc::collections::VecDeque;
 use alloc::vec::Vec;

@@ -407,7 +407,10 @@ fn timers_fire_in_order_and_groups_wake_once() {
 
 proptest! {
     #[test]
-    fn any_bytes_may_arrive(frames in proptest::collection::vec((any::<bool>(), proptest::collection::vec(any::<u8>(), 0..120)), 0..20), mangle in any::<[u8; 8]>()) {
+    fn any_bytes_may_arrive(
+        frames in proptest::collection::vec((any::<bool>(), proptest::collection::vec(any::<u8>(), 0..120)), 0..20),
+        mangle in any::<[u8; 8]>()
+    ) {
         let mut bench = Bench::new(LinkSet::Ring);
         let bus = bench.supervisor.bus();
         bench.start(async move { bus.fprd(STATION, map::AL_STATUS, 2).await });

@@ -7,8 +7,8 @@ use ringcat_wire::command::Command;
 use ringcat_wire::datagram::{MAX_DATA, OVERHEAD, Target};
 use ringcat_wire::register::map;
 
-use super::bus::{BusError, Reply};
-use super::executor::TaskId;
+use super::reply::{BusError, Reply};
+use super::task::TaskId;
 use crate::time::Instant;
 
 /// What is asked of the bus.
@@ -32,7 +32,8 @@ pub(crate) struct Request {
     pub mail: Option<StationAddress>,
     /// So many more of the same go before it, in a frame that holds nothing else.
     pub before: usize,
-    /// No other frame is to be on the wire while it is; the links on which copies are known not to come home, a bit each.
+    /// No other frame is to be on the wire while it is; the links on which copies are known not to come home, a bit
+    /// each.
     pub alone: Option<u8>,
     /// The data is a system time of 32 bits that was right then; it leaves as what it is when the frame does.
     pub time_at: Option<Instant>,

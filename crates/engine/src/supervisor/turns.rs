@@ -58,8 +58,8 @@ pub(super) struct Accounts {
 }
 
 impl Accounts {
-    /// The turn of something that takes so many bytes of a frame. `now` is the round of what has waited longest: whoever
-    /// had nothing to send before has no right to what he did not use.
+    /// The turn of something that takes so many bytes of a frame. `now` is the round of what has waited longest:
+    /// whoever had nothing to send before has no right to what he did not use.
     pub(super) fn turn(&mut self, target: Target, bytes: usize, now: u64) -> Turn {
         let begin = now * SHARE;
         if self.used.len() >= self.limit.max(ACCOUNTS) {

@@ -1,5 +1,5 @@
-//! The ends of a broken cable by what the ports themselves say: it does not depend on who was taken for whose neighbour, which
-//! is an assumption while SubDevices are crossed or hang on a port 2 (LC-02).
+//! The ends of a broken cable by what the ports themselves say: it does not depend on who was taken for whose
+//! neighbour, which is an assumption while SubDevices are crossed or hang on a port 2 (LC-02).
 
 use alloc::vec::Vec;
 
@@ -7,11 +7,12 @@ use ringcat_wire::register::DlStatus;
 
 use super::{Finding, Node, PortOf, Topology};
 
-/// Both ends of a cable, the first nearer to MAIN as far as that is known. `None` is an interface: MAIN where it is the first
-/// one, REDUNDANT the second.
+/// Both ends of a cable, the first nearer to MAIN as far as that is known. `None` is an interface: MAIN where it is the
+/// first one, REDUNDANT the second.
 pub type Ends = (Option<PortOf>, Option<PortOf>);
 
-/// Whether neighbours in a ring are an assumption: where somebody is or may be crossed, and in an open ring with branches.
+/// Whether neighbours in a ring are an assumption: where somebody is or may be crossed, and in an open ring with
+/// branches.
 pub fn are_doubtful(topology: &Topology) -> bool {
     let odd = |finding: &Finding| matches!(finding, Finding::CrossedLine { .. } | Finding::Inconsistent { .. });
     let was_open = topology.redundant_head.is_some() || topology.open_ports.is_empty();
@@ -21,9 +22,9 @@ pub fn are_doubtful(topology: &Topology) -> bool {
         || (was_open && (topology.nodes.iter().any(branches) || topology.open_ports.iter().any(|at| at.port > 1)))
 }
 
-/// The ends of the cable at which a ring is open, from the ports of all SubDevices now. `counts` is how many of them live on each
-/// link now. Both ends have to be seen, and everybody: the neighbours of one without power are not the ends of one
-/// cable.
+/// The ends of the cable at which a ring is open, from the ports of all SubDevices now. `counts` is how many of them
+/// live on each link now. Both ends have to be seen, and everybody: the neighbours of one without power are not the
+/// ends of one cable.
 pub fn ends_of_break(topology: &Topology, dl_status: &[Option<DlStatus>], counts: [u16; 2]) -> Option<Ends> {
     if dl_status.contains(&None) || dl_status.len() != topology.nodes.len() {
         return None;

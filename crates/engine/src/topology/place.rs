@@ -9,8 +9,10 @@ use alloc::vec::Vec;
 
 use ringcat_wire::register::PortKind;
 
-use super::local_ring::Rings;
-use super::{Finding, Node, NodeStatus, PortOf, Topology};
+use super::finding::Finding;
+use super::port::PortOf;
+use super::rings::Rings;
+use super::tree::{Node, NodeStatus, Topology};
 
 /// Order in which a frame passes the ports (facts 2.1). The processing unit is behind port 0.
 pub(super) const TRAVEL: [u8; 4] = [0, 3, 1, 2];
@@ -120,7 +122,8 @@ impl<'s> Walk<'s> {
         self.rings.orphans.contains(&node)
     }
 
-    /// Where a stub ends that goes the usual way from port to port: at the one SubDevice with a single port that leads on.
+    /// Where a stub ends that goes the usual way from port to port: at the one SubDevice with a single port that leads
+    /// on.
     pub(super) fn loose_end(&self, stub: core::ops::Range<usize>) -> Option<PortOf> {
         let mut end = None;
         for node in stub {
@@ -135,9 +138,9 @@ impl<'s> Walk<'s> {
         end.filter(|at| self.exists(at.node, at.port))
     }
 
-    /// Where a stub ends: at the end of its usual way, or at a port without a link that this has passed, where what was taken
-    /// for the line is a branch, as the terminals of a coupler are. Cables join ports of one kind, and `towards` is that of
-    /// the other end. `None` where several ports may be it.
+    /// Where a stub ends: at the end of its usual way, or at a port without a link that this has passed, where what was
+    /// taken for the line is a branch, as the terminals of a coupler are. Cables join ports of one kind, and `towards`
+    /// is that of the other end. `None` where several ports may be it.
     pub(super) fn certain_end(&self, stub: core::ops::Range<usize>, towards: PortKind) -> Option<PortOf> {
         let is_loose = |at: &PortOf| self.exists(at.node, at.port) && !self.is_open(at.node, at.port);
         let ports = |node: usize| (0..4).map(move |port| PortOf { node, port });
@@ -356,6 +359,12 @@ impl<'s> Walk<'s> {
             };
             self.findings.push(finding);
         }
+    }
+
+    /// Hangs a member of a broken ring that has nothing on its port 0 nowhere, as if it were entered there.
+    pub(super) fn orphan(&mut self, node: usize) {
+        self.hang(node, None, 0);
+        self.expect_children(node, 0);
     }
 }
 

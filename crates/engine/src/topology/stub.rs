@@ -65,12 +65,12 @@ pub(super) struct Link {
     crossed: bool,
 }
 
-/// Stubs without branches in which SubDevices are crossed. Frames of the redundant link meet those on their way to the break,
-/// and the others on their way back. So where the last one is in the order tells of all who is crossed; how both
+/// Stubs without branches in which SubDevices are crossed. Frames of the redundant link meet those on their way to the
+/// break, and the others on their way back. So where the last one is in the order tells of all who is crossed; how both
 /// kinds follow each other, only receive times do.
 impl Walk<'_> {
-    /// The SubDevices of the redundant link, from the break on, where the ring is open, has no branches, and some of them are
-    /// crossed. Not where all are and nobody else is there: that is a line on the redundant link.
+    /// The SubDevices of the redundant link, from the break on, where the ring is open, has no branches, and some of
+    /// them are crossed. Not where all are and nobody else is there: that is a line on the redundant link.
     pub(super) fn crossed_stub(&mut self, main_count: usize) -> Option<Vec<Link>> {
         let rest = main_count..self.nodes.len();
         if main_count > 0 {

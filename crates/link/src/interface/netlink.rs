@@ -1,8 +1,8 @@
 //! Which bridge or bond an interface is a member of, and where the other end of a veth pair is, asked of the kernel
 //! through netlink.
 //!
-//! In go the index of an interface, out come its controller, its kind and its other end. `/sys` would tell too, but is tied to the
-//! namespace that it was mounted in.
+//! In go the index of an interface, out come its controller, its kind and its other end. `/sys` would tell too, but is
+//! tied to the namespace that it was mounted in.
 
 use std::os::fd::AsRawFd;
 

@@ -2,8 +2,8 @@
 //! producer and one consumer.
 //!
 //! In go frames with interface, direction and time, out come the same in the same order. Without locks and without
-//! `unsafe`: the memory is words that are atomics. The producer neither waits nor allocates nor calls the kernel; frames
-//! that find the queue full are counted per interface.
+//! `unsafe`: the memory is words that are atomics. The producer neither waits nor allocates nor calls the kernel;
+//! frames that find the queue full are counted per interface.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};

@@ -18,7 +18,8 @@ use scenarios::figures::{Figures, verdict};
 
 const SHORT: u64 = 1_000;
 const LONG: u64 = 3_000;
-/// Most instructions of a cycle with one SubDevice on one link: 900 before each copy was judged by itself (decision 0023).
+/// Most instructions of a cycle with one SubDevice on one link: 900 before each copy was judged by itself (decision
+/// 0023).
 const BAR: f64 = 945.0;
 /// Most that two links may cost, as a multiple of one link.
 const RING_BAR: f64 = 1.7;
@@ -174,14 +175,14 @@ fn slope(short: &Profile, long: &Profile) -> f64 {
 /// Functions that allocate, lock or enter the kernel. Rust's own paths begin with `alloc::` also where nothing is
 /// allocated, so names are taken for what they call in the end.
 fn allocates_or_locks(name: &str) -> bool {
-    const PARTS: &str = "malloc calloc realloc memalign __rust_alloc __rust_dealloc _int_free mutex rwlock futex pthread \
-                         lll_lock syscall";
+    const PARTS: &str = "malloc calloc realloc memalign __rust_alloc __rust_dealloc _int_free mutex rwlock futex \
+                         pthread lll_lock syscall";
     let lower = name.to_ascii_lowercase();
     lower.starts_with("free") || lower.starts_with("cfree") || PARTS.split(' ').any(|part| lower.contains(part))
 }
 
-/// What it costs that freshness is exact: presence datagrams against the same bytes in datagrams with one SubDevice each, whose
-/// working counters are exact without.
+/// What it costs that freshness is exact: presence datagrams against the same bytes in datagrams with one SubDevice
+/// each, whose working counters are exact without.
 fn print_exactness<'a>(find: &impl Fn(&str) -> &'a Measured) {
     println!(
         "  what exact freshness costs, one link, 2 + 2 bytes per SubDevice, against as many bytes of few SubDevices:"
@@ -204,7 +205,8 @@ fn print(measured: &[Measured]) -> bool {
     };
     let mut figures = Figures::new("instructions per process-data cycle, the double's subtracted");
     println!(
-        "  lrw, lwr+lrd: one SubDevice with 2 + 2 bytes on one link. closed, cut-main, cut-redundant: two links, the ring"
+        "  lrw, lwr+lrd: one SubDevice with 2 + 2 bytes on one link. closed, cut-main, cut-redundant: two links, the \
+         ring"
     );
     println!(
         "  closed, or cut so that the main or the redundant copy meets it. n-of-b: n SubDevices with b + b bytes each."

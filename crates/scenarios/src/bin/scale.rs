@@ -1,10 +1,10 @@
 //! A thousand SubDevices: CPU per simulated second and memory of the MainDevice (issue 2, "What it must reach").
 //!
-//! Terminals as in [`scenarios::terminals`] form a closed ring on two links. With 1,000 of them and 1 us per hop the round
-//! trip exceeds a millisecond, so that cycles take 4 ms; with 0.3 us it does not. CPU is what the kernel charges this
-//! process, engine and simulator together, while all are in OP; the best of several stretches counts, for neighbours on
-//! the machine only add to it. Memory is what the allocator handed out since the segment was made: the MainDevice, and
-//! the few frames and queues that the simulator needed since.
+//! Terminals as in [`scenarios::terminals`] form a closed ring on two links. With 1,000 of them and 1 us per hop the
+//! round trip exceeds a millisecond, so that cycles take 4 ms; with 0.3 us it does not. CPU is what the kernel charges
+//! this process, engine and simulator together, while all are in OP; the best of several stretches counts, for
+//! neighbours on the machine only add to it. Memory is what the allocator handed out since the segment was made: the
+//! MainDevice, and the few frames and queues that the simulator needed since.
 
 use std::process::ExitCode;
 use std::time::Duration;

@@ -1,8 +1,8 @@
 //! What 1,000 SDO requests per second cost a cyclic task of 1 kHz (issue 4): instructions of the cyclic half per cycle,
 //! counted by callgrind within that half alone, and when its frames leave, in virtual time.
 //!
-//! Four drives hang on one link. Both halves have links of their own, as in two threads; here they take turns in one, so
-//! that virtual time decides. Each millisecond one SDO is asked for, of one drive after the other. The bar is for
+//! Four drives hang on one link. Both halves have links of their own, as in two threads; here they take turns in one,
+//! so that virtual time decides. Each millisecond one SDO is asked for, of one drive after the other. The bar is for
 //! requests of another thread; requests that the cyclic task makes itself cost what their calls cost, and are shown.
 //! Run without arguments it prints the table; `run KIND CYCLES` is the work that callgrind watches.
 

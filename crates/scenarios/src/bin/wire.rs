@@ -2,8 +2,8 @@
 //! beside the MainDevices of others, the largest cycle rate.
 //!
 //! Everything runs in processes of its own on a veth pair, the MainDevice on one processor, the other end on another.
-//! What is compared alternates in blocks, because the machine may be busy with anything; a figure that misses its bar has
-//! three tries, and each is shown. `RINGCAT_PYTHON` names a Python with pysoem; without it pysoem is left out.
+//! What is compared alternates in blocks, because the machine may be busy with anything; a figure that misses its bar
+//! has three tries, and each is shown. `RINGCAT_PYTHON` names a Python with pysoem; without it pysoem is left out.
 
 use std::path::PathBuf;
 use std::process::{Command, ExitCode, Stdio};

@@ -1,5 +1,5 @@
-//! Reading an EtherCAT frame for the judge (facts 1.1 to 1.3, 9.7.1 A), strictly: a MainDevice has no business with what
-//! is refused here.
+//! Reading an EtherCAT frame for the judge (facts 1.1 to 1.3, 9.7.1 A), strictly: a MainDevice has no business with
+//! what is refused here.
 
 /// Commands that only read: APRD, FPRD, BRD, LRD.
 pub const READS: [u8; 4] = [1, 4, 7, 10];

@@ -6,9 +6,9 @@
 use std::collections::HashMap;
 use std::time::Duration;
 
-use super::Verdict;
 use super::ethercat::Frame;
 use super::pcapng::Packet;
+use super::verdict::Verdict;
 
 /// The number that a MainDevice begins with.
 const FIRST: u16 = 1;

@@ -1,20 +1,20 @@
 //! Send windows: how cyclic and acyclic frames share a wire of 100 Mbit/s, check 9 of [`crate::capture`].
 //!
-//! In go the frames that were sent, with link, class, length and time, out comes a measure. A frame occupies its link for
-//! 80 ns per byte and 24 bytes more (preamble, FCS, gap; facts 1.3), behind those that were handed over before it.
+//! In go the frames that were sent, with link, class, length and time, out comes a measure. A frame occupies its link
+//! for 80 ns per byte and 24 bytes more (preamble, FCS, gap; facts 1.3), behind those that were handed over before it.
 //!
-//! The grid of the cycles is found in the capture: the period is given or the usual distance of the cycles' first frames,
-//! the phase is where the promptest of them lie. A cyclic frame **wants** to leave at its point of the grid and leaves a
-//! little later, when the thread has woken up. An acyclic frame is **in time** when it leaves behind the cyclic frames of a
-//! cycle and is through by the next point of the grid. One that was handed over before that point and is still on the
-//! wire **crosses** it; one that was handed over behind the point and before the cyclic frames **pushes in**. When a
-//! cyclic frame then finds the wire taken, it is **held up**.
+//! The grid of the cycles is found in the capture: the period is given or the usual distance of the cycles' first
+//! frames, the phase is where the promptest of them lie. A cyclic frame **wants** to leave at its point of the grid and
+//! leaves a little later, when the thread has woken up. An acyclic frame is **in time** when it leaves behind the
+//! cyclic frames of a cycle and is through by the next point of the grid. One that was handed over before that point
+//! and is still on the wire **crosses** it; one that was handed over behind the point and before the cyclic frames
+//! **pushes in**. When a cyclic frame then finds the wire taken, it is **held up**.
 //!
-//! A sender that keeps windows decides in time and may be stopped by its machine between the decision and the wire. Where
-//! the cycle begins late as well, by more than a tenth of the period, the machine's **stall** is seen in the capture itself
-//! and such frames are counted apart. So is a second copy that was handed over more than a tenth of the period after the first
-//! one of the same frame: nothing is decided between the two. Between `Windows::acyclic` and the rest stands the share that a sender without windows
-//! would have: the wire time of acyclic frames, by chance.
+//! A sender that keeps windows decides in time and may be stopped by its machine between the decision and the wire.
+//! Where the cycle begins late as well, by more than a tenth of the period, the machine's **stall** is seen in the
+//! capture itself and such frames are counted apart. So is a second copy that was handed over more than a tenth of the
+//! period after the first one of the same frame: nothing is decided between the two. Between `Windows::acyclic` and the
+//! rest stands the share that a sender without windows would have: the wire time of acyclic frames, by chance.
 
 use std::fmt;
 use std::time::Duration;
@@ -76,8 +76,8 @@ impl fmt::Display for Windows {
         )?;
         writeln!(
             f,
-            "  not through by the next cycle: {crossed} (by {:?} at most), in stalls of the machine {crossed_in_stalls}; \
-             by chance it would be {}",
+            "  not through by the next cycle: {crossed} (by {:?} at most), in stalls of the machine \
+             {crossed_in_stalls}; by chance it would be {}",
             self.furthest, self.by_chance
         )?;
         writeln!(f, "  cycles held up by an acyclic frame: {held_up}, by {:?} at most", self.longest_hold_up)

@@ -28,8 +28,8 @@ const END_LIMIT: Duration = Duration::from_secs(90);
 /// Both ends sleep until something comes, before all other programs: the machine may be busy.
 const THREAD: [&str; 4] = ["--receive", "block", "--priority", "50"];
 
-/// Where the programs of this repository lie, made if they are not up to date: the whole workspace decides on the features
-/// of what they depend on, so that nothing is built twice.
+/// Where the programs of this repository lie, made if they are not up to date: the whole workspace decides on the
+/// features of what they depend on, so that nothing is built twice.
 static PROGRAMS: LazyLock<PathBuf> = LazyLock::new(|| {
     let profile = target_directory();
     let mut build = Command::new(env!("CARGO"));

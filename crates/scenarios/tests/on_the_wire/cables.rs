@@ -1,7 +1,7 @@
-//! A ring of 16 in OP, and each of its cables cut and healed: those of the host at either end of the cable, by switching
-//! the interface off, the inner ones by the simulator. Nobody leaves OP, and no more cycles are incomplete than the
-//! detection of the cut and stalls of this machine explain; both are measured at each edge and printed. Each edge is told
-//! once, with the counts of both sides and its place. All of it takes more than 20 s of cycles.
+//! A ring of 16 in OP, and each of its cables cut and healed: those of the host at either end of the cable, by
+//! switching the interface off, the inner ones by the simulator. Nobody leaves OP, and no more cycles are incomplete
+//! than the detection of the cut and stalls of this machine explain; both are measured at each edge and printed. Each
+//! edge is told once, with the counts of both sides and its place. All of it takes more than 20 s of cycles.
 
 use std::time::{Duration, Instant};
 

@@ -1,10 +1,11 @@
-//! Captures of our MainDevice on real interfaces, by itself (`--capture`) and by an onlooker (`ringcat capture`), read by
-//! others: tshark finds nothing malformed, and the judge of [`scenarios::capture`] recomputes that every promise was kept.
+//! Captures of our MainDevice on real interfaces, by itself (`--capture`) and by an onlooker (`ringcat capture`), read
+//! by others: tshark finds nothing malformed, and the judge of [`scenarios::capture`] recomputes that every promise was
+//! kept.
 //!
 //! Send windows are judged with a tolerance: a machine that stops the sender between its decision and the wire makes
-//! frames late that were decided in time. Where the cycle is late as well this is seen in the capture and told apart; of
-//! the rest a few are allowed. Without windows, forty SubDevices that return had five times as many frames in the way of
-//! cycles as are allowed here.
+//! frames late that were decided in time. Where the cycle is late as well this is seen in the capture and told apart;
+//! of the rest a few are allowed. Without windows, forty SubDevices that return had five times as many frames in the
+//! way of cycles as are allowed here.
 
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Output};
@@ -16,8 +17,8 @@ use scenarios::capture::{Verdict, judge};
 use crate::bench::{Bench, await_op, finish, program};
 use crate::{PLANTS, RING_OF_16, said};
 
-/// So many acyclic frames may be in the way of a cycle without a stall in sight, and this part of those that would be by
-/// chance.
+/// So many acyclic frames may be in the way of a cycle without a stall in sight, and this part of those that would be
+/// by chance.
 const TOLERATED: u64 = 2;
 const PART_OF_CHANCE: u64 = 5;
 /// Sends five frames that are no EtherCAT.

@@ -1,6 +1,6 @@
-//! Distributed clocks on interfaces. The simulator's clocks run in the segment's own time, which follows this machine's, so
-//! what they latch is exact however late this machine is: delays are judged, and that clocks lock. How far cycles are from
-//! their phase depends on this machine, and is printed.
+//! Distributed clocks on interfaces. The simulator's clocks run in the segment's own time, which follows this
+//! machine's, so what they latch is exact however late this machine is: delays are judged, and that clocks lock. How
+//! far cycles are from their phase depends on this machine, and is printed.
 
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -149,8 +149,8 @@ fn ethercrab_measures_the_delays_that_we_measure_and_both_are_true_facts_7_1() {
     }
     let Some(mut bench) = Bench::new(1) else { return };
     let client = program("examples/ethercrab_client");
-    // Where the two differ, ours are true: ethercrab leaves out cables to SubDevices without a clock, and the last branch of a
-    // fork of four cables with another fork behind it.
+    // Where the two differ, ours are true: ethercrab leaves out cables to SubDevices without a clock, and the last
+    // branch of a fork of four cables with another fork behind it.
     let (everywhere, larger) = (LINE.replace("clock_bits = 0", "clock_bits = 64"), format!("{TREE}{FOURTH}"));
     for (name, segment, with_foreign) in
         [("line", everywhere.as_str(), true), ("tree", TREE, true), ("tree with a fourth branch", &larger, false)]
@@ -201,8 +201,9 @@ fn check_capture(path: &Path, clocks: usize) {
     assert!(output.status.success() && text.contains(&format!("judged: {clocks} delays")), "{text}{errors}");
 }
 
+// covers: facts 7.3, facts 7.4
 #[test]
-fn clocks_on_interfaces_lock_start_their_signals_and_cycles_follow_them_facts_7_3_facts_7_4() {
+fn clocks_on_interfaces_lock_start_their_signals_and_cycles_follow_them() {
     let Some(mut bench) = Bench::new(1) else { return };
     bench.simulate(LINE, false);
     let plot = file("plot.svg");

@@ -1,5 +1,5 @@
-//! Distributed clocks on two interfaces in real time: host cables and one inside are cut and come back. The simulator knows
-//! how far clocks are apart in truth. Inside each part no host is in between; across both parts its sending is.
+//! Distributed clocks on two interfaces in real time: host cables and one inside are cut and come back. The simulator
+//! knows how far clocks are apart in truth. Inside each part no host is in between; across both parts its sending is.
 
 use std::time::{Duration, Instant};
 
@@ -36,7 +36,8 @@ const COUNT: usize = 5;
 const LOCK_LIMIT: Duration = Duration::from_secs(10);
 /// From one edge to the next.
 const PAUSE: Duration = Duration::from_millis(300);
-/// So far clocks may be apart inside of a part, across both, and before the first cut: each is within 100 ns of its reference.
+/// So far clocks may be apart inside of a part, across both, and before the first cut: each is within 100 ns of its
+/// reference.
 const INSIDE_NS: i64 = 1_000;
 const ACROSS_NS: i64 = 5_000;
 const LOCKED_NS: i64 = 200;
@@ -57,8 +58,9 @@ fn watch(bench: &Bench, groups: [&[usize]; 3]) -> [i64; 3] {
     worst
 }
 
+// covers: facts 7.5
 #[test]
-fn clocks_of_a_ring_on_two_interfaces_stay_together_when_cables_go_and_come_facts_7_5() {
+fn clocks_of_a_ring_on_two_interfaces_stay_together_when_cables_go_and_come() {
     let Some(mut bench) = Bench::new(2) else { return };
     bench.simulate(RING, true);
     let run = bench.run_ringcat(&["clocks", "--main", "main0", "--redundant", "main1", "--for", "60s"]);

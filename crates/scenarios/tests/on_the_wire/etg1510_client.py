@@ -1,12 +1,13 @@
-"""The ETG.1510 client of others (pyetg1510 0.1.3) reads the whole object dictionary of a MainDevice through its gateway.
+"""The ETG.1510 client of others (pyetg1510 0.1.3) reads the whole object dictionary of a MainDevice through its
+gateway.
 
 Usage: etg1510_client.py ADDRESS. Prints each object with the fields that the client knows.
 """
 import asyncio, importlib.abc, importlib.util, sys
 from dataclasses import fields
 
-# Two of its headers are structures whose bit fields have types of several sizes. Where it was made (Windows) each type has
-# bytes of its own; here these fields overlap, and the type of the frame is lost. With one type they are as they were meant.
+# Two of its headers are structures whose bit fields have types of several sizes. Where it was made (Windows) each type
+# has bytes of its own; here these fields overlap, and the type of the frame is lost. With one type they are as meant.
 NAME = "pyetg1510.mailbox.mailbox_gateway"
 HEADERS = ("class EtherCATHeader(Structure):", "class CoEHeader(Structure):")
 

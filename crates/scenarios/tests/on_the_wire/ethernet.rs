@@ -27,7 +27,8 @@ gateway = \"10.0.0.1\"
 ";
 const INTERFACES: [&str; 2] = ["eoe0s1", "eoe0a7"];
 const LIMIT: Duration = Duration::from_secs(10);
-/// Pings an address, downloads bytes from its web server, or has bytes echoed; prints how long that took. Standard library only.
+/// Pings an address, downloads bytes from its web server, or has bytes echoed; prints how long that took. Standard
+/// library only.
 const CLIENT: &str = "
 import socket, struct, sys, threading, time
 def checksum(data):

@@ -295,8 +295,10 @@ fn a_cable_without_subdevices_and_a_ring_that_is_open_are_said_last() {
 }
 
 /// A network of a coupler alone.
-const COUPLER_ALONE: &str = "<EtherCATConfig Version=\"1.3\"><Config><Master><Info><Name>M</Name></Info></Master><Slave><Info>\
-    <Name>Coupler</Name><PhysAddr>1001</PhysAddr><AutoIncAddr>0</AutoIncAddr><Physics>YKY</Physics><VendorId>3143</VendorId>\
+const COUPLER_ALONE: &str = "<EtherCATConfig Version=\"1.3\"><Config><Master><Info><Name>M</Name></Info></Master>\
+    <Slave><Info>\
+    <Name>Coupler</Name><PhysAddr>1001</PhysAddr><AutoIncAddr>0</AutoIncAddr><Physics>YKY</Physics>\
+    <VendorId>3143</VendorId>\
     <ProductCode>72089601</ProductCode></Info></Slave></Config></EtherCATConfig>";
 
 #[test]

@@ -1,7 +1,7 @@
 //! The MainDevices of others on our simulator: they bring it to OP, and their process data is right at both ends.
 //!
-//! They have time limits of their own, which a stall of this machine breaks whatever the simulator does. So each has three
-//! tries, and each try that fails is shown with what it said and how late the simulator was.
+//! They have time limits of their own, which a stall of this machine breaks whatever the simulator does. So each has
+//! three tries, and each try that fails is shown with what it said and how late the simulator was.
 
 use std::io::Write;
 use std::path::{Path, PathBuf};
@@ -19,8 +19,8 @@ pub const FOREIGN: &str = "RINGCAT_FOREIGN";
 pub const NO_CACHE: &str = "-B";
 /// Cycles of process data.
 const CYCLES: usize = 500;
-/// A stall of this machine that is longer than the other's patience is no fault of the simulator: so many cycles may have
-/// another working counter.
+/// A stall of this machine that is longer than the other's patience is no fault of the simulator: so many cycles may
+/// have another working counter.
 const WRONG_ALLOWED: usize = CYCLES / 10;
 /// Tries for each MainDevice and segment.
 const TRIES: usize = 3;

@@ -1,6 +1,7 @@
-//! Every frame is accounted for: a ring of 16 at 1 kHz for 30 s, or 10 minutes with RINGCAT_LONG=1. What our MainDevice sent
-//! went into the segment, what came out of it our MainDevice received, and what is missing is what the simulator was told
-//! to drop. Frames may come late when this machine stalls, or find a full ring; both are told apart from lost ones.
+//! Every frame is accounted for: a ring of 16 at 1 kHz for 30 s, or 10 minutes with RINGCAT_LONG=1. What our MainDevice
+//! sent went into the segment, what came out of it our MainDevice received, and what is missing is what the simulator
+//! was told to drop. Frames may come late when this machine stalls, or find a full ring; both are told apart from lost
+//! ones.
 
 use std::time::Duration;
 

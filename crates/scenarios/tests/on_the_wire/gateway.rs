@@ -1,5 +1,5 @@
-//! Clients of the mailbox gateway that share nothing with it: one in Python, written from the protocol, and the ETG.1510
-//! client of others; tshark judges what the first one exchanged.
+//! Clients of the mailbox gateway that share nothing with it: one in Python, written from the protocol, and the
+//! ETG.1510 client of others; tshark judges what the first one exchanged.
 
 use std::path::Path;
 use std::process::Command;
@@ -37,8 +37,9 @@ fn packets(path: &str, filter: &str) -> Vec<String> {
     String::from_utf8_lossy(&output.stdout).lines().map(str::to_owned).collect()
 }
 
+// covers: facts 10.1, facts 10.2
 #[test]
-fn clients_of_others_read_dictionaries_objects_and_files_through_the_gateway_facts_10_1_facts_10_2() {
+fn clients_of_others_read_dictionaries_objects_and_files_through_the_gateway() {
     let Some(mut bench) = Bench::new(1) else { return };
     bench.simulate(SEGMENT, false);
     bench.ip_main("link set lo up");

@@ -1,5 +1,5 @@
-//! Rings behind junctions and crossed lines on interfaces: modes `automatic` and `strict` of `ringcat run`, and enhanced
-//! detection, which takes the redundant interface down and brings it back.
+//! Rings behind junctions and crossed lines on interfaces: modes `automatic` and `strict` of `ringcat run`, and
+//! enhanced detection, which takes the redundant interface down and brings it back.
 
 use std::time::Duration;
 
@@ -42,7 +42,8 @@ attach = "first.2"
 from = "last.1"
 to = "redundant"
 "#;
-/// Cables that are cut, by the devices at their ends, and the words for both ends: an inner one, the closing one, the first.
+/// Cables that are cut, by the devices at their ends, and the words for both ends: an inner one, the closing one, the
+/// first.
 const BROKEN: [(&str, [&str; 2]); 3] = [
     ("2-3", [" SubDevice 2 ", " port 1 and SubDevice 3 "]),
     ("1-4", [" SubDevice 4 ", " port 1 and SubDevice 1 "]),

@@ -1,7 +1,7 @@
 //! Mail in captures, judged from the file alone by `ci/check-mail` on what tshark reads: counters, requests that a
 //! SubDevice could act on twice, and the same start-up list at each of a hundred power cycles. The captures come from
-//! virtual time; those that were tampered with, and one of a SubDevice that sends its mail twice, show that the script sees
-//! what it looks for.
+//! virtual time; those that were tampered with, and one of a SubDevice that sends its mail twice, show that the script
+//! sees what it looks for.
 
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -164,8 +164,9 @@ fn written(capture: &Capture) -> Vec<Vec<(usize, usize)>> {
     mails
 }
 
+// covers: facts 6.1
 #[test]
-fn mail_of_a_hundred_power_cycles_counts_on_and_brings_the_same_list_each_time_facts_6_1() {
+fn mail_of_a_hundred_power_cycles_counts_on_and_brings_the_same_list_each_time() {
     if !has_tshark() {
         return;
     }

@@ -1,9 +1,9 @@
 //! Real Ethernet frames: our MainDevice and those of others, each in a process of its own, on veth pairs in front of
-//! simulated segments. Needs RINGCAT_ON_THE_WIRE=1 (for MainDevices of others RINGCAT_FOREIGN=1 too), root and iproute2;
-//! prints a line and passes where they are missing.
+//! simulated segments. Needs RINGCAT_ON_THE_WIRE=1 (for MainDevices of others RINGCAT_FOREIGN=1 too), root and
+//! iproute2; prints a line and passes where they are missing.
 //!
-//! Times are printed, not judged: the machine that tests run on may be busy with anything. Where a stall may be the reason
-//! for a lost cycle, both ends say how late they were.
+//! Times are printed, not judged: the machine that tests run on may be busy with anything. Where a stall may be the
+//! reason for a lost cycle, both ends say how late they were.
 
 mod bench;
 mod cables;

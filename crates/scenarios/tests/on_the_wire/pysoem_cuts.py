@@ -1,8 +1,8 @@
 """The MainDevice of another project (SOEM, through pysoem) on a ring whose cables are cut, to be compared with ours.
 
 pysoem_cuts.py MAIN,REDUNDANT SUBDEVICES SECONDS: brings everything to OP, prints a line, exchanges process data every
-millisecond for so long, and prints how many cycles there were, in how many the working counter was not the expected one,
-how many began late, and how many SubDevices are in OP in the end.
+millisecond for so long, and prints how many cycles there were, in how many the working counter was not the expected
+one, how many began late, and how many SubDevices are in OP in the end.
 """
 
 import sys

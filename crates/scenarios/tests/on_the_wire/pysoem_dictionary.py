@@ -1,9 +1,9 @@
 """The objects of simulated SubDevices as another project's MainDevice (SOEM, through pysoem) lists them.
 
 pysoem_dictionary.py INTERFACE COUNT: reads from all SubDevices, which offer SDO information, the object list, the
-description of each object and of each of its entries, and every value that may be read, as `slaveinfo -sdo -map` of SOEM
-does; then the assignment and mapping of PDOs, against which the sizes of the process data are held. Prints one line per
-SubDevice; ends with an error where a description and a value do not fit each other.
+description of each object and of each of its entries, and every value that may be read, as `slaveinfo -sdo -map` of
+SOEM does; then the assignment and mapping of PDOs, against which the sizes of the process data are held. Prints one
+line per SubDevice; ends with an error where a description and a value do not fit each other.
 """
 
 import struct

@@ -1,8 +1,8 @@
 """The mailbox of a simulated SubDevice as another project's MainDevice (SOEM, through pysoem) sees it.
 
-pysoem_mailbox.py INTERFACE: expects one device `all-protocols`. Reads and writes objects (expedited, normal, in segments,
-complete access), reads the object list with descriptions, transfers files, writes firmware in BOOT. Prints one line per
-step; ends with an error where something is not as it should be.
+pysoem_mailbox.py INTERFACE: expects one device `all-protocols`. Reads and writes objects (expedited, normal, in
+segments, complete access), reads the object list with descriptions, transfers files, writes firmware in BOOT. Prints
+one line per step; ends with an error where something is not as it should be.
 """
 
 import struct
@@ -38,7 +38,8 @@ def objects(device):
         device.sdo_write(LARGE, 0, data)
         check(f"{length} bytes written in segments", device.sdo_read(LARGE, 0, 100_000), data)
     complete = device.sdo_read(ARRAY, 0, 1000, True)
-    check("complete access", complete, struct.pack("<BB", 200, 0) + b"".join(struct.pack("<H", n) for n in range(1, 201)))
+    entries = b"".join(struct.pack("<H", n) for n in range(1, 201))
+    check("complete access", complete, struct.pack("<BB", 200, 0) + entries)
     for index, sub, data, code in (
         (0x5000, 0, None, 0x0602_0000),
         (0x1018, 9, None, 0x0609_0011),

@@ -1,5 +1,5 @@
-//! What the acyclic half asks of a segment on which nothing happens: little at a time, so that cyclic frames hardly ever
-//! wait behind it.
+//! What the acyclic half asks of a segment on which nothing happens: little at a time, so that cyclic frames hardly
+//! ever wait behind it.
 
 use std::cell::Cell;
 use std::rc::Rc;

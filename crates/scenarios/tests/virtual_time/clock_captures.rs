@@ -1,6 +1,6 @@
 //! The set-up of distributed clocks in captures, judged from the file alone by `ci/check-clocks`: delays and offsets
-//! computed anew from what SubDevices latched and from their DL status (facts 7.1, 7.2, 7.5). Captures that were tampered
-//! with show that the script sees what it looks for.
+//! computed anew from what SubDevices latched and from their DL status (facts 7.1, 7.2, 7.5). Captures that were
+//! tampered with show that the script sees what it looks for.
 
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -127,8 +127,9 @@ impl Drop for Cases {
 }
 
 /// As often as declared (here 100 times), eight at a time, while states change.
+// covers: facts 7.2
 #[test]
-fn the_static_drift_phase_is_as_long_as_declared_in_bursts_beside_the_start_up_facts_7_2() {
+fn the_static_drift_phase_is_as_long_as_declared_in_bursts_beside_the_start_up() {
     let path = file();
     recorded(&Options::default(), line(clocked(3, 50), NetworkOptions::default()), &path, |run| cycles(run, 20));
     let capture = Capture::parse(&std::fs::read(&path).expect("a capture")).expect("a capture");
@@ -147,7 +148,8 @@ fn the_static_drift_phase_is_as_long_as_declared_in_bursts_beside_the_start_up_f
     assert_eq!(handed_out.len(), 100);
     let (first, last) = (handed_out[0], handed_out[99]);
     assert!(states.iter().any(|at| (first..last).contains(at)), "{first} to {last}: {states:?}");
-    // 80 us apart in the mean, since loops need their time; less within a burst, so that others have the bus in between.
+    // 80 us apart in the mean, since loops need their time; less within a burst, so that others have the bus in
+    // between.
     assert!(last - first >= 12 * 640_000, "{handed_out:?}");
     for bursts in handed_out.chunks(8).collect::<Vec<_>>().windows(2) {
         let (within, between) = (bursts[0][7] - bursts[0][0], bursts[1][0] - bursts[0][7]);
@@ -179,8 +181,9 @@ fn written_delays_and_offsets_are_those_that_a_capture_gives_facts_7_1_facts_7_2
     cases.judge();
 }
 
+// covers: facts 7.5
 #[test]
-fn clocks_of_a_ring_that_breaks_and_of_a_subdevice_that_returns_keep_their_delays_facts_7_5() {
+fn clocks_of_a_ring_that_breaks_and_of_a_subdevice_that_returns_keep_their_delays() {
     let mut cases = Cases::default();
     let network = ring(clocked(8, 100), NetworkOptions::default());
     cases.fine("ring that breaks", network, "judged: 21 delays", |run| {
@@ -324,8 +327,8 @@ impl Tampering {
         cases.all.push((path, case));
     }
 
-    /// The delays of these stations are told to be longer by so much: those written with their offsets, or those written by
-    /// themselves later.
+    /// The delays of these stations are told to be longer by so much: those written with their offsets, or those
+    /// written by themselves later.
     fn add_longer(&self, cases: &mut Cases, finding: &'static str, stations: &[u16], from: u16, by: i32) {
         self.add(cases, Case::Finding(finding), &mut |_, command, register, bytes| {
             let station = u16::from_le_bytes([bytes[2], bytes[3]]);

@@ -1,5 +1,5 @@
-//! Distributed clocks while the segment changes: rings behind junctions, groups that come and go, trees, clocks that lose
-//! their power (facts 7.1, 7.5, 9.4).
+//! Distributed clocks while the segment changes: rings behind junctions, groups that come and go, trees, clocks that
+//! lose their power (facts 7.1, 7.5, 9.4).
 
 use std::time::Duration;
 
@@ -50,8 +50,9 @@ fn change(world: &mut World, what: &str, act: impl FnOnce(&mut World)) -> usize 
     world.events(mark).iter().filter(|timed| matches!(timed.event, Event::DelaysChanged { .. })).count()
 }
 
+// covers: facts 7.5, facts 9.4
 #[test]
-fn clocks_of_a_ring_behind_a_junction_stay_together_whole_and_broken_anywhere_facts_7_5_9_4() {
+fn clocks_of_a_ring_behind_a_junction_stay_together_whole_and_broken_anywhere() {
     let mut world = world(1, junction_ring());
     let everybody = all(world.network());
     assert!(largest_spread(&mut world, &everybody, 300) <= 100, "{:?}", differences(world.network(), &everybody));
@@ -118,8 +119,9 @@ fn a_local_ring_in_a_ring_of_two_links_keeps_its_clocks_through_breaks_of_either
 }
 
 /// No frame comes back meanwhile, and rings are looked into one after the other.
+// covers: JR-02, facts 7.5
 #[test]
-fn clocks_come_back_together_when_two_rings_behind_junctions_broke_at_once_jr_02_facts_7_5() {
+fn clocks_come_back_together_when_two_rings_behind_junctions_broke_at_once() {
     let mut world = world(10, wired(clocked(7, 50), &TWO_RINGS));
     let everybody = all(world.network());
     for (first, second, gap) in [(2, 6, 100), (5, 1, 800)] {
@@ -164,8 +166,8 @@ fn a_ring_that_was_broken_from_the_start_has_the_delay_of_its_missing_cable_afte
     assert!(world.incomplete(mark) <= 1 && world.left_op(mark).is_empty());
 }
 
-/// Nobody looks for rings behind junctions, and there is one: delays cannot be measured. That is told once, and once more
-/// when the segment has changed; with the ring broken all is well.
+/// Nobody looks for rings behind junctions, and there is one: delays cannot be measured. That is told once, and once
+/// more when the segment has changed; with the ring broken all is well.
 #[test]
 fn a_ring_that_nobody_looks_for_is_told_once_for_each_change_and_clocks_begin_when_it_is_open_facts_7_1_9_4() {
     let mut world = World::with(9, junction_ring(), &Options::default(), |scan| with_clocks(scan, config()))
@@ -259,8 +261,9 @@ fn every_cable_of_a_tree_may_go_and_come_though_one_has_no_clock_and_frames_get_
     }
 }
 
+// covers: facts 7.5
 #[test]
-fn a_reference_that_loses_its_power_is_replaced_and_comes_back_without_a_jump_facts_7_5() {
+fn a_reference_that_loses_its_power_is_replaced_and_comes_back_without_a_jump() {
     let count = 6;
     let mut cables: Vec<(Endpoint, Endpoint)> = (1..count).map(|device| (at(device - 1, B), at(device, A))).collect();
     cables.insert(0, (MAIN, at(0, A)));
@@ -364,8 +367,8 @@ fn a_group_that_joins_late_and_then_elsewhere_has_the_delays_and_sync_signals_of
     }
 }
 
-/// Three without a clock; a group of three behind port 3 of the second one brings the first clocks of the segment, and one
-/// SubDevice without a clock between them.
+/// Three without a clock; a group of three behind port 3 of the second one brings the first clocks of the segment, and
+/// one SubDevice without a clock between them.
 #[test]
 fn the_first_clocks_of_a_segment_may_come_with_a_group_and_come_again_facts_7_2() {
     let cables = [

@@ -47,13 +47,15 @@ fn largest_error(world: &World, devices: std::ops::Range<usize>) -> i64 {
 }
 
 fn not_measured(event: &Event) -> bool {
-    matches!(event, Event::ClocksFailed { reason } if reason.contains("process data") || reason.contains("other frames"))
+    matches!(event, Event::ClocksFailed { reason }
+        if reason.contains("process data") || reason.contains("other frames"))
 }
 
 /// Frames leave as soon as the last ones are home, or several cycles are under way all the time: the cyclic half pauses
 /// when it is asked to, and where it may not, nothing is written and it is told why.
+// covers: facts 7.1
 #[test]
-fn with_frames_on_the_wire_all_the_time_cycles_pause_or_nothing_is_written_facts_7_1() {
+fn with_frames_on_the_wire_all_the_time_cycles_pause_or_nothing_is_written() {
     const COUNT: usize = 24;
     for (under_way, pauses) in [(1, true), (3, true), (1, false), (3, false)] {
         let text = format!("{under_way} under way, pauses {pauses}");

@@ -1,5 +1,5 @@
-//! Distributed clocks with a host that sends tens of microseconds late at random: a reference that loses its power comes
-//! back to OP, and SYNC0 stays together while cables of a ring go and come (facts 7.2, 7.3, 7.5).
+//! Distributed clocks with a host that sends tens of microseconds late at random: a reference that loses its power
+//! comes back to OP, and SYNC0 stays together while cables of a ring go and come (facts 7.2, 7.3, 7.5).
 
 use std::time::Duration;
 
@@ -28,8 +28,9 @@ fn window_events(world: &World, since: Mark) -> usize {
     world.events(since).iter().filter(|timed| matches!(timed.event, Event::SyncWindow { .. })).count()
 }
 
+// covers: facts 7.2
 #[test]
-fn a_reference_that_was_power_cycled_is_back_in_op_within_5_s_at_any_host_jitter_facts_7_2() {
+fn a_reference_that_was_power_cycled_is_back_in_op_within_5_s_at_any_host_jitter() {
     const COUNT: usize = 6;
     let (everybody, others): (Vec<usize>, Vec<usize>) = ((0..COUNT).collect(), (1..COUNT).collect());
     for (late_us, closed) in [(0, false), (5, false), (20, false), (50, false), (5, true), (50, true)] {
@@ -56,8 +57,9 @@ fn a_reference_that_was_power_cycled_is_back_in_op_within_5_s_at_any_host_jitter
     }
 }
 
+// covers: facts 7.5
 #[test]
-fn sync0_stays_together_while_cables_go_and_come_though_the_host_sends_50_us_late_facts_7_5() {
+fn sync0_stays_together_while_cables_go_and_come_though_the_host_sends_50_us_late() {
     const COUNT: usize = 8;
     let network = || ring(clocked(COUNT, 50), NetworkOptions::default());
     let everybody: Vec<usize> = (0..COUNT).collect();

@@ -29,8 +29,9 @@ fn with_bus_shift_the_reference_follows_the_host_facts_7_4() {
     assert!(spread(network, &all(5)) <= 200);
 }
 
+// covers: facts 7.4
 #[test]
-fn the_reference_follows_the_time_of_the_application_and_is_led_to_a_given_time_facts_7_4() {
+fn the_reference_follows_the_time_of_the_application_and_is_led_to_a_given_time() {
     // The application's time runs 30 ppm faster than the host's.
     let time = |world: &World| {
         let host = world.application().now().0;
@@ -59,8 +60,8 @@ fn the_reference_follows_the_time_of_the_application_and_is_led_to_a_given_time_
     }
 }
 
-/// Where the host says what time it is, the reference follows it through a break; where the reference does, cycles follow
-/// it, also when all frames meet it from the other side.
+/// Where the host says what time it is, the reference follows it through a break; where the reference does, cycles
+/// follow it, also when all frames meet it from the other side.
 #[test]
 fn bus_shift_and_master_shift_go_on_through_a_cut_and_a_repair_cr_26_facts_7_5() {
     for cable in [0, 2] {
@@ -131,8 +132,8 @@ fn cycles_follow_the_reference_clock_though_the_host_wakes_late_facts_7_4() {
     assert!(world.application().follower().is_some_and(Follower::is_locked));
 }
 
-/// What the reference is told is up to 50 us late at random. It keeps near the host in the mean, so calmly that the others
-/// lock on it; nobody is told that they left their window, though the reference itself shows the host's jitter.
+/// What the reference is told is up to 50 us late at random. It keeps near the host in the mean, so calmly that the
+/// others lock on it; nobody is told that they left their window, though the reference itself shows the host's jitter.
 #[test]
 fn with_bus_shift_clocks_lock_and_keep_their_window_though_the_host_sends_50_us_late_facts_7_4() {
     const COUNT: usize = 5;
@@ -164,8 +165,8 @@ fn with_bus_shift_clocks_lock_and_keep_their_window_though_the_host_sends_50_us_
     }
 }
 
-/// A clock that is moved by 6 us is told of when it has left the window, and when it is back; with bus shift each clock is
-/// looked at, without it the broadcast read of all.
+/// A clock that is moved by 6 us is told of when it has left the window, and when it is back; with bus shift each clock
+/// is looked at, without it the broadcast read of all.
 #[test]
 fn clocks_that_leave_their_window_and_come_back_are_told_facts_7_2() {
     for bus_shift in [false, true] {

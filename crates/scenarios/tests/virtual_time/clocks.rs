@@ -150,7 +150,8 @@ fn the_first_that_is_configured_is_the_reference_where_that_is_wanted() {
     assert_eq!(references.iter().map(|clock| clock.is_reference).collect::<Vec<_>>(), [false, true, false, false]);
 }
 
-/// The first clock leads all others though nobody declares its SubDevice, which is left in the state in which it was found.
+/// The first clock leads all others though nobody declares its SubDevice, which is left in the state in which it was
+/// found.
 #[test]
 fn a_reference_that_nobody_declares_is_followed_and_left_alone_facts_7_2() {
     let network = line(clocked(3, 30), NetworkOptions::default());
@@ -245,8 +246,9 @@ fn a_cut_and_a_heal_at_any_cable_leave_no_clock_behind_facts_7_5() {
 
 /// Both copies of a frame leave at times of their own: between clocks of a part no host is in between, and across both
 /// parts only as far as the mean of what it does.
+// covers: facts 7.5
 #[test]
-fn clocks_of_an_open_ring_stay_together_though_copies_leave_up_to_5_us_apart_facts_7_5() {
+fn clocks_of_an_open_ring_stay_together_though_copies_leave_up_to_5_us_apart() {
     const COUNT: usize = 6;
     for (ppm, open_for) in [(20, 3_000), (100, 1_200)] {
         let mut world = world(16, ring(clocked(COUNT, ppm), NetworkOptions::default()), config());
@@ -272,8 +274,9 @@ fn clocks_of_an_open_ring_stay_together_though_copies_leave_up_to_5_us_apart_fac
 }
 
 /// Nobody has ever told the second part how fast the first one runs, and they are as far apart as clocks can be.
+// covers: facts 7.5
 #[test]
-fn a_ring_that_is_open_from_the_start_locks_though_copies_leave_up_to_5_us_apart_facts_7_5() {
+fn a_ring_that_is_open_from_the_start_locks_though_copies_leave_up_to_5_us_apart() {
     let mut descriptions = clocked(6, 100);
     (descriptions[0].clock_drift_ppb, descriptions[3].clock_drift_ppb) = (-100_000, 100_000);
     let mut network = ring(descriptions, NetworkOptions::default());

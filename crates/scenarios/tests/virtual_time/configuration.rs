@@ -111,7 +111,10 @@ fn an_alias_that_two_have_is_an_event_and_an_error_where_it_matters() {
     let network = || ring(devices.clone(), NetworkOptions::default());
     let mut world = declared(network(), |_, config| config);
     world.settle();
-    let told = |event: &Event| matches!(event, Event::DuplicateAlias { alias: 99, first, second } if (first.0, second.0) == (3, 9));
+    let told = |event: &Event| {
+        matches!(event, Event::DuplicateAlias { alias: 99, first, second }
+        if (first.0, second.0) == (3, 9))
+    };
     assert!(world.saw(world.beginning(), told));
     let text = refused(network(), |number, config| match number {
         3 => SubDeviceConfig::at_alias(99, 0),

@@ -1,5 +1,5 @@
-//! Inputs of one SubDevice that are copied to outputs of another within the cycle: across domains, during cuts, while the
-//! source is away.
+//! Inputs of one SubDevice that are copied to outputs of another within the cycle: across domains, during cuts, while
+//! the source is away.
 
 use std::time::Duration;
 

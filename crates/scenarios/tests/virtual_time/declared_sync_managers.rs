@@ -38,8 +38,8 @@ fn inputs() -> Vec<PdoMapping> {
     vec![PdoMapping::of(0x1A00, [PdoEntry::new(0x6064, 0, 32), PdoEntry::new(0x6041, 0, 16)])]
 }
 
-/// The servo drive of the catalogue as a file may have it: mailboxes where they are, six bytes each way instead of twelve
-/// and fourteen.
+/// The servo drive of the catalogue as a file may have it: mailboxes where they are, six bytes each way instead of
+/// twelve and fourteen.
 fn of_file() -> Vec<DeclaredSyncManager> {
     let device = &descriptions(&KINDS)[DRIVE];
     let sm = |kind| *device.sync_managers.iter().find(|sm| sm.kind == kind).expect("a servo has all four");

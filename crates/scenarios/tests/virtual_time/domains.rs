@@ -161,7 +161,8 @@ fn a_subdevice_that_nobody_declared_is_named_and_left_alone() {
     world.settle();
     world.run_cycles(1_500);
     let unexpected = world.events(world.beginning()).iter().filter(|timed| {
-        matches!(timed.event, Event::Unexpected { position, identity } if position.0 == 15 && identity.product_code == 0x1B96_0402)
+        matches!(timed.event, Event::Unexpected { position, identity }
+            if position.0 == 15 && identity.product_code == 0x1B96_0402)
     });
     assert_eq!(unexpected.count(), 1);
     assert_eq!(world.network().device(DeviceIndex(15)).al_status().al_state(), Some(AlState::Init));

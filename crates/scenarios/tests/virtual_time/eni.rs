@@ -1,5 +1,5 @@
-//! Networks from ENIs, end to end: the file is read, a segment is made of it, it comes to OP as the file says, and exchanges
-//! data through the variables of the file (facts 8).
+//! Networks from ENIs, end to end: the file is read, a segment is made of it, it comes to OP as the file says, and
+//! exchanges data through the variables of the file (facts 8).
 
 mod cables;
 mod variants;
@@ -390,7 +390,8 @@ fn variables_tell_how_old_they_are_by_the_subdevice_that_they_come_from() {
 
 /// Written by hand, with two outputs' worth of process data for a SubDevice whose SII has eight bits.
 const BY_HAND: &str = r#"<EtherCATConfig><Config>
-<Slave><Info><Name>Outputs</Name><PhysAddr>1001</PhysAddr><VendorId>3143</VendorId><ProductCode>131596296</ProductCode></Info>
+<Slave><Info><Name>Outputs</Name><PhysAddr>1001</PhysAddr>
+<VendorId>3143</VendorId><ProductCode>131596296</ProductCode></Info>
 <ProcessData><Send><BitStart>0</BitStart><BitLength>BITS</BitLength></Send></ProcessData></Slave>
 <Cyclic><CycleTime>1000</CycleTime></Cyclic>
 <ProcessImage><Outputs><ByteSize>2</ByteSize></Outputs></ProcessImage>

@@ -282,7 +282,10 @@ fn declared_addresses_are_set_at_each_start_and_refused_ones_are_told_facts_6_5(
     let mut world = start(&multicast, TERMINAL).expect("it can be activated");
     let mark = world.mark();
     world.run_cycles(200);
-    let told = |event: &Event| matches!(event, Event::ConfigurationFailed { subdevice: TERMINAL, reason } if reason.contains("EoE port 0: the SubDevice refused"));
+    let told = |event: &Event| {
+        matches!(event, Event::ConfigurationFailed { subdevice: TERMINAL, reason }
+        if reason.contains("EoE port 0: the SubDevice refused"))
+    };
     assert!(world.saw(mark, told), "{:?}", world.events(mark));
     let without = start(&settings, 1).expect_err("a terminal without a mailbox");
     assert!(without.to_string().contains("addresses are to be set, but there is no EoE"), "{without}");

@@ -1,7 +1,8 @@
 //! Short runs of random segments under random faults, each from its seed: nothing panics, nothing hangs, and when the
 //! faults end, everything is back in OP and complete.
 //!
-//! `SEED=17 cargo test -p scenarios --test virtual_time explorer::environment -- --nocapture` runs one seed, `SEED=1000..2000` many.
+//! `SEED=17 cargo test -p scenarios --test virtual_time explorer::environment -- --nocapture` runs one seed,
+//! `SEED=1000..2000` many.
 
 use std::ops::Range;
 use std::time::Duration;

@@ -117,7 +117,10 @@ fn an_application_that_hangs_while_it_is_configured_is_named_and_configured_late
         assert!(matches!(world.application().states()[3], SubDeviceState::Configuring));
         world.hang(DeviceIndex(3), false);
         world.until(LIMIT, "all in OP", all_well);
-        let named = |event: &Event| matches!(event, Event::ConfigurationFailed { subdevice: 3, reason } if reason.contains("within 40 ms"));
+        let named = |event: &Event| {
+            matches!(event, Event::ConfigurationFailed { subdevice: 3, reason }
+            if reason.contains("within 40 ms"))
+        };
         assert!(world.saw(world.beginning(), named));
         assert_eq!(world.left_op(world.beginning()), []);
     }
@@ -182,10 +185,16 @@ fn a_subdevice_with_a_wrong_checksum_in_its_sii_is_told_and_holds_up_nobody() {
     let mut world = World::with(6, network, &Options::default(), impatient).expect("activation");
     world.run_cycles(200);
     let start = world.beginning();
-    let told = |event: &Event| matches!(event, Event::SiiOddity { position, what } if position.0 == 2 && what.contains("checksum: expected"));
+    let told = |event: &Event| {
+        matches!(event, Event::SiiOddity { position, what }
+        if position.0 == 2 && what.contains("checksum: expected"))
+    };
     assert!(world.saw(start, told));
     // The controller does not load such an EEPROM, and without it the application does not run (facts 4.7).
-    let named = |event: &Event| matches!(event, Event::ConfigurationFailed { subdevice: 2, reason } if reason.contains("expected PREOP"));
+    let named = |event: &Event| {
+        matches!(event, Event::ConfigurationFailed { subdevice: 2, reason }
+        if reason.contains("expected PREOP"))
+    };
     assert!(world.saw(start, named));
     let op = AlStatus::new(AlState::Op);
     assert!(world.network().devices().enumerate().all(|(number, device)| number == 2 || device.al_status() == op));

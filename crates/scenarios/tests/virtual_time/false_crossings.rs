@@ -1,5 +1,5 @@
-//! Cables that are cut and healed within milliseconds while frames get lost: in a ring no line is said to be crossed that is
-//! not, and one that is is told (facts 9.5).
+//! Cables that are cut and healed within milliseconds while frames get lost: in a ring no line is said to be crossed
+//! that is not, and one that is is told (facts 9.5).
 //!
 //! `SEED=0..2000 cargo test -p scenarios --test virtual_time false_crossings::seeds -- --nocapture` runs many.
 

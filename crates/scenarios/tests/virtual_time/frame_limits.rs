@@ -1,5 +1,5 @@
-//! Segments whose frames may hold fewer datagrams than fit, as behind some gateways and with other simulators: the MainDevice
-//! finds out and says what to set, and with that set nothing else is different.
+//! Segments whose frames may hold fewer datagrams than fit, as behind some gateways and with other simulators: the
+//! MainDevice finds out and says what to set, and with that set nothing else is different.
 
 use std::time::Duration;
 

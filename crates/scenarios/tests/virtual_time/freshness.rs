@@ -1,7 +1,7 @@
 //! What counts as fresh was put into this very frame by that SubDevice, whatever is cut, healed, lost or without power.
 //!
-//! Every world judges that from the logs of the devices (`scenarios::truth`); here are segments and faults that are made to
-//! confuse a sum of working counters.
+//! Every world judges that from the logs of the devices (`scenarios::truth`); here are segments and faults that are
+//! made to confuse a sum of working counters.
 //!
 //! `SEED=17 cargo test -p scenarios --test virtual_time freshness::seeds -- --nocapture` runs one seed,
 //! `SEED=0..10000` many.
@@ -54,8 +54,8 @@ fn junctions() -> Options {
     Options { junctions: JunctionMode::Automatic, ..Options::default() }
 }
 
-/// A ring behind a junction that breaks at one cable while the break at another is healed: the sum of the working counters
-/// is the one that was expected before, from other SubDevices.
+/// A ring behind a junction that breaks at one cable while the break at another is healed: the sum of the working
+/// counters is the one that was expected before, from other SubDevices.
 #[test]
 fn an_absent_subdevice_keeps_its_last_inputs_when_a_break_moves() {
     let kinds = ["digital-input-8", "junction", "digital-input-8", "digital-input-8"];
@@ -101,7 +101,8 @@ fn subdevices_that_latch_their_fmmus_on_the_way_to_safeop_exchange_process_data(
     assert!(world.all_in_op());
 }
 
-/// One after the other joins again, each with its FMMUs set long before it is in SAFEOP: the others stay fresh in each cycle.
+/// One after the other joins again, each with its FMMUs set long before it is in SAFEOP: the others stay fresh in each
+/// cycle.
 #[test]
 fn a_subdevice_on_its_slow_way_to_safeop_leaves_the_inputs_of_all_others_fresh() {
     let kinds = ["digital-input-8", "emulated-input-8", "servo", "emulated-output-8", "analog-input-4", "block"];
@@ -124,8 +125,8 @@ fn a_subdevice_on_its_slow_way_to_safeop_leaves_the_inputs_of_all_others_fresh()
     }
 }
 
-/// A SubDevice is out of reach while the MainDevice starts anew, and keeps its station address, FMMUs and state. In the new
-/// session another one has this address; it loses its power as the old one comes into reach again.
+/// A SubDevice is out of reach while the MainDevice starts anew, and keeps its station address, FMMUs and state. In the
+/// new session another one has this address; it loses its power as the old one comes into reach again.
 #[test]
 fn a_subdevice_of_an_earlier_session_is_not_taken_for_another_one() {
     let mut described = with_four_ports(&["digital-input-16"; 3]);
@@ -162,7 +163,8 @@ fn a_subdevice_of_an_earlier_session_is_not_taken_for_another_one() {
     }
 }
 
-/// FMMUs and SyncManagers are set before SAFEOP: a buffer of one byte is read from then on, though nothing has written it yet.
+/// FMMUs and SyncManagers are set before SAFEOP: a buffer of one byte is read from then on, though nothing has written
+/// it yet.
 #[test]
 fn inputs_of_a_subdevice_below_safeop_are_not_fresh() {
     for (count, fmmus) in [(1, None), (3, None), (3, Some(1))] {

@@ -260,10 +260,11 @@ fn a_group_that_breaks_off_is_told_and_its_rest_is_taken() {
     assert_eq!(world.network().device(DeviceIndex(5)).al_status(), AlStatus::new(AlState::Init), "it is left alone");
 }
 
-/// Two groups beside each other, the break between them: each goes on in its half, and one that comes anew joins from the
-/// side that is left to it.
+/// Two groups beside each other, the break between them: each goes on in its half, and one that comes anew joins from
+/// the side that is left to it.
+// covers: CR-21
 #[test]
-fn groups_side_by_side_that_a_break_separates_go_on_and_join_from_their_own_side_cr_21() {
+fn groups_side_by_side_that_a_break_separates_go_on_and_join_from_their_own_side() {
     let mut second = tool();
     second[0].alias = TOOL + 1;
     let mut all = descriptions(&BASE);

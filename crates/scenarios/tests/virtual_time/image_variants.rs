@@ -1,8 +1,9 @@
 //! Odd SII images, many of them: made by a seeded generator from those of the catalogue, and from those of real devices
 //! where `../shared/data` lies beside the repository.
 //!
-//! One SubDevice of four has such an image. It comes to OP with complete working counters, or the reason is told of it; all
-//! others are in OP and exchange process data whatever it has. `SEED` and `VARIANTS` choose others, and how many per image.
+//! One SubDevice of four has such an image. It comes to OP with complete working counters, or the reason is told of it;
+//! all others are in OP and exchange process data whatever it has. `SEED` and `VARIANTS` choose others, and how many
+//! per image.
 
 use std::path::Path;
 use std::time::Duration;
@@ -124,19 +125,7 @@ fn judge(made: &Variant, odd: DeviceDescription) -> Result<(Outcome, bool), Stri
     let mark = world.mark();
     let latched: Vec<u64> = world.network().devices().map(|device| device.outputs_latched()).collect();
     world.run_cycles(50);
-    for other in [0, 1, 3] {
-        let device = world.network().device(ringcat_sim::cable::DeviceIndex(other));
-        if device.al_status() != AlStatus::new(AlState::Op) {
-            return Err(format!("{} is in {:?}", device.name(), device.al_status()));
-        }
-        let freshness = world.application().exchange().freshness(DomainId(0), other);
-        if !device.inputs().is_empty() && freshness != Freshness::Fresh {
-            return Err(format!("{} is not fresh", device.name()));
-        }
-        if !device.outputs().is_empty() && device.outputs_latched() < latched[other] + 40 {
-            return Err(format!("{} took no outputs", device.name()));
-        }
-    }
+    others_work(&world, &latched)?;
     if world.judged(mark).iter().any(|judged| judged.delivery.is_incomplete()) {
         return Err(format!("{outcome:?}, and cycles are incomplete"));
     }
@@ -158,6 +147,24 @@ fn judge(made: &Variant, odd: DeviceDescription) -> Result<(Outcome, bool), Stri
         return Err("a warning that names byte 0".to_owned());
     }
     Ok((outcome, warned))
+}
+
+/// The SubDevices around the odd one are in OP, their inputs fresh, and they took outputs since.
+fn others_work(world: &World, latched: &[u64]) -> Result<(), String> {
+    for other in [0, 1, 3] {
+        let device = world.network().device(ringcat_sim::cable::DeviceIndex(other));
+        if device.al_status() != AlStatus::new(AlState::Op) {
+            return Err(format!("{} is in {:?}", device.name(), device.al_status()));
+        }
+        let freshness = world.application().exchange().freshness(DomainId(0), other);
+        if !device.inputs().is_empty() && freshness != Freshness::Fresh {
+            return Err(format!("{} is not fresh", device.name()));
+        }
+        if !device.outputs().is_empty() && device.outputs_latched() < latched[other] + 40 {
+            return Err(format!("{} took no outputs", device.name()));
+        }
+    }
+    Ok(())
 }
 
 /// Judges all variants of an image.
@@ -209,8 +216,8 @@ fn judge_all(sound: &DeviceDescription, seed: u64, count: u64, tally: &mut Tally
 
 fn finish(tally: &Tally, what: &str) {
     println!(
-        "{what}: {} in OP and complete, {} with the reason from the SII, {} with the reason from the SubDevice, {} make no \
-         device; {} warned of",
+        "{what}: {} in OP and complete, {} with the reason from the SII, {} with the reason from the SubDevice, {} \
+         make no device; {} warned of",
         tally.complete, tally.refused, tally.by_device, tally.no_device, tally.warned
     );
     for what in &tally.disagree {

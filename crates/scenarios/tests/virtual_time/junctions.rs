@@ -163,8 +163,9 @@ fn unknown(world: &World, mark: Mark) -> Vec<usize> {
     world.events(mark).iter().filter_map(rings).collect()
 }
 
+// covers: JR-03, JR-09
 #[test]
-fn a_ring_that_closes_after_the_scan_is_told_as_unknown_unless_it_was_declared_jr_03_jr_09() {
+fn a_ring_that_closes_after_the_scan_is_told_as_unknown_unless_it_was_declared() {
     for (setting, expected) in [
         ((JunctionMode::Automatic, &[][..]), vec![1]),
         ((JunctionMode::Strict, &[STRICT]), vec![]),
@@ -237,7 +238,10 @@ fn without_junction_redundancy_a_ring_that_breaks_reads_as_a_crossed_line_jr_04(
         assert_eq!(crossed(&world, world.beginning()), 0);
         let mark = edge(&mut world, "cut", |world| world.cut(CableId(cable)));
         assert_eq!(told(&world, mark), []);
-        let reversed = |event: &Event| matches!(event, Event::LineCrossed { position: Some(at), entry_port: Some(1) } if usize::from(at.0) == cable);
+        let reversed = |event: &Event| {
+            matches!(event, Event::LineCrossed { position: Some(at), entry_port: Some(1) }
+            if usize::from(at.0) == cable)
+        };
         assert!(world.saw(mark, reversed), "cable {cable}: the one behind the break is entered at port 1");
         let mark = edge(&mut world, "heal", |world| world.heal(CableId(cable)));
         assert_eq!(crossed(&world, mark), 0);
@@ -343,8 +347,8 @@ fn transfers_go_on_through_cuts_and_repairs_of_a_local_ring() {
     }
 }
 
-/// Ports change while others than whoever watches them read them: the look for crossed lines, and the clocks. What they read
-/// is no longer told to anybody else.
+/// Ports change while others than whoever watches them read them: the look for crossed lines, and the clocks. What they
+/// read is no longer told to anybody else.
 #[test]
 fn a_repair_right_behind_a_break_is_told_in_time_whoever_else_looks_at_ports_jr_07() {
     for with_clocks in [false, true] {

@@ -1,5 +1,5 @@
-//! Segments of more SubDevices than a byte counts: 300 and 1,000 of all kinds, on one link and in a ring, from power-on to OP
-//! and through breaks.
+//! Segments of more SubDevices than a byte counts: 300 and 1,000 of all kinds, on one link and in a ring, from power-on
+//! to OP and through breaks.
 
 use std::time::Duration;
 

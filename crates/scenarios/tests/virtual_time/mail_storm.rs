@@ -1,8 +1,8 @@
-//! Any interleaving of protocols, losses, faults of mail, cut cables and power cycles, by seed: no answer reaches another
-//! question, everything ends in bounded time, and nothing stays behind, neither in mailboxes nor among procedures and
-//! datagrams. Beside the procedures a request of the cyclic thread, a client of the gateway and a host that downloads through
-//! the Ethernet port use each device. A list of a drive has a check sum in it: of fragments that a device takes and
-//! forgets, nothing else tells.
+//! Any interleaving of protocols, losses, faults of mail, cut cables and power cycles, by seed: no answer reaches
+//! another question, everything ends in bounded time, and nothing stays behind, neither in mailboxes nor among
+//! procedures and datagrams. Beside the procedures a request of the cyclic thread, a client of the gateway and a host
+//! that downloads through the Ethernet port use each device. A list of a drive has a check sum in it: of fragments that
+//! a device takes and forgets, nothing else tells.
 
 use std::cell::Cell;
 use std::collections::BTreeMap;
@@ -110,7 +110,8 @@ fn happen(world: &mut World, beside: &mut Beside, dice: &mut Dice, emergencies: 
     }
 }
 
-/// Questions of one kind, one after the other, until it is time to stop; those that were given up in the middle are gone.
+/// Questions of one kind, one after the other, until it is time to stop; those that were given up in the middle are
+/// gone.
 fn start(world: &mut World, device: usize, at: usize, stop: &Rc<Cell<bool>>, tally: &Rc<Tally>) -> Pending<()> {
     let mailbox = world.mailbox(device);
     let bus = mailbox.bus().clone();
@@ -128,7 +129,8 @@ fn start(world: &mut World, device: usize, at: usize, stop: &Rc<Cell<bool>>, tal
     })
 }
 
-/// Downloads through the Ethernet port of a device, one after the other. What breaks off is no failure, other bytes are.
+/// Downloads through the Ethernet port of a device, one after the other. What breaks off is no failure, other bytes
+/// are.
 fn start_downloads(world: &mut World, device: usize, stop: &Rc<Cell<bool>>, tally: &Rc<Tally>) -> Pending<()> {
     let (mailbox, stop, tally) = (world.mailbox(device), stop.clone(), tally.clone());
     let addresses = Addresses { mac: [2, 0, 0, 0, 0, 9], host: [10, 0, 0, 1], device: DEVICE };
@@ -199,18 +201,36 @@ fn run(seed: u64, tally: &Rc<Tally>) {
         world.finish(END, work);
     }
     world.settle();
-    let until = world.application().now() + END;
-    while !beside.stop(&mut world) {
-        assert!(world.application().now() < until, "seed {seed}: {beside:?}");
-        world.cycle();
-    }
+    end(&mut beside, &mut world, seed);
     tally.answered.set(tally.answered.get() + beside.answered);
     tally.failed.set(tally.failed.get() + beside.failed);
     tally.beside.set(tally.beside.get() + beside.answered + beside.failed);
-    // An error reply does not say to what it belongs (decision 0007): one that is late on purpose would refuse the first
-    // question of whoever asks now.
+    // An error reply does not say to what it belongs (decision 0007): one that is late on purpose would refuse the
+    // first question of whoever asks now.
     world.run_cycles(100);
     // What was lost on purpose and never met its frame would meet the next one.
+    all_answer(&mut world, seed);
+    world.run_cycles(90);
+    let after = quiet_moment(&mut world);
+    assert!(
+        after.procedures <= before.procedures && after.datagrams <= before.datagrams,
+        "seed {seed}: {before:?} {after:?}"
+    );
+    each_emergency_came_once(&world, seed, emergencies, tally);
+    mailboxes_are_idle(&world, seed);
+}
+
+/// What goes on beside the storm ends.
+fn end(beside: &mut Beside, world: &mut World, seed: u64) {
+    let until = world.application().now() + END;
+    while !beside.stop(world) {
+        assert!(world.application().now() < until, "seed {seed}: {beside:?}");
+        world.cycle();
+    }
+}
+
+/// Every kind of question is answered by every device that serves it.
+fn all_answer(world: &mut World, seed: u64) {
     for (device, kind) in ALL.into_iter().flat_map(|device| KINDS.map(|kind| (device, kind))) {
         if (device, kind) == (ALL[0], Kind::Address) {
             continue;
@@ -219,20 +239,21 @@ fn run(seed: u64, tally: &Rc<Tally>) {
         let result = world.run(async move { asker.ask(0xFFFF).await });
         assert_eq!(result, Ok(()), "seed {seed}, device {device}, {kind:?}");
     }
-    world.run_cycles(90);
-    let after = quiet_moment(&mut world);
-    assert!(
-        after.procedures <= before.procedures && after.datagrams <= before.datagrams,
-        "seed {seed}: {before:?} {after:?}"
-    );
+}
+
+/// Emergencies came as often as they were sent on purpose.
+fn each_emergency_came_once(world: &World, seed: u64, mut left_of: BTreeMap<u16, u32>, tally: &Tally) {
     for event in world.events(world.beginning()) {
         if let Event::Emergency { emergency, .. } = event.event {
             tally.emergencies.set(tally.emergencies.get() + 1);
-            let left = emergencies.get_mut(&emergency.error_code).expect("sent on purpose");
+            let left = left_of.get_mut(&emergency.error_code).expect("sent on purpose");
             assert!(*left > 0, "seed {seed}: {:#06x} came twice", emergency.error_code);
             *left -= 1;
         }
     }
+}
+
+fn mailboxes_are_idle(world: &World, seed: u64) {
     for device in ALL {
         let mailbox = world.mailbox(device);
         let counters = mailbox.counters();

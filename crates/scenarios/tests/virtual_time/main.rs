@@ -1,6 +1,7 @@
 //! Whole systems in virtual time: an engine and a simulated segment, one module per subject.
 //!
-//! One program and not twenty, because each would be linked with everything; only those that count allocations are apart.
+//! One program and not twenty, because each would be linked with everything; only those that count allocations are
+//! apart.
 
 mod break_places;
 mod broken_ring;

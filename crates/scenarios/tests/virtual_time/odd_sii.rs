@@ -1,5 +1,5 @@
-//! SubDevices whose SII is odd: no PDOs in it, others than the dictionary has, no end marker, SyncManagers in another order
-//! or without a type, nothing at all, nothing that can be followed.
+//! SubDevices whose SII is odd: no PDOs in it, others than the dictionary has, no end marker, SyncManagers in another
+//! order or without a type, nothing at all, nothing that can be followed.
 
 use std::time::Duration;
 
@@ -219,7 +219,10 @@ fn one_with_a_blank_eeprom_is_told_and_keeps_nobody_from_op() {
 /// What is told of the odd one, whose reason begins so, while the others exchange process data.
 fn others_run_and_it_says(mut world: World, reason: &str) {
     world.run_cycles(400);
-    let failed = |event: &Event| matches!(event, Event::ConfigurationFailed { subdevice: ODD, reason: got } if got.contains(reason));
+    let failed = |event: &Event| {
+        matches!(event, Event::ConfigurationFailed { subdevice: ODD, reason: got }
+        if got.contains(reason))
+    };
     assert!(world.saw(world.beginning(), failed), "{:?}", troubles(world.events(world.beginning())));
     let mark = world.mark();
     let compared = world.compared();
@@ -289,8 +292,8 @@ fn one_whose_damaged_sii_lacks_what_is_declared_keeps_its_places_and_holds_up_no
     assert!(world.saw(world.beginning(), failed));
 }
 
-/// SubDevices that are what their SII says: outputs and inputs with default lengths, and PDOs for one direction or none.
-/// Three alike, which share what was read of their SIIs: one with damage inside of a category, whichever it is.
+/// SubDevices that are what their SII says: outputs and inputs with default lengths, and PDOs for one direction or
+/// none. Three alike, which share what was read of their SIIs: one with damage inside of a category, whichever it is.
 #[test]
 fn damage_inside_a_category_does_not_spread_to_subdevices_alike() {
     for damaged in 1..4 {
@@ -363,7 +366,8 @@ fn is_mailbox(kind: SyncManagerKind) -> bool {
     matches!(kind, SyncManagerKind::MailboxOut | SyncManagerKind::MailboxIn)
 }
 
-/// A segment with a SubDevice that is what an SII says, in OP with complete working counters whatever dictionaries are read.
+/// A segment with a SubDevice that is what an SII says, in OP with complete working counters whatever dictionaries are
+/// read.
 fn in_op_as_it_says(described: &DeviceDescription, what: &str) -> World {
     let mut devices = descriptions(&KINDS);
     let mut described = DeviceDescription { emulation: false, ..described.clone() };

@@ -1,5 +1,5 @@
-//! Datagrams of the application's own on two links: positions are those of the scan whatever becomes of the ring, and LRW
-//! over several SubDevices is refused, declared or sent by hand.
+//! Datagrams of the application's own on two links: positions are those of the scan whatever becomes of the ring, and
+//! LRW over several SubDevices is refused, declared or sent by hand.
 
 use std::time::Duration;
 
@@ -92,9 +92,11 @@ fn movable() -> Network {
     network
 }
 
-/// Whoever was unplugged, plugged in elsewhere or is new has the position that a rescan has shown, and nobody another one.
+/// Whoever was unplugged, plugged in elsewhere or is new has the position that a rescan has shown, and nobody another
+/// one.
+// covers: CR-09, CR-17
 #[test]
-fn positions_of_an_application_are_those_of_a_rescan_that_took_over_the_cabling_cr_09_cr_17() {
+fn positions_of_an_application_are_those_of_a_rescan_that_took_over_the_cabling() {
     let declare = |scan: &Scan| {
         let mut declaration = automatic(&scan.subdevices, CYCLE);
         declaration.subdevices[1].optional = true;
@@ -151,8 +153,9 @@ fn refused(result: Result<World, Error>) -> (Vec<usize>, String) {
 }
 
 /// Whatever a declaration was read from, it has to be applied: there it is refused.
+// covers: CR-16
 #[test]
-fn declared_lrw_is_refused_with_rings_behind_junctions_and_hot_connect_groups_too_cr_16() {
+fn declared_lrw_is_refused_with_rings_behind_junctions_and_hot_connect_groups_too() {
     let kinds = ["digital-output-8", "junction", "servo", "digital-input-8", "analog-input-4"];
     let connection = JunctionConnection { head: 1, head_port: 1, tail: 3, tail_port: 1 };
     for (junctions, connections) in [(JunctionMode::Strict, &[connection][..]), (JunctionMode::Automatic, &[])] {
@@ -176,8 +179,9 @@ fn declared_lrw_is_refused_with_rings_behind_junctions_and_hot_connect_groups_to
     assert!(subdevices == [1, 2, 3, 4, 5] && text.contains("[1, 2, 3, 4, 5]"), "{text}");
 }
 
+// covers: CR-16, facts 9.2.2
 #[test]
-fn an_lrw_of_the_applications_own_addresses_one_subdevice_on_two_links_cr_16_facts_9_2_2() {
+fn an_lrw_of_the_applications_own_addresses_one_subdevice_on_two_links() {
     let mut world = World::in_op(5, segment());
     let lrw = |logical: u32, length: usize| RawDatagram {
         command: Command::Lrw,

@@ -154,8 +154,9 @@ fn the_main_device_tells_what_was_declared_found_and_how_each_is_facts_10_2() {
     assert_eq!((world.incomplete(mark), world.left_op(mark)), (0, vec![]), "process data goes on");
 }
 
+// covers: facts 10.2
 #[test]
-fn what_the_objects_say_follows_a_break_damaged_frames_and_a_loss_until_it_is_reset_facts_10_2() {
+fn what_the_objects_say_follows_a_break_damaged_frames_and_a_loss_until_it_is_reset() {
     let mut world = world();
     world.judge_latched(false);
     world.corrupt(CableId(2), 20);
@@ -238,8 +239,9 @@ fn what_goes_wrong_with_a_subdevice_is_counted_and_kept_in_the_history_facts_10_
     assert_eq!((complete[0], complete.len(), complete.last()), (19, 2 + 16 + 8 * 4 + 2 + 1, Some(&1)));
 }
 
+// covers: facts 6.3
 #[test]
-fn detection_looks_at_the_whole_segment_and_lists_go_in_segments_and_fragments_facts_6_3() {
+fn detection_looks_at_the_whole_segment_and_lists_go_in_segments_and_fragments() {
     // So many that their addresses need two lists.
     let inputs = descriptions(&["digital-input-8"; COUNT]);
     let mut world = World::in_op(2, ring(inputs, NetworkOptions::default()));

@@ -1,5 +1,5 @@
-//! Start-up commands that a configuration file brings: registers that are written and checked, objects that are read, time
-//! limits and comments (facts 8.2).
+//! Start-up commands that a configuration file brings: registers that are written and checked, objects that are read,
+//! time limits and comments (facts 8.2).
 
 use std::time::Duration;
 
@@ -187,8 +187,9 @@ fn a_command_may_have_a_time_limit_of_its_own_facts_8_2() {
     assert!(text.contains("25 ms"), "{text}");
 }
 
+// covers: facts 8.2
 #[test]
-fn a_look_that_may_take_an_hour_does_not_outlive_the_power_of_its_subdevice_facts_8_2() {
+fn a_look_that_may_take_an_hour_does_not_outlive_the_power_of_its_subdevice() {
     let mut world = world(&[check(Transition::Ps, map::AL_STATUS, &[8, 0], &[0x0F, 0], 3_600_000)]);
     world.run_cycles(400);
     let state = |world: &World| world.network().device(DeviceIndex(DRIVE)).al_status().al_state();

@@ -1,10 +1,10 @@
 """Merges the copies of process data in a capture anew, by the rules of the ring alone, and compares that with what a
 MainDevice made of them.
 
-remerge.py CAPTURE.pcapng IMAGES.json: the capture has interface 0 for MAIN and 1 for REDUNDANT, both directions. The images
-are what the MainDevice printed: {"first": the first cycle that counts, "cycles": [{"complete": whether every logical read
-had the working counter that is usual for it, "inputs": hexadecimal text}, ...]}. Prints how many cycles were compared and
-how many of them were incomplete, or the first difference, and ends with status 1 then.
+remerge.py CAPTURE.pcapng IMAGES.json: the capture has interface 0 for MAIN and 1 for REDUNDANT, both directions. The
+images are what the MainDevice printed: {"first": the first cycle that counts, "cycles": [{"complete": whether every
+logical read had the working counter that is usual for it, "inputs": hexadecimal text}, ...]}. Prints how many cycles
+were compared and how many of them were incomplete, or the first difference, and ends with status 1 then.
 
 Nothing here comes from the MainDevice: frames are told apart by their source address and Idx, copies by the bit of the
 redundant link, a copy counts if it came back before the next cycle was sent. Working counters of both copies are added,
@@ -95,7 +95,8 @@ def cycles(path):
                 out, sent_at = {}, time
             if not redundant:
                 out[key] = Flight()
-                out[key].asked = {address: len(data) for command, _, address, data, _ in found if is_input(command, address)}
+                inputs = (each for each in found if is_input(each[0], each[2]))
+                out[key].asked = {address: len(data) for _, _, address, data, _ in inputs}
         elif key in out and redundant not in out[key].copies:
             out[key].copies[redundant] = {
                 address: (data, counter) for command, _, address, data, counter in found if is_input(command, address)

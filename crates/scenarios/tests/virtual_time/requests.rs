@@ -1,4 +1,5 @@
-//! Requests that a cyclic thread makes and re-uses: registers, IDNs, vendor messages; cancelled, timed out, out of reach.
+//! Requests that a cyclic thread makes and re-uses: registers, IDNs, vendor messages; cancelled, timed out, out of
+//! reach.
 
 use std::time::Duration;
 

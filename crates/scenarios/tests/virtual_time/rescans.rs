@@ -21,8 +21,8 @@ const LEAVING: DeviceIndex = DeviceIndex(7);
 const AT_THE_JUNCTION: CableId = CableId(6);
 const AT_THE_END: CableId = CableId(8);
 
-/// A junction with a line of three behind it, the last of which has no power at first, and two branches of one device: the
-/// first of them can be plugged in at the end of the line instead. All that is plugged in works.
+/// A junction with a line of three behind it, the last of which has no power at first, and two branches of one device:
+/// the first of them can be plugged in at the end of the line instead. All that is plugged in works.
 fn workshop() -> Network {
     let kinds = ["coupler", "digital-input-8", "junction", "digital-output-8", "digital-input-16", "analog-input-4"];
     let branch = |kind: &str| devices(descriptions(&[kind]));
@@ -211,8 +211,9 @@ fn after_a_rescan_breaks_and_errors_of_cables_are_told_by_the_cabling_as_it_is()
 }
 
 /// Frames meet the branch behind the port on which the ring goes on in another order while the ring is open (CR-09).
+// covers: CR-09, CR-17
 #[test]
-fn a_break_that_changes_the_order_of_a_ring_with_a_branch_has_moved_nobody_cr_09_cr_17() {
+fn a_break_that_changes_the_order_of_a_ring_with_a_branch_has_moved_nobody() {
     use ringcat_sim::frame::Port::{A, B, D};
     use scenarios::segments::{MAIN, REDUNDANT, at, wired};
     let cables =
@@ -293,9 +294,11 @@ fn after_a_rescan_of_a_closed_ring_with_a_branch_on_port_2_places_are_those_of_t
     }
 }
 
-/// Somebody like a declared one is at a place of the cabling as nobody's; when that one goes he takes over, where he is.
+/// Somebody like a declared one is at a place of the cabling as nobody's; when that one goes he takes over, where he
+/// is.
+// covers: CR-09, CR-17
 #[test]
-fn a_stranger_that_becomes_a_member_has_the_place_that_a_rescan_found_him_at_cr_09_cr_17() {
+fn a_stranger_that_becomes_a_member_has_the_place_that_a_rescan_found_him_at() {
     use ringcat_sim::frame::Port::{A, C, D};
     use scenarios::segments::{MAIN, at, wired};
     const FIRST: DeviceIndex = DeviceIndex(1);

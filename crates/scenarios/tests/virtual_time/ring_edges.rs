@@ -1,5 +1,6 @@
-//! A copy that is turned round at a cut behind the other one: outputs come twice, with the same bytes. Whether that shows
-//! depends on whether the copy comes back (issue 5: a working counter above the expected one is an incomplete cycle).
+//! A copy that is turned round at a cut behind the other one: outputs come twice, with the same bytes. Whether that
+//! shows depends on whether the copy comes back (issue 5: a working counter above the expected one is an incomplete
+//! cycle).
 
 use std::time::Duration;
 

@@ -41,8 +41,9 @@ fn others(events: &[TimedEvent]) -> Vec<Event> {
     events.iter().map(|timed| &timed.event).filter(wanted).cloned().collect()
 }
 
+// covers: CR-11, CR-12
 #[test]
-fn each_edge_is_told_in_the_cycle_that_shows_it_and_its_place_within_five_cr_11_cr_12() {
+fn each_edge_is_told_in_the_cycle_that_shows_it_and_its_place_within_five() {
     let mut world = World::in_op(1, ring_of_16(FAST));
     let (mut slowest, mut slowest_place) = (Duration::ZERO, Duration::ZERO);
     for cable in 0..=usize::from(COUNT) {
@@ -159,8 +160,9 @@ fn redundancy_is_a_state_of_its_own_apart_from_faults_of_the_bus_and_carriers_ar
     }
 }
 
+// covers: facts 9.2.1
 #[test]
-fn a_ring_that_passes_frames_one_way_only_has_lost_its_redundancy_and_nothing_else_facts_9_2_1() {
+fn a_ring_that_passes_frames_one_way_only_has_lost_its_redundancy_and_nothing_else() {
     let mut world = small(4);
     let mark = world.mark();
     // Frames of RED die on their way to MAIN; the copies of MAIN do all the work.
@@ -177,8 +179,9 @@ fn a_ring_that_passes_frames_one_way_only_has_lost_its_redundancy_and_nothing_el
     assert_eq!(others(world.events(mark)).last(), Some(&Event::RedundancyRegained));
 }
 
+// covers: CR-18
 #[test]
-fn two_breaks_are_faults_of_the_bus_and_redundancy_comes_back_with_the_last_repair_cr_18() {
+fn two_breaks_are_faults_of_the_bus_and_redundancy_comes_back_with_the_last_repair() {
     let mut world = small(5);
     let mark = world.mark();
     world.cut(CableId(1));
@@ -234,7 +237,8 @@ fn a_cable_that_flaps_at_any_rate_floods_nobody_and_changes_no_state() {
         assert_eq!(world.left_op(mark), [], "{micros} us");
         assert!(!world.saw(mark, |event| matches!(event, Event::Lost { .. })), "{micros} us");
         let changes = (lasts.as_nanos() / half_period.as_nanos()) as usize + 1;
-        // Ring, place, redundancy and carrier for each of 32 changes and four more a second, or of all if they are fewer.
+        // Ring, place, redundancy and carrier for each of 32 changes and four more a second, or of all if they are
+        // fewer.
         let most = 4 * changes.min(32 + 4 * (lasts.as_millis() as usize / 1000 + 1)) + 2;
         assert!(told <= most, "{micros} us: {told} of {most}");
         assert_eq!(world.application().ring_status().redundancy, Redundancy::Ready);

@@ -1,5 +1,5 @@
-//! Cutting and healing any one cable of a closed ring of 16 in OP at 1 ms: every cable, several detection delays, several
-//! moments of the cycle (issue 2, "What it must reach").
+//! Cutting and healing any one cable of a closed ring of 16 in OP at 1 ms: every cable, several detection delays,
+//! several moments of the cycle (issue 2, "What it must reach").
 
 use std::time::Duration;
 
@@ -119,8 +119,8 @@ fn cutting_and_healing_any_cable_of_a_ring_of_16_costs_no_more_cycles_than_its_d
     }
 }
 
-/// The ends of a cable that is healed open their ports one after the other: until the later one does, frames that are sent
-/// into the cable are lost. It costs the difference, not more, and is told as one repair.
+/// The ends of a cable that is healed open their ports one after the other: until the later one does, frames that are
+/// sent into the cable are lost. It costs the difference, not more, and is told as one repair.
 #[test]
 fn ends_that_open_one_after_the_other_cost_no_more_cycles_than_the_difference_cr_15() {
     println!("later end, by us | cycles incomplete of allowed, worst of 5 cables");

@@ -31,8 +31,8 @@ struct Segment {
     network: Network,
     /// The cables of the way.
     trunk: Vec<CableId>,
-    /// A branch hangs behind the port through which the way goes on, or a SubDevice is crossed: a break changes the order
-    /// in which frames meet them (CR-09).
+    /// A branch hangs behind the port through which the way goes on, or a SubDevice is crossed: a break changes the
+    /// order in which frames meet them (CR-09).
     reordered: bool,
 }
 
@@ -187,8 +187,8 @@ fn compare(worlds: &mut [World; 2], datagram: Random, what: &str) {
     assert_eq!(split, whole, "{what}: what they hold after {datagram:?}");
 }
 
-/// What the addressed SubDevice has is sent to it with FRMW or ARMW: everybody gets it then, also on the other side of a
-/// break.
+/// What the addressed SubDevice has is sent to it with FRMW or ARMW: everybody gets it then, also on the other side of
+/// a break.
 fn distribute(worlds: &mut [World; 2], dice: &mut Dice, stations: &[u16], what: &str) {
     let (station, ram) = (StationAddress(*dice.pick(stations)), RegisterAddress(USER_RAM + dice.below(64) as u16));
     let own: Vec<u8> = (0..4).map(|_| dice.below(256) as u8).collect();

@@ -1,6 +1,6 @@
-//! A merge that was written apart from the engine (`remerge.py`, from the capture of both links alone) comes to the same
-//! inputs and to the same incomplete cycles as the engine printed as JSON, in runs with random breaks. CR-05, CR-06, CR-07,
-//! facts 9.3.
+//! A merge that was written apart from the engine (`remerge.py`, from the capture of both links alone) comes to the
+//! same inputs and to the same incomplete cycles as the engine printed as JSON, in runs with random breaks. CR-05,
+//! CR-06, CR-07, facts 9.3.
 
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -31,8 +31,8 @@ struct Cycle {
     inputs: String,
 }
 
-/// A straight ring, or one with branches on ports 3 and 2, of which the latter is met by the redundant copy even while the ring
-/// is closed, and with crossed SubDevices; with the number of cables that are the ring's.
+/// A straight ring, or one with branches on ports 3 and 2, of which the latter is met by the redundant copy even while
+/// the ring is closed, and with crossed SubDevices; with the number of cables that are the ring's.
 fn segment(shape: u64, options: NetworkOptions) -> (Network, usize) {
     if shape == 0 {
         return (ring(descriptions(&KINDS), options), KINDS.len() + 1);
@@ -122,8 +122,9 @@ fn remerged(capture: &Path, images: &Path, seed: u64) -> Option<(usize, usize)> 
     numbers.next().zip(numbers.next())
 }
 
+// covers: CR-05, CR-06, CR-07, facts 9.3
 #[test]
-fn a_merge_written_apart_comes_to_the_same_inputs_and_the_same_incomplete_cycles_cr_05_cr_06_cr_07_facts_9_3() {
+fn a_merge_written_apart_comes_to_the_same_inputs_and_the_same_incomplete_cycles() {
     let (mut compared, mut incomplete) = (0, 0);
     for seed in 0..12 {
         let capture: PathBuf =

@@ -1,5 +1,5 @@
-//! Everything goes on while a ring is broken: mailboxes, registers, EEPROMs, state changes, those that lose their power or
-//! appear for the first time, start and stop; LRW where it is allowed.
+//! Everything goes on while a ring is broken: mailboxes, registers, EEPROMs, state changes, those that lose their power
+//! or appear for the first time, start and stop; LRW where it is allowed.
 
 use std::time::Duration;
 
@@ -63,8 +63,9 @@ async fn all_services(mailbox: Mailbox) {
     assert_eq!(voe::exchange(&mailbox, &message, LIMITS).await.unwrap(), message);
 }
 
+// covers: CR-08, CR-20
 #[test]
-fn every_mailbox_protocol_works_on_either_stub_while_process_data_goes_on_cr_08_cr_20() {
+fn every_mailbox_protocol_works_on_either_stub_while_process_data_goes_on() {
     for cable in 0..=KINDS.len() {
         let mut world = World::in_op(cable as u64, segment());
         world.cut(CableId(cable));
@@ -148,8 +149,9 @@ fn optional_analog_input(position: u16) -> SubDeviceConfig {
     SubDeviceConfig::at_position(position).optional().assign(3, Direction::Inputs, pdos)
 }
 
+// covers: CR-17, CR-21
 #[test]
-fn an_optional_subdevice_on_either_side_of_a_break_joins_and_its_neighbours_go_on_cr_17_cr_21() {
+fn an_optional_subdevice_on_either_side_of_a_break_joins_and_its_neighbours_go_on() {
     // It heads the redundant stub, or ends the main one: its neighbour across the break is configured beside it.
     for cable in [2, 3] {
         let kinds = ["coupler", "digital-output-8", "analog-input-4", "servo", "digital-output-16"];
@@ -183,8 +185,9 @@ fn an_optional_subdevice_on_either_side_of_a_break_joins_and_its_neighbours_go_o
     }
 }
 
+// covers: CR-19
 #[test]
-fn a_ring_that_is_broken_from_start_to_end_is_started_stopped_and_started_again_cr_19() {
+fn a_ring_that_is_broken_from_start_to_end_is_started_stopped_and_started_again() {
     for cable in 0..=KINDS.len() {
         let mut network = segment();
         network.cut(CableId(cable));
@@ -213,8 +216,9 @@ fn with_lrw(scan: &Scan, lrw: LrwPolicy) -> ringcat::Declaration {
     ringcat::Declaration { lrw, ..automatic(&scan.subdevices, CYCLE) }
 }
 
+// covers: CR-16, facts 9.2.2
 #[test]
-fn an_explicit_lrw_is_refused_on_two_links_and_names_datagram_and_subdevices_cr_16_facts_9_2_2() {
+fn an_explicit_lrw_is_refused_on_two_links_and_names_datagram_and_subdevices() {
     let refused = World::with(0, segment(), &Options::default(), |scan| with_lrw(scan, LrwPolicy::Explicit));
     let Err(Error::Activate(error)) = refused else { panic!("it was taken: {refused:?}") };
     let ActivateError::LrwOnTwoLinks { domain, subdevices, length, .. } = &error else { panic!("{error}") };
@@ -270,8 +274,8 @@ fn an_lrw_that_a_file_names_is_refused_on_two_links_with_its_name_and_one_per_su
     };
     let several = || declare(vec![named(&[1]), named(&[2, 3])]);
     let error = World::with(0, segment(), &Options::default(), several()).expect_err("it was taken").to_string();
-    let expected = "frame 1, command 2 \"cyclic cmd\": an LRW at logical address 0x01000000 of 12 bytes for declarations [2, 3] \
-                    cannot be used with two links";
+    let expected = "frame 1, command 2 \"cyclic cmd\": an LRW at logical address 0x01000000 of 12 bytes for \
+                    declarations [2, 3] cannot be used with two links";
     assert!(error.contains(expected), "{error}");
     // On one link nothing speaks against it.
     let line = scenarios::segments::line(descriptions(&KINDS), NetworkOptions::default());

@@ -32,15 +32,16 @@ fn in_line(seed: u64) -> World {
     World::in_op(seed, line(descriptions(&KINDS), options()))
 }
 
+// covers: facts 2.5
 #[test]
-fn error_counters_are_kept_beyond_255_on_a_period_and_read_and_cleared_on_demand_facts_2_5() {
+fn error_counters_are_kept_beyond_255_on_a_period_and_read_and_cleared_on_demand() {
     let mut world = in_line(1);
     world.application_mut().engine_mut().set_statistics_period(Some(Duration::from_millis(20)));
     world.run_cycles(50);
     let before = world.application().engine().statistics(2).expect("it is declared");
     assert!(before.is_clean() && before.readings >= 2, "{before:?}");
-    // Frames on the cable before the third one, in both directions: it sees those that come, its neighbour those that go
-    // back.
+    // Frames on the cable before the third one, in both directions: it sees those that come, its neighbour those that
+    // go back.
     for _ in 0..40 {
         world.corrupt(CableId(2), 10);
         world.run_cycles(25);
@@ -102,8 +103,9 @@ fn a_subdevice_that_is_blocked_in_a_ring_is_cut_off_alone_and_comes_back_when_it
     assert!(error.to_string().contains("hangs on the main link"), "{error}");
 }
 
+// covers: facts 2.2
 #[test]
-fn closing_a_port_of_a_line_takes_those_behind_it_and_opening_brings_them_back_facts_2_2() {
+fn closing_a_port_of_a_line_takes_those_behind_it_and_opening_brings_them_back() {
     let mut world = in_line(3);
     let set = |world: &mut World, control| {
         let set = world.application_mut().engine_mut().start_port_set(2, 1, control);
@@ -129,8 +131,9 @@ fn closing_a_port_of_a_line_takes_those_behind_it_and_opening_brings_them_back_f
     assert!(world.finish(LIMIT, set).expect_err("no such port").to_string().contains("only 0 to 3"));
 }
 
+// covers: facts 3.2
 #[test]
-fn a_controller_that_is_reset_starts_anew_and_comes_back_also_when_frames_are_lost_facts_3_2() {
+fn a_controller_that_is_reset_starts_anew_and_comes_back_also_when_frames_are_lost() {
     for lost in [0, 1, 2, 3] {
         let mut world = in_ring(4);
         let starts = world.network().device(DeviceIndex(3)).controller.starts();

@@ -97,8 +97,9 @@ fn a_scan_after_one_of_a_slow_eeprom_reads_quick_ones_quickly() {
     assert!(took < Duration::from_millis(60), "{took:?}");
 }
 
+// covers: TO-39
 #[test]
-fn late_and_lost_frames_while_eeproms_are_read_do_not_begin_the_scan_anew_seeds_0_to_39() {
+fn late_and_lost_frames_while_eeproms_are_read_do_not_begin_the_scan_anew_seeds_0() {
     for seed in 0..40 {
         let mut dice = Dice::new(seed);
         let busy = [500, 2_000, 8_000][dice.below(3) as usize];
@@ -130,8 +131,8 @@ fn a_command_that_travels_again_because_its_answer_was_lost_is_refused_and_does_
         let mut dice = Dice::new(seed);
         let busy = Duration::from_micros(*dice.pick(&[500, 3_000, 8_000]));
         let mut lost = 0;
-        // One in four answers to frames with a command to the EEPROM is lost: the same command comes once more while the
-        // EEPROM is busy with it or has done it.
+        // One in four answers to frames with a command to the EEPROM is lost: the same command comes once more while
+        // the EEPROM is busy with it or has done it.
         let links = Meddled::new(network(vec![terminal(busy); 2]), LIMIT, |bytes| {
             let is_command = |it: &Header| it.command == Command::Fpwr && it.address >> 16 == map::SII_CONTROL.0.into();
             let frame = Frame::parse(bytes);

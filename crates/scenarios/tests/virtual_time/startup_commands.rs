@@ -91,8 +91,9 @@ fn expected() -> Vec<(AlState, String, Vec<u8>)> {
     all
 }
 
+// covers: facts 5.2
 #[test]
-fn objects_and_idns_are_written_at_their_transitions_in_the_declared_order_facts_5_2() {
+fn objects_and_idns_are_written_at_their_transitions_in_the_declared_order() {
     let mut world = world(segment(|_| ()), many);
     world.settle();
     assert_eq!(written(&world), expected());
@@ -143,7 +144,8 @@ fn a_refused_idn_is_told_with_its_number_and_code_facts_6_6() {
     world.run_cycles(300);
     let told = |event: &Event| {
         matches!(event, Event::ConfigurationFailed { subdevice: DRIVE, reason }
-            if reason.starts_with("start-up command 1 (SAFEOP to OP): SoE drive 0 S-0-0001 elements 0x40: refused by the drive"))
+            if reason.starts_with("start-up command 1 (SAFEOP to OP): SoE drive 0 S-0-0001 elements 0x40: refused by \
+                the drive"))
     };
     assert!(world.saw(world.beginning(), told), "{:?}", troubles(world.events(world.beginning())));
     let others = world.network().devices().enumerate().filter(|(number, _)| *number != DRIVE);

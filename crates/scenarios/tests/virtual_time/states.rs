@@ -115,6 +115,14 @@ fn firmware_is_updated_through_boot_while_the_others_stay_in_op_facts_6_4() {
     assert_undisturbed(&world, mark, DRIVE);
 }
 
+/// Start, length and whether it is enabled of a SyncManager of the drive.
+fn manager(world: &World, number: u8) -> (u16, u16, bool) {
+    let controller = &world.network().device(DeviceIndex(DRIVE)).controller;
+    let bytes = controller.register(map::sync_manager(number), 8);
+    let register = SyncManager::decode(bytes.first_chunk().expect("eight bytes"));
+    (register.start, register.length, register.activate.enable)
+}
+
 #[test]
 fn firmware_goes_through_boot_with_mailboxes_on_the_sync_managers_that_the_sii_names_facts_3_11() {
     for own in [false, true] {
@@ -146,12 +154,6 @@ fn firmware_goes_through_boot_with_mailboxes_on_the_sync_managers_that_the_sii_n
         let before = registers(&world, DRIVE);
         assert_eq!(world.scan.subdevices[DRIVE].boot_sync_managers(), (receive, send));
         assert_eq!(request(&mut world, DRIVE, AlState::Boot), Ok(()));
-        let manager = |world: &World, number| {
-            let controller = &world.network().device(DeviceIndex(DRIVE)).controller;
-            let bytes = controller.register(map::sync_manager(number), 8);
-            let register = SyncManager::decode(bytes.first_chunk().expect("eight bytes"));
-            (register.start, register.length, register.activate.enable)
-        };
         assert_eq!(manager(&world, receive), (boot.receive_offset, boot.receive_size, true), "own: {own}");
         assert_eq!(manager(&world, send), (boot.send_offset, boot.send_size, true), "own: {own}");
         // A lost answer is asked for again at the right one.

@@ -180,8 +180,8 @@ fn neighbours_alike_keep_their_places_whichever_side_they_come_back_from() {
     }
 }
 
-/// The first of two alike has its cables again at the moment in which the second one, who answered from the redundant side
-/// before, is told who it is: nobody takes the place of the one who has not been seen yet.
+/// The first of two alike has its cables again at the moment in which the second one, who answered from the redundant
+/// side before, is told who it is: nobody takes the place of the one who has not been seen yet.
 #[test]
 fn neighbours_alike_keep_their_places_when_the_ring_closes_while_one_is_recognised() {
     let kinds = ["coupler", "digital-input-8", "digital-output-8", "digital-output-8", "digital-input-8"];

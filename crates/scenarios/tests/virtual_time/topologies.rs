@@ -74,8 +74,8 @@ fn a_crossed_subdevice_in_a_closed_ring_is_located_and_works_lc_07() {
     }
 }
 
-/// Who has one port cannot pass the ring on (CR-22): everybody behind it is a stub of the redundant link, from the start and
-/// for good, and a break of that stub costs whoever is behind it.
+/// Who has one port cannot pass the ring on (CR-22): everybody behind it is a stub of the redundant link, from the
+/// start and for good, and a break of that stub costs whoever is behind it.
 #[test]
 fn a_subdevice_with_one_port_leaves_the_ring_open_and_that_is_told_cr_22() {
     use Port::{A, B};
@@ -100,7 +100,8 @@ fn a_subdevice_with_one_port_leaves_the_ring_open_and_that_is_told_cr_22() {
     assert_eq!(world.left_op(mark).iter().filter(|device| device.0 != 2).count(), 0);
 }
 
-/// A ring of five with a branch of two on a port of its second device. Cables 0 to 5 are the ring's, 6 leads to the branch.
+/// A ring of five with a branch of two on a port of its second device. Cables 0 to 5 are the ring's, 6 leads to the
+/// branch.
 pub(crate) fn ring_with_branch(port: Port) -> Network {
     use Port::{A, B};
     let kinds = ["digital-output-8", "junction", "servo", "coupler", "digital-input-8", "block", "analog-input-4"];

@@ -98,8 +98,8 @@ impl Stamped {
         stamped
     }
 
-    /// How old inputs are that count as fresh. Devices compute theirs after each exchange, so whoever was out of reach has
-    /// old ones for the frames that find it again.
+    /// How old inputs are that count as fresh. Devices compute theirs after each exchange, so whoever was out of reach
+    /// has old ones for the frames that find it again.
     fn look_at_all(&mut self, now: u8) {
         let exchange = self.world.application().exchange();
         for input in &mut self.inputs {
@@ -135,6 +135,17 @@ impl Stamped {
 
     fn incomplete(&self) -> u64 {
         self.world.application().cyclic_counters().incomplete
+    }
+
+    /// Two cables are cut at once and healed one after the other.
+    fn cut_two(&mut self, first: CableId, second: CableId) {
+        self.world.cut(first);
+        self.world.cut(second);
+        self.run(100);
+        self.world.heal(first);
+        self.run(100);
+        self.world.heal(second);
+        self.run(100);
     }
 }
 
@@ -229,8 +240,8 @@ fn whatever_is_lost_or_broken_inputs_never_become_older_and_afterwards_all_is_co
     }
 }
 
-/// Rings behind junctions break and are mended, one cable or two at once, on one link and on two: at most what is under way
-/// is lost, and inputs that count as fresh are no older than that.
+/// Rings behind junctions break and are mended, one cable or two at once, on one link and on two: at most what is under
+/// way is lost, and inputs that count as fresh are no older than that.
 #[test]
 fn breaks_behind_junctions_cost_at_most_the_cycles_that_are_under_way_and_no_old_input_counts_as_fresh_jr_02() {
     let kinds = ["digital-input-8", "junction", "digital-input-8", "digital-input-16", "digital-input-8"];
@@ -276,13 +287,7 @@ fn breaks_behind_junctions_cost_at_most_the_cycles_that_are_under_way_and_no_old
             }
             assert_eq!(stamped.world.left_op(mark), []);
             for (first, second) in pairs {
-                stamped.world.cut(CableId(first));
-                stamped.world.cut(CableId(second));
-                stamped.run(100);
-                stamped.world.heal(CableId(first));
-                stamped.run(100);
-                stamped.world.heal(CableId(second));
-                stamped.run(100);
+                stamped.cut_two(CableId(first), CableId(second));
                 let before = stamped.incomplete();
                 stamped.run(50);
                 let oldest = stamped.oldest_fresh;

@@ -9,8 +9,8 @@ use ringcat_wire::mailbox::aoe::{AdsErrorCode, AdsRequest, AdsResponse, AmsHeade
 use ringcat_wire::mailbox::sdo::AbortCode;
 use ringcat_wire::mailbox::{ErrorReply, PayloadError};
 
+use super::answer::Answer;
 use super::dictionary::Dictionary;
-use super::mailbox::Answer;
 use crate::description::AoeDescription;
 
 /// Index group of the memory.

@@ -2,38 +2,22 @@
 //! information, `pdo` PDOs by mailbox.
 //!
 //! In: the payload of a CoE message, the dictionary, the process data (mapped objects show what is in it), the state.
-//! Out: the payloads of the answer. Emergencies are sent by whoever makes them; what is no request gets the mailbox error
-//! "service not supported".
+//! Out: the payloads of the answer. Emergencies are sent by whoever makes them; what is no request gets the mailbox
+//! error "service not supported".
 
 mod information;
+mod objects;
 mod pdo;
 mod transfer;
 
-use ringcat_wire::al::AlState;
 use ringcat_wire::mailbox::ErrorReply;
 use ringcat_wire::mailbox::coe::{CoeHeader, CoeService, Emergency};
 
-use super::dictionary::Dictionary;
-use super::mailbox::Answer;
-use super::process_data::ProcessData;
+use super::answer::Answer;
 use transfer::Transfer;
 
-pub use transfer::MAX_TRANSFER_BYTES;
-
-/// What a transfer works on.
-#[derive(Debug)]
-pub struct Objects<'a> {
-    /// The objects.
-    pub dictionary: &'a mut Dictionary,
-    /// Values of mapped objects.
-    pub process_data: &'a ProcessData,
-    /// Present state; some objects are writable in PREOP alone.
-    pub state: AlState,
-    /// Complete access is served.
-    pub complete_access: bool,
-    /// SDO information is served.
-    pub information: bool,
-}
+pub use super::dictionary::MAX_TRANSFER_BYTES;
+pub use objects::Objects;
 
 /// The server with what it remembers between two messages.
 #[derive(Clone, Debug, Default)]

@@ -6,133 +6,26 @@
 //! synchronisation in `sync`. The SDO services around it are in [`coe`](super::coe), what the process data looks like
 //! with a given assignment in [`process_data`](super::process_data).
 
+mod diagnosis;
 mod entry;
 mod history;
+mod object;
 mod objects;
 mod sync;
 
 use ringcat_wire::al::AlState;
-use ringcat_wire::mailbox::coe::{AccessRights, DataType, ObjectCode};
+use ringcat_wire::mailbox::coe::AccessRights;
 use ringcat_wire::mailbox::sdo::AbortCode;
 use ringcat_wire::sii::PdoDirection;
 
-use crate::description::{DeviceDescription, data_type};
+use crate::description::DeviceDescription;
 use history::check_acknowledge;
 
-pub use entry::{Access, Entry};
+pub use entry::{Access, Entry, MAX_TRANSFER_BYTES};
 pub use history::history;
+pub use object::{ASSIGNMENT_BASE, MappedEntry, Object, ObjectRole};
 pub use objects::type_name;
 pub use sync::SyncParameters;
-
-/// Index of the PDO assignment of SyncManager 0; that of SyncManager n is n further on.
-pub const ASSIGNMENT_BASE: u16 = 0x1C10;
-/// Entries that a configurable mapping may have.
-const MAX_MAPPED_ENTRIES: usize = 32;
-
-/// What rules apply beyond the access of the entries.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum ObjectRole {
-    /// None.
-    Plain,
-    /// A list of PDOs of this direction: sub index 0 must be 0 while the others are written.
-    Assignment(PdoDirection),
-    /// A list of mapped entries of this direction, same rule.
-    Mapping(PdoDirection),
-    /// The diagnosis history: writing sub index 3 acknowledges or clears.
-    History,
-}
-
-/// One object.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Object {
-    /// Index.
-    pub index: u16,
-    /// Name for people.
-    pub name: String,
-    /// Extra rules.
-    pub role: ObjectRole,
-    /// Its entries, sub indices ascending.
-    pub entries: Vec<Entry>,
-}
-
-impl Object {
-    /// An object with one value at sub index 0.
-    pub fn variable(index: u16, name: &str, data_type: u8, access: Access, value: &[u8]) -> Object {
-        let entries = vec![Entry::new(0, data_type, access, value)];
-        Object { index, name: name.into(), role: ObjectRole::Plain, entries }
-    }
-
-    /// An array or record: sub index 0 is added and is the number of the entries, which follow each other from 1.
-    pub fn record(index: u16, name: &str, entries: Vec<Entry>) -> Object {
-        let count = entries.last().map_or(0, |entry| entry.sub_index);
-        let mut all = vec![Entry::new(0, data_type::U8, Access::ReadOnly, &[count])];
-        all.extend(entries);
-        Object { index, name: name.into(), role: ObjectRole::Plain, entries: all }
-    }
-
-    /// What SDO information calls it: one value is a variable, entries of one type an array.
-    pub fn code(&self) -> ObjectCode {
-        let mut values = self.entries.iter().filter(|entry| entry.sub_index != 0);
-        let Some(first) = values.next() else {
-            let domain = self.entries.first().is_some_and(|entry| entry.data_type() == DataType::DOMAIN);
-            return if domain { ObjectCode::Domain } else { ObjectCode::Variable };
-        };
-        let alike = values.all(|entry| entry.data_type == first.data_type);
-        if alike && !matches!(self.role, ObjectRole::Mapping(_)) { ObjectCode::Array } else { ObjectCode::Record }
-    }
-
-    /// Data type of the object as a whole: that of its entries where they are alike.
-    pub fn data_type(&self) -> DataType {
-        match (self.code(), self.role, self.index) {
-            (_, ObjectRole::Mapping(_), _) => DataType::PDO_MAPPING,
-            (_, _, 0x1018) => DataType::IDENTITY,
-            (ObjectCode::Record, _, _) => DataType(0),
-            _ => self.entries.last().map_or(DataType(0), Entry::data_type),
-        }
-    }
-
-    /// Looks an entry up.
-    pub fn entry(&self, sub_index: u8) -> Option<&Entry> {
-        self.entries.iter().find(|entry| entry.sub_index == sub_index)
-    }
-
-    fn entry_mut(&mut self, sub_index: u8) -> Option<&mut Entry> {
-        self.entries.iter_mut().find(|entry| entry.sub_index == sub_index)
-    }
-
-    /// Value of sub index 0 of a list.
-    fn count(&self) -> usize {
-        self.entry(0).and_then(|entry| entry.value.first()).map_or(0, |count| usize::from(*count))
-    }
-
-    /// The valid entries of a list.
-    fn listed(&self) -> impl Iterator<Item = &Entry> {
-        self.entries.iter().filter(|entry| entry.sub_index != 0).take(self.count())
-    }
-}
-
-/// One mapped entry of a PDO.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct MappedEntry {
-    /// Object index, 0 for a gap.
-    pub index: u16,
-    /// Sub index.
-    pub sub_index: u8,
-    /// Length in bits.
-    pub bit_length: u8,
-}
-
-impl MappedEntry {
-    fn decode(bytes: &[u8]) -> Option<MappedEntry> {
-        let [bit_length, sub_index, low, high] = bytes.first_chunk().copied()?;
-        Some(MappedEntry { index: u16::from_le_bytes([low, high]), sub_index, bit_length })
-    }
-
-    fn encode(self) -> [u8; 4] {
-        let [low, high] = self.index.to_le_bytes();
-        [self.bit_length, self.sub_index, low, high]
-    }
-}
 
 /// All objects of a device, indices ascending.
 #[derive(Clone, Debug, Default)]

@@ -4,6 +4,7 @@
 //! [`reassembly`] puts fragments together, [`stack`] is an IP stack that answers ping and serves TCP. Time stamps are
 //! those of virtual time.
 
+mod addresses;
 pub mod frames;
 pub mod reassembly;
 pub mod stack;
@@ -15,33 +16,18 @@ use core::net::Ipv4Addr;
 use ringcat_wire::mailbox::eoe::{AddressFilter, BLOCK, EoeBody, EoeFragment, EoeMessage, EoeResult, IpParameters};
 use ringcat_wire::mailbox::{ErrorReply, PayloadError};
 
-use super::mailbox::Answer;
+use super::answer::Answer;
 use crate::description::{EoeDescription, EoeEnd};
 use crate::time::SimTime;
 use reassembly::Reassembly;
 use stack::Stack;
 
+pub use addresses::Addresses;
+
 /// Messages of the device's own that wait until the mailbox has room.
 const MAX_WAITING: usize = 64;
 /// Room of messages without a frame: the address filter is the longest.
 const MAX_OTHER: usize = 128;
-
-/// The addresses as they are set now.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Addresses {
-    /// MAC address.
-    pub mac: [u8; 6],
-    /// IP address; unspecified until one is set.
-    pub address: Ipv4Addr,
-    /// Subnet mask.
-    pub mask: Ipv4Addr,
-    /// Default gateway.
-    pub gateway: Ipv4Addr,
-    /// DNS server.
-    pub dns: Ipv4Addr,
-    /// Name.
-    pub name: Vec<u8>,
-}
 
 /// The server with what it remembers between two messages.
 #[derive(Clone, Debug)]
@@ -239,21 +225,6 @@ impl EoeServer {
             dns: Some(*dns),
             name: Some(name),
         }
-    }
-}
-
-impl Addresses {
-    /// A unicast MAC address, a unicast IP address or none, a mask of ones and then zeros.
-    fn make_sense(&self) -> bool {
-        let mac = self.mac[0] & 0x01 == 0 && self.mac != [0; 6];
-        let unicast = |address: Ipv4Addr| !address.is_multicast() && !address.is_broadcast();
-        let mask = u32::from(self.mask);
-        mac && unicast(self.address) && unicast(self.gateway) && mask.leading_ones() + mask.trailing_zeros() == 32
-    }
-
-    /// Bits of the network part.
-    pub fn prefix(&self) -> u8 {
-        u32::from(self.mask).leading_ones() as u8
     }
 }
 

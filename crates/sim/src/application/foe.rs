@@ -11,7 +11,7 @@ pub mod firmware;
 use ringcat_wire::mailbox::foe::{FoeErrorCode, FoeMessage};
 use ringcat_wire::mailbox::{ErrorReply, PayloadError};
 
-use super::mailbox::Answer;
+use super::answer::Answer;
 use crate::description::FoeDescription;
 use crate::time::SimTime;
 use files::FileStore;

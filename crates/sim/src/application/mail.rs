@@ -3,13 +3,13 @@
 //! In: AL events of the mailbox SyncManagers, the time, news of the device (emergencies, messages for the diagnosis
 //! history), faults. Out: what the MainDevice reads.
 
-use ringcat_wire::al::AlState;
 use ringcat_wire::mailbox::Protocol;
 use ringcat_wire::mailbox::coe::{DiagnosisFlags, DiagnosisMessage, DiagnosisParameter, Emergency};
 
 use super::Application;
 use super::coe::emergency_payload;
 use super::mailbox::faults::MailFault;
+use super::mailbox::record::ServedMail;
 use super::servers::Surroundings;
 use crate::controller::Controller;
 use crate::description::DeviceDescription;
@@ -24,19 +24,6 @@ const MAX_DIAGNOSIS: usize = 256;
 
 /// Requests that a record keeps; later ones are not recorded.
 const MAX_RECORDED: usize = 1 << 18;
-
-/// A request that was served.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct ServedMail {
-    /// When.
-    pub at: SimTime,
-    /// In which state.
-    pub state: AlState,
-    /// Protocol.
-    pub protocol: Protocol,
-    /// What follows the mailbox header.
-    pub payload: Vec<u8>,
-}
 
 impl Application {
     /// Begins to record the requests that are served; those that came before are forgotten. A restart ends nothing.
@@ -66,8 +53,8 @@ impl Application {
         self.post(Protocol::Coe, emergency_payload(emergency))
     }
 
-    /// Keeps a message in the diagnosis history, with the present time and these parameters; an emergency tells of it where
-    /// the flags say so. False where it is not kept.
+    /// Keeps a message in the diagnosis history, with the present time and these parameters; an emergency tells of it
+    /// where the flags say so. False where it is not kept.
     pub fn diagnose(&mut self, message: &DiagnosisMessage<'_>, parameters: &[DiagnosisParameter<'_>]) -> bool {
         let mut bytes = vec![0; MAX_DIAGNOSIS];
         let mut length = DiagnosisMessage::OVERHEAD;

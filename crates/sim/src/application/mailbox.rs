@@ -5,6 +5,7 @@
 //! the servers' matter ([`servers`](super::servers)).
 
 pub mod faults;
+pub mod record;
 
 use std::collections::VecDeque;
 
@@ -13,6 +14,7 @@ use ringcat_wire::mailbox::{ErrorReply, Header, Message, MessageError, Protocol,
 use ringcat_wire::register::{SyncManager, SyncManagerPdiControl, map};
 use ringcat_wire::sii::MailboxLayout;
 
+use super::answer::Answer;
 use super::process_data::event_bit;
 use crate::controller::Controller;
 use crate::time::SimTime;
@@ -25,24 +27,6 @@ const MAX_ANSWERS: usize = 4;
 const MAX_OWN: usize = 2;
 /// Messages that may wait for the send mailbox, answers and others together; more of the others are dropped.
 const MAX_POSTED: usize = 64;
-
-/// What a message leads to.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub enum Answer {
-    /// Answers of the same protocol, one message each.
-    Payloads(Vec<Vec<u8>>),
-    /// An error reply of the mailbox with this detail.
-    Error(u16),
-    /// Nothing.
-    Silence,
-}
-
-impl Answer {
-    /// One answer of the same protocol.
-    pub fn payload(bytes: Vec<u8>) -> Answer {
-        Answer::Payloads(vec![bytes])
-    }
-}
 
 /// A message on its way to the send mailbox.
 #[derive(Clone, Debug)]

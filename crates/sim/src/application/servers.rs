@@ -7,13 +7,13 @@ use ringcat_wire::al::AlState;
 use ringcat_wire::mailbox::foe::FoeMessage;
 use ringcat_wire::mailbox::{ErrorReply, Protocol};
 
+use super::answer::Answer;
 use super::aoe::AoeServer;
 use super::coe::{CoeServer, Objects};
 use super::dictionary::{Dictionary, type_name};
 use super::eoe::EoeServer;
 use super::foe::files::FileStore;
 use super::foe::{Files, FoeServer};
-use super::mailbox::Answer;
 use super::process_data::ProcessData;
 use super::soe::SoeServer;
 use super::voe;

@@ -1,71 +1,37 @@
 //! A CiA 402 drive with a motor and a load that have inertia: profile and cyclic modes, homing, brake, fault reactions.
 //!
-//! In: objects of the outputs and of the dictionary (`parameters`), virtual time. Out: the objects that [`Servo::value`]
-//! knows, among them statusword, position, velocity and torque. The drive computes in steps of [`STEP_NS`], whose times do
-//! not depend on frames. Units are increments, seconds and thousandths of the rated torque.
+//! In: objects of the outputs and of the dictionary (`parameters`), virtual time. Out: the objects that
+//! [`Servo::value`] knows, among them statusword, position, velocity and torque. The drive computes in steps of
+//! [`STEP_NS`], whose times do not depend on frames. Units are increments, seconds and thousandths of the rated torque.
 //!
 //! A step asks the power state machine ([`power`]) what to do (`Order`), lets the mode move the set-point, makes the
 //! torque with a position loop around a velocity loop (`motion`), and moves the motor. `homing` looks for the origin,
-//! `status` says what the application sees. Position and velocity of the motor are those of the machine, whose position 0
-//! is where it first got power; `origin` is what homing adds to that.
+//! `status` says what the application sees. Position and velocity of the motor are those of the machine, whose position
+//! 0 is where it first got power; `origin` is what homing adds to that.
 
+mod axis;
 mod homing;
 mod motion;
+mod motor;
 mod parameters;
+mod phase;
 pub mod power;
 mod status;
 
 use super::dictionary::Dictionary;
-use super::process_data::Mapping;
+use super::mapping::Mapping;
 use crate::time::SimTime;
-use homing::Homing;
-use motion::Motor;
+use axis::STEP;
+use motor::Motor;
 use parameters::Parameters;
+use phase::{Homing, Order};
 
+pub use axis::{
+    ACCELERATION, BRAKE_TORQUE, ERROR_COMMUNICATION, ERROR_FOLLOWING, FRICTION, HOMING_METHODS,
+    INCREMENTS_PER_REVOLUTION, INDEX_PULSE, LIMIT_SWITCH, MODE_CSP, MODE_CST, MODE_CSV, MODE_HOMING,
+    MODE_PROFILE_POSITION, MODE_PROFILE_TORQUE, MODE_PROFILE_VELOCITY, MODES, PEAK_TORQUE, STANDSTILL, STEP_NS,
+};
 pub use power::{DriveCommand, DriveState};
-
-/// Time from one step to the next.
-pub const STEP_NS: u64 = 125_000;
-const STEP: f64 = STEP_NS as f64 / 1e9;
-/// Increments of the encoder.
-pub const INCREMENTS_PER_REVOLUTION: i32 = 131_072;
-/// Acceleration that one thousandth of the rated torque gives to motor and load: increments per second squared.
-pub const ACCELERATION: f64 = 50_000.0;
-/// Friction in thousandths of the rated torque at one increment per second.
-pub const FRICTION: f64 = 1e-5;
-/// Torque of the closed brake.
-pub const BRAKE_TORQUE: f64 = 1_000.0;
-/// Torque that the motor cannot exceed.
-pub const PEAK_TORQUE: f64 = 3_000.0;
-/// Where the limit switches are on the machine; both are cams that the axis can pass.
-pub const LIMIT_SWITCH: f64 = 2_000_000.0;
-/// Where the index pulse of a revolution is.
-pub const INDEX_PULSE: f64 = 12_345.0;
-/// Below this speed the motor stands still.
-pub const STANDSTILL: f64 = 1_000.0;
-/// Error code: process data was lost while the drive had torque.
-pub const ERROR_COMMUNICATION: u16 = 0x7500;
-/// Error code: the following error was too large for too long.
-pub const ERROR_FOLLOWING: u16 = 0x8611;
-
-/// Mode of operation: profile position.
-pub const MODE_PROFILE_POSITION: i8 = 1;
-/// Mode of operation: profile velocity.
-pub const MODE_PROFILE_VELOCITY: i8 = 3;
-/// Mode of operation: profile torque.
-pub const MODE_PROFILE_TORQUE: i8 = 4;
-/// Mode of operation: homing.
-pub const MODE_HOMING: i8 = 6;
-/// Mode of operation: cyclic synchronous position.
-pub const MODE_CSP: i8 = 8;
-/// Mode of operation: cyclic synchronous velocity.
-pub const MODE_CSV: i8 = 9;
-/// Mode of operation: cyclic synchronous torque.
-pub const MODE_CST: i8 = 10;
-/// What 0x6060 takes; 0 is none: the drive stops.
-pub const MODES: &[i64] = &[0, 1, 3, 4, 6, 8, 9, 10];
-/// What 0x6098 takes.
-pub const HOMING_METHODS: &[i64] = &[17, 18, 33, 34, 35, 37];
 
 /// The drive tests itself for so long after power-on.
 const SELF_TEST_NS: u64 = 10_000_000;
@@ -77,17 +43,6 @@ const IMMEDIATE: u16 = 0x0020;
 const RELATIVE: u16 = 0x0040;
 const FAULT_RESET: u16 = 0x0080;
 const HALT: u16 = 0x0100;
-
-/// What the power stage does in a step.
-#[derive(Clone, Copy, Debug, PartialEq)]
-enum Order {
-    /// No torque, brake closed.
-    Off,
-    /// Slow down with so much per second, and hold the position then; infinite: with all torque.
-    Stop(f64),
-    /// Do what the mode says.
-    Follow,
-}
 
 /// State of a drive.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -305,7 +260,8 @@ impl Servo {
         self.state = match (self.state, self.command) {
             (DriveState::OperationEnabled, DriveCommand::SwitchOn) => DriveState::SwitchedOn, // 5
             (DriveState::OperationEnabled, DriveCommand::Shutdown) => DriveState::ReadyToSwitchOn, // 8
-            (DriveState::QuickStopActive, _) if self.parameters.quick_stop_option < 5 => DriveState::SwitchOnDisabled, // 12
+            // 12
+            (DriveState::QuickStopActive, _) if self.parameters.quick_stop_option < 5 => DriveState::SwitchOnDisabled,
             (DriveState::FaultReactionActive, _) => DriveState::Fault, // 14
             (state, _) => state,
         };

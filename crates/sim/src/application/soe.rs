@@ -1,7 +1,7 @@
 //! The SoE server of a device: drives with IDNs, elements in fragments, procedure commands (facts 6.6).
 //!
-//! In: the payload of a SoE message, the state, virtual time. Out: the answer, and notifications when a procedure command
-//! has ended. [`idn`] says what an IDN is.
+//! In: the payload of a SoE message, the state, virtual time. Out: the answer, and notifications when a procedure
+//! command has ended. [`idn`] says what an IDN is.
 
 pub mod idn;
 
@@ -11,7 +11,7 @@ use ringcat_wire::al::AlState;
 use ringcat_wire::mailbox::ErrorReply;
 use ringcat_wire::mailbox::soe::{Idn, SoeElements, SoeErrorCode, SoeMessage, SoeOperation};
 
-use super::mailbox::Answer;
+use super::answer::Answer;
 use crate::description::SoeDescription;
 use crate::time::SimTime;
 use idn::IdnObject;

@@ -3,7 +3,7 @@
 use ringcat_wire::mailbox::ErrorReply;
 use ringcat_wire::mailbox::voe::VoeMessage;
 
-use super::mailbox::Answer;
+use super::answer::Answer;
 
 /// Answers one message of this vendor with the same content; those of other vendors are not for the device.
 pub fn serve(payload: &[u8], room: usize, vendor_id: u32) -> Answer {

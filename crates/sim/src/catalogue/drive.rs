@@ -20,8 +20,8 @@ use crate::description::{DcDescription, DeviceDescription, data_type};
 const DEVICE_TYPE: u32 = 0x0002_0192;
 /// Smallest cycle of process data.
 const MINIMUM_CYCLE_NS: u32 = 125_000;
-/// Units of ETG.1004 for SDO information, which has room for prefix and unit; speeds and accelerations do not fit and are
-/// told by 0x60A8 to 0x60AA.
+/// Units of ETG.1004 for SDO information, which has room for prefix and unit; speeds and accelerations do not fit and
+/// are told by 0x60A8 to 0x60AA.
 const INCREMENTS: u16 = 0x00B5;
 const THOUSANDTHS: u16 = 0xFD00;
 const MILLIAMPERES: u16 = 0xFD04;

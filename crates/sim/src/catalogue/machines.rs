@@ -3,7 +3,7 @@
 use ringcat_wire::register::PortKind;
 use ringcat_wire::sii::{FmmuUsage, Identity, PdoDirection, SyncManagerKind};
 
-use super::VENDOR_ID;
+use super::parts::VENDOR_ID;
 use super::parts::{FIXED_MANDATORY, entry, pdo, sync_manager};
 use crate::application::{Behaviour, InputSource};
 use crate::description::{DcDescription, DeviceDescription, data_type};

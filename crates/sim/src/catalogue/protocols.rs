@@ -8,7 +8,7 @@ use ringcat_wire::sii::{
     CoeDetails, FmmuUsage, Identity, MailboxLayout, MailboxProtocols, PdoDirection, SyncManagerKind,
 };
 
-use super::VENDOR_ID;
+use super::parts::VENDOR_ID;
 use super::parts::{FIXED_MANDATORY, entry, pdo, sync_manager};
 use crate::application::dictionary::{Access, Entry, Object, history};
 use crate::application::soe::idn::IdnObject;

@@ -2,7 +2,7 @@
 
 use ringcat_wire::sii::{CoeDetails, FmmuUsage, Identity, PdoDirection, SyncManagerKind};
 
-use super::VENDOR_ID;
+use super::parts::VENDOR_ID;
 use super::parts::{
     EBUS_PORTS, FIXED_MANDATORY, FLEXIBLE, OUTPUTS_START, channel_settings, coe_mailbox, entry, four_sync_managers,
     pdo, sync_manager, sync_parameters,

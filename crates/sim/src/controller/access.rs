@@ -1,15 +1,15 @@
 //! Reads and writes of address ranges by either side (facts 1.4, 2.5, 3.2, 3.8, 3.11).
 //!
-//! In: a side, an address, bytes. Out: how many bytes were accessible; bytes that are not there or blocked change nothing
-//! (facts 1.4). EtherCAT's register writes and SyncManager accesses go into the [`super::pass::Pass`] and count at the
-//! end of the frame; RAM is written at once.
+//! In: a side, an address, bytes. Out: how many bytes were accessible; bytes that are not there or blocked change
+//! nothing (facts 1.4). EtherCAT's register writes and SyncManager accesses go into the [`super::pass::Pass`] and count
+//! at the end of the frame; RAM is written at once.
 
 use core::mem;
 
 use ringcat_wire::register::map;
 
 use super::Controller;
-use super::events::{EVENT_AL_CONTROL, EVENT_PROCESS_DATA_WATCHDOG, EVENT_SYNC_MANAGER_ACTIVATION};
+use super::event_bits::{EVENT_AL_CONTROL, EVENT_PROCESS_DATA_WATCHDOG, EVENT_SYNC_MANAGER_ACTIVATION};
 use super::fmmu::Piece;
 use super::memory::{Side, USER_RAM};
 use super::pass::Pass;
@@ -80,8 +80,8 @@ impl Controller {
         true
     }
 
-    /// Writes `data`. Where `mask` is not 0xFF, only its bits are written (in [`BITWISE`]; elsewhere the others become 0).
-    /// Returns how many bytes were accessible.
+    /// Writes `data`. Where `mask` is not 0xFF, only its bits are written (in [`BITWISE`]; elsewhere the others become
+    /// 0). Returns how many bytes were accessible.
     pub(super) fn write(&mut self, side: Side, address: u32, data: &[u8], mask: u8) -> usize {
         let end = (address + data.len() as u32).min(ADDRESS_END);
         let (mut at, mut count) = (address, 0);

@@ -140,15 +140,16 @@ impl Clock {
         at
     }
 
-    /// Notes the first bit of a frame at a port. Returns whether it is latched: a latching frame that came back, or what is
-    /// taken for one.
+    /// Notes the first bit of a frame at a port. Returns whether it is latched: a latching frame that came back, or
+    /// what is taken for one.
     pub fn arrived(&mut self, port: Port, frame: u64, first_bit: SimTime) -> bool {
         self.arrivals[port.index()] = Some((frame, first_bit));
         core::mem::take(&mut self.armed[port.index()]) || self.latching == Some(frame)
     }
 
-    /// Starts latching `frame`, which the processing unit meets at `at_unit`; yields the arrivals it has had so far. Where
-    /// frames are not told apart (`any`) it yields the last arrival at each port, and the next one at the others counts.
+    /// Starts latching `frame`, which the processing unit meets at `at_unit`; yields the arrivals it has had so far.
+    /// Where frames are not told apart (`any`) it yields the last arrival at each port, and the next one at the others
+    /// counts.
     pub fn latch(&mut self, frame: u64, at_unit: SimTime, any: bool) -> impl Iterator<Item = (Port, SimTime)> + use<> {
         let arrivals = self.arrivals;
         self.latched = Some((frame, at_unit));

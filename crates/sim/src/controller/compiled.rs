@@ -1,9 +1,11 @@
 //! What logical datagrams do here, found once for all that are alike.
 //!
 //! In: a datagram's command, address and length, and the FMMUs and SyncManagers as they are. Out: the pieces of memory
-//! that it touches, which are then moved without a search. Only what is plain is compiled: whole bytes, each piece in one
-//! area of process RAM or the AL status, nothing read where something is written. Everything else goes the way of [`super::processing`].
-//! A write to a register that matters throws everything away.
+//! that it touches, which are then moved without a search. Only what is plain is compiled: whole bytes, each piece in
+//! one area of process RAM or the AL status, nothing read where something is written. Everything else goes the way of
+//! [`super::processing`]. A write to a register that matters throws everything away.
+
+mod known;
 
 use ringcat_wire::command::Command;
 use ringcat_wire::register::map;
@@ -12,63 +14,9 @@ use super::Controller;
 use super::fmmu::{Direction, Piece};
 use super::memory::{PROCESS_RAM, Side};
 use super::sync_manager::Claim;
+use known::{AL_STATUS, FREE, Known, Move, PIECES};
 
-/// Datagrams that are remembered: those of a cycle.
-const REMEMBERED: usize = 4;
-/// Most pieces of one.
-const PIECES: usize = 4;
-/// In place of a SyncManager's number: none is there.
-const FREE: u8 = u8::MAX;
-/// In place of a SyncManager's number: it is the first byte of AL_STATUS, which MainDevices like to have with process data.
-const AL_STATUS: u8 = u8::MAX - 1;
-
-/// A piece of a datagram's data and where it lies.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-struct Move {
-    write: bool,
-    /// SyncManager whose area it lies in, [`FREE`] or [`AL_STATUS`].
-    sync_manager: u8,
-    /// Offset in the datagram's data.
-    at: u16,
-    len: u16,
-    /// First byte by address.
-    physical: u16,
-}
-
-/// What is known of a kind of datagram.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-struct Known {
-    command: Command,
-    address: u32,
-    len: u16,
-    /// How many of the moves it makes; `None` where it has to be worked out each time.
-    count: Option<u8>,
-    moves: [Move; PIECES],
-}
-
-/// The kinds of datagrams that were met last.
-#[derive(Clone, Debug, Default)]
-pub(super) struct Compiled {
-    known: [Option<Known>; REMEMBERED],
-    oldest: usize,
-}
-
-impl Compiled {
-    /// What was found holds no more.
-    pub fn forget(&mut self) {
-        self.known = [None; REMEMBERED];
-    }
-
-    fn find(&self, command: Command, address: u32, len: u16) -> Option<&Known> {
-        let is = |known: &&Known| known.address == address && known.len == len && known.command == command;
-        self.known.iter().flatten().find(is)
-    }
-
-    fn keep(&mut self, known: Known) {
-        self.known[self.oldest] = Some(known);
-        self.oldest = (self.oldest + 1) % REMEMBERED;
-    }
-}
+pub(super) use known::Compiled;
 
 impl Controller {
     /// Moves the data of a logical datagram that concerns this controller. What was read and what was written, each if

@@ -51,7 +51,8 @@ impl Controller {
         self.memory.count(map::RX_ERROR_COUNTER.offset(2 * port.index() as u16 + 1));
     }
 
-    /// Counts an access of the PDI that went wrong, as on a disturbed SPI bus; `code` is what the kind of PDI says of it.
+    /// Counts an access of the PDI that went wrong, as on a disturbed SPI bus; `code` is what the kind of PDI says of
+    /// it.
     pub fn count_pdi_error(&mut self, code: u8) {
         self.memory.count(map::PDI_ERROR_COUNTER);
         self.memory.set_u8(map::PDI_ERROR_CODE, code);

@@ -6,24 +6,7 @@
 use ringcat_wire::register::{DlStatus, map};
 
 use super::Controller;
-
-/// ECAT event: DL status changed; cleared by reading it.
-pub(super) const EVENT_DL_STATUS: u16 = 1 << 2;
-/// ECAT event: AL status written; cleared by reading it.
-pub(super) const EVENT_AL_STATUS: u16 = 1 << 3;
-/// First of the eight ECAT events that mirror SyncManagers.
-const EVENT_SYNC_MANAGER_ECAT: u32 = 4;
-/// SyncManagers with an ECAT event.
-const MIRRORED: usize = 8;
-
-/// AL event: AL control written; cleared by the PDI reading it.
-pub(super) const EVENT_AL_CONTROL: u32 = 1 << 0;
-/// AL event: a SyncManager's activation changed; cleared by the PDI reading an activate register.
-pub(super) const EVENT_SYNC_MANAGER_ACTIVATION: u32 = 1 << 4;
-/// AL event: the process data watchdog expired; cleared by the PDI reading the watchdog status.
-pub(super) const EVENT_PROCESS_DATA_WATCHDOG: u32 = 1 << 6;
-/// First of the sixteen AL events of SyncManagers.
-const EVENT_SYNC_MANAGER_PDI: u32 = 8;
+use super::event_bits::{EVENT_DL_STATUS, EVENT_SYNC_MANAGER_ECAT, EVENT_SYNC_MANAGER_PDI, MIRRORED};
 
 /// Bits of ESC_CONFIGURATION that switch enhanced link detection on (facts 2.8).
 const ENHANCED_LINK_DETECTION: u8 = 0xF2;

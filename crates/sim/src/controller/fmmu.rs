@@ -1,7 +1,7 @@
 //! FMMUs: which logical bits are which physical bits (facts 3.10).
 //!
-//! In: the FMMU registers and the bit range of a datagram. Out: the pieces of that range that this controller maps, in one
-//! direction, the lower-numbered FMMU winning where several hit. Moving the bits is [`super::access`]'s.
+//! In: the FMMU registers and the bit range of a datagram. Out: the pieces of that range that this controller maps, in
+//! one direction, the lower-numbered FMMU winning where several hit. Moving the bits is [`super::access`]'s.
 
 use ringcat_wire::register::{Fmmu, map};
 

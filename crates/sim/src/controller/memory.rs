@@ -1,7 +1,7 @@
 //! The address space of a controller: its bytes, what exists where, and which side may write it (facts section 3).
 //!
-//! In: addresses. Out: runs of addresses with equal rights, and little-endian access to the bytes. What a write causes is
-//! in [`super::registers`]; SyncManagers, protection and the SII interface restrict further in [`super::access`].
+//! In: addresses. Out: runs of addresses with equal rights, and little-endian access to the bytes. What a write causes
+//! is in [`super::registers`]; SyncManagers, protection and the SII interface restrict further in [`super::access`].
 
 use ringcat_wire::address::RegisterAddress;
 use ringcat_wire::register::map;
@@ -166,8 +166,8 @@ static UPPER_REGIONS: [Region; 5] = [
 /// Where the latter begin.
 const UPPER_START: u32 = map::DC_PDI_BUFFER_START.0 as u32;
 
-/// For each address below user RAM, the place of the first region that ends behind it, in [`REGIONS`] or from where they
-/// begin on in [`UPPER_REGIONS`]: every read of a register looks here.
+/// For each address below user RAM, the place of the first region that ends behind it, in [`REGIONS`] or from where
+/// they begin on in [`UPPER_REGIONS`]: every read of a register looks here.
 static NEXT_REGION: [u8; USER_RAM as usize] = {
     let mut next = [0; USER_RAM as usize];
     let (mut place, mut address) = (0, 0);

@@ -1,14 +1,14 @@
 //! The local side of the controller, as the application sees it (facts 3.4, 3.5, 3.7, 3.11).
 //!
-//! In: reads and writes of the application. Out: bytes, under the rules of SyncManagers and the watchdog, and the events
-//! that reading and writing clears and raises.
+//! In: reads and writes of the application. Out: bytes, under the rules of SyncManagers and the watchdog, and the
+//! events that reading and writing clears and raises.
 
 use ringcat_wire::address::RegisterAddress;
 use ringcat_wire::al::{AlControl, AlStatus, AlStatusCode};
 use ringcat_wire::register::map;
 
 use super::Controller;
-use super::events::EVENT_AL_STATUS;
+use super::event_bits::EVENT_AL_STATUS;
 use super::memory::Side;
 use crate::time::SimTime;
 
@@ -57,8 +57,8 @@ impl Controller {
         self.set_ecat_event(EVENT_AL_STATUS);
     }
 
-    /// Whether the application serves its PDI. While it does, the PDI watchdog is retriggered all the time; from when it
-    /// stops, the watchdog runs.
+    /// Whether the application serves its PDI. While it does, the PDI watchdog is retriggered all the time; from when
+    /// it stops, the watchdog runs.
     pub fn set_pdi_alive(&mut self, alive: bool, now: SimTime) {
         if alive {
             self.pdi_watchdog.rest();

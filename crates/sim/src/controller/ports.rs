@@ -1,7 +1,7 @@
 //! The four ports: links, loops, the order of travel, DL status (facts 2.1, 2.2, 2.3).
 //!
-//! In: link changes and loop modes. Out: which ports are open and the content of DL_STATUS. When a change raises an event
-//! or a counter is [`super::Controller`]'s matter.
+//! In: link changes and loop modes. Out: which ports are open and the content of DL_STATUS. When a change raises an
+//! event or a counter is [`super::Controller`]'s matter.
 
 use ringcat_wire::register::{LoopControl, PortKind, PortStatus};
 

@@ -12,7 +12,7 @@ use ringcat_wire::datagram::CIRCULATING;
 use ringcat_wire::register::map;
 
 use super::Controller;
-use super::events::{EVENT_AL_STATUS, EVENT_DL_STATUS};
+use super::event_bits::{EVENT_AL_STATUS, EVENT_DL_STATUS};
 use super::fmmu::Direction;
 use super::logical_log::{LogicalAccess, frame_id};
 use super::memory::Side;

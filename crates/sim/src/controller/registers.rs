@@ -10,7 +10,7 @@ use ringcat_wire::register::{DlControl, Fmmu, SyncManager, map};
 
 use super::Controller;
 use super::counters::is_counter;
-use super::events::{EVENT_AL_CONTROL, EVENT_AL_STATUS, EVENT_SYNC_MANAGER_ACTIVATION};
+use super::event_bits::{EVENT_AL_CONTROL, EVENT_AL_STATUS, EVENT_SYNC_MANAGER_ACTIVATION};
 use super::memory::Side;
 use crate::frame::Port;
 use crate::time::SimTime;
@@ -223,8 +223,8 @@ impl Controller {
         }
     }
 
-    /// The frame that latched receive times last, by its number in the simulation, and when the processing unit met it: the
-    /// truth that no MainDevice can see.
+    /// The frame that latched receive times last, by its number in the simulation, and when the processing unit met it:
+    /// the truth that no MainDevice can see.
     pub const fn latched(&self) -> Option<(u64, SimTime)> {
         self.clock.latched()
     }

@@ -3,6 +3,8 @@
 //! In: writes to 0x0500..0x050F and virtual time. Out: data, busy and error bits, and after loading the registers that
 //! come from the EEPROM. A command starts at the end of its frame and takes the configured time.
 
+mod interface;
+
 use core::time::Duration;
 
 use ringcat_wire::register::{SiiCommand, SiiControl, SiiPdiAccess, map};
@@ -10,8 +12,11 @@ use ringcat_wire::sii;
 
 use super::Controller;
 use super::memory::Side;
-use crate::fault::SpoiltWrite;
+use super::spoilt_write::SpoiltWrite;
 use crate::time::SimTime;
+use interface::Task;
+
+pub(super) use interface::SiiInterface;
 
 /// Bytes of words 0 to 7, which are loaded.
 const CONFIGURATION_AREA: usize = 16;
@@ -21,59 +26,6 @@ const CHECKED: usize = 14;
 const ONE_ADDRESS_BYTE: usize = 2048;
 /// What is read beyond the end of the image.
 const ERASED: u8 = 0xFF;
-
-/// What the interface is doing.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Task {
-    Idle,
-    /// Loading the configuration, for the first time since the reset or again.
-    Load {
-        first: bool,
-    },
-    Read,
-    Write,
-}
-
-/// State of the interface beside its registers.
-#[derive(Clone, Debug)]
-pub(super) struct SiiInterface {
-    task: Task,
-    until: SimTime,
-    /// A command that was written in this frame.
-    command: Option<SiiCommand>,
-    /// Bit 0 of SII_CONTROL, at hand for every frame.
-    write_enabled: bool,
-    /// So many of the next commands take this long.
-    slow: (u32, Duration),
-    /// So many of the next writes go wrong in this way.
-    spoilt: (u32, SpoiltWrite),
-}
-
-impl SiiInterface {
-    pub const fn new() -> SiiInterface {
-        SiiInterface {
-            task: Task::Idle,
-            until: SimTime::NEVER,
-            command: None,
-            write_enabled: false,
-            slow: (0, Duration::ZERO),
-            spoilt: (0, SpoiltWrite::NotStored),
-        }
-    }
-
-    /// When the running command ends.
-    pub const fn deadline(&self) -> SimTime {
-        self.until
-    }
-
-    pub const fn is_loading(&self) -> bool {
-        matches!(self.task, Task::Load { .. })
-    }
-
-    fn is_busy(&self) -> bool {
-        self.task != Task::Idle
-    }
-}
 
 impl Controller {
     /// The EEPROM's content.

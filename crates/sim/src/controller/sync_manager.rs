@@ -1,8 +1,8 @@
 //! SyncManagers: three buffers or a mailbox in front of a piece of RAM (facts 3.11).
 //!
 //! In: the register bytes of each SyncManager and accesses to its area. Out: whether an access is granted and to which
-//! bytes, and after complete accesses the status byte and events. An access by EtherCAT is complete only when its frame had
-//! a good FCS, so [`SyncManagers::finish_frame`] decides; the PDI's accesses are complete at once.
+//! bytes, and after complete accesses the status byte and events. An access by EtherCAT is complete only when its frame
+//! had a good FCS, so [`SyncManagers::finish_frame`] decides; the PDI's accesses are complete at once.
 //!
 //! Not configured areas are free. The area of a SyncManager that is switched off, by either side, is locked. The second
 //! and third buffer are not addressable. Areas of one byte, and areas in register space, have a single buffer.

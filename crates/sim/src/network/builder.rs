@@ -3,13 +3,12 @@
 use core::time::Duration;
 
 use super::{Network, NetworkOptions};
+pub use crate::cable::DEFAULT_CABLE_DELAY;
+
 use crate::cable::{CableSpec, DeviceIndex, Endpoint, HostLink};
 use crate::device::Device;
 use crate::frame::Port;
 use crate::segment::SegmentError;
-
-/// Propagation delay of a cable unless another is asked for: 10 m at 5 ns per metre (facts 1.3).
-pub const DEFAULT_CABLE_DELAY: Duration = Duration::from_nanos(50);
 
 /// Devices and cables of a segment to be.
 ///

@@ -35,8 +35,8 @@ impl Node {
         }
     }
 
-    /// Whether the deadlines of the controller may have changed since the device was last settled without a run. Those of
-    /// the application change when it runs.
+    /// Whether the deadlines of the controller may have changed since the device was last settled without a run. Those
+    /// of the application change when it runs.
     fn has_news(&self) -> bool {
         self.arranged != Some(self.device.controller.schedules())
     }

@@ -11,7 +11,8 @@ pub enum LossCause {
     NoCarrier,
     /// It was longer than an interface sends.
     Oversized,
-    /// It held more datagrams than the segment takes ([`NetworkOptions::max_datagrams`](super::NetworkOptions::max_datagrams)).
+    /// It held more datagrams than the segment takes
+    /// ([`NetworkOptions::max_datagrams`](super::NetworkOptions::max_datagrams)).
     TooManyDatagrams,
     /// The transmit queue of the interface was full.
     TransmitQueueFull,

@@ -4,7 +4,7 @@ use core::time::Duration;
 use std::path::Path;
 
 use super::SegmentError;
-use super::format::{DeviceEntry, File, duration, line};
+use super::format::{DeviceEntry, File, Place, duration, line};
 use super::services::services;
 use crate::catalogue;
 use crate::controller::Wander;
@@ -87,8 +87,6 @@ fn check_name(name: &str, plan: &[PlannedDevice]) -> Result<(), String> {
     }
     Ok(())
 }
-
-pub(super) type Place = Option<core::ops::Range<usize>>;
 
 /// The device of one table.
 fn template(entry: &DeviceEntry, name: &str, base_dir: &Path) -> Result<DeviceDescription, (String, Place)> {

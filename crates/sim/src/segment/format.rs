@@ -199,3 +199,5 @@ fn in_words(message: &str) -> String {
     });
     words.collect::<Vec<_>>().join(", ")
 }
+
+pub(super) type Place = Option<core::ops::Range<usize>>;

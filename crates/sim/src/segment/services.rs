@@ -3,9 +3,8 @@
 use core::net::Ipv4Addr;
 use std::path::Path;
 
-use super::devices::Place;
-use super::format::{DeviceEntry, duration};
-use crate::description::{DeviceDescription, EoeEnd};
+use super::format::{DeviceEntry, Place, duration};
+use crate::description::{DeviceDescription, EoeDescription, EoeEnd, FoeDescription};
 
 /// Sizes of a mailbox: the least that an SDO needs, the most that a datagram carries.
 const MAILBOX_BYTES: core::ops::RangeInclusive<u16> = 24..=1486;
@@ -33,7 +32,12 @@ pub(super) fn services(
             return Err(error("only for a device of the catalogue with a mailbox".into()));
         }
     }
-    let foe = &mut description.services.foe;
+    files(entry, &mut description.services.foe, base_dir)?;
+    ethernet(entry, &mut description.services.eoe)
+}
+
+/// Files that the device is delivered with, and how it takes others.
+fn files(entry: &DeviceEntry, foe: &mut FoeDescription, base_dir: &Path) -> Result<(), (String, Place)> {
     for file in &entry.files {
         let path = base_dir.join(file.get_ref());
         let error = |message: String| (format!("files: {}: {message}", path.display()), Some(file.span()));
@@ -49,7 +53,11 @@ pub(super) fn services(
     if let Some(erase) = &entry.erase_ms {
         foe.erase_time = duration(erase, "erase_ms", 1e-3).map_err(|error| (error.message, Some(erase.span())))?;
     }
-    let eoe = &mut description.services.eoe;
+    Ok(())
+}
+
+/// What stands behind EoE, and its addresses.
+fn ethernet(entry: &DeviceEntry, eoe: &mut EoeDescription) -> Result<(), (String, Place)> {
     if let Some(end) = &entry.ethernet {
         eoe.end = match end.get_ref().as_str() {
             "stack" => EoeEnd::Stack,

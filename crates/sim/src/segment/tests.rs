@@ -156,27 +156,52 @@ fn a_real_image_with_another_alias_keeps_a_valid_checksum() {
     assert_eq!((device.name.as_str(), again.alias, again.identity.serial), ("di-1", 300, 9));
 }
 
+/// Texts of segment files, and what is said of them; `{known}` is the list of all devices.
+const REFUSED: &[(&str, &str)] = &[
+    ("[segment]\nspeed = 3", "line 2: unknown field `speed`"),
+    ("[[device]]\nname = \"x\"\ntyp = \"servo\"", "line 3: device \"x\": unknown field `typ`"),
+    ("[[device]]\ntype = \"servo\"\n[[device]]\nalias = 70000", "line 4: device \"number 2\": invalid value"),
+    (
+        "[[device]]\nname = \"x\"\ntype = \"servvo\"",
+        "line 3: device \"x\": type: expected one of {known}, got \"servvo\"",
+    ),
+    ("\n[[device]]\nname = \"x\"", "line 2: device \"x\": expected type or sii, got neither"),
+    (
+        "[[device]]\ntype = \"servo\"\nsii = \"a.bin\"",
+        "line 3: device \"servo-1\": expected either type or sii, got both",
+    ),
+    ("[[device]]\nsii = \"a.bin\"", "line 2: device \"a-1\": sii: nowhere/a.bin cannot be read"),
+    (
+        "[[device]]\ntype = \"servo\"\ncount = 0",
+        "line 3: device \"servo-1\": count: expected 1 to 65535 devices in all, got 0",
+    ),
+    (
+        "[[device]]\ntype = \"servo\"\nname = \"a.b\"",
+        "line 3: device \"a.b\": name: expected one without a dot that is not one of main, redundant, \
+         none, got \"a.b\"",
+    ),
+    (
+        "[[device]]\ntype = \"servo\"\nto_op_ms = -1",
+        "line 3: device \"servo-1\": to_op_ms: expected a time, not negative, got -1",
+    ),
+    (
+        "[[device]]\ntype = \"servo\"\ndrift_ppm = inf",
+        "line 3: device \"servo-1\": drift_ppm: expected -1000000 to 1000000, got inf",
+    ),
+    ("[segment]\nlink_up_delay_us = nan", "line 2: link_up_delay_us: expected a time, not negative, got NaN"),
+    ("[segment]\nring = true", "line 2: ring: there is no device"),
+    (
+        "[segment]\nring = 7\n[[device]]\ntype = \"servo\"",
+        "line 2: ring: expected true, false or \"device.port\", got 7",
+    ),
+];
+
 #[test]
 fn errors_name_line_and_device() {
     let known = crate::catalogue::names().collect::<Vec<_>>().join(", ");
     let coupler = "[[device]]\ntype = \"coupler\"\nname = \"head\"\n";
-    for (text, expected) in [
-        ("[segment]\nspeed = 3", "line 2: unknown field `speed`".to_owned()),
-        ("[[device]]\nname = \"x\"\ntyp = \"servo\"", "line 3: device \"x\": unknown field `typ`".to_owned()),
-        ("[[device]]\ntype = \"servo\"\n[[device]]\nalias = 70000", "line 4: device \"number 2\": invalid value".to_owned()),
-        ("[[device]]\nname = \"x\"\ntype = \"servvo\"", format!("line 3: device \"x\": type: expected one of {known}, got \"servvo\"")),
-        ("\n[[device]]\nname = \"x\"", "line 2: device \"x\": expected type or sii, got neither".to_owned()),
-        ("[[device]]\ntype = \"servo\"\nsii = \"a.bin\"", "line 3: device \"servo-1\": expected either type or sii, got both".to_owned()),
-        ("[[device]]\nsii = \"a.bin\"", "line 2: device \"a-1\": sii: nowhere/a.bin cannot be read".to_owned()),
-        ("[[device]]\ntype = \"servo\"\ncount = 0", "line 3: device \"servo-1\": count: expected 1 to 65535 devices in all, got 0".to_owned()),
-        ("[[device]]\ntype = \"servo\"\nname = \"a.b\"", "line 3: device \"a.b\": name: expected one without a dot that is not one of main, redundant, none, got \"a.b\"".to_owned()),
-        ("[[device]]\ntype = \"servo\"\nto_op_ms = -1", "line 3: device \"servo-1\": to_op_ms: expected a time, not negative, got -1".to_owned()),
-        ("[[device]]\ntype = \"servo\"\ndrift_ppm = inf", "line 3: device \"servo-1\": drift_ppm: expected -1000000 to 1000000, got inf".to_owned()),
-        ("[segment]\nlink_up_delay_us = nan", "line 2: link_up_delay_us: expected a time, not negative, got NaN".to_owned()),
-        ("[segment]\nring = true", "line 2: ring: there is no device".to_owned()),
-        ("[segment]\nring = 7\n[[device]]\ntype = \"servo\"", "line 2: ring: expected true, false or \"device.port\", got 7".to_owned()),
-    ] {
-        let got = refused(text);
+    for (text, expected) in REFUSED {
+        let (got, expected) = (refused(text), expected.replace("{known}", &known));
         assert!(got.starts_with(&expected), "{text}\nexpected {expected}\ngot      {got}");
     }
     for (text, expected) in [

@@ -9,9 +9,8 @@ use toml::Value;
 use super::SegmentError;
 use super::devices::PlannedDevice;
 use super::format::{DeviceEntry, File, line};
-use crate::cable::{CableSpec, DeviceIndex, Endpoint, HostLink};
+use crate::cable::{CableSpec, DEFAULT_CABLE_DELAY, DeviceIndex, Endpoint, HostLink};
 use crate::frame::Port;
-use crate::network::builder::DEFAULT_CABLE_DELAY;
 
 /// Ports that lead further, in the order in which a device's next free one is looked for: OUT of a two-port device
 /// first, then in the order in which frames travel.

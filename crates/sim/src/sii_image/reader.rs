@@ -105,7 +105,8 @@ fn sync_managers(sii: &Sii<'_>) -> Vec<SyncManagerDescription> {
     entries.collect()
 }
 
-/// What a SyncManager is for. Where the image gives no type, its PDOs say so, then the control byte of one that is in use.
+/// What a SyncManager is for. Where the image gives no type, its PDOs say so, then the control byte of one that is in
+/// use.
 fn kind(sii: &Sii<'_>, number: usize, entry: &SiiSyncManager) -> SyncManagerKind {
     let has = |direction| sii.pdos(direction).any(|pdo| pdo.sync_manager.map(usize::from) == Some(number));
     match entry.kind {

@@ -108,7 +108,10 @@ proptest! {
     }
 
     #[test]
-    fn any_image_makes_a_device_or_an_error(mut image in prop::collection::vec(any::<u8>(), 128..700), small in any::<bool>()) {
+    fn any_image_makes_a_device_or_an_error(
+        mut image in prop::collection::vec(any::<u8>(), 128..700),
+        small in any::<bool>()
+    ) {
         if small {
             // Make the chain of categories plausible more often.
             for place in (0x80..image.len().saturating_sub(1)).step_by(20) {

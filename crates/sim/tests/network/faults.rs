@@ -69,8 +69,9 @@ fn a_corrupted_frame_is_counted_by_the_controllers_and_refused_by_the_interface(
     assert_eq!(met(&mut network, Main), Some(vec![1, 2, 3]));
 }
 
+// covers: facts 2.5
 #[test]
-fn symbol_errors_are_counted_where_they_arrive_and_hurt_only_the_frames_they_are_in_facts_2_5() {
+fn symbol_errors_are_counted_where_they_arrive_and_hurt_only_the_frames_they_are_in() {
     let mut network = segment(&ring(3));
     let cable = first_cable(&network);
     let counted = |network: &Network, device: usize| {

@@ -93,10 +93,12 @@ fn faults(devices: usize) -> impl Strategy<Value = Fault> {
     prop_oneof![
         3 => cable.clone().prop_map(Fault::Cut),
         4 => cable.clone().prop_map(Fault::Heal),
-        1 => (cable.clone(), direction.clone()).prop_map(|(cable, direction)| Fault::Drop { cable, direction, count: 1 }),
+        1 => (cable.clone(), direction.clone())
+            .prop_map(|(cable, direction)| Fault::Drop { cable, direction, count: 1 }),
         1 => (cable.clone(), direction.clone())
             .prop_map(|(cable, direction)| Fault::Duplicate { cable, direction, count: 1 }),
-        1 => (cable.clone(), direction.clone()).prop_map(|(cable, direction)| Fault::Corrupt { cable, direction, count: 1 }),
+        1 => (cable.clone(), direction.clone())
+            .prop_map(|(cable, direction)| Fault::Corrupt { cable, direction, count: 1 }),
         1 => (cable, direction).prop_map(move |(cable, direction)| Fault::Delay { cable, direction, count: 1, by }),
         1 => device.clone().prop_map(Fault::PowerOff),
         1 => device.clone().prop_map(Fault::PowerOn),
@@ -118,7 +120,8 @@ fn deeds(devices: usize) -> impl Strategy<Value = Vec<Deed>> {
     let time = prop_oneof![0u64..3_000, 0u64..60_000, Just(1_000_000), Just(120_000_000)];
     let deed = prop_oneof![
         10 => (link, datagrams).prop_map(|(link, datagrams)| Deed::Send(link, datagrams)),
-        1 => (0..devices as u16, register, value).prop_map(|(device, register, data)| Deed::Write(device, register, data)),
+        1 => (0..devices as u16, register, value)
+            .prop_map(|(device, register, data)| Deed::Write(device, register, data)),
         4 => time.clone().prop_map(Deed::Advance),
         4 => time.clone().prop_map(Deed::UntilReceived),
         2 => time.clone().prop_map(Deed::Leap),

@@ -157,7 +157,8 @@ proptest! {
         let mut buffer = [0xAA; MAX_FRAME];
         let mut builder = FrameBuilder::ethernet(&mut buffer, MacAddress::BROADCAST, SOURCE).unwrap();
         for &(code, index, address, length) in &datagrams {
-            let header = Header { address, ..Header::new(Command::from_code(code), index, Target::None, length as u16) };
+            let plain = Header::new(Command::from_code(code), index, Target::None, length as u16);
+            let header = Header { address, ..plain };
             let at = builder.header(header).unwrap();
             builder.data_mut(at, length).unwrap().fill(index);
         }

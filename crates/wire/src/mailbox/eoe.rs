@@ -1,36 +1,24 @@
 //! EoE: Ethernet frames in fragments, and what an IP stack behind a SubDevice needs (facts 6.5).
 //!
-//! In goes or out comes the payload of a mailbox message of protocol EoE. Cutting frames into fragments and putting them
-//! together again is the matter of both ends; [`EoeFragment::max_data`] says how much fits.
+//! In goes or out comes the payload of a mailbox message of protocol EoE. Cutting frames into fragments and putting
+//! them together again is the matter of both ends; [`EoeFragment::max_data`] says how much fits.
 
 mod filter;
 mod fragment;
+mod head;
 mod ip;
 mod result;
 
 use super::payload::{PayloadError, Pen, split};
+use head::{
+    FRAGMENT, GET_FILTER_REQUEST, GET_FILTER_RESPONSE, GET_IP_REQUEST, GET_IP_RESPONSE, KIND, LAST, PORT_SHIFT,
+    SET_FILTER_REQUEST, SET_FILTER_RESPONSE, SET_IP_REQUEST, SET_IP_RESPONSE, TIME_STAMP_RESPONSE,
+};
 
 pub use filter::AddressFilter;
 pub use fragment::{BLOCK, EoeFragment};
 pub use ip::{IpParameters, MAX_NAME};
 pub use result::EoeResult;
-
-const FRAGMENT: u16 = 0;
-const TIME_STAMP_RESPONSE: u16 = 1;
-const SET_IP_REQUEST: u16 = 2;
-const SET_IP_RESPONSE: u16 = 3;
-const SET_FILTER_REQUEST: u16 = 4;
-const SET_FILTER_RESPONSE: u16 = 5;
-const GET_IP_REQUEST: u16 = 6;
-const GET_IP_RESPONSE: u16 = 7;
-const GET_FILTER_REQUEST: u16 = 8;
-const GET_FILTER_RESPONSE: u16 = 9;
-
-const KIND: u16 = 0x000F;
-const PORT_SHIFT: u16 = 4;
-const LAST: u16 = 1 << 8;
-const TIME_APPENDED: u16 = 1 << 9;
-const TIME_REQUESTED: u16 = 1 << 10;
 
 /// A message, with the port of the SubDevice that it is for: 0 is the SubDevice itself or any.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -73,7 +61,7 @@ pub enum EoeBody<'a> {
 
 impl<'a> EoeMessage<'a> {
     /// Bytes before the data.
-    pub const OVERHEAD: usize = 4;
+    pub const OVERHEAD: usize = head::OVERHEAD;
 
     /// Decodes a payload.
     pub fn decode(payload: &'a [u8]) -> Result<EoeMessage<'a>, PayloadError> {

@@ -1,8 +1,8 @@
 //! SoE: reading and writing the elements of IDNs of a drive (facts 6.6).
 //!
-//! In goes or out comes the payload of a mailbox message of protocol SoE. Data that does not fit into one mailbox comes in
-//! fragments; all but the last are marked incomplete and tell how many follow in place of the IDN. Putting them together
-//! is the reader's matter.
+//! In goes or out comes the payload of a mailbox message of protocol SoE. Data that does not fit into one mailbox comes
+//! in fragments; all but the last are marked incomplete and tell how many follow in place of the IDN. Putting them
+//! together is the reader's matter.
 
 mod attribute;
 mod error;
@@ -152,7 +152,8 @@ impl<'a> SoeMessage<'a> {
         })
     }
 
-    /// Encodes a payload and returns its length; `None` where it does not fit `out`. A drive above 7 loses its upper bits.
+    /// Encodes a payload and returns its length; `None` where it does not fit `out`. A drive above 7 loses its upper
+    /// bits.
     pub fn encode(&self, out: &mut [u8]) -> Option<usize> {
         let mut head = self.operation.code() | self.drive << DRIVE_SHIFT;
         if self.incomplete {
@@ -252,7 +253,9 @@ mod tests {
 
     proptest! {
         #[test]
-        fn any_bytes_never_panic_and_what_decodes_encodes_again(bytes in proptest::collection::vec(any::<u8>(), 0..40)) {
+        fn any_bytes_never_panic_and_what_decodes_encodes_again(
+            bytes in proptest::collection::vec(any::<u8>(), 0..40)
+        ) {
             if let Ok(message) = SoeMessage::decode(&bytes) {
                 let _ = (message.error_code(), message.idn());
                 let mut out = [0; 64];

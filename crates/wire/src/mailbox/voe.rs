@@ -53,7 +53,9 @@ mod tests {
 
     proptest! {
         #[test]
-        fn any_bytes_never_panic_and_what_decodes_encodes_again(bytes in proptest::collection::vec(any::<u8>(), 0..40)) {
+        fn any_bytes_never_panic_and_what_decodes_encodes_again(
+            bytes in proptest::collection::vec(any::<u8>(), 0..40)
+        ) {
             if let Ok(message) = VoeMessage::decode(&bytes) {
                 let mut out = [0; 64];
                 let length = message.encode(&mut out).unwrap();

@@ -78,7 +78,8 @@ pub struct Sii<'a> {
 }
 
 impl<'a> Sii<'a> {
-    /// Checks the checksum and walks the chain of categories. What is inside the categories is judged by their decoders.
+    /// Checks the checksum and walks the chain of categories. What is inside the categories is judged by their
+    /// decoders.
     pub fn parse(image: &'a [u8]) -> Result<Sii<'a>, SiiError> {
         let short = SiiError::Short { expected: SiiHeader::LEN, got: image.len() };
         let header = SiiHeader::decode(image.first_chunk().ok_or(short)?);

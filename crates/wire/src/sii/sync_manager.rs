@@ -97,8 +97,8 @@ impl SiiSyncManager {
         self.enable & Self::ENABLE != 0
     }
 
-    /// What its control byte alone says it is for: a mailbox or process data, by its direction (facts 3.11). Some images
-    /// name no type. [`SyncManagerKind::Unused`] where mode or direction are reserved.
+    /// What its control byte alone says it is for: a mailbox or process data, by its direction (facts 3.11). Some
+    /// images name no type. [`SyncManagerKind::Unused`] where mode or direction are reserved.
     pub const fn kind_of_control(&self) -> SyncManagerKind {
         match (self.control & 0x03, self.control & 0x0C) {
             (0b10, 0x04) => SyncManagerKind::MailboxOut,

@@ -204,7 +204,8 @@ proptest! {
 
     #[test]
     fn any_categories_behind_a_good_fixed_area_are_read_without_panic(
-        parts in vec((prop_oneof![Just(10_u16), Just(30), Just(40), Just(41), Just(50), Just(51), Just(60), any::<u16>()],
+        parts in vec((
+            prop_oneof![Just(10_u16), Just(30), Just(40), Just(41), Just(50), Just(51), Just(60), any::<u16>()],
             0_u16..40, vec(any::<u8>(), 0..80)), 0..8),
     ) {
         let mut categories = Vec::new();

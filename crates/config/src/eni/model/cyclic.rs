@@ -2,7 +2,8 @@
 
 use std::fmt;
 
-use super::{Datagram, Place};
+use super::command::Datagram;
+use crate::eni::Place;
 
 /// A state in which a cyclic command is sent (facts 8.2: numbers count states, they are no AL codes).
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]

@@ -1,6 +1,7 @@
 //! What an ENI says of a mailbox: buffers, protocols, commands of each protocol (facts 8.1).
 
-use super::{Place, Transition};
+use super::command::Transition;
+use crate::eni::Place;
 
 /// `Send` or `Recv` of a mailbox.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

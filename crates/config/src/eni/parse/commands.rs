@@ -4,8 +4,9 @@ use ringcat_wire::address::{LogicalAddress, RegisterAddress};
 use ringcat_wire::command::{Addressing, Command};
 
 use crate::eni::element::Element;
-use crate::eni::error::{EniError, Problem, shown};
+use crate::eni::error::{EniError, Problem};
 use crate::eni::model::{Datagram, EcatCommand, Requires, Target, Transition, Validate};
+use crate::eni::quoted::shown;
 
 /// Bytes of a datagram at most (facts 1.3).
 const MAX_DATA: u16 = 1486;

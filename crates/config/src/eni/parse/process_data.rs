@@ -1,10 +1,11 @@
 //! `ProcessData` of a SubDevice, and `ProcessImage` with its variables.
 
 use crate::eni::element::Element;
-use crate::eni::error::{EniError, Problem, shown};
+use crate::eni::error::{EniError, Problem};
 use crate::eni::model::{
     BitRange, ImageSide, Pdo, PdoEntry, ProcessData, ProcessImage, SyncManagerKind, SyncManagerSettings, Variable,
 };
+use crate::eni::quoted::shown;
 
 /// PDOs that can be assigned to a SyncManager: subindices of an object (facts 6.3).
 const ASSIGNED: usize = 255;

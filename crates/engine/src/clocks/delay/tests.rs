@@ -160,8 +160,9 @@ fn errors(broken: Option<usize>, passages: &[Passage], cables: &mut Cables) -> V
     (0..7).map(|node| (unit(node) - truth[node]) >> FRACTION).collect()
 }
 
+// covers: facts 7.5, facts 9.4
 #[test]
-fn a_local_ring_is_known_whole_from_what_it_was_open_and_broken_by_itself_facts_7_5_9_4() {
+fn a_local_ring_is_known_whole_from_what_it_was_open_and_broken_by_itself() {
     let mixed: Vec<Passage> = (0..7).map(|node| passage(150 * (node % 3) + 40, 140 * (node % 3))).collect();
     for passages in [vec![], vec![passage(40, 0); 7], mixed] {
         let is_mixed = passages.iter().any(|other| *other != passages[0]);

@@ -1,19 +1,19 @@
-//! How a reference follows another time: in a ring that is open the second one the first (facts 7.5), with bus shift the
-//! segment's reference the host (facts 7.4).
+//! How a reference follows another time: in a ring that is open the second one the first (facts 7.5), with bus shift
+//! the segment's reference the host (facts 7.4).
 //!
-//! In: how both times differ when a frame, or frames that left together, pass them. Out: what to tell the one that follows.
-//! Every telling has the jitter of the host's sending in it, and so has each difference. One that is far away, since it has
-//! never followed the other, is taken there as fast as its loop can. Once it is near:
+//! In: how both times differ when a frame, or frames that left together, pass them. Out: what to tell the one that
+//! follows. Every telling has the jitter of the host's sending in it, and so has each difference. One that is far away,
+//! since it has never followed the other, is taken there as fast as its loop can. Once it is near:
 //!
-//! * a second reference, which has followed the same clock as the first one and so differs by nanoseconds for seconds, is left
-//!   alone; it is told something when its mean has strayed, and then of a mean, in every cycle;
-//! * one that follows the host is told in every cycle, but of a small part of a long mean. What it is told is that much less
-//!   than what it showed last: the jitter of one cycle is taken back in the next.
+//! * a second reference, which has followed the same clock as the first one and so differs by nanoseconds for seconds,
+//!   is left alone; it is told something when its mean has strayed, and then of a mean, in every cycle;
+//! * one that follows the host is told in every cycle, but of a small part of a long mean. What it is told is that much
+//!   less than what it showed last: the jitter of one cycle is taken back in the next.
 
 use crate::time::Instant;
 
-/// Cycles of which the mean says by how much the ways from the host to both references differ, at the least. Of references
-/// that have followed one clock until now, so many that the mean is as exact as [`EXACT_NS`].
+/// Cycles of which the mean says by how much the ways from the host to both references differ, at the least. Of
+/// references that have followed one clock until now, so many that the mean is as exact as [`EXACT_NS`].
 const GAP_CYCLES: u32 = 16;
 /// And at the most: clocks that are left alone come apart meanwhile.
 const MOST_GAP_CYCLES: u32 = 4_096;
@@ -56,8 +56,8 @@ const CALM_CYCLES: u32 = 1_000;
 const FRESH_NS: u64 = 100_000_000;
 /// It is told of at most this difference at a time.
 const MOST_NS: i64 = 50_000;
-/// Far away, a change of the difference counts like the difference that it would lead to within this time: without that, the
-/// loop in the controller swings for seconds at the pace of cycles.
+/// Far away, a change of the difference counts like the difference that it would lead to within this time: without
+/// that, the loop in the controller swings for seconds at the pace of cycles.
 const FORESIGHT_NS: i64 = 150_000_000;
 /// Clocks never differ by more than what their loops can take out.
 const MOST_PPB: i64 = 800_000;
@@ -73,8 +73,8 @@ struct Law {
     far_ns: i64,
     /// Until it has been nearer than this for [`CALM_CYCLES`].
     settled_ns: i64,
-    /// One that is near is told of this part of the long mean, as a shift; `None`: of all of a short one, and it is left alone
-    /// when it may be.
+    /// One that is near is told of this part of the long mean, as a shift; `None`: of all of a short one, and it is
+    /// left alone when it may be.
     share: Option<u32>,
 }
 
@@ -108,7 +108,8 @@ pub(super) struct Lead {
     /// Nanoseconds that it is ahead, with fraction, and how fast this changes.
     ahead: i64,
     change_ppb: i64,
-    /// Where there is much jitter: nanoseconds that it is ahead and how this changes per cycle, with [`CHANGE_FRACTION`].
+    /// Where there is much jitter: nanoseconds that it is ahead and how this changes per cycle, with
+    /// [`CHANGE_FRACTION`].
     calm_ahead: i64,
     calm_change: i64,
     /// A longer mean, with as many fractional bits as its depth.

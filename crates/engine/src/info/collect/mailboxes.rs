@@ -4,9 +4,9 @@ use alloc::vec::Vec;
 
 use ringcat_wire::sii::{MailboxLayout, SiiHeader, SyncManagerKind};
 
-use super::super::warning::MAILBOX_HEADER;
-use super::super::{InfoWarning, SiiProblem, SubDeviceInfo};
-use super::fixed_area;
+use super::parts::fixed_area;
+use crate::info::subdevice::SubDeviceInfo;
+use crate::info::warning::{InfoWarning, MAILBOX_HEADER, SiiProblem};
 
 /// Byte offsets in the fixed area, for warnings.
 const BOOTSTRAP_AT: usize = 2 * 0x14;

@@ -4,8 +4,9 @@ use ringcat_wire::sii::{
     CategoryKind, FmmuUsage, PdoDirection, Pdos, SiiSyncManager, SiiSyncManagers, SyncManagerKind,
 };
 
-use super::super::{InfoWarning, SiiProblem, SubDeviceInfo};
-use super::{Parts, whole, within};
+use super::parts::{Parts, whole, within};
+use crate::info::subdevice::SubDeviceInfo;
+use crate::info::warning::{InfoWarning, SiiProblem};
 
 const KIND: CategoryKind = CategoryKind::SyncManager;
 
@@ -37,8 +38,8 @@ pub(super) fn collect(info: &mut SubDeviceInfo, parts: &Parts<'_, '_>) {
     }
 }
 
-/// As its type says. Without one, as the PDOs say that belong to it (so does SOEM), then as its control byte does (so does
-/// IgH); one that is neither used nor has a length is for nothing.
+/// As its type says. Without one, as the PDOs say that belong to it (so does SOEM), then as its control byte does (so
+/// does IgH); one that is neither used nor has a length is for nothing.
 fn kind(parts: &Parts<'_, '_>, number: usize, manager: &SiiSyncManager) -> SyncManagerKind {
     match manager.kind {
         SyncManagerKind::MailboxOut

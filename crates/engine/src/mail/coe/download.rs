@@ -6,11 +6,11 @@ use ringcat_wire::mailbox::sdo::{
     AbortCode, EXPEDITED_MAX_DATA, INITIATE_LEN, SEGMENT_OVERHEAD, SdoRequest, SdoResponse,
 };
 
+use super::address::SdoAddress;
 use super::error::{SdoError, SdoFailure};
 use super::transfer::Transfer;
-use super::{Limits, SdoAddress};
-use crate::mail::Mailbox;
 use crate::mail::stream::{Bytes, Source};
+use crate::mail::{Limits, Mailbox};
 
 /// Writes an object.
 pub async fn write(mailbox: &Mailbox, object: SdoAddress, data: &[u8], limits: Limits) -> Result<(), SdoError> {

@@ -4,7 +4,7 @@ use core::fmt;
 
 use ringcat_wire::mailbox::sdo::AbortCode;
 
-use super::SdoAddress;
+use super::address::SdoAddress;
 use crate::mail::MailboxError;
 use crate::mail::stream::Overflow;
 

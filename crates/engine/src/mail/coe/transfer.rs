@@ -4,10 +4,10 @@ use alloc::vec;
 
 use ringcat_wire::mailbox::sdo::{AbortCode, INITIATE_LEN, SdoRequest, SdoResponse};
 
+use super::address::SdoAddress;
 use super::error::{SdoError, SdoFailure};
-use super::{Limits, SdoAddress};
 use crate::mail::lane::Lane;
-use crate::mail::{Mailbox, MailboxError, Talk};
+use crate::mail::{Limits, Mailbox, MailboxError, Talk};
 
 /// Objects that every CoE device has; one that it lacks is answered with an abort, which does as well.
 const DEVICE_TYPE: u16 = 0x1000;

@@ -4,11 +4,11 @@ use alloc::vec::Vec;
 
 use ringcat_wire::mailbox::sdo::{AbortCode, SdoRequest, SdoResponse};
 
+use super::address::SdoAddress;
 use super::error::{SdoError, SdoFailure};
 use super::transfer::Transfer;
-use super::{Limits, SdoAddress};
-use crate::mail::Mailbox;
 use crate::mail::stream::{Bounded, Overflow, Sink};
+use crate::mail::{Limits, Mailbox};
 
 /// Reads an object of at most `limit` bytes.
 pub async fn read(mailbox: &Mailbox, object: SdoAddress, limits: Limits, limit: usize) -> Result<Vec<u8>, SdoError> {

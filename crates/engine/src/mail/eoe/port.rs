@@ -16,8 +16,8 @@ const SEND_LIMIT: Duration = Duration::from_millis(500);
 
 /// The Ethernet of one SubDevice: frames to it and from it. There is one port for a mailbox; dropped, it ends.
 ///
-/// It lasts longer than the SubDevice's being there. While the mailbox is not in use it is down: frames are refused, and
-/// those that waited are dropped and counted.
+/// It lasts longer than the SubDevice's being there. While the mailbox is not in use it is down: frames are refused,
+/// and those that waited are dropped and counted.
 #[derive(Debug)]
 pub struct EthernetPort {
     room: Rc<Room>,
@@ -50,8 +50,8 @@ impl EthernetPort {
         self.queue(frame, false).map(drop)
     }
 
-    /// As [`EthernetPort::send`], and asks the SubDevice when it sends the frame on: the answer is a [`TimeStamp`] with the
-    /// number that is returned.
+    /// As [`EthernetPort::send`], and asks the SubDevice when it sends the frame on: the answer is a [`TimeStamp`] with
+    /// the number that is returned.
     pub fn send_with_time(&self, frame: &[u8]) -> Result<u8, QueueError> {
         self.queue(frame, true)
     }

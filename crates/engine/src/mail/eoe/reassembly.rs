@@ -1,14 +1,12 @@
 //! Frames put together from fragments as they come (facts 6.5).
 //!
-//! Frames are told apart by their number, so fragments of several may mix. A fragment that does not go on where its frame
-//! ended loses that frame; a fragment 0 begins anew. What a SubDevice sends takes no more memory than one frame for each
-//! number.
+//! Frames are told apart by their number, so fragments of several may mix. A fragment that does not go on where its
+//! frame ended loses that frame; a fragment 0 begins anew. What a SubDevice sends takes no more memory than one frame
+//! for each number.
 
 use alloc::vec::Vec;
 
 use ringcat_wire::mailbox::eoe::{BLOCK, EoeFragment};
-
-use super::traffic::MAX_FRAME;
 
 /// Frame numbers.
 const NUMBERS: usize = 16;
@@ -87,6 +85,9 @@ impl Partial {
         true
     }
 }
+
+/// Longest frame without check sequence: 1,500 bytes of payload, header, a VLAN tag.
+pub const MAX_FRAME: usize = 1518;
 
 #[cfg(test)]
 mod tests {

@@ -7,13 +7,11 @@ use core::time::Duration;
 
 use ringcat_wire::mailbox::eoe::{EoeBody, EoeMessage};
 
-use super::reassembly::{Outcome, Reassembly};
+use super::reassembly::{MAX_FRAME, Outcome, Reassembly};
 use crate::mail::answer_time::AnswerTime;
 use crate::mail::ring::Ring;
 use crate::time::Instant;
 
-/// Longest frame without check sequence: 1,500 bytes of payload, header, a VLAN tag.
-pub const MAX_FRAME: usize = 1518;
 /// Shortest frame: its header.
 const MIN_FRAME: usize = 14;
 /// Frames that may wait to be sent: some twenty milliseconds of what a mailbox carries. Who sends more has to wait.
@@ -80,7 +78,8 @@ pub struct EthernetCounters {
     pub tx_frames: u64,
     /// Their bytes.
     pub tx_bytes: u64,
-    /// Frames that were taken for sending and did not get through: the SubDevice went away, or took no mail for too long.
+    /// Frames that were taken for sending and did not get through: the SubDevice went away, or took no mail for too
+    /// long.
     pub tx_dropped: u64,
     /// Frames that came from the SubDevice.
     pub rx_frames: u64,

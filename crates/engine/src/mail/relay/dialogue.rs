@@ -101,8 +101,8 @@ impl Dialogue {
         self.transfer != Transfer::None
     }
 
-    /// A message of the client goes to the SubDevice, whose receive mailbox has this size. The error is for the client: no
-    /// such service passes.
+    /// A message of the client goes to the SubDevice, whose receive mailbox has this size. The error is for the client:
+    /// no such service passes.
     pub(super) fn ask(&mut self, lane: Lane, payload: &[u8], mailbox_size: usize) -> Result<Asks, u16> {
         self.pending = self.transfer.clone();
         match lane {

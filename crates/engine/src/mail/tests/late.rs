@@ -1,4 +1,5 @@
-//! What comes late: fragments of an answer that nobody waits for any more, and error replies that may be to something else.
+//! What comes late: fragments of an answer that nobody waits for any more, and error replies that may be to something
+//! else.
 
 use alloc::vec;
 use alloc::vec::Vec;
@@ -212,8 +213,9 @@ fn a_protocol_that_is_known_is_not_refused_because_ethernet_frames_are_facts_6_1
     assert_eq!(kept, Some(Protocol::Error));
 }
 
+// covers: facts 6.1
 #[test]
-fn an_error_reply_to_something_else_does_not_end_the_wait_for_a_late_answer_facts_6_1() {
+fn an_error_reply_to_something_else_does_not_end_the_wait_for_a_late_answer() {
     let mut bench = Bench::new(LinkSet::Single, 64);
     bench.device.delay = 3 * MS;
     bench.send_unanswered();

@@ -281,8 +281,9 @@ fn vendor_messages_are_exchanged_and_received_unasked_facts_6_8() {
     assert_eq!(result, Ok(message));
 }
 
+// covers: facts 6.1
 #[test]
-fn an_error_reply_goes_to_the_request_whose_protocol_is_unknown_to_the_subdevice_facts_6_1() {
+fn an_error_reply_goes_to_the_request_whose_protocol_is_unknown_to_the_subdevice() {
     let mut bench = Bench::new(LinkSet::Single, 128);
     bench.device.server.objects.insert((0x2000, 1), pattern(1, 2000));
     let mailbox = bench.mailbox.clone();
@@ -300,8 +301,9 @@ fn an_error_reply_goes_to_the_request_whose_protocol_is_unknown_to_the_subdevice
 }
 
 // Only the last fragment is answered: an error reply before that may be to any of them, or to what somebody else asked.
+// covers: facts 6.6
 #[test]
-fn an_error_reply_while_fragments_are_written_fails_the_write_whoever_else_waits_facts_6_6() {
+fn an_error_reply_while_fragments_are_written_fails_the_write_whoever_else_waits() {
     let mut bench = Bench::new(LinkSet::Single, 64);
     let address = SoeAddress::value(1, Idn::standard(0, 7));
     let mailbox = bench.mailbox.clone();

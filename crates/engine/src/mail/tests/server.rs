@@ -77,6 +77,24 @@ impl Everything {
         Everything { room, ..Everything::default() }
     }
 
+    fn upload(&mut self, index: u16, sub_index: u8, complete_access: bool) -> Vec<(Protocol, Vec<u8>)> {
+        let mut out = vec![0; self.room];
+        let Some(data) = self.objects.get(&(index, sub_index)).cloned() else {
+            return abort(index, sub_index, AbortCode::OBJECT_DOES_NOT_EXIST);
+        };
+        if (1..=4).contains(&data.len()) {
+            let response = SdoResponse::UploadExpedited { index, sub_index, complete_access, data: &data };
+            return encoded(&response, &mut out);
+        }
+        let total = data.len();
+        let at = total.min(self.room - 10);
+        let first = data[..at].to_vec();
+        self.sdo = Some(Sdo { key: (index, sub_index), data, at, total, toggle: false });
+        let total = total as u32;
+        let response = SdoResponse::UploadNormal { index, sub_index, complete_access, total, data: &first };
+        encoded(&response, &mut out)
+    }
+
     fn sdo(&mut self, payload: &[u8]) -> Vec<(Protocol, Vec<u8>)> {
         let Ok(request) = SdoRequest::decode(payload) else { return Vec::new() };
         let mut out = vec![0; self.room];
@@ -95,20 +113,7 @@ impl Everything {
                 SdoResponse::DownloadDone { index, sub_index }
             }
             SdoRequest::Upload { index, sub_index, complete_access } => {
-                let Some(data) = self.objects.get(&(index, sub_index)).cloned() else {
-                    return abort(index, sub_index, AbortCode::OBJECT_DOES_NOT_EXIST);
-                };
-                if (1..=4).contains(&data.len()) {
-                    let response = SdoResponse::UploadExpedited { index, sub_index, complete_access, data: &data };
-                    return encoded(&response, &mut out);
-                }
-                let total = data.len();
-                let at = total.min(self.room - 10);
-                let first = data[..at].to_vec();
-                self.sdo = Some(Sdo { key: (index, sub_index), data, at, total, toggle: false });
-                let total = total as u32;
-                let response = SdoResponse::UploadNormal { index, sub_index, complete_access, total, data: &first };
-                return encoded(&response, &mut out);
+                return self.upload(index, sub_index, complete_access);
             }
             SdoRequest::DownloadSegment { toggle, last, data } => {
                 let Some(sdo) = self.sdo.as_mut().filter(|sdo| sdo.toggle == toggle) else {
@@ -245,6 +250,13 @@ impl Everything {
             FoeMessage::Busy { .. } => return Vec::new(),
         };
         let packets = matches!(message, FoeMessage::Read { .. } | FoeMessage::Acknowledge { .. });
+        self.foe_reply(answer, packets)
+    }
+
+    /// The next packet, an acknowledgement or an error.
+    fn foe_reply(&self, answer: Result<(), (FoeErrorCode, &str)>, packets: bool) -> Vec<(Protocol, Vec<u8>)> {
+        let full = self.room - FoeMessage::OVERHEAD;
+        let mut out = vec![0; self.room];
         let reply = match (answer, &self.reading, &self.writing) {
             (Err((code, text)), _, _) => FoeMessage::Error { code, text: text.as_bytes() },
             (Ok(()), Some((file, next)), _) if packets => {

@@ -89,6 +89,20 @@ async fn vendor(mailbox: Mailbox, done: Done) {
     done.borrow_mut()[4] += 1;
 }
 
+/// What becomes of a frame.
+fn fate(dice: &mut Dice, percent: u64, links: LinkSet) -> Fate {
+    if dice.below(100) >= percent {
+        return Fate::Passes;
+    }
+    match dice.below(4) {
+        0 => Fate::LostOut,
+        1 => Fate::LostBack,
+        2 => Fate::Late(Duration::from_micros(dice.below(60_000))),
+        _ if links == LinkSet::Ring => Fate::MetTwice,
+        _ => Fate::LostBack,
+    }
+}
+
 /// One run; `percent` of the frames meet with something.
 fn storm(seed: u64, links: LinkSet, percent: u64, drops: bool) {
     let mut dice = Dice(seed.wrapping_mul(0x9E37_79B9_7F4A_7C15) | 1);
@@ -131,18 +145,7 @@ fn storm(seed: u64, links: LinkSet, percent: u64, drops: bool) {
                 };
             });
         }
-        bench.step(|| {
-            if dice.below(100) >= percent {
-                return Fate::Passes;
-            }
-            match dice.below(4) {
-                0 => Fate::LostOut,
-                1 => Fate::LostBack,
-                2 => Fate::Late(Duration::from_micros(dice.below(60_000))),
-                _ if links == LinkSet::Ring => Fate::MetTwice,
-                _ => Fate::LostBack,
-            }
-        });
+        bench.step(|| fate(&mut dice, percent, links));
         heard.extend(core::iter::from_fn(|| bench.mailbox.pop_emergency()).map(|(_, emergency)| emergency.error_code));
     }
     for _ in 0..10 {

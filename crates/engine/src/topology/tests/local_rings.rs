@@ -29,8 +29,9 @@ fn a_whole_ring_behind_a_junction_is_a_branch_on_the_port_where_it_begins_jr_01(
     assert_eq!(topology.local_rings[0].cables, cables);
 }
 
+// covers: LC-06
 #[test]
-fn a_broken_ring_behind_a_junction_keeps_order_and_place_and_is_no_crossed_line_lc_06() {
+fn a_broken_ring_behind_a_junction_keeps_order_and_place_and_is_no_crossed_line() {
     // Between 10 and 11.
     let nodes = [status(JUNCTION), status(END), status(HEAD), status(PASS), status(END)];
     let topology = Topology::with_local_rings(&nodes, 5, &[CLOSING]);

@@ -1,8 +1,9 @@
-//! Distributed clocks (issue 6): how exact delays are, how closely clocks stay together, how well the host follows them.
+//! Distributed clocks (issue 6): how exact delays are, how closely clocks stay together, how well the host follows
+//! them.
 //!
-//! Everything runs in virtual time on clocks that are not ideal ([`scenarios::clocks`]): drift up to 50 or 100 ppm, slow
-//! wander, 40 ns of jitter on every receive time, a fourth of them with 32 bits. What the MainDevice cannot see, the truth
-//! about the clocks, comes from the simulator.
+//! Everything runs in virtual time on clocks that are not ideal ([`scenarios::clocks`]): drift up to 50 or 100 ppm,
+//! slow wander, 40 ns of jitter on every receive time, a fourth of them with 32 bits. What the MainDevice cannot see,
+//! the truth about the clocks, comes from the simulator.
 
 use std::process::ExitCode;
 use std::time::Duration;

@@ -1,6 +1,6 @@
-//! Delays that are written while process data goes on (issue 14): rings of 2 to 64, local rings, random trees with rings,
-//! against the truth of the simulator ([`scenarios::delays`]). `DELAYS` in the environment is how many changes of each kind;
-//! without it, a share of what is to hold.
+//! Delays that are written while process data goes on (issue 14): rings of 2 to 64, local rings, random trees with
+//! rings, against the truth of the simulator ([`scenarios::delays`]). `DELAYS` in the environment is how many changes
+//! of each kind; without it, a share of what is to hold.
 
 use std::process::ExitCode;
 use std::thread;

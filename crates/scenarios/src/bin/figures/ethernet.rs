@@ -1,9 +1,9 @@
 //! TCP through the mailbox of one SubDevice in virtual time (issue 4): how much per second, and that it does not depend
 //! on the application's cycle.
 //!
-//! The SubDevice has the simulator's IP stack behind its mailbox. It takes 200 us for a message that it gets and no time for
-//! those that it sends of itself, so what is measured is the wire and us. The host's end is another stack that works beside
-//! the acyclic half. Process data of the whole segment goes on meanwhile.
+//! The SubDevice has the simulator's IP stack behind its mailbox. It takes 200 us for a message that it gets and no
+//! time for those that it sends of itself, so what is measured is the wire and us. The host's end is another stack that
+//! works beside the acyclic half. Process data of the whole segment goes on meanwhile.
 
 use std::net::Ipv4Addr;
 use std::process::ExitCode;

@@ -1,5 +1,5 @@
-//! Figures in virtual time, each with its bar: `figures SUBJECT`, without one all of them. One program for all, because each
-//! would be linked with everything.
+//! Figures in virtual time, each with its bar: `figures SUBJECT`, without one all of them. One program for all, because
+//! each would be linked with everything.
 
 mod clocks;
 mod delays;

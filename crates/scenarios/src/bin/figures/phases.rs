@@ -1,8 +1,8 @@
-//! Where the time of a start-up of a few SubDevices goes, in virtual time: the end of each phase, how long nothing was on
-//! the wire, and how many exchanges followed one another.
+//! Where the time of a start-up of a few SubDevices goes, in virtual time: the end of each phase, how long nothing was
+//! on the wire, and how many exchanges followed one another.
 //!
-//! The segments are those of the tests on real interfaces: 1, 10 and 50 SubDevices of the catalogue with the simulator's
-//! usual timing (8 bytes of SII every 500 us, 1 ms per change of state).
+//! The segments are those of the tests on real interfaces: 1, 10 and 50 SubDevices of the catalogue with the
+//! simulator's usual timing (8 bytes of SII every 500 us, 1 ms per change of state).
 
 use std::process::ExitCode;
 use std::time::Duration;

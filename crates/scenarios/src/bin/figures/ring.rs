@@ -1,6 +1,6 @@
-//! Figures of the ring (issue 5), in virtual time: incomplete cycles per edge for every cable of rings of 2, 5, 16 and 64
-//! in every phase of their life, how soon a break is told and placed, how soon the original direction is back, and ten
-//! thousand short random runs.
+//! Figures of the ring (issue 5), in virtual time: incomplete cycles per edge for every cable of rings of 2, 5, 16 and
+//! 64 in every phase of their life, how soon a break is told and placed, how soon the original direction is back, and
+//! ten thousand short random runs.
 //!
 //! Without arguments all of it; `ring SEED` runs one of the random runs again.
 

@@ -8,10 +8,10 @@
 //! The bytes that cannot be done without, per SubDevice: for every 4 or 8 bytes of its SII one FPWR of command and word
 //! address (6 bytes) and one FPRD that polls and brings the data along (6 + 4 or 6 + 8 bytes); its station address (2);
 //! its SyncManager (8) and FMMU (16); AL control for PREOP, SAFEOP and OP (2 each). These are steps that follow one
-//! another, each with a datagram (12 bytes besides its data) for every SubDevice, packed into as few frames as hold them
-//! (16 bytes of header, at least 60, at most 1,514). Neither AL status nor anything else is read, no working counter is
-//! checked twice, and process data is not in it. What is compared with it are all bytes that left the interface until
-//! OP, cyclic frames too, without check sequences.
+//! another, each with a datagram (12 bytes besides its data) for every SubDevice, packed into as few frames as hold
+//! them (16 bytes of header, at least 60, at most 1,514). Neither AL status nor anything else is read, no working
+//! counter is checked twice, and process data is not in it. What is compared with it are all bytes that left the
+//! interface until OP, cyclic frames too, without check sequences.
 
 use std::process::ExitCode;
 use std::time::Duration;
@@ -51,7 +51,8 @@ impl Start {
         let Start { time, scanned, bytes, cyclic_bytes, floor } = self;
         let (time, scanned, ratio) = (time.as_secs_f64(), scanned.as_secs_f64(), self.ratio());
         format!(
-            "{time:.3} s (scan {scanned:.3} s), {bytes:>7} bytes ({cyclic_bytes:>4} cyclic), floor {floor:>7}, {ratio:.2} x"
+            "{time:.3} s (scan {scanned:.3} s), {bytes:>7} bytes ({cyclic_bytes:>4} cyclic), floor {floor:>7}, \
+             {ratio:.2} x"
         )
     }
 }

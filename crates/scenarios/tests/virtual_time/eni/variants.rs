@@ -1,5 +1,5 @@
-//! What files say beside the usual: groups that come later, tasks of several speeds, objects that a drive does not have; and
-//! a ring behind a junction, of which no file says anything.
+//! What files say beside the usual: groups that come later, tasks of several speeds, objects that a drive does not
+//! have; and a ring behind a junction, of which no file says anything.
 
 use std::time::Duration;
 
@@ -113,7 +113,8 @@ fn an_object_that_a_drive_refuses_is_told_with_the_comment_of_the_file_facts_8_2
     assert_eq!(plant.device(LAMPS).outputs(), [1], "the others work");
 }
 
-/// Coupler, lamps, valves, buttons and back to the coupler, which has the drive on its port 2. The file knows nothing of it.
+/// Coupler, lamps, valves, buttons and back to the coupler, which has the drive on its port 2. The file knows nothing
+/// of it.
 #[test]
 fn a_ring_behind_a_junction_is_declared_by_station_addresses_of_the_file_between_load_and_apply_jr_05() {
     let file = with(&[]);
@@ -201,7 +202,8 @@ fn with_commands_of_the_drive(commands: &str) -> EniFile {
 fn registers_that_a_file_checks_are_those_of_the_simulated_segment_where_an_eeprom_sets_them() {
     let check = |ado: u16, data: &str, mask: &str| {
         format!(
-            "<InitCmd><Transition>IP</Transition><Comment>check {ado}</Comment><Cmd>4</Cmd><Adp>1005</Adp><Ado>{ado}</Ado>\
+            "<InitCmd><Transition>IP</Transition><Comment>check {ado}</Comment><Cmd>4</Cmd><Adp>1005</Adp>\
+             <Ado>{ado}</Ado>\
              <Data>0000</Data><Validate><Data>{data}</Data>{mask}<Timeout>10</Timeout></Validate></InitCmd>"
         )
     };

@@ -1,4 +1,5 @@
-//! Ports of junctions that were closed on purpose, while rings are looked into of which no frame comes back (facts 2.2).
+//! Ports of junctions that were closed on purpose, while rings are looked into of which no frame comes back (facts
+//! 2.2).
 
 use std::time::Duration;
 
@@ -15,8 +16,9 @@ use super::second_breaks::{ends_of_two, two_rings};
 use super::{change, in_op, told};
 
 /// Junctions are told with one order what to do about all of their ports: one that the application had closed stays so.
+// covers: facts 2.2
 #[test]
-fn a_port_that_is_closed_on_purpose_stays_closed_while_rings_are_looked_into_facts_2_2() {
+fn a_port_that_is_closed_on_purpose_stays_closed_while_rings_are_looked_into() {
     for by_name in [false, true] {
         let mut world = in_op(43, two_rings(), (JunctionMode::Automatic, &[]));
         let engine = world.application_mut().engine_mut();
@@ -65,8 +67,8 @@ fn a_port_that_is_closed_on_purpose_stays_closed_while_rings_are_looked_into_fac
     }
 }
 
-/// Starts to have junction 3 of [`two_rings`] close its port 2, in one of several ways. What comes back says whether that
-/// has worked, once it is known.
+/// Starts to have junction 3 of [`two_rings`] close its port 2, in one of several ways. What comes back says whether
+/// that has worked, once it is known.
 fn close_port(world: &mut World, way: usize) -> Box<dyn FnMut() -> Option<bool>> {
     let loops = vec![LoopControl::Closed.code() << 4];
     let register = map::DL_CONTROL.offset(1);

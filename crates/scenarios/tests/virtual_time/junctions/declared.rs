@@ -1,5 +1,5 @@
-//! Connections that are declared and are not there (JR-05, JR-06): they are refused, whatever open ports allow, and those that
-//! are there are not.
+//! Connections that are declared and are not there (JR-05, JR-06): they are refused, whatever open ports allow, and
+//! those that are there are not.
 
 use ringcat::{ActivateError, Error, JunctionConnection, JunctionError, JunctionMode, Options, automatic};
 use ringcat_sim::cable::{CableId, Endpoint};
@@ -31,8 +31,9 @@ fn not_there(result: Result<World, Error>) -> Option<JunctionConnection> {
     }
 }
 
+// covers: JR-05, JR-06
 #[test]
-fn a_ring_that_is_declared_to_close_elsewhere_is_refused_whole_and_broken_jr_05_jr_06() {
+fn a_ring_that_is_declared_to_close_elsewhere_is_refused_whole_and_broken() {
     // All but the last open ports allow as well as the truth.
     for wrong in [(1, 2, 1), (1, 3, 1), (1, 5, 1), (1, 6, 1)].map(connection) {
         for broken in [None, Some(2), Some(3), Some(4), Some(5)] {
@@ -96,8 +97,9 @@ fn connections_of_two_rings_that_are_exchanged_or_of_a_line_are_refused_jr_05_jr
     }
 }
 
+// covers: JR-05, JR-06
 #[test]
-fn of_random_segments_the_right_connections_are_taken_and_wrong_ones_refused_jr_05_jr_06() {
+fn of_random_segments_the_right_connections_are_taken_and_wrong_ones_refused() {
     let (mut taken, mut wrong) = (0, 0);
     for seed in 0..16 {
         let dice = &mut Dice::new(900 + seed);

@@ -1,6 +1,6 @@
-//! Random segments with rings behind junctions, one in another or side by side, hot connect groups in them or beside them,
-//! one link or two: groups come and go, cables break and are mended, the segment is looked at anew, at any moment. What is
-//! told is held against what was done. Frames get lost meanwhile.
+//! Random segments with rings behind junctions, one in another or side by side, hot connect groups in them or beside
+//! them, one link or two: groups come and go, cables break and are mended, the segment is looked at anew, at any
+//! moment. What is told is held against what was done. Frames get lost meanwhile.
 //!
 //! `SEED=17 cargo test --workspace --test virtual_time junctions::explorer::seeds -- --nocapture` runs one seed,
 //! `SEED=1000..2000` many.
@@ -200,8 +200,8 @@ impl Run {
         assert!(broken <= 1 && told.len() == 2 * broken, "cable {cable}: {told:?}");
     }
 
-    /// More than is tolerated: two cables of local rings. Whatever that costs, both are told, each with its place where the
-    /// cabling is known, and all is well when they are mended.
+    /// More than is tolerated: two cables of local rings. Whatever that costs, both are told, each with its place where
+    /// the cabling is known, and all is well when they are mended.
     fn break_two(&mut self) {
         if self.broken.is_some() || self.looking.is_some() || !self.is_settled || !self.is_known {
             return;

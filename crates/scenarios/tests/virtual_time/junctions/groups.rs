@@ -207,8 +207,9 @@ const WITH_GROUP: [Option<usize>; 7] = [Some(0), Some(1), Some(2), Some(5), Some
 const WITHOUT_GROUP: [Option<usize>; 5] = [Some(0), Some(1), Some(2), Some(3), Some(4)];
 
 /// By itself, and otherwise when somebody asks for a rescan.
+// covers: JR-07, CR-17
 #[test]
-fn a_group_in_a_local_ring_is_a_piece_of_it_and_when_it_has_left_no_more_jr_07_cr_17() {
+fn a_group_in_a_local_ring_is_a_piece_of_it_and_when_it_has_left_no_more() {
     let asked = SETTINGS.map(|setting| (false, setting));
     for (seed, (follow, (two_links, setting))) in
         (20..).zip(asked.into_iter().chain([1, 2].map(|it| (true, SETTINGS[it]))))
@@ -268,7 +269,8 @@ fn a_group_in_a_local_ring_is_a_piece_of_it_and_when_it_has_left_no_more_jr_07_c
     }
 }
 
-/// Broken and whole again, once each, the latter with its true place, however the break and the look at the segment meet.
+/// Broken and whole again, once each, the latter with its true place, however the break and the look at the segment
+/// meet.
 #[test]
 fn a_break_at_the_moment_of_a_groups_join_is_told_once_jr_07() {
     for (number, cable) in [4, 3, 5, 4, 6, 2].into_iter().enumerate() {

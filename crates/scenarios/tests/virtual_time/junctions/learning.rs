@@ -1,5 +1,5 @@
-//! What a scan knows of rings behind junctions: in mode automatic several of them, one in another, one of them broken, though
-//! open ports allow many answers (JR-03); of one that is broken, all but an end of the broken cable.
+//! What a scan knows of rings behind junctions: in mode automatic several of them, one in another, one of them broken,
+//! though open ports allow many answers (JR-03); of one that is broken, all but an end of the broken cable.
 
 use ringcat::{Cable, Event, JunctionMode};
 use ringcat_engine::topology::{Closing, PortOf};
@@ -72,8 +72,8 @@ fn four_rings_one_in_another_are_learned_whole_and_with_any_one_broken_jr_03() {
     }
 }
 
-/// A cable that was broken at the scan has an end that nobody knows: it is no cable of an interface, and is among the others
-/// once it has been whole.
+/// A cable that was broken at the scan has an end that nobody knows: it is no cable of an interface, and is among the
+/// others once it has been whole.
 #[test]
 fn a_cable_of_a_local_ring_that_was_broken_at_the_scan_is_listed_with_its_ends_once_it_is_whole_jr_07() {
     let cables = |world: &World| -> Vec<Cable> {
@@ -92,7 +92,10 @@ fn a_cable_of_a_local_ring_that_was_broken_at_the_scan_is_listed_with_its_ends_o
         // Errors are counted for it like for any other.
         world.corrupt(CableId(broken), 30);
         world.run_cycles(1_600);
-        let told = |timed: &&ringcat::TimedEvent| matches!(timed.event, Event::CableErrors { cable, .. } if cable == whole[broken]);
+        let told = |timed: &&ringcat::TimedEvent| {
+            matches!(timed.event, Event::CableErrors { cable, .. }
+            if cable == whole[broken])
+        };
         assert_eq!(world.events(world.beginning()).iter().filter(told).count(), 1, "{what}");
     }
 }

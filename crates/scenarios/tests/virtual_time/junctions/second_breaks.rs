@@ -74,10 +74,11 @@ pub fn ends_of_two(cable: usize) -> (PortOf, PortOf) {
     (PortOf { node: near, port }, PortOf { node: far, port: 0 })
 }
 
-/// Both breaks of two rings come within one cycle, so that no frame can tell where. Nothing comes back, and that is said;
-/// then each ring is looked into while the other one is left out.
+/// Both breaks of two rings come within one cycle, so that no frame can tell where. Nothing comes back, and that is
+/// said; then each ring is looked into while the other one is left out.
+// covers: JR-02
 #[test]
-fn two_rings_that_break_at_once_are_told_as_blocked_and_both_with_their_places_jr_02() {
+fn two_rings_that_break_at_once_are_told_as_blocked_and_both_with_their_places() {
     let apart = [Duration::ZERO, Duration::from_micros(3), Duration::from_micros(400)];
     let settings = [(JunctionMode::Automatic, &[][..]), (JunctionMode::Strict, &TWO_STRICT)];
     for (number, (first, second)) in [(2, 6), (1, 5), (3, 7), (6, 1), (2, 5), (5, 2)].into_iter().enumerate() {
@@ -126,8 +127,9 @@ fn two_rings_that_break_at_once_are_told_as_blocked_and_both_with_their_places_j
 }
 
 /// The same in a closed ring of two links, in which copies of the redundant link come back and have met nobody.
+// covers: JR-02
 #[test]
-fn two_local_rings_that_break_in_a_ring_of_two_links_are_told_with_their_places_too_jr_02() {
+fn two_local_rings_that_break_in_a_ring_of_two_links_are_told_with_their_places_too() {
     let mut cables = TWO_RINGS.to_vec();
     cables.push((at(6, B), REDUNDANT));
     let mut world = in_op(40, wired(&KINDS, &cables), (JunctionMode::Automatic, &[]));
@@ -280,10 +282,11 @@ fn a_local_ring_in_a_ring_of_two_links_goes_on_with_one_break_anywhere_jr_02() {
     }
 }
 
-/// Enhanced detection opens the ring of two links for a moment whenever ports change, and finds nobody crossed in a local ring
-/// that is entered from behind.
+/// Enhanced detection opens the ring of two links for a moment whenever ports change, and finds nobody crossed in a
+/// local ring that is entered from behind.
+// covers: LC-03, LC-06
 #[test]
-fn a_local_ring_that_breaks_is_no_crossed_line_for_enhanced_detection_either_lc_03_lc_06() {
+fn a_local_ring_that_breaks_is_no_crossed_line_for_enhanced_detection_either() {
     let strict = JunctionConnection { head: 1, head_port: 1, tail: 3, tail_port: 1 };
     for (mode, connections) in [(JunctionMode::Automatic, &[][..]), (JunctionMode::Strict, &[strict])] {
         let options = Options { junctions: mode, enhanced_line_crossed: true, ..Options::default() };

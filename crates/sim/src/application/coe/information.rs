@@ -124,8 +124,8 @@ fn entry(request: EntryRequest, dictionary: &Dictionary) -> Data {
     Ok(bytes)
 }
 
-/// A gap between two entries of a record: an entry without type and bits. MainDevices that list an object ask for each sub
-/// index up to the last, and take an error as one of the device.
+/// A gap between two entries of a record: an entry without type and bits. MainDevices that list an object ask for each
+/// sub index up to the last, and take an error as one of the device.
 fn gap(request: EntryRequest) -> Data {
     let EntryRequest { index, sub_index, value_info } = request;
     let name = format!("SubIndex {sub_index:03}");

@@ -1,14 +1,16 @@
 //! PDOs by mailbox instead of with the process data (facts 6.3).
 //!
-//! In: an RxPDO, whose values go to the objects that it maps; a request for a TxPDO or RxPDO. Out: that PDO with the present
-//! values. An RxPDO is not answered. The number of the CoE header is the distance of the PDO from 0x1600 or 0x1A00.
+//! In: an RxPDO, whose values go to the objects that it maps; a request for a TxPDO or RxPDO. Out: that PDO with the
+//! present values. An RxPDO is not answered. The number of the CoE header is the distance of the PDO from 0x1600 or
+//! 0x1A00.
 
 use ringcat_wire::al::AlState;
 use ringcat_wire::mailbox::ErrorReply;
 use ringcat_wire::mailbox::coe::{CoeHeader, CoeService};
 use ringcat_wire::sii::PdoDirection;
 
-use super::{Answer, Objects};
+use super::objects::Objects;
+use crate::application::answer::Answer;
 use crate::application::dictionary::{MappedEntry, ObjectRole};
 
 const RX_BASE: u16 = 0x1600;

@@ -6,10 +6,9 @@ use ringcat_wire::mailbox::sdo::{
     AbortCode, EXPEDITED_MAX_DATA, INITIATE_LEN, SEGMENT_MIN_DATA, SEGMENT_OVERHEAD, SdoError, SdoRequest, SdoResponse,
 };
 
-use super::{Answer, Objects};
-
-/// Most bytes of an object: what a download announces is kept until its end.
-pub const MAX_TRANSFER_BYTES: usize = 1 << 20;
+use super::objects::Objects;
+use crate::application::answer::Answer;
+use crate::application::dictionary::MAX_TRANSFER_BYTES;
 
 /// An object on its way in segments.
 #[derive(Clone, Debug, Default)]

@@ -4,8 +4,8 @@ use ringcat_wire::al::AlState;
 use ringcat_wire::mailbox::coe::{AccessRights, DataType};
 use ringcat_wire::mailbox::sdo::AbortCode;
 
-use crate::application::coe::MAX_TRANSFER_BYTES;
-
+/// Most bytes of an object: what a download announces is kept until its end.
+pub const MAX_TRANSFER_BYTES: usize = 1 << 20;
 /// Longest value that has a default and a range: one number.
 const MAX_NUMBER: usize = 8;
 

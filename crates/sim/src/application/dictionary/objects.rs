@@ -5,7 +5,8 @@ use std::collections::BTreeMap;
 use ringcat_wire::mailbox::coe::AccessRights;
 use ringcat_wire::sii::{PdoDirection, SyncManagerKind};
 
-use super::{ASSIGNMENT_BASE, Access, Entry, MAX_MAPPED_ENTRIES, MappedEntry, Object, ObjectRole};
+use super::entry::{Access, Entry};
+use super::object::{ASSIGNMENT_BASE, MAX_MAPPED_ENTRIES, MappedEntry, Object, ObjectRole};
 use crate::description::{DeviceDescription, PdoDescription, data_type};
 
 /// All objects, indices ascending. An object of the description replaces a standard one.

@@ -1,7 +1,7 @@
 //! An IP stack behind an EoE device (smoltcp): answers ARP and ping, serves TCP.
 //!
-//! In: frames, virtual time. Out: frames. Port 7 sends back what comes; port 80 answers `GET /bytes/N` with N bytes and any
-//! other request with the device's name. Nothing is random: the seed of the sequence numbers is the MAC address.
+//! In: frames, virtual time. Out: frames. Port 7 sends back what comes; port 80 answers `GET /bytes/N` with N bytes and
+//! any other request with the device's name. Nothing is random: the seed of the sequence numbers is the MAC address.
 
 use core::fmt;
 use core::fmt::Write as _;
@@ -13,7 +13,7 @@ use smoltcp::socket::tcp;
 use smoltcp::time::Instant;
 use smoltcp::wire::{EthernetAddress, HardwareAddress, IpCidr};
 
-use super::Addresses;
+use super::addresses::Addresses;
 use super::frames::Frames;
 use crate::time::SimTime;
 

@@ -10,7 +10,7 @@ use ringcat_wire::mailbox::coe::Emergency;
 use ringcat_wire::mailbox::foe::{FoeErrorCode, FoeMessage};
 use ringcat_wire::mailbox::sdo::{AbortCode, SdoRequest, SdoResponse};
 
-use super::Answer;
+use crate::application::answer::Answer;
 use crate::application::coe::emergency_payload;
 use crate::time::SimTime;
 

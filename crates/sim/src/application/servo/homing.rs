@@ -1,19 +1,8 @@
 //! Homing: looks for a limit switch or an index pulse and makes the origin of the positions from it.
 
-use super::{INCREMENTS_PER_REVOLUTION, INDEX_PULSE, LIMIT_SWITCH, Servo};
-
-/// How far homing has come. Directions are -1.0 and 1.0.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub(super) enum Homing {
-    #[default]
-    NotStarted,
-    ToSwitch(f64),
-    FromSwitch(f64),
-    ToIndex(f64),
-    Stopping,
-    Done,
-    Failed,
-}
+use super::Servo;
+use super::axis::{INCREMENTS_PER_REVOLUTION, INDEX_PULSE, LIMIT_SWITCH};
+use super::phase::Homing;
 
 impl Servo {
     pub(super) fn begin_homing(&mut self) {

@@ -1,8 +1,9 @@
-//! The motor and its load, the loops that make its torque, the profiles that move the set-point.
+//! The loops that make the torque of the motor, the profiles that move the set-point.
 
-use super::{
-    ACCELERATION, BRAKE_TORQUE, FRICTION, MODE_CSP, MODE_CST, MODE_CSV, MODE_HOMING, MODE_PROFILE_POSITION,
-    MODE_PROFILE_TORQUE, MODE_PROFILE_VELOCITY, PEAK_TORQUE, STEP, Servo,
+use super::Servo;
+use super::axis::{
+    ACCELERATION, FRICTION, MODE_CSP, MODE_CST, MODE_CSV, MODE_HOMING, MODE_PROFILE_POSITION, MODE_PROFILE_TORQUE,
+    MODE_PROFILE_VELOCITY, PEAK_TORQUE, STEP,
 };
 
 /// Speed follows the set-point with this gain, position with that, per second.
@@ -12,27 +13,6 @@ const POSITION_GAIN: f64 = 250.0;
 const BRAKING_RESERVE: f64 = 0.8;
 /// Part of the deceleration that is counted on before a software limit.
 const LIMIT_RESERVE: f64 = 0.9;
-
-/// Motor and load.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub(super) struct Motor {
-    pub position: f64,
-    pub velocity: f64,
-    pub torque: f64,
-}
-
-impl Motor {
-    pub fn step(&mut self, torque: f64, brake: bool) {
-        let mut velocity = self.velocity + (torque - FRICTION * self.velocity) * ACCELERATION * STEP;
-        if brake {
-            let most = BRAKE_TORQUE * ACCELERATION * STEP;
-            velocity -= velocity.clamp(-most, most);
-        }
-        // The mean of both speeds: the work of the torque is exactly the energy that the load gains.
-        self.position += (self.velocity + velocity) / 2.0 * STEP;
-        (self.velocity, self.torque) = (velocity, torque);
-    }
-}
 
 impl Servo {
     /// Moves the set-point as the mode says and returns the torque for it.

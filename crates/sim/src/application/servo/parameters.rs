@@ -1,9 +1,9 @@
 //! What a drive is told: objects that it reads, from the outputs where they are mapped, else from the dictionary.
 //!
-//! In: objects as index, sub index and value. Out: numbers in the units that the drive computes with: increments, seconds,
-//! thousandths of the rated torque. Objects that the drive does not read are ignored.
+//! In: objects as index, sub index and value. Out: numbers in the units that the drive computes with: increments,
+//! seconds, thousandths of the rated torque. Objects that the drive does not read are ignored.
 
-use super::INCREMENTS_PER_REVOLUTION;
+use super::axis::INCREMENTS_PER_REVOLUTION;
 
 /// Objects of the drive as numbers; the fields are in the order of their indices.
 #[derive(Clone, Debug, Default, PartialEq)]

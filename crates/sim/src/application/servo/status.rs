@@ -1,6 +1,6 @@
 //! What a drive says: statusword, actual values, and whether a target is reached.
 
-use super::homing::Homing;
+use super::phase::Homing;
 use super::*;
 
 /// Torque has reached its target within so much.

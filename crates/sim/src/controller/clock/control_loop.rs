@@ -119,8 +119,9 @@ mod tests {
         ControlLoop { mean: 0, difference: difference * NS }.steering(RESET)
     }
 
+    // covers: facts 7.2.1
     #[test]
-    fn one_unit_of_the_speed_counter_is_0_012_ppm_and_the_range_ends_near_760_ppm_facts_7_2_1() {
+    fn one_unit_of_the_speed_counter_is_0_012_ppm_and_the_range_ends_near_760_ppm() {
         let second = 1_000_000_000 * NS;
         let ppb = |difference| at_difference(difference).added(second) / NS;
         assert_eq!(ppb(1), 11);
@@ -129,8 +130,9 @@ mod tests {
         assert_eq!(ppb(limit(RESET)), 762_797);
     }
 
+    // covers: facts 7.2.1
     #[test]
-    fn phase_is_corrected_by_one_nanosecond_in_start_ticks_and_no_further_than_asked_facts_7_2_1() {
+    fn phase_is_corrected_by_one_nanosecond_in_start_ticks_and_no_further_than_asked() {
         let steering = ControlLoop { mean: 640 * NS, difference: 0 }.steering(RESET);
         let added = |us: i128| steering.added(us * 1_000 * NS) / NS;
         // 4096 ticks of 10 ns for each nanosecond, 640 / 64 nanoseconds in all.

@@ -201,8 +201,9 @@ fn edges_at_latch_pins_leave_their_time_facts_3_12() {
     assert_eq!(bench.read(0x09B8, 8).0, second.to_le_bytes());
 }
 
+// covers: facts 3.12
 #[test]
-fn a_sync_signal_without_a_pulse_length_stays_until_the_pdi_has_read_its_status_facts_3_12() {
+fn a_sync_signal_without_a_pulse_length_stays_until_the_pdi_has_read_its_status() {
     let mut bench = Bench::new();
     bench.controller.memory.set_u16(RegisterAddress(0x0982), 0);
     let start = bench.controller.system_time(bench.now) + 5_000_000;

@@ -226,8 +226,9 @@ fn a_symbol_error_in_a_frame_is_counted_once_beside_the_frame_facts_2_5() {
     assert_eq!(second.register(0x0300), [0, 0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 0]);
 }
 
+// covers: facts 2.5
 #[test]
-fn the_first_controller_counts_an_invalid_frame_the_next_a_forwarded_error_facts_2_5() {
+fn the_first_controller_counts_an_invalid_frame_the_next_a_forwarded_error() {
     let (mut first, mut second) = (with_links(&[Port::A, Port::B]), with_links(&[Port::A, Port::B]));
     let mut frame = first.frame(&[(Command::Nop, 0, 0, &[0])]);
     frame.fcs = Fcs::Bad;

@@ -96,8 +96,9 @@ fn the_reader_always_gets_the_last_complete_buffer_facts_3_11() {
     assert_eq!(bench.read(0x1180, 4), (vec![5, 6, 7, 8], 1));
 }
 
+// covers: facts 3.1, facts 3.11
 #[test]
-fn sequential_mode_is_not_announced_and_its_bit_changes_nothing_facts_3_1_facts_3_11() {
+fn sequential_mode_is_not_announced_and_its_bit_changes_nothing() {
     let mut bench = buffers();
     let [features] = bench.register(0x0009);
     assert_eq!(features & 0x10, 0, "controllers may have it and say so; this one does not");

@@ -369,7 +369,11 @@ mod tests {
         }
 
         #[test]
-        fn any_short_entry_reads_back(info in any::<u8>(), bits in 0u16..40, name in proptest::collection::vec(any::<u8>(), 0..20)) {
+        fn any_short_entry_reads_back(
+            info in any::<u8>(),
+            bits in 0u16..40,
+            name in proptest::collection::vec(any::<u8>(), 0..20)
+        ) {
             let value = [0x5A; 5];
             let value = &value[..usize::from(bits).div_ceil(8)];
             let part = |bit| ValueInfo(info).has(bit).then_some(value);

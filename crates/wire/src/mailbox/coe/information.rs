@@ -1,8 +1,8 @@
 //! SDO information: the lists of objects of a SubDevice, one object, one entry, errors, in fragments (facts 6.3).
 //!
-//! In goes or out comes the payload of a mailbox message of protocol CoE. Data that does not fit into one mailbox comes in
-//! fragments: each but the last is marked incomplete, and each tells how many follow. Only the first begins with list
-//! type or index; putting the fragments together is the reader's matter. Whole data is read by
+//! In goes or out comes the payload of a mailbox message of protocol CoE. Data that does not fit into one mailbox comes
+//! in fragments: each but the last is marked incomplete, and each tells how many follow. Only the first begins with
+//! list type or index; putting the fragments together is the reader's matter. Whole data is read by
 //! [`ListType`] and [`Indices`], [`ObjectDescription`](super::ObjectDescription) and
 //! [`EntryDescription`](super::EntryDescription).
 

@@ -1,6 +1,7 @@
 //! A part of an Ethernet frame (facts 6.5).
 
-use super::{FRAGMENT, LAST, PayloadError, Pen, TIME_APPENDED, TIME_REQUESTED};
+use super::head::{FRAGMENT, LAST, OVERHEAD, TIME_APPENDED, TIME_REQUESTED};
+use crate::mailbox::payload::{PayloadError, Pen};
 
 /// Offsets and sizes are counted in blocks of so many bytes.
 pub const BLOCK: usize = 32;
@@ -32,7 +33,7 @@ pub struct EoeFragment<'a> {
 impl<'a> EoeFragment<'a> {
     /// Data bytes of each fragment but the last for a mailbox of this size (header included).
     pub const fn max_data(mailbox_size: usize) -> usize {
-        let room = mailbox_size.saturating_sub(crate::mailbox::Header::LEN + super::EoeMessage::OVERHEAD);
+        let room = mailbox_size.saturating_sub(crate::mailbox::Header::LEN + OVERHEAD);
         room - room % BLOCK
     }
 

@@ -14,8 +14,8 @@ const END: [(Endpoint, Endpoint); 8] = [
     (at(1, C), at(4, A)),
 ];
 
-/// The group is the end of the ring. Where it is away the ring ends at the one before it; until it is known who comes back it
-/// is nobody's, and the ring must be taken neither for another one nor for crossed lines.
+/// The group is the end of the ring. Where it is away the ring ends at the one before it; until it is known who comes
+/// back it is nobody's, and the ring must be taken neither for another one nor for crossed lines.
 #[test]
 fn a_group_that_is_the_end_of_a_local_ring_comes_back_as_what_it_was_jr_03_jr_04() {
     let strict = [JunctionConnection { head: 1, head_port: 1, tail: 6, tail_port: 1 }];

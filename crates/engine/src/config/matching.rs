@@ -1,0 +1,45 @@
+//! Whether the SubDevice at a place is the declared one, and where an alias or identification is.
+
+use super::resolution::{ConfigError, Resolution};
+use super::{ConfigAddress, SubDeviceConfig};
+use crate::info::SubDeviceInfo;
+
+/// The SubDevice with this index, where it is the expected one.
+pub(super) fn at_place(
+    configs: &[SubDeviceConfig],
+    infos: &[SubDeviceInfo],
+    config: usize,
+    place: Option<usize>,
+) -> Resolution {
+    let declared = &configs[config];
+    let Some((index, info)) = place.and_then(|place| Some((place, infos.get(place)?))) else {
+        return missing(declared, config, nobody(declared, infos));
+    };
+    match declared.expected.mismatch(info) {
+        None => Resolution::Found { config, info: index },
+        Some((field, expected, got)) => {
+            let error = ConfigError::Mismatch { position: info.position, field, expected, got };
+            missing(declared, config, error)
+        }
+    }
+}
+
+/// No SubDevice is at the place.
+pub(super) fn nobody(declared: &SubDeviceConfig, infos: &[SubDeviceInfo]) -> ConfigError {
+    ConfigError::Missing { address: declared.address, present: infos.len() }
+}
+
+pub(super) fn missing(declared: &SubDeviceConfig, config: usize, error: ConfigError) -> Resolution {
+    if declared.optional { Resolution::Absent { config, error } } else { Resolution::Failed { config, error } }
+}
+
+/// The one SubDevice with the alias or identification of an address.
+pub(super) fn bearer(address: ConfigAddress, infos: &[SubDeviceInfo]) -> Result<Option<usize>, ConfigError> {
+    let mut bearers = infos.iter().enumerate().filter(|(_, info)| address.is_borne_by(info));
+    match (bearers.next(), bearers.next()) {
+        (Some((_, first)), Some((_, second))) => {
+            Err(ConfigError::Ambiguous { address, first: first.position, second: second.position })
+        }
+        (first, _) => Ok(first.map(|(index, _)| index)),
+    }
+}

@@ -1,0 +1,55 @@
+//! PDOs that the application declares: what is assigned to a SyncManager, and what a PDO maps.
+
+use alloc::vec::Vec;
+
+use crate::info::Direction;
+
+/// An entry of a PDO mapping.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub struct PdoEntry {
+    /// Index of the object; 0 is a gap.
+    pub index: u16,
+    /// Subindex of the object.
+    pub sub_index: u8,
+    /// Bits.
+    pub bit_length: u8,
+}
+
+/// A PDO and what it maps.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct PdoMapping {
+    /// Index of the PDO mapping object.
+    pub index: u16,
+    /// Its entries; `None` takes those of the SII.
+    pub entries: Option<Vec<PdoEntry>>,
+}
+
+/// The PDOs of one SyncManager.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct PdoAssignment {
+    /// The SyncManager.
+    pub sync_manager: u8,
+    /// Its direction.
+    pub direction: Direction,
+    /// Its PDOs in order; none switches it off.
+    pub pdos: Vec<PdoMapping>,
+}
+
+impl PdoMapping {
+    /// A PDO with the entries that the SII gives it.
+    pub fn from_sii(index: u16) -> PdoMapping {
+        PdoMapping { index, entries: None }
+    }
+
+    /// A PDO with these entries.
+    pub fn of(index: u16, entries: impl Into<Vec<PdoEntry>>) -> PdoMapping {
+        PdoMapping { index, entries: Some(entries.into()) }
+    }
+}
+
+impl PdoEntry {
+    /// An object's bits.
+    pub const fn new(index: u16, sub_index: u8, bit_length: u8) -> PdoEntry {
+        PdoEntry { index, sub_index, bit_length }
+    }
+}

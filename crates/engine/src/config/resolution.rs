@@ -1,0 +1,100 @@
+//! What became of a declaration, or of a SubDevice that was found.
+
+use core::fmt;
+
+use ringcat_wire::address::Position;
+
+use super::ConfigAddress;
+use crate::info::IdentityField;
+
+/// Why a declaration has no SubDevice.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum ConfigError {
+    /// Another SubDevice is at its place.
+    Mismatch {
+        /// Position of the SubDevice.
+        position: Position,
+        /// The field that differs.
+        field: IdentityField,
+        /// Declared value.
+        expected: u32,
+        /// Value of the SubDevice.
+        got: u32,
+    },
+    /// No SubDevice is at its place.
+    Missing {
+        /// The place.
+        address: ConfigAddress,
+        /// SubDevices in the segment.
+        present: usize,
+    },
+    /// Several SubDevices have the alias or the identification.
+    Ambiguous {
+        /// Of the one that they are looked for by.
+        address: ConfigAddress,
+        /// Position of the first one.
+        first: Position,
+        /// Position of the second one.
+        second: Position,
+    },
+    /// An earlier declaration has the SubDevice already.
+    DeclaredTwice {
+        /// Position of the SubDevice.
+        position: Position,
+        /// Number of the earlier declaration.
+        first: usize,
+    },
+}
+
+impl fmt::Display for ConfigError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            ConfigError::Mismatch { position, field, expected, got } => {
+                write!(f, "SubDevice {position}: expected {field} {expected:#010x}, got {got:#010x}")
+            }
+            ConfigError::Missing { address, present } => {
+                write!(f, "no SubDevice at {address}; {present} are present")
+            }
+            ConfigError::Ambiguous { address, first, second } => {
+                write!(f, "{} belongs to SubDevice {first} and to SubDevice {second}", address.mark())
+            }
+            ConfigError::DeclaredTwice { position, first } => {
+                write!(f, "SubDevice {position} is declared by declaration {first} already")
+            }
+        }
+    }
+}
+
+impl core::error::Error for ConfigError {}
+
+/// What became of a declaration, or of a SubDevice that nobody declared. Both are named by their index in the slices
+/// given to [`resolve`].
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Resolution {
+    /// The declaration has its SubDevice.
+    Found {
+        /// The declaration.
+        config: usize,
+        /// The SubDevice.
+        info: usize,
+    },
+    /// An optional SubDevice is not there.
+    Absent {
+        /// The declaration.
+        config: usize,
+        /// What is there instead, if anything.
+        error: ConfigError,
+    },
+    /// The declaration has no SubDevice though it needs one.
+    Failed {
+        /// The declaration.
+        config: usize,
+        /// Why.
+        error: ConfigError,
+    },
+    /// Nobody declared the SubDevice.
+    Extra {
+        /// The SubDevice.
+        info: usize,
+    },
+}

@@ -1,0 +1,46 @@
+//! Why process data cannot be laid out.
+
+use core::fmt;
+
+use ringcat_wire::datagram::MAX_DATA;
+
+/// Why domains cannot be laid out.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum LayoutError {
+    /// An area is longer than a datagram can carry.
+    AreaTooLong {
+        /// Index of the SubDevice.
+        subdevice: usize,
+        /// SyncManager.
+        sync_manager: u8,
+        /// Its bytes.
+        length: u16,
+    },
+    /// Logical addresses or images beyond 2 GiB.
+    TooLarge,
+    /// More frames than may be in flight at once.
+    TooManyFrames {
+        /// Frames that would be needed.
+        frames: usize,
+    },
+}
+
+impl fmt::Display for LayoutError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            LayoutError::AreaTooLong { subdevice, sync_manager, length } => write!(
+                f,
+                "SubDevice {subdevice}, SyncManager {sync_manager}: {length} bytes of process data, a datagram carries \
+                 at most {MAX_DATA}"
+            ),
+            LayoutError::TooLarge => f.write_str("process data of all domains exceeds 2 GiB"),
+            LayoutError::TooManyFrames { frames } => write!(
+                f,
+                "process data needs {frames} frames at once, at most {} may be in flight",
+                crate::ring::MAX_IN_FLIGHT
+            ),
+        }
+    }
+}
+
+impl core::error::Error for LayoutError {}

@@ -1,0 +1,75 @@
+//! What gives the tasks of a mailbox something to do: they are started where none runs.
+
+use alloc::rc::Rc;
+use alloc::vec::Vec;
+use core::time::Duration;
+
+use ringcat_wire::mailbox::Header;
+
+use super::Room;
+use crate::mail::error::MailboxError;
+use crate::mail::lane::{Lane, Outgoing};
+use crate::mail::{reader, writer};
+
+impl Room {
+    /// Queues a message; returns its number.
+    pub(in crate::mail) fn queue(
+        self: &Rc<Room>,
+        lane: Lane,
+        payload: Vec<u8>,
+        limit: Duration,
+        (turn, asks): (u32, Option<Duration>),
+    ) -> Result<u32, MailboxError> {
+        let id = {
+            let state = &mut *self.state();
+            let session = state.session.as_ref().filter(|_| state.open).ok_or(MailboxError::Closed)?;
+            let room = usize::from(session.layout.receive_size).saturating_sub(Header::LEN);
+            if payload.len() > room {
+                return Err(MailboxError::TooLong { bytes: payload.len(), limit: room });
+            }
+            let queue = &mut state.lanes[lane.place()];
+            if !queue.has_room() {
+                state.counters.refused += 1;
+                return Err(MailboxError::Full { limit });
+            }
+            state.next_id = state.next_id.wrapping_add(1);
+            queue.outbox.push_back(Outgoing { id: state.next_id, lane, payload, limit, turn, asks });
+            state.next_id
+        };
+        writer::start(self);
+        Ok(id)
+    }
+
+    /// The mailbox may be used as before.
+    pub(in crate::mail) fn resume(self: &Rc<Room>) {
+        {
+            let state = &mut *self.state();
+            if state.open || state.session.is_none() {
+                return;
+            }
+            let repeat = state.repeat;
+            let now = self.bus.now();
+            state.end_time(true);
+            state.repeat = repeat;
+            state.lanes.iter_mut().for_each(|lane| lane.resume(now));
+        }
+        self.tell();
+        reader::start(self);
+    }
+
+    /// There may be mail.
+    pub(in crate::mail) fn is_full(self: &Rc<Room>) {
+        {
+            let state = &mut *self.state();
+            state.full = true;
+            state.seen = self.bus.now();
+        }
+        reader::start(self);
+    }
+
+    /// There might be mail: the reader looks once.
+    pub(in crate::mail) fn look_once(self: &Rc<Room>) {
+        self.state().curious = true;
+        reader::start(self);
+    }
+}

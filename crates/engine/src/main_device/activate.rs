@@ -1,0 +1,176 @@
+//! The last step of a configuration: process data is laid out, both halves get what they need, procedures start.
+
+use alloc::sync::Arc;
+use alloc::vec::Vec;
+
+use super::MainDevice;
+use super::activate_error::ActivateError;
+use super::active::Active;
+use super::areas::{Areas, Directory};
+use super::declaration::Declaration;
+use super::loaded::Loaded;
+use super::lrw::{self, check_lrw};
+use super::prepare::{
+    check_clocks, check_domains, domain_specs, match_declaration, members, plan_all, report_oddities, with_domain,
+    witnesses,
+};
+use crate::board::Board;
+use crate::config::ClockConfig;
+use crate::exchange::{ClockSetup, Exchange};
+use crate::info::SubDeviceInfo;
+use crate::layout::{DomainSpec, Layout, Rules};
+use crate::procedures::clocks::{self, SharedClocks};
+use crate::procedures::configure::Start;
+use crate::procedures::fleet::{Fleet, Member, Phase, SharedFleet, stations_by_position};
+use crate::procedures::mail_watch::watch_mail;
+use crate::procedures::recover::start_all;
+use crate::procedures::scan::Scan;
+use crate::procedures::serve_requests::serve_requests;
+use crate::procedures::services::statistics::{Book, collect};
+use crate::procedures::supervise::supervise;
+use crate::procedures::watch_groups::watch_groups;
+use crate::queue::queue;
+use crate::ring_status::{CableErrors, cables};
+use crate::time::Instant;
+use crate::topology::Topology;
+
+/// Messages of the exchange that may wait until events are fetched.
+const CYCLIC_EVENTS: usize = 1024;
+
+impl MainDevice {
+    /// Starts what was loaded.
+    pub(super) fn start_loaded(&mut self, loaded: Loaded) -> Result<Active, ActivateError> {
+        let scan = match &*self.scan.borrow() {
+            Some(Ok(scan)) => scan.clone(),
+            Some(Err(_)) | None => return Err(ActivateError::NoScan),
+        };
+        let bus = self.supervisor.bus();
+        let declaration = with_domain(loaded.declaration.clone());
+        let (found, strangers) = match_declaration(&bus, &declaration, &scan)?;
+        let topology = loaded.topology(&bus, self.options.junctions, &scan, &found)?;
+        check_clocks(&declaration, &found)?;
+        let clock_config = declaration.clocks.clone();
+        let plans = plan_all(&declaration, &found)?;
+        check_domains(&loaded.declaration, &plans)?;
+        let (specs, layout) = self.lay_out(&declaration, &plans, &found)?;
+        let members = members(&bus, declaration, found, &plans, &layout)?;
+        let clocks = clocks_of(clock_config.clone(), &scan, &topology, &members);
+        let directory = Directory::new(&plans, &layout);
+        report_oddities(&bus, &members, &layout);
+        let optional = members.iter().map(|member| member.config.optional).collect();
+        let board = Arc::new(Board::new(members.len()).with_optional(optional));
+        let (producer, consumer) = queue(CYCLIC_EVENTS);
+        let mut exchange = Exchange::new(self.identity, self.options.links(), &layout, board.clone(), producer);
+        if let Some(config) = &clock_config {
+            exchange.set_up_clocks(ClockSetup {
+                epoch: config.epoch,
+                bus_shift: config.bus_shift,
+                sync_window_ns: config.sync_window_ns,
+            });
+        }
+        let stations = stations_by_position(&members, scan.subdevices.iter().map(|info| info.station));
+        let closings = loaded.closings(&topology, &members, &stations);
+        let cables = cables(&topology, self.options.links());
+        let book = Book::new(&bus, members.len(), self.statistics_period);
+        let fleet = Fleet {
+            members,
+            strangers,
+            next_temporary: 0,
+            layout,
+            closings,
+            topology,
+            stations,
+            ring: self.first_ring_status(),
+            cables: cables.into_iter().map(|cable| (cable, CableErrors::default())).collect(),
+            recablings: 0,
+            cache: self.cache.clone(),
+            blocked: Vec::new(),
+            junction_controls: Vec::new(),
+            statistics: book.clone(),
+        };
+        bus.set_occupants(fleet.occupants());
+        let fleet = SharedFleet::new(fleet, board.clone(), clocks);
+        self.supervisor.attach(board);
+        self.start_procedures(&fleet, book, clock_config.is_some());
+        self.cyclic_events = Some(consumer);
+        let periods = specs.iter().map(|spec| spec.period).collect();
+        let under_way = specs.iter().map(|spec| spec.under_way).max().unwrap_or(1);
+        Ok(Active { exchange, directory, periods, under_way })
+    }
+
+    /// The domains, and where their process data lies.
+    fn lay_out(
+        &mut self,
+        declaration: &Declaration,
+        plans: &[Areas],
+        found: &[Option<SubDeviceInfo>],
+    ) -> Result<(Vec<DomainSpec>, Layout), ActivateError> {
+        let links = self.options.links();
+        let lrw = lrw::policy(declaration.lrw, &declaration.explicit_lrw, links)?;
+        let specs = domain_specs(declaration, plans, lrw, links)?;
+        check_lrw(lrw, &specs, links)?;
+        let witnesses = witnesses(plans, found);
+        let (supervision, max_datagrams) = (self.options.supervision, self.options.most_datagrams());
+        let session = self.next_session(self.supervisor.bus().now());
+        let rules = Rules { links, supervision, lrw, witnesses: &witnesses, session, max_datagrams };
+        let mut layout = Layout::with(&specs, rules).map_err(ActivateError::Layout)?;
+        if declaration.clocks.is_some() {
+            layout.add_clocks().map_err(ActivateError::Layout)?;
+        }
+        Ok((specs, layout))
+    }
+
+    /// Starts configuration, supervision and what else goes on while the MainDevice is active.
+    fn start_procedures(&mut self, fleet: &SharedFleet, book: Book, with_clocks: bool) {
+        let bus = self.supervisor.bus();
+        let start = if self.has_visited() { Start::Doubtful } else { Start::Cleared };
+        self.visited.drain(..).for_each(|mailbox| mailbox.close());
+        if with_clocks {
+            // A SubDevice that answers while clocks are measured has not come back: its configuration begins
+            // afterwards.
+            for member in fleet.access().members.iter_mut().filter(|member| member.is_there()) {
+                member.phase = Phase::Configuring;
+            }
+            let (bus, fleet) = (bus.clone(), fleet.clone());
+            // Receive times are latched before other frames are on the way (facts 7.1).
+            self.supervisor.spawn(async move {
+                clocks::begin(&bus, &fleet).await;
+                start_all(&bus, &fleet, start);
+                clocks::keep(bus, fleet).await;
+            });
+        } else {
+            start_all(&bus, fleet, start);
+        }
+        if self.options.supervision {
+            let (enhanced, rings) = (self.options.enhanced_line_crossed, self.options.junctions);
+            self.supervisor.spawn(supervise(bus.clone(), fleet.clone(), enhanced, rings));
+        }
+        // Without supervision it is never found out what strangers are.
+        let follow = self.options.follow_groups && self.options.supervision;
+        self.supervisor.spawn(watch_groups(bus.clone(), fleet.clone(), follow));
+        self.supervisor.spawn(watch_mail(bus.clone(), fleet.clone()));
+        self.supervisor.spawn(serve_requests(bus.clone(), fleet.clone(), self.requests.clone()));
+        self.supervisor.spawn(collect(bus, fleet.clone(), book.clone()));
+        self.statistics = Some(book);
+        self.fleet = Some(fleet.clone());
+    }
+
+    /// Number of a session that begins now: another one than before, and hardly that of a program that ran here a while
+    /// ago.
+    fn next_session(&mut self, now: Instant) -> u32 {
+        /// About four seconds.
+        const STEP_BITS: u32 = 32;
+        self.activations = self.activations.wrapping_add(1);
+        (self.activations - 1).wrapping_add((now.0 >> STEP_BITS) as u32)
+    }
+}
+
+/// Clocks of all SubDevices that were scanned.
+fn clocks_of(config: Option<ClockConfig>, scan: &Scan, topology: &Topology, members: &[Member]) -> SharedClocks {
+    let member = |info: &SubDeviceInfo| {
+        let index = members.iter().position(|member| member.station == info.station)?;
+        Some((index, &*members[index].config))
+    };
+    let scanned: &[SubDeviceInfo] = if config.is_some() { &scan.subdevices } else { &[] };
+    SharedClocks::new(config, scanned, topology, member)
+}

@@ -1,0 +1,117 @@
+//! The plan of one SubDevice: SyncManagers, areas of process data, and what they map.
+
+use alloc::vec::Vec;
+
+use ringcat_wire::address::{RegisterAddress, StationAddress};
+use ringcat_wire::register::SyncManager;
+use ringcat_wire::sii::MailboxLayout;
+
+use super::error::PlanWarning;
+use crate::config::SdoDownload;
+use crate::info::Direction;
+
+/// A SyncManager to be written.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct SmPlan {
+    /// Its number.
+    pub index: u8,
+    /// Its registers.
+    pub register: SyncManager,
+}
+
+/// An entry of a PDO and where it lies.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct MappedEntry {
+    /// Index of the object; 0 is a gap.
+    pub index: u16,
+    /// Subindex of the object.
+    pub sub_index: u8,
+    /// First bit, counted from the start of the area.
+    pub bit_offset: u32,
+    /// Bits.
+    pub bit_length: u8,
+}
+
+/// A PDO in an area.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct MappedPdo {
+    /// Index of the PDO mapping object.
+    pub index: u16,
+    /// Its entries in order, gaps included.
+    pub entries: Vec<MappedEntry>,
+}
+
+/// The process data of one SyncManager.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct AreaPlan {
+    /// The SyncManager.
+    pub sync_manager: u8,
+    /// Its direction.
+    pub direction: Direction,
+    /// First physical byte.
+    pub physical: u16,
+    /// Bytes; 0 where the SyncManager is switched off and needs no FMMU.
+    pub length: u16,
+    /// Registers of the SyncManager.
+    pub register: SyncManager,
+    /// To be enabled on the way to OP only, not for SAFEOP (facts 4.4).
+    pub op_only: bool,
+    /// Its PDOs; none where the SII names a length only.
+    pub pdos: Vec<MappedPdo>,
+}
+
+/// What has to be written to a SubDevice.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct SubDevicePlan {
+    /// Its station address.
+    pub station: StationAddress,
+    /// Mailbox SyncManagers for PREOP: first the one that the MainDevice writes. None or two.
+    pub mailbox: Vec<SmPlan>,
+    /// Mailbox SyncManagers for BOOT. None or two.
+    pub bootstrap: Vec<SmPlan>,
+    /// Process data areas by SyncManager number. Each of them gets an FMMU unless its length is 0.
+    pub process_data: Vec<AreaPlan>,
+    /// SyncManagers of the controller to be switched off before SAFEOP: neither mailbox nor process data.
+    pub unused: Vec<u8>,
+    /// SDO downloads that make PDO assignment and mapping what they are planned to be; they come after the start-up
+    /// commands of PREOP.
+    pub assign_sdos: Vec<SdoDownload>,
+    /// LRW reaches the SubDevice.
+    pub lrw_supported: bool,
+    /// Watchdog registers to be written before SAFEOP.
+    pub watchdog: Vec<(RegisterAddress, Vec<u8>)>,
+    /// What the application asked for and the SubDevice may not follow.
+    pub warnings: Vec<PlanWarning>,
+}
+
+impl SubDevicePlan {
+    /// Areas that need an FMMU, with its number: in the order of the SyncManagers.
+    pub fn mapped_areas(&self) -> impl Iterator<Item = (u8, &AreaPlan)> {
+        (0..).zip(self.process_data.iter().filter(|area| area.length > 0))
+    }
+
+    /// Some of its SyncManagers are for OP only: then none of its process data flows before.
+    pub fn is_op_only(&self) -> bool {
+        self.mapped_areas().any(|(_, area)| area.op_only)
+    }
+
+    /// Where the mailboxes lie from PREOP on; `None` where there are none.
+    pub fn mailbox_layout(&self) -> Option<MailboxLayout> {
+        layout_of(&self.mailbox)
+    }
+
+    /// Where the mailboxes lie in BOOT; `None` where there are none.
+    pub fn bootstrap_layout(&self) -> Option<MailboxLayout> {
+        layout_of(&self.bootstrap)
+    }
+}
+
+fn layout_of(pair: &[SmPlan]) -> Option<MailboxLayout> {
+    let [out, inward] = pair else { return None };
+    Some(MailboxLayout {
+        receive_offset: out.register.start,
+        receive_size: out.register.length,
+        send_offset: inward.register.start,
+        send_size: inward.register.length,
+    })
+}

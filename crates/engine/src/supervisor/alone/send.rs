@@ -1,0 +1,89 @@
+//! When a datagram that is to be alone leaves, and what became of it.
+
+use core::time::Duration;
+
+use ringcat_wire::datagram::Target;
+
+use super::Stage;
+use crate::link::Link;
+use crate::supervisor::reply::{BusError, Reply};
+use crate::supervisor::shared::Shared;
+use crate::supervisor::transfer::TransferId;
+
+/// A wire that is never empty for so long is waited for no longer; meanwhile nothing acyclic is sent.
+const LIMIT: Duration = Duration::from_millis(4);
+
+impl Shared {
+    /// The datagram that leaves now and alone, if one may, and the links on which copies are known not to come home.
+    pub(in crate::supervisor) fn next_alone(&mut self) -> Option<(TransferId, u8)> {
+        let (id, deaf) = loop {
+            let (id, deaf) = *self.alone.waiting.front()?;
+            if matches!(self.alone.stage, Stage::UnderWay { .. }) {
+                return None;
+            }
+            if self.transfers.find(id).is_some_and(|transfer| !transfer.abandoned) {
+                break (id, deaf);
+            }
+            self.transfers.remove(id);
+            self.end_alone();
+        };
+        let silent = deaf | self.silence.mask(self.now);
+        if self.flights.are_under_way(self.links, silent) {
+            return None;
+        }
+        let departures = match &self.board {
+            Some(board) => {
+                if !matches!(self.alone.stage, Stage::Waiting { .. }) {
+                    self.alone.stage =
+                        Stage::Waiting { until: self.now + LIMIT, home: board.traffic.home(self.links, silent) };
+                }
+                self.alone.at_rest(board, self.links, silent, self.now)?
+            }
+            None => 0,
+        };
+        self.alone.stage = Stage::UnderWay { departures };
+        Some((id, deaf))
+    }
+
+    /// Gives up one that waits for the cyclic half for too long. Where frames of that come home all the time, it has to
+    /// pause; where some do not, they were lost.
+    pub(in crate::supervisor) fn expire_alone(&mut self) {
+        let Stage::Waiting { until, home: before } = self.alone.stage else { return };
+        let Some((id, deaf)) = self.alone.waiting.front().copied().filter(|_| self.now >= until) else { return };
+        let target = self.transfers.find(id).map_or(Target::None, |transfer| transfer.request.target);
+        let silent = deaf | self.silence.mask(self.now);
+        let home = self.board.as_ref().map_or(before, |board| board.traffic.home(self.links, silent));
+        let waited_for = self.links.mask() & !silent;
+        let links = Link::ALL.into_iter().filter(|link| waited_for & link.bit() != 0);
+        let come_home = links.map(|link| link.index()).all(|link| home[link] != before[link]);
+        self.finish(id, Err(if come_home { BusError::Busy { target } } else { BusError::Lost { target, retries: 0 } }));
+    }
+
+    /// What became of a datagram, if it was to be alone and was not.
+    pub(in crate::supervisor) fn judge_alone(
+        &mut self,
+        id: TransferId,
+        result: Result<Reply, BusError>,
+    ) -> Result<Reply, BusError> {
+        if self.alone.waiting.front().is_none_or(|(first, _)| *first != id) {
+            return result;
+        }
+        let sent_meanwhile = match (self.alone.stage, &self.board) {
+            (Stage::UnderWay { departures }, Some(board)) => board.traffic.departures() != departures,
+            _ => false,
+        };
+        self.end_alone();
+        let target = self.transfers.find(id).map_or(Target::None, |transfer| transfer.request.target);
+        result.and_then(|reply| if sent_meanwhile { Err(BusError::Disturbed { target }) } else { Ok(reply) })
+    }
+
+    fn end_alone(&mut self) {
+        self.alone.waiting.pop_front();
+        self.alone.stage = Stage::Idle;
+    }
+
+    /// Queues one.
+    pub(in crate::supervisor) fn push_alone(&mut self, id: TransferId, deaf: u8) {
+        self.alone.waiting.push_back((id, deaf));
+    }
+}

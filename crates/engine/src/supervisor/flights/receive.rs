@@ -1,0 +1,179 @@
+//! Acyclic frames that come home: pairing and merging the copies, answering or giving up.
+
+use ringcat_wire::address::Wkc;
+use ringcat_wire::command::Command;
+
+use super::{Flights, SLOTS};
+use crate::link::Link;
+use crate::ring::FrameCopy;
+use crate::supervisor::flight::{Flight, Place};
+use crate::supervisor::outbox::Rank;
+use crate::supervisor::received::Received;
+use crate::supervisor::reply::{BusError, Reply};
+use crate::supervisor::shared::Shared;
+use crate::supervisor::stray::Stray;
+use crate::supervisor::transfer::{Stage, TransferId};
+
+/// A lost datagram is sent again so often; the retry index in the source address has three bits (facts SM-04).
+const MAX_RETRIES: u8 = 7;
+
+impl Shared {
+    /// Takes in a copy of an acyclic frame.
+    pub(in crate::supervisor) fn receive(&mut self, copy: FrameCopy, arrived_on: Link, bytes: &[u8]) -> Received {
+        self.silence.came_back(copy.sent_on);
+        let slot = Flights::slot(copy.sequence);
+        let Some(flight) = self.flights.slots[slot].as_mut().filter(|flight| flight.sequence == copy.sequence) else {
+            self.round_trip.was_late();
+            self.counters.late += 1;
+            self.strays.late(copy.sequence, bytes, self.now);
+            return Received::Late;
+        };
+        if !flight.is_what_was_sent(bytes) {
+            self.counters.corrupt += 1;
+            return Received::Corrupt;
+        }
+        let first = flight.arrivals.arrived == 0;
+        if !flight.arrivals.note(copy.sent_on, arrived_on) {
+            self.counters.late += 1;
+            return Received::Late;
+        }
+        self.round_trip.took(self.now.since(flight.sent_at));
+        self.outbox.took(self.now.since(flight.left_at));
+        for read in flight.second_reads() {
+            if let Some(mail) = read.mail(bytes) {
+                self.strays.keep(read.station, Stray { mail, sent_at: read.sent_at });
+            }
+        }
+        flight.take(copy.sent_on, bytes, first);
+        let finished = flight.has_all(self.links);
+        let enough = finished || flight.has_all_but(self.silence.mask(self.now) | flight.deaf, self.links);
+        self.answer(slot, enough);
+        if finished {
+            self.end(slot);
+        } else if enough {
+            self.flights.release(slot);
+        }
+        Received::Taken
+    }
+
+    /// Hands replies to procedures: those with the expected working counter at once, all when no further copy is
+    /// waited for. What was met while the ring changed is lost.
+    fn answer(&mut self, slot: usize, enough: bool) {
+        let Some(mut flight) = self.flights.slots[slot].take() else { return };
+        let straddled = flight.straddled_a_change();
+        let stamp = (flight.sequence, flight.sent_at);
+        if enough && !straddled {
+            self.learn_main_count(&flight);
+        }
+        for place in flight.places.iter_mut().filter(|place| !place.answered) {
+            let satisfied = place.satisfied();
+            if !satisfied && !enough {
+                continue;
+            }
+            place.answered = true;
+            if satisfied || !straddled {
+                let reply = place.reply(&flight.bytes, stamp);
+                self.finish(place.transfer, Ok(reply));
+            } else {
+                self.lost(place.transfer);
+            }
+        }
+        if !flight.answered && flight.places.iter().all(|place| place.answered) {
+            flight.answered = true;
+            self.counters.received += 1;
+            self.outbox.came_back(core::mem::take(&mut flight.reads));
+        }
+        self.flights.slots[slot] = Some(flight);
+    }
+
+    /// A broadcast shows how many SubDevices the main copy meets (facts CR-09).
+    fn learn_main_count(&mut self, flight: &Flight) {
+        let is_broadcast = |place: &&Place| matches!(place.command, Command::Brd | Command::Bwr);
+        // One that no SubDevice has processed shows nothing.
+        let met = |place: &&Place| place.total() != Wkc(0);
+        if let Some(place) = flight.places.iter().rfind(is_broadcast).filter(met) {
+            self.main_count = place.wkc[Link::Main.index()].0;
+        }
+    }
+
+    fn end(&mut self, slot: usize) {
+        let Some(flight) = self.flights.take(slot) else { return };
+        self.monitor.observe(flight.arrivals);
+        self.flights.spare.push(flight);
+    }
+
+    pub(in crate::supervisor) fn finish(&mut self, id: TransferId, result: Result<Reply, BusError>) {
+        let result = self.judge_alone(id, result);
+        let Some(transfer) = self.transfers.find(id) else { return };
+        if transfer.abandoned {
+            self.transfers.remove(id);
+            return;
+        }
+        transfer.stage = Stage::Done(result);
+        let task = transfer.task;
+        self.wake(task);
+    }
+
+    /// Gives up flights whose deadline is over.
+    pub(in crate::supervisor) fn expire_flights(&mut self) {
+        if self.flights.in_flight == 0 {
+            return;
+        }
+        for slot in 0..SLOTS {
+            let overdue = |flight: &Flight| flight.deadline <= self.now;
+            if self.flights.slots[slot].as_ref().is_some_and(overdue) {
+                self.expire(slot);
+            }
+        }
+    }
+
+    /// Datagrams that one copy answered as expected are done, and those to one SubDevice that has answered (CR-06); the
+    /// others count as lost: the copy that is missing may have been the one that reached the SubDevice.
+    fn expire(&mut self, slot: usize) {
+        let Some(flight) = self.flights.take(slot) else { return };
+        self.monitor.observe(flight.arrivals);
+        self.outbox.came_back(flight.reads);
+        flight.mail_reads().for_each(|read| self.strays.remember(read));
+        if !flight.answered {
+            if flight.arrivals.arrived == 0 {
+                self.counters.lost += 1;
+            } else {
+                self.counters.half += 1;
+            }
+            let enough = flight.has_all_but(self.silence.mask(self.now), self.links);
+            if enough {
+                self.learn_main_count(&flight);
+            }
+            for place in flight.places.iter().filter(|place| !place.answered) {
+                if enough || (place.is_answered_by_one() && !self.is_apart(place.transfer)) {
+                    let reply = place.reply(&flight.bytes, (flight.sequence, flight.sent_at));
+                    self.finish(place.transfer, Ok(reply));
+                } else {
+                    self.lost(place.transfer);
+                }
+            }
+        }
+        self.flights.spare.push(flight);
+    }
+
+    /// Whether the copies of a datagram say different things, so that none can stand for the other.
+    fn is_apart(&mut self, id: TransferId) -> bool {
+        let transfer = self.transfers.find(id);
+        transfer.is_some_and(|it| it.request.redundant.is_some() || it.request.redundant_station.is_some())
+    }
+
+    fn lost(&mut self, id: TransferId) {
+        let Some(transfer) = self.transfers.find(id) else { return };
+        if transfer.request.resend && transfer.retries < MAX_RETRIES && !transfer.abandoned {
+            transfer.retries += 1;
+            transfer.stage = Stage::Queued;
+            self.counters.resent += 1;
+            let target = transfer.request.target;
+            self.outbox.push(id, Rank::First, target, 0, self.now);
+            return;
+        }
+        let error = BusError::Lost { target: transfer.request.target, retries: transfer.retries };
+        self.counters.timed_out += 1;
+        self.finish(id, Err(error));
+    }
+}

@@ -1,0 +1,197 @@
+//! Acyclic frames on their way out: packing requests, sending on all links.
+
+use core::time::Duration;
+
+use ringcat_wire::command::Command;
+use ringcat_wire::datagram::HEADER_LEN;
+use ringcat_wire::frame::{FrameBuilder, MAX_FRAME, MIN_FRAME, MacAddress};
+
+use super::Flights;
+use crate::link::{Link, LinkSet};
+use crate::ring::identity::DATAGRAMS_AT;
+use crate::ring::{Class, Identity};
+use crate::supervisor::flight::{Flight, Place};
+use crate::supervisor::outbox::Rank;
+use crate::supervisor::shared::Shared;
+use crate::supervisor::transfer::{Request, Stage, TransferId, WITNESS_BYTES};
+use crate::time::Instant;
+
+/// A datagram that fits no send window goes out after this time all the same, and delays a cycle once.
+const STARVED: Duration = Duration::from_millis(10);
+
+impl Shared {
+    /// Packs what waits in the outbox into frames and sends them, within the budget and the window.
+    pub(in crate::supervisor) fn transmit(&mut self, budget: usize, transmit: &mut impl FnMut(Link, &[u8])) -> usize {
+        let mut used = 0;
+        while self.flights.has_room() && used < budget {
+            let limit = (budget - used).min(MAX_FRAME);
+            let flight = match self.alone.is_held() {
+                true => self.next_alone().and_then(|(id, deaf)| self.pack_alone(id, deaf)),
+                false if self.outbox.is_ready(self.now) => self.pack(limit),
+                false => None,
+            };
+            let Some(flight) = flight else { break };
+            self.blocked = None;
+            used += flight.bytes.len();
+            self.counters.sent += 1;
+            self.counters.bytes += flight.bytes.len() as u64;
+            self.counters.datagrams += flight.places.len() as u64;
+            self.silence.sent(Link::Main, self.now);
+            transmit(Link::Main, &flight.bytes);
+            if self.links == LinkSet::Ring {
+                self.silence.sent(Link::Redundant, self.now);
+                let copy = &mut self.flights.redundant[..flight.bytes.len()];
+                copy.copy_from_slice(&flight.bytes);
+                Identity::mark_redundant(copy, true);
+                adjust_auto_increment(copy, &flight.places, self.main_count);
+                for place in &flight.places {
+                    let Some(transfer) = self.transfers.find(place.transfer) else { continue };
+                    if let Some(station) = transfer.request.redundant_station {
+                        let at = place.header_at + 2;
+                        copy[at..at + 2].copy_from_slice(&station.0.to_le_bytes());
+                    }
+                    if let Some(data) = &transfer.request.redundant {
+                        let at = place.header_at + HEADER_LEN;
+                        copy[at..at + place.length].copy_from_slice(data);
+                    }
+                }
+                transmit(Link::Redundant, copy);
+            }
+            let slot = Flights::slot(flight.sequence);
+            self.flights.slots[slot] = Some(flight);
+            self.flights.in_flight += 1;
+        }
+        used
+    }
+
+    /// Whether a first datagram that is too long for the window has waited for so long that it goes out all the same:
+    /// it may be too long for every window.
+    fn is_starved(blocked: &mut Option<(TransferId, Instant)>, first: TransferId, now: Instant) -> bool {
+        let (_, since) = *blocked.insert(blocked.filter(|(id, _)| *id == first).unwrap_or((first, now)));
+        now.since(since) >= STARVED
+    }
+
+    /// Builds one frame of at most `limit` bytes from the front of the outbox; `None` where nothing fits.
+    fn pack(&mut self, limit: usize) -> Option<Flight> {
+        let sequence = self.flights.sequence.next();
+        let mut flight = self.flights.fresh(sequence);
+        flight.bytes.resize(MAX_FRAME, 0);
+        let mut retry = 0;
+        let length = {
+            let source = self.identity.source();
+            let mut builder = FrameBuilder::ethernet(&mut flight.bytes, MacAddress::ETHERCAT_GROUP, source)?;
+            let (mut total, mut datagrams, mut is_alone) = (DATAGRAMS_AT, 0, false);
+            let reads = self.outbox.may_read(self.now);
+            while let Some((id, rank)) = self.outbox.front(reads, self.now) {
+                let Some(transfer) = self.transfers.find(id) else {
+                    self.outbox.pop(rank);
+                    continue;
+                };
+                if transfer.abandoned {
+                    self.outbox.pop(rank);
+                    self.transfers.remove(id);
+                    continue;
+                }
+                let request = &transfer.request;
+                let bytes = request.bytes();
+                let fills_up = is_alone || request.before > 0 || datagrams + request.datagrams() > self.max_datagrams;
+                if fills_up && !flight.places.is_empty() {
+                    break;
+                }
+                // Only the first datagram of a frame may be longer than the window.
+                if (total + bytes).max(MIN_FRAME) > limit
+                    && (!flight.places.is_empty() || !Shared::is_starved(&mut self.blocked, id, self.now))
+                {
+                    break;
+                }
+                let index = sequence.index(Class::Acyclic);
+                is_alone = request.before > 0;
+                let Some(data_at) = put(&mut builder, request, index, self.now) else { break };
+                total += bytes;
+                datagrams += request.datagrams();
+                retry = retry.max(transfer.retries);
+                flight.places.push(Place::new(id, request, data_at));
+                transfer.stage = Stage::InFlight;
+                self.outbox.pop(rank);
+                if rank == Rank::Read {
+                    flight.reads += bytes;
+                    self.outbox.set_out(bytes);
+                }
+            }
+            builder.finish()
+        };
+        self.launch(flight, length, retry)
+    }
+
+    /// Builds a frame that holds one datagram.
+    fn pack_alone(&mut self, id: TransferId, deaf: u8) -> Option<Flight> {
+        let sequence = self.flights.sequence.next();
+        let mut flight = self.flights.fresh(sequence);
+        flight.bytes.resize(MAX_FRAME, 0);
+        flight.deaf = deaf;
+        let length = {
+            let source = self.identity.source();
+            let mut builder = FrameBuilder::ethernet(&mut flight.bytes, MacAddress::ETHERCAT_GROUP, source)?;
+            let transfer = self.transfers.find(id)?;
+            let (request, index) = (&transfer.request, sequence.index(Class::Acyclic));
+            let data_at = builder.datagram(request.command, index, request.target, request.data.len())?;
+            builder.data_mut(data_at, request.data.len())?.copy_from_slice(&request.data);
+            flight.places.push(Place::new(id, request, data_at));
+            transfer.stage = Stage::InFlight;
+            builder.finish()
+        };
+        self.launch(flight, length, 0)
+    }
+
+    /// A frame of so many bytes is ready to leave; `None` where nothing is in it.
+    fn launch(&mut self, mut flight: Flight, length: usize, retry: u8) -> Option<Flight> {
+        let sequence = flight.sequence;
+        flight.bytes.truncate(length);
+        self.identity.stamp(&mut flight.bytes, sequence, retry);
+        if flight.places.is_empty() {
+            self.flights.spare.push(flight);
+            return None;
+        }
+        self.flights.sequence = sequence;
+        flight.sent_at = self.now;
+        let (begins, left_at) = self.outbox.hand_over(flight.bytes.len(), self.now);
+        flight.left_at = left_at;
+        flight.deadline = begins + self.round_trip.wait(retry);
+        Some(flight)
+    }
+}
+
+/// Appends the datagrams of a request. Returns where the data of its own is; `None` where they do not fit.
+fn put(builder: &mut FrameBuilder<'_>, request: &Request, index: u8, now: Instant) -> Option<usize> {
+    if let Some((command, target, lead)) = &request.lead {
+        let at = builder.datagram(*command, index, *target, lead.len())?;
+        if let Some(data) = builder.data_mut(at, lead.len()) {
+            data.copy_from_slice(lead);
+        }
+    }
+    for _ in 0..request.before {
+        builder.datagram(request.command, index, request.target, request.data.len());
+    }
+    let data_at = builder.datagram(request.command, index, request.target, request.data.len())?;
+    if let Some(data) = builder.data_mut(data_at, request.data.len()) {
+        data.copy_from_slice(&request.data);
+        request.let_run(data, now);
+    }
+    Some(data_at)
+}
+
+/// In an open ring the SubDevice at position `p` behind the break is the one at `p - main_count` on the redundant link;
+/// in a closed one nobody is addressed twice (facts CR-09).
+fn adjust_auto_increment(frame: &mut [u8], places: &[Place], main_count: u16) {
+    for place in places {
+        if !matches!(place.command, Command::Aprd | Command::Apwr | Command::Aprw | Command::Armw) {
+            continue;
+        }
+        let witness = place.witness.then(|| place.header_at - WITNESS_BYTES);
+        for at in [Some(place.header_at), witness].into_iter().flatten() {
+            let adp = at + 2;
+            let shifted = u16::from_le_bytes([frame[adp], frame[adp + 1]]).wrapping_add(main_count);
+            frame[adp..adp + 2].copy_from_slice(&shifted.to_le_bytes());
+        }
+    }
+}

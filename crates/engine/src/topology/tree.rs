@@ -1,0 +1,114 @@
+//! The tree of a segment: which SubDevice hangs on which port of which other one, and what can be asked of that.
+
+use alloc::vec::Vec;
+
+use ringcat_wire::register::{DlStatus, PortKind};
+
+use super::finding::Finding;
+use super::local_ring::LocalRing;
+use super::port::{Connection, PortOf};
+use crate::info::SubDeviceInfo;
+
+/// What a SubDevice reported about its ports.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct NodeStatus {
+    /// Register DL_STATUS.
+    pub dl_status: DlStatus,
+    /// Times at which one frame came in at port 0..3, in nanoseconds of the SubDevice's own clock.
+    pub receive_times: Option<[u32; 4]>,
+    /// Kind of port 0..3.
+    pub ports: [PortKind; 4],
+}
+
+impl From<&SubDeviceInfo> for NodeStatus {
+    fn from(info: &SubDeviceInfo) -> NodeStatus {
+        NodeStatus { dl_status: info.dl_status, receive_times: info.receive_times, ports: info.controller.ports }
+    }
+}
+
+/// A SubDevice in the tree.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Node {
+    /// SubDevice and port on which it hangs; `None` for the first one of a link.
+    pub parent: Option<(usize, u8)>,
+    /// Its own port towards the parent or the link.
+    pub entry_port: u8,
+    /// SubDevice on port 0..3, the parent not included.
+    pub children: [Option<usize>; 4],
+}
+
+/// The tree of a segment, or the two trees of a broken ring.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Topology {
+    /// SubDevices by position.
+    pub nodes: Vec<Node>,
+    /// SubDevices in front, met by the frames of the main link.
+    pub main_count: usize,
+    /// Head of the tree on the redundant link, next to the break; `None` in a closed ring or without a second link.
+    pub redundant_head: Option<usize>,
+    /// Where the SubDevices of the main link end in an open ring, or all of them where only the redundant link meets
+    /// any and enters each at port 0. Not where branches leave several ports that a cable of the ring could be missing
+    /// from.
+    pub main_end: Option<PortOf>,
+    /// Ports that are open but lead to no SubDevice: the redundant link, or a device that is no SubDevice. In the order
+    /// in which frames of the main link, then of the redundant link, pass them.
+    pub open_ports: Vec<PortOf>,
+    /// What is odd, by position.
+    pub findings: Vec<Finding>,
+    /// Rings behind a junction, as far as they are known.
+    pub local_rings: Vec<LocalRing>,
+}
+
+impl Topology {
+    /// Whether neighbours are an assumption: frames of both links meet SubDevices though no break separates them. Who
+    /// of them is crossed, or hangs on a port 2, does not show as long as the ring is closed (LC-02).
+    pub fn is_assumed(&self) -> bool {
+        self.redundant_head.is_none() && self.main_count < self.nodes.len()
+    }
+
+    /// Whether the cable that leads to a SubDevice from the one before it is part of a local ring.
+    pub fn is_in_local_ring(&self, node: usize) -> bool {
+        let Some(here) = self.nodes.get(node) else { return false };
+        let far = PortOf { node, port: here.entry_port };
+        self.local_rings.iter().flat_map(|ring| &ring.cables).any(|cable| cable.far == far)
+    }
+
+    /// Whether a SubDevice is another one, or is reached through it.
+    pub(crate) fn hangs_behind(&self, node: usize, other: usize) -> bool {
+        let mut at = node;
+        for _ in 0..=self.nodes.len() {
+            if at == other {
+                return true;
+            }
+            let Some((parent, _)) = self.nodes.get(at).and_then(|here| here.parent) else { break };
+            at = parent;
+        }
+        false
+    }
+
+    /// The cable that leads to a SubDevice from the one before it.
+    pub fn connection_to(&self, node: usize) -> Option<Connection> {
+        let here = self.nodes.get(node)?;
+        let (parent, port) = here.parent?;
+        let far = PortOf { node, port: here.entry_port };
+        Some(Connection { near: PortOf { node: parent, port }, far })
+    }
+
+    /// The cable on a port.
+    pub fn connection_at(&self, at: PortOf) -> Option<Connection> {
+        let here = self.nodes.get(at.node)?;
+        match here.children.get(usize::from(at.port))? {
+            Some(child) => self.connection_to(*child),
+            None if here.entry_port == at.port => self.connection_to(at.node),
+            None => None,
+        }
+    }
+
+    /// The cable between two SubDevices, in either order.
+    pub fn connection_between(&self, a: usize, b: usize) -> Option<Connection> {
+        [(a, b), (b, a)]
+            .into_iter()
+            .filter_map(|(from, to)| self.connection_to(to).filter(|connection| connection.near.node == from))
+            .next()
+    }
+}

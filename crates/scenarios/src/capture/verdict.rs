@@ -1,0 +1,66 @@
+//! What a capture shows: counts, and promises that were broken.
+
+use std::fmt;
+use std::time::Duration;
+
+use super::windows::Windows;
+
+/// Findings that are kept in words; all are counted.
+const TOLD: usize = 20;
+
+/// What a capture shows.
+#[derive(Debug, Default)]
+pub struct Verdict {
+    /// Frames sent, by link.
+    pub sent: [u64; 2],
+    /// Frames received, by link.
+    pub received: [u64; 2],
+    /// Datagrams sent whose data was judged to be zeros.
+    pub reads: u64,
+    /// Frames whose copies on both links were compared.
+    pub pairs: u64,
+    /// Copies that came back.
+    pub returned: u64,
+    /// Copies that did not.
+    pub missing: u64,
+    /// Longest time between the copies of a frame on both links.
+    pub longest_pair: Duration,
+    /// How often the numbers of a class began with 1 again.
+    pub anew: u64,
+    /// How cyclic and acyclic frames shared the wire, by link; nothing where there were no cycles.
+    pub windows: Vec<Windows>,
+    /// Promises broken.
+    pub broken: u64,
+    /// The first of them in words.
+    pub findings: Vec<String>,
+}
+
+impl Verdict {
+    pub(super) fn find(&mut self, frame: usize, text: impl fmt::Display) {
+        self.broken += 1;
+        if self.findings.len() < TOLD {
+            self.findings.push(format!("frame {frame}: {text}"));
+        }
+    }
+}
+
+impl fmt::Display for Verdict {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Verdict { sent, received, reads, pairs, returned, missing, .. } = self;
+        writeln!(
+            f,
+            "frames sent: {} on MAIN, {} on REDUNDANT; received: {}, {}",
+            sent[0], sent[1], received[0], received[1]
+        )?;
+        writeln!(f, "reads sent as zeros: {reads}; pairs alike: {pairs}, at most {:?} apart", self.longest_pair)?;
+        writeln!(f, "copies that came back: {returned}, that did not: {missing}")?;
+        for windows in &self.windows {
+            write!(f, "{windows}")?;
+        }
+        writeln!(f, "promises broken: {}", self.broken)?;
+        for finding in &self.findings {
+            writeln!(f, "  {finding}")?;
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,19 @@
+//! What a message in the mailbox leads to: protocol servers say it, the mailbox sends it.
+
+/// What a message leads to.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Answer {
+    /// Answers of the same protocol, one message each.
+    Payloads(Vec<Vec<u8>>),
+    /// An error reply of the mailbox with this detail.
+    Error(u16),
+    /// Nothing.
+    Silence,
+}
+
+impl Answer {
+    /// One answer of the same protocol.
+    pub fn payload(bytes: Vec<u8>) -> Answer {
+        Answer::Payloads(vec![bytes])
+    }
+}

@@ -1,0 +1,35 @@
+//! The addresses of a device behind EoE.
+
+use core::net::Ipv4Addr;
+
+/// The addresses as they are set now.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Addresses {
+    /// MAC address.
+    pub mac: [u8; 6],
+    /// IP address; unspecified until one is set.
+    pub address: Ipv4Addr,
+    /// Subnet mask.
+    pub mask: Ipv4Addr,
+    /// Default gateway.
+    pub gateway: Ipv4Addr,
+    /// DNS server.
+    pub dns: Ipv4Addr,
+    /// Name.
+    pub name: Vec<u8>,
+}
+
+impl Addresses {
+    /// A unicast MAC address, a unicast IP address or none, a mask of ones and then zeros.
+    pub(super) fn make_sense(&self) -> bool {
+        let mac = self.mac[0] & 0x01 == 0 && self.mac != [0; 6];
+        let unicast = |address: Ipv4Addr| !address.is_multicast() && !address.is_broadcast();
+        let mask = u32::from(self.mask);
+        mac && unicast(self.address) && unicast(self.gateway) && mask.leading_ones() + mask.trailing_zeros() == 32
+    }
+
+    /// Bits of the network part.
+    pub fn prefix(&self) -> u8 {
+        u32::from(self.mask).leading_ones() as u8
+    }
+}

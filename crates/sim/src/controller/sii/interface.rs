@@ -1,0 +1,61 @@
+//! What the SII interface is doing, beside its registers.
+
+use core::time::Duration;
+
+use ringcat_wire::register::SiiCommand;
+
+use crate::controller::spoilt_write::SpoiltWrite;
+use crate::time::SimTime;
+
+/// What the interface is doing.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Task {
+    Idle,
+    /// Loading the configuration, for the first time since the reset or again.
+    Load {
+        first: bool,
+    },
+    Read,
+    Write,
+}
+
+/// State of the interface beside its registers.
+#[derive(Clone, Debug)]
+pub(in crate::controller) struct SiiInterface {
+    pub(super) task: Task,
+    pub(super) until: SimTime,
+    /// A command that was written in this frame.
+    pub(super) command: Option<SiiCommand>,
+    /// Bit 0 of SII_CONTROL, at hand for every frame.
+    pub(super) write_enabled: bool,
+    /// So many of the next commands take this long.
+    pub(super) slow: (u32, Duration),
+    /// So many of the next writes go wrong in this way.
+    pub(super) spoilt: (u32, SpoiltWrite),
+}
+
+impl SiiInterface {
+    pub const fn new() -> SiiInterface {
+        SiiInterface {
+            task: Task::Idle,
+            until: SimTime::NEVER,
+            command: None,
+            write_enabled: false,
+            slow: (0, Duration::ZERO),
+            spoilt: (0, SpoiltWrite::NotStored),
+        }
+    }
+
+    /// When the running command ends.
+    pub const fn deadline(&self) -> SimTime {
+        self.until
+    }
+
+    pub const fn is_loading(&self) -> bool {
+        matches!(self.task, Task::Load { .. })
+    }
+
+    pub(super) fn is_busy(&self) -> bool {
+        self.task != Task::Idle
+    }
+}

@@ -1,0 +1,161 @@
+//! Frames fly along a [`Route`] in one go, as far as nothing else happens.
+//!
+//! A frame that cannot change the way of frames goes from one processing unit to the next, and on to the end, at the
+//! times that hop by hop ([`super::traffic`]) would give. What it does to a device is done by the same code.
+//!
+//! Frames of the same kind that enter behind it, or at the other end, may do so meanwhile: they do not overtake it,
+//! each processing unit belongs to the way of one interface, and a frame that only passes by leaves no trace. Anything
+//! else that is due, in the segment or in a device, ends the flight there, and the frame goes on hop by hop. The same
+//! holds for the limit of the caller, which may look at the devices or change the segment then.
+
+use super::Network;
+use super::event::Event;
+use super::pool::Slot;
+use super::route::{Hop, Route, Stop};
+use crate::cable::{Endpoint, HostLink, LegId};
+use crate::controller::Way;
+use crate::queue::Lane;
+use crate::time::SimTime;
+
+impl Network {
+    /// A frame has come to the end of the first cable.
+    pub(super) fn enter(&mut self, slot: Slot, link: HostLink, leg: LegId) -> Option<(SimTime, Event)> {
+        if self.options.compiled {
+            let frame = self.frames.frame(slot);
+            let first_bit = self.now.back_ns(frame.first_to_last_bit_ns());
+            if self.routes[link as usize].wiring != Some(self.wiring) {
+                self.find_route(link);
+            }
+            let route = &self.routes[link as usize];
+            // What is due at this very time has its own order.
+            let alone = self.horizon(link) >= self.now;
+            if alone && route.wiring == Some(self.wiring) && first_bit >= route.since {
+                return self.fly(slot, link);
+            }
+        }
+        self.arrive(slot, leg, false)
+    }
+
+    /// Something about cables, links or power has changed.
+    pub(super) fn wiring_changed(&mut self) {
+        self.wiring = self.wiring.wrapping_add(1);
+    }
+
+    /// Takes a frame as far along its route as nothing else happens. Returns its next hop, if that is not the end.
+    fn fly(&mut self, slot: Slot, link: HostLink) -> Option<(SimTime, Event)> {
+        let mut route = core::mem::take(&mut self.routes[link as usize]);
+        let entered = self.now;
+        let place = self.follow(slot, link, &mut route);
+        self.now = entered;
+        let last = route.hops.len() - 1;
+        let place = place.min(last);
+        let time = |hop: Hop| SimTime(entered.0.saturating_add(hop.after_ns));
+        let Hop { leg, .. } = route.hops[place];
+        let at = time(route.hops[place]);
+        self.flown_to = self.flown_to.max(time(route.hops[place.saturating_sub(1)]));
+        self.statistics.hops += place as u64;
+        self.routes[link as usize] = route;
+        let arrival = Event::Arrival { slot, leg, meddled: false };
+        if place < last {
+            return Some((at, arrival));
+        }
+        self.queue.push(Lane::Exit, at, arrival);
+        None
+    }
+
+    /// Does everything up to the hop whose place it returns.
+    fn follow(&mut self, slot: Slot, link: HostLink, route: &mut Route) -> usize {
+        let entered = self.now;
+        let time = |hop: &Hop| SimTime(entered.0.saturating_add(hop.after_ns));
+        let end = SimTime(entered.0.saturating_add(route.length_ns()));
+        let (id, wire_ns) = (self.frames.frame(slot).id, self.frames.frame(slot).first_to_last_bit_ns());
+        let mut horizon = self.horizon(link);
+        for stop in &route.stops {
+            let place = stop.hop as usize;
+            let at = time(&route.hops[place]);
+            if at > horizon {
+                break;
+            }
+            let index = stop.device as usize;
+            self.now = at;
+            if stop.processed {
+                self.settle_before(index, id);
+            }
+            let controller = &mut self.nodes[index].device.controller;
+            if !controller.stays(stop.port_changes, end) {
+                route.refuse(controller.port_changes() != stop.port_changes);
+                return place;
+            }
+            if !stop.processed {
+                continue;
+            }
+            controller.process_on_way(self.frames.frame_mut(slot), at.back_ns(wire_ns), at);
+            if self.leaping {
+                self.settle_later(index, id);
+            } else {
+                self.settle(index);
+            }
+            horizon = self.horizon(link);
+            let controller = &self.nodes[index].device.controller;
+            if !controller.stays(stop.port_changes, end) {
+                route.refuse(controller.port_changes() != stop.port_changes);
+                return place + 1;
+            }
+        }
+        match end <= horizon {
+            true => route.hops.len() - 1,
+            false => route.hops.partition_point(|hop| time(hop) <= horizon),
+        }
+    }
+
+    /// Up to here a frame of an interface can go without meeting anything else.
+    fn horizon(&self, link: HostLink) -> SimTime {
+        let horizon = self.limit.min(self.queue.next_in(Lane::Any).back_ns(1));
+        if !self.until_received {
+            return horizon;
+        }
+        // Whoever gets the first frame may change the segment then.
+        let other = if link == HostLink::Main { HostLink::Redundant } else { HostLink::Main };
+        let entry = self.queue.next_in(other.entry_lane());
+        let route = &self.routes[other as usize];
+        let there = if route.wiring == Some(self.wiring) { route.length_ns() } else { 0 };
+        horizon.min(self.queue.next_in(Lane::Exit)).min(SimTime(entry.0.saturating_add(there)))
+    }
+
+    /// Finds the way of frames of an interface, if it leads through healthy cables and back to an interface.
+    fn find_route(&mut self, link: HostLink) {
+        let mut route = core::mem::take(&mut self.routes[link as usize]);
+        route.hops.clear();
+        route.stops.clear();
+        route.since = SimTime::ZERO;
+        route.wiring = self.walk(link, &mut route).map(|()| self.wiring);
+        self.routes[link as usize] = route;
+    }
+
+    fn walk(&self, link: HostLink, route: &mut Route) -> Option<()> {
+        let mut leg_id = self.hosts[link as usize].out?;
+        let mut after_ns = 0u64;
+        // Every port of every device is entered once at most.
+        for _ in 0..=4 * self.nodes.len() {
+            let leg = &self.legs[leg_id.index()];
+            route.since = route.since.max(leg.steady_since()?);
+            let hop = route.hops.len() as u32;
+            route.hops.push(Hop { leg: leg_id, after_ns });
+            let (index, port) = match leg.to {
+                Endpoint::Host(_) => return (hop > 0).then_some(()),
+                Endpoint::Device(device, port) => (device.0, port),
+            };
+            let node = &self.nodes[index];
+            route.since = route.since.max(node.last_loop_change);
+            let Way { exit, processed, port_changes } = node.device.controller.way(port)?;
+            let device = index as u32;
+            if processed || !route.stops.iter().rev().any(|stop| stop.device == device) {
+                route.stops.push(Stop { hop, device, port_changes, processed });
+            }
+            leg_id = node.out[exit.index()]?;
+            let delay_ns = u64::try_from(self.options.passage(&node.device, processed).as_nanos()).ok()?;
+            after_ns = after_ns.checked_add(delay_ns)?.checked_add(self.legs[leg_id.index()].delay_ns)?;
+        }
+        None
+    }
+}

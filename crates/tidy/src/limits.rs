@@ -1,0 +1,160 @@
+//! Limits of size: lines of a function and of a file, columns of a line, characters of a test's name.
+//!
+//! In goes a tree, out come [`Counts`] of what is over a limit.
+
+use syn::spanned::Spanned;
+use syn::visit::{self, Visit};
+
+use crate::Finding;
+use crate::features::test_names;
+use crate::known::{self, Counts};
+use crate::tokens::tokens;
+use crate::tree::{File, Tree};
+
+/// Lines of a function, from `fn` to its closing brace: it fits a screen.
+pub const FUNCTION_LINES: usize = 60;
+/// Lines of a file, tests apart.
+pub const FILE_LINES: usize = 500;
+/// Columns of a line.
+pub const COLUMNS: usize = 120;
+/// Characters of a test's name.
+pub const TEST_NAME: usize = 80;
+
+/// Functions with more than [`FUNCTION_LINES`] lines, each with its lines; tests count like all others.
+pub fn long_functions(tree: &Tree) -> Result<Counts, Finding> {
+    let mut long = Counts::new();
+    for file in tree.rust() {
+        let syntax = syn::parse_file(&file.text)
+            .map_err(|error| Finding::new(&file.path, error.span().start().line, format!("does not parse: {error}")))?;
+        let mut lengths = Lengths(Vec::new());
+        lengths.visit_file(&syntax);
+        for (name, lines) in lengths.0.into_iter().filter(|(_, lines)| *lines > FUNCTION_LINES) {
+            long.insert(format!("{}: {name}", file.path), lines);
+        }
+    }
+    Ok(long)
+}
+
+/// Name and lines of each function.
+struct Lengths(Vec<(String, usize)>);
+
+impl Lengths {
+    fn add(&mut self, signature: &syn::Signature, block: &syn::Block) {
+        let lines = block.span().end().line + 1 - signature.fn_token.span.start().line;
+        self.0.push((signature.ident.to_string(), lines));
+    }
+}
+
+impl<'ast> Visit<'ast> for Lengths {
+    fn visit_item_fn(&mut self, item: &'ast syn::ItemFn) {
+        self.add(&item.sig, &item.block);
+        visit::visit_item_fn(self, item);
+    }
+
+    fn visit_impl_item_fn(&mut self, item: &'ast syn::ImplItemFn) {
+        self.add(&item.sig, &item.block);
+        visit::visit_impl_item_fn(self, item);
+    }
+
+    fn visit_trait_item_fn(&mut self, item: &'ast syn::TraitItemFn) {
+        if let Some(block) = &item.default {
+            self.add(&item.sig, block);
+        }
+        visit::visit_trait_item_fn(self, item);
+    }
+}
+
+/// Sources with more than [`FILE_LINES`] lines.
+pub fn long_files(tree: &Tree) -> Counts {
+    let lines = |file: &File| (file.path.clone(), file.text.lines().count());
+    tree.rust().filter(|file| !is_test(&file.path)).map(lines).filter(|(_, lines)| *lines > FILE_LINES).collect()
+}
+
+fn is_test(path: &str) -> bool {
+    path.contains("/tests/") || path.ends_with("/tests.rs")
+}
+
+/// How many lines of each file are wider than [`COLUMNS`]. Tables and links in Markdown cannot be wrapped.
+pub fn wide_lines(tree: &Tree) -> Counts {
+    let width = |file: &File| {
+        let markdown = file.path.ends_with(".md");
+        let cannot_wrap = |line: &str| markdown && (line.starts_with('|') || is_one_word(line));
+        let wide = |line: &&str| line.chars().count() > COLUMNS && !cannot_wrap(line);
+        (file.path.clone(), file.text.lines().filter(wide).count())
+    };
+    let written = tree.files.iter().filter(|file| file.path != known::PATH);
+    written.map(width).filter(|(_, lines)| *lines > 0).collect()
+}
+
+/// Whether there is no place to wrap a line of Markdown behind its list mark.
+fn is_one_word(line: &str) -> bool {
+    !line.trim_start_matches([' ', '-', '*', '>']).contains(' ')
+}
+
+/// Tests whose names have more than [`TEST_NAME`] characters.
+pub fn long_test_names(tree: &Tree) -> Counts {
+    let mut long = Counts::new();
+    for file in tree.rust() {
+        for name in test_names(&tokens(&file.text)).into_iter().filter(|name| name.chars().count() > TEST_NAME) {
+            let length = name.chars().count();
+            long.insert(format!("{}: {name}", file.path), length);
+        }
+    }
+    long
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn tree(path: &str, text: &str) -> Tree {
+        Tree { files: vec![File::new(path, text)] }
+    }
+
+    #[test]
+    fn functions_of_all_kinds_are_measured() {
+        let body = "\n    f();".repeat(58);
+        let fits = tree("a.rs", &format!("#[test]\nfn fits() {{{body}\n}}\n"));
+        assert_eq!(long_functions(&fits), Ok(Counts::new()));
+        let body = "\n    f();".repeat(60);
+        let text = format!(
+            "impl A {{ fn a() {{{body}\n}} }} trait T {{ fn t() {{{body} }} }} fn o() {{ fn i() {{{body} }} }}"
+        );
+        let long = long_functions(&tree("a.rs", &text)).expect("parses");
+        let expected = [("a.rs: a", 62), ("a.rs: i", 61), ("a.rs: o", 61), ("a.rs: t", 61)];
+        assert_eq!(long, expected.map(|(name, lines)| (name.to_owned(), lines)).into());
+    }
+
+    #[test]
+    fn files_of_tests_may_be_longer() {
+        assert_eq!(long_files(&tree("a/src/b.rs", &"\n".repeat(501))).len(), 1);
+        assert!(long_files(&tree("a/src/b.rs", &"\n".repeat(500))).is_empty());
+        for path in ["a/src/tests.rs", "a/tests/b.rs", "a/b.md"] {
+            assert!(long_files(&tree(path, &"\n".repeat(501))).is_empty(), "{path}");
+        }
+    }
+
+    #[test]
+    fn columns_are_characters() {
+        assert!(wide_lines(&tree("a.rs", &"ä".repeat(120))).is_empty());
+        assert_eq!(wide_lines(&tree("a.rs", &"ä".repeat(121))).len(), 1);
+    }
+
+    #[test]
+    fn what_cannot_be_wrapped_is_excepted_in_markdown_only() {
+        let link = format!("- https://{}", "a".repeat(120));
+        let table = format!("| {} |", "a ".repeat(60));
+        for line in [&link, &table] {
+            assert!(wide_lines(&tree("a.md", line)).is_empty());
+            assert_eq!(wide_lines(&tree("a.rs", line)).len(), 1);
+        }
+        assert_eq!(wide_lines(&tree("a.md", &"ab ".repeat(41))).len(), 1);
+    }
+
+    #[test]
+    fn names_of_tests_only_are_measured() {
+        let (short, long) = ("a".repeat(80), "b".repeat(81));
+        let text = format!("#[test] fn {short}() {{}} #[test] fn {long}() {{}} fn c{long}() {{}}");
+        assert_eq!(long_test_names(&tree("a.rs", &text)), [(format!("a.rs: {long}"), 81)].into());
+    }
+}

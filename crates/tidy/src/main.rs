@@ -1,0 +1,61 @@
+//! `cargo run -p tidy`: what the rules find in this repository, with the longest chain of files of each crate.
+//!
+//! `cargo run -p tidy -- shrink` lowers `known.toml` to what is there; it refuses where a rule found more than before.
+
+use std::path::Path;
+use std::process::ExitCode;
+
+use tidy::circles::{Graph, crates};
+use tidy::known::{Counts, Known, PATH, file_of};
+use tidy::rules::RULES;
+use tidy::tree::Tree;
+use tidy::{Finding, arrows};
+
+fn main() -> ExitCode {
+    let shrink = std::env::args().nth(1).is_some_and(|word| word == "shrink");
+    match run(shrink) {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(finding) => {
+            eprintln!("{finding}");
+            ExitCode::FAILURE
+        }
+    }
+}
+
+fn run(shrink: bool) -> Result<(), Finding> {
+    let tree = Tree::of_this_repository().map_err(|error| Finding::new(".", 0, error.to_string()))?;
+    if !shrink {
+        chains(&tree)?;
+    }
+    let known = Known::read(&tree)?;
+    let mut found: Vec<(&str, Counts)> = Vec::new();
+    for rule in &RULES {
+        let counts = (rule.count)(&tree)?;
+        let (places, sum) = (counts.len(), counts.values().sum::<usize>());
+        println!("{}: {places} places, {sum} in all, {} known", rule.name, known.total(rule.name));
+        if shrink && tree.file(PATH).is_some() && sum > known.total(rule.name) {
+            return Err(Finding::new(PATH, 0, format!("{} has grown: mend it", rule.name)));
+        }
+        found.push((rule.name, counts));
+    }
+    if shrink {
+        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("known.toml");
+        std::fs::write(path, file_of(&found)).map_err(|error| Finding::new(PATH, 0, error.to_string()))?;
+    }
+    Ok(())
+}
+
+fn chains(tree: &Tree) -> Result<(), Finding> {
+    for name in crates(tree) {
+        let graph = Graph::new(&arrows::of_crate(tree, &name)?);
+        let chain = graph.longest_chain();
+        println!("{name}: longest chain of {} files", chain.len());
+        let below = format!("crates/{name}/src/");
+        let names: Vec<&str> = chain.iter().map(|file| file.trim_start_matches(&below)).collect();
+        println!("    {}", names.join(" > "));
+        for circle in graph.circles() {
+            println!("    circle of {}: {}", circle.len(), circle.join(", "));
+        }
+    }
+    Ok(())
+}
