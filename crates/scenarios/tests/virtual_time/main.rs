@@ -31,6 +31,7 @@ mod false_crossings;
 mod frame_limits;
 mod freshness;
 mod hot_connect;
+mod identity;
 mod image_variants;
 mod junctions;
 mod long_segments;
