@@ -93,7 +93,10 @@ impl Truth {
                     }
                     let value = &image[area.in_image.clone()];
                     let is_own = |access: &LogicalAccess| {
-                        access.read && is_of_cycle(access) && area.bytes_of(access) == Some(value)
+                        access.read
+                            && is_of_cycle(access)
+                            && area.is_moved(access, false)
+                            && area.bytes_of(access) == Some(value)
                     };
                     assert!(
                         controller.logical_accesses().any(is_own),
@@ -110,9 +113,8 @@ impl Truth {
                     if status.state != DomainState::Complete || status.wkc != status.expected {
                         continue;
                     }
-                    let is_own = |access: &LogicalAccess| {
-                        access.written && is_of_cycle(access) && area.bytes_of(access).is_some()
-                    };
+                    let is_own =
+                        |access: &LogicalAccess| access.written && is_of_cycle(access) && area.is_moved(access, true);
                     assert!(
                         controller.logical_accesses().any(is_own),
                         "domain {} is called complete, device {} took no outputs from {:02x?}",
@@ -137,6 +139,12 @@ impl Truth {
 }
 
 impl Area {
+    /// Whether the device moved all of it between a datagram and its memory.
+    fn is_moved(&self, access: &LogicalAccess, write: bool) -> bool {
+        let at = self.logical.checked_sub(access.address).and_then(|at| usize::try_from(at).ok());
+        at.is_some_and(|at| access.has_moved(at..at + self.in_image.len(), write))
+    }
+
     /// The part of a datagram's data that is this area's.
     fn bytes_of<'a>(&self, access: &'a LogicalAccess) -> Option<&'a [u8]> {
         let at = usize::try_from(self.logical.checked_sub(access.address)?).ok()?;

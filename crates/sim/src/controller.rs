@@ -32,7 +32,7 @@ mod watchdog;
 pub use clock::{ClockErrors, Wander};
 pub use clock_registers::LatchPin;
 pub use config::{ControllerConfig, MAX_UNITS};
-pub use logical_log::LogicalAccess;
+pub use logical_log::{LogicalAccess, Moved};
 
 use ringcat_wire::address::RegisterAddress;
 use ringcat_wire::register::{LoopControl, map};
