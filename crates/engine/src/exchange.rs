@@ -301,8 +301,8 @@ impl Exchange {
     }
 }
 
-/// A cycle of a domain was incomplete, or is the first complete one. Changes are told, and once that a domain is silent from
-/// the beginning.
+/// A cycle of a domain was incomplete, or is the first complete one. Changes are told, and once that a domain is silent
+/// from the beginning.
 #[cold]
 fn note_change(
     id: DomainId,

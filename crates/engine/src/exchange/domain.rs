@@ -21,8 +21,8 @@ struct Member {
     inputs: Box<[InputNumber]>,
 }
 
-/// Cycles that may stay silent behind the moment in which SubDevices begin to take part: those that are under way, and the first
-/// ones with process data of theirs.
+/// Cycles that may stay silent behind the moment in which SubDevices begin to take part: those that are under way, and
+/// the first ones with process data of theirs.
 const SILENT_CYCLES: u8 = 16;
 
 /// A domain of the exchange.
@@ -202,8 +202,8 @@ impl Domain {
         complete && wkc > 0 && self.status.state == DomainState::Complete
     }
 
-    /// The state of what was judged, of which any copy returned or none. True where it is to be told: it is another one than
-    /// before, or process data stays silent from the beginning though SubDevices take part.
+    /// The state of what was judged, of which any copy returned or none. True where it is to be told: it is another one
+    /// than before, or process data stays silent from the beginning though SubDevices take part.
     pub(crate) fn change_state(&mut self, wkc: u32, complete: bool, returned: bool, is_awaited: bool) -> bool {
         self.status.returned = returned;
         let state = match (wkc, complete) {

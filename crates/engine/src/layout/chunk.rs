@@ -135,7 +135,8 @@ impl Chunk {
         let Some(subdevice) = areas.first().map(|area| area.subdevice) else { return };
         let lrw = self.groups[SHARED].lrw;
         let has_inputs = areas.iter().any(|area| area.direction == Direction::Inputs);
-        // It adds to a working counter once, whatever part of its inputs came: each further area has a datagram of its own.
+        // It adds to a working counter once, whatever part of its inputs came: each further area has a datagram of its
+        // own.
         let has_some = |group: &Group| group.inputs.iter().any(|area| area.subdevice == subdevice);
         let mut is_further = self.groups.iter().any(has_some);
         let (further, first): (Vec<AreaSpec>, Vec<AreaSpec>) = areas

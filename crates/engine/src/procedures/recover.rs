@@ -279,8 +279,8 @@ async fn turn_away(bus: &Bus, fleet: &SharedFleet, index: usize) {
     let _ = take_away(bus, fleet, station).await;
 }
 
-/// Whether what has the station address of a lost member is that member: it may be one that had this address in an earlier
-/// session, or was exchanged for one that ran elsewhere.
+/// Whether what has the station address of a lost member is that member: it may be one that had this address in an
+/// earlier session, or was exchanged for one that ran elsewhere.
 async fn is_the_lost_one(bus: &Bus, fleet: &SharedFleet, index: usize) -> Result<bool, BusError> {
     let station = fleet.access().members[index].station;
     Ok(match mark(bus, fleet, index, station).await? {

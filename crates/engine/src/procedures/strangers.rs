@@ -280,8 +280,8 @@ pub(super) async fn admit_all(bus: &Bus, fleet: &SharedFleet) -> bool {
 }
 
 /// Looks again where the strangers are, if somebody is missed: since they were found the ring may have opened somewhere
-/// else, and of several alike it is the place that tells who is who. Gives back whom cables tell; `None` where the segment
-/// changes.
+/// else, and of several alike it is the place that tells who is who. Gives back whom cables tell; `None` where the
+/// segment changes.
 async fn find_places(bus: &Bus, fleet: &SharedFleet) -> Option<Vec<(StationAddress, usize)>> {
     let somebody_is_missed = {
         let access = fleet.access();
@@ -300,7 +300,8 @@ async fn find_places(bus: &Bus, fleet: &SharedFleet) -> Option<Vec<(StationAddre
     cables::members(bus, fleet, &view, &owners).await
 }
 
-/// Strangers of whom it is known which absent members they are, or that they are none. `told`: those of whom cables tell it.
+/// Strangers of whom it is known which absent members they are, or that they are none. `told`: those of whom cables
+/// tell it.
 fn match_all(bus: &Bus, fleet: &SharedFleet, told: &[(StationAddress, usize)]) -> Vec<(Stranger, Option<usize>)> {
     let mut access = fleet.access();
     let mut strangers = access.strangers.clone();
@@ -336,8 +337,8 @@ fn match_all(bus: &Bus, fleet: &SharedFleet, told: &[(StationAddress, usize)]) -
     matched
 }
 
-/// It could be another absent member as well: of one kind with several, without a serial number, and not as many of them are there
-/// as are missed. Outputs of one must not go to another one.
+/// It could be another absent member as well: of one kind with several, without a serial number, and not as many of
+/// them are there as are missed. Outputs of one must not go to another one.
 fn is_doubtful(fleet: &Fleet, stranger: &Stranger, index: usize, gap: &[Stranger], absent: &[usize]) -> bool {
     if fit(fleet, stranger, index) != Fit::Seen {
         return false;

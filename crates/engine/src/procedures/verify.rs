@@ -1,8 +1,8 @@
-//! Looking from time to time whether SubDevices in their target state still have the registers that were written to them:
-//! SyncManagers, FMMUs, watchdog.
+//! Looking from time to time whether SubDevices in their target state still have the registers that were written to
+//! them: SyncManagers, FMMUs, watchdog.
 //!
-//! A SubDevice without them stays in OP and answers everything, only its process data or its mails are missing. That happens when a
-//! copy of a write that was thought lost arrives late, behind later ones, or when something else writes.
+//! A SubDevice without them stays in OP and answers everything, only its process data or its mails are missing. That
+//! happens when a copy of a write that was thought lost arrives late, behind later ones, or when something else writes.
 
 mod held;
 
@@ -22,7 +22,8 @@ use crate::supervisor::Bus;
 
 /// Pause between two looks: up to three datagrams per SubDevice and second.
 const PAUSE: Duration = Duration::from_secs(1);
-/// So often in a row a SubDevice is configured anew for the same reason; one that holds something else each time does so by itself.
+/// So often in a row a SubDevice is configured anew for the same reason; one that holds something else each time does
+/// so by itself.
 const ATTEMPTS: u8 = 3;
 
 /// A SubDevice to be looked at.

@@ -176,7 +176,8 @@ fn a_subdevice_that_nobody_declared_is_named_and_left_alone() {
     assert_eq!(SIXTEEN.len() - 1, world.application().states().len());
 }
 
-/// The PDI holds the SyncManager of the only inputs back from the beginning (facts 3.5): there never was another state than Zero.
+/// The PDI holds the SyncManager of the only inputs back from the beginning (facts 3.5): there never was another state
+/// than Zero.
 #[test]
 fn a_domain_that_is_silent_from_the_beginning_is_told_once() {
     let network = line(descriptions(&["digital-input-8"]), NetworkOptions::default());

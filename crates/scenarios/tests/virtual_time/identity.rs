@@ -1,5 +1,5 @@
-//! Two SubDevices at one station address: which of them is ours is told by what this MainDevice wrote to it, by identity and by
-//! place, never by which answers first.
+//! Two SubDevices at one station address: which of them is ours is told by what this MainDevice wrote to it, by
+//! identity and by place, never by which answers first.
 
 use std::time::Duration;
 
@@ -19,7 +19,8 @@ use scenarios::world::{CYCLE, World};
 
 const DOMAIN: DomainId = DomainId(0);
 
-/// Devices with four MII ports each; the inputs of each are its number, from 0xA0 on. Those that are alike have one identity.
+/// Devices with four MII ports each; the inputs of each are its number, from 0xA0 on. Those that are alike have one
+/// identity.
 fn described(kinds: &[&str], alike: bool) -> Vec<DeviceDescription> {
     let mut described = descriptions(kinds);
     for (number, it) in described.iter_mut().enumerate() {
@@ -63,8 +64,8 @@ fn second_session(
     activated(main_device, count - 1)
 }
 
-/// The device that has a station address of this session keeps it, in OP and with all its inputs fresh, whether the one of the
-/// earlier session comes before or behind it in the order of frames, and whether or not they are alike.
+/// The device that has a station address of this session keeps it, in OP and with all its inputs fresh, whether the one
+/// of the earlier session comes before or behind it in the order of frames, and whether or not they are alike.
 #[test]
 fn of_two_at_one_address_the_one_of_this_session_stays_and_the_other_one_loses_it() {
     let tree = [(MAIN, at(0, Port::A)), (at(0, Port::B), at(1, Port::A)), (at(0, Port::D), at(2, Port::A))];
@@ -106,7 +107,10 @@ fn of_two_at_one_address_the_one_of_this_session_stays_and_the_other_one_loses_i
         assert_eq!(other.al_status().al_state(), Some(AlState::Init), "{what}: it is nobody's");
         let identity = other.description.identity;
         let events: Vec<Event> = core::iter::from_fn(|| application.pop_event()).map(|timed| timed.event).collect();
-        let unexpected = |event: &&Event| matches!(event, Event::Unexpected { identity: seen, .. } if seen.product_code == identity.product_code);
+        let unexpected = |event: &&Event| match event {
+            Event::Unexpected { identity: seen, .. } => seen.product_code == identity.product_code,
+            _ => false,
+        };
         assert_eq!(events.iter().filter(unexpected).count(), 1, "{what}: {events:?}");
         let troubles =
             |event: &&Event| matches!(event, Event::Lost { .. } | Event::Returned { .. } | Event::StateError { .. });
@@ -114,8 +118,9 @@ fn of_two_at_one_address_the_one_of_this_session_stays_and_the_other_one_loses_i
     }
 }
 
-/// Branches of a junction with devices that are alike, without serial numbers: the one on the later branch has its power back first. A
-/// ring behind a junction whose first two are alike, the second one reached from the far end while the first has no power.
+/// Branches of a junction with devices that are alike, without serial numbers: the one on the later branch has its
+/// power back first. A ring behind a junction whose first two are alike, the second one reached from the far end while
+/// the first has no power.
 #[test]
 fn of_several_alike_each_comes_back_to_its_own_place_whichever_is_there_first() {
     let branches = [

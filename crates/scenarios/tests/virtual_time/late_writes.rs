@@ -1,4 +1,5 @@
-//! Copies of configuration writes that were given up and come late, after later writes: what they undo is found and written again.
+//! Copies of configuration writes that were given up and come late, after later writes: what they undo is found and
+//! written again.
 
 use std::time::Duration;
 

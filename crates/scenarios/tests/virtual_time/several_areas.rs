@@ -1,5 +1,5 @@
-//! SubDevices with several areas of inputs: one that is dead is not hidden by another one that is not, though a SubDevice adds to a
-//! working counter once (facts 1.4).
+//! SubDevices with several areas of inputs: one that is dead is not hidden by another one that is not, though a
+//! SubDevice adds to a working counter once (facts 1.4).
 
 use std::time::Duration;
 
@@ -56,7 +56,8 @@ fn inputs_of_a_dead_sync_manager_are_not_fresh_beside_those_of_another_one() {
                         assert_eq!(exchange.image(DOMAIN)[area.placed.image_offset as usize], 0xAA, "{what}");
                     }
                     assert!(matches!(exchange.freshness(DOMAIN, 1), Freshness::Stale { .. }), "{what}");
-                    // The first area shares its datagram with others where it is witnessed: then none of that can be told apart.
+                    // The first area shares its datagram with others where it is witnessed: then none of that can be
+                    // told apart.
                     if dead == 1 || fmmus.is_some() {
                         assert_eq!(exchange.freshness(DOMAIN, 0), Freshness::Fresh, "{what}");
                     }

@@ -29,8 +29,8 @@ pub struct LogicalAccess {
     pub written: bool,
     /// The data as it left the SubDevice.
     pub data: Vec<u8>,
-    /// What was moved: a SubDevice adds to the working counter once for all that it reads, whatever part of it its SyncManagers
-    /// refuse.
+    /// What was moved: a SubDevice adds to the working counter once for all that it reads, whatever part of it its
+    /// SyncManagers refuse.
     pub moved: Vec<Moved>,
 }
 

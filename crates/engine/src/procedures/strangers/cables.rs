@@ -1,9 +1,9 @@
 //! Which absent members strangers are by the cables that lead to them.
 //!
-//! Several may be alike. Their order tells who is who where all of them are there; where some are not, or a ring is open elsewhere
-//! than at the scan so that frames meet its SubDevices from the other side, only their neighbours do. In go the cables as the scan
-//! or a rescan found them and as the ports tell them now: what hangs on the port of a member to which a cable led before, with the
-//! same port of its own, is what hung there.
+//! Several may be alike. Their order tells who is who where all of them are there; where some are not, or a ring is
+//! open elsewhere than at the scan so that frames meet its SubDevices from the other side, only their neighbours do. In
+//! go the cables as the scan or a rescan found them and as the ports tell them now: what hangs on the port of a member
+//! to which a cable led before, with the same port of its own, is what hung there.
 
 use alloc::vec;
 use alloc::vec::Vec;
@@ -142,8 +142,8 @@ impl Look<'_> {
         counts == (before.main_count, before.nodes.len()) && members.iter().enumerate().all(at_home)
     }
 
-    /// The cabling as the ports tell it. A ring whose last SubDevice is a stranger closes where the cables of all that are known are
-    /// those of before.
+    /// The cabling as the ports tell it. A ring whose last SubDevice is a stranger closes where the cables of all that
+    /// are known are those of before.
     fn topology(&self, members: &[Option<usize>]) -> Topology {
         let main_count = usize::from(self.view.counts.0.0);
         let mut closings = Vec::new();

@@ -1,9 +1,9 @@
 //! Station addresses that several SubDevices had: which of them the member is.
 //!
-//! One of an earlier session, or of another MainDevice, may have a member's address and its identity too. What this MainDevice
-//! wrote to it tells them apart: each session has logical addresses of its own (decision 0023), so FMMUs with those of the
-//! member are those of the member. Only where nothing was mapped, place and identity decide. Those that are not the member keep
-//! the temporary address that they were given, and are strangers.
+//! One of an earlier session, or of another MainDevice, may have a member's address and its identity too. What this
+//! MainDevice wrote to it tells them apart: each session has logical addresses of its own (decision 0023), so FMMUs
+//! with those of the member are those of the member. Only where nothing was mapped, place and identity decide. Those
+//! that are not the member keep the temporary address that they were given, and are strangers.
 
 use alloc::vec::Vec;
 
@@ -55,8 +55,8 @@ pub(in super::super) async fn mark(
     }
 }
 
-/// Whether the SubDevice at a station address says that it is of the kind and has the serial number of a member; one that cannot
-/// be read has to be trusted.
+/// Whether the SubDevice at a station address says that it is of the kind and has the serial number of a member; one
+/// that cannot be read has to be trusted.
 pub(in super::super) async fn has_identity(
     bus: &Bus,
     fleet: &SharedFleet,
@@ -78,8 +78,8 @@ pub(in super::super) async fn has_identity(
     }
 }
 
-/// Gives each member its address back that several had. `before` is how it was then, `after` how it is now that each of them has
-/// an address of its own, `owners` who was at which place by order.
+/// Gives each member its address back that several had. `before` is how it was then, `after` how it is now that each of
+/// them has an address of its own, `owners` who was at which place by order.
 pub(super) async fn restore(
     bus: &Bus,
     fleet: &SharedFleet,

@@ -167,7 +167,8 @@ async fn look(bus: &Bus, fleet: &SharedFleet) -> Result<Option<Rescan>, BusError
     Ok(Some(Rescan { counts: seen.counts, subdevices, missing, topology }))
 }
 
-/// The ports of all that were seen; `None` where the segment has changed since: ports of one would be mixed with those of another.
+/// The ports of all that were seen; `None` where the segment has changed since: ports of one would be mixed with those
+/// of another.
 pub(super) async fn ports_of(bus: &Bus, seen: &View) -> Result<Option<Vec<DlStatus>>, BusError> {
     let ports = bus.gather((0..seen.stations.len() as u16).map(Position), |bus, position| async move {
         let bytes = bus.aprd(position, map::DL_STATUS, DlStatus::LEN).await?;

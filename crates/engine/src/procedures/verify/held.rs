@@ -66,8 +66,8 @@ impl Held {
     }
 }
 
-/// What a SubDevice holds in a state: mailbox SyncManagers from PREOP on, the others and FMMUs from SAFEOP on. One for OP only has
-/// its process data in OP only.
+/// What a SubDevice holds in a state: mailbox SyncManagers from PREOP on, the others and FMMUs from SAFEOP on. One for
+/// OP only has its process data in OP only.
 pub(super) fn registers(setup: &Setup, config: &SubDeviceConfig, state: AlState) -> Vec<Held> {
     let (from_preop, from_safeop, in_op) = match state {
         AlState::Init | AlState::Boot => (false, false, false),
