@@ -3,7 +3,7 @@
 
 use std::time::Duration;
 
-use ringcat::{DomainId, DomainState, Event};
+use ringcat::{DomainId, DomainState, Event, Services};
 use ringcat_sim::cable::{CableId, DeviceIndex, Direction};
 use ringcat_sim::fault::Fault;
 use ringcat_sim::network::NetworkOptions;

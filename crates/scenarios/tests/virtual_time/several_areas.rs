@@ -22,9 +22,9 @@ fn described(fmmus: Option<u8>) -> Vec<DeviceDescription> {
     two.behaviour = Behaviour::Terminal(InputSource::Constant(vec![0xAA; 2]));
     two.controller_fmmus = fmmus;
     two.fmmus = vec![FmmuUsage::Inputs; 2];
-    let mut first = two.sync_managers[0].clone();
+    let mut first = two.sync_managers[0];
     first.length = 1;
-    let mut second = first.clone();
+    let mut second = first;
     second.start += 0x100;
     two.sync_managers = vec![first, second];
     for pdo in &mut two.pdos[8..] {
