@@ -202,7 +202,8 @@ impl Exchange {
             judged = true;
             if !domain.judge(wkc, complete, left) {
                 let returned = self.frames[set.clone()].iter().any(|frame| frame.arrivals().arrived != 0);
-                note_change(id, domain, (wkc, complete, returned), &mut self.counters, &mut self.events);
+                let judgement = (wkc, complete, returned);
+                note_change(id, domain, judgement, &self.board, &mut self.counters, &mut self.events);
                 if !complete {
                     count_errors(&self.frames[set], &self.board);
                 }
@@ -302,16 +303,19 @@ impl Exchange {
     }
 }
 
-/// A cycle of a domain was incomplete, or is the first complete one.
+/// A cycle of a domain was incomplete, or is the first complete one. Changes are told, and once that a domain is silent
+/// from the beginning.
 #[cold]
 fn note_change(
     id: DomainId,
     domain: &mut Domain,
     (wkc, complete, returned): (u32, bool, bool),
+    board: &Board,
     counters: &mut CyclicCounters,
     events: &mut Producer,
 ) {
-    let changed = domain.change_state(wkc, complete, returned);
+    let is_awaited = domain.is_awaited(|subdevice| board.takes_part(subdevice));
+    let changed = domain.change_state(wkc, complete, returned, is_awaited);
     if domain.state() != DomainState::Complete {
         counters.incomplete += 1;
     }

@@ -73,7 +73,10 @@ impl Truth {
                     }
                     let value = &image[area.in_image.clone()];
                     let is_own = |access: &LogicalAccess| {
-                        access.read && is_of_cycle(access) && bytes_of(area, access) == Some(value)
+                        access.read
+                            && is_of_cycle(access)
+                            && is_moved(area, access, false)
+                            && bytes_of(area, access) == Some(value)
                     };
                     assert!(
                         controller.logical_accesses().any(is_own),
@@ -90,9 +93,8 @@ impl Truth {
                     if status.state != DomainState::Complete || status.wkc != status.expected {
                         continue;
                     }
-                    let is_own = |access: &LogicalAccess| {
-                        access.written && is_of_cycle(access) && bytes_of(area, access).is_some()
-                    };
+                    let is_own =
+                        |access: &LogicalAccess| access.written && is_of_cycle(access) && is_moved(area, access, true);
                     assert!(
                         controller.logical_accesses().any(is_own),
                         "domain {} is called complete, device {} took no outputs from {:02x?}",
@@ -114,6 +116,12 @@ impl Truth {
         }
         departures.push_back(frames.clone());
     }
+}
+
+/// Whether the device moved all of an area between a datagram and its memory.
+fn is_moved(area: &Area, access: &LogicalAccess, write: bool) -> bool {
+    let at = area.logical.checked_sub(access.address).and_then(|at| usize::try_from(at).ok());
+    at.is_some_and(|at| access.has_moved(at..at + area.in_image.len(), write))
 }
 
 /// The part of a datagram's data that is an area's.

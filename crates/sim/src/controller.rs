@@ -35,7 +35,7 @@ mod watchdog;
 pub use clock::{ClockErrors, Wander};
 pub use clock_registers::LatchPin;
 pub use config::{ControllerConfig, MAX_UNITS};
-pub use logical_log::LogicalAccess;
+pub use logical_log::{LogicalAccess, Moved};
 pub use spoilt_write::SpoiltWrite;
 
 use ringcat_wire::address::RegisterAddress;

@@ -22,6 +22,10 @@ struct Member {
     inputs: Box<[InputNumber]>,
 }
 
+/// Cycles that may stay silent behind the moment in which SubDevices begin to take part: those that are under way, and
+/// the first ones with process data of theirs.
+const SILENT_CYCLES: u8 = 16;
+
 /// A domain of the exchange.
 ///
 /// Its frames lie in sets, one per cycle that may be under way, each with all frames of a cycle. They take turns.
@@ -43,8 +47,18 @@ pub struct Domain {
     timeout_ns: u64,
     members: Vec<Member>,
     status: DomainStatus,
+    told: Told,
     /// When, as a cycle plus one, the flight that was judged last had left.
     judged: u64,
+}
+
+/// What was told of a domain's state.
+#[derive(Clone, Copy, Debug)]
+enum Told {
+    /// Nothing: no SubDevice has answered so far. So many cycles were judged since SubDevices take part.
+    Nothing { silent: u8 },
+    /// At least one state.
+    Something,
 }
 
 impl Domain {
@@ -72,6 +86,7 @@ impl Domain {
             timeout_ns: whole_ns(planned.period.saturating_mul(planned.under_way.into()) - planned.period / 4),
             members: subdevices.into_iter().map(member).collect(),
             status: DomainStatus { expected, ..DomainStatus::default() },
+            told: Told::Nothing { silent: 0 },
             judged: 0,
         }
     }
@@ -188,15 +203,32 @@ impl Domain {
         complete && wkc > 0 && self.status.state == DomainState::Complete
     }
 
-    /// The state of what was judged, of which any copy returned or none. True where it is another one than before.
-    pub(crate) fn change_state(&mut self, wkc: u32, complete: bool, returned: bool) -> bool {
+    /// The state of what was judged, of which any copy returned or none. True where it is to be told: it is another one
+    /// than before, or process data stays silent from the beginning though SubDevices take part.
+    pub(crate) fn change_state(&mut self, wkc: u32, complete: bool, returned: bool, is_awaited: bool) -> bool {
         self.status.returned = returned;
         let state = match (wkc, complete) {
             (0, _) if self.status.expected > 0 => DomainState::Zero,
             (_, true) => DomainState::Complete,
             (_, false) => DomainState::Incomplete,
         };
-        core::mem::replace(&mut self.status.state, state) != state
+        let is_another = core::mem::replace(&mut self.status.state, state) != state;
+        match &mut self.told {
+            Told::Something => is_another,
+            Told::Nothing { silent } => {
+                *silent = silent.saturating_add(u8::from(is_awaited));
+                let is_due = is_another || *silent >= SILENT_CYCLES;
+                if is_due {
+                    self.told = Told::Something;
+                }
+                is_due
+            }
+        }
+    }
+
+    /// Whether SubDevices with process data in it take part.
+    pub(crate) fn is_awaited(&self, takes_part: impl Fn(usize) -> bool) -> bool {
+        self.members.iter().any(|member| takes_part(member.subdevice))
     }
 
     /// When these inputs came last: a cycle, plus one.

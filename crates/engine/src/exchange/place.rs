@@ -45,6 +45,8 @@ struct Segment {
 struct Contribution {
     subdevice: usize,
     wkc: Wkc,
+    /// Some of the inputs are its own.
+    has_inputs: bool,
     /// Place in the presence datagram.
     witness: Option<usize>,
     /// It takes part in process data, and was seen to give its inputs.
@@ -113,6 +115,10 @@ impl Place {
             contribution: contribution(placed.area.subdevice).unwrap_or_default(),
             span: span(placed.image_offset as usize, usize::from(placed.area.length)),
         };
+        let contributor = |(subdevice, wkc): &(usize, Wkc)| {
+            let has_inputs = datagram.input_areas.iter().any(|placed| placed.area.subdevice == *subdevice);
+            Contribution::new(*subdevice, *wkc, has_inputs)
+        };
         let view = || View { runs: Vec::with_capacity(datagram.input_areas.len()), ..View::default() };
         Place {
             wkc_at: data_at + outputs + inputs,
@@ -122,11 +128,7 @@ impl Place {
             expected: datagram.contributions.iter().fold(Wkc(0), |sum, (_, wkc)| sum.plus(*wkc)),
             outputs: span(start, outputs),
             inputs: span(start + outputs, inputs),
-            contributions: datagram
-                .contributions
-                .iter()
-                .map(|(subdevice, wkc)| Contribution::new(*subdevice, *wkc))
-                .collect(),
+            contributions: datagram.contributions.iter().map(contributor).collect(),
             segments: datagram.input_areas.iter().map(segment).collect(),
             views: [view(), view()],
         }
@@ -224,7 +226,7 @@ impl Place {
     }
 
     /// Whether copies on these links, as they were looked at, bring just what they should: each required SubDevice
-    /// processed one of them, and none processed both.
+    /// processed one of them and its inputs count, and none processed both.
     pub fn is_complete(&self, links: [bool; 2]) -> bool {
         let arrived = || self.views.iter().zip(links).filter(|(_, arrived)| *arrived).map(|(view, _)| view);
         let sum = arrived().fold(0, |sum, view| sum + u32::from(view.wkc.0));
@@ -233,12 +235,17 @@ impl Place {
             let needed = needed.map(|it| u32::from(it.wkc.0)).sum();
             return (needed..=u32::from(self.expected.0)).contains(&sum);
         }
+        // Those of one that is below SAFEOP, or was not seen to give them yet, are not fresh.
+        let brings = |it: &Contribution| {
+            !it.required || !it.has_inputs || it.met.iter().zip(links).any(|(met, arrived)| *met && arrived)
+        };
         if let [alone] = &self.contributions[..] {
-            return sum == u32::from(alone.wkc.0) || (!alone.required && sum < u32::from(alone.wkc.0));
+            let wkc = u32::from(alone.wkc.0);
+            return (sum == wkc && brings(alone)) || (!alone.required && sum < wkc);
         }
         let is_met = |it: &Contribution| {
             let copies = it.did.iter().zip(links).filter(|(did, arrived)| **did && *arrived).count();
-            copies == 1 || (copies == 0 && !it.required)
+            (copies == 1 && brings(it)) || (copies == 0 && !it.required)
         };
         arrived().all(|view| view.is_sure) && self.contributions.iter().all(is_met)
     }
@@ -335,10 +342,11 @@ impl Place {
 }
 
 impl Contribution {
-    fn new(subdevice: usize, wkc: Wkc) -> Contribution {
+    fn new(subdevice: usize, wkc: Wkc, has_inputs: bool) -> Contribution {
         Contribution {
             subdevice,
             wkc,
+            has_inputs,
             witness: None,
             is_proven: false,
             required: true,

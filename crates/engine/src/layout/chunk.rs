@@ -137,15 +137,27 @@ impl Chunk {
         let Some(subdevice) = areas.first().map(|area| area.subdevice) else { return };
         let lrw = self.groups[SHARED].lrw;
         let has_inputs = areas.iter().any(|area| area.direction == Direction::Inputs);
+        // It adds to a working counter once, whatever part of its inputs came: each further area has a datagram of its
+        // own.
+        let has_some = |group: &Group| group.inputs.iter().any(|area| area.subdevice == subdevice);
+        let mut is_further = self.groups.iter().any(has_some);
+        let (further, first): (Vec<AreaSpec>, Vec<AreaSpec>) = areas
+            .iter()
+            .partition(|area| area.direction == Direction::Inputs && core::mem::replace(&mut is_further, true));
+        for area in further {
+            let mut alone = Group::default();
+            alone.add(area);
+            self.groups.push(alone);
+        }
         if matches!(witness, Witness::Mapped(_)) {
-            areas.iter().for_each(|area| self.groups[SHARED].add(*area));
+            first.iter().for_each(|area| self.groups[SHARED].add(*area));
             if !self.witnessed.contains(&subdevice) {
                 self.witnessed.push(subdevice);
             }
             return;
         }
         let mut own = Group { lrw, ..Group::default() };
-        for area in areas {
+        for area in &first {
             // Outputs alone are no secret: a sum tells whether all took them.
             let is_plain = area.direction == Direction::Outputs && !(lrw && has_inputs);
             if is_plain { self.groups[PLAIN].add(*area) } else { own.add(*area) }

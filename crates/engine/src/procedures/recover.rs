@@ -15,7 +15,7 @@ use super::fleet::{Member, Phase, SharedFleet};
 use super::frame_limit;
 use super::request_state::read_again;
 use super::sii;
-use super::strangers::take_away;
+use super::strangers::{Mark, has_identity, mark, take_away};
 use crate::event::Event;
 use crate::mail::MailboxError;
 use crate::mail::coe::SdoFailure;
@@ -226,8 +226,25 @@ pub(super) fn start(bus: &Bus, fleet: &SharedFleet, index: usize, from: Start, t
 
 /// A lost SubDevice's station address answers again: it comes back, if it is the same one.
 pub(super) fn welcome(bus: &Bus, fleet: &SharedFleet, index: usize) {
-    bus.report(Event::Returned { subdevice: index });
-    start_if_same(bus, fleet, index, Start::Unknown);
+    fleet.set_phase(index, Phase::Configuring);
+    let attempt = fleet.next_attempt(index);
+    let (bus, fleet) = (bus.clone(), fleet.clone());
+    bus.clone().spawn(async move {
+        let checked = async {
+            match is_the_lost_one(&bus, &fleet, index).await {
+                Ok(true) => {
+                    bus.report(Event::Returned { subdevice: index });
+                    return bring_back(&bus, &fleet, index, Start::Unknown).await;
+                }
+                // It is looked at like others without an address of ours, and told by its place then.
+                Ok(false) => turn_away(&bus, &fleet, index).await,
+                Err(_) => {}
+            }
+            fleet.set_phase(index, Phase::Absent);
+            fleet.note_news();
+        };
+        while_current(&fleet, index, attempt, checked).await;
+    });
 }
 
 /// Starts the configuration of what answers at a member's station address, if it is that member; otherwise takes the address
@@ -238,37 +255,39 @@ pub(super) fn start_if_same(bus: &Bus, fleet: &SharedFleet, index: usize, from: 
     let (bus, fleet) = (bus.clone(), fleet.clone());
     bus.clone().spawn(async move {
         let checked = async {
-            if is_same(&bus, &fleet, index).await {
-                if fleet.access().members[index].unfit.is_some() {
-                    read_again(&bus, &fleet, index).await;
-                }
-                return keep_up(bus.clone(), fleet.clone(), index, from, None).await;
-            }
             let station = fleet.access().members[index].station;
-            // Where that fails, the next look finds the address again.
-            let _ = take_away(&bus, &fleet, station).await;
+            if has_identity(&bus, &fleet, index, station).await {
+                return bring_back(&bus, &fleet, index, from).await;
+            }
+            turn_away(&bus, &fleet, index).await;
             lose(&bus, &fleet, index);
         };
         while_current(&fleet, index, attempt, checked).await;
     });
 }
 
-/// Whether who has the station address of a member is that member: it may have been exchanged for one that ran
-/// elsewhere. One that cannot be read has to be trusted.
-async fn is_same(bus: &Bus, fleet: &SharedFleet, index: usize) -> bool {
-    let (station, known, cache) = {
-        let access = fleet.access();
-        let member = &access.members[index];
-        (member.station, member.info.as_ref().map(|info| info.identity), access.cache.clone())
-    };
-    let Some(known) = known else { return true };
-    if sii::claim(bus, station).await.is_err() {
-        return true;
+async fn bring_back(bus: &Bus, fleet: &SharedFleet, index: usize, from: Start) {
+    if fleet.access().members[index].unfit.is_some() {
+        read_again(bus, fleet, index).await;
     }
-    match sii::identity(bus, station, &cache).await {
-        Ok(now) => (now.vendor_id, now.product_code, now.serial) == (known.vendor_id, known.product_code, known.serial),
-        Err(_) => true,
-    }
+    keep_up(bus.clone(), fleet.clone(), index, from, None).await;
+}
+
+async fn turn_away(bus: &Bus, fleet: &SharedFleet, index: usize) {
+    let station = fleet.access().members[index].station;
+    // Where that fails, the next look finds the address again.
+    let _ = take_away(bus, fleet, station).await;
+}
+
+/// Whether what has the station address of a lost member is that member: it may be one that had this address in an
+/// earlier session, or was exchanged for one that ran elsewhere.
+async fn is_the_lost_one(bus: &Bus, fleet: &SharedFleet, index: usize) -> Result<bool, BusError> {
+    let station = fleet.access().members[index].station;
+    Ok(match mark(bus, fleet, index, station).await? {
+        Mark::Borne => true,
+        Mark::Missing | Mark::Unmapped => false,
+        Mark::None => has_identity(bus, fleet, index, station).await,
+    })
 }
 
 /// Lets a procedure for a SubDevice run until another one begins or the SubDevice is lost.

@@ -4,6 +4,8 @@
 //! Each is read by a procedure of its own, so that one whose EEPROM is slow or broken keeps nobody waiting.
 
 mod address;
+mod cables;
+mod doubles;
 mod groups;
 mod matching;
 mod owners;
@@ -11,6 +13,7 @@ mod quiet;
 mod recabling;
 pub mod rescan;
 
+use alloc::format;
 use alloc::rc::Rc;
 use alloc::string::{String, ToString};
 use alloc::vec::Vec;
@@ -22,6 +25,8 @@ use ringcat_wire::register::map;
 pub(super) use self::address::take_away;
 pub(super) use self::address::view;
 use self::address::{View, give};
+use self::doubles::restore;
+pub(super) use self::doubles::{Mark, has_identity, mark};
 use self::matching::{Fit, assign};
 pub(crate) use self::owners::Owners;
 use self::owners::{owners_of, ranks};
@@ -74,6 +79,8 @@ pub struct Stranger {
     from_main: bool,
     /// It was reported as unexpected.
     reported: bool,
+    /// It is not known since then which of several members it is.
+    held_since: Option<Instant>,
     knowledge: Knowledge,
 }
 
@@ -94,7 +101,8 @@ impl Stranger {
     ) -> Stranger {
         let (between, behind) = (owners.neighbours(at), owners.before(at));
         let position = Position(at as u16);
-        Stranger { station, between, behind, position, from_main: at < main_count, reported, knowledge }
+        let from_main = at < main_count;
+        Stranger { station, between, behind, position, from_main, reported, held_since: None, knowledge }
     }
 
     /// It is known, as well as it will be for now, that it is nobody's.
@@ -109,7 +117,8 @@ impl Stranger {
 
     /// The same one at another look.
     fn moved(&self, at: usize, owners: &Owners, main_count: usize) -> Stranger {
-        Stranger::at(self.station, at, owners, main_count, self.reported, self.knowledge.clone())
+        let moved = Stranger::at(self.station, at, owners, main_count, self.reported, self.knowledge.clone());
+        Stranger { held_since: self.held_since, ..moved }
     }
 }
 
@@ -183,28 +192,6 @@ fn unknown(fleet: &SharedFleet, view: &View, owners: &Owners) -> Vec<StationAddr
     old
 }
 
-/// A member whose address somebody else had too was given another one with him, and gets its own back.
-async fn restore(
-    bus: &Bus,
-    fleet: &SharedFleet,
-    owners: &Owners,
-    before: &View,
-    after: &mut View,
-) -> Result<(), BusError> {
-    if before.counts != after.counts {
-        return Ok(());
-    }
-    for (at, owner) in owners.all().iter().enumerate() {
-        let Some(station) = owner.and_then(|index| Some(fleet.access().members.get(index)?.station)) else { continue };
-        let now = after.stations[at];
-        if now != station && after.position(now).is_some() && after.positions(station).count() == 0 {
-            bus.fpwr(now, map::STATION_ADDRESS, &station.0.to_le_bytes()).await?;
-            after.stations[at] = station;
-        }
-    }
-    Ok(())
-}
-
 /// Notes where the strangers are now.
 fn refresh(fleet: &SharedFleet, view: &View, owners: &Owners) {
     for stranger in &mut fleet.access().strangers {
@@ -275,10 +262,8 @@ fn note(
 ///
 /// False where it could not be found out where they are.
 pub(super) async fn admit_all(bus: &Bus, fleet: &SharedFleet) -> bool {
-    if !find_places(bus, fleet).await {
-        return false;
-    }
-    for (stranger, member) in match_all(bus, fleet) {
+    let Some(told) = find_places(bus, fleet).await else { return false };
+    for (stranger, member) in match_all(bus, fleet, &told) {
         let Knowledge::Known(info) = &stranger.knowledge else { continue };
         if let Some(index) = member {
             if admit(bus, fleet, &stranger, info, index).await {
@@ -295,43 +280,89 @@ pub(super) async fn admit_all(bus: &Bus, fleet: &SharedFleet) -> bool {
 }
 
 /// Looks again where the strangers are, if somebody is missed: since they were found the ring may have opened somewhere
-/// else, and of several alike it is the place that tells who is who.
-async fn find_places(bus: &Bus, fleet: &SharedFleet) -> bool {
+/// else, and of several alike it is the place that tells who is who. Gives back whom cables tell; `None` where the
+/// segment changes.
+async fn find_places(bus: &Bus, fleet: &SharedFleet) -> Option<Vec<(StationAddress, usize)>> {
     let somebody_is_missed = {
         let access = fleet.access();
         !access.strangers.is_empty() && access.members.iter().any(|member| member.phase == Phase::Absent)
     };
-    if somebody_is_missed {
-        let Ok(Some(view)) = view(bus).await else { return false };
-        let owners = owners_of(fleet, &view.stations);
-        // One that has come since may be the first of several alike.
-        if !unknown(fleet, &view, &owners).is_empty() {
-            return false;
-        }
-        refresh(fleet, &view, &owners);
+    if !somebody_is_missed {
+        return Some(Vec::new());
     }
-    true
+    let view = view(bus).await.ok()??;
+    let owners = owners_of(fleet, &view.stations);
+    // One that has come since may be the first of several alike.
+    if !unknown(fleet, &view, &owners).is_empty() {
+        return None;
+    }
+    refresh(fleet, &view, &owners);
+    cables::members(bus, fleet, &view, &owners).await
 }
 
-/// Strangers of whom it is known which absent members they are, or that they are none.
-fn match_all(bus: &Bus, fleet: &SharedFleet) -> Vec<(Stranger, Option<usize>)> {
-    let access = fleet.access();
+/// Strangers of whom it is known which absent members they are, or that they are none. `told`: those of whom cables
+/// tell it.
+fn match_all(bus: &Bus, fleet: &SharedFleet, told: &[(StationAddress, usize)]) -> Vec<(Stranger, Option<usize>)> {
+    let mut access = fleet.access();
     let mut strangers = access.strangers.clone();
     strangers.sort_by_key(|stranger| stranger.position);
     let now = bus.now();
     let mut matched = groups::members(&access, &mut strangers, now);
+    let by_cable = |stranger: &Stranger| told.iter().find(|(station, _)| *station == stranger.station);
+    for (stranger, index) in strangers.iter().filter_map(|it| Some((it, by_cable(it)?.1))) {
+        matched.push((stranger.clone(), Some(index)));
+    }
+    strangers.retain(|stranger| by_cable(stranger).is_none());
+    let mut held = Vec::new();
     for gap in strangers.chunk_by(|one, other| one.between == other.between) {
         if gap.iter().any(|stranger| stranger.is_awaited(now)) {
             continue;
         }
-        let absent = absent_between(&access, gap[0].between);
+        let mut absent = absent_between(&access, gap[0].between);
+        absent.retain(|index| told.iter().all(|(_, other)| other != index));
         let from_main: Vec<bool> = gap.iter().map(|stranger| stranger.from_main).collect();
         let fit = |stranger: usize, place: usize| fit(&access, &gap[stranger], absent[place]);
         let places = assign(&from_main, absent.len(), fit);
-        let members = places.into_iter().map(|place| place.map(|place| absent[place]));
-        matched.extend(gap.iter().cloned().zip(members));
+        for (stranger, place) in gap.iter().zip(places) {
+            let member = place.map(|place| absent[place]);
+            match member.filter(|index| is_doubtful(&access, stranger, *index, gap, &absent)) {
+                Some(index) => held.push((stranger.station, index)),
+                None => matched.push((stranger.clone(), member)),
+            }
+        }
+    }
+    for (station, index) in held {
+        hold(bus, &mut access, station, index, now);
     }
     matched
+}
+
+/// It could be another absent member as well: of one kind with several, without a serial number, and not as many of
+/// them are there as are missed. Outputs of one must not go to another one.
+fn is_doubtful(fleet: &Fleet, stranger: &Stranger, index: usize, gap: &[Stranger], absent: &[usize]) -> bool {
+    if fit(fleet, stranger, index) != Fit::Seen {
+        return false;
+    }
+    let alike = |index: &usize| cables::may_be(fleet, stranger, *index);
+    let missed = cables::absent(fleet).filter(alike).count();
+    let (here, there) =
+        (absent.iter().filter(|it| alike(it)).count(), gap.iter().filter(|it| cables::may_be(fleet, it, index)));
+    // Where some are crossed in a closed ring, order is another one when it is open.
+    missed > 1 && (fleet.topology.is_assumed() || here != missed || there.count() != missed)
+}
+
+/// Leaves a stranger alone until it is known which of several it is, and says so when that lasts.
+fn hold(bus: &Bus, fleet: &mut Fleet, station: StationAddress, index: usize, now: Instant) {
+    let Some(stranger) = fleet.strangers.iter_mut().find(|stranger| stranger.station == station) else { return };
+    let since = *stranger.held_since.get_or_insert(now);
+    if now.since(since) >= HOLD && !core::mem::replace(&mut stranger.reported, true) {
+        let reason = format!(
+            "the SubDevice at position {} may be this one or another one of its kind that is missed: no cable tells which, and \
+             it has no serial number",
+            stranger.position.0
+        );
+        bus.report(Event::ConfigurationFailed { subdevice: index, reason });
+    }
 }
 
 /// Absent members between two others, in the order of the segment.

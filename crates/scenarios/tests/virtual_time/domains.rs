@@ -3,12 +3,13 @@
 use std::time::Duration;
 
 use ringcat::{
-    Declaration, Direction, DomainConfig, DomainId, DomainMember, Event, Options, PdoEntry, PdoMapping, Scan,
-    SubDeviceConfig, SubDeviceState, automatic,
+    Declaration, Direction, DomainConfig, DomainId, DomainMember, DomainState, Event, Options, PdoEntry, PdoMapping,
+    Scan, SubDeviceConfig, SubDeviceState, automatic,
 };
 use ringcat_sim::cable::{CableId, DeviceIndex};
 use ringcat_sim::network::NetworkOptions;
 use ringcat_wire::al::AlState;
+use ringcat_wire::register::{SyncManager, map};
 use scenarios::check::{Delivery, ring_events};
 use scenarios::segments::{SIXTEEN, descriptions, line, ring, ring_of_16};
 use scenarios::world::{CYCLE, World};
@@ -174,4 +175,31 @@ fn a_subdevice_that_nobody_declared_is_named_and_left_alone() {
     world.until(Duration::from_secs(2), "back", |world| world.application().all_settled());
     assert!(!world.saw(mark, |event| matches!(event, Event::Unexpected { .. })));
     assert_eq!(SIXTEEN.len() - 1, world.application().states().len());
+}
+
+/// The PDI holds the SyncManager of the only inputs back from the beginning (facts 3.5): there never was another state
+/// than Zero.
+#[test]
+fn a_domain_that_is_silent_from_the_beginning_is_told_once() {
+    let network = line(descriptions(&["digital-input-8"]), NetworkOptions::default());
+    let mut world = World::new(1, network);
+    let mark = world.beginning();
+    for _ in 0..3_000 {
+        let now = world.now();
+        let controller = &mut world.network_mut().device_mut(DeviceIndex(0)).controller;
+        for number in 0..4 {
+            let pdi_control = map::sync_manager(number).offset(SyncManager::PDI_CONTROL);
+            controller.pdi_write(pdi_control, &[1], now);
+        }
+        world.cycle();
+    }
+    assert!(
+        world.saw(mark, |event| matches!(event, Event::StateReached { subdevice: 0, .. })),
+        "it does not know of it"
+    );
+    let told = world.events(mark).iter().filter_map(|timed| match timed.event {
+        Event::Domain { domain, status } => Some((domain, status.state, status.wkc, status.returned)),
+        _ => None,
+    });
+    assert_eq!(told.collect::<Vec<_>>(), [(0, DomainState::Zero, 0, true)]);
 }

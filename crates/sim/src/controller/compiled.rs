@@ -35,6 +35,7 @@ impl Controller {
         for piece in known.moves.get(..usize::from(known.count?))? {
             let data = data.get_mut(usize::from(piece.at)..usize::from(piece.at) + usize::from(piece.len))?;
             let Some(physical) = self.piece_address(*piece) else { continue };
+            self.logical_log.moved(piece.at.into(), piece.len.into(), piece.write);
             if piece.write {
                 self.memory.store(physical, data);
                 written = true;

@@ -5,6 +5,7 @@
 //! holds the newest accesses only.
 
 use std::collections::VecDeque;
+use std::ops::Range;
 
 use ringcat_wire::command::Command;
 
@@ -28,12 +29,42 @@ pub struct LogicalAccess {
     pub written: bool,
     /// The data as it left the SubDevice.
     pub data: Vec<u8>,
+    /// What was moved: a SubDevice adds to the working counter once for all that it reads, whatever part of it its
+    /// SyncManagers refuse.
+    pub moved: Vec<Moved>,
+}
+
+/// Data that was moved between a datagram and the memory.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Moved {
+    /// First byte in the data.
+    pub at: usize,
+    /// Bytes, those included of which only bits were moved.
+    pub len: usize,
+    /// Into the memory.
+    pub write: bool,
+}
+
+impl LogicalAccess {
+    /// Whether all of some bytes of the data was moved in one direction.
+    pub fn has_moved(&self, bytes: Range<usize>, write: bool) -> bool {
+        let mut at = bytes.start;
+        // Pieces may follow each other in any order.
+        while at < bytes.end {
+            let holds = |it: &&Moved| it.write == write && it.at <= at && at < it.at + it.len;
+            let Some(end) = self.moved.iter().filter(holds).map(|it| it.at + it.len).max() else { return false };
+            at = end;
+        }
+        true
+    }
 }
 
 /// The newest accesses of a SubDevice.
 #[derive(Clone, Debug, Default)]
 pub(super) struct LogicalLog {
     kept: Option<VecDeque<LogicalAccess>>,
+    /// What the datagram that is being processed has moved.
+    moved: Vec<Moved>,
 }
 
 impl LogicalLog {
@@ -43,6 +74,18 @@ impl LogicalLog {
 
     pub fn turn_on(&mut self) {
         self.kept.get_or_insert_default();
+    }
+
+    #[inline]
+    pub fn moved(&mut self, at: usize, len: usize, write: bool) {
+        if self.kept.is_some() {
+            self.moved.push(Moved { at, len, write });
+        }
+    }
+
+    /// What has been moved since the last call.
+    pub fn take_moved(&mut self) -> Vec<Moved> {
+        core::mem::take(&mut self.moved)
     }
 
     pub fn note(&mut self, access: LogicalAccess) {

@@ -13,7 +13,7 @@ use ringcat_wire::register::map;
 
 use super::Controller;
 use super::event_bits::{EVENT_AL_STATUS, EVENT_DL_STATUS};
-use super::fmmu::Direction;
+use super::fmmu::{Direction, Piece};
 use super::logical_log::{LogicalAccess, frame_id};
 use super::memory::Side;
 use super::pass::Pass;
@@ -203,6 +203,7 @@ impl Controller {
     }
 
     fn log_access(&mut self, frame: (u8, u8), command: Command, address: u32, added: u16, data: &[u8]) {
+        let moved = self.logical_log.take_moved();
         if added == 0 {
             return;
         }
@@ -210,7 +211,12 @@ impl Controller {
             Command::Lwr => (false, true),
             _ => (added & 1 != 0, added & 2 != 0),
         };
-        self.logical_log.note(LogicalAccess { frame, command, address, read, written, data: data.to_vec() });
+        self.logical_log.note(LogicalAccess { frame, command, address, read, written, data: data.to_vec(), moved });
+    }
+
+    fn log_moved(&mut self, piece: Piece, first: u64, write: bool) {
+        let (begin, end) = (piece.logical - first, piece.logical - first + piece.len);
+        self.logical_log.moved((begin / 8) as usize, (end.div_ceil(8) - begin / 8) as usize, write);
     }
 
     fn logical_read(&mut self, first: u64, end: u64, data: &mut [u8]) -> bool {
@@ -218,7 +224,10 @@ impl Controller {
         for n in 0..self.fmmus.count() {
             let mut from = first;
             while let Some(piece) = self.fmmus.piece(n, Direction::Read, from, end) {
-                any |= self.read_bits(piece, first, data);
+                if self.read_bits(piece, first, data) {
+                    any = true;
+                    self.log_moved(piece, first, false);
+                }
                 from = piece.logical + piece.len;
             }
         }
@@ -230,7 +239,10 @@ impl Controller {
         for n in 0..self.fmmus.count() {
             let mut from = first;
             while let Some(piece) = self.fmmus.piece(n, Direction::Write, from, end) {
-                any |= self.write_bits(piece, first, data);
+                if self.write_bits(piece, first, data) {
+                    any = true;
+                    self.log_moved(piece, first, true);
+                }
                 from = piece.logical + piece.len;
             }
         }

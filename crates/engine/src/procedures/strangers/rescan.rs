@@ -12,11 +12,11 @@ use ringcat_wire::address::{Position, StationAddress, Wkc};
 use ringcat_wire::register::{DlStatus, PortKind, map};
 use ringcat_wire::sii::Identity;
 
-use super::owners::owners_of;
+use super::owners::{Owners, owners_of};
 use super::recabling;
-use super::{Knowledge, view};
+use super::{Knowledge, View, view};
 use crate::event::Event;
-use crate::procedures::fleet::SharedFleet;
+use crate::procedures::fleet::{Fleet, SharedFleet};
 use crate::procedures::junction::cabling;
 use crate::procedures::services::ServiceError;
 use crate::ring::RingState;
@@ -128,24 +128,12 @@ async fn look_until(bus: &Bus, fleet: &SharedFleet, limit: Duration) -> Result<(
 /// One look; `None` while the segment changes.
 async fn look(bus: &Bus, fleet: &SharedFleet) -> Result<Option<Rescan>, BusError> {
     let Some(seen) = view(bus).await? else { return Ok(None) };
-    let ports = bus.gather((0..seen.stations.len() as u16).map(Position), |bus, position| async move {
-        let bytes = bus.aprd(position, map::DL_STATUS, DlStatus::LEN).await?;
-        Ok::<_, BusError>(DlStatus::decode(&[bytes[0], bytes[1]]))
-    });
-    let ports: Vec<DlStatus> = match ports.await.into_iter().collect() {
-        Ok(ports) => ports,
-        Err(BusError::Wkc { .. }) => return Ok(None),
-        Err(error) => return Err(error),
-    };
-    // Places that have changed meanwhile would mix ports of one with those of another.
-    if view(bus).await?.as_ref() != Some(&seen) {
-        return Ok(None);
-    }
+    let Some(ports) = ports_of(bus, &seen).await? else { return Ok(None) };
     let owners = owners_of(fleet, &seen.stations);
     let access = fleet.access();
     let mut subdevices = Vec::new();
-    let mut nodes = Vec::new();
-    for (at, (station, dl_status)) in seen.stations.iter().zip(ports).enumerate() {
+    let nodes = nodes_of(&access, &seen, &owners, &ports);
+    for (at, station) in seen.stations.iter().enumerate() {
         let stranger = access.strangers.iter().find(|it| it.station == *station);
         let known = match (owners.at(at), stranger.map(|stranger| &stranger.knowledge)) {
             (Some(index), _) => access.members[index].info.as_ref(),
@@ -158,8 +146,6 @@ async fn look(bus: &Bus, fleet: &SharedFleet) -> Result<Option<Rescan>, BusError
             (None, Some(info)) if stranger.is_some_and(|it| it.reported) => Who::Undeclared(info.identity),
             (None, _) => Who::Unknown,
         };
-        let kinds: [PortKind; 4] = known.map(|info| info.controller.ports).unwrap_or_default();
-        nodes.push(NodeStatus { dl_status, receive_times: None, ports: kinds });
         subdevices.push(Found { position: Position(at as u16), station: *station, who, moved_from: None });
     }
     let place_at_scan = |index: usize| access.members[index].node;
@@ -179,6 +165,38 @@ async fn look(bus: &Bus, fleet: &SharedFleet) -> Result<Option<Rescan>, BusError
     let missing = (0..access.members.len()).filter(|index| !is_found(index)).collect();
     let topology = cabling(&access, &seen.stations, &nodes, usize::from(seen.counts.0.0));
     Ok(Some(Rescan { counts: seen.counts, subdevices, missing, topology }))
+}
+
+/// The ports of all that were seen; `None` where the segment has changed since: ports of one would be mixed with those
+/// of another.
+pub(super) async fn ports_of(bus: &Bus, seen: &View) -> Result<Option<Vec<DlStatus>>, BusError> {
+    let ports = bus.gather((0..seen.stations.len() as u16).map(Position), |bus, position| async move {
+        let bytes = bus.aprd(position, map::DL_STATUS, DlStatus::LEN).await?;
+        Ok::<_, BusError>(DlStatus::decode(&[bytes[0], bytes[1]]))
+    });
+    let ports: Vec<DlStatus> = match ports.await.into_iter().collect() {
+        Ok(ports) => ports,
+        Err(BusError::Wkc { .. }) => return Ok(None),
+        Err(error) => return Err(error),
+    };
+    Ok((view(bus).await?.as_ref() == Some(seen)).then_some(ports))
+}
+
+/// The same, with the kinds of ports as far as they are known.
+pub(super) fn nodes_of(fleet: &Fleet, seen: &View, owners: &Owners, ports: &[DlStatus]) -> Vec<NodeStatus> {
+    let node = |(at, (station, dl_status)): (usize, (&StationAddress, &DlStatus))| {
+        let stranger = || fleet.strangers.iter().find(|stranger| stranger.station == *station);
+        let known = match owners.at(at) {
+            Some(index) => fleet.members[index].info.as_ref(),
+            None => match stranger().map(|stranger| &stranger.knowledge) {
+                Some(Knowledge::Known(info)) => Some(&**info),
+                _ => None,
+            },
+        };
+        let ports: [PortKind; 4] = known.map(|info| info.controller.ports).unwrap_or_default();
+        NodeStatus { dl_status: *dl_status, receive_times: None, ports }
+    };
+    seen.stations.iter().zip(ports).enumerate().map(node).collect()
 }
 
 /// Who has to be taken out, as few as possible, for the others to be in the order of the scan: these have moved.

@@ -1,0 +1,227 @@
+//! Which absent members strangers are by the cables that lead to them.
+//!
+//! Several may be alike. Their order tells who is who where all of them are there; where some are not, or a ring is
+//! open elsewhere than at the scan so that frames meet its SubDevices from the other side, only their neighbours do. In
+//! go the cables as the scan or a rescan found them and as the ports tell them now: what hangs on the port of a member
+//! to which a cable led before, with the same port of its own, is what hung there.
+
+use alloc::vec;
+use alloc::vec::Vec;
+
+use ringcat_wire::address::StationAddress;
+
+use super::owners::Owners;
+use super::rescan::{nodes_of, ports_of};
+use super::{Fit, Knowledge, Stranger, View, absent_between, fit};
+use crate::procedures::fleet::{Fleet, Phase, SharedFleet};
+use crate::supervisor::Bus;
+use crate::topology::{Closing, Finding, NodeStatus, PortOf, Topology};
+
+/// One end of a cable; `None` is the main link.
+type End = Option<PortOf>;
+
+/// Strangers by the member that they are, as far as cables tell; `None` while the segment changes.
+pub(super) async fn members(
+    bus: &Bus,
+    fleet: &SharedFleet,
+    view: &View,
+    owners: &Owners,
+) -> Option<Vec<(StationAddress, usize)>> {
+    if !is_asked_for(&fleet.access()) {
+        return Some(Vec::new());
+    }
+    let ports = ports_of(bus, view).await.ok()??;
+    let access = fleet.access();
+    let look = Look { fleet: &access, view, nodes: nodes_of(&access, view, owners, &ports) };
+    let owners: Vec<Option<usize>> = (0..view.stations.len()).map(|at| owners.at(at)).collect();
+    Some(look.told(owners))
+}
+
+/// A stranger could be several of those that are missed, or one of them though order does not say so.
+fn is_asked_for(fleet: &Fleet) -> bool {
+    fleet.strangers.iter().any(|stranger| {
+        let fits: Vec<usize> = absent(fleet).filter(|index| may_be(fleet, stranger, *index)).collect();
+        match fits[..] {
+            [] => false,
+            [only] => !absent_between(fleet, stranger.between).contains(&only),
+            _ => true,
+        }
+    })
+}
+
+pub(super) fn absent(fleet: &Fleet) -> impl Iterator<Item = usize> + '_ {
+    let members = fleet.members.iter().enumerate();
+    let absent = members.filter(|(_, member)| member.phase == Phase::Absent && member.config.group.is_none());
+    absent.map(|(index, _)| index)
+}
+
+/// It is known what it is, and that is what the member was when it was seen last.
+pub(super) fn may_be(fleet: &Fleet, stranger: &Stranger, index: usize) -> bool {
+    let is_known = matches!(stranger.knowledge, Knowledge::Known(_));
+    is_known && matches!(fit(fleet, stranger, index), Fit::Seen | Fit::Serial)
+}
+
+/// The segment as it is now.
+struct Look<'a> {
+    fleet: &'a Fleet,
+    view: &'a View,
+    nodes: Vec<NodeStatus>,
+}
+
+impl Look<'_> {
+    fn stranger_at(&self, at: usize) -> Option<&Stranger> {
+        self.fleet.strangers.iter().find(|stranger| self.view.position(stranger.station) == Some(at))
+    }
+
+    /// The absent member that was at a place, if the stranger at a position may be it.
+    fn candidate(&self, node: usize, at: usize) -> Option<usize> {
+        let index = self.fleet.members.iter().position(|member| member.node == Some(node))?;
+        let stranger = self.stranger_at(at)?;
+        (absent(self.fleet).any(|it| it == index) && may_be(self.fleet, stranger, index)).then_some(index)
+    }
+
+    fn told(&self, mut members: Vec<Option<usize>>) -> Vec<(StationAddress, usize)> {
+        let count = members.len();
+        if self.is_as_before(&members) {
+            let strangers = (0..count).filter(|at| members[*at].is_none());
+            return strangers.filter_map(|at| Some((self.view.stations[at], self.candidate(at, at)?))).collect();
+        }
+        let before = &self.fleet.topology;
+        let now = self.topology(&members);
+        // In a closed ring with crossed SubDevices neighbours are an assumption.
+        if before.is_assumed() || now.is_assumed() {
+            return Vec::new();
+        }
+        let (before, now) = (ends(before), self.ends(&now));
+        let mut told = Vec::new();
+        loop {
+            let found = self.next_to(&members, &before, &now);
+            let is_sure = |(at, index): &(usize, usize)| {
+                found.iter().filter(|(other, member)| other == at || member == index).count() == 1
+            };
+            let sure: Vec<(usize, usize)> = found.iter().copied().filter(is_sure).collect();
+            if sure.is_empty() {
+                return told;
+            }
+            for (at, index) in sure {
+                members[at] = Some(index);
+                told.push((self.view.stations[at], index));
+            }
+        }
+    }
+
+    /// Strangers next to members, by position, with the member that was there.
+    fn next_to(&self, members: &[Option<usize>], before: &[[End; 2]], now: &[[End; 2]]) -> Vec<(usize, usize)> {
+        let mut found = Vec::new();
+        for (near, far) in now.iter().flat_map(|[one, other]| [(*one, *other), (*other, *one)]) {
+            let Some(far) = far.filter(|far| members[far.node].is_none()) else { continue };
+            let Some(then) = self.place_before(members, near) else { continue };
+            let Some(other) = opposite(before, then).filter(|other| other.port == far.port) else { continue };
+            if let Some(index) = self.candidate(other.node, far.node).filter(|it| !members.contains(&Some(*it))) {
+                found.push((far.node, index));
+            }
+        }
+        found.sort_unstable();
+        found.dedup();
+        found
+    }
+
+    /// An end of a cable in the cabling of before, where the one there is known.
+    fn place_before(&self, members: &[Option<usize>], end: End) -> Option<End> {
+        let Some(PortOf { node, port }) = end else { return Some(None) };
+        let node = self.fleet.members.get(members[node]?)?.node?;
+        Some(Some(PortOf { node, port }))
+    }
+
+    /// As many answer on each link as when the cabling was found, and all that are known are at their places.
+    fn is_as_before(&self, members: &[Option<usize>]) -> bool {
+        let before = &self.fleet.topology;
+        let counts = (usize::from(self.view.counts.0.0), members.len());
+        let at_home =
+            |(at, index): (usize, &Option<usize>)| index.is_none_or(|it| self.fleet.members[it].node == Some(at));
+        counts == (before.main_count, before.nodes.len()) && members.iter().enumerate().all(at_home)
+    }
+
+    /// The cabling as the ports tell it. A ring whose last SubDevice is a stranger closes where the cables of all that
+    /// are known are those of before.
+    fn topology(&self, members: &[Option<usize>]) -> Topology {
+        let main_count = usize::from(self.view.counts.0.0);
+        let mut closings = Vec::new();
+        let mut open = Vec::new();
+        for ring in &self.fleet.topology.local_rings {
+            let place = |end: PortOf| {
+                let index = self.fleet.members.iter().position(|member| member.node == Some(end.node));
+                let node = members.iter().position(|member| index.is_some() && *member == index)?;
+                Some(PortOf { node, port: end.port })
+            };
+            match (place(ring.closing.head), place(ring.closing.tail)) {
+                (Some(head), Some(tail)) => closings.push(Closing { head, tail }),
+                (Some(head), None) => open.push((head, ring.closing.tail)),
+                (None, _) => {}
+            }
+        }
+        let before = ends(&self.fleet.topology);
+        for (head, tail) in open.into_iter().filter(|(head, _)| self.communicates(*head)) {
+            let ends_there = |at: &usize| {
+                let end = PortOf { node: *at, port: tail.port };
+                self.communicates(end) && members[*at].is_none() && self.candidate(tail.node, *at).is_some()
+            };
+            let candidates: Vec<Closing> = (head.node + 1..members.len())
+                .filter(ends_there)
+                .map(|node| Closing { head, tail: PortOf { node, port: tail.port } })
+                .filter(|closing| {
+                    let all: Vec<Closing> = closings.iter().chain([closing]).copied().collect();
+                    self.is_possible(&Topology::with_local_rings(&self.nodes, main_count, &all), members, &before)
+                })
+                .take(2)
+                .collect();
+            if let [only] = candidates[..] {
+                closings.push(only);
+            }
+        }
+        Topology::with_local_rings(&self.nodes, main_count, &closings)
+    }
+
+    /// No cable between two that are known is another one than before, and all have a place.
+    fn is_possible(&self, now: &Topology, members: &[Option<usize>], before: &[[End; 2]]) -> bool {
+        let fits = |[one, other]: &[End; 2]| {
+            let (one, other) = (self.place_before(members, *one), self.place_before(members, *other));
+            let (Some(one), Some(other)) = (one, other) else { return true };
+            opposite(before, one) == other
+        };
+        let is_odd = |finding: &Finding| matches!(finding, Finding::Inconsistent { .. });
+        !now.findings.iter().any(is_odd) && self.ends(now).iter().all(fits)
+    }
+
+    fn communicates(&self, end: PortOf) -> bool {
+        self.nodes[end.node].dl_status.ports[usize::from(end.port & 3)].communication
+    }
+
+    /// The ends of the cables that communicate.
+    fn ends(&self, topology: &Topology) -> Vec<[End; 2]> {
+        let mut ends = ends(topology);
+        ends.retain(|cable| cable.iter().flatten().all(|end| self.communicates(*end)));
+        ends
+    }
+}
+
+/// The ends of all cables.
+fn ends(topology: &Topology) -> Vec<[End; 2]> {
+    let mut ends = vec![];
+    if let Some(first) = topology.nodes.first().filter(|_| topology.main_count > 0) {
+        ends.push([None, Some(PortOf { node: 0, port: first.entry_port })]);
+    }
+    let inner = (0..topology.nodes.len()).filter_map(|node| topology.connection_to(node));
+    ends.extend(inner.map(|cable| [Some(cable.near), Some(cable.far)]));
+    ends.extend(topology.local_rings.iter().map(|ring| [Some(ring.closing.tail), Some(ring.closing.head)]));
+    ends
+}
+
+/// The other end of the cable that begins here.
+fn opposite(cables: &[[End; 2]], here: End) -> End {
+    cables.iter().find_map(|[one, other]| match here {
+        here if *one == here => *other,
+        here if *other == here => *one,
+        _ => None,
+    })
+}

@@ -1,0 +1,157 @@
+//! Station addresses that several SubDevices had: which of them the member is.
+//!
+//! One of an earlier session, or of another MainDevice, may have a member's address and its identity too. What this
+//! MainDevice wrote to it tells them apart: each session has logical addresses of its own (decision 0023), so FMMUs
+//! with those of the member are those of the member. Only where nothing was mapped, place and identity decide. Those
+//! that are not the member keep the temporary address that they were given, and are strangers.
+
+use alloc::vec::Vec;
+
+use ringcat_wire::address::{StationAddress, Wkc};
+use ringcat_wire::register::map;
+
+use super::address::View;
+use super::owners::Owners;
+use crate::procedures::fleet::SharedFleet;
+use crate::procedures::sii;
+use crate::supervisor::{Bus, BusError};
+
+/// What tells whether a SubDevice is a member.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(in super::super) enum Mark {
+    /// It holds the FMMUs that were written to the member.
+    Borne,
+    /// It does not hold them.
+    Missing,
+    /// Nothing is mapped for the member at present.
+    Unmapped,
+    /// The member has no FMMUs.
+    None,
+}
+
+/// Whether the SubDevice at a station address holds what was mapped for a member.
+pub(in super::super) async fn mark(
+    bus: &Bus,
+    fleet: &SharedFleet,
+    index: usize,
+    station: StationAddress,
+) -> Result<Mark, BusError> {
+    let (expected, is_mapped) = {
+        let access = fleet.access();
+        let Some(member) = access.members.get(index) else { return Ok(Mark::None) };
+        let registers = member.setup.as_ref().map(|setup| setup.fmmu_registers());
+        (registers.unwrap_or_default(), member.configured)
+    };
+    match (expected.is_empty(), is_mapped) {
+        (true, _) => return Ok(Mark::None),
+        (false, false) => return Ok(Mark::Unmapped),
+        (false, true) => {}
+    }
+    match bus.fprd(station, map::FMMU_BASE, expected.len()).await {
+        Ok(got) => Ok(if got == expected { Mark::Borne } else { Mark::Missing }),
+        // Fewer FMMUs than the member has.
+        Err(BusError::Wkc { got: Wkc(0), .. }) => Ok(Mark::Missing),
+        Err(error) => Err(error),
+    }
+}
+
+/// Whether the SubDevice at a station address says that it is of the kind and has the serial number of a member; one
+/// that cannot be read has to be trusted.
+pub(in super::super) async fn has_identity(
+    bus: &Bus,
+    fleet: &SharedFleet,
+    index: usize,
+    station: StationAddress,
+) -> bool {
+    let (known, cache) = {
+        let access = fleet.access();
+        let Some(member) = access.members.get(index) else { return false };
+        (member.info.as_ref().map(|info| info.identity), access.cache.clone())
+    };
+    let Some(known) = known else { return true };
+    if sii::claim(bus, station).await.is_err() {
+        return true;
+    }
+    match sii::identity(bus, station, &cache).await {
+        Ok(now) => (now.vendor_id, now.product_code, now.serial) == (known.vendor_id, known.product_code, known.serial),
+        Err(_) => true,
+    }
+}
+
+/// Gives each member its address back that several had. `before` is how it was then, `after` how it is now that each of
+/// them has an address of its own, `owners` who was at which place by order.
+pub(super) async fn restore(
+    bus: &Bus,
+    fleet: &SharedFleet,
+    owners: &Owners,
+    before: &View,
+    after: &mut View,
+) -> Result<(), BusError> {
+    let doubled = doubled(fleet, before);
+    for (index, station) in doubled {
+        if after.positions(station).next().is_some() {
+            continue;
+        }
+        let Some(keeper) = keeper(bus, fleet, owners, before, after, index, station).await? else { continue };
+        bus.fpwr(keeper, map::STATION_ADDRESS, &station.0.to_le_bytes()).await?;
+        after.stations.iter_mut().filter(|it| **it == keeper).for_each(|it| *it = station);
+    }
+    Ok(())
+}
+
+/// Members whose addresses several have.
+fn doubled(fleet: &SharedFleet, view: &View) -> Vec<(usize, StationAddress)> {
+    let access = fleet.access();
+    let members = access.members.iter().enumerate().map(|(index, member)| (index, member.station));
+    members.filter(|(_, station)| view.positions(*station).count() > 1).collect()
+}
+
+/// The address that the member has now, where it is known which of them it is.
+async fn keeper(
+    bus: &Bus,
+    fleet: &SharedFleet,
+    owners: &Owners,
+    before: &View,
+    after: &View,
+    index: usize,
+    station: StationAddress,
+) -> Result<Option<StationAddress>, BusError> {
+    let has_moved = before.counts != after.counts;
+    let known: Vec<StationAddress> = fleet.access().members.iter().map(|member| member.station).collect();
+    // Where places have changed meanwhile, any that has no address of ours may be one of them.
+    let is_candidate = |at: &usize| match before.stations.get(*at) {
+        Some(then) if !has_moved => *then == station,
+        _ => !known.contains(&after.stations[*at]),
+    };
+    let mut bearers = Vec::new();
+    for at in (0..after.stations.len()).filter(is_candidate) {
+        let now = after.stations[at];
+        match mark(bus, fleet, index, now).await? {
+            Mark::Borne => bearers.push(now),
+            Mark::Missing => {}
+            Mark::Unmapped | Mark::None => return by_place(bus, fleet, owners, before, after, index).await,
+        }
+    }
+    // Where several bear it, one was taken for the other before.
+    Ok(if let [only] = bearers[..] { Some(only) } else { None })
+}
+
+/// Nothing tells but place and identity.
+async fn by_place(
+    bus: &Bus,
+    fleet: &SharedFleet,
+    owners: &Owners,
+    before: &View,
+    after: &View,
+    index: usize,
+) -> Result<Option<StationAddress>, BusError> {
+    if before.counts != after.counts {
+        return Ok(None);
+    }
+    let Some(at) = owners.all().iter().position(|owner| *owner == Some(index)) else { return Ok(None) };
+    let now = after.stations[at];
+    if after.position(now).is_none() {
+        return Ok(None);
+    }
+    Ok(has_identity(bus, fleet, index, now).await.then_some(now))
+}

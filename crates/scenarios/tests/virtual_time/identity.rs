@@ -1,0 +1,171 @@
+//! Two SubDevices at one station address: which of them is ours is told by what this MainDevice wrote to it, by
+//! identity and by place, never by which answers first.
+
+use std::time::Duration;
+
+use ringcat::{
+    Application, DomainId, DomainState, Event, Freshness, JunctionMode, LastOutputs, MainDevice, Options, automatic,
+};
+use ringcat_sim::application::{Behaviour, InputSource};
+use ringcat_sim::cable::{CableId, DeviceIndex, Endpoint};
+use ringcat_sim::description::DeviceDescription;
+use ringcat_sim::frame::Port;
+use ringcat_sim::network::Network;
+use ringcat_wire::al::AlState;
+use ringcat_wire::register::{PortKind, map};
+use scenarios::segments::{MAIN, REDUNDANT, at, descriptions, wired_with};
+use scenarios::tap::Tap;
+use scenarios::world::{CYCLE, World};
+
+const DOMAIN: DomainId = DomainId(0);
+
+/// Devices with four MII ports each; the inputs of each are its number, from 0xA0 on. Those that are alike have one
+/// identity.
+fn described(kinds: &[&str], alike: bool) -> Vec<DeviceDescription> {
+    let mut described = descriptions(kinds);
+    for (number, it) in described.iter_mut().enumerate() {
+        it.ports = [PortKind::Mii; 4];
+        if !alike {
+            it.identity.product_code += 0x1000 * number as u32;
+        }
+        if let Behaviour::Terminal(source) = &mut it.behaviour {
+            *source = InputSource::Constant(vec![0xA0 + number as u8; 2]);
+        }
+    }
+    described
+}
+
+fn station(network: &Network, device: usize) -> u16 {
+    let bytes = network.device(DeviceIndex(device)).controller.register(map::STATION_ADDRESS, 2);
+    u16::from_le_bytes([bytes[0], bytes[1]])
+}
+
+fn activated(mut main_device: MainDevice<Tap>, count: usize) -> Application<Tap> {
+    let scan = main_device.scan().expect("they are there");
+    assert_eq!(scan.subdevices.len(), count);
+    let mut application =
+        main_device.activate(automatic(&scan.subdevices, CYCLE)).map_err(|it| it.error).expect("it fits");
+    (0..1_000).for_each(|_| application.cycle(|_| ()));
+    assert!(application.all_settled());
+    application
+}
+
+/// A session in which the branch behind `cable` is out of reach, which was in OP in the session before.
+fn second_session(
+    described: Vec<DeviceDescription>,
+    cables: &[(Endpoint, Endpoint)],
+    cable: CableId,
+) -> Application<Tap> {
+    let count = described.len();
+    let main_device = MainDevice::request(Tap::new(wired_with(described, cables)), &Options::default());
+    let mut application = activated(main_device, count);
+    application.links_mut().network_mut().cut(cable);
+    let main_device = application.stop(LastOutputs::Zero, AlState::Init, Duration::from_secs(1)).expect("it stops");
+    activated(main_device, count - 1)
+}
+
+/// The device that has a station address of this session keeps it, in OP and with all its inputs fresh, whether the one
+/// of the earlier session comes before or behind it in the order of frames, and whether or not they are alike.
+#[test]
+fn of_two_at_one_address_the_one_of_this_session_stays_and_the_other_one_loses_it() {
+    let tree = [(MAIN, at(0, Port::A)), (at(0, Port::B), at(1, Port::A)), (at(0, Port::D), at(2, Port::A))];
+    let closed = [tree[0], tree[1], tree[2], (at(1, Port::B), REDUNDANT)];
+    for (cables, alike, kind) in [
+        (&tree[..], false, "digital-input-16"),
+        (&tree[..], true, "digital-input-16"),
+        (&tree[..], false, "servo"),
+        (&tree[..], true, "servo"),
+        (&closed[..], false, "digital-input-16"),
+        (&closed[..], true, "digital-input-16"),
+        (&closed[..], true, "digital-output-8"),
+    ] {
+        let what = format!("{} cables, alike: {alike}, {kind}", cables.len());
+        let mut application = second_session(described(&[kind; 3], alike), cables, CableId(2));
+        let network = application.links_mut().network_mut();
+        let ours = station(network, 1);
+        assert_eq!(ours, station(network, 2), "{what}: the one out of reach has this address from before");
+        while application.pop_event().is_some() {}
+        let image = application.exchange().image(DOMAIN).to_vec();
+        application.links_mut().network_mut().heal(CableId(2));
+        for cycle in 0..5_000 {
+            application.cycle(|_| ());
+            let network = application.links().network();
+            let status = network.device(DeviceIndex(1)).al_status().al_state();
+            assert_eq!(status, Some(AlState::Op), "{what}, cycle {cycle}");
+            // What was under way when the other one came, and frames that it bent to itself.
+            if cycle > 2 {
+                let exchange = application.exchange();
+                assert_eq!(exchange.freshness(DOMAIN, 1) == Freshness::Fresh, kind != "digital-output-8", "{what}");
+                assert_eq!(exchange.status(DOMAIN).state, DomainState::Complete, "{what}, cycle {cycle}");
+                assert_eq!(exchange.image(DOMAIN), image, "{what}, cycle {cycle}");
+            }
+        }
+        let network = application.links().network();
+        assert_eq!(station(network, 1), ours, "{what}");
+        assert_ne!(station(network, 2), ours, "{what}");
+        let other = network.device(DeviceIndex(2));
+        assert_eq!(other.al_status().al_state(), Some(AlState::Init), "{what}: it is nobody's");
+        let identity = other.description.identity;
+        let events: Vec<Event> = core::iter::from_fn(|| application.pop_event()).map(|timed| timed.event).collect();
+        let unexpected = |event: &&Event| match event {
+            Event::Unexpected { identity: seen, .. } => seen.product_code == identity.product_code,
+            _ => false,
+        };
+        assert_eq!(events.iter().filter(unexpected).count(), 1, "{what}: {events:?}");
+        let troubles =
+            |event: &&Event| matches!(event, Event::Lost { .. } | Event::Returned { .. } | Event::StateError { .. });
+        assert_eq!(events.iter().find(troubles), None, "{what}");
+    }
+}
+
+/// Branches of a junction with devices that are alike, without serial numbers: the one on the later branch has its
+/// power back first. A ring behind a junction whose first two are alike, the second one reached from the far end while
+/// the first has no power.
+#[test]
+fn of_several_alike_each_comes_back_to_its_own_place_whichever_is_there_first() {
+    let branches = [
+        (MAIN, at(0, Port::A)),
+        (at(0, Port::D), at(1, Port::A)),
+        (at(0, Port::B), at(2, Port::A)),
+        (at(0, Port::C), at(3, Port::A)),
+    ];
+    let local_ring = [
+        (MAIN, at(0, Port::A)),
+        (at(0, Port::D), at(1, Port::A)),
+        (at(1, Port::B), at(2, Port::A)),
+        (at(2, Port::B), at(3, Port::A)),
+        (at(3, Port::B), at(0, Port::B)),
+    ];
+    for (cables, kind) in [
+        (&branches[..], "digital-output-8"),
+        (&branches[..], "servo"),
+        (&local_ring[..], "digital-output-8"),
+        (&local_ring[..], "servo"),
+    ] {
+        for last in 1..4 {
+            let network = wired_with(described(&["junction", kind, kind, kind], true), cables);
+            let options = Options { junctions: JunctionMode::Automatic, ..Options::default() };
+            let declare = |scan: &ringcat::Scan| automatic(&scan.subdevices, CYCLE);
+            let mut world = World::with(7, network, &options, declare).expect("it fits");
+            world.settle();
+            world.judge_latched(false);
+            let home: Vec<u16> = (0..4).map(|device| world.station_of(device)).collect();
+            let what = format!("{} cables, {kind}, {last} comes last", cables.len());
+            (1..4).for_each(|device| world.power_off(DeviceIndex(device)));
+            world.run_cycles(300);
+            for device in (1..4).filter(|device| *device != last) {
+                world.power_on(DeviceIndex(device));
+                world.run_cycles(1_500);
+            }
+            for device in (1..4).filter(|device| *device != last) {
+                let here = world.station_of(device);
+                assert_eq!(here, home[device], "{what}: device {device}");
+            }
+            world.power_on(DeviceIndex(last));
+            world.run_cycles(1_500);
+            let now: Vec<u16> = (0..4).map(|device| world.station_of(device)).collect();
+            assert_eq!(now, home, "{what}");
+            assert!(world.all_in_op(), "{what}");
+        }
+    }
+}

@@ -1,0 +1,112 @@
+//! Copies of configuration writes that were given up and come late, after later writes: what they undo is found and
+//! written again.
+
+use std::time::Duration;
+
+use ringcat::{DomainId, DomainState, Event, Services};
+use ringcat_sim::cable::{CableId, DeviceIndex, Direction};
+use ringcat_sim::fault::Fault;
+use ringcat_sim::network::NetworkOptions;
+use ringcat_wire::address::RegisterAddress;
+use ringcat_wire::al::AlState;
+use ringcat_wire::register::{Fmmu, SyncManager, map};
+use ringcat_wire::sii::SiiSyncManager;
+use scenarios::segments::{descriptions, line};
+use scenarios::world::World;
+
+/// What was undone is found by then, and written again.
+const HEALED: Duration = Duration::from_millis(2_500);
+
+/// A terminal whose outputs flow in OP only, and one with a mailbox.
+fn world() -> World {
+    let mut described = descriptions(&["emulated-output-8", "servo"]);
+    described[0].sync_managers[0].enable = SiiSyncManager::ENABLE | SiiSyncManager::OP_ONLY;
+    let mut world = World::in_op(1, line(described, NetworkOptions::default()));
+    world.judge_latched(false);
+    world
+}
+
+fn is_well(world: &World) -> bool {
+    let status = world.application().exchange().status(DomainId(0));
+    world.all_in_op() && world.application().all_settled() && status.state == DomainState::Complete
+}
+
+/// Each group of registers of a configuration, cleared behind the back of the engine in OP, SAFEOP and PREOP.
+#[test]
+fn a_configuration_that_a_late_write_has_undone_is_told_and_written_again() {
+    let registers: [(usize, AlState, RegisterAddress, usize); 8] = [
+        (0, AlState::Op, map::sync_manager(0), SyncManager::LEN),
+        (0, AlState::Op, map::fmmu(0), Fmmu::LEN),
+        (1, AlState::Op, map::sync_manager(2), SyncManager::LEN),
+        (1, AlState::Op, map::sync_manager(3), SyncManager::LEN),
+        (1, AlState::Op, map::sync_manager(0), SyncManager::LEN),
+        (1, AlState::SafeOp, map::sync_manager(3), SyncManager::LEN),
+        (1, AlState::SafeOp, map::sync_manager(1), SyncManager::LEN),
+        (1, AlState::PreOp, map::sync_manager(1), SyncManager::LEN),
+    ];
+    for (subdevice, state, register, length) in registers {
+        let mut world = world();
+        if state != AlState::Op {
+            let request = world.application_mut().request_state(subdevice, state);
+            world.finish(Duration::from_secs(1), request).expect("it goes there");
+            world.run_cycles(50);
+        }
+        let what = format!("{subdevice} in {state}, {register}");
+        let held = |world: &World| {
+            let controller = &world.network().device(DeviceIndex(subdevice)).controller;
+            let mut held = controller.register(register, length).to_vec();
+            // The status byte of a SyncManager, and what its PDI says.
+            if length == SyncManager::LEN {
+                (held[5], held[7]) = (0, 0);
+            }
+            held
+        };
+        let before = held(&world);
+        let mark = world.mark();
+        let write = world.application_mut().engine_mut().start_register_write(subdevice, register, vec![0; length]);
+        world.finish(Duration::from_secs(1), write).expect("it is there");
+        world.until(HEALED, &what, |world| held(world) == before && world.application().all_settled());
+        // Some see it themselves.
+        let told = |event: &Event| match event {
+            Event::ConfigurationFailed { subdevice: of, reason } => *of == subdevice && reason.contains("0x0"),
+            Event::StateError { subdevice: of, .. } => *of == subdevice,
+            _ => false,
+        };
+        assert!(world.saw(mark, told), "{what}: {:?}", world.events(mark));
+        world.run_cycles(3_000);
+        let count = world.events(mark).iter().filter(|timed| told(&timed.event)).count();
+        assert_eq!(count, 1, "{what}: it is not configured again and again");
+    }
+}
+
+/// Nothing is wrong with one that was led to SAFEOP and whose outputs flow in OP only.
+#[test]
+fn one_for_op_only_that_was_led_to_safeop_is_left_in_peace() {
+    let mut world = world();
+    let request = world.application_mut().request_state(0, AlState::SafeOp);
+    world.finish(Duration::from_secs(1), request).expect("it goes there");
+    let mark = world.mark();
+    world.run_cycles(3_000);
+    assert!(!world.saw(mark, |event| matches!(event, Event::ConfigurationFailed { .. })), "{:?}", world.events(mark));
+    assert_eq!(world.steps(mark), []);
+}
+
+/// Frames are late by milliseconds while a SubDevice comes back from a blink of its power, from each moment of that on.
+#[test]
+fn frames_that_are_late_while_a_subdevice_comes_back_undo_nothing_for_good() {
+    for (seed, by) in (0..).zip([1_900, 2_900, 3_900, 5_900].map(Duration::from_micros)) {
+        let mut world = world();
+        for moment in 0..60 {
+            let device = DeviceIndex(seed as usize % 2);
+            world.power_off(device);
+            world.run_cycles(3);
+            world.power_on(device);
+            let delay = Duration::from_micros(400 * moment);
+            world.fault_in(delay, Fault::Delay { cable: CableId(0), direction: Some(Direction::AToB), count: 2, by });
+            world.run_cycles(40);
+            world.until(Duration::from_secs(8), "it is back", is_well);
+            world.run_cycles(20);
+            assert!(is_well(&world), "{by:?} late, {delay:?} behind its power");
+        }
+    }
+}
