@@ -33,6 +33,10 @@ pub struct ClockOptions {
     /// position.
     #[arg(long, value_name = "WHO", default_value = "first", value_parser = reference)]
     reference: ReferenceClock,
+    /// Where a fork without a clock hides the propagation delay of a SubDevice, write the middle of what it can be. Otherwise
+    /// none is written there, and SubDevices with SYNC signals stay in SAFEOP.
+    #[arg(long)]
+    estimate_delays: bool,
     #[arg(long, value_name = "SIGNALS", value_parser = sync, help = SYNC_HELP)]
     sync: Vec<Sync>,
 }
@@ -52,7 +56,7 @@ fn reference(text: &str) -> Result<ReferenceClock, String> {
 impl ClockOptions {
     /// Whether one of them was given: clocks are wanted.
     pub fn are_given(&self) -> bool {
-        let given = self.phase.is_some() || self.bus_shift || !self.sync.is_empty();
+        let given = self.phase.is_some() || self.bus_shift || self.estimate_delays || !self.sync.is_empty();
         given || self.reference != ReferenceClock::default()
     }
 
@@ -68,8 +72,13 @@ impl ClockOptions {
             config.sync = signals;
         }
         let epoch = system_time::epoch(now());
-        let config =
-            ClockConfig { reference: self.reference, bus_shift: self.bus_shift, epoch, ..ClockConfig::default() };
+        let config = ClockConfig {
+            reference: self.reference,
+            bus_shift: self.bus_shift,
+            estimated_delays: self.estimate_delays,
+            epoch,
+            ..ClockConfig::default()
+        };
         if let Some(words) = in_front(self.reference, found, declaration) {
             eprintln!("ringcat: {words}");
         }

@@ -43,13 +43,15 @@ const LOOK: Duration = Duration::from_millis(10);
 
 /// How to read what it prints.
 const TABLE_HELP: &str = "\
-  delay       nanoseconds from the reference clock, as measured (register 0x0928)
+  delay       nanoseconds from the reference clock, as measured (register 0x0928); -: a fork without a clock hides it and
+              none was written; ~: the middle of what it can be (--estimate-delays)
   offset      from the clock's own time to system time (0x0920)
   drift       how much faster than the reference it would run by itself (0x0932)
   now, worst  its difference to the reference (0x092C): when it was read last, and the largest since it was locked
   SYNC        signals in microseconds: cycle, and shift with its sign
 
-Exit status: 0 all clocks locked and stayed within 1 us, and all SubDevices were in OP in the end, 1 they did not.";
+Exit status: 0 all clocks locked and stayed within 1 us, their delays are known or estimated, and all SubDevices were in OP
+in the end, 1 they did not.";
 
 /// Options of `ringcat clocks`.
 #[derive(Args, Debug)]
@@ -156,6 +158,10 @@ fn reasons(clocks: &[ClockStatus], locked: bool, settled: bool) -> Vec<String> {
         let (position, worst) = (clock.position, clock.worst_ns);
         reasons
             .push(format!("the clock of position {position} was {worst} ns from the reference, {window} ns allowed"));
+    }
+    let unknown = clocks.iter().filter(|clock| clock.hidden.is_some_and(|hidden| !hidden.is_estimated)).count();
+    if unknown > 0 {
+        reasons.push(format!("the propagation delay of {unknown} of {} clocks is not known", clocks.len()));
     }
     if !settled {
         reasons.push("not all SubDevices are in OP".to_owned());

@@ -1,7 +1,7 @@
 //! Distributed clocks as arithmetic: what follows from latched times, and what to do about it (facts 7).
 //!
 //! * [`wiring`]: the way of a frame through the segment;
-//! * [`delay`]: propagation delays along it, with what is known about [`cables`];
+//! * [`delay`]: propagation delays along it, with what is known about [`cables`] and what follows from `sums` of them;
 //! * [`measurement`]: the mean of several measurements, corrected for the drift of each clock;
 //! * [`start`]: when SYNC signals begin;
 //! * [`follow`]: making a cycle of the host follow the reference clock.
@@ -13,12 +13,14 @@ pub mod cables;
 pub mod delay;
 pub mod follow;
 pub mod measurement;
+mod places;
 pub mod start;
+mod sums;
 mod window;
 pub mod wiring;
 
 pub use cables::Cables;
-pub use delay::{Delays, Passage, PortTimes, Segment};
+pub use delay::{Delays, Passage, PortTimes, Segment, Unknown};
 pub use follow::{Follower, phase_error};
 pub use measurement::{Disagreement, Latched, Measurements};
 pub use start::first_pulse;

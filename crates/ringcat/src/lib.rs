@@ -109,7 +109,7 @@ pub use ringcat_engine::main_device::{
     MAX_UNDER_WAY, Pending, RawDatagram, Required, SubDeviceState,
 };
 pub use ringcat_engine::plan::{AreaPlan, MappedEntry, MappedPdo, PlanError, SubDevicePlan, plan};
-pub use ringcat_engine::procedures::clocks::ClockStatus;
+pub use ringcat_engine::procedures::clocks::{ClockStatus, HiddenDelay};
 pub use ringcat_engine::procedures::configure::ConfigureError;
 pub use ringcat_engine::procedures::dictionary::ReadPdos;
 pub use ringcat_engine::procedures::look_at_ring::RingLook;

@@ -125,6 +125,12 @@ pub fn describe(timed: &TimedEvent, names: &Names) -> String {
                 (false, _) => format!("Line is fixed {place}: broken cables left: {breaks}"),
             }
         }
+        Event::JunctionsNotLearned { rings } => {
+            format!(
+                "rings behind junctions of which it was not found out where they close: {rings}; scan again without frames \
+                 that get lost, or declare their connections (--junction strict)"
+            )
+        }
         Event::JunctionUnknown { rings } => {
             let what = "rings behind junctions closed that are not known";
             format!("{rings} {what}: their breaks read as crossed lines until the segment is scanned anew")
@@ -201,6 +207,16 @@ pub fn describe(timed: &TimedEvent, names: &Names) -> String {
         Event::ReferenceClock { position: None } => "no clock is left that could be the reference".into(),
         Event::DelaysChanged { clocks, largest_ns } => {
             format!("propagation delays of {clocks} clocks have changed, by {largest_ns} ns at most")
+        }
+        Event::DelayUnknown { position, fork, range_ns, is_estimated } => {
+            let why = fork.map_or_else(
+                || "it is not known what is between it and the reference".into(),
+                |fork| format!("the fork at position {fork} has no clock"),
+            );
+            let range = range_ns.map_or_else(String::new, |(least, most)| format!(", {least} to {most} ns"));
+            let written = if *is_estimated { "the middle is written" } else { "none is written" };
+            let at = names.at(*position, whom[0]);
+            format!("the propagation delay of {at} cannot be measured, {why}{range}: {written}")
         }
         Event::ClocksFailed { reason } => format!("distributed clocks: {reason}"),
         Event::SyncWindow { inside: true, spread_ns } => format!("clocks came into their window: {spread_ns} ns"),

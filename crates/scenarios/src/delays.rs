@@ -32,6 +32,9 @@ const LOOK_CYCLES: u64 = 60;
 /// Cycles in which it must stay so.
 const CALM_CYCLES: u64 = 20;
 
+/// Cycles in which it must stay the same which delays are hidden: the next measurement may find what one has not.
+const STEADY_CYCLES: u64 = 200;
+
 /// What a segment looks like.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Shape {
@@ -41,6 +44,8 @@ pub enum Shape {
     LocalRing(usize),
     /// Anything with branches and rings behind junctions, with one link or two.
     Tree,
+    /// The same with forks and others that have no clock.
+    Gaps,
 }
 
 /// What became of changes of a segment.
@@ -54,6 +59,8 @@ pub struct Outcome {
     pub right: u64,
     /// Changes after which some were not written, by the reason that was told.
     pub not_written: BTreeMap<String, u64>,
+    /// Changes after which so many delays were hidden by forks without a clock, and told to be.
+    pub hidden: BTreeMap<usize, u64>,
     /// Delays that were written and wrong, or not written without a reason.
     pub wrong: Vec<String>,
     /// Largest error of what was written, in nanoseconds for each hop.
@@ -66,6 +73,7 @@ impl Outcome {
         (self.changes, self.written) = (self.changes + other.changes, self.written + other.written);
         self.right += other.right;
         other.not_written.into_iter().for_each(|(reason, count)| *self.not_written.entry(reason).or_default() += count);
+        other.hidden.into_iter().for_each(|(count, times)| *self.hidden.entry(count).or_default() += times);
         self.wrong.extend(other.wrong);
         self.largest_ns = self.largest_ns.max(other.largest_ns);
     }
@@ -97,7 +105,7 @@ impl Plan {
                 plan.cut = (begin..plan.cables.len()).collect();
                 plan.hang(at(junction, C));
             }
-            Shape::Tree => plan.tree(dice),
+            Shape::Tree | Shape::Gaps => plan.tree(dice),
         }
         plan
     }
@@ -187,7 +195,14 @@ fn devices(count: usize, dice: &mut Dice) -> Vec<DeviceDescription> {
 pub fn run(shape: Shape, seed: u64, changes: u64) -> Outcome {
     let mut dice = Dice::new(seed);
     let plan = Plan::new(shape, &mut dice);
-    let network = wired(devices(plan.devices, &mut dice), &plan.cables);
+    let mut devices = devices(plan.devices, &mut dice);
+    if shape == Shape::Gaps {
+        // At least one has a clock.
+        let keeps = dice.below(devices.len() as u64) as usize;
+        let without = devices.iter_mut().enumerate().filter(|(number, _)| *number != keeps);
+        without.filter(|_| dice.one_in(3)).for_each(|(_, device)| device.dc = None);
+    }
+    let network = wired(devices, &plan.cables);
     let junctions = if plan.connections.is_empty() { JunctionMode::Disabled } else { JunctionMode::Strict };
     let options = Options { junctions, ..Options::default() };
     let config = ClockConfig { drift_distributions: 500, ..config() };
@@ -215,52 +230,67 @@ pub fn run(shape: Shape, seed: u64, changes: u64) -> Outcome {
 struct Watch {
     since: Mark,
     before: Vec<u32>,
-    /// Values that were written, by device.
-    written: Vec<Vec<u32>>,
+    written: Vec<Written>,
+}
+
+/// A value that was written.
+struct Written {
+    device: usize,
+    value: u32,
+    /// Whose delays were hidden by then: others do not count from them.
+    hidden: Vec<usize>,
 }
 
 impl Watch {
     fn new(world: &World, since: Mark) -> Watch {
         let before = delays(world.network());
-        Watch { since, written: vec![Vec::new(); before.len()], before }
+        Watch { since, written: Vec::new(), before }
     }
 
     fn cycle(&mut self, world: &mut World) {
         world.cycle();
-        for ((device, now), written) in delays(world.network()).into_iter().enumerate().zip(&mut self.written) {
-            if *written.last().unwrap_or(&self.before[device]) != now {
-                written.push(now);
-            }
+        let now = delays(world.network());
+        for (device, value) in now.iter().copied().enumerate().filter(|(device, now)| self.before[*device] != *now) {
+            self.written.push(Written { device, value, hidden: hidden(world) });
         }
+        self.before = now;
     }
 
     /// Until all delays are right and stay so, or it is told why they are not.
     fn settle(mut self, world: &mut World, outcome: &mut Outcome, what: &str) {
         (0..LOOK_CYCLES).for_each(|_| self.cycle(world));
         let mut cycles = LOOK_CYCLES;
-        let truth = loop {
-            let truth = truth(world);
+        let all = loop {
+            let all = truth(world);
             let now = delays(world.network());
-            if truth.iter().all(|place| !place.is_wrong(now[place.device])) {
-                (0..CALM_CYCLES).for_each(|_| self.cycle(world));
+            let hidden = hidden(world);
+            let truth = from_known(&all, &hidden);
+            // One that is hidden may keep what it had before: it is told that this counts for nothing.
+            if truth.iter().all(|place| hidden.contains(&place.device) || !place.is_wrong(now[place.device])) {
+                let calm = if hidden.is_empty() { CALM_CYCLES } else { STEADY_CYCLES };
+                (0..calm).for_each(|_| self.cycle(world));
+                if self::hidden(world) != hidden && cycles < LIMIT_CYCLES {
+                    cycles += calm;
+                    continue;
+                }
                 outcome.right += 1;
-                break truth;
+                *outcome.hidden.entry(hidden.len()).or_default() += 1;
+                break all;
             }
             if cycles >= LIMIT_CYCLES {
                 self.explain(world, outcome, what, &truth);
-                break truth;
+                break all;
             }
             (0..CALM_CYCLES).for_each(|_| self.cycle(world));
             cycles += CALM_CYCLES;
         };
         outcome.changes += 1;
-        for place in truth {
-            for written in &self.written[place.device] {
+        for Written { device, value, hidden } in &self.written {
+            for place in from_known(&all, hidden).iter().filter(|place| place.device == *device) {
                 outcome.written += 1;
-                outcome.largest_ns = outcome.largest_ns.max(place.error(*written).abs() as f64 / place.hops as f64);
-                if place.is_wrong(*written) {
-                    let text =
-                        format!("device {}: expected {} ns, {written} was written", place.device, place.delay_ns);
+                outcome.largest_ns = outcome.largest_ns.max(place.error(*value).abs() as f64 / place.hops as f64);
+                if place.is_wrong(*value) || hidden.contains(device) {
+                    let text = format!("device {device}: expected {} ns, {value} was written", place.delay_ns);
                     outcome.wrong.push(format!("{what}: {text}"));
                 }
             }
@@ -291,8 +321,12 @@ impl Watch {
 #[derive(Clone, Copy, Debug)]
 struct Place {
     device: usize,
+    /// Which of the frames of both links it met.
+    frame: u64,
     /// From the first processing unit that the frame met.
     delay_ns: i64,
+    /// How many it met before.
+    number: i64,
     hops: i64,
 }
 
@@ -306,11 +340,30 @@ impl Place {
     }
 }
 
+/// Devices whose delays are not known, as it is told.
+fn hidden(world: &World) -> Vec<usize> {
+    let clocks = world.application().engine().clocks();
+    let hidden = clocks.iter().filter(|clock| clock.hidden.is_some_and(|hidden| !hidden.is_estimated));
+    let stations: Vec<u16> = hidden.map(|clock| clock.station.0).collect();
+    (0..world.network().devices().len()).filter(|device| stations.contains(&world.station_of(*device))).collect()
+}
+
 fn delays(network: &Network) -> Vec<u32> {
     (0..network.devices().len()).map(|device| delay(network, device)).collect()
 }
 
-/// When the processing units meet a frame, from the first one on its link on.
+/// The same from the first one on its link whose delay is known.
+fn from_known(truth: &[Place], hidden: &[usize]) -> Vec<Place> {
+    let known = |place: &&Place| !hidden.contains(&place.device);
+    let since = |place: &Place| {
+        let first = truth.iter().filter(known).find(|first| first.frame == place.frame).unwrap_or(place);
+        let hops = (place.number - first.number).abs().max(1);
+        Place { delay_ns: place.delay_ns - first.delay_ns, hops, ..*place }
+    };
+    truth.iter().map(since).collect()
+}
+
+/// When the processing units of those with a clock meet a frame, from the first one on its link on.
 fn truth(world: &mut World) -> Vec<Place> {
     let latched =
         |world: &World| -> Vec<_> { world.network().devices().map(|device| device.controller.latched()).collect() };
@@ -325,10 +378,10 @@ fn truth(world: &mut World) -> Vec<Place> {
     let _ = world.finish(Duration::from_secs(1), work);
     let mut met: Vec<(u64, u64, usize)> = Vec::new();
     for (device, (now, before)) in latched(world).into_iter().zip(before).enumerate() {
+        let of = world.network().device(DeviceIndex(device));
         // What is not reached keeps what it had, what lost its power has nothing.
-        if let Some((frame, at)) =
-            now.filter(|_| now != before && world.network().device(DeviceIndex(device)).controller.is_powered())
-        {
+        let counts = now != before && of.controller.is_powered() && of.description.dc.is_some();
+        if let Some((frame, at)) = now.filter(|_| counts) {
             met.push((frame, at.0, device));
         }
     }
@@ -339,7 +392,8 @@ fn truth(world: &mut World) -> Vec<Place> {
         if number == 0 || frame != first.0 {
             first = (frame, at, number);
         }
-        places.push(Place { device, delay_ns: (at - first.1) as i64, hops: (number - first.2).max(1) as i64 });
+        let number = (number - first.2) as i64;
+        places.push(Place { device, frame, delay_ns: (at - first.1) as i64, number, hops: number.max(1) });
     }
     places
 }

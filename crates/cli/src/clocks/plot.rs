@@ -207,6 +207,7 @@ mod tests {
             subdevice: None,
             is_reference: false,
             delay_ns: 0,
+            hidden: None,
             offset_ns: 0,
             drift_ppb: 0,
             difference_ns,

@@ -15,6 +15,20 @@ fn signals_of(clock: &ClockStatus, signals: &[Option<SyncSignals>]) -> Option<Sy
     clock.subdevice.and_then(|subdevice| signals.get(subdevice).copied().flatten())
 }
 
+/// Whether a delay is known, or one was estimated.
+fn is_written(clock: &ClockStatus) -> bool {
+    clock.hidden.is_none_or(|hidden| hidden.is_estimated)
+}
+
+/// The delay, `~` before an estimate, `-` where none was written.
+fn delay(clock: &ClockStatus) -> String {
+    match clock.hidden {
+        None => clock.delay_ns.to_string(),
+        Some(_) if is_written(clock) => format!("~{}", clock.delay_ns),
+        Some(_) => "-".to_owned(),
+    }
+}
+
 /// One line per clock, below a heading. `signals` by SubDevice.
 pub fn lines(clocks: &[ClockStatus], names: &Names, signals: &[Option<SyncSignals>]) -> Vec<String> {
     let heading =
@@ -31,7 +45,7 @@ pub fn lines(clocks: &[ClockStatus], names: &Names, signals: &[Option<SyncSignal
             "{:>3}  {}  {:>8}  {:>9.3}  {:>7}  {:>8}  {:<9}  {:>20}  {}{}",
             clock.position,
             clock.station,
-            clock.delay_ns,
+            delay(clock),
             clock.drift_ppb as f64 / 1e3,
             difference,
             clock.worst_ns,
@@ -62,13 +76,22 @@ pub fn json(
                 "sync1_shift_ns": signals.sync1_shift_ns,
             })
         });
+        let hidden = clock.hidden.map(|hidden| {
+            json!({
+                "fork": hidden.fork.map(|fork| fork.0),
+                "least_ns": hidden.range_ns.map(|(least, _)| least),
+                "most_ns": hidden.range_ns.map(|(_, most)| most),
+                "estimated": hidden.is_estimated,
+            })
+        });
         json!({
             "position": clock.position,
             "station": clock.station.0,
             "name": name(clock, names),
             "reference": clock.is_reference,
             "locked": clock.is_locked,
-            "delay_ns": clock.delay_ns,
+            "delay_ns": is_written(clock).then_some(clock.delay_ns),
+            "delay_hidden": hidden,
             "offset_ns": clock.offset_ns,
             "drift_ppb": clock.drift_ppb,
             "difference_ns": clock.difference_ns,
@@ -91,7 +114,8 @@ pub fn json(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use ringcat::wire::address::StationAddress;
+    use ringcat::HiddenDelay;
+    use ringcat::wire::address::{Position, StationAddress};
 
     fn clock() -> ClockStatus {
         ClockStatus {
@@ -100,6 +124,7 @@ mod tests {
             subdevice: Some(0),
             is_reference: false,
             delay_ns: 1_050,
+            hidden: None,
             offset_ns: -7,
             drift_ppb: -12_345,
             difference_ns: Some(-9),
@@ -115,6 +140,25 @@ mod tests {
         let words: Vec<&str> = lines[1].split_whitespace().collect();
         let expected = ["3", "0x1004", "1050", "-12.345", "-9", "31", "yes", "-7", "servo", "SYNC0", "1000+250"];
         assert_eq!(words, expected);
+    }
+
+    #[test]
+    fn a_delay_that_is_not_known_is_none_and_an_estimate_is_marked() {
+        let hidden = HiddenDelay { fork: Some(Position(2)), range_ns: Some((0, 2_100)), is_estimated: true };
+        let one = |is_estimated| ClockStatus { hidden: Some(HiddenDelay { is_estimated, ..hidden }), ..clock() };
+        let words = |clock: ClockStatus| {
+            let lines = lines(&[clock], &Names::default(), &[None]);
+            let value = json(&[clock], &Names::default(), &[None], true, &Histogram::default());
+            let one = &value["clocks"][0];
+            (
+                lines[1].split_whitespace().nth(2).map(str::to_owned),
+                one["delay_ns"].as_i64(),
+                one["delay_hidden"].clone(),
+            )
+        };
+        let json = |is_estimated| json!({ "fork": 2, "least_ns": 0, "most_ns": 2_100, "estimated": is_estimated });
+        assert_eq!(words(one(true)), (Some("~1050".to_owned()), Some(1_050), json(true)));
+        assert_eq!(words(one(false)), (Some("-".to_owned()), None, json(false)));
     }
 
     #[test]

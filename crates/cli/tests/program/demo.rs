@@ -57,6 +57,20 @@ fn the_demonstration_holds_on_devices_made_of_real_images() {
     assert!(said.contains("EL2809"), "{said}");
 }
 
+/// Nothing was compared: that is said, as no failure and not as a comparison that held.
+#[test]
+fn the_demonstration_says_that_nothing_was_compared_without_process_data() {
+    let path = std::env::temp_dir().join(format!("ringcat-couplers-{}.toml", std::process::id()));
+    let couplers = "[segment]\nring = true\n[[device]]\ntype = \"coupler\"\n[[device]]\ntype = \"coupler\"\n";
+    std::fs::write(&path, couplers).expect("writable");
+    let output = ringcat(&["demo", "--fast", "--segment", &path.display().to_string()]);
+    std::fs::remove_file(&path).expect("it was just written");
+    let said = text(&output.stdout);
+    assert!(output.status.success(), "{said}{}", text(&output.stderr));
+    assert!(said.contains("no SubDevice has process data, so none was compared"), "{said}");
+    assert!(!said.contains("comparisons") && !said.contains("FAILED"), "{said}");
+}
+
 #[test]
 fn two_runs_of_the_demonstration_print_the_same() {
     let run = || text(&ringcat(&["demo", "--fast"]).stdout);

@@ -2,15 +2,17 @@
 //!
 //! The frame's way is followed port by port ([`Wiring::way`]). Between two arrivals at a SubDevice with a clock lies a
 //! branch: what its clock says the branch took, less what the SubDevices in the branch say that they took, is the time
-//! on cables. What is known about cables ([`Cables`]) counts, and the rest is shared evenly among the others.
-//! SubDevices without a clock are part of the cable.
+//! on cables. SubDevices without a clock are part of the cable. There and back a cable takes as long, and what is known about
+//! cables ([`Cables`]) counts: what follows from that is a delay. What does not, behind a fork without a clock, is none:
+//! clocks there are a group whose place within the branch is not known ([`places`](super::places)).
 
 use alloc::vec;
 use alloc::vec::Vec;
 
 use ringcat_wire::address::StationAddress;
 
-use super::cables::{Cables, End};
+use super::cables::{Cables, End, Ends, ends};
+use super::places::{Place, Places, Range};
 use super::wiring::{Arrival, TREES, Wiring, processed_in};
 use super::{FRACTION, round};
 use crate::topology::PortOf;
@@ -31,8 +33,10 @@ pub struct PortTimes(pub [i64; 4]);
 /// What each SubDevice is away from where the frame came in.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Delays {
-    /// By position, to the processing unit, with fraction; `None` without a clock or without times.
+    /// By position, to the processing unit, with fraction; `None` without a clock or without times, and where it is not known.
     pub units: Vec<Option<i64>>,
+    /// Those of clocks whose delay to the reference is not known, by position.
+    pub unknown: Vec<Unknown>,
     /// By position, whose frame it processes: 0 for the main link, 1 for the redundant one.
     pub trees: Vec<usize>,
     /// Some way between two clocks is neither measured nor remembered.
@@ -40,8 +44,21 @@ pub struct Delays {
     /// Several cables share a time that was measured of them together: the members of a whole ring whose cables nobody
     /// knows.
     pub is_shared: bool,
+    /// What is known of each cable of a branch does not make up the time that they took together.
+    pub is_contradictory: bool,
     /// Some time between two arrivals cannot be: the frame has taken another way.
     pub is_implausible: bool,
+}
+
+/// A clock whose place on the way cannot be told from what was latched.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Unknown {
+    /// Its position.
+    pub node: usize,
+    /// The fork without a clock that hides it, by position.
+    pub fork: Option<usize>,
+    /// The least and the most that its processing unit may be away from where the frame came in, with fraction.
+    pub range: Option<(i64, i64)>,
 }
 
 impl Delays {
@@ -85,9 +102,10 @@ impl Segment<'_> {
         cables.see(self.wiring.cables().filter_map(|(near, far)| Some((self.end(near)?, self.end(far)?))));
     }
 
-    /// Propagation delays. `times` by position, on one clock (see [`super::Measurements::mean`]); `None` without a
-    /// clock. What was measured of cables is learned.
-    pub fn propagation(&self, times: &[Option<PortTimes>], cables: &mut Cables) -> Delays {
+    /// Propagation delays. `times` by position, on one clock (see [`super::Measurements::mean`]); `None` without a clock.
+    /// Delays count for those of whom it is known how far they are from the reference or, where that is on another link, from
+    /// the first clock. What was measured of cables is learned.
+    pub fn propagation(&self, times: &[Option<PortTimes>], reference: usize, cables: &mut Cables) -> Delays {
         let count = self.wiring.count();
         let mut delays = Delays { units: vec![None; count], trees: vec![0; count], ..Delays::default() };
         for tree in 0..TREES {
@@ -97,7 +115,7 @@ impl Segment<'_> {
             let here: Vec<bool> = (0..count).map(|node| is_here(&node)).collect();
             here.iter().zip(&mut delays.trees).filter(|(is, _)| **is).for_each(|(_, of)| *of = tree);
             let clock = |node: usize| times.get(node).copied().flatten().filter(|_| here[node]);
-            Walk::new(self, &way, &clock).run(&mut delays, cables);
+            Walk::new(self, &way, &clock).run(&mut delays, reference, cables);
         }
         delays
     }
@@ -121,8 +139,21 @@ struct Gap {
     to: usize,
     /// What its cables are known to take.
     known: Option<i64>,
+    /// What they take, as known or as follows.
+    time: Option<i64>,
     /// What the SubDevice at its end takes for what lies behind it.
     span: i64,
+}
+
+/// What is known of the cables of a branch.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Found {
+    /// All, or what a fork without a clock does not hide.
+    Exact,
+    /// Which of several cables of a ring takes what is not known.
+    Shared,
+    /// Each, and they do not take as long together.
+    Contradiction,
 }
 
 impl Gap {
@@ -146,25 +177,30 @@ impl<'a, C: Fn(usize) -> Option<PortTimes>> Walk<'a, C> {
         Walk { segment, way, clock, last, next }
     }
 
-    fn run(&self, delays: &mut Delays, cables: &mut Cables) {
-        let mut entered = vec![None; delays.units.len()];
+    fn run(&self, delays: &mut Delays, reference: usize, cables: &mut Cables) {
+        let count = delays.units.len();
+        let mut places = Places::new(count);
+        let mut units: Vec<Option<Place>> = vec![None; count];
         // What comes before the first clock, and between the branches in front of it, nobody measures.
-        delays.is_guessed |= self.trunk(cables, &mut entered);
+        delays.is_guessed |= self.trunk(cables, &mut places);
         for place in 0..self.way.len() {
             let PortOf { node, port } = self.way[place].at;
-            let (Some(delay), Some(times)) = (entered[node], (self.clock)(node)) else { continue };
-            let is_first = delays.units[node].is_none();
+            let (Some(entered), Some(times)) = (places.entered[node], (self.clock)(node)) else { continue };
+            let is_first = units[node].is_none();
             if is_first {
-                delays.units[node] = Some(delay + self.to_unit(place, &times));
+                units[node] = Some(entered.after(self.to_unit(place, &times)));
             }
             if let Some(next) = self.next[place] {
                 let at = |port: u8| times.0[usize::from(port & 3)];
                 let from = if is_first { 0 } else { at(port) };
                 let took = at(self.way[next].at.port) - from;
                 delays.is_implausible |= !(0..=MOST_NS << FRACTION).contains(&took);
-                delays.is_shared |= self.branch(place, next, took, delay + from, cables, &mut entered);
+                let found = self.branch(place, next, took, entered.after(from), cables, &mut places);
+                delays.is_shared |= found != Found::Exact;
+                delays.is_contradictory |= found == Found::Contradiction;
             }
         }
+        places.conclude(&units, reference, delays);
     }
 
     /// From the port of entry to the processing unit.
@@ -178,36 +214,36 @@ impl<'a, C: Fn(usize) -> Option<PortTimes>> Walk<'a, C> {
     }
 
     /// The way that nobody measures as a whole. Returns whether something in it is not known.
-    fn trunk(&self, cables: &Cables, entered: &mut [Option<i64>]) -> bool {
-        let (mut at, mut is_guessed) = (0, false);
-        for gap in self.gaps(0, self.way.len(), &|_, _| None) {
+    fn trunk(&self, cables: &Cables, places: &mut Places) -> bool {
+        let (mut at, mut is_guessed) = (places.begin(), false);
+        for gap in self.gaps(0, self.way.len(), &|hops| cables.remembered(hops)) {
             let first_clock = gap.from == 0 && (self.clock)(self.way[0].at.node).is_none();
-            for hop in gap.from..gap.to {
-                let time = self.cable(hop).and_then(|(one, other)| cables.remembered(one, other));
-                is_guessed |= time.is_none() && !first_clock;
-                at += time.unwrap_or(0) + self.passage(hop);
+            if gap.known.is_none() && !first_clock {
+                is_guessed = true;
+                at = places.apart(self.fork(gap.from, gap.to), None);
             }
+            at = at.after(gap.known.unwrap_or(0) + self.in_passages(&gap));
             if let Some(arrival) = self.way.get(gap.to) {
-                entered[arrival.at.node] = Some(at);
+                places.entered[arrival.at.node] = Some(at);
             }
-            at += gap.span;
+            at = at.after(gap.span);
         }
         is_guessed
     }
 
-    /// Shares the time from one arrival at a SubDevice to its next one among the cables of the branch. `begin` is the
-    /// delay at the first one. Returns whether it is not known which of several cables takes what.
+    /// Finds out which part of the time from one arrival at a SubDevice to its next one which cables of the branch take. `begin` is
+    /// the place of the first one.
     fn branch(
         &self,
         from: usize,
         to: usize,
         took: i64,
-        begin: i64,
+        begin: Place,
         cables: &mut Cables,
-        entered: &mut [Option<i64>],
-    ) -> bool {
-        let mut gaps = self.gaps(from, to, &|one, other| cables.measured(one, other));
-        let in_passages: i64 = gaps.iter().flat_map(|gap| gap.from..gap.to).map(|hop| self.passage(hop)).sum();
+        places: &mut Places,
+    ) -> Found {
+        let mut gaps = self.gaps(from, to, &|hops| cables.measured(hops));
+        let in_passages: i64 = gaps.iter().map(|gap| self.in_passages(gap)).sum();
         let total = (took - in_passages - gaps.iter().map(|gap| gap.span).sum::<i64>()).max(0);
         let known = |gaps: &[Gap]| gaps.iter().filter_map(|gap| gap.known).sum::<i64>();
         let fits = |gaps: &[Gap]| {
@@ -216,50 +252,122 @@ impl<'a, C: Fn(usize) -> Option<PortTimes>> Walk<'a, C> {
         };
         if gaps.iter().any(|gap| gap.known.is_none()) {
             // Cables that were away are those from before where all of them take as long together.
-            let before = self.gaps(from, to, &|one, other| cables.remembered(one, other));
+            let before = self.gaps(from, to, &|hops| cables.remembered(hops));
             gaps = if fits(&before) { before } else { gaps };
         }
+        let mut is_believed = true;
         if known(&gaps) > total && gaps.iter().any(|gap| gap.known.is_none()) {
             // What is known cannot be right.
             gaps.iter_mut().for_each(|gap| gap.known = None);
+            is_believed = false;
         }
         // Where all is known, the difference to what was measured now is shared by all.
         let all_known = gaps.iter().all(|gap| gap.known.is_some());
-        let takes_rest = |gap: &Gap| all_known || gap.known.is_none();
         let rest = total - known(&gaps);
-        let sharing: i64 = gaps.iter().filter(|gap| takes_rest(gap)).map(Gap::hops).sum();
-        let is_shared = if all_known { !fits(&gaps) } else { self.are_several(&gaps) };
         let is_one_cable = gaps.len() == 2 && gaps.iter().all(|gap| gap.hops() == 1);
-        let (mut spent, mut shared, mut done) = (begin, 0, 0);
+        if all_known {
+            self.share(&mut gaps, rest);
+        } else {
+            self.follow(&mut gaps, rest, is_believed.then_some(&*cables));
+        }
+        let found = match gaps.iter().any(|gap| gap.time.is_none()) {
+            _ if all_known && !fits(&gaps) => Found::Contradiction,
+            true if self.are_several(&gaps) => Found::Shared,
+            _ => Found::Exact,
+        };
+        self.enter(&gaps, (to, begin, begin.after(took)), rest, places);
         for gap in &gaps {
-            let mut on_cables = gap.known.unwrap_or(0);
-            if takes_rest(gap) {
-                done += gap.hops();
-                let until = rest * done / sharing.max(1);
-                on_cables += until - shared;
-                shared = until;
-            }
-            spent += on_cables + (gap.from..gap.to).map(|hop| self.passage(hop)).sum::<i64>();
-            if gap.to < to {
-                entered[self.way[gap.to].at.node] = Some(spent);
-            }
-            spent += gap.span;
-            if (gap.known.is_none() && !is_shared) || is_one_cable {
-                for (one, other) in (gap.from..gap.to).filter_map(|hop| self.cable(hop)) {
-                    cables.learn(one, other, on_cables / gap.hops().max(1));
-                }
+            if let Some(time) = gap.time.filter(|_| gap.known.is_none() || is_one_cable) {
+                cables.learn(&self.hops(gap.from, gap.to), time);
             }
         }
-        is_shared
+        found
+    }
+
+    /// What all gaps take where each is known, and something is left over.
+    fn share(&self, gaps: &mut [Gap], rest: i64) {
+        let all: i64 = gaps.iter().map(Gap::hops).sum();
+        let (mut shared, mut done) = (0, 0);
+        for gap in gaps {
+            done += gap.hops();
+            let until = rest * done / all.max(1);
+            gap.time = gap.known.map(|known| known + until - shared);
+            shared = until;
+        }
+    }
+
+    /// What gaps take that are not known and have a time together: what follows from that, and from what is known of cables.
+    fn follow(&self, gaps: &mut [Gap], rest: i64, cables: Option<&Cables>) {
+        let unknown = || gaps.iter().filter(|gap| gap.known.is_none());
+        let together: Vec<Ends> = unknown().flat_map(|gap| self.hops(gap.from, gap.to)).collect();
+        let nothing = Cables::default();
+        let cables = cables.unwrap_or(&nothing);
+        let time = |gap: &Gap| {
+            gap.known
+                .or_else(|| cables.measured_with(&self.hops(gap.from, gap.to), &together, rest))
+                .filter(|time| *time >= 0)
+        };
+        let times: Vec<Option<i64>> = gaps.iter().map(time).collect();
+        gaps.iter_mut().zip(times).for_each(|(gap, time)| gap.time = time);
+    }
+
+    /// Notes where the frame comes to clocks in a branch: from its beginning as far as is known, from its end as well, and in
+    /// between clocks are apart from both.
+    fn enter(&self, gaps: &[Gap], (to, begin, end): (usize, Place, Place), rest: i64, places: &mut Places) {
+        let first = gaps.iter().position(|gap| gap.time.is_none()).unwrap_or(gaps.len());
+        let last = gaps.iter().rposition(|gap| gap.time.is_none()).unwrap_or(0);
+        let took = |gap: &Gap| Some(gap.time? + self.in_passages(gap));
+        let mut at = begin;
+        for (number, gap) in gaps.iter().enumerate().filter(|(_, gap)| gap.to < to) {
+            at = match took(gap) {
+                Some(took) => at.after(took),
+                None if number == last && first < last => {
+                    // What follows is known.
+                    let behind = gaps[number + 1..].iter().map(|gap| took(gap).unwrap_or(0) + gap.span).sum::<i64>();
+                    end.after(-behind - gap.span)
+                }
+                None => {
+                    let range = self.range(&gaps[..=number], gaps, rest);
+                    places.apart(self.fork(gap.from, gap.to), Some((begin, range)))
+                }
+            };
+            places.entered[self.way[gap.to].at.node] = Some(at);
+            at = at.after(gap.span);
+        }
+    }
+
+    /// The least and the most that the way through the first gaps may take, of all whose unknown cables take `rest` together.
+    fn range(&self, front: &[Gap], all: &[Gap], rest: i64) -> Range {
+        let unknown = |gaps: &[Gap]| -> Vec<Ends> {
+            gaps.iter().filter(|gap| gap.known.is_none()).flat_map(|gap| self.hops(gap.from, gap.to)).collect()
+        };
+        let (before, all) = (unknown(front), unknown(all));
+        let count = |of: &[Ends], ends: &Ends| of.iter().filter(|other| *other == ends).count() as i64;
+        // All of it on that cable of which most is in front, or least.
+        let shares = || all.iter().map(|ends| rest * count(&before, ends) / count(&all, ends).max(1));
+        let (least, most) = (shares().min().unwrap_or(0), shares().max().unwrap_or(0));
+        let spans = front.split_last().map_or(0, |(_, before)| before.iter().map(|gap| gap.span).sum());
+        let fixed: i64 = front.iter().map(|gap| gap.known.unwrap_or(0) + self.in_passages(gap)).sum::<i64>() + spans;
+        (fixed + least, fixed + most)
+    }
+
+    /// The SubDevice without a clock between two places that has a branch there, if one has.
+    fn fork(&self, from: usize, to: usize) -> Option<usize> {
+        let between = self.way.get(from..to.min(self.way.len()))?.iter().map(|arrival| arrival.at.node);
+        let is_fork = |node: &usize| {
+            let at = |port: u8| PortOf { node: *node, port };
+            let leads_on = |port: &u8| self.segment.wiring.far(at(*port)).is_some();
+            let is_entry = self.segment.wiring.entries.iter().flatten().any(|entry| entry.node == *node);
+            (0..4).filter(leads_on).count() + usize::from(is_entry) > 2
+        };
+        between.filter(|node| (self.clock)(*node).is_none()).find(is_fork)
     }
 
     /// Whether the gaps that are not known are several, and some of a cable on which the frame goes one way only: there
     /// and back the same cable takes as long.
     fn are_several(&self, gaps: &[Gap]) -> bool {
         let unknown = || gaps.iter().filter(|gap| gap.known.is_none());
-        let sorted = |(one, other): (End, End)| (one.min(other), one.max(other));
-        let mut cables: Vec<_> =
-            unknown().flat_map(|gap| gap.from..gap.to).filter_map(|hop| self.cable(hop)).map(sorted).collect();
+        let mut cables: Vec<Ends> = unknown().flat_map(|gap| self.hops(gap.from, gap.to)).collect();
         cables.sort_unstable();
         unknown().count() > 1 && cables.chunk_by(|one, other| one == other).any(|same| same.len() == 1)
     }
@@ -271,6 +379,16 @@ impl<'a, C: Fn(usize) -> Option<PortTimes>> Walk<'a, C> {
         if processed { passage.processed } else { passage.forwarded }
     }
 
+    /// What is known of all passages on the way of a gap.
+    fn in_passages(&self, gap: &Gap) -> i64 {
+        (gap.from..gap.to).map(|hop| self.passage(hop)).sum()
+    }
+
+    /// The cables between two places, each as often as the frame takes it.
+    fn hops(&self, from: usize, to: usize) -> Vec<Ends> {
+        (from..to).filter_map(|hop| self.cable(hop)).map(ends).collect()
+    }
+
     /// Both ends of the cable behind an arrival.
     fn cable(&self, place: usize) -> Option<(End, End)> {
         let far = self.way.get(place + 1)?.at;
@@ -278,16 +396,17 @@ impl<'a, C: Fn(usize) -> Option<PortTimes>> Walk<'a, C> {
         Some((self.segment.end(near)?, self.segment.end(far)?))
     }
 
-    /// The gaps between two places of which the first one counts only where it is the beginning of the way or a
-    /// SubDevice with a clock.
-    fn gaps(&self, from: usize, to: usize, known: &dyn Fn(End, End) -> Option<i64>) -> Vec<Gap> {
+    /// The gaps between two places of which the first one counts only where it is the beginning of the way or a SubDevice
+    /// with a clock.
+    fn gaps(&self, from: usize, to: usize, known: &dyn Fn(&[Ends]) -> Option<i64>) -> Vec<Gap> {
         let mut gaps = Vec::new();
         let mut begin = from;
         // The SubDevice at the beginning of a branch is not part of it; one at the beginning of the way is.
         let mut place = if from == 0 && to == self.way.len() { from } else { from + 1 };
         let gap = |from: usize, to: usize, span: i64| {
-            let cable = |hop: usize| self.cable(hop).and_then(|(one, other)| known(one, other));
-            Gap { from, to, known: (from..to).map(cable).sum(), span }
+            let hops = self.hops(from, to);
+            let known = if hops.len() == to - from { known(&hops) } else { None };
+            Gap { from, to, known, time: None, span }
         };
         while place < to {
             let node = self.way[place].at.node;

@@ -143,7 +143,11 @@ impl MainDevice {
         }
         if self.options.supervision {
             let (enhanced, rings) = (self.options.enhanced_line_crossed, self.options.junctions);
-            self.supervisor.spawn(supervise(bus.clone(), fleet.clone(), enhanced, rings));
+            let (bus, fleet) = (bus.clone(), fleet.clone());
+            self.supervisor.spawn(async move {
+                fleet.clocks.clone().all_in_reach(&bus).await;
+                supervise(bus, fleet, enhanced, rings).await;
+            });
         }
         // Without supervision it is never found out what strangers are.
         let follow = self.options.follow_groups && self.options.supervision;

@@ -1,12 +1,14 @@
 //! Distributed clocks: set up, brought together, watched (facts 7).
 //!
 //! * `measure`: who is connected to whom now, and what frames take from clock to clock;
+//! * `branches`: which ports to close so that what is behind forks without a clock can be measured;
 //! * `set_up`: propagation delays, offsets, filters;
 //! * `signals`: SYNC signals of one SubDevice;
 //! * `watch`: the static drift phase, who is locked, whose time each link distributes.
 //!
 //! What they know about the clocks is in [`SharedClocks`], which the bring-up of SubDevices looks at too.
 
+mod branches;
 mod measure;
 mod set_up;
 mod signals;
@@ -16,15 +18,17 @@ use alloc::rc::Rc;
 use alloc::string::String;
 use alloc::vec::Vec;
 use core::cell::{RefCell, RefMut};
+use core::time::Duration;
 
-use ringcat_wire::address::StationAddress;
+use ringcat_wire::address::{Position, StationAddress};
 use ringcat_wire::register::PortKind;
 
 use crate::clocks::cables::End;
-use crate::clocks::{Cables, SyncWindow};
+use crate::clocks::{Cables, SyncWindow, Unknown, Wiring, round};
 use crate::config::{ClockConfig, Passage, ReferenceClock, SubDeviceConfig};
 use crate::info::SubDeviceInfo;
 use crate::link::Link;
+use crate::supervisor::Bus;
 use crate::time::Instant;
 use crate::topology::{PortOf, Topology};
 
@@ -32,6 +36,8 @@ pub use signals::NotLocked;
 pub(super) use signals::{SignalsError, restore, start_signals, wait_for_lock};
 pub(crate) use watch::{begin, keep};
 
+/// Pause between two looks whether branches are in reach.
+const PAUSE: Duration = Duration::from_millis(1);
 /// Depth of the mean of differences of clocks that are told what the host believes.
 const AVERAGE: u32 = 5;
 
@@ -52,6 +58,8 @@ pub(super) struct Node {
     pub passage: Option<Passage>,
     /// From where frames come in to its processing unit, with fraction.
     pub unit: Option<i64>,
+    /// That cannot be measured, since a fork without a clock hides it.
+    pub hidden: Option<Unknown>,
     /// Where that counts from: measurements and links number these places.
     pub origin: u32,
     /// DC_LATCH_MODE says that frames enter it from behind.
@@ -103,6 +111,10 @@ pub(super) struct Clocks {
     pub trouble: Option<String>,
     /// The ring is kept open on purpose.
     pub is_measuring: bool,
+    /// Rings were opened on these cables, and which of them takes how long is not known all the same.
+    pub in_vain: Option<Wiring>,
+    /// Branches of forks without a clock may be left out: SubDevices there do not answer.
+    pub leaves_out: bool,
     /// The static drift phase runs: what differences show then does not hold for the pace of cycles.
     pub is_drifting: bool,
     /// All clocks were within the window for long enough.
@@ -132,6 +144,8 @@ pub struct ClockStatus {
     pub is_reference: bool,
     /// Nanoseconds from the reference of its part of the segment (0x0928).
     pub delay_ns: i64,
+    /// That cannot be measured where it is, and why.
+    pub hidden: Option<HiddenDelay>,
     /// System time less local time when it was set up (0x0920).
     pub offset_ns: i64,
     /// How much faster than the reference it would run by itself, in parts per billion: as it ran within the milliseconds of
@@ -143,6 +157,18 @@ pub struct ClockStatus {
     pub worst_ns: u32,
     /// It was within the window for as many samples as configured.
     pub is_locked: bool,
+}
+
+/// Why the delay of a SubDevice is not known (facts 7.1): it is behind a fork without a clock, and what was latched shows only what
+/// the branches of that take together.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct HiddenDelay {
+    /// Position of the fork; `None` where it is not known what is between this SubDevice and the reference.
+    pub fork: Option<Position>,
+    /// The least and the most that it may be away from the reference, in nanoseconds; `None` where nothing is known.
+    pub range_ns: Option<(i64, i64)>,
+    /// The middle of that was written ([`ClockConfig::estimated_delays`]); otherwise no delay was.
+    pub is_estimated: bool,
 }
 
 impl SharedClocks {
@@ -162,7 +188,10 @@ impl SharedClocks {
         let end = |at: PortOf| Some((nodes.get(at.node)?.station, at.port));
         let rings = topology.local_rings.iter().map(|ring| ring.closing);
         let closings = rings.filter_map(|closing| Some([end(closing.head)?, end(closing.tail)?])).collect();
-        SharedClocks { clocks: Rc::new(RefCell::new(Clocks { config, nodes, epoch, closings, ..Clocks::default() })) }
+        let has_clock: Vec<bool> = nodes.iter().map(|node| node.has_clock).collect();
+        let leaves_out = config.is_some() && branches::are_hidden(topology, &has_clock);
+        let clocks = Clocks { config, nodes, epoch, closings, leaves_out, ..Clocks::default() };
+        SharedClocks { clocks: Rc::new(RefCell::new(clocks)) }
     }
 
     pub(super) fn access(&self) -> RefMut<'_, Clocks> {
@@ -177,6 +206,13 @@ impl SharedClocks {
     /// Whether the ring is kept open to measure delays.
     pub(crate) fn are_measuring(&self) -> bool {
         self.access().is_measuring
+    }
+
+    /// Returns when no SubDevices are out of reach for being measured, at once where none have to be.
+    pub(crate) async fn all_in_reach(&self, bus: &Bus) {
+        while self.access().leaves_out {
+            bus.sleep(PAUSE).await;
+        }
     }
 
     /// Whether all clocks are locked.
@@ -195,6 +231,7 @@ impl SharedClocks {
             subdevice: node.member,
             is_reference: clocks.reference == Some(index),
             delay_ns: node.delay_ns,
+            hidden: clocks.hidden(index),
             offset_ns: node.offset_ns,
             drift_ppb: node.drift_ppb,
             difference_ns: node.difference_ns,
@@ -217,6 +254,7 @@ impl Node {
             is_configured: member.is_some_and(|(_, config)| config.sync.is_some()),
             passage: member.and_then(|(_, config)| config.passage),
             unit: None,
+            hidden: None,
             origin: 0,
             latches_backwards: false,
             filter_depths: None,
@@ -234,6 +272,11 @@ impl Node {
 }
 
 impl Node {
+    /// It has a clock, and it is known how far away that is, or that was estimated.
+    pub(super) const fn has_delay(&self) -> bool {
+        self.has_clock && (self.unit.is_some() || self.hidden.is_none())
+    }
+
     /// The mean of differences with one more of them: those of a clock that is told what the host believes have its jitter.
     pub(super) fn average(&mut self, ahead_ns: i32) -> i32 {
         let before = self.average.unwrap_or(i64::from(ahead_ns) << AVERAGE);
@@ -244,6 +287,24 @@ impl Node {
 }
 
 impl Clocks {
+    /// Of all clocks, why their delays are not known.
+    pub fn all_hidden(&self) -> Vec<Option<HiddenDelay>> {
+        (0..self.nodes.len()).map(|index| self.hidden(index)).collect()
+    }
+
+    /// Why the delay of a clock is not known.
+    pub fn hidden(&self, index: usize) -> Option<HiddenDelay> {
+        let node = &self.nodes[index];
+        let hidden = node.hidden?;
+        let reference = self.reference_on(node.link.unwrap_or(Link::Main)).and_then(|index| self.nodes[index].unit);
+        let range = hidden.range.zip(reference);
+        Some(HiddenDelay {
+            fork: hidden.fork.map(|fork| Position(fork as u16)),
+            range_ns: range.map(|((least, most), reference)| (round(least - reference), round(most - reference))),
+            is_estimated: node.unit.is_some(),
+        })
+    }
+
     /// Whether frames meet a clock before the reference of its link.
     pub fn is_in_front(&self, index: usize, reference: usize) -> bool {
         let (node, reference) = (&self.nodes[index], &self.nodes[reference]);

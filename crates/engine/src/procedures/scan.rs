@@ -38,7 +38,7 @@ use crate::junction::JunctionMode;
 use crate::link::LinkSet;
 use crate::ring::RingState;
 use crate::supervisor::{Bus, BusError, Reply};
-use crate::topology::{Closing, Finding, NodeStatus, PortOf, Topology};
+use crate::topology::{Closing, Finding, NodeStatus, PortOf, Topology, rings_shown};
 
 /// Station address of the SubDevice at position 0; the others follow.
 pub const FIRST_STATION: u16 = 0x1001;
@@ -197,6 +197,14 @@ async fn attempt(bus: &Bus, options: &ScanOptions, expected: Count) -> Result<Sc
         JunctionMode::Automatic => learn(bus, &statuses, main_count, bus.ring() == RingState::Closed).await?,
         JunctionMode::Disabled | JunctionMode::Strict => Vec::new(),
     };
+    // Of rings that were not learned times of reception tell of crossed lines that are none.
+    let is_closed = bus.ring() == RingState::Closed;
+    let not_learned = match options.junctions {
+        JunctionMode::Automatic => rings_shown(&statuses, is_closed).saturating_sub(closings.len()),
+        JunctionMode::Disabled | JunctionMode::Strict => 0,
+    };
+    let untimed = |node: &NodeStatus| NodeStatus { receive_times: None, ..*node };
+    let statuses = if not_learned > 0 { statuses.iter().map(untimed).collect() } else { statuses };
     let topology = Topology::with_local_rings(&statuses, main_count, &closings);
     let mut scan = Scan { subdevices, topology, main_count, redundant_count };
     report_findings(bus, &scan);
@@ -207,6 +215,9 @@ async fn attempt(bus: &Bus, options: &ScanOptions, expected: Count) -> Result<Sc
     }
     for closing in closings {
         bus.report(Event::JunctionLearned { closing });
+    }
+    if not_learned > 0 {
+        bus.report(Event::JunctionsNotLearned { rings: not_learned });
     }
     Ok(scan)
 }

@@ -350,7 +350,7 @@ fn delays_that_were_tampered_with_are_found_when_crossed_behind_forks_without_a_
     let tampering = Tampering::with(fork(), |_| ());
     // The second of a branch against its first; a branch as a whole between what is in front of it and behind it.
     tampering.add_longer(&mut cases, "ns is what was measured", &[0x1004], 0x0920, 4);
-    tampering.add_longer(&mut cases, "before what is in front of it has ended", &[0x1005, 0x1006], 0x0920, -2_000);
+    tampering.add_longer(&mut cases, "before what is in front of it has ended", &[0x1005, 0x1006], 0x0920, -2_100);
     tampering.add_longer(&mut cases, "after the frame was back", &[0x1007], 0x0920, 2_000);
     // Of a ring that was broken from the start and is whole later.
     let mut network = wired(clocked(7, 100), &RING_BEHIND_JUNCTION);

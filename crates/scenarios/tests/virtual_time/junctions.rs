@@ -7,6 +7,7 @@ mod groups;
 mod learning;
 mod plans;
 mod second_breaks;
+mod sizes;
 
 use std::time::Duration;
 

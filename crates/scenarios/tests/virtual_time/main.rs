@@ -11,6 +11,7 @@ mod clock_captures;
 mod clock_changes;
 mod clock_delays;
 mod clock_disturbances;
+mod clock_forks;
 mod clock_jitter;
 mod clock_shifts;
 mod clocks;

@@ -14,7 +14,7 @@ fn wiring(topology: &Topology) -> Wiring {
 
 fn propagation(topology: &Topology, times: &[Option<PortTimes>]) -> Delays {
     let (wiring, stations) = (wiring(topology), stations(topology.nodes.len()));
-    Segment { wiring: &wiring, stations: &stations, passages: &[] }.propagation(times, &mut Cables::default())
+    Segment { wiring: &wiring, stations: &stations, passages: &[] }.propagation(times, 0, &mut Cables::default())
 }
 
 fn entry_ports(topology: &Topology) -> Vec<u8> {
@@ -70,14 +70,68 @@ fn devices_without_a_clock_are_part_of_the_cable_facts_7_1() {
     let topology = tree(3, &[(0, 1, 1), (1, 1, 2)]);
     let delays = propagation(&topology, &[times([0, 1_600, 0, 0]), None, times([0; 4])]);
     assert_eq!(rounded(&delays, 0), [Some(0), None, Some(800)]);
+    // Nor does it matter that it has a branch with nothing in it but such devices, where that comes last.
+    let topology = tree(4, &[(0, 1, 1), (1, 3, 2), (1, 1, 3)]);
+    let delays = propagation(&topology, &[times([0, 2_400, 0, 0]), None, None, None]);
+    assert_eq!((rounded(&delays, 0), delays.unknown), (vec![Some(0), None, None, None], vec![]));
+}
+
+fn unknown(node: usize, fork: usize, range: Option<(i64, i64)>) -> Unknown {
+    Unknown { node, fork: Some(fork), range: range.map(|(least, most)| (least << FRACTION, most << FRACTION)) }
+}
+
+#[test]
+fn behind_forks_without_a_clock_delays_are_known_within_branches_only_facts_7_1() {
     // A junction without a clock in front: what it does to the frame nobody measures, its branches are.
     let topology = tree(4, &[(0, 3, 1), (0, 1, 2), (2, 1, 3)]);
-    let delays = propagation(&topology, &[None, times([0; 4]), times([0, 780, 0, 0]), times([0; 4])]);
-    assert_eq!(rounded(&delays, 2), [None, Some(0), Some(0), Some(390)]);
-    // One in between shares its cables with both branches: out, back, out, back, home.
+    let all = [None, times([0; 4]), times([0, 780, 0, 0]), times([0; 4])];
+    let delays = propagation(&topology, &all);
+    assert_eq!(rounded(&delays, 1), [None, Some(0), None, None]);
+    assert_eq!(delays.unknown, [unknown(2, 0, None), unknown(3, 0, None)]);
+    // The branch of the reference counts.
+    let (wiring, stations) = (wiring(&topology), stations(4));
+    let segment = Segment { wiring: &wiring, stations: &stations, passages: &[] };
+    let delays = segment.propagation(&all, 3, &mut Cables::default());
+    assert_eq!(
+        (rounded(&delays, 3), delays.unknown),
+        (vec![None, None, Some(-390), Some(0)], vec![unknown(1, 0, None)])
+    );
+    // One in between: out, back, out, back, home. The first is met within a half, the second from there to the end.
     let topology = tree(4, &[(0, 1, 1), (1, 3, 2), (1, 1, 3)]);
     let delays = propagation(&topology, &[times([0, 2_400, 0, 0]), None, times([0; 4]), times([0; 4])]);
-    assert_eq!(rounded(&delays, 0), [Some(0), None, Some(800), Some(1_600)]);
+    assert_eq!(rounded(&delays, 0), [Some(0), None, None, None]);
+    assert_eq!(delays.unknown, [unknown(2, 1, Some((0, 1_200))), unknown(3, 1, Some((1_200, 2_400)))]);
+}
+
+/// A clock, a fork without one, its branches: two and one clocks, and behind it a fork without a clock with two more.
+const FORKS: [(usize, u8, usize); 7] = [(0, 1, 1), (1, 3, 2), (2, 1, 3), (1, 1, 4), (1, 2, 5), (5, 3, 6), (5, 1, 7)];
+
+#[test]
+fn forks_without_a_clock_have_exact_delays_once_each_branch_was_open_facts_7_1() {
+    let wiring = wiring(&tree(8, &FORKS));
+    let stations = stations(8);
+    let mut cables = Cables::default();
+    let mut run = |closed: &[(usize, u8)]| {
+        let mut wiring = wiring.clone();
+        wiring.open(&closed.iter().map(|(node, port)| PortOf { node: *node, port: *port }).collect::<Vec<_>>());
+        let (mut times, truth) = walk(&wiring, &[], |at| 30 * at.node as i64 * at.node as i64);
+        (times[1], times[5]) = (None, None);
+        let delays =
+            Segment { wiring: &wiring, stations: &stations, passages: &[] }.propagation(&times, 0, &mut cables);
+        for (node, unit) in delays.units.iter().enumerate() {
+            assert!(unit.is_none_or(|unit| unit == truth[node]), "{node}: {unit:?}, {}", truth[node]);
+        }
+        delays.unknown.iter().map(|unknown| (unknown.node, unknown.fork)).collect::<Vec<_>>()
+    };
+    let behind = |nodes: &[usize], fork: usize| nodes.iter().map(|node| (*node, Some(fork))).collect::<Vec<_>>();
+    assert_eq!(run(&[]), [behind(&[2, 3, 4, 6], 1), behind(&[7], 5)].concat());
+    // The way to the first fork, and with one branch of it each; of the second fork that leads there, too.
+    run(&[(1, 3), (1, 1), (1, 2)]);
+    run(&[(1, 1), (1, 2)]);
+    run(&[(1, 3), (1, 2)]);
+    run(&[(1, 3), (1, 1), (5, 3), (5, 1)]);
+    run(&[(1, 3), (1, 1), (5, 1)]);
+    assert_eq!(run(&[]), []);
 }
 
 #[test]
@@ -147,17 +201,16 @@ fn local_ring(broken: Option<usize>) -> Wiring {
     Wiring::new(&topology, false, |_| broken != Some(7))
 }
 
-/// Errors of delays with this break, in nanoseconds; what is learned of cables is kept.
-fn errors(broken: Option<usize>, passages: &[Passage], cables: &mut Cables) -> Vec<i64> {
+/// Errors of delays with this break, in nanoseconds, `None` where they are not known; what is learned of cables is kept.
+fn errors(broken: Option<usize>, passages: &[Passage], cables: &mut Cables) -> Vec<Option<i64>> {
     let wiring = local_ring(broken);
     // Each cable has a length of its own.
     let (times, truth) = walk(&wiring, passages, |at| 20 * (3 * at.node as i64 + i64::from(at.port)));
     let stations = stations(7);
     let segment = Segment { wiring: &wiring, stations: &stations, passages };
     segment.see(cables);
-    let delays = segment.propagation(&times, cables);
-    let unit = |node: usize| delays.units[node].expect("all have clocks");
-    (0..7).map(|node| (unit(node) - truth[node]) >> FRACTION).collect()
+    let delays = segment.propagation(&times, 0, cables);
+    (0..7).map(|node| Some((delays.units[node]? - truth[node]) >> FRACTION)).collect()
 }
 
 // covers: facts 7.5, facts 9.4
@@ -167,14 +220,13 @@ fn a_local_ring_is_known_whole_from_what_it_was_open_and_broken_by_itself() {
     for passages in [vec![], vec![passage(40, 0); 7], mixed] {
         let is_mixed = passages.iter().any(|other| *other != passages[0]);
         let mut cables = Cables::default();
-        // Nothing is known of a ring that is whole: what is on its cables is shared, behind it nothing is wrong.
-        let guessed = errors(None, &passages, &mut cables);
-        assert_eq!((guessed[1], guessed[5], guessed[6]), (0, 0, 0));
-        assert!(guessed[2..5].iter().any(|error| *error != 0));
+        // Nothing is known of a ring that is whole, behind it nothing is wrong.
+        let [right, none] = [Some(0), None];
+        assert_eq!(errors(None, &passages, &mut cables), [right, right, none, none, none, right, right]);
         let mut cables = Cables::default();
         // Open at its closing cable, as set-up makes it; then whole, and broken anywhere.
         for broken in [Some(7), None, Some(3), None, Some(2), Some(4), None, Some(7), None] {
-            assert_eq!(errors(broken, &passages, &mut cables), [0; 7], "{broken:?}, mixed {is_mixed}");
+            assert_eq!(errors(broken, &passages, &mut cables), [Some(0); 7], "{broken:?}, mixed {is_mixed}");
         }
     }
 }
@@ -184,7 +236,7 @@ fn a_closed_ring_is_what_was_measured_of_it_as_a_line_and_says_where_it_was_not(
     let mut topology = tree(4, &[(0, 1, 1), (1, 1, 2), (2, 1, 3)]);
     let (mut cables, stations) = (Cables::default(), stations(4));
     let mut run = |wiring: &Wiring, times: &[Option<PortTimes>]| {
-        let delays = Segment { wiring, stations: &stations, passages: &[] }.propagation(times, &mut cables);
+        let delays = Segment { wiring, stations: &stations, passages: &[] }.propagation(times, 0, &mut cables);
         (rounded(&delays, 0), delays.is_guessed)
     };
     topology.open_ports = vec![PortOf { node: 3, port: 1 }];
@@ -209,7 +261,7 @@ fn errors_of_line(passages: &[Passage], known: &[Passage]) -> Vec<i64> {
     let wiring = wiring(&tree(9, &links));
     let (times, truth) = walk(&wiring, passages, |_| 50);
     let segment = Segment { wiring: &wiring, stations: &stations(9), passages: known };
-    let delays = segment.propagation(&times, &mut Cables::default());
+    let delays = segment.propagation(&times, 0, &mut Cables::default());
     delays.units.iter().zip(&truth).map(|(unit, truth)| (unit.unwrap() - truth) >> FRACTION).collect()
 }
 
@@ -267,7 +319,7 @@ proptest::proptest! {
         let (times, truth) = walk(&wiring, &passages, |at| cables[at.node]);
         let stations = stations(topology.nodes.len());
         let segment = Segment { wiring: &wiring, stations: &stations, passages: &passages };
-        let delays = segment.propagation(&times, &mut Cables::default());
+        let delays = segment.propagation(&times, 0, &mut Cables::default());
         for (node, truth) in truth.iter().enumerate() {
             proptest::prop_assert_eq!(delays.units[node], Some(*truth));
         }

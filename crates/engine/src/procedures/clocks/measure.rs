@@ -3,7 +3,8 @@
 //! Nothing here disturbs process data, so a measurement may be taken at any time. But a frame meets those in a whole ring
 //! only once, which measures nothing: at the set-up every ring is opened for a moment, with the bit that closes it again
 //! by itself. Of the ring of two links the last port is closed, of one behind a junction both ends of its closing cable.
-//! What was measured of cables then holds afterwards, whatever is plugged where.
+//! What was measured of cables then holds afterwards, whatever is plugged where. Before anything is exchanged the branches of
+//! forks without a clock are closed one after the other as well ([`branches`]).
 
 use alloc::format;
 use alloc::string::{String, ToString};
@@ -15,8 +16,8 @@ use ringcat_wire::command::Command;
 use ringcat_wire::datagram::Target;
 use ringcat_wire::register::{DlControl, DlStatus, LoopControl, map};
 
-use super::{Clocks, SharedClocks};
-use crate::clocks::wiring::Wiring;
+use super::{Clocks, SharedClocks, branches};
+use crate::clocks::wiring::{TREES, Wiring};
 use crate::clocks::{Delays, Disagreement, FRACTION, Latched, Measurements, Passage, Segment};
 use crate::link::{Link, LinkSet};
 use crate::procedures::latch::{self as frames, Pauses};
@@ -50,6 +51,8 @@ struct Survey {
     latched: Option<Vec<Option<Latched>>>,
     /// The link on which copies do not come home, because the ring is opened.
     deaf: Option<Link>,
+    /// No branch is left out.
+    is_whole: bool,
 }
 
 /// What was measured.
@@ -62,41 +65,77 @@ pub(super) struct Measured {
     pub drift_ppb: Vec<Option<i64>>,
 }
 
-/// Measures; `opening` says that rings are opened for it.
-pub(super) async fn measure(bus: &Bus, clocks: &SharedClocks, opening: bool) -> Result<Measured, String> {
+/// Which ports may be closed for a moment, for measuring.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Opening {
+    /// None that is not needed.
+    Nothing,
+    /// Those that make a ring a line: everything stays in reach.
+    Rings,
+    /// Branches too: nothing is exchanged yet.
+    Branches,
+}
+
+/// Measures.
+pub(super) async fn measure(bus: &Bus, clocks: &SharedClocks, opening: Opening) -> Result<Measured, String> {
     let mut survey = look(bus, clocks).await?;
     let rings = survey.whole_rings();
-    if opening && !rings.is_empty() {
+    if opening != Opening::Nothing && !rings.is_empty() {
         survey.latched = None;
-        measure_open(bus, clocks, &survey, &rings).await?;
+        measure_open(bus, clocks, &survey, &rings, &[]).await?;
     }
-    let measured = take(bus, clocks, &survey).await?;
+    let mut measured = take(bus, clocks, &survey).await?;
+    if opening == Opening::Branches && !measured.delays.unknown.is_empty() {
+        survey.latched = None;
+        measure_branches(bus, clocks, &survey, &rings).await;
+        measured = take(bus, clocks, &survey).await?;
+    }
     // A ring of two links that was broken until now has a cable that was never measured, and one behind a junction that came
     // as a whole, or came back with other cables, has several.
-    let is_open_question = measured.delays.is_shared || (measured.delays.is_guessed && survey.is_closed);
-    if !is_open_question || opening || rings.is_empty() {
+    let is_open = |measured: &Measured| measured.delays.is_shared || (measured.delays.is_guessed && survey.is_closed);
+    let is_open_question = is_open(&measured);
+    // Opening changes ports, so that the segment is measured again: the same is not opened twice in vain.
+    let is_in_vain = clocks.access().in_vain.as_ref() == Some(&survey.wiring);
+    if !is_open_question || opening != Opening::Nothing || rings.is_empty() || is_in_vain {
+        let is_still_open = is_open_question && !rings.is_empty();
+        clocks.access().in_vain = is_still_open.then(|| survey.wiring.clone());
         return measured.exact();
     }
-    survey.latched = None;
-    measure_open(bus, clocks, &survey, &rings).await?;
-    take(bus, clocks, &survey).await?.exact()
+    let survey = Survey { latched: None, ..survey.clone() };
+    measure_open(bus, clocks, &survey, &rings, &[]).await?;
+    measured = take(bus, clocks, &survey).await?;
+    clocks.access().in_vain = is_open(&measured).then_some(survey.wiring);
+    measured.exact()
 }
 
 impl Measured {
-    /// Nothing where cables share a time.
+    /// Nothing where times contradict each other.
     fn exact(self) -> Result<Measured, String> {
-        if self.delays.is_shared {
+        if self.delays.is_contradictory {
             return Err(
-                "which of the cables of a ring takes how long cannot be told, although it was opened".to_string()
+                "cables of a ring do not take as long together as each by itself, although it was opened".to_string()
             );
         }
         Ok(self)
     }
 }
 
-/// Opens rings, measures what cables take, closes the rings again.
-async fn measure_open(bus: &Bus, clocks: &SharedClocks, survey: &Survey, rings: &[PortOf]) -> Result<(), String> {
-    let ports: Vec<(StationAddress, u8)> = rings.iter().map(|at| (survey.stations[at.node], at.port)).collect();
+/// Opens rings and leaves branches out, measures what cables take, and takes that back.
+async fn measure_open(
+    bus: &Bus,
+    clocks: &SharedClocks,
+    survey: &Survey,
+    rings: &[PortOf],
+    branches: &[PortOf],
+) -> Result<(), String> {
+    let mut wiring = survey.wiring.clone();
+    wiring.open(branches);
+    // An end of a ring in a branch that is left out needs no order, and would not hear the one that takes it back.
+    let links = if survey.is_closed { 1 } else { TREES };
+    let met: Vec<usize> = (0..links).flat_map(|link| wiring.way(link)).map(|arrival| arrival.at.node).collect();
+    let is_reached = |at: &&PortOf| branches.is_empty() || met.contains(&at.node);
+    let all: Vec<PortOf> = rings.iter().chain(branches).filter(is_reached).copied().collect();
+    let ports: Vec<(StationAddress, u8)> = all.iter().map(|at| (survey.stations[at.node], at.port)).collect();
     let text = |error: BusError| error.to_string();
     let before = controls(bus, &ports).await.map_err(text)?;
     let closed = before.iter().map(|(station, control)| (*station, closed(*control, *station, &ports)));
@@ -104,8 +143,9 @@ async fn measure_open(bus: &Bus, clocks: &SharedClocks, survey: &Survey, rings: 
     let result = match write(bus, closed.collect()).await {
         Ok(()) => {
             let mut open = survey.clone();
-            open.wiring.open(rings);
+            open.wiring.open(&[rings, branches].concat());
             open.latched = None;
+            open.is_whole = branches.is_empty();
             // The port at the end of a ring of two links is closed: what comes to it ends there.
             open.deaf = survey.is_closed.then_some(Link::Redundant);
             take(bus, clocks, &open).await.map(drop)
@@ -119,6 +159,19 @@ async fn measure_open(bus: &Bus, clocks: &SharedClocks, survey: &Survey, rings: 
     }
     clocks.access().is_measuring = false;
     result
+}
+
+/// Measures what is behind forks without a clock, branch by branch. What cannot be is left open.
+async fn measure_branches(bus: &Bus, clocks: &SharedClocks, survey: &Survey, rings: &[PortOf]) {
+    let has_clock: Vec<bool> = {
+        let clocks = clocks.access();
+        survey.stations.iter().map(|station| clocks.has_clock(*station)).collect()
+    };
+    let mut lines = survey.wiring.clone();
+    lines.open(rings);
+    for set in branches::sets(&lines, &has_clock) {
+        let _ = measure_open(bus, clocks, survey, rings, &set).await;
+    }
 }
 
 /// Until frames of both halves have shown that the ring is closed.
@@ -211,6 +264,7 @@ async fn look_once(bus: &Bus, clocks: &SharedClocks) -> Result<Option<Survey>, B
         is_closed,
         latched: Some(latched),
         deaf: None,
+        is_whole: true,
     }))
 }
 
@@ -247,8 +301,11 @@ async fn take(bus: &Bus, clocks: &SharedClocks, survey: &Survey) -> Result<Measu
         return Err(if odd.is_possible() { told(&odd, survey.stations[odd.node]) } else { unfit });
     }
     let segment = Segment { wiring: &survey.wiring, stations: &survey.stations, passages: &passages };
-    segment.see(&mut access.cables);
-    let delays = segment.propagation(&measurements.mean(on_clock), &mut access.cables);
+    // Cables of branches that are left out are where they were.
+    if survey.is_whole {
+        segment.see(&mut access.cables);
+    }
+    let delays = segment.propagation(&measurements.mean(on_clock), on_clock, &mut access.cables);
     if delays.is_implausible {
         return Err(unfit);
     }
@@ -270,6 +327,10 @@ fn told(odd: &Disagreement, station: StationAddress) -> String {
 }
 
 impl Clocks {
+    fn has_clock(&self, station: StationAddress) -> bool {
+        self.nodes.iter().any(|node| node.station == station && node.has_clock)
+    }
+
     /// What is declared about passages through a SubDevice.
     fn passage_of(&self, station: StationAddress) -> Passage {
         let own = self.nodes.iter().find(|node| node.station == station).and_then(|node| node.passage);

@@ -7,9 +7,9 @@ use alloc::vec::Vec;
 use ringcat_wire::address::StationAddress;
 use ringcat_wire::register::map;
 
-use super::measure::{Measured, latch, measure};
+use super::measure::{Measured, Opening, latch, measure};
 use super::{Clocks, Node, SharedClocks};
-use crate::clocks::{Latched, round};
+use crate::clocks::{Latched, Unknown, round};
 use crate::link::Link;
 use crate::supervisor::{Bus, BusError};
 
@@ -28,7 +28,7 @@ const STEADY_DEPTH: u8 = 15;
 const SAME_NS: i64 = 30;
 
 /// Measures all delays and writes delays and offsets.
-pub(super) async fn set_up(bus: &Bus, clocks: &SharedClocks) -> Result<(), String> {
+pub(super) async fn set_up(bus: &Bus, clocks: &SharedClocks, opening: Opening) -> Result<(), String> {
     let text = |error: BusError| error.to_string();
     let reference = {
         let mut clocks = clocks.access();
@@ -39,7 +39,7 @@ pub(super) async fn set_up(bus: &Bus, clocks: &SharedClocks) -> Result<(), Strin
     if reference.is_none() {
         return Err("no SubDevice has a clock".to_string());
     }
-    let measured = measure(bus, clocks, true).await?;
+    let measured = measure(bus, clocks, opening).await?;
     take_over(&mut clocks.access(), &measured);
     let stations = clocks.access().stations();
     let wanted = bus.now().0.wrapping_add(clocks.access().epoch);
@@ -54,7 +54,7 @@ pub(super) async fn set_up(bus: &Bus, clocks: &SharedClocks) -> Result<(), Strin
 /// Measures all delays anew. Where some on a link are not what they were, those of that link are written, after `hold`:
 /// nobody must be told a time meanwhile. Returns how many were written with another value, and the largest change.
 pub(super) async fn measure_again(bus: &Bus, clocks: &SharedClocks, hold: impl Fn()) -> Result<(usize, u32), String> {
-    let measured = measure(bus, clocks, false).await?;
+    let measured = measure(bus, clocks, Opening::Nothing).await?;
     let before: Vec<Node> = clocks.access().nodes.clone();
     let changed: Vec<Link> = {
         let mut clocks = clocks.access();
@@ -75,7 +75,7 @@ pub(super) async fn measure_again(bus: &Bus, clocks: &SharedClocks, hold: impl F
 /// links, which what is measured in a broken ring does not. Returns whether it is so.
 fn keep_same(clocks: &mut Clocks, before: &[Node], link: Link) -> bool {
     let here: Vec<usize> = (0..before.len())
-        .filter(|index| clocks.nodes[*index].has_clock && clocks.nodes[*index].link == Some(link))
+        .filter(|index| clocks.nodes[*index].has_delay() && clocks.nodes[*index].link == Some(link))
         .collect();
     let origin = here.first().map(|index| before[*index].origin);
     let is_same = |index: &usize| {
@@ -96,6 +96,9 @@ fn keep_same(clocks: &mut Clocks, before: &[Node], link: Link) -> bool {
 /// Takes over what was measured, on whose link everybody is, and from whom delays count there.
 fn take_over(clocks: &mut Clocks, measured: &Measured) {
     clocks.measured = clocks.measured.wrapping_add(1);
+    let are_estimated = clocks.config.as_ref().is_some_and(|config| config.estimated_delays);
+    let positions: Vec<(StationAddress, usize)> =
+        clocks.nodes.iter().map(|node| (node.station, usize::from(node.position))).collect();
     for node in &mut clocks.nodes {
         let Some(at) = measured.stations.iter().position(|station| *station == node.station) else { continue };
         let tree = measured.delays.trees.get(at).copied().unwrap_or(0);
@@ -105,6 +108,17 @@ fn take_over(clocks: &mut Clocks, measured: &Measured) {
             node.drift_ppb = drift_ppb;
         }
         node.unit = measured.delays.units.get(at).copied().flatten();
+        node.hidden = None;
+        if let Some(unknown) = measured.delays.unknown.iter().find(|unknown| unknown.node == at) {
+            let fork =
+                unknown.fork.and_then(|fork| positions.iter().find(|(station, _)| *station == measured.stations[fork]));
+            node.hidden = Some(Unknown { fork: fork.map(|(_, position)| *position), ..*unknown });
+            node.unit = unknown.range.filter(|_| are_estimated).map(|(least, most)| (least + most) / 2);
+            // What it had at another place does not count here.
+            if node.is_unset {
+                node.delay_ns = 0;
+            }
+        }
         node.origin = 2 * clocks.measured + tree as u32;
         node.link = Some(if tree == 0 { Link::Main } else { Link::Redundant });
     }
@@ -139,7 +153,10 @@ impl Clocks {
         let node = &self.nodes[index];
         let reference = self.reference_on(node.link.unwrap_or(Link::Main));
         // A SubDevice is behind its reference where frames meet it later.
-        let is_behind = reference.is_some_and(|reference| node.unit > self.nodes[reference].unit);
+        let is_behind = reference.is_some_and(|reference| match node.unit {
+            Some(_) => node.unit > self.nodes[reference].unit,
+            None => node.position > self.nodes[reference].position,
+        });
         let follows_host = self.config.as_ref().is_some_and(|config| config.bus_shift);
         let is_steered = reference == Some(index) && (follows_host || self.reference != Some(index));
         let difference = if is_behind { EXACT_DEPTH } else { HOST_DEPTH };
@@ -172,9 +189,12 @@ impl Clocks {
 
 /// Offsets such that all show `wanted` where the frame came in, plus their way.
 fn set_offsets(clocks: &mut Clocks, latched: &[Option<Latched>], wanted: u64) {
+    let references = Link::ALL.map(|link| clocks.reference_on(link).and_then(|index| clocks.nodes[index].unit));
     for (node, latched) in clocks.nodes.iter_mut().zip(latched) {
         let Some(latched) = latched else { continue };
-        let unit = node.unit.map_or(0, round);
+        // Without a delay it shows what it is told: the time at which the frame passes the reference.
+        let told = || references[usize::from(node.link == Some(Link::Redundant))];
+        let unit = node.unit.or_else(told).map_or(0, round);
         node.offset_ns = wanted.wrapping_add_signed(unit).wrapping_sub(latched.unit) as i64;
     }
 }
@@ -225,7 +245,7 @@ async fn write(bus: &Bus, station: StationAddress, registers: [u8; 12]) -> Resul
 pub(super) async fn write_delays(bus: &Bus, clocks: &SharedClocks, link: Link) -> Result<(), BusError> {
     let all: Vec<(StationAddress, u32)> = {
         let clocks = clocks.access();
-        let here = clocks.nodes.iter().filter(|node| node.has_clock && node.link == Some(link));
+        let here = clocks.nodes.iter().filter(|node| node.has_delay() && node.link == Some(link));
         here.map(|node| (node.station, node.delay_ns as u32)).collect()
     };
     let written = bus.gather(all, |bus, (station, delay)| async move {

@@ -6,9 +6,9 @@ use core::time::Duration;
 use ringcat_wire::address::StationAddress;
 use ringcat_wire::register::{DcSystemTimeDifference, map};
 
-use super::Node;
 use super::set_up::set_up_one;
 use super::watch::drift_phase;
+use super::{HiddenDelay, Node};
 use crate::clocks::{extend, first_pulse, start::whole_cycle};
 use crate::config::SyncSignals;
 use crate::procedures::fleet::SharedFleet;
@@ -34,10 +34,19 @@ pub struct NotLocked {
     pub window_ns: u32,
     /// Its position where another clock of the segment is to blame.
     pub other: Option<u16>,
+    /// Its delay is not known.
+    pub hidden: Option<HiddenDelay>,
 }
 
 impl fmt::Display for NotLocked {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        if let Some(hidden) = self.hidden {
+            f.write_str("its propagation delay is not known, ")?;
+            return match hidden.fork {
+                Some(fork) => write!(f, "since the fork at position {fork} has no clock"),
+                None => f.write_str("since it is not known what lies between it and the reference clock"),
+            };
+        }
         match self.other {
             Some(position) => write!(f, "the clock of position {position}")?,
             None => f.write_str("its clock")?,
@@ -157,7 +166,7 @@ async fn wait_until_about_right(
         let node = position.and_then(|position| clocks.nodes.get(position));
         let difference = node.and_then(|node| node.difference_ns);
         let near = difference.is_some_and(|ns| ns.unsigned_abs() <= GOOD_ENOUGH_NS);
-        (clocks.is_set_up && (near || position == clocks.reference), difference, None)
+        (clocks.is_set_up && (near || position == clocks.reference), difference, None, None)
     };
     wait(bus, fleet, limit, GOOD_ENOUGH_NS, is_right).await
 }
@@ -183,7 +192,9 @@ pub(in crate::procedures) async fn wait_for_lock(
         let to_blame = own.filter(open).or_else(|| (0..clocks.nodes.len()).find(open));
         let difference = to_blame.or(own).and_then(|position| clocks.nodes[position].difference_ns);
         let other = to_blame.filter(|index| Some(*index) != own).map(|index| clocks.nodes[index].position);
-        (clocks.is_set_up && to_blame.is_none(), difference, other)
+        // It may become known: a branch is unplugged, or known cables are back.
+        let hidden = own.and_then(|index| clocks.hidden(index)).filter(|hidden| !hidden.is_estimated);
+        (clocks.is_set_up && to_blame.is_none() && hidden.is_none(), difference, other, hidden)
     };
     wait(bus, fleet, limit, window, is_locked).await
 }
@@ -193,16 +204,16 @@ async fn wait(
     fleet: &SharedFleet,
     limit: Duration,
     window_ns: u32,
-    is_good: impl Fn(&super::Clocks) -> (bool, Option<i32>, Option<u16>),
+    is_good: impl Fn(&super::Clocks) -> (bool, Option<i32>, Option<u16>, Option<HiddenDelay>),
 ) -> Result<(), NotLocked> {
     let begin = bus.now();
     loop {
-        let (good, difference_ns, other) = is_good(&fleet.clocks.access());
+        let (good, difference_ns, other, hidden) = is_good(&fleet.clocks.access());
         if good {
             return Ok(());
         }
         if bus.now() >= begin + limit {
-            return Err(NotLocked { waited: limit, difference_ns, window_ns, other });
+            return Err(NotLocked { waited: limit, difference_ns, window_ns, other, hidden });
         }
         bus.sleep(PAUSE).await;
     }

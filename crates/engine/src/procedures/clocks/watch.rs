@@ -18,6 +18,8 @@ use ringcat_wire::command::Command;
 use ringcat_wire::datagram::Target;
 use ringcat_wire::register::{DcSpeedCounterDifference, DcSpeedCounterStart, map};
 
+use super::HiddenDelay;
+use super::measure::Opening;
 use super::set_up::{measure_again, set_filters, set_up, write_delays};
 use super::signals::difference;
 use crate::board::clocks::References;
@@ -56,11 +58,12 @@ const BURST_TIME: Duration = Duration::from_micros(640);
 
 /// The first try to set the clocks up, before anything else is asked of the SubDevices.
 pub(crate) async fn begin(bus: &Bus, fleet: &SharedFleet) {
-    try_set_up(bus, fleet).await;
+    try_set_up(bus, fleet, Opening::Branches).await;
+    fleet.clocks.access().leaves_out = false;
 }
 
-async fn try_set_up(bus: &Bus, fleet: &SharedFleet) {
-    if let Err(reason) = set_up(bus, &fleet.clocks).await {
+async fn try_set_up(bus: &Bus, fleet: &SharedFleet, opening: Opening) {
+    if let Err(reason) = set_up(bus, &fleet.clocks, opening).await {
         // What has been told is not told again.
         if fleet.clocks.access().trouble.replace(reason.clone()).as_ref() != Some(&reason) {
             bus.report(Event::ClocksFailed { reason });
@@ -69,6 +72,7 @@ async fn try_set_up(bus: &Bus, fleet: &SharedFleet) {
     }
     post(fleet);
     tell_reference(bus, fleet);
+    tell_hidden(bus, fleet, &[]);
     bus.spawn(drift_phase(bus.clone(), fleet.clone()));
 }
 
@@ -88,7 +92,7 @@ pub(crate) async fn keep(bus: Bus, fleet: SharedFleet) {
                 RETRY
             }
         };
-        try_set_up(&bus, &fleet).await;
+        try_set_up(&bus, &fleet, Opening::Rings).await;
     }
     let mut next_look = Instant::default();
     let mut seen = (fleet.board.ring().changes, answering(&fleet));
@@ -153,6 +157,7 @@ async fn wait_for_change(bus: &Bus, fleet: &SharedFleet, limit: Duration) -> Cha
 async fn measure_once(bus: &Bus, fleet: &SharedFleet, since: Instant) {
     let hold = || fleet.board.clocks.post_references(References::default());
     let holds = fleet.board.clocks.holds();
+    let hidden = fleet.clocks.access().all_hidden();
     match measure_again(bus, &fleet.clocks, hold).await {
         Ok((0, _)) => {}
         Ok((clocks, largest_ns)) => bus.report(Event::DelaysChanged { clocks, largest_ns }),
@@ -160,6 +165,7 @@ async fn measure_once(bus: &Bus, fleet: &SharedFleet, since: Instant) {
         Err(reason) => bus.report(Event::ClocksFailed { reason }),
     }
     elect(bus, fleet);
+    tell_hidden(bus, fleet, &hidden);
     fleet.clocks.access().is_doubtful = None;
     post(fleet);
     fleet.board.clocks.answer(holds);
@@ -434,6 +440,25 @@ fn tell_reference(bus: &Bus, fleet: &SharedFleet) {
     match reference {
         Some((_, station)) => bus.report_of(event, fleet.access().occupant(station)),
         None => bus.report(event),
+    }
+}
+
+/// Tells whose delay is not known, but for those that were told before.
+fn tell_hidden(bus: &Bus, fleet: &SharedFleet, before: &[Option<HiddenDelay>]) {
+    let now = fleet.clocks.access().all_hidden();
+    for (index, hidden) in now.into_iter().enumerate() {
+        let told = before.get(index).copied().flatten();
+        let Some(HiddenDelay { fork, range_ns, is_estimated }) = hidden.filter(|hidden| {
+            told.is_none_or(|told| (told.fork, told.is_estimated) != (hidden.fork, hidden.is_estimated))
+        }) else {
+            continue;
+        };
+        let (position, station) = {
+            let clocks = fleet.clocks.access();
+            (Position(clocks.nodes[index].position), clocks.nodes[index].station)
+        };
+        let event = Event::DelayUnknown { position, fork, range_ns, is_estimated };
+        bus.report_of(event, fleet.access().occupant(station));
     }
 }
 

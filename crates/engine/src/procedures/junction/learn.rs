@@ -5,6 +5,9 @@
 //! other pair of ports cuts somebody off. Where the ring is broken already, the end at the junction alone is closed, and
 //! those between the break and the closing cable, and nobody else, must fall silent. The loops return to what they were
 //! in any case: the setting is temporary (facts 2.2, DL control bit 1).
+//!
+//! A try in vain says more than no: of a ring that is closed at its junction and somewhere in the middle the members behind
+//! that fall silent, up to the last one. So that one's cable is tried next, and a ring takes two or three tries, however long.
 
 use alloc::vec::Vec;
 use core::time::Duration;
@@ -18,8 +21,10 @@ use super::super::scan::station_at;
 use crate::supervisor::{Bus, BusError};
 use crate::topology::{Closing, NodeStatus, PortOf, Topology, candidates_with};
 
-/// Closing cables that are tried and are none. Those of which frames do not come back cost [`TEMPORARY`] each.
-const TRIES: usize = 16;
+/// Closing cables that are tried and are none.
+const TRIES: usize = 256;
+/// Of these, so many of which frames do not come back: they cost [`TEMPORARY`] each.
+const SLOW_TRIES: usize = 16;
 /// Until temporary loop settings have certainly ended.
 const TEMPORARY: Duration = Duration::from_millis(1_200);
 /// Bytes of DL_CONTROL that are written: forwarding rule and temporary bit, loops.
@@ -36,18 +41,34 @@ pub(in super::super) async fn learn(
     // In a ring that is taken for something else, times of reception tell of crossed lines.
     let untimed: Vec<NodeStatus> = nodes.iter().map(|node| NodeStatus { receive_times: None, ..*node }).collect();
     let (mut right, mut wrong) = (Vec::new(), Vec::new());
-    'sets: while wrong.len() < TRIES {
-        let sets = candidates_with(nodes, main_count, ring_closed, 1, (&right, &wrong));
-        let Some(mut set) = sets.into_iter().next() else { break };
+    let (mut slow, mut likely): (usize, Vec<Closing>) = (0, Vec::new());
+    'sets: while wrong.len() < TRIES && slow < SLOW_TRIES {
+        let with = |likely: &[Closing]| {
+            let right = [&right[..], likely].concat();
+            candidates_with(nodes, main_count, ring_closed, 1, (&right, &wrong)).into_iter().next()
+        };
+        let hinted = likely.drain(..).find_map(|likely| with(&[likely]).filter(|set| set.contains(&likely)));
+        let Some(mut set) = hinted.or_else(|| with(&[])) else { break };
         let topology = Topology::with_local_rings(&untimed, main_count, &set);
         // Who is behind a break depends on the rings that are in it, which are tried first.
         set.sort_by_key(|closing| core::cmp::Reverse(closing.head.node));
         for closing in set.iter().filter(|closing| !right.contains(closing)).copied().collect::<Vec<_>>() {
-            if !attempt(bus, nodes, &topology, closing).await? {
-                wrong.push(closing);
-                continue 'sets;
+            match attempt(bus, nodes, &topology, closing).await? {
+                Tried::Right => right.push(closing),
+                Tried::Wrong { last_silent } => {
+                    wrong.push(closing);
+                    let tail = |node: usize| [1, 3, 2].map(|port| PortOf { node, port });
+                    let ends = last_silent.into_iter().flat_map(tail);
+                    likely = ends.map(|tail| Closing { head: closing.head, tail }).collect();
+                    likely.retain(|likely| !wrong.contains(likely));
+                    continue 'sets;
+                }
+                Tried::NoFrame => {
+                    wrong.push(closing);
+                    slow += 1;
+                    continue 'sets;
+                }
             }
-            right.push(closing);
         }
         set.sort_unstable();
         return Ok(set);
@@ -55,16 +76,29 @@ pub(in super::super) async fn learn(
     Ok(Vec::new())
 }
 
-/// Whether a ring closes here.
-async fn attempt(bus: &Bus, nodes: &[NodeStatus], topology: &Topology, closing: Closing) -> Result<bool, BusError> {
+/// What a try has shown.
+enum Tried {
+    /// The ring closes here.
+    Right,
+    /// It does not. The last of the SubDevices that fell silent behind the supposed last member.
+    Wrong { last_silent: Option<usize> },
+    /// No frame came back.
+    NoFrame,
+}
+
+/// Tries whether a ring closes here.
+async fn attempt(bus: &Bus, nodes: &[NodeStatus], topology: &Topology, closing: Closing) -> Result<Tried, BusError> {
     let Closing { head, tail } = closing;
     let broken = first_behind_break(nodes, topology, closing);
     // Behind a break all is reached through the closing cable.
     let silent = |node: usize| broken.is_some_and(|first| topology.hangs_behind(node, first));
     let ports = if broken.is_some() { Vec::from([head]) } else { Vec::from([head, tail]) };
-    let expected = |answers: &Vec<bool>| answers.iter().enumerate().all(|(node, is)| *is != silent(node));
-    let answers = with_closed(bus, &ports, nodes.len()).await?;
-    Ok(answers.as_ref().is_some_and(expected))
+    let Some(answers) = with_closed(bus, &ports, nodes.len()).await? else { return Ok(Tried::NoFrame) };
+    if answers.iter().enumerate().all(|(node, is)| *is != silent(node)) {
+        return Ok(Tried::Right);
+    }
+    let behind = answers.iter().enumerate().skip(tail.node + 1).take_while(|(_, answers)| !**answers);
+    Ok(Tried::Wrong { last_silent: behind.last().map(|(node, _)| node) })
 }
 
 /// The member behind the break of a ring that is open elsewhere than at its closing cable.

@@ -19,12 +19,13 @@ pub fn main() -> ExitCode {
     let mut figures = Figures::new("delays written while cycles of 1 ms go on, cables cut and healed, in virtual time");
     let mut dice = Dice::new(14);
     type Draw = fn(&mut Dice) -> Shape;
-    let kinds: [(&str, Draw); 5] = [
+    let kinds: [(&str, Draw); 6] = [
         ("rings of 2 to 16", |dice| Shape::Ring(2 + dice.below(15) as usize)),
         ("rings of 17 to 64", |dice| Shape::Ring(17 + dice.below(48) as usize)),
         ("local rings of 2 to 12", |dice| Shape::LocalRing(2 + dice.below(11) as usize)),
         ("local rings of 13 to 32", |dice| Shape::LocalRing(13 + dice.below(20) as usize)),
         ("random trees with rings", |_| Shape::Tree),
+        ("the same, a third without a clock", |_| Shape::Gaps),
     ];
     for (name, draw) in kinds {
         let runs: Vec<(Shape, u64)> = (0..wanted.div_ceil(OF_ONE)).map(|_| (draw(&mut dice), dice.roll())).collect();
@@ -57,6 +58,8 @@ fn print(figures: &mut Figures, name: &str, outcome: &Outcome) {
     figures.show("the same: largest error of a hop", format!("{:.1} ns", outcome.largest_ns));
     let not_written: u64 = outcome.not_written.values().sum();
     figures.show("the same: changes after which some were not written", not_written);
+    let hidden: u64 = outcome.hidden.iter().filter(|(count, _)| **count > 0).map(|(_, times)| times).sum();
+    figures.show("the same: changes after which some were hidden by forks without a clock, and told to be", hidden);
     for (reason, count) in &outcome.not_written {
         println!("  {name}: not written {count} times: {reason}");
     }

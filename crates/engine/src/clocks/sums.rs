@@ -1,0 +1,150 @@
+//! What follows from times that several cables take together: linear equations, solved exactly.
+//!
+//! In: sums of cables, each cable as often as it counts, with what they take. Out: what others take, where that follows and is
+//! no guess. Coefficients are small, since a frame passes a cable once there and once back.
+
+use alloc::vec;
+use alloc::vec::Vec;
+
+use super::cables::Ends;
+
+/// More cables than this are not solved for.
+const MOST_CABLES: usize = 512;
+
+/// Cables, as often as they are named, take a time together.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(super) struct Sum {
+    pub cables: Vec<Ends>,
+    pub time: i64,
+}
+
+/// Coefficients by cable, and the time of all.
+#[derive(Clone, Debug)]
+struct Row {
+    factors: Vec<i128>,
+    time: i128,
+}
+
+impl Row {
+    fn pivot(&self) -> Option<usize> {
+        self.factors.iter().position(|factor| *factor != 0)
+    }
+
+    /// Takes another row out of this one, so that the factor of that one's pivot is zero. Returns what this one was multiplied
+    /// with; `None` where figures get too large.
+    fn reduce(&mut self, other: &Row, pivot: usize) -> Option<i128> {
+        let (own, of_other) = (self.factors[pivot], other.factors[pivot]);
+        let common = divisor(own, of_other);
+        let (times, less) = (of_other / common, own / common);
+        let next = |own: i128, other: i128| own.checked_mul(times)?.checked_sub(other.checked_mul(less)?);
+        for (own, other) in self.factors.iter_mut().zip(&other.factors) {
+            *own = next(*own, *other)?;
+        }
+        self.time = next(self.time, other.time)?;
+        Some(times)
+    }
+}
+
+/// What these cables take together; `None` where that does not follow from the sums.
+pub(super) fn solve(sums: &[Sum], wanted: &[Ends]) -> Option<i64> {
+    let mut cables = wanted.to_vec();
+    cables.sort_unstable();
+    cables.dedup();
+    // Those that have cables in common with what is wanted, directly or by others.
+    let mut relevant: Vec<&Sum> = Vec::new();
+    let mut others: Vec<&Sum> = sums.iter().filter(|sum| !sum.cables.is_empty()).collect();
+    loop {
+        let (near, far): (Vec<_>, Vec<_>) =
+            others.into_iter().partition(|sum| sum.cables.iter().any(|ends| cables.binary_search(ends).is_ok()));
+        if near.is_empty() {
+            break;
+        }
+        cables.extend(near.iter().flat_map(|sum| &sum.cables));
+        cables.sort_unstable();
+        cables.dedup();
+        relevant.extend(near);
+        others = far;
+    }
+    if cables.len() > MOST_CABLES {
+        return None;
+    }
+    let row = |of: &[Ends], time: i64| {
+        let mut factors = vec![0; cables.len()];
+        of.iter().filter_map(|ends| cables.binary_search(ends).ok()).for_each(|at| factors[at] += 1);
+        Row { factors, time: i128::from(time) }
+    };
+    let mut rows: Vec<(usize, Row)> = Vec::new();
+    for sum in relevant {
+        let mut row = row(&sum.cables, sum.time);
+        for (pivot, other) in &rows {
+            row.reduce(other, *pivot)?;
+        }
+        rows.extend(row.pivot().map(|pivot| (pivot, row)));
+    }
+    let (mut left, mut scale) = (row(wanted, 0), 1_i128);
+    for (pivot, other) in &rows {
+        scale = scale.checked_mul(left.reduce(other, *pivot)?)?;
+    }
+    let time = -left.time;
+    // To the nearest.
+    let half = scale.abs() / 2;
+    let rounded = (time * scale.signum() + half).div_euclid(scale.abs());
+    left.pivot().is_none().then_some(i64::try_from(rounded).ok()?)
+}
+
+/// The greatest common divisor, at least 1.
+fn divisor(one: i128, other: i128) -> i128 {
+    let (mut one, mut other) = (one.abs(), other.abs());
+    while other != 0 {
+        (one, other) = (other, one % other);
+    }
+    one.max(1)
+}
+
+#[cfg(test)]
+mod tests {
+    use ringcat_wire::address::StationAddress;
+
+    use super::*;
+
+    fn cable(number: u16) -> Ends {
+        ((StationAddress(number), 0), (StationAddress(number + 1), 0))
+    }
+
+    #[test]
+    fn what_follows_is_exact_and_what_does_not_is_none() {
+        let sum = |cables: &[u16], time| Sum { cables: cables.iter().map(|number| cable(*number)).collect(), time };
+        let of =
+            |sums: &[Sum], cables: &[u16]| solve(sums, &cables.iter().map(|number| cable(*number)).collect::<Vec<_>>());
+        let round = sum(&[1, 2, 2, 3, 3, 1], 1_000);
+        assert_eq!(of(std::slice::from_ref(&round), &[1, 2]), None);
+        assert_eq!(of(std::slice::from_ref(&round), &[3, 2, 1]), Some(500));
+        let sums = [round, sum(&[3, 1], 301)];
+        assert_eq!((of(&sums, &[2]), of(&sums, &[1, 2, 2, 3]), of(&sums, &[1])), (Some(199), Some(699), None));
+        // Twice the same is no contradiction, and something else does not help.
+        let sums = [sum(&[1, 1], 500), sum(&[1], 250), sum(&[7, 8], 9), sum(&[], 4)];
+        assert_eq!((of(&sums, &[1, 1, 1]), of(&sums, &[7]), of(&[], &[1])), (Some(750), None, None));
+    }
+
+    proptest::proptest! {
+        /// What is solved fits any times of single cables that the sums were made of.
+        #[test]
+        fn whatever_is_solved_is_the_truth(
+            times in proptest::collection::vec(0i64..10_000, 6),
+            sums in proptest::collection::vec(proptest::collection::vec(0u16..6, 1..8), 0..8),
+            wanted in proptest::collection::vec(0u16..6, 1..6),
+        ) {
+            let time = |cables: &[u16]| cables.iter().map(|number| times[usize::from(*number)]).sum::<i64>();
+            let of = |cables: &[u16]| cables.iter().map(|number| cable(*number)).collect::<Vec<_>>();
+            let known: Vec<Sum> = sums.iter().map(|cables| Sum { cables: of(cables), time: time(cables) }).collect();
+            let solved = solve(&known, &of(&wanted));
+            proptest::prop_assert!(solved.is_none_or(|solved| solved == time(&wanted)));
+            let is_told = sums.iter().any(|cables| {
+                let (mut one, mut other) = (cables.clone(), wanted.clone());
+                (one.sort_unstable(), other.sort_unstable());
+                one == other
+            });
+            proptest::prop_assert!(!is_told || solved.is_some());
+        }
+    }
+}

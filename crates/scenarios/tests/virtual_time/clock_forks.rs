@@ -1,0 +1,138 @@
+//! Forks without a clock: delays behind them are measured branch by branch at the set-up, and where they cannot be, none is
+//! written and that is told (facts 7.1).
+
+use std::time::Duration;
+
+use ringcat::{ClockConfig, Event, Options, SyncSignals};
+use ringcat_sim::cable::{CableId, DeviceIndex, Endpoint};
+use ringcat_sim::frame::Port::{A, B, C, D};
+use ringcat_wire::address::Position;
+use scenarios::clocks::{clocked, config, delay, lock, spread, wired, with_clocks};
+use scenarios::delays::{Shape, run};
+use scenarios::segments::{MAIN, at};
+use scenarios::world::World;
+
+/// A world on these cables whose devices `without` have no clock.
+fn world(cables: &[(Endpoint, Endpoint)], without: &[usize], config: ClockConfig) -> World {
+    let mut descriptions = clocked(cables.len(), 50);
+    without.iter().for_each(|device| descriptions[*device].dc = None);
+    let network = wired(descriptions, cables);
+    World::with(3, network, &Options::default(), |scan| with_clocks(scan, config)).expect("it comes up")
+}
+
+/// Times on cables of [`wired`], with the passage of 300 ns behind each.
+fn hop(cable: i64) -> i64 {
+    300 + 50 + 70 * (cable * 5 % 11)
+}
+
+fn delays_told(world: &World) -> Vec<(Position, Option<Position>)> {
+    let told = |timed: &ringcat::TimedEvent| match timed.event {
+        Event::DelayUnknown { position, fork, .. } => Some((position, fork)),
+        _ => None,
+    };
+    world.events(world.beginning()).iter().filter_map(told).collect()
+}
+
+/// A clock, a splitter without one, two clocks on its port 3, one on its port 1, and on port 2 another splitter with two.
+const SPLITTERS: [(Endpoint, Endpoint); 8] = [
+    (MAIN, at(0, A)),
+    (at(0, B), at(1, A)),
+    (at(1, D), at(2, A)),
+    (at(2, B), at(3, A)),
+    (at(1, B), at(4, A)),
+    (at(1, C), at(5, A)),
+    (at(5, D), at(6, A)),
+    (at(5, B), at(7, A)),
+];
+
+#[test]
+fn delays_behind_splitters_without_a_clock_are_those_of_the_cables_facts_7_1() {
+    let mut world = world(&SPLITTERS, &[1, 5], config());
+    world.until(Duration::from_secs(8), "everything in OP", World::all_in_op);
+    lock(&mut world, Duration::from_secs(8));
+    assert_eq!(delays_told(&world), []);
+    let there_and_back = |cables: &[i64]| 2 * cables.iter().map(|cable| hop(*cable)).sum::<i64>();
+    let first = hop(1) + hop(2);
+    let second = hop(1) + there_and_back(&[2, 3]) + hop(4);
+    let third = hop(1) + there_and_back(&[2, 3, 4]) + hop(5) + hop(6);
+    let expected = [(2, first), (3, first + hop(3)), (4, second), (6, third), (7, third + hop(6) + hop(7))];
+    for (device, expected) in expected {
+        let error = i64::from(delay(world.network(), device)) - expected;
+        assert!(error.abs() <= 20, "device {device}: {error} ns from {expected} ns");
+    }
+    world.run_cycles(500);
+    let apart = spread(world.network(), &[0, 2, 3, 4, 6, 7]);
+    assert!(apart <= 100, "{apart} ns");
+    // A branch that is unplugged and back is known from before, and nothing is hidden by that.
+    world.cut(CableId(2));
+    world.run_cycles(200);
+    world.heal(CableId(2));
+    world.run_cycles(1_500);
+    assert_eq!(delays_told(&world), []);
+    let error = i64::from(delay(world.network(), 4)) - second;
+    assert!(error.abs() <= 20, "{error} ns from {second} ns");
+}
+
+/// Nothing measures what is between branches of a splitter that no clock is in front of.
+#[test]
+fn behind_a_splitter_without_a_clock_at_the_head_the_second_branch_is_told() {
+    let cables =
+        [(MAIN, at(0, A)), (at(0, D), at(1, A)), (at(1, B), at(2, A)), (at(0, B), at(3, A)), (at(3, B), at(4, A))];
+    for estimated_delays in [false, true] {
+        let mut world = world(&cables, &[0], ClockConfig { estimated_delays, ..config() });
+        world.until(Duration::from_secs(8), "everything in OP", World::all_in_op);
+        lock(&mut world, Duration::from_secs(8));
+        let hidden: Vec<_> = [3, 4].map(|position| (Position(position), Some(Position(0)))).to_vec();
+        assert_eq!(delays_told(&world), hidden);
+        let error = i64::from(delay(world.network(), 2)) - hop(2);
+        assert!(error.abs() <= 20, "{error} ns");
+        assert_eq!([3, 4].map(|device| delay(world.network(), device)), [0; 2]);
+        let clocks = world.application().engine().clocks();
+        let is_hidden: Vec<bool> = clocks.iter().map(|clock| clock.hidden.is_some()).collect();
+        assert_eq!(is_hidden, [false, false, true, true]);
+        // A long time after, nothing is told again.
+        world.run_cycles(2_000);
+        assert_eq!(delays_told(&world).len(), 2);
+    }
+}
+
+#[test]
+fn a_subdevice_with_sync0_whose_delay_is_hidden_stays_in_safeop_and_says_why() {
+    let cables = [(MAIN, at(0, A)), (at(0, D), at(1, A)), (at(0, B), at(2, A))];
+    let mut descriptions = clocked(3, 50);
+    descriptions[0].dc = None;
+    let network = wired(descriptions, &cables);
+    let config = ClockConfig { lock_limit: Duration::from_millis(500), ..config() };
+    let mut world = World::with(4, network, &Options::default(), |scan| {
+        let mut declaration = with_clocks(scan, config);
+        [1, 2].into_iter().for_each(|index| {
+            declaration.subdevices[index].sync = Some(SyncSignals::sync0(1_000_000, 0));
+        });
+        declaration
+    })
+    .expect("it comes up");
+    let reason = "its propagation delay is not known, since the fork at position 0 has no clock";
+    world.run_cycles(6_000);
+    let told = world
+        .events(world.beginning())
+        .iter()
+        .map(|timed| ringcat::text::describe(timed, &ringcat::text::Names::default()));
+    let told: Vec<String> = told.collect();
+    assert!(told.iter().any(|line| line.contains(reason)), "{told:#?}");
+    let state = |device: usize| {
+        world.network().device(DeviceIndex(device)).controller.register(ringcat_wire::register::map::AL_STATUS, 1)[0]
+    };
+    assert_eq!([0, 1, 2].map(state), [8, 8, 4]);
+}
+
+/// Random trees, a third of whose SubDevices have no clock: what is written is right, what is hidden is told.
+#[test]
+fn delays_in_random_trees_with_gaps_are_right_or_not_written() {
+    let seeds =
+        std::env::var("SEED").ok().and_then(|text| text.parse::<u64>().ok()).map_or(0..6, |seed| seed..seed + 1);
+    for seed in seeds {
+        let outcome = run(Shape::Gaps, seed, 6);
+        assert!(outcome.wrong.is_empty(), "{:#?}", outcome.wrong);
+        assert!(outcome.right > 0, "seed {seed}: {:?}", outcome.not_written);
+    }
+}
