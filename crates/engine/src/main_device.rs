@@ -50,22 +50,27 @@ use crate::link::{Link, LinkSet};
 use crate::mail::Mailbox;
 use crate::mail::eoe::EthernetPort;
 use crate::mail::relay::Desk;
-use crate::procedures::clocks::{self, ClockStatus, SharedClocks};
-use crate::procedures::configure::Start;
-use crate::procedures::fleet::{Fleet, Member, Phase, SharedFleet, stations_by_position};
+use crate::procedures::clocks;
+use crate::procedures::error_statistics::ErrorStatistics;
+use crate::procedures::error_watch::watch_errors;
 use crate::procedures::mail_watch::watch_mail;
 use crate::procedures::own_objects::OwnObjects;
-use crate::procedures::recover::start_all;
+use crate::procedures::reconcile::reconcile;
 use crate::procedures::scan::{Scan, ScanError, ScanOptions, scan};
 use crate::procedures::serve_requests::{Requests, serve_requests};
-use crate::procedures::services::statistics::{Book, collect};
+use crate::procedures::services::statistics::collect;
+use crate::procedures::shared_clocks::{ClockStatus, SharedClocks};
+use crate::procedures::shared_segment::{Beside, SharedSegment};
 use crate::procedures::sii::SiiCache;
 use crate::procedures::stop::{StopError, all_known, stop};
 use crate::procedures::supervise::supervise;
-use crate::procedures::watch_groups::{counts, watch_groups};
+use crate::procedures::verify::verify;
 use crate::queue::{Consumer, queue};
 use crate::ring::Identity;
 use crate::ring_status::{Cable, CableErrors, LinkStatus, Redundancy, RingStatus, cables};
+use crate::segment::member::{Member, Phase};
+use crate::segment::start::Start;
+use crate::segment::{Cabling, Choices, Known, Observation, Segment, counts, stations_by_position};
 use crate::supervisor::{AcyclicCounters, Bus, Received, Supervisor, UnderWay};
 use crate::time::Instant;
 use crate::topology::Topology;
@@ -96,13 +101,13 @@ pub struct MainDevice {
     scan: ScanSlot,
     scanning: Rc<Cell<bool>>,
     stopped: StopSlot,
-    fleet: Option<SharedFleet>,
+    segment: Option<SharedSegment>,
     cyclic_events: Option<Consumer>,
     /// Mailboxes by position, before activation.
     visited: Vec<Mailbox>,
     requests: Requests,
     /// Error counters, once active.
-    statistics: Option<Book>,
+    statistics: Option<ErrorStatistics>,
     statistics_period: Option<Duration>,
     parked: ticket::Cloakroom,
     loaded: Option<Loaded>,
@@ -129,7 +134,7 @@ impl MainDevice {
             scan: ScanSlot::default(),
             scanning: Rc::default(),
             stopped: StopSlot::default(),
-            fleet: None,
+            segment: None,
             cyclic_events: None,
             visited: Vec::new(),
             requests: Requests::default(),
@@ -147,7 +152,7 @@ impl MainDevice {
 
     /// Starts a scan, which puts all SubDevices into INIT. Refused while active.
     pub fn start_scan(&mut self) -> Result<(), ActivateError> {
-        if self.fleet.is_some() {
+        if self.segment.is_some() {
             return Err(ActivateError::Active);
         }
         if self.scanning.replace(true) {
@@ -196,7 +201,7 @@ impl MainDevice {
         };
         let bus = self.supervisor.bus();
         let declaration = with_domain(loaded.declaration.clone());
-        let (found, strangers) = match_declaration(&bus, &declaration, &scan)?;
+        let (found, unassigned) = match_declaration(&bus, &declaration, &scan)?;
         let topology = loaded.topology(&bus, self.options.junctions, &scan, &found)?;
         check_clocks(&declaration, &found)?;
         let clock_config = declaration.clocks.clone();
@@ -214,7 +219,7 @@ impl MainDevice {
         if clock_config.is_some() {
             layout.add_clocks().map_err(ActivateError::Layout)?;
         }
-        let members = members(&bus, declaration, found, &plans, &layout)?;
+        let members = members(declaration, found, &plans, &layout)?;
         let clocks = clocks_of(clock_config.clone(), &scan, &topology, &members);
         let directory = Directory::new(&plans, &layout);
         report_oddities(&bus, &members, &layout);
@@ -225,26 +230,29 @@ impl MainDevice {
         let stations = stations_by_position(&members, scan.subdevices.iter().map(|info| info.station));
         let closings = loaded.closings(&topology, &members, &stations);
         let cables = cables(&topology, self.options.links());
-        let book = Book::new(&bus, members.len(), self.statistics_period);
-        let fleet = Fleet {
-            members,
-            strangers,
-            next_temporary: 0,
-            layout,
-            closings,
-            topology,
-            stations,
-            ring: self.first_ring_status(),
-            cables: cables.into_iter().map(|cable| (cable, CableErrors::default())).collect(),
-            recablings: 0,
-            cache: self.cache.clone(),
-            blocked: Vec::new(),
-            junction_controls: Vec::new(),
-            statistics: book.clone(),
+        let cables = cables.into_iter().map(|cable| (cable, CableErrors::default())).collect();
+        let statistics = ErrorStatistics::new(&bus, members.len(), self.statistics_period);
+        let mailboxes = (0..members.len()).map(|index| Mailbox::new(&bus, index)).collect();
+        let choices = Choices {
+            enhanced_line_crossed: self.options.enhanced_line_crossed,
+            junctions: self.options.junctions,
+            // Without supervision it is not found out which unassigned SubDevices are members.
+            follow_groups: self.options.follow_groups && self.options.supervision,
         };
-        bus.set_occupants(fleet.occupants());
-        let fleet = SharedFleet::new(fleet, board.clone(), clocks);
+        let known = Known {
+            members,
+            unassigned,
+            layout,
+            cabling: Cabling { topology, stations, cables, closings, version: 0 },
+            ring: self.first_ring_status(),
+            carriers: bus.carriers(),
+        };
+        let model = Segment::new(known, board.clone(), choices);
+        bus.set_occupants(model.occupants());
+        let beside = Beside { mailboxes, clocks, cache: self.cache.clone(), statistics: statistics.clone() };
+        let segment = SharedSegment::new(bus.clone(), model, board.clone(), beside);
         self.supervisor.attach(board);
+        self.supervisor.spawn(reconcile(bus.clone(), segment.clone()));
         let start = if self.has_visited() { Start::Doubtful } else { Start::Cleared };
         self.visited.drain(..).for_each(|mailbox| mailbox.close());
         match clock_config {
@@ -254,32 +262,28 @@ impl MainDevice {
                     bus_shift: config.bus_shift,
                     sync_window_ns: config.sync_window_ns,
                 });
-                // Whoever answers while clocks are measured has not come back: its configuration begins afterwards.
-                for member in fleet.access().members.iter_mut().filter(|member| member.is_there()) {
-                    member.phase = Phase::Configuring;
-                }
-                let (bus, fleet) = (bus.clone(), fleet.clone());
+                // What answers while clocks are measured has not come back: its configuration begins afterwards.
+                segment.observe(Observation::Delayed);
+                let (bus, segment) = (bus.clone(), segment.clone());
                 // Receive times are latched before other frames are on the way (facts 7.1).
                 self.supervisor.spawn(async move {
-                    clocks::begin(&bus, &fleet).await;
-                    start_all(&bus, &fleet, start);
-                    clocks::keep(bus, fleet).await;
+                    clocks::begin(&bus, &segment).await;
+                    segment.observe(Observation::Started(start));
+                    clocks::keep(bus, segment).await;
                 });
             }
-            None => start_all(&bus, &fleet, start),
+            None => segment.observe(Observation::Started(start)),
         }
         if self.options.supervision {
-            let (enhanced, rings) = (self.options.enhanced_line_crossed, self.options.junctions);
-            self.supervisor.spawn(supervise(bus.clone(), fleet.clone(), enhanced, rings));
+            self.supervisor.spawn(supervise(bus.clone(), segment.clone()));
+            self.supervisor.spawn(verify(bus.clone(), segment.clone()));
+            self.supervisor.spawn(watch_errors(bus.clone(), segment.clone()));
         }
-        // Without supervision nobody finds out who strangers are.
-        let follow = self.options.follow_groups && self.options.supervision;
-        self.supervisor.spawn(watch_groups(bus.clone(), fleet.clone(), follow));
-        self.supervisor.spawn(watch_mail(bus.clone(), fleet.clone()));
-        self.supervisor.spawn(serve_requests(bus.clone(), fleet.clone(), self.requests.clone()));
-        self.supervisor.spawn(collect(bus, fleet.clone(), book.clone()));
-        self.statistics = Some(book);
-        self.fleet = Some(fleet);
+        self.supervisor.spawn(watch_mail(bus.clone(), segment.clone()));
+        self.supervisor.spawn(serve_requests(bus.clone(), segment.clone(), self.requests.clone()));
+        self.supervisor.spawn(collect(bus, segment.clone()));
+        self.statistics = Some(statistics);
+        self.segment = Some(segment);
         self.cyclic_events = Some(consumer);
         let periods = specs.iter().map(|spec| spec.period).collect();
         let under_way = specs.iter().map(|spec| spec.under_way).max().unwrap_or(1);
@@ -297,7 +301,7 @@ impl MainDevice {
     /// Ends supervision and all other procedures, and takes all SubDevices down to a state; those in a lower one stay there.
     /// The exchange must not send any more. Afterwards a new scan may start.
     pub fn start_stop(&mut self, state: AlState, limit: Duration, now: Instant) {
-        let led = self.fleet.as_ref().map(|fleet| all_known(&fleet.access())).unwrap_or_default();
+        let led = self.segment.as_ref().map(|segment| all_known(&segment.view())).unwrap_or_default();
         self.counted = self.counters();
         self.supervisor = supervisor(self.identity, &self.options, now);
         // Whoever would have brought it back is gone.
@@ -308,7 +312,7 @@ impl MainDevice {
         self.ports.clear();
         self.desk = None;
         self.own_objects = OwnObjects::default();
-        self.fleet = None;
+        self.segment = None;
         self.statistics = None;
         self.cyclic_events = None;
         *self.stopped.borrow_mut() = None;
@@ -331,33 +335,33 @@ impl MainDevice {
 
     /// How far each declared SubDevice is.
     pub fn states(&self) -> Vec<SubDeviceState> {
-        let Some(fleet) = &self.fleet else { return Vec::new() };
-        fleet.access().members.iter().map(|member| member.phase.into()).collect()
+        let Some(segment) = &self.segment else { return Vec::new() };
+        segment.view().members.iter().map(|member| member.phase.into()).collect()
     }
 
     /// What is known about each clock of the segment, by position; empty without distributed clocks.
     pub fn clocks(&self) -> Vec<ClockStatus> {
-        self.fleet
+        self.segment
             .as_ref()
-            .filter(|fleet| fleet.clocks.are_declared())
-            .map_or(Vec::new(), |fleet| fleet.clocks.status())
+            .filter(|segment| segment.clocks.are_declared())
+            .map_or(Vec::new(), |segment| segment.clocks.status())
     }
 
     /// Whether all clocks are locked (facts 7.2).
     pub fn clocks_locked(&self) -> bool {
-        self.fleet.as_ref().is_some_and(|fleet| fleet.clocks.are_locked())
+        self.segment.as_ref().is_some_and(|segment| segment.clocks.are_locked())
     }
 
     /// Station addresses of the declared SubDevices.
     pub fn stations(&self) -> Vec<StationAddress> {
-        let Some(fleet) = &self.fleet else { return Vec::new() };
-        fleet.access().members.iter().map(|member| member.station).collect()
+        let Some(segment) = &self.segment else { return Vec::new() };
+        segment.view().members.iter().map(|member| member.station).collect()
     }
 
     /// Whether every declared SubDevice is in its target state.
     pub fn all_settled(&self) -> bool {
-        let Some(fleet) = &self.fleet else { return false };
-        let access = fleet.access();
+        let Some(segment) = &self.segment else { return false };
+        let access = segment.view();
         access
             .members
             .iter()
@@ -366,15 +370,15 @@ impl MainDevice {
 
     /// Whether every declared SubDevice that is not optional is in its target state.
     pub fn mandatory_settled(&self) -> bool {
-        let Some(fleet) = &self.fleet else { return false };
-        let access = fleet.access();
+        let Some(segment) = &self.segment else { return false };
+        let access = segment.view();
         access.members.iter().all(|member| member.config.optional || matches!(member.phase, Phase::Settled(_)))
     }
 
     /// How far each hot connect group is, by its number.
     pub fn groups(&self) -> Vec<GroupState> {
-        let Some(fleet) = &self.fleet else { return Vec::new() };
-        let counts = counts(&fleet.access());
+        let Some(segment) = &self.segment else { return Vec::new() };
+        let counts = counts(&segment.view().members);
         counts.into_iter().map(|(present, settled, members)| GroupState { present, settled, members }).collect()
     }
 
@@ -452,11 +456,11 @@ impl MainDevice {
 
     /// The ring and both links. What comes from frames needs the supervision datagram.
     pub fn ring_status(&self) -> RingStatus {
-        let mut status = match &self.fleet {
-            Some(fleet) => fleet.access().ring,
+        let mut status = match &self.segment {
+            Some(segment) => segment.view().ring_status(),
             None => RingStatus { state: self.ring(), ..self.first_ring_status() },
         };
-        let board = self.fleet.as_ref().map(|fleet| &fleet.board);
+        let board = self.segment.as_ref().map(|segment| &segment.board);
         let seen = board.and_then(|board| board.supervision()).map(|(_, seen)| seen).unwrap_or_default();
         let carriers = self.supervisor.bus().carriers();
         let positions = status.place.map_or([None; 2], |cable| cable.positions());
@@ -470,7 +474,7 @@ impl MainDevice {
 
     /// Every cable of the scan with what the ports at its ends have counted since activation, read once a second.
     pub fn cable_errors(&self) -> Vec<(Cable, CableErrors)> {
-        self.fleet.as_ref().map(|fleet| fleet.access().cables.clone()).unwrap_or_default()
+        self.segment.as_ref().map(|segment| segment.view().cabling.cables.clone()).unwrap_or_default()
     }
 
     fn first_ring_status(&self) -> RingStatus {

@@ -13,6 +13,7 @@ mod flights;
 mod group;
 mod link_order;
 mod outbox;
+mod posted;
 mod round_trip;
 mod shared;
 mod signal;
@@ -31,6 +32,7 @@ pub use bus::{Bus, BusError, Elapsed, Reply};
 pub use counters::AcyclicCounters;
 pub use group::Group;
 pub(crate) use group::{TURN, TURN_PAUSE};
+pub(crate) use posted::Posted;
 pub use signal::Signal;
 pub use stray::Stray;
 
@@ -121,6 +123,7 @@ impl Supervisor {
             shared.expire_flights();
             shared.expire_alone();
             shared.fire_timers();
+            shared.wake_watchers();
         }
         self.executor.run();
     }

@@ -9,7 +9,7 @@ use ringcat_engine::main_device::RawDatagram;
 use ringcat_engine::procedures::services::ports::BlockedPort;
 use ringcat_engine::procedures::services::statistics::Statistics;
 use ringcat_engine::procedures::sii::program::SiiWritten;
-use ringcat_engine::procedures::strangers::rescan::Rescan;
+use ringcat_engine::procedures::unassigned::rescan::Rescan;
 use ringcat_engine::supervisor::{BusError, Reply};
 use ringcat_wire::address::RegisterAddress;
 use ringcat_wire::register::LoopControl;

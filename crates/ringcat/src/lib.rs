@@ -88,14 +88,14 @@ pub use ringcat_engine::main_device::{
     ActivateError, Declaration, DomainConfig, DomainMember, ExplicitLrw, GroupState, MAX_UNDER_WAY, RawDatagram,
     Required, SubDeviceState,
 };
-pub use ringcat_engine::procedures::clocks::ClockStatus;
+pub use ringcat_engine::procedures::shared_clocks::ClockStatus;
 pub use ringcat_engine::procedures::dictionary::ReadPdos;
 pub use ringcat_engine::procedures::look_at_ring::RingLook;
 pub use ringcat_engine::procedures::scan::{Scan, ScanError};
 pub use ringcat_engine::procedures::services::ServiceError;
 pub use ringcat_engine::procedures::services::statistics::{PortErrors, Statistics};
 pub use ringcat_engine::procedures::stop::StopError;
-pub use ringcat_engine::procedures::strangers::rescan::{Found, Rescan, Who};
+pub use ringcat_engine::procedures::unassigned::rescan::{Found, Rescan, Who};
 pub use ringcat_engine::request::{
     RegisterRequest, Request, RequestFailure, RequestRefused, RequestState, SdoRequest, SoeRequest, VoeHandler,
 };

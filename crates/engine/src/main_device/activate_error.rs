@@ -12,7 +12,7 @@ use super::lrw::ExplicitLrw;
 use crate::config::ConfigError;
 use crate::junction::JunctionError;
 use crate::layout::LayoutError;
-use crate::procedures::fleet::SetupError;
+use crate::segment::setup::SetupError;
 
 /// Why a declaration cannot be activated.
 #[derive(Clone, Debug, PartialEq)]

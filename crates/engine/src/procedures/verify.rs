@@ -1,7 +1,7 @@
 //! Looking from time to time whether SubDevices in their target state still have the FMMUs that were written.
 //!
 //! A SubDevice without them stays in OP and answers everything, only its process data is missing. That happens when a
-//! write that was thought lost arrives late, or when somebody else writes.
+//! write that was thought lost arrives late, or when another MainDevice writes.
 
 use alloc::vec::Vec;
 use core::fmt::Write;
@@ -10,10 +10,9 @@ use core::time::Duration;
 use ringcat_wire::address::StationAddress;
 use ringcat_wire::register::{Fmmu, map};
 
-use super::configure::Start;
-use super::fleet::{Phase, SharedFleet};
-use super::recover::start_if_same;
-use crate::event::Event;
+use super::shared_segment::SharedSegment;
+use crate::segment::Observation;
+use crate::segment::member::Phase;
 use crate::supervisor::Bus;
 
 /// Pause between two looks: one datagram per SubDevice and second.
@@ -28,21 +27,28 @@ struct Suspect {
 }
 
 /// Runs for ever.
-pub(crate) async fn verify(bus: Bus, fleet: SharedFleet) {
+pub(crate) async fn verify(bus: Bus, segment: SharedSegment) {
     loop {
         bus.sleep(PAUSE).await;
-        let all = bus.gather_in_turns(settled(&fleet), look).await;
+        let all = bus.gather_in_turns(settled(&segment), look).await;
         // Once may be the edge of a change.
         let wrong = bus.gather(all.into_iter().flatten(), look).await;
-        for suspect in wrong.into_iter().flatten() {
-            configure_anew(&bus, &fleet, &suspect);
+        for Suspect { index, attempt, expected, .. } in wrong.into_iter().flatten() {
+            let mut reason = alloc::string::String::new();
+            let count = expected.len() / Fmmu::LEN;
+            let _ = write!(
+                reason,
+                "registers from {} on: the {count} FMMUs that were written are not there",
+                map::FMMU_BASE
+            );
+            segment.observe(Observation::Undone { index, attempt, reason });
         }
     }
 }
 
 /// Members that have FMMUs and are where they should be.
-fn settled(fleet: &SharedFleet) -> Vec<Suspect> {
-    let access = fleet.access();
+fn settled(segment: &SharedSegment) -> Vec<Suspect> {
+    let access = segment.view();
     let members = access.members.iter().enumerate();
     members
         .filter_map(|(index, member)| {
@@ -53,21 +59,8 @@ fn settled(fleet: &SharedFleet) -> Vec<Suspect> {
         .collect()
 }
 
-/// Gives back whose FMMUs are not as they should be.
+/// Gives it back where its FMMUs are not as they should be.
 async fn look(bus: Bus, suspect: Suspect) -> Option<Suspect> {
     let got = bus.fprd(suspect.station, map::FMMU_BASE, suspect.expected.len()).await.ok()?;
     (got != suspect.expected).then_some(suspect)
-}
-
-fn configure_anew(bus: &Bus, fleet: &SharedFleet, suspect: &Suspect) {
-    let Suspect { index, attempt, ref expected, .. } = *suspect;
-    if fleet.attempt(index) != attempt {
-        return;
-    }
-    let mut reason = alloc::string::String::new();
-    let count = expected.len() / Fmmu::LEN;
-    let _ = write!(reason, "registers from {} on: the {count} FMMUs that were written are not there", map::FMMU_BASE);
-    bus.report(Event::ConfigurationFailed { subdevice: index, reason });
-    // Another SubDevice may answer at its address: one that was out of reach since an earlier session.
-    start_if_same(bus, fleet, index, Start::Doubtful);
 }

@@ -15,13 +15,15 @@ use ringcat_wire::command::Command;
 use ringcat_wire::datagram::Target;
 use ringcat_wire::register::{DlControl, DlStatus, LoopControl, map};
 
-use super::{Clocks, SharedClocks};
 use crate::clocks::wiring::Wiring;
 use crate::clocks::{Delays, Disagreement, FRACTION, Latched, Measurements, Passage, Segment};
 use crate::link::{Link, LinkSet};
 use crate::procedures::latch::{self as frames, Pauses};
-use crate::procedures::strangers::view;
+use crate::procedures::shared_clocks::{Clocks, Node, SharedClocks};
+use crate::procedures::shared_segment::SharedSegment;
+use crate::procedures::unassigned::view;
 use crate::ring::RingState;
+use crate::segment::disturbance::Disturbance;
 use crate::supervisor::{Bus, BusError};
 use crate::topology::{Closing, NodeStatus, PortOf, Topology};
 
@@ -31,6 +33,8 @@ const LATCHED_LEN: usize = 32;
 const MOST_FAILURES: u32 = 16;
 /// Looks at a segment that changes meanwhile.
 const LOOKS: u32 = 3;
+/// So long other disturbances may keep rings from being opened.
+const LIMIT: Duration = Duration::from_secs(5);
 /// Until a ring that was opened must be closed again: loop settings end by themselves within a second.
 const CLOSING_LIMIT: Duration = Duration::from_millis(1_200);
 /// Pause between two looks for that.
@@ -63,12 +67,13 @@ pub(super) struct Measured {
 }
 
 /// Measures; `opening` says that rings are opened for it.
-pub(super) async fn measure(bus: &Bus, clocks: &SharedClocks, opening: bool) -> Result<Measured, String> {
+pub(super) async fn measure(bus: &Bus, segment: &SharedSegment, opening: bool) -> Result<Measured, String> {
+    let clocks = &segment.clocks;
     let mut survey = look(bus, clocks).await?;
     let rings = survey.whole_rings();
     if opening && !rings.is_empty() {
         survey.latched = None;
-        measure_open(bus, clocks, &survey, &rings).await?;
+        measure_open(bus, segment, &survey, &rings).await?;
     }
     let measured = take(bus, clocks, &survey).await?;
     // A ring of two links that was broken until now has a cable that was never measured, and one behind a junction that came
@@ -78,7 +83,7 @@ pub(super) async fn measure(bus: &Bus, clocks: &SharedClocks, opening: bool) -> 
         return measured.exact();
     }
     survey.latched = None;
-    measure_open(bus, clocks, &survey, &rings).await?;
+    measure_open(bus, segment, &survey, &rings).await?;
     take(bus, clocks, &survey).await?.exact()
 }
 
@@ -95,12 +100,14 @@ impl Measured {
 }
 
 /// Opens rings, measures what cables take, closes the rings again.
-async fn measure_open(bus: &Bus, clocks: &SharedClocks, survey: &Survey, rings: &[PortOf]) -> Result<(), String> {
+async fn measure_open(bus: &Bus, segment: &SharedSegment, survey: &Survey, rings: &[PortOf]) -> Result<(), String> {
     let ports: Vec<(StationAddress, u8)> = rings.iter().map(|at| (survey.stations[at.node], at.port)).collect();
     let text = |error: BusError| error.to_string();
     let before = controls(bus, &ports).await.map_err(text)?;
     let closed = before.iter().map(|(station, control)| (*station, closed(*control, *station, &ports)));
-    clocks.access().is_measuring = true;
+    if !segment.disturb(Disturbance::OpenByPort, LIMIT).await {
+        return Err("rings are kept from being opened: others are being looked into".to_string());
+    }
     let result = match write(bus, closed.collect()).await {
         Ok(()) => {
             let mut open = survey.clone();
@@ -108,7 +115,7 @@ async fn measure_open(bus: &Bus, clocks: &SharedClocks, survey: &Survey, rings: 
             open.latched = None;
             // The port at the end of a ring of two links is closed: what comes to it ends there.
             open.deaf = survey.is_closed.then_some(Link::Redundant);
-            take(bus, clocks, &open).await.map(drop)
+            take(bus, &segment.clocks, &open).await.map(drop)
         }
         Err(error) => Err(text(error)),
     };
@@ -117,7 +124,7 @@ async fn measure_open(bus: &Bus, clocks: &SharedClocks, survey: &Survey, rings: 
     if survey.is_closed {
         wait_for_ring(bus).await;
     }
-    clocks.access().is_measuring = false;
+    segment.undisturb();
     result
 }
 
@@ -236,7 +243,7 @@ async fn take(bus: &Bus, clocks: &SharedClocks, survey: &Survey) -> Result<Measu
     let mut access = clocks.access();
     let access = &mut *access;
     let at = |station: StationAddress| survey.stations.iter().position(|at| *at == station);
-    let is_there = |node: &super::Node| at(node.station).is_some();
+    let is_there = |node: &Node| at(node.station).is_some();
     let reference = access.reference.filter(|index| is_there(&access.nodes[*index]));
     let reference = reference.or_else(|| access.elect(|_, node| is_there(node)));
     let on_clock = reference.and_then(|index| at(access.nodes[index].station)).unwrap_or(0);

@@ -1,0 +1,100 @@
+//! Waiting for what the cyclic half posts and the links tell, instead of looking for it again and again.
+
+use core::future::poll_fn;
+use core::task::Poll;
+
+use super::bus::Bus;
+use super::executor::TaskId;
+use super::shared::Shared;
+use super::signal::Signal;
+use crate::board::{RingWord, Supervision};
+use crate::time::Instant;
+
+/// What is posted, as far as it changes by events and not with each cycle.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Posted {
+    /// What the latest supervision datagram has brought back.
+    pub supervision: Option<Supervision>,
+    /// The state of the ring.
+    pub ring: RingWord,
+    /// By [`crate::link::Link::index`].
+    pub carriers: [Option<bool>; 2],
+    /// How often clocks are not told a time since ports have changed.
+    pub holds: u32,
+}
+
+/// Procedures that wait for another word, and the words of when they were woken last.
+#[derive(Debug, Default)]
+pub(super) struct Watchers {
+    waiting: alloc::vec::Vec<TaskId>,
+    seen: Posted,
+}
+
+impl Shared {
+    pub(super) fn posted(&self) -> Posted {
+        let Some(board) = &self.board else { return Posted { carriers: self.carriers, ..Posted::default() } };
+        Posted {
+            supervision: board.supervision().map(|(_, supervision)| supervision),
+            ring: board.ring(),
+            carriers: self.carriers,
+            holds: board.clocks.holds(),
+        }
+    }
+
+    /// Whether a procedure waits for what has been posted.
+    pub(super) fn is_posted(&self) -> bool {
+        !self.watchers.waiting.is_empty() && self.posted() != self.watchers.seen
+    }
+
+    /// Wakes the procedures that wait for something else to be posted.
+    pub(super) fn wake_watchers(&mut self) {
+        if !self.is_posted() {
+            return;
+        }
+        self.watchers.seen = self.posted();
+        for task in core::mem::take(&mut self.watchers.waiting) {
+            self.wake(task);
+        }
+    }
+}
+
+impl Bus {
+    /// What is posted now.
+    pub(crate) fn posted(&self) -> Posted {
+        self.shared.borrow().posted()
+    }
+
+    /// Waits until something else is posted than this, until a point of time, or until `ready`, which is asked after each
+    /// notification of `signal`.
+    pub(crate) async fn until_posted(
+        &self,
+        seen: Posted,
+        until: Instant,
+        signal: &Signal,
+        mut ready: impl FnMut() -> bool,
+    ) {
+        let mut armed = false;
+        poll_fn(|_| {
+            if ready() {
+                return Poll::Ready(());
+            }
+            let shared = &mut *self.shared.borrow_mut();
+            let posted = shared.posted();
+            if posted != seen || shared.now >= until {
+                return Poll::Ready(());
+            }
+            let task = shared.current;
+            shared.watchers.seen = posted;
+            if !shared.watchers.waiting.contains(&task) {
+                shared.watchers.waiting.push(task);
+            }
+            signal.register(task);
+            if !armed && until != Instant::NEVER {
+                shared.wake_at(until);
+                armed = true;
+            }
+            Poll::Pending
+        })
+        .await;
+    }
+}
