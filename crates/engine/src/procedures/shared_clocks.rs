@@ -21,10 +21,12 @@ const AVERAGE: u32 = 5;
 
 /// A SubDevice of the scan, or a declared one that came later, as far as clocks are concerned.
 #[derive(Clone, Debug)]
-pub struct Node {
+pub(crate) struct Node {
+    /// Its station address.
     pub station: StationAddress,
     /// Where it was found.
     pub position: u16,
+    /// Kinds of its ports.
     pub ports: [PortKind; 4],
     /// Index in the declaration.
     pub member: Option<usize>,
@@ -64,7 +66,7 @@ pub struct Node {
 
 /// What is known about the clocks of a segment.
 #[derive(Debug, Default)]
-pub struct Clocks {
+pub(crate) struct Clocks {
     /// `None`: distributed clocks were not declared.
     pub config: Option<ClockConfig>,
     /// By position of the scan, then those that came later.

@@ -7,6 +7,7 @@ mod address;
 mod quiet;
 pub mod rescan;
 
+use alloc::boxed::Box;
 use alloc::rc::Rc;
 use alloc::string::ToString;
 use core::cell::Cell;
@@ -196,5 +197,5 @@ async fn admit(
     if written.is_err() && bus.fprd(info.station, map::STATION_ADDRESS, 2).await.is_err() {
         return;
     }
-    segment.observe(Observation::Admitted { station, index, info });
+    segment.observe(Observation::Admitted { station, index, info: Box::new(info) });
 }

@@ -1,5 +1,6 @@
 //! What was seen, heard or done: all that changes the model.
 
+use alloc::boxed::Box;
 use alloc::rc::Rc;
 use alloc::string::String;
 use core::time::Duration;
@@ -171,7 +172,7 @@ pub enum Observation<'a> {
         /// The member.
         index: usize,
         /// What it is.
-        info: SubDeviceInfo,
+        info: Box<SubDeviceInfo>,
     },
 
     /// The segment was looked at for crossed lines.
@@ -273,7 +274,7 @@ impl Segment {
             Observation::Read { station, read } => self.observe_read(station, read, effects),
             Observation::Unexpected(station) => self.observe_unexpected(station, effects),
             Observation::Misfit { station, index, reason } => self.observe_misfit(station, index, reason, effects),
-            Observation::Admitted { station, index, info } => self.observe_admitted(station, index, info, effects),
+            Observation::Admitted { station, index, info } => self.observe_admitted(station, index, *info, effects),
 
             Observation::LineChecked { found, in_control } => self.observe_line_check(found, in_control, effects),
             Observation::Rescanned { seen, words } => self.adopt(seen, &words, effects),

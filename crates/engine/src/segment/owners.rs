@@ -21,6 +21,7 @@ impl Owners {
         Owners { all, anchors }
     }
 
+    /// By position.
     pub fn all(&self) -> &[Option<usize>] {
         &self.all
     }

@@ -236,7 +236,12 @@ fn run(seed: u64, tally: &Rc<Tally>) {
     for device in ALL {
         let mailbox = world.mailbox(device);
         let counters = mailbox.counters();
-        assert!(mailbox.is_idle(), "seed {seed}, device {device}: {counters:?}");
+        // One that is being looked into right now is at work.
+        let is_idle = (0..QUIET).any(|_| {
+            world.cycle();
+            mailbox.is_idle()
+        });
+        assert!(is_idle, "seed {seed}, device {device}: {counters:?}");
         assert_eq!((counters.malformed, counters.refused), (0, 0), "seed {seed}, device {device}");
     }
     assert_eq!(world.mailbox(ALL[0]).bus().stray_mails_dropped(), 0, "seed {seed}");

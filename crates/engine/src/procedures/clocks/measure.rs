@@ -23,6 +23,7 @@ use crate::procedures::shared_clocks::{Clocks, Node, SharedClocks};
 use crate::procedures::shared_segment::SharedSegment;
 use crate::procedures::unassigned::view;
 use crate::ring::RingState;
+use crate::segment::Observation;
 use crate::segment::disturbance::Disturbance;
 use crate::supervisor::{Bus, BusError};
 use crate::topology::{Closing, NodeStatus, PortOf, Topology};
@@ -69,7 +70,7 @@ pub(super) struct Measured {
 /// Measures; `opening` says that rings are opened for it.
 pub(super) async fn measure(bus: &Bus, segment: &SharedSegment, opening: bool) -> Result<Measured, String> {
     let clocks = &segment.clocks;
-    let mut survey = look(bus, clocks).await?;
+    let mut survey = look(bus, segment).await?;
     let rings = survey.whole_rings();
     if opening && !rings.is_empty() {
         survey.latched = None;
@@ -163,9 +164,12 @@ impl Survey {
     }
 }
 
-async fn look(bus: &Bus, clocks: &SharedClocks) -> Result<Survey, String> {
+async fn look(bus: &Bus, segment: &SharedSegment) -> Result<Survey, String> {
     for _ in 0..LOOKS {
-        match look_once(bus, clocks).await {
+        let looked = look_once(bus, &segment.clocks).await;
+        // Ports that changed in between have told it to this look.
+        segment.observe(Observation::LookAgain);
+        match looked {
             Ok(Some(survey)) => return Ok(survey),
             Ok(None) => {}
             Err(error) => return Err(error.to_string()),
