@@ -9,6 +9,7 @@
 //! Nothing here talks to the bus: [`crate::procedures::clocks`] does, and the cyclic datagrams are in
 //! [`crate::exchange`].
 
+pub mod branches;
 pub mod cables;
 pub mod delay;
 pub mod follow;

@@ -37,6 +37,7 @@ pub mod queue;
 pub mod request;
 pub mod ring;
 pub mod ring_status;
+pub(crate) mod segment;
 pub mod supervisor;
 pub mod time;
 pub mod topology;

@@ -47,18 +47,19 @@ use crate::link::{Link, LinkSet};
 use crate::mail::Mailbox;
 use crate::mail::eoe::EthernetPort;
 use crate::mail::relay::Desk;
-use crate::procedures::clocks::ClockStatus;
-use crate::procedures::fleet::{Phase, SharedFleet};
+use crate::procedures::error_statistics::ErrorStatistics;
 use crate::procedures::own_objects::OwnObjects;
 use crate::procedures::scan::{Scan, ScanError, ScanOptions, scan};
 use crate::procedures::serve_requests::Requests;
-use crate::procedures::services::statistics::Book;
+use crate::procedures::shared_clocks::ClockStatus;
+use crate::procedures::shared_segment::SharedSegment;
 use crate::procedures::sii::SiiCache;
 use crate::procedures::stop::{StopError, all_known, stop};
-use crate::procedures::watch_groups::counts;
 use crate::queue::Consumer;
 use crate::ring::Identity;
 use crate::ring_status::{Cable, CableErrors, LinkStatus, Redundancy, RingStatus};
+use crate::segment::counts;
+use crate::segment::member::Phase;
 use crate::supervisor::{AcyclicCounters, Bus, Received, Supervisor, UnderWay};
 use crate::time::Instant;
 use loaded::Loaded;
@@ -80,13 +81,13 @@ pub struct MainDevice {
     scan: ScanSlot,
     scanning: Rc<Cell<bool>>,
     stopped: StopSlot,
-    fleet: Option<SharedFleet>,
+    segment: Option<SharedSegment>,
     cyclic_events: Option<Consumer>,
     /// Mailboxes by position, before activation.
     visited: Vec<Mailbox>,
     requests: Requests,
     /// Error counters, once active.
-    statistics: Option<Book>,
+    statistics: Option<ErrorStatistics>,
     statistics_period: Option<Duration>,
     loaded: Option<Loaded>,
     /// Ethernet of declared SubDevices, where it was asked for.
@@ -112,7 +113,7 @@ impl MainDevice {
             scan: ScanSlot::default(),
             scanning: Rc::default(),
             stopped: StopSlot::default(),
-            fleet: None,
+            segment: None,
             cyclic_events: None,
             visited: Vec::new(),
             requests: Requests::default(),
@@ -129,7 +130,7 @@ impl MainDevice {
 
     /// Starts a scan, which puts all SubDevices into INIT. Refused while active.
     pub fn start_scan(&mut self) -> Result<(), ActivateError> {
-        if self.fleet.is_some() {
+        if self.segment.is_some() {
             return Err(ActivateError::Active);
         }
         if self.scanning.replace(true) {
@@ -173,7 +174,7 @@ impl MainDevice {
     /// Ends supervision and all other procedures, and takes all SubDevices down to a state; those in a lower one stay
     /// there. The exchange must not send any more. Afterwards a new scan may start.
     pub fn start_stop(&mut self, state: AlState, limit: Duration, now: Instant) {
-        let led = self.fleet.as_ref().map(|fleet| all_known(&fleet.access())).unwrap_or_default();
+        let led = self.segment.as_ref().map(|segment| all_known(&segment.view())).unwrap_or_default();
         self.counted = self.counters();
         self.supervisor = supervisor(self.identity, &self.options, now);
         // Whoever would have brought it back is gone.
@@ -184,7 +185,7 @@ impl MainDevice {
         self.ports.clear();
         self.desk = None;
         self.own_objects = OwnObjects::default();
-        self.fleet = None;
+        self.segment = None;
         self.statistics = None;
         self.cyclic_events = None;
         *self.stopped.borrow_mut() = None;
@@ -207,33 +208,33 @@ impl MainDevice {
 
     /// How far each declared SubDevice is.
     pub fn states(&self) -> Vec<SubDeviceState> {
-        let Some(fleet) = &self.fleet else { return Vec::new() };
-        fleet.access().members.iter().map(|member| member.phase.into()).collect()
+        let Some(segment) = &self.segment else { return Vec::new() };
+        segment.view().members.iter().map(|member| member.phase.into()).collect()
     }
 
     /// What is known about each clock of the segment, by position; empty without distributed clocks.
     pub fn clocks(&self) -> Vec<ClockStatus> {
-        self.fleet
+        self.segment
             .as_ref()
-            .filter(|fleet| fleet.clocks.are_declared())
-            .map_or(Vec::new(), |fleet| fleet.clocks.status())
+            .filter(|segment| segment.clocks.are_declared())
+            .map_or(Vec::new(), |segment| segment.clocks.status())
     }
 
     /// Whether all clocks are locked (facts 7.2).
     pub fn clocks_locked(&self) -> bool {
-        self.fleet.as_ref().is_some_and(|fleet| fleet.clocks.are_locked())
+        self.segment.as_ref().is_some_and(|segment| segment.clocks.are_locked())
     }
 
     /// Station addresses of the declared SubDevices.
     pub fn stations(&self) -> Vec<StationAddress> {
-        let Some(fleet) = &self.fleet else { return Vec::new() };
-        fleet.access().members.iter().map(|member| member.station).collect()
+        let Some(segment) = &self.segment else { return Vec::new() };
+        segment.view().members.iter().map(|member| member.station).collect()
     }
 
     /// Whether every declared SubDevice is in its target state.
     pub fn all_settled(&self) -> bool {
-        let Some(fleet) = &self.fleet else { return false };
-        let access = fleet.access();
+        let Some(segment) = &self.segment else { return false };
+        let access = segment.view();
         access
             .members
             .iter()
@@ -242,15 +243,15 @@ impl MainDevice {
 
     /// Whether every declared SubDevice that is not optional is in its target state.
     pub fn mandatory_settled(&self) -> bool {
-        let Some(fleet) = &self.fleet else { return false };
-        let access = fleet.access();
+        let Some(segment) = &self.segment else { return false };
+        let access = segment.view();
         access.members.iter().all(|member| member.config.optional || matches!(member.phase, Phase::Settled(_)))
     }
 
     /// How far each hot connect group is, by its number.
     pub fn groups(&self) -> Vec<GroupState> {
-        let Some(fleet) = &self.fleet else { return Vec::new() };
-        let counts = counts(&fleet.access());
+        let Some(segment) = &self.segment else { return Vec::new() };
+        let counts = counts(&segment.view().members);
         counts.into_iter().map(|(present, settled, members)| GroupState { present, settled, members }).collect()
     }
 
@@ -328,11 +329,11 @@ impl MainDevice {
 
     /// The ring and both links. What comes from frames needs the supervision datagram.
     pub fn ring_status(&self) -> RingStatus {
-        let mut status = match &self.fleet {
-            Some(fleet) => fleet.access().ring,
+        let mut status = match &self.segment {
+            Some(segment) => segment.view().ring_status(),
             None => RingStatus { state: self.ring(), ..self.first_ring_status() },
         };
-        let board = self.fleet.as_ref().map(|fleet| &fleet.board);
+        let board = self.segment.as_ref().map(|segment| &segment.board);
         let seen = board.and_then(|board| board.supervision()).map(|(_, seen)| seen).unwrap_or_default();
         let carriers = self.supervisor.bus().carriers();
         let positions = status.place.map_or([None; 2], |cable| cable.positions());
@@ -346,7 +347,7 @@ impl MainDevice {
 
     /// Every cable of the scan with what the ports at its ends have counted since activation, read once a second.
     pub fn cable_errors(&self) -> Vec<(Cable, CableErrors)> {
-        self.fleet.as_ref().map(|fleet| fleet.access().cables.clone()).unwrap_or_default()
+        self.segment.as_ref().map(|segment| segment.view().cabling.cables.clone()).unwrap_or_default()
     }
 
     fn first_ring_status(&self) -> RingStatus {

@@ -13,6 +13,7 @@ mod flights;
 mod group;
 mod link_order;
 mod outbox;
+mod posted;
 mod received;
 mod reply;
 mod round_trip;
@@ -23,6 +24,7 @@ mod stray;
 mod task;
 mod transfer;
 mod turns;
+mod watching;
 
 use alloc::rc::Rc;
 use alloc::sync::Arc;
@@ -34,6 +36,7 @@ pub use bus::Bus;
 pub use counters::AcyclicCounters;
 pub use group::Group;
 pub(crate) use group::{TURN, TURN_PAUSE};
+pub(crate) use posted::Posted;
 pub use received::Received;
 pub use reply::{BusError, Elapsed, Reply};
 pub use signal::Signal;
@@ -109,6 +112,7 @@ impl Supervisor {
             shared.expire_flights();
             shared.expire_alone();
             shared.fire_timers();
+            shared.wake_watchers();
         }
         self.executor.run();
     }

@@ -109,7 +109,6 @@ pub use ringcat_engine::main_device::{
     MAX_UNDER_WAY, Pending, RawDatagram, Required, SubDeviceState,
 };
 pub use ringcat_engine::plan::{AreaPlan, MappedEntry, MappedPdo, PlanError, SubDevicePlan, plan};
-pub use ringcat_engine::procedures::clocks::{ClockStatus, HiddenDelay};
 pub use ringcat_engine::procedures::configure::ConfigureError;
 pub use ringcat_engine::procedures::dictionary::ReadPdos;
 pub use ringcat_engine::procedures::look_at_ring::RingLook;
@@ -117,9 +116,10 @@ pub use ringcat_engine::procedures::scan::{FIRST_STATION, Scan, ScanError};
 pub use ringcat_engine::procedures::services::ServiceError;
 pub use ringcat_engine::procedures::services::ports::BlockedPort;
 pub use ringcat_engine::procedures::services::statistics::{PortErrors, Statistics};
+pub use ringcat_engine::procedures::shared_clocks::{ClockStatus, HiddenDelay};
 pub use ringcat_engine::procedures::sii::program::SiiWritten;
 pub use ringcat_engine::procedures::stop::StopError;
-pub use ringcat_engine::procedures::strangers::rescan::{Found, Rescan, Who};
+pub use ringcat_engine::procedures::unassigned::rescan::{Found, Rescan, Who};
 pub use ringcat_engine::request::{
     RegisterRequest, Request, RequestFailure, RequestRefused, RequestState, SdoRequest, SoeRequest, VoeHandler,
 };

@@ -22,7 +22,7 @@ use ringcat_engine::procedures::services::ServiceError;
 use ringcat_engine::procedures::services::ports::BlockedPort;
 use ringcat_engine::procedures::services::statistics::Statistics;
 use ringcat_engine::procedures::sii::program::SiiWritten;
-use ringcat_engine::procedures::strangers::rescan::Rescan;
+use ringcat_engine::procedures::unassigned::rescan::Rescan;
 use ringcat_engine::request::{RegisterRequest, SdoRequest, SoeRequest, VoeHandler};
 use ringcat_engine::supervisor::{BusError, Reply};
 use ringcat_wire::address::RegisterAddress;

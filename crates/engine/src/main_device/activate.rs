@@ -19,18 +19,24 @@ use crate::config::ClockConfig;
 use crate::exchange::{ClockSetup, Exchange};
 use crate::info::SubDeviceInfo;
 use crate::layout::{DomainSpec, Layout, Rules};
-use crate::procedures::clocks::{self, SharedClocks};
-use crate::procedures::configure::Start;
-use crate::procedures::fleet::{Fleet, Member, Phase, SharedFleet, stations_by_position};
+use crate::mail::Mailbox;
+use crate::procedures::clocks;
+use crate::procedures::error_statistics::ErrorStatistics;
+use crate::procedures::error_watch::watch_errors;
 use crate::procedures::mail_watch::watch_mail;
-use crate::procedures::recover::start_all;
+use crate::procedures::reconcile::reconcile;
 use crate::procedures::scan::Scan;
 use crate::procedures::serve_requests::serve_requests;
-use crate::procedures::services::statistics::{Book, collect};
+use crate::procedures::services::statistics::collect;
+use crate::procedures::shared_clocks::SharedClocks;
+use crate::procedures::shared_segment::{Beside, SharedSegment};
 use crate::procedures::supervise::supervise;
-use crate::procedures::watch_groups::watch_groups;
+use crate::procedures::verify::verify;
 use crate::queue::queue;
 use crate::ring_status::{CableErrors, cables};
+use crate::segment::member::Member;
+use crate::segment::start::Start;
+use crate::segment::{Cabling, Choices, Known, Observation, Segment, stations_by_position};
 use crate::time::Instant;
 use crate::topology::Topology;
 
@@ -46,14 +52,14 @@ impl MainDevice {
         };
         let bus = self.supervisor.bus();
         let declaration = with_domain(loaded.declaration.clone());
-        let (found, strangers) = match_declaration(&bus, &declaration, &scan)?;
+        let (found, unassigned) = match_declaration(&bus, &declaration, &scan)?;
         let topology = loaded.topology(&bus, self.options.junctions, &scan, &found)?;
         check_clocks(&declaration, &found)?;
         let clock_config = declaration.clocks.clone();
         let plans = plan_all(&declaration, &found)?;
         check_domains(&loaded.declaration, &plans)?;
         let (specs, layout) = self.lay_out(&declaration, &plans, &found)?;
-        let members = members(&bus, declaration, found, &plans, &layout)?;
+        let members = members(declaration, found, &plans, &layout)?;
         let clocks = clocks_of(clock_config.clone(), &scan, &topology, &members);
         let directory = Directory::new(&plans, &layout);
         report_oddities(&bus, &members, &layout);
@@ -71,27 +77,29 @@ impl MainDevice {
         let stations = stations_by_position(&members, scan.subdevices.iter().map(|info| info.station));
         let closings = loaded.closings(&topology, &members, &stations);
         let cables = cables(&topology, self.options.links());
-        let book = Book::new(&bus, members.len(), self.statistics_period);
-        let fleet = Fleet {
+        let cables = cables.into_iter().map(|cable| (cable, CableErrors::default())).collect();
+        let mailboxes = (0..members.len()).map(|index| Mailbox::new(&bus, index)).collect();
+        let statistics = ErrorStatistics::new(&bus, members.len(), self.statistics_period);
+        let beside = Beside { mailboxes, clocks, cache: self.cache.clone(), statistics };
+        let known = Known {
             members,
-            strangers,
-            next_temporary: 0,
+            unassigned,
             layout,
-            closings,
-            topology,
-            stations,
+            cabling: Cabling { topology, stations, cables, closings, version: 0 },
             ring: self.first_ring_status(),
-            cables: cables.into_iter().map(|cable| (cable, CableErrors::default())).collect(),
-            recablings: 0,
-            cache: self.cache.clone(),
-            blocked: Vec::new(),
-            junction_controls: Vec::new(),
-            statistics: book.clone(),
+            carriers: bus.carriers(),
         };
-        bus.set_occupants(fleet.occupants());
-        let fleet = SharedFleet::new(fleet, board.clone(), clocks);
+        let choices = Choices {
+            enhanced_line_crossed: self.options.enhanced_line_crossed,
+            junctions: self.options.junctions,
+            // Without supervision it is not found out which unassigned SubDevices are members.
+            follow_groups: self.options.follow_groups && self.options.supervision,
+        };
+        let model = Segment::new(known, board.clone(), choices);
+        bus.set_occupants(model.occupants());
+        let segment = SharedSegment::new(bus.clone(), model, board.clone(), beside);
         self.supervisor.attach(board);
-        self.start_procedures(&fleet, book, clock_config.is_some());
+        self.start_procedures(segment, clock_config.is_some());
         self.cyclic_events = Some(consumer);
         let periods = specs.iter().map(|spec| spec.period).collect();
         let under_way = specs.iter().map(|spec| spec.under_way).max().unwrap_or(1);
@@ -121,42 +129,39 @@ impl MainDevice {
     }
 
     /// Starts configuration, supervision and what else goes on while the MainDevice is active.
-    fn start_procedures(&mut self, fleet: &SharedFleet, book: Book, with_clocks: bool) {
+    fn start_procedures(&mut self, segment: SharedSegment, with_clocks: bool) {
         let bus = self.supervisor.bus();
+        self.supervisor.spawn(reconcile(bus.clone(), segment.clone()));
         let start = if self.has_visited() { Start::Doubtful } else { Start::Cleared };
         self.visited.drain(..).for_each(|mailbox| mailbox.close());
         if with_clocks {
             // A SubDevice that answers while clocks are measured has not come back: its configuration begins
             // afterwards.
-            for member in fleet.access().members.iter_mut().filter(|member| member.is_there()) {
-                member.phase = Phase::Configuring;
-            }
-            let (bus, fleet) = (bus.clone(), fleet.clone());
+            segment.observe(Observation::Delayed);
+            let (bus, segment) = (bus.clone(), segment.clone());
             // Receive times are latched before other frames are on the way (facts 7.1).
             self.supervisor.spawn(async move {
-                clocks::begin(&bus, &fleet).await;
-                start_all(&bus, &fleet, start);
-                clocks::keep(bus, fleet).await;
+                clocks::begin(&bus, &segment).await;
+                segment.observe(Observation::Started(start));
+                clocks::keep(bus, segment).await;
             });
         } else {
-            start_all(&bus, fleet, start);
+            segment.observe(Observation::Started(start));
         }
         if self.options.supervision {
-            let (enhanced, rings) = (self.options.enhanced_line_crossed, self.options.junctions);
-            let (bus, fleet) = (bus.clone(), fleet.clone());
+            let (own_bus, own) = (bus.clone(), segment.clone());
             self.supervisor.spawn(async move {
-                fleet.clocks.clone().all_in_reach(&bus).await;
-                supervise(bus, fleet, enhanced, rings).await;
+                own.clocks.clone().all_in_reach(&own_bus).await;
+                own_bus.spawn(verify(own_bus.clone(), own.clone()));
+                own_bus.spawn(watch_errors(own_bus.clone(), own.clone()));
+                supervise(own_bus, own).await;
             });
         }
-        // Without supervision it is never found out what strangers are.
-        let follow = self.options.follow_groups && self.options.supervision;
-        self.supervisor.spawn(watch_groups(bus.clone(), fleet.clone(), follow));
-        self.supervisor.spawn(watch_mail(bus.clone(), fleet.clone()));
-        self.supervisor.spawn(serve_requests(bus.clone(), fleet.clone(), self.requests.clone()));
-        self.supervisor.spawn(collect(bus, fleet.clone(), book.clone()));
-        self.statistics = Some(book);
-        self.fleet = Some(fleet.clone());
+        self.supervisor.spawn(watch_mail(bus.clone(), segment.clone()));
+        self.supervisor.spawn(serve_requests(bus.clone(), segment.clone(), self.requests.clone()));
+        self.supervisor.spawn(collect(bus, segment.clone()));
+        self.statistics = Some(segment.statistics.clone());
+        self.segment = Some(segment);
     }
 
     /// Number of a session that begins now: another one than before, and hardly that of a program that ran here a while

@@ -11,7 +11,7 @@ use super::declaration::{ExplicitLrw, MAX_UNDER_WAY};
 use crate::config::ConfigError;
 use crate::junction::JunctionError;
 use crate::layout::LayoutError;
-use crate::procedures::fleet::SetupError;
+use crate::segment::setup::SetupError;
 
 /// Why a declaration cannot be activated.
 #[derive(Clone, Debug, PartialEq)]

@@ -10,7 +10,7 @@ use crate::exchange::Entry;
 use crate::info::{Direction, SubDeviceInfo};
 use crate::layout::{Layout, PlacedArea};
 use crate::plan::{MappedEntry, SubDevicePlan};
-use crate::procedures::fleet::{SetupError, declared_areas, planned_areas};
+use crate::segment::setup::{SetupError, declared_areas, planned_areas};
 
 /// Where the PDO entries of all declared SubDevices lie in the domains' images.
 #[derive(Clone, Debug, Default)]

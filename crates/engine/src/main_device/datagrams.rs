@@ -14,9 +14,9 @@ use super::MainDevice;
 use super::pending::Pending;
 use crate::layout::Layout;
 use crate::link::LinkSet;
-use crate::procedures::fleet::SharedFleet;
 use crate::procedures::junction::{UnderWay, ordering};
 use crate::procedures::services::ServiceError;
+use crate::procedures::shared_segment::SharedSegment;
 use crate::supervisor::{Bus, BusError, Reply};
 
 /// Datagrams of the application that are taken at once.
@@ -49,10 +49,10 @@ impl MainDevice {
     ) -> Pending<Result<Vec<Result<Reply, BusError>>, ServiceError>> {
         let bus = self.bus();
         let addressed = self.addressed(datagrams);
-        let fleet = self.fleet.clone();
+        let segment = self.segment.clone();
         self.start(async move {
             let addressed = addressed?;
-            let _orders: Vec<_> = addressed.iter().flat_map(|(it, _)| orders(fleet.as_ref(), it)).collect();
+            let _orders: Vec<_> = addressed.iter().flat_map(|(it, _)| orders(segment.as_ref(), it)).collect();
             Ok(bus.gather(addressed, send).await)
         })
     }
@@ -80,8 +80,8 @@ impl MainDevice {
     /// The station addresses of those that the last scan found, or the rescan of which the cabling was taken over, by
     /// position.
     fn stations_by_position(&self) -> Vec<StationAddress> {
-        match (&self.fleet, &*self.scan.borrow()) {
-            (Some(fleet), _) => fleet.access().stations.clone(),
+        match (&self.segment, &*self.scan.borrow()) {
+            (Some(segment), _) => segment.view().cabling.stations.clone(),
             (None, Some(Ok(scan))) => scan.subdevices.iter().map(|info| info.station).collect(),
             (None, Some(Err(_)) | None) => Vec::new(),
         }
@@ -89,8 +89,10 @@ impl MainDevice {
 
     fn check_lrw_of(&self, datagram: &RawDatagram) -> Result<(), ServiceError> {
         let (Command::Lrw, Target::Logical(logical)) = (datagram.command, datagram.target) else { return Ok(()) };
-        let Some(fleet) = self.fleet.as_ref().filter(|_| self.options.links() == LinkSet::Ring) else { return Ok(()) };
-        match covered(&fleet.access().layout, logical, datagram.data.len()) {
+        let Some(segment) = self.segment.as_ref().filter(|_| self.options.links() == LinkSet::Ring) else {
+            return Ok(());
+        };
+        match covered(&segment.view().layout, logical, datagram.data.len()) {
             Some(subdevices) => Err(ServiceError::LrwOnTwoLinks { logical, length: datagram.data.len(), subdevices }),
             None => Ok(()),
         }
@@ -98,19 +100,19 @@ impl MainDevice {
 }
 
 /// Notes what a datagram tells junctions to do about their ports.
-fn orders(fleet: Option<&SharedFleet>, datagram: &RawDatagram) -> Vec<UnderWay> {
+fn orders(segment: Option<&SharedSegment>, datagram: &RawDatagram) -> Vec<UnderWay> {
     use Command::{Aprw, Apwr, Brw, Bwr, Fprw, Fpwr};
-    let Some(known) = fleet.filter(|_| matches!(datagram.command, Aprw | Apwr | Brw | Bwr | Fprw | Fpwr)) else {
+    let Some(known) = segment.filter(|_| matches!(datagram.command, Aprw | Apwr | Brw | Bwr | Fprw | Fpwr)) else {
         return Vec::new();
     };
-    let at = |place: usize| known.access().stations.get(place).copied();
+    let at = |place: usize| known.view().cabling.stations.get(place).copied();
     let (stations, register) = match datagram.target {
         Target::Station(station, register) => (Vec::from([station]), register),
         Target::Position(Position(place), register) => (at(place.into()).into_iter().collect(), register),
-        Target::Broadcast(register) => (known.access().stations.clone(), register),
+        Target::Broadcast(register) => (known.view().cabling.stations.clone(), register),
         Target::Logical(_) | Target::None => return Vec::new(),
     };
-    stations.into_iter().filter_map(|station| ordering(fleet, station, register, &datagram.data)).collect()
+    stations.into_iter().filter_map(|station| ordering(segment, station, register, &datagram.data)).collect()
 }
 
 /// Two SubDevices of which process data lies in a range of logical addresses, if there are as many.

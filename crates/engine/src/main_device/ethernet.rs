@@ -23,8 +23,8 @@ impl MainDevice {
     /// Declared SubDevices that have been seen and whose SII offers EoE, whether they are there now or not; nobody
     /// before activation.
     pub fn ethernet_subdevices(&self) -> Vec<EthernetSubDevice> {
-        let Some(fleet) = &self.fleet else { return Vec::new() };
-        let access = fleet.access();
+        let Some(segment) = &self.segment else { return Vec::new() };
+        let access = segment.view();
         let members = access.members.iter().enumerate();
         members
             .filter_map(|(subdevice, member)| {
@@ -39,7 +39,7 @@ impl MainDevice {
     /// The Ethernet of a declared SubDevice. Its port is opened when it is asked for first and lasts until the
     /// MainDevice stops; `None` where nobody is declared, or somebody has a port of this mailbox.
     pub fn ethernet_port(&mut self, subdevice: usize) -> Option<&EthernetPort> {
-        let mailbox = self.fleet.as_ref()?.mailbox(subdevice)?;
+        let mailbox = self.segment.as_ref()?.mailbox(subdevice)?;
         while self.ports.len() <= subdevice {
             self.ports.push(None);
         }

@@ -8,8 +8,8 @@ use ringcat_wire::sii::MailboxProtocols;
 
 use super::MainDevice;
 use crate::mail::relay::{Asked, Desk, RelayCounters, Relayed};
-use crate::procedures::fleet::SharedFleet;
 use crate::procedures::own_objects::Seen;
+use crate::procedures::shared_segment::SharedSegment;
 
 /// The address of the MainDevice itself.
 const OWN_ADDRESS: u16 = 0;
@@ -20,12 +20,12 @@ impl MainDevice {
     /// or 0 for the objects of the MainDevice itself (docs/mailbox-gateway.md).
     pub fn relay(&mut self, client: u64, message: &[u8]) {
         let bus = self.supervisor.bus();
-        let (fleet, scan, acyclic) = (self.fleet.clone(), self.scan.clone(), self.counters());
+        let (segment, scan, acyclic) = (self.segment.clone(), self.scan.clone(), self.counters());
         let own_objects = self.own_objects.clone();
         let desk = self.desk.get_or_insert_with(|| Desk::new(&bus));
         desk.take(client, message, |message| {
             if message.header.address != OWN_ADDRESS {
-                return find(fleet.as_ref(), message);
+                return find(segment.as_ref(), message);
             }
             if message.header.protocol != Protocol::Coe {
                 return Err(ErrorReply::UNSUPPORTED_PROTOCOL);
@@ -34,7 +34,7 @@ impl MainDevice {
                 Some(Ok(scan)) => scan.subdevices.iter().map(|info| info.station).collect(),
                 Some(Err(_)) | None => Vec::new(),
             };
-            let (seen, payload) = (Seen { bus, fleet, scanned, acyclic }, message.payload.to_vec());
+            let (seen, payload) = (Seen { bus, segment, scanned, acyclic }, message.payload.to_vec());
             Ok(Asked::Own(Box::pin(async move { own_objects.answer(&seen, client, &payload).await })))
         });
     }
@@ -58,9 +58,9 @@ impl MainDevice {
     }
 }
 
-fn find(fleet: Option<&SharedFleet>, message: &Message<'_>) -> Result<Asked, u16> {
-    let Some(fleet) = fleet else { return Err(ErrorReply::INVALID_HEADER) };
-    let access = fleet.access();
+fn find(segment: Option<&SharedSegment>, message: &Message<'_>) -> Result<Asked, u16> {
+    let Some(segment) = segment else { return Err(ErrorReply::INVALID_HEADER) };
+    let access = segment.view();
     let member = access.members.iter().find(|member| member.station.0 == message.header.address);
     let Some((member, info)) = member.and_then(|member| Some((member, member.info.as_ref()?))) else {
         return Err(ErrorReply::INVALID_HEADER);
@@ -77,5 +77,7 @@ fn find(fleet: Option<&SharedFleet>, message: &Message<'_>) -> Result<Asked, u16
     if info.protocols.0 & bit == 0 {
         return Err(ErrorReply::UNSUPPORTED_PROTOCOL);
     }
-    Ok(Asked::SubDevice(member.mailbox.clone()))
+    let index = access.member_of(member.station);
+    let mailbox = index.and_then(|index| segment.mailbox(index));
+    mailbox.map(Asked::SubDevice).ok_or(ErrorReply::INVALID_HEADER)
 }

@@ -10,8 +10,8 @@ use super::declaration::Declaration;
 use crate::event::Event;
 use crate::info::SubDeviceInfo;
 use crate::junction::{JunctionConnection, JunctionError, JunctionMode, START_PORT};
-use crate::procedures::fleet::Member;
 use crate::procedures::scan::{Scan, node_status, report_cabling};
+use crate::segment::member::Member;
 use crate::supervisor::Bus;
 use crate::topology::{Closing, NodeStatus, PortOf, Topology};
 

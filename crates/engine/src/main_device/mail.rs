@@ -18,8 +18,8 @@ impl MainDevice {
     /// Mailbox of a SubDevice: by its index in the declaration; before activation by its position in the last scan, and
     /// to be used once [`MainDevice::start_visit`] has brought it to PREOP. `None` where there is no such one.
     pub fn mailbox(&self, subdevice: usize) -> Option<Mailbox> {
-        match &self.fleet {
-            Some(fleet) => fleet.mailbox(subdevice),
+        match &self.segment {
+            Some(segment) => segment.mailbox(subdevice),
             None => self.visited.get(subdevice).cloned(),
         }
     }
@@ -27,7 +27,7 @@ impl MainDevice {
     /// Before activation: starts to bring a scanned SubDevice to PREOP or BOOT, where its mailbox can be used, or back
     /// to INIT.
     pub fn start_visit(&mut self, position: usize, state: AlState) -> Pending<Result<(), ConfigureError>> {
-        let info = match (&self.fleet, &*self.scan.borrow()) {
+        let info = match (&self.segment, &*self.scan.borrow()) {
             (None, Some(Ok(scan))) => scan.subdevices.get(position).cloned(),
             _ => None,
         };
@@ -51,7 +51,7 @@ impl MainDevice {
     /// Without process data its working counters are not expected, and its inputs are not fresh.
     pub fn start_state_request(&mut self, subdevice: usize, state: AlState) -> Pending<Result<(), ConfigureError>> {
         let bus = self.supervisor.bus();
-        let work = self.fleet.as_ref().map(|fleet| request_state(&bus, fleet, subdevice, state));
+        let work = self.segment.as_ref().map(|segment| request_state(&bus, segment, subdevice, state));
         self.start(async move {
             match work {
                 Some(work) => work.await,

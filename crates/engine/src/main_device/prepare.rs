@@ -20,20 +20,20 @@ use crate::event::Event;
 use crate::info::SubDeviceInfo;
 use crate::layout::{AreaSpec, DomainSpec, Layout, LrwPolicy, Witness};
 use crate::link::LinkSet;
-use crate::mail::Mailbox;
 use crate::plan::{PlanFault, plan};
-use crate::procedures::fleet::{Member, Setup, SetupError, declared_areas};
-use crate::procedures::presence;
 use crate::procedures::request_state::exchanges;
 use crate::procedures::scan::{Scan, station_at};
-use crate::procedures::strangers::{Owners, Stranger};
+use crate::segment::Owners;
+use crate::segment::member::Member;
+use crate::segment::setup::{Setup, SetupError, declared_areas, presence};
+use crate::segment::unassigned::UnassignedSubDevice;
 use crate::supervisor::Bus;
 
 /// Period of the domain that only carries the supervision datagram.
 const SUPERVISION_PERIOD: Duration = Duration::from_millis(10);
 
 /// By declaration the SubDevice that was found, and those that nobody declared.
-type Matched = (Vec<Option<SubDeviceInfo>>, Vec<Stranger>);
+type Matched = (Vec<Option<SubDeviceInfo>>, Vec<UnassignedSubDevice>);
 
 /// Who is whom.
 pub(super) fn match_declaration(bus: &Bus, declaration: &Declaration, scan: &Scan) -> Result<Matched, ActivateError> {
@@ -59,12 +59,12 @@ pub(super) fn match_declaration(bus: &Bus, declaration: &Declaration, scan: &Sca
         }
     }
     let owners = Owners::new(owners, |index| declaration.subdevices[index].group.is_some());
-    let strangers = extra.into_iter().map(|at| {
+    let unassigned = extra.into_iter().map(|at| {
         let info = scan.subdevices[at].clone();
         bus.report(Event::Unexpected { position: info.position, identity: info.identity });
-        Stranger::new(info, &owners, scan.main_count, true)
+        UnassignedSubDevice::new(info, &owners, scan.main_count, true)
     });
-    Ok((found, strangers.collect()))
+    Ok((found, unassigned.collect()))
 }
 
 /// SYNC signals need a clock, and clocks that are kept together.
@@ -249,7 +249,6 @@ fn beyond_watchdog(subdevice: usize, member: &Member, layout: &Layout) -> Option
 }
 
 pub(super) fn members(
-    bus: &Bus,
     declaration: Declaration,
     found: Vec<Option<SubDeviceInfo>>,
     plans: &[Areas],
@@ -269,7 +268,9 @@ pub(super) fn members(
         // One that is not there yet gets an address behind those of the scan.
         let absent = station_at(Position((0x4000 + index) as u16));
         let station = info.as_ref().map_or(absent, |info| info.station);
-        members.push(Member { unfit, ..Member::new(config, info, station, setup, Mailbox::new(bus, index)) });
+        let mut member = Member::new(config, info, station, setup);
+        member.unfit = unfit;
+        members.push(member);
     }
     Ok(members)
 }

@@ -15,14 +15,15 @@ use crate::procedures::services::ports::BlockedPort;
 use crate::procedures::services::statistics::{self, Statistics};
 use crate::procedures::services::{ServiceError, ports, registers, reset};
 use crate::procedures::sii::program::{self, SiiWritten};
-use crate::procedures::strangers::rescan::{Rescan, rescan};
+use crate::procedures::unassigned::rescan::{Rescan, rescan};
+use crate::segment::Observation;
 use crate::supervisor::Bus;
 
 impl MainDevice {
     /// Station address of a SubDevice, by which it is reached on the bus.
     pub fn station(&self, subdevice: usize) -> Option<StationAddress> {
-        match (&self.fleet, &*self.scan.borrow()) {
-            (Some(fleet), _) => fleet.access().members.get(subdevice).map(|member| member.station),
+        match (&self.segment, &*self.scan.borrow()) {
+            (Some(segment), _) => segment.view().members.get(subdevice).map(|member| member.station),
             (None, Some(Ok(scan))) => scan.subdevices.get(subdevice).map(|info| info.station),
             (None, _) => None,
         }
@@ -69,9 +70,9 @@ impl MainDevice {
         address: RegisterAddress,
         data: Vec<u8>,
     ) -> Pending<Result<(), ServiceError>> {
-        let fleet = self.fleet.clone();
+        let segment = self.segment.clone();
         self.start_on(subdevice, move |bus, station| async move {
-            registers::write(&bus, fleet.as_ref(), station, address, &data).await
+            registers::write(&bus, segment.as_ref(), station, address, &data).await
         })
     }
 
@@ -87,28 +88,28 @@ impl MainDevice {
         port: u8,
         control: LoopControl,
     ) -> Pending<Result<(), ServiceError>> {
-        let fleet = self.fleet.clone();
+        let segment = self.segment.clone();
         self.start_on(subdevice, move |bus, station| async move {
-            ports::set(&bus, fleet.as_ref(), station, port, control).await
+            ports::set(&bus, segment.as_ref(), station, port, control).await
         })
     }
 
     /// Starts to cut a declared SubDevice off, by closing the ports of its neighbours. In a line those behind it go
     /// with it.
     pub fn start_block(&mut self, subdevice: usize) -> Pending<Result<Vec<BlockedPort>, ServiceError>> {
-        let (bus, fleet) = (self.bus(), self.fleet.clone());
+        let (bus, segment) = (self.bus(), self.segment.clone());
         self.start(async move {
-            let fleet = fleet.ok_or(ServiceError::NotActive)?;
-            ports::block(&bus, &fleet, subdevice).await
+            let segment = segment.ok_or(ServiceError::NotActive)?;
+            ports::block(&bus, &segment, subdevice).await
         })
     }
 
     /// Starts to open all ports that were closed to cut somebody off.
     pub fn start_open_blocked(&mut self) -> Pending<Result<usize, ServiceError>> {
-        let (bus, fleet) = (self.bus(), self.fleet.clone());
+        let (bus, segment) = (self.bus(), self.segment.clone());
         self.start(async move {
-            let fleet = fleet.ok_or(ServiceError::NotActive)?;
-            ports::open_blocked(&bus, &fleet).await
+            let segment = segment.ok_or(ServiceError::NotActive)?;
+            ports::open_blocked(&bus, &segment).await
         })
     }
 
@@ -120,10 +121,10 @@ impl MainDevice {
     /// Has whoever supervises look at all SubDevices now, and for new ones, as if the segment had changed. False before
     /// activation: there a scan looks.
     pub fn force_topology_change(&mut self) -> bool {
-        if let Some(fleet) = &self.fleet {
-            fleet.note_news();
+        if let Some(segment) = &self.segment {
+            segment.observe(Observation::LookAgain);
         }
-        self.fleet.is_some()
+        self.segment.is_some()
     }
 
     /// Starts to look at the whole segment again while process data goes on: who is at which place now, who is new, has
@@ -134,8 +135,8 @@ impl MainDevice {
     /// junctions included, unless it is not whole: while the ring of two links is open, or a mandatory SubDevice does
     /// not answer, they go by the cabling of before.
     pub fn start_rescan(&mut self, limit: Duration) -> Pending<Result<Rescan, ServiceError>> {
-        let (bus, fleet) = (self.bus(), self.fleet.clone());
-        self.start(async move { rescan(&bus, &fleet.ok_or(ServiceError::NotActive)?, limit).await })
+        let (bus, segment) = (self.bus(), self.segment.clone());
+        self.start(async move { rescan(&bus, &segment.ok_or(ServiceError::NotActive)?, limit).await })
     }
 
     /// Starts to read an EEPROM, as large as it says that it is.

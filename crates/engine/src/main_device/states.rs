@@ -2,7 +2,7 @@
 
 use ringcat_wire::al::AlState;
 
-use crate::procedures::fleet::Phase;
+use crate::segment::member::Phase;
 
 /// How far a declared SubDevice is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

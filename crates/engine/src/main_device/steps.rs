@@ -25,7 +25,7 @@ impl MainDevice {
     /// # Errors
     /// [`ActivateError::Active`], and what is wrong with the declaration by itself.
     pub fn load(&mut self, declaration: Declaration) -> Result<(), ActivateError> {
-        if self.fleet.is_some() {
+        if self.segment.is_some() {
             return Err(ActivateError::Active);
         }
         check(&declaration)?;
@@ -70,7 +70,7 @@ impl MainDevice {
 
     /// What was declared of rings, where it is in what was scanned; `None` where nothing can be said of that.
     fn declared_closings(&self) -> Option<DeclaredClosings> {
-        let loaded = self.loaded.as_ref().filter(|_| self.fleet.is_none())?;
+        let loaded = self.loaded.as_ref().filter(|_| self.segment.is_none())?;
         let scan = self.scan.borrow().as_ref()?.as_ref().ok()?.clone();
         let mut found: Vec<Option<SubDeviceInfo>> = alloc::vec![None; loaded.declaration.subdevices.len()];
         for resolution in resolve(&loaded.declaration.subdevices, &scan.subdevices) {
@@ -92,7 +92,7 @@ impl MainDevice {
     /// # Errors
     /// [`ActivateError`]: nothing is loaded or scanned, or what does not fit what was found.
     pub fn apply(&mut self) -> Result<Active, ActivateError> {
-        if self.fleet.is_some() {
+        if self.segment.is_some() {
             return Err(ActivateError::Active);
         }
         let loaded = self.loaded.clone().ok_or(ActivateError::NotLoaded)?;

@@ -16,12 +16,14 @@ use ringcat_wire::register::{Fmmu, SyncManager, map};
 
 use super::al_state;
 use super::clocks;
-use super::fleet::{Setup, SharedFleet};
-use super::presence;
+use super::shared_segment::SharedSegment;
 use super::sii;
 use crate::config::{SdoDownload, SubDeviceConfig, Transition};
 use crate::mail::Mailbox;
 use crate::mail::coe::{self, SdoAddress};
+use crate::segment::setup::Setup;
+use crate::segment::start::Start;
+use crate::segment::{Observation, ProcessDataStep};
 use crate::supervisor::{Bus, BusError};
 
 pub use error::{ConfigureError, StartupError};
@@ -33,21 +35,10 @@ const CYCLES_BEFORE_OP: u64 = 2;
 /// Pause between two looks at the cycle counter.
 const CYCLE_PAUSE: Duration = Duration::from_micros(200);
 
-/// What a SubDevice is like when its configuration begins.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Start {
-    /// A scan has just put it into INIT and cleared its registers.
-    Cleared,
-    /// Anything; what it still has may be used.
-    Unknown,
-    /// Anything, and what it has is of no use.
-    Doubtful,
-}
-
 /// One SubDevice's bring-up.
 pub(super) struct BringUp<'a> {
     pub bus: &'a Bus,
-    pub fleet: &'a SharedFleet,
+    pub segment: &'a SharedSegment,
     pub index: usize,
     pub station: StationAddress,
     pub setup: Rc<Setup>,
@@ -59,8 +50,8 @@ pub(super) struct BringUp<'a> {
 impl BringUp<'_> {
     /// The whole way. Process data counts on the SubDevice from SAFEOP on.
     pub(super) async fn run(&self, start: Start) -> Result<(), ConfigureError> {
-        self.fleet.board.set_taking_part(self.index, false);
-        self.fleet.set_configured(self.index, false);
+        self.process_data(ProcessDataStep::Off);
+        self.set_configured(false);
         self.mailbox.close();
         if start != Start::Cleared {
             self.back_to_init().await?;
@@ -94,7 +85,7 @@ impl BringUp<'_> {
 
     /// The FMMUs go first: a SubDevice that leaves OP may take part in process data by halves on its way.
     async fn back_to_init(&self) -> Result<(), ConfigureError> {
-        self.fleet.board.set_unproven(self.index, false);
+        self.process_data(ProcessDataStep::Unmapped);
         let (status, _) = al_state::read_status(self.bus, self.station).await?;
         let fmmus = vec![0; Fmmu::LEN * usize::from(self.setup.fmmu_count)];
         self.bus.fpwr(self.station, map::FMMU_BASE, &fmmus).await?;
@@ -186,14 +177,13 @@ impl BringUp<'_> {
         if !plan.is_op_only() {
             self.join();
         }
-        self.fleet.set_configured(self.index, true);
+        self.set_configured(true);
         Ok(())
     }
 
     /// Maps process data, all of it at once with what shows whether the SubDevice processed a frame.
     async fn map(&self) -> Result<(), BusError> {
-        // SyncManagers for OP only are still off.
-        self.fleet.board.set_unproven(self.index, self.setup.presence_fmmu.is_some() || !self.setup.plan.is_op_only());
+        self.process_data(ProcessDataStep::Mapped);
         let fmmus = self.setup.fmmu_registers();
         if fmmus.is_empty() {
             return Ok(());
@@ -203,23 +193,27 @@ impl BringUp<'_> {
 
     /// Process data counts on it from now on, on its inputs as soon as they were seen.
     pub(super) fn join(&self) {
-        let is_unproven = self.setup.presence_fmmu.is_some();
-        self.fleet.board.set_unproven(self.index, is_unproven);
-        self.fleet.board.set_taking_part(self.index, true);
-        if is_unproven {
-            presence::prove(self.bus, self.fleet, self.index, self.station, self.setup.clone());
-        }
+        self.process_data(ProcessDataStep::Joined);
+    }
+
+    /// What the SubDevice does in process data from now on.
+    fn process_data(&self, step: ProcessDataStep) {
+        self.segment.observe(Observation::ProcessData { index: self.index, step });
+    }
+
+    fn set_configured(&self, is: bool) {
+        self.segment.observe(Observation::Configured { index: self.index, is });
     }
 
     /// The SYNC signals that are declared, or what is left of others.
     async fn start_clock(&self) -> Result<(), ConfigureError> {
-        if !self.fleet.clocks.are_declared() {
+        if !self.segment.clocks.are_declared() {
             return Ok(());
         }
-        clocks::restore(self.bus, self.fleet, self.index).await?;
+        clocks::restore(self.bus, self.segment, self.index).await?;
         let limit = self.config.limit(AlState::PreOp, AlState::SafeOp);
         if let Some(signals) = &self.config.sync {
-            clocks::start_signals(self.bus, self.fleet, self.index, self.station, signals, limit).await?;
+            clocks::start_signals(self.bus, self.segment, self.index, self.station, signals, limit).await?;
         }
         Ok(())
     }
@@ -228,7 +222,7 @@ impl BringUp<'_> {
     pub(super) async fn op(&self) -> Result<(), ConfigureError> {
         self.command(Transition::So).await?;
         if self.config.sync.is_some() {
-            clocks::wait_for_lock(self.bus, self.fleet, self.index).await.map_err(ConfigureError::NotLocked)?;
+            clocks::wait_for_lock(self.bus, self.segment, self.index).await.map_err(ConfigureError::NotLocked)?;
         }
         for area in self.setup.plan.process_data.iter().filter(|area| area.op_only) {
             self.write_sync_manager(area.sync_manager, &area.register).await?;
@@ -238,8 +232,8 @@ impl BringUp<'_> {
             self.map().await?;
             self.join();
         }
-        let cycles = self.fleet.board.cycles() + CYCLES_BEFORE_OP;
-        while self.fleet.board.cycles() < cycles {
+        let cycles = self.segment.board.cycles() + CYCLES_BEFORE_OP;
+        while self.segment.board.cycles() < cycles {
             self.bus.sleep(CYCLE_PAUSE).await;
         }
         self.request(AlState::SafeOp, AlState::Op).await

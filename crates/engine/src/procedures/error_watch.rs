@@ -10,9 +10,11 @@ use core::time::Duration;
 use ringcat_wire::address::StationAddress;
 use ringcat_wire::register::{ErrorCounters, map};
 
-use super::fleet::{Phase, SharedFleet};
+use super::shared_segment::SharedSegment;
 use crate::event::Event;
 use crate::ring_status::{Cable, CableErrors, port_errors};
+use crate::segment::Observation;
+use crate::segment::member::Phase;
 use crate::supervisor::{Bus, BusError};
 use crate::time::Instant;
 use crate::topology::PortOf;
@@ -27,49 +29,46 @@ const AGAIN: Duration = Duration::from_secs(10);
 const FULL: u8 = 128;
 
 /// Runs for ever.
-pub(super) async fn watch_errors(bus: Bus, fleet: SharedFleet) {
-    let count = fleet.access().members.len();
+pub(crate) async fn watch_errors(bus: Bus, segment: SharedSegment) {
+    let count = segment.view().members.len();
     let mut last = vec![None; count];
-    let mut recablings = fleet.access().recablings;
-    let mut watched = watch_all(&fleet);
+    let mut asked = segment.view().asked();
+    let mut watched = watch_all(&segment);
     let mut at_node = by_node(&watched);
     // Others look once a second, too: not all at once.
     bus.sleep(PAUSE / 2).await;
     loop {
         bus.sleep(PAUSE).await;
-        for (index, counters) in bus.gather_in_turns(present(&fleet), read).await.into_iter().flatten() {
-            if fleet.access().recablings != recablings {
-                recablings = fleet.access().recablings;
-                watched = watch_all(&fleet);
+        for (index, counters) in bus.gather_in_turns(present(&segment), read).await.into_iter().flatten() {
+            if segment.view().asked().cabling != asked.cabling {
+                asked = segment.view().asked();
+                watched = watch_all(&segment);
                 at_node = by_node(&watched);
             }
             let before = last[index].replace(counters);
-            fleet.access().statistics.heard(index, &counters);
-            let Some(node) = fleet.access().members.get(index).and_then(|member| member.node) else { continue };
+            segment.statistics.heard(index, &counters);
+            let Some(node) = segment.view().members.get(index).and_then(|member| member.node) else { continue };
             for at in at_node.get(node).into_iter().flatten() {
                 watched[*at].take(node, before.as_ref(), &counters);
             }
-            if is_full(&counters) && clear(&bus, &fleet, index).await.is_ok() {
+            if is_full(&counters) && clear(&bus, &segment, index).await.is_ok() {
                 last[index] = Some(ErrorCounters::default());
             }
         }
         // Where it was cabled anew just now, the next look begins anew.
-        if fleet.access().recablings != recablings {
+        if segment.view().asked().cabling != asked.cabling {
             continue;
         }
         let now = bus.now();
-        for (at, watched) in watched.iter_mut().enumerate() {
-            let (fresh, event) = watched.close(now);
-            if let Some((_, total)) = fleet.access().cables.get_mut(at) {
-                *total = total.plus(fresh);
-            }
-            event.into_iter().for_each(|event| bus.report(event));
-        }
+        let (fresh, events): (Vec<CableErrors>, Vec<Option<Event>>) =
+            watched.iter_mut().map(|watched| watched.close(now)).unzip();
+        segment.observe(Observation::CableErrors { asked, fresh: &fresh });
+        events.into_iter().flatten().for_each(|event| bus.report(event));
     }
 }
 
-fn watch_all(fleet: &SharedFleet) -> Vec<Watched> {
-    fleet.access().cables.iter().map(|(cable, _)| Watched::new(*cable)).collect()
+fn watch_all(segment: &SharedSegment) -> Vec<Watched> {
+    segment.view().cabling.cables.iter().map(|(cable, _)| Watched::new(*cable)).collect()
 }
 
 /// Cables at each SubDevice, by its position.
@@ -87,8 +86,8 @@ fn by_node(watched: &[Watched]) -> Vec<Vec<usize>> {
 }
 
 /// Members that answer, by index.
-fn present(fleet: &SharedFleet) -> Vec<(usize, StationAddress)> {
-    let access = fleet.access();
+fn present(segment: &SharedSegment) -> Vec<(usize, StationAddress)> {
+    let access = segment.view();
     let members = access.members.iter().enumerate().filter(|(_, member)| member.phase != Phase::Absent);
     members.map(|(index, member)| (index, member.station)).collect()
 }
@@ -102,11 +101,11 @@ fn is_full(counters: &ErrorCounters) -> bool {
     counters.rx.iter().map(|rx| rx.invalid_frames).chain(counters.lost_link).any(|count| count >= FULL)
 }
 
-async fn clear(bus: &Bus, fleet: &SharedFleet, index: usize) -> Result<(), BusError> {
-    let Some(station) = fleet.access().members.get(index).map(|member| member.station) else { return Ok(()) };
+async fn clear(bus: &Bus, segment: &SharedSegment, index: usize) -> Result<(), BusError> {
+    let Some(station) = segment.view().members.get(index).map(|member| member.station) else { return Ok(()) };
     bus.fpwr(station, map::RX_ERROR_COUNTER, &[0]).await?;
     bus.fpwr(station, map::LOST_LINK_COUNTER, &[0]).await?;
-    fleet.access().statistics.cleared(index);
+    segment.statistics.cleared(index);
     Ok(())
 }
 

@@ -10,7 +10,7 @@ use core::time::Duration;
 use ringcat_wire::address::Wkc;
 use ringcat_wire::register::map;
 
-use super::fleet::SharedFleet;
+use super::shared_segment::SharedSegment;
 use crate::event::Event;
 use crate::ring::FrameLimit;
 use crate::supervisor::{Bus, BusError};
@@ -76,14 +76,14 @@ async fn attempt(bus: &Bus, datagrams: usize) -> Outcome {
 
 /// In operation: has the limit told, once, where there is one. Long frames delay a cycle, so it is tried now and then only,
 /// whatever else disturbs the segment.
-pub(super) async fn explain(bus: &Bus, fleet: &SharedFleet) {
-    if bus.now() < fleet.next_frame_trial() {
+pub(super) async fn explain(bus: &Bus, segment: &SharedSegment) {
+    if bus.now() < segment.next_frame_trial() {
         return;
     }
     // At once: the procedure that asks may end before it is answered.
-    fleet.set_next_frame_trial(bus.now() + PAUSE);
+    segment.set_next_frame_trial(bus.now() + PAUSE);
     if let Some(limit) = probe(bus).await {
-        fleet.set_next_frame_trial(Instant::NEVER);
+        segment.set_next_frame_trial(Instant::NEVER);
         bus.report(Event::FrameLimit { limit });
     }
 }

@@ -8,49 +8,20 @@ use alloc::vec;
 use alloc::vec::Vec;
 use core::time::Duration;
 
-use ringcat_wire::address::{LogicalAddress, RegisterAddress, StationAddress, Wkc};
+use ringcat_wire::address::{RegisterAddress, StationAddress, Wkc};
 use ringcat_wire::command::Command;
-use ringcat_wire::datagram::{MAX_DATA, Target};
-use ringcat_wire::register::{Fmmu, SyncManager, SyncManagerStatus, map};
-use ringcat_wire::sii::FmmuUsage;
+use ringcat_wire::datagram::Target;
+use ringcat_wire::register::SyncManagerStatus;
 
-use super::fleet::SharedFleet;
-use crate::info::SubDeviceInfo;
+use super::shared_segment::SharedSegment;
 use crate::mail::Mailbox;
-use crate::plan::SubDevicePlan;
+use crate::segment::setup::mail_status::BITS_AT;
 use crate::supervisor::Bus;
 
 /// Shortest pause between two rounds.
 const PAUSE: Duration = Duration::from_millis(5);
 /// Time on the wire that one question may take on average; with its overhead one takes about 3 us.
 const TIME_EACH: Duration = Duration::from_micros(60);
-/// Where the bits lie: beyond all process data, which ends at 2 GiB.
-const BITS_AT: LogicalAddress = LogicalAddress(0xF000_0000);
-/// Bit of the status register that says "full".
-const FULL_BIT: u8 = 3;
-
-/// The FMMU that shows whether there is mail, with its number: the one that the SII names, or the first one behind those
-/// of process data. `None` where the SII names none, or where bits cannot be mapped.
-pub(super) fn fmmu(index: usize, plan: &SubDevicePlan, info: &SubDeviceInfo) -> Option<(u8, Fmmu)> {
-    let named = info.fmmu_usages.iter().position(|usage| *usage == FmmuUsage::MailboxStatus)?;
-    let mapped = plan.mapped_areas().count();
-    let number = u8::try_from(named.max(mapped)).ok().filter(|number| *number < info.controller.fmmu_count)?;
-    let byte = u32::try_from(index / 8).ok().filter(|byte| *byte < MAX_DATA as u32)?;
-    let send = plan.mailbox.last().filter(|_| !info.controller.features.fmmu_byte_oriented)?;
-    let bit = (index % 8) as u8;
-    let register = Fmmu {
-        logical_start: LogicalAddress(BITS_AT.0 + byte),
-        length: 1,
-        logical_start_bit: bit,
-        logical_stop_bit: bit,
-        physical_start: map::sync_manager(send.index).offset(SyncManager::STATUS).0,
-        physical_start_bit: FULL_BIT,
-        read: true,
-        active: true,
-        ..Fmmu::default()
-    };
-    Some((number, register))
-}
 
 /// A mailbox that may be used.
 struct Open {
@@ -63,12 +34,12 @@ struct Open {
 }
 
 /// Runs for ever.
-pub(crate) async fn watch_mail(bus: Bus, fleet: SharedFleet) {
+pub(crate) async fn watch_mail(bus: Bus, segment: SharedSegment) {
     let mut alone = 0;
     loop {
         bus.sleep(PAUSE.max(TIME_EACH.saturating_mul(alone))).await;
         let (mapped, mut others): (Vec<Open>, Vec<Open>) =
-            open_mailboxes(&fleet).into_iter().partition(|open| open.mapped);
+            open_mailboxes(&segment).into_iter().partition(|open| open.mapped);
         for open in &mapped {
             if bus.has_stray_mail(open.station) {
                 open.mailbox.is_full();
@@ -83,14 +54,14 @@ pub(crate) async fn watch_mail(bus: Bus, fleet: SharedFleet) {
     }
 }
 
-fn open_mailboxes(fleet: &SharedFleet) -> Vec<Open> {
-    let access = fleet.access();
-    let members = access.members.iter().enumerate();
+fn open_mailboxes(segment: &SharedSegment) -> Vec<Open> {
+    let view = segment.view();
+    let members = view.members.iter().zip(segment.mailboxes()).enumerate();
     members
-        .filter_map(|(index, member)| {
+        .filter_map(|(index, (member, mailbox))| {
             let mapped = member.setup.as_ref().is_some_and(|setup| setup.mail_fmmu.is_some());
-            let (station, status) = member.mailbox.send_status()?;
-            Some(Open { index, station, status, mailbox: member.mailbox.clone(), mapped })
+            let (station, status) = mailbox.send_status()?;
+            Some(Open { index, station, status, mailbox: mailbox.clone(), mapped })
         })
         .collect()
 }
@@ -109,7 +80,7 @@ async fn look_together(bus: &Bus, mapped: &[Open]) -> bool {
     reply.wkc() == expected
 }
 
-/// One that does not answer is the matter of whoever supervises.
+/// One that does not answer is the matter of the supervision.
 async fn look(bus: Bus, open: Open) {
     if bus.has_stray_mail(open.station) {
         open.mailbox.is_full();

@@ -27,9 +27,10 @@ use self::catalogue::Object;
 use self::detection::Detection;
 use self::rates::Rates;
 use self::upload::{Upload, abort, begin, encode};
-use super::fleet::SharedFleet;
 use super::services::statistics;
+use super::shared_segment::SharedSegment;
 use crate::mail::coe::SdoAddress;
+use crate::segment::Observation;
 use crate::supervisor::{AcyclicCounters, Bus};
 
 /// Bytes of a message to or from address 0, mailbox header included: a long list goes in segments.
@@ -43,7 +44,7 @@ const UPLOADS: usize = 64;
 pub(crate) struct Seen {
     pub bus: Bus,
     /// Once active.
-    pub fleet: Option<SharedFleet>,
+    pub segment: Option<SharedSegment>,
     /// Station addresses of the last scan, by position.
     pub scanned: Vec<StationAddress>,
     pub acyclic: AcyclicCounters,
@@ -51,7 +52,7 @@ pub(crate) struct Seen {
 
 impl Seen {
     fn declared(&self) -> usize {
-        self.fleet.as_ref().map_or(0, |fleet| fleet.access().members.len())
+        self.segment.as_ref().map_or(0, |segment| segment.view().members.len())
     }
 }
 
@@ -217,23 +218,18 @@ impl OwnObjects {
     /// Clears what 0xAnnn and 0xF120 count.
     async fn reset(&self, seen: &Seen) {
         self.shared.forgotten.set(rates::lost(seen));
-        let Some(fleet) = &seen.fleet else { return };
-        let (book, stations) = {
-            let mut access = fleet.access();
-            for member in &mut access.members {
-                member.incidents = Default::default();
-                member.mailbox.forget_protocol_error(0);
-            }
-            let wrong = (0..access.members.len()).map(|subdevice| fleet.board.wkc_errors(subdevice));
-            *self.shared.forgotten_wkc.borrow_mut() = wrong.collect();
-            let stations: Vec<_> = access.members.iter().map(|member| member.station).enumerate().collect();
-            (access.statistics.clone(), stations)
-        };
+        let Some(segment) = &seen.segment else { return };
+        segment.observe(Observation::IncidentsForgotten);
+        segment.mailboxes().iter().for_each(|mailbox| mailbox.forget_protocol_error(0));
+        let stations: Vec<_> = segment.view().members.iter().map(|member| member.station).enumerate().collect();
+        let wrong = stations.iter().map(|(subdevice, _)| segment.board.wkc_errors(*subdevice));
+        *self.shared.forgotten_wkc.borrow_mut() = wrong.collect();
+        let statistics = segment.statistics.clone();
         let clear = move |bus: Bus, (subdevice, station)| {
-            let book = book.clone();
+            let statistics = statistics.clone();
             async move {
                 // One that is not there counts nothing.
-                let _ = statistics::clear(&bus, &book, subdevice, station).await;
+                let _ = statistics::clear(&bus, &statistics, subdevice, station).await;
             }
         };
         seen.bus.gather_in_turns(stations, clear).await;

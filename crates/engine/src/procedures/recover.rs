@@ -1,69 +1,70 @@
 //! Bringing SubDevices back: from an error, from power-off, or for the first time. The others go on meanwhile.
 
 use alloc::string::ToString;
-use alloc::vec::Vec;
 use core::future::{Future, poll_fn};
 use core::pin::pin;
 use core::task::Poll;
 use core::time::Duration;
 
-use ringcat_wire::al::{AlState, AlStatus, AlStatusCode};
+use ringcat_wire::address::StationAddress;
+use ringcat_wire::al::AlState;
 
 use super::al_state;
-use super::configure::{BringUp, ConfigureError, RegisterFailure, Start, StartupError};
-use super::fleet::{Member, Phase, SharedFleet};
+use super::configure::{BringUp, ConfigureError, RegisterFailure, StartupError};
 use super::frame_limit;
-use super::request_state::read_again;
+use super::read_again::read_again;
+use super::shared_segment::SharedSegment;
 use super::sii;
-use super::strangers::{Mark, has_identity, mark, take_away};
+use super::unassigned::{Mark, has_identity, mark, take_away};
 use crate::event::Event;
 use crate::mail::MailboxError;
 use crate::mail::coe::SdoFailure;
 use crate::mail::eoe::EoeFailure;
 use crate::mail::soe::SoeFailure;
+use crate::segment::effect::{Check, Shown};
+use crate::segment::member::Member;
+use crate::segment::start::Start;
+use crate::segment::{Observation, ProcessDataStep};
 use crate::supervisor::{Bus, BusError};
 
 /// Pause before the first new attempt to configure a SubDevice; it doubles with every failure.
 const FIRST_PAUSE: Duration = Duration::from_millis(100);
 /// Longest pause between attempts.
 const LONGEST_PAUSE: Duration = Duration::from_secs(5);
-/// Looks at a SubDevice that did not answer once, before it is lost: at the edge of a cut a frame may have met nobody.
+/// Looks at a SubDevice that did not answer once, before it is lost: at the edge of a cut a frame may have been processed by none.
 const LOOKS: usize = 3;
 /// Pause between two of them, and before a configuration that the bus disturbed is tried again for the first time.
 const LOOK_PAUSE: Duration = Duration::from_millis(3);
 
-/// AL status and code that a SubDevice showed.
-pub(super) type Shown = (AlStatus, AlStatusCode);
-
 /// Brings a SubDevice to its target state, again and again until it works or it no longer answers. `told`: the error of its
 /// that was told and still stands.
-pub(super) async fn keep_up(bus: Bus, fleet: SharedFleet, index: usize, start: Start, told: Option<Shown>) {
+pub(super) async fn keep_up(
+    bus: &Bus,
+    segment: &SharedSegment,
+    (index, attempt): (usize, u32),
+    start: Start,
+    told: Option<Shown>,
+) {
     let (mut start, mut told) = (start, told);
     let mut pause = FIRST_PAUSE;
     let mut disturbed = false;
     loop {
-        let result = attempt(&bus, &fleet, index, start, &mut told).await;
+        let result = try_once(bus, segment, index, start, &mut told).await;
         // A short way that did not lead there is followed by the whole one, and that by the short one.
         start = if start == Start::Unknown { Start::Doubtful } else { Start::Unknown };
         match result {
-            Ok(state) => {
-                fleet.set_phase(index, Phase::Settled(state));
-                fleet.board.set_excused(index, !fleet.exchanges(index, state));
-                bus.report(Event::StateReached { subdevice: index, state });
-                return;
-            }
+            Ok(state) => return segment.observe(Observation::Reached { index, attempt, state }),
             Err(error) if is_of_bus(&error) => {
-                if !is_there(&bus, &fleet, index).await {
-                    // Whoever supervises finds out more.
-                    lose(&bus, &fleet, index);
-                    return;
+                if !is_there(bus, segment, index).await {
+                    // The supervision finds out more.
+                    return segment.observe(Observation::Unreachable { index, attempt });
                 }
                 // Once may be the edge of a cut, which is no matter of this SubDevice.
                 if !core::mem::replace(&mut disturbed, true) {
                     bus.sleep(LOOK_PAUSE).await;
                     continue;
                 }
-                frame_limit::explain(&bus, &fleet).await;
+                frame_limit::explain(bus, segment).await;
                 bus.report(failure(index, &error));
             }
             // Another try brings nothing new before its EEPROM is another one, which is read when it comes back.
@@ -103,8 +104,8 @@ pub(super) fn is_of_bus(error: &ConfigureError) -> bool {
 }
 
 /// Whether a SubDevice answers. While frames get lost nothing is known, and it counts as there.
-async fn is_there(bus: &Bus, fleet: &SharedFleet, index: usize) -> bool {
-    let Some(station) = fleet.access().members.get(index).map(|member| member.station) else { return false };
+async fn is_there(bus: &Bus, segment: &SharedSegment, index: usize) -> bool {
+    let Some(station) = segment.view().members.get(index).map(|member| member.station) else { return false };
     for _ in 0..LOOKS {
         match al_state::read_status(bus, station).await {
             Err(BusError::Wkc { .. }) => bus.sleep(LOOK_PAUSE).await,
@@ -112,23 +113,6 @@ async fn is_there(bus: &Bus, fleet: &SharedFleet, index: usize) -> bool {
         }
     }
     false
-}
-
-/// A SubDevice no longer answers. What was under way for it ends.
-pub(super) fn lose(bus: &Bus, fleet: &SharedFleet, index: usize) {
-    fleet.next_attempt(index);
-    if fleet.phase(index) != Phase::Absent {
-        fleet.set_phase(index, Phase::Absent);
-        fleet.count(index, |incidents| &mut incidents.absences);
-        bus.report(Event::Lost { subdevice: index });
-    }
-    fleet.board.set_taking_part(index, false);
-    fleet.board.set_unproven(index, false);
-    // One that was on its way to process data is missed from now on.
-    fleet.board.set_excused(index, !fleet.exchanges(index, fleet.target(index)));
-    if let Some(mailbox) = fleet.mailbox(index) {
-        mailbox.suspend();
-    }
 }
 
 pub(super) fn failure(index: usize, error: &ConfigureError) -> Event {
@@ -141,18 +125,22 @@ pub(super) fn failure(index: usize, error: &ConfigureError) -> Event {
 }
 
 /// The bring-up of a SubDevice to its present target.
-pub(super) fn bring_up<'a>(bus: &'a Bus, fleet: &'a SharedFleet, index: usize) -> Result<BringUp<'a>, ConfigureError> {
-    let access = fleet.access();
+pub(super) fn bring_up<'a>(
+    bus: &'a Bus,
+    segment: &'a SharedSegment,
+    index: usize,
+) -> Result<BringUp<'a>, ConfigureError> {
+    let access = segment.view();
     let member = access.members.get(index).ok_or(ConfigureError::NoSetup)?;
     Ok(BringUp {
         bus,
-        fleet,
+        segment,
         index,
         station: member.station,
         setup: member.setup.clone().ok_or_else(|| no_setup(member))?,
         config: member.config.clone(),
         target: member.target,
-        mailbox: member.mailbox.clone(),
+        mailbox: segment.mailbox(index).ok_or(ConfigureError::NoSetup)?,
     })
 }
 
@@ -161,14 +149,14 @@ pub(super) fn no_setup(member: &Member) -> ConfigureError {
     member.unfit.clone().map_or(ConfigureError::NoSetup, ConfigureError::Unfit)
 }
 
-async fn attempt(
+async fn try_once(
     bus: &Bus,
-    fleet: &SharedFleet,
+    segment: &SharedSegment,
     index: usize,
     start: Start,
     told: &mut Option<Shown>,
 ) -> Result<AlState, ConfigureError> {
-    let bring_up = bring_up(bus, fleet, index)?;
+    let bring_up = bring_up(bus, segment, index)?;
     let quickly = start == Start::Unknown && quick(&bring_up, told).await?;
     // The whole way begins with an acknowledgement: what it shows behind that is new.
     let result = if quickly { Ok(()) } else { bring_up.run(start).await.inspect_err(|_| *told = None) };
@@ -186,18 +174,21 @@ async fn attempt(
 /// A SubDevice that only fell from OP to SAFEOP still has its configuration: acknowledged, it may go back to OP. Its error is
 /// told, unless it is the one that was.
 async fn quick(bring_up: &BringUp<'_>, told: &mut Option<Shown>) -> Result<bool, ConfigureError> {
-    let BringUp { bus, fleet, index, station, setup, target, mailbox, .. } = bring_up;
+    let BringUp { bus, segment, index, station, setup, target, mailbox, .. } = bring_up;
     let (status, code) = al_state::read_status(bus, *station).await?;
     if !status.error && status.al_state() == Some(*target) {
-        if fleet.exchanges(*index, *target) {
+        if segment.view().members[*index].exchanges(*target) {
             bring_up.join();
         } else {
-            fleet.board.set_taking_part(*index, false);
+            segment.observe(Observation::ProcessData { index: *index, step: ProcessDataStep::Off });
         }
         mailbox.resume();
         return Ok(true);
     }
-    if status.al_state() != Some(AlState::SafeOp) || *target != AlState::Op || !fleet.is_configured(*index) {
+    if status.al_state() != Some(AlState::SafeOp)
+        || *target != AlState::Op
+        || !segment.view().members[*index].configured
+    {
         return Ok(false);
     }
     bring_up.join();
@@ -213,108 +204,86 @@ async fn quick(bring_up: &BringUp<'_>, told: &mut Option<Shown>) -> Result<bool,
     Ok(true)
 }
 
-/// Starts the configuration of a SubDevice that answers. `told`: its error that was told.
-pub(super) fn start(bus: &Bus, fleet: &SharedFleet, index: usize, from: Start, told: Option<Shown>) {
-    fleet.set_phase(index, Phase::Configuring);
-    let attempt = fleet.next_attempt(index);
-    let (own_bus, own_fleet) = (bus.clone(), fleet.clone());
-    bus.spawn(async move {
-        let procedure = keep_up(own_bus.clone(), own_fleet.clone(), index, from, told);
-        while_current(&own_fleet, index, attempt, procedure).await;
-    });
+/// Brings a member to its target state while the attempt is the current one. First it is checked whether it is that member;
+/// from another one the address is taken away.
+pub(super) async fn bring_up_member(
+    bus: Bus,
+    segment: SharedSegment,
+    (index, attempt): (usize, u32),
+    from: Start,
+    told: Option<Shown>,
+    check: Check,
+) {
+    let procedure = async {
+        if check == Check::None {
+            return keep_up(&bus, &segment, (index, attempt), from, told).await;
+        }
+        if !is_the_member(&bus, &segment, (index, attempt), check).await {
+            return;
+        }
+        if segment.view().members[index].unfit.is_some() {
+            read_again(&bus, &segment, index).await;
+        }
+        keep_up(&bus, &segment, (index, attempt), from, told).await;
+    };
+    while_current(&segment, index, attempt, procedure).await;
 }
 
-/// A lost SubDevice's station address answers again: it comes back, if it is the same one.
-pub(super) fn welcome(bus: &Bus, fleet: &SharedFleet, index: usize) {
-    fleet.set_phase(index, Phase::Configuring);
-    let attempt = fleet.next_attempt(index);
-    let (bus, fleet) = (bus.clone(), fleet.clone());
-    bus.clone().spawn(async move {
-        let checked = async {
-            match is_the_lost_one(&bus, &fleet, index).await {
-                Ok(true) => {
-                    bus.report(Event::Returned { subdevice: index });
-                    return bring_back(&bus, &fleet, index, Start::Unknown).await;
-                }
-                // It is looked at like others without an address of ours, and told by its place then.
-                Ok(false) => turn_away(&bus, &fleet, index).await,
-                Err(_) => {}
+/// Whether what has the station address of a member is that member.
+async fn is_the_member(bus: &Bus, segment: &SharedSegment, (index, attempt): (usize, u32), check: Check) -> bool {
+    let station = segment.view().members[index].station;
+    let is = match check {
+        Check::None => Ok(true),
+        Check::Identity => Ok(has_identity(bus, segment, index, station).await),
+        Check::Return => is_the_lost_one(bus, segment, index, station).await,
+    };
+    match (is, check) {
+        (Ok(true), Check::Return) => segment.observe(Observation::Returned { index, attempt }),
+        (Ok(true), Check::Identity | Check::None) => {}
+        (not, check) => {
+            if not.is_ok() {
+                // Where that fails, the next look finds the address again.
+                let _ = take_away(bus, segment, station).await;
             }
-            fleet.set_phase(index, Phase::Absent);
-            fleet.note_news();
-        };
-        while_current(&fleet, index, attempt, checked).await;
-    });
-}
-
-/// Starts the configuration of what answers at a member's station address, if it is that member; otherwise takes the address
-/// away.
-pub(super) fn start_if_same(bus: &Bus, fleet: &SharedFleet, index: usize, from: Start) {
-    fleet.set_phase(index, Phase::Configuring);
-    let attempt = fleet.next_attempt(index);
-    let (bus, fleet) = (bus.clone(), fleet.clone());
-    bus.clone().spawn(async move {
-        let checked = async {
-            let station = fleet.access().members[index].station;
-            if has_identity(&bus, &fleet, index, station).await {
-                return bring_back(&bus, &fleet, index, from).await;
-            }
-            turn_away(&bus, &fleet, index).await;
-            lose(&bus, &fleet, index);
-        };
-        while_current(&fleet, index, attempt, checked).await;
-    });
-}
-
-async fn bring_back(bus: &Bus, fleet: &SharedFleet, index: usize, from: Start) {
-    if fleet.access().members[index].unfit.is_some() {
-        read_again(bus, fleet, index).await;
+            // One that was lost is looked at like others without an address of ours, and told by its place then.
+            segment.observe(match check {
+                Check::Return => Observation::NotReturned { index, attempt },
+                Check::Identity | Check::None => Observation::Unreachable { index, attempt },
+            });
+            return false;
+        }
     }
-    keep_up(bus.clone(), fleet.clone(), index, from, None).await;
-}
-
-async fn turn_away(bus: &Bus, fleet: &SharedFleet, index: usize) {
-    let station = fleet.access().members[index].station;
-    // Where that fails, the next look finds the address again.
-    let _ = take_away(bus, fleet, station).await;
+    true
 }
 
 /// Whether what has the station address of a lost member is that member: it may be one that had this address in an
 /// earlier session, or was exchanged for one that ran elsewhere.
-async fn is_the_lost_one(bus: &Bus, fleet: &SharedFleet, index: usize) -> Result<bool, BusError> {
-    let station = fleet.access().members[index].station;
-    Ok(match mark(bus, fleet, index, station).await? {
+async fn is_the_lost_one(
+    bus: &Bus,
+    segment: &SharedSegment,
+    index: usize,
+    station: StationAddress,
+) -> Result<bool, BusError> {
+    Ok(match mark(bus, segment, index, station).await? {
         Mark::Borne => true,
         Mark::Missing | Mark::Unmapped => false,
-        Mark::None => has_identity(bus, fleet, index, station).await,
+        Mark::None => has_identity(bus, segment, index, station).await,
     })
 }
 
 /// Lets a procedure for a SubDevice run until another one begins or the SubDevice is lost.
 pub(super) async fn while_current(
-    fleet: &SharedFleet,
+    segment: &SharedSegment,
     index: usize,
     attempt: u32,
     procedure: impl Future<Output = ()>,
 ) {
     let mut procedure = pin!(procedure);
     poll_fn(|context| {
-        if fleet.attempt(index) != attempt {
+        if segment.view().members.get(index).is_none_or(|member| member.attempt != attempt) {
             return Poll::Ready(());
         }
         procedure.as_mut().poll(context)
     })
     .await;
-}
-
-/// Starts the configuration of all SubDevices that were found.
-pub(crate) fn start_all(bus: &Bus, fleet: &SharedFleet, from: Start) {
-    let found: Vec<usize> = {
-        let access = fleet.access();
-        let members = access.members.iter().enumerate();
-        members.filter(|(_, member)| member.is_there()).map(|(index, _)| index).collect()
-    };
-    for index in found {
-        start(bus, fleet, index, from, None);
-    }
 }

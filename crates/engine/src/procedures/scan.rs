@@ -26,7 +26,7 @@ use ringcat_wire::sii::SiiHeader;
 use self::count::Count;
 pub use self::error::ScanError;
 use super::al_state;
-use super::cabling::{Cabling, Known, cabling, is_swapped, stays_closed};
+use super::cabling::{Known, cabling, stays_closed};
 use super::dictionary::{ReadPdos, complete};
 use super::frame_limit::probe;
 use super::junction::learn;
@@ -37,6 +37,7 @@ use crate::info::{InfoWarning, Readout, SiiProblem, SubDeviceInfo};
 use crate::junction::JunctionMode;
 use crate::link::LinkSet;
 use crate::ring::RingState;
+use crate::segment::{LineCheck, is_swapped};
 use crate::supervisor::{Bus, BusError, Reply};
 use crate::topology::{Closing, Finding, NodeStatus, PortOf, Topology, rings_shown};
 
@@ -436,12 +437,12 @@ async fn locate_crossings(bus: &Bus, scan: &mut Scan) -> bool {
     if !stays_closed(bus).await {
         return false;
     }
-    let Some(found) = cabling(bus, scan, true, &Cabling::default()).await.map(|seen| seen.crossings) else {
+    let Some(found) = cabling(bus, scan, true, &LineCheck::default()).await.map(|seen| seen.crossings) else {
         return false;
     };
     let node = |station: StationAddress| scan.subdevices.iter().position(|info| info.station == station);
     let exact = found.iter().filter_map(|crossing| {
-        Some(Finding::CrossedLine { node: node(crossing.who?.0)?, entry_port: crossing.entry_port? })
+        Some(Finding::CrossedLine { node: node(crossing.subdevice?.0)?, entry_port: crossing.entry_port? })
     });
     let mut exact: Vec<Finding> = exact.collect();
     if exact.len() < found.len() {

@@ -11,8 +11,8 @@ use core::time::Duration;
 use ringcat_wire::address::{RegisterAddress, StationAddress};
 use ringcat_wire::mailbox::soe::{Idn, SoeElements};
 
-use super::fleet::SharedFleet;
 use super::services::registers;
+use super::shared_segment::SharedSegment;
 use crate::mail::coe::{self, SdoAddress, SdoError, SdoFailure};
 use crate::mail::soe::{self, SoeAddress, SoeError, SoeFailure};
 use crate::mail::voe::{self, Voe};
@@ -51,7 +51,7 @@ impl Requests {
 }
 
 /// Runs for ever.
-pub(crate) async fn serve_requests(bus: Bus, fleet: SharedFleet, requests: Requests) {
+pub(crate) async fn serve_requests(bus: Bus, segment: SharedSegment, requests: Requests) {
     let cancelled = bus.signal();
     loop {
         bus.sleep(PAUSE).await;
@@ -59,9 +59,12 @@ pub(crate) async fn serve_requests(bus: Bus, fleet: SharedFleet, requests: Reque
             cancelled.notify();
         }
         for (served, order) in requests.asked() {
-            let member = fleet.access().members.get(order.subdevice).map(|m| (m.station, m.mailbox.clone()));
+            let station = segment.view().members.get(order.subdevice).map(|member| member.station);
+            let member = station.zip(segment.mailbox(order.subdevice));
             match member {
-                Some(target) => bus.spawn(serve(bus.clone(), fleet.clone(), served, order, target, cancelled.clone())),
+                Some(target) => {
+                    bus.spawn(serve(bus.clone(), segment.clone(), served, order, target, cancelled.clone()))
+                }
                 None => served.fail(RequestFailure::Failed),
             }
         }
@@ -73,14 +76,14 @@ type Done = (Option<Vec<u8>>, Option<Subject>);
 
 async fn serve(
     bus: Bus,
-    fleet: SharedFleet,
+    segment: SharedSegment,
     served: Served,
     order: Order,
     target: (StationAddress, Mailbox),
     cancelled: Signal,
 ) {
     let result = {
-        let mut work = pin!(bus.within(order.timeout, execute(&bus, &fleet, &order, target)));
+        let mut work = pin!(bus.within(order.timeout, execute(&bus, &segment, &order, target)));
         let mut cancel = pin!(cancelled.until(|| served.is_cancelled().then_some(())));
         poll_fn(|context| {
             if cancel.as_mut().poll(context).is_ready() {
@@ -98,7 +101,7 @@ async fn serve(
 
 async fn execute(
     bus: &Bus,
-    fleet: &SharedFleet,
+    segment: &SharedSegment,
     order: &Order,
     target: (StationAddress, Mailbox),
 ) -> Result<Done, RequestFailure> {
@@ -110,7 +113,7 @@ async fn execute(
             object(&mailbox, SdoAddress { index, sub_index, complete_access }, order, limits).await?
         }
         Subject::Register { address, length } => {
-            register(bus, fleet, station, RegisterAddress(address), length, order).await?
+            register(bus, segment, station, RegisterAddress(address), length, order).await?
         }
         Subject::Idn { drive, idn, elements } => {
             let address = SoeAddress { drive, idn: Idn(idn), elements: SoeElements(elements) };
@@ -136,14 +139,14 @@ async fn object(
 
 async fn register(
     bus: &Bus,
-    fleet: &SharedFleet,
+    segment: &SharedSegment,
     station: StationAddress,
     address: RegisterAddress,
     length: u16,
     order: &Order,
 ) -> Result<Option<Vec<u8>>, RequestFailure> {
     let result = match &order.access {
-        Access::Write(data) => registers::write(bus, Some(fleet), station, address, data).await.map(|()| None),
+        Access::Write(data) => registers::write(bus, Some(segment), station, address, data).await.map(|()| None),
         Access::Read | Access::ReadDirectly => registers::read(bus, station, address, length.into()).await.map(Some),
     };
     result.map_err(|_| RequestFailure::Failed)

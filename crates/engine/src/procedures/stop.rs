@@ -14,7 +14,7 @@ use ringcat_wire::al::{AlControl, AlState, AlStatus, AlStatusCode};
 use ringcat_wire::register::map;
 
 use super::al_state::{ask, read_status};
-use super::fleet::Fleet;
+use crate::segment::Segment;
 use crate::supervisor::{Bus, BusError};
 use crate::time::Instant;
 
@@ -86,9 +86,9 @@ impl From<BusError> for StopError {
 pub(crate) type Led = (Option<usize>, StationAddress);
 
 /// All SubDevices with a known address, declared ones first.
-pub(crate) fn all_known(fleet: &Fleet) -> Vec<Led> {
-    let members = fleet.members.iter().enumerate().map(|(index, member)| (Some(index), member.station));
-    members.chain(fleet.strangers.iter().map(|stranger| (None, stranger.station))).collect()
+pub(crate) fn all_known(segment: &Segment) -> Vec<Led> {
+    let members = segment.members.iter().enumerate().map(|(index, member)| (Some(index), member.station));
+    members.chain(segment.unassigned.iter().map(|it| (None, it.station))).collect()
 }
 
 /// Takes SubDevices to a state that lies below the one they are in. Those that are in a lower one stay there, and so do those

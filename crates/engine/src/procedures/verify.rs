@@ -14,10 +14,9 @@ use core::time::Duration;
 use ringcat_wire::address::StationAddress;
 
 use self::held::{Held, registers};
-use super::configure::Start;
-use super::fleet::{Phase, SharedFleet};
-use super::recover::start_if_same;
-use crate::event::Event;
+use super::shared_segment::SharedSegment;
+use crate::segment::Observation;
+use crate::segment::member::Phase;
 use crate::supervisor::Bus;
 
 /// Pause between two looks: up to three datagrams per SubDevice and second.
@@ -50,11 +49,11 @@ struct Remedy {
 }
 
 /// Runs for ever.
-pub(crate) async fn verify(bus: Bus, fleet: SharedFleet) {
-    let mut remedies = alloc::vec![Remedy::default(); fleet.access().members.len()];
+pub(crate) async fn verify(bus: Bus, segment: SharedSegment) {
+    let mut remedies = alloc::vec![Remedy::default(); segment.view().members.len()];
     loop {
         bus.sleep(PAUSE).await;
-        let all = bus.gather_in_turns(settled(&fleet), look).await;
+        let all = bus.gather_in_turns(settled(&segment), look).await;
         let mut wrong = Vec::new();
         for found in all.into_iter().flatten() {
             match found {
@@ -69,9 +68,10 @@ pub(crate) async fn verify(bus: Bus, fleet: SharedFleet) {
                 if remedy.reason != reason {
                     *remedy = Remedy { reason: reason.clone(), tries: 0 };
                 }
-                if remedy.tries < ATTEMPTS && fleet.attempt(suspect.index) == suspect.attempt {
+                let (index, attempt) = (suspect.index, suspect.attempt);
+                if remedy.tries < ATTEMPTS && segment.view().members[index].attempt == attempt {
                     remedy.tries += 1;
-                    configure_anew(&bus, &fleet, suspect.index, reason);
+                    segment.observe(Observation::Undone { index, attempt, reason });
                 }
             }
         }
@@ -79,8 +79,8 @@ pub(crate) async fn verify(bus: Bus, fleet: SharedFleet) {
 }
 
 /// Members that are where they should be, with what was written to them for that.
-fn settled(fleet: &SharedFleet) -> Vec<Suspect> {
-    let access = fleet.access();
+fn settled(segment: &SharedSegment) -> Vec<Suspect> {
+    let access = segment.view();
     let members = access.members.iter().enumerate();
     members
         .filter_map(|(index, member)| {
@@ -107,10 +107,4 @@ async fn look(bus: Bus, suspect: Suspect) -> Option<Found> {
         Some(reason) => Found::Wrong(suspect, reason),
         None => Found::Right(suspect.index),
     })
-}
-
-fn configure_anew(bus: &Bus, fleet: &SharedFleet, index: usize, reason: String) {
-    bus.report(Event::ConfigurationFailed { subdevice: index, reason });
-    // Another SubDevice may answer at its address: one that was out of reach since an earlier session.
-    start_if_same(bus, fleet, index, Start::Doubtful);
 }

@@ -8,12 +8,12 @@ use ringcat_wire::register::{SyncManager, map};
 
 use super::al_state;
 use super::configure::ConfigureError;
-use super::fleet::SetupError;
 use super::sii;
 use crate::config::{SubDeviceConfig, Timeouts};
 use crate::info::SubDeviceInfo;
 use crate::mail::Mailbox;
 use crate::plan::plan;
+use crate::segment::setup::SetupError;
 use crate::supervisor::Bus;
 
 /// Brings a SubDevice to a state with a mailbox, PREOP or BOOT, and opens the mailbox; or to INIT, and closes it.

@@ -11,6 +11,7 @@ use super::counters::AcyclicCounters;
 use super::flights::Flights;
 use super::link_order::LinkOrder;
 use super::outbox::{Outbox, Rank};
+use super::posted::Watchers;
 use super::reply::BusError;
 use super::round_trip::RoundTrip;
 use super::silence::Silence;
@@ -45,6 +46,7 @@ pub(crate) struct Shared {
     /// The first datagram of the outbox where it was too long for the send window, and since when.
     pub(crate) blocked: Option<(TransferId, Instant)>,
     pub(crate) link_order: LinkOrder,
+    pub(super) watchers: Watchers,
     /// Datagrams that a frame may hold.
     pub(crate) max_datagrams: usize,
     pub(crate) current: TaskId,
@@ -74,6 +76,7 @@ impl Shared {
             main_count: 0,
             blocked: None,
             link_order: LinkOrder::default(),
+            watchers: Watchers::default(),
             max_datagrams: usize::MAX,
             current: TaskId(0),
             spawned: VecDeque::new(),
@@ -110,7 +113,7 @@ impl Shared {
     }
 
     pub(crate) fn next_deadline(&self) -> Option<Instant> {
-        if !self.ready.is_empty() || !self.spawned.is_empty() {
+        if !self.ready.is_empty() || !self.spawned.is_empty() || self.is_posted() {
             return Some(self.now);
         }
         let timer = self.timers.peek().map(|Reverse((at, _))| *at);

@@ -30,17 +30,21 @@ impl Signal {
         }
     }
 
+    /// A procedure is to be woken by the next [`Signal::notify`].
+    pub(super) fn register(&self, task: TaskId) {
+        let mut waiting = self.waiting.borrow_mut();
+        if !waiting.contains(&task) {
+            waiting.push(task);
+        }
+    }
+
     /// Waits until `ready` gives something; it is asked now and after each [`Signal::notify`].
     pub async fn until<T>(&self, mut ready: impl FnMut() -> Option<T>) -> T {
         poll_fn(|_| {
             if let Some(value) = ready() {
                 return Poll::Ready(value);
             }
-            let current = self.shared.borrow().current;
-            let mut waiting = self.waiting.borrow_mut();
-            if !waiting.contains(&current) {
-                waiting.push(current);
-            }
+            self.register(self.shared.borrow().current);
             Poll::Pending
         })
         .await

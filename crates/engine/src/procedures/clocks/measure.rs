@@ -16,13 +16,16 @@ use ringcat_wire::command::Command;
 use ringcat_wire::datagram::Target;
 use ringcat_wire::register::{DlControl, DlStatus, LoopControl, map};
 
-use super::{Clocks, SharedClocks, branches};
 use crate::clocks::wiring::{TREES, Wiring};
-use crate::clocks::{Delays, Disagreement, FRACTION, Latched, Measurements, Passage, Segment};
+use crate::clocks::{Delays, Disagreement, FRACTION, Latched, Measurements, Passage, Segment, branches};
 use crate::link::{Link, LinkSet};
 use crate::procedures::latch::{self as frames, Pauses};
-use crate::procedures::strangers::view;
+use crate::procedures::shared_clocks::{Clocks, Node, SharedClocks};
+use crate::procedures::shared_segment::SharedSegment;
+use crate::procedures::unassigned::view;
 use crate::ring::RingState;
+use crate::segment::Observation;
+use crate::segment::disturbance::Disturbance;
 use crate::supervisor::{Bus, BusError};
 use crate::topology::{Closing, NodeStatus, PortOf, Topology};
 
@@ -32,6 +35,8 @@ const LATCHED_LEN: usize = 32;
 const MOST_FAILURES: u32 = 16;
 /// Looks at a segment that changes meanwhile.
 const LOOKS: u32 = 3;
+/// So long other disturbances may keep rings from being opened.
+const LIMIT: Duration = Duration::from_secs(5);
 /// Until a ring that was opened must be closed again: loop settings end by themselves within a second.
 const CLOSING_LIMIT: Duration = Duration::from_millis(1_200);
 /// Pause between two looks for that.
@@ -77,17 +82,18 @@ pub(super) enum Opening {
 }
 
 /// Measures.
-pub(super) async fn measure(bus: &Bus, clocks: &SharedClocks, opening: Opening) -> Result<Measured, String> {
-    let mut survey = look(bus, clocks).await?;
+pub(super) async fn measure(bus: &Bus, segment: &SharedSegment, opening: Opening) -> Result<Measured, String> {
+    let clocks = &segment.clocks;
+    let mut survey = look(bus, segment).await?;
     let rings = survey.whole_rings();
     if opening != Opening::Nothing && !rings.is_empty() {
         survey.latched = None;
-        measure_open(bus, clocks, &survey, &rings, &[]).await?;
+        measure_open(bus, segment, &survey, &rings, &[]).await?;
     }
     let mut measured = take(bus, clocks, &survey).await?;
     if opening == Opening::Branches && !measured.delays.unknown.is_empty() {
         survey.latched = None;
-        measure_branches(bus, clocks, &survey, &rings).await;
+        measure_branches(bus, segment, &survey, &rings).await;
         measured = take(bus, clocks, &survey).await?;
     }
     // A ring of two links that was broken until now has a cable that was never measured, and one behind a junction that came
@@ -102,7 +108,7 @@ pub(super) async fn measure(bus: &Bus, clocks: &SharedClocks, opening: Opening) 
         return measured.exact();
     }
     let survey = Survey { latched: None, ..survey.clone() };
-    measure_open(bus, clocks, &survey, &rings, &[]).await?;
+    measure_open(bus, segment, &survey, &rings, &[]).await?;
     measured = take(bus, clocks, &survey).await?;
     clocks.access().in_vain = is_open(&measured).then_some(survey.wiring);
     measured.exact()
@@ -123,7 +129,7 @@ impl Measured {
 /// Opens rings and leaves branches out, measures what cables take, and takes that back.
 async fn measure_open(
     bus: &Bus,
-    clocks: &SharedClocks,
+    segment: &SharedSegment,
     survey: &Survey,
     rings: &[PortOf],
     branches: &[PortOf],
@@ -139,7 +145,9 @@ async fn measure_open(
     let text = |error: BusError| error.to_string();
     let before = controls(bus, &ports).await.map_err(text)?;
     let closed = before.iter().map(|(station, control)| (*station, closed(*control, *station, &ports)));
-    clocks.access().is_measuring = true;
+    if !segment.disturb(Disturbance::OpenByPort, LIMIT).await {
+        return Err("rings are kept from being opened: others are being looked into".to_string());
+    }
     let result = match write(bus, closed.collect()).await {
         Ok(()) => {
             let mut open = survey.clone();
@@ -148,7 +156,7 @@ async fn measure_open(
             open.is_whole = branches.is_empty();
             // The port at the end of a ring of two links is closed: what comes to it ends there.
             open.deaf = survey.is_closed.then_some(Link::Redundant);
-            take(bus, clocks, &open).await.map(drop)
+            take(bus, &segment.clocks, &open).await.map(drop)
         }
         Err(error) => Err(text(error)),
     };
@@ -157,20 +165,20 @@ async fn measure_open(
     if survey.is_closed {
         wait_for_ring(bus).await;
     }
-    clocks.access().is_measuring = false;
+    segment.undisturb();
     result
 }
 
 /// Measures what is behind forks without a clock, branch by branch. What cannot be is left open.
-async fn measure_branches(bus: &Bus, clocks: &SharedClocks, survey: &Survey, rings: &[PortOf]) {
+async fn measure_branches(bus: &Bus, segment: &SharedSegment, survey: &Survey, rings: &[PortOf]) {
     let has_clock: Vec<bool> = {
-        let clocks = clocks.access();
+        let clocks = segment.clocks.access();
         survey.stations.iter().map(|station| clocks.has_clock(*station)).collect()
     };
     let mut lines = survey.wiring.clone();
     lines.open(rings);
     for set in branches::sets(&lines, &has_clock) {
-        let _ = measure_open(bus, clocks, survey, rings, &set).await;
+        let _ = measure_open(bus, segment, survey, rings, &set).await;
     }
 }
 
@@ -209,9 +217,12 @@ impl Survey {
     }
 }
 
-async fn look(bus: &Bus, clocks: &SharedClocks) -> Result<Survey, String> {
+async fn look(bus: &Bus, segment: &SharedSegment) -> Result<Survey, String> {
     for _ in 0..LOOKS {
-        match look_once(bus, clocks).await {
+        let looked = look_once(bus, &segment.clocks).await;
+        // Ports that changed in between have told it to this look.
+        segment.observe(Observation::LookAgain);
+        match looked {
             Ok(Some(survey)) => return Ok(survey),
             Ok(None) => {}
             Err(error) => return Err(error.to_string()),
@@ -290,7 +301,7 @@ async fn take(bus: &Bus, clocks: &SharedClocks, survey: &Survey) -> Result<Measu
     let mut access = clocks.access();
     let access = &mut *access;
     let at = |station: StationAddress| survey.stations.iter().position(|at| *at == station);
-    let is_there = |node: &super::Node| at(node.station).is_some();
+    let is_there = |node: &Node| at(node.station).is_some();
     let reference = access.reference.filter(|index| is_there(&access.nodes[*index]));
     let reference = reference.or_else(|| access.elect(|_, node| is_there(node)));
     let on_clock = reference.and_then(|index| at(access.nodes[index].station)).unwrap_or(0);

@@ -8,9 +8,10 @@ use ringcat_wire::address::StationAddress;
 use ringcat_wire::register::map;
 
 use super::measure::{Measured, Opening, latch, measure};
-use super::{Clocks, Node, SharedClocks};
 use crate::clocks::{Latched, Unknown, round};
 use crate::link::Link;
+use crate::procedures::shared_clocks::{Clocks, Node, SharedClocks};
+use crate::procedures::shared_segment::SharedSegment;
 use crate::supervisor::{Bus, BusError};
 
 /// Reset value of DC_SPEED_COUNTER_START; writing it restarts the filters.
@@ -28,7 +29,8 @@ const STEADY_DEPTH: u8 = 15;
 const SAME_NS: i64 = 30;
 
 /// Measures all delays and writes delays and offsets.
-pub(super) async fn set_up(bus: &Bus, clocks: &SharedClocks, opening: Opening) -> Result<(), String> {
+pub(super) async fn set_up(bus: &Bus, segment: &SharedSegment, opening: Opening) -> Result<(), String> {
+    let clocks = &segment.clocks;
     let text = |error: BusError| error.to_string();
     let reference = {
         let mut clocks = clocks.access();
@@ -39,7 +41,7 @@ pub(super) async fn set_up(bus: &Bus, clocks: &SharedClocks, opening: Opening) -
     if reference.is_none() {
         return Err("no SubDevice has a clock".to_string());
     }
-    let measured = measure(bus, clocks, opening).await?;
+    let measured = measure(bus, segment, opening).await?;
     take_over(&mut clocks.access(), &measured);
     let stations = clocks.access().stations();
     let wanted = bus.now().0.wrapping_add(clocks.access().epoch);
@@ -53,8 +55,9 @@ pub(super) async fn set_up(bus: &Bus, clocks: &SharedClocks, opening: Opening) -
 
 /// Measures all delays anew. Where some on a link are not what they were, those of that link are written, after `hold`:
 /// nobody must be told a time meanwhile. Returns how many were written with another value, and the largest change.
-pub(super) async fn measure_again(bus: &Bus, clocks: &SharedClocks, hold: impl Fn()) -> Result<(usize, u32), String> {
-    let measured = measure(bus, clocks, Opening::Nothing).await?;
+pub(super) async fn measure_again(bus: &Bus, segment: &SharedSegment, hold: impl Fn()) -> Result<(usize, u32), String> {
+    let clocks = &segment.clocks;
+    let measured = measure(bus, segment, Opening::Nothing).await?;
     let before: Vec<Node> = clocks.access().nodes.clone();
     let changed: Vec<Link> = {
         let mut clocks = clocks.access();

@@ -8,10 +8,10 @@ use ringcat_wire::register::{DcSystemTimeDifference, map};
 
 use super::set_up::set_up_one;
 use super::watch::drift_phase;
-use super::{HiddenDelay, Node};
 use crate::clocks::{extend, first_pulse, start::whole_cycle};
 use crate::config::SyncSignals;
-use crate::procedures::fleet::SharedFleet;
+use crate::procedures::shared_clocks::{Clocks, HiddenDelay, Node};
+use crate::procedures::shared_segment::SharedSegment;
 use crate::supervisor::{Bus, BusError};
 
 /// From the look at the clock to the first pulse at the least (facts 7.3).
@@ -60,18 +60,18 @@ impl fmt::Display for NotLocked {
 }
 
 /// Sets up anew what a clock has lost with its power, or what one that came later has never had.
-pub(in crate::procedures) async fn restore(bus: &Bus, fleet: &SharedFleet, member: usize) -> Result<(), BusError> {
-    let Some(index) = index_of(fleet, member) else { return Ok(()) };
+pub(in crate::procedures) async fn restore(bus: &Bus, segment: &SharedSegment, member: usize) -> Result<(), BusError> {
+    let Some(index) = index_of(segment, member) else { return Ok(()) };
     // The first clock of a segment begins with the set-up of all, which takes in whoever is there by then.
     let until = bus.now() + MEASURING_LIMIT;
-    while !fleet.clocks.access().is_set_up {
+    while !segment.clocks.access().is_set_up {
         if bus.now() >= until {
             return Ok(());
         }
         bus.sleep(PAUSE).await;
     }
     let (station, expected, is_new) = {
-        let clocks = fleet.clocks.access();
+        let clocks = segment.clocks.access();
         let node = &clocks.nodes[index];
         (node.station, node.offset_ns, node.unit.is_none())
     };
@@ -80,7 +80,7 @@ pub(in crate::procedures) async fn restore(bus: &Bus, fleet: &SharedFleet, membe
         return Ok(());
     }
     {
-        let mut clocks = fleet.clocks.access();
+        let mut clocks = segment.clocks.access();
         let node = &mut clocks.nodes[index];
         (node.is_unset, node.latches_backwards, node.filter_depths) = (true, false, None);
         if clocks.reference == Some(index) {
@@ -90,21 +90,21 @@ pub(in crate::procedures) async fn restore(bus: &Bus, fleet: &SharedFleet, membe
     }
     // Its place is known when the segment has been measured with it.
     let until = bus.now() + MEASURING_LIMIT;
-    while fleet.clocks.access().is_doubtful.is_some() && bus.now() < until {
+    while segment.clocks.access().is_doubtful.is_some() && bus.now() < until {
         bus.sleep(PAUSE).await;
     }
-    set_up_one(bus, &fleet.clocks, index).await?;
-    bus.spawn(drift_phase(bus.clone(), fleet.clone()));
+    set_up_one(bus, &segment.clocks, index).await?;
+    bus.spawn(drift_phase(bus.clone(), segment.clone()));
     Ok(())
 }
 
 /// The clock of a member. One that was not there at the scan is added. `None` where those that are known could not be set up
 /// yet: whoever is among them is when they are.
-fn index_of(fleet: &SharedFleet, member: usize) -> Option<usize> {
-    let access = fleet.access();
+fn index_of(segment: &SharedSegment, member: usize) -> Option<usize> {
+    let access = segment.view();
     let declared = access.members.get(member)?;
     let info = declared.info.as_ref()?;
-    let mut clocks = fleet.clocks.access();
+    let mut clocks = segment.clocks.access();
     if !info.controller.features.dc {
         return None;
     }
@@ -118,7 +118,7 @@ fn index_of(fleet: &SharedFleet, member: usize) -> Option<usize> {
 /// Programs the SYNC unit and starts it. The clock must be about right by then.
 pub(in crate::procedures) async fn start_signals(
     bus: &Bus,
-    fleet: &SharedFleet,
+    segment: &SharedSegment,
     member: usize,
     station: StationAddress,
     signals: &SyncSignals,
@@ -126,7 +126,7 @@ pub(in crate::procedures) async fn start_signals(
 ) -> Result<(), SignalsError> {
     let [control, activation] = signals.assign_activate.to_le_bytes();
     bus.fpwr(station, map::DC_ACTIVATION, &[0]).await?;
-    wait_until_about_right(bus, fleet, member, limit).await.map_err(SignalsError::NotLocked)?;
+    wait_until_about_right(bus, segment, member, limit).await.map_err(SignalsError::NotLocked)?;
     bus.fpwr(station, map::DC_CYCLIC_UNIT_CONTROL, &[control]).await?;
     let sync1 = if activation & 0x04 != 0 { signals.sync1_register_ns() } else { 0 };
     let mut cycles = [0; 8];
@@ -134,7 +134,7 @@ pub(in crate::procedures) async fn start_signals(
     cycles[4..].copy_from_slice(&sync1.to_le_bytes());
     bus.fpwr(station, map::DC_SYNC0_CYCLE, &cycles).await?;
     let low = u32::from_le_bytes(bus.fprd_array(station, map::DC_SYSTEM_TIME).await?);
-    let near = bus.now().0.wrapping_add(fleet.clocks.access().epoch);
+    let near = bus.now().0.wrapping_add(segment.clocks.access().epoch);
     let earliest = extend(low, near).wrapping_add(AHEAD_NS);
     let cycle = whole_cycle(signals.sync0_cycle_ns, sync1);
     let start = first_pulse(earliest, cycle, signals.sync0_shift_ns.into());
@@ -157,32 +157,32 @@ impl From<BusError> for SignalsError {
 
 async fn wait_until_about_right(
     bus: &Bus,
-    fleet: &SharedFleet,
+    segment: &SharedSegment,
     member: usize,
     limit: Duration,
 ) -> Result<(), NotLocked> {
-    let is_right = |clocks: &super::Clocks| {
+    let is_right = |clocks: &Clocks| {
         let position = clocks.position_of(member);
         let node = position.and_then(|position| clocks.nodes.get(position));
         let difference = node.and_then(|node| node.difference_ns);
         let near = difference.is_some_and(|ns| ns.unsigned_abs() <= GOOD_ENOUGH_NS);
         (clocks.is_set_up && (near || position == clocks.reference), difference, None, None)
     };
-    wait(bus, fleet, limit, GOOD_ENOUGH_NS, is_right).await
+    wait(bus, segment, limit, GOOD_ENOUGH_NS, is_right).await
 }
 
 /// Waits until all clocks are locked.
 pub(in crate::procedures) async fn wait_for_lock(
     bus: &Bus,
-    fleet: &SharedFleet,
+    segment: &SharedSegment,
     member: usize,
 ) -> Result<(), NotLocked> {
     let (limit, window, samples) = {
-        let clocks = fleet.clocks.access();
+        let clocks = segment.clocks.access();
         let Some(config) = &clocks.config else { return Ok(()) };
         (config.lock_limit, config.lock_window_ns, config.lock_samples)
     };
-    let is_locked = |clocks: &super::Clocks| {
+    let is_locked = |clocks: &Clocks| {
         let own = clocks.position_of(member);
         let open = |position: &usize| {
             let node = &clocks.nodes[*position];
@@ -196,19 +196,19 @@ pub(in crate::procedures) async fn wait_for_lock(
         let hidden = own.and_then(|index| clocks.hidden(index)).filter(|hidden| !hidden.is_estimated);
         (clocks.is_set_up && to_blame.is_none() && hidden.is_none(), difference, other, hidden)
     };
-    wait(bus, fleet, limit, window, is_locked).await
+    wait(bus, segment, limit, window, is_locked).await
 }
 
 async fn wait(
     bus: &Bus,
-    fleet: &SharedFleet,
+    segment: &SharedSegment,
     limit: Duration,
     window_ns: u32,
-    is_good: impl Fn(&super::Clocks) -> (bool, Option<i32>, Option<u16>, Option<HiddenDelay>),
+    is_good: impl Fn(&Clocks) -> (bool, Option<i32>, Option<u16>, Option<HiddenDelay>),
 ) -> Result<(), NotLocked> {
     let begin = bus.now();
     loop {
-        let (good, difference_ns, other, hidden) = is_good(&fleet.clocks.access());
+        let (good, difference_ns, other, hidden) = is_good(&segment.clocks.access());
         if good {
             return Ok(());
         }

@@ -18,7 +18,6 @@ use ringcat_wire::command::Command;
 use ringcat_wire::datagram::Target;
 use ringcat_wire::register::{DcSpeedCounterDifference, DcSpeedCounterStart, map};
 
-use super::HiddenDelay;
 use super::measure::Opening;
 use super::set_up::{measure_again, set_filters, set_up, write_delays};
 use super::signals::difference;
@@ -26,7 +25,8 @@ use crate::board::clocks::References;
 use crate::clocks::{SyncWindow, extend};
 use crate::event::Event;
 use crate::link::Link;
-use crate::procedures::fleet::SharedFleet;
+use crate::procedures::shared_clocks::HiddenDelay;
+use crate::procedures::shared_segment::SharedSegment;
 use crate::supervisor::{Bus, Reply};
 use crate::time::Instant;
 
@@ -57,70 +57,70 @@ const BURST_PAUSE: Duration = Duration::from_micros(100);
 const BURST_TIME: Duration = Duration::from_micros(640);
 
 /// The first try to set the clocks up, before anything else is asked of the SubDevices.
-pub(crate) async fn begin(bus: &Bus, fleet: &SharedFleet) {
-    try_set_up(bus, fleet, Opening::Branches).await;
-    fleet.clocks.access().leaves_out = false;
+pub(crate) async fn begin(bus: &Bus, segment: &SharedSegment) {
+    try_set_up(bus, segment, Opening::Branches).await;
+    segment.clocks.access().leaves_out = false;
 }
 
-async fn try_set_up(bus: &Bus, fleet: &SharedFleet, opening: Opening) {
-    if let Err(reason) = set_up(bus, &fleet.clocks, opening).await {
+async fn try_set_up(bus: &Bus, segment: &SharedSegment, opening: Opening) {
+    if let Err(reason) = set_up(bus, segment, opening).await {
         // What has been told is not told again.
-        if fleet.clocks.access().trouble.replace(reason.clone()).as_ref() != Some(&reason) {
+        if segment.clocks.access().trouble.replace(reason.clone()).as_ref() != Some(&reason) {
             bus.report(Event::ClocksFailed { reason });
         }
         return;
     }
-    post(fleet);
-    tell_reference(bus, fleet);
-    tell_hidden(bus, fleet, &[]);
-    bus.spawn(drift_phase(bus.clone(), fleet.clone()));
+    post(segment);
+    tell_reference(bus, segment);
+    tell_hidden(bus, segment, &[]);
+    bus.spawn(drift_phase(bus.clone(), segment.clone()));
 }
 
 /// Runs for ever.
-pub(crate) async fn keep(bus: Bus, fleet: SharedFleet) {
+pub(crate) async fn keep(bus: Bus, segment: SharedSegment) {
     // The first clock may come with a group that joins.
-    while !fleet.clocks.access().nodes.iter().any(|node| node.has_clock) {
+    while !segment.clocks.access().nodes.iter().any(|node| node.has_clock) {
         bus.sleep(RETRY).await;
     }
     let mut pause = RETRY;
-    while !fleet.clocks.access().is_set_up {
-        pause = match wait_for_change(&bus, &fleet, pause).await {
+    while !segment.clocks.access().is_set_up {
+        pause = match wait_for_change(&bus, &segment, pause).await {
             Change::None => (2 * pause).min(LONGEST_RETRY),
             Change::FirstAnswer => RETRY,
             Change::Segment => {
-                fleet.clocks.access().trouble = None;
+                segment.clocks.access().trouble = None;
                 RETRY
             }
         };
-        try_set_up(&bus, &fleet, Opening::Rings).await;
+        try_set_up(&bus, &segment, Opening::Rings).await;
     }
     let mut next_look = Instant::default();
-    let mut seen = (fleet.board.ring().changes, answering(&fleet));
+    let mut seen = (segment.board.ring().changes, answering(&segment));
     let mut next_measurement = Instant::default();
     let mut explained_until = Instant::default();
-    fleet.board.clocks.guard_ports();
+    segment.board.clocks.guard_ports();
     loop {
         bus.sleep(PAUSE).await;
-        let now = (fleet.board.ring().changes, answering(&fleet));
+        let now = (segment.board.ring().changes, answering(&segment));
         let changed = now != seen;
         if now.0 != seen.0 {
             explained_until = bus.now() + EXPLAINED;
         }
         seen = now;
-        if changed || (fleet.board.clocks.is_held() && fleet.clocks.access().is_doubtful.is_none()) {
-            fleet.clocks.access().is_doubtful.get_or_insert(bus.now());
+        if changed || (segment.board.clocks.is_held() && segment.clocks.access().is_doubtful.is_none()) {
+            segment.clocks.access().is_doubtful.get_or_insert(bus.now());
             next_measurement = bus.now() + SETTLE;
         }
-        let is_locked = fleet.clocks.are_locked();
+        let is_locked = segment.clocks.are_locked();
         let is_explained = bus.now() < explained_until;
-        if changed || bus.now() >= next_look || (is_explained && fleet.board.clocks.is_held()) {
-            look(&bus, &fleet, is_explained).await;
-            let is_open = !is_locked || is_anybody_open(&fleet) || fleet.clocks.access().moving.is_some();
+        if changed || bus.now() >= next_look || (is_explained && segment.board.clocks.is_held()) {
+            look(&bus, &segment, is_explained).await;
+            let is_open = !is_locked || is_anybody_open(&segment) || segment.clocks.access().moving.is_some();
             next_look = if is_open { bus.now() } else { bus.now() + ROUTINE };
         }
-        let doubtful = fleet.clocks.access().is_doubtful;
+        let doubtful = segment.clocks.access().is_doubtful;
         if let Some(since) = doubtful.filter(|since| bus.now() >= next_measurement.max(*since + SETTLE)) {
-            measure_once(&bus, &fleet, since).await;
+            measure_once(&bus, &segment, since).await;
             next_measurement = bus.now() + AGAIN;
         }
     }
@@ -136,9 +136,9 @@ enum Change {
 }
 
 /// Waits, until the segment has changed and is at rest again at the longest.
-async fn wait_for_change(bus: &Bus, fleet: &SharedFleet, limit: Duration) -> Change {
-    fleet.board.clocks.guard_ports();
-    let state = || (fleet.board.ring().changes, fleet.board.clocks.holds(), answering(fleet));
+async fn wait_for_change(bus: &Bus, segment: &SharedSegment, limit: Duration) -> Change {
+    segment.board.clocks.guard_ports();
+    let state = || (segment.board.ring().changes, segment.board.clocks.holds(), answering(segment));
     let (until, mut seen) = (bus.now() + limit, state());
     let (mut change, mut changed_at) = (Change::None, bus.now());
     while bus.now() < until && (change == Change::None || bus.now() < changed_at + SETTLE) {
@@ -154,51 +154,51 @@ async fn wait_for_change(bus: &Bus, fleet: &SharedFleet, limit: Duration) -> Cha
 }
 
 /// Measures the segment after a change.
-async fn measure_once(bus: &Bus, fleet: &SharedFleet, since: Instant) {
-    let hold = || fleet.board.clocks.post_references(References::default());
-    let holds = fleet.board.clocks.holds();
-    let hidden = fleet.clocks.access().all_hidden();
-    match measure_again(bus, &fleet.clocks, hold).await {
+async fn measure_once(bus: &Bus, segment: &SharedSegment, since: Instant) {
+    let hold = || segment.board.clocks.post_references(References::default());
+    let holds = segment.board.clocks.holds();
+    let hidden = segment.clocks.access().all_hidden();
+    match measure_again(bus, segment, hold).await {
         Ok((0, _)) => {}
         Ok((clocks, largest_ns)) => bus.report(Event::DelaysChanged { clocks, largest_ns }),
         Err(_) if bus.now() < since + PATIENCE => return,
         Err(reason) => bus.report(Event::ClocksFailed { reason }),
     }
-    elect(bus, fleet);
-    tell_hidden(bus, fleet, &hidden);
-    fleet.clocks.access().is_doubtful = None;
-    post(fleet);
-    fleet.board.clocks.answer(holds);
-    set_filters(bus, &fleet.clocks).await;
+    elect(bus, segment);
+    tell_hidden(bus, segment, &hidden);
+    segment.clocks.access().is_doubtful = None;
+    post(segment);
+    segment.board.clocks.answer(holds);
+    set_filters(bus, &segment.clocks).await;
 }
 
 /// Whether a clock that is there is not locked, or not again.
-fn is_anybody_open(fleet: &SharedFleet) -> bool {
-    let clocks = fleet.clocks.access();
+fn is_anybody_open(segment: &SharedSegment) -> bool {
+    let clocks = segment.clocks.access();
     let samples = clocks.config.as_ref().map_or(0, |config| config.lock_samples);
     clocks.nodes.iter().any(|node| node.has_clock && node.link.is_some() && node.good < samples)
 }
 
 /// How many SubDevices answered on each link.
-fn answering(fleet: &SharedFleet) -> (u16, u16) {
-    fleet.board.supervision().map_or((0, 0), |(_, seen)| (seen.main.0, seen.redundant.0))
+fn answering(segment: &SharedSegment) -> (u16, u16) {
+    segment.board.supervision().map_or((0, 0), |(_, seen)| (seen.main.0, seen.redundant.0))
 }
 
 /// Hands the reference time out, many times. One of these runs at a time.
-pub(super) async fn drift_phase(bus: Bus, fleet: SharedFleet) {
+pub(super) async fn drift_phase(bus: Bus, segment: SharedSegment) {
     let count = {
-        let mut clocks = fleet.clocks.access();
+        let mut clocks = segment.clocks.access();
         if core::mem::replace(&mut clocks.is_drifting, true) {
             return;
         }
         clocks.config.as_ref().map_or(0, |config| config.drift_distributions)
     };
-    let followers = fleet.clocks.access().nodes.iter().filter(|node| node.has_clock).count() as u16;
+    let followers = segment.clocks.access().nodes.iter().filter(|node| node.has_clock).count() as u16;
     let (mut next, mut reading) = (bus.now(), None);
     for number in 0..count {
-        let (references, _) = fleet.board.clocks.references();
+        let (references, _) = segment.board.clocks.references();
         // With a ring that opens or closes right now, the wrong clocks would follow.
-        let is_certain = references == wanted(&fleet) && !fleet.board.clocks.is_held();
+        let is_certain = references == wanted(&segment) && !segment.board.clocks.is_held();
         let nobody = StationAddress(0);
         let stations = Link::ALL.map(|link| references.on(link).unwrap_or(nobody));
         if !is_certain || stations == [nobody; 2] {
@@ -206,7 +206,8 @@ pub(super) async fn drift_phase(bus: Bus, fleet: SharedFleet) {
             continue;
         }
         // A link without a reference has nobody who takes a time.
-        let time = reading.unwrap_or_else(|| (bus.now().0.wrapping_add(fleet.clocks.access().epoch) as u32, bus.now()));
+        let time =
+            reading.unwrap_or_else(|| (bus.now().0.wrapping_add(segment.clocks.access().epoch) as u32, bus.now()));
         reading = None;
         match bus.distribute_time(stations, map::DC_SYSTEM_TIME, time, Wkc(followers)).await {
             // Clocks in front of the reference are told what it showed last, and what has passed since: by how late this host
@@ -222,7 +223,7 @@ pub(super) async fn drift_phase(bus: Bus, fleet: SharedFleet) {
             bus.sleep_until(next.max(bus.now() + BURST_PAUSE)).await;
         }
     }
-    fleet.clocks.access().is_drifting = false;
+    segment.clocks.access().is_drifting = false;
 }
 
 /// What one clock said, and on which link.
@@ -235,10 +236,10 @@ struct Answer {
 }
 
 /// Reads all differences and draws conclusions.
-async fn look(bus: &Bus, fleet: &SharedFleet, is_explained: bool) {
-    let holds = fleet.board.clocks.holds();
+async fn look(bus: &Bus, segment: &SharedSegment, is_explained: bool) {
+    let holds = segment.board.clocks.holds();
     let stations: Vec<Option<StationAddress>> = {
-        let clocks = fleet.clocks.access();
+        let clocks = segment.clocks.access();
         clocks.nodes.iter().map(|node| node.has_clock.then_some(node.station)).collect()
     };
     let answers = bus.gather(stations, |bus, station| async move {
@@ -260,23 +261,23 @@ async fn look(bus: &Bus, fleet: &SharedFleet, is_explained: bool) {
         Some(Answer { link: Some(link), difference_ns: Some(difference([*a, *b, *c, *d])), deviation_ppb })
     });
     let mut answers: Vec<Option<Answer>> = answers.await;
-    look_in_front(bus, fleet, &mut answers).await;
+    look_in_front(bus, segment, &mut answers).await;
     // While nobody is told a time, differences are those of a frame that came another way.
-    if !fleet.board.clocks.is_held() {
-        judge(bus, fleet, &answers);
+    if !segment.board.clocks.is_held() {
+        judge(bus, segment, &answers);
     }
-    if follow_links(bus, fleet, &answers, is_explained).await {
-        fleet.board.clocks.answer(holds);
-        set_filters(bus, &fleet.clocks).await;
+    if follow_links(bus, segment, &answers, is_explained).await {
+        segment.board.clocks.answer(holds);
+        set_filters(bus, &segment.clocks).await;
     }
-    follow_reference(bus, fleet).await;
+    follow_reference(bus, segment).await;
 }
 
 /// Clocks that frames meet before the reference are told what the host believes, and what they show of that is by how late it
 /// sends. How they differ is seen in what they and the reference show to one and the same frame.
-async fn look_in_front(bus: &Bus, fleet: &SharedFleet, answers: &mut [Option<Answer>]) {
+async fn look_in_front(bus: &Bus, segment: &SharedSegment, answers: &mut [Option<Answer>]) {
     let groups: Vec<(usize, Vec<usize>)> = {
-        let clocks = fleet.clocks.access();
+        let clocks = segment.clocks.access();
         let group = |link| {
             let reference = clocks.reference_on(link)?;
             let in_front = |index: &usize| clocks.is_in_front(*index, reference);
@@ -284,11 +285,11 @@ async fn look_in_front(bus: &Bus, fleet: &SharedFleet, answers: &mut [Option<Ans
         };
         Link::ALL.into_iter().filter_map(group).filter(|(_, some)| !some.is_empty()).collect()
     };
-    fleet.board.clocks.post_in_front(!groups.is_empty());
+    segment.board.clocks.post_in_front(!groups.is_empty());
     for (reference, in_front) in groups {
         for some in in_front.chunks(IN_A_FRAME) {
             let stations: Vec<StationAddress> = {
-                let clocks = fleet.clocks.access();
+                let clocks = segment.clocks.access();
                 some.iter().chain([&reference]).map(|index| clocks.nodes[*index].station).collect()
             };
             let read = |station| (Command::Fprd, Target::Station(station, map::DC_SYSTEM_TIME), vec![0; 4]);
@@ -296,7 +297,7 @@ async fn look_in_front(bus: &Bus, fleet: &SharedFleet, answers: &mut [Option<Ans
             let Ok(replies) = replies else { continue };
             let Some((of_reference, others)) = replies.split_last() else { continue };
             let time = |reply: &Reply| reply.data.first_chunk().map_or(0, |bytes| u32::from_le_bytes(*bytes));
-            let clocks = &mut *fleet.clocks.access();
+            let clocks = &mut *segment.clocks.access();
             for (index, reply) in some.iter().zip(others) {
                 let Some(answer) = answers[*index].as_mut().filter(|answer| answer.link.is_some()) else { continue };
                 // Another frame was met at another time.
@@ -315,8 +316,8 @@ async fn look_in_front(bus: &Bus, fleet: &SharedFleet, answers: &mut [Option<Ans
 }
 
 /// Notes the differences; all locked is an event.
-fn judge(bus: &Bus, fleet: &SharedFleet, answers: &[Option<Answer>]) {
-    let clocks = &mut *fleet.clocks.access();
+fn judge(bus: &Bus, segment: &SharedSegment, answers: &[Option<Answer>]) {
+    let clocks = &mut *segment.clocks.access();
     let Some(config) = &clocks.config else { return };
     let references = Link::ALL.map(|link| clocks.reference_on(link));
     let (mut all, mut largest) = (clocks.reference.is_some(), 0);
@@ -342,7 +343,7 @@ fn judge(bus: &Bus, fleet: &SharedFleet, answers: &[Option<Answer>]) {
         largest = largest.max(magnitude);
     }
     // Where a reference is steered, the exchange does not see how far the others are from theirs.
-    let is_steered = references.iter().all(Option::is_some) || fleet.board.clocks.is_host_told();
+    let is_steered = references.iter().all(Option::is_some) || segment.board.clocks.is_host_told();
     let inside = largest <= config.sync_window_ns;
     if !clocks.is_locked || !(is_steered || clocks.window.is_outside()) {
         clocks.window.skip();
@@ -352,7 +353,7 @@ fn judge(bus: &Bus, fleet: &SharedFleet, answers: &[Option<Answer>]) {
     if all && !clocks.is_locked {
         clocks.is_locked = true;
         clocks.window = SyncWindow::inside();
-        fleet.board.clocks.watch_window();
+        segment.board.clocks.watch_window();
         bus.report(Event::ClocksLocked { largest_ns: largest });
         if is_steered {
             bus.report(Event::SyncWindow { inside: true, spread_ns: largest });
@@ -362,9 +363,9 @@ fn judge(bus: &Bus, fleet: &SharedFleet, answers: &[Option<Answer>]) {
 
 /// Follows SubDevices from link to link, and replaces a reference that is gone. Returns whether references were posted with
 /// which clocks may be told a time; `is_explained` is for changes of ports that come of a ring that opened or closed.
-async fn follow_links(bus: &Bus, fleet: &SharedFleet, answers: &[Option<Answer>], is_explained: bool) -> bool {
+async fn follow_links(bus: &Bus, segment: &SharedSegment, answers: &[Option<Answer>], is_explained: bool) -> bool {
     let moved = {
-        let mut clocks = fleet.clocks.access();
+        let mut clocks = segment.clocks.access();
         // Answers that came while a ring opened or closed are of both states: another look has to say the same.
         let links: Vec<Option<Option<Link>>> = answers.iter().map(|answer| answer.map(|answer| answer.link)).collect();
         let before = clocks.moving.take();
@@ -384,16 +385,16 @@ async fn follow_links(bus: &Bus, fleet: &SharedFleet, answers: &[Option<Answer>]
         }
         moved
     };
-    let elected = elect(bus, fleet);
-    let is_other = fleet.board.clocks.references().0 != wanted(fleet);
-    if fleet.clocks.access().is_doubtful.is_some() && !is_explained {
+    let elected = elect(bus, segment);
+    let is_other = segment.board.clocks.references().0 != wanted(segment);
+    if segment.clocks.access().is_doubtful.is_some() && !is_explained {
         return false;
     }
-    if !(moved || is_other || elected || fleet.board.clocks.is_held()) {
+    if !(moved || is_other || elected || segment.board.clocks.is_held()) {
         return false;
     }
     let changed: Vec<Link> = {
-        let mut clocks = fleet.clocks.access();
+        let mut clocks = segment.clocks.access();
         if Link::ALL.iter().any(|link| clocks.is_mixed(*link)) {
             // What is between them is not known before the segment has been measured.
             clocks.is_doubtful.get_or_insert(bus.now());
@@ -403,21 +404,21 @@ async fn follow_links(bus: &Bus, fleet: &SharedFleet, answers: &[Option<Answer>]
     };
     if !changed.is_empty() {
         // Nobody is told a time while delays count from different clocks.
-        fleet.board.clocks.post_references(References::default());
+        segment.board.clocks.post_references(References::default());
         for link in changed {
-            if let Err(error) = write_delays(bus, &fleet.clocks, link).await {
+            if let Err(error) = write_delays(bus, &segment.clocks, link).await {
                 bus.report(Event::ClocksFailed { reason: error.to_string() });
             }
         }
     }
-    post(fleet);
+    post(segment);
     true
 }
 
 /// Replaces a reference that is gone. Returns whether there is another one.
-fn elect(bus: &Bus, fleet: &SharedFleet) -> bool {
+fn elect(bus: &Bus, segment: &SharedSegment) -> bool {
     {
-        let mut clocks = fleet.clocks.access();
+        let mut clocks = segment.clocks.access();
         let before = clocks.reference;
         let is_there = |index: &usize| clocks.nodes[*index].link.is_some() && !clocks.nodes[*index].is_unset;
         if before.as_ref().is_none_or(|index| !is_there(index)) {
@@ -427,25 +428,25 @@ fn elect(bus: &Bus, fleet: &SharedFleet) -> bool {
             return false;
         }
     }
-    tell_reference(bus, fleet);
+    tell_reference(bus, segment);
     true
 }
 
-fn tell_reference(bus: &Bus, fleet: &SharedFleet) {
+fn tell_reference(bus: &Bus, segment: &SharedSegment) {
     let reference = {
-        let clocks = fleet.clocks.access();
+        let clocks = segment.clocks.access();
         clocks.reference.map(|index| (Position(clocks.nodes[index].position), clocks.nodes[index].station))
     };
     let event = Event::ReferenceClock { position: reference.map(|(position, _)| position) };
     match reference {
-        Some((_, station)) => bus.report_of(event, fleet.access().occupant(station)),
+        Some((_, station)) => bus.report_of(event, segment.view().occupant(station)),
         None => bus.report(event),
     }
 }
 
 /// Tells whose delay is not known, but for those that were told before.
-fn tell_hidden(bus: &Bus, fleet: &SharedFleet, before: &[Option<HiddenDelay>]) {
-    let now = fleet.clocks.access().all_hidden();
+fn tell_hidden(bus: &Bus, segment: &SharedSegment, before: &[Option<HiddenDelay>]) {
+    let now = segment.clocks.access().all_hidden();
     for (index, hidden) in now.into_iter().enumerate() {
         let told = before.get(index).copied().flatten();
         let Some(HiddenDelay { fork, range_ns, is_estimated }) = hidden.filter(|hidden| {
@@ -454,37 +455,37 @@ fn tell_hidden(bus: &Bus, fleet: &SharedFleet, before: &[Option<HiddenDelay>]) {
             continue;
         };
         let (position, station) = {
-            let clocks = fleet.clocks.access();
+            let clocks = segment.clocks.access();
             (Position(clocks.nodes[index].position), clocks.nodes[index].station)
         };
         let event = Event::DelayUnknown { position, fork, range_ns, is_estimated };
-        bus.report_of(event, fleet.access().occupant(station));
+        bus.report_of(event, segment.view().occupant(station));
     }
 }
 
 /// Whose time the copies are to distribute.
-fn wanted(fleet: &SharedFleet) -> References {
-    let clocks = fleet.clocks.access();
+fn wanted(segment: &SharedSegment) -> References {
+    let clocks = segment.clocks.access();
     let station = |link| clocks.reference_on(link).map(|position| clocks.nodes[position].station);
     let leads = clocks.reference.and_then(|position| clocks.nodes[position].link) == Some(Link::Redundant);
     References { main: station(Link::Main), redundant: station(Link::Redundant), redundant_leads: leads }
 }
 
-fn post(fleet: &SharedFleet) {
-    fleet.board.clocks.post_references(wanted(fleet));
+fn post(segment: &SharedSegment) {
+    segment.board.clocks.post_references(wanted(segment));
 }
 
 /// Keeps in mind what the reference clock shows at which host time.
-async fn follow_reference(bus: &Bus, fleet: &SharedFleet) {
+async fn follow_reference(bus: &Bus, segment: &SharedSegment) {
     let station = {
-        let clocks = fleet.clocks.access();
+        let clocks = segment.clocks.access();
         clocks.reference.map(|position| clocks.nodes[position].station)
     };
     let Some(station) = station else { return };
     let target = Target::Station(station, map::DC_SYSTEM_TIME);
     let Ok(reply) = bus.transfer(Command::Fprd, target, vec![0; 4], Some(Wkc(1))).await else { return };
     let (Some(bytes), Wkc(1)) = (reply.data.first_chunk(), reply.wkc()) else { return };
-    let mut clocks = fleet.clocks.access();
+    let mut clocks = segment.clocks.access();
     let near = reply.sent_at.0.wrapping_add(clocks.epoch);
     clocks.epoch = extend(u32::from_le_bytes(*bytes), near).wrapping_sub(reply.sent_at.0);
 }

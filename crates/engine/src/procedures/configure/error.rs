@@ -11,7 +11,7 @@ use crate::mail::eoe::EoeError;
 use crate::mail::soe::SoeError;
 use crate::procedures::al_state::StateError;
 use crate::procedures::clocks::{NotLocked, SignalsError};
-use crate::procedures::fleet::SetupError;
+use crate::segment::setup::SetupError;
 use crate::supervisor::BusError;
 
 /// Why a SubDevice is not configured.

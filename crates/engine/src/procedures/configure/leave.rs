@@ -3,16 +3,18 @@
 use ringcat_wire::al::AlState;
 use ringcat_wire::register::{Fmmu, SyncManager, map};
 
-use super::{BringUp, ConfigureError, Start};
+use super::{BringUp, ConfigureError};
 use crate::config::Transition;
 use crate::procedures::al_state;
+use crate::segment::ProcessDataStep;
+use crate::segment::start::Start;
 use crate::supervisor::BusError;
 
 impl BringUp<'_> {
     /// Goes to the target state. Where there is no short way it is the one through INIT.
     pub(in crate::procedures) async fn travel(&self) -> Result<(), ConfigureError> {
         let (status, _) = al_state::read_status(self.bus, self.station).await?;
-        let configured = self.fleet.is_configured(self.index);
+        let configured = self.segment.view().members[self.index].configured;
         let from = status.al_state().filter(|_| !status.error).unwrap_or(AlState::Init);
         match (from, self.target) {
             (AlState::PreOp, AlState::SafeOp | AlState::Op) if self.is_prepared() => self.up_from_preop().await,
@@ -47,8 +49,7 @@ impl BringUp<'_> {
 
     /// Process data ends for all of it at once, before the SubDevice ends it by halves. Mail goes on.
     pub(super) async fn part(&self) -> Result<(), BusError> {
-        self.fleet.board.set_taking_part(self.index, false);
-        self.fleet.board.set_unproven(self.index, false);
+        self.process_data(ProcessDataStep::Left);
         let mut fmmus = alloc::vec![0; self.setup.fmmu_registers().len()];
         for (number, register) in self.setup.fmmus.iter().filter(|(number, _)| Some(*number) == self.setup.mail_fmmu) {
             let at = Fmmu::LEN * usize::from(*number);
@@ -62,7 +63,7 @@ impl BringUp<'_> {
 
     async fn leave_safeop(&self) -> Result<(), ConfigureError> {
         self.command(Transition::Sp).await?;
-        self.fleet.set_configured(self.index, false);
+        self.set_configured(false);
         self.part().await?;
         self.request(AlState::SafeOp, AlState::PreOp).await?;
         for area in &self.setup.plan.process_data {

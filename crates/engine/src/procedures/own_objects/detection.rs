@@ -9,7 +9,7 @@ use ringcat_wire::address::StationAddress;
 use ringcat_wire::mailbox::sdo::AbortCode;
 
 use super::Seen;
-use crate::procedures::strangers::rescan::rescan;
+use crate::procedures::unassigned::rescan::rescan;
 
 /// The segment has to hold still within.
 const LIMIT: Duration = Duration::from_secs(5);
@@ -45,13 +45,13 @@ impl Detection {
 
     /// Begins; refused while it goes on, and before activation.
     pub(super) fn start(this: &Rc<Detection>, seen: &Seen) -> Result<(), AbortCode> {
-        let fleet = seen.fleet.clone().ok_or(AbortCode::CANNOT_BE_STORED_DEVICE_STATE)?;
+        let segment = seen.segment.clone().ok_or(AbortCode::CANNOT_BE_STORED_DEVICE_STATE)?;
         if this.status.replace(Status::Running) == Status::Running {
             return Err(AbortCode::CANNOT_BE_STORED_DEVICE_STATE);
         }
         let (bus, detection) = (seen.bus.clone(), this.clone());
         seen.bus.spawn(async move {
-            match rescan(&bus, &fleet, LIMIT).await {
+            match rescan(&bus, &segment, LIMIT).await {
                 Ok(rescan) => {
                     let stations = rescan.subdevices.iter().map(|found| found.station).collect();
                     *detection.found.borrow_mut() = Some(stations);

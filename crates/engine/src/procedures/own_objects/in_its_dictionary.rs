@@ -7,7 +7,7 @@ use ringcat_wire::sii::MailboxProtocols;
 
 use crate::mail::coe::{SdoAddress, SdoFailure, read};
 use crate::mail::{Limits, Mailbox};
-use crate::procedures::fleet::SharedFleet;
+use crate::procedures::shared_segment::SharedSegment;
 
 /// Other clients of address 0 wait meanwhile.
 const LIMITS: Limits = (Duration::from_millis(100), Duration::from_millis(300));
@@ -24,12 +24,11 @@ pub(super) struct Asked<W> {
 
 impl<W: Fn(u8) -> bool> Asked<W> {
     /// `wants` says whether a subindex is wanted; of others it is not asked.
-    pub fn of(fleet: &SharedFleet, index: usize, wants: W) -> Asked<W> {
-        let access = fleet.access();
-        let speaks = |protocols: MailboxProtocols| protocols.0 & MailboxProtocols::COE != 0;
-        let member = access.members.get(index);
-        let member = member.filter(|member| member.info.as_ref().is_some_and(|info| speaks(info.protocols)));
-        Asked { mailbox: member.map(|member| member.mailbox.clone()).filter(Mailbox::is_open), wants }
+    pub fn of(segment: &SharedSegment, index: usize, wants: W) -> Asked<W> {
+        let view = segment.view();
+        let info = view.members.get(index).and_then(|member| member.info.as_ref());
+        let speaks = info.is_some_and(|info| info.protocols.0 & MailboxProtocols::COE != 0);
+        Asked { mailbox: segment.mailbox(index).filter(|_| speaks).filter(Mailbox::is_open), wants }
     }
 
     /// What it answers; `None` also where it does not.

@@ -9,16 +9,16 @@ use ringcat_wire::mailbox::sdo::AbortCode;
 
 use super::values::Values;
 use crate::event::history::{Incident, MESSAGES};
-use crate::procedures::fleet::SharedFleet;
+use crate::procedures::shared_segment::SharedSegment;
 use crate::supervisor::Bus;
 
 /// Bytes of the two parameters of each message: a station address (UNSIGNED16), a code (UNSIGNED32).
 pub(super) const PARAMETERS: usize = 2 + 2 + 2 + 4;
 
 /// All entries; places without a message are empty.
-pub(super) fn read(bus: &Bus, fleet: Option<&SharedFleet>) -> Values {
+pub(super) fn read(bus: &Bus, segment: Option<&SharedSegment>) -> Values {
     let station = |subdevice: usize| {
-        let station = fleet.and_then(|fleet| fleet.access().members.get(subdevice).map(|member| member.station));
+        let station = segment.and_then(|segment| segment.view().members.get(subdevice).map(|member| member.station));
         station.unwrap_or_default()
     };
     bus.history(|history| {

@@ -38,12 +38,12 @@ impl Rates {
 
 /// Frames that were sent, cyclic and acyclic ones.
 pub(super) fn sent(seen: &Seen) -> [u64; 2] {
-    [seen.fleet.as_ref().map_or(0, |fleet| fleet.board.frames().sent), seen.acyclic.sent]
+    [seen.segment.as_ref().map_or(0, |segment| segment.board.frames().sent), seen.acyclic.sent]
 }
 
 /// Frames that were lost, cyclic and acyclic ones.
 pub(super) fn lost(seen: &Seen) -> [u64; 2] {
-    [seen.fleet.as_ref().map_or(0, |fleet| fleet.board.frames().lost), seen.acyclic.lost]
+    [seen.segment.as_ref().map_or(0, |segment| segment.board.frames().lost), seen.acyclic.lost]
 }
 
 #[cfg(test)]

@@ -11,8 +11,10 @@ use super::in_its_dictionary::Asked;
 use super::{Seen, Shared, messages, rates};
 use crate::config::groups;
 use crate::info::SubDeviceInfo;
-use crate::procedures::fleet::{Fleet, Member, Phase, SharedFleet};
 use crate::procedures::services::statistics;
+use crate::procedures::shared_segment::SharedSegment;
+use crate::segment::Segment;
+use crate::segment::member::{Member, Phase};
 use crate::supervisor::{Bus, BusError};
 use crate::topology::PortOf;
 
@@ -59,29 +61,30 @@ fn text(sub_index: u8, value: &[u8]) -> (u8, Vec<u8>) {
 /// All values of an object. Where only one entry is `wanted`, SubDevices are not asked by mailbox for others: these are
 /// zeros.
 pub(super) async fn read(seen: &Seen, shared: &Shared, object: Object, wanted: Option<u8>) -> Values {
-    match (object, &seen.fleet) {
+    match (object, &seen.segment) {
         (Object::DeviceType, _) => vec![u32_(0, DEVICE_TYPE)],
         (Object::Name, _) => vec![text(0, NAME)],
         (Object::HardwareVersion, _) => vec![text(0, HARDWARE_VERSION)],
         (Object::SoftwareVersion, _) => vec![text(0, SOFTWARE_VERSION)],
         // There is no vendor id of ours.
         (Object::Identity, _) => (1..=4).map(|sub_index| u32_(sub_index, 0)).collect(),
-        (Object::DiagnosisHistory, fleet) => messages::read(&seen.bus, fleet.as_ref()),
+        (Object::DiagnosisHistory, segment) => messages::read(&seen.bus, segment.as_ref()),
         (Object::ModularProfile, _) => vec![u16_(1, INDEX_DISTANCE), u16_(2, MAX_MODULES as u16)],
         (Object::DetectModules, _) => {
             let status = shared.detection.status() as u8;
             vec![u16_(1, 0), u8_(2, status), text(3, &[status, 0, 0, 0, 0, 0])]
         }
         (Object::DetectedAddresses(list), _) => addresses(list, &shared.detection.found(seen)),
-        (Object::ConfiguredAddresses(list), fleet) => {
-            let stations = |fleet: &SharedFleet| fleet.access().members.iter().map(|member| member.station).collect();
-            addresses(list, &fleet.as_ref().map_or(Vec::new(), stations))
+        (Object::ConfiguredAddresses(list), segment) => {
+            let stations =
+                |segment: &SharedSegment| segment.view().members.iter().map(|member| member.station).collect();
+            addresses(list, &segment.as_ref().map_or(Vec::new(), stations))
         }
         (Object::MainDeviceDiagnosis, _) => main_device(seen, shared),
         (Object::DiagnosisControl, _) => vec![u8_(16, 0)],
-        (Object::Configuration(index), Some(fleet)) => configuration(&seen.bus, fleet, index, wanted).await,
-        (Object::Information(index), Some(fleet)) => information(&seen.bus, fleet, index).await,
-        (Object::Diagnosis(index), Some(fleet)) => diagnosis(seen, shared, fleet, index, wanted).await,
+        (Object::Configuration(index), Some(segment)) => configuration(&seen.bus, segment, index, wanted).await,
+        (Object::Information(index), Some(segment)) => information(&seen.bus, segment, index).await,
+        (Object::Diagnosis(index), Some(segment)) => diagnosis(seen, shared, segment, index, wanted).await,
         (Object::Configuration(_) | Object::Information(_) | Object::Diagnosis(_), None) => Vec::new(),
     }
 }
@@ -94,7 +97,7 @@ fn addresses(list: usize, all: &[StationAddress]) -> Values {
 fn main_device(seen: &Seen, shared: &Shared) -> Values {
     let (lost, forgotten) = (rates::lost(seen), shared.forgotten.get());
     let rates = shared.rates.borrow_mut().take(seen.bus.now(), rates::sent(seen));
-    let state = seen.fleet.as_ref().map_or(0, |fleet| lowest_state(&fleet.access()));
+    let state = seen.segment.as_ref().map_or(0, |segment| lowest_state(&segment.view()));
     vec![
         counter(1, lost[0].saturating_sub(forgotten[0])),
         counter(2, lost[1].saturating_sub(forgotten[1])),
@@ -105,8 +108,8 @@ fn main_device(seen: &Seen, shared: &Shared) -> Values {
 }
 
 /// The lowest state of those that must be there; 0 while one of them is missing or on its way.
-fn lowest_state(fleet: &Fleet) -> u16 {
-    let mandatory = fleet.members.iter().filter(|member| !member.config.optional);
+fn lowest_state(segment: &Segment) -> u16 {
+    let mandatory = segment.members.iter().filter(|member| !member.config.optional);
     let code = |member: &Member| match member.phase {
         Phase::Settled(state) => u16::from(state.code()),
         Phase::Absent | Phase::Configuring => 0,
@@ -114,17 +117,17 @@ fn lowest_state(fleet: &Fleet) -> u16 {
     mandatory.map(code).min().unwrap_or(0)
 }
 
-async fn dl_status(bus: &Bus, fleet: &SharedFleet, index: usize) -> Option<[u8; DlStatus::LEN]> {
-    let station = fleet.access().members.get(index)?.station;
+async fn dl_status(bus: &Bus, segment: &SharedSegment, index: usize) -> Option<[u8; DlStatus::LEN]> {
+    let station = segment.view().members.get(index)?.station;
     bus.fprd_array(station, map::DL_STATUS).await.ok()
 }
 
-async fn configuration(bus: &Bus, fleet: &SharedFleet, index: usize, wanted: Option<u8>) -> Values {
-    let status = dl_status(bus, fleet, index).await.map(|bytes| DlStatus::decode(&bytes));
-    let asked = Asked::of(fleet, index, |sub_index| wanted.is_none_or(|wanted| wanted == sub_index));
+async fn configuration(bus: &Bus, segment: &SharedSegment, index: usize, wanted: Option<u8>) -> Values {
+    let status = dl_status(bus, segment, index).await.map(|bytes| DlStatus::decode(&bytes));
+    let asked = Asked::of(segment, index, |sub_index| wanted.is_none_or(|wanted| wanted == sub_index));
     let device_type = asked.device_type(4).await;
     let has_history = asked.has_history(40).await;
-    let access = fleet.access();
+    let access = segment.view();
     let Some(member) = access.members.get(index) else { return Vec::new() };
     let (expected, info) = (&member.config.expected, member.info.as_ref());
     let planned = member.setup.as_ref().and_then(|setup| setup.plan.mailbox_layout());
@@ -151,21 +154,22 @@ async fn configuration(bus: &Bus, fleet: &SharedFleet, index: usize, wanted: Opt
 }
 
 /// The ports that had something plugged in at the scan.
-fn preset_ports(fleet: &Fleet, member: &Member) -> [bool; 4] {
-    let Some((node, here)) = member.node.and_then(|node| Some((node, fleet.topology.nodes.get(node)?))) else {
+fn preset_ports(segment: &Segment, member: &Member) -> [bool; 4] {
+    let Some((node, here)) = member.node.and_then(|node| Some((node, segment.cabling.topology.nodes.get(node)?)))
+    else {
         return [false; 4];
     };
     [0, 1, 2, 3].map(|port: u8| {
         let is_end = |end: &Option<PortOf>| *end == Some(PortOf { node, port });
-        let closes = fleet.cables.iter().any(|(cable, _)| is_end(&cable.near) || is_end(&cable.far));
+        let closes = segment.cabling.cables.iter().any(|(cable, _)| is_end(&cable.near) || is_end(&cable.far));
         port == here.entry_port || here.children[usize::from(port)].is_some() || closes
     })
 }
 
-fn link_status(fleet: &Fleet, member: &Member, status: Option<DlStatus>) -> u8 {
+fn link_status(segment: &Segment, member: &Member, status: Option<DlStatus>) -> u8 {
     let Some(status) = status else { return NO_LINK };
     let mut bits = 0;
-    for (number, (port, preset)) in status.ports.iter().zip(preset_ports(fleet, member)).enumerate() {
+    for (number, (port, preset)) in status.ports.iter().zip(preset_ports(segment, member)).enumerate() {
         let finding = match (preset, port.link, port.communication) {
             (true, false, _) => MISSING_LINK,
             (false, true, _) => ADDITIONAL_LINK,
@@ -178,15 +182,16 @@ fn link_status(fleet: &Fleet, member: &Member, status: Option<DlStatus>) -> u8 {
 }
 
 /// Ports 1 to 3: communication, and above it the physical link.
-fn link_preset(fleet: &Fleet, member: &Member) -> u8 {
-    let ports = preset_ports(fleet, member);
+fn link_preset(segment: &Segment, member: &Member) -> u8 {
+    let ports = preset_ports(segment, member);
     (1..4).filter(|port| ports[*port]).map(|port| 0x11 << (port - 1)).sum()
 }
 
-fn flags(fleet: &Fleet, index: usize, member: &Member) -> u8 {
-    let ends_at_link = fleet.cables.iter().find(|(cable, _)| cable.far.is_none()).and_then(|(cable, _)| cable.near);
+fn flags(segment: &Segment, index: usize, member: &Member) -> u8 {
+    let ends_at_link =
+        segment.cabling.cables.iter().find(|(cable, _)| cable.far.is_none()).and_then(|(cable, _)| cable.near);
     let port = ends_at_link.filter(|end| Some(end.node) == member.node).map_or(0, |end| end.port & 3);
-    let groups = groups(fleet.members.iter().map(|member| &*member.config));
+    let groups = groups(segment.members.iter().map(|member| &*member.config));
     let head = groups.iter().any(|group| group.first() == Some(&index));
     let group = match (head, member.config.group.is_some()) {
         (true, _) => GROUP_HEAD,
@@ -196,9 +201,9 @@ fn flags(fleet: &Fleet, index: usize, member: &Member) -> u8 {
     port | group
 }
 
-async fn information(bus: &Bus, fleet: &SharedFleet, index: usize) -> Values {
-    let status = dl_status(bus, fleet, index).await.unwrap_or_default();
-    let access = fleet.access();
+async fn information(bus: &Bus, segment: &SharedSegment, index: usize) -> Values {
+    let status = dl_status(bus, segment, index).await.unwrap_or_default();
+    let access = segment.view();
     let Some(member) = access.members.get(index) else { return Vec::new() };
     let identity = member.info.as_ref().map(|info| info.identity).unwrap_or_default();
     vec![
@@ -228,20 +233,16 @@ async fn registers(bus: &Bus, station: StationAddress) -> Result<Registers, BusE
     Ok(Registers { al_control: al_control?, al_status: al_status?, dl_control: dl_control?, dl_status })
 }
 
-async fn diagnosis(seen: &Seen, shared: &Shared, fleet: &SharedFleet, index: usize, wanted: Option<u8>) -> Values {
+async fn diagnosis(seen: &Seen, shared: &Shared, segment: &SharedSegment, index: usize, wanted: Option<u8>) -> Values {
     let bus = &seen.bus;
-    let Some((station, book)) = ({
-        let access = fleet.access();
-        access.members.get(index).map(|member| (member.station, access.statistics.clone()))
-    }) else {
-        return Vec::new();
-    };
-    let (registers, counted) = bus.both(registers(bus, station), statistics::read(bus, &book, index, station)).await;
+    let Some(station) = segment.view().members.get(index).map(|member| member.station) else { return Vec::new() };
+    let kept = &segment.statistics;
+    let (registers, counted) = bus.both(registers(bus, station), statistics::read(bus, kept, index, station)).await;
     let registers = registers.unwrap_or_default();
-    let asked = Asked::of(fleet, index, |sub_index| wanted.is_none_or(|wanted| wanted == sub_index));
+    let asked = Asked::of(segment, index, |sub_index| wanted.is_none_or(|wanted| wanted == sub_index));
     let has_news = asked.has_news(19).await;
-    let counted = counted.ok().or_else(|| book.find(index)).unwrap_or_default();
-    let access = fleet.access();
+    let counted = counted.ok().or_else(|| kept.find(index)).unwrap_or_default();
+    let access = segment.view();
     let Some(member) = access.members.get(index) else { return Vec::new() };
     let [al_low, al_high, _, _, code_low, code_high] = registers.al_status;
     let ports = registers.dl_status.map(|status| status.ports).unwrap_or_default();
@@ -261,25 +262,25 @@ async fn diagnosis(seen: &Seen, shared: &Shared, fleet: &SharedFleet, index: usi
     values.extend((10..).zip(&counted.ports).map(|(sub_index, port)| counter(sub_index, port.invalid_frames)));
     let forgotten = shared.forgotten_wkc.borrow().get(index).copied().unwrap_or(0);
     values.extend([
-        u32_(14, fleet.board.wkc_errors(index).wrapping_sub(forgotten)),
+        u32_(14, segment.board.wkc_errors(index).wrapping_sub(forgotten)),
         u32_(15, member.incidents.absences),
         u32_(16, member.incidents.state_changes),
         u8_(17, u8::from(registers.dl_control[1] != 0)),
-        u32_(18, member.mailbox.last_protocol_error()),
+        u32_(18, segment.mailbox(index).map_or(0, |mailbox| mailbox.last_protocol_error())),
         u8_(19, u8::from(has_news)),
     ]);
     values
 }
 
 /// Who was at a port at the scan.
-fn neighbour(fleet: &Fleet, member: &Member, port: u8) -> Option<StationAddress> {
+fn neighbour(segment: &Segment, member: &Member, port: u8) -> Option<StationAddress> {
     let node = member.node?;
-    let here = fleet.topology.nodes.get(node)?;
+    let here = segment.cabling.topology.nodes.get(node)?;
     let other = match here.parent {
         Some((parent, _)) if port == here.entry_port => parent,
         _ => here.children[usize::from(port)]?,
     };
-    fleet.members.iter().find(|member| member.node == Some(other)).map(|member| member.station)
+    segment.members.iter().find(|member| member.node == Some(other)).map(|member| member.station)
 }
 
 #[cfg(test)]

@@ -1,5 +1,7 @@
 //! Ports of a SubDevice: opened and closed by DL control; SubDevices cut off from the others on purpose (facts 2.2).
 
+pub use crate::segment::BlockedPort;
+
 use alloc::vec::Vec;
 use core::time::Duration;
 
@@ -7,9 +9,10 @@ use ringcat_wire::address::{RegisterAddress, StationAddress};
 use ringcat_wire::register::{DlControl, LoopControl, map};
 
 use super::ServiceError;
-use crate::procedures::fleet::SharedFleet;
 use crate::procedures::junction::ordering;
+use crate::procedures::shared_segment::SharedSegment;
 use crate::ring::RingState;
+use crate::segment::Observation;
 use crate::supervisor::{Bus, BusError};
 
 /// The byte of DL_CONTROL that holds the loops of all ports.
@@ -19,15 +22,6 @@ const LOOPS: RegisterAddress = map::DL_CONTROL.offset(1);
 const TEMPORARY: Duration = Duration::from_millis(1_300);
 /// Pause between two looks for that.
 const PAUSE: Duration = Duration::from_millis(20);
-
-/// A port that was closed to cut a SubDevice off.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct BlockedPort {
-    /// Station address of the neighbour whose port it is.
-    pub station: StationAddress,
-    /// Port 0..3.
-    pub port: u8,
-}
 
 /// What a port does about its loop.
 pub async fn read(bus: &Bus, station: StationAddress, port: u8) -> Result<LoopControl, ServiceError> {
@@ -39,7 +33,7 @@ pub async fn read(bus: &Bus, station: StationAddress, port: u8) -> Result<LoopCo
 /// Opens or closes a port. Who is behind a port that is closed is gone for everybody.
 pub async fn set(
     bus: &Bus,
-    fleet: Option<&SharedFleet>,
+    segment: Option<&SharedSegment>,
     station: StationAddress,
     port: u8,
     control: LoopControl,
@@ -48,7 +42,7 @@ pub async fn set(
     let before = lasting_loops(bus, station).await?;
     let shift = 2 * port;
     let loops = before & !(3 << shift) | control.code() << shift;
-    let _order = ordering(fleet, station, LOOPS, &[loops]);
+    let _order = ordering(segment, station, LOOPS, &[loops]);
     bus.fpwr(station, LOOPS, &[loops]).await?;
     Ok(())
 }
@@ -73,33 +67,38 @@ const fn check(port: u8) -> Result<(), ServiceError> {
 
 /// Cuts a declared SubDevice off by closing the port of its neighbour before it. In a closed ring those behind it stay,
 /// for the port of the neighbour behind it is closed too; in a line they go with it.
-pub(crate) async fn block(bus: &Bus, fleet: &SharedFleet, subdevice: usize) -> Result<Vec<BlockedPort>, ServiceError> {
-    let ports = neighbours(bus, fleet, subdevice)?;
-    if let Err(error) = set_all(bus, fleet, &ports, LoopControl::Closed).await {
+pub(crate) async fn block(
+    bus: &Bus,
+    segment: &SharedSegment,
+    subdevice: usize,
+) -> Result<Vec<BlockedPort>, ServiceError> {
+    let ports = neighbours(bus, segment, subdevice)?;
+    if let Err(error) = set_all(bus, segment, &ports, LoopControl::Closed).await {
         // One end that is closed alone swallows the frames of the other side.
-        let _ = set_all(bus, fleet, &ports, LoopControl::Auto).await;
+        let _ = set_all(bus, segment, &ports, LoopControl::Auto).await;
         return Err(error);
     }
-    fleet.access().blocked.extend(&ports);
+    segment.observe(Observation::Blocked(&ports));
     Ok(ports)
 }
 
 /// Opens all ports that were closed to cut somebody off; returns how many there were. Where one cannot be reached now, all
 /// are kept for the next try.
-pub(crate) async fn open_blocked(bus: &Bus, fleet: &SharedFleet) -> Result<usize, ServiceError> {
-    let blocked = core::mem::take(&mut fleet.access().blocked);
-    let opened = set_all(bus, fleet, &blocked, LoopControl::Auto).await;
+pub(crate) async fn open_blocked(bus: &Bus, segment: &SharedSegment) -> Result<usize, ServiceError> {
+    let blocked = segment.view().blocked.clone();
+    segment.observe(Observation::Unblocking);
+    let opened = set_all(bus, segment, &blocked, LoopControl::Auto).await;
     if opened.is_err() {
-        fleet.access().blocked.extend(&blocked);
+        segment.observe(Observation::Blocked(&blocked));
     }
-    fleet.note_news();
+    segment.observe(Observation::LookAgain);
     opened.map(|()| blocked.len())
 }
 
 /// Sets ports of several SubDevices with one frame: a cable of which one end is closed swallows frames.
 async fn set_all(
     bus: &Bus,
-    fleet: &SharedFleet,
+    segment: &SharedSegment,
     ports: &[BlockedPort],
     control: LoopControl,
 ) -> Result<(), ServiceError> {
@@ -116,7 +115,7 @@ async fn set_all(
         }
         writes.push((station, loops));
     }
-    let order = |(station, loops): &(StationAddress, u8)| ordering(Some(fleet), *station, LOOPS, &[*loops]);
+    let order = |(station, loops): &(StationAddress, u8)| ordering(Some(segment), *station, LOOPS, &[*loops]);
     let _orders: Vec<_> = writes.iter().map(order).collect();
     let write = |bus: Bus, (station, loops)| async move { bus.fpwr(station, LOOPS, &[loops]).await };
     for written in bus.gather(writes, write).await {
@@ -126,18 +125,17 @@ async fn set_all(
 }
 
 /// The ports of its neighbours that lead to a SubDevice.
-fn neighbours(bus: &Bus, fleet: &SharedFleet, subdevice: usize) -> Result<Vec<BlockedPort>, ServiceError> {
-    let access = fleet.access();
+fn neighbours(bus: &Bus, segment: &SharedSegment, subdevice: usize) -> Result<Vec<BlockedPort>, ServiceError> {
+    let access = segment.view();
     let missing = ServiceError::NoSubDevice { subdevice };
     let node = access.members.get(subdevice).and_then(|member| member.node).ok_or(missing)?;
-    let here = access.topology.nodes.get(node).ok_or(missing)?;
-    let station = |node: usize| access.members.iter().find(|m| m.node == Some(node)).map(|member| member.station);
-    let port = |node: usize, port: u8| station(node).map(|station| BlockedPort { station, port });
+    let here = access.cabling.topology.nodes.get(node).ok_or(missing)?;
+    let port = |node: usize, port: u8| access.station_of(node).map(|station| BlockedPort { station, port });
     let parent = here.parent.and_then(|(parent, at)| port(parent, at)).ok_or(ServiceError::OnTheLink { subdevice })?;
     let mut ports = Vec::new();
     if bus.ring() == RingState::Closed && bus.links() == crate::link::LinkSet::Ring {
         let behind = here.children.iter().flatten();
-        ports.extend(behind.filter_map(|child| port(*child, access.topology.nodes.get(*child)?.entry_port)));
+        ports.extend(behind.filter_map(|child| port(*child, access.cabling.topology.nodes.get(*child)?.entry_port)));
     }
     ports.push(parent);
     Ok(ports)

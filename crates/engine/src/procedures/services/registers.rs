@@ -6,8 +6,8 @@ use ringcat_wire::address::{RegisterAddress, StationAddress};
 use ringcat_wire::datagram::MAX_DATA;
 
 use super::ServiceError;
-use crate::procedures::fleet::SharedFleet;
 use crate::procedures::junction::ordering;
+use crate::procedures::shared_segment::SharedSegment;
 use crate::supervisor::Bus;
 
 /// Bytes that a SubDevice has.
@@ -34,13 +34,13 @@ pub async fn read(
 /// that a register may be written twice.
 pub async fn write(
     bus: &Bus,
-    fleet: Option<&SharedFleet>,
+    segment: Option<&SharedSegment>,
     station: StationAddress,
     address: RegisterAddress,
     data: &[u8],
 ) -> Result<(), ServiceError> {
     check(address, data.len())?;
-    let _order = ordering(fleet, station, address, data);
+    let _order = ordering(segment, station, address, data);
     for (number, piece) in data.chunks(MAX_DATA).enumerate() {
         bus.fpwr(station, address.offset((number * MAX_DATA) as u16), piece).await?;
     }

@@ -10,7 +10,7 @@ use ringcat_wire::al::AlState;
 use ringcat_wire::register::{SyncManager, map};
 
 use crate::config::{RegisterAccess, StartupAction, SubDeviceConfig};
-use crate::procedures::fleet::Setup;
+use crate::segment::setup::Setup;
 
 /// Bits of a SyncManager's control byte that do not depend on the controller: buffer type and direction.
 const CONTROL_MASK: u8 = 0x0F;

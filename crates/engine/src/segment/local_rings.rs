@@ -1,32 +1,21 @@
 //! What becomes of local rings in operation: which of their cables are broken, seen in the DL status of the SubDevices
-//! at both ends (JR-09), and whether frames still come back at all (JR-02).
+//! at both ends (JR-09).
 
-use alloc::rc::Rc;
 use alloc::vec::Vec;
-use core::cell::Cell;
 use core::time::Duration;
 
-use super::super::fleet::{Fleet, SharedFleet};
-use super::look_inside::look_inside;
-use super::retrace::End;
 use ringcat_wire::address::StationAddress;
 
+use super::cabling::Cabling;
+use super::member::Member;
+use super::retrace::End;
 use crate::event::Event;
-use crate::link::{Link, LinkSet};
 use crate::ring_status::{Cable, CableErrors};
-use crate::supervisor::Bus;
 use crate::time::Instant;
 use crate::topology::{Closing, LocalRing, NodeStatus, PortOf, RingCable, Topology};
 
 /// A cable counts as whole again when it was so for this long: a plug that makes bad contact must not flood anybody.
 const STEADY: Duration = Duration::from_millis(50);
-/// Pause between two looks whether frames come back.
-const PAUSE: Duration = Duration::from_millis(5);
-/// Frames have not come back for so long: beyond what a break of a single cable can cost.
-const BLOCKED: Duration = Duration::from_millis(20);
-/// Cycles that must have been sent in that time; an application that stands still sends none.
-const BLOCKED_CYCLES: u64 = 3;
-
 /// A cable, and what is known about it.
 #[derive(Clone, Debug)]
 struct Watched {
@@ -39,53 +28,52 @@ struct Watched {
 
 /// Watches the cables of all local rings.
 #[derive(Debug)]
-pub(in super::super) struct JunctionWatch {
+pub(super) struct LocalRings {
     rings: Vec<Vec<Watched>>,
     closings: Vec<Closing>,
     main_count: usize,
     /// Who is at the places of the cabling, and the number of that cabling.
     places: Places,
-    recablings: u32,
+    version: u32,
     /// Cables that were not known and are: from where they come, and who is behind them.
     completed: Vec<(PortOf, usize)>,
-    /// How many cables are broken, for whoever else wants to know.
-    broken: Rc<Cell<usize>>,
+    /// How many cables are broken.
+    broken: usize,
 }
 
-impl JunctionWatch {
-    /// Watches the rings of a fleet.
-    pub fn new(fleet: &Fleet) -> JunctionWatch {
-        let declared = |node: usize| fleet.members.iter().position(|member| member.node == Some(node));
-        let places =
-            Places { stations: fleet.stations.clone(), declared: (0..fleet.stations.len()).map(declared).collect() };
-        JunctionWatch { recablings: fleet.recablings, ..JunctionWatch::over(&fleet.topology, places) }
+impl LocalRings {
+    /// Watches the rings of a cabling.
+    pub fn new(cabling: &Cabling, members: &[Member]) -> LocalRings {
+        let declared = |node: usize| members.iter().position(|member| member.node == Some(node));
+        let stations = cabling.stations.clone();
+        let places = Places { declared: (0..stations.len()).map(declared).collect(), stations };
+        LocalRings { version: cabling.version, ..LocalRings::over(&cabling.topology, places) }
     }
 
-    fn over(topology: &Topology, places: Places) -> JunctionWatch {
-        JunctionWatch {
+    fn over(topology: &Topology, places: Places) -> LocalRings {
+        LocalRings {
             rings: topology.local_rings.iter().map(watched).collect(),
             closings: topology.local_rings.iter().map(|ring| ring.closing).collect(),
             main_count: topology.main_count,
             places,
-            recablings: 0,
+            version: 0,
             completed: Vec::new(),
-            broken: Rc::default(),
+            broken: 0,
         }
     }
 
     /// Goes over to the cabling that a rescan has found since, if one has. `status` is by the positions of that.
-    pub fn follow(&mut self, fleet: &Fleet, status: &[Option<NodeStatus>]) {
-        if self.recablings != fleet.recablings {
-            self.go_over(JunctionWatch::new(fleet), status);
+    pub fn follow(&mut self, cabling: &Cabling, members: &[Member], status: &[Option<NodeStatus>]) {
+        if self.version != cabling.version {
+            self.go_over(LocalRings::new(cabling, members), status);
         }
     }
 
     /// A break that was told goes on to be that of one cable: one that is broken and has an end in common with the one of
     /// which it was told, or else is in the same ring, or else has that and is whole again. Where there is none, the cable
     /// is gone.
-    fn go_over(&mut self, new: JunctionWatch, status: &[Option<NodeStatus>]) {
-        let broken = self.broken.clone();
-        let before = core::mem::replace(self, JunctionWatch { broken, ..new });
+    fn go_over(&mut self, new: LocalRings, status: &[Option<NodeStatus>]) {
+        let before = core::mem::replace(self, new);
         let places = &self.places;
         let told = before.rings.iter().zip(&before.closings).flat_map(|(ring, closing)| {
             let head = before.places.end(closing.head);
@@ -113,24 +101,24 @@ impl JunctionWatch {
                 (watched.reported, watched.whole_since) = (true, told.whole_since);
             }
         }
-        self.broken.set(self.rings.iter().flatten().filter(|watched| watched.reported).count());
+        self.broken = self.rings.iter().flatten().filter(|watched| watched.reported).count();
     }
 
     /// Puts cables that have become known since into the cabling.
-    pub fn complete_cabling(&mut self, fleet: &mut Fleet) {
+    pub fn complete_cabling(&mut self, cabling: &mut Cabling) {
         for (near, node) in self.completed.drain(..) {
-            fleet.topology.hang_behind_break(near, node);
-            let known = fleet.topology.connection_to(node).map(|it| Cable { near: Some(it.near), far: Some(it.far) });
-            if let Some(cable) = known.filter(|known| fleet.cables.iter().all(|(cable, _)| cable != known)) {
+            cabling.topology.hang_behind_break(near, node);
+            let known = cabling.topology.connection_to(node).map(|it| Cable { near: Some(it.near), far: Some(it.far) });
+            if let Some(cable) = known.filter(|known| cabling.cables.iter().all(|(cable, _)| cable != known)) {
                 // Those that lead to SubDevices come first, in their order.
                 let closes = |it: &Cable| {
                     self.closings.iter().any(|closing| (it.near, it.far) == (Some(closing.tail), Some(closing.head)))
                 };
                 let is_behind = |it: &Cable| it.far.is_none_or(|far| far.node > node) || closes(it);
-                let at = fleet.cables.iter().position(|(it, _)| is_behind(it)).unwrap_or(fleet.cables.len());
-                fleet.cables.insert(at, (cable, CableErrors::default()));
+                let at = cabling.cables.iter().position(|(it, _)| is_behind(it)).unwrap_or(cabling.cables.len());
+                cabling.cables.insert(at, (cable, CableErrors::default()));
             }
-            fleet.recablings = fleet.recablings.wrapping_add(1);
+            cabling.version = cabling.version.wrapping_add(1);
         }
     }
 
@@ -140,8 +128,8 @@ impl JunctionWatch {
     }
 
     /// How many cables are known to be broken.
-    pub fn broken(&self) -> Rc<Cell<usize>> {
-        self.broken.clone()
+    pub fn broken(&self) -> usize {
+        self.broken
     }
 
     /// Takes in what SubDevices said about their ports, by position; reports each edge once. Returns when to look again
@@ -157,8 +145,8 @@ impl JunctionWatch {
             match (is_down(&watched.cable, status), watched.reported) {
                 (Some(true), false) => {
                     watched.reported = true;
-                    self.broken.set(self.broken.get() + 1);
-                    report(self.places.changed(&watched.cable, true, self.broken.get()));
+                    self.broken += 1;
+                    report(self.places.changed(&watched.cable, true, self.broken));
                 }
                 (Some(true), true) | (None, _) => watched.whole_since = None,
                 (Some(false), true) => {
@@ -168,8 +156,8 @@ impl JunctionWatch {
                         continue;
                     }
                     (watched.reported, watched.whole_since) = (false, None);
-                    self.broken.set(self.broken.get().saturating_sub(1));
-                    report(self.places.changed(&watched.cable, false, self.broken.get()));
+                    self.broken = self.broken.saturating_sub(1);
+                    report(self.places.changed(&watched.cable, false, self.broken));
                 }
                 (Some(false), false) => {}
             }
@@ -232,7 +220,7 @@ impl Places {
 }
 
 /// Whether a cable has no communication at one end; `None` where neither end says anything.
-pub(super) fn is_down(cable: &RingCable, status: &[Option<NodeStatus>]) -> Option<bool> {
+pub fn is_down(cable: &RingCable, status: &[Option<NodeStatus>]) -> Option<bool> {
     let end = |at: PortOf| {
         let status = status.get(at.node).copied().flatten()?;
         Some(!status.dl_status.ports[usize::from(at.port & 3)].communication)
@@ -241,51 +229,6 @@ pub(super) fn is_down(cable: &RingCable, status: &[Option<NodeStatus>]) -> Optio
         (None, None) => None,
         (near, far) => Some(near == Some(true) || far == Some(true)),
     }
-}
-
-/// Reports when no frame comes back while a local ring is open, or all of a sudden where there are two that may have
-/// broken at once, and looks into them then; and when frames come back again. Runs for ever.
-pub(in super::super) async fn watch_blocked(bus: Bus, fleet: SharedFleet, broken: Rc<Cell<usize>>) {
-    // A frame that has met nobody has not come back from them: in a closed ring of two links the other copies do.
-    let number = |fleet: &SharedFleet| {
-        let seen = fleet.board.supervision().filter(|(_, seen)| seen.total().0 > 0);
-        seen.map(|(number, _)| number)
-    };
-    let mut last = (number(&fleet), bus.now(), fleet.board.cycles());
-    let mut blocked = false;
-    loop {
-        bus.sleep(PAUSE).await;
-        let seen = number(&fleet).or(last.0);
-        if seen != last.0 {
-            last = (seen, bus.now(), fleet.board.cycles());
-            if core::mem::take(&mut blocked) {
-                bus.report(Event::JunctionsBlocked { blocked: false, breaks: broken.get() });
-                // Who is where has to be looked at anew.
-                fleet.note_news();
-            }
-            continue;
-        }
-        let sent = fleet.board.cycles().wrapping_sub(last.2);
-        let is_long = bus.now().since(last.1) >= BLOCKED && sent >= BLOCKED_CYCLES;
-        // Without a carrier it is the cable of the interface.
-        let several = fleet.access().topology.local_rings.len() > 1;
-        let at_once = several && Link::ALL.iter().all(|link| !has_no_carrier(&bus, *link));
-        if is_long && (broken.get() > 0 || at_once) && !blocked {
-            blocked = true;
-            bus.report(Event::JunctionsBlocked { blocked: true, breaks: broken.get() });
-            fleet.begin_to_look_inside();
-            let found = look_inside(&bus, &fleet).await;
-            // Frames that left before the last loop opened may still be on their way.
-            bus.sleep(PAUSE).await;
-            last = (number(&fleet).or(last.0), bus.now(), fleet.board.cycles());
-            fleet.end_to_look_inside(found);
-        }
-    }
-}
-
-/// Whether a link that there is has lost its carrier.
-fn has_no_carrier(bus: &Bus, link: Link) -> bool {
-    (link == Link::Main || bus.links() == LinkSet::Ring) && bus.carriers()[link.index()] == Some(false)
 }
 
 #[cfg(test)]
@@ -313,14 +256,14 @@ mod tests {
         open.into_iter().map(node).collect()
     }
 
-    fn watch(open: [&[u8]; 4]) -> JunctionWatch {
+    fn watch(open: [&[u8]; 4]) -> LocalRings {
         let closing = Closing { head: at(0, 1), tail: at(3, 1) };
         let stations = (0x1001..0x1005).map(StationAddress).collect();
         let places = Places { stations, declared: vec![Some(0), None, Some(7), Some(8)] };
-        JunctionWatch::over(&Topology::with_local_rings(&nodes(open), 4, &[closing]), places)
+        LocalRings::over(&Topology::with_local_rings(&nodes(open), 4, &[closing]), places)
     }
 
-    fn seen(watch: &mut JunctionWatch, ms: u64, open: [&[u8]; 4]) -> Vec<Event> {
+    fn seen(watch: &mut LocalRings, ms: u64, open: [&[u8]; 4]) -> Vec<Event> {
         let status: Vec<Option<NodeStatus>> = nodes(open).into_iter().map(Some).collect();
         let mut events = Vec::new();
         watch.observe(Instant(ms * 1_000_000), &status, |event| events.push(event));
@@ -372,7 +315,7 @@ mod tests {
         let mut events = vec![];
         watch.observe(Instant(0), &status, |event| events.push(event));
         assert_eq!(events, [event(Some(at(1, 1)), at(2, 0), true, 1), event(Some(at(2, 1)), at(3, 0), true, 2)]);
-        assert_eq!(watch.broken().get(), 2);
+        assert_eq!(watch.broken(), 2);
         watch.observe(Instant(1), &[None; 4], |event| panic!("{event:?}"));
     }
 }

@@ -1,4 +1,4 @@
-//! Which absent SubDevices the strangers between two known ones are.
+//! Which absent SubDevices the unassigned SubDevices between two known ones are.
 //!
 //! Both are in the order of the segment, and that order decides: of several alike the first on the main side is the
 //! first, the last on the redundant side the last, because a SubDevice can only answer through its neighbours. Serial
@@ -7,7 +7,7 @@
 use alloc::vec;
 use alloc::vec::Vec;
 
-/// How well a stranger fits an absent SubDevice.
+/// How well an unassigned SubDevice fits an absent SubDevice.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Fit {
     /// It is not that one.
@@ -33,31 +33,31 @@ impl Fit {
     }
 }
 
-/// The absent SubDevice that each stranger is, if any. `fit` tells of a stranger and an absent one how well they fit;
-/// `from_main` whether a stranger answers on the main link.
+/// The absent SubDevice that each unassigned SubDevice is, if any. `fit` tells of an unassigned and an absent one how well they fit;
+/// `from_main` whether an unassigned one answers on the main link.
 pub(super) fn assign(from_main: &[bool], absent: usize, fit: impl Fn(usize, usize) -> Fit) -> Vec<Option<usize>> {
     let mut assigned = vec![None; from_main.len()];
-    for (stranger, slot) in assigned.iter_mut().enumerate() {
-        *slot = (0..absent).find(|place| fit(stranger, *place) == Fit::Serial);
+    for (candidate, slot) in assigned.iter_mut().enumerate() {
+        *slot = (0..absent).find(|place| fit(candidate, *place) == Fit::Serial);
     }
-    let strangers: Vec<usize> = (0..assigned.len()).filter(|stranger| assigned[*stranger].is_none()).collect();
+    let open: Vec<usize> = (0..assigned.len()).filter(|candidate| assigned[*candidate].is_none()).collect();
     let places: Vec<usize> = (0..absent).filter(|place| !assigned.contains(&Some(*place))).collect();
-    // The best sum of scores; the lower half of the word prefers places near the side that a stranger answers from.
+    // The best sum of scores; the lower half of the word prefers places near the side that an unassigned one answers from.
     let value = |one: usize, other: usize| {
-        let (stranger, place) = (strangers[one], places[other]);
-        let near = if from_main[stranger] { places.len() - other } else { other + 1 };
-        fit(stranger, place).score().map(|score| (score << 32) + near as u64)
+        let (candidate, place) = (open[one], places[other]);
+        let near = if from_main[candidate] { places.len() - other } else { other + 1 };
+        fit(candidate, place).score().map(|score| (score << 32) + near as u64)
     };
     let width = places.len() + 1;
-    let mut best = vec![0u64; (strangers.len() + 1) * width];
-    for one in 0..strangers.len() {
+    let mut best = vec![0u64; (open.len() + 1) * width];
+    for one in 0..open.len() {
         for other in 0..places.len() {
             let paired = value(one, other).map_or(0, |value| best[one * width + other] + value);
             best[(one + 1) * width + other + 1] =
                 paired.max(best[one * width + other + 1]).max(best[(one + 1) * width + other]);
         }
     }
-    let (mut one, mut other) = (strangers.len(), places.len());
+    let (mut one, mut other) = (open.len(), places.len());
     while one > 0 && other > 0 {
         let here = best[one * width + other];
         if here == best[(one - 1) * width + other] {
@@ -66,7 +66,7 @@ pub(super) fn assign(from_main: &[bool], absent: usize, fit: impl Fn(usize, usiz
             other -= 1;
         } else {
             (one, other) = (one - 1, other - 1);
-            assigned[strangers[one]] = Some(places[other]);
+            assigned[open[one]] = Some(places[other]);
         }
     }
     assigned
@@ -78,11 +78,11 @@ mod tests {
     use super::*;
 
     fn assigned<const N: usize>(from_main: &[bool], fits: &[[Fit; N]]) -> Vec<Option<usize>> {
-        assign(from_main, N, |stranger, place| fits[stranger][place])
+        assign(from_main, N, |candidate, place| fits[candidate][place])
     }
 
     #[test]
-    fn strangers_alike_keep_the_order_of_the_segment() {
+    fn subdevices_alike_keep_the_order_of_the_segment() {
         assert_eq!(assigned(&[true, true], &[[Seen; 2]; 2]), [Some(0), Some(1)]);
         assert_eq!(assigned(&[false, false], &[[Seen; 2]; 2]), [Some(0), Some(1)]);
         assert_eq!(assigned(&[true, false], &[[Seen; 3]; 2]), [Some(0), Some(2)]);

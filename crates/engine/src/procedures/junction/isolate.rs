@@ -12,21 +12,21 @@
 //! it begins, where all are entered at port 0, or else from the one on which it closes. Then its own closing side is left out:
 //! the break of the outer ring is the one unconnected port 0 that frames may pass.
 //!
-//! While it goes on, most SubDevices are out of reach at one time or another, which must tell nobody that they are lost
-//! ([`super::super::fleet::SharedFleet::is_looking_inside`]).
+//! While it goes on, most SubDevices are out of reach at one time or another, which must not mean that they are lost
+//! ([`Disturbance::IsolateRings`]).
 
 use alloc::vec;
 use alloc::vec::Vec;
+use core::time::Duration;
 
 use ringcat_wire::address::{StationAddress, Wkc};
 use ringcat_wire::command::Command;
 use ringcat_wire::datagram::Target;
 use ringcat_wire::register::{DlControl, DlStatus, LoopControl, map};
 
-use super::super::fleet::{Fleet, SharedFleet};
-use super::orders::control_of;
-use super::station_of;
-use super::watch::is_down;
+use super::super::shared_segment::SharedSegment;
+use crate::segment::disturbance::Disturbance;
+use crate::segment::{Observation, Segment, is_down};
 use crate::supervisor::{Bus, BusError};
 use crate::topology::{Closing, LocalRing, NodeStatus, PortOf};
 
@@ -34,6 +34,10 @@ use crate::topology::{Closing, LocalRing, NodeStatus, PortOf};
 const WRITTEN: usize = 2;
 /// Rings that are looked into; each takes some frames, and what the settings last for is about a second.
 const MOST: usize = 16;
+/// Pause after it.
+const PAUSE: Duration = Duration::from_millis(5);
+/// So long other disturbances may keep it waiting.
+const LIMIT: Duration = Duration::from_secs(5);
 /// Orders that come back without the junction's answer before it is out of reach: the first ones open the way for the next.
 const TRIES: usize = 4;
 
@@ -64,10 +68,10 @@ enum Sides {
 
 impl Ring {
     /// `None` where its junction is not declared.
-    fn new(fleet: &Fleet, ring: &LocalRing) -> Option<Ring> {
+    fn new(segment: &Segment, ring: &LocalRing) -> Option<Ring> {
         let Closing { head: PortOf { node: head, port: closes }, tail } = ring.closing;
-        let junction = station_of(fleet, head)?;
-        let children = fleet.topology.nodes.get(head)?.children;
+        let junction = segment.station_of(head)?;
+        let children = segment.cabling.topology.nodes.get(head)?.children;
         let begins = (0..4).filter(|port| {
             let child = children[usize::from(*port)];
             child.is_some_and(|child| head < child && child <= tail.node)
@@ -91,19 +95,31 @@ impl Ring {
     }
 }
 
-/// Looks into all local rings; returns what members said about their ports, by position. Empty where that cannot be
-/// done: there is one ring only, or a junction is not declared.
-///
-/// With the number of the cabling to which the positions belong.
-pub(super) async fn look_inside(bus: &Bus, fleet: &SharedFleet) -> (u32, Vec<Option<NodeStatus>>) {
-    let (rings, count, recablings) = {
-        let access = fleet.access();
-        let rings = access.topology.local_rings.iter().map(|ring| Ring::new(&access, ring));
+/// Looks into all local rings, and hands what is found to the model.
+pub(in super::super) async fn isolate_rings(bus: Bus, segment: SharedSegment) {
+    if !segment.disturb(Disturbance::IsolateRings, LIMIT).await {
+        return;
+    }
+    let asked = segment.view().asked();
+    let found = look_inside(&bus, &segment).await;
+    // Frames that left before the last loop opened may still be on their way.
+    bus.sleep(PAUSE).await;
+    segment.undisturb();
+    segment.observe(Observation::Isolated { asked, found: &found, words: segment.words() });
+}
+
+/// Returns what members said about their ports, by position. Empty where that cannot be done: there is one ring only, or a
+/// junction is not declared.
+async fn look_inside(bus: &Bus, segment: &SharedSegment) -> Vec<Option<NodeStatus>> {
+    let (rings, count) = {
+        let view = segment.view();
+        let topology = &view.cabling.topology;
+        let rings = topology.local_rings.iter().map(|ring| Ring::new(&view, ring));
         let mut rings: Vec<Ring> = rings.collect::<Option<_>>().unwrap_or_default();
         // Those around others first.
         rings.sort_by_key(|ring| ring.head);
         let is_possible = (2..=MOST).contains(&rings.len());
-        (if is_possible { rings } else { Vec::new() }, access.topology.nodes.len(), access.recablings)
+        (if is_possible { rings } else { Vec::new() }, topology.nodes.len())
     };
     let mut found = vec![None; if rings.is_empty() { 0 } else { count }];
     for ring in &rings {
@@ -121,19 +137,19 @@ pub(super) async fn look_inside(bus: &Bus, fleet: &SharedFleet) -> (u32, Vec<Opt
                 _ if other.holds(ring.head) => Sides::Both,
                 _ => Sides::Neither,
             };
-            if let Ok(true) = set_loops(bus, fleet, &rings, sides, ring).await {
-                read(bus, fleet, ring, &mut found).await;
+            if let Ok(true) = set_loops(bus, segment, &rings, sides, ring).await {
+                read(bus, segment, ring, &mut found).await;
                 break;
             }
         }
     }
     if !rings.is_empty() {
         // It need not come back, and will not where two are open. What it does not reach ends by itself.
-        let open = loops(fleet, &rings, |_| Sides::Both);
+        let open = loops(segment, &rings, |_| Sides::Both);
         let write = |bus: Bus, (command, target, data)| async move { bus.transfer_once(command, target, data).await };
         let _ = bus.gather(open, write).await;
     }
-    (recablings, found)
+    found
 }
 
 /// Has junctions let frames into their rings or not, for a moment. Frames that do not come back have done it all the same, so it
@@ -141,13 +157,13 @@ pub(super) async fn look_inside(bus: &Bus, fleet: &SharedFleet) -> (u32, Vec<Opt
 /// may have opened the way to the junction that is wanted; false where it is out of reach all the same.
 async fn set_loops(
     bus: &Bus,
-    fleet: &SharedFleet,
+    segment: &SharedSegment,
     rings: &[Ring],
     sides: impl Fn(&Ring) -> Sides,
     wanted: &Ring,
 ) -> Result<bool, BusError> {
     for number in 0..TRIES {
-        let replies = bus.transfer_all(loops(fleet, rings, &sides), Some(Wkc(1))).await?;
+        let replies = bus.transfer_all(loops(segment, rings, &sides), Some(Wkc(1))).await?;
         let mut all = rings.iter().zip(&replies);
         // The first one went where the loops of before let it.
         if number > 0 && all.any(|(ring, reply)| ring.head == wanted.head && reply.wkc() == Wkc(1)) {
@@ -158,10 +174,10 @@ async fn set_loops(
 }
 
 /// What has them do that.
-fn loops(fleet: &SharedFleet, rings: &[Ring], sides: impl Fn(&Ring) -> Sides) -> Vec<(Command, Target, Vec<u8>)> {
+fn loops(segment: &SharedSegment, rings: &[Ring], sides: impl Fn(&Ring) -> Sides) -> Vec<(Command, Target, Vec<u8>)> {
     let controls = rings.iter().map(|ring| {
         // The application may order something meanwhile.
-        let mut control = DlControl { temporary: true, ..control_of(&fleet.access(), ring.junction) };
+        let mut control = DlControl { temporary: true, ..segment.view().control_of(ring.junction) };
         for port in ring.closed(sides(ring)) {
             control.loops[usize::from(port & 3)] = LoopControl::Closed;
         }
@@ -174,9 +190,9 @@ fn loops(fleet: &SharedFleet, rings: &[Ring], sides: impl Fn(&Ring) -> Sides) ->
 }
 
 /// Reads the ports of a ring's junction and members.
-async fn read(bus: &Bus, fleet: &SharedFleet, ring: &Ring, found: &mut [Option<NodeStatus>]) {
+async fn read(bus: &Bus, segment: &SharedSegment, ring: &Ring, found: &mut [Option<NodeStatus>]) {
     let members: Vec<_> = {
-        let access = fleet.access();
+        let access = segment.view();
         let of_ring = access.members.iter().filter_map(|member| {
             let node = member.node.filter(|node| *node == ring.head || ring.holds(*node))?;
             let ports = member.info.as_ref().map(|info| info.controller.ports).unwrap_or_default();

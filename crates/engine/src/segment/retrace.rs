@@ -10,41 +10,36 @@ use alloc::vec::Vec;
 use ringcat_wire::address::StationAddress;
 use ringcat_wire::register::PortKind;
 
-use super::super::fleet::Fleet;
+use super::cabling::Cabling;
 use crate::junction::{HEAD_PORT, START_PORT};
 use crate::topology::{Closing, LocalRing, NodeStatus, PortOf, Topology};
 
-/// A port, by who has it.
-pub(in super::super) type End = (StationAddress, u8);
+/// A port, by the SubDevice that has it.
+pub type End = (StationAddress, u8);
 
 /// Where the rings that are known close in a segment in which these are, by position.
-pub(in super::super) fn closings(fleet: &Fleet, stations: &[StationAddress]) -> Vec<Closing> {
+pub fn closings(known: &Cabling, stations: &[StationAddress]) -> Vec<Closing> {
     let place = |(station, port): End| Some(PortOf { node: position(stations, station)?, port });
-    let known = fleet.closings.iter().filter_map(|[head, tail]| {
+    let known = known.closings.iter().filter_map(|[head, tail]| {
         let head_now = place(*head)?;
         // Its last members may have left.
-        let left = || before(fleet, *head)?.cables.iter().rev().find_map(|cable| place(end(fleet, cable.near?)?));
+        let left = || before(known, *head)?.cables.iter().rev().find_map(|cable| place(end(known, cable.near?)?));
         let tail = place(*tail).or_else(left)?;
         (head_now.node < tail.node).then_some(Closing { head: head_now, tail })
     });
     known.collect()
 }
 
-/// The cabling of the segment in which these are, with these rings. Who is behind a break of one hangs where it hangs
+/// The cabling of the segment in which these are, with these rings. What is behind a break of one hangs where it hangs
 /// when the ring is whole, as far as that is known.
-pub(in super::super) fn cabling(
-    fleet: &Fleet,
-    stations: &[StationAddress],
-    status: &[NodeStatus],
-    main_count: usize,
-) -> Topology {
-    let mut topology = Topology::with_local_rings(status, main_count, &closings(fleet, stations));
+pub fn cabling(known: &Cabling, stations: &[StationAddress], status: &[NodeStatus], main_count: usize) -> Topology {
+    let mut topology = Topology::with_local_rings(status, main_count, &closings(known, stations));
     for at in 0..topology.local_rings.len() {
         let ring = &topology.local_rings[at];
         let Some(orphan) = ring.cables.first().filter(|cable| cable.near.is_none()).map(|cable| cable.far.node) else {
             continue;
         };
-        if let Some(near) = last_before_break(fleet, stations, status, &topology, ring) {
+        if let Some(near) = last_before_break(known, stations, status, &topology, ring) {
             topology.hang_behind_break(near, orphan);
         }
     }
@@ -53,18 +48,18 @@ pub(in super::super) fn cabling(
 
 /// The port at which the members before a break end.
 fn last_before_break(
-    fleet: &Fleet,
+    known: &Cabling,
     stations: &[StationAddress],
     status: &[NodeStatus],
     topology: &Topology,
     ring: &LocalRing,
 ) -> Option<PortOf> {
     let head = ring.closing.head;
-    let known = before(fleet, (*stations.get(head.node)?, head.port));
+    let ring_before = before(known, (*stations.get(head.node)?, head.port));
     // The port at which the ring left a SubDevice when that was seen last.
     let port_before = |node: usize| {
-        let cables = known.map(|ring| ring.cables.as_slice()).unwrap_or_default();
-        let nears = cables.iter().filter_map(|cable| end(fleet, cable.near?));
+        let cables = ring_before.map(|ring| ring.cables.as_slice()).unwrap_or_default();
+        let nears = cables.iter().filter_map(|cable| end(known, cable.near?));
         nears.into_iter().find(|(station, _)| stations.get(node) == Some(station)).map(|(_, port)| port)
     };
     let is_member = |node: usize| head.node < node && node <= ring.closing.tail.node;
@@ -99,12 +94,12 @@ fn only_way_on(topology: &Topology, status: &[NodeStatus], node: usize) -> Optio
 }
 
 /// The ring that closes at a port of a junction, as it was known so far.
-fn before(fleet: &Fleet, head: End) -> Option<&LocalRing> {
-    fleet.topology.local_rings.iter().find(|ring| end(fleet, ring.closing.head) == Some(head))
+fn before(known: &Cabling, head: End) -> Option<&LocalRing> {
+    known.topology.local_rings.iter().find(|ring| end(known, ring.closing.head) == Some(head))
 }
 
-fn end(fleet: &Fleet, at: PortOf) -> Option<End> {
-    Some((*fleet.stations.get(at.node)?, at.port))
+fn end(known: &Cabling, at: PortOf) -> Option<End> {
+    Some((*known.stations.get(at.node)?, at.port))
 }
 
 /// The position of a station address that only one SubDevice has.

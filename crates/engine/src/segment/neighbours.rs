@@ -1,92 +1,102 @@
-//! Which absent members strangers are by the cables that lead to them.
+//! Which absent members unassigned SubDevices are by the cables that lead to them.
 //!
-//! Several may be alike. Their order tells who is who where all of them are there; where some are not, or a ring is
-//! open elsewhere than at the scan so that frames meet its SubDevices from the other side, only their neighbours do. In
-//! go the cables as the scan or a rescan found them and as the ports tell them now: what hangs on the port of a member
-//! to which a cable led before, with the same port of its own, is what hung there.
+//! Several may be alike. Their order tells them apart where all of them are there; where some are not, or a ring is open
+//! elsewhere than at the scan so that frames meet its SubDevices from the other side, only their neighbours do. In go the
+//! cables as the scan or a rescan found them and as the ports tell them now: what hangs on the port of a member to which
+//! a cable led before, with the same port of its own, is what hung there.
 
 use alloc::vec;
 use alloc::vec::Vec;
 
 use ringcat_wire::address::StationAddress;
+use ringcat_wire::register::{DlStatus, PortKind};
 
-use super::owners::Owners;
-use super::rescan::{nodes_of, ports_of};
-use super::{Fit, Knowledge, Stranger, View, absent_between, fit};
-use crate::procedures::fleet::{Fleet, Phase, SharedFleet};
-use crate::supervisor::Bus;
+use super::Segment;
+use super::matching::Fit;
+use super::member::Phase;
+use super::unassigned::{Knowledge, UnassignedSubDevice, fit};
+use super::view::View;
 use crate::topology::{Closing, Finding, NodeStatus, PortOf, Topology};
 
 /// One end of a cable; `None` is the main link.
 type End = Option<PortOf>;
 
-/// Strangers by the member that they are, as far as cables tell; `None` while the segment changes.
-pub(super) async fn members(
-    bus: &Bus,
-    fleet: &SharedFleet,
-    view: &View,
-    owners: &Owners,
-) -> Option<Vec<(StationAddress, usize)>> {
-    if !is_asked_for(&fleet.access()) {
-        return Some(Vec::new());
+impl Segment {
+    /// An unassigned SubDevice could be several of those that are missed, or one of them though order does not say so: then
+    /// ports have to be read ([`Segment::told_by_cables`]).
+    pub fn asks_for_cables(&self) -> bool {
+        self.unassigned.iter().any(|it| {
+            let fits: Vec<usize> = self.absent().filter(|index| self.may_be(it, *index)).collect();
+            match fits[..] {
+                [] => false,
+                [only] => !self.is_between(it, only),
+                _ => true,
+            }
+        })
     }
-    let ports = ports_of(bus, view).await.ok()??;
-    let access = fleet.access();
-    let look = Look { fleet: &access, view, nodes: nodes_of(&access, view, owners, &ports) };
-    let owners: Vec<Option<usize>> = (0..view.stations.len()).map(|at| owners.at(at)).collect();
-    Some(look.told(owners))
-}
 
-/// A stranger could be several of those that are missed, or one of them though order does not say so.
-fn is_asked_for(fleet: &Fleet) -> bool {
-    fleet.strangers.iter().any(|stranger| {
-        let fits: Vec<usize> = absent(fleet).filter(|index| may_be(fleet, stranger, *index)).collect();
-        match fits[..] {
-            [] => false,
-            [only] => !absent_between(fleet, stranger.between).contains(&only),
-            _ => true,
-        }
-    })
-}
+    /// Unassigned SubDevices with the members that they are, as far as cables tell. `ports` by position.
+    pub fn told_by_cables(&self, view: &View, ports: &[DlStatus]) -> Vec<(StationAddress, usize)> {
+        let owners = self.owners(&view.stations);
+        let owners: Vec<Option<usize>> = (0..view.stations.len()).map(|at| owners.at(at)).collect();
+        Look { segment: self, view, nodes: self.nodes(view, ports) }.told(owners)
+    }
 
-pub(super) fn absent(fleet: &Fleet) -> impl Iterator<Item = usize> + '_ {
-    let members = fleet.members.iter().enumerate();
-    let absent = members.filter(|(_, member)| member.phase == Phase::Absent && member.config.group.is_none());
-    absent.map(|(index, _)| index)
-}
+    /// What the ports of all SubDevices say, with their kinds as far as they are known. By position.
+    pub fn nodes(&self, view: &View, ports: &[DlStatus]) -> Vec<NodeStatus> {
+        let owners = self.owners(&view.stations);
+        let node = |(at, (station, dl_status)): (usize, (&StationAddress, &DlStatus))| {
+            let known = match (owners.at(at), self.unassigned(*station).map(|it| &it.knowledge)) {
+                (Some(index), _) => self.members[index].info.as_ref(),
+                (None, Some(Knowledge::Known(info))) => Some(&**info),
+                (None, _) => None,
+            };
+            let ports: [PortKind; 4] = known.map(|info| info.controller.ports).unwrap_or_default();
+            NodeStatus { dl_status: *dl_status, receive_times: None, ports }
+        };
+        view.stations.iter().zip(ports).enumerate().map(node).collect()
+    }
 
-/// It is known what it is, and that is what the member was when it was seen last.
-pub(super) fn may_be(fleet: &Fleet, stranger: &Stranger, index: usize) -> bool {
-    let is_known = matches!(stranger.knowledge, Knowledge::Known(_));
-    is_known && matches!(fit(fleet, stranger, index), Fit::Seen | Fit::Serial)
+    /// Members that are missed, but for those of groups.
+    pub(super) fn absent(&self) -> impl Iterator<Item = usize> + '_ {
+        let members = self.members.iter().enumerate();
+        let absent = members.filter(|(_, member)| member.phase == Phase::Absent && member.config.group.is_none());
+        absent.map(|(index, _)| index)
+    }
+
+    /// It is known what it is, and that is what the member was when it was seen last.
+    pub(super) fn may_be(&self, it: &UnassignedSubDevice, index: usize) -> bool {
+        let is_known = matches!(it.knowledge, Knowledge::Known(_));
+        is_known && matches!(fit(self, it, index), Fit::Seen | Fit::Serial)
+    }
 }
 
 /// The segment as it is now.
 struct Look<'a> {
-    fleet: &'a Fleet,
+    segment: &'a Segment,
     view: &'a View,
     nodes: Vec<NodeStatus>,
 }
 
 impl Look<'_> {
-    fn stranger_at(&self, at: usize) -> Option<&Stranger> {
-        self.fleet.strangers.iter().find(|stranger| self.view.position(stranger.station) == Some(at))
+    fn unassigned_at(&self, at: usize) -> Option<&UnassignedSubDevice> {
+        self.segment.unassigned.iter().find(|it| self.view.position(it.station) == Some(at))
     }
 
-    /// The absent member that was at a place, if the stranger at a position may be it.
+    /// The absent member that was at a place, if the unassigned one at a position may be it.
     fn candidate(&self, node: usize, at: usize) -> Option<usize> {
-        let index = self.fleet.members.iter().position(|member| member.node == Some(node))?;
-        let stranger = self.stranger_at(at)?;
-        (absent(self.fleet).any(|it| it == index) && may_be(self.fleet, stranger, index)).then_some(index)
+        let index = self.segment.members.iter().position(|member| member.node == Some(node))?;
+        let unassigned = self.unassigned_at(at)?;
+        (self.segment.absent().any(|it| it == index) && self.segment.may_be(unassigned, index)).then_some(index)
     }
 
     fn told(&self, mut members: Vec<Option<usize>>) -> Vec<(StationAddress, usize)> {
         let count = members.len();
         if self.is_as_before(&members) {
-            let strangers = (0..count).filter(|at| members[*at].is_none());
-            return strangers.filter_map(|at| Some((self.view.stations[at], self.candidate(at, at)?))).collect();
+            let unassigned = (0..count).filter(|at| members[*at].is_none());
+            return unassigned.filter_map(|at| Some((self.view.stations[at], self.candidate(at, at)?))).collect();
         }
-        let before = &self.fleet.topology;
+        let before = &self.segment.cabling.topology;
         let now = self.topology(&members);
         // In a closed ring with crossed SubDevices neighbours are an assumption.
         if before.is_assumed() || now.is_assumed() {
@@ -110,7 +120,7 @@ impl Look<'_> {
         }
     }
 
-    /// Strangers next to members, by position, with the member that was there.
+    /// Unassigned SubDevices next to members, by position, with the member that was there.
     fn next_to(&self, members: &[Option<usize>], before: &[[End; 2]], now: &[[End; 2]]) -> Vec<(usize, usize)> {
         let mut found = Vec::new();
         for (near, far) in now.iter().flat_map(|[one, other]| [(*one, *other), (*other, *one)]) {
@@ -129,28 +139,28 @@ impl Look<'_> {
     /// An end of a cable in the cabling of before, where the one there is known.
     fn place_before(&self, members: &[Option<usize>], end: End) -> Option<End> {
         let Some(PortOf { node, port }) = end else { return Some(None) };
-        let node = self.fleet.members.get(members[node]?)?.node?;
+        let node = self.segment.members.get(members[node]?)?.node?;
         Some(Some(PortOf { node, port }))
     }
 
     /// As many answer on each link as when the cabling was found, and all that are known are at their places.
     fn is_as_before(&self, members: &[Option<usize>]) -> bool {
-        let before = &self.fleet.topology;
+        let before = &self.segment.cabling.topology;
         let counts = (usize::from(self.view.counts.0.0), members.len());
         let at_home =
-            |(at, index): (usize, &Option<usize>)| index.is_none_or(|it| self.fleet.members[it].node == Some(at));
+            |(at, index): (usize, &Option<usize>)| index.is_none_or(|it| self.segment.members[it].node == Some(at));
         counts == (before.main_count, before.nodes.len()) && members.iter().enumerate().all(at_home)
     }
 
-    /// The cabling as the ports tell it. A ring whose last SubDevice is a stranger closes where the cables of all that
+    /// The cabling as the ports tell it. A ring whose last SubDevice is unassigned closes where the cables of all that
     /// are known are those of before.
     fn topology(&self, members: &[Option<usize>]) -> Topology {
         let main_count = usize::from(self.view.counts.0.0);
         let mut closings = Vec::new();
         let mut open = Vec::new();
-        for ring in &self.fleet.topology.local_rings {
+        for ring in &self.segment.cabling.topology.local_rings {
             let place = |end: PortOf| {
-                let index = self.fleet.members.iter().position(|member| member.node == Some(end.node));
+                let index = self.segment.members.iter().position(|member| member.node == Some(end.node));
                 let node = members.iter().position(|member| index.is_some() && *member == index)?;
                 Some(PortOf { node, port: end.port })
             };
@@ -160,7 +170,7 @@ impl Look<'_> {
                 (None, _) => {}
             }
         }
-        let before = ends(&self.fleet.topology);
+        let before = ends(&self.segment.cabling.topology);
         for (head, tail) in open.into_iter().filter(|(head, _)| self.communicates(*head)) {
             let ends_there = |at: &usize| {
                 let end = PortOf { node: *at, port: tail.port };

@@ -4,11 +4,11 @@ use alloc::vec::Vec;
 
 use ringcat_wire::address::StationAddress;
 
-use crate::procedures::fleet::{Fleet, Member, SharedFleet};
+use super::member::Member;
 
 /// The member at each position.
 #[derive(Debug)]
-pub(crate) struct Owners {
+pub struct Owners {
     all: Vec<Option<usize>>,
     /// Without those of groups, which may be anywhere.
     anchors: Vec<Option<usize>>,
@@ -16,42 +16,42 @@ pub(crate) struct Owners {
 
 impl Owners {
     /// Owners by position; some of them float.
-    pub(crate) fn new(all: Vec<Option<usize>>, floats: impl Fn(usize) -> bool) -> Owners {
+    pub fn new(all: Vec<Option<usize>>, floats: impl Fn(usize) -> bool) -> Owners {
         let anchors = all.iter().map(|owner| owner.filter(|index| !floats(*index))).collect();
         Owners { all, anchors }
     }
 
-    pub(super) fn all(&self) -> &[Option<usize>] {
+    /// By position.
+    pub fn all(&self) -> &[Option<usize>] {
         &self.all
     }
 
     /// The member at a position.
-    pub(super) fn at(&self, at: usize) -> Option<usize> {
+    pub fn at(&self, at: usize) -> Option<usize> {
         self.all.get(at).copied().flatten()
     }
 
     /// The member right before a position.
-    pub(super) fn before(&self, at: usize) -> Option<usize> {
+    pub fn before(&self, at: usize) -> Option<usize> {
         self.at(at.checked_sub(1)?)
     }
 
     /// The nearest members before and behind a position, without those of groups.
-    pub(super) fn neighbours(&self, at: usize) -> (Option<usize>, Option<usize>) {
+    pub fn neighbours(&self, at: usize) -> (Option<usize>, Option<usize>) {
         neighbours(&self.anchors, at)
     }
 }
 
 /// The member at each position. Where several have the address of one member, the one between its neighbours is it; if
 /// that does not tell, none of them is.
-pub(super) fn owners_of(fleet: &SharedFleet, stations: &[StationAddress]) -> Owners {
-    let access = fleet.access();
-    let floats = |index: usize| access.members[index].config.group.is_some();
-    let member = |station: &StationAddress| access.members.iter().position(|member| member.station == *station);
+pub(super) fn owners_of(members: &[Member], stations: &[StationAddress]) -> Owners {
+    let floats = |index: usize| members[index].config.group.is_some();
+    let member = |station: &StationAddress| members.iter().position(|member| member.station == *station);
     let all: Vec<Option<usize>> = stations.iter().map(member).collect();
     let is_single = |owner: &Option<usize>| all.iter().filter(|other| *other == owner).count() == 1;
     let mut owners: Vec<Option<usize>> = all.iter().map(|owner| owner.filter(|_| is_single(owner))).collect();
-    let ranks = ranks(&access);
-    for index in 0..access.members.len() {
+    let ranks = ranks(members);
+    for index in 0..members.len() {
         let several = |at: &usize| all[*at] == Some(index) && owners[*at].is_none();
         let candidates: Vec<usize> = (0..all.len()).filter(several).collect();
         if candidates.is_empty() {
@@ -67,8 +67,8 @@ pub(super) fn owners_of(fleet: &SharedFleet, stations: &[StationAddress]) -> Own
         let between: Vec<usize> = candidates.iter().copied().filter(is_between).collect();
         let keeper = match between[..] {
             [only] => Some(only),
-            // It was there at the scan, and nobody has moved since.
-            _ => between.into_iter().find(|at| access.members[index].node == Some(*at)),
+            // It was there at the scan, and none has moved since.
+            _ => between.into_iter().find(|at| members[index].node == Some(*at)),
         };
         if let Some(at) = keeper {
             owners[at] = Some(index);
@@ -87,7 +87,7 @@ fn neighbours(owners: &[Option<usize>], at: usize) -> (Option<usize>, Option<usi
 pub(super) type Rank = (Option<usize>, bool, usize);
 
 /// The ranks of all members; those of groups mean nothing.
-pub(super) fn ranks(fleet: &Fleet) -> Vec<Rank> {
+pub(super) fn ranks(members: &[Member]) -> Vec<Rank> {
     let mut last = None;
     let rank = |(index, member): (usize, &Member)| {
         // One that was never seen belongs behind the one that is declared before it.
@@ -96,5 +96,5 @@ pub(super) fn ranks(fleet: &Fleet) -> Vec<Rank> {
         }
         (last, member.node.is_none(), index)
     };
-    fleet.members.iter().enumerate().map(rank).collect()
+    members.iter().enumerate().map(rank).collect()
 }

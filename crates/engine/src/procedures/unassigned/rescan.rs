@@ -9,22 +9,29 @@ use alloc::vec::Vec;
 use core::time::Duration;
 
 use ringcat_wire::address::{Position, StationAddress, Wkc};
-use ringcat_wire::register::{DlStatus, PortKind, map};
+use ringcat_wire::register::{DlStatus, map};
 use ringcat_wire::sii::Identity;
 
-use super::owners::{Owners, owners_of};
-use super::recabling;
-use super::{Knowledge, View, view};
+use super::address::view;
 use crate::event::Event;
-use crate::procedures::fleet::{Fleet, SharedFleet};
-use crate::procedures::junction::cabling;
 use crate::procedures::services::ServiceError;
+use crate::procedures::shared_segment::SharedSegment;
 use crate::ring::RingState;
+use crate::segment::unassigned::Knowledge;
+use crate::segment::view::View;
+use crate::segment::{Observation, Seen, retrace};
 use crate::supervisor::{Bus, BusError};
-use crate::topology::{NodeStatus, Topology};
+use crate::topology::Topology;
 
 /// Pause between two looks.
 const PAUSE: Duration = Duration::from_millis(10);
+
+/// So long the segment may take to hold still after a group has joined or left.
+const FOLLOW_LIMIT: Duration = Duration::from_millis(200);
+/// Pause before the cabling is looked at again where it could not be taken over, twice as long each time.
+const AGAIN: Duration = Duration::from_millis(50);
+/// The longest of these pauses.
+const LONGEST: Duration = Duration::from_secs(2);
 
 /// Who a SubDevice is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -81,19 +88,33 @@ impl Rescan {
 
 /// Looks until the segment holds still and it is known of everybody who it is, for so long at most. Then what is known is
 /// the result. Those that have moved are reported.
-pub(crate) async fn rescan(bus: &Bus, fleet: &SharedFleet, limit: Duration) -> Result<Rescan, ServiceError> {
-    let (rescan, _) = look_until(bus, fleet, limit).await?;
+pub(crate) async fn rescan(bus: &Bus, segment: &SharedSegment, limit: Duration) -> Result<Rescan, ServiceError> {
+    let (rescan, _) = look_until(bus, segment, limit).await?;
     report_moved(bus, &rescan);
     Ok(rescan)
 }
 
-/// A look nobody has asked for, because the segment is known to be another one. True where the cabling was taken over; where
+/// Takes over the cabling after hot connect groups have joined or left, as soon as nothing is broken that would be forgotten.
+pub(in crate::procedures) async fn follow_groups(bus: Bus, segment: SharedSegment) {
+    let mut pause = AGAIN;
+    loop {
+        let changes = segment.view().group_changes();
+        if follow_segment(&bus, &segment, FOLLOW_LIMIT).await {
+            return segment.observe(Observation::GroupsFollowed(changes));
+        }
+        bus.sleep(pause).await;
+        let is_same = segment.view().group_changes() == changes;
+        pause = if is_same { (2 * pause).min(LONGEST) } else { AGAIN };
+    }
+}
+
+/// A look that was not asked for, because the segment is known to be another one. True where the cabling was taken over; where
 /// that cannot be nothing is sent, and nothing told.
-pub(crate) async fn follow_segment(bus: &Bus, fleet: &SharedFleet, limit: Duration) -> bool {
-    if !recabling::is_whole(bus, fleet) {
+async fn follow_segment(bus: &Bus, segment: &SharedSegment, limit: Duration) -> bool {
+    if !segment.view().is_whole(&segment.words()) {
         return false;
     }
-    let Ok((rescan, true)) = look_until(bus, fleet, limit).await else { return false };
+    let Ok((rescan, true)) = look_until(bus, segment, limit).await else { return false };
     report_moved(bus, &rescan);
     true
 }
@@ -105,17 +126,17 @@ fn report_moved(bus: &Bus, rescan: &Rescan) {
 }
 
 /// With whether the cabling was taken over.
-async fn look_until(bus: &Bus, fleet: &SharedFleet, limit: Duration) -> Result<(Rescan, bool), ServiceError> {
+async fn look_until(bus: &Bus, segment: &SharedSegment, limit: Duration) -> Result<(Rescan, bool), ServiceError> {
     let until = bus.now() + limit;
-    fleet.note_news();
+    segment.observe(Observation::LookAgain);
     loop {
-        let looked = look(bus, fleet).await;
+        let looked = look(bus, segment).await;
         // Whose ports changed in between has told it to this look.
-        fleet.note_news();
+        segment.observe(Observation::LookAgain);
         let is_last = bus.now() >= until;
         match looked {
             Ok(Some(rescan)) if is_last || rescan.is_complete() => {
-                let is_adopted = rescan.is_complete() && recabling::adopt(bus, fleet, &rescan);
+                let is_adopted = rescan.is_complete() && adopt(segment, &rescan);
                 return Ok((rescan, is_adopted));
             }
             Ok(None) if is_last => return Err(ServiceError::Unsteady),
@@ -125,17 +146,28 @@ async fn look_until(bus: &Bus, fleet: &SharedFleet, limit: Duration) -> Result<(
     }
 }
 
+/// Hands a complete look to the model. True where its cabling is that of the segment from now on.
+fn adopt(segment: &SharedSegment, rescan: &Rescan) -> bool {
+    let stations: Vec<StationAddress> = rescan.subdevices.iter().map(|found| found.station).collect();
+    let member = |found: &Found| if let Who::Declared(index) = found.who { Some(index) } else { None };
+    let members: Vec<Option<usize>> = rescan.subdevices.iter().map(member).collect();
+    let seen = Seen { topology: &rescan.topology, stations: &stations, members: &members };
+    let before = segment.view().adoptions();
+    segment.observe(Observation::Rescanned { seen, words: segment.words() });
+    segment.view().adoptions() != before
+}
+
 /// One look; `None` while the segment changes.
-async fn look(bus: &Bus, fleet: &SharedFleet) -> Result<Option<Rescan>, BusError> {
+async fn look(bus: &Bus, segment: &SharedSegment) -> Result<Option<Rescan>, BusError> {
     let Some(seen) = view(bus).await? else { return Ok(None) };
     let Some(ports) = ports_of(bus, &seen).await? else { return Ok(None) };
-    let owners = owners_of(fleet, &seen.stations);
-    let access = fleet.access();
+    let access = segment.view();
+    let owners = access.owners(&seen.stations);
     let mut subdevices = Vec::new();
-    let nodes = nodes_of(&access, &seen, &owners, &ports);
+    let nodes = access.nodes(&seen, &ports);
     for (at, station) in seen.stations.iter().enumerate() {
-        let stranger = access.strangers.iter().find(|it| it.station == *station);
-        let known = match (owners.at(at), stranger.map(|stranger| &stranger.knowledge)) {
+        let unassigned = access.unassigned(*station);
+        let known = match (owners.at(at), unassigned.map(|it| &it.knowledge)) {
             (Some(index), _) => access.members[index].info.as_ref(),
             (None, Some(Knowledge::Known(info))) => Some(&**info),
             (None, _) => None,
@@ -143,7 +175,7 @@ async fn look(bus: &Bus, fleet: &SharedFleet) -> Result<Option<Rescan>, BusError
         let who = match (owners.at(at), known) {
             (Some(index), _) => Who::Declared(index),
             // Until it was reported it may be one that is missed.
-            (None, Some(info)) if stranger.is_some_and(|it| it.reported) => Who::Undeclared(info.identity),
+            (None, Some(info)) if unassigned.is_some_and(|it| it.reported) => Who::Undeclared(info.identity),
             (None, _) => Who::Unknown,
         };
         subdevices.push(Found { position: Position(at as u16), station: *station, who, moved_from: None });
@@ -151,7 +183,7 @@ async fn look(bus: &Bus, fleet: &SharedFleet) -> Result<Option<Rescan>, BusError
     let place_at_scan = |index: usize| access.members[index].node;
     // In a ring that is open elsewhere than at the scan, or that was open then and has branches, frames meet these in
     // another order (CR-09): that moves nobody.
-    let scanned = &access.topology;
+    let scanned = &access.cabling.topology;
     let was_open = scanned.redundant_head.is_some();
     let is_comparable = match bus.ring() {
         RingState::Open => was_open && usize::from(seen.counts.0.0) == scanned.main_count,
@@ -163,7 +195,7 @@ async fn look(bus: &Bus, fleet: &SharedFleet) -> Result<Option<Rescan>, BusError
     }
     let is_found = |index: &usize| subdevices.iter().any(|found| found.who == Who::Declared(*index));
     let missing = (0..access.members.len()).filter(|index| !is_found(index)).collect();
-    let topology = cabling(&access, &seen.stations, &nodes, usize::from(seen.counts.0.0));
+    let topology = retrace::cabling(&access.cabling, &seen.stations, &nodes, usize::from(seen.counts.0.0));
     Ok(Some(Rescan { counts: seen.counts, subdevices, missing, topology }))
 }
 
@@ -180,23 +212,6 @@ pub(super) async fn ports_of(bus: &Bus, seen: &View) -> Result<Option<Vec<DlStat
         Err(error) => return Err(error),
     };
     Ok((view(bus).await?.as_ref() == Some(seen)).then_some(ports))
-}
-
-/// The same, with the kinds of ports as far as they are known.
-pub(super) fn nodes_of(fleet: &Fleet, seen: &View, owners: &Owners, ports: &[DlStatus]) -> Vec<NodeStatus> {
-    let node = |(at, (station, dl_status)): (usize, (&StationAddress, &DlStatus))| {
-        let stranger = || fleet.strangers.iter().find(|stranger| stranger.station == *station);
-        let known = match owners.at(at) {
-            Some(index) => fleet.members[index].info.as_ref(),
-            None => match stranger().map(|stranger| &stranger.knowledge) {
-                Some(Knowledge::Known(info)) => Some(&**info),
-                _ => None,
-            },
-        };
-        let ports: [PortKind; 4] = known.map(|info| info.controller.ports).unwrap_or_default();
-        NodeStatus { dl_status: *dl_status, receive_times: None, ports }
-    };
-    seen.stations.iter().zip(ports).enumerate().map(node).collect()
 }
 
 /// Who has to be taken out, as few as possible, for the others to be in the order of the scan: these have moved.

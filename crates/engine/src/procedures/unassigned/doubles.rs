@@ -3,17 +3,17 @@
 //! One of an earlier session, or of another MainDevice, may have a member's address and its identity too. What this
 //! MainDevice wrote to it tells them apart: each session has logical addresses of its own (decision 0023), so FMMUs
 //! with those of the member are those of the member. Only where nothing was mapped, place and identity decide. Those
-//! that are not the member keep the temporary address that they were given, and are strangers.
+//! that are not the member keep the temporary address that they were given, and are unassigned.
 
 use alloc::vec::Vec;
 
 use ringcat_wire::address::{StationAddress, Wkc};
 use ringcat_wire::register::map;
 
-use super::address::View;
-use super::owners::Owners;
-use crate::procedures::fleet::SharedFleet;
+use crate::procedures::shared_segment::SharedSegment;
 use crate::procedures::sii;
+use crate::segment::Owners;
+use crate::segment::view::View;
 use crate::supervisor::{Bus, BusError};
 
 /// What tells whether a SubDevice is a member.
@@ -32,12 +32,12 @@ pub(in super::super) enum Mark {
 /// Whether the SubDevice at a station address holds what was mapped for a member.
 pub(in super::super) async fn mark(
     bus: &Bus,
-    fleet: &SharedFleet,
+    segment: &SharedSegment,
     index: usize,
     station: StationAddress,
 ) -> Result<Mark, BusError> {
     let (expected, is_mapped) = {
-        let access = fleet.access();
+        let access = segment.view();
         let Some(member) = access.members.get(index) else { return Ok(Mark::None) };
         let registers = member.setup.as_ref().map(|setup| setup.fmmu_registers());
         (registers.unwrap_or_default(), member.configured)
@@ -59,40 +59,40 @@ pub(in super::super) async fn mark(
 /// that cannot be read has to be trusted.
 pub(in super::super) async fn has_identity(
     bus: &Bus,
-    fleet: &SharedFleet,
+    segment: &SharedSegment,
     index: usize,
     station: StationAddress,
 ) -> bool {
-    let (known, cache) = {
-        let access = fleet.access();
-        let Some(member) = access.members.get(index) else { return false };
-        (member.info.as_ref().map(|info| info.identity), access.cache.clone())
+    let known = {
+        let view = segment.view();
+        let Some(member) = view.members.get(index) else { return false };
+        member.info.as_ref().map(|info| info.identity)
     };
     let Some(known) = known else { return true };
     if sii::claim(bus, station).await.is_err() {
         return true;
     }
-    match sii::identity(bus, station, &cache).await {
+    match sii::identity(bus, station, &segment.cache).await {
         Ok(now) => (now.vendor_id, now.product_code, now.serial) == (known.vendor_id, known.product_code, known.serial),
         Err(_) => true,
     }
 }
 
 /// Gives each member its address back that several had. `before` is how it was then, `after` how it is now that each of
-/// them has an address of its own, `owners` who was at which place by order.
+/// them has an address of its own, `owners` the member at each place by order.
 pub(super) async fn restore(
     bus: &Bus,
-    fleet: &SharedFleet,
+    segment: &SharedSegment,
     owners: &Owners,
     before: &View,
     after: &mut View,
 ) -> Result<(), BusError> {
-    let doubled = doubled(fleet, before);
+    let doubled = doubled(segment, before);
     for (index, station) in doubled {
         if after.positions(station).next().is_some() {
             continue;
         }
-        let Some(keeper) = keeper(bus, fleet, owners, before, after, index, station).await? else { continue };
+        let Some(keeper) = keeper(bus, segment, owners, before, after, index, station).await? else { continue };
         bus.fpwr(keeper, map::STATION_ADDRESS, &station.0.to_le_bytes()).await?;
         after.stations.iter_mut().filter(|it| **it == keeper).for_each(|it| *it = station);
     }
@@ -100,8 +100,8 @@ pub(super) async fn restore(
 }
 
 /// Members whose addresses several have.
-fn doubled(fleet: &SharedFleet, view: &View) -> Vec<(usize, StationAddress)> {
-    let access = fleet.access();
+fn doubled(segment: &SharedSegment, view: &View) -> Vec<(usize, StationAddress)> {
+    let access = segment.view();
     let members = access.members.iter().enumerate().map(|(index, member)| (index, member.station));
     members.filter(|(_, station)| view.positions(*station).count() > 1).collect()
 }
@@ -109,7 +109,7 @@ fn doubled(fleet: &SharedFleet, view: &View) -> Vec<(usize, StationAddress)> {
 /// The address that the member has now, where it is known which of them it is.
 async fn keeper(
     bus: &Bus,
-    fleet: &SharedFleet,
+    segment: &SharedSegment,
     owners: &Owners,
     before: &View,
     after: &View,
@@ -117,7 +117,7 @@ async fn keeper(
     station: StationAddress,
 ) -> Result<Option<StationAddress>, BusError> {
     let has_moved = before.counts != after.counts;
-    let known: Vec<StationAddress> = fleet.access().members.iter().map(|member| member.station).collect();
+    let known: Vec<StationAddress> = segment.view().members.iter().map(|member| member.station).collect();
     // Where places have changed meanwhile, any that has no address of ours may be one of them.
     let is_candidate = |at: &usize| match before.stations.get(*at) {
         Some(then) if !has_moved => *then == station,
@@ -126,10 +126,10 @@ async fn keeper(
     let mut bearers = Vec::new();
     for at in (0..after.stations.len()).filter(is_candidate) {
         let now = after.stations[at];
-        match mark(bus, fleet, index, now).await? {
+        match mark(bus, segment, index, now).await? {
             Mark::Borne => bearers.push(now),
             Mark::Missing => {}
-            Mark::Unmapped | Mark::None => return by_place(bus, fleet, owners, before, after, index).await,
+            Mark::Unmapped | Mark::None => return by_place(bus, segment, owners, before, after, index).await,
         }
     }
     // Where several bear it, one was taken for the other before.
@@ -139,7 +139,7 @@ async fn keeper(
 /// Nothing tells but place and identity.
 async fn by_place(
     bus: &Bus,
-    fleet: &SharedFleet,
+    segment: &SharedSegment,
     owners: &Owners,
     before: &View,
     after: &View,
@@ -153,5 +153,5 @@ async fn by_place(
     if after.position(now).is_none() {
         return Ok(None);
     }
-    Ok(has_identity(bus, fleet, index, now).await.then_some(now))
+    Ok(has_identity(bus, segment, index, now).await.then_some(now))
 }

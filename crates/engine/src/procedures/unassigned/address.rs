@@ -1,8 +1,8 @@
-//! A temporary station address for everyone who has none of ours, without ever writing to a position.
+//! A temporary station address for each SubDevice that has none of ours, without ever writing to a position.
 //!
 //! Positions move when a cable is cut or plugged in, also while a frame is on its way, and a write to a position may
 //! then hit a SubDevice in OP. So positions are only read. Addresses are given through the address that a SubDevice has:
-//! one that nobody else has is written, and where several have the same one it is exchanged (FPRW): the first SubDevice
+//! one that no other has is written, and where several have the same one it is exchanged (FPRW): the first SubDevice
 //! on a link takes the new address and hands its old one on with the datagram, so that the others take what they have.
 
 use alloc::vec::Vec;
@@ -13,41 +13,17 @@ use ringcat_wire::command::Command;
 use ringcat_wire::datagram::Target;
 use ringcat_wire::register::map;
 
-use super::super::fleet::SharedFleet;
 use super::super::scan::MAX_SUBDEVICES;
-use crate::board::RingWord;
+use super::super::shared_segment::SharedSegment;
+use crate::segment::view::View;
 use crate::supervisor::{Bus, BusError};
 
-/// Temporary station addresses, taken in turn: one who was out of reach for a while must not be mistaken for another.
+/// Temporary station addresses, taken in turn: one that was out of reach for a while must not be mistaken for another.
 const TEMPORARY: RangeInclusive<u16> = 0xC000..=0xFFFE;
 /// Addresses that are given in one round, before all others are looked at again.
 const ROUND: usize = 64;
 /// What a SubDevice adds to the working counter when it reads and writes.
 const EXCHANGED: u16 = 3;
-
-/// The station addresses of all positions.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub(in super::super) struct View {
-    /// SubDevices on the main and on the redundant link.
-    pub counts: (Wkc, Wkc),
-    ring: RingWord,
-    /// By position.
-    pub stations: Vec<StationAddress>,
-}
-
-impl View {
-    /// The positions at which a station address answers.
-    pub(super) fn positions(&self, station: StationAddress) -> impl Iterator<Item = usize> + '_ {
-        self.stations.iter().enumerate().filter(move |(_, at)| **at == station).map(|(position, _)| position)
-    }
-
-    /// The position of a station address that only one SubDevice has.
-    pub(in super::super) fn position(&self, station: StationAddress) -> Option<usize> {
-        let mut positions = self.positions(station);
-        let first = positions.next()?;
-        positions.next().is_none().then_some(first)
-    }
-}
 
 /// Reads all station addresses; `None` while the segment changes.
 async fn read(bus: &Bus) -> Result<Option<View>, BusError> {
@@ -77,17 +53,16 @@ pub(in super::super) async fn view(bus: &Bus) -> Result<Option<View>, BusError> 
     Ok(read(bus).await?.filter(|second| *second == first))
 }
 
-/// A temporary address that nobody has.
-fn fresh(fleet: &SharedFleet, present: &[StationAddress]) -> StationAddress {
-    let mut access = fleet.access();
+/// A temporary address that no SubDevice has.
+fn fresh(segment: &SharedSegment, present: &[StationAddress]) -> StationAddress {
+    let view = segment.view();
     let mut address = StationAddress(*TEMPORARY.start());
     for _ in TEMPORARY {
-        address = StationAddress(TEMPORARY.start() + access.next_temporary % TEMPORARY.len() as u16);
-        access.next_temporary = access.next_temporary.wrapping_add(1);
+        address = StationAddress(TEMPORARY.start() + segment.next_temporary() % TEMPORARY.len() as u16);
         let is_taken = present.contains(&address)
-            || access.stations.contains(&address)
-            || access.members.iter().any(|member| member.station == address)
-            || access.strangers.iter().any(|stranger| stranger.station == address);
+            || view.cabling.stations.contains(&address)
+            || view.member_of(address).is_some()
+            || view.unassigned(address).is_some();
         if !is_taken {
             break;
         }
@@ -95,11 +70,11 @@ fn fresh(fleet: &SharedFleet, present: &[StationAddress]) -> StationAddress {
     address
 }
 
-/// Gives each SubDevice that has one of these addresses one of its own. Returns what was given, and whether nobody is
+/// Gives each SubDevice that has one of these addresses one of its own. Returns what was given, and whether none is
 /// left.
 pub(super) async fn give(
     bus: &Bus,
-    fleet: &SharedFleet,
+    segment: &SharedSegment,
     view: &View,
     old: &[StationAddress],
 ) -> Result<(Vec<StationAddress>, bool), BusError> {
@@ -110,7 +85,7 @@ pub(super) async fn give(
             if given.len() >= ROUND {
                 return Ok((given, false));
             }
-            let new = [fresh(fleet, &view.stations), fresh(fleet, &view.stations)];
+            let new = [fresh(segment, &view.stations), fresh(segment, &view.stations)];
             let taken = exchange(bus, *station, new, left == 1).await?;
             if taken == [false; 2] {
                 return Ok((given, false));
@@ -123,19 +98,19 @@ pub(super) async fn give(
     Ok((given, true))
 }
 
-/// Takes an address from whoever has it. He is found with another one.
+/// Takes an address from the SubDevice that has it. It is found with another one.
 pub(in super::super) async fn take_away(
     bus: &Bus,
-    fleet: &SharedFleet,
+    segment: &SharedSegment,
     station: StationAddress,
 ) -> Result<(), BusError> {
-    let new = [fresh(fleet, &[]), fresh(fleet, &[])];
+    let new = [fresh(segment, &[]), fresh(segment, &[])];
     exchange(bus, station, new, true).await.map(drop)
 }
 
-/// Gives the first SubDevice on each link that has an address a new one. Returns on which links somebody took it.
+/// Gives the first SubDevice on each link that has an address a new one. Returns on which links one took it.
 ///
-/// The two links get different ones: there may be somebody on the other link whose answers do not arrive.
+/// The two links get different ones: there may be one on the other link whose answers do not arrive.
 async fn exchange(
     bus: &Bus,
     station: StationAddress,

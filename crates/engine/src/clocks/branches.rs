@@ -8,14 +8,14 @@
 use alloc::vec;
 use alloc::vec::Vec;
 
-use crate::clocks::Wiring;
+use super::wiring::Wiring;
 use crate::topology::{PortOf, Topology};
 
 /// Sets that are measured at most: four for each of sixteen forks. What is not known then is told.
 const MOST_SETS: usize = 64;
 
 /// Ports to close, set by set. `has_clock` by position.
-pub(super) fn sets(wiring: &Wiring, has_clock: &[bool]) -> Vec<Vec<PortOf>> {
+pub fn sets(wiring: &Wiring, has_clock: &[bool]) -> Vec<Vec<PortOf>> {
     let tree = Tree::new(wiring, has_clock);
     let forks = (0..wiring.count()).filter(|node| tree.is_fork(*node));
     let sets = forks.flat_map(|fork| {
@@ -26,7 +26,7 @@ pub(super) fn sets(wiring: &Wiring, has_clock: &[bool]) -> Vec<Vec<PortOf>> {
 }
 
 /// Whether a fork without a clock, with a clock in front, has branches.
-pub(super) fn are_hidden(topology: &Topology, has_clock: &[bool]) -> bool {
+pub fn are_hidden(topology: &Topology, has_clock: &[bool]) -> bool {
     !sets(&Wiring::new(topology, false, |_| true), has_clock).is_empty()
 }
 
@@ -45,7 +45,7 @@ impl<'a> Tree<'a> {
         let count = wiring.count();
         let mut tree = Tree { wiring, has_clock, parents: vec![None; count], branches: vec![Vec::new(); count] };
         let mut is_met = vec![false; count];
-        for arrival in (0..crate::clocks::wiring::TREES).flat_map(|link| wiring.way(link)) {
+        for arrival in (0..super::wiring::TREES).flat_map(|link| wiring.way(link)) {
             if !core::mem::replace(&mut is_met[arrival.at.node], true)
                 && let Some(near) = wiring.far(arrival.at).filter(|near| is_met[near.node])
             {

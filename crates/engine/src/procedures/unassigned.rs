@@ -1,0 +1,197 @@
+//! SubDevices that answer but have no station address of ours: found, read, and given the address of the declared SubDevice
+//! that they are, as the model tells ([`crate::segment::unassigned`]).
+//!
+//! Each is read by a procedure of its own, so that one whose EEPROM is slow or broken keeps no other waiting.
+
+mod address;
+mod doubles;
+mod quiet;
+pub mod rescan;
+
+use alloc::boxed::Box;
+use alloc::rc::Rc;
+use alloc::string::ToString;
+use alloc::vec::Vec;
+use core::cell::Cell;
+use core::time::Duration;
+
+use ringcat_wire::address::StationAddress;
+use ringcat_wire::register::map;
+
+use self::address::give;
+pub(super) use self::address::take_away;
+pub(super) use self::address::view;
+use self::doubles::restore;
+pub(super) use self::doubles::{Mark, has_identity, mark};
+use self::rescan::ports_of;
+use super::frame_limit;
+use super::scan::{ScanError, read_one};
+use super::shared_segment::SharedSegment;
+use crate::event::Event;
+use crate::info::SubDeviceInfo;
+use crate::segment::Observation;
+use crate::segment::member::Phase;
+use crate::segment::unassigned::{Knowledge, Matches, UnassignedSubDevice};
+use crate::supervisor::{Bus, BusError};
+
+/// Pause before an SII that could not be read is read again; it doubles with every failure.
+const FIRST_PAUSE: Duration = Duration::from_millis(100);
+/// Longest pause.
+const LONGEST_PAUSE: Duration = Duration::from_secs(5);
+/// Searches without success in a row before that is reported.
+const PATIENCE: u32 = 100;
+/// Searches without success in a row before it is tried whether frames hold too many datagrams.
+const DOUBT: u32 = 3;
+/// Failures of the bus in a row before they are reported.
+const BUS_PATIENCE: u32 = 3;
+
+/// The search for SubDevices without a station address of ours.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Search {
+    /// Without success, in a row.
+    failures: Rc<Cell<u32>>,
+}
+
+impl Search {
+    /// Finds SubDevices without a known station address, gives them one and has them read. True where none is left that is
+    /// not known.
+    pub(super) async fn run(&self, bus: &Bus, segment: &SharedSegment) -> bool {
+        let (complete, reason) = match find(bus, segment).await {
+            Ok(complete) => (complete, "SubDevices answer that cannot be told apart".into()),
+            Err(error) => (false, error.to_string()),
+        };
+        if complete {
+            self.failures.set(0);
+            return true;
+        }
+        let failures = self.failures.get().saturating_add(1);
+        self.failures.set(failures);
+        if failures == DOUBT {
+            frame_limit::explain(bus, segment).await;
+        }
+        if failures == PATIENCE {
+            bus.report(Event::ScanFailed { reason });
+        }
+        false
+    }
+}
+
+/// True where none is left that is not known.
+async fn find(bus: &Bus, segment: &SharedSegment) -> Result<bool, BusError> {
+    let Some(before) = view(bus).await? else { return Ok(false) };
+    let old = segment.view().unknown(&before);
+    if old.is_empty() {
+        segment.observe(Observation::Places(&before));
+        return Ok(true);
+    }
+    // One that is given another address is read anew.
+    segment.observe(Observation::Readdressing(&old));
+    let (given, complete) = give(bus, segment, &before, &old).await?;
+    let Some(mut after) = view(bus).await? else { return Ok(false) };
+    let owners = segment.view().owners(&before.stations);
+    restore(bus, segment, &owners, &before, &mut after).await?;
+    segment.observe(Observation::Places(&after));
+    segment.observe(Observation::Given { view: &after, given: &given });
+    let is_known = segment.view().unknown(&after).is_empty();
+    Ok(complete && is_known)
+}
+
+/// Reads one, again and again until it works or it is unassigned no longer.
+pub(super) async fn read_unassigned(bus: Bus, segment: SharedSegment, station: StationAddress) {
+    let mut pause = FIRST_PAUSE;
+    let mut bus_failures = 0;
+    loop {
+        let result = read_once(&bus, &segment, station).await;
+        if segment.view().unassigned(station).is_none() {
+            return;
+        }
+        let failed_on_bus = match &result {
+            Err(ScanError::Bus(_)) => true,
+            Err(ScanError::Sii { error, .. }) => error.is_passing(),
+            Ok(_) | Err(_) => false,
+        };
+        bus_failures = if failed_on_bus { bus_failures + 1 } else { 0 };
+        let is_patient = failed_on_bus && bus_failures < BUS_PATIENCE;
+        let is_read = result.is_ok();
+        let told = |error: ScanError| (!is_patient).then(|| error.to_string());
+        segment.observe(Observation::Read { station, read: result.map(Rc::new).map_err(told) });
+        if is_read {
+            return;
+        }
+        bus.sleep(pause).await;
+        pause = (pause * 2).min(LONGEST_PAUSE);
+    }
+}
+
+async fn read_once(bus: &Bus, segment: &SharedSegment, station: StationAddress) -> Result<SubDeviceInfo, ScanError> {
+    quiet::level(bus, station).await?;
+    let position = segment.view().unassigned(station).map(|it| it.position);
+    read_one(bus, position.unwrap_or_default(), station, &segment.cache).await
+}
+
+/// Gives those that are absent members their addresses, and has the others told. To be called when it is known of all members
+/// whether they are there: one that is absent, but not known to be, may be the one that another SubDevice is.
+///
+/// False where it could not be found out where they are.
+pub(super) async fn admit_all(bus: &Bus, segment: &SharedSegment) -> bool {
+    let Some(told) = find_places(bus, segment).await else { return false };
+    let Matches { matched, held } = segment.view().match_all(&told, bus.now());
+    for (station, index) in held {
+        segment.observe(Observation::Held { station, index });
+    }
+    for (unassigned, member) in matched {
+        let Knowledge::Known(info) = &unassigned.knowledge else { continue };
+        match member {
+            Some(index) => admit(bus, segment, &unassigned, info, index).await,
+            None => segment.observe(Observation::Unexpected(unassigned.station)),
+        }
+    }
+    true
+}
+
+/// Looks again where they are, if a member is missed: since they were found the ring may have opened somewhere else, and of
+/// several alike it is the place that tells them apart. Gives back which members cables tell; `None` where the segment
+/// changes.
+async fn find_places(bus: &Bus, segment: &SharedSegment) -> Option<Vec<(StationAddress, usize)>> {
+    let is_one_missed = {
+        let view = segment.view();
+        !view.unassigned.is_empty() && view.members.iter().any(|member| member.phase == Phase::Absent)
+    };
+    if !is_one_missed {
+        return Some(Vec::new());
+    }
+    let seen = view(bus).await.ok()??;
+    // One that has come since may be the first of several alike.
+    if !segment.view().unknown(&seen).is_empty() {
+        return None;
+    }
+    segment.observe(Observation::Places(&seen));
+    if !segment.view().asks_for_cables() {
+        return Some(Vec::new());
+    }
+    let ports = ports_of(bus, &seen).await.ok()??;
+    let told = segment.view().told_by_cables(&seen, &ports);
+    Some(told)
+}
+
+/// Makes one the member that it is, unless its address cannot be written now.
+async fn admit(
+    bus: &Bus,
+    segment: &SharedSegment,
+    unassigned: &UnassignedSubDevice,
+    info: &SubDeviceInfo,
+    index: usize,
+) {
+    let station = unassigned.station;
+    let fitted = segment.view().as_member(unassigned, info, index);
+    let info = match fitted {
+        Ok(info) => info,
+        Err(reason) => return segment.observe(Observation::Misfit { station, index, reason }),
+    };
+    let written = bus.fpwr(station, map::STATION_ADDRESS, &info.station.0.to_le_bytes()).await;
+    // The reply to the first try may have been lost, and then the old address answers no more.
+    if written.is_err() && bus.fprd(info.station, map::STATION_ADDRESS, 2).await.is_err() {
+        return;
+    }
+    segment.observe(Observation::Admitted { station, index, info: Box::new(info) });
+}

@@ -1,0 +1,84 @@
+//! Unassigned SubDevices that are members of hot connect groups: the head by its alias or identification at any place, the
+//! others by what they are behind.
+
+use alloc::vec::Vec;
+
+use super::Segment;
+use super::matching::Fit;
+use super::member::Phase;
+use super::unassigned::{Knowledge, UnassignedSubDevice, fit};
+use crate::config::groups;
+use crate::time::Instant;
+
+/// Takes those out that are members of groups, and says which. Also those that may be one as soon as they are read are
+/// taken out, without being told anything.
+pub(super) fn members(
+    segment: &Segment,
+    unassigned: &mut Vec<UnassignedSubDevice>,
+    now: Instant,
+) -> Vec<(UnassignedSubDevice, Option<usize>)> {
+    let groups = groups(segment.members.iter().map(|member| &*member.config));
+    if groups.is_empty() {
+        return Vec::new();
+    }
+    let mut matched: Vec<(UnassignedSubDevice, Option<usize>)> = Vec::new();
+    // By position what is there and waits to be read, or the member that it is.
+    let mut before: Option<(u16, Option<usize>)> = None;
+    let mut rest = Vec::new();
+    for candidate in unassigned.drain(..) {
+        let at = candidate.position.0;
+        let ahead = match before {
+            Some((position, owner)) if position.checked_add(1) == Some(at) => owner,
+            _ => candidate.behind,
+        };
+        let waits_behind = matches!(before, Some((position, None)) if position.checked_add(1) == Some(at));
+        let member = head(segment, &groups, &candidate).or_else(|| follower(segment, &groups, &candidate, ahead?));
+        match member {
+            Some(index) => {
+                before = Some((at, Some(index)));
+                matched.push((candidate, Some(index)));
+            }
+            // Whose place is right behind one that is not known yet may belong to that one's group.
+            None if candidate.is_awaited(now) || waits_behind => {
+                before = Some((at, None));
+                if !candidate.is_awaited(now) {
+                    continue;
+                }
+                rest.push(candidate);
+            }
+            None => rest.push(candidate),
+        }
+    }
+    *unassigned = rest;
+    matched
+}
+
+/// The head that one is: absent, and alone with its alias or identification.
+fn head(segment: &Segment, groups: &[Vec<usize>], candidate: &UnassignedSubDevice) -> Option<usize> {
+    let heads = groups.iter().filter_map(|members| members.first().copied());
+    heads
+        .into_iter()
+        .find(|index| is_absent_and_fits(segment, candidate, *index) && is_alone(segment, candidate, *index))
+}
+
+/// No other one has the mark.
+fn is_alone(segment: &Segment, candidate: &UnassignedSubDevice, index: usize) -> bool {
+    let address = segment.members[index].config.address;
+    let others = segment.unassigned.iter().filter(|other| other.station != candidate.station);
+    others.into_iter().all(|other| match &other.knowledge {
+        Knowledge::Known(info) => !address.is_borne_by(info),
+        Knowledge::Reading(_) | Knowledge::Unreadable(_) => true,
+    })
+}
+
+/// The next member of the group of the member that is right before one.
+fn follower(segment: &Segment, groups: &[Vec<usize>], candidate: &UnassignedSubDevice, ahead: usize) -> Option<usize> {
+    let members = groups.iter().find(|members| members.contains(&ahead))?;
+    let next = members.iter().skip_while(|index| **index != ahead).nth(1)?;
+    is_absent_and_fits(segment, candidate, *next).then_some(*next)
+}
+
+fn is_absent_and_fits(segment: &Segment, candidate: &UnassignedSubDevice, index: usize) -> bool {
+    let known = matches!(candidate.knowledge, Knowledge::Known(_));
+    known && segment.members[index].phase == Phase::Absent && fit(segment, candidate, index) != Fit::No
+}

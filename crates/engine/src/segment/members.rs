@@ -1,0 +1,329 @@
+//! What becomes of the declared SubDevices: each is a machine of its own, so that a hundred come back at once.
+
+use alloc::rc::Rc;
+use alloc::string::ToString;
+use core::time::Duration;
+
+use ringcat_wire::address::{StationAddress, Wkc};
+use ringcat_wire::al::AlState;
+
+use super::effect::{Check, Effect, Effects, Shown, Task};
+use super::look::{Look, answers};
+use super::member::{Incidents, Member, Phase};
+use super::observation::ProcessDataStep;
+use super::setup::Setup;
+use super::start::Start;
+use super::{Asked, Round, Segment};
+use crate::event::Event;
+use crate::info::SubDeviceInfo;
+use crate::ring::RingState;
+use crate::time::Instant;
+
+/// A SubDevice is lost when it was silent in so many looks in a row: at the edge of a cut a copy may have been processed by none.
+const SILENT_LOOKS: u8 = 2;
+/// Pause before a silent SubDevice is looked at again.
+const SECOND_LOOK_PAUSE: Duration = Duration::from_millis(2);
+/// Rounds in a row in which looks do not come back though process data does, or the other way round, before it is tried
+/// whether frames hold too many datagrams.
+const BLIND_ROUNDS: u8 = 2;
+
+/// What a round of looks has shown.
+#[derive(Clone, Copy, Debug)]
+pub struct Looked<'a> {
+    /// What it was about.
+    pub asked: Asked,
+    /// By member.
+    pub looks: &'a [Look],
+    /// How far each member was when the round began.
+    pub before: &'a [Phase],
+    /// Of those without a declaration, by station address.
+    pub unassigned: &'a [(StationAddress, Look)],
+    /// SubDevices that the latest supervision result counts; `None` before the first.
+    pub counted: Option<Wkc>,
+}
+
+impl Segment {
+    /// Takes in a round of looks.
+    pub(super) fn observe_looks(&mut self, looked: &Looked<'_>, now: Instant, effects: &mut Effects) {
+        let Looked { asked, looks, before, unassigned, counted } = *looked;
+        self.attention.round = Round::default();
+        if asked.isolations != self.slot.isolations() {
+            // Some were out of reach on purpose meanwhile.
+            return self.attention.again_in(SECOND_LOOK_PAUSE, now);
+        }
+        // Either frames of looks do not come back though SubDevices process those of the exchange, or the other way round.
+        let is_blind = match counted {
+            Some(counted) if counted != Wkc(0) => looks.contains(&Look::Unknown),
+            Some(_) | None => answers(looks) > 0,
+        };
+        self.attention.blind = if is_blind { self.attention.blind.saturating_add(1) } else { 0 };
+        self.attention.round.is_blind = self.attention.blind == BLIND_ROUNDS;
+        let Some(counted) = counted else { return };
+        let others = unassigned.iter().filter(|(_, look)| look.is_answer()).count();
+        let (counted, answering) = (usize::from(counted.0), answers(looks) + others);
+        // When the count and the answers agree, a silent SubDevice is certainly not there.
+        let needed = if counted == answering { 1 } else { SILENT_LOOKS };
+        let is_certain = self.judge(looks, before, needed, now, effects);
+        if needed == 1 {
+            self.unassigned.retain(|it| !unassigned.contains(&(it.station, Look::Silent)));
+        }
+        if !is_certain {
+            // Certainty soon, and then again only when something changes.
+            self.attention.again_in(SECOND_LOOK_PAUSE, now);
+        }
+        let reported: RingState = self.attention.reported();
+        self.observe_breaks(looks, reported, now, effects);
+        let status = self.by_position(looks);
+        self.observe_local_rings(&status, now, effects);
+        self.observe_ports(looks, effects);
+        self.attention.round = Round {
+            is_certain,
+            finds_others: counted > answering && !looks.contains(&Look::Unknown),
+            is_complete: counted <= answering,
+            is_blind: self.attention.round.is_blind,
+            counts: true,
+        };
+    }
+
+    /// Draws conclusions from what each member said. True where it is known of all whether they are there.
+    fn judge(&mut self, looks: &[Look], before: &[Phase], needed: u8, now: Instant, effects: &mut Effects) -> bool {
+        let mut certain = true;
+        for (index, look) in looks.iter().enumerate() {
+            let Some(member) = self.members.get_mut(index) else { continue };
+            match (look, member.phase) {
+                (Look::Unknown | Look::Doubled, _) => certain = false,
+                (Look::Silent, Phase::Absent) => member.silent = SILENT_LOOKS,
+                (Look::Silent, Phase::Configuring | Phase::Settled(_)) => {
+                    member.silent = (member.silent + 1).min(SILENT_LOOKS);
+                    if member.silent >= needed {
+                        self.lose(index, effects);
+                    } else {
+                        certain = false;
+                    }
+                }
+                // It has got there since: what it said is not what it says now.
+                (Look::Answer { .. }, Phase::Settled(_)) if before.get(index) != Some(&member.phase) => {
+                    member.silent = 0;
+                    self.attention.again_in(SECOND_LOOK_PAUSE, now);
+                }
+                (Look::Answer { status, code, .. }, phase) => {
+                    member.silent = 0;
+                    self.heard(index, phase, (*status, *code), effects);
+                }
+            }
+        }
+        certain
+    }
+
+    /// A member answered.
+    fn heard(&mut self, index: usize, phase: Phase, (status, code): Shown, effects: &mut Effects) {
+        let member = &mut self.members[index];
+        match phase {
+            Phase::Configuring => {}
+            Phase::Settled(state) if !status.error && status.al_state() == Some(state) => {
+                if core::mem::take(&mut member.suspended) {
+                    self.board.set_taking_part(index, true);
+                }
+            }
+            Phase::Settled(_) => {
+                member.suspended = false;
+                let count = &mut member.incidents.state_changes;
+                *count = count.saturating_add(1);
+                effects.report(Event::StateError { subdevice: index, requested: None, status, code });
+                self.start(index, Start::Unknown, Some((status, code)), Check::None, effects);
+            }
+            // Its station address answers again: it has come back, if it is the same one.
+            Phase::Absent => {
+                member.suspended = false;
+                self.start(index, Start::Unknown, None, Check::Return, effects);
+            }
+        }
+    }
+
+    /// As soon as all that the cyclic datagram counts have answered, process data no longer waits for the others: whether
+    /// they are lost is seen later, whose inputs are new is seen now.
+    pub(super) fn observe_part_of_looks(&mut self, asked: Asked, looks: &[Look], others: usize, counted: Option<Wkc>) {
+        if asked.isolations != self.slot.isolations()
+            || counted.map(|counted| usize::from(counted.0)) != Some(answers(looks) + others)
+        {
+            return;
+        }
+        for (index, look) in looks.iter().enumerate() {
+            let Some(member) = self.members.get_mut(index).filter(|_| !look.is_answer()) else { continue };
+            if matches!(member.phase, Phase::Settled(_)) && self.board.takes_part(index) {
+                self.board.set_taking_part(index, false);
+                member.suspended = true;
+            }
+        }
+    }
+
+    /// A member no longer answers. What was under way for it ends.
+    pub(super) fn lose(&mut self, index: usize, effects: &mut Effects) {
+        let Some(member) = self.members.get_mut(index) else { return };
+        member.attempt = member.attempt.wrapping_add(1);
+        if member.phase != Phase::Absent {
+            member.phase = Phase::Absent;
+            member.incidents.absences = member.incidents.absences.saturating_add(1);
+            effects.report(Event::Lost { subdevice: index });
+        }
+        let is_excused = !member.exchanges(member.target);
+        self.board.set_taking_part(index, false);
+        self.board.set_unproven(index, false);
+        // One that was on its way to process data is missed from now on.
+        self.board.set_excused(index, is_excused);
+        effects.0.push(Effect::SuspendMailbox { index });
+    }
+
+    /// Starts the configuration of a member that answers. `told`: its error that was told.
+    pub(super) fn start(
+        &mut self,
+        index: usize,
+        from: Start,
+        told: Option<Shown>,
+        check: Check,
+        effects: &mut Effects,
+    ) {
+        let Some(member) = self.members.get_mut(index) else { return };
+        let attempt = member.begin_attempt();
+        effects.start(Task::BringUp { index, attempt, from, told, check });
+    }
+
+    /// Starts the configuration of all members that were found.
+    pub(super) fn start_all(&mut self, from: Start, effects: &mut Effects) {
+        for index in 0..self.members.len() {
+            if self.members[index].is_there() {
+                self.start(index, from, None, Check::None, effects);
+            }
+        }
+    }
+
+    /// What answers at a lost member's address is that member.
+    pub(super) fn observe_return(&mut self, index: usize, attempt: u32, effects: &mut Effects) {
+        if self.current(index, attempt).is_some() {
+            effects.report(Event::Returned { subdevice: index });
+        }
+    }
+
+    /// What answers at a lost member's address is not known to be that member.
+    pub(super) fn keep_absent(&mut self, index: usize, attempt: u32) {
+        if let Some(member) = self.current(index, attempt) {
+            member.phase = Phase::Absent;
+            self.attention.want();
+        }
+    }
+
+    /// A member has reached the state to which it was to be brought.
+    pub(super) fn settle(&mut self, index: usize, attempt: u32, state: AlState, effects: &mut Effects) {
+        let Some(member) = self.current(index, attempt) else { return };
+        member.phase = Phase::Settled(state);
+        let is_excused = !member.exchanges(state);
+        self.board.set_excused(index, is_excused);
+        effects.report(Event::StateReached { subdevice: index, state });
+    }
+
+    /// A member is to be brought to another state.
+    pub(super) fn request(&mut self, index: usize, state: AlState) {
+        let Some(member) = self.members.get_mut(index) else { return };
+        member.target = state;
+        let exchanges = member.exchanges(state);
+        match member.phase {
+            Phase::Absent => self.board.set_excused(index, !exchanges),
+            Phase::Settled(is) if is == state => {}
+            Phase::Settled(_) | Phase::Configuring => {
+                member.begin_attempt();
+                // On the way up it is excused until it is there.
+                if !exchanges {
+                    self.board.set_excused(index, true);
+                }
+            }
+        }
+    }
+
+    /// A member has refused a state, and keeps the one that it was to have before.
+    pub(super) fn refuse(&mut self, index: usize, attempt: u32, before: AlState) {
+        let Some(member) = self.current(index, attempt) else { return };
+        member.target = before;
+        let is_excused = !member.exchanges(before);
+        self.board.set_excused(index, is_excused);
+    }
+
+    /// What a member does in process data from now on.
+    pub(super) fn observe_process_data(&mut self, index: usize, step: ProcessDataStep, effects: &mut Effects) {
+        let Some(setup) = self.members.get(index).map(|member| member.setup.clone()) else { return };
+        let is_seen_alone = setup.as_ref().is_some_and(|setup| setup.presence_fmmu.is_some());
+        match step {
+            ProcessDataStep::Off => self.board.set_taking_part(index, false),
+            ProcessDataStep::Unmapped => self.board.set_unproven(index, false),
+            ProcessDataStep::Left => {
+                self.board.set_taking_part(index, false);
+                self.board.set_unproven(index, false);
+            }
+            // SyncManagers for OP only are still off.
+            ProcessDataStep::Mapped => {
+                let is_op_only = setup.is_some_and(|setup| setup.plan.is_op_only());
+                self.board.set_unproven(index, is_seen_alone || !is_op_only);
+            }
+            ProcessDataStep::Joined => {
+                self.board.set_unproven(index, is_seen_alone);
+                self.board.set_taking_part(index, true);
+                if is_seen_alone {
+                    effects.start(Task::ProveInputs { index });
+                }
+            }
+            ProcessDataStep::Proven => self.board.set_unproven(index, false),
+        }
+    }
+
+    /// A member's registers do not hold its configuration any more.
+    pub(super) fn observe_undone(&mut self, index: usize, attempt: u32, reason: &str, effects: &mut Effects) {
+        if self.current(index, attempt).is_none() {
+            return;
+        }
+        effects.failed(index, reason.to_string());
+        // Another SubDevice may answer at its address: one that was out of reach since an earlier session.
+        self.start(index, Start::Doubtful, None, Check::Identity, effects);
+    }
+
+    /// A member's SII was read again.
+    pub(super) fn observe_info(&mut self, index: usize, info: &SubDeviceInfo, effects: &mut Effects) {
+        let Segment { members, layout, .. } = self;
+        let Some(member) = members.get_mut(index) else { return };
+        match Setup::new(index, &member.config, info, layout) {
+            Ok(setup) => {
+                if member.unfit.take().is_some() && setup.plan.mapped_areas().count() > setup.process_data_fmmus() {
+                    let what =
+                        "its SII can be followed now: it has no place in the process image before the next activation";
+                    effects.report(Event::PlanOddity { subdevice: index, what: what.to_string() });
+                }
+                member.setup = Some(Rc::new(setup));
+                member.info = Some(info.clone());
+            }
+            // As before.
+            Err(_) if member.unfit.is_some() => {}
+            Err(error) => effects.failed(index, error.to_string()),
+        }
+    }
+
+    /// Members that are there will be configured later: what answers meanwhile has not come back.
+    pub(super) fn delay_all(&mut self) {
+        for member in self.members.iter_mut().filter(|member| member.is_there()) {
+            member.phase = Phase::Configuring;
+        }
+    }
+
+    /// What has happened to members is counted from 0 again.
+    pub(super) fn forget_incidents(&mut self) {
+        self.members.iter_mut().for_each(|member| member.incidents = Incidents::default());
+    }
+
+    pub(super) fn set_configured(&mut self, index: usize, is: bool) {
+        if let Some(member) = self.members.get_mut(index) {
+            member.configured = is;
+        }
+    }
+
+    /// The member whose attempt of that number is under way.
+    pub(super) fn current(&mut self, index: usize, attempt: u32) -> Option<&mut Member> {
+        self.members.get_mut(index).filter(|member| member.attempt == attempt)
+    }
+}

@@ -1,0 +1,332 @@
+//! What was seen, heard or done: all that changes the model.
+
+use alloc::boxed::Box;
+use alloc::rc::Rc;
+use alloc::string::String;
+use core::time::Duration;
+
+use ringcat_wire::address::{StationAddress, Wkc};
+use ringcat_wire::al::AlState;
+use ringcat_wire::register::DlControl;
+
+use super::disturbance::Disturbance;
+use super::effect::Effects;
+use super::look::Look;
+use super::members::Looked;
+use super::port_control::BlockedPort;
+use super::recabling::Seen;
+use super::ring::Words;
+use super::start::Start;
+use super::view::View;
+use super::{Asked, LineCheck, Segment};
+use crate::info::SubDeviceInfo;
+use crate::ring_status::CableErrors;
+use crate::time::Instant;
+use crate::topology::NodeStatus;
+
+/// What a SubDevice does in process data from now on.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum ProcessDataStep {
+    /// Nothing is counted on any more.
+    Off,
+    /// Its FMMUs are about to be cleared.
+    Unmapped,
+    /// Both.
+    Left,
+    /// Its FMMUs are about to be set.
+    Mapped,
+    /// It is counted on, for its inputs as soon as they were seen.
+    Joined,
+    /// It was seen to give its inputs.
+    Proven,
+}
+
+/// Something that was observed.
+#[derive(Debug)]
+pub enum Observation<'a> {
+    /// What the exchange has posted, and what the links tell.
+    Words(Words),
+    /// A round of looks has brought this so far. `others`: answers of SubDevices without a declaration.
+    PartOfLooks {
+        /// What it was about.
+        asked: Asked,
+        /// By member.
+        looks: &'a [Look],
+        /// Answers of SubDevices without a declaration.
+        others: usize,
+        /// SubDevices that the latest supervision result counts.
+        counted: Option<Wkc>,
+    },
+    /// A round of looks is complete.
+    Looks(Looked<'a>),
+    /// What followed from a round of looks is done. With the number of the latest supervision result.
+    RoundEnded(Option<u32>),
+    /// Another round is called for.
+    LookAgain,
+    /// Another round is called for after a pause.
+    LookAgainIn(Duration),
+
+    /// The configuration of all members that are there may begin.
+    Started(Start),
+    /// They will be configured later: what answers meanwhile has not come back.
+    Delayed,
+    /// A member reached a state.
+    Reached {
+        /// The member.
+        index: usize,
+        /// The attempt.
+        attempt: u32,
+        /// The state.
+        state: AlState,
+    },
+    /// What answers at a lost member's address is that member.
+    Returned {
+        /// The member.
+        index: usize,
+        /// The attempt that found it out.
+        attempt: u32,
+    },
+    /// What answers at a lost member's address is another SubDevice, or cannot be told.
+    NotReturned {
+        /// The member.
+        index: usize,
+        /// The attempt that found it out.
+        attempt: u32,
+    },
+    /// A member does not answer.
+    Unreachable {
+        /// The member.
+        index: usize,
+        /// The attempt that found it out.
+        attempt: u32,
+    },
+    /// A member's registers hold its configuration, or no longer do.
+    Configured {
+        /// The member.
+        index: usize,
+        /// They do.
+        is: bool,
+    },
+    /// A member's registers do not hold what was written to them.
+    Undone {
+        /// The member.
+        index: usize,
+        /// Its attempt when they were read.
+        attempt: u32,
+        /// What is not there.
+        reason: String,
+    },
+    /// What a member does in process data from now on.
+    ProcessData {
+        /// The member.
+        index: usize,
+        /// What it does.
+        step: ProcessDataStep,
+    },
+    /// The application wants a member in another state.
+    Requested {
+        /// The member.
+        index: usize,
+        /// The state.
+        state: AlState,
+    },
+    /// A member has refused that.
+    Refused {
+        /// The member.
+        index: usize,
+        /// The attempt.
+        attempt: u32,
+        /// The state that was its target before.
+        before: AlState,
+    },
+    /// A member's SII was read again.
+    ReadAgain {
+        /// The member.
+        index: usize,
+        /// What it says.
+        info: &'a SubDeviceInfo,
+    },
+
+    /// What has happened to members is counted from 0 again.
+    IncidentsForgotten,
+
+    /// Where SubDevices are, all of which are known.
+    Places(&'a View),
+    /// These addresses are taken from the SubDevices that have them.
+    Readdressing(&'a [StationAddress]),
+    /// Temporary addresses were given.
+    Given {
+        /// Where SubDevices are with them.
+        view: &'a View,
+        /// The addresses.
+        given: &'a [StationAddress],
+    },
+    /// An unassigned SubDevice was read, or could not be: then why, where that is to be told.
+    Read {
+        /// Its address.
+        station: StationAddress,
+        /// What it is.
+        read: Result<Rc<SubDeviceInfo>, Option<String>>,
+    },
+    /// An unassigned SubDevice is none of the declared ones.
+    Unexpected(StationAddress),
+    /// An unassigned SubDevice is a member and does not fit.
+    Misfit {
+        /// Its address.
+        station: StationAddress,
+        /// The member.
+        index: usize,
+        /// Why.
+        reason: String,
+    },
+    /// An unassigned SubDevice may be this member, or another one of the same kind.
+    Held {
+        /// Its address.
+        station: StationAddress,
+        /// The member.
+        index: usize,
+    },
+    /// An unassigned SubDevice has got the address of the member that it is.
+    Admitted {
+        /// Its address until then.
+        station: StationAddress,
+        /// The member.
+        index: usize,
+        /// What it is.
+        info: Box<SubDeviceInfo>,
+    },
+
+    /// The segment was looked at for crossed lines.
+    LineChecked {
+        /// What was found; `None` where it changes too much to tell.
+        found: Option<LineCheck>,
+        /// The redundant link was down meanwhile.
+        in_control: bool,
+    },
+    /// The whole segment was looked at.
+    Rescanned {
+        /// What was found.
+        seen: Seen<'a>,
+        /// What was posted then.
+        words: Words,
+    },
+    /// The cabling was followed up to so many changes of hot connect groups.
+    GroupsFollowed(u32),
+    /// Cables have counted errors since the last look. By their number in the cabling that was asked about.
+    CableErrors {
+        /// What it was about.
+        asked: Asked,
+        /// Those that are new.
+        fresh: &'a [CableErrors],
+    },
+
+    /// Something that puts SubDevices out of reach is wanted.
+    Wanted(Disturbance),
+    /// It is not wanted any more, before it began.
+    Renounced(Disturbance),
+    /// It has been undone.
+    Undisturbed,
+    /// Rings behind junctions have been looked into, and all is as before.
+    Isolated {
+        /// What it was about.
+        asked: Asked,
+        /// What SubDevices said about their ports, by position.
+        found: &'a [Option<NodeStatus>],
+        /// What was posted then.
+        words: Words,
+    },
+    /// A junction is about to be told something about its ports.
+    PortsOrdered {
+        /// The junction.
+        station: StationAddress,
+        /// What.
+        control: DlControl,
+    },
+    /// It has been told.
+    PortsTold(StationAddress),
+    /// What a junction was told was read, when it had had so many orders.
+    PortsRead {
+        /// The junction.
+        station: StationAddress,
+        /// Orders by then.
+        orders: u32,
+        /// What it said.
+        control: DlControl,
+    },
+    /// Ports were closed to cut a SubDevice off.
+    Blocked(&'a [BlockedPort]),
+    /// They are about to be opened.
+    Unblocking,
+}
+
+impl Segment {
+    /// What follows from each observation.
+    pub(super) fn take(&mut self, seen: Observation<'_>, now: Instant, effects: &mut Effects) {
+        match seen {
+            Observation::Words(words) => self.observe_words(&words, now, effects),
+            Observation::PartOfLooks { asked, looks, others, counted } => {
+                self.observe_part_of_looks(asked, looks, others, counted);
+            }
+            Observation::Looks(looked) => self.observe_looks(&looked, now, effects),
+            Observation::RoundEnded(number) => self.attention.end(number, now),
+            Observation::LookAgain => self.attention.want(),
+            Observation::LookAgainIn(pause) => self.attention.again_in(pause, now),
+
+            Observation::Started(from) => self.start_all(from, effects),
+            Observation::Delayed => self.delay_all(),
+            Observation::Reached { index, attempt, state } => self.settle(index, attempt, state, effects),
+            Observation::Returned { index, attempt } => self.observe_return(index, attempt, effects),
+            Observation::NotReturned { index, attempt } => self.keep_absent(index, attempt),
+            Observation::Unreachable { index, attempt } => {
+                if self.current(index, attempt).is_some() {
+                    self.lose(index, effects);
+                }
+            }
+            Observation::Configured { index, is } => self.set_configured(index, is),
+            Observation::Undone { index, attempt, reason } => self.observe_undone(index, attempt, &reason, effects),
+            Observation::ProcessData { index, step } => self.observe_process_data(index, step, effects),
+            Observation::Requested { index, state } => self.request(index, state),
+            Observation::Refused { index, attempt, before } => self.refuse(index, attempt, before),
+            Observation::ReadAgain { index, info } => self.observe_info(index, info, effects),
+
+            Observation::IncidentsForgotten => self.forget_incidents(),
+
+            Observation::Places(view) => self.observe_places(view),
+            Observation::Readdressing(old) => self.unassigned.retain(|it| !old.contains(&it.station)),
+            Observation::Given { view, given } => self.observe_given(view, given, now, effects),
+            Observation::Read { station, read } => self.observe_read(station, read, effects),
+            Observation::Unexpected(station) => self.observe_unexpected(station, effects),
+            Observation::Misfit { station, index, reason } => self.observe_misfit(station, index, reason, effects),
+            Observation::Held { station, index } => self.hold(station, index, now, effects),
+            Observation::Admitted { station, index, info } => self.observe_admitted(station, index, *info, effects),
+
+            Observation::LineChecked { found, in_control } => self.observe_line_check(found, in_control, effects),
+            Observation::Rescanned { seen, words } => self.adopt(seen, &words, effects),
+            Observation::GroupsFollowed(changes) => self.hot_connect.follow(changes),
+            Observation::CableErrors { asked, fresh } => self.observe_cable_errors(asked, fresh),
+
+            Observation::Wanted(disturbance) => self.slot.want(disturbance),
+            Observation::Renounced(disturbance) => self.slot.renounce(disturbance),
+            Observation::Undisturbed => self.slot.end(),
+            Observation::Isolated { asked, found, words } => {
+                self.end_silence(&words, now);
+                self.observe_isolated(asked, found, now, effects);
+            }
+            Observation::PortsOrdered { station, control } => self.begin_order(station, control),
+            Observation::PortsTold(station) => self.end_order(station),
+            Observation::PortsRead { station, orders, control } => self.note_control(station, orders, control),
+            Observation::Blocked(ports) => self.blocked.extend(ports),
+            Observation::Unblocking => self.blocked.clear(),
+        }
+    }
+
+    fn observe_cable_errors(&mut self, asked: Asked, fresh: &[CableErrors]) {
+        // Where it was cabled anew since, these are of other cables.
+        if asked.cabling != self.cabling.version {
+            return;
+        }
+        for ((_, total), fresh) in self.cabling.cables.iter_mut().zip(fresh) {
+            *total = total.plus(*fresh);
+        }
+    }
+}

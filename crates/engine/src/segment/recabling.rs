@@ -1,0 +1,110 @@
+//! What a look at the whole segment has shown takes the place of the cabling of the scan: places of breaks, errors of
+//! cables and positions in events are then those of the segment as it is.
+
+use alloc::vec::Vec;
+
+use ringcat_wire::address::StationAddress;
+
+use super::cabling::{Cabling, stations_by_position};
+use super::effect::{Effect, Effects};
+use super::member::Phase;
+use super::retrace::End;
+use super::{Segment, Words};
+use crate::link::LinkSet;
+use crate::ring::RingState;
+use crate::ring_status::{Cable, CableErrors, cables};
+use crate::topology::{PortOf, Topology};
+
+/// The ends of a cable, by the SubDevices there.
+type Ends = [Option<End>; 2];
+
+/// A segment as it was seen, all of it.
+#[derive(Clone, Copy, Debug)]
+pub struct Seen<'a> {
+    /// Connections.
+    pub topology: &'a Topology,
+    /// Station addresses by position.
+    pub stations: &'a [StationAddress],
+    /// Members by position.
+    pub members: &'a [Option<usize>],
+}
+
+impl Segment {
+    /// Whether a look could be taken over: nothing is broken or missing that would be forgotten.
+    pub fn is_whole(&self, words: &Words) -> bool {
+        let is_missed = self.members.iter().any(|member| !member.config.optional && member.phase == Phase::Absent);
+        (words.links == LinkSet::Single || self.is_closed(words)) && !is_missed
+    }
+
+    fn is_closed(&self, words: &Words) -> bool {
+        words.ring.state == RingState::Closed && self.ring.status.state == RingState::Closed
+    }
+
+    /// Takes over the cabling, unless the ring of two links is open, or a mandatory SubDevice does not answer: what is broken
+    /// would be forgotten. A ring behind a junction may be broken, for it is known where it closes, and what was told of it
+    /// goes on to hold.
+    pub(super) fn adopt(&mut self, seen: Seen<'_>, words: &Words, effects: &mut Effects) {
+        let is_single = words.links == LinkSet::Single;
+        let is_whole = is_single || (self.is_closed(words) && seen.topology.redundant_head.is_none());
+        let is_there = |index: usize| seen.members.contains(&Some(index));
+        let is_missed = (0..self.members.len()).any(|index| !is_there(index) && !self.members[index].config.optional);
+        if !is_whole || is_missed {
+            return;
+        }
+        let before: Vec<(Ends, CableErrors)> = {
+            let ends = |cable: &Cable| ends(cable, |node| self.station_of(node));
+            self.cabling.cables.iter().map(|(cable, errors)| (ends(cable), *errors)).collect()
+        };
+        for (index, member) in self.members.iter_mut().enumerate() {
+            member.node = seen.members.iter().position(|owner| *owner == Some(index));
+        }
+        let counted = |cable: Cable| {
+            // What is not known has counted nothing, and the ends of two cables without a SubDevice are not the same.
+            let now = ends(&cable, |node| seen.stations.get(node).copied());
+            let same = before.iter().find(|(ends, _)| *ends == now && now != [None, None]);
+            (cable, same.map_or(CableErrors::default(), |(_, errors)| *errors))
+        };
+        let now = Cabling {
+            topology: seen.topology.clone(),
+            stations: stations_by_position(&self.members, seen.stations.iter().copied()),
+            cables: cables(seen.topology, words.links).into_iter().map(counted).collect(),
+            closings: core::mem::take(&mut self.cabling.closings),
+            version: self.cabling.version,
+        };
+        let is_other = self.cabling.cables != now.cables
+            || self.cabling.stations != now.stations
+            || self.cabling.topology.local_rings != now.topology.local_rings;
+        self.cabling = Cabling { version: now.version.wrapping_add(u32::from(is_other)), ..now };
+        self.adoptions = self.adoptions.wrapping_add(1);
+        effects.0.push(Effect::Occupants(self.occupants()));
+        effects.0.push(Effect::Closings(self.present_closings()));
+        // What is broken in it may not have been told yet.
+        self.attention.want();
+    }
+
+    /// Both ends of the closing cables of all local rings of the cabling.
+    fn present_closings(&self) -> Vec<[End; 2]> {
+        let end = |at: PortOf| Some((*self.cabling.stations.get(at.node)?, at.port));
+        let rings = self.cabling.topology.local_rings.iter().map(|ring| ring.closing);
+        rings.filter_map(|closing| Some([end(closing.head)?, end(closing.tail)?])).collect()
+    }
+
+    /// An unassigned SubDevice that has a place in the cabling and becomes a member has that place as a member.
+    pub(super) fn take_place(&mut self, unassigned: StationAddress, index: usize, effects: &mut Effects) {
+        let stations = &mut self.cabling.stations;
+        let Some(at) = stations.iter().position(|station| *station == unassigned) else { return };
+        let Some(member) = self.members.get_mut(index) else { return };
+        // None answers at its temporary address any more, nor is any where the member was.
+        if let Some(place) = member.node.and_then(|node| stations.get_mut(node)) {
+            *place = unassigned;
+        }
+        stations[at] = member.station;
+        member.node = Some(at);
+        self.cabling.version = self.cabling.version.wrapping_add(1);
+        effects.0.push(Effect::Occupants(self.occupants()));
+    }
+}
+
+fn ends(cable: &Cable, station: impl Fn(usize) -> Option<StationAddress>) -> Ends {
+    [cable.near, cable.far].map(|end| end.and_then(|PortOf { node, port }| Some((station(node)?, port))))
+}

@@ -1,0 +1,309 @@
+//! The ring and the links: opened and closed with the counts of both sides, redundancy lost and regained, a carrier gone
+//! and back. Each edge is told once, and not too often ([`Damper`]); what is asked for is always up to date.
+//!
+//! All of it comes from words that the exchange posts: nothing here waits for a frame, so that the event comes in the
+//! cycle whose frames showed the change.
+
+use core::time::Duration;
+
+use super::damper::Damper;
+use super::disturbance::Disturbance;
+use super::effect::{Effect, Effects};
+use crate::board::{RingWord, Supervision};
+use crate::event::Event;
+use crate::link::{Link, LinkSet};
+use crate::ring::RingState;
+use crate::ring_status::{Cable, CableErrors, LinkStatus, Redundancy, RedundancyLoss, RingStatus};
+use crate::time::Instant;
+use crate::topology::{Topology, are_doubtful};
+
+/// Pause between two looks at results while counts are settling, or a change has still to be told.
+const PAUSE: Duration = Duration::from_micros(500);
+/// Where the counts are not known from before: supervision results until they must be the same twice in a row. At the
+/// edge of a cut one copy may be processed by fewer SubDevices than are connected to its side.
+const SETTLING_RESULTS: u32 = 20;
+
+/// Words that the exchange has posted, and what the links tell.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Words {
+    /// The links that there are.
+    pub links: LinkSet,
+    /// By [`Link::index`].
+    pub carriers: [Option<bool>; 2],
+    /// The state of the ring.
+    pub ring: RingWord,
+    /// The latest supervision result and its number.
+    pub supervision: Option<(u32, Supervision)>,
+    /// Cycles that the exchange has sent.
+    pub cycles: u64,
+}
+
+/// What is known of the ring, and what was told of it.
+#[derive(Debug)]
+pub(super) struct Ring {
+    /// The state that was told last.
+    reported: RingState,
+    /// Changes of the ring that were seen.
+    changes: u32,
+    damper: Damper,
+    /// The way that was seen dead last.
+    dead_way: Option<Link>,
+    ways: Damper,
+    carriers: [Option<bool>; 2],
+    told_carriers: [Option<bool>; 2],
+    cables: [Damper; 2],
+    /// Number and counts of the last supervision result that was looked at.
+    last: Option<(u32, (u16, u16))>,
+    /// Results since the ring changed.
+    settling: u32,
+    /// SubDevices that answered twice in a row while the ring did not change.
+    steady: u16,
+    /// What can be asked for.
+    pub status: RingStatus,
+}
+
+/// What the place of a break is judged by.
+pub(super) struct Cabled<'a> {
+    pub topology: &'a Topology,
+    pub cables: &'a [(Cable, CableErrors)],
+}
+
+impl Ring {
+    /// A ring of which nothing was seen, on links with these carriers.
+    pub fn new(status: RingStatus, carriers: [Option<bool>; 2]) -> Ring {
+        Ring {
+            reported: RingState::Unknown,
+            changes: 0,
+            damper: Damper::default(),
+            dead_way: None,
+            ways: Damper::default(),
+            carriers,
+            told_carriers: carriers,
+            cables: [Damper::default(); 2],
+            last: None,
+            settling: 0,
+            steady: 0,
+            status,
+        }
+    }
+
+    /// The state that was told last.
+    pub fn reported(&self) -> RingState {
+        self.reported
+    }
+
+    /// Takes in what was posted. Returns when to look again though nothing else is posted.
+    pub fn observe(
+        &mut self,
+        words: &Words,
+        disturbance: Option<Disturbance>,
+        cabled: &Cabled<'_>,
+        now: Instant,
+        effects: &mut Effects,
+    ) -> Option<Instant> {
+        match disturbance {
+            // The redundant link is down on our own order: that is nothing to tell.
+            Some(Disturbance::OpenByLink) => {
+                (self.changes, self.dead_way) = (words.ring.changes, words.ring.dead_way);
+                self.carriers = words.carriers;
+                return None;
+            }
+            // A ring that is open on purpose has an interface whose carrier says what it always says.
+            Some(Disturbance::OpenByPort) => {
+                let again = self.observe_carriers(words.carriers, now, effects);
+                self.changes = words.ring.changes;
+                return again;
+            }
+            Some(Disturbance::IsolateRings) | None => {}
+        }
+        let again = self.observe_carriers(words.carriers, now, effects);
+        // One link is a ring of one, which is no news.
+        if words.links == LinkSet::Single {
+            return again;
+        }
+        let is_open = self.observe_ring(words, cabled, now, effects);
+        [again, is_open.then(|| now + PAUSE)].into_iter().flatten().min()
+    }
+
+    /// When a change of a carrier may be told that may not be now.
+    fn observe_carriers(
+        &mut self,
+        carriers: [Option<bool>; 2],
+        now: Instant,
+        effects: &mut Effects,
+    ) -> Option<Instant> {
+        let mut again = None;
+        for link in Link::ALL {
+            let at = link.index();
+            if carriers[at] != self.carriers[at] {
+                self.cables[at].changed(now);
+                self.carriers[at] = carriers[at];
+            }
+            if carriers[at] == self.told_carriers[at] {
+                continue;
+            }
+            if !self.cables[at].may_tell(now) {
+                again = Some(now + PAUSE);
+                continue;
+            }
+            let before = core::mem::replace(&mut self.told_carriers[at], carriers[at]);
+            match carriers[at] {
+                Some(false) => effects.report(Event::LinkDown { link }),
+                Some(true) if before == Some(false) => effects.report(Event::LinkUp { link }),
+                Some(true) | None => continue,
+            }
+            self.cables[at].tell(now);
+        }
+        again
+    }
+
+    /// True while something has still to be told or to settle.
+    fn observe_ring(&mut self, words: &Words, cabled: &Cabled<'_>, now: Instant, effects: &mut Effects) -> bool {
+        let word = words.ring;
+        if word.changes != self.changes {
+            self.damper.changed(now);
+            self.changes = word.changes;
+        }
+        if word.dead_way != self.dead_way {
+            self.ways.changed(now);
+            self.dead_way = word.dead_way;
+        }
+        let is_settled = self.tell_ring(words, cabled, now, effects);
+        let is_told = self.tell_redundancy(word, now, effects);
+        self.status.state = word.state;
+        self.status.changes = word.changes;
+        self.status.unsteady = self.damper.is_unsteady(now);
+        !is_settled || !is_told || self.status.unsteady
+    }
+
+    /// True where the state was told, and the counts of it are steady.
+    fn tell_ring(&mut self, words: &Words, cabled: &Cabled<'_>, now: Instant, effects: &mut Effects) -> bool {
+        let word = words.ring;
+        let Some((number, supervision)) = words.supervision else { return true };
+        let counts = (supervision.main.0, supervision.redundant.0);
+        if word.state == self.reported {
+            if self.last.is_some_and(|(before, same)| before != number && same == counts) {
+                self.steady = supervision.total().0;
+            }
+            self.last = Some((number, counts));
+            self.settling = 0;
+            return self.steady == supervision.total().0;
+        }
+        if !self.damper.may_tell(now) {
+            return false;
+        }
+        let Some((main, redundant)) = self.counts(word, number, supervision) else { return false };
+        let place = self.status.place;
+        let event = match (core::mem::replace(&mut self.reported, word.state), word.state) {
+            (_, RingState::Open) => Event::RingOpened { main, redundant },
+            (RingState::Open, RingState::Closed) => Event::RingClosed { main, redundant, place },
+            (_, RingState::Closed | RingState::Unknown) => return false,
+        };
+        effects.report(event);
+        effects.0.push(Effect::MainCount(main));
+        self.place_at_host(word, (main, redundant), cabled, effects);
+        if self.damper.tell(now) {
+            effects.report(Event::RingUnsteady { changes: word.changes });
+        }
+        false
+    }
+
+    /// Where all answer on one side it is the other interface's cable, which no SubDevice needs to be asked for.
+    fn place_at_host(
+        &mut self,
+        word: RingWord,
+        (main, redundant): (u16, u16),
+        cabled: &Cabled<'_>,
+        effects: &mut Effects,
+    ) {
+        let Cabled { topology, cables } = cabled;
+        // Which cable leads to an interface is certain only where neighbours are.
+        let all = self.steady > 0 && main + redundant == self.steady && !are_doubtful(topology);
+        let is_end_known = !topology.open_ports.is_empty() || topology.main_end.is_some();
+        let cable = match (word.state, main, redundant) {
+            (RingState::Open, 0, _) if all => cables.first().filter(|(cable, _)| cable.near.is_none()),
+            (RingState::Open, _, 0) if all && is_end_known => cables.last().filter(|(cable, _)| cable.far.is_none()),
+            _ => None,
+        };
+        let place = cable.map(|(cable, _)| *cable);
+        self.status.place = place;
+        self.status.links = [main, redundant].map(|answering| LinkStatus { answering, ..LinkStatus::default() });
+        if let Some(cable) = place {
+            effects.report(Event::BreakLocated { cable });
+        }
+    }
+
+    /// SubDevices on each link, as soon as they are certain.
+    fn counts(&mut self, word: RingWord, number: u32, supervision: Supervision) -> Option<(u16, u16)> {
+        let counts = (supervision.main.0, supervision.redundant.0);
+        match (word.state, word.returned) {
+            // A copy that came back on its own link was processed by all that are connected there. The others are on the other
+            // side, also
+            // where the other copy is still out or was lost.
+            (RingState::Open, Some((link, count))) if self.steady > 0 => {
+                let other = self.steady.saturating_sub(count);
+                let (seen, derived) = match link {
+                    Link::Main => (supervision.main.0, (count, other)),
+                    Link::Redundant => (supervision.redundant.0, (other, count)),
+                };
+                let is_of_both = seen == count && counts.0 > 0 && counts.1 > 0;
+                Some(if is_of_both { counts } else { derived })
+            }
+            // Another frame may have shown the change, and these are still counts of the open ring.
+            (RingState::Closed, _) if supervision.returned => None,
+            (RingState::Closed, _) if supervision.total().0 == self.steady => Some(counts),
+            _ => self.settled(number, counts),
+        }
+    }
+
+    fn settled(&mut self, number: u32, counts: (u16, u16)) -> Option<(u16, u16)> {
+        match self.last {
+            Some((before, _)) if before == number => return None,
+            Some((_, before)) if self.settling > 0 && (before == counts || self.settling >= SETTLING_RESULTS) => {
+                return Some(counts);
+            }
+            _ => {}
+        }
+        self.settling += 1;
+        self.last = Some((number, counts));
+        None
+    }
+
+    /// True where what is known was told.
+    fn tell_redundancy(&mut self, word: RingWord, now: Instant, effects: &mut Effects) -> bool {
+        let before = self.status.redundancy;
+        let cause = match (self.reported, word.dead_way) {
+            (RingState::Open, _) => Some(RedundancyLoss::Open),
+            (RingState::Closed, Some(link)) => Some(RedundancyLoss::OneWay(link)),
+            (RingState::Closed, None) => None,
+            (RingState::Unknown, _) => return true,
+        };
+        let is_told = match (before, cause) {
+            (Redundancy::Lost { cause: before, .. }, Some(cause)) => before == cause,
+            (Redundancy::Ready, None) => true,
+            _ => false,
+        };
+        let by_way = matches!(cause, Some(RedundancyLoss::OneWay(_)))
+            || matches!(before, Redundancy::Lost { cause: RedundancyLoss::OneWay(_), .. });
+        if is_told || (by_way && !self.ways.may_tell(now)) {
+            return is_told;
+        }
+        let was_lost = matches!(before, Redundancy::Lost { .. });
+        match cause {
+            Some(cause) => {
+                self.status.redundancy = Redundancy::Lost { cause, since: now };
+                effects.report(Event::RedundancyLost { cause });
+            }
+            None => {
+                self.status.redundancy = Redundancy::Ready;
+                if was_lost {
+                    effects.report(Event::RedundancyRegained);
+                }
+            }
+        }
+        if by_way {
+            self.ways.tell(now);
+        }
+        true
+    }
+}

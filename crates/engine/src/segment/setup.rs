@@ -1,0 +1,146 @@
+//! What has to be written to a SubDevice, complete with logical addresses.
+
+pub mod mail_status;
+pub mod presence;
+
+use alloc::vec::Vec;
+
+use ringcat_wire::register::Fmmu;
+
+use crate::config::{DeclaredSyncManager, SubDeviceConfig};
+use crate::info::{Direction, SubDeviceInfo};
+use crate::layout::Layout;
+use crate::plan::{self, AreaPlan, PlanError, SubDevicePlan};
+
+/// What has to be written to one SubDevice, complete with logical addresses.
+#[derive(Debug)]
+pub struct Setup {
+    /// Registers and SDOs.
+    pub plan: SubDevicePlan,
+    /// FMMU number and registers.
+    pub fmmus: Vec<(u8, Fmmu)>,
+    /// Of these, the number of the one that shows whether there is mail.
+    pub mail_fmmu: Option<u8>,
+    /// Of these, the number of the one that shows its AL status in the frames of its process data.
+    pub presence_fmmu: Option<u8>,
+    /// FMMUs that the controller has.
+    pub fmmu_count: u8,
+    /// SyncManagers that the controller has.
+    pub sync_manager_count: u8,
+    /// AL control is copied into AL status by hardware.
+    pub emulated: bool,
+}
+
+/// An area whose size on the SubDevice differs from that in the layout.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum SetupError {
+    /// The declaration does not fit the SubDevice.
+    Plan(PlanError),
+    /// The process image has no place, or another one, for what the SubDevice has.
+    Area {
+        /// The SyncManager.
+        sync_manager: u8,
+        /// Bytes in the process image.
+        expected: u16,
+        /// Bytes of the SubDevice.
+        got: u16,
+    },
+    /// The process image wants its AL status through an FMMU, and of these it has none to spare.
+    NoSpareFmmu(u8),
+}
+
+impl core::fmt::Display for SetupError {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        match self {
+            SetupError::Plan(error) => error.fmt(f),
+            SetupError::Area { sync_manager, expected, got } => write!(
+                f,
+                "SyncManager {sync_manager}: the process image has {expected} bytes for it, the SubDevice {got}"
+            ),
+            SetupError::NoSpareFmmu(count) => {
+                write!(f, "expected an FMMU to spare for the AL status, all {count} are in use")
+            }
+        }
+    }
+}
+
+impl core::error::Error for SetupError {}
+
+impl Setup {
+    /// Plans a SubDevice and gives its areas the logical addresses of the layout. Areas that no domain holds are
+    /// configured without an FMMU.
+    pub fn new(
+        index: usize,
+        config: &SubDeviceConfig,
+        info: &SubDeviceInfo,
+        layout: &Layout,
+    ) -> Result<Setup, SetupError> {
+        let plan = plan::plan(config, info).map_err(SetupError::Plan)?;
+        let mut fmmus = Vec::new();
+        for (number, area) in plan.mapped_areas() {
+            let Some((_, placed)) = layout.area(index, area.sync_manager) else { continue };
+            if placed.area.length != area.length {
+                let (expected, got) = (placed.area.length, area.length);
+                return Err(SetupError::Area { sync_manager: area.sync_manager, expected, got });
+            }
+            fmmus.push((number, plan::fmmu(area, placed.logical)));
+        }
+        let mail = mail_status::fmmu(index, &plan, info);
+        let mail_fmmu = mail.map(|(number, _)| number);
+        fmmus.extend(mail);
+        let mut presence_fmmu = None;
+        if let Some(logical) = layout.presence(index) {
+            let number =
+                presence::number(index, &plan, info).ok_or(SetupError::NoSpareFmmu(info.controller.fmmu_count))?;
+            fmmus.push((number, presence::fmmu(logical)));
+            presence_fmmu = Some(number);
+        }
+        Ok(Setup {
+            plan,
+            fmmus,
+            mail_fmmu,
+            presence_fmmu,
+            fmmu_count: info.controller.fmmu_count,
+            sync_manager_count: info.controller.sync_manager_count,
+            emulated: info.device_emulation,
+        })
+    }
+
+    /// How many areas have an FMMU.
+    pub fn process_data_fmmus(&self) -> usize {
+        let others = [self.mail_fmmu, self.presence_fmmu];
+        self.fmmus.iter().filter(|(number, _)| !others.contains(&Some(*number))).count()
+    }
+
+    /// The FMMU registers from the first to the last one that is used, to be written at once.
+    pub fn fmmu_registers(&self) -> Vec<u8> {
+        let count = self.fmmus.iter().map(|(number, _)| usize::from(*number) + 1).max().unwrap_or(0);
+        let mut registers = alloc::vec![0; Fmmu::LEN * count];
+        for (number, fmmu) in &self.fmmus {
+            let at = Fmmu::LEN * usize::from(*number);
+            registers[at..at + Fmmu::LEN].copy_from_slice(&fmmu.encode());
+        }
+        registers
+    }
+}
+
+/// Bytes of the process data areas that a declaration fixes by itself, for a SubDevice that is not there yet.
+pub fn declared_areas(config: &SubDeviceConfig) -> Option<Vec<(u8, Direction, u16)>> {
+    if let Some(declared) = &config.declared {
+        return Some(declared.iter().filter_map(DeclaredSyncManager::area).collect());
+    }
+    let mut areas = Vec::new();
+    for assignment in config.pdos.as_ref()? {
+        let mut bits = 0;
+        for pdo in &assignment.pdos {
+            bits += pdo.entries.as_ref()?.iter().map(|entry| u32::from(entry.bit_length)).sum::<u32>();
+        }
+        areas.push((assignment.sync_manager, assignment.direction, u16::try_from(bits.div_ceil(8)).ok()?));
+    }
+    Some(areas)
+}
+
+/// Bytes of the process data areas of a plan.
+pub fn planned_areas(plan: &SubDevicePlan) -> Vec<(u8, Direction, u16)> {
+    plan.process_data.iter().map(|area: &AreaPlan| (area.sync_manager, area.direction, area.length)).collect()
+}

@@ -1,0 +1,38 @@
+//! The FMMU that shows whether a SubDevice has mail (facts 6.1): each has a bit of its own in the logical address space, so
+//! that all answer one read together.
+
+use ringcat_wire::address::LogicalAddress;
+use ringcat_wire::datagram::MAX_DATA;
+use ringcat_wire::register::{Fmmu, SyncManager, map};
+use ringcat_wire::sii::FmmuUsage;
+
+use crate::info::SubDeviceInfo;
+use crate::plan::SubDevicePlan;
+
+/// Where the bits lie: beyond all process data, which ends at 2 GiB.
+pub const BITS_AT: LogicalAddress = LogicalAddress(0xF000_0000);
+/// Bit of the status register that says "full".
+const FULL_BIT: u8 = 3;
+
+/// The FMMU that shows whether there is mail, with its number: the one that the SII names, or the first one behind those
+/// of process data. `None` where the SII names none, or where bits cannot be mapped.
+pub fn fmmu(index: usize, plan: &SubDevicePlan, info: &SubDeviceInfo) -> Option<(u8, Fmmu)> {
+    let named = info.fmmu_usages.iter().position(|usage| *usage == FmmuUsage::MailboxStatus)?;
+    let mapped = plan.mapped_areas().count();
+    let number = u8::try_from(named.max(mapped)).ok().filter(|number| *number < info.controller.fmmu_count)?;
+    let byte = u32::try_from(index / 8).ok().filter(|byte| *byte < MAX_DATA as u32)?;
+    let send = plan.mailbox.last().filter(|_| !info.controller.features.fmmu_byte_oriented)?;
+    let bit = (index % 8) as u8;
+    let register = Fmmu {
+        logical_start: LogicalAddress(BITS_AT.0 + byte),
+        length: 1,
+        logical_start_bit: bit,
+        logical_stop_bit: bit,
+        physical_start: map::sync_manager(send.index).offset(SyncManager::STATUS).0,
+        physical_start_bit: FULL_BIT,
+        read: true,
+        active: true,
+        ..Fmmu::default()
+    };
+    Some((number, register))
+}

@@ -1,0 +1,292 @@
+//! From what is posted and seen to what is told, without a bus.
+
+use alloc::sync::Arc;
+use alloc::vec;
+use alloc::vec::Vec;
+use std::time::Duration;
+
+use ringcat_wire::address::{Position, StationAddress, Wkc};
+use ringcat_wire::al::{AlState, AlStatus, AlStatusCode};
+use ringcat_wire::register::{DlStatus, PortKind};
+use ringcat_wire::sii::Identity;
+
+use super::effect::{Check, Effect, Shown, Task};
+use super::member::{Member, Phase};
+use super::start::Start;
+use super::*;
+use crate::board::{RingWord, Supervision};
+use crate::config::SubDeviceConfig;
+use crate::event::Event;
+use crate::info::SubDeviceInfo;
+use crate::layout::Rules;
+use crate::link::{Link, LinkSet};
+use crate::ring::RingState;
+use crate::ring_status::{Cable, CableErrors, Redundancy, RedundancyLoss, cables};
+use crate::topology::{NodeStatus, PortOf, Topology};
+
+/// High bytes of DL_STATUS: a SubDevice between two others, and those at both sides of a break.
+const PASS: u8 = 0x5A;
+const BEFORE: u8 = 0x56;
+const BEHIND: u8 = 0x59;
+
+const OP: Shown = (AlStatus { state: 8, error: false, identification: false, reserved: 0 }, AlStatusCode(0));
+
+/// A change that comes so long after another one is told at once.
+const QUIET: Duration = Duration::from_millis(50);
+
+/// A closed ring of so many SubDevices, all of them members and in OP.
+struct Ring {
+    segment: Segment,
+    words: Words,
+    now: Instant,
+}
+
+fn station(index: usize) -> StationAddress {
+    StationAddress(0x1001 + index as u16)
+}
+
+fn node(high: u8) -> NodeStatus {
+    let dl_status = DlStatus::from_bits(u16::from(high) << 8);
+    NodeStatus { dl_status, receive_times: None, ports: [PortKind::Mii; 4] }
+}
+
+impl Ring {
+    fn closed(count: usize) -> Ring {
+        let member = |index: usize| {
+            let identity = Identity { vendor_id: 2, product_code: 7, revision: 1, serial: 0 };
+            let (position, station) = (Position(index as u16), station(index));
+            let info = SubDeviceInfo { position, station, identity, ..SubDeviceInfo::default() };
+            Member::new(SubDeviceConfig::at_position(index as u16), Some(info), station, None)
+        };
+        let topology = Topology::build(&vec![node(PASS); count], count);
+        let cables = cables(&topology, LinkSet::Ring).into_iter().map(|cable| (cable, CableErrors::default()));
+        let cabling = Cabling {
+            cables: cables.collect(),
+            topology,
+            stations: (0..count).map(station).collect(),
+            closings: Vec::new(),
+            version: 0,
+        };
+        let rules = Rules {
+            links: LinkSet::Ring,
+            supervision: true,
+            lrw: Default::default(),
+            witnesses: &[],
+            session: 0,
+            max_datagrams: None,
+        };
+        let known = Known {
+            members: (0..count).map(member).collect(),
+            unassigned: Vec::new(),
+            layout: Layout::with(&[], rules).unwrap(),
+            cabling,
+            ring: RingStatus { redundancy: Redundancy::Unknown, ..RingStatus::default() },
+            carriers: [Some(true); 2],
+        };
+        let choices = Choices { enhanced_line_crossed: false, junctions: JunctionMode::Disabled, follow_groups: false };
+        let segment = Segment::new(known, Arc::new(Board::new(count)), choices);
+        let counts = Supervision { main: Wkc(count as u16), al_status: [8, 0], ..Supervision::default() };
+        let words = Words {
+            links: LinkSet::Ring,
+            carriers: [Some(true); 2],
+            ring: RingWord { state: RingState::Closed, changes: 1, ..RingWord::default() },
+            supervision: Some((1, counts)),
+            cycles: 1,
+        };
+        let mut ring = Ring { segment, words, now: Instant(0) };
+        for member in &mut ring.segment.members {
+            member.phase = Phase::Settled(AlState::Op);
+        }
+        // Counts are known once they were the same several times; the first looks at all are no news.
+        for _ in 0..6 {
+            ring.cycle();
+            ring.look(&vec![PASS; count]);
+        }
+        ring
+    }
+
+    fn observe(&mut self, seen: Observation<'_>) -> Vec<Effect> {
+        self.segment.observe(seen, self.now).0
+    }
+
+    /// A cycle later.
+    fn cycle(&mut self) -> Vec<Effect> {
+        self.now += Duration::from_millis(1);
+        if let Some((number, _)) = &mut self.words.supervision {
+            *number += 1;
+        }
+        self.words.cycles += 1;
+        let words = self.words;
+        self.observe(Observation::Words(words))
+    }
+
+    /// A round of looks, in which all are in OP; 0 for one that is silent.
+    fn look(&mut self, high: &[u8]) -> Vec<Effect> {
+        let (status, code) = OP;
+        let looks: Vec<Look> = high
+            .iter()
+            .map(|high| match high {
+                0 => Look::Silent,
+                high => Look::Answer { status, code, dl_status: node(*high).dl_status },
+            })
+            .collect();
+        let before: Vec<Phase> = self.segment.members.iter().map(|member| member.phase).collect();
+        let counted = self.words.supervision.map(|(_, seen)| seen.total());
+        let asked = self.segment.asked();
+        let looked = Looked { asked, looks: &looks, before: &before, unassigned: &[], counted };
+        let effects = self.observe(Observation::Looks(looked));
+        let number = self.words.supervision.map(|(number, _)| number);
+        self.observe(Observation::RoundEnded(number));
+        effects
+    }
+
+    fn counts(&mut self, main: u16, redundant: u16, state: RingState) {
+        let seen = Supervision {
+            main: Wkc(main),
+            redundant: Wkc(redundant),
+            al_status: [8, 8],
+            irq: 0,
+            returned: state == RingState::Open,
+        };
+        let number = self.words.supervision.map_or(0, |(number, _)| number);
+        self.words.supervision = Some((number, seen));
+        self.words.ring.state = state;
+        self.words.ring.returned = (state == RingState::Open).then_some((Link::Main, main));
+        self.words.ring.changes += 1;
+    }
+}
+
+fn told(effects: &[Effect]) -> Vec<Event> {
+    let event = |effect: &Effect| match effect {
+        Effect::Report(event) | Effect::ReportOf(event, _) => Some(event.clone()),
+        _ => None,
+    };
+    effects.iter().filter_map(event).collect()
+}
+
+const fn cable(near: (usize, u8), far: (usize, u8)) -> Cable {
+    Cable { near: Some(PortOf { node: near.0, port: near.1 }), far: Some(PortOf { node: far.0, port: far.1 }) }
+}
+
+#[test]
+fn a_cut_cable_is_told_in_the_cycle_that_shows_it_and_its_place_by_the_next_look() {
+    for count in [2, 3, 8, 64] {
+        for at in 1..count {
+            let mut ring = Ring::closed(count);
+            let (main, redundant) = (at as u16, (count - at) as u16);
+            ring.now += QUIET;
+            ring.counts(main, redundant, RingState::Open);
+            let effects = ring.cycle();
+            let opened = [Event::RingOpened { main, redundant }, Event::RedundancyLost { cause: RedundancyLoss::Open }];
+            assert_eq!(told(&effects), opened, "{at} of {count}");
+            assert!(effects.contains(&Effect::MainCount(main)));
+            assert!(effects.contains(&Effect::Start(Task::Look { routine: false })));
+            let mut high = vec![PASS; count];
+            (high[at - 1], high[at]) = (BEFORE, BEHIND);
+            let place = cable((at - 1, 1), (at, 0));
+            let effects = ring.look(&high);
+            assert_eq!(told(&effects), [Event::BreakLocated { cable: place }], "{at} of {count}");
+            assert!(effects.contains(&Effect::Start(Task::ExamineCabling { in_control: false })));
+            assert_eq!(ring.segment.ring_status().place, Some(place));
+            assert_eq!(told(&ring.cycle()), [], "each edge once");
+            ring.counts(count as u16, 0, RingState::Closed);
+            ring.now += QUIET;
+            let closed =
+                [Event::RingClosed { main: count as u16, redundant: 0, place: Some(place) }, Event::RedundancyRegained];
+            assert_eq!(told(&ring.cycle()), closed, "{at} of {count}");
+        }
+    }
+}
+
+#[test]
+fn what_is_opened_on_purpose_is_no_news_and_ends_without_any() {
+    for disturbance in [Disturbance::OpenByLink, Disturbance::OpenByPort] {
+        let mut ring = Ring::closed(4);
+        ring.observe(Observation::Wanted(disturbance));
+        assert_eq!(ring.segment.disturbance(), Some(disturbance));
+        ring.counts(4, 0, RingState::Open);
+        assert_eq!(told(&ring.cycle()), [], "{disturbance:?}");
+        ring.counts(4, 0, RingState::Closed);
+        assert_eq!(told(&ring.cycle()), [], "{disturbance:?}");
+        ring.observe(Observation::Undisturbed);
+        assert_eq!(told(&ring.cycle()), [], "{disturbance:?}");
+    }
+}
+
+#[test]
+fn a_member_is_lost_when_counts_say_so_and_otherwise_at_the_second_silent_look() {
+    let mut ring = Ring::closed(3);
+    let silent = ring.look(&[PASS, PASS, 0]);
+    assert_eq!(told(&silent), [], "three are counted: a frame may have gone another way");
+    let lost = ring.look(&[PASS, PASS, 0]);
+    assert_eq!(told(&lost), [Event::Lost { subdevice: 2 }]);
+    assert!(lost.contains(&Effect::SuspendMailbox { index: 2 }));
+    let mut ring = Ring::closed(3);
+    ring.counts(2, 0, RingState::Closed);
+    ring.cycle();
+    assert_eq!(told(&ring.look(&[PASS, PASS, 0])), [Event::Lost { subdevice: 2 }]);
+    ring.counts(3, 0, RingState::Closed);
+    ring.cycle();
+    let back = ring.look(&[PASS; 3]);
+    assert_eq!(told(&back), [], "another one may have its address");
+    let check = Check::Return;
+    let task = Task::BringUp { index: 2, attempt: 2, from: Start::Unknown, told: None, check };
+    assert!(back.contains(&Effect::Start(task)), "{back:?}");
+    let back = ring.observe(Observation::Returned { index: 2, attempt: 2 });
+    assert_eq!(told(&back), [Event::Returned { subdevice: 2 }]);
+}
+
+#[test]
+fn looks_across_an_isolation_say_nothing_of_who_is_there() {
+    let mut ring = Ring::closed(3);
+    let asked = ring.segment.asked();
+    ring.observe(Observation::Wanted(Disturbance::IsolateRings));
+    ring.observe(Observation::Undisturbed);
+    let before = [Phase::Settled(AlState::Op); 3];
+    for _ in 0..3 {
+        let looked =
+            Looked { asked, looks: &[Look::Silent; 3], before: &before, unassigned: &[], counted: Some(Wkc(0)) };
+        assert_eq!(told(&ring.observe(Observation::Looks(looked))), []);
+    }
+    assert_eq!(ring.segment.members[0].phase, Phase::Settled(AlState::Op));
+}
+
+#[test]
+fn an_attempt_that_is_over_changes_nothing() {
+    let mut ring = Ring::closed(1);
+    ring.observe(Observation::Undone { index: 0, attempt: 0, reason: "FMMUs".into() });
+    assert_eq!(ring.segment.members[0].phase, Phase::Configuring);
+    for late in [
+        Observation::Reached { index: 0, attempt: 0, state: AlState::Op },
+        Observation::Unreachable { index: 0, attempt: 0 },
+        Observation::Undone { index: 0, attempt: 0, reason: "FMMUs".into() },
+        Observation::Reached { index: 7, attempt: 0, state: AlState::Op },
+    ] {
+        assert_eq!(ring.observe(late), []);
+        assert_eq!(ring.segment.members[0].phase, Phase::Configuring);
+    }
+    let effects = ring.observe(Observation::Reached { index: 0, attempt: 1, state: AlState::Op });
+    assert_eq!(told(&effects), [Event::StateReached { subdevice: 0, state: AlState::Op }]);
+}
+
+#[test]
+fn a_carrier_that_goes_and_comes_is_told_once_each() {
+    let mut ring = Ring::closed(2);
+    ring.words.carriers[1] = Some(false);
+    assert_eq!(told(&ring.cycle()), [Event::LinkDown { link: Link::Redundant }]);
+    assert_eq!(told(&ring.cycle()), []);
+    ring.now += QUIET;
+    ring.words.carriers[1] = Some(true);
+    assert_eq!(told(&ring.cycle()), [Event::LinkUp { link: Link::Redundant }]);
+}
+
+#[test]
+fn without_news_the_model_sleeps_until_the_next_routine_look() {
+    let mut ring = Ring::closed(4);
+    ring.cycle();
+    ring.look(&[PASS; 4]);
+    let effects = ring.cycle();
+    assert_eq!(effects, []);
+    let wake = ring.segment.next_look();
+    assert!(wake > ring.now + Duration::from_millis(900), "a look at {wake:?}, now {:?}", ring.now);
+}

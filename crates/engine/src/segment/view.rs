@@ -1,0 +1,32 @@
+//! The station addresses of all positions, as frames have met them.
+
+use alloc::vec::Vec;
+
+use ringcat_wire::address::{StationAddress, Wkc};
+
+use crate::board::RingWord;
+
+/// Who answers at each position.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct View {
+    /// SubDevices on the main and on the redundant link.
+    pub counts: (Wkc, Wkc),
+    /// The state of the ring meanwhile.
+    pub ring: RingWord,
+    /// By position.
+    pub stations: Vec<StationAddress>,
+}
+
+impl View {
+    /// The positions at which a station address answers.
+    pub fn positions(&self, station: StationAddress) -> impl Iterator<Item = usize> + '_ {
+        self.stations.iter().enumerate().filter(move |(_, at)| **at == station).map(|(position, _)| position)
+    }
+
+    /// The position of a station address that only one SubDevice has.
+    pub fn position(&self, station: StationAddress) -> Option<usize> {
+        let mut positions = self.positions(station);
+        let first = positions.next()?;
+        positions.next().is_none().then_some(first)
+    }
+}

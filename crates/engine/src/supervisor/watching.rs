@@ -1,0 +1,79 @@
+//! Waiting for what the cyclic half posts and the links tell, instead of looking for it again and again.
+
+use core::future::poll_fn;
+use core::task::Poll;
+
+use super::bus::Bus;
+use super::posted::Posted;
+use super::shared::Shared;
+use super::signal::Signal;
+use crate::time::Instant;
+
+impl Shared {
+    pub(super) fn posted(&self) -> Posted {
+        let Some(board) = &self.board else { return Posted { carriers: self.carriers, ..Posted::default() } };
+        Posted {
+            supervision: board.supervision().map(|(_, supervision)| supervision),
+            ring: board.ring(),
+            carriers: self.carriers,
+            holds: board.clocks.holds(),
+        }
+    }
+
+    /// Whether a procedure waits for what has been posted.
+    pub(super) fn is_posted(&self) -> bool {
+        !self.watchers.waiting.is_empty() && self.posted() != self.watchers.seen
+    }
+
+    /// Wakes the procedures that wait for something else to be posted.
+    pub(super) fn wake_watchers(&mut self) {
+        if !self.is_posted() {
+            return;
+        }
+        self.watchers.seen = self.posted();
+        for task in core::mem::take(&mut self.watchers.waiting) {
+            self.wake(task);
+        }
+    }
+}
+
+impl Bus {
+    /// What is posted now.
+    pub(crate) fn posted(&self) -> Posted {
+        self.shared.borrow().posted()
+    }
+
+    /// Waits until something else is posted than this, until a point of time, or until `ready`, which is asked after each
+    /// notification of `signal`.
+    pub(crate) async fn until_posted(
+        &self,
+        seen: Posted,
+        until: Instant,
+        signal: &Signal,
+        mut ready: impl FnMut() -> bool,
+    ) {
+        let mut armed = false;
+        poll_fn(|_| {
+            if ready() {
+                return Poll::Ready(());
+            }
+            let shared = &mut *self.shared.borrow_mut();
+            let posted = shared.posted();
+            if posted != seen || shared.now >= until {
+                return Poll::Ready(());
+            }
+            let task = shared.current;
+            shared.watchers.seen = posted;
+            if !shared.watchers.waiting.contains(&task) {
+                shared.watchers.waiting.push(task);
+            }
+            signal.register(task);
+            if !armed && until != Instant::NEVER {
+                shared.wake_at(until);
+                armed = true;
+            }
+            Poll::Pending
+        })
+        .await;
+    }
+}
