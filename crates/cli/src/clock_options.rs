@@ -1,6 +1,7 @@
 //! What `ringcat run` and `ringcat clocks` are told about distributed clocks: who follows whom, and SYNC signals.
 //!
-//! In go options and what a scan found, out come declarations; what does not fit together is an error that says what would.
+//! In go options and what a scan found, out come declarations; what does not fit together is an error that says what
+//! would.
 
 mod sync;
 
@@ -21,20 +22,21 @@ const SYNC_HELP: &str = "SYNC signals: auto (as the EEPROMs say, where they do),
 /// Options about clocks.
 #[derive(Args, Clone, Debug, Default)]
 pub struct ClockOptions {
-    /// When cycles begin: so long after the multiples of the cycle time in the system time of the segment, at which SYNC0
-    /// comes too unless it is shifted. Such as 300us or -300us; 0us by default. Cycles follow the reference clock for that
-    /// (master shift).
+    /// When cycles begin: so long after the multiples of the cycle time in the system time of the segment, at which
+    /// SYNC0 comes too unless it is shifted. Such as 300us or -300us; 0us by default. Cycles follow the reference clock
+    /// for that (master shift).
     #[arg(long, value_name = "TIME", allow_hyphen_values = true, value_parser = shift, conflicts_with = "bus_shift")]
     phase: Option<i64>,
-    /// The reference clock follows this host (bus shift); otherwise the cycles follow the reference clock (master shift).
+    /// The reference clock follows this host (bus shift); otherwise the cycles follow the reference clock (master
+    /// shift).
     #[arg(long)]
     pub bus_shift: bool,
     /// Whose clock all others follow: first (the first one with a clock), sync (the first one with SYNC signals), or a
     /// position.
     #[arg(long, value_name = "WHO", default_value = "first", value_parser = reference)]
     reference: ReferenceClock,
-    /// Where a fork without a clock hides the propagation delay of a SubDevice, write the middle of what it can be. Otherwise
-    /// none is written there, and SubDevices with SYNC signals stay in SAFEOP.
+    /// Where a fork without a clock hides the propagation delay of a SubDevice, write the middle of what it can be.
+    /// Otherwise none is written there, and SubDevices with SYNC signals stay in SAFEOP.
     #[arg(long)]
     estimate_delays: bool,
     #[arg(long, value_name = "SIGNALS", value_parser = sync, help = SYNC_HELP)]
@@ -110,8 +112,8 @@ impl ClockOptions {
         }
     }
 
-    /// As [`ClockOptions::declare`] for a declaration that brings its clocks with it, from an ENI: who has SYNC signals and
-    /// who is followed is said there, which of host and reference follows the other may be chosen.
+    /// As [`ClockOptions::declare`] for a declaration that brings its clocks with it, from an ENI: who has SYNC signals
+    /// and who is followed is said there, which of host and reference follows the other may be chosen.
     pub fn adapt(&self, declaration: &mut Declaration, asked: bool) -> Result<(), Failure> {
         if !self.sync.is_empty() || self.reference != ReferenceClock::default() {
             return Err(Failure::new("--sync and --reference: the ENI says who has SYNC signals and who is followed"));

@@ -1,7 +1,7 @@
 //! `ringcat clocks`: brings the distributed clocks of a segment together and shows how well they keep.
 //!
-//! Everything on the wire goes to OP as its SII says, with SYNC signals where they are asked for. Once all clocks are locked
-//! their differences are watched for a while; then comes a table, and a picture if one is wanted.
+//! Everything on the wire goes to OP as its SII says, with SYNC signals where they are asked for. Once all clocks are
+//! locked their differences are watched for a while; then comes a table, and a picture if one is wanted.
 
 mod plot;
 mod table;
@@ -204,8 +204,8 @@ fn tell(json: bool, line: &str) {
 }
 
 impl Watch<'_> {
-    /// Tells events and notes differences until a time, or until all clocks are locked and all SubDevices, which may wait
-    /// for that, are where they belong; whether clocks are locked.
+    /// Tells events and notes differences until a time, or until all clocks are locked and all SubDevices, which may
+    /// wait for that, are where they belong; whether clocks are locked.
     fn until(
         &mut self,
         cycles: &CyclicThread<Tee<PacketLinks>>,

@@ -83,9 +83,9 @@ pub struct ThreadArguments {
     /// How to wait for frames.
     #[arg(long, value_enum, default_value = "busy")]
     receive: Receive,
-    /// Real-time priority (SCHED_FIFO) of the thread that sends and receives; memory is locked and processors kept awake
-    /// with it. A spinning thread with a priority leaves its processor to no other one. 99 is left to the kernel and to the
-    /// thread that takes signals.
+    /// Real-time priority (SCHED_FIFO) of the thread that sends and receives; memory is locked and processors kept
+    /// awake with it. A spinning thread with a priority leaves its processor to no other one. 99 is left to the kernel
+    /// and to the thread that takes signals.
     #[arg(long, value_name = "1-98", value_parser = clap::value_parser!(i32).range(1..=98))]
     pub priority: Option<i32>,
     /// Processor to keep that thread on.
@@ -112,8 +112,8 @@ impl ThreadArguments {
         }
     }
 
-    /// How frames are really waited for. A thread that spins needs a processor of its own: on the only one it would keep
-    /// everything else in this program from running, and with a priority for ever.
+    /// How frames are really waited for. A thread that spins needs a processor of its own: on the only one it would
+    /// keep everything else in this program from running, and with a priority for ever.
     fn receive(self) -> Receive {
         static TOLD: Once = Once::new();
         let processors = available_parallelism().map_or(1, usize::from);
@@ -178,7 +178,8 @@ pub struct InterfaceArguments {
     /// Network interface at the other end of a ring.
     #[arg(long, value_name = "IF")]
     pub redundant: Option<String>,
-    /// How frames are marked in their source address: flags-first, or id-last as older MainDevices with two interfaces do.
+    /// How frames are marked in their source address: flags-first, or id-last as older MainDevices with two interfaces
+    /// do.
     #[arg(long, value_name = "HOW", value_enum, default_value_t = SourceAddress::FlagsFirst)]
     pub source_address: SourceAddress,
     /// Put at most so many datagrams into a frame: some gateways and simulators take no more (often 15).
@@ -230,8 +231,8 @@ impl InterfaceArguments {
         two_interfaces(&self.main, self.redundant.as_deref())
     }
 
-    /// What there is to find before anything is sent. The sockets are open: of two commands that begin at one time at least
-    /// one sees the other.
+    /// What there is to find before anything is sent. The sockets are open: of two commands that begin at one time at
+    /// least one sees the other.
     fn check(&self) -> Result<(), Failure> {
         check_sockets(self.names(), self.force)?;
         self.await_carrier()?;

@@ -1,7 +1,7 @@
 //! `--capture FILE`: what a command exchanges with the segment, as a file that Wireshark reads.
 //!
-//! In goes the option, out come [`Tee`]s around the command's links, and when the command is over a line that says what is
-//! in the file.
+//! In goes the option, out come [`Tee`]s around the command's links, and when the command is over a line that says what
+//! is in the file.
 
 use std::path::PathBuf;
 

@@ -1,8 +1,9 @@
-//! `ringcat run`: everything on the wire to OP as its SII says, or as an ENI says, process data in a fixed cycle, and an orderly stop.
+//! `ringcat run`: everything on the wire to OP as its SII says, or as an ENI says, process data in a fixed cycle, and
+//! an orderly stop.
 //!
-//! Cycles have a thread of their own, and so has everything else; this one only tells. Outputs stay zero, or what was asked
-//! for with an ENI: this command knows of no application. What keeps the cycle from its time is told apart: wake-ups
-//! that came late and cycles that were left out are this machine's, lost frames are the wire's.
+//! Cycles have a thread of their own, and so has everything else; this one only tells. Outputs stay zero, or what was
+//! asked for with an ENI: this command knows of no application. What keeps the cycle from its time is told apart:
+//! wake-ups that came late and cycles that were left out are this machine's, lost frames are the wire's.
 
 mod beside;
 mod eni;
@@ -86,8 +87,8 @@ pub struct RunArguments {
     cycle: Duration,
     #[command(flatten)]
     eni: EniArguments,
-    /// Cycles that may be under way at once, for a cycle time that is shorter than the way of a frame through segment and
-    /// host. Inputs are then as many cycles old as their way takes.
+    /// Cycles that may be under way at once, for a cycle time that is shorter than the way of a frame through segment
+    /// and host. Inputs are then as many cycles old as their way takes.
     #[arg(long, value_name = "CYCLES", default_value = "1", value_parser = clap::value_parser!(u8).range(1..=i64::from(MAX_UNDER_WAY)))]
     under_way: u8,
     /// Tell everything one by one, however often it comes. Otherwise what a bad time makes many of is counted.

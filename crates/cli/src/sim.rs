@@ -43,7 +43,8 @@ pub struct SimArguments {
     /// Segment file (see docs/segments.md).
     #[arg(long, value_name = "FILE.toml", required_unless_present = "eni")]
     segment: Option<PathBuf>,
-    /// Make the segment from this ENI, with the SubDevices that it describes; a ring with --redundant (see docs/eni.md).
+    /// Make the segment from this ENI, with the SubDevices that it describes; a ring with --redundant (see
+    /// docs/eni.md).
     #[arg(long, value_name = "FILE", conflicts_with = "segment")]
     eni: Option<PathBuf>,
     /// Unix socket at which orders are taken; each answer ends with a line `ok` or `error: ...`.

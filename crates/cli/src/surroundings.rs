@@ -1,5 +1,5 @@
-//! What goes wrong around a segment and looks like a dead cable: a cable of it that ends at another interface of this host,
-//! and MainDevices of others.
+//! What goes wrong around a segment and looks like a dead cable: a cable of it that ends at another interface of this
+//! host, and MainDevices of others.
 //!
 //! Another interface is found by our own frames: a ring that is plugged into an interface which was not named lets no
 //! frame return, they all arrive there. A thread of its own listens on all other interfaces, from before the scan until
@@ -43,8 +43,8 @@ impl Surroundings {
         Surroundings { interfaces: interfaces.clone(), elsewhere, senders: Vec::new(), _end: end }
     }
 
-    /// Takes note of an event. Whether it was a frame of another MainDevice; with it the words to tell, if there are new
-    /// ones.
+    /// Takes note of an event. Whether it was a frame of another MainDevice; with it the words to tell, if there are
+    /// new ones.
     pub fn note(&mut self, event: &Event) -> Option<Option<String>> {
         let Event::ForeignFrame { arrived_on, bytes } = event else { return None };
         Some(self.note_sender(*arrived_on, address_of_sender(bytes)?))

@@ -3,7 +3,8 @@
 use ringcat::{Direction, Scan, SubDeviceConfig, SubDeviceInfo, plan};
 use serde_json::{Value, json};
 
-/// Bytes of outputs and inputs that a MainDevice exchanges without any declaration; `None` where the SII cannot be followed.
+/// Bytes of outputs and inputs that a MainDevice exchanges without any declaration; `None` where the SII cannot be
+/// followed.
 fn bytes(info: &SubDeviceInfo) -> Option<[u32; 2]> {
     let plan = plan(&SubDeviceConfig::from_info(info), info).ok()?;
     let of = |direction: Direction| {

@@ -1,7 +1,7 @@
 //! The last line of every command, and the exit status that goes with it.
 //!
-//! `result: ok: ...` and 0, or `result: FAILED: ...` and 1 where it ran and something did not hold, or 2 where it could not
-//! do what was asked. It goes to the standard output, or beside it where that is for JSON.
+//! `result: ok: ...` and 0, or `result: FAILED: ...` and 1 where it ran and something did not hold, or 2 where it could
+//! not do what was asked. It goes to the standard output, or beside it where that is for JSON.
 
 use std::process::ExitCode;
 

@@ -100,15 +100,15 @@ pub enum Event {
         /// Its closing cable, from the last SubDevice back to the junction; nodes are positions.
         closing: Closing,
     },
-    /// The ports show rings behind junctions of which a scan in mode automatic did not find out where they close: frames got
-    /// lost meanwhile, a junction does not close its ports on demand, or there are more than 16. Declared connections
-    /// ([`JunctionMode::Strict`](crate::junction::JunctionMode)) need no tries.
+    /// The ports show rings behind junctions of which a scan in mode automatic did not find out where they close:
+    /// frames got lost meanwhile, a junction does not close its ports on demand, or there are more than 16. Declared
+    /// connections ([`JunctionMode::Strict`](crate::junction::JunctionMode)) need no tries.
     JunctionsNotLearned {
         /// How many.
         rings: usize,
     },
-    /// A cable of a ring behind a junction broke or is whole again (JUNCTION_RED_CHANGE of the seeds). Nodes are positions,
-    /// of the cabling as it was found last.
+    /// A cable of a ring behind a junction broke or is whole again (JUNCTION_RED_CHANGE of the seeds). Nodes are
+    /// positions, of the cabling as it was found last.
     JunctionChanged {
         /// The port from which frames come; `None` where the ring has not been seen whole yet.
         near: Option<PortOf>,
@@ -365,8 +365,8 @@ pub enum Event {
         /// Largest change in nanoseconds.
         largest_ns: u32,
     },
-    /// The propagation delay of a SubDevice cannot be measured: a fork without a clock is in front of it, and times that were
-    /// latched show only what all branches of that take together (facts 7.1). Told once, until it is known.
+    /// The propagation delay of a SubDevice cannot be measured: a fork without a clock is in front of it, and times
+    /// that were latched show only what all branches of that take together (facts 7.1). Told once, until it is known.
     DelayUnknown {
         /// Where in the scan.
         position: Position,

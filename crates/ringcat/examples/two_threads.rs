@@ -1,7 +1,8 @@
 //! A running light whose cycles have a thread of their own: what a machine runs.
 //!
 //! `cargo run -p ringcat --example two_threads` on a simulated segment;
-//! `cargo run -p ringcat --example two_threads -- eth1` (as root) on a network interface whose second SubDevice has outputs.
+//! `cargo run -p ringcat --example two_threads -- eth1` (as root) on a network interface whose second SubDevice has
+//! outputs.
 
 use std::ops::ControlFlow;
 use std::path::Path;

@@ -97,7 +97,8 @@ pub(crate) fn work(engine: &mut Engine, links: &mut impl Links, window: &Window)
     if !engine.wants_to_send() {
         return false;
     }
-    // Procedures have taken their time, the kernel takes some for each frame: the window is looked at as late as possible.
+    // Procedures have taken their time, the kernel takes some for each frame: the window is looked at as late as
+    // possible.
     let now = links.now();
     let budget = window.bytes(now);
     if budget > 0 {

@@ -5,11 +5,11 @@
 //! [`Application::process`], [`Application::queue`], [`Application::send`].
 //!
 //! What makes a cycle begin is a [`Trigger`]: usually the time, on a fixed grid. A cycle that begins late is counted
-//! ([`Pace`]); those that a stall of the machine has passed over altogether are left out, so that frames are not sent in
-//! bursts to catch up.
+//! ([`Pace`]); those that a stall of the machine has passed over altogether are left out, so that frames are not sent
+//! in bursts to catch up.
 //!
-//! The acyclic half runs in the same thread and on the same links ([`Inline`]): it works while a cycle is waited for. Or
-//! it has a thread and links of its own ([`crate::supervisor_thread`]).
+//! The acyclic half runs in the same thread and on the same links ([`Inline`]): it works while a cycle is waited for.
+//! Or it has a thread and links of its own ([`crate::supervisor_thread`]).
 
 use std::sync::Arc;
 use std::time::Duration;
@@ -74,8 +74,8 @@ impl<L: Links, H: AcyclicHalf> Application<L, H> {
         result
     }
 
-    /// Receives, and lets the acyclic half work if it does so here, until the cycle begins. Returns the time, and when the
-    /// look for frames began that was the last one.
+    /// Receives, and lets the acyclic half work if it does so here, until the cycle begins. Returns the time, and when
+    /// the look for frames began that was the last one.
     fn wait_for_cycle(&mut self) -> (Instant, Instant) {
         loop {
             let looked_at = self.links.now();
@@ -93,8 +93,8 @@ impl<L: Links, H: AcyclicHalf> Application<L, H> {
         }
     }
 
-    /// Takes in all frames that have arrived, and lets the acyclic half work if it does so here. The first step of a cycle
-    /// that the application runs itself; more often does no harm.
+    /// Takes in all frames that have arrived, and lets the acyclic half work if it does so here. The first step of a
+    /// cycle that the application runs itself; more often does no harm.
     pub fn receive(&mut self) {
         let Application { links, acyclic, cyclic, window } = self;
         loop {
@@ -144,8 +144,9 @@ impl<L: Links, H: AcyclicHalf> Application<L, H> {
     }
 
     /// Has inputs copied to outputs in every cycle, in place of the copies that were set before: what came in with this
-    /// cycle's frames leaves with its next ones, whatever `work` writes there. A source in a domain with a longer period
-    /// may be as old as that; `max_age` is what it may be older, in cycles. To be called before the cycles begin.
+    /// cycle's frames leaves with its next ones, whatever `work` writes there. A source in a domain with a longer
+    /// period may be as old as that; `max_age` is what it may be older, in cycles. To be called before the cycles
+    /// begin.
     ///
     /// # Errors
     /// Sources that are no inputs, targets that are no outputs or have two sources, different lengths.
@@ -164,7 +165,8 @@ impl<L: Links, H: AcyclicHalf> Application<L, H> {
         self.cyclic.begun_at()
     }
 
-    /// A few more cycles, with all outputs zero where `outputs` says so. Afterwards the wire belongs to the acyclic half.
+    /// A few more cycles, with all outputs zero where `outputs` says so. Afterwards the wire belongs to the acyclic
+    /// half.
     fn last_cycles(&mut self, outputs: LastOutputs) {
         self.cyclic.set_trigger(Trigger::Time);
         for _ in 0..LAST_CYCLES {
@@ -182,8 +184,8 @@ impl<L: Links, H: AcyclicHalf> Application<L, H> {
         self.cyclic.pace
     }
 
-    /// Times from the sending of a cycle's frames to the arrival of each of their copies at the interface, whenever the copy
-    /// was read ([`Links::received_at`]).
+    /// Times from the sending of a cycle's frames to the arrival of each of their copies at the interface, whenever the
+    /// copy was read ([`Links::received_at`]).
     pub fn round_trips(&self) -> &Histogram {
         self.cyclic.news.round_trips()
     }
@@ -223,8 +225,8 @@ impl<L: Links, H: AcyclicHalf> Application<L, H> {
         self.acyclic.pop_event(now)
     }
 
-    /// The ring and both links: carriers, who answers on each in which states, the place of a break, redundancy. Not for
-    /// the cyclic path.
+    /// The ring and both links: carriers, who answers on each in which states, the place of a break, redundancy. Not
+    /// for the cyclic path.
     pub fn ring_status(&self) -> RingStatus {
         self.acyclic.ring_status()
     }

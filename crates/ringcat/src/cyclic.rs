@@ -136,8 +136,8 @@ impl Cyclic {
         matches!(self.trigger, Trigger::FramesReturned { .. }) && !self.exchange.is_full()
     }
 
-    /// A cycle begins: notes how late it is, judges what is due. All frames were taken in that had arrived at `looked_at`;
-    /// only what was overdue by then is given up, however long this thread was held up since.
+    /// A cycle begins: notes how late it is, judges what is due. All frames were taken in that had arrived at
+    /// `looked_at`; only what was overdue by then is given up, however long this thread was held up since.
     pub fn begin(&mut self, now: Instant, looked_at: Instant) {
         self.begun_at = now;
         self.keep_pace(now);
@@ -222,8 +222,8 @@ impl Cyclic {
                 self.exchange.queue(DomainId(number), now);
             }
         }
-        // Round trips, deadlines and readings of the reference clock count from the time at which the frames leave, not from
-        // the beginning of the work.
+        // Round trips, deadlines and readings of the reference clock count from the time at which the frames leave, not
+        // from the beginning of the work.
         let now = links.now();
         let next = match self.trigger {
             Trigger::Time | Trigger::ReferenceClock { .. } => self.next_cycle,

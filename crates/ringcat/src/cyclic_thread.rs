@@ -3,8 +3,8 @@
 //! What the application computes in a cycle is a closure that this thread runs. Other threads look at [`News`], and ask
 //! the supervisor's thread.
 //!
-//! A panic of that closure does not take the bus down: cycles go on with outputs zero until [`CyclicThread::end`] hands the
-//! application back with the panic's message, to be stopped in order.
+//! A panic of that closure does not take the bus down: cycles go on with outputs zero until [`CyclicThread::end`] hands
+//! the application back with the panic's message, to be stopped in order.
 
 use std::any::Any;
 use std::fmt;
@@ -34,8 +34,8 @@ pub struct CyclicThread<L> {
 /// The application when its cycles have ended.
 pub type Ended<L> = Result<Application<L, SupervisorThread>, Box<Panicked<L>>>;
 
-/// The closure of the cycles has panicked. The application is as it was, with all outputs zero: it can be stopped in order,
-/// or run cycles with another closure.
+/// The closure of the cycles has panicked. The application is as it was, with all outputs zero: it can be stopped in
+/// order, or run cycles with another closure.
 #[derive(Debug)]
 pub struct Panicked<L> {
     /// The panic's message.
@@ -67,9 +67,10 @@ fn message(payload: &(dyn Any + Send)) -> String {
 }
 
 impl<L: Links + Send + 'static> Application<L, SupervisorThread> {
-    /// Runs the cycles in a thread of their own, each with `work`, until that breaks or [`CyclicThread::end`] is called.
-    /// `prepare` runs in the thread first: the place to set its priority and processor. `work` is in the cyclic path: it
-    /// must not allocate, lock or wait. Should it panic, it is not called any more, and cycles go on with outputs zero.
+    /// Runs the cycles in a thread of their own, each with `work`, until that breaks or [`CyclicThread::end`] is
+    /// called. `prepare` runs in the thread first: the place to set its priority and processor. `work` is in the cyclic
+    /// path: it must not allocate, lock or wait. Should it panic, it is not called any more, and cycles go on with
+    /// outputs zero.
     ///
     /// # Errors
     /// The system has no more threads.
@@ -85,7 +86,8 @@ impl<L: Links + Send + 'static> Application<L, SupervisorThread> {
         let body = move || {
             prepare();
             while !ended.load(Ordering::Relaxed) {
-                // The closure is not called again after a panic. What it has left half done is the image, which is zeroed.
+                // The closure is not called again after a panic. What it has left half done is the image, which is
+                // zeroed.
                 match catch_unwind(AssertUnwindSafe(|| self.cycle(&mut work))) {
                     Ok(ControlFlow::Continue(())) => self.cyclic.publish_foreign(),
                     Ok(ControlFlow::Break(())) => break,

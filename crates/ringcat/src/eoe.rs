@@ -1,9 +1,9 @@
 //! Ethernet over EtherCAT as network interfaces of this host: one for each SubDevice that speaks EoE.
 //!
-//! [`SupervisorThread::start_ethernet`] makes interfaces as SubDevices are found, and from then on the supervisor's thread
-//! moves frames between them and the mailboxes: what the host sends is taken as far as the queue of the SubDevice has room,
-//! and waits in the kernel otherwise. While a SubDevice is away its interface has no carrier; addresses, routes and its
-//! place in a bridge stay. Interfaces go when the MainDevice stops.
+//! [`SupervisorThread::start_ethernet`] makes interfaces as SubDevices are found, and from then on the supervisor's
+//! thread moves frames between them and the mailboxes: what the host sends is taken as far as the queue of the
+//! SubDevice has room, and waits in the kernel otherwise. While a SubDevice is away its interface has no carrier;
+//! addresses, routes and its place in a bridge stay. Interfaces go when the MainDevice stops.
 //!
 //! An interface that cannot be made is told once, and everything else goes on.
 
@@ -84,8 +84,8 @@ impl EthernetOptions {
         }
     }
 
-    /// Address of a SubDevice's interface, the same each time: locally administered, with the last three bytes of the main
-    /// link's address and the position or the alias.
+    /// Address of a SubDevice's interface, the same each time: locally administered, with the last three bytes of the
+    /// main link's address and the position or the alias.
     pub fn mac(&self, subdevice: &EthernetSubDevice) -> [u8; 6] {
         let [.., a, b, c] = self.main;
         let (kind, number) = match subdevice.alias {

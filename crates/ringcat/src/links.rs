@@ -40,8 +40,8 @@ pub trait Links {
         self.wait(until);
     }
 
-    /// Takes a link down so that its partner notices, or brings it back. False where that is not possible. Not called in
-    /// the cyclic path of an application whose halves have threads of their own.
+    /// Takes a link down so that its partner notices, or brings it back. False where that is not possible. Not called
+    /// in the cyclic path of an application whose halves have threads of their own.
     fn force_disconnect(&mut self, link: Link, disconnect: bool) -> bool {
         let _ = (link, disconnect);
         false

@@ -51,8 +51,9 @@ pub struct Options {
     /// Whether the redundant link may be taken down for a moment, when ports have changed, to find out where a line is
     /// crossed ([`Links::force_disconnect`]). Without, a closed ring shows only that there is a crossing.
     pub enhanced_line_crossed: bool,
-    /// Datagrams that a frame may hold, cyclic and acyclic; `None`: as many as fit. Some gateways and simulators take fewer
-    /// (often 15): a scan that fails for that says so ([`ScanError::FrameLimit`](crate::ScanError)). Less than 3 counts as 3.
+    /// Datagrams that a frame may hold, cyclic and acyclic; `None`: as many as fit. Some gateways and simulators take
+    /// fewer (often 15): a scan that fails for that says so ([`ScanError::FrameLimit`](crate::ScanError)). Less than 3
+    /// counts as 3.
     pub max_datagrams_per_frame: Option<u16>,
     /// Bytes that everything but process data may send in a cycle, on each link; never more than what is left of the
     /// cycle's time on the wire, and a longest frame at least. SubDevices share it fairly.
@@ -243,8 +244,8 @@ impl<L: Links> MainDevice<L> {
         }
     }
 
-    /// First of the steps that [`MainDevice::activate`] takes at once: a declaration is loaded. It takes the place of one
-    /// that was loaded before, with all connections.
+    /// First of the steps that [`MainDevice::activate`] takes at once: a declaration is loaded. It takes the place of
+    /// one that was loaded before, with all connections.
     ///
     /// # Errors
     /// What is wrong with the declaration by itself.
@@ -260,11 +261,12 @@ impl<L: Links> MainDevice<L> {
         Ok(self.engine.add_junction_connection(connection).map_err(ActivateError::Junction)?)
     }
 
-    /// Last step: lays out process data, starts the configuration of all SubDevices, and hands out the running application.
+    /// Last step: lays out process data, starts the configuration of all SubDevices, and hands out the running
+    /// application.
     ///
     /// # Errors
-    /// Nothing is loaded, or it does not fit what was scanned. A ring that was declared is tried: one that does not close there
-    /// is refused. The MainDevice comes back with the error, and what was loaded with it.
+    /// Nothing is loaded, or it does not fit what was scanned. A ring that was declared is tried: one that does not
+    /// close there is refused. The MainDevice comes back with the error, and what was loaded with it.
     pub fn apply(mut self) -> Result<Application<L>, Box<Refused<MainDevice<L>>>> {
         let window = Arc::new(Window::new(self.acyclic_bytes));
         let check = self.engine.start_connection_check();

@@ -142,12 +142,14 @@ impl News {
     }
 
     /// How far cycles were from their phase in the system time of the segment, with
-    /// [`Trigger::ReferenceClock`](crate::Trigger::ReferenceClock), to either side: once per reading of the reference clock.
+    /// [`Trigger::ReferenceClock`](crate::Trigger::ReferenceClock), to either side: once per reading of the reference
+    /// clock.
     pub fn phase_errors(&self) -> &Histogram {
         &self.phase_errors
     }
 
-    /// The last of these errors in nanoseconds (positive: the host is late), and whether they have been small for a while.
+    /// The last of these errors in nanoseconds (positive: the host is late), and whether they have been small for a
+    /// while.
     pub fn phase(&self) -> (i64, bool) {
         let word = self.phase.load(Ordering::Relaxed);
         (word as i64 >> 1, word & 1 != 0)

@@ -1,7 +1,7 @@
 //! Links that are network interfaces: one packet socket each, or two where both halves have threads of their own.
 //!
-//! Time is `CLOCK_MONOTONIC`. How [`Links::wait`] waits is the user's choice ([`ReceiveMode`]): asleep, spinning, or one
-//! after the other. A link that goes down swallows frames and works again as soon as it is back.
+//! Time is `CLOCK_MONOTONIC`. How [`Links::wait`] waits is the user's choice ([`ReceiveMode`]): asleep, spinning, or
+//! one after the other. A link that goes down swallows frames and works again as soon as it is back.
 
 use ringcat_engine::link::Link;
 use ringcat_engine::time::Instant;
@@ -48,8 +48,8 @@ impl PacketLinks {
         PacketLinks::open_class(main, redundant, mode, ClassFilter::All)?.watch_carriers(main, redundant)
     }
 
-    /// Opens the interfaces twice: for the frames of the cyclic half, to be waited for in this mode, and for those of the
-    /// acyclic half, to be slept for.
+    /// Opens the interfaces twice: for the frames of the cyclic half, to be waited for in this mode, and for those of
+    /// the acyclic half, to be slept for.
     ///
     /// # Errors
     /// As [`PacketLinks::open`].

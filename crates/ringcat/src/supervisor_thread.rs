@@ -78,8 +78,8 @@ struct Handle {
 }
 
 impl SupervisorThread {
-    /// Starts the thread on links that carry the frames of the acyclic half. `prepare` runs in it first: the place to set
-    /// its priority and processor.
+    /// Starts the thread on links that carry the frames of the acyclic half. `prepare` runs in it first: the place to
+    /// set its priority and processor.
     ///
     /// # Errors
     /// The system has no more threads.
@@ -211,8 +211,8 @@ impl SupervisorThread {
     /// cycles use `links`: they carry the frames of the cyclic half, on the same interfaces.
     ///
     /// # Errors
-    /// A declaration that does not fit what was scanned, or process data that does not fit frames. Everything comes back
-    /// with the error, for another try.
+    /// A declaration that does not fit what was scanned, or process data that does not fit frames. Everything comes
+    /// back with the error, for another try.
     pub fn activate<C: Links>(self, declaration: Declaration, links: C) -> Activated<C> {
         match self.load(declaration) {
             Ok(()) => self.apply(links),

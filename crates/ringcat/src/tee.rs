@@ -1,8 +1,8 @@
 //! Links that are recorded: whatever passes goes on as before, and into a capture too.
 //!
-//! In go any [`Links`] and a [`Tap`], out come links. Frames are stamped with the links' own time, sent ones before they
-//! are handed on, received ones when they are taken. Interface 0 of the capture is the main link, 1 the redundant one. One
-//! tap serves one thread; tees of several threads write into one file.
+//! In go any [`Links`] and a [`Tap`], out come links. Frames are stamped with the links' own time, sent ones before
+//! they are handed on, received ones when they are taken. Interface 0 of the capture is the main link, 1 the redundant
+//! one. One tap serves one thread; tees of several threads write into one file.
 
 use ringcat_engine::link::Link;
 use ringcat_engine::time::Instant;

@@ -1,9 +1,9 @@
 //! When frames of the acyclic half may leave: between the frames of two cycles.
 //!
-//! The cyclic half says when its next frames leave, both halves say when what they sent will have left the interface. Each
-//! word has one writer, so the halves may live in threads of their own. Both links carry the same frames; one account
-//! serves both. Besides, the acyclic half has a budget per cycle, so that a long cycle does not fill the queues of the
-//! interface at once.
+//! The cyclic half says when its next frames leave, both halves say when what they sent will have left the interface.
+//! Each word has one writer, so the halves may live in threads of their own. Both links carry the same frames; one
+//! account serves both. Besides, the acyclic half has a budget per cycle, so that a long cycle does not fill the queues
+//! of the interface at once.
 
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Duration;

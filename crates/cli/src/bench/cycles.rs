@@ -1,7 +1,8 @@
 //! All SubDevices to OP, and process data as fast as the frames come back.
 //!
 //! A cycle is receive, judge, work, queue, send; it begins when all frames of the last one are back, or, with several
-//! cycles under way, those of the oldest one. The halves run as in `ringcat run`, the cycles in the thread that measures.
+//! cycles under way, those of the oldest one. The halves run as in `ringcat run`, the cycles in the thread that
+//! measures.
 
 use std::time::Duration;
 
@@ -158,7 +159,8 @@ fn exchange<H: AcyclicHalf>(
     reasons
 }
 
-/// A cycle with an application's part: an output changes, and answers to an input. Returns when it began, in nanoseconds.
+/// A cycle with an application's part: an output changes, and answers to an input. Returns when it began, in
+/// nanoseconds.
 fn one_cycle<H: AcyclicHalf>(application: &mut Application<PacketLinks, H>) -> u64 {
     application.cycle(|data| {
         if let [first, second, .., last] = data.image_mut(DOMAIN) {

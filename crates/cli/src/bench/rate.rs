@@ -1,8 +1,8 @@
 //! The largest cycle rate: ever shorter cycles on a fixed grid, until one has to be left out.
 //!
-//! A cycle is skipped because its time has passed when the thread looks, or because the frames of the last one are still
-//! out. Stalls of the machine do both at any rate and come by chance; they are counted apart: a thread that does nothing
-//! but spin and run cycles is never [`STALL`] late by itself, nor is a segment that answers within less.
+//! A cycle is skipped because its time has passed when the thread looks, or because the frames of the last one are
+//! still out. Stalls of the machine do both at any rate and come by chance; they are counted apart: a thread that does
+//! nothing but spin and run cycles is never [`STALL`] late by itself, nor is a segment that answers within less.
 
 use std::ops::ControlFlow;
 use std::time::Duration;

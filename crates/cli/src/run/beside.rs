@@ -15,15 +15,15 @@ use crate::output::say;
 /// Options for it.
 #[derive(Args, Clone, Debug)]
 pub struct BesideArguments {
-    /// Make a network interface for each SubDevice that speaks Ethernet over EtherCAT: eoeXsY with this MainDevice's number
-    /// X and the position Y, or eoeXaY with the alias Y. Needs cap_net_admin.
+    /// Make a network interface for each SubDevice that speaks Ethernet over EtherCAT: eoeXsY with this MainDevice's
+    /// number X and the position Y, or eoeXaY with the alias Y. Needs cap_net_admin.
     #[arg(long)]
     eoe: bool,
     /// Number of this MainDevice in the names of those interfaces.
     #[arg(long, value_name = "NUMBER", default_value_t = 0)]
     index: u16,
-    /// Open the mailbox gateway (ETG.8200, UDP and TCP) on this address, 127.0.0.1:34980 by default. It knows no password:
-    /// whoever reaches it may change SubDevices.
+    /// Open the mailbox gateway (ETG.8200, UDP and TCP) on this address, 127.0.0.1:34980 by default. It knows no
+    /// password: whoever reaches it may change SubDevices.
     #[arg(long, value_name = "ADDR[:PORT]", num_args = 0..=1, default_missing_value = "127.0.0.1", value_parser = address)]
     gateway: Option<SocketAddr>,
 }

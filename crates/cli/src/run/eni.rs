@@ -24,8 +24,8 @@ const LIKE: f64 = 0.6;
 /// Options about an ENI.
 #[derive(Args, Debug, Default)]
 pub struct EniArguments {
-    /// Bring the network of this ENI to OP (TwinCAT, EC-Engineer and others export it) instead of whatever is there; see
-    /// docs/eni.md, and `ringcat eni FILE` for what of it is followed.
+    /// Bring the network of this ENI to OP (TwinCAT, EC-Engineer and others export it) instead of whatever is there;
+    /// see docs/eni.md, and `ringcat eni FILE` for what of it is followed.
     #[arg(long, value_name = "FILE", conflicts_with = "cycle")]
     eni: Option<PathBuf>,
     /// Send LRD and LWR where the file has an LRW over several SubDevices, which two interfaces cannot have.
@@ -135,8 +135,8 @@ impl EniNetwork {
         self.watch.iter().try_for_each(|name| self.variable("--watch", name, Direction::Inputs).map(|_| ()))
     }
 
-    /// Number of a variable in document order, and what the file says of it. Where an input and an output have one name, it
-    /// is the one of this direction.
+    /// Number of a variable in document order, and what the file says of it. Where an input and an output have one
+    /// name, it is the one of this direction.
     fn variable(&self, option: &str, name: &str, wanted: Direction) -> Result<(usize, &Variable), Failure> {
         let variables = &self.file.configuration.image.variables;
         let mut named = variables.iter().enumerate().filter(|(_, variable)| variable.name == name);

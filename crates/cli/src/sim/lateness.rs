@@ -1,7 +1,7 @@
 //! How well the simulator keeps up with the clock: turns that came later than they were asked for.
 //!
-//! A stall of the machine that this program runs on, or a frame that takes long to simulate, delays frames without any fault of the MainDevice or of the
-//! simulated segment; it is counted and told, so that nobody looks for it elsewhere.
+//! A stall of the machine that this program runs on, or a frame that takes long to simulate, delays frames without any
+//! fault of the MainDevice or of the simulated segment; it is counted and told, so that nobody looks for it elsewhere.
 
 use std::time::Duration;
 

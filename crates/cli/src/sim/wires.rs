@@ -1,15 +1,16 @@
 //! Between network interfaces and a segment in virtual time.
 //!
-//! Virtual time follows `CLOCK_MONOTONIC`: before anything else, each turn lets everything happen in the segment that is
-//! due by now. A frame that has arrived on an interface then begins its way at the segment's host interface, and one
+//! Virtual time follows `CLOCK_MONOTONIC`: before anything else, each turn lets everything happen in the segment that
+//! is due by now. A frame that has arrived on an interface then begins its way at the segment's host interface, and one
 //! that has come back there leaves on the network interface.
 //!
 //! The segment's host interface takes a frame's wire time at 100 Mbit/s once, when the frame enters; the way out adds
-//! nothing, because what comes out is due when its last bit is. On a veth pair, which takes no time itself, a round trip
-//! is thus as long as on a real segment. On a real cable the wire time of both its directions comes on top.
+//! nothing, because what comes out is due when its last bit is. On a veth pair, which takes no time itself, a round
+//! trip is thus as long as on a real segment. On a real cable the wire time of both its directions comes on top.
 //!
-//! As fast as possible ([`Pace::AsFastAsPossible`]), virtual time leaps to the end of each frame's way, and keeps the lead
-//! that it gains so over the monotonic clock: nothing in the segment runs backwards or waits for the clock to catch up.
+//! As fast as possible ([`Pace::AsFastAsPossible`]), virtual time leaps to the end of each frame's way, and keeps the
+//! lead that it gains so over the monotonic clock: nothing in the segment runs backwards or waits for the clock to
+//! catch up.
 
 use std::time::Duration;
 

@@ -1,5 +1,5 @@
-//! Situations in which something does not hold, and what the program says last: `result: FAILED: ...` and an exit status
-//! that is not 0. Those that need no network interface; the others are in `crates/scenarios/tests/on_the_wire`.
+//! Situations in which something does not hold, and what the program says last: `result: FAILED: ...` and an exit
+//! status that is not 0. Those that need no network interface; the others are in `crates/scenarios/tests/on_the_wire`.
 
 use std::fs::{self, File};
 use std::path::{Path, PathBuf};

@@ -1,9 +1,10 @@
-//! Which ports to close, one set after the other, so that what is behind forks without a clock can be measured (facts 7.1).
+//! Which ports to close, one set after the other, so that what is behind forks without a clock can be measured (facts
+//! 7.1).
 //!
-//! A clock in front of such a fork sees what all of its branches take together. With all of them closed but one, it sees that
-//! one: the way to the fork, then the way into each branch. What follows from these sums is exact. In: the cables, and who
-//! has a clock. Out: sets of ports. SubDevices behind them are out of reach meanwhile, so this is for the set-up, before
-//! anything is exchanged with them.
+//! A clock in front of such a fork sees what all of its branches take together. With all of them closed but one, it
+//! sees that one: the way to the fork, then the way into each branch. What follows from these sums is exact. In: the
+//! cables, and who has a clock. Out: sets of ports. SubDevices behind them are out of reach meanwhile, so this is for
+//! the set-up, before anything is exchanged with them.
 
 use alloc::vec;
 use alloc::vec::Vec;
@@ -60,8 +61,8 @@ impl<'a> Tree<'a> {
         !self.has_clock.get(node).copied().unwrap_or(false) && self.branches[node].len() > 1
     }
 
-    /// All that leads away from the way to a fork and, beyond it, into one of its branches. `None` where no clock is in front: nothing
-    /// measures that way.
+    /// All that leads away from the way to a fork and, beyond it, into one of its branches. `None` where no clock is in
+    /// front: nothing measures that way.
     fn closed(&self, fork: usize, open: Option<PortOf>) -> Option<Vec<PortOf>> {
         let mut closed = Vec::new();
         let mut close = |node: usize, but: Option<PortOf>| {

@@ -1,8 +1,9 @@
 //! What is known about the cables of a segment, so that a delay that cannot be measured now is known from before.
 //!
-//! A frame meets the members of a whole ring only once, and what is between them cannot be measured then. It was while the
-//! ring was open: at the set-up, which opens it for that, or while it was broken. Where SubDevices without a clock are in
-//! between, times show the sum of several cables; what follows from such sums is known as well ([`super::sums`]).
+//! A frame meets the members of a whole ring only once, and what is between them cannot be measured then. It was while
+//! the ring was open: at the set-up, which opens it for that, or while it was broken. Where SubDevices without a clock
+//! are in between, times show the sum of several cables; what follows from such sums is known as well
+//! ([`super::sums`]).
 
 use alloc::collections::BTreeMap;
 use alloc::vec::Vec;
@@ -61,8 +62,8 @@ impl Cables {
         }
     }
 
-    /// What these cables take together, as often as each is named. Those that have been away since they were measured do not
-    /// count.
+    /// What these cables take together, as often as each is named. Those that have been away since they were measured
+    /// do not count.
     pub(super) fn measured(&self, cables: &[Ends]) -> Option<i64> {
         self.time(cables, &|known| !known.is_old, None)
     }

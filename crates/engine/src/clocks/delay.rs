@@ -2,9 +2,9 @@
 //!
 //! The frame's way is followed port by port ([`Wiring::way`]). Between two arrivals at a SubDevice with a clock lies a
 //! branch: what its clock says the branch took, less what the SubDevices in the branch say that they took, is the time
-//! on cables. SubDevices without a clock are part of the cable. There and back a cable takes as long, and what is known about
-//! cables ([`Cables`]) counts: what follows from that is a delay. What does not, behind a fork without a clock, is none:
-//! clocks there are a group whose place within the branch is not known ([`places`](super::places)).
+//! on cables. SubDevices without a clock are part of the cable. There and back a cable takes as long, and what is known
+//! about cables ([`Cables`]) counts: what follows from that is a delay. What does not, behind a fork without a clock,
+//! is none: clocks there are a group whose place within the branch is not known ([`places`](super::places)).
 
 use alloc::vec;
 use alloc::vec::Vec;
@@ -33,7 +33,8 @@ pub struct PortTimes(pub [i64; 4]);
 /// What each SubDevice is away from where the frame came in.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Delays {
-    /// By position, to the processing unit, with fraction; `None` without a clock or without times, and where it is not known.
+    /// By position, to the processing unit, with fraction; `None` without a clock or without times, and where it is not
+    /// known.
     pub units: Vec<Option<i64>>,
     /// Those of clocks whose delay to the reference is not known, by position.
     pub unknown: Vec<Unknown>,
@@ -102,9 +103,9 @@ impl Segment<'_> {
         cables.see(self.wiring.cables().filter_map(|(near, far)| Some((self.end(near)?, self.end(far)?))));
     }
 
-    /// Propagation delays. `times` by position, on one clock (see [`super::Measurements::mean`]); `None` without a clock.
-    /// Delays count for those of whom it is known how far they are from the reference or, where that is on another link, from
-    /// the first clock. What was measured of cables is learned.
+    /// Propagation delays. `times` by position, on one clock (see [`super::Measurements::mean`]); `None` without a
+    /// clock. Delays count for those of whom it is known how far they are from the reference or, where that is on
+    /// another link, from the first clock. What was measured of cables is learned.
     pub fn propagation(&self, times: &[Option<PortTimes>], reference: usize, cables: &mut Cables) -> Delays {
         let count = self.wiring.count();
         let mut delays = Delays { units: vec![None; count], trees: vec![0; count], ..Delays::default() };
@@ -231,8 +232,8 @@ impl<'a, C: Fn(usize) -> Option<PortTimes>> Walk<'a, C> {
         is_guessed
     }
 
-    /// Finds out which part of the time from one arrival at a SubDevice to its next one which cables of the branch take. `begin` is
-    /// the place of the first one.
+    /// Finds out which part of the time from one arrival at a SubDevice to its next one which cables of the branch
+    /// take. `begin` is the place of the first one.
     fn branch(
         &self,
         from: usize,
@@ -296,7 +297,8 @@ impl<'a, C: Fn(usize) -> Option<PortTimes>> Walk<'a, C> {
         }
     }
 
-    /// What gaps take that are not known and have a time together: what follows from that, and from what is known of cables.
+    /// What gaps take that are not known and have a time together: what follows from that, and from what is known of
+    /// cables.
     fn follow(&self, gaps: &mut [Gap], rest: i64, cables: Option<&Cables>) {
         let unknown = || gaps.iter().filter(|gap| gap.known.is_none());
         let together: Vec<Ends> = unknown().flat_map(|gap| self.hops(gap.from, gap.to)).collect();
@@ -311,8 +313,8 @@ impl<'a, C: Fn(usize) -> Option<PortTimes>> Walk<'a, C> {
         gaps.iter_mut().zip(times).for_each(|(gap, time)| gap.time = time);
     }
 
-    /// Notes where the frame comes to clocks in a branch: from its beginning as far as is known, from its end as well, and in
-    /// between clocks are apart from both.
+    /// Notes where the frame comes to clocks in a branch: from its beginning as far as is known, from its end as well,
+    /// and in between clocks are apart from both.
     fn enter(&self, gaps: &[Gap], (to, begin, end): (usize, Place, Place), rest: i64, places: &mut Places) {
         let first = gaps.iter().position(|gap| gap.time.is_none()).unwrap_or(gaps.len());
         let last = gaps.iter().rposition(|gap| gap.time.is_none()).unwrap_or(0);
@@ -336,7 +338,8 @@ impl<'a, C: Fn(usize) -> Option<PortTimes>> Walk<'a, C> {
         }
     }
 
-    /// The least and the most that the way through the first gaps may take, of all whose unknown cables take `rest` together.
+    /// The least and the most that the way through the first gaps may take, of all whose unknown cables take `rest`
+    /// together.
     fn range(&self, front: &[Gap], all: &[Gap], rest: i64) -> Range {
         let unknown = |gaps: &[Gap]| -> Vec<Ends> {
             gaps.iter().filter(|gap| gap.known.is_none()).flat_map(|gap| self.hops(gap.from, gap.to)).collect()
@@ -396,8 +399,8 @@ impl<'a, C: Fn(usize) -> Option<PortTimes>> Walk<'a, C> {
         Some((self.segment.end(near)?, self.segment.end(far)?))
     }
 
-    /// The gaps between two places of which the first one counts only where it is the beginning of the way or a SubDevice
-    /// with a clock.
+    /// The gaps between two places of which the first one counts only where it is the beginning of the way or a
+    /// SubDevice with a clock.
     fn gaps(&self, from: usize, to: usize, known: &dyn Fn(&[Ends]) -> Option<i64>) -> Vec<Gap> {
         let mut gaps = Vec::new();
         let mut begin = from;

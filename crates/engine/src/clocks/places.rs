@@ -1,7 +1,7 @@
 //! Where on its way a frame comes to clocks, as far as that is known.
 //!
-//! Clocks between which a time is known are a group; from group to group only a range is known, or nothing. Delays are those of
-//! the group of the reference.
+//! Clocks between which a time is known are a group; from group to group only a range is known, or nothing. Delays are
+//! those of the group of the reference.
 
 use alloc::vec;
 use alloc::vec::Vec;

@@ -1,7 +1,7 @@
 //! What follows from times that several cables take together: linear equations, solved exactly.
 //!
-//! In: sums of cables, each cable as often as it counts, with what they take. Out: what others take, where that follows and is
-//! no guess. Coefficients are small, since a frame passes a cable once there and once back.
+//! In: sums of cables, each cable as often as it counts, with what they take. Out: what others take, where that follows
+//! and is no guess. Coefficients are small, since a frame passes a cable once there and once back.
 
 use alloc::vec;
 use alloc::vec::Vec;
@@ -30,8 +30,8 @@ impl Row {
         self.factors.iter().position(|factor| *factor != 0)
     }
 
-    /// Takes another row out of this one, so that the factor of that one's pivot is zero. Returns what this one was multiplied
-    /// with; `None` where figures get too large.
+    /// Takes another row out of this one, so that the factor of that one's pivot is zero. Returns what this one was
+    /// multiplied with; `None` where figures get too large.
     fn reduce(&mut self, other: &Row, pivot: usize) -> Option<i128> {
         let (own, of_other) = (self.factors[pivot], other.factors[pivot]);
         let common = divisor(own, of_other);

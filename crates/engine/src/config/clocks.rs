@@ -57,8 +57,8 @@ pub struct ClockConfig {
     /// propagation delays are measured: once for each of [`ClockConfig::measurements`], by about two round trips.
     /// Otherwise they are not measured there, which is told.
     pub pauses: bool,
-    /// Where a fork without a clock hides the delay of a SubDevice, the middle of what it can be is written, which is told with its
-    /// limits. Otherwise no delay is written there, and SubDevices with SYNC signals stay in SAFEOP.
+    /// Where a fork without a clock hides the delay of a SubDevice, the middle of what it can be is written, which is
+    /// told with its limits. Otherwise no delay is written there, and SubDevices with SYNC signals stay in SAFEOP.
     pub estimated_delays: bool,
 }
 

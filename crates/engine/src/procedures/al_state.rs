@@ -79,8 +79,8 @@ pub(super) fn split_status(bytes: &[u8; 6]) -> (AlStatus, AlStatusCode) {
     (AlStatus::decode(&[a, b]), AlStatusCode::decode(&[c, d]))
 }
 
-/// Asks a SubDevice for its explicit device identification, in any state without an error; `None` where it does not give
-/// it in time (facts 5.3).
+/// Asks a SubDevice for its explicit device identification, in any state without an error; `None` where it does not
+/// give it in time (facts 5.3).
 pub async fn identification(bus: &Bus, station: StationAddress) -> Result<Option<u16>, BusError> {
     let (status, _) = read_status(bus, station).await?;
     let Some(state) = status.al_state().filter(|_| !status.error) else { return Ok(None) };
@@ -104,8 +104,8 @@ pub async fn identification(bus: &Bus, station: StationAddress) -> Result<Option
     Ok(value)
 }
 
-/// Asks for a state, once. A SubDevice with an error gets the acknowledgement with it, unless it copies AL control into AL
-/// status.
+/// Asks for a state, once. A SubDevice with an error gets the acknowledgement with it, unless it copies AL control into
+/// AL status.
 pub(super) async fn ask(bus: &Bus, station: StationAddress, state: AlState, error: bool) -> Result<(), BusError> {
     let copies = error && {
         let bytes = bus.fprd_array(station, map::ESC_CONFIGURATION).await?;

@@ -4,13 +4,13 @@
 //! More rings behind junctions than are known are told too: whoever asked for junction redundancy must know that one of
 //! them is not watched.
 //!
-//! One look proves little: cables that are cut and healed within milliseconds, and frames that get lost meanwhile, make a
-//! straight ring look crossed. So a look counts only if the segment was the same before and behind it, and what it shows
-//! beyond what was told is believed when the next one shows the same.
+//! One look proves little: cables that are cut and healed within milliseconds, and frames that get lost meanwhile, make
+//! a straight ring look crossed. So a look counts only if the segment was the same before and behind it, and what it
+//! shows beyond what was told is believed when the next one shows the same.
 //!
 //! In a closed ring that shows only that something is crossed (LC-02). In *enhanced* mode the redundant link is
-//! disconnected under control meanwhile: the segment is an open line then, and each crossing has its place (LC-03). That
-//! costs what a cut of that cable costs, and what mending it does; it is not told as a break.
+//! disconnected under control meanwhile: the segment is an open line then, and each crossing has its place (LC-03).
+//! That costs what a cut of that cable costs, and what mending it does; it is not told as a break.
 
 use alloc::vec::Vec;
 use core::time::Duration;
@@ -69,9 +69,9 @@ pub(super) async fn examine(bus: Bus, segment: SharedSegment, enhanced: bool) {
     segment.observe(Observation::LineChecked { found, in_control });
 }
 
-/// Who is crossed, and which rings are not known; `None` where the segment changes too much to tell. `told` is what was told
-/// of it before. With `in_control`, for a ring that [`stays_closed`], the redundant link is taken down meanwhile; where it
-/// cannot be, that is reported, and the ring is looked at as it is.
+/// Who is crossed, and which rings are not known; `None` where the segment changes too much to tell. `told` is what was
+/// told of it before. With `in_control`, for a ring that [`stays_closed`], the redundant link is taken down meanwhile;
+/// where it cannot be, that is reported, and the ring is looked at as it is.
 pub(super) async fn cabling(bus: &Bus, known: &impl Known, in_control: bool, told: &LineCheck) -> Option<LineCheck> {
     if in_control && !bus.force_disconnect(Link::Redundant, true).await {
         bus.report(Event::CannotDisconnect { link: Link::Redundant });
@@ -101,8 +101,8 @@ async fn wait_for(bus: &Bus, state: RingState) {
     }
 }
 
-/// Whether a ring of two links is closed, and still is a moment later, with the same SubDevices in the same places: a link
-/// that is taken down in a ring that breaks costs those in between.
+/// Whether a ring of two links is closed, and still is a moment later, with the same SubDevices in the same places: a
+/// link that is taken down in a ring that breaks costs those in between.
 pub(super) async fn stays_closed(bus: &Bus) -> bool {
     if bus.links() != LinkSet::Ring || bus.ring() != RingState::Closed {
         return false;

@@ -1,8 +1,8 @@
-//! PDO assignment and mapping as the dictionaries of SubDevices have them, where SIIs say nothing or something else (facts
-//! 4.5, 6.3).
+//! PDO assignment and mapping as the dictionaries of SubDevices have them, where SIIs say nothing or something else
+//! (facts 4.5, 6.3).
 //!
-//! After a scan, SubDevices with CoE are brought to PREOP, asked, and sent back to INIT. What the dictionary says counts
-//! before the SII.
+//! After a scan, SubDevices with CoE are brought to PREOP, asked, and sent back to INIT. What the dictionary says
+//! counts before the SII.
 
 use alloc::string::{String, ToString};
 use alloc::vec::Vec;
@@ -78,7 +78,8 @@ fn is_wanted(info: &SubDeviceInfo, which: ReadPdos) -> bool {
         }
 }
 
-/// Whether the SII gives a SyncManager that is in use no PDO. One without a length next to others with PDOs is not in use.
+/// Whether the SII gives a SyncManager that is in use no PDO. One without a length next to others with PDOs is not in
+/// use.
 fn is_missing(info: &SubDeviceInfo, number: u8) -> bool {
     let in_use = |sii: &SiiSyncManager| info.pdos.is_empty() || (sii.is_enabled() && sii.length > 0);
     info.assigned_pdos(number).next().is_none() && info.sync_managers.get(usize::from(number)).is_some_and(in_use)

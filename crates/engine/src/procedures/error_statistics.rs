@@ -1,7 +1,7 @@
 //! What SubDevices have counted of errors (facts 2.5).
 //!
-//! The registers stop at 255. What is kept here goes on: each reading adds what was counted since the last one. What else
-//! reads or clears them says so here (`error_watch`).
+//! The registers stop at 255. What is kept here goes on: each reading adds what was counted since the last one. What
+//! else reads or clears them says so here (`error_watch`).
 
 use alloc::rc::Rc;
 use alloc::vec::Vec;

@@ -1,7 +1,7 @@
 //! Reading the error counters of all ports in the background, and telling of cables whose errors rise.
 //!
-//! Once a second, a few SubDevices at a time. A cut damages the frame that is under way: only errors that come in numbers,
-//! or second after second, are worth a word.
+//! Once a second, a few SubDevices at a time. A cut damages the frame that is under way: only errors that come in
+//! numbers, or second after second, are worth a word.
 
 use alloc::vec;
 use alloc::vec::Vec;

@@ -1,9 +1,9 @@
 //! How many datagrams a frame may hold on this segment: asked when frames do not bring back what they should.
 //!
-//! EtherCAT knows no limit but the length of a frame, but some gateways and simulators process the first 15 datagrams only,
-//! or drop a frame that holds more. To procedures that looks like SubDevices that do not answer, so a failure of the bus is
-//! explained by trying: a frame of many reads of one byte, which any SubDevice answers, and then the number in the middle
-//! between one that works and one that does not.
+//! EtherCAT knows no limit but the length of a frame, but some gateways and simulators process the first 15 datagrams
+//! only, or drop a frame that holds more. To procedures that looks like SubDevices that do not answer, so a failure of
+//! the bus is explained by trying: a frame of many reads of one byte, which any SubDevice answers, and then the number
+//! in the middle between one that works and one that does not.
 
 use core::time::Duration;
 
@@ -32,8 +32,8 @@ enum Outcome {
     Lost,
 }
 
-/// The limit of the segment, where it is below what this MainDevice puts into a frame. `None` too where the segment does not
-/// answer a frame with one datagram.
+/// The limit of the segment, where it is below what this MainDevice puts into a frame. `None` too where the segment
+/// does not answer a frame with one datagram.
 pub(super) async fn probe(bus: &Bus) -> Option<FrameLimit> {
     let mut too_many = bus.max_datagrams().min(MOST);
     if attempt(bus, 1).await != Outcome::Answered {
@@ -74,8 +74,8 @@ async fn attempt(bus: &Bus, datagrams: usize) -> Outcome {
     Outcome::Lost
 }
 
-/// In operation: has the limit told, once, where there is one. Long frames delay a cycle, so it is tried now and then only,
-/// whatever else disturbs the segment.
+/// In operation: has the limit told, once, where there is one. Long frames delay a cycle, so it is tried now and then
+/// only, whatever else disturbs the segment.
 pub(super) async fn explain(bus: &Bus, segment: &SharedSegment) {
     if bus.now() < segment.next_frame_trial() {
         return;

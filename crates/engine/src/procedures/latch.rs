@@ -1,7 +1,8 @@
 //! Receive times of one frame: all clocks latch it, and what they have latched is read (facts 7.1).
 //!
-//! Another frame that is on the wire meanwhile may spoil what is latched, and another one that latches overwrites it. So the
-//! frame is alone on the wire ([`Bus::alone`]), and its latches belong to one procedure until it has read them ([`Latches`]).
+//! Another frame that is on the wire meanwhile may spoil what is latched, and another one that latches overwrites it.
+//! So the frame is alone on the wire ([`Bus::alone`]), and its latches belong to one procedure until it has read them
+//! ([`Latches`]).
 
 use core::time::Duration;
 
@@ -37,7 +38,8 @@ pub(super) enum Pauses {
     Forbidden,
 }
 
-/// Lets all clocks latch a frame that is alone on the wire. Copies on the link that is `deaf` are known not to come home.
+/// Lets all clocks latch a frame that is alone on the wire. Copies on the link that is `deaf` are known not to come
+/// home.
 pub(super) async fn latch(bus: &Bus, pauses: Pauses, deaf: Option<Link>) -> Result<Latches, BusError> {
     let _turn = bus.latch_turn().await;
     let met = send(bus, pauses, deaf).await?;

@@ -1,8 +1,8 @@
 //! Finding out who has mail that nobody asked for (facts 6.1).
 //!
-//! SubDevices whose SII offers it show the status bit of their send mailbox through an FMMU: each has a bit of its own in
-//! the logical address space, and all answer one read together. The others are asked one by one, so seldom that all of
-//! them together take a small part of the wire.
+//! SubDevices whose SII offers it show the status bit of their send mailbox through an FMMU: each has a bit of its own
+//! in the logical address space, and all answer one read together. The others are asked one by one, so seldom that all
+//! of them together take a small part of the wire.
 
 use alloc::vec;
 use alloc::vec::Vec;

@@ -31,13 +31,14 @@ use crate::supervisor::{Bus, BusError};
 const FIRST_PAUSE: Duration = Duration::from_millis(100);
 /// Longest pause between attempts.
 const LONGEST_PAUSE: Duration = Duration::from_secs(5);
-/// Looks at a SubDevice that did not answer once, before it is lost: at the edge of a cut a frame may have been processed by none.
+/// Looks at a SubDevice that did not answer once, before it is lost: at the edge of a cut a frame may have been
+/// processed by none.
 const LOOKS: usize = 3;
 /// Pause between two of them, and before a configuration that the bus disturbed is tried again for the first time.
 const LOOK_PAUSE: Duration = Duration::from_millis(3);
 
-/// Brings a SubDevice to its target state, again and again until it works or it no longer answers. `told`: the error of its
-/// that was told and still stands.
+/// Brings a SubDevice to its target state, again and again until it works or it no longer answers. `told`: the error of
+/// its that was told and still stands.
 pub(super) async fn keep_up(
     bus: &Bus,
     segment: &SharedSegment,
@@ -171,8 +172,8 @@ async fn try_once(
     result.map(|()| bring_up.target)
 }
 
-/// A SubDevice that only fell from OP to SAFEOP still has its configuration: acknowledged, it may go back to OP. Its error is
-/// told, unless it is the one that was.
+/// A SubDevice that only fell from OP to SAFEOP still has its configuration: acknowledged, it may go back to OP. Its
+/// error is told, unless it is the one that was.
 async fn quick(bring_up: &BringUp<'_>, told: &mut Option<Shown>) -> Result<bool, ConfigureError> {
     let BringUp { bus, segment, index, station, setup, target, mailbox, .. } = bring_up;
     let (status, code) = al_state::read_status(bus, *station).await?;
@@ -204,8 +205,8 @@ async fn quick(bring_up: &BringUp<'_>, told: &mut Option<Shown>) -> Result<bool,
     Ok(true)
 }
 
-/// Brings a member to its target state while the attempt is the current one. First it is checked whether it is that member;
-/// from another one the address is taken away.
+/// Brings a member to its target state while the attempt is the current one. First it is checked whether it is that
+/// member; from another one the address is taken away.
 pub(super) async fn bring_up_member(
     bus: Bus,
     segment: SharedSegment,

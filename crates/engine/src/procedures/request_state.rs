@@ -1,8 +1,8 @@
 //! A state for one SubDevice while the others go on: the application's wish, kept until it has another one.
 //!
-//! The SubDevice goes there by the shortest way, its process data ends or begins at once and not by halves, and no domain
-//! misses it meanwhile. A SubDevice that loses its power comes back to the state that was asked for last. One that refuses
-//! is brought back to the state that it had.
+//! The SubDevice goes there by the shortest way, its process data ends or begins at once and not by halves, and no
+//! domain misses it meanwhile. A SubDevice that loses its power comes back to the state that was asked for last. One
+//! that refuses is brought back to the state that it had.
 
 use alloc::rc::Rc;
 use core::cell::RefCell;

@@ -269,8 +269,8 @@ pub(super) fn event_mask() -> EcatEvent {
     EcatEvent { dl_status: true, ..EcatEvent::default() }
 }
 
-/// Waits until all are in INIT, as the OR of their AL status shows it; false where they are not in time. Devices that copy AL
-/// control into AL status show the acknowledge bit as an error: they get the bare state.
+/// Waits until all are in INIT, as the OR of their AL status shows it; false where they are not in time. Devices that
+/// copy AL control into AL status show the acknowledge bit as an error: they get the bare state.
 async fn to_init(bus: &Bus, count: u16) -> Result<bool, BusError> {
     let until = bus.now() + INIT_LIMIT;
     loop {

@@ -1,4 +1,5 @@
-//! What can be asked of one SubDevice besides its mailbox (000 10.8): registers, ports, resets, error counters, its EEPROM.
+//! What can be asked of one SubDevice besides its mailbox (000 10.8): registers, ports, resets, error counters, its
+//! EEPROM.
 
 pub mod ports;
 pub mod registers;
@@ -52,8 +53,8 @@ pub enum ServiceError {
         /// At most.
         limit: usize,
     },
-    /// An LRW of the application's own over process data of several SubDevices, with two links: a break would leave half of
-    /// them to each copy (facts 9.2.2).
+    /// An LRW of the application's own over process data of several SubDevices, with two links: a break would leave
+    /// half of them to each copy (facts 9.2.2).
     LrwOnTwoLinks {
         /// Its logical address.
         logical: LogicalAddress,

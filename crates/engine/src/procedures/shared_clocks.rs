@@ -130,8 +130,9 @@ pub struct ClockStatus {
     pub hidden: Option<HiddenDelay>,
     /// System time less local time when it was set up (0x0920).
     pub offset_ns: i64,
-    /// How much faster than the reference it would run by itself, in parts per billion: as it ran within the milliseconds of
-    /// the first measurement, to some tens of thousands; once it was locked, what its control loop makes up for (0x0932).
+    /// How much faster than the reference it would run by itself, in parts per billion: as it ran within the
+    /// milliseconds of the first measurement, to some tens of thousands; once it was locked, what its control loop
+    /// makes up for (0x0932).
     pub drift_ppb: i64,
     /// Its time less that of the reference in nanoseconds (0x092C); `None` before it was read.
     pub difference_ns: Option<i32>,
@@ -141,8 +142,8 @@ pub struct ClockStatus {
     pub is_locked: bool,
 }
 
-/// Why the delay of a SubDevice is not known (facts 7.1): it is behind a fork without a clock, and what was latched shows only what
-/// the branches of that take together.
+/// Why the delay of a SubDevice is not known (facts 7.1): it is behind a fork without a clock, and what was latched
+/// shows only what the branches of that take together.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct HiddenDelay {
     /// Position of the fork; `None` where it is not known what is between this SubDevice and the reference.
@@ -254,7 +255,8 @@ impl Node {
         self.has_clock && (self.unit.is_some() || self.hidden.is_none())
     }
 
-    /// The mean of differences with one more of them: those of a clock that is told what the host believes have its jitter.
+    /// The mean of differences with one more of them: those of a clock that is told what the host believes have its
+    /// jitter.
     pub fn average(&mut self, ahead_ns: i32) -> i32 {
         let before = self.average.unwrap_or(i64::from(ahead_ns) << AVERAGE);
         let now = before + i64::from(ahead_ns) - (before >> AVERAGE);

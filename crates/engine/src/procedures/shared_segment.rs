@@ -1,5 +1,5 @@
-//! What all procedures of one MainDevice have at hand after activation: the model of the segment, to be looked at and to be
-//! told what was observed, and what belongs to the bus beside it.
+//! What all procedures of one MainDevice have at hand after activation: the model of the segment, to be looked at and
+//! to be told what was observed, and what belongs to the bus beside it.
 
 use alloc::collections::VecDeque;
 use alloc::rc::Rc;
@@ -118,7 +118,8 @@ impl SharedSegment {
         }
     }
 
-    /// Waits until the cyclic half has posted something else than this, something else was observed, or a point of time.
+    /// Waits until the cyclic half has posted something else than this, something else was observed, or a point of
+    /// time.
     pub(super) async fn until_news(&self, seen: Posted, until: Instant) {
         self.bus.until_posted(seen, until, &self.changed, || self.news.replace(false)).await;
     }
@@ -133,8 +134,8 @@ impl SharedSegment {
         self.changed.until(|| self.tasks.borrow_mut().pop_front()).await
     }
 
-    /// Waits until nothing else puts SubDevices or links out of reach, and keeps others from it; false where that does not come
-    /// within a time. To be ended with [`SharedSegment::undisturb`], after everything has been undone.
+    /// Waits until nothing else puts SubDevices or links out of reach, and keeps others from it; false where that does
+    /// not come within a time. To be ended with [`SharedSegment::undisturb`], after everything has been undone.
     pub(super) async fn disturb(&self, wanted: Disturbance, limit: Duration) -> bool {
         self.observe(Observation::Wanted(wanted));
         let granted = self.until(|segment| (segment.disturbance() == Some(wanted)).then_some(()));

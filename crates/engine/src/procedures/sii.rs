@@ -175,8 +175,8 @@ const fn is_needed(kind: CategoryKind) -> bool {
     )
 }
 
-/// Reads the SII of one SubDevice, which must be assigned to EtherCAT: the fixed area and the categories that the engine
-/// uses.
+/// Reads the SII of one SubDevice, which must be assigned to EtherCAT: the fixed area and the categories that the
+/// engine uses.
 pub(super) async fn read(bus: &Bus, station: StationAddress, cache: &SiiCache) -> Result<SiiContents, SiiReadError> {
     let mut eeprom = Eeprom::open(bus, station, Pace::guess(cache.pace())).await?;
     let mut area: FixedArea = [0; SiiHeader::LEN];

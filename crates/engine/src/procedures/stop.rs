@@ -1,9 +1,10 @@
 //! Taking all SubDevices down to a state: the end of an orderly stop (facts 5.3).
 //!
-//! Each is led by itself. What one broadcast asks for, some may not do: a SubDevice that was not declared is in INIT and has
-//! no mailbox for PREOP, one may have another target state, one that copies AL control into AL status takes an
-//! acknowledgement for an error; and of all AL states together frames bring back the OR. INIT is the exception, because all
-//! states lead there: a broadcast asks for it first, so that all leave OP at once and those without a known address, too.
+//! Each is led by itself. What one broadcast asks for, some may not do: a SubDevice that was not declared is in INIT
+//! and has no mailbox for PREOP, one may have another target state, one that copies AL control into AL status takes an
+//! acknowledgement for an error; and of all AL states together frames bring back the OR. INIT is the exception, because
+//! all states lead there: a broadcast asks for it first, so that all leave OP at once and those without a known
+//! address, too.
 
 use alloc::vec::Vec;
 use core::fmt;
@@ -91,8 +92,8 @@ pub(crate) fn all_known(segment: &Segment) -> Vec<Led> {
     members.chain(segment.unassigned.iter().map(|it| (None, it.station))).collect()
 }
 
-/// Takes SubDevices to a state that lies below the one they are in. Those that are in a lower one stay there, and so do those
-/// in BOOT, unless INIT is asked for. Where none is known, only INIT is asked for, of all at once.
+/// Takes SubDevices to a state that lies below the one they are in. Those that are in a lower one stay there, and so do
+/// those in BOOT, unless INIT is asked for. Where none is known, only INIT is asked for, of all at once.
 pub(crate) async fn stop(bus: &Bus, led: Vec<Led>, state: AlState, limit: Duration) -> Result<(), StopError> {
     let until = bus.now() + limit;
     if state == AlState::Init {

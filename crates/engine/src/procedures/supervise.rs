@@ -1,8 +1,8 @@
-//! Supervision after activation: what the cyclic half posts is handed to the model of the segment, and rounds of looks that
-//! it calls for are made.
+//! Supervision after activation: what the cyclic half posts is handed to the model of the segment, and rounds of looks
+//! that it calls for are made.
 //!
-//! The exchange posts one word per cycle: how many SubDevices answered on each link, the OR of their AL status, the OR of
-//! their event requests. As long as it does not change, nothing is asked of the bus but one look per second.
+//! The exchange posts one word per cycle: how many SubDevices answered on each link, the OR of their AL status, the OR
+//! of their event requests. As long as it does not change, nothing is asked of the bus but one look per second.
 
 use alloc::vec::Vec;
 use core::time::Duration;

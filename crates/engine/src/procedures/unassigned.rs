@@ -1,5 +1,5 @@
-//! SubDevices that answer but have no station address of ours: found, read, and given the address of the declared SubDevice
-//! that they are, as the model tells ([`crate::segment::unassigned`]).
+//! SubDevices that answer but have no station address of ours: found, read, and given the address of the declared
+//! SubDevice that they are, as the model tells ([`crate::segment::unassigned`]).
 //!
 //! Each is read by a procedure of its own, so that one whose EEPROM is slow or broken keeps no other waiting.
 
@@ -53,8 +53,8 @@ pub(super) struct Search {
 }
 
 impl Search {
-    /// Finds SubDevices without a known station address, gives them one and has them read. True where none is left that is
-    /// not known.
+    /// Finds SubDevices without a known station address, gives them one and has them read. True where none is left that
+    /// is not known.
     pub(super) async fn run(&self, bus: &Bus, segment: &SharedSegment) -> bool {
         let (complete, reason) = match find(bus, segment).await {
             Ok(complete) => (complete, "SubDevices answer that cannot be told apart".into()),
@@ -129,8 +129,8 @@ async fn read_once(bus: &Bus, segment: &SharedSegment, station: StationAddress) 
     read_one(bus, position.unwrap_or_default(), station, &segment.cache).await
 }
 
-/// Gives those that are absent members their addresses, and has the others told. To be called when it is known of all members
-/// whether they are there: one that is absent, but not known to be, may be the one that another SubDevice is.
+/// Gives those that are absent members their addresses, and has the others told. To be called when it is known of all
+/// members whether they are there: one that is absent, but not known to be, may be the one that another SubDevice is.
 ///
 /// False where it could not be found out where they are.
 pub(super) async fn admit_all(bus: &Bus, segment: &SharedSegment) -> bool {
@@ -149,9 +149,9 @@ pub(super) async fn admit_all(bus: &Bus, segment: &SharedSegment) -> bool {
     true
 }
 
-/// Looks again where they are, if a member is missed: since they were found the ring may have opened somewhere else, and of
-/// several alike it is the place that tells them apart. Gives back which members cables tell; `None` where the segment
-/// changes.
+/// Looks again where they are, if a member is missed: since they were found the ring may have opened somewhere else,
+/// and of several alike it is the place that tells them apart. Gives back which members cables tell; `None` where the
+/// segment changes.
 async fn find_places(bus: &Bus, segment: &SharedSegment) -> Option<Vec<(StationAddress, usize)>> {
     let is_one_missed = {
         let view = segment.view();

@@ -1,5 +1,5 @@
-//! When all SubDevices are looked at: as soon as something that is posted differs from what it was at the last look, when
-//! something else calls for it, and once a second.
+//! When all SubDevices are looked at: as soon as something that is posted differs from what it was at the last look,
+//! when something else calls for it, and once a second.
 
 use core::time::Duration;
 
@@ -91,8 +91,8 @@ impl Attention {
             || self.is_wanted
     }
 
-    /// Ports have changed again right behind a look that took their request for attention away: it stands, as before the
-    /// look. `None` where that cannot be.
+    /// Ports have changed again right behind a look that took their request for attention away: it stands, as before
+    /// the look. `None` where that cannot be.
     fn has_missed(&mut self, words: &Words) -> Option<bool> {
         let (number, supervision) = words.supervision?;
         if !EcatEvent::from_bits(supervision.irq).dl_status {

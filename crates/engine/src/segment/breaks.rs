@@ -120,8 +120,8 @@ impl Segment {
     }
 }
 
-/// The cables of the ring that no longer have communication, in its order. Branches are none of it: what is behind one is told
-/// as lost. `dl_status` by position.
+/// The cables of the ring that no longer have communication, in its order. Branches are none of it: what is behind one
+/// is told as lost. `dl_status` by position.
 fn locate_breaks(topology: &Topology, dl_status: &[Option<DlStatus>]) -> Vec<Cable> {
     let Some(first) = topology.nodes.first() else { return Vec::new() };
     let trunk = trunk(topology);

@@ -18,8 +18,8 @@ pub struct Cabling {
     pub stations: Vec<StationAddress>,
     /// All cables with what their ends have counted.
     pub cables: Vec<(Cable, CableErrors)>,
-    /// Both ends of the closing cables of all rings behind junctions that were learned or declared, the junction's first:
-    /// also those whose SubDevices are not all there.
+    /// Both ends of the closing cables of all rings behind junctions that were learned or declared, the junction's
+    /// first: also those whose SubDevices are not all there.
     pub closings: Vec<[End; 2]>,
     /// How often other cables, or other SubDevices at their ends, were found since the scan.
     pub version: u32,

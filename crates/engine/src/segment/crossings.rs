@@ -1,8 +1,8 @@
-//! Crossed lines in operation (facts 9.5): whenever ports of SubDevices have changed, the segment is looked at anew, and each
-//! SubDevice that is entered at another port than 0 is told, once.
+//! Crossed lines in operation (facts 9.5): whenever ports of SubDevices have changed, the segment is looked at anew,
+//! and each SubDevice that is entered at another port than 0 is told, once.
 //!
-//! More rings behind junctions than are known are told too: an application that asked for junction redundancy must know that
-//! one of them is not watched.
+//! More rings behind junctions than are known are told too: an application that asked for junction redundancy must know
+//! that one of them is not watched.
 
 use alloc::collections::BTreeSet;
 use alloc::vec::Vec;
@@ -58,8 +58,8 @@ impl LineCheck {
         crossed(self) == crossed(told) && self.swapped == told.swapped && self.unknown_rings <= told.unknown_rings
     }
 
-    /// What was told and still stands, with what is new. A closed ring takes nothing back that an open one has shown, and
-    /// an open one shows nothing of those that do not answer.
+    /// What was told and still stands, with what is new. A closed ring takes nothing back that an open one has shown,
+    /// and an open one shows nothing of those that do not answer.
     fn and(mut self, found: LineCheck) -> LineCheck {
         if found.crossings.is_empty() {
             self.crossings.clear();
@@ -78,8 +78,8 @@ impl LineCheck {
     }
 }
 
-/// Whether frames reach all of a ring the wrong way round: in a closed one those of the redundant link only, in an open one as
-/// the findings say.
+/// Whether frames reach all of a ring the wrong way round: in a closed one those of the redundant link only, in an open
+/// one as the findings say.
 pub fn is_swapped(topology: &Topology) -> bool {
     let crossed = |finding: &&Finding| matches!(finding, Finding::CrossedLine { .. });
     let count = topology.nodes.len();
@@ -163,8 +163,8 @@ impl Segment {
         }
     }
 
-    /// The segment was looked at; `None` where it changes too much to tell. Where the redundant link was down for it, looking
-    /// again soon would not help.
+    /// The segment was looked at; `None` where it changes too much to tell. Where the redundant link was down for it,
+    /// looking again soon would not help.
     pub(super) fn observe_line_check(&mut self, found: Option<LineCheck>, in_control: bool, effects: &mut Effects) {
         // Ports that changed in between have told it to this look.
         self.attention.want();

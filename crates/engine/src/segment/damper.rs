@@ -41,8 +41,8 @@ impl Default for Damper {
 }
 
 impl Damper {
-    /// The state changed since the last look. At the edge of a cut frames of one cycle may show both states: that is one
-    /// change.
+    /// The state changed since the last look. At the edge of a cut frames of one cycle may show both states: that is
+    /// one change.
     pub(crate) fn changed(&mut self, now: Instant) {
         self.is_prompt = self.changed_at.is_none_or(|at| now.since(at) >= QUIET);
         self.changed_at = Some(now);

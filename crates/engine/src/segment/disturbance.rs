@@ -1,7 +1,8 @@
 //! What puts SubDevices out of reach, or a link out of use, on purpose: one at a time.
 //!
-//! None of these can be cancelled: each runs to its undo. Where several are wanted at once the one that is needed most is
-//! next, and each ends by itself within its own time limit, so that a segment that changes all the time starves none.
+//! None of these can be cancelled: each runs to its undo. Where several are wanted at once the one that is needed most
+//! is next, and each ends by itself within its own time limit, so that a segment that changes all the time starves
+//! none.
 
 use alloc::vec::Vec;
 

@@ -1,5 +1,5 @@
-//! Unassigned SubDevices that are members of hot connect groups: the head by its alias or identification at any place, the
-//! others by what they are behind.
+//! Unassigned SubDevices that are members of hot connect groups: the head by its alias or identification at any place,
+//! the others by what they are behind.
 
 use alloc::vec::Vec;
 

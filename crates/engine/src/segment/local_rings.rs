@@ -69,9 +69,9 @@ impl LocalRings {
         }
     }
 
-    /// A break that was told goes on to be that of one cable: one that is broken and has an end in common with the one of
-    /// which it was told, or else is in the same ring, or else has that and is whole again. Where there is none, the cable
-    /// is gone.
+    /// A break that was told goes on to be that of one cable: one that is broken and has an end in common with the one
+    /// of which it was told, or else is in the same ring, or else has that and is whole again. Where there is none, the
+    /// cable is gone.
     fn go_over(&mut self, new: LocalRings, status: &[Option<NodeStatus>]) {
         let before = core::mem::replace(self, new);
         let places = &self.places;

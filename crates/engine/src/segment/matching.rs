@@ -33,8 +33,8 @@ impl Fit {
     }
 }
 
-/// The absent SubDevice that each unassigned SubDevice is, if any. `fit` tells of an unassigned and an absent one how well they fit;
-/// `from_main` whether an unassigned one answers on the main link.
+/// The absent SubDevice that each unassigned SubDevice is, if any. `fit` tells of an unassigned and an absent one how
+/// well they fit; `from_main` whether an unassigned one answers on the main link.
 pub(super) fn assign(from_main: &[bool], absent: usize, fit: impl Fn(usize, usize) -> Fit) -> Vec<Option<usize>> {
     let mut assigned = vec![None; from_main.len()];
     for (candidate, slot) in assigned.iter_mut().enumerate() {
@@ -42,7 +42,8 @@ pub(super) fn assign(from_main: &[bool], absent: usize, fit: impl Fn(usize, usiz
     }
     let open: Vec<usize> = (0..assigned.len()).filter(|candidate| assigned[*candidate].is_none()).collect();
     let places: Vec<usize> = (0..absent).filter(|place| !assigned.contains(&Some(*place))).collect();
-    // The best sum of scores; the lower half of the word prefers places near the side that an unassigned one answers from.
+    // The best sum of scores; the lower half of the word prefers places near the side that an unassigned one answers
+    // from.
     let value = |one: usize, other: usize| {
         let (candidate, place) = (open[one], places[other]);
         let near = if from_main[candidate] { places.len() - other } else { other + 1 };

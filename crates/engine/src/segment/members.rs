@@ -19,7 +19,8 @@ use crate::info::SubDeviceInfo;
 use crate::ring::RingState;
 use crate::time::Instant;
 
-/// A SubDevice is lost when it was silent in so many looks in a row: at the edge of a cut a copy may have been processed by none.
+/// A SubDevice is lost when it was silent in so many looks in a row: at the edge of a cut a copy may have been
+/// processed by none.
 const SILENT_LOOKS: u8 = 2;
 /// Pause before a silent SubDevice is looked at again.
 const SECOND_LOOK_PAUSE: Duration = Duration::from_millis(2);
@@ -51,7 +52,8 @@ impl Segment {
             // Some were out of reach on purpose meanwhile.
             return self.attention.again_in(SECOND_LOOK_PAUSE, now);
         }
-        // Either frames of looks do not come back though SubDevices process those of the exchange, or the other way round.
+        // Either frames of looks do not come back though SubDevices process those of the exchange, or the other way
+        // round.
         let is_blind = match counted {
             Some(counted) if counted != Wkc(0) => looks.contains(&Look::Unknown),
             Some(_) | None => answers(looks) > 0,
@@ -140,8 +142,8 @@ impl Segment {
         }
     }
 
-    /// As soon as all that the cyclic datagram counts have answered, process data no longer waits for the others: whether
-    /// they are lost is seen later, whose inputs are new is seen now.
+    /// As soon as all that the cyclic datagram counts have answered, process data no longer waits for the others:
+    /// whether they are lost is seen later, whose inputs are new is seen now.
     pub(super) fn observe_part_of_looks(&mut self, asked: Asked, looks: &[Look], others: usize, counted: Option<Wkc>) {
         if asked.isolations != self.slot.isolations()
             || counted.map(|counted| usize::from(counted.0)) != Some(answers(looks) + others)

@@ -1,9 +1,9 @@
 //! Which absent members unassigned SubDevices are by the cables that lead to them.
 //!
-//! Several may be alike. Their order tells them apart where all of them are there; where some are not, or a ring is open
-//! elsewhere than at the scan so that frames meet its SubDevices from the other side, only their neighbours do. In go the
-//! cables as the scan or a rescan found them and as the ports tell them now: what hangs on the port of a member to which
-//! a cable led before, with the same port of its own, is what hung there.
+//! Several may be alike. Their order tells them apart where all of them are there; where some are not, or a ring is
+//! open elsewhere than at the scan so that frames meet its SubDevices from the other side, only their neighbours do. In
+//! go the cables as the scan or a rescan found them and as the ports tell them now: what hangs on the port of a member
+//! to which a cable led before, with the same port of its own, is what hung there.
 
 use alloc::vec;
 use alloc::vec::Vec;
@@ -22,8 +22,8 @@ use crate::topology::{Closing, Finding, NodeStatus, PortOf, Topology};
 type End = Option<PortOf>;
 
 impl Segment {
-    /// An unassigned SubDevice could be several of those that are missed, or one of them though order does not say so: then
-    /// ports have to be read ([`Segment::told_by_cables`]).
+    /// An unassigned SubDevice could be several of those that are missed, or one of them though order does not say so:
+    /// then ports have to be read ([`Segment::told_by_cables`]).
     pub fn asks_for_cables(&self) -> bool {
         self.unassigned.iter().any(|it| {
             let fits: Vec<usize> = self.absent().filter(|index| self.may_be(it, *index)).collect();

@@ -1,9 +1,9 @@
 //! What SubDevices were told to do about their ports.
 //!
-//! Rings of which no frame comes back are looked into by writing the loops of all ports of their junctions at once. A port
-//! that was closed on purpose must stay closed then, also where that was less than a look ago, or where the answer to the
-//! order did not come back any more. So an order counts from before it leaves on, and nothing that is read while it is
-//! under way.
+//! Rings of which no frame comes back are looked into by writing the loops of all ports of their junctions at once. A
+//! port that was closed on purpose must stay closed then, also where that was less than a look ago, or where the answer
+//! to the order did not come back any more. So an order counts from before it leaves on, and nothing that is read while
+//! it is under way.
 
 use alloc::vec::Vec;
 

@@ -40,9 +40,9 @@ impl Segment {
         words.ring.state == RingState::Closed && self.ring.status.state == RingState::Closed
     }
 
-    /// Takes over the cabling, unless the ring of two links is open, or a mandatory SubDevice does not answer: what is broken
-    /// would be forgotten. A ring behind a junction may be broken, for it is known where it closes, and what was told of it
-    /// goes on to hold.
+    /// Takes over the cabling, unless the ring of two links is open, or a mandatory SubDevice does not answer: what is
+    /// broken would be forgotten. A ring behind a junction may be broken, for it is known where it closes, and what was
+    /// told of it goes on to hold.
     pub(super) fn adopt(&mut self, seen: Seen<'_>, words: &Words, effects: &mut Effects) {
         let is_single = words.links == LinkSet::Single;
         let is_whole = is_single || (self.is_closed(words) && seen.topology.redundant_head.is_none());

@@ -2,8 +2,8 @@
 //! broken.
 //!
 //! Hot connect groups may be pieces of them. A ring whose last SubDevices have left ends at the one before these. What
-//! leads to the SubDevice behind a break no port tells: it is followed from the junction on, along the members that were
-//! known before and those that have come since, as far as there is no choice.
+//! leads to the SubDevice behind a break no port tells: it is followed from the junction on, along the members that
+//! were known before and those that have come since, as far as there is no choice.
 
 use alloc::vec::Vec;
 

@@ -1,5 +1,5 @@
-//! The ring and the links: opened and closed with the counts of both sides, redundancy lost and regained, a carrier gone
-//! and back. Each edge is told once, and not too often ([`Damper`]); what is asked for is always up to date.
+//! The ring and the links: opened and closed with the counts of both sides, redundancy lost and regained, a carrier
+//! gone and back. Each edge is told once, and not too often ([`Damper`]); what is asked for is always up to date.
 //!
 //! All of it comes from words that the exchange posts: nothing here waits for a frame, so that the event comes in the
 //! cycle whose frames showed the change.
@@ -237,8 +237,8 @@ impl Ring {
     fn counts(&mut self, word: RingWord, number: u32, supervision: Supervision) -> Option<(u16, u16)> {
         let counts = (supervision.main.0, supervision.redundant.0);
         match (word.state, word.returned) {
-            // A copy that came back on its own link was processed by all that are connected there. The others are on the other
-            // side, also
+            // A copy that came back on its own link was processed by all that are connected there. The others are on
+            // the other side, also
             // where the other copy is still out or was lost.
             (RingState::Open, Some((link, count))) if self.steady > 0 => {
                 let other = self.steady.saturating_sub(count);

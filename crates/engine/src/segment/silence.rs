@@ -19,7 +19,8 @@ const BLOCKED_CYCLES: u64 = 3;
 /// When frames came back last.
 #[derive(Debug, Default)]
 pub(super) struct Silence {
-    /// Number of the last supervision result with an answer, when it was seen, and how many cycles had been sent by then.
+    /// Number of the last supervision result with an answer, when it was seen, and how many cycles had been sent by
+    /// then.
     last: Option<(Option<u32>, Instant, u64)>,
     next: Instant,
     is_blocked: bool,
@@ -69,8 +70,8 @@ impl Segment {
     }
 }
 
-/// The number of a result that a SubDevice has answered: a frame that none has processed has not come back from them, and in
-/// a closed ring of two links the other copies do.
+/// The number of a result that a SubDevice has answered: a frame that none has processed has not come back from them,
+/// and in a closed ring of two links the other copies do.
 fn answered(words: &Words) -> Option<u32> {
     words.supervision.filter(|(_, seen)| seen.total().0 > 0).map(|(number, _)| number)
 }

@@ -1,5 +1,5 @@
-//! SubDevices that answer but have no station address of ours: which declared SubDevice they are, if any. One that is none
-//! keeps a temporary address and is looked at again when a declared one is lost.
+//! SubDevices that answer but have no station address of ours: which declared SubDevice they are, if any. One that is
+//! none keeps a temporary address and is looked at again when a declared one is lost.
 
 use alloc::format;
 use alloc::rc::Rc;
@@ -66,7 +66,8 @@ struct At<'a> {
 }
 
 impl UnassignedSubDevice {
-    /// One that a scan has found among the owners of all positions, of which the main copy reaches the first `main_count`.
+    /// One that a scan has found among the owners of all positions, of which the main copy reaches the first
+    /// `main_count`.
     pub fn new(info: SubDeviceInfo, owners: &Owners, main_count: usize, reported: bool) -> UnassignedSubDevice {
         let (station, position) = (info.station, usize::from(info.position.0));
         let knowledge = Knowledge::Known(Rc::new(info));
@@ -245,8 +246,8 @@ impl Segment {
         }
     }
 
-    /// Which absent members they are. To be asked when it is known of all members whether they are there: one that is absent,
-    /// but not known to be, may be the one that an unassigned one is. `told`: those of which cables tell it.
+    /// Which absent members they are. To be asked when it is known of all members whether they are there: one that is
+    /// absent, but not known to be, may be the one that an unassigned one is. `told`: those of which cables tell it.
     pub fn match_all(&self, told: &[(StationAddress, usize)], now: Instant) -> Matches {
         let mut unassigned = self.unassigned.clone();
         unassigned.sort_by_key(|it| it.position);
@@ -276,8 +277,8 @@ impl Segment {
         Matches { matched, held }
     }
 
-    /// It could be another absent member as well: of one kind with several, without a serial number, and not as many of them
-    /// are there as are missed. Outputs of one must not go to another one.
+    /// It could be another absent member as well: of one kind with several, without a serial number, and not as many of
+    /// them are there as are missed. Outputs of one must not go to another one.
     fn is_doubtful(
         &self,
         it: &UnassignedSubDevice,

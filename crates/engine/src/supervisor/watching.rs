@@ -43,8 +43,8 @@ impl Bus {
         self.shared.borrow().posted()
     }
 
-    /// Waits until something else is posted than this, until a point of time, or until `ready`, which is asked after each
-    /// notification of `signal`.
+    /// Waits until something else is posted than this, until a point of time, or until `ready`, which is asked after
+    /// each notification of `signal`.
     pub(crate) async fn until_posted(
         &self,
         seen: Posted,

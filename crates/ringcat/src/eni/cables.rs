@@ -1,7 +1,7 @@
 //! The cables of a network held against `PreviousPort` of a file (facts 8.2): who is plugged into which port of whom.
 //!
-//! A difference is told and no more: process data finds its SubDevices by their order, but whoever looks for a broken cable
-//! with the drawing of the machine in hand wants to know.
+//! A difference is told and no more: process data finds its SubDevices by their order, but whoever looks for a broken
+//! cable with the drawing of the machine in hand wants to know.
 
 use ringcat_config::eni::Port;
 use ringcat_engine::config::{Resolution, resolve};
@@ -14,8 +14,9 @@ use super::file::{Difference, EniFile};
 const LETTERS: [char; 4] = ['A', 'B', 'C', 'D'];
 
 impl EniFile {
-    /// Cables that are not where `PreviousPort` says. Nothing is told of what does not show: of SubDevices that are missing,
-    /// of the place where a ring is open, of rings behind junctions, or while crossed lines make neighbours doubtful.
+    /// Cables that are not where `PreviousPort` says. Nothing is told of what does not show: of SubDevices that are
+    /// missing, of the place where a ring is open, of rings behind junctions, or while crossed lines make neighbours
+    /// doubtful.
     pub fn compare_cables(&self, found: &[SubDeviceInfo], topology: &Topology) -> Vec<Difference> {
         let facts = &self.configuration.subdevices;
         let configs = &self.configuration.declaration.subdevices;

@@ -107,8 +107,8 @@ impl EniFile {
         Ok(EniFile { eni, configuration })
     }
 
-    /// What is activated. With `split_lrw` the engine is free to send LRD and LWR where the file has an LRW over several
-    /// SubDevices, as it must with two links (facts CR-16, 9.2.2).
+    /// What is activated. With `split_lrw` the engine is free to send LRD and LWR where the file has an LRW over
+    /// several SubDevices, as it must with two links (facts CR-16, 9.2.2).
     pub fn declaration(&self, split_lrw: bool) -> Declaration {
         let mut declaration = self.configuration.declaration.clone();
         if split_lrw {
@@ -126,7 +126,8 @@ impl EniFile {
         Names(self.configuration.subdevices.iter().map(name).collect())
     }
 
-    /// Whether the SubDevices that a scan found are those of the file: each that is missing, another one, or not in the file.
+    /// Whether the SubDevices that a scan found are those of the file: each that is missing, another one, or not in the
+    /// file.
     pub fn compare(&self, found: &[SubDeviceInfo]) -> Vec<Difference> {
         let configs = &self.configuration.declaration.subdevices;
         let names = self.names().0;

@@ -1,7 +1,7 @@
 //! The process image of an ENI at run time: what the application sees, as the file lays it out (facts 8.1).
 //!
-//! On the wire process data lies as the engine lays it out; here it is copied from there and back. What is copied is worked
-//! out when the network is active; in a cycle nothing is allocated and nothing waits.
+//! On the wire process data lies as the engine lays it out; here it is copied from there and back. What is copied is
+//! worked out when the network is active; in a cycle nothing is allocated and nothing waits.
 
 use std::fmt;
 
@@ -154,8 +154,8 @@ impl EniImage {
         })
     }
 
-    /// Takes over what the last cycle brought: the first thing in a cycle. Inputs of a SubDevice that did not answer keep
-    /// their values ([`EniImage::freshness`]).
+    /// Takes over what the last cycle brought: the first thing in a cycle. Inputs of a SubDevice that did not answer
+    /// keep their values ([`EniImage::freshness`]).
     pub fn take_inputs(&mut self, data: &ProcessData<'_>) {
         self.take_inputs_of(data.exchange);
     }
@@ -237,7 +237,8 @@ impl EniImage {
         }
     }
 
-    /// What the file copies from inputs to outputs in every cycle, for [`Application::set_copies`](crate::Application::set_copies).
+    /// What the file copies from inputs to outputs in every cycle, for
+    /// [`Application::set_copies`](crate::Application::set_copies).
     pub fn copies(&self) -> &[CopyRule] {
         &self.copies
     }

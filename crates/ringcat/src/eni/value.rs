@@ -65,8 +65,8 @@ impl VariableType {
         }
     }
 
-    /// The bits of a value that somebody wrote: `true`, `-5`, `0x1F`, `2.5`. `None` where it is no value of this type, or
-    /// has more bits than there are.
+    /// The bits of a value that somebody wrote: `true`, `-5`, `0x1F`, `2.5`. `None` where it is no value of this type,
+    /// or has more bits than there are.
     pub fn parse(self, text: &str, length: u16) -> Option<u64> {
         let text = text.trim();
         let mask = if length >= 64 { u64::MAX } else { (1 << length) - 1 };

@@ -66,8 +66,8 @@ fn positions_of_which_it_is_not_known_who_is_there_have_no_names() {
     assert_eq!(describe(&timed, &names), "position 1 \"pump\" (0x1002): line crossed, frames enter at port 1");
 }
 
-/// As on real devices: those of one kind have one name in their SIIs, whose contents are read once for all of them. Whoever
-/// has a name of his own is told by it, though nothing else is different.
+/// As on real devices: those of one kind have one name in their SIIs, whose contents are read once for all of them.
+/// Whoever has a name of his own is told by it, though nothing else is different.
 #[test]
 fn simulated_devices_have_the_names_of_their_segment_file_and_copies_one_for_all() {
     let text = "[[device]]\ntype = \"block\"\nname = \"member\"\ncount = 3\n[[device]]\ntype = \"block\"\n\

@@ -1,5 +1,5 @@
-//! Both halves in threads of their own, on a simulated segment in real time. The machine may be busy with anything: what
-//! is asked for is that things happen, not how soon.
+//! Both halves in threads of their own, on a simulated segment in real time. The machine may be busy with anything:
+//! what is asked for is that things happen, not how soon.
 
 use std::ops::ControlFlow;
 use std::path::Path;
@@ -112,8 +112,8 @@ fn a_refused_declaration_leaves_both_parts_for_another_try() -> Result<(), Error
     Ok(())
 }
 
-/// Of some batches the best: the machine may be busy. A thread that looked once in a millisecond would take one for each
-/// question, however idle the machine is.
+/// Of some batches the best: the machine may be busy. A thread that looked once in a millisecond would take one for
+/// each question, however idle the machine is.
 #[test]
 fn who_asks_one_thing_after_the_other_does_not_wait_a_millisecond_for_each() -> Result<(), Error> {
     const QUESTIONS: u32 = 20;

@@ -1,5 +1,5 @@
-//! Forks without a clock: delays behind them are measured branch by branch at the set-up, and where they cannot be, none is
-//! written and that is told (facts 7.1).
+//! Forks without a clock: delays behind them are measured branch by branch at the set-up, and where they cannot be,
+//! none is written and that is told (facts 7.1).
 
 use std::time::Duration;
 
@@ -33,7 +33,8 @@ fn delays_told(world: &World) -> Vec<(Position, Option<Position>)> {
     world.events(world.beginning()).iter().filter_map(told).collect()
 }
 
-/// A clock, a splitter without one, two clocks on its port 3, one on its port 1, and on port 2 another splitter with two.
+/// A clock, a splitter without one, two clocks on its port 3, one on its port 1, and on port 2 another splitter with
+/// two.
 const SPLITTERS: [(Endpoint, Endpoint); 8] = [
     (MAIN, at(0, A)),
     (at(0, B), at(1, A)),

@@ -20,9 +20,9 @@ use crate::description::{DcDescription, DeviceDescription, data_type};
 const DEVICE_TYPE: u32 = 0x0002_0192;
 /// Smallest cycle of process data.
 const MINIMUM_CYCLE_NS: u32 = 125_000;
-/// Units of ETG.1004 for SDO information, which has room for prefix and unit; speeds and accelerations do not fit and are
-/// told by 0x60A8 to 0x60AA. Increments (00 B5), milli (FD), ampere (04), second (03) and their places in 32 bits, with "per
-/// second" and "per second squared" (57) as denominators, are those of ESI files of drives on the market.
+/// Units of ETG.1004 for SDO information, which has room for prefix and unit; speeds and accelerations do not fit and
+/// are told by 0x60A8 to 0x60AA. Increments (00 B5), milli (FD), ampere (04), second (03) and their places in 32 bits,
+/// with "per second" and "per second squared" (57) as denominators, are those of ESI files of drives on the market.
 const INCREMENTS: u16 = 0x00B5;
 const THOUSANDTHS: u16 = 0xFD00;
 const MILLIAMPERES: u16 = 0xFD04;

@@ -201,7 +201,8 @@ fn local_ring(broken: Option<usize>) -> Wiring {
     Wiring::new(&topology, false, |_| broken != Some(7))
 }
 
-/// Errors of delays with this break, in nanoseconds, `None` where they are not known; what is learned of cables is kept.
+/// Errors of delays with this break, in nanoseconds, `None` where they are not known; what is learned of cables is
+/// kept.
 fn errors(broken: Option<usize>, passages: &[Passage], cables: &mut Cables) -> Vec<Option<i64>> {
     let wiring = local_ring(broken);
     // Each cable has a length of its own.

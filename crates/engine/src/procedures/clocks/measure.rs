@@ -1,10 +1,10 @@
 //! Who is connected to whom now, and what frames take from clock to clock (facts 7.1).
 //!
-//! Nothing here disturbs process data, so a measurement may be taken at any time. But a frame meets those in a whole ring
-//! only once, which measures nothing: at the set-up every ring is opened for a moment, with the bit that closes it again
-//! by itself. Of the ring of two links the last port is closed, of one behind a junction both ends of its closing cable.
-//! What was measured of cables then holds afterwards, whatever is plugged where. Before anything is exchanged the branches of
-//! forks without a clock are closed one after the other as well ([`branches`]).
+//! Nothing here disturbs process data, so a measurement may be taken at any time. But a frame meets those in a whole
+//! ring only once, which measures nothing: at the set-up every ring is opened for a moment, with the bit that closes it
+//! again by itself. Of the ring of two links the last port is closed, of one behind a junction both ends of its closing
+//! cable. What was measured of cables then holds afterwards, whatever is plugged where. Before anything is exchanged
+//! the branches of forks without a clock are closed one after the other as well ([`branches`]).
 
 use alloc::format;
 use alloc::string::{String, ToString};
@@ -96,8 +96,8 @@ pub(super) async fn measure(bus: &Bus, segment: &SharedSegment, opening: Opening
         measure_branches(bus, segment, &survey, &rings).await;
         measured = take(bus, clocks, &survey).await?;
     }
-    // A ring of two links that was broken until now has a cable that was never measured, and one behind a junction that came
-    // as a whole, or came back with other cables, has several.
+    // A ring of two links that was broken until now has a cable that was never measured, and one behind a junction that
+    // came as a whole, or came back with other cables, has several.
     let is_open = |measured: &Measured| measured.delays.is_shared || (measured.delays.is_guessed && survey.is_closed);
     let is_open_question = is_open(&measured);
     // Opening changes ports, so that the segment is measured again: the same is not opened twice in vain.
@@ -374,7 +374,8 @@ async fn enter_backwards(bus: &Bus, clocks: &SharedClocks, stations: &[StationAd
     is_as_before
 }
 
-/// Lets all clocks latch one frame and reads what these SubDevices have. Copies on the link that is `deaf` do not come home.
+/// Lets all clocks latch one frame and reads what these SubDevices have. Copies on the link that is `deaf` do not come
+/// home.
 pub(super) async fn latch(
     bus: &Bus,
     clocks: &SharedClocks,

@@ -1,5 +1,5 @@
-//! Delays, offsets and filters of all clocks (facts 7.1, 7.2): at the beginning, after each change of the segment, and of
-//! one clock that has lost its registers.
+//! Delays, offsets and filters of all clocks (facts 7.1, 7.2): at the beginning, after each change of the segment, and
+//! of one clock that has lost its registers.
 
 use alloc::string::{String, ToString};
 use alloc::vec::Vec;
@@ -16,8 +16,8 @@ use crate::supervisor::{Bus, BusError};
 
 /// Reset value of DC_SPEED_COUNTER_START; writing it restarts the filters.
 const SPEED_COUNTER_START: u16 = 0x1000;
-/// DC_FILTER_DIFFERENCE of clocks that follow one that frames meet before: what they are told is exact, and a mean that lags
-/// behind the samples makes the loop swing where drift is large.
+/// DC_FILTER_DIFFERENCE of clocks that follow one that frames meet before: what they are told is exact, and a mean that
+/// lags behind the samples makes the loop swing where drift is large.
 const EXACT_DEPTH: u8 = 0;
 /// Of clocks that are told what the host believes: its reset value, which takes most of the host's jitter out.
 const HOST_DEPTH: u8 = 4;
@@ -213,8 +213,8 @@ async fn write_all(bus: &Bus, clocks: &SharedClocks) -> Result<(), BusError> {
     written.await.into_iter().filter(|result| !matches!(result, Err(BusError::Wkc { .. }))).collect()
 }
 
-/// Writes the filter depths of those for whom they are others than before: references and clocks in front of them are told
-/// what the host believes, all others what a reference shows.
+/// Writes the filter depths of those for whom they are others than before: references and clocks in front of them are
+/// told what the host believes, all others what a reference shows.
 pub(super) async fn set_filters(bus: &Bus, clocks: &SharedClocks) {
     let all: Vec<(usize, StationAddress, [u8; 2])> = {
         let clocks = clocks.access();
@@ -257,8 +257,8 @@ pub(super) async fn write_delays(bus: &Bus, clocks: &SharedClocks, link: Link) -
     written.await.into_iter().filter(|result| !matches!(result, Err(BusError::Wkc { .. }))).collect()
 }
 
-/// Sets up one clock that has lost its registers: offset by a frame that it and its reference latch. Where nobody else has
-/// the time, the host has.
+/// Sets up one clock that has lost its registers: offset by a frame that it and its reference latch. Where nobody else
+/// has the time, the host has.
 pub(super) async fn set_up_one(bus: &Bus, clocks: &SharedClocks, index: usize) -> Result<(), BusError> {
     let host = bus.now().0;
     let stations = clocks.access().stations();

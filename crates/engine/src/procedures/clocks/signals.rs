@@ -98,8 +98,8 @@ pub(in crate::procedures) async fn restore(bus: &Bus, segment: &SharedSegment, m
     Ok(())
 }
 
-/// The clock of a member. One that was not there at the scan is added. `None` where those that are known could not be set up
-/// yet: whoever is among them is when they are.
+/// The clock of a member. One that was not there at the scan is added. `None` where those that are known could not be
+/// set up yet: whoever is among them is when they are.
 fn index_of(segment: &SharedSegment, member: usize) -> Option<usize> {
     let access = segment.view();
     let declared = access.members.get(member)?;

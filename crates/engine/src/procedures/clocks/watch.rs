@@ -1,11 +1,11 @@
 //! The static drift phase, who is locked, and whose time each link distributes (facts 7.2, 7.5).
 //!
-//! Two procedures run side by side: one hands the reference time to all clocks many times, as fast as the segment allows,
-//! the other reads their differences, every millisecond until all are locked and now and again afterwards. When the
-//! ring opens or closes, or a SubDevice is lost, the second one finds out who answers on which link, lets the delays
-//! there count from the clock that is followed there, and posts the references for the cyclic frames. When ports have
-//! changed, or somebody came or went, it has all delays measured again; from the cycle on in which ports have changed
-//! nobody is told a time until that is done.
+//! Two procedures run side by side: one hands the reference time to all clocks many times, as fast as the segment
+//! allows, the other reads their differences, every millisecond until all are locked and now and again afterwards. When
+//! the ring opens or closes, or a SubDevice is lost, the second one finds out who answers on which link, lets the
+//! delays there count from the clock that is followed there, and posts the references for the cyclic frames. When ports
+//! have changed, or somebody came or went, it has all delays measured again; from the cycle on in which ports have
+//! changed nobody is told a time until that is done.
 
 use core::time::Duration;
 
@@ -34,14 +34,15 @@ use crate::time::Instant;
 const PAUSE: Duration = Duration::from_millis(1);
 /// Between two looks at the differences afterwards.
 const ROUTINE: Duration = Duration::from_millis(100);
-/// Between the first two tries to set the clocks up. Each further one comes after twice the time, until the segment changes.
+/// Between the first two tries to set the clocks up. Each further one comes after twice the time, until the segment
+/// changes.
 const RETRY: Duration = Duration::from_millis(100);
 /// The longest time between two of them.
 const LONGEST_RETRY: Duration = Duration::from_secs(10);
 /// From the last change of the segment until it is measured again: a plug that is pushed in bounces.
 const SETTLE: Duration = Duration::from_millis(5);
-/// A ring that opened or closed explains ports that change within so long: in each part the way from clock to clock is what
-/// it was (facts 7.5), so that nobody has to wait for the measurement.
+/// A ring that opened or closed explains ports that change within so long: in each part the way from clock to clock is
+/// what it was (facts 7.5), so that nobody has to wait for the measurement.
 const EXPLAINED: Duration = Duration::from_millis(20);
 /// Between two tries to measure it.
 const AGAIN: Duration = Duration::from_millis(20);
@@ -210,8 +211,8 @@ pub(super) async fn drift_phase(bus: Bus, segment: SharedSegment) {
             reading.unwrap_or_else(|| (bus.now().0.wrapping_add(segment.clocks.access().epoch) as u32, bus.now()));
         reading = None;
         match bus.distribute_time(stations, map::DC_SYSTEM_TIME, time, Wkc(followers)).await {
-            // Clocks in front of the reference are told what it showed last, and what has passed since: by how late this host
-            // sent one frame comes back with the other sign in the next one.
+            // Clocks in front of the reference are told what it showed last, and what has passed since: by how late
+            // this host sent one frame comes back with the other sign in the next one.
             Ok(reply) if reply.redundant == Wkc(0) => {
                 reading = reply.data.first_chunk().map(|bytes| (u32::from_le_bytes(*bytes), reply.sent_at));
             }
@@ -273,8 +274,8 @@ async fn look(bus: &Bus, segment: &SharedSegment, is_explained: bool) {
     follow_reference(bus, segment).await;
 }
 
-/// Clocks that frames meet before the reference are told what the host believes, and what they show of that is by how late it
-/// sends. How they differ is seen in what they and the reference show to one and the same frame.
+/// Clocks that frames meet before the reference are told what the host believes, and what they show of that is by how
+/// late it sends. How they differ is seen in what they and the reference show to one and the same frame.
 async fn look_in_front(bus: &Bus, segment: &SharedSegment, answers: &mut [Option<Answer>]) {
     let groups: Vec<(usize, Vec<usize>)> = {
         let clocks = segment.clocks.access();
@@ -361,8 +362,9 @@ fn judge(bus: &Bus, segment: &SharedSegment, answers: &[Option<Answer>]) {
     }
 }
 
-/// Follows SubDevices from link to link, and replaces a reference that is gone. Returns whether references were posted with
-/// which clocks may be told a time; `is_explained` is for changes of ports that come of a ring that opened or closed.
+/// Follows SubDevices from link to link, and replaces a reference that is gone. Returns whether references were posted
+/// with which clocks may be told a time; `is_explained` is for changes of ports that come of a ring that opened or
+/// closed.
 async fn follow_links(bus: &Bus, segment: &SharedSegment, answers: &[Option<Answer>], is_explained: bool) -> bool {
     let moved = {
         let mut clocks = segment.clocks.access();

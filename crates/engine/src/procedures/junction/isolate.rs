@@ -1,16 +1,16 @@
 //! Where rings behind junctions are broken when no frame comes back: two of them broke (JR-02).
 //!
 //! The second SubDevice with nothing on its port 0 destroys every frame, but all that are passed before it take part in
-//! it, among them the junction at which its ring begins. So a junction can be told blindly to leave its ring out, by closing
-//! both ports of the ring. One ring after the other is looked into while all others are left out; then the others are
-//! reached again, too. The settings are temporary (facts 2.2, DL control bit 1): what becomes of frames meanwhile, the
-//! loops return to what they were within about a second. All loops of a junction are written at once, and nobody can be
-//! asked for them any more: those that somebody had closed on purpose are known from before ([`super::orders`]), and stay
-//! closed.
+//! it, among them the junction at which its ring begins. So a junction can be told blindly to leave its ring out, by
+//! closing both ports of the ring. One ring after the other is looked into while all others are left out; then the
+//! others are reached again, too. The settings are temporary (facts 2.2, DL control bit 1): what becomes of frames
+//! meanwhile, the loops return to what they were within about a second. All loops of a junction are written at once,
+//! and nobody can be asked for them any more: those that somebody had closed on purpose are known from before
+//! ([`super::orders`]), and stay closed.
 //!
-//! A ring behind a member of another one that is broken too is reached from one side of that one: from the side on which
-//! it begins, where all are entered at port 0, or else from the one on which it closes. Then its own closing side is left out:
-//! the break of the outer ring is the one unconnected port 0 that frames may pass.
+//! A ring behind a member of another one that is broken too is reached from one side of that one: from the side on
+//! which it begins, where all are entered at port 0, or else from the one on which it closes. Then its own closing side
+//! is left out: the break of the outer ring is the one unconnected port 0 that frames may pass.
 //!
 //! While it goes on, most SubDevices are out of reach at one time or another, which must not mean that they are lost
 //! ([`Disturbance::IsolateRings`]).
@@ -38,7 +38,8 @@ const MOST: usize = 16;
 const PAUSE: Duration = Duration::from_millis(5);
 /// So long other disturbances may keep it waiting.
 const LIMIT: Duration = Duration::from_secs(5);
-/// Orders that come back without the junction's answer before it is out of reach: the first ones open the way for the next.
+/// Orders that come back without the junction's answer before it is out of reach: the first ones open the way for the
+/// next.
 const TRIES: usize = 4;
 
 /// A ring, as far as it has to be known here.
@@ -108,8 +109,8 @@ pub(in super::super) async fn isolate_rings(bus: Bus, segment: SharedSegment) {
     segment.observe(Observation::Isolated { asked, found: &found, words: segment.words() });
 }
 
-/// Returns what members said about their ports, by position. Empty where that cannot be done: there is one ring only, or a
-/// junction is not declared.
+/// Returns what members said about their ports, by position. Empty where that cannot be done: there is one ring only,
+/// or a junction is not declared.
 async fn look_inside(bus: &Bus, segment: &SharedSegment) -> Vec<Option<NodeStatus>> {
     let (rings, count) = {
         let view = segment.view();
@@ -152,9 +153,9 @@ async fn look_inside(bus: &Bus, segment: &SharedSegment) -> Vec<Option<NodeStatu
     found
 }
 
-/// Has junctions let frames into their rings or not, for a moment. Frames that do not come back have done it all the same, so it
-/// is done when one does: each that is lost may have been the one that makes the next one return. And each that comes back
-/// may have opened the way to the junction that is wanted; false where it is out of reach all the same.
+/// Has junctions let frames into their rings or not, for a moment. Frames that do not come back have done it all the
+/// same, so it is done when one does: each that is lost may have been the one that makes the next one return. And each
+/// that comes back may have opened the way to the junction that is wanted; false where it is out of reach all the same.
 async fn set_loops(
     bus: &Bus,
     segment: &SharedSegment,

@@ -1,5 +1,5 @@
-//! What junctions were told to do about their ports: read while they can be asked, and noted when the application orders
-//! something else ([`crate::segment::PortControl`]).
+//! What junctions were told to do about their ports: read while they can be asked, and noted when the application
+//! orders something else ([`crate::segment::PortControl`]).
 
 use alloc::vec::Vec;
 
@@ -52,8 +52,8 @@ pub(crate) fn ordering(
     Some(UnderWay { segment: segment.clone(), station })
 }
 
-/// Reads what the junctions of all local rings were told to do about their ports, while they can be asked. Where there is
-/// one ring only it never has to be known.
+/// Reads what the junctions of all local rings were told to do about their ports, while they can be asked. Where there
+/// is one ring only it never has to be known.
 pub(in super::super) async fn note_controls(bus: &Bus, segment: &SharedSegment) {
     let asked: Vec<(StationAddress, u32)> = {
         let view = segment.view();

@@ -1,9 +1,10 @@
 //! Whether a ring that was declared closes where it is said to (JR-05, JR-06), before anybody is configured.
 //!
-//! Open ports do not tell: whatever follows the junction could as well hang on the last member of its ring. So it is tried, as
-//! [`super::learn()`] does: with both ends of the closing cable closed for a moment nobody is out of reach, and with the end
-//! at the junction alone, those behind a break of the ring are and nobody else. Where one end only has communication it is
-//! no cable between the two. Where neither has, the closing cable may be broken, which shows nothing: such a ring is believed.
+//! Open ports do not tell: whatever follows the junction could as well hang on the last member of its ring. So it is
+//! tried, as [`super::learn()`] does: with both ends of the closing cable closed for a moment nobody is out of reach,
+//! and with the end at the junction alone, those behind a break of the ring are and nobody else. Where one end only has
+//! communication it is no cable between the two. Where neither has, the closing cable may be broken, which shows
+//! nothing: such a ring is believed.
 //!
 //! A segment that changes meanwhile shows nothing either, and what is found wrong is tried again.
 
@@ -25,8 +26,8 @@ const TRIES: usize = 2;
 const LOOKS: u8 = 5;
 const PAUSE: Duration = Duration::from_millis(2);
 
-/// A closing cable that is not where it was declared, by its number, and what shows it. Every SubDevice has the station address
-/// of its position.
+/// A closing cable that is not where it was declared, by its number, and what shows it. Every SubDevice has the station
+/// address of its position.
 pub(crate) async fn refute(
     bus: &Bus,
     scanned: &[NodeStatus],

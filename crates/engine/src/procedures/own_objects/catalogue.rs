@@ -12,7 +12,8 @@ const LISTS: u16 = 16;
 /// SubDevices that have objects: the lists have room for no more.
 pub(super) const MAX_MODULES: usize = LIST * LISTS as usize;
 
-/// Bytes of a text: so much is told of a longer one, and a shorter one is filled with zeros where a whole object is read.
+/// Bytes of a text: so much is told of a longer one, and a shorter one is filled with zeros where a whole object is
+/// read.
 pub(super) const TEXT_BYTES: usize = 64;
 
 const CONFIGURATION: u16 = 0x8000;

@@ -15,8 +15,8 @@ use super::catalogue::Object;
 /// Bytes of a description beside its name.
 const DESCRIPTION_ROOM: usize = 16;
 
-/// The messages that answer a request, where so many SubDevices are declared; each fits the room. The error is that of a
-/// mailbox error reply.
+/// The messages that answer a request, where so many SubDevices are declared; each fits the room. The error is that of
+/// a mailbox error reply.
 pub(super) fn answer(payload: &[u8], room: usize, declared: usize) -> Result<Vec<Vec<u8>>, u16> {
     match respond(payload, declared) {
         Ok((opcode, Ok(data))) => Ok(fragments(opcode, &data, room)),

@@ -47,8 +47,8 @@ pub async fn set(
     Ok(())
 }
 
-/// What a SubDevice was told to do about its loops. Settings that end by themselves, as of rings that are looked into, are
-/// waited for: whatever is written meanwhile would end with them.
+/// What a SubDevice was told to do about its loops. Settings that end by themselves, as of rings that are looked into,
+/// are waited for: whatever is written meanwhile would end with them.
 async fn lasting_loops(bus: &Bus, station: StationAddress) -> Result<u8, BusError> {
     let until = bus.now() + TEMPORARY;
     loop {
@@ -82,8 +82,8 @@ pub(crate) async fn block(
     Ok(ports)
 }
 
-/// Opens all ports that were closed to cut somebody off; returns how many there were. Where one cannot be reached now, all
-/// are kept for the next try.
+/// Opens all ports that were closed to cut somebody off; returns how many there were. Where one cannot be reached now,
+/// all are kept for the next try.
 pub(crate) async fn open_blocked(bus: &Bus, segment: &SharedSegment) -> Result<usize, ServiceError> {
     let blocked = segment.view().blocked.clone();
     segment.observe(Observation::Unblocking);

@@ -1,8 +1,8 @@
 //! SII contents that were read before, for SubDevices with the same fixed area and the same category headers.
 //!
-//! The checksum of the SII covers 14 bytes and tells nothing about the rest, so that equal headers are asked for, and two
-//! SubDevices have to be read alike before others are spared: one bad EEPROM is a matter of its SubDevice alone. Where two
-//! differ each is read for itself.
+//! The checksum of the SII covers 14 bytes and tells nothing about the rest, so that equal headers are asked for, and
+//! two SubDevices have to be read alike before others are spared: one bad EEPROM is a matter of its SubDevice alone.
+//! Where two differ each is read for itself.
 
 use alloc::rc::Rc;
 use alloc::vec::Vec;
@@ -128,8 +128,8 @@ impl SiiCache {
     }
 }
 
-/// The right to read an SII with this fixed area; further SubDevices with the same one wait. Dropped, also with the procedure
-/// that reads, another one may try.
+/// The right to read an SII with this fixed area; further SubDevices with the same one wait. Dropped, also with the
+/// procedure that reads, another one may try.
 pub(super) struct Claim {
     entries: Rc<RefCell<Vec<Entry>>>,
     area: FixedArea,

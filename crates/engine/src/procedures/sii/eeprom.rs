@@ -1,8 +1,8 @@
 //! Words of an EEPROM through the SII interface of its controller (facts 3.8).
 //!
-//! A poll brings the data of a command along, and the next command travels behind it in the same frame: while the EEPROM
-//! is busy the controller refuses it, and where it was in time it goes on at once. Which word the data belongs to is told
-//! by the address register, so that commands that came twice, late or not at all are noticed.
+//! A poll brings the data of a command along, and the next command travels behind it in the same frame: while the
+//! EEPROM is busy the controller refuses it, and where it was in time it goes on at once. Which word the data belongs
+//! to is told by the address register, so that commands that came twice, late or not at all are noticed.
 
 use alloc::vec::Vec;
 use core::time::Duration;

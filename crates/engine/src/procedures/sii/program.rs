@@ -1,7 +1,7 @@
 //! Writing an EEPROM: word by word, each read back (facts 3.8, 4.7); the alias; loading what was written.
 //!
-//! Words that are right already are left alone. The configuration area goes last, so that a write that is cut off leaves
-//! the one that was there. Afterwards the EEPROM belongs to whom it belonged before.
+//! Words that are right already are left alone. The configuration area goes last, so that a write that is cut off
+//! leaves the one that was there. Afterwards the EEPROM belongs to whom it belonged before.
 
 use alloc::vec::Vec;
 use core::fmt;

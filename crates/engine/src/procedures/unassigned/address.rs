@@ -1,9 +1,10 @@
 //! A temporary station address for each SubDevice that has none of ours, without ever writing to a position.
 //!
 //! Positions move when a cable is cut or plugged in, also while a frame is on its way, and a write to a position may
-//! then hit a SubDevice in OP. So positions are only read. Addresses are given through the address that a SubDevice has:
-//! one that no other has is written, and where several have the same one it is exchanged (FPRW): the first SubDevice
-//! on a link takes the new address and hands its old one on with the datagram, so that the others take what they have.
+//! then hit a SubDevice in OP. So positions are only read. Addresses are given through the address that a SubDevice
+//! has: one that no other has is written, and where several have the same one it is exchanged (FPRW): the first
+//! SubDevice on a link takes the new address and hands its old one on with the datagram, so that the others take what
+//! they have.
 
 use alloc::vec::Vec;
 use core::ops::RangeInclusive;

@@ -86,15 +86,16 @@ impl Rescan {
     }
 }
 
-/// Looks until the segment holds still and it is known of everybody who it is, for so long at most. Then what is known is
-/// the result. Those that have moved are reported.
+/// Looks until the segment holds still and it is known of everybody who it is, for so long at most. Then what is known
+/// is the result. Those that have moved are reported.
 pub(crate) async fn rescan(bus: &Bus, segment: &SharedSegment, limit: Duration) -> Result<Rescan, ServiceError> {
     let (rescan, _) = look_until(bus, segment, limit).await?;
     report_moved(bus, &rescan);
     Ok(rescan)
 }
 
-/// Takes over the cabling after hot connect groups have joined or left, as soon as nothing is broken that would be forgotten.
+/// Takes over the cabling after hot connect groups have joined or left, as soon as nothing is broken that would be
+/// forgotten.
 pub(in crate::procedures) async fn follow_groups(bus: Bus, segment: SharedSegment) {
     let mut pause = AGAIN;
     loop {
@@ -108,8 +109,8 @@ pub(in crate::procedures) async fn follow_groups(bus: Bus, segment: SharedSegmen
     }
 }
 
-/// A look that was not asked for, because the segment is known to be another one. True where the cabling was taken over; where
-/// that cannot be nothing is sent, and nothing told.
+/// A look that was not asked for, because the segment is known to be another one. True where the cabling was taken
+/// over; where that cannot be nothing is sent, and nothing told.
 async fn follow_segment(bus: &Bus, segment: &SharedSegment, limit: Duration) -> bool {
     if !segment.view().is_whole(&segment.words()) {
         return false;

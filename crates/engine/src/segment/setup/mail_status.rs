@@ -1,5 +1,5 @@
-//! The FMMU that shows whether a SubDevice has mail (facts 6.1): each has a bit of its own in the logical address space, so
-//! that all answer one read together.
+//! The FMMU that shows whether a SubDevice has mail (facts 6.1): each has a bit of its own in the logical address
+//! space, so that all answer one read together.
 
 use ringcat_wire::address::LogicalAddress;
 use ringcat_wire::datagram::MAX_DATA;
@@ -14,8 +14,8 @@ pub const BITS_AT: LogicalAddress = LogicalAddress(0xF000_0000);
 /// Bit of the status register that says "full".
 const FULL_BIT: u8 = 3;
 
-/// The FMMU that shows whether there is mail, with its number: the one that the SII names, or the first one behind those
-/// of process data. `None` where the SII names none, or where bits cannot be mapped.
+/// The FMMU that shows whether there is mail, with its number: the one that the SII names, or the first one behind
+/// those of process data. `None` where the SII names none, or where bits cannot be mapped.
 pub fn fmmu(index: usize, plan: &SubDevicePlan, info: &SubDeviceInfo) -> Option<(u8, Fmmu)> {
     let named = info.fmmu_usages.iter().position(|usage| *usage == FmmuUsage::MailboxStatus)?;
     let mapped = plan.mapped_areas().count();

@@ -17,8 +17,8 @@ struct Plan<'a> {
     cables: Vec<CableSpec>,
 }
 
-/// All cables: cable n leads to SubDevice n, the last one closes the ring. Ports that the file does not have but uses are
-/// given to the devices.
+/// All cables: cable n leads to SubDevice n, the last one closes the ring. Ports that the file does not have but uses
+/// are given to the devices.
 pub(super) fn plug(
     devices: &mut [DeviceDescription],
     plugged_into: &[Option<(usize, FilePort)>],

@@ -76,8 +76,8 @@ pub(super) fn describe(subdevice: &SubDevice, config: &SubDeviceConfig) -> Devic
     device
 }
 
-/// Registers that a controller loads from its EEPROM are what the file expects them to be. Other registers are those of the
-/// simulated controller, whatever the file expects.
+/// Registers that a controller loads from its EEPROM are what the file expects them to be. Other registers are those of
+/// the simulated controller, whatever the file expects.
 fn loaded_registers(subdevice: &SubDevice, device: &mut DeviceDescription) {
     let checks =
         subdevice.init_commands.iter().filter_map(|command| match (&command.validate, command.datagram.target) {
@@ -227,8 +227,8 @@ fn guessed(
     declared
 }
 
-/// SyncManagers to which commands of the file assign PDOs, one behind the other. Nothing says how long a PDO is that is only
-/// assigned: it gets two bytes.
+/// SyncManagers to which commands of the file assign PDOs, one behind the other. Nothing says how long a PDO is that is
+/// only assigned: it gets two bytes.
 fn assigned(config: &SubDeviceConfig) -> Vec<DeclaredSyncManager> {
     let mut start = PROCESS_DATA_START;
     let sync_manager = |assignment: &PdoAssignment| {
@@ -367,8 +367,8 @@ fn entry(entry: &PdoEntry) -> PdoEntryDescription {
     }
 }
 
-/// PDOs as long as their SyncManager. One that the file assigns without saying what it maps, or another one where there is
-/// none, has what is missing; where the file's PDOs are too long, one without names stands for all.
+/// PDOs as long as their SyncManager. One that the file assigns without saying what it maps, or another one where there
+/// is none, has what is missing; where the file's PDOs are too long, one without names stands for all.
 fn filled(
     mut mapped: Vec<PdoDescription>,
     sync_manager: u8,

@@ -12,8 +12,8 @@ use scenarios::world::World;
 
 use super::{crossed, in_op, told};
 
-/// Rings with so many members each, one behind the other, with a SubDevice in front of, between and behind them, and where
-/// they close.
+/// Rings with so many members each, one behind the other, with a SubDevice in front of, between and behind them, and
+/// where they close.
 fn rings(members: &[usize], two_links: bool) -> (Network, Vec<Closing>, Vec<CableId>) {
     let (mut kinds, mut cables, mut closings, mut within) =
         (vec!["digital-input-8"], vec![(MAIN, at(0, A))], vec![], vec![]);
