@@ -5,9 +5,11 @@ use alloc::vec::Vec;
 use ringcat_wire::address::StationAddress;
 
 use super::member::Member;
-use super::retrace::End;
 use crate::ring_status::{Cable, CableErrors};
 use crate::topology::Topology;
+
+/// A port, by the SubDevice that has it.
+pub type End = (StationAddress, u8);
 
 /// Connections, and what is known of the cables.
 #[derive(Clone, Debug)]

@@ -1,8 +1,4 @@
-//! Crossed lines in operation (facts 9.5): whenever ports of SubDevices have changed, the segment is looked at anew,
-//! and each SubDevice that is entered at another port than 0 is told, once.
-//!
-//! More rings behind junctions than are known are told too: an application that asked for junction redundancy must know
-//! that one of them is not watched.
+//! Crossed lines, and what was told of them.
 
 use alloc::collections::BTreeSet;
 use alloc::vec::Vec;
@@ -10,13 +6,8 @@ use alloc::vec::Vec;
 use ringcat_wire::address::{Position, StationAddress};
 
 use super::cabling::Cabling;
-use super::disturbance::Disturbance;
-use super::effect::{Effects, Task};
-use super::look::Look;
-use super::member::{Member, Phase};
-use super::unassigned::UnassignedSubDevice;
-use super::{Choices, Segment};
-use crate::event::Event;
+use super::choices::Choices;
+use super::member::Member;
 use crate::junction::JunctionMode;
 use crate::topology::{Finding, Topology};
 
@@ -33,7 +24,7 @@ pub struct Crossing {
 }
 
 impl Crossing {
-    fn station(&self) -> Option<StationAddress> {
+    pub(super) fn station(&self) -> Option<StationAddress> {
         self.subdevice.map(|(station, _)| station)
     }
 }
@@ -60,7 +51,7 @@ impl LineCheck {
 
     /// What was told and still stands, with what is new. A closed ring takes nothing back that an open one has shown,
     /// and an open one shows nothing of those that do not answer.
-    fn and(mut self, found: LineCheck) -> LineCheck {
+    pub(super) fn and(mut self, found: LineCheck) -> LineCheck {
         if found.crossings.is_empty() {
             self.crossings.clear();
         }
@@ -90,7 +81,7 @@ pub fn is_swapped(topology: &Topology) -> bool {
 
 /// How far the search for crossed lines is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Search {
+pub(super) enum Search {
     /// Nothing has changed since the last look at the segment.
     Idle,
     /// The segment is being looked at.
@@ -103,11 +94,13 @@ enum Search {
 #[derive(Debug)]
 pub(super) struct Crossings {
     /// Rings behind junctions are watched.
-    junctions: bool,
+    pub junctions: bool,
     /// What members said about their ports when the segment was looked at last; empty before the first time.
-    ports: Vec<Option<u16>>,
-    search: Search,
-    told: LineCheck,
+    pub ports: Vec<Option<u16>>,
+    /// How far the search is.
+    pub search: Search,
+    /// What was told.
+    pub told: LineCheck,
 }
 
 impl Crossings {
@@ -133,74 +126,5 @@ impl Crossings {
 
     pub fn told(&self) -> &LineCheck {
         &self.told
-    }
-}
-
-impl Segment {
-    /// Takes in looks at all members; where ports have changed, the segment is looked at.
-    pub(super) fn observe_ports(&mut self, looks: &[Look], effects: &mut Effects) {
-        let ports = |look: &Look| match look {
-            Look::Answer { dl_status, .. } => Some(dl_status.bits() & PORT_BITS),
-            Look::Unknown | Look::Silent | Look::Doubled => None,
-        };
-        let now: Vec<Option<u16>> = looks.iter().map(ports).collect();
-        // One that is silent and not lost yet will be one or the other.
-        let phase = |index: usize| self.members.get(index).map_or(Phase::Absent, |member| member.phase);
-        let is_open = |(index, ports): (usize, &Option<u16>)| ports.is_none() && phase(index) != Phase::Absent;
-        // Clocks that are being measured need the receive times of their own frame.
-        let waits = self.crossings.search == Search::UnderWay || self.slot.running() == Some(Disturbance::OpenByPort);
-        // One that may be a member, and the end of a ring, is another one before it is known which it is.
-        let waits = waits || !self.unassigned.iter().all(UnassignedSubDevice::is_settled);
-        let is_new = now != self.crossings.ports || self.crossings.search == Search::Again;
-        if waits || !is_new || now.iter().enumerate().any(is_open) {
-            return;
-        }
-        let is_first = self.crossings.ports.is_empty();
-        self.crossings.ports = now;
-        self.crossings.search = if is_first { Search::Idle } else { Search::UnderWay };
-        if !is_first {
-            effects.start(Task::ExamineCabling { in_control: self.choices.enhanced_line_crossed });
-        }
-    }
-
-    /// The segment was looked at; `None` where it changes too much to tell. Where the redundant link was down for it,
-    /// looking again soon would not help.
-    pub(super) fn observe_line_check(&mut self, found: Option<LineCheck>, in_control: bool, effects: &mut Effects) {
-        // Ports that changed in between have told it to this look.
-        self.attention.want();
-        self.crossings.search = if found.is_none() && !in_control { Search::Again } else { Search::Idle };
-        let Some(found) = found else { return };
-        self.tell_crossings(&found, effects);
-        let told = core::mem::take(&mut self.crossings.told);
-        if self.crossings.junctions && found.unknown_rings > told.unknown_rings {
-            effects.report(Event::JunctionUnknown { rings: found.unknown_rings });
-        }
-        self.crossings.told = told.and(found);
-    }
-
-    fn tell_crossings(&self, found: &LineCheck, effects: &mut Effects) {
-        let told = &self.crossings.told;
-        if found.swapped {
-            if !told.swapped {
-                effects.report(Event::InterfacesSwapped);
-            }
-            return;
-        }
-        let is_told = |new: &Crossing| match new.station() {
-            Some(station) => told.crossings.iter().any(|old| old.station() == Some(station)),
-            // Which one it is may be known from when the ring was open.
-            None => !told.crossings.is_empty(),
-        };
-        for Crossing { subdevice, entry_port } in found.crossings.iter().filter(|new| !is_told(new)).copied() {
-            let position = subdevice.map(|(station, now)| {
-                let member = self.members.iter().find(|member| member.station == station);
-                member.and_then(|member| member.node).map_or(now, |node| Position(node as u16))
-            });
-            let event = Event::LineCrossed { position, entry_port };
-            match subdevice {
-                Some((station, _)) => effects.report_of(event, self.occupant(station)),
-                None => effects.report(event),
-            }
-        }
     }
 }

@@ -6,7 +6,7 @@ use alloc::vec::Vec;
 use ringcat_wire::address::StationAddress;
 use ringcat_wire::al::{AlStatus, AlStatusCode};
 
-use super::retrace::End;
+use super::cabling::End;
 use super::start::Start;
 use crate::event::Event;
 use crate::ring_status::Occupant;

@@ -6,9 +6,8 @@ use core::time::Duration;
 
 use ringcat_wire::address::StationAddress;
 
-use super::cabling::Cabling;
+use super::cabling::{Cabling, End};
 use super::member::Member;
-use super::retrace::End;
 use crate::event::Event;
 use crate::ring_status::{Cable, CableErrors};
 use crate::time::Instant;

@@ -10,12 +10,9 @@ use alloc::vec::Vec;
 use ringcat_wire::address::StationAddress;
 use ringcat_wire::register::PortKind;
 
-use super::cabling::Cabling;
+use super::cabling::{Cabling, End};
 use crate::junction::{HEAD_PORT, START_PORT};
 use crate::topology::{Closing, LocalRing, NodeStatus, PortOf, Topology};
-
-/// A port, by the SubDevice that has it.
-pub type End = (StationAddress, u8);
 
 /// Where the rings that are known close in a segment in which these are, by position.
 pub fn closings(known: &Cabling, stations: &[StationAddress]) -> Vec<Closing> {

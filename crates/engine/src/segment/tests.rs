@@ -10,18 +10,21 @@ use ringcat_wire::al::{AlState, AlStatus, AlStatusCode};
 use ringcat_wire::register::{DlStatus, PortKind};
 use ringcat_wire::sii::Identity;
 
+use super::disturbance::Disturbance;
 use super::effect::{Check, Effect, Shown, Task};
 use super::member::{Member, Phase};
 use super::start::Start;
 use super::*;
-use crate::board::{RingWord, Supervision};
+use crate::board::{Board, RingWord, Supervision};
 use crate::config::SubDeviceConfig;
 use crate::event::Event;
 use crate::info::SubDeviceInfo;
-use crate::layout::Rules;
+use crate::junction::JunctionMode;
+use crate::layout::{Layout, Rules};
 use crate::link::{Link, LinkSet};
 use crate::ring::RingState;
-use crate::ring_status::{Cable, CableErrors, Redundancy, RedundancyLoss, cables};
+use crate::ring_status::{Cable, CableErrors, Redundancy, RedundancyLoss, RingStatus, cables};
+use crate::time::Instant;
 use crate::topology::{NodeStatus, PortOf, Topology};
 
 /// High bytes of DL_STATUS: a SubDevice between two others, and those at both sides of a break.

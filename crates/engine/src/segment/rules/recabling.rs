@@ -5,29 +5,19 @@ use alloc::vec::Vec;
 
 use ringcat_wire::address::StationAddress;
 
-use super::cabling::{Cabling, stations_by_position};
-use super::effect::{Effect, Effects};
-use super::member::Phase;
-use super::retrace::End;
-use super::{Segment, Words};
 use crate::link::LinkSet;
 use crate::ring::RingState;
 use crate::ring_status::{Cable, CableErrors, cables};
-use crate::topology::{PortOf, Topology};
+use crate::segment::cabling::{Cabling, End, stations_by_position};
+use crate::segment::effect::{Effect, Effects};
+use crate::segment::member::Phase;
+use crate::segment::model::Segment;
+use crate::segment::ring::Words;
+use crate::segment::seen::Seen;
+use crate::topology::PortOf;
 
 /// The ends of a cable, by the SubDevices there.
 type Ends = [Option<End>; 2];
-
-/// A segment as it was seen, all of it.
-#[derive(Clone, Copy, Debug)]
-pub struct Seen<'a> {
-    /// Connections.
-    pub topology: &'a Topology,
-    /// Station addresses by position.
-    pub stations: &'a [StationAddress],
-    /// Members by position.
-    pub members: &'a [Option<usize>],
-}
 
 impl Segment {
     /// Whether a look could be taken over: nothing is broken or missing that would be forgotten.
@@ -43,7 +33,7 @@ impl Segment {
     /// Takes over the cabling, unless the ring of two links is open, or a mandatory SubDevice does not answer: what is
     /// broken would be forgotten. A ring behind a junction may be broken, for it is known where it closes, and what was
     /// told of it goes on to hold.
-    pub(super) fn adopt(&mut self, seen: Seen<'_>, words: &Words, effects: &mut Effects) {
+    pub(in crate::segment) fn adopt(&mut self, seen: Seen<'_>, words: &Words, effects: &mut Effects) {
         let is_single = words.links == LinkSet::Single;
         let is_whole = is_single || (self.is_closed(words) && seen.topology.redundant_head.is_none());
         let is_there = |index: usize| seen.members.contains(&Some(index));
@@ -90,7 +80,7 @@ impl Segment {
     }
 
     /// An unassigned SubDevice that has a place in the cabling and becomes a member has that place as a member.
-    pub(super) fn take_place(&mut self, unassigned: StationAddress, index: usize, effects: &mut Effects) {
+    pub(in crate::segment) fn take_place(&mut self, unassigned: StationAddress, index: usize, effects: &mut Effects) {
         let stations = &mut self.cabling.stations;
         let Some(at) = stations.iter().position(|station| *station == unassigned) else { return };
         let Some(member) = self.members.get_mut(index) else { return };

@@ -11,11 +11,12 @@ use alloc::vec::Vec;
 use ringcat_wire::address::StationAddress;
 use ringcat_wire::register::{DlStatus, PortKind};
 
-use super::Segment;
-use super::matching::Fit;
-use super::member::Phase;
-use super::unassigned::{Knowledge, UnassignedSubDevice, fit};
-use super::view::View;
+use super::fit::fit;
+use crate::segment::matching::Fit;
+use crate::segment::member::Phase;
+use crate::segment::model::Segment;
+use crate::segment::unassigned::{Knowledge, UnassignedSubDevice};
+use crate::segment::view::View;
 use crate::topology::{Closing, Finding, NodeStatus, PortOf, Topology};
 
 /// One end of a cable; `None` is the main link.
@@ -58,14 +59,14 @@ impl Segment {
     }
 
     /// Members that are missed, but for those of groups.
-    pub(super) fn absent(&self) -> impl Iterator<Item = usize> + '_ {
+    pub(in crate::segment) fn absent(&self) -> impl Iterator<Item = usize> + '_ {
         let members = self.members.iter().enumerate();
         let absent = members.filter(|(_, member)| member.phase == Phase::Absent && member.config.group.is_none());
         absent.map(|(index, _)| index)
     }
 
     /// It is known what it is, and that is what the member was when it was seen last.
-    pub(super) fn may_be(&self, it: &UnassignedSubDevice, index: usize) -> bool {
+    pub(in crate::segment) fn may_be(&self, it: &UnassignedSubDevice, index: usize) -> bool {
         let is_known = matches!(it.knowledge, Knowledge::Known(_));
         is_known && matches!(fit(self, it, index), Fit::Seen | Fit::Serial)
     }

@@ -3,11 +3,12 @@
 
 use alloc::vec::Vec;
 
-use super::Segment;
-use super::matching::Fit;
-use super::member::Phase;
-use super::unassigned::{Knowledge, UnassignedSubDevice, fit};
+use super::fit::fit;
 use crate::config::groups;
+use crate::segment::matching::Fit;
+use crate::segment::member::Phase;
+use crate::segment::model::Segment;
+use crate::segment::unassigned::{Knowledge, UnassignedSubDevice};
 use crate::time::Instant;
 
 /// Takes those out that are members of groups, and says which. Also those that may be one as soon as they are read are

@@ -4,19 +4,22 @@ use alloc::rc::Rc;
 use alloc::string::ToString;
 use core::time::Duration;
 
-use ringcat_wire::address::{StationAddress, Wkc};
+use ringcat_wire::address::Wkc;
 use ringcat_wire::al::AlState;
 
-use super::effect::{Check, Effect, Effects, Shown, Task};
-use super::look::{Look, answers};
-use super::member::{Incidents, Member, Phase};
-use super::observation::ProcessDataStep;
-use super::setup::Setup;
-use super::start::Start;
-use super::{Asked, Round, Segment};
 use crate::event::Event;
 use crate::info::SubDeviceInfo;
 use crate::ring::RingState;
+use crate::segment::asked::Asked;
+use crate::segment::attention::Round;
+use crate::segment::effect::{Check, Effect, Effects, Shown, Task};
+use crate::segment::look::{Look, answers};
+use crate::segment::looked::Looked;
+use crate::segment::member::{Incidents, Member, Phase};
+use crate::segment::model::Segment;
+use crate::segment::observation::ProcessDataStep;
+use crate::segment::setup::Setup;
+use crate::segment::start::Start;
 use crate::time::Instant;
 
 /// A SubDevice is lost when it was silent in so many looks in a row: at the edge of a cut a copy may have been
@@ -28,24 +31,9 @@ const SECOND_LOOK_PAUSE: Duration = Duration::from_millis(2);
 /// whether frames hold too many datagrams.
 const BLIND_ROUNDS: u8 = 2;
 
-/// What a round of looks has shown.
-#[derive(Clone, Copy, Debug)]
-pub struct Looked<'a> {
-    /// What it was about.
-    pub asked: Asked,
-    /// By member.
-    pub looks: &'a [Look],
-    /// How far each member was when the round began.
-    pub before: &'a [Phase],
-    /// Of those without a declaration, by station address.
-    pub unassigned: &'a [(StationAddress, Look)],
-    /// SubDevices that the latest supervision result counts; `None` before the first.
-    pub counted: Option<Wkc>,
-}
-
 impl Segment {
     /// Takes in a round of looks.
-    pub(super) fn observe_looks(&mut self, looked: &Looked<'_>, now: Instant, effects: &mut Effects) {
+    pub(in crate::segment) fn observe_looks(&mut self, looked: &Looked<'_>, now: Instant, effects: &mut Effects) {
         let Looked { asked, looks, before, unassigned, counted } = *looked;
         self.attention.round = Round::default();
         if asked.isolations != self.slot.isolations() {
@@ -144,7 +132,13 @@ impl Segment {
 
     /// As soon as all that the cyclic datagram counts have answered, process data no longer waits for the others:
     /// whether they are lost is seen later, whose inputs are new is seen now.
-    pub(super) fn observe_part_of_looks(&mut self, asked: Asked, looks: &[Look], others: usize, counted: Option<Wkc>) {
+    pub(in crate::segment) fn observe_part_of_looks(
+        &mut self,
+        asked: Asked,
+        looks: &[Look],
+        others: usize,
+        counted: Option<Wkc>,
+    ) {
         if asked.isolations != self.slot.isolations()
             || counted.map(|counted| usize::from(counted.0)) != Some(answers(looks) + others)
         {
@@ -160,7 +154,7 @@ impl Segment {
     }
 
     /// A member no longer answers. What was under way for it ends.
-    pub(super) fn lose(&mut self, index: usize, effects: &mut Effects) {
+    pub(in crate::segment) fn lose(&mut self, index: usize, effects: &mut Effects) {
         let Some(member) = self.members.get_mut(index) else { return };
         member.attempt = member.attempt.wrapping_add(1);
         if member.phase != Phase::Absent {
@@ -177,7 +171,7 @@ impl Segment {
     }
 
     /// Starts the configuration of a member that answers. `told`: its error that was told.
-    pub(super) fn start(
+    pub(in crate::segment) fn start(
         &mut self,
         index: usize,
         from: Start,
@@ -191,7 +185,7 @@ impl Segment {
     }
 
     /// Starts the configuration of all members that were found.
-    pub(super) fn start_all(&mut self, from: Start, effects: &mut Effects) {
+    pub(in crate::segment) fn start_all(&mut self, from: Start, effects: &mut Effects) {
         for index in 0..self.members.len() {
             if self.members[index].is_there() {
                 self.start(index, from, None, Check::None, effects);
@@ -200,14 +194,14 @@ impl Segment {
     }
 
     /// What answers at a lost member's address is that member.
-    pub(super) fn observe_return(&mut self, index: usize, attempt: u32, effects: &mut Effects) {
+    pub(in crate::segment) fn observe_return(&mut self, index: usize, attempt: u32, effects: &mut Effects) {
         if self.current(index, attempt).is_some() {
             effects.report(Event::Returned { subdevice: index });
         }
     }
 
     /// What answers at a lost member's address is not known to be that member.
-    pub(super) fn keep_absent(&mut self, index: usize, attempt: u32) {
+    pub(in crate::segment) fn keep_absent(&mut self, index: usize, attempt: u32) {
         if let Some(member) = self.current(index, attempt) {
             member.phase = Phase::Absent;
             self.attention.want();
@@ -215,7 +209,7 @@ impl Segment {
     }
 
     /// A member has reached the state to which it was to be brought.
-    pub(super) fn settle(&mut self, index: usize, attempt: u32, state: AlState, effects: &mut Effects) {
+    pub(in crate::segment) fn settle(&mut self, index: usize, attempt: u32, state: AlState, effects: &mut Effects) {
         let Some(member) = self.current(index, attempt) else { return };
         member.phase = Phase::Settled(state);
         let is_excused = !member.exchanges(state);
@@ -224,7 +218,7 @@ impl Segment {
     }
 
     /// A member is to be brought to another state.
-    pub(super) fn request(&mut self, index: usize, state: AlState) {
+    pub(in crate::segment) fn request(&mut self, index: usize, state: AlState) {
         let Some(member) = self.members.get_mut(index) else { return };
         member.target = state;
         let exchanges = member.exchanges(state);
@@ -242,7 +236,7 @@ impl Segment {
     }
 
     /// A member has refused a state, and keeps the one that it was to have before.
-    pub(super) fn refuse(&mut self, index: usize, attempt: u32, before: AlState) {
+    pub(in crate::segment) fn refuse(&mut self, index: usize, attempt: u32, before: AlState) {
         let Some(member) = self.current(index, attempt) else { return };
         member.target = before;
         let is_excused = !member.exchanges(before);
@@ -250,7 +244,12 @@ impl Segment {
     }
 
     /// What a member does in process data from now on.
-    pub(super) fn observe_process_data(&mut self, index: usize, step: ProcessDataStep, effects: &mut Effects) {
+    pub(in crate::segment) fn observe_process_data(
+        &mut self,
+        index: usize,
+        step: ProcessDataStep,
+        effects: &mut Effects,
+    ) {
         let Some(setup) = self.members.get(index).map(|member| member.setup.clone()) else { return };
         let is_seen_alone = setup.as_ref().is_some_and(|setup| setup.presence_fmmu.is_some());
         match step {
@@ -277,7 +276,13 @@ impl Segment {
     }
 
     /// A member's registers do not hold its configuration any more.
-    pub(super) fn observe_undone(&mut self, index: usize, attempt: u32, reason: &str, effects: &mut Effects) {
+    pub(in crate::segment) fn observe_undone(
+        &mut self,
+        index: usize,
+        attempt: u32,
+        reason: &str,
+        effects: &mut Effects,
+    ) {
         if self.current(index, attempt).is_none() {
             return;
         }
@@ -287,7 +292,7 @@ impl Segment {
     }
 
     /// A member's SII was read again.
-    pub(super) fn observe_info(&mut self, index: usize, info: &SubDeviceInfo, effects: &mut Effects) {
+    pub(in crate::segment) fn observe_info(&mut self, index: usize, info: &SubDeviceInfo, effects: &mut Effects) {
         let Segment { members, layout, .. } = self;
         let Some(member) = members.get_mut(index) else { return };
         match Setup::new(index, &member.config, info, layout) {
@@ -307,25 +312,25 @@ impl Segment {
     }
 
     /// Members that are there will be configured later: what answers meanwhile has not come back.
-    pub(super) fn delay_all(&mut self) {
+    pub(in crate::segment) fn delay_all(&mut self) {
         for member in self.members.iter_mut().filter(|member| member.is_there()) {
             member.phase = Phase::Configuring;
         }
     }
 
     /// What has happened to members is counted from 0 again.
-    pub(super) fn forget_incidents(&mut self) {
+    pub(in crate::segment) fn forget_incidents(&mut self) {
         self.members.iter_mut().for_each(|member| member.incidents = Incidents::default());
     }
 
-    pub(super) fn set_configured(&mut self, index: usize, is: bool) {
+    pub(in crate::segment) fn set_configured(&mut self, index: usize, is: bool) {
         if let Some(member) = self.members.get_mut(index) {
             member.configured = is;
         }
     }
 
     /// The member whose attempt of that number is under way.
-    pub(super) fn current(&mut self, index: usize, attempt: u32) -> Option<&mut Member> {
+    pub(in crate::segment) fn current(&mut self, index: usize, attempt: u32) -> Option<&mut Member> {
         self.members.get_mut(index).filter(|member| member.attempt == attempt)
     }
 }

@@ -1,0 +1,14 @@
+//! What is chosen at activation.
+
+use crate::junction::JunctionMode;
+
+/// What is chosen at activation.
+#[derive(Clone, Copy, Debug)]
+pub struct Choices {
+    /// The redundant link is taken down for a moment where a closed ring has crossed lines (LC-03).
+    pub enhanced_line_crossed: bool,
+    /// Rings behind junctions.
+    pub junctions: JunctionMode,
+    /// The cabling is taken over when a hot connect group joins or leaves.
+    pub follow_groups: bool,
+}

@@ -1,0 +1,14 @@
+//! What follows from what is seen, rule by rule.
+
+mod breaks;
+mod crossings;
+mod fit;
+mod group_matching;
+mod matches;
+mod members;
+mod neighbours;
+mod observe;
+mod ports;
+mod recabling;
+mod silence;
+mod unassigned;

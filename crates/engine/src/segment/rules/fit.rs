@@ -1,0 +1,30 @@
+//! How well an unassigned SubDevice fits an absent member.
+
+use crate::config::ConfigAddress;
+use crate::segment::matching::Fit;
+use crate::segment::model::Segment;
+use crate::segment::unassigned::{Knowledge, UnassignedSubDevice};
+
+/// How well an unassigned SubDevice fits an absent member.
+pub(super) fn fit(segment: &Segment, it: &UnassignedSubDevice, index: usize) -> Fit {
+    let member = &segment.members[index];
+    let Knowledge::Known(info) = &it.knowledge else { return Fit::Unreadable };
+    let identity = &info.identity;
+    let mark_fits = match member.config.address {
+        address @ (ConfigAddress::Alias { offset: 0, .. } | ConfigAddress::Identification { offset: 0, .. }) => {
+            matches!(address, ConfigAddress::Alias { alias: 0, .. }) || address.is_borne_by(info)
+        }
+        ConfigAddress::Alias { .. } | ConfigAddress::Identification { .. } | ConfigAddress::Position(_) => true,
+    };
+    if !mark_fits || member.config.expected.mismatch(info).is_some() {
+        return Fit::No;
+    }
+    let Some(known) = member.info.as_ref().map(|info| info.identity) else { return Fit::NeverSeen };
+    if (known.vendor_id, known.product_code) != (identity.vendor_id, identity.product_code) {
+        Fit::No
+    } else if identity.serial != 0 && identity.serial == known.serial {
+        Fit::Serial
+    } else {
+        Fit::Seen
+    }
+}

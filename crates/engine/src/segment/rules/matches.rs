@@ -1,0 +1,119 @@
+//! Which absent members unassigned SubDevices are.
+
+use alloc::format;
+use alloc::vec::Vec;
+
+use ringcat_wire::address::StationAddress;
+
+use super::fit::fit;
+use super::group_matching;
+use crate::event::Event;
+use crate::info::SubDeviceInfo;
+use crate::segment::effect::Effects;
+use crate::segment::matching::{Fit, assign};
+use crate::segment::member::Phase;
+use crate::segment::model::Segment;
+use crate::segment::owners::ranks;
+use crate::segment::unassigned::{HOLD, Matches, UnassignedSubDevice};
+use crate::time::Instant;
+
+impl Segment {
+    /// Which absent members they are. To be asked when it is known of all members whether they are there: one that is
+    /// absent, but not known to be, may be the one that an unassigned one is. `told`: those of which cables tell it.
+    pub fn match_all(&self, told: &[(StationAddress, usize)], now: Instant) -> Matches {
+        let mut unassigned = self.unassigned.clone();
+        unassigned.sort_by_key(|it| it.position);
+        let mut matched = group_matching::members(self, &mut unassigned, now);
+        let by_cable = |it: &UnassignedSubDevice| told.iter().find(|(station, _)| *station == it.station);
+        for (it, index) in unassigned.iter().filter_map(|it| Some((it, by_cable(it)?.1))) {
+            matched.push((it.clone(), Some(index)));
+        }
+        unassigned.retain(|it| by_cable(it).is_none());
+        let mut held = Vec::new();
+        for gap in unassigned.chunk_by(|one, other| one.between == other.between) {
+            if gap.iter().any(|it| it.is_awaited(now)) {
+                continue;
+            }
+            let mut absent = self.absent_between(gap[0].between);
+            absent.retain(|index| told.iter().all(|(_, other)| other != index));
+            let from_main: Vec<bool> = gap.iter().map(|it| it.from_main).collect();
+            let fit = |candidate: usize, place: usize| fit(self, &gap[candidate], absent[place]);
+            for (it, place) in gap.iter().zip(assign(&from_main, absent.len(), fit)) {
+                let member = place.map(|place| absent[place]);
+                match member.filter(|index| self.is_doubtful(it, *index, gap, &absent)) {
+                    Some(index) => held.push((it.station, index)),
+                    None => matched.push((it.clone(), member)),
+                }
+            }
+        }
+        Matches { matched, held }
+    }
+
+    /// It could be another absent member as well: of one kind with several, without a serial number, and not as many of
+    /// them are there as are missed. Outputs of one must not go to another one.
+    fn is_doubtful(
+        &self,
+        it: &UnassignedSubDevice,
+        index: usize,
+        gap: &[UnassignedSubDevice],
+        absent: &[usize],
+    ) -> bool {
+        if fit(self, it, index) != Fit::Seen {
+            return false;
+        }
+        let alike = |index: &usize| self.may_be(it, *index);
+        let missed = self.absent().filter(alike).count();
+        let here = absent.iter().filter(|index| alike(index)).count();
+        let there = gap.iter().filter(|other| self.may_be(other, index)).count();
+        // Where some are crossed in a closed ring, order is another one when it is open.
+        missed > 1 && (self.cabling.topology.is_assumed() || here != missed || there != missed)
+    }
+
+    /// It is left alone until it is known which of several members it is, and that is told when it lasts.
+    pub(in crate::segment) fn hold(
+        &mut self,
+        station: StationAddress,
+        index: usize,
+        now: Instant,
+        effects: &mut Effects,
+    ) {
+        let Some(it) = self.unassigned_mut(station) else { return };
+        let since = *it.held_since.get_or_insert(now);
+        if now.since(since) >= HOLD && !core::mem::replace(&mut it.reported, true) {
+            let reason = format!(
+                "the SubDevice at position {} may be this one or another one of its kind that is missed: no cable tells \
+                 which, and it has no serial number",
+                it.position.0
+            );
+            effects.failed(index, reason);
+        }
+    }
+
+    /// Whether an absent member is between the same two others.
+    pub(in crate::segment) fn is_between(&self, it: &UnassignedSubDevice, index: usize) -> bool {
+        self.absent_between(it.between).contains(&index)
+    }
+
+    /// Absent members between two others, in the order of the segment.
+    fn absent_between(&self, between: (Option<usize>, Option<usize>)) -> Vec<usize> {
+        let rank = ranks(&self.members);
+        let is_absent = |index: &usize| {
+            let member = &self.members[*index];
+            member.phase == Phase::Absent && member.config.group.is_none()
+        };
+        let mut absent: Vec<usize> = (0..self.members.len())
+            .filter(is_absent)
+            .filter(|index| between.0.is_none_or(|before| rank[before] < rank[*index]))
+            .filter(|index| between.1.is_none_or(|behind| rank[*index] < rank[behind]))
+            .collect();
+        absent.sort_by_key(|index| rank[*index]);
+        absent
+    }
+
+    /// Where one is in the place of the one absent member that belongs there: what differs.
+    pub(in crate::segment) fn mismatch(&self, it: &UnassignedSubDevice, info: &SubDeviceInfo) -> Option<Event> {
+        let [subdevice] = self.absent_between(it.between)[..] else { return None };
+        let (field, expected, got) = self.members.get(subdevice)?.config.expected.mismatch(info)?;
+        Some(Event::Mismatch { subdevice, position: it.position, field, expected, got })
+    }
+}

@@ -1,0 +1,99 @@
+//! What follows from each observation.
+
+use crate::ring_status::CableErrors;
+use crate::segment::asked::Asked;
+use crate::segment::effect::Effects;
+use crate::segment::model::Segment;
+use crate::segment::observation::Observation;
+use crate::segment::ring::{Cabled, Words};
+use crate::time::Instant;
+
+impl Segment {
+    /// Takes in what was seen. What follows is to be carried out in its order.
+    pub fn observe(&mut self, seen: Observation<'_>, now: Instant) -> Effects {
+        let mut effects = Effects::default();
+        self.take(seen, now, &mut effects);
+        self.hot_connect.observe(&self.members, &mut effects);
+        effects
+    }
+
+    /// What follows from each observation.
+    fn take(&mut self, seen: Observation<'_>, now: Instant, effects: &mut Effects) {
+        match seen {
+            Observation::Words(words) => self.observe_words(&words, now, effects),
+            Observation::PartOfLooks { asked, looks, others, counted } => {
+                self.observe_part_of_looks(asked, looks, others, counted);
+            }
+            Observation::Looks(looked) => self.observe_looks(&looked, now, effects),
+            Observation::RoundEnded(number) => self.attention.end(number, now),
+            Observation::LookAgain => self.attention.want(),
+            Observation::LookAgainIn(pause) => self.attention.again_in(pause, now),
+
+            Observation::Started(from) => self.start_all(from, effects),
+            Observation::Delayed => self.delay_all(),
+            Observation::Reached { index, attempt, state } => self.settle(index, attempt, state, effects),
+            Observation::Returned { index, attempt } => self.observe_return(index, attempt, effects),
+            Observation::NotReturned { index, attempt } => self.keep_absent(index, attempt),
+            Observation::Unreachable { index, attempt } => {
+                if self.current(index, attempt).is_some() {
+                    self.lose(index, effects);
+                }
+            }
+            Observation::Configured { index, is } => self.set_configured(index, is),
+            Observation::Undone { index, attempt, reason } => self.observe_undone(index, attempt, &reason, effects),
+            Observation::ProcessData { index, step } => self.observe_process_data(index, step, effects),
+            Observation::Requested { index, state } => self.request(index, state),
+            Observation::Refused { index, attempt, before } => self.refuse(index, attempt, before),
+            Observation::ReadAgain { index, info } => self.observe_info(index, info, effects),
+
+            Observation::IncidentsForgotten => self.forget_incidents(),
+
+            Observation::Places(view) => self.observe_places(view),
+            Observation::Readdressing(old) => self.unassigned.retain(|it| !old.contains(&it.station)),
+            Observation::Given { view, given } => self.observe_given(view, given, now, effects),
+            Observation::Read { station, read } => self.observe_read(station, read, effects),
+            Observation::Unexpected(station) => self.observe_unexpected(station, effects),
+            Observation::Misfit { station, index, reason } => self.observe_misfit(station, index, reason, effects),
+            Observation::Held { station, index } => self.hold(station, index, now, effects),
+            Observation::Admitted { station, index, info } => self.observe_admitted(station, index, *info, effects),
+
+            Observation::LineChecked { found, in_control } => self.observe_line_check(found, in_control, effects),
+            Observation::Rescanned { seen, words } => self.adopt(seen, &words, effects),
+            Observation::GroupsFollowed(changes) => self.hot_connect.follow(changes),
+            Observation::CableErrors { asked, fresh } => self.observe_cable_errors(asked, fresh),
+
+            Observation::Wanted(disturbance) => self.slot.want(disturbance),
+            Observation::Renounced(disturbance) => self.slot.renounce(disturbance),
+            Observation::Undisturbed => self.slot.end(),
+            Observation::Isolated { asked, found, words } => {
+                self.end_silence(&words, now);
+                self.observe_isolated(asked, found, now, effects);
+            }
+            Observation::PortsOrdered { station, control } => self.begin_order(station, control),
+            Observation::PortsTold(station) => self.end_order(station),
+            Observation::PortsRead { station, orders, control } => self.note_control(station, orders, control),
+            Observation::Blocked(ports) => self.blocked.extend(ports),
+            Observation::Unblocking => self.blocked.clear(),
+        }
+    }
+
+    fn observe_cable_errors(&mut self, asked: Asked, fresh: &[CableErrors]) {
+        // Where it was cabled anew since, these are of other cables.
+        if asked.cabling != self.cabling.version {
+            return;
+        }
+        for ((_, total), fresh) in self.cabling.cables.iter_mut().zip(fresh) {
+            *total = total.plus(*fresh);
+        }
+    }
+
+    fn observe_words(&mut self, words: &Words, now: Instant, effects: &mut Effects) {
+        let disturbance = self.slot.running();
+        let cabled = Cabled { topology: &self.cabling.topology, cables: &self.cabling.cables };
+        let ring = self.ring.observe(words, disturbance, &cabled, now, effects);
+        let silence = self.observe_silence(words, now, effects);
+        let reported = self.ring.reported();
+        let look = self.attention.observe(words, reported, disturbance, now, effects);
+        self.attention.wake = [ring, silence, Some(look)].into_iter().flatten().min().unwrap_or(Instant::NEVER);
+    }
+}

@@ -1,0 +1,78 @@
+//! Whether frames come back at all while rings behind junctions are open (JR-02).
+
+use core::time::Duration;
+
+use crate::event::Event;
+use crate::link::{Link, LinkSet};
+use crate::segment::disturbance::Disturbance;
+use crate::segment::effect::{Effects, Task};
+use crate::segment::model::Segment;
+use crate::segment::ring::Words;
+use crate::time::Instant;
+
+/// Pause between two looks whether frames come back: silence posts nothing.
+const PAUSE: Duration = Duration::from_millis(5);
+/// Frames have not come back for so long: beyond what a break of a single cable can cost.
+const BLOCKED: Duration = Duration::from_millis(20);
+/// Cycles that must have been sent in that time; an application that stands still sends none.
+const BLOCKED_CYCLES: u64 = 3;
+
+impl Segment {
+    /// Tells when no frame comes back while a local ring is open, or all of a sudden where there are two that may have
+    /// broken at once, and has them looked into then; and when frames come back again. Returns when to look again.
+    pub(in crate::segment) fn observe_silence(
+        &mut self,
+        words: &Words,
+        now: Instant,
+        effects: &mut Effects,
+    ) -> Option<Instant> {
+        if self.cabling.closings.is_empty() || self.slot.running() == Some(Disturbance::IsolateRings) {
+            return None;
+        }
+        if now < self.silence.next {
+            return Some(self.silence.next);
+        }
+        self.silence.next = now + PAUSE;
+        let last = self.silence.last.get_or_insert((answered(words), now, words.cycles));
+        let seen = answered(words).or(last.0);
+        if seen != last.0 {
+            *last = (seen, now, words.cycles);
+            if core::mem::take(&mut self.silence.is_blocked) {
+                effects.report(Event::JunctionsBlocked { blocked: false, breaks: self.local_rings.broken() });
+                // Which SubDevice is where has to be looked at anew.
+                self.attention.want();
+            }
+            return Some(self.silence.next);
+        }
+        let sent = words.cycles.wrapping_sub(last.2);
+        let is_long = now.since(last.1) >= BLOCKED && sent >= BLOCKED_CYCLES;
+        // Without a carrier it is the cable of the interface.
+        let several = self.cabling.topology.local_rings.len() > 1;
+        let at_once = several && Link::ALL.iter().all(|link| !has_no_carrier(words, *link));
+        let breaks = self.local_rings.broken();
+        if is_long && (breaks > 0 || at_once) && !self.silence.is_blocked {
+            self.silence.is_blocked = true;
+            effects.report(Event::JunctionsBlocked { blocked: true, breaks });
+            effects.start(Task::IsolateRings);
+        }
+        Some(self.silence.next)
+    }
+
+    /// Rings have been looked into: until now nothing could come back.
+    pub(in crate::segment) fn end_silence(&mut self, words: &Words, now: Instant) {
+        let before = self.silence.last.and_then(|(number, ..)| number);
+        self.silence.last = Some((answered(words).or(before), now, words.cycles));
+        self.silence.next = now + PAUSE;
+    }
+}
+
+/// The number of a result that a SubDevice has answered: a frame that none has processed has not come back from them,
+/// and in a closed ring of two links the other copies do.
+fn answered(words: &Words) -> Option<u32> {
+    words.supervision.filter(|(_, seen)| seen.total().0 > 0).map(|(number, _)| number)
+}
+
+/// Whether a link that there is has lost its carrier.
+fn has_no_carrier(words: &Words, link: Link) -> bool {
+    (link == Link::Main || words.links == LinkSet::Ring) && words.carriers[link.index()] == Some(false)
+}

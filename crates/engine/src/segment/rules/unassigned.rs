@@ -1,0 +1,171 @@
+//! What becomes of SubDevices without a declaration: found, read, told, or made the member that they are.
+
+use alloc::rc::Rc;
+use alloc::string::{String, ToString};
+use alloc::vec::Vec;
+
+use ringcat_wire::address::StationAddress;
+
+use crate::event::Event;
+use crate::info::SubDeviceInfo;
+use crate::segment::effect::{Check, Effects, Task};
+use crate::segment::model::Segment;
+use crate::segment::owners::{Owners, owners_of};
+use crate::segment::setup::Setup;
+use crate::segment::start::Start;
+use crate::segment::unassigned::{At, Knowledge, UnassignedSubDevice};
+use crate::segment::view::View;
+use crate::time::Instant;
+
+impl Segment {
+    /// The member at each position.
+    pub fn owners(&self, stations: &[StationAddress]) -> Owners {
+        owners_of(&self.members, stations)
+    }
+
+    /// The unassigned SubDevice with a station address.
+    pub fn unassigned(&self, station: StationAddress) -> Option<&UnassignedSubDevice> {
+        self.unassigned.iter().find(|it| it.station == station)
+    }
+
+    pub(in crate::segment) fn unassigned_mut(&mut self, station: StationAddress) -> Option<&mut UnassignedSubDevice> {
+        self.unassigned.iter_mut().find(|it| it.station == station)
+    }
+
+    /// The station addresses of those that are neither members nor listed, or that several have.
+    pub fn unknown(&self, view: &View) -> Vec<StationAddress> {
+        let owners = self.owners(&view.stations);
+        let mut old = Vec::new();
+        for (at, station) in view.stations.iter().enumerate() {
+            let is_listed = self.unassigned(*station).is_some();
+            let is_known = owners.at(at).is_some() || (is_listed && view.position(*station).is_some());
+            if !is_known && !old.contains(station) {
+                old.push(*station);
+            }
+        }
+        old
+    }
+
+    /// Notes where they are now.
+    pub(in crate::segment) fn observe_places(&mut self, view: &View) {
+        let owners = self.owners(&view.stations);
+        let main_count = usize::from(view.counts.0.0);
+        for it in &mut self.unassigned {
+            if let Some(position) = view.position(it.station) {
+                let at = At { position, owners: &owners, main_count };
+                let moved = UnassignedSubDevice::at(it.station, &at, it.reported, it.knowledge.clone());
+                *it = UnassignedSubDevice { held_since: it.held_since, ..moved };
+            }
+        }
+    }
+
+    /// These have got temporary addresses: they are to be read.
+    pub(in crate::segment) fn observe_given(
+        &mut self,
+        view: &View,
+        given: &[StationAddress],
+        now: Instant,
+        effects: &mut Effects,
+    ) {
+        let owners = self.owners(&view.stations);
+        let main_count = usize::from(view.counts.0.0);
+        for station in given.iter().copied() {
+            let Some(position) = view.position(station) else { continue };
+            let at = At { position, owners: &owners, main_count };
+            self.unassigned.push(UnassignedSubDevice::at(station, &at, false, Knowledge::Reading(now)));
+            effects.start(Task::ReadUnassigned { station });
+        }
+    }
+
+    /// One was read, or could not be: then why, where that is worth telling.
+    pub(in crate::segment) fn observe_read(
+        &mut self,
+        station: StationAddress,
+        read: Result<Rc<SubDeviceInfo>, Option<String>>,
+        effects: &mut Effects,
+    ) {
+        self.attention.want();
+        let Some(it) = self.unassigned_mut(station) else { return };
+        match read {
+            Ok(info) => it.knowledge = Knowledge::Known(info),
+            Err(None) => {}
+            Err(Some(reason)) => {
+                if !matches!(&it.knowledge, Knowledge::Unreadable(before) if *before == reason) {
+                    effects.report(Event::ScanFailed { reason: reason.clone() });
+                    it.knowledge = Knowledge::Unreadable(reason);
+                }
+            }
+        }
+    }
+
+    /// One of which it is known that it is none of the declared ones: told once.
+    pub(in crate::segment) fn observe_unexpected(&mut self, station: StationAddress, effects: &mut Effects) {
+        let Some(it) = self.unassigned_mut(station) else { return };
+        let Knowledge::Known(info) = it.knowledge.clone() else { return };
+        if core::mem::replace(&mut it.reported, true) {
+            return;
+        }
+        let it = it.clone();
+        effects.report(Event::Unexpected { position: it.position, identity: info.identity });
+        if let Some(mismatch) = self.mismatch(&it, &info) {
+            effects.report(mismatch);
+        }
+    }
+
+    /// One that is a member does not fit the process image: told once.
+    pub(in crate::segment) fn observe_misfit(
+        &mut self,
+        station: StationAddress,
+        subdevice: usize,
+        reason: String,
+        effects: &mut Effects,
+    ) {
+        let Some(it) = self.unassigned_mut(station) else { return };
+        if !core::mem::replace(&mut it.reported, true) {
+            effects.failed(subdevice, reason);
+        }
+    }
+
+    /// One has got the station address of the member that it is.
+    pub(in crate::segment) fn observe_admitted(
+        &mut self,
+        station: StationAddress,
+        index: usize,
+        info: SubDeviceInfo,
+        effects: &mut Effects,
+    ) {
+        self.take_place(station, index, effects);
+        let Segment { members, layout, .. } = self;
+        let Some(member) = members.get_mut(index) else { return };
+        let Ok(setup) = Setup::new(index, &member.config, &info, layout) else { return };
+        member.setup = Some(Rc::new(setup));
+        member.unfit = None;
+        member.info = Some(info);
+        member.configured = false;
+        self.unassigned.retain(|other| other.station != station);
+        effects.report(Event::Returned { subdevice: index });
+        // Whatever state it is in, it is not one that we brought it to.
+        self.start(index, Start::Doubtful, None, Check::None, effects);
+    }
+
+    /// What a member's registers need if it is this SubDevice, with its station address.
+    ///
+    /// # Errors
+    /// It does not fit the process image.
+    pub fn as_member(
+        &self,
+        it: &UnassignedSubDevice,
+        info: &SubDeviceInfo,
+        index: usize,
+    ) -> Result<SubDeviceInfo, String> {
+        let member = &self.members[index];
+        let mut info = SubDeviceInfo { station: member.station, position: it.position, ..info.clone() };
+        if let Some(known) = &member.info {
+            info.keep_read_online(known);
+        }
+        match Setup::new(index, &member.config, &info, &self.layout) {
+            Ok(_) => Ok(info),
+            Err(error) => Err(error.to_string()),
+        }
+    }
+}
