@@ -53,6 +53,7 @@ fn quantile_us(sorted_ns: &[u64], percent: usize) -> f64 {
 mod tests {
     use super::quantile_us;
 
+    // covers: bench
     #[test]
     fn quantiles_stay_within_the_times() {
         assert_eq!(quantile_us(&[], 50), 0.0);

@@ -188,6 +188,7 @@ mod tests {
         assert!(reference("-1").is_err() && reference("last").is_err());
     }
 
+    // covers: dc-tools
     #[test]
     fn what_does_not_fit_is_told_with_what_would() {
         let mut found = vec![SubDeviceInfo::default(), SubDeviceInfo::default()];
@@ -207,6 +208,7 @@ mod tests {
         assert!(!ClockOptions::default().are_given());
     }
 
+    // covers: dc-tools
     #[test]
     fn clocks_in_front_of_the_reference_are_told() {
         let mut found = vec![SubDeviceInfo::default(); 3];

@@ -250,8 +250,9 @@ mod tests {
         (eni, configuration)
     }
 
+    // covers: 8.1, eni-run
     #[test]
-    fn a_file_is_shown_in_a_table_with_what_is_not_followed_facts_8_1() {
+    fn a_file_is_shown_in_a_table_with_what_is_not_followed() {
         let (model, configuration) = small();
         let lines = summary(&model, &configuration);
         assert_eq!(lines[0], "network     \"Small\", 4 SubDevices");
@@ -280,6 +281,7 @@ mod tests {
         assert_eq!(copies, [["2", "8", "18"], ["2", "10", "20"]]);
     }
 
+    // covers: eni-run
     #[test]
     fn the_same_is_there_as_json() {
         let (model, configuration) = small();
@@ -294,6 +296,7 @@ mod tests {
         assert_eq!(json["not_followed"].as_array().unwrap().len(), configuration.notices.len());
     }
 
+    // covers: eni-run
     #[test]
     fn rows_of_numbers_are_shown_as_ranges_and_names_cannot_disturb_a_terminal() {
         assert_eq!(ranges(&[0, 1, 2, 5, 7, 8]), "0-2, 5, 7-8");

@@ -190,7 +190,7 @@ pub struct InterfaceArguments {
     pub force: bool,
 }
 
-/// Marks in the source address (facts 9.7.1).
+/// Marks in the source address (protocol 9.7.1).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
 pub enum SourceAddress {
     /// Flags and retries in the first byte, the frame's number in the second.

@@ -127,6 +127,7 @@ mod tests {
 
     use super::*;
 
+    // covers: run
     #[test]
     fn every_command_and_option_is_explained() {
         let program = Arguments::command();

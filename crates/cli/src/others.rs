@@ -114,6 +114,7 @@ mod tests {
         frame
     }
 
+    // covers: other-main-device
     #[test]
     fn only_frames_with_commands_show_a_main_device() {
         assert!(has_commands(&frame(&ETHERCAT, 0x10)));

@@ -187,6 +187,7 @@ mod tests {
         MainDevice::request(segment, &Options::default()).look_at_ring().unwrap()
     }
 
+    // covers: ring-status
     #[test]
     fn a_closed_ring_is_shown_with_every_cable() {
         let look = look(None, None);
@@ -198,8 +199,9 @@ mod tests {
         assert_eq!(lines.len(), 8);
     }
 
+    // covers: ring-status
     #[test]
-    fn a_ring_with_swapped_interfaces_is_shown_as_such_and_one_that_nobody_answers_in_is_none() {
+    fn swapped_interfaces_of_a_ring_are_shown_and_a_silent_pair_is_no_ring() {
         use ringcat::sim::cable::{CableId, DeviceIndex, Endpoint, HostLink};
         use ringcat::sim::frame::Port;
         let device = || ringcat::sim::device::Device::new(ringcat::sim::catalogue::by_name("coupler").unwrap());
@@ -224,6 +226,7 @@ mod tests {
         assert!(error.contains("no frame returns"), "{error}");
     }
 
+    // covers: ring-status
     #[test]
     fn interfaces_that_are_joined_without_any_subdevice_are_no_closed_ring() {
         use ringcat::sim::cable::{Endpoint, HostLink};
@@ -237,6 +240,7 @@ mod tests {
         assert!(text.ends_with("something sends the frames back unchanged: is this the cable to the SubDevices?"));
     }
 
+    // covers: ring-status
     #[test]
     fn the_place_of_a_break_and_damaged_frames_are_shown_wherever_they_are() {
         for cable in 0..=3 {

@@ -18,7 +18,7 @@ use ringcat_link::{Listener, Sender};
 
 use crate::interfaces::{Failure, InterfaceArguments};
 
-/// Bytes of the source address that MainDevices and controllers leave alone (facts 9.7.1): they tell senders apart.
+/// Bytes of the source address that MainDevices and controllers leave alone (protocol 9.7.1): they tell senders apart.
 const SENDER_MASK: [u8; 6] = [0, 0, 0, 0xFF, 0xFF, 0xFF];
 /// Senders that are told; a segment has one MainDevice, and one too many is one.
 const SENDERS_TOLD: usize = 4;
@@ -150,6 +150,7 @@ mod tests {
         Event::ForeignFrame { arrived_on: Link::Main, bytes }
     }
 
+    // covers: other-main-device
     #[test]
     fn each_sender_is_told_once_whatever_marks_its_frames_carry() {
         let mut surroundings = surroundings(None);
@@ -164,6 +165,7 @@ mod tests {
         surroundings.note(&foreign([0; 6], 3));
     }
 
+    // covers: other-main-device
     #[test]
     fn a_scan_that_fails_says_what_was_noticed_meanwhile() {
         let failed = || Error::Scan(ScanError::NoAnswer);

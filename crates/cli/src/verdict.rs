@@ -85,6 +85,7 @@ pub fn conclude(outcome: Result<Verdict, Failure>, last_line: LastLine) -> ExitC
 mod tests {
     use super::*;
 
+    // covers: verdict
     #[test]
     fn a_verdict_has_held_only_without_reasons_against_it() {
         let held = Verdict::of(Vec::new(), "3 SubDevices");

@@ -1,4 +1,4 @@
-//! ENI files (ETG.2100; facts 8): bytes go in, [`Eni`] or an error with line, column and element comes out.
+//! ENI files (ETG.2100; protocol 8): bytes go in, [`Eni`] or an error with line, column and element comes out.
 //!
 //! The reader is lenient where files of different tools differ (order of elements, `#x` and `0x` numbers, encodings,
 //! elements that it does not know) and strict where a wrong guess would make a wrong network: a number that is none,

@@ -1,8 +1,8 @@
 //! Configuration files of EtherCAT networks: text goes in, what the engine needs comes out. No bus, no files, no clock.
 //!
-//! [`eni`] reads an ENI (EtherCAT Network Information, ETG.2100; facts 8) into a typed model that keeps what the file
-//! says; [`follow`] makes a [`Configuration`] of it. In such a file the network is configured already: it counts before
-//! the SII, and what of it is not followed is said.
+//! [`eni`] reads an ENI (EtherCAT Network Information, ETG.2100; protocol 8) into a typed model that keeps what the
+//! file says; [`follow`] makes a [`Configuration`] of it. In such a file the network is configured already: it counts
+//! before the SII, and what of it is not followed is said.
 #![forbid(unsafe_code)]
 
 mod configuration;

@@ -30,7 +30,7 @@ pub struct Supervision {
     pub returned: bool,
 }
 
-/// Bits of both AL status bytes that are kept: the upper two say nothing (facts 5.3).
+/// Bits of both AL status bytes that are kept: the upper two say nothing (protocol 5.3).
 const AL_MASK: u16 = 0x3F3F;
 /// Where [`Supervision::returned`] travels: among those that are left out of AL status.
 const RETURNED_BIT: u32 = 32 + 15;
@@ -297,6 +297,7 @@ mod tests {
         assert_eq!(board.supervision(), Some((2, Supervision { irq: 0x8004, returned: true, ..first })));
     }
 
+    // covers: ring-status
     #[test]
     fn the_state_of_the_ring_survives_the_word() {
         let board = Board::new(1);
@@ -321,6 +322,7 @@ mod tests {
         assert!(board.takes_part(69) && !board.takes_part(68) && !board.takes_part(1000));
     }
 
+    // covers: states
     #[test]
     fn one_that_is_away_on_purpose_is_optional_for_as_long() {
         let board = Board::new(2).with_optional(alloc::vec![true, false]);

@@ -1,4 +1,4 @@
-//! Distributed clocks as arithmetic: what follows from latched times, and what to do about it (facts 7).
+//! Distributed clocks as arithmetic: what follows from latched times, and what to do about it (protocol 7).
 //!
 //! * [`wiring`]: the way of a frame through the segment;
 //! * [`delay`]: propagation delays along it, with what is known about [`cables`] and what follows from `sums` of them;
@@ -45,8 +45,9 @@ pub const fn round(time: i64) -> i64 {
 mod tests {
     use super::*;
 
+    // covers: 7.1
     #[test]
-    fn a_low_half_is_extended_across_a_wrap_facts_7_1() {
+    fn a_low_half_is_extended_across_a_wrap() {
         assert_eq!(extend(0x0000_0010, 0x5_FFFF_FFF0), 0x6_0000_0010);
         assert_eq!(extend(0xFFFF_FFF0, 0x6_0000_0010), 0x5_FFFF_FFF0);
         assert_eq!(extend(7, 9), 7);

@@ -56,7 +56,7 @@ pub struct Expected {
     pub minimum_revision: Option<u32>,
     /// Serial number.
     pub serial: Option<u32>,
-    /// Explicit device identification (facts 5.3).
+    /// Explicit device identification (protocol 5.3).
     pub identification: Option<u16>,
 }
 

@@ -80,20 +80,20 @@ pub enum Event {
         what: String,
     },
     /// Port 0 of a SubDevice is not connected though frames reach it: the frame is looped there and may pass no second
-    /// such place (facts 2.4).
+    /// such place (protocol 2.4).
     UnconnectedPort0 {
         /// Where.
         position: Position,
     },
-    /// A SubDevice is entered at a port other than 0: its cables are swapped (facts LC-01).
+    /// A SubDevice is entered at a port other than 0: its cables are swapped (protocol LC-01).
     LineCrossed {
-        /// Where; `None` where only the ring shows that there is one (facts LC-02).
+        /// Where; `None` where only the ring shows that there is one (protocol LC-02).
         position: Option<Position>,
         /// The port of entry, where known.
         entry_port: Option<u8>,
     },
     /// All SubDevices of a ring are entered at another port than 0: the main link is plugged in where the redundant one
-    /// belongs, and the other way round (facts LC-01). All works, as with any crossed line.
+    /// belongs, and the other way round (protocol LC-01). All works, as with any crossed line.
     InterfacesSwapped,
     /// A scan found a ring behind a junction (JR-03).
     JunctionLearned {
@@ -107,7 +107,7 @@ pub enum Event {
         /// How many.
         rings: usize,
     },
-    /// A cable of a ring behind a junction broke or is whole again (JUNCTION_RED_CHANGE of the seeds). Nodes are
+    /// A cable of a ring behind a junction broke or is whole again (JUNCTION_RED_CHANGE in Cable Redundancy). Nodes are
     /// positions, of the cabling as it was found last.
     JunctionChanged {
         /// The port from which frames come; `None` where the ring has not been seen whole yet.
@@ -162,7 +162,7 @@ pub enum Event {
         /// Second one.
         second: Position,
     },
-    /// The ring opened (RED_LINEBRK of the seeds).
+    /// The ring opened (RED_LINEBRK in Cable Redundancy).
     RingOpened {
         /// SubDevices on the main link.
         main: u16,
@@ -270,7 +270,7 @@ pub enum Event {
         /// What came.
         data: Vec<u8>,
     },
-    /// A SubDevice sent a CoE emergency (facts 6.3). The last ones of each SubDevice are kept with its mailbox, too.
+    /// A SubDevice sent a CoE emergency (protocol 6.3). The last ones of each SubDevice are kept with its mailbox, too.
     Emergency {
         /// Index in the declaration; before activation the position.
         subdevice: usize,
@@ -323,7 +323,7 @@ pub enum Event {
         /// Whether the declaration allows that.
         optional: bool,
     },
-    /// A frame of another MainDevice arrived (facts MR-10). The first few are kept, all are counted.
+    /// A frame of another MainDevice arrived (protocol MR-10). The first few are kept, all are counted.
     ForeignFrame {
         /// Where it arrived.
         arrived_on: Link,
@@ -348,7 +348,7 @@ pub enum Event {
         /// Number of the domain.
         domain: usize,
     },
-    /// All clocks are locked (facts 7.2).
+    /// All clocks are locked (protocol 7.2).
     ClocksLocked {
         /// Largest |0x092C| in nanoseconds.
         largest_ns: u32,
@@ -358,7 +358,7 @@ pub enum Event {
         /// Where in the scan; `None` where nobody is left.
         position: Option<Position>,
     },
-    /// The segment has changed, and propagation delays with it (facts 7.1).
+    /// The segment has changed, and propagation delays with it (protocol 7.1).
     DelaysChanged {
         /// Clocks with another delay.
         clocks: usize,
@@ -366,7 +366,8 @@ pub enum Event {
         largest_ns: u32,
     },
     /// The propagation delay of a SubDevice cannot be measured: a fork without a clock is in front of it, and times
-    /// that were latched show only what all branches of that take together (facts 7.1). Told once, until it is known.
+    /// that were latched show only what all branches of that take together (protocol 7.1). Told once, until it is
+    /// known.
     DelayUnknown {
         /// Where in the scan.
         position: Position,

@@ -1,4 +1,4 @@
-//! What a scan found about one SubDevice, in owned types (facts 3.1, 4).
+//! What a scan found about one SubDevice, in owned types (protocol 3.1, 4).
 //!
 //! In go what was read from the controller's registers ([`Readout`]), the fixed area of the SII and those categories
 //! that the scan fetched; out comes a [`SubDeviceInfo`]. Nothing in an SII keeps a SubDevice from being listed: what

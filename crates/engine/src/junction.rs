@@ -1,4 +1,4 @@
-//! Junction redundancy as the application asks for it (facts 9.4): the mode, and connections that it declares.
+//! Junction redundancy as the application asks for it (protocol 9.4): the mode, and connections that it declares.
 //!
 //! A local ring leaves a junction through one port and comes back to it through another one. The cable that comes back,
 //! the *closing* cable, is what a connection names: its *head* is the junction, its *tail* the last SubDevice of the
@@ -8,7 +8,7 @@ use core::fmt;
 
 /// Port of a junction to which the closing cable of a declared connection leads (JR-06).
 pub const HEAD_PORT: u8 = 1;
-/// Port at which the ring begins then: the one that frames pass before [`HEAD_PORT`] (facts 9.4).
+/// Port at which the ring begins then: the one that frames pass before [`HEAD_PORT`] (protocol 9.4).
 pub const START_PORT: u8 = 3;
 /// Ports that a SubDevice can have.
 const PORTS: u8 = 4;
@@ -181,7 +181,7 @@ impl JunctionConnection {
 mod tests {
     use super::*;
 
-    // covers: JR-06
+    // covers: JR-06, junctions
     #[test]
     fn connections_have_their_head_at_port_1_and_their_tail_at_another_port_than_0() {
         let good = JunctionConnection { head: 1, head_port: 1, tail: 4, tail_port: 1 };

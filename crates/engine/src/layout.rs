@@ -1,9 +1,9 @@
 //! From who exchanges what to logical addresses, images and frames.
 //!
 //! A domain is cut into chunks of whole areas that fit one frame, so that no SyncManager is spread over datagrams
-//! (facts 3.11: an access must cover start and end). A chunk is one LRW, or an LWR and an LRD, over
+//! (protocol 3.11: an access must cover start and end). A chunk is one LRW, or an LWR and an LRD, over
 //! `[outputs of the chunk][inputs of the chunk]`; image and logical addresses follow the same order. Areas are aligned
-//! to bytes (facts 3.10: bitwise FMMUs work in few places).
+//! to bytes (protocol 3.10: bitwise FMMUs work in few places).
 //!
 //! A working counter is a sum: where several SubDevices add to one, it does not say which of them did. So each of them
 //! shows its AL status in a presence datagram of the same frame, through an FMMU that it has to spare; one without has
@@ -253,7 +253,7 @@ impl PlannedDomain {
     }
 }
 
-/// What each SubDevice adds to the working counter (facts 1.4): once per datagram and direction.
+/// What each SubDevice adds to the working counter (protocol 1.4): once per datagram and direction.
 fn contributions(command: Command, reads: &[PlacedArea], writes: &[PlacedArea]) -> Vec<(usize, Wkc)> {
     let write = if command == Command::Lrw { 2 } else { 1 };
     let mut contributions: Vec<(usize, Wkc)> = Vec::new();

@@ -3,7 +3,7 @@
 /// One of the two interfaces of a MainDevice.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum Link {
-    /// The first interface, MAIN in the seeds: frames sent here meet the SubDevices in order.
+    /// The first interface, MAIN in docs/protocol: frames sent here meet the SubDevices in order.
     Main,
     /// The second interface, RED: closes the ring.
     Redundant,

@@ -1,4 +1,4 @@
-//! Mailboxes: one router per SubDevice, and the protocols that share it (facts 6, decision 0007).
+//! Mailboxes: one router per SubDevice, and the protocols that share it (protocol 6, decision 0007).
 //!
 //! A [`Mailbox`] is the handle to a SubDevice's router. Procedures take a [`Lane`] of it, one per protocol, and talk: a
 //! request goes out with the next counter, what comes back goes to the lane to which it belongs. All lanes run side by

@@ -220,7 +220,7 @@ impl MainDevice {
             .map_or(Vec::new(), |segment| segment.clocks.status())
     }
 
-    /// Whether all clocks are locked (facts 7.2).
+    /// Whether all clocks are locked (protocol 7.2).
     pub fn clocks_locked(&self) -> bool {
         self.segment.as_ref().is_some_and(|segment| segment.clocks.are_locked())
     }

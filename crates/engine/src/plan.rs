@@ -1,5 +1,5 @@
 //! Declaration and scan result to register values: what has to be written to a SubDevice on its way to OP
-//! (facts 3.10, 3.11, 5.2).
+//! (protocol 3.10, 3.11, 5.2).
 //!
 //! In go a [`SubDeviceConfig`] and the [`SubDeviceInfo`] to which it belongs; out comes a [`SubDevicePlan`]: mailbox
 //! and process data SyncManagers, the layout of each process data area, watchdog registers, SDO downloads for PDO
@@ -28,9 +28,9 @@ pub use subdevice::{AreaPlan, MappedEntry, MappedPdo, SmPlan, SubDevicePlan};
 
 use areas::sync_manager;
 
-/// Control byte of the mailbox that the MainDevice writes, where the SII gives none (facts 3.11).
+/// Control byte of the mailbox that the MainDevice writes, where the SII gives none (protocol 3.11).
 const MAILBOX_OUT_CONTROL: u8 = 0x26;
-/// Control byte of the mailbox that the MainDevice reads, where the SII gives none (facts 3.11).
+/// Control byte of the mailbox that the MainDevice reads, where the SII gives none (protocol 3.11).
 const MAILBOX_IN_CONTROL: u8 = 0x22;
 
 /// Plans one SubDevice. The error names SubDevice, SyncManager, PDO or object, what was expected and what came, and

@@ -1,4 +1,5 @@
-//! Requests that a cyclic thread makes and re-uses (000 5.8, seed 004): no allocation, no lock, no waiting.
+//! Requests that a cyclic thread makes and re-uses (Master Redundancy 5.8, IgH manual): no allocation, no lock, no
+//! waiting.
 //!
 //! A request has its own memory of a size given at its creation. The cyclic side owns it while it is not busy: it may
 //! change what it is about and its timeout, put in data, start it. The acyclic half takes it up, and gives it back with

@@ -91,7 +91,7 @@ impl fmt::Display for RedundancyLoss {
     }
 }
 
-/// One link (`ecrt_master_link_state` of the seeds).
+/// One link (`ecrt_master_link_state` of the IgH manual).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct LinkStatus {
     /// Whether the interface has a carrier; `None` where the links do not tell.
@@ -110,7 +110,7 @@ impl LinkStatus {
 
     /// Whether somebody who answers on this link is in a state.
     pub fn has(&self, state: AlState) -> bool {
-        // BOOT is a number of its own among the bits (facts 5.1).
+        // BOOT is a number of its own among the bits (protocol 5.1).
         self.al_states & state.code() == state.code()
     }
 }
@@ -148,7 +148,7 @@ impl RingStatus {
     }
 
     /// SubDevices answer on the redundant link because the ring is broken: without it they would be lost
-    /// (`redundancy_active` of the seeds).
+    /// (`redundancy_active` of the IgH manual).
     pub fn redundancy_active(&self) -> bool {
         self.state == RingState::Open && self.link(Link::Redundant).answering > 0
     }
@@ -160,8 +160,9 @@ mod tests {
 
     use super::*;
 
+    // covers: CR-12
     #[test]
-    fn a_cable_is_named_by_its_ends_cr_12() {
+    fn a_cable_is_named_by_its_ends() {
         let (near, far) = (Some(PortOf { node: 7, port: 1 }), Some(PortOf { node: 8, port: 0 }));
         assert_eq!(Cable { near, far }.to_string(), "between SubDevice 7 port 1 and SubDevice 8 port 0");
         let host = Cable { near: None, far: Some(PortOf { node: 0, port: 0 }) };
@@ -170,6 +171,7 @@ mod tests {
         assert_eq!(host.to_string(), "between SubDevice 7 port 1 and the REDUNDANT interface");
     }
 
+    // covers: ring-status
     #[test]
     fn redundancy_is_active_where_the_redundant_link_carries_somebody() {
         let mut status = RingStatus { state: RingState::Open, ..RingStatus::default() };

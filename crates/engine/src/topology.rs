@@ -1,4 +1,4 @@
-//! Who hangs on which port of whom, from DL status and receive times (facts 2.1 to 2.4, 2.9, 9.5).
+//! Who hangs on which port of whom, from DL status and receive times (protocol 2.1 to 2.4, 2.9, 9.5).
 //!
 //! In goes what each SubDevice reported, in the order in which frames meet the processing units: first those that the
 //! frames of the main link met, then those of the redundant link. Out comes a tree and what is odd about the

@@ -1,5 +1,5 @@
 //! The mailbox gateway: programs on this host or in the network talk to SubDevices through the MainDevice's mailboxes
-//! (facts 10.1, ETG.8200), over UDP and TCP at once.
+//! (protocol 10.1, ETG.8200), over UDP and TCP at once.
 //!
 //! A thread of its own serves the sockets ([`Gateway`]); messages pass to the engine's thread and answers back through
 //! bounded queues ([`Passage`]). Which message may pass, and which client has its turn, is decided in the engine
@@ -209,6 +209,7 @@ mod tests {
         passage.waker.wake().expect("it can be woken");
     }
 
+    // covers: gateway
     #[test]
     fn messages_of_both_kinds_come_with_their_client_and_answers_find_it() {
         let (gateway, passage) = open();
@@ -242,6 +243,7 @@ mod tests {
         assert_eq!(gateway.counters().connections, 1);
     }
 
+    // covers: gateway
     #[test]
     fn a_client_that_sends_no_message_is_cut_off_and_the_others_go_on() {
         let (gateway, passage) = open();
@@ -258,6 +260,7 @@ mod tests {
         assert_eq!((gateway.counters().connections, gateway.counters().ended), (2, 1));
     }
 
+    // covers: gateway
     #[test]
     fn a_gateway_that_is_dropped_closes_its_connections_and_ends_the_passage() {
         let (gateway, passage) = open();

@@ -38,6 +38,7 @@ pub(crate) fn timespec(ns: u64) -> libc::timespec {
 mod tests {
     use super::*;
 
+    // covers: links
     #[test]
     fn a_unix_time_of_a_moment_ago_is_found_on_the_monotonic_clock() {
         let before = now_ns();

@@ -269,6 +269,7 @@ mod tests {
         assert_eq!(handed(TP_STATUS_USER, slot(&FRAME[..10], 0, 0)).0, Taken::Truncated);
     }
 
+    // covers: capture
     #[test]
     fn whoever_looks_on_sees_sent_frames_times_and_the_beginning_of_long_frames() {
         let mut long = slot(&FRAME, 0xe005, PACKET_OUTGOING);

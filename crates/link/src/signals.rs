@@ -83,6 +83,7 @@ impl HeldSignals {
 mod tests {
     use super::*;
 
+    // covers: signals
     #[test]
     fn a_signal_that_is_held_back_waits_for_the_thread_that_asks() {
         // In a thread of its own: the mask of the others stays as it is.

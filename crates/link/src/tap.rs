@@ -198,6 +198,7 @@ fn ioctl<T: Argument>(fd: &OwnedFd, request: libc::c_ulong, argument: &mut T) ->
 mod tests {
     use super::*;
 
+    // covers: eoe-interfaces
     #[test]
     fn what_keeps_an_interface_from_being_made_is_told_with_what_to_do() {
         let text = TapError::from_errno("eoe0s1", "making it", libc::EPERM).to_string();

@@ -355,6 +355,7 @@ mod tests {
     use super::*;
     use ringcat_wire::address::Position;
 
+    // covers: eoe-interfaces
     #[test]
     fn interfaces_are_named_and_addressed_by_position_or_alias() {
         let options = EthernetOptions { index: 0, main: [0x00, 0x1B, 0x21, 0xAA, 0xBB, 0xCC] };

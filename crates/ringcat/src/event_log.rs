@@ -189,6 +189,7 @@ mod tests {
         (one_by_one, counts)
     }
 
+    // covers: no-frame-lost, run
     #[test]
     fn a_crowd_has_a_line_each_first_then_counts_at_pauses_that_grow() {
         let mut crowd = Crowd::default();
@@ -203,6 +204,7 @@ mod tests {
         assert_eq!(crowd.count(Instant(800_000_000_000)), None);
     }
 
+    // covers: run
     #[test]
     fn after_a_quiet_time_events_have_a_line_each_again() {
         let mut crowd = Crowd::default();
@@ -221,6 +223,7 @@ mod tests {
         Event::ForeignFrame { arrived_on: crate::Link::Main, bytes: vec![0; 60] }
     }
 
+    // covers: run
     #[test]
     fn a_break_has_its_line_in_the_middle_of_a_storm() {
         let mut log = EventLog::new(Instant(0), Names::default());
@@ -233,6 +236,7 @@ mod tests {
         assert_eq!(counts, ["    2000.000 ms  980 frames of another MainDevice within 2s"]);
     }
 
+    // covers: run
     #[test]
     fn one_by_one_nothing_is_condensed() {
         let mut log = EventLog::new(Instant(0), Names::default()).one_by_one(true);
@@ -241,6 +245,7 @@ mod tests {
         assert!((1..100).all(|cycle| log.left_out(cycle, Instant(cycle)).is_some()));
     }
 
+    // covers: run
     #[test]
     fn cycles_left_out_are_those_since_the_last_call() {
         let mut log = EventLog::new(Instant(0), Names::default());

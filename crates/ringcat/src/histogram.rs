@@ -135,6 +135,7 @@ mod tests {
         }
     }
 
+    // covers: scan-command
     #[test]
     fn quantiles_are_at_most_an_eighth_too_long() {
         let histogram = Histogram::default();

@@ -36,7 +36,7 @@ pub struct Options {
     pub pdos: ReadPdos,
     /// Whether a supervision datagram rides with the process data. Without it nothing is noticed by itself.
     pub supervision: bool,
-    /// How marks are written into source addresses (facts 9.7.1).
+    /// How marks are written into source addresses (protocol 9.7.1).
     pub source_address: MacCodec,
     /// For so long the number of SubDevices must not change at the beginning of a scan.
     pub settle: Duration,

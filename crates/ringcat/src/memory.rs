@@ -142,6 +142,7 @@ impl Links for MemoryLinks {
 mod tests {
     use super::*;
 
+    // covers: links
     #[test]
     fn frames_come_out_in_order_and_an_overflow_is_counted() {
         let mut ring = FrameRing::new(2);

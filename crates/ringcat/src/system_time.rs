@@ -1,4 +1,4 @@
-//! System time of distributed clocks from the time of day of this host (facts 3.12).
+//! System time of distributed clocks from the time of day of this host (protocol 3.12).
 
 use std::time::{SystemTime, UNIX_EPOCH};
 

@@ -124,6 +124,7 @@ mod tests {
 
     const MS: u64 = 1_000_000;
 
+    // covers: threads
     #[test]
     fn acyclic_frames_end_before_the_next_cycle_begins() {
         let window = Window::default();
@@ -140,6 +141,7 @@ mod tests {
         assert!(window.look_again(Instant(MS - 10_000)) > Instant(MS));
     }
 
+    // covers: byte-budget
     #[test]
     fn a_budget_is_for_a_cycle_and_never_less_than_a_frame() {
         let window = Window::new(4_000);
@@ -160,6 +162,7 @@ mod tests {
         assert_eq!(least.bytes(Instant(0)), MAX_FRAME);
     }
 
+    // covers: threads
     #[test]
     fn a_cyclic_half_that_has_fallen_silent_keeps_nobody_from_the_wire() {
         let window = Window::default();

@@ -2,7 +2,8 @@
 //!
 //! In: the frames that a MainDevice put on its in-memory links. Out: the same frames, with the working counters that
 //! SubDevices would have written, their AL status in presence datagrams, and the bit that controllers set in the source
-//! address (facts 2.6), on the link where the cabling brings them back (facts 9.2.1). Inputs stay as they were sent.
+//! address (protocol 2.6), on the link where the cabling brings them back (protocol 9.2.1). Inputs stay as they were
+//! sent.
 
 use ringcat::memory::FrameRing;
 use ringcat_engine::layout::{Layout, PlannedFrame};

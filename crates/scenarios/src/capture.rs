@@ -2,15 +2,15 @@
 //!
 //! In goes a pcapng file with both directions of one or two links (main link first), out comes a [`Verdict`]. It parses
 //! pcapng, Ethernet and EtherCAT by itself: nothing of the engine or of `ringcat-wire` is used, so that one misreading
-//! does not hide itself. Constants are those of facts 1.1 to 1.4 and 9.7.
+//! does not hide itself. Constants are those of protocol 1.1 to 1.4 and 9.7.
 //!
 //! What is checked of every frame that was sent:
 //!
-//! 1. **Form** (facts 1.1 to 1.3): EtherType 0x88A4, type 1, 60 to 1,514 bytes, the length in the EtherCAT header is
+//! 1. **Form** (protocol 1.1 to 1.3): EtherType 0x88A4, type 1, 60 to 1,514 bytes, the length in the EtherCAT header is
 //!    that of the datagrams, the M bit is set in all of them but the last, reserved bits and padding are zero.
-//! 2. **Circulation** (facts 2.4, CR-25): the C bit of each datagram is 0.
-//! 3. **Fresh datagrams** (facts 1.2): working counters and event requests are 0.
-//! 4. **Reads** (facts 9.3): the data of APRD, FPRD, BRD and LRD is zeros. (What is read by LRW, APRW, FPRW and BRW
+//! 2. **Circulation** (protocol 2.4, CR-25): the C bit of each datagram is 0.
+//! 3. **Fresh datagrams** (protocol 1.2): working counters and event requests are 0.
+//! 4. **Reads** (protocol 9.3): the data of APRD, FPRD, BRD and LRD is zeros. (What is read by LRW, APRW, FPRW and BRW
 //!    cannot be told apart from what is written; of ARMW and FRMW the data is written to all others.)
 //! 5. **Link mark** (SM-01): the RED bit of the source address is set on the redundant link and clear on the main link.
 //! 6. **Pairs** (CR-01, SM-02): with two links each frame leaves once on each; the copies differ in the RED bit, in the

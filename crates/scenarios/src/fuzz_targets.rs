@@ -1,5 +1,5 @@
-//! What a fuzzer may throw any bytes at: one target per mailbox decoder (facts 6, 10.1), and one for ENI files (facts
-//! 8).
+//! What a fuzzer may throw any bytes at: one target per mailbox decoder (protocol 6, 10.1), and one for ENI files
+//! (protocol 8).
 //!
 //! A target is a plain function. It panics where a decoder does, and where what was decoded does not survive being
 //! encoded and decoded again. `fuzz/` runs the targets under cargo-fuzz, `cargo test` with the corpora in `fuzz/corpus`

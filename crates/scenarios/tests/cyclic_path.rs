@@ -49,11 +49,13 @@ fn counted(work: impl FnOnce()) -> (u64, u64) {
     (after.allocations - before.allocations, after.deallocations - before.deallocations)
 }
 
+// covers: no-allocation
 #[test]
 fn the_counter_sees_an_allocation() {
     assert_eq!(counted(|| drop(std::hint::black_box(vec![1u8; 100]))), (1, 1));
 }
 
+// covers: no-allocation
 #[test]
 fn undisturbed_cycles_take_no_memory() {
     for cabling in CABLINGS {
@@ -71,6 +73,7 @@ fn undisturbed_cycles_take_no_memory() {
     }
 }
 
+// covers: under-way
 #[test]
 fn several_cycles_under_way_take_no_memory_and_lose_nothing() {
     for (cabling, under_way) in CABLINGS.into_iter().zip(2..=4) {
@@ -90,6 +93,7 @@ fn several_cycles_under_way_take_no_memory_and_lose_nothing() {
     }
 }
 
+// covers: no-allocation
 #[test]
 fn disturbed_cycles_take_no_memory() {
     for cabling in CABLINGS {
@@ -111,6 +115,7 @@ fn disturbed_cycles_take_no_memory() {
     }
 }
 
+// covers: capture
 #[test]
 fn recorded_cycles_take_no_memory() {
     let path = std::env::temp_dir().join(format!("ringcat-no-memory-{}.pcapng", std::process::id()));
@@ -144,6 +149,7 @@ fn recorded_cycles_take_no_memory() {
     }
 }
 
+// covers: copy
 #[test]
 fn copying_takes_no_memory() {
     let mut load = load(Cabling::ClosedRing);
@@ -168,6 +174,7 @@ fn copying_takes_no_memory() {
     println!("{} words refused", load.exchange.counters().stale_copies);
 }
 
+// covers: byte-budget, jobs
 #[test]
 fn requests_take_no_memory_on_the_side_of_the_cyclic_thread() {
     let options = Options::new(MacAddress([0x00, 0x00, 0x5E, 0x00, 0x53, 0x01]), None);
@@ -261,6 +268,7 @@ fn copy_first(links: &mut MemoryLinks, first: &mut [u8; 1514]) -> (Link, usize) 
 }
 
 /// The image of an ENI is copied bit by bit where its SubDevices share bytes.
+// covers: eni-run
 #[test]
 fn the_image_of_an_eni_takes_no_memory() {
     let file = EniFile::from_bytes(include_bytes!("../../ringcat/examples/machine.eni.xml")).expect("it is ours");

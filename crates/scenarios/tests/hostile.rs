@@ -206,11 +206,13 @@ fn lies(seed: u64) {
     }
 }
 
+// covers: robust
 #[test]
 fn eeproms_of_any_content_are_read_or_refused_seeds_0_to_149() {
     runs(0..150, eeproms);
 }
 
+// covers: robust
 #[test]
 fn answers_that_lie_do_no_harm_beyond_their_time_seeds_0_to_149() {
     runs(0..150, lies);

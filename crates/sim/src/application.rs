@@ -1,4 +1,4 @@
-//! The application behind a SubDevice controller: everything that the PDI side does (facts 3.4, 5, 6).
+//! The application behind a SubDevice controller: everything that the PDI side does (protocol 3.4, 5, 6).
 //!
 //! In: AL events and virtual time, through [`Application::run`], and faults. Out: AL status, answers in the mailbox,
 //! inputs and latched outputs. The parts: [`state_machine`] says what a request means, [`settings`] whether the
@@ -43,7 +43,7 @@ use state_machine::{Pending, StateMachine};
 pub use behaviours::{Behaviour, InputFunction, InputSource};
 pub use mailbox::record::ServedMail;
 
-/// AL_EVENT bits (facts 3.5).
+/// AL_EVENT bits (protocol 3.5).
 const EVENT_AL_CONTROL: u32 = 1 << 0;
 const EVENT_SYNC_MANAGER: u32 = 1 << 4;
 const EVENT_WATCHDOG: u32 = 1 << 6;
@@ -234,7 +234,7 @@ impl Application {
         }
     }
 
-    /// A SyncManager was switched on or off, or the last answer is asked for again (facts 5.2, 6.2).
+    /// A SyncManager was switched on or off, or the last answer is asked for again (protocol 5.2, 6.2).
     fn sync_managers_changed(&mut self, description: &DeviceDescription, controller: &mut Controller, now: SimTime) {
         let actual = settings::sync_managers(controller, now);
         let state = self.machine.state();

@@ -1,4 +1,4 @@
-//! Cables and what happens to a frame on the way through one (issue 2, part 3; facts 11.4).
+//! Cables and what happens to a frame on the way through one (issue 2, part 3; protocol 11.4).
 //!
 //! A cable is two legs, one for each direction. A leg knows where it leads, how long a bit takes, since when it
 //! carries a signal, and which faults wait for the frames that come along. What is decided here is the fate of a frame
@@ -50,7 +50,7 @@ pub enum Endpoint {
     Host(HostLink),
 }
 
-/// A cable as it is given: both ends and how long a bit takes from one to the other (5 ns per metre, facts 1.3).
+/// A cable as it is given: both ends and how long a bit takes from one to the other (5 ns per metre, protocol 1.3).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct CableSpec {
     /// One end.
@@ -224,7 +224,7 @@ impl Leg {
     }
 }
 
-/// Propagation delay of a cable unless another is asked for: 10 m at 5 ns per metre (facts 1.3).
+/// Propagation delay of a cable unless another is asked for: 10 m at 5 ns per metre (protocol 1.3).
 pub const DEFAULT_CABLE_DELAY: Duration = Duration::from_nanos(50);
 
 #[cfg(test)]

@@ -1,9 +1,9 @@
 //! Devices out of the box, by name.
 //!
 //! In: a name as segment files use it. Out: a [`DeviceDescription`] to be changed at will before a device is made of
-//! it. Vendor and product numbers are the simulator's own; SyncManager settings are like those of real terminals (facts
-//! 3.11). Terminals are in `terminals`, the servo drive in `drive`, block and junctions in `machines`, devices for the
-//! mailbox in `protocols`.
+//! it. Vendor and product numbers are the simulator's own; SyncManager settings are like those of real terminals
+//! (protocol 3.11). Terminals are in `terminals`, the servo drive in `drive`, block and junctions in `machines`,
+//! devices for the mailbox in `protocols`.
 
 mod drive;
 mod machines;

@@ -1,4 +1,4 @@
-//! One SubDevice controller (ESC), register by register (facts 2, 3, 4.7, 11.4).
+//! One SubDevice controller (ESC), register by register (protocol 2, 3, 4.7, 11.4).
 //!
 //! In: frames at ports, link changes, accesses of the application, virtual time. Out: frames at ports, events for the
 //! application, deadlines. The network carries frames between controllers; the application behind the PDI makes a
@@ -360,7 +360,7 @@ impl Controller {
             .min(loops);
     }
 
-    /// The local clock in nanoseconds (facts 3.12).
+    /// The local clock in nanoseconds (protocol 3.12).
     pub fn local_time(&self, now: SimTime) -> u64 {
         self.clock.local(now)
     }

@@ -1,4 +1,4 @@
-//! Data type codes of CoE that the models use (facts 6.3).
+//! Data type codes of CoE that the models use (protocol 6.3).
 
 /// One bit.
 pub const BOOL: u8 = 0x01;

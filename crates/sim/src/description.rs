@@ -2,7 +2,7 @@
 //!
 //! In: values written by the [`catalogue`](crate::catalogue), by an application, or read from a real SII image
 //! ([`DeviceDescription::from_sii`](crate::sii_image)). Out: the SII image, the object dictionary and the settings
-//! of the controller follow from it, so that they cannot contradict each other (facts 4, 5.2, 6.3).
+//! of the controller follow from it, so that they cannot contradict each other (protocol 4, 5.2, 6.3).
 
 mod services;
 
@@ -21,7 +21,7 @@ use crate::controller::{ClockErrors, ControllerConfig, MAX_UNITS, Wander};
 pub use crate::data_type;
 pub use services::{AoeDescription, EoeDescription, EoeEnd, FoeDescription, Services, SoeDescription};
 
-/// One SyncManager as the SII declares it (facts 4.4).
+/// One SyncManager as the SII declares it (protocol 4.4).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct SyncManagerDescription {
     /// Physical start address.
@@ -36,7 +36,7 @@ pub struct SyncManagerDescription {
     pub kind: SyncManagerKind,
 }
 
-/// One process data object (facts 4.5).
+/// One process data object (protocol 4.5).
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct PdoDescription {
     /// `Tx` = inputs of the MainDevice, `Rx` = outputs.
@@ -60,7 +60,7 @@ impl PdoDescription {
     }
 }
 
-/// One entry of a PDO; index 0 is a gap (facts 4.5).
+/// One entry of a PDO; index 0 is a gap (protocol 4.5).
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct PdoEntryDescription {
     /// Object index, 0 for a gap.
@@ -75,7 +75,7 @@ pub struct PdoEntryDescription {
     pub bit_length: u8,
 }
 
-/// The mailbox of a SubDevice (facts 4.1, 4.3).
+/// The mailbox of a SubDevice (protocol 4.1, 4.3).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct MailboxDescription {
     /// Places and sizes in PREOP and above.
@@ -97,7 +97,7 @@ impl MailboxDescription {
     }
 }
 
-/// Distributed clock of a SubDevice (facts 3.12, 4.6).
+/// Distributed clock of a SubDevice (protocol 3.12, 4.6).
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct DcDescription {
     /// 64-bit registers; 32-bit otherwise.
@@ -108,7 +108,7 @@ pub struct DcDescription {
     pub minimum_cycle_ns: u32,
 }
 
-/// How long the application takes to reach each state (facts 5.4 has what a MainDevice waits).
+/// How long the application takes to reach each state (protocol 5.4 has what a MainDevice waits).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct TransitionTimes {
     /// INIT from anywhere.
@@ -152,9 +152,9 @@ pub struct DeviceDescription {
     pub identity: Identity,
     /// Configured station alias.
     pub alias: u16,
-    /// Value of the identification switch; `None` = the request is not supported (facts 5.3).
+    /// Value of the identification switch; `None` = the request is not supported (protocol 5.3).
     pub identification: Option<u16>,
-    /// Physical address at which the identification switch is read; `None` = it is not in memory (facts 4.3).
+    /// Physical address at which the identification switch is read; `None` = it is not in memory (protocol 4.3).
     pub id_switch_address: Option<u16>,
     /// Kind of each port.
     pub ports: [PortKind; 4],
@@ -183,7 +183,7 @@ pub struct DeviceDescription {
     pub esc_configuration: u8,
     /// Registers 0x0150 to 0x0153.
     pub pdi_configuration: [u8; 4],
-    /// AL control is copied to AL status by the controller; no application checks anything (facts 3.4).
+    /// AL control is copied to AL status by the controller; no application checks anything (protocol 3.4).
     pub emulation: bool,
     /// Process data is refused without a running watchdog (0x001F).
     pub watchdog_required: bool,

@@ -1,4 +1,4 @@
-//! A frame on its way through the segment (facts 1.1, 1.2, 1.3).
+//! A frame on its way through the segment (protocol 1.1, 1.2, 1.3).
 //!
 //! In: the bytes that a host sends. Out: [`SimFrame`], which carries the offsets of its datagrams so that no controller
 //! parses it again, and the state of its frame check sequence. What happens to it is the controllers' and the
@@ -45,7 +45,7 @@ impl Port {
     }
 }
 
-/// State of a frame's check sequence (facts 2.5).
+/// State of a frame's check sequence (protocol 2.5).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub enum Fcs {
     /// The frame is as it was sent.
@@ -159,7 +159,7 @@ impl SimFrame {
     }
 
     /// Finds kind and datagrams anew. Controllers walk the lengths of the datagrams, not the one in the EtherCAT header
-    /// (facts 1.1).
+    /// (protocol 1.1).
     fn parse(&mut self) {
         self.datagrams.clear();
         let (kind, payload) = classify(&self.bytes);
@@ -209,7 +209,7 @@ impl DatagramPlace {
     }
 }
 
-/// Offset of the UDP checksum in an EtherCAT frame over UDP, which a processing unit clears (facts 1.3).
+/// Offset of the UDP checksum in an EtherCAT frame over UDP, which a processing unit clears (protocol 1.3).
 pub(crate) const UDP_CHECKSUM: usize = ETHERNET_HEADER_LEN + UDP_HEADERS_LEN - 2;
 
 /// Whether the frame's EtherCAT part is wrapped in UDP.
@@ -273,6 +273,7 @@ mod tests {
         assert_eq!((frame.datagrams.len(), frame.malformed, frame.fcs), (1, true, Fcs::Bad));
     }
 
+    // covers: sim-faults
     #[test]
     fn datagrams_behind_the_limit_are_none_also_after_a_cut() {
         let mut frame = SimFrame::new(7, two_datagrams());

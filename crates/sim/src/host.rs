@@ -1,5 +1,5 @@
 //! The two network interfaces of the MainDevice: they send at 100 Mbit/s, one frame after the other, and keep what
-//! arrives until it is fetched (facts 1.3).
+//! arrives until it is fetched (protocol 1.3).
 
 use core::time::Duration;
 use std::collections::VecDeque;
@@ -92,7 +92,7 @@ mod tests {
 
     #[test]
     fn back_to_back_frames_are_one_wire_time_apart() {
-        // facts 1.3: 60 bytes, 8 of preamble, 4 of FCS, 12 of gap: 84 byte times of 80 ns.
+        // protocol 1.3: 60 bytes, 8 of preamble, 4 of FCS, 12 of gap: 84 byte times of 80 ns.
         let mut host = HostInterface::new(None, 8, 8);
         assert_eq!(host.transmit(SimTime(1_000), &frame(60)), Some(SimTime(1_000 + 72 * 80)));
         assert_eq!(host.transmit(SimTime(1_000), &frame(60)), Some(SimTime(1_000 + 84 * 80 + 72 * 80)));

@@ -1,5 +1,5 @@
 //! A segment in virtual time: devices, the cables between them and the two interfaces of the MainDevice (issue 2,
-//! part 3; facts 2, 9.1, 11.3, 11.4).
+//! part 3; protocol 2, 9.1, 11.3, 11.4).
 //!
 //! In: frames of the MainDevice ([`Network::send`]), the time up to which things shall happen ([`Network::advance`]),
 //! and faults. Out: the frames that come back, with the time of their last bit ([`Network::receive`]), and the devices
@@ -11,9 +11,9 @@
 //! An event is the arrival of a frame's *last* bit at an end of a cable. Controllers cut through, so the next arrival
 //! is this one, plus the delay of the hop, plus that of the cable; when the first bit passed follows from the frame's
 //! length at 100 Mbit/s. A frame is lost if the cable, from the first bit's entry to the last bit's exit, was dead at
-//! any moment; where the receiver saw its beginning it travels on as a damaged frame (facts 2.5). Both ends of a cable
-//! notice a lost or a new signal after a detection delay; until then frames sent there are lost. A frame on whose way
-//! through a device a port opens or closes is lost (facts 2.2).
+//! any moment; where the receiver saw its beginning it travels on as a damaged frame (protocol 2.5). Both ends of a
+//! cable notice a lost or a new signal after a detection delay; until then frames sent there are lost. A frame on whose
+//! way through a device a port opens or closes is lost (protocol 2.2).
 
 pub mod builder;
 mod cabling;

@@ -1,4 +1,4 @@
-//! SII image from a device description, and description from a real SII image (facts 4).
+//! SII image from a device description, and description from a real SII image (protocol 4).
 //!
 //! In and out: [`DeviceDescription`] and the bytes of an EEPROM. A real image is kept byte for byte; the description
 //! made from it says what the device behind it must do. Where an image is silent, as about the mapping of a device
@@ -227,7 +227,7 @@ fn general<'a>(description: &'a DeviceDescription, strings: &mut StringTable<'a>
     }
 }
 
-/// A nibble per port (facts 4.3).
+/// A nibble per port (protocol 4.3).
 fn physical_ports(ports: &[PortKind; 4]) -> u16 {
     ports.iter().rev().fold(0, |bits, port| {
         bits << 4

@@ -46,11 +46,13 @@ fn nothing_is_unfinished() {
     none(files::unfinished(&tree()));
 }
 
+// covers: tree
 #[test]
 fn crates_depend_on_each_other_as_the_map_says() {
     none(crates::forbidden_arrows(&tree()));
 }
 
+// covers: library
 #[test]
 fn an_application_on_interfaces_takes_in_few_crates() {
     for features in dependencies::FEATURE_SETS {
@@ -66,11 +68,13 @@ fn an_application_on_interfaces_takes_in_few_crates() {
     }
 }
 
+// covers: library
 #[test]
 fn examples_and_the_program_use_the_library_alone() {
     none(dependencies::beside_the_library(&tree()));
 }
 
+// covers: tree
 #[test]
 fn modules_of_the_engine_name_each_other_as_the_map_says() {
     none(modules::forbidden_arrows_in_engine(&tree()));
@@ -81,11 +85,13 @@ fn unsafe_code_is_where_it_may_be() {
     none(safety::misplaced(&tree()));
 }
 
+// covers: tree
 #[test]
 fn pure_crates_forbid_unsafe_code() {
     none(safety::not_forbidden(&tree()));
 }
 
+// covers: tree
 #[test]
 fn every_feature_has_a_test() {
     none(features::rows_without_test(&tree()));

@@ -33,12 +33,12 @@ newtype!(
     LogicalAddress(u32), "{:#010x}"
 );
 newtype!(
-    /// Working counter of a datagram (facts 1.4).
+    /// Working counter of a datagram (protocol 1.4).
     Wkc(u16), "{}"
 );
 
 impl Position {
-    /// The ADP value with which a datagram must be sent to meet zero at this position (facts 1.4: every
+    /// The ADP value with which a datagram must be sent to meet zero at this position (protocol 1.4: every
     /// processing unit on the way adds one).
     pub const fn auto_increment(self) -> u16 {
         0u16.wrapping_sub(self.0)
@@ -46,7 +46,7 @@ impl Position {
 }
 
 impl Wkc {
-    /// Sum of the working counters of the two copies of a datagram (facts CR-05), wrapping as on the wire.
+    /// Sum of the working counters of the two copies of a datagram (protocol CR-05), wrapping as on the wire.
     #[must_use]
     pub const fn plus(self, other: Wkc) -> Wkc {
         Wkc(self.0.wrapping_add(other.0))

@@ -1,5 +1,5 @@
 //! The EtherCAT state machine as registers show it: AL control, AL status, AL status codes, allowed transitions
-//! (facts 3.4, 5.1, 5.3, 5.5).
+//! (protocol 3.4, 5.1, 5.3, 5.5).
 
 use core::fmt;
 
@@ -52,7 +52,7 @@ impl fmt::Display for AlState {
     }
 }
 
-/// Whether a SubDevice that is in `from` may be asked for `to` (facts 5.1). Asking for the present state is allowed.
+/// Whether a SubDevice that is in `from` may be asked for `to` (protocol 5.1). Asking for the present state is allowed.
 pub const fn transition_allowed(from: AlState, to: AlState) -> bool {
     use AlState::{Boot, Init, Op, PreOp, SafeOp};
     match from {
@@ -221,7 +221,7 @@ macro_rules! al_status_codes {
                 pub const $name: AlStatusCode = AlStatusCode($code);
             )*
 
-            /// The codes that have a name, in ascending order (facts 5.5).
+            /// The codes that have a name, in ascending order (protocol 5.5).
             pub const ALL: &'static [AlStatusCode] = &[$(AlStatusCode::$name),*];
 
             /// What the code means; `None` where the standard has no name for it (see

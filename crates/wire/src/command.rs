@@ -1,4 +1,4 @@
-//! The commands of EtherCAT datagrams (facts 1.4).
+//! The commands of EtherCAT datagrams (protocol 1.4).
 
 use core::fmt;
 
@@ -180,6 +180,7 @@ impl fmt::Display for Command {
 mod tests {
     use super::*;
 
+    // covers: codec-frames
     #[test]
     fn every_code_round_trips() {
         for code in 0..=255 {

@@ -1,4 +1,4 @@
-//! One EtherCAT datagram: ten bytes of header, data, two bytes of working counter (facts 1.2).
+//! One EtherCAT datagram: ten bytes of header, data, two bytes of working counter (protocol 1.2).
 
 use crate::address::{LogicalAddress, Position, RegisterAddress, StationAddress, Wkc};
 use crate::command::Command;
@@ -9,13 +9,13 @@ pub const HEADER_LEN: usize = 10;
 pub const WKC_LEN: usize = 2;
 /// Bytes of a datagram beside its data.
 pub const OVERHEAD: usize = HEADER_LEN + WKC_LEN;
-/// Largest data of a datagram that is alone in its frame (facts 1.3; not 1484).
+/// Largest data of a datagram that is alone in its frame (protocol 1.3; not 1484).
 pub const MAX_DATA: usize = 1486;
 
 const LENGTH_MASK: u16 = 0x07FF;
 const RESERVED_MASK: u16 = 0x3800;
 const RESERVED_SHIFT: u32 = 11;
-/// Bit "circulating" in the length field: the frame has passed a SubDevice with auto-closed port 0 (facts 2.4).
+/// Bit "circulating" in the length field: the frame has passed a SubDevice with auto-closed port 0 (protocol 2.4).
 pub const CIRCULATING: u16 = 0x4000;
 /// Bit "more datagrams follow" in the length field.
 pub const MORE: u16 = 0x8000;
@@ -65,11 +65,11 @@ pub struct Header {
     pub length: u16,
     /// Reserved bits 13:11 of the length field, 0..=7.
     pub reserved: u8,
-    /// C bit (facts 2.4).
+    /// C bit (protocol 2.4).
     pub circulating: bool,
     /// M bit.
     pub more: bool,
-    /// ECAT event request, OR of all SubDevices (facts 1.2).
+    /// ECAT event request, OR of all SubDevices (protocol 1.2).
     pub irq: u16,
 }
 
@@ -144,12 +144,13 @@ mod tests {
 
     #[test]
     fn a_read_of_al_status_has_these_bytes() {
-        // facts 1.2: FPRD 0x1001:0x0130, two bytes, more to follow.
+        // protocol 1.2: FPRD 0x1001:0x0130, two bytes, more to follow.
         let target = Target::Station(StationAddress(0x1001), RegisterAddress(0x0130));
         let header = Header { more: true, ..Header::new(Command::Fprd, 0x2A, target, 2) };
         assert_eq!(header.encode(), [0x04, 0x2A, 0x01, 0x10, 0x30, 0x01, 0x02, 0x80, 0x00, 0x00]);
     }
 
+    // covers: codec-frames
     #[test]
     fn one_vector_for_every_command() {
         let ado = RegisterAddress(0x0120);
@@ -180,6 +181,7 @@ mod tests {
     }
 
     proptest! {
+        // covers: codec-frames
         #[test]
         fn any_ten_bytes_round_trip(bytes in any::<[u8; HEADER_LEN]>()) {
             prop_assert_eq!(Header::decode(&bytes).encode(), bytes);

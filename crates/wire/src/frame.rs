@@ -1,4 +1,4 @@
-//! Ethernet frames that carry EtherCAT (facts 1.1, 1.3).
+//! Ethernet frames that carry EtherCAT (protocol 1.1, 1.3).
 //!
 //! [`Frame::parse`] reads one in a single pass and borrows it; [`FrameBuilder`] writes one into a buffer of the
 //! caller. Plain Ethernet II, one VLAN tag and UDP are known. The frame check sequence is not part of the bytes here.
@@ -40,7 +40,7 @@ pub struct MacAddress(pub [u8; 6]);
 impl MacAddress {
     /// ff:ff:ff:ff:ff:ff.
     pub const BROADCAST: MacAddress = MacAddress([0xFF; 6]);
-    /// 01:01:05:01:00:00, the group address of EtherCAT (facts 1.1, X21).
+    /// 01:01:05:01:00:00, the group address of EtherCAT (protocol 1.1, X21).
     pub const ETHERCAT_GROUP: MacAddress = MacAddress([0x01, 0x01, 0x05, 0x01, 0x00, 0x00]);
 }
 
@@ -79,7 +79,7 @@ impl Encapsulation {
     }
 }
 
-/// Type in the EtherCAT header (facts 1.1).
+/// Type in the EtherCAT header (protocol 1.1).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum EthercatType {
     /// Type 1: datagrams, the only one that controllers process.
@@ -177,7 +177,7 @@ pub struct Frame<'a> {
     pub ethercat_type: EthercatType,
     /// The EtherCAT part without header and padding.
     pub payload: &'a [u8],
-    /// What the EtherCAT header announces behind the last datagram. Controllers go by the datagrams (facts 1.1), and
+    /// What the EtherCAT header announces behind the last datagram. Controllers go by the datagrams (protocol 1.1), and
     /// some MainDevices count the padding in.
     pub surplus: &'a [u8],
     /// What follows the EtherCAT part, normally zeros.
@@ -353,7 +353,7 @@ impl<'a> Iterator for Datagrams<'a> {
     }
 }
 
-/// Length of the frame that carries datagrams with these data lengths in plain Ethernet, without FCS (facts 1.3).
+/// Length of the frame that carries datagrams with these data lengths in plain Ethernet, without FCS (protocol 1.3).
 pub fn frame_len(data_lengths: impl IntoIterator<Item = usize>) -> usize {
     let datagrams: usize = data_lengths.into_iter().map(|length| OVERHEAD + length).sum();
     (ETHERNET_HEADER_LEN + ETHERCAT_HEADER_LEN + datagrams).max(MIN_FRAME)

@@ -1,4 +1,4 @@
-//! Mailbox messages (facts 6, 10.1).
+//! Mailbox messages (protocol 6, 10.1).
 //!
 //! [`Header`] stands before every message, [`Message`] is header and payload together; [`ErrorReply`] is the payload of
 //! protocol 0. One module per protocol reads and writes the others: [`coe`] with [`sdo`], [`foe`], [`eoe`], [`soe`],

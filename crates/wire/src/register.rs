@@ -1,4 +1,4 @@
-//! The registers of a SubDevice controller (facts section 3).
+//! The registers of a SubDevice controller (protocol 3).
 //!
 //! * [`map`]: their addresses;
 //! * [`table()`]: size, access rights, reset value and groups of each;

@@ -1,4 +1,4 @@
-//! SubDevice information (SII): what the EEPROM of a SubDevice holds (facts 4).
+//! SubDevice information (SII): what the EEPROM of a SubDevice holds (protocol 4).
 //!
 //! [`Sii::parse`] takes a whole image and borrows it; each category also has its own decoder ([`General::decode`],
 //! [`Strings::new`], [`Pdos::new`], ...) for readers that fetch one category at a time. [`SiiWriter`] writes an image

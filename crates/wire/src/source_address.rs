@@ -1,4 +1,4 @@
-//! Ring and standby marks in the source MAC address (facts 9.7).
+//! Ring and standby marks in the source MAC address (protocol 9.7).
 //!
 //! In: the address of the MainDevice's main network interface and the marks of a frame; out: the source address to
 //! send with, and back. Which frame gets which id, and what is dropped, is the engine's matter.
@@ -10,7 +10,7 @@ use crate::frame::MacAddress;
 
 /// Bit of byte 0 that is set on frames sent on the redundant link; the same in both encodings.
 pub const REDUNDANT: u8 = 0x08;
-/// Bit of byte 0 that a controller with forwarding rule 1 sets in every EtherCAT frame it processes (facts 2.6).
+/// Bit of byte 0 that a controller with forwarding rule 1 sets in every EtherCAT frame it processes (protocol 2.6).
 pub const PROCESSED: u8 = 0x02;
 /// Bit of byte 0 in encoding A: a standby MainDevice has forwarded the frame on its main link.
 pub const FORWARDED_ON_MAIN: u8 = 0x04;
@@ -35,7 +35,7 @@ pub struct SourceMarks {
     pub forwarded_on_main: bool,
     /// Forwarded by a standby MainDevice on its redundant link (A only).
     pub forwarded_on_redundant: bool,
-    /// Processed by a controller with forwarding rule 1. A missing mark proves nothing (facts 2.6).
+    /// Processed by a controller with forwarding rule 1. A missing mark proves nothing (protocol 2.6).
     pub processed: bool,
 }
 
@@ -139,8 +139,9 @@ mod tests {
         assert_eq!(codec.decode(mac(source)), marks);
     }
 
+    // covers: 9.7.3, codec-frames
     #[test]
-    fn the_trace_of_facts_9_7_3_reads_as_its_text_says() {
+    fn the_trace_with_a_standby_reads_as_its_text_says() {
         let nic = [0x00, 0x00, 0x0E, 0x01, 0xBD, 0x9A];
         let plain = SourceMarks { frame_id: 0x76, ..SourceMarks::default() };
         let redundant = SourceMarks { redundant: true, ..plain };
@@ -161,15 +162,16 @@ mod tests {
 
     #[test]
     fn a_redundant_copy_that_was_forwarded_on_both_links_has_all_marks() {
-        // facts 9.7.4, CF-05.
+        // protocol 9.7.4, CF-05.
         let marks = A.decode(mac([0x8E, 0x10, 0x0E, 0x01, 0xBD, 0x9A]));
         assert!(marks.redundant && marks.processed && marks.forwarded_on_main && marks.forwarded_on_redundant);
         assert_eq!((marks.retry, marks.frame_id), (0, 0x10));
     }
 
+    // covers: codec-frames
     #[test]
     fn the_trace_of_encoding_b_counts_the_id_in_the_last_byte() {
-        // facts 9.7.1, trace of S001.
+        // protocol 9.7.1, trace of Cable Redundancy 4.2.
         let nic = [0x00, 0x0E, 0x0C, 0x61, 0x3D, 0x7C];
         for id in [1, 2] {
             let main = SourceMarks { frame_id: id, ..SourceMarks::default() };
@@ -204,6 +206,7 @@ mod tests {
     }
 
     proptest! {
+        // covers: codec-frames
         #[test]
         fn any_address_decodes_and_encodes_to_itself_except_for_reserved_bits(bytes in any::<[u8; 6]>()) {
             let source = mac(bytes);

@@ -1,10 +1,10 @@
 //! Time on the bus.
 
-/// Distributed-clocks system time: nanoseconds since 2000-01-01T00:00:00 (facts 3.12).
+/// Distributed-clocks system time: nanoseconds since 2000-01-01T00:00:00 (protocol 3.12).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct DcTime(pub u64);
 
-/// Seconds from the Unix epoch to the DC epoch (facts 3.12).
+/// Seconds from the Unix epoch to the DC epoch (protocol 3.12).
 pub const DC_EPOCH_UNIX_SECONDS: u64 = 946_684_800;
 
 impl DcTime {
@@ -32,7 +32,7 @@ impl DcTime {
 pub struct DcTime32(pub u32);
 
 impl DcTime32 {
-    /// `self - earlier` as a signed difference, right across a wrap as long as it is below 2^31 ns (facts 7.1).
+    /// `self - earlier` as a signed difference, right across a wrap as long as it is below 2^31 ns (protocol 7.1).
     pub const fn since(self, earlier: DcTime32) -> i32 {
         self.0.wrapping_sub(earlier.0) as i32
     }
@@ -42,13 +42,15 @@ impl DcTime32 {
 mod tests {
     use super::*;
 
+    // covers: codec-frames
     #[test]
     fn differences_survive_the_wrap_of_a_32_bit_clock() {
-        // facts 7.1, wrap test: S2 port 0 at 0xFFFFF800, port 1 at 0x00000408: 3080 ns apart.
+        // protocol 7.1, wrap test: S2 port 0 at 0xFFFFF800, port 1 at 0x00000408: 3080 ns apart.
         assert_eq!(DcTime32(0x0000_0408).since(DcTime32(0xFFFF_F800)), 3080);
         assert_eq!(DcTime32(0x0000_020C).since(DcTime32(0xFFFF_FF00)), 780);
     }
 
+    // covers: codec-frames
     #[test]
     fn unix_time_converts_both_ways() {
         assert_eq!(DcTime::from_unix_ns(946_684_800_000_000_001), Some(DcTime(1)));

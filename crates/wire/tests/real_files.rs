@@ -27,6 +27,7 @@ fn files(directory: &str, extension: &str) -> Option<BTreeMap<String, PathBuf>> 
     Some(wanted.map(|path| (path.file_stem().unwrap().to_string_lossy().into_owned(), path)).collect())
 }
 
+// covers: codec-frames
 #[test]
 fn every_sii_image_parses_or_is_refused_with_a_reason() {
     let Some(files) = files("sii", "bin") else { return };
@@ -139,6 +140,7 @@ struct Counts {
     other_mail: usize,
 }
 
+// covers: codec-frames
 #[test]
 fn every_captured_ethercat_frame_is_encoded_as_it_was_decoded() {
     let Some(files) = files("pcap", "pcapng") else { return };

@@ -1,7 +1,7 @@
 //! The other end of a round trip: frames go back as one SubDevice with outputs and inputs would send them.
 //!
-//! Every datagram's working counter grows by what its command makes one such SubDevice add (facts 1.4), and the source
-//! address gets the bit that controllers set (facts 2.6). The data stays as it came.
+//! Every datagram's working counter grows by what its command makes one such SubDevice add (protocol 1.4), and the
+//! source address gets the bit that controllers set (protocol 2.6). The data stays as it came.
 
 use clap::Args;
 use ringcat::wire::command::Command;
@@ -100,6 +100,7 @@ mod tests {
     use ringcat::wire::frame::{Frame, FrameBuilder, MacAddress};
     use ringcat::wire::register::map;
 
+    // covers: bench
     #[test]
     fn every_datagram_gets_what_one_subdevice_adds_and_the_source_its_mark() {
         let mut frame = vec![0; 1514];

@@ -170,6 +170,7 @@ fn wait_until(
 mod tests {
     use super::*;
 
+    // covers: bench
     #[test]
     fn what_a_stall_has_skipped_is_counted_apart() {
         let us = Duration::from_micros;

@@ -1,4 +1,4 @@
-//! The option `--sync`: who gets which SYNC signals (facts 4.6, 7.3).
+//! The option `--sync`: who gets which SYNC signals (protocol 4.6, 7.3).
 
 use std::time::Duration;
 
@@ -168,8 +168,9 @@ mod tests {
         choose(&options?, found, CYCLE)
     }
 
+    // covers: 4.6, dc-tools
     #[test]
-    fn signals_are_given_by_position_or_taken_from_the_eeprom_facts_4_6() {
+    fn signals_are_given_by_position_or_taken_from_the_eeprom() {
         let found = [info(false, &[]), info(true, &[0x0000, 0x0320, 0x0730]), info(true, &[])];
         let words = |chosen: &[Option<SyncSignals>]| -> Vec<Option<u16>> {
             chosen.iter().map(|signals| signals.map(|signals| signals.assign_activate)).collect()
@@ -185,6 +186,7 @@ mod tests {
         assert_eq!(choice(&[], &found), Ok(vec![None; 3]));
     }
 
+    // covers: dc-tools
     #[test]
     fn signals_that_make_no_sense_are_refused_with_what_would() {
         let found = [info(false, &[]), info(true, &[0x0300]), info(true, &[])];

@@ -216,6 +216,7 @@ mod tests {
         }
     }
 
+    // covers: dc-tools
     #[test]
     fn every_clock_has_a_line_and_any_difference_is_inside_the_picture() {
         let mut course = Course::default();
@@ -232,6 +233,7 @@ mod tests {
         assert!(plot(&course, &many).contains("3 more"));
     }
 
+    // covers: dc-tools
     #[test]
     fn times_have_lines_at_round_numbers() {
         let step = |seconds: f64| Scale { first: 0.3, last: 0.3 + seconds }.step();

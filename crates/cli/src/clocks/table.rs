@@ -133,6 +133,7 @@ mod tests {
         }
     }
 
+    // covers: dc-tools
     #[test]
     fn a_line_says_what_is_known_of_a_clock() {
         let signals = [Some(SyncSignals::sync0(1_000_000, 250_000))];
@@ -142,6 +143,7 @@ mod tests {
         assert_eq!(words, expected);
     }
 
+    // covers: dc-delays
     #[test]
     fn a_delay_that_is_not_known_is_none_and_an_estimate_is_marked() {
         let hidden = HiddenDelay { fork: Some(Position(2)), range_ns: Some((0, 2_100)), is_estimated: true };
@@ -161,6 +163,7 @@ mod tests {
         assert_eq!(words(one(false)), (Some("-".to_owned()), None, json(false)));
     }
 
+    // covers: dc-tools
     #[test]
     fn json_has_the_same_figures() {
         let phase_errors = Histogram::default();

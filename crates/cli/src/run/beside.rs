@@ -115,6 +115,7 @@ impl Beside {
 mod tests {
     use super::*;
 
+    // covers: gateway
     #[test]
     fn an_address_for_the_gateway_may_leave_out_the_port() {
         assert_eq!(address("127.0.0.1"), Ok(SocketAddr::from(([127, 0, 0, 1], 34_980))));

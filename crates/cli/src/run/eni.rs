@@ -297,6 +297,7 @@ mod tests {
         EniNetwork { file, split_lrw: false, set: strings(set), watch: strings(watch) }
     }
 
+    // covers: eni-run
     #[test]
     fn variables_are_set_and_told_and_what_cannot_be_is_refused_with_its_name() {
         let segment = SimulatedSegment::new(network(&[], &[]).file.simulated(false).unwrap());
@@ -318,8 +319,9 @@ mod tests {
         assert!(network(&["Lamps.Channel 2=on"], &["Lamp"]).check_variables().is_err());
     }
 
+    // covers: eni-run
     #[test]
-    fn what_is_wrong_with_variables_shows_before_anything_is_sent_with_names_that_are_near() {
+    fn errors_of_variables_show_before_anything_is_sent_with_similar_names() {
         let refused = |set: &str| network(&[set], &[]).check_variables().unwrap_err().to_string();
         let unknown = refused("Lamp.Channel 2=1");
         let expected = "--set: the file has no variable \"Lamp.Channel 2\"; similar: \"Lamps.Channel 2\", ";
@@ -335,8 +337,9 @@ mod tests {
         assert!(refused("Lamps.Channel 1").contains("expected NAME=VALUE"));
     }
 
+    // covers: eni-run
     #[test]
-    fn variables_of_nobody_are_refused_and_one_name_for_input_and_output_means_the_right_one() {
+    fn variables_without_an_owner_are_refused_and_shared_names_mean_the_right_one() {
         let changed = |from: &str, to: &str, set: &[&str], watch: &[&str]| {
             let text = std::str::from_utf8(MACHINE).unwrap();
             assert!(text.contains(from));
@@ -360,8 +363,9 @@ mod tests {
         assert_eq!(watched.direction, Direction::Inputs);
     }
 
+    // covers: CR-16
     #[test]
-    fn an_lrw_that_is_refused_is_explained_with_subdevices_and_the_way_out_cr_16() {
+    fn an_lrw_that_is_refused_is_explained_with_subdevices_and_the_way_out() {
         let network = network(&[], &[]);
         let lrw = network.file.configuration.declaration.explicit_lrw[0].clone();
         let text = network.explain(Error::Activate(ActivateError::NamedLrwOnTwoLinks(lrw))).to_string();

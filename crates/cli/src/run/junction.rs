@@ -87,6 +87,7 @@ fn end(text: &str) -> Option<(Who, u8)> {
 mod tests {
     use super::*;
 
+    // covers: junctions
     #[test]
     fn the_option_names_a_mode_and_the_ports_of_closing_cables() {
         let strict = |list: &[(usize, u8, usize, u8)]| Junctions {

@@ -200,6 +200,7 @@ mod tests {
         assert_eq!(ring_lines(&status, &names)[0], expected);
     }
 
+    // covers: dc-tools
     #[test]
     fn clocks_have_a_line() {
         let clock = ClockStatus { position: 3, is_reference: true, ..ClockStatus::default() };
@@ -209,6 +210,7 @@ mod tests {
         assert_eq!(clock_line(&[], None, (7, false)), "clocks        0 of 0 locked");
     }
 
+    // covers: run
     #[test]
     fn of_many_subdevices_those_that_are_not_in_op_are_listed() {
         let mut states = vec![SubDeviceState::Settled(AlState::Op); 40];

@@ -128,8 +128,9 @@ mod tests {
         exchanged.reasons(&Names(vec!["coupler".to_owned()]))
     }
 
+    // covers: lost-frames
     #[test]
-    fn lost_frames_are_missing_late_or_damaged_and_are_not_told_again_as_incomplete_cycles() {
+    fn lost_frames_are_missing_late_or_damaged_and_no_incomplete_cycles_besides() {
         let counters =
             CyclicCounters { lost: 76, lost_late: 71, lost_damaged: 2, incomplete: 76, ..Default::default() };
         let mut exchanged = Exchanged { after: seen(counters, 3_704, 0), ..settled() };

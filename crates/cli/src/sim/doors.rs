@@ -147,6 +147,7 @@ mod tests {
         assert_eq!(echo(b""), "");
     }
 
+    // covers: sim-interfaces
     #[test]
     fn a_line_without_end_is_refused_and_takes_no_memory() {
         let endless = BufReader::new(io::repeat(0));

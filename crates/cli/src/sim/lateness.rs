@@ -70,6 +70,7 @@ impl Lateness {
 mod tests {
     use super::*;
 
+    // covers: sim-interfaces
     #[test]
     fn late_wake_ups_are_counted_and_told_once_a_second() {
         let mut lateness = Lateness::default();

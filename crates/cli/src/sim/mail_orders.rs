@@ -84,6 +84,7 @@ fn hexadecimal(text: &str) -> Result<u32, String> {
 mod tests {
     use super::*;
 
+    // covers: sim-interfaces
     #[test]
     fn each_order_about_mail_is_understood() {
         let ms = Duration::from_millis;
@@ -106,6 +107,7 @@ mod tests {
         }
     }
 
+    // covers: sim-interfaces
     #[test]
     fn an_order_about_mail_that_makes_no_sense_is_answered_with_what_would() {
         for (order, part) in [

@@ -233,6 +233,7 @@ mod tests {
         }
     }
 
+    // covers: sim-interfaces
     #[test]
     fn orders_name_devices_by_number_or_name_and_answers_say_what_was_done() {
         let mut plant = plant();
@@ -252,6 +253,7 @@ mod tests {
         assert_eq!(say(&mut plant, "quit"), "quit");
     }
 
+    // covers: sim-interfaces
     #[test]
     fn an_order_that_makes_no_sense_is_answered_with_what_would() {
         let mut plant = plant();
@@ -273,6 +275,7 @@ mod tests {
         }
     }
 
+    // covers: sim-interfaces
     #[test]
     fn a_host_cable_works_when_it_is_whole_and_its_interface_has_carrier() {
         let mut plant = plant();

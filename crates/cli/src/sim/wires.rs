@@ -156,6 +156,7 @@ impl Wires {
 mod tests {
     use super::*;
 
+    // covers: sim-interfaces
     #[test]
     fn virtual_time_keeps_what_it_has_gained_and_never_goes_back() {
         let mut clock = Clock { begin_ns: 1_000, lead_ns: 0 };

@@ -15,6 +15,7 @@ fn segment(name: &str) -> String {
     format!("{}/../sim/segments/{name}.toml", env!("CARGO_MANIFEST_DIR"))
 }
 
+// covers: demo
 #[test]
 fn the_demonstration_on_the_embedded_ring_holds() {
     let output = ringcat(&["demo", "--fast"]);
@@ -26,6 +27,7 @@ fn the_demonstration_on_the_embedded_ring_holds() {
     }
 }
 
+// covers: demo
 #[test]
 fn the_demonstration_holds_on_every_example_segment() {
     for name in ["demo", "tree", "junction-ring"] {
@@ -71,12 +73,14 @@ fn the_demonstration_says_that_nothing_was_compared_without_process_data() {
     assert!(!said.contains("comparisons") && !said.contains("FAILED"), "{said}");
 }
 
+// covers: demo
 #[test]
 fn two_runs_of_the_demonstration_print_the_same() {
     let run = || text(&ringcat(&["demo", "--fast"]).stdout);
     assert_eq!(run(), run());
 }
 
+// covers: demo
 #[test]
 fn a_wrong_segment_file_is_named_with_its_line() {
     let path: PathBuf = std::env::temp_dir().join(format!("ringcat-wrong-{}.toml", std::process::id()));
@@ -103,6 +107,7 @@ fn a_reader_that_goes_away_is_no_panic() {
     assert!(output.stderr.is_empty());
 }
 
+// covers: demo
 #[test]
 fn a_missing_segment_file_is_named() {
     let output = ringcat(&["demo", "--segment", "/nowhere/plant.toml"]);

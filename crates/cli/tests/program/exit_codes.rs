@@ -139,6 +139,7 @@ fn files() -> PathBuf {
     directory
 }
 
+// covers: verdict
 #[test]
 fn what_does_not_hold_is_said_last_and_none_of_it_exits_with_0() {
     let directory = files();
@@ -158,6 +159,7 @@ fn what_does_not_hold_is_said_last_and_none_of_it_exits_with_0() {
     assert!(wrong.is_empty(), "{} of {}:\n{}", wrong.len(), SITUATIONS.len(), wrong.join("\n"));
 }
 
+// covers: verdict
 #[test]
 fn what_holds_is_said_last_too() {
     let examples = format!("{}/../ringcat/examples", env!("CARGO_MANIFEST_DIR"));

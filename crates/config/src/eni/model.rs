@@ -1,4 +1,4 @@
-//! What an ENI says, as it says it (facts 8.1). Numbers are checked to be numbers, nothing is interpreted yet.
+//! What an ENI says, as it says it (protocol 8.1). Numbers are checked to be numbers, nothing is interpreted yet.
 
 mod command;
 mod cyclic;

@@ -1,5 +1,5 @@
 //! From XML to the model: the root, the MainDevice and the SubDevices; commands, cycles and images are in modules of
-//! their own. The order of elements does not matter (facts 8.2).
+//! their own. The order of elements does not matter (protocol 8.2).
 
 mod commands;
 mod cyclic;

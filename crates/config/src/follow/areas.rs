@@ -1,5 +1,5 @@
 //! Which bits of a SyncManager are which logical bits: FMMUs as the commands leave them, cut at the borders of
-//! SyncManagers (facts 3.10).
+//! SyncManagers (protocol 3.10).
 
 use ringcat_engine::config::DeclaredSyncManager;
 use ringcat_engine::info::Direction;

@@ -1,5 +1,5 @@
 //! PDO assignment and mapping of a file without commands for SyncManagers: the objects that its CoE commands write say
-//! how long process data is (facts 6.3: 0x1C10 + n, 0x1600 to 0x17FF, 0x1A00 to 0x1BFF).
+//! how long process data is (protocol 6.3: 0x1C10 + n, 0x1600 to 0x17FF, 0x1A00 to 0x1BFF).
 
 use std::collections::BTreeMap;
 

@@ -1,4 +1,4 @@
-//! Distributed clocks: SYNC signals from the registers that the commands leave (facts 7.3), the reference from the
+//! Distributed clocks: SYNC signals from the registers that the commands leave (protocol 7.3), the reference from the
 //! cyclic commands. Delays, offsets and start times are measured and computed by RingCAT.
 
 use ringcat_engine::config::{ClockConfig, ReferenceClock, SubDeviceConfig, SyncSignals};

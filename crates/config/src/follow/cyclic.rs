@@ -1,4 +1,4 @@
-//! Cyclic tasks: domains, where commands put process data into the image, LRW by name, clocks (facts 8.2).
+//! Cyclic tasks: domains, where commands put process data into the image, LRW by name, clocks (protocol 8.2).
 
 use std::ops::Range;
 use std::time::Duration;
@@ -170,7 +170,7 @@ fn cover(
         }
         if reads || writes {
             met.push(subdevice);
-            // Facts 1.4: LRW counts 1 for what is read and 2 for what is written.
+            // Protocol 1.4: LRW counts 1 for what is read and 2 for what is written.
             let write = if code == Command::Lrw { 2 } else { 1 };
             count += u32::from(reads) + if writes { write } else { 0 };
         }

@@ -1,4 +1,4 @@
-//! Hot connect groups: the head is found by alias or identification, its members stand behind it (facts 8.2).
+//! Hot connect groups: the head is found by alias or identification, its members stand behind it (protocol 8.2).
 
 use ringcat_engine::config::{ConfigAddress, SubDeviceConfig};
 

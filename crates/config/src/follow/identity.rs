@@ -1,5 +1,5 @@
 //! Who a SubDevice must be: reads of the EEPROM through registers 0x0502 to 0x050B whose answers are compared, and the
-//! identification of hot connect groups (facts 8.2).
+//! identification of hot connect groups (protocol 8.2).
 
 use ringcat_engine::config::Expected;
 use ringcat_wire::register::map;
@@ -26,7 +26,7 @@ pub(super) enum Mark {
     },
     /// The alias, from its register.
     Alias(u16),
-    /// The identification in AL status code (facts 5.3).
+    /// The identification in AL status code (protocol 5.3).
     Identification(u16),
 }
 

@@ -1,4 +1,4 @@
-//! Commands through mailboxes: CoE, SoE and EoE become start-up commands (facts 6, 8.1).
+//! Commands through mailboxes: CoE, SoE and EoE become start-up commands (protocol 6, 8.1).
 
 use std::borrow::Cow;
 use std::net::Ipv4Addr;
@@ -17,7 +17,7 @@ use crate::eni::{CoeCommand, Eni, EniError, EoeCommand, Place, SoeCommand, Trans
 /// SoE: the value of an IDN in the elements, and the code of a write.
 const SOE_VALUE: u8 = 0x40;
 const SOE_WRITE: u8 = 3;
-/// Drives of a SubDevice (facts 6.6).
+/// Drives of a SubDevice (protocol 6.6).
 const SOE_DRIVES: u8 = 8;
 /// EoE type of a command that sets addresses.
 const EOE_SET_IP: u8 = 2;
@@ -112,8 +112,8 @@ fn idn(command: &SoeCommand) -> Result<StartupAction, String> {
     Ok(StartupAction::Idn(IdnWrite { drive: command.drive, idn: Idn(command.idn), data: command.data.clone() }))
 }
 
-/// The message of a command that sets addresses. Some tools write what follows the EoE header (facts 6.5) and leave the
-/// header to the MainDevice: flags and fields that are as long as they say.
+/// The message of a command that sets addresses. Some tools write what follows the EoE header (protocol 6.5) and leave
+/// the header to the MainDevice: flags and fields that are as long as they say.
 fn with_header(data: &[u8]) -> Cow<'_, [u8]> {
     /// Type 2, port 0, no result.
     const HEADER: [u8; 4] = [EOE_SET_IP, 0, 0, 0];

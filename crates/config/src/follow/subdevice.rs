@@ -124,7 +124,7 @@ enum Class {
     Refused(&'static str),
 }
 
-/// By the register that is addressed (facts 3).
+/// By the register that is addressed (protocol 3).
 fn class(command: &EcatCommand) -> Class {
     let Target::Register { ado, .. } = command.datagram.target else { return Class::Ours };
     let zero = command.datagram.data.iter().all(|byte| *byte == 0);

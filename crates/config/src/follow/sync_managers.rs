@@ -1,4 +1,4 @@
-//! SyncManagers as the commands leave them (facts 3.11, 8.1): roles, mailboxes, PDOs of their areas.
+//! SyncManagers as the commands leave them (protocol 3.11, 8.1): roles, mailboxes, PDOs of their areas.
 
 use ringcat_engine::config::{DeclaredSyncManager, PdoEntry, PdoMapping, SyncManagerRole};
 use ringcat_wire::register::{
@@ -11,7 +11,7 @@ use super::notices::Notices;
 use super::registers::Registers;
 use crate::eni::{Eni, EniError, MailboxBuffer, Place, ProcessData, SyncManagerKind, SyncManagerSettings, Transition};
 
-/// Control bytes of mailboxes where no command says them (facts 3.11): one buffer, event to the PDI.
+/// Control bytes of mailboxes where no command says them (protocol 3.11): one buffer, event to the PDI.
 const MAILBOX_OUT: u8 = 0x26;
 const MAILBOX_IN: u8 = 0x22;
 /// Bits that one entry of the engine has at most; longer ones are cut.

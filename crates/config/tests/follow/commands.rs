@@ -26,8 +26,9 @@ fn registers(config: &SubDeviceConfig) -> Vec<(Transition, RegisterCommand)> {
     config.startup.iter().filter_map(|command| Some((command.transition, register(&command.action)?))).collect()
 }
 
+// covers: 8.2, eni-commands
 #[test]
-fn commands_that_every_main_device_sends_become_part_of_the_declaration_facts_8_2() {
+fn commands_that_every_main_device_sends_become_part_of_the_declaration() {
     let configuration = configured(SMALL);
     let drive = drive(&configuration);
     assert_eq!(drive.watchdog_divider, Some(0x09C2));
@@ -39,8 +40,9 @@ fn commands_that_every_main_device_sends_become_part_of_the_declaration_facts_8_
     assert_eq!(configuration.declaration.subdevices[0].declared, Some(Vec::new()));
 }
 
+// covers: 8.2, eni-commands
 #[test]
-fn only_what_the_commands_compare_is_expected_facts_8_2() {
+fn only_what_the_commands_compare_is_expected() {
     let configuration = configured(SMALL);
     let coupler = configuration.declaration.subdevices[0].expected;
     assert_eq!((coupler.vendor_id, coupler.product_code, coupler.revision), (Some(2), None, None));
@@ -48,6 +50,7 @@ fn only_what_the_commands_compare_is_expected_facts_8_2() {
     assert_eq!(terminal, ringcat_engine::config::Expected::default(), "nothing is compared, nothing is expected");
 }
 
+// covers: eni-commands
 #[test]
 fn a_single_word_of_the_revision_is_compared_as_the_file_does() {
     let lookup = ("<Data>000108000000</Data>", "<Data>00010c000000</Data>");
@@ -66,8 +69,9 @@ fn a_single_word_of_the_revision_is_compared_as_the_file_does() {
     assert!(registers(&whole.declaration.subdevices[0]).is_empty());
 }
 
+// covers: 3.11, eni-commands
 #[test]
-fn sync_managers_are_what_the_commands_leave_in_how_many_pieces_ever_facts_3_11() {
+fn sync_managers_are_what_the_commands_leave_in_how_many_pieces_ever() {
     let drive = drive(&configured(SMALL));
     let declared = drive.declared.expect("the file declares them");
     let found: Vec<_> = declared.iter().map(|sm| (sm.index, sm.role, sm.register.start, sm.register.length)).collect();
@@ -92,6 +96,7 @@ fn sync_managers_are_what_the_commands_leave_in_how_many_pieces_ever_facts_3_11(
     assert_eq!((back.register.start, back.register.length, back.register.control.bits()), (4352, 256, 0x22));
 }
 
+// covers: eni-commands
 #[test]
 fn a_sync_manager_that_is_switched_on_at_so_is_for_op_only() {
     let op_only = |configuration: &ringcat_config::Configuration, subdevice: usize| {
@@ -108,6 +113,7 @@ fn a_sync_manager_that_is_switched_on_at_so_is_for_op_only() {
     assert!(has_notice(&changed, &["SyncManager 0 at SO", "SAFEOP already"]));
 }
 
+// covers: eni-commands
 #[test]
 fn long_entries_are_cut_and_pdos_that_do_not_fit_have_no_places() {
     let entry = "<Entry><Index>#x6064</Index><SubIndex>0</SubIndex><BitLen>32</BitLen></Entry>";
@@ -127,8 +133,9 @@ fn long_entries_are_cut_and_pdos_that_do_not_fit_have_no_places() {
     assert!(has_notice(&too_long, &["PDOs of SyncManager 3", "816 bits, more than its 48"]));
 }
 
+// covers: 7.3, eni-commands
 #[test]
-fn sync_signals_come_from_the_registers_and_the_shift_from_the_element_facts_7_3() {
+fn sync_signals_come_from_the_registers_and_the_shift_from_the_element() {
     let configuration = configured(SMALL);
     let expected = SyncSignals {
         assign_activate: 0x0700,
@@ -147,7 +154,7 @@ fn sync_signals_come_from_the_registers_and_the_shift_from_the_element_facts_7_3
     assert!(drive(&changed(&[("<Data>0007</Data>", "<Data>0000</Data>")])).sync.is_none());
 }
 
-// covers: facts 8.1
+// covers: 8.1, eni-commands
 #[test]
 fn commands_through_the_mailbox_become_start_up_commands_in_document_order() {
     let drive = drive(&configured(SMALL));
@@ -176,8 +183,9 @@ fn commands_through_the_mailbox_become_start_up_commands_in_document_order() {
     assert_eq!(mail[1].comment.as_deref(), Some("assign"));
 }
 
+// covers: 8.2, eni-commands
 #[test]
-fn a_file_that_only_says_ccs_2_means_downloads_facts_8_2() {
+fn a_file_that_only_says_ccs_2_means_downloads() {
     let upload = "<Comment>look</Comment><Ccs>2</Ccs><Index>#x1018</Index><SubIndex>1</SubIndex><Data>9A000000</Data>";
     let text = SMALL.replace("<Ccs>1</Ccs>", "<Ccs>2</Ccs>").replace("<Comment>not this</Comment>", "<Ccs>2</Ccs>");
     assert!(text.contains(upload));
@@ -187,6 +195,7 @@ fn a_file_that_only_says_ccs_2_means_downloads_facts_8_2() {
     assert!(has_notice(&configuration, &["CoE/InitCmd/Ccs", "taken as downloads"]));
 }
 
+// covers: eni-commands
 #[test]
 fn other_registers_are_written_and_looked_at_as_the_file_says() {
     let configuration = configured(SMALL);
@@ -207,6 +216,7 @@ fn other_registers_are_written_and_looked_at_as_the_file_says() {
     assert!(has_notice(&configuration, &["own register", "not sent at OI"]));
 }
 
+// covers: eni-commands
 #[test]
 fn what_addresses_somebody_else_is_not_sent_and_said() {
     let position = changed(&[("<Adp>1004</Adp><Ado>3840</Ado>", "<Adp>1003</Adp><Ado>3840</Ado>")]);
@@ -217,6 +227,7 @@ fn what_addresses_somebody_else_is_not_sent_and_said() {
     assert!(has_notice(&mixed_up, &["own register", "APWR counts positions", "Cmd 4 and 5 address by PhysAddr"]));
 }
 
+// covers: eni-commands
 #[test]
 fn what_is_ours_is_not_in_the_notices_and_what_is_not_followed_is() {
     let configuration = configured(SMALL);
@@ -227,9 +238,10 @@ fn what_is_ours_is_not_in_the_notices_and_what_is_not_followed_is() {
     assert!(has_notice(&ports, &["own register", "ports and forwarding"]));
 }
 
-/// Facts 4.4, 8.2: outputs that a file switches on at SO must not act in SAFEOP.
+/// Protocol 4.4, 8.2: outputs that a file switches on at SO must not act in SAFEOP.
+// covers: sync-managers-declared
 #[test]
-fn a_sync_manager_that_is_switched_on_at_so_is_for_op_only_and_one_that_only_changes_there_is_noted() {
+fn a_sync_manager_switched_on_at_so_is_op_only_and_one_changed_there_is_noted() {
     let op_only = |configuration: &ringcat_config::Configuration, index: usize| -> Vec<bool> {
         let declared = configuration.declaration.subdevices[index].declared.iter().flatten();
         declared.map(|sync_manager| sync_manager.op_only).collect()
@@ -244,8 +256,9 @@ fn a_sync_manager_that_is_switched_on_at_so_is_for_op_only_and_one_that_only_cha
     assert!(has_notice(&twice, &["SyncManager 0 at SO", "SAFEOP already"]));
 }
 
+// covers: 6.5, eni-commands
 #[test]
-fn addresses_are_hexadecimal_have_points_or_are_the_message_itself_facts_6_5() {
+fn addresses_are_hexadecimal_have_points_or_are_the_message_itself() {
     let elements = "<Type>2</Type><MAC>020000000004</MAC><IP>c0a80104</IP><Subnet>ffffff00</Subnet>";
     let ip = |configuration: &ringcat_config::Configuration| {
         drive(configuration).startup.iter().find_map(|command| match &command.action {
@@ -271,8 +284,8 @@ fn addresses_are_hexadecimal_have_points_or_are_the_message_itself_facts_6_5() {
     );
 }
 
-/// Facts 8.2: PO is among the transitions; OP is reached through SAFEOP.
-// covers: facts 8.2
+/// Protocol 8.2: PO is among the transitions; OP is reached through SAFEOP.
+// covers: 8.2, eni-commands
 #[test]
 fn a_way_over_two_transitions_is_sent_at_the_one_that_is_listed_too_or_noted() {
     let own = "<Transition>PS</Transition><Transition>OP</Transition>";
@@ -289,6 +302,7 @@ fn a_way_over_two_transitions_is_sent_at_the_one_that_is_listed_too_or_noted() {
     assert!(has_notice(&alone, &["own register", "not sent at PO, OI:"]));
 }
 
+// covers: eni-commands
 #[test]
 fn a_command_that_is_disabled_is_not_sent_whatever_it_is() {
     let own = "<Comment>own register</Comment>";
@@ -299,7 +313,8 @@ fn a_command_that_is_disabled_is_not_sent_whatever_it_is() {
     assert_eq!(drive(&enabled).startup, drive(&configured(SMALL)).startup);
 }
 
-/// Facts 6.6: a write with several elements has more than the value in its data.
+/// Protocol 6.6: a write with several elements has more than the value in its data.
+// covers: eni-commands
 #[test]
 fn an_idn_is_written_where_the_command_has_its_value_and_nothing_else() {
     let value = "<Elements>64</Elements>";
@@ -312,9 +327,10 @@ fn an_idn_is_written_where_the_command_has_its_value_and_nothing_else() {
     assert!(has_notice(&several, &["SoE/InitCmd \"cycle time\"", "Elements 0x48", "only values (0x40)"]));
 }
 
-/// Facts 8.2: document order within a transition, mailbox commands and registers alike.
+/// Protocol 8.2: document order within a transition, mailbox commands and registers alike.
+// covers: 8.2, eni-commands
 #[test]
-fn registers_and_mailbox_commands_of_a_transition_are_in_document_order_facts_8_2() {
+fn registers_and_mailbox_commands_of_a_transition_are_in_document_order() {
     let at_ps = |configuration: &ringcat_config::Configuration| -> Vec<Option<String>> {
         let startup = drive(configuration).startup.into_iter();
         startup.filter(|command| command.transition == Transition::Ps).map(|command| command.comment).collect()

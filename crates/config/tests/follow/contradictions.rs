@@ -8,6 +8,7 @@ fn has(text: &str, parts: &[&str]) {
     }
 }
 
+// covers: eni-commands
 #[test]
 fn the_station_address_that_is_set_must_be_phys_addr() {
     let text = refused(&[("<Data>e903</Data>", "<Data>ea03</Data>")]);
@@ -28,6 +29,7 @@ fn a_sync_manager_must_have_the_direction_of_its_type() {
     has(&text, &["Slave 2 \"Left\"", "direction of SyncManager 0", "Write", "Read"]);
 }
 
+// covers: eni-commands
 #[test]
 fn mailbox_and_sync_manager_must_be_the_same_memory() {
     let text = refused(&[(
@@ -37,13 +39,15 @@ fn mailbox_and_sync_manager_must_be_the_same_memory() {
     has(&text, &["Slave 4 \"Drive\"", "Mailbox/Send", "64 bytes at 0x1000", "128 bytes at 0x1000"]);
 }
 
+// covers: 3.10, eni-commands
 #[test]
-fn an_fmmu_must_not_lead_beyond_its_sync_manager_facts_3_10() {
+fn an_fmmu_must_not_lead_beyond_its_sync_manager() {
     let text =
         refused(&[("<Data>00000010060000070011000201000000</Data>", "<Data>00000010080000070011000201000000</Data>")]);
     has(&text, &["FMMU 0", "SyncManager 2 (6 bytes)", "64 bits"]);
 }
 
+// covers: eni-commands
 #[test]
 fn send_must_have_as_many_bits_as_the_fmmus_map() {
     let text = refused(&[(
@@ -53,6 +57,7 @@ fn send_must_have_as_many_bits_as_the_fmmus_map() {
     has(&text, &["ProcessData/Send", "expected 48 bits", "got 40 bits"]);
 }
 
+// covers: eni-commands
 #[test]
 fn two_subdevices_cannot_have_the_same_bits_address_or_position() {
     let bits = ("<BitStart>20</BitStart>", "<BitStart>18</BitStart>");
@@ -71,6 +76,7 @@ fn al_control_must_ask_for_the_state_of_its_transition() {
     has(&refused(&[("<Data>1200</Data>", "<Data>1800</Data>")]), &["AL control at the transition IP", "got 0x08"]);
 }
 
+// covers: eni-cabling
 #[test]
 fn previous_port_must_exist_and_lead_to_the_first_one() {
     let to = "<Port>C</Port><PhysAddr>1001</PhysAddr>";
@@ -78,6 +84,7 @@ fn previous_port_must_exist_and_lead_to_the_first_one() {
     has(&refused(&[(to, "<Port>C</Port><PhysAddr>1004</PhysAddr>")]), &["PreviousPort", "circle"]);
 }
 
+// covers: eni-read
 #[test]
 fn an_image_that_is_too_small_or_too_large_is_refused() {
     has(

@@ -19,13 +19,15 @@ const AREAS: [ImageArea; 4] = [
     area(3, Direction::Inputs, 3, 0, 48),
 ];
 
+// covers: 8.1, eni-image
 #[test]
-fn packed_bits_have_their_places_in_the_image_facts_8_1() {
+fn packed_bits_have_their_places_in_the_image() {
     let image = configured(SMALL).image;
     assert_eq!((image.inputs_len, image.outputs_len), (8, 10));
     assert_eq!(image.areas, AREAS);
 }
 
+// covers: eni-image
 #[test]
 fn offsets_may_count_from_the_header_of_a_datagram_as_twincat_writes_them() {
     // As if each datagram with its header lay in the image: ten bytes further on.
@@ -42,6 +44,7 @@ fn offsets_may_count_from_the_header_of_a_datagram_as_twincat_writes_them() {
     assert!(!has_notice(&moved, &["the offsets of the cyclic commands lead elsewhere"]));
 }
 
+// covers: eni-image
 #[test]
 fn where_offsets_lead_elsewhere_send_and_recv_count() {
     let elsewhere = changed(&[("<InputOffs>2</InputOffs><OutputOffs>2</OutputOffs>", "<OutputOffs>7</OutputOffs>")]);
@@ -49,6 +52,7 @@ fn where_offsets_lead_elsewhere_send_and_recv_count() {
     assert!(has_notice(&elsewhere, &["ProcessData/Send", "the offsets of the cyclic commands lead elsewhere"]));
 }
 
+// covers: eni-image
 #[test]
 fn process_data_in_several_ranges_fills_them_in_order() {
     let offsets = ("<InputOffs>0</InputOffs><OutputOffs>4</OutputOffs>", "");
@@ -60,8 +64,9 @@ fn process_data_in_several_ranges_fills_them_in_order() {
     assert_eq!(drive, [second, area(3, Direction::Outputs, 2, 64, 8), AREAS[3]]);
 }
 
+// covers: 8.2, eni-image
 #[test]
-fn copies_are_cut_at_the_borders_of_process_data_facts_8_2() {
+fn copies_are_cut_at_the_borders_of_process_data() {
     let copies = configured(SMALL).image.copies;
     let first = ImageCopy { source_area: 3, source_bit: 8, target_area: 0, target_bit: 2, bits: 2 };
     let second = ImageCopy { source_area: 3, source_bit: 10, target_area: 1, target_bit: 0, bits: 2 };
@@ -71,6 +76,7 @@ fn copies_are_cut_at_the_borders_of_process_data_facts_8_2() {
     assert!(has_notice(&beyond, &["CopyInfo", "nobody's process data"]));
 }
 
+// covers: eni-image
 #[test]
 fn variables_know_whose_they_are() {
     let variables = configured(SMALL).image.variables;
@@ -86,8 +92,9 @@ fn variables_know_whose_they_are() {
     assert_eq!(owners, expected);
 }
 
+// covers: CR-16, eni-image
 #[test]
-fn lrw_is_named_with_the_subdevices_that_it_meets_cr_16() {
+fn lrw_is_named_with_the_subdevices_that_it_meets() {
     let declaration = configured(SMALL).declaration;
     let [lrw] = &declaration.explicit_lrw[..] else { panic!("{:?}", declaration.explicit_lrw) };
     assert!(lrw.name.starts_with("frame 1, command 4 \"drive\" (line "), "{}", lrw.name);
@@ -100,6 +107,7 @@ fn a_working_counter_that_the_fmmus_do_not_give_is_said() {
     assert!(has_notice(&wrong, &["command 4 \"drive\"", "Cnt is 4", "give 3"]));
 }
 
+// covers: eni-image
 #[test]
 fn tasks_become_domains_each_with_its_cycle_and_members() {
     let one = configured(SMALL);
@@ -118,6 +126,7 @@ fn tasks_become_domains_each_with_its_cycle_and_members() {
     assert!(two.declaration.explicit_lrw[0].name.starts_with("task 2, frame 1, command 1"));
 }
 
+// covers: eni-image
 #[test]
 fn sync_managers_of_different_tasks_are_members_of_both() {
     let border = "</Frame></Cyclic><Cyclic><CycleTime>500</CycleTime><Frame>";
@@ -133,6 +142,7 @@ fn sync_managers_of_different_tasks_are_members_of_both() {
     assert!(configuration.declaration.explicit_lrw.is_empty());
 }
 
+// covers: eni-commands
 #[test]
 fn what_no_command_covers_is_not_exchanged_and_said() {
     let nothing = changed(&[("<Addr>16777216</Addr>", "<Addr>33554432</Addr>")]);
@@ -144,7 +154,8 @@ fn what_no_command_covers_is_not_exchanged_and_said() {
     assert_eq!(variable.subdevice, None);
 }
 
-/// Facts 8.2: a command is active in the states that it lists.
+/// Protocol 8.2: a command is active in the states that it lists.
+// covers: eni-image
 #[test]
 fn process_data_that_the_file_exchanges_in_other_states_is_told() {
     let states = "<State>SAFEOP</State><State>OP</State><Comment>drive</Comment>";

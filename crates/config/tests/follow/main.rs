@@ -1,5 +1,5 @@
-//! What follows from an ENI (facts 8): one own file, `files/small.xml`, and what becomes of it when something in it is
-//! different.
+//! What follows from an ENI (protocol 8): one own file, `files/small.xml`, and what becomes of it when something in it
+//! is different.
 
 mod commands;
 mod contradictions;

@@ -4,8 +4,9 @@ use ringcat_config::eni::{self, EniError, MAX_DEPTH, Problem, Requires, Transiti
 
 use crate::{SMALL, configured, has_notice, model, refusal, refused, with};
 
+// covers: 8.2, eni-read
 #[test]
-fn the_order_of_elements_and_the_case_of_digits_do_not_matter_facts_8_2() {
+fn the_order_of_elements_and_the_case_of_digits_do_not_matter() {
     let info = "<Name>Small</Name>\n        <Destination>ffffffffffff</Destination>";
     let turned = "<Destination>FF-FF-ff-ff-ff-ff</Destination>\n        <Name>Small</Name>";
     let (plain, other) = (model(SMALL), model(&with(&[(info, turned)])));
@@ -24,8 +25,9 @@ fn the_order_of_elements_and_the_case_of_digits_do_not_matter_facts_8_2() {
     assert_eq!(plain.version.as_deref(), Some("1.3"));
 }
 
+// covers: 8.2, eni-read
 #[test]
-fn a_command_keeps_all_that_the_file_says_facts_8_2() {
+fn a_command_keeps_all_that_the_file_says() {
     let text = with(&[("<Comment>read count</Comment>", "<Comment>read count</Comment><Requires>cycle</Requires>")]);
     let command = &model(&text).main_device.init_commands[0];
     assert_eq!(command.requires, Some(Requires::Cycle));
@@ -34,6 +36,7 @@ fn a_command_keeps_all_that_the_file_says_facts_8_2() {
     assert_eq!(model(SMALL).main_device.init_commands[1].retries, 3);
 }
 
+// covers: eni-read
 #[test]
 fn files_come_in_utf_8_utf_16_and_one_byte_encodings_with_and_without_a_mark() {
     let text = SMALL.replace("<Name>Left</Name>", "<Name>Türe</Name>");
@@ -56,6 +59,7 @@ fn files_come_in_utf_8_utf_16_and_one_byte_encodings_with_and_without_a_mark() {
     assert_eq!(name(text.replace("UTF-8", "utf-16").as_bytes()), "Türe");
 }
 
+// covers: eni-read
 #[test]
 fn bytes_that_are_not_in_the_encoding_are_refused_with_their_line() {
     let mut bytes = SMALL.as_bytes().to_vec();
@@ -68,6 +72,7 @@ fn bytes_that_are_not_in_the_encoding_are_refused_with_their_line() {
     assert!(refusal(&SMALL.replace("UTF-8", "klingon")).contains("\"klingon\" is not known"));
 }
 
+// covers: eni-read
 #[test]
 fn other_files_are_called_by_their_name() {
     let said = |text: &str, what: &str| {
@@ -87,6 +92,7 @@ fn other_files_are_called_by_their_name() {
     said("\u{7f}ELF", "no XML file");
 }
 
+// covers: eni-read
 #[test]
 fn errors_name_line_column_element_expected_and_got() {
     let error = refused(&[("<BitStart>20</BitStart>", "<BitStart>twenty</BitStart>")]);
@@ -111,6 +117,7 @@ fn errors_name_line_column_element_expected_and_got() {
     assert!(broken.starts_with("line ") && broken.contains("no well-formed XML"), "{broken}");
 }
 
+// covers: eni-read
 #[test]
 fn unknown_elements_are_listed_and_do_no_harm() {
     let text = with(&[("<Name>Right</Name>", "<Name>Right</Name><Colour>red</Colour>")]);
@@ -124,6 +131,7 @@ fn unknown_elements_are_listed_and_do_no_harm() {
     assert_eq!((found.unknown.len(), found.more_unknown), (eni::MAX_UNKNOWN, 500 - eni::MAX_UNKNOWN));
 }
 
+// covers: eni-read
 #[test]
 fn what_is_too_much_is_refused_before_it_costs_anything() {
     let problem = |text: &str| match eni::read(text.as_bytes()) {
@@ -141,6 +149,7 @@ fn what_is_too_much_is_refused_before_it_costs_anything() {
 }
 
 /// What is short in a file must not become long in memory or time.
+// covers: eni-read
 #[test]
 fn repetitions_do_not_multiply() {
     let transitions = "<Transition>PS</Transition>".repeat(1000);
@@ -166,6 +175,7 @@ fn repetitions_do_not_multiply() {
     assert!(refusal(&many).contains("looks at cyclic commands"), "{}", refusal(&many));
 }
 
+// covers: eni-read
 #[test]
 fn lengths_that_add_up_to_too_much_are_refused_or_left_out() {
     let all = "<Send><BitStart>0</BitStart><BitLength>4294967295</BitLength></Send>".repeat(3);
@@ -191,6 +201,7 @@ fn lengths_that_add_up_to_too_much_are_refused_or_left_out() {
     assert_eq!(pdos[0].pdos[0].entries, None, "too long for a PDO: left to the SII");
 }
 
+// covers: eni-read
 #[test]
 fn a_file_that_was_cut_off_is_told_as_such_with_its_end() {
     let last = SMALL.rfind("</Config>").expect("it is there");
@@ -202,6 +213,7 @@ fn a_file_that_was_cut_off_is_told_as_such_with_its_end() {
     }
 }
 
+// covers: eni-read
 #[test]
 fn an_encrypted_file_is_called_so_with_the_tool_that_makes_such_files() {
     let mut state = 1_u64;
@@ -227,6 +239,7 @@ fn an_encrypted_file_is_called_so_with_the_tool_that_makes_such_files() {
     assert!(eni::read(text.as_bytes()).expect_err("it is no ENI").to_string().contains("this is no XML file"));
 }
 
+// covers: eni-read
 #[test]
 fn names_and_comments_are_on_one_line() {
     let text = SMALL.replacen("</Name>", "\n\tleft</Name>", 3).replacen("</Comment>", "\r\nmore</Comment>", 9);

@@ -32,6 +32,7 @@ fn refusal(path: &Path) -> Problem {
     eni::read(&fs::read(path).unwrap()).expect_err("it is no ENI").problem
 }
 
+// covers: eni-read
 #[test]
 fn every_real_file_gives_a_configuration_or_says_what_it_is() {
     for path in files("eni") {
@@ -48,6 +49,7 @@ fn every_real_file_gives_a_configuration_or_says_what_it_is() {
 }
 
 /// Drives of an EC-Engineer file: in the order of the file, with LRW over all of them.
+// covers: eni-read
 #[test]
 fn drives_of_ec_engineer_have_sync_managers_clocks_and_one_lrw() {
     let counts = [("rocos_eni.xml", 1), ("rocos_bcr_eni.xml", 3), ("rocos_eni4.xml", 4), ("rocos_eni7.xml", 7)];
@@ -80,6 +82,7 @@ fn drives_of_ec_engineer_have_sync_managers_clocks_and_one_lrw() {
 }
 
 /// Terminals of a TwinCAT file, whose image is made of whole datagrams.
+// covers: eni-read
 #[test]
 fn terminals_of_twincat_lie_where_their_variables_are() {
     for path in files("eni").iter().filter(|path| path.to_string_lossy().contains("twincat")) {
@@ -97,6 +100,7 @@ fn terminals_of_twincat_lie_where_their_variables_are() {
     }
 }
 
+// covers: eni-read
 #[test]
 fn device_descriptions_and_eeprom_images_are_called_by_their_name() {
     // Large ones take long in an unoptimised build, and say the same.

@@ -10,8 +10,9 @@ fn addresses(configuration: &ringcat_config::Configuration) -> Vec<ConfigAddress
     configuration.declaration.subdevices.iter().map(|config| config.address).collect()
 }
 
+// covers: 8.1, eni-cabling
 #[test]
-fn positions_follow_auto_inc_addr_and_not_the_order_of_the_file_facts_8_1() {
+fn positions_follow_auto_inc_addr_and_not_the_order_of_the_file() {
     let swapped = changed(&[
         ("<AutoIncAddr>65535</AutoIncAddr>", "<AutoIncAddr>1</AutoIncAddr>"),
         ("<AutoIncAddr>65534</AutoIncAddr>", "<AutoIncAddr>65535</AutoIncAddr>"),
@@ -47,7 +48,7 @@ const GROUP: &str = "<HotConnect><GroupName>Gripper</GroupName><GroupMemberCnt>2
 /// Where the second SubDevice has its `PreviousPort`, which becomes a group's head.
 const HEAD: &str = "<PreviousPort Selected=\"1\"><Port>B</Port><PhysAddr>1001</PhysAddr></PreviousPort>";
 
-// covers: facts 8.2
+// covers: 8.2, eni-cabling
 #[test]
 fn a_hot_connect_group_is_found_by_its_alias_and_its_members_are_behind_it() {
     let configuration = changed(&[(HEAD, GROUP)]);
@@ -59,6 +60,7 @@ fn a_hot_connect_group_is_found_by_its_alias_and_its_members_are_behind_it() {
     assert_eq!(configuration.groups, ["Gripper"]);
 }
 
+// covers: eni-cabling
 #[test]
 fn a_group_may_be_identified_by_its_eeprom_or_its_switch() {
     let eeprom = "<IdentifyCmd><Cmd>2</Cmd><Adp>0</Adp><Ado>1282</Ado><Data>000104000000</Data></IdentifyCmd>\
@@ -80,8 +82,9 @@ fn a_group_that_cannot_be_found_or_is_not_complete_is_refused() {
     assert!(long.contains("expected 9, got 3"), "{long}");
 }
 
+// covers: 7, eni-image
 #[test]
-fn the_reference_is_whom_the_cycle_asks_for_the_time_facts_7() {
+fn the_reference_is_whom_the_cycle_asks_for_the_time() {
     let clocks = configured(SMALL).declaration.clocks.expect("the file uses clocks");
     assert_eq!((clocks.reference, clocks.bus_shift), (ReferenceClock::Declared(3), false));
     let bus_shift = "<Cmd><Cmd>5</Cmd><Adp>1004</Adp><Ado>2320</Ado><DataLength>4</DataLength></Cmd>";
@@ -95,6 +98,7 @@ fn the_reference_is_whom_the_cycle_asks_for_the_time_facts_7() {
     assert_eq!((clocks.reference, clocks.bus_shift), (ReferenceClock::Declared(0), true));
 }
 
+// covers: eni-commands
 #[test]
 fn a_file_without_commands_leaves_the_rest_to_the_sii_and_expects_what_info_says() {
     let text = "<EtherCATConfig><Config><Slave><Info><Name>A</Name><PhysAddr>1001</PhysAddr><VendorId>2</VendorId>\
@@ -113,7 +117,7 @@ fn a_file_without_commands_leaves_the_rest_to_the_sii_and_expects_what_info_says
 }
 
 /// As users write it who have only start-up lists (users' pain: a mapping that differs from the SII).
-// covers: facts 6.3
+// covers: 6.3, eni-commands
 #[test]
 fn a_file_with_nothing_but_coe_commands_says_with_them_how_long_process_data_is() {
     let command = |object: &str, sub_index: u8, complete: u8, data: &str| {

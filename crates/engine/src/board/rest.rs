@@ -23,6 +23,7 @@ impl Board {
 mod tests {
     use super::*;
 
+    // covers: dc-remeasure
     #[test]
     fn the_wire_is_at_rest_when_the_last_frame_is_home_on_each_link_that_is_not_silent() {
         let board = Board::new(0);

@@ -1,4 +1,4 @@
-//! What the exchange posts about its frames on the wire, so that a frame of the other half can be alone there (facts
+//! What the exchange posts about its frames on the wire, so that a frame of the other half can be alone there (protocol
 //! 7.1).
 //!
 //! Single writer: the exchange. It posts a departure before it hands the first frame to a link, the cycle when it has

@@ -1,5 +1,5 @@
-//! Which ports to close, one set after the other, so that what is behind forks without a clock can be measured (facts
-//! 7.1).
+//! Which ports to close, one set after the other, so that what is behind forks without a clock can be measured
+//! (protocol 7.1).
 //!
 //! A clock in front of such a fork sees what all of its branches take together. With all of them closed but one, it
 //! sees that one: the way to the fork, then the way into each branch. What follows from these sums is exact. In: the

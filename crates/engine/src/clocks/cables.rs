@@ -113,6 +113,7 @@ fn sorted(cables: &[Ends]) -> Vec<Ends> {
 mod tests {
     use super::*;
 
+    // covers: dc-remeasure
     #[test]
     fn a_cable_that_was_away_is_remembered_and_counts_as_measured_no_longer() {
         let (one, other) = ((StationAddress(7), 1), (StationAddress(3), 0));
@@ -128,6 +129,7 @@ mod tests {
         assert_eq!(cables.measured(&cable), Some(360));
     }
 
+    // covers: dc-remeasure
     #[test]
     fn what_follows_from_sums_is_known_and_a_sum_is_as_old_as_its_oldest_cable() {
         let cable = |number: u16| ((StationAddress(number), 0), (StationAddress(number + 1), 0));

@@ -1,4 +1,4 @@
-//! Propagation delays of any segment, from the times at which one frame came in at each port (facts 7.1).
+//! Propagation delays of any segment, from the times at which one frame came in at each port (protocol 7.1).
 //!
 //! The frame's way is followed port by port ([`Wiring::way`]). Between two arrivals at a SubDevice with a clock lies a
 //! branch: what its clock says the branch took, less what the SubDevices in the branch say that they took, is the time
@@ -83,8 +83,8 @@ pub struct Segment<'a> {
     pub passages: &'a [Passage],
 }
 
-/// What a frame takes through a SubDevice from port to port, with fraction, less what it takes through all (facts 7.1:
-/// there, tDiff is the difference of both).
+/// What a frame takes through a SubDevice from port to port, with fraction, less what it takes through all (protocol
+/// 7.1: there, tDiff is the difference of both).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Passage {
     /// Where its processing unit meets the frame.

@@ -1,4 +1,4 @@
-//! A cycle of the host follows the reference clock (master shift, facts 7.4).
+//! A cycle of the host follows the reference clock (master shift, protocol 7.4).
 //!
 //! In: how far the next cycle of the host's grid is from where the reference clock wants it. Out: by how much to move
 //! it. The reference clock is read with every cyclic frame, and the host knows when that was sent, so neither wake-ups
@@ -92,6 +92,7 @@ mod tests {
         (follower, worst)
     }
 
+    // covers: dc-master-shift
     #[test]
     fn any_drift_and_any_first_phase_settle_within_seconds() {
         for ppm in [-100, -1, 0, 50, 100] {

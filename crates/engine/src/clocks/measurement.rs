@@ -1,4 +1,4 @@
-//! The mean of several measurements of receive times, corrected for the drift of each clock (facts 7.1).
+//! The mean of several measurements of receive times, corrected for the drift of each clock (protocol 7.1).
 //!
 //! Receive times of a SubDevice are differences on its own clock. In a line of 200 SubDevices the first one waits for
 //! 200 us until the frame is back, in which clocks that differ by 100 ppm come apart by 20 ns. How much they differ
@@ -194,8 +194,9 @@ mod tests {
         measurements
     }
 
+    // covers: 7.1, dc-delays
     #[test]
-    fn the_mean_is_on_the_clock_of_the_reference_and_survives_wraps_facts_7_1() {
+    fn the_mean_is_on_the_clock_of_the_reference_and_survives_wraps() {
         // The second clock runs 100 ppm fast and wraps between the measurements.
         let first = [latched(1_000, 200_000), latched(0xFFFF_FF00, 100_010)];
         let second = [latched(10_001_000, 200_001), latched(0x1_0000_0000 + 10_001_000 - 256, 100_010)];
@@ -216,7 +217,7 @@ mod tests {
         assert_eq!(empty(1).mean(3), [None]);
     }
 
-    // covers: facts 7.1
+    // covers: 7.1, dc-remeasure
     #[test]
     fn a_port_that_latched_another_frame_and_a_clock_that_latched_none_are_found() {
         let first = [latched(1_000, 700), latched(5_000, 300)];

@@ -1,4 +1,4 @@
-//! When SYNC signals begin (facts 7.3).
+//! When SYNC signals begin (protocol 7.3).
 
 /// System time of the first pulse: at `earliest` or later, a multiple of the cycle plus the shift, so that SubDevices
 /// with one cycle pulse together whenever they were started. A cycle of zero is a single pulse.
@@ -24,8 +24,9 @@ pub const fn whole_cycle(sync0_cycle_ns: u32, sync1_register_ns: u32) -> u64 {
 mod tests {
     use super::*;
 
+    // covers: 7.3, dc-sync
     #[test]
-    fn pulses_are_aligned_to_the_cycle_and_shifted_to_either_side_facts_7_3() {
+    fn pulses_are_aligned_to_the_cycle_and_shifted_to_either_side() {
         assert_eq!(first_pulse(10_000_001, 1_000_000, 0), 11_000_000);
         assert_eq!(first_pulse(11_000_000, 1_000_000, 0), 11_000_000);
         assert_eq!(first_pulse(10_000_001, 1_000_000, 250_000), 10_250_000);
@@ -35,8 +36,9 @@ mod tests {
         assert_eq!(first_pulse(77, 0, -7), 70);
     }
 
+    // covers: 7.3
     #[test]
-    fn sync1_lengthens_the_pattern_facts_7_3() {
+    fn sync1_lengthens_the_pattern() {
         assert_eq!(whole_cycle(1_000_000, 0), 1_000_000);
         assert_eq!(whole_cycle(1_000_000, 999_999), 1_000_000);
         assert_eq!(whole_cycle(1_000_000, 3_000_000), 4_000_000);

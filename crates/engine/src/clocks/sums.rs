@@ -128,6 +128,7 @@ mod tests {
 
     proptest::proptest! {
         /// What is solved fits any times of single cables that the sums were made of.
+        // covers: dc-delays
         #[test]
         fn whatever_is_solved_is_the_truth(
             times in proptest::collection::vec(0i64..10_000, 6),

@@ -84,6 +84,7 @@ mod tests {
         assert!(window.take(false) && window.is_outside());
     }
 
+    // covers: dc-late-host
     #[test]
     fn clocks_at_the_edge_of_their_window_are_told_less_and_less_often() {
         let mut window = SyncWindow::default();

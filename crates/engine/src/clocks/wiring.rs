@@ -1,4 +1,4 @@
-//! Which port is connected to which, and the way of a frame through that (facts 2.1, 7.1).
+//! Which port is connected to which, and the way of a frame through that (protocol 2.1, 7.1).
 //!
 //! In: a [`Topology`] and which ports are open now. A topology has local rings as branches; here their closing cables
 //! are what they are, cables. Out: the arrivals of a frame of either link, in order, and whether a processing unit
@@ -9,7 +9,7 @@ use alloc::vec::Vec;
 
 use crate::topology::{PortOf, Topology};
 
-/// Order in which a frame passes the ports; the processing unit is behind port 0 (facts 2.1).
+/// Order in which a frame passes the ports; the processing unit is behind port 0 (protocol 2.1).
 const TRAVEL: [u8; 4] = [0, 3, 1, 2];
 /// So many open ports are looked at for the one that leads to the redundant link; it is the last one.
 const OPEN_PORTS: usize = 16;
@@ -207,7 +207,7 @@ mod tests {
         wiring.way(tree).iter().map(|arrival| (arrival.at.node, arrival.at.port, arrival.processed)).collect()
     }
 
-    // covers: facts 9.4
+    // covers: 9.4, dc-delays
     #[test]
     fn a_frame_goes_round_a_local_ring_once_and_back_and_forth_through_a_broken_one() {
         let whole = Wiring::new(&junction(), false, |_| true);
@@ -236,7 +236,7 @@ mod tests {
         assert_eq!(broken.entry_ports(), [0, 0, 1, 1, 0]);
     }
 
-    // covers: facts 2.9
+    // covers: 2.9
     #[test]
     fn frames_of_both_links_pass_a_closed_ring_and_a_branch_on_port_2_is_met_by_one() {
         // S1, S2 with S5 on port 2, S3.

@@ -17,7 +17,7 @@ pub enum ConfigAddress {
         /// SubDevices behind it.
         offset: u16,
     },
-    /// `offset` SubDevices behind the one with this explicit device identification (facts 5.3).
+    /// `offset` SubDevices behind the one with this explicit device identification (protocol 5.3).
     Identification {
         /// The identification.
         value: u16,

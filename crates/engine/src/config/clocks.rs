@@ -1,4 +1,4 @@
-//! What the application declares about distributed clocks: of the whole segment, and of one SubDevice (facts 7).
+//! What the application declares about distributed clocks: of the whole segment, and of one SubDevice (protocol 7).
 
 use core::time::Duration;
 
@@ -15,10 +15,10 @@ pub enum ReferenceClock {
     Declared(usize),
 }
 
-/// What a frame takes through a SubDevice's controller from port to port (facts 7.1). No register tells it, and receive
-/// times show only there and back together. Only differences count, between both ways and between SubDevices: what is
-/// left out of all of them is measured with the cables. By half of what is left out of some the delay to the next one
-/// is wrong.
+/// What a frame takes through a SubDevice's controller from port to port (protocol 7.1). No register tells it, and
+/// receive times show only there and back together. Only differences count, between both ways and between SubDevices:
+/// what is left out of all of them is measured with the cables. By half of what is left out of some the delay to the
+/// next one is wrong.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub struct Passage {
     /// Nanoseconds of a passage on which its processing unit meets the frame.
@@ -32,7 +32,7 @@ pub struct Passage {
 pub struct ClockConfig {
     /// Whose clock all others follow. Where it is lost, the next one with a clock is chosen.
     pub reference: ReferenceClock,
-    /// System time when the host's monotonic time is zero, in nanoseconds (facts 3.12: since 2000).
+    /// System time when the host's monotonic time is zero, in nanoseconds (protocol 3.12: since 2000).
     pub epoch: u64,
     /// The reference clock follows the host (bus shift). Otherwise it runs free.
     pub bus_shift: bool,
@@ -42,7 +42,7 @@ pub struct ClockConfig {
     /// nothing.
     pub passage: Passage,
     /// Distributions of the reference time that the static drift phase sends as fast as the segment allows, beside the
-    /// cyclic ones (facts 7.2: about 15,000).
+    /// cyclic ones (protocol 7.2: about 15,000).
     pub drift_distributions: u32,
     /// A clock is locked when |0x092C| was at most this for [`ClockConfig::lock_samples`] samples.
     pub lock_window_ns: u32,
@@ -81,7 +81,7 @@ impl Default for ClockConfig {
     }
 }
 
-/// SYNC signals of one SubDevice (facts 7.3).
+/// SYNC signals of one SubDevice (protocol 7.3).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub struct SyncSignals {
     /// Registers 0x0980 (low byte) and 0x0981 (high byte), as ESI and SII give them: 0x0300, 0x0700.
@@ -130,8 +130,9 @@ impl SyncSignals {
 mod tests {
     use super::*;
 
+    // covers: 7.3, dc-sync
     #[test]
-    fn the_register_of_sync1_counts_from_sync0_facts_7_3() {
+    fn the_register_of_sync1_counts_from_sync0() {
         let signals = |cycle, shift| SyncSignals {
             assign_activate: 0x0700,
             sync1_cycle_ns: cycle,

@@ -1,4 +1,5 @@
-//! SyncManagers as a network configuration file writes them (ETG.2100, facts 8.1): such a file counts before the SII.
+//! SyncManagers as a network configuration file writes them (ETG.2100, protocol 8.1): such a file counts before the
+//! SII.
 
 use alloc::vec::Vec;
 

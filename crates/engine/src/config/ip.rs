@@ -1,4 +1,4 @@
-//! Addresses of the IP stack behind a SubDevice (facts 6.5).
+//! Addresses of the IP stack behind a SubDevice (protocol 6.5).
 
 use alloc::vec::Vec;
 use core::net::Ipv4Addr;

@@ -1,5 +1,5 @@
 //! Registers that are written or looked at whenever a SubDevice passes a transition: raw commands of a configuration
-//! file (ECatCmd of ETG.2100, facts 8.2).
+//! file (ECatCmd of ETG.2100, protocol 8.2).
 
 use alloc::vec::Vec;
 use core::time::Duration;

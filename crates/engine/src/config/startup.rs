@@ -1,5 +1,5 @@
 //! Start-up commands: objects, IDNs, addresses and registers that are written whenever a SubDevice passes a transition
-//! (facts 5.1, 6.3, 6.5, 6.6).
+//! (protocol 5.1, 6.3, 6.5, 6.6).
 
 use alloc::string::String;
 use alloc::vec::Vec;

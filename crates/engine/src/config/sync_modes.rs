@@ -1,4 +1,4 @@
-//! SYNC signals as an operation mode in the SII wants them (facts 4.6, 7.3).
+//! SYNC signals as an operation mode in the SII wants them (protocol 4.6, 7.3).
 
 use core::fmt;
 use core::time::Duration;
@@ -109,8 +109,9 @@ mod tests {
         DcMode { assign_activate, sync0_cycle_factor: factors.0, sync1_cycle_factor: factors.1, ..DcMode::default() }
     }
 
+    // covers: 4.6, dc-tools
     #[test]
-    fn factors_and_shifts_of_a_mode_become_signals_facts_4_6() {
+    fn factors_and_shifts_of_a_mode_become_signals() {
         let cycles = |mode: &DcMode| {
             SyncSignals::from_mode(mode, CYCLE).map(|signals| (signals.sync0_cycle_ns, signals.sync1_cycle_ns))
         };
@@ -127,6 +128,7 @@ mod tests {
         );
     }
 
+    // covers: dc-tools
     #[test]
     fn modes_without_signals_or_with_cycles_that_do_not_exist_are_refused() {
         let error = |mode: &DcMode| SyncSignals::from_mode(mode, CYCLE).expect_err("it must be refused");

@@ -32,12 +32,14 @@ fn absent(config: usize, position: u16, present: usize) -> Resolution {
     Resolution::Absent { config, error }
 }
 
+// covers: declaration
 #[test]
 fn each_declaration_finds_its_position_in_any_order() {
     let configs = [config(1, 11), config(0, 10), SubDeviceConfig::at_position(2)];
     assert_eq!(resolve(&configs, &infos(&[10, 11, 12])), [found(0, 1), found(1, 0), found(2, 2)]);
 }
 
+// covers: declaration
 #[test]
 fn a_wrong_product_is_named_with_position_expected_and_got() {
     let resolutions = resolve(&[config(0, 10)], &infos(&[11]));
@@ -65,6 +67,7 @@ fn a_missing_subdevice_is_an_error_and_an_undeclared_one_is_extra() {
     assert_eq!(missing.to_string(), "no SubDevice at position 1; 1 are present");
 }
 
+// covers: declaration
 #[test]
 fn an_absent_optional_subdevice_moves_those_behind_it_forward() {
     let configs = [config(0, 10), config(1, 11).optional(), config(2, 12)];
@@ -78,6 +81,7 @@ fn a_mandatory_subdevice_goes_before_an_optional_one_of_the_same_product() {
     assert_eq!(resolve(&configs, &infos(&[10])), [absent(0, 0, 1), found(1, 0)]);
 }
 
+// covers: declaration
 #[test]
 fn an_alias_counts_from_its_bearer_and_alias_0_from_the_start() {
     let mut infos = infos(&[10, 11, 12]);
@@ -126,8 +130,9 @@ fn a_later_declaration_of_a_sync_manager_replaces_the_earlier() {
     assert_eq!((pdos.len(), pdos[0].pdos[0].index), (1, 0x1600));
 }
 
+// covers: 5.4
 #[test]
-fn default_time_limits_are_those_of_facts_5_4() {
+fn default_time_limits_are_those_of_the_esi_schema() {
     let timeouts = Timeouts::default();
     let limit = |from, to| timeouts.transition(from, to);
     assert_eq!(limit(AlState::Init, AlState::PreOp), Duration::from_secs(3));
@@ -161,8 +166,9 @@ fn a_revision_may_be_a_lowest_one_and_an_identification_counts_where_declared() 
     assert_eq!(resolve(&[identified], &infos), [found(0, 0)]);
 }
 
+// covers: 5.3, mandatory
 #[test]
-fn an_identification_finds_its_bearer_wherever_it_is_facts_5_3() {
+fn an_identification_finds_its_bearer_wherever_it_is() {
     let mut infos = infos(&[10, 11, 12]);
     infos[2].identification = Some(5);
     let configs = [SubDeviceConfig::at_identification(5), config(0, 10), config(1, 11)];
@@ -181,6 +187,7 @@ fn with_group() -> Vec<SubDeviceConfig> {
     [config(0, 10), config(1, 11)].into_iter().chain(group.into_configs(0)).collect()
 }
 
+// covers: hot-connect
 #[test]
 fn a_group_is_found_at_any_place_and_positions_do_not_count_it() {
     for place in 0..3 {

@@ -1,10 +1,10 @@
-//! Time limits of a SubDevice (facts 5.4).
+//! Time limits of a SubDevice (protocol 5.4).
 
 use core::time::Duration;
 
 use ringcat_wire::al::AlState;
 
-/// Time limits (facts 5.4).
+/// Time limits (protocol 5.4).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Timeouts {
     /// INIT to PREOP or BOOT.

@@ -1,4 +1,5 @@
-//! The history of what happened to SubDevices and cables: what object 0x10F3 of the MainDevice holds (facts 6.3, 10.2).
+//! The history of what happened to SubDevices and cables: what object 0x10F3 of the MainDevice holds (protocol 6.3,
+//! 10.2).
 //!
 //! In go the events of the acyclic half, out come messages in places that are used in turns, oldest first. Like that of
 //! a SubDevice it is bounded, and says when something was lost.
@@ -177,8 +178,9 @@ mod tests {
         history
     }
 
+    // covers: 6.3, own-objects
     #[test]
-    fn places_are_used_in_turns_and_what_is_lost_is_told_facts_6_3() {
+    fn places_are_used_in_turns_and_what_is_lost_is_told() {
         let mut history = history(50);
         assert_eq!((history.newest(), history.flags().0, history.has_news()), (55, 0, true));
         history.note(Instant(50), &Event::Returned { subdevice: 50 });
@@ -188,8 +190,9 @@ mod tests {
         assert_eq!((history.incident(5), history.incident(56)), (None, None));
     }
 
+    // covers: 6.3
     #[test]
-    fn acknowledged_messages_make_room_and_zero_forgets_all_facts_6_3() {
+    fn acknowledged_messages_make_room_and_zero_forgets_all() {
         let mut history = history(10);
         assert_eq!(history.acknowledge(16), Err(AbortCode::VALUE_TOO_HIGH), "there is none");
         assert_eq!(history.acknowledge(5), Err(AbortCode::VALUE_TOO_LOW));
@@ -198,8 +201,9 @@ mod tests {
         assert_eq!((history.acknowledge(0), history.newest(), history.incident(6)), (Ok(()), 0, None));
     }
 
+    // covers: 6.3
     #[test]
-    fn flags_keep_kinds_out_and_a_full_history_may_keep_what_it_has_facts_6_3() {
+    fn flags_keep_kinds_out_and_a_full_history_may_keep_what_it_has() {
         let mut history = History::default();
         assert_eq!(history.set_flags(DiagnosisFlags::EMERGENCY), Err(AbortCode::VALUE_RANGE));
         assert_eq!(history.set_flags(DiagnosisFlags::NO_INFORMATION | DiagnosisFlags::ACKNOWLEDGE), Ok(()));

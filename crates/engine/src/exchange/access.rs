@@ -156,7 +156,7 @@ impl Exchange {
         &self.counters
     }
 
-    /// Takes the oldest kept frame of another MainDevice (facts MR-10).
+    /// Takes the oldest kept frame of another MainDevice (protocol MR-10).
     pub fn pop_foreign(&mut self) -> Option<ForeignFrame<'_>> {
         self.foreign.pop()
     }

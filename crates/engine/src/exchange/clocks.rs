@@ -1,4 +1,4 @@
-//! Distributed clocks in the cyclic frames (facts 7.2, 7.4, 7.5).
+//! Distributed clocks in the cyclic frames (protocol 7.2, 7.4, 7.5).
 //!
 //! Three datagrams ride in one frame: an FRMW of 0x0910 that hands the reference's time to all others, an FPWR of
 //! 0x0910 that steers a clock (the reference towards the host, on the other copy a second one towards the first), a BRD
@@ -79,7 +79,7 @@ pub(crate) struct Seen {
     sync: [(u32, Wkc); 2],
     spread: u32,
     spread_wkc: u16,
-    /// What SubDevices ask for, as far as they are let (facts 3.5).
+    /// What SubDevices ask for, as far as they are let (protocol 3.5).
     events: u16,
 }
 

@@ -1,5 +1,6 @@
-//! Copies from inputs of one SubDevice to outputs of another, within a cycle (000 10.8): what came in with this cycle's
-//! frames leaves with its next ones, whatever the application does. Devices of functional safety talk this way.
+//! Copies from inputs of one SubDevice to outputs of another, within a cycle (Master Redundancy 10.8): what came in
+//! with this cycle's frames leaves with its next ones, whatever the application does. Devices of functional safety talk
+//! this way.
 //!
 //! A copy is refused where its source is stale: the outputs keep what was copied last, or become zero. The table is
 //! checked and split into words when it is set; afterwards a copy is bounded work without allocation.

@@ -114,6 +114,7 @@ mod tests {
         assert_eq!(entry(11, 1).read(&image), 1);
     }
 
+    // covers: domains
     #[test]
     fn signed_values_are_extended() {
         assert_eq!(entry(0, 16).read_signed(&[0xFE, 0xFF]), -2);
@@ -142,6 +143,7 @@ mod tests {
     }
 
     proptest! {
+        // covers: domains
         #[test]
         fn what_is_written_is_read_and_nothing_else_changes(
             before in any::<[u8; 16]>(), offset in 0u32..56, length in 1u16..=64, value: u64,

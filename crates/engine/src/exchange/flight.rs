@@ -38,7 +38,7 @@ pub(crate) enum Step {
     Corrupt,
 }
 
-/// A datagram's first eight bytes, as far as no controller changes them (facts 1.5): command, Idx, length, M bit.
+/// A datagram's first eight bytes, as far as no controller changes them (protocol 1.5): command, Idx, length, M bit.
 #[derive(Debug)]
 struct Header {
     at: usize,

@@ -69,6 +69,7 @@ impl Missed {
 mod tests {
     use super::*;
 
+    // covers: lost-frames
     #[test]
     fn a_frame_that_was_given_up_is_late_damaged_or_missing_and_only_one_of_these() {
         let (mut missed, mut counters) = (Missed::default(), CyclicCounters::default());

@@ -1,5 +1,5 @@
-//! The presence datagram of a frame: the AL status of each SubDevice whose process data shares a working counter (facts
-//! 1.4, 3.4, 3.10).
+//! The presence datagram of a frame: the AL status of each SubDevice whose process data shares a working counter
+//! (protocol 1.4, 3.4, 3.10).
 //!
 //! In: a copy of the frame that came back. Out: which SubDevices processed it, once each, and in which state. A byte
 //! that stayed zero belongs to a SubDevice that is not there or has lost its FMMUs, because no AL status is zero. What

@@ -105,7 +105,7 @@ fn meet(frame: &mut [u8], subdevices: &[usize], base: u8) {
     }
 }
 
-// Facts CR-24.
+// covers: CR-24
 #[test]
 fn in_a_closed_ring_the_complete_copy_is_delivered_without_waiting_for_the_other() {
     let mut ring = Ring::new();
@@ -125,6 +125,7 @@ fn in_a_closed_ring_the_complete_copy_is_delivered_without_waiting_for_the_other
     assert!(ring.events.pop().is_some() && ring.events.pop().is_none(), "one change of state");
 }
 
+// covers: ring-merge
 #[test]
 fn inputs_of_the_first_copy_stay_where_a_second_one_was_processed_again() {
     let mut ring = Ring::new();
@@ -172,8 +173,9 @@ fn in_a_cut_ring_both_copies_make_one_answer() {
     }
 }
 
+// covers: freshness
 #[test]
-fn a_missing_subdevice_keeps_its_last_inputs_and_those_of_the_others_are_new_at_once() {
+fn a_missing_subdevice_keeps_its_last_inputs_and_the_others_are_new_at_once() {
     let mut ring = Ring::new();
     for (who, base) in [(&[0, 1, 2][..], 0x10), (&[0, 2][..], 0x20)] {
         let [mut main, redundant] = ring.send();
@@ -210,6 +212,7 @@ fn inputs_of_those_that_take_part_are_new_and_the_missing_one_keeps_its_last() {
 }
 
 /// The copies of a frame that one SubDevice with an input did not process, and another one that is not counted on did.
+// covers: freshness
 #[test]
 fn a_sum_that_fits_by_chance_makes_no_inputs_fresh() {
     let mut ring = Ring::new();
@@ -227,6 +230,7 @@ fn a_sum_that_fits_by_chance_makes_no_inputs_fresh() {
 }
 
 /// A SubDevice processes both copies while another one loses its power: the sum is that of all.
+// covers: freshness
 #[test]
 fn a_subdevice_that_processed_both_copies_does_not_stand_for_one_that_is_gone() {
     let mut ring = Ring::new();
@@ -286,7 +290,7 @@ fn a_copy_that_a_subdevice_processed_twice_makes_nothing_fresh() {
     assert_eq!((ring.inputs(), ring.freshness()), (&[0; 3][..], [Freshness::Never; 3]));
 }
 
-// Facts CR-06.
+// covers: CR-06
 #[test]
 fn one_lost_copy_of_a_closed_ring_costs_nothing_and_both_lost_cost_a_cycle() {
     let mut ring = Ring::new();
@@ -387,6 +391,7 @@ fn what_was_queued_and_never_sent_was_not_answered() {
     assert_eq!((status.wkc, status.state), (0, DomainState::Zero));
 }
 
+// covers: domains
 #[test]
 fn a_datagram_that_is_short_does_not_hide_behind_one_that_is_over() {
     let mut ring = Ring::new();
@@ -401,8 +406,9 @@ fn a_datagram_that_is_short_does_not_hide_behind_one_that_is_over() {
     assert_eq!(ring.freshness(), [Freshness::Never; 3]);
 }
 
+// covers: domains
 #[test]
-fn without_its_optional_subdevice_a_domain_is_complete_and_without_another_it_is_not() {
+fn a_domain_is_complete_without_its_optional_subdevice_but_no_other() {
     for (missing, state) in [(1, DomainState::Complete), (2, DomainState::Incomplete)] {
         let mut ring = Ring::with_optional(vec![false, true, false]);
         ring.board.set_taking_part(missing, false);
@@ -420,7 +426,7 @@ fn without_its_optional_subdevice_a_domain_is_complete_and_without_another_it_is
 }
 
 #[test]
-fn a_domain_that_is_queued_twice_leaves_once_with_its_last_outputs_and_keeps_no_other_from_leaving() {
+fn a_domain_queued_twice_leaves_once_with_its_last_outputs() {
     let spec = |subdevice| {
         let areas = vec![AreaSpec { subdevice, sync_manager: 0, direction: Direction::Outputs, length: 1 }];
         DomainSpec { period: PERIOD, under_way: 1, lrw: false, areas }
@@ -497,6 +503,7 @@ impl Starting {
     }
 }
 
+// covers: layout
 #[test]
 fn a_frame_carries_process_data_from_its_first_subdevice_with_fmmus_on() {
     let mut start = Starting::new();

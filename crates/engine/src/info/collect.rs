@@ -1,4 +1,4 @@
-//! From the bytes of an SII to a [`SubDeviceInfo`], leniently (facts 4.1 to 4.6).
+//! From the bytes of an SII to a [`SubDeviceInfo`], leniently (protocol 4.1 to 4.6).
 
 mod mailboxes;
 mod parts;

@@ -15,7 +15,7 @@ pub enum IdentityField {
     MinimumRevision,
     /// Serial number.
     Serial,
-    /// Explicit device identification (facts 5.3); 0 is that of a SubDevice without one.
+    /// Explicit device identification (protocol 5.3); 0 is that of a SubDevice without one.
     Identification,
 }
 

@@ -1,4 +1,4 @@
-//! What is known of a SubDevice after a scan: registers of its controller, and what its SII says (facts 3.1, 4).
+//! What is known of a SubDevice after a scan: registers of its controller, and what its SII says (protocol 3.1, 4).
 
 use alloc::string::String;
 use alloc::vec::Vec;
@@ -58,7 +58,7 @@ pub struct PdoEntryInfo {
     pub sub_index: u8,
     /// Bits.
     pub bit_length: u8,
-    /// CoE data type (facts 6.3).
+    /// CoE data type (protocol 6.3).
     pub data_type: u8,
     /// Name; empty where the SII gives none.
     pub name: String,
@@ -116,11 +116,12 @@ pub struct SubDeviceInfo {
     pub alias: u16,
     /// Vendor, product, revision, serial number.
     pub identity: Identity,
-    /// Explicit device identification, as set at its switches; `None` where it has none (facts 5.3, 4.3).
+    /// Explicit device identification, as set at its switches; `None` where it has none (protocol 5.3, 4.3).
     pub identification: Option<u16>,
     /// The controller.
     pub controller: ControllerInfo,
-    /// The controller copies AL control into AL status by itself: no application, and no acknowledge bit (facts 3.4).
+    /// The controller copies AL control into AL status by itself: no application, and no acknowledge bit (protocol
+    /// 3.4).
     pub device_emulation: bool,
     /// Register DL_STATUS at the time of the scan.
     pub dl_status: DlStatus,
@@ -146,7 +147,7 @@ pub struct SubDeviceInfo {
     pub flags: GeneralFlags,
     /// Physical address of the ID switch, meant where the flags name identification in memory.
     pub id_switch_address: u16,
-    /// Kind of port 0..3 as the SII says, a nibble per port, raw (facts 4.3).
+    /// Kind of port 0..3 as the SII says, a nibble per port, raw (protocol 4.3).
     pub physical_ports: u16,
     /// Current from the EBUS in milliamperes; negative where it feeds.
     pub ebus_current_ma: i16,
@@ -194,7 +195,7 @@ impl SubDeviceInfo {
     }
 
     /// SyncManagers of the mailboxes: that of the one which the MainDevice writes, that of the one which it reads. As
-    /// the SII says where it names both, else 0 and 1 (facts 3.11).
+    /// the SII says where it names both, else 0 and 1 (protocol 3.11).
     pub fn mailbox_sync_managers(&self) -> (u8, u8) {
         self.sync_managers_of(self.mailbox.as_ref())
     }

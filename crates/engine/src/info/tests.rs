@@ -90,6 +90,7 @@ fn warning(category: CategoryKind, offset: usize, problem: SiiProblem) -> InfoWa
     InfoWarning { category: Some(category), offset: Some(offset), problem }
 }
 
+// covers: scan
 #[test]
 fn every_category_finds_its_place() {
     let general = general();
@@ -120,6 +121,7 @@ fn every_category_finds_its_place() {
     assert_eq!(info.warnings, []);
 }
 
+// covers: odd-sii
 #[test]
 fn mailboxes_that_cannot_be_there_are_not_believed() {
     let spoil: [fn(&mut MailboxLayout); 5] = [
@@ -158,6 +160,7 @@ fn a_sync_manager_without_a_type_is_for_what_its_pdos_or_its_control_byte_say() 
     assert_eq!(told.len(), 3);
 }
 
+// covers: odd-sii
 #[test]
 fn an_image_that_was_cut_short_is_told_wherever_it_ends() {
     let whole = SYNC_MANAGERS.to_vec();
@@ -181,6 +184,7 @@ fn an_image_that_was_cut_short_is_told_wherever_it_ends() {
     assert_eq!(ends.warnings[0].problem, SiiProblem::NoSyncManagers);
 }
 
+// covers: eni-read
 #[test]
 fn what_is_not_printable_in_a_name_is_a_space() {
     let strings = [1, 9, b'T', b'w', b'o', b'\n', b'l', 0x1B, b'n', b'e', b's', 0];
@@ -190,6 +194,7 @@ fn what_is_not_printable_in_a_name_is_a_space() {
     assert_eq!((info.name.as_str(), info.order_code.as_str()), ("Two l nes", "Two l nes"));
 }
 
+// covers: scan
 #[test]
 fn a_blank_eeprom_is_one_warning() {
     for erased in [0xFF, 0x00] {
@@ -302,6 +307,7 @@ fn what_a_writer_wrote_is_found_without_warnings() {
 }
 
 /// Every real image gives an info with a name and as many PDOs as the reader of whole images finds.
+// covers: scan
 #[test]
 fn real_images_are_listed() {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared/data/sii");
@@ -322,6 +328,7 @@ fn real_images_are_listed() {
 }
 
 proptest! {
+    // covers: scan
     #[test]
     fn any_bytes_give_an_info_without_panic(
         header in proptest::collection::vec(any::<u8>(), 128),

@@ -1,10 +1,10 @@
-//! What is odd in an SII, and where (facts 4; users meet all of it in the field).
+//! What is odd in an SII, and where (protocol 4; users meet all of it in the field).
 
 use core::fmt;
 
 use ringcat_wire::sii::{CategoryKind, MailboxLayout, SyncManagerKind};
 
-/// A mailbox holds at least the header of a message (facts 6.1).
+/// A mailbox holds at least the header of a message (protocol 6.1).
 pub(super) const MAILBOX_HEADER: u16 = 6;
 
 /// Something odd in the SII of a SubDevice.

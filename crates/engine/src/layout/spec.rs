@@ -19,7 +19,7 @@ pub struct AreaSpec {
     pub length: u16,
 }
 
-/// Where LRW is used instead of LWR and LRD (facts 9.2.2).
+/// Where LRW is used instead of LWR and LRD (protocol 9.2.2).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum LrwPolicy {
     /// On one link, where every SubDevice of a domain knows it; never on two.
@@ -46,7 +46,7 @@ pub enum Witness {
 pub enum Delivers {
     /// In SAFEOP and OP.
     FromSafeOp,
-    /// In OP only (facts 4.4).
+    /// In OP only (protocol 4.4).
     InOp,
 }
 
@@ -75,7 +75,7 @@ pub struct DomainSpec {
     pub period: Duration,
     /// How many of its cycles may be under way at once.
     pub under_way: u8,
-    /// Whether every SubDevice of the domain knows LRW (facts 3.1, features bit 9).
+    /// Whether every SubDevice of the domain knows LRW (protocol 3.1, features bit 9).
     pub lrw: bool,
     /// Areas in the order in which they lie in the image; those of a SubDevice stand together.
     pub areas: Vec<AreaSpec>,

@@ -29,6 +29,7 @@ fn each(supervision: bool) -> Rules<'static> {
     }
 }
 
+// covers: layout
 #[test]
 fn one_link_uses_lrw_and_two_links_use_lwr_and_lrd() {
     let areas =
@@ -38,7 +39,7 @@ fn one_link_uses_lrw_and_two_links_use_lwr_and_lrd() {
     assert_eq!(frame.datagrams.len(), 1);
     assert_eq!(frame.datagrams[0].command, Command::Lrw);
     assert_eq!((frame.datagrams[0].outputs, frame.datagrams[0].inputs), (5, 6));
-    // facts 1.4: LRW read +1, write +2.
+    // protocol 1.4: LRW read +1, write +2.
     assert_eq!(frame.datagrams[0].contributions, vec![(0, Wkc(3)), (1, Wkc(2))]);
 
     let ring = Layout::new(&[spec(areas)], LinkSet::Ring, false).unwrap();
@@ -47,8 +48,9 @@ fn one_link_uses_lrw_and_two_links_use_lwr_and_lrd() {
     assert_eq!(ring.domains[0].frames[0].datagrams[1].contributions, vec![(0, Wkc(1))]);
 }
 
+// covers: CR-16, 9.2.2, layout
 #[test]
-fn one_lrw_per_subdevice_is_allowed_on_two_links_facts_9_2_2() {
+fn one_lrw_per_subdevice_is_allowed_on_two_links() {
     let pair = |n: usize, out, inp| [area(n, 2, Direction::Outputs, out), area(n, 3, Direction::Inputs, inp)];
     let areas: Vec<_> = (0..3).flat_map(|n| pair(n, 4, 6)).chain([area(3, 3, Direction::Inputs, 2)]).collect();
     let layout = Layout::with(&[spec(areas)], each(true)).unwrap();
@@ -96,6 +98,7 @@ fn several_subdevices_of_a_datagram_show_their_al_status_behind_it() {
     assert_eq!(witnessed(&[MAPPED], LinkSet::Single).presence, None, "its working counter is exact");
 }
 
+// covers: freshness
 #[test]
 fn inputs_of_a_subdevice_without_an_fmmu_to_spare_have_a_datagram_of_their_own() {
     let found = |links| {
@@ -112,7 +115,7 @@ fn inputs_of_a_subdevice_without_an_fmmu_to_spare_have_a_datagram_of_their_own()
 }
 
 #[test]
-fn subdevices_show_themselves_where_their_inputs_share_a_working_counter_and_in_one_domain() {
+fn presence_is_shown_where_inputs_share_a_working_counter_and_in_one_domain() {
     let outputs = spec((0..2).map(|n| area(n, 2, Direction::Outputs, 2)).collect());
     let inputs = spec((0..2).map(|n| area(n, 3, Direction::Inputs, 2)).collect());
     let others = spec((0..2).map(|n| area(n, 4, Direction::Inputs, 2)).collect());
@@ -145,6 +148,7 @@ fn two_areas_of_one_subdevice_count_once_per_direction() {
     assert_eq!(layout.domains[0].frames[0].datagrams[0].contributions, vec![(0, Wkc(1))]);
 }
 
+// covers: layout
 #[test]
 fn a_domain_larger_than_a_frame_is_cut_between_areas() {
     let areas = (0..4).map(|n| area(n, 3, Direction::Inputs, 700)).collect();
@@ -165,6 +169,7 @@ fn an_area_beyond_a_datagram_is_refused_with_its_name() {
 }
 
 proptest! {
+    // covers: layout
     #[test]
     fn areas_are_disjoint_and_frames_fit(
         lengths in proptest::collection::vec((0u16..1000, 0u16..1000, any::<bool>()), 1..40), ring: bool, lrw: bool,

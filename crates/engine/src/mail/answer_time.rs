@@ -120,6 +120,7 @@ mod tests {
         looks
     }
 
+    // covers: mailbox, start-lists
     #[test]
     fn looks_come_when_answers_do() {
         let real = Duration::from_micros(1000);
@@ -132,6 +133,7 @@ mod tests {
         assert!(later < 12, "{later} of 200 looks came too early");
     }
 
+    // covers: start-lists
     #[test]
     fn answers_that_become_quicker_or_slower_are_followed() {
         let mut time = AnswerTime::default();
@@ -149,6 +151,7 @@ mod tests {
         assert_eq!(AnswerTime::pause(Duration::from_secs(1)), LONGEST_PAUSE);
     }
 
+    // covers: start-lists
     #[test]
     fn waiting_for_a_turn_is_no_part_of_a_trip() {
         let us = Duration::from_micros;

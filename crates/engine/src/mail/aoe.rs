@@ -1,4 +1,4 @@
-//! AoE: ADS requests to the ports of a SubDevice (facts 6.7).
+//! AoE: ADS requests to the ports of a SubDevice (protocol 6.7).
 
 use alloc::string::String;
 use alloc::vec;

@@ -1,4 +1,4 @@
-//! CoE: objects of a SubDevice's dictionary (facts 6.3).
+//! CoE: objects of a SubDevice's dictionary (protocol 6.3).
 //!
 //! [`upload`] and [`download`] move objects of any size, expedited, normal or in segments, between the SubDevice and a
 //! [`Sink`](super::stream::Sink) or [`Source`](super::stream::Source); [`read`] and [`write()`] do so with bytes in

@@ -14,12 +14,12 @@ use super::unsolicited::{Unclaimed, Unsolicited};
 use crate::event::Event;
 use crate::time::Instant;
 
-/// SoE services that are answers; the others come unasked (facts 6.6).
+/// SoE services that are answers; the others come unasked (protocol 6.6).
 const SOE_ANSWERS: [u8; 2] = [2, 4];
-/// Offset of the flags in an AoE header, and the bit of an answer (facts 6.7).
+/// Offset of the flags in an AoE header, and the bit of an answer (protocol 6.7).
 const AOE_FLAGS_AT: usize = 18;
 const AOE_RESPONSE: u8 = 0x01;
-/// EoE types that are answers: set IP, set filter, get IP, get filter (facts 6.5).
+/// EoE types that are answers: set IP, set filter, get IP, get filter (protocol 6.5).
 const EOE_ANSWERS: [u8; 4] = [3, 5, 7, 9];
 
 /// Takes in the content of the send mailbox. Any bytes are allowed. True where somebody waited for it.

@@ -1,4 +1,4 @@
-//! EoE: Ethernet through a mailbox, and the addresses of the IP stack behind it (facts 6.5).
+//! EoE: Ethernet through a mailbox, and the addresses of the IP stack behind it (protocol 6.5).
 //!
 //! An [`EthernetPort`] takes whole Ethernet frames for a SubDevice and gives out those that come from it. Its task cuts
 //! frames into fragments and writes them in a lane of its own, so that they take turns with every other protocol; what

@@ -1,4 +1,4 @@
-//! FoE: files of a SubDevice, read into a sink and written from a source, piece by piece (facts 6.4).
+//! FoE: files of a SubDevice, read into a sink and written from a source, piece by piece (protocol 6.4).
 
 mod error;
 mod read;

@@ -46,7 +46,7 @@ impl Lane {
     /// The lanes of the protocols.
     pub const ALL: [Lane; 7] = [Lane::Coe, Lane::Foe, Lane::Soe, Lane::Aoe, Lane::Voe, Lane::Eoe, Lane::Frames];
 
-    /// The lane for mail of a type: the lower four bits of the type byte (facts 6.1).
+    /// The lane for mail of a type: the lower four bits of the type byte (protocol 6.1).
     pub const fn of(code: u8) -> Lane {
         match Protocol::from_code(code & 0x0F) {
             Protocol::Aoe => Lane::Aoe,

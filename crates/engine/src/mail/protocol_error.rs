@@ -1,4 +1,4 @@
-//! The errors that SubDevices tell in their mails, in the numbers of each protocol (facts 6.1, 6.3, 6.4, 6.6, 6.7).
+//! The errors that SubDevices tell in their mails, in the numbers of each protocol (protocol 6.1, 6.3, 6.4, 6.6, 6.7).
 
 use ringcat_wire::mailbox::aoe::{AdsErrorCode, AdsResponse, AmsHeader};
 use ringcat_wire::mailbox::coe::{CoeHeader, CoeService, InformationOpcode, SdoInformation};
@@ -64,8 +64,9 @@ mod tests {
         told_by(&Message { header, payload })
     }
 
+    // covers: 6, own-objects
     #[test]
-    fn errors_of_all_protocols_are_found_and_nothing_else_is_one_facts_6() {
+    fn errors_of_all_protocols_are_found_and_nothing_else_is_one() {
         let abort = [0x00, 0x30, 0x80, 0x00, 0x20, 0x01, 0x11, 0x00, 0x09, 0x06];
         assert_eq!(told(Protocol::Coe, &abort), Some(0x0609_0011));
         let from_a_device = [0x00, 0x20, 0x80, 0x00, 0x20, 0x01, 0x00, 0x00, 0x02, 0x06];

@@ -1,4 +1,4 @@
-//! Reading: when there is mail, or while somebody waits for an answer (facts 6.1, 6.2).
+//! Reading: when there is mail, or while somebody waits for an answer (protocol 6.1, 6.2).
 //!
 //! A lost read is healed with the repeat request. What comes is handed to `delivery`.
 
@@ -246,7 +246,7 @@ async fn repeat(room: &Rc<Room>, session: &Session) -> Result<bool, MailboxError
     Ok(true)
 }
 
-/// Asks for the last mail again: toggles the repeat request and waits for its acknowledgement (facts 6.2). One that
+/// Asks for the last mail again: toggles the repeat request and waits for its acknowledgement (protocol 6.2). One that
 /// does not come in time is no matter: what is read next is then what would have come next.
 async fn request_repeat(bus: &Bus, session: &Session) -> Result<(), BusError> {
     let register = map::sync_manager(session.send_manager);

@@ -1,4 +1,4 @@
-//! Mail that comes twice (facts 6.1, 6.2).
+//! Mail that comes twice (protocol 6.1, 6.2).
 //!
 //! A repeat brings a mail with its old counter, and so does a frame that comes back late; some SubDevices send an
 //! answer twice. A mail is a double when its counter is not zero and counter and content are those of a mail of late.
@@ -92,6 +92,7 @@ fn hash(bytes: &[u8]) -> u64 {
 mod tests {
     use super::*;
 
+    // covers: mailbox
     #[test]
     fn the_same_counter_with_the_same_content_is_a_double() {
         let mut recent = Recent::default();
@@ -115,6 +116,7 @@ mod tests {
         assert!(!is_double(4, Way::Repeat, 4));
     }
 
+    // covers: mailbox-faults
     #[test]
     fn what_comes_late_is_compared_with_what_was_read_about_the_time_when_it_left() {
         let mut recent = Recent::default();

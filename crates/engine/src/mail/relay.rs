@@ -1,4 +1,4 @@
-//! Mailbox messages of somebody else: clients of a gateway talk to SubDevices through our mailboxes (facts 10.1).
+//! Mailbox messages of somebody else: clients of a gateway talk to SubDevices through our mailboxes (protocol 10.1).
 //!
 //! A [`Desk`] takes whole messages and gives out answers, with the address and the counter that the client used;
 //! towards the SubDevice the router counts for itself. A message waits for the lane of its protocol like any procedure

@@ -1,4 +1,4 @@
-//! SoE: elements of the IDNs of a drive, read and written, in fragments where they are long (facts 6.6).
+//! SoE: elements of the IDNs of a drive, read and written, in fragments where they are long (protocol 6.6).
 
 pub mod command;
 

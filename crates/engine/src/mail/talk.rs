@@ -21,7 +21,7 @@ const POST_LIMIT: Duration = Duration::from_millis(100);
 /// How long after the end of a conversation an error reply may still be to one of its parts.
 const PARTS_LIMIT: Duration = Duration::from_secs(1);
 
-/// Parts of an answer that comes late, at most: they are counted with 16 bits (facts 6.3, 6.6).
+/// Parts of an answer that comes late, at most: they are counted with 16 bits (protocol 6.3, 6.6).
 const LATE_PARTS: usize = 1 << 16;
 
 /// A lane of a mailbox, held by one conversation. Dropped, it is free for the next; what was asked and not answered is

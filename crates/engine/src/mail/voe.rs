@@ -1,4 +1,4 @@
-//! VoE: messages of a vendor to and from a SubDevice (facts 6.8). What they mean is the vendor's matter.
+//! VoE: messages of a vendor to and from a SubDevice (protocol 6.8). What they mean is the vendor's matter.
 
 use alloc::vec;
 use alloc::vec::Vec;

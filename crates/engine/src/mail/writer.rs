@@ -1,4 +1,4 @@
-//! Writing: one message after the other, the lanes in turn (facts 6.1).
+//! Writing: one message after the other, the lanes in turn (protocol 6.1).
 //!
 //! A lost write is sent again with the same counter until the SubDevice takes it, which drops it where the first one
 //! had arrived. No other message goes out meanwhile: one in between would make the old counter look new.

@@ -139,7 +139,7 @@ impl MainDevice {
             // afterwards.
             segment.observe(Observation::Delayed);
             let (bus, segment) = (bus.clone(), segment.clone());
-            // Receive times are latched before other frames are on the way (facts 7.1).
+            // Receive times are latched before other frames are on the way (protocol 7.1).
             self.supervisor.spawn(async move {
                 clocks::begin(&bus, &segment).await;
                 segment.observe(Observation::Started(start));

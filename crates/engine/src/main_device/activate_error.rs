@@ -92,7 +92,7 @@ pub enum ActivateError {
         under_way: u8,
     },
     /// LRW was asked for on two links. When the ring breaks, half of its SubDevices would be met by one copy and half
-    /// by the other (facts CR-16, 9.2.2).
+    /// by the other (protocol CR-16, 9.2.2).
     LrwOnTwoLinks {
         /// Number of the domain.
         domain: usize,
@@ -103,7 +103,7 @@ pub enum ActivateError {
         /// Indices in the declaration of the SubDevices that it addresses.
         subdevices: Vec<usize>,
     },
-    /// A configuration file names an LRW over several SubDevices, and there are two links (facts CR-16, 9.2.2).
+    /// A configuration file names an LRW over several SubDevices, and there are two links (protocol CR-16, 9.2.2).
     NamedLrwOnTwoLinks(ExplicitLrw),
     /// LRW was asked for, and a SubDevice does not know it.
     LrwUnknown {

@@ -1,4 +1,4 @@
-//! Messages of a gateway's clients to declared SubDevices and to the MainDevice itself (facts 10.1).
+//! Messages of a gateway's clients to declared SubDevices and to the MainDevice itself (protocol 10.1).
 
 use alloc::boxed::Box;
 use alloc::vec::Vec;

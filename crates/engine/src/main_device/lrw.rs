@@ -1,4 +1,4 @@
-//! Where LRW may be used: never over several SubDevices on two links (facts 9.2.2, CR-16).
+//! Where LRW may be used: never over several SubDevices on two links (protocol 9.2.2, CR-16).
 
 use alloc::vec::Vec;
 

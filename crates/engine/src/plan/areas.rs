@@ -1,4 +1,4 @@
-//! The process data area of each SyncManager: which PDOs, where each entry lies, how long (facts 3.11, 4.2 to 4.5).
+//! The process data area of each SyncManager: which PDOs, where each entry lies, how long (protocol 3.11, 4.2 to 4.5).
 
 use alloc::collections::BTreeSet;
 use alloc::vec::Vec;

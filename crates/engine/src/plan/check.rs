@@ -1,4 +1,4 @@
-//! Whether the planned SyncManagers fit into the controller (facts 3.1, 3.11, 5.2).
+//! Whether the planned SyncManagers fit into the controller (protocol 3.1, 3.11, 5.2).
 
 use alloc::vec::Vec;
 
@@ -100,7 +100,7 @@ const WRITTEN: &[SyncManagerDirection] = &[SyncManagerDirection::Write];
 const READ: &[SyncManagerDirection] = &[SyncManagerDirection::Read];
 const BOTH: &[SyncManagerDirection] = &[SyncManagerDirection::Write, SyncManagerDirection::Read];
 
-/// Digital outputs, general purpose outputs and inputs, user RAM (facts 3.13). All else is registers.
+/// Digital outputs, general purpose outputs and inputs, user RAM (protocol 3.13). All else is registers.
 const BELOW_PROCESS_RAM: [Memory; 4] = [
     Memory { start: 0x0F00, end: 0x0F04, directions: WRITTEN },
     Memory { start: 0x0F10, end: 0x0F18, directions: WRITTEN },

@@ -1,4 +1,4 @@
-//! SyncManagers as a configuration file declares them, instead of what the SII says (facts 8.1).
+//! SyncManagers as a configuration file declares them, instead of what the SII says (protocol 8.1).
 
 use alloc::vec::Vec;
 

@@ -1,5 +1,5 @@
 //! SDO downloads that tell a SubDevice its PDO assignment and mapping where they are not those of its SII
-//! (facts 5.2, 6.3).
+//! (protocol 5.2, 6.3).
 //!
 //! Per SyncManager: the assignment is emptied, the mapping of each changed PDO is emptied, written and counted, the
 //! assignment is written and counted.

@@ -54,7 +54,7 @@ pub struct AreaPlan {
     pub length: u16,
     /// Registers of the SyncManager.
     pub register: SyncManager,
-    /// To be enabled on the way to OP only, not for SAFEOP (facts 4.4).
+    /// To be enabled on the way to OP only, not for SAFEOP (protocol 4.4).
     pub op_only: bool,
     /// Its PDOs; none where the SII names a length only.
     pub pdos: Vec<MappedPdo>,

@@ -79,6 +79,7 @@ fn sdos(plan: &SubDevicePlan) -> Vec<(u16, u8, Vec<u8>)> {
     plan.assign_sdos.iter().map(|sdo| (sdo.index, sdo.sub_index, sdo.data.clone())).collect()
 }
 
+// covers: plan
 #[test]
 fn the_sii_alone_gives_mailbox_areas_and_unused_sync_managers() {
     let plan = plan(&any(), &device()).unwrap();
@@ -190,6 +191,7 @@ fn another_assignment_is_emptied_written_and_counted() {
     assert_eq!(plan.process_data[0].length, 3);
 }
 
+// covers: plan
 #[test]
 fn another_mapping_is_written_while_the_pdo_is_not_assigned() {
     let mapping = PdoMapping::of(0x1A00, [PdoEntry::new(0x6000, 1, 16), PdoEntry::new(0, 0, 8)]);
@@ -243,6 +245,7 @@ fn other_process_data_without_coe_is_an_error() {
     assert_eq!(plan(&renamed, &terminal()).unwrap().assign_sdos, []);
 }
 
+// covers: plan
 #[test]
 fn watchdogs_are_declared_per_sync_manager_and_for_the_controller() {
     let config = any()
@@ -266,6 +269,7 @@ fn lrw_is_ruled_out_by_controller_or_sii() {
     assert!(!plan(&any(), &info).unwrap().lrw_supported);
 }
 
+// covers: plan
 #[test]
 fn an_error_names_subdevice_sync_manager_expected_and_got() {
     let config = any().assign(9, Direction::Inputs, vec![]);
@@ -365,6 +369,7 @@ fn the_type_of_a_sync_manager_goes_before_its_pdos() {
     assert_eq!((plan.process_data[1].direction, plan.process_data[1].pdos.len()), (Direction::Inputs, 0));
 }
 
+// covers: odd-sii
 #[test]
 fn an_error_says_whether_declaration_or_sii_have_to_be_mended() {
     let fault = |config: &SubDeviceConfig, info: &SubDeviceInfo| plan(config, info).unwrap_err().fault;
@@ -395,6 +400,7 @@ fn nothing_is_made_of_a_blank_eeprom_unless_process_data_is_declared() {
 }
 
 /// Every real image that parses gives a plan on a large controller.
+// covers: plan
 #[test]
 fn real_images_can_be_planned() {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared/data/sii");

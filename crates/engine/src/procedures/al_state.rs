@@ -1,4 +1,4 @@
-//! Requesting a state of a SubDevice and waiting for it (facts 5.3).
+//! Requesting a state of a SubDevice and waiting for it (protocol 5.3).
 
 use core::fmt;
 use core::time::Duration;
@@ -80,7 +80,7 @@ pub(super) fn split_status(bytes: &[u8; 6]) -> (AlStatus, AlStatusCode) {
 }
 
 /// Asks a SubDevice for its explicit device identification, in any state without an error; `None` where it does not
-/// give it in time (facts 5.3).
+/// give it in time (protocol 5.3).
 pub async fn identification(bus: &Bus, station: StationAddress) -> Result<Option<u16>, BusError> {
     let (status, _) = read_status(bus, station).await?;
     let Some(state) = status.al_state().filter(|_| !status.error) else { return Ok(None) };

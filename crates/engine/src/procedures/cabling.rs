@@ -1,5 +1,5 @@
-//! Crossed lines in operation (facts 9.5): whenever ports of SubDevices have changed, the segment is looked at anew and
-//! who is entered at another port than 0 is told, once.
+//! Crossed lines in operation (protocol 9.5): whenever ports of SubDevices have changed, the segment is looked at anew
+//! and who is entered at another port than 0 is told, once.
 //!
 //! More rings behind junctions than are known are told too: whoever asked for junction redundancy must know that one of
 //! them is not watched.

@@ -1,4 +1,4 @@
-//! Distributed clocks: set up, brought together, watched (facts 7).
+//! Distributed clocks: set up, brought together, watched (protocol 7).
 //!
 //! * `measure`: who is connected to whom now, and what frames take from clock to clock;
 //! * `set_up`: propagation delays, offsets, filters;

@@ -1,4 +1,4 @@
-//! Bringing one SubDevice from INIT to its target state with its whole configuration (facts 5.2, order of IgH).
+//! Bringing one SubDevice from INIT to its target state with its whole configuration (protocol 5.2, order of IgH).
 
 mod compare;
 mod error;
@@ -29,8 +29,8 @@ use crate::supervisor::{Bus, BusError};
 pub use error::{ConfigureError, StartupError};
 pub use registers::{RegisterError, RegisterFailure, WrongValue};
 
-/// Cycles of the exchange that must have gone by before OP is requested, so that valid outputs are there (facts 5.2).
-/// The first of them may have been queued without process data.
+/// Cycles of the exchange that must have gone by before OP is requested, so that valid outputs are there (protocol
+/// 5.2). The first of them may have been queued without process data.
 const CYCLES_BEFORE_OP: u64 = 2;
 /// Pause between two looks at the cycle counter.
 const CYCLE_PAUSE: Duration = Duration::from_micros(200);
@@ -147,8 +147,8 @@ impl BringUp<'_> {
         self.bus.fpwr(self.station, map::fmmu(*number), &register.encode()).await
     }
 
-    /// Commands of PS, PDO assignment and mapping, watchdog, process data SyncManagers, FMMUs, SAFEOP (facts 5.2). From
-    /// its FMMUs on a SubDevice may take outputs and give inputs, one before the other; what it adds to a working
+    /// Commands of PS, PDO assignment and mapping, watchdog, process data SyncManagers, FMMUs, SAFEOP (protocol 5.2).
+    /// From its FMMUs on a SubDevice may take outputs and give inputs, one before the other; what it adds to a working
     /// counter is not counted on before it was seen to give its inputs, so that those of the others stay fresh
     /// meanwhile.
     async fn safeop(&self) -> Result<(), ConfigureError> {

@@ -1,5 +1,5 @@
 //! PDO assignment and mapping as the dictionaries of SubDevices have them, where SIIs say nothing or something else
-//! (facts 4.5, 6.3).
+//! (protocol 4.5, 6.3).
 //!
 //! After a scan, SubDevices with CoE are brought to PREOP, asked, and sent back to INIT. What the dictionary says
 //! counts before the SII.

@@ -1,4 +1,4 @@
-//! What SubDevices have counted of errors (facts 2.5).
+//! What SubDevices have counted of errors (protocol 2.5).
 //!
 //! The registers stop at 255. What is kept here goes on: each reading adds what was counted since the last one. What
 //! else reads or clears them says so here (`error_watch`).
@@ -152,6 +152,7 @@ impl ErrorStatistics {
 mod tests {
     use super::*;
 
+    // covers: cable-errors
     #[test]
     fn what_is_kept_goes_on_where_registers_were_cleared() {
         let mut statistics = Statistics::default();

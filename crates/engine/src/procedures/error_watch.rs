@@ -173,6 +173,7 @@ mod tests {
         counters
     }
 
+    // covers: cable-errors
     #[test]
     fn one_damaged_frame_is_no_event_but_many_or_lasting_ones_are() {
         let mut watched = Watched::new(CABLE);

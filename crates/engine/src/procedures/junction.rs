@@ -1,4 +1,4 @@
-//! Rings behind junctions (facts 9.4): which there are ([`learn()`]), whether
+//! Rings behind junctions (protocol 9.4): which there are ([`learn()`]), whether
 //! those that are declared are where they are said to be ([`refute()`]), where they are broken when nothing comes back
 //! ([`isolate`]), and what their junctions were told ([`orders`]). What becomes of them in operation is a matter of the
 //! model ([`crate::segment`]).

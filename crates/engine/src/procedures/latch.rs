@@ -1,4 +1,4 @@
-//! Receive times of one frame: all clocks latch it, and what they have latched is read (facts 7.1).
+//! Receive times of one frame: all clocks latch it, and what they have latched is read (protocol 7.1).
 //!
 //! Another frame that is on the wire meanwhile may spoil what is latched, and another one that latches overwrites it.
 //! So the frame is alone on the wire ([`Bus::alone`]), and its latches belong to one procedure until it has read them

@@ -1,4 +1,4 @@
-//! Finding out who has mail that nobody asked for (facts 6.1).
+//! Finding out who has mail that nobody asked for (protocol 6.1).
 //!
 //! SubDevices whose SII offers it show the status bit of their send mailbox through an FMMU: each has a bit of its own
 //! in the logical address space, and all answer one read together. The others are asked one by one, so seldom that all

@@ -1,4 +1,4 @@
-//! Objects of the MainDevice itself: what a client of the mailbox gateway reads at address 0 (facts 10.1, 10.2).
+//! Objects of the MainDevice itself: what a client of the mailbox gateway reads at address 0 (protocol 10.1, 10.2).
 //!
 //! In go CoE messages of clients, out come the answers: SDOs and SDO information. Values are those of the moment: what
 //! a SubDevice has to say is asked of it when a client asks. Nothing of it is on the cyclic path.

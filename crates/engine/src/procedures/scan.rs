@@ -1,4 +1,4 @@
-//! Finding out who is there (facts 5.6): count, common ground, station addresses, what each SubDevice is, topology.
+//! Finding out who is there (protocol 5.6): count, common ground, station addresses, what each SubDevice is, topology.
 //!
 //! All SubDevices are asked at once, one task each; their datagrams share frames by themselves.
 
@@ -505,7 +505,7 @@ pub(crate) fn report_cabling(bus: &Bus, scan: &Scan, exact: bool) {
             }
         }
     }
-    // In a closed ring only branches on port 2 and crossed SubDevices work on the redundant copy (facts LC-04).
+    // In a closed ring only branches on port 2 and crossed SubDevices work on the redundant copy (protocol LC-04).
     let crossed_known = scan.topology.findings.iter().any(|finding| matches!(finding, Finding::CrossedLine { .. }));
     if bus.links() == LinkSet::Ring
         && bus.ring() == RingState::Closed

@@ -1,5 +1,5 @@
-//! What can be asked of one SubDevice besides its mailbox (000 10.8): registers, ports, resets, error counters, its
-//! EEPROM.
+//! What can be asked of one SubDevice besides its mailbox (Master Redundancy 10.8): registers, ports, resets, error
+//! counters, its EEPROM.
 
 pub mod ports;
 pub mod registers;
@@ -54,7 +54,7 @@ pub enum ServiceError {
         limit: usize,
     },
     /// An LRW of the application's own over process data of several SubDevices, with two links: a break would leave
-    /// half of them to each copy (facts 9.2.2).
+    /// half of them to each copy (protocol 9.2.2).
     LrwOnTwoLinks {
         /// Its logical address.
         logical: LogicalAddress,

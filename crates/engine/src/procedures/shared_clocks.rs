@@ -142,7 +142,7 @@ pub struct ClockStatus {
     pub is_locked: bool,
 }
 
-/// Why the delay of a SubDevice is not known (facts 7.1): it is behind a fork without a clock, and what was latched
+/// Why the delay of a SubDevice is not known (protocol 7.1): it is behind a fork without a clock, and what was latched
 /// shows only what the branches of that take together.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct HiddenDelay {

@@ -1,4 +1,4 @@
-//! Reading the SII of a SubDevice through its controller (facts 3.8, 4).
+//! Reading the SII of a SubDevice through its controller (protocol 3.8, 4).
 //!
 //! Only the words of the fixed area and the categories that the engine uses are read, and where another SubDevice with
 //! the same fixed area was read before, or is being read, only the category headers.
@@ -35,8 +35,9 @@ const IDENTITY_WORD: u32 = 0x08;
 const ERASED: u8 = 0xFF;
 /// Words before the categories.
 const HEADER_WORDS: u32 = (SiiHeader::LEN / 2) as u32;
-/// What is read of the fixed area: all but reserved words (facts 4.1). Words 0x20 to 0x23 are reserved too, but in many
-/// real images they differ where nothing else in the fixed area does, though the categories do: they are worth a read.
+/// What is read of the fixed area: all but reserved words (protocol 4.1). Words 0x20 to 0x23 are reserved too, but in
+/// many real images they differ where nothing else in the fixed area does, though the categories do: they are worth a
+/// read.
 const FIXED_AREA: [(u32, u32); 2] = [(0x00, 0x24), (0x3E, 2)];
 /// Pause between two looks whether somebody else has read the same SII.
 const CACHE_PAUSE: Duration = Duration::from_micros(500);
@@ -287,7 +288,7 @@ pub(super) const FORCE: [u8; 1] = [0x02];
 /// Written to `SII_CONFIGURATION`: the EEPROM is EtherCAT's.
 pub(super) const ETHERCAT: [u8; 1] = [0x00];
 
-/// Takes the EEPROM of one SubDevice away from its PDI (facts 5.6).
+/// Takes the EEPROM of one SubDevice away from its PDI (protocol 5.6).
 pub(super) async fn claim(bus: &Bus, station: StationAddress) -> Result<(), BusError> {
     bus.fpwr(station, map::SII_CONFIGURATION, &FORCE).await?;
     bus.fpwr(station, map::SII_CONFIGURATION, &ETHERCAT).await

@@ -1,4 +1,4 @@
-//! Taking all SubDevices down to a state: the end of an orderly stop (facts 5.3).
+//! Taking all SubDevices down to a state: the end of an orderly stop (protocol 5.3).
 //!
 //! Each is led by itself. What one broadcast asks for, some may not do: a SubDevice that was not declared is in INIT
 //! and has no mailbox for PREOP, one may have another target state, one that copies AL control into AL status takes an

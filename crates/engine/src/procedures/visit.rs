@@ -1,4 +1,4 @@
-//! Bringing a scanned SubDevice to PREOP or BOOT before activation, so that its mailbox can be used (facts 5.2).
+//! Bringing a scanned SubDevice to PREOP or BOOT before activation, so that its mailbox can be used (protocol 5.2).
 
 use alloc::vec;
 use core::time::Duration;

@@ -1,4 +1,4 @@
-//! Register requests of a cyclic thread (seed 004: register requests).
+//! Register requests of a cyclic thread (IgH manual: register requests).
 
 use ringcat_wire::address::RegisterAddress;
 

@@ -42,6 +42,7 @@ mod tests {
     use super::*;
     use crate::request::{Access, RequestFailure, RequestState};
 
+    // covers: jobs, sdo
     #[test]
     fn a_request_goes_to_the_other_side_and_comes_back_with_what_was_read() {
         let (mut request, served) = SdoRequest::new(3, 8);

@@ -1,4 +1,4 @@
-//! SoE requests of a cyclic thread (seed 004: SoE requests).
+//! SoE requests of a cyclic thread (IgH manual: SoE requests).
 
 use ringcat_wire::mailbox::soe::{Idn, SoeElements};
 

@@ -1,4 +1,4 @@
-//! VoE handlers of a cyclic thread (seed 004: VoE handlers).
+//! VoE handlers of a cyclic thread (IgH manual: VoE handlers).
 
 use super::slot::{Request, RequestRefused, RequestState, Served, Subject, pair};
 

@@ -35,6 +35,7 @@ mod tests {
 
     use super::*;
 
+    // covers: frame-limit
     #[test]
     fn what_to_set_is_said_unless_nothing_helps() {
         let said = |datagrams, returns| FrameLimit { datagrams, returns }.to_string();

@@ -1,7 +1,7 @@
 //! Marks that a MainDevice puts on its frames, and how it finds them again.
 //!
 //! The source address carries the identity of the MainDevice, the bit of the link the copy was sent on, and the lower 8
-//! bits of the frame's sequence number (facts 9.7.1, 9.7.2). The Idx of every datagram carries the class bit and 7
+//! bits of the frame's sequence number (protocol 9.7.1, 9.7.2). The Idx of every datagram carries the class bit and 7
 //! further bits, so that a frame that was delayed by more than 256 others is never taken for a new one.
 
 use ringcat_wire::datagram;
@@ -20,7 +20,7 @@ const KIND_AT: usize = ETHERNET_HEADER_LEN + 1;
 pub(crate) const DATAGRAMS_AT: usize = ETHERNET_HEADER_LEN + ETHERCAT_HEADER_LEN;
 /// Offset of the first datagram's Idx.
 const FIRST_INDEX_AT: usize = DATAGRAMS_AT + 1;
-/// Bit of the source address that tells the copies apart (facts SM-01).
+/// Bit of the source address that tells the copies apart (protocol SM-01).
 const REDUNDANT_BIT: u8 = 0x08;
 /// Bit of Idx that tells the classes apart.
 const CLASS_BIT: u8 = 0x80;
@@ -55,7 +55,7 @@ impl Sequence {
         self.0
     }
 
-    /// The lower 8 bits, RedFrameId of the seeds.
+    /// The lower 8 bits, RedFrameId in docs/protocol.
     pub const fn frame_id(self) -> u8 {
         self.0 as u8
     }
@@ -91,7 +91,7 @@ pub struct FrameCopy {
 pub enum Classified {
     /// A copy of one of our frames.
     Ours(FrameCopy),
-    /// An EtherCAT frame of another MainDevice (facts MR-10).
+    /// An EtherCAT frame of another MainDevice (protocol MR-10).
     Foreign,
     /// No EtherCAT frame with datagrams.
     Other,
@@ -112,7 +112,7 @@ pub struct Identity {
 }
 
 impl Identity {
-    /// The addresses of the interfaces; both copies of a frame carry those of the main one (facts SM-07).
+    /// The addresses of the interfaces; both copies of a frame carry those of the main one (protocol SM-07).
     pub fn new(codec: MacCodec, main: MacAddress, redundant: Option<MacAddress>) -> Identity {
         let (id_at, mask) = match codec {
             MacCodec::FlagsFirst => (SOURCE_AT + 1, [0, 0, 0, 0xFF, 0xFF, 0xFF, 0xFF, 0xFF]),
@@ -136,7 +136,7 @@ impl Identity {
         self.codec.encode(self.main, &SourceMarks { frame_id: sequence.frame_id(), retry, ..SourceMarks::default() })
     }
 
-    /// Writes the source address of the main copy into a built frame. `retry` counts resends (facts SM-04).
+    /// Writes the source address of the main copy into a built frame. `retry` counts resends (protocol SM-04).
     pub(crate) fn stamp(&self, frame: &mut [u8], sequence: Sequence, retry: u8) {
         frame[SOURCE_AT..SOURCE_AT + 6].copy_from_slice(&self.marked(sequence, retry).0);
     }
@@ -208,7 +208,7 @@ mod tests {
         bytes
     }
 
-    // Facts CR-04, CR-24.
+    // covers: CR-04, CR-24, SM-02, ring-merge
     #[test]
     fn both_copies_of_a_frame_are_recognised_after_controllers_marked_them() {
         let mut sequence = Sequence::default();
@@ -224,7 +224,7 @@ mod tests {
         }
     }
 
-    // Facts CR-04.
+    // covers: CR-04, SM-03, ring-merge
     #[test]
     fn a_frame_that_is_256_frames_old_has_another_sequence_number() {
         let old = Sequence::default();
@@ -235,6 +235,7 @@ mod tests {
         assert_ne!(copy.sequence, new);
     }
 
+    // covers: SM-08, ring-merge
     #[test]
     fn frames_of_others_are_foreign_and_short_ones_are_nothing() {
         let mut bytes = frame(Sequence::default(), Class::Cyclic);

@@ -1,5 +1,5 @@
-//! What becomes of two copies of a datagram (facts 9.3). Decided by command and by which copy was worked on, never by
-//! comparing data. Working counters are always added.
+//! What becomes of two copies of a datagram (protocol 9.3). Decided by command and by which copy was worked on, never
+//! by comparing data. Working counters are always added.
 
 use ringcat_wire::address::Wkc;
 use ringcat_wire::command::Command;
@@ -14,7 +14,7 @@ pub enum MergeRule {
     /// Broadcast and logical reads, sent as zeros: each bit belongs to one SubDevice, or is an OR of all.
     Or,
     /// One SubDevice answers: the copy whose working counter is not zero. An LRW on two links addresses one SubDevice
-    /// (facts 9.2.2).
+    /// (protocol 9.2.2).
     Answered,
     /// The copy that was sent on this link, because the addressed SubDevice is visible there (ARMW, FRMW: every other
     /// SubDevice counts too, so the working counter cannot tell).
@@ -74,6 +74,7 @@ mod tests {
         forward
     }
 
+    // covers: CR-05, 9.3, ring-merge
     #[test]
     fn reads_by_one_subdevice_come_from_the_copy_it_answered() {
         for command in [Command::Aprd, Command::Fprd, Command::Fprw, Command::Aprw, Command::Lrw] {
@@ -82,6 +83,7 @@ mod tests {
         }
     }
 
+    // covers: ring-merge
     #[test]
     fn broadcast_and_logical_reads_are_ored() {
         for command in [Command::Brd, Command::Lrd] {
@@ -89,11 +91,13 @@ mod tests {
         }
     }
 
+    // covers: ring-merge
     #[test]
     fn a_distributed_time_comes_from_the_side_of_the_reference() {
         assert_eq!(merged(Command::Frmw, (&[9, 9], 5), (&[1, 2], 7)), [1, 2]);
     }
 
+    // covers: ring-merge
     #[test]
     fn writes_stay_as_sent() {
         for command in [Command::Fpwr, Command::Lwr, Command::Bwr, Command::Apwr, Command::Nop] {

@@ -1,4 +1,4 @@
-//! Whether the ring is closed, judged from where the copies of frames arrive (facts 9.2.1).
+//! Whether the ring is closed, judged from where the copies of frames arrive (protocol 9.2.1).
 //!
 //! A copy that comes back on the link it was sent on is proof of an open ring, copies that crossed prove a closed one;
 //! what is missing proves nothing (a single loss, or a break that the controllers have not noticed yet).
@@ -74,7 +74,8 @@ impl RingMonitor {
         }
     }
 
-    /// Takes in one frame; true where the state changed (facts CR-12: once per change) or a direction died or revived.
+    /// Takes in one frame; true where the state changed (protocol CR-12: once per change) or a direction died or
+    /// revived.
     pub fn observe(&mut self, arrivals: Arrivals) -> bool {
         let Some(verdict) = arrivals.verdict() else { return self.observe_alone(arrivals) };
         if verdict == self.state && self.alone == [0; 2] {
@@ -113,9 +114,9 @@ mod tests {
         arrivals
     }
 
-    // Facts CR-11.
+    // covers: CR-11, 9.2.1, ring-merge
     #[test]
-    fn the_table_of_facts_9_2_1() {
+    fn the_table_of_ring_states_holds() {
         use Link::{Main, Redundant};
         type Copies = &'static [(Link, Link)];
         let table: [(Copies, Option<RingState>); 7] = [
@@ -132,6 +133,7 @@ mod tests {
         }
     }
 
+    // covers: ring-merge
     #[test]
     fn a_thousand_broken_cycles_are_one_change() {
         let mut monitor = RingMonitor::default();
@@ -143,7 +145,7 @@ mod tests {
         assert_eq!(monitor.state(), RingState::Open);
     }
 
-    // covers: facts 9.2.1
+    // covers: CR-11, 9.2.1, ring-merge
     #[test]
     fn one_copy_that_keeps_coming_alone_shows_a_dead_direction_and_single_losses_do_not() {
         let mut monitor = RingMonitor::default();

@@ -1,6 +1,6 @@
 //! The cables of a segment, from its topology, and the errors that the ports at their ends have counted.
 //!
-//! A controller counts an invalid frame where it is seen first (facts 2.5): at the receiving end of the cable that
+//! A controller counts an invalid frame where it is seen first (protocol 2.5): at the receiving end of the cable that
 //! damaged it. Controllers behind count it as forwarded, which says nothing about their own cables.
 
 use alloc::vec::Vec;
@@ -112,7 +112,7 @@ mod tests {
     use super::*;
     use crate::topology::NodeStatus;
 
-    /// High bytes of DL_STATUS (facts 2.3).
+    /// High bytes of DL_STATUS (protocol 2.3).
     fn named(high: &[u8], main_count: usize, links: LinkSet) -> Vec<String> {
         let node = |high: &u8| NodeStatus {
             dl_status: DlStatus::from_bits(u16::from(*high) << 8),
@@ -128,6 +128,7 @@ mod tests {
     const PASS: u8 = 0x5A;
     const HEAD: u8 = 0x59;
 
+    // covers: ring-status
     #[test]
     fn every_cable_of_a_closed_ring_is_named() {
         let expected = [
@@ -138,6 +139,7 @@ mod tests {
         assert_eq!(named(&[PASS, PASS], 2, LinkSet::Ring), expected);
     }
 
+    // covers: ring-status
     #[test]
     fn a_broken_cable_is_among_them_wherever_it_is() {
         let expected = [
@@ -155,6 +157,7 @@ mod tests {
         assert_eq!(named(&[PASS, END], 2, LinkSet::Single).len(), 2);
     }
 
+    // covers: cable-errors
     #[test]
     fn errors_are_those_of_the_port() {
         let mut bytes = [0; ErrorCounters::LEN];

@@ -108,6 +108,7 @@ mod tests {
         assert!(damper.may_tell(Instant(5)));
     }
 
+    // covers: ring-flap
     #[test]
     fn flapping_at_any_rate_is_told_a_bounded_number_of_times() {
         let lasts = Duration::from_secs(60);

@@ -26,7 +26,7 @@ pub enum Effect {
         /// The member.
         index: usize,
     },
-    /// Positions from here on are reached through the redundant link (facts CR-09).
+    /// Positions from here on are reached through the redundant link (protocol CR-09).
     MainCount(u16),
     /// Other SubDevices are at the positions of the cabling.
     Occupants(Vec<Occupant>),

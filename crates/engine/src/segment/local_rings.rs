@@ -276,8 +276,9 @@ mod tests {
         Event::JunctionChanged { near, far, station, declared, broken, breaks }
     }
 
+    // covers: JR-07
     #[test]
-    fn each_edge_is_reported_once_with_both_ends_jr_07() {
+    fn each_edge_is_reported_once_with_both_ends() {
         let mut watch = watch(WHOLE);
         assert_eq!(seen(&mut watch, 0, WHOLE), []);
         assert_eq!(seen(&mut watch, 1, CUT_1_2), [event(Some(at(1, 1)), at(2, 0), true, 1)]);
@@ -287,6 +288,7 @@ mod tests {
         assert_eq!(seen(&mut watch, 61, WHOLE), []);
     }
 
+    // covers: junctions
     #[test]
     fn a_plug_with_bad_contact_is_one_break() {
         let mut watch = watch(WHOLE);

@@ -1,4 +1,4 @@
-//! A frame that is alone on the wire: what SubDevices latch of it no other frame has spoiled (facts 7.1).
+//! A frame that is alone on the wire: what SubDevices latch of it no other frame has spoiled (protocol 7.1).
 //!
 //! In: a datagram that asks for that ([`Bus::alone`]). It waits until all acyclic frames are home or lost and no cyclic
 //! one is under way; nothing acyclic follows until all its copies are in. The cyclic half knows nothing of it: it posts

@@ -111,7 +111,7 @@ impl Bus {
         self.submit(Request { expected, resend, ..Request::once(command, target, data) })
     }
 
-    /// Positions from here on live behind the redundant link (facts CR-09). Broadcasts show it, too.
+    /// Positions from here on live behind the redundant link (protocol CR-09). Broadcasts show it, too.
     pub(crate) fn set_main_count(&self, count: u16) {
         self.shared.borrow_mut().main_count = count;
     }

@@ -84,7 +84,7 @@ impl Flight {
         (self.released, self.deaf) = (false, 0);
     }
 
-    /// Everything controllers never change is as sent (facts 1.5): command, Idx, length, M bit of every datagram.
+    /// Everything controllers never change is as sent (protocol 1.5): command, Idx, length, M bit of every datagram.
     pub fn is_what_was_sent(&self, bytes: &[u8]) -> bool {
         if bytes.len() < self.bytes.len() {
             return false;
@@ -126,7 +126,7 @@ impl Flight {
             if witnessed {
                 place.visible = sent_on;
             }
-            // OR of the event requests (facts 9.3); both copies have them behind the length.
+            // OR of the event requests (protocol 9.3); both copies have them behind the length.
             let irq = place.header_at + 8;
             if first {
                 self.bytes[data.clone()].copy_from_slice(&bytes[data]);

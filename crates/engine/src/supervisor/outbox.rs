@@ -168,6 +168,7 @@ mod tests {
         core::array::from_fn(|_| transfers.insert(Transfer::for_test()))
     }
 
+    // covers: start-lists
     #[test]
     fn requests_go_before_reads_unless_these_have_waited_for_long() {
         let [a, b, c] = ids();
@@ -190,8 +191,9 @@ mod tests {
         Mail { write: usize, read: usize },
     }
 
+    // covers: byte-budget
     #[test]
-    fn who_always_has_something_waiting_gets_as_many_bytes_as_any_other_to_a_datagram_of_each_and_two_shares() {
+    fn subdevices_that_always_wait_get_equal_bytes_to_a_datagram_and_two_shares() {
         const MAIL: Wish = Wish::Mail { write: 40, read: READ };
         let wishes =
             [MAIL, Wish::Datagrams(1490), MAIL, Wish::Datagrams(28), Wish::Datagrams(400), MAIL, Wish::Datagrams(800)];
@@ -243,6 +245,7 @@ mod tests {
         }
     }
 
+    // covers: start-lists
     #[test]
     fn reads_under_way_are_those_of_two_frames_and_of_the_way_through_the_segment() {
         let mut outbox = Outbox::default();
@@ -260,6 +263,7 @@ mod tests {
         assert!(outbox.is_ready(Instant(0)));
     }
 
+    // covers: start-lists
     #[test]
     fn a_few_reads_wait_for_others_while_the_interface_is_busy() {
         let [a] = ids();

@@ -27,7 +27,7 @@ pub struct Reply {
 }
 
 impl Reply {
-    /// Sum of the working counters (facts CR-05).
+    /// Sum of the working counters (protocol CR-05).
     pub const fn wkc(&self) -> Wkc {
         self.main.plus(self.redundant)
     }
@@ -69,7 +69,7 @@ pub enum BusError {
         /// Whom it addressed.
         target: Target,
     },
-    /// An LRW of which both copies met somebody: neither has what the other one read (facts 9.2.2).
+    /// An LRW of which both copies met somebody: neither has what the other one read (protocol 9.2.2).
     Split {
         /// Whom it addressed.
         target: Target,

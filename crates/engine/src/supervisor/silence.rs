@@ -41,7 +41,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn silence_begins_with_the_first_copy_that_is_not_answered_and_ends_with_any_that_is() {
+    fn silence_begins_with_the_first_copy_without_answer_and_ends_with_any_answer() {
         let mut silence = Silence::default();
         let at = |ms: u64| Instant(ms * 1_000_000);
         assert_eq!(silence.mask(at(1000)), 0, "nothing was sent");

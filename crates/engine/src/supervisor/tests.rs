@@ -146,6 +146,7 @@ fn nobody_answering_is_an_error_that_names_register_and_counter() {
     );
 }
 
+// covers: SM-04, ring-merge
 #[test]
 fn a_lost_frame_is_sent_again_with_the_retry_index_and_given_up_in_the_end() {
     let mut bench = Bench::new(LinkSet::Single);
@@ -154,7 +155,7 @@ fn a_lost_frame_is_sent_again_with_the_retry_index_and_given_up_in_the_end() {
     for retry in 0..=7 {
         bench.step();
         assert_eq!(bench.sent.len(), 1, "try {retry}");
-        // facts SM-04: bits 6:4 of the first byte of the source address.
+        // protocol SM-04: bits 6:4 of the first byte of the source address.
         assert_eq!(bench.sent[0].1[6], retry << 4);
         bench.pass(Duration::from_millis(20));
     }
@@ -179,6 +180,7 @@ fn what_must_not_happen_twice_is_not_sent_again() {
     assert!(matches!(*result.borrow(), Some(Err(BusError::Lost { retries: 0, .. }))));
 }
 
+// covers: ring-merge
 #[test]
 fn an_answer_that_comes_after_the_retry_is_late() {
     let mut bench = Bench::new(LinkSet::Single);
@@ -197,7 +199,7 @@ fn an_answer_that_comes_after_the_retry_is_late() {
 
 #[test]
 fn both_copies_leave_with_one_id_and_the_redundant_bit_on_one() {
-    // facts CR-01, CR-24, SM-02.
+    // protocol CR-01, CR-24, SM-02.
     let mut bench = Bench::new(LinkSet::Ring);
     let bus = bench.supervisor.bus();
     bench.start(async move { bus.brd(map::TYPE, 1).await });
@@ -227,10 +229,10 @@ fn in_an_open_ring_counts_are_added_and_reads_are_ored() {
     assert_eq!(bench.supervisor.ring(), RingState::Open);
 }
 
-// Facts CR-09.
+// covers: CR-09, CR-10, ring-merge
 #[test]
 fn positions_behind_the_break_are_shifted_on_the_redundant_copy() {
-    // facts CR-09: three on the main link, so position 4 is position 1 on the redundant one: ADP -4 + 3 = -1.
+    // protocol CR-09: three on the main link, so position 4 is position 1 on the redundant one: ADP -4 + 3 = -1.
     let mut bench = Bench::new(LinkSet::Ring);
     let bus = bench.supervisor.bus();
     bench.start(async move {
@@ -249,10 +251,10 @@ fn positions_behind_the_break_are_shifted_on_the_redundant_copy() {
     assert_eq!(adp(&bench.sent[1].1), 0u16.wrapping_sub(1));
 }
 
-// Facts CR-06.
+// covers: CR-06, ring-merge
 #[test]
 fn one_copy_is_enough_where_the_counter_is_as_expected() {
-    // facts CR-06.
+    // protocol CR-06.
     let mut bench = Bench::new(LinkSet::Ring);
     let bus = bench.supervisor.bus();
     let result = bench.start(async move { bus.fprd(STATION, map::AL_STATUS, 2).await });
@@ -322,6 +324,7 @@ fn a_request_abandoned_before_it_was_sent_is_never_sent() {
     assert!(bench.sent.is_empty());
 }
 
+// covers: byte-budget
 #[test]
 fn a_frame_that_is_filled_up_to_the_shortest_one_fits_the_budget_too() {
     let mut bench = Bench::new(LinkSet::Single);

@@ -77,7 +77,7 @@ impl Request {
     }
 
     /// A read of the SubDevice that ARMW and FRMW address: which copy meets it, their own working counters do not tell,
-    /// because all others count too (facts 9.3).
+    /// because all others count too (protocol 9.3).
     pub(crate) fn witness(&self) -> Option<(Command, Target, Vec<u8>)> {
         let (command, target) = match (self.command, self.target) {
             (Command::Armw, Target::Position(position, _)) => (Command::Aprd, Target::Position(position, map::TYPE)),

@@ -158,6 +158,7 @@ mod tests {
         }
     }
 
+    // covers: byte-budget
     #[test]
     fn who_asks_for_no_more_than_a_share_is_served_in_the_order_of_asking() {
         let mut bench = Bench::default();
@@ -168,6 +169,7 @@ mod tests {
         assert!(bench.turns.is_empty());
     }
 
+    // covers: byte-budget
     #[test]
     fn accounts_are_looked_through_seldom_however_many_owe_something() {
         let mut accounts = Accounts::default();
@@ -178,6 +180,7 @@ mod tests {
         assert_eq!((accounts.used.len(), accounts.limit), (1 << 16, 1 << 16));
     }
 
+    // covers: byte-budget
     #[test]
     fn a_thousand_datagrams_to_one_subdevice_let_others_pass() {
         let mut bench = Bench::default();
@@ -196,6 +199,7 @@ mod tests {
         assert!(bytes[0].abs_diff(bytes[1]) <= 100 + 300 + SHARE as u32, "{served:?}");
     }
 
+    // covers: byte-budget
     #[test]
     fn a_datagram_that_was_next_once_is_not_overtaken() {
         let mut bench = Bench::default();

@@ -1,4 +1,4 @@
-//! Rings behind junctions that would explain the open ports of a segment (facts 9.4).
+//! Rings behind junctions that would explain the open ports of a segment (protocol 9.4).
 //!
 //! In: what SubDevices report of their ports. Out: sets of closing cables that would fit. Which of them it is, frames
 //! have to show.

@@ -5,7 +5,7 @@ use core::fmt;
 /// Something odd about the cabling.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Finding {
-    /// Nothing is plugged into port 0: frames pass at most one such SubDevice (facts 2.4).
+    /// Nothing is plugged into port 0: frames pass at most one such SubDevice (protocol 2.4).
     UnconnectedPort0 {
         /// Position of the SubDevice.
         node: usize,

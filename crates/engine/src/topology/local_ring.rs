@@ -1,4 +1,4 @@
-//! Rings behind a junction (facts 9.4): how they lie in the tree, and which cables they have.
+//! Rings behind a junction (protocol 9.4): how they lie in the tree, and which cables they have.
 //!
 //! A local ring leaves its junction through one port, passes its members, and comes back through a later one; frames
 //! meet the members in the same order whether it is whole or broken at one place. So the tree has it as a branch on the

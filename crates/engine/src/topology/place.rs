@@ -1,8 +1,8 @@
 //! Follows the walk of a frame through the segment and hangs each SubDevice where the walk must have met it.
 //!
 //! A SubDevice entered at port 0 is met before what hangs on its ports 3, 1, 2. One that is entered elsewhere is met
-//! only when the frame is about to leave it through port 0 or has come back there (facts 2.1): what hangs on its ports
-//! before that was met earlier and is taken over ([`Walk::take_over`]).
+//! only when the frame is about to leave it through port 0 or has come back there (protocol 2.1): what hangs on its
+//! ports before that was met earlier and is taken over ([`Walk::take_over`]).
 
 use alloc::vec;
 use alloc::vec::Vec;
@@ -14,7 +14,7 @@ use super::port::PortOf;
 use super::rings::Rings;
 use super::tree::{Node, NodeStatus, Topology};
 
-/// Order in which a frame passes the ports (facts 2.1). The processing unit is behind port 0.
+/// Order in which a frame passes the ports (protocol 2.1). The processing unit is behind port 0.
 pub(super) const TRAVEL: [u8; 4] = [0, 3, 1, 2];
 
 /// Where the next SubDevice may hang: a port of another one, or (`None`) the link.

@@ -2,7 +2,7 @@
 //!
 //! Frames of the redundant link run up the trunk from the link to the break without meeting a processing unit, pass the
 //! branches that lie behind the trunk's ports on that way, and meet the units of the trunk on the way back, the one
-//! next to the break first (facts 2.9). So branches come before the head in the order, and the rest behind it.
+//! next to the break first (protocol 2.9). So branches come before the head in the order, and the rest behind it.
 
 use alloc::vec::Vec;
 use core::ops::Range;

@@ -11,7 +11,7 @@ use walk_model::{End, Segment};
 mod local_rings;
 mod walk_model;
 
-/// High byte of DL_STATUS as in facts 2.3; a link wherever there is communication.
+/// High byte of DL_STATUS as in protocol 2.3; a link wherever there is communication.
 fn status(high: u8) -> NodeStatus {
     let links = (0..4).filter(|port| high >> (2 * port + 1) & 1 != 0).map(|port| 0x10 << port).sum::<u16>();
     node(u16::from(high) << 8 | links)
@@ -96,7 +96,7 @@ fn a_junction_has_its_branches_in_the_order_3_1_2() {
 
 #[test]
 fn a_branch_on_port_2_of_a_closed_ring_is_met_by_the_redundant_link() {
-    // Facts 2.9: S5 on port 2 of S2; the main copy meets 1 2 3 4 and leaves at S4 port 1, the other one meets S5.
+    // Protocol 2.9: S5 on port 2 of S2; the main copy meets 1 2 3 4 and leaves at S4 port 1, the other one meets S5.
     let nodes = [status(PASS), status(0x6A), status(PASS), status(PASS), status(END)];
     let topology = Topology::build(&nodes, 4);
     assert_eq!(parents(&topology), [None, Some((0, 1)), Some((1, 1)), Some((2, 1)), Some((1, 2))]);
@@ -106,7 +106,7 @@ fn a_branch_on_port_2_of_a_closed_ring_is_met_by_the_redundant_link() {
 
 #[test]
 fn a_branch_on_port_2_of_a_stub_is_met_before_its_head() {
-    // Facts 2.9, break between S1 and S2: main 1, redundant 5 2 3 4.
+    // Protocol 2.9, break between S1 and S2: main 1, redundant 5 2 3 4.
     let nodes = [status(END), status(END), status(0x69), status(PASS), status(PASS)];
     let topology = Topology::build(&nodes, 1);
     assert_eq!(parents(&topology), [None, Some((2, 2)), None, Some((2, 1)), Some((3, 1))]);
@@ -132,7 +132,7 @@ fn a_crossed_subdevice_in_a_closed_ring_is_found() {
 
 #[test]
 fn an_unconnected_port_0_at_the_end_of_a_line_is_found() {
-    // Facts 2.9: S2 and S3 entered at port 1, port 0 of S3 unconnected: visits 1 3 2.
+    // Protocol 2.9: S2 and S3 entered at port 1, port 0 of S3 unconnected: visits 1 3 2.
     let topology = Topology::build(&[status(PASS), status(HEAD), status(PASS)], 3);
     assert_eq!(parents(&topology), [None, Some((2, 0)), Some((0, 1))]);
     let expected = [
@@ -191,6 +191,7 @@ fn trees() -> impl Strategy<Value = Segment> {
 }
 
 proptest! {
+    // covers: topology
     #[test]
     fn any_tree_comes_back_from_its_dl_status(segment in trees(), times in any::<bool>()) {
         let seen = segment.walk();
@@ -201,6 +202,7 @@ proptest! {
         prop_assert_eq!(&topology.open_ports, &[]);
     }
 
+    // covers: topology
     #[test]
     fn any_closed_ring_comes_back_from_its_dl_status(
         mut segment in trees(), tail in any::<prop::sample::Index>(), times in any::<bool>()
@@ -215,6 +217,7 @@ proptest! {
         prop_assert_eq!(&topology.open_ports, &[at(seen.order.iter().position(|n| *n == node).unwrap(), port)]);
     }
 
+    // covers: topology
     #[test]
     fn any_ring_cut_anywhere_comes_back_with_receive_times(
         mut segment in trees(), tail in any::<prop::sample::Index>(), cut in any::<prop::sample::Index>()
@@ -233,6 +236,7 @@ proptest! {
         prop_assert_eq!(&topology.findings, &[]);
     }
 
+    // covers: topology
     #[test]
     fn any_one_crossed_subdevice_of_a_line_is_located(length in 2usize..20, crossed in any::<prop::sample::Index>()) {
         // The last one would have an unconnected port 0 instead.
@@ -251,6 +255,7 @@ proptest! {
         prop_assert_eq!(&topology.findings, &[Finding::CrossedLine { node, entry_port: 1 }]);
     }
 
+    // covers: ring-places
     #[test]
     fn any_crossed_subdevices_of_a_ring_that_is_cut_anywhere_are_found(
         crossed in proptest::collection::vec(any::<bool>(), 1..12), cut in any::<prop::sample::Index>(),

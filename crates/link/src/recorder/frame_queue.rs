@@ -190,7 +190,7 @@ mod tests {
     }
 
     #[test]
-    fn a_frame_that_finds_the_queue_full_is_counted_for_its_interface_and_the_others_stay() {
+    fn a_frame_that_finds_the_queue_full_is_counted_and_the_others_stay() {
         let (mut producer, mut consumer) = queue(256, 2);
         let ones = Note { interface: 1, ..note(1) };
         let pushed = (0..5).filter(|_| producer.push(ones, &[7; 64])).count();
@@ -205,6 +205,7 @@ mod tests {
         assert_eq!(rest, [7, 7, 8]);
     }
 
+    // covers: capture
     #[test]
     fn two_threads_at_once_lose_nothing_but_what_is_counted() {
         const FRAMES: u64 = 20_000;

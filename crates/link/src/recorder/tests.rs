@@ -47,6 +47,7 @@ fn frames(blocks: &[(u32, Vec<u8>)]) -> Vec<(u32, u64, u8)> {
         .collect()
 }
 
+// covers: capture
 #[test]
 fn frames_of_two_threads_are_in_one_file_in_the_order_of_time() {
     let shared = Arc::new(Shared {
@@ -107,6 +108,7 @@ fn frames_of_two_threads_at_once_are_all_in_the_file() {
     }
 }
 
+// covers: capture
 #[test]
 fn frames_that_find_the_queue_full_are_told_in_the_statistics() {
     let scratch = Scratch::new();
@@ -164,6 +166,7 @@ fn a_capture_is_complete_when_its_recorder_is_dropped() {
     tap.record(0, Direction::In, 0, &[1; 60]);
 }
 
+// covers: capture
 #[test]
 fn a_file_that_cannot_be_written_is_named_with_what_to_do() {
     let start = |path: &str| Recorder::start(Path::new(path), &[("a", "")]).expect_err("no file").to_string();

@@ -85,7 +85,7 @@ fn a_frame_beyond_the_mtu_is_refused_and_the_next_one_sent() {
 }
 
 #[test]
-fn a_tagged_frame_reaches_the_sockets_of_its_class_and_keeps_its_tag_where_that_is_asked_for() {
+fn a_tagged_frame_reaches_the_sockets_of_its_class_and_keeps_its_tag_on_request() {
     let Some(bench) = Bench::make() else { return };
     let mut far = bench.far_socket();
     let open = |filter, keep_vlan_tags| bench.near_socket(PacketOptions { keep_vlan_tags, ..class(filter) });

@@ -33,6 +33,7 @@ fn heard(bench: &Bench, except: &[&str], frames: &[Vec<u8>]) -> Option<Heard> {
     })
 }
 
+// covers: stray-ring-cable
 #[test]
 fn a_frame_of_the_sender_is_heard_with_the_name_of_its_interface() {
     let Some(bench) = Bench::make() else { return };

@@ -10,6 +10,7 @@ use crate::bench::Bench;
 
 const MAC: [u8; 6] = [2, 0xEC, 1, 2, 3, 4];
 
+// covers: eoe-interfaces
 #[test]
 fn a_tap_interface_has_its_name_address_and_carrier_and_passes_frames_both_ways() {
     let Some(bench) = Bench::make() else { return };

@@ -1,4 +1,5 @@
-//! The cables of a network held against `PreviousPort` of a file (facts 8.2): who is plugged into which port of whom.
+//! The cables of a network held against `PreviousPort` of a file (protocol 8.2): who is plugged into which port of
+//! whom.
 //!
 //! A difference is told and no more: process data finds its SubDevices by their order, but whoever looks for a broken
 //! cable with the drawing of the machine in hand wants to know.

@@ -108,7 +108,7 @@ impl EniFile {
     }
 
     /// What is activated. With `split_lrw` the engine is free to send LRD and LWR where the file has an LRW over
-    /// several SubDevices, as it must with two links (facts CR-16, 9.2.2).
+    /// several SubDevices, as it must with two links (protocol CR-16, 9.2.2).
     pub fn declaration(&self, split_lrw: bool) -> Declaration {
         let mut declaration = self.configuration.declaration.clone();
         if split_lrw {

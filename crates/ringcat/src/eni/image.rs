@@ -1,4 +1,4 @@
-//! The process image of an ENI at run time: what the application sees, as the file lays it out (facts 8.1).
+//! The process image of an ENI at run time: what the application sees, as the file lays it out (protocol 8.1).
 //!
 //! On the wire process data lies as the engine lays it out; here it is copied from there and back. What is copied is
 //! worked out when the network is active; in a cycle nothing is allocated and nothing waits.

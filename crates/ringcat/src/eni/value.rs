@@ -1,4 +1,4 @@
-//! Values of variables by the types that ENIs name (IEC 61131-3, as in process images of facts 8.1).
+//! Values of variables by the types that ENIs name (IEC 61131-3, as in process images of protocol 8.1).
 
 use std::fmt;
 
@@ -108,6 +108,7 @@ impl fmt::Display for Value {
 mod tests {
     use super::*;
 
+    // covers: eni-run
     #[test]
     fn bits_become_values_by_the_type() {
         let value = |name: &str, bits, length| VariableType::named(name).value(bits, length).to_string();
@@ -120,6 +121,7 @@ mod tests {
         assert_eq!(value("LINT", u64::MAX, 64), "-1");
     }
 
+    // covers: eni-run
     #[test]
     fn what_somebody_writes_becomes_bits_where_it_fits() {
         let bits = |name: &str, text: &str, length| VariableType::named(name).parse(text, length);

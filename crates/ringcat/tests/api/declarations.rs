@@ -47,6 +47,7 @@ fn run(application: &mut Application<SimulatedSegment>, cycles: usize) -> Vec<Ev
     events
 }
 
+// covers: declaration
 #[test]
 fn what_is_wrong_is_named_and_the_main_device_is_there_for_another_try() -> Result<(), Error> {
     let (main_device, good) = scanned(SEGMENT);
@@ -99,6 +100,7 @@ fn what_is_wrong_is_named_and_the_main_device_is_there_for_another_try() -> Resu
     Ok(())
 }
 
+// covers: declaration
 #[test]
 fn outputs_that_come_slower_than_their_watchdog_are_named() -> Result<(), Error> {
     let (main_device, mut declaration) = scanned("[[device]]\ntype = \"servo\"\n");
@@ -110,6 +112,7 @@ fn outputs_that_come_slower_than_their_watchdog_are_named() -> Result<(), Error>
     Ok(())
 }
 
+// covers: declaration
 #[test]
 fn without_a_domain_subdevices_are_still_supervised() -> Result<(), Error> {
     let (main_device, declaration) = scanned(SEGMENT);
@@ -127,6 +130,7 @@ fn without_a_domain_subdevices_are_still_supervised() -> Result<(), Error> {
     Ok(())
 }
 
+// covers: declaration
 #[test]
 fn a_subdevice_that_stays_in_preop_does_not_keep_a_domain_incomplete() -> Result<(), Error> {
     let (main_device, mut declaration) = scanned(SEGMENT);
@@ -138,6 +142,7 @@ fn a_subdevice_that_stays_in_preop_does_not_keep_a_domain_incomplete() -> Result
     Ok(())
 }
 
+// covers: declaration
 #[test]
 fn an_absent_optional_subdevice_has_its_place_and_leaves_the_domain_complete() -> Result<(), Error> {
     let (main_device, mut declaration) = scanned(SEGMENT);

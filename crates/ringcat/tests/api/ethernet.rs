@@ -83,6 +83,7 @@ fn wait(what: &str, condition: impl Fn() -> bool) {
     }
 }
 
+// covers: eoe-interfaces
 #[test]
 fn each_eoe_subdevice_has_an_interface_by_position_or_alias_until_the_stop() -> Result<(), Error> {
     let (supervisor, cyclic) = start()?;
@@ -131,6 +132,7 @@ fn each_eoe_subdevice_has_an_interface_by_position_or_alias_until_the_stop() -> 
     Ok(())
 }
 
+// covers: eoe-interfaces
 #[test]
 fn an_interface_that_must_not_be_made_is_told_once_and_everything_else_goes_on() -> Result<(), Error> {
     let (supervisor, cyclic) = start()?;

@@ -235,8 +235,9 @@ impl Client {
     }
 }
 
+// covers: 10.1, gateway
 #[test]
-fn several_clients_and_our_own_traffic_share_a_mailbox_and_none_disturbs_another_facts_10_1() {
+fn several_clients_and_our_own_traffic_share_a_mailbox_and_none_disturbs_another() {
     let bench = Bench::new(8);
     thread::scope(|scope| {
         for number in 0..4u16 {
@@ -278,8 +279,9 @@ fn several_clients_and_our_own_traffic_share_a_mailbox_and_none_disturbs_another
     assert_eq!((counters.connections, counters.ended, counters.dropped), (3, 0, 0), "{counters:?}");
 }
 
+// covers: 10.1, own-objects
 #[test]
-fn at_address_0_are_the_objects_of_the_main_device_facts_10_1() {
+fn at_address_0_are_the_objects_of_the_main_device() {
     let bench = Bench::new(8);
     for mut client in [bench.tcp(), bench.udp()] {
         client.station = 0;
@@ -295,8 +297,9 @@ fn at_address_0_are_the_objects_of_the_main_device_facts_10_1() {
     }
 }
 
+// covers: 10.1, own-objects
 #[test]
-fn before_activation_address_0_has_the_objects_that_need_no_declaration_facts_10_1() {
+fn before_activation_address_0_has_the_objects_that_need_no_declaration() {
     let segment = Segment::from_toml(SEGMENT, Path::new(".")).expect("a good segment");
     let (_, acyclic) = SharedSegment::halves(Network::from_description(segment).expect("it can be built"));
     let supervisor = SupervisorThread::start(acyclic, &Options::default(), || ()).expect("a thread");
@@ -315,8 +318,9 @@ fn before_activation_address_0_has_the_objects_that_need_no_declaration_facts_10
     });
 }
 
+// covers: 10.1, gateway
 #[test]
-fn what_cannot_be_passed_on_is_answered_with_an_error_reply_facts_10_1() {
+fn what_cannot_be_passed_on_is_answered_with_an_error_reply() {
     let bench = Bench::new(8);
     let mut client = bench.udp();
     let upload = [0x00, 0x20, 0x40, 0x01, 0x20, 0x01, 0, 0, 0, 0];
@@ -340,6 +344,7 @@ fn what_cannot_be_passed_on_is_answered_with_an_error_reply_facts_10_1() {
     bench.own_traffic(1);
 }
 
+// covers: gateway
 #[test]
 fn a_client_that_leaves_in_a_transfer_loses_it_and_nobody_waits_for_that() {
     let bench = Bench::new(8);
@@ -363,6 +368,7 @@ fn a_client_that_leaves_in_a_transfer_loses_it_and_nobody_waits_for_that() {
     assert_eq!(patient.read(3), 0x33);
 }
 
+// covers: gateway
 #[test]
 fn garbage_half_messages_floods_and_clients_that_do_not_read_hurt_only_themselves() {
     let bench = Bench::new(3);

@@ -54,6 +54,7 @@ fn block_on<T>(future: impl Future<Output = T>) -> T {
     }
 }
 
+// covers: jobs
 #[test]
 fn one_service_works_before_activation_beside_cycles_and_from_any_thread() -> Result<(), Error> {
     let mut main_device = MainDevice::request(SimulatedSegment::from_toml(SEGMENT)?, &Options::default());
@@ -84,6 +85,7 @@ fn one_service_works_before_activation_beside_cycles_and_from_any_thread() -> Re
     Ok(())
 }
 
+// covers: jobs
 #[test]
 fn a_job_is_waited_for_with_a_limit_polled_and_awaited() -> Result<(), Error> {
     let (supervisor, _cyclic) = supervisor()?;
@@ -112,6 +114,7 @@ fn a_job_is_waited_for_with_a_limit_polled_and_awaited() -> Result<(), Error> {
     Ok(())
 }
 
+// covers: jobs
 #[test]
 fn a_stop_ends_jobs_and_an_abort_leaves_the_mailbox_free() -> Result<(), Error> {
     let (supervisor, cyclic) = supervisor()?;

@@ -39,8 +39,9 @@ fn refused<T: std::fmt::Debug>(
     }
 }
 
+// covers: JR-05, JR-06, JR-08, junctions
 #[test]
-fn load_add_apply_and_each_misuse_is_an_error_of_its_own_jr_05_jr_06_jr_08() {
+fn load_add_apply_and_each_misuse_is_an_error_of_its_own() {
     let mut main_device = requested(JunctionMode::Strict);
     assert_eq!(junction_error(main_device.add_junction_connection(GOOD)), JunctionError::NotLoaded);
     let (error, mut main_device) = refused(main_device.apply());
@@ -102,6 +103,7 @@ fn load_add_apply_and_each_misuse_is_an_error_of_its_own_jr_05_jr_06_jr_08() {
     assert!(matches!(application.engine_mut().load(Declaration::default()), Err(ActivateError::Active)));
 }
 
+// covers: junctions
 #[test]
 fn breaks_of_rings_behind_junctions_are_told_in_the_words_of_seed_001() {
     let names = Names(vec!["head".into(), "junction".into(), "first".into(), "second".into()]);

@@ -18,8 +18,9 @@ fn lines(application: &mut Application<SimulatedSegment>, names: &Names) -> Vec<
 }
 
 /// The first declared SubDevice is optional and not there, so that everybody's position is one less than the index.
+// covers: CR-12, ring-events
 #[test]
-fn a_break_is_told_with_the_names_and_the_station_of_those_at_its_ends_cr_12() {
+fn a_break_is_told_with_the_names_and_the_station_of_those_at_its_ends() {
     let segment = SimulatedSegment::from_toml(RING).expect("it is a segment");
     let mut main_device = MainDevice::request(segment, &Options::default());
     let found = main_device.scan().expect("it is whole").subdevices;
@@ -51,6 +52,7 @@ fn a_break_is_told_with_the_names_and_the_station_of_those_at_its_ends_cr_12() {
 }
 
 /// Who nobody declared has no name of the declaration, whatever its position.
+// covers: ring-events
 #[test]
 fn positions_of_which_it_is_not_known_who_is_there_have_no_names() {
     let names = Names(vec!["pump".into(), "valve".into()]);
@@ -68,6 +70,7 @@ fn positions_of_which_it_is_not_known_who_is_there_have_no_names() {
 
 /// As on real devices: those of one kind have one name in their SIIs, whose contents are read once for all of them.
 /// Whoever has a name of his own is told by it, though nothing else is different.
+// covers: sim-files
 #[test]
 fn simulated_devices_have_the_names_of_their_segment_file_and_copies_one_for_all() {
     let text = "[[device]]\ntype = \"block\"\nname = \"member\"\ncount = 3\n[[device]]\ntype = \"block\"\n\

@@ -29,6 +29,7 @@ const LIMIT: Duration = Duration::from_secs(30);
 const USER_RAM: RegisterAddress = RegisterAddress(0x0F80);
 const LIMITS: Limits = (Duration::from_secs(5), Duration::from_secs(10));
 
+// covers: jobs
 #[test]
 fn objects_and_files_are_moved_from_any_thread_and_requests_from_the_cyclic_one() -> Result<(), Error> {
     let segment = Segment::from_toml(SEGMENT, Path::new(".")).expect("a good segment");
@@ -94,6 +95,7 @@ fn objects_and_files_are_moved_from_any_thread_and_requests_from_the_cyclic_one(
     Ok(())
 }
 
+// covers: jobs, registers, rescan
 #[test]
 fn services_on_single_subdevices_and_jobs_work_from_any_thread() -> Result<(), Error> {
     let segment = Segment::from_toml(SEGMENT, Path::new(".")).expect("a good segment");

@@ -19,6 +19,7 @@ const SEGMENT: &str = "[segment]\n[[device]]\ntype = \"coupler\"\n[[device]]\nty
 const PERIOD: Duration = Duration::from_millis(2);
 const LIMIT: Duration = Duration::from_secs(30);
 
+// covers: states
 #[test]
 fn states_and_groups_are_asked_for_from_any_thread() -> Result<(), Error> {
     let segment = Segment::from_toml(SEGMENT, Path::new(".")).expect("a good segment");

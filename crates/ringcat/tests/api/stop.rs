@@ -37,6 +37,7 @@ fn outputs(network: &Network) -> Vec<Vec<u8>> {
     all.filter(|bytes| !bytes.is_empty()).collect()
 }
 
+// covers: stop
 #[test]
 fn an_orderly_stop_zeroes_outputs_and_takes_everybody_to_init() {
     let application = in_op();
@@ -50,6 +51,7 @@ fn an_orderly_stop_zeroes_outputs_and_takes_everybody_to_init() {
     assert_eq!(main_device.scan().expect("a stopped MainDevice scans again").subdevices.len(), 4);
 }
 
+// covers: stop
 #[test]
 fn a_stop_may_leave_the_outputs_alone_and_end_in_safeop() {
     let mut main_device = in_op().stop(LastOutputs::Held, AlState::SafeOp, LIMIT).expect("all go to SAFEOP");
@@ -57,6 +59,7 @@ fn a_stop_may_leave_the_outputs_alone_and_end_in_safeop() {
     assert!(network.devices().all(|device| device.al_status() == AlStatus::new(AlState::SafeOp)));
 }
 
+// covers: cycles
 #[test]
 fn cycles_that_a_stall_has_passed_over_are_left_out_and_counted() {
     let mut application = in_op();

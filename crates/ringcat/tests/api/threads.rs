@@ -34,6 +34,7 @@ fn until(what: &str, mut holds: impl FnMut() -> bool) {
     }
 }
 
+// covers: threads
 #[test]
 fn two_threads_bring_everybody_to_op_exchange_data_and_stop_in_order() -> Result<(), Error> {
     let (cyclic, acyclic) = SharedSegment::halves(network());
@@ -73,6 +74,7 @@ fn outputs(network: &Network) -> Vec<Vec<u8>> {
     network.devices().map(|device| device.outputs().to_vec()).filter(|bytes| !bytes.is_empty()).collect()
 }
 
+// covers: threads
 #[test]
 fn an_application_whose_closure_breaks_comes_back_and_goes_on_by_hand() -> Result<(), Error> {
     let (cyclic, acyclic) = SharedSegment::halves(network());
@@ -98,6 +100,7 @@ fn an_application_whose_closure_breaks_comes_back_and_goes_on_by_hand() -> Resul
     Ok(())
 }
 
+// covers: threads
 #[test]
 fn a_refused_declaration_leaves_both_parts_for_another_try() -> Result<(), Error> {
     let (cyclic, acyclic) = SharedSegment::halves(network());
@@ -114,6 +117,7 @@ fn a_refused_declaration_leaves_both_parts_for_another_try() -> Result<(), Error
 
 /// Of some batches the best: the machine may be busy. A thread that looked once in a millisecond would take one for
 /// each question, however idle the machine is.
+// covers: threads
 #[test]
 fn who_asks_one_thing_after_the_other_does_not_wait_a_millisecond_for_each() -> Result<(), Error> {
     const QUESTIONS: u32 = 20;
@@ -132,6 +136,7 @@ fn who_asks_one_thing_after_the_other_does_not_wait_a_millisecond_for_each() -> 
     Ok(())
 }
 
+// covers: signals
 #[test]
 fn a_panic_of_the_closure_is_an_error_of_its_own_and_the_bus_is_stopped_in_order() -> Result<(), Error> {
     let (cyclic, acyclic) = SharedSegment::halves(network());
@@ -218,6 +223,7 @@ impl Links for Deaf {
     }
 }
 
+// covers: links
 #[test]
 fn second_copies_are_waited_for_and_no_round_trip_is_as_long_as_a_cycle() -> Result<(), Error> {
     // Long beside the way of a frame, and beside what a busy machine adds to it.

@@ -36,6 +36,7 @@ fn gaps(application: &mut Application<SimulatedSegment>, count: usize) -> Vec<Du
     begins.windows(2).map(|pair| pair[1].since(pair[0])).collect()
 }
 
+// covers: cycles
 #[test]
 fn cycles_follow_each_other_as_soon_as_their_frames_have_returned() {
     let mut application = in_op();
@@ -54,6 +55,7 @@ fn cycles_follow_each_other_as_soon_as_their_frames_have_returned() {
     assert_eq!(application.pace().skipped, 0);
 }
 
+// covers: cycles
 #[test]
 fn the_least_time_between_two_cycles_is_kept() {
     let mut application = in_op();
@@ -65,6 +67,7 @@ fn the_least_time_between_two_cycles_is_kept() {
     }
 }
 
+// covers: cycles
 #[test]
 fn frames_that_do_not_return_are_waited_for_a_period_and_no_longer() {
     let mut application = in_op();
@@ -84,6 +87,7 @@ fn frames_that_do_not_return_are_waited_for_a_period_and_no_longer() {
     assert!(healed.iter().any(|gap| *gap < PERIOD / 5), "{healed:?}");
 }
 
+// covers: cycles
 #[test]
 fn everything_else_goes_on_beside_cycles_that_leave_no_pause() {
     let mut application = activated();
@@ -95,6 +99,7 @@ fn everything_else_goes_on_beside_cycles_that_leave_no_pause() {
     }
 }
 
+// covers: cycles
 #[test]
 fn an_application_may_take_the_steps_of_a_cycle_itself() {
     let mut application = activated();

@@ -1,4 +1,4 @@
-//! Reading an EtherCAT frame for the judge (facts 1.1 to 1.3, 9.7.1 A), strictly: a MainDevice has no business with
+//! Reading an EtherCAT frame for the judge (protocol 1.1 to 1.3, 9.7.1 A), strictly: a MainDevice has no business with
 //! what is refused here.
 
 /// Commands that only read: APRD, FPRD, BRD, LRD.

@@ -1,7 +1,8 @@
 //! Send windows: how cyclic and acyclic frames share a wire of 100 Mbit/s, check 9 of [`crate::capture`].
 //!
 //! In go the frames that were sent, with link, class, length and time, out comes a measure. A frame occupies its link
-//! for 80 ns per byte and 24 bytes more (preamble, FCS, gap; facts 1.3), behind those that were handed over before it.
+//! for 80 ns per byte and 24 bytes more (preamble, FCS, gap; protocol 1.3), behind those that were handed over before
+//! it.
 //!
 //! The grid of the cycles is found in the capture: the period is given or the usual distance of the cycles' first
 //! frames, the phase is where the promptest of them lie. A cyclic frame **wants** to leave at its point of the grid and

@@ -1,4 +1,4 @@
-//! ENI files and any bytes (facts 8): whatever a file says, it is a configuration that holds together, or an error.
+//! ENI files and any bytes (protocol 8): whatever a file says, it is a configuration that holds together, or an error.
 //!
 //! [`mutate`] changes a file as people and tools do: other numbers, half a datagram, elements that are gone, doubled,
 //! or elsewhere. Changed bytes alone are seldom XML any more.

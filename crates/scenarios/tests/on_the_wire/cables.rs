@@ -135,8 +135,9 @@ pub fn left_out(lines: &[String]) -> usize {
     counts.map(|(_, rest)| rest.split(' ').next().and_then(|count| count.parse::<usize>().ok()).expect("a count")).sum()
 }
 
+// covers: ring-interfaces, run
 #[test]
-fn each_cable_of_a_ring_of_16_cut_and_healed_on_interfaces_costs_no_more_cycles_than_detection_and_stalls_explain() {
+fn cutting_each_cable_of_16_on_interfaces_costs_what_detection_and_stalls_explain() {
     let Some(mut bench) = Bench::new(2) else { return };
     bench.simulate(&RING_OF_16.segment(), true);
     let run = bench.run_ringcat(&["run", "--main", "main0", "--redundant", "main1", "--tell-all"]);

@@ -122,6 +122,7 @@ pub fn interrupt(child: Child) -> Output {
     finish(child)
 }
 
+// covers: capture
 #[test]
 fn a_capture_of_one_subdevice_is_understood_by_tshark_and_shows_every_promise_kept() {
     let Some(mut bench) = Bench::new(1) else { return };
@@ -139,8 +140,9 @@ fn a_capture_of_one_subdevice_is_understood_by_tshark_and_shows_every_promise_ke
     assert!(verdict.windows[0].cycles > 1000, "{verdict}");
 }
 
+// covers: capture
 #[test]
-fn a_capture_of_a_ring_of_16_that_is_cut_inside_and_an_onlookers_capture_show_every_promise_kept() {
+fn captures_of_a_ring_of_16_that_is_cut_keep_every_promise() {
     let Some(mut bench) = Bench::new(2) else { return };
     bench.simulate(&RING_OF_16.segment(), true);
     let (own, seen) = (CaptureFile::new("own"), CaptureFile::new("seen"));
@@ -165,6 +167,7 @@ fn a_capture_of_a_ring_of_16_that_is_cut_inside_and_an_onlookers_capture_show_ev
     assert_eq!((onlookers.sent, onlookers.reads), (verdict.sent, verdict.reads));
 }
 
+// covers: capture
 #[test]
 fn a_capture_of_a_ring_whose_host_cable_is_cut_shows_every_promise_kept() {
     let Some(mut bench) = Bench::new(2) else { return };
@@ -193,6 +196,7 @@ fn a_capture_of_a_ring_whose_host_cable_is_cut_shows_every_promise_kept() {
     assert!(verdict.missing > 100, "{verdict}");
 }
 
+// covers: capture
 #[test]
 fn a_capture_of_forty_subdevices_that_return_shows_every_cycle_had_its_time() {
     let Some(mut bench) = Bench::new(1) else { return };
@@ -213,6 +217,7 @@ fn a_capture_of_forty_subdevices_that_return_shows_every_cycle_had_its_time() {
     assert!(verdict.windows[0].by_chance >= 10, "too few acyclic frames to show anything: {verdict}");
 }
 
+// covers: capture
 #[test]
 fn an_onlooker_records_ethercat_or_everything_and_says_what_is_wrong() {
     let Some(mut bench) = Bench::new(1) else { return };

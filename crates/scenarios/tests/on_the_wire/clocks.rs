@@ -142,8 +142,9 @@ fn judge(who: &str, delays: &[i64], truth: &[Option<i64>]) {
     assert!(pairs.iter().all(|(delay, truth)| (delay - truth).abs() <= WITHIN_NS), "{who}: expected {truth:?}");
 }
 
+// covers: 7.1, dc-delays
 #[test]
-fn ethercrab_measures_the_delays_that_we_measure_and_both_are_true_facts_7_1() {
+fn ethercrab_measures_the_delays_that_we_measure_and_both_are_true() {
     if !is_asked_for(FOREIGN) {
         return;
     }
@@ -201,7 +202,7 @@ fn check_capture(path: &Path, clocks: usize) {
     assert!(output.status.success() && text.contains(&format!("judged: {clocks} delays")), "{text}{errors}");
 }
 
-// covers: facts 7.3, facts 7.4
+// covers: 7.3, 7.4, dc-tools
 #[test]
 fn clocks_on_interfaces_lock_start_their_signals_and_cycles_follow_them() {
     let Some(mut bench) = Bench::new(1) else { return };

@@ -58,7 +58,7 @@ fn watch(bench: &Bench, groups: [&[usize]; 3]) -> [i64; 3] {
     worst
 }
 
-// covers: facts 7.5
+// covers: 7.5, dc-ring
 #[test]
 fn clocks_of_a_ring_on_two_interfaces_stay_together_when_cables_go_and_come() {
     let Some(mut bench) = Bench::new(2) else { return };

@@ -1,12 +1,13 @@
-//! An ENI on interfaces: `ringcat sim --eni` makes the segment, `ringcat run --eni` brings it to OP (facts 8).
+//! An ENI on interfaces: `ringcat sim --eni` makes the segment, `ringcat run --eni` brings it to OP (protocol 8).
 
 use std::path::Path;
 
 use crate::bench::Bench;
 use crate::said;
 
+// covers: CR-16, 8, eni-lrw, eni-run
 #[test]
-fn a_network_from_an_eni_runs_on_a_ring_of_interfaces_with_its_lrw_split_and_not_otherwise_cr_16_facts_8() {
+fn a_network_from_an_eni_runs_on_a_ring_of_interfaces_only_with_lrw_split() {
     let Some(mut bench) = Bench::new(2) else { return };
     let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("../ringcat/examples/machine.eni.xml");
     let path = file.to_str().expect("its name is text");

@@ -130,8 +130,9 @@ fn ask(tasks: &[&str], start: impl FnOnce(&[&str]) -> Child) {
     print!("{told}");
 }
 
+// covers: eoe-interfaces
 #[test]
-fn two_eoe_devices_are_pinged_and_downloaded_from_through_a_bridge_without_and_from_beyond_a_router() {
+fn two_eoe_devices_answer_ping_and_downloads_bridged_and_routed() {
     let Some(mut bench) = Bench::new(1).filter(|_| has_taps()) else { return };
     bench.simulate(SEGMENT, false);
     let capture = CaptureFile::new("eoe");
@@ -192,8 +193,9 @@ fn two_eoe_devices_are_pinged_and_downloaded_from_through_a_bridge_without_and_f
     capture.check_frames("two EoE devices", &["ip"]);
 }
 
+// covers: eoe-interfaces
 #[test]
-fn without_the_permission_interfaces_are_missing_with_a_warning_and_process_data_goes_on() {
+fn without_permission_interfaces_are_missing_with_a_warning_and_cycles_go_on() {
     let Some(mut bench) = Bench::new(1).filter(|_| has_taps()) else { return };
     bench.simulate(SEGMENT, false);
     let program = program("ringcat").display().to_string();

@@ -147,6 +147,7 @@ fn judge_all(bench: &Bench, situations: &[(String, Happens, &str)], findings: &m
     }
 }
 
+// covers: signals, verdict
 #[test]
 fn what_does_not_hold_in_a_ring_is_said_last_and_does_not_exit_with_0() {
     let Some(mut bench) = Bench::new(2) else { return };
@@ -181,6 +182,7 @@ fn what_does_not_hold_in_a_ring_is_said_last_and_does_not_exit_with_0() {
     findings.assert_none();
 }
 
+// covers: verdict
 #[test]
 fn what_does_not_hold_on_one_interface_is_said_last_and_does_not_exit_with_0() {
     let Some(mut bench) = Bench::new(1) else { return };
@@ -212,6 +214,7 @@ fn what_does_not_hold_on_one_interface_is_said_last_and_does_not_exit_with_0() {
     findings.assert_none();
 }
 
+// covers: other-main-device
 #[test]
 fn no_command_but_capture_begins_beside_a_main_device_which_stays_in_op() {
     let Some(mut bench) = Bench::new(2) else { return };
@@ -254,6 +257,7 @@ fn no_command_but_capture_begins_beside_a_main_device_which_stays_in_op() {
     findings.assert_none();
 }
 
+// covers: other-main-device
 #[test]
 fn a_main_device_is_found_by_its_frames_where_its_socket_is_elsewhere() {
     let Some(mut bench) = Bench::new(2) else { return };
@@ -273,6 +277,7 @@ fn a_main_device_is_found_by_its_frames_where_its_socket_is_elsewhere() {
     findings.assert_none();
 }
 
+// covers: verdict
 #[test]
 fn a_cable_without_subdevices_and_a_ring_that_is_open_are_said_last() {
     let Some(mut bench) = Bench::new(2) else { return };
@@ -301,6 +306,7 @@ const COUPLER_ALONE: &str = "<EtherCATConfig Version=\"1.3\"><Config><Master><In
     <VendorId>3143</VendorId>\
     <ProductCode>72089601</ProductCode></Info></Slave></Config></EtherCATConfig>";
 
+// covers: verdict
 #[test]
 fn a_bus_with_more_than_the_eni_says_runs_and_fails_with_what_the_file_lacks() {
     let Some(mut bench) = Bench::new(1) else { return };
@@ -314,6 +320,7 @@ fn a_bus_with_more_than_the_eni_says_runs_and_fails_with_what_the_file_lacks() {
     findings.assert_none();
 }
 
+// covers: signals
 #[test]
 fn on_one_processor_no_thread_spins_limits_hold_and_signals_are_obeyed() {
     let Some(mut bench) = Bench::new(1) else { return };

@@ -76,6 +76,7 @@ fn exchange(bench: &mut Bench, plant: &Plant, ring: bool, who: &str, start: impl
     panic!("{who} failed {TRIES} times with {} SubDevices", plant.count());
 }
 
+// covers: sim-foreign
 #[test]
 fn ethercrab_exchanges_right_values_with_1_10_and_50_simulated_subdevices() {
     if !is_asked_for(FOREIGN) {
@@ -89,6 +90,7 @@ fn ethercrab_exchanges_right_values_with_1_10_and_50_simulated_subdevices() {
     }
 }
 
+// covers: sim-foreign
 #[test]
 fn pysoem_exchanges_right_values_with_1_10_and_50_simulated_subdevices() {
     if !is_asked_for(FOREIGN) {
@@ -101,6 +103,7 @@ fn pysoem_exchanges_right_values_with_1_10_and_50_simulated_subdevices() {
     }
 }
 
+// covers: sim-foreign
 #[test]
 fn pysoem_exchanges_right_values_on_a_ring_with_two_interfaces() {
     if !is_asked_for(FOREIGN) {
@@ -114,6 +117,7 @@ fn pysoem_exchanges_right_values_on_a_ring_with_two_interfaces() {
     });
 }
 
+// covers: sim-foreign
 #[test]
 fn pysoem_moves_objects_files_and_firmware_of_a_simulated_subdevice() {
     if !is_asked_for(FOREIGN) {
@@ -146,6 +150,7 @@ fn pysoem_moves_objects_files_and_firmware_of_a_simulated_subdevice() {
     panic!("{failures:?}");
 }
 
+// covers: sim-foreign
 #[test]
 fn pysoem_lists_the_objects_of_every_device_that_offers_sdo_information() {
     if !is_asked_for(FOREIGN) {

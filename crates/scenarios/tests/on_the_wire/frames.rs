@@ -60,6 +60,7 @@ impl Link {
     }
 }
 
+// covers: no-frame-lost
 #[test]
 fn a_ring_of_16_at_1_khz_loses_no_frame_that_the_simulator_did_not_drop() {
     let Some(mut bench) = Bench::new(2) else { return };

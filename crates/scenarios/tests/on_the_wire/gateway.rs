@@ -37,7 +37,7 @@ fn packets(path: &str, filter: &str) -> Vec<String> {
     String::from_utf8_lossy(&output.stdout).lines().map(str::to_owned).collect()
 }
 
-// covers: facts 10.1, facts 10.2
+// covers: 10.1, 10.2, gateway
 #[test]
 fn clients_of_others_read_dictionaries_objects_and_files_through_the_gateway() {
     let Some(mut bench) = Bench::new(1) else { return };

@@ -52,8 +52,9 @@ const BROKEN: [(&str, [&str; 2]); 3] = [
 /// From an order until what comes of it has been told: a repair counts when it has held for 50 ms.
 const PAUSE: Duration = Duration::from_millis(250);
 
+// covers: JR-03, JR-07, junctions
 #[test]
-fn a_ring_behind_a_junction_breaks_and_is_mended_on_an_interface_in_modes_automatic_and_strict_jr_03_jr_07() {
+fn a_local_ring_breaks_and_heals_on_an_interface_in_both_junction_modes() {
     let Some(mut bench) = Bench::new(1) else { return };
     for mode in ["automatic", "strict=1:1-4:1"] {
         bench.simulate(JUNCTION, false);
@@ -85,8 +86,9 @@ fn a_ring_behind_a_junction_breaks_and_is_mended_on_an_interface_in_modes_automa
     }
 }
 
+// covers: LC-03, crossed-enhanced
 #[test]
-fn enhanced_detection_takes_the_redundant_interface_down_and_brings_it_back_lc_03() {
+fn enhanced_detection_takes_the_redundant_interface_down_and_brings_it_back() {
     let Some(mut bench) = Bench::new(2) else { return };
     bench.simulate(CROSSED, true);
     let run = bench.run_ringcat(&["run", "--main", "main0", "--redundant", "main1", "--enhanced-line-crossed"]);

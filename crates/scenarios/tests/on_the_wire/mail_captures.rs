@@ -164,7 +164,7 @@ fn written(capture: &Capture) -> Vec<Vec<(usize, usize)>> {
     mails
 }
 
-// covers: facts 6.1
+// covers: 6.1, mail-judge
 #[test]
 fn mail_of_a_hundred_power_cycles_counts_on_and_brings_the_same_list_each_time() {
     if !has_tshark() {
@@ -178,6 +178,7 @@ fn mail_of_a_hundred_power_cycles_counts_on_and_brings_the_same_list_each_time()
     std::fs::remove_file(&path).expect("it was written");
 }
 
+// covers: mail-judge
 #[test]
 fn a_subdevice_that_sends_its_mail_twice_is_found() {
     if !has_tshark() {
@@ -190,6 +191,7 @@ fn a_subdevice_that_sends_its_mail_twice_is_found() {
     std::fs::remove_file(&path).expect("it was written");
 }
 
+// covers: mail-judge
 #[test]
 fn mail_that_was_tampered_with_is_found() {
     if !has_tshark() {

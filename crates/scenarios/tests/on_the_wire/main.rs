@@ -91,6 +91,7 @@ fn show_summary(title: &str, output: &str) {
     println!("ringcat run, {title}:\n{summary}");
 }
 
+// covers: scan-command
 #[test]
 fn our_main_device_brings_1_10_50_and_200_subdevices_to_op_and_stops_in_order() {
     let Some(mut bench) = Bench::new(1) else { return };
@@ -108,6 +109,7 @@ fn our_main_device_brings_1_10_50_and_200_subdevices_to_op_and_stops_in_order() 
     }
 }
 
+// covers: sim-interfaces
 #[test]
 fn the_next_main_device_takes_over_from_one_that_was_killed_in_operation() {
     let Some(mut bench) = Bench::new(1) else { return };

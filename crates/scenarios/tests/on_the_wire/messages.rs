@@ -27,6 +27,7 @@ fn error_of(bench: &Bench, arguments: &[&str]) -> String {
     said(&output).1
 }
 
+// covers: links
 #[test]
 fn whoever_cannot_start_is_told_what_to_do() {
     let Some(bench) = Bench::new(1) else { return };
@@ -46,6 +47,7 @@ fn whoever_cannot_start_is_told_what_to_do() {
     assert!(off.contains("main0 is switched off: sudo ip link set main0 up"), "{off}");
 }
 
+// covers: links
 #[test]
 fn a_cable_without_subdevices_is_told_apart_from_a_dead_one() {
     let Some(bench) = Bench::new(1) else { return };
@@ -57,6 +59,7 @@ fn a_cable_without_subdevices_is_told_apart_from_a_dead_one() {
     assert!(unchanged.contains("is this the cable to the SubDevices?"), "{unchanged}");
 }
 
+// covers: links
 #[test]
 fn a_user_without_the_permission_is_told_the_line_that_grants_it() {
     let Some(bench) = Bench::new(1) else { return };
@@ -83,6 +86,7 @@ fn a_user_without_the_permission_is_told_the_line_that_grants_it() {
     }
 }
 
+// covers: stray-ring-cable
 #[test]
 fn a_ring_that_ends_at_an_interface_nobody_named_is_told_with_its_name() {
     let Some(mut bench) = Bench::new(2) else { return };
@@ -106,6 +110,7 @@ fn a_ring_that_ends_at_an_interface_nobody_named_is_told_with_its_name() {
     assert!(!errors.contains("arrive on"), "{errors}");
 }
 
+// covers: stray-ring-cable
 #[test]
 fn a_cable_that_is_plugged_into_another_interface_in_operation_is_told() {
     let Some(mut bench) = Bench::new(2) else { return };
@@ -120,6 +125,7 @@ fn a_cable_that_is_plugged_into_another_interface_in_operation_is_told() {
     assert_eq!(errors.matches("frames sent on main0 arrive on main1").count(), 1, "{errors}{output}");
 }
 
+// covers: other-main-device
 #[test]
 fn a_main_device_at_the_other_end_of_the_segment_is_told_once_and_counted() {
     let Some(mut bench) = Bench::new(2) else { return };

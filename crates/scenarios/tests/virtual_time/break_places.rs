@@ -27,8 +27,9 @@ fn places(world: &World, mark: Mark) -> Vec<Cable> {
     ring_events(world.events(mark)).into_iter().filter_map(place).collect()
 }
 
+// covers: CR-12, ring-places
 #[test]
-fn a_branch_that_is_not_there_is_never_taken_for_the_break_of_the_ring_cr_12() {
+fn a_branch_that_is_not_there_is_never_taken_for_the_break_of_the_ring() {
     for number in 0..=5 {
         let mut world = World::in_op(number as u64, ring_with_branch(Port::D));
         world.cut(CableId(6));
@@ -70,7 +71,7 @@ fn ring_of_couplers(couplers: usize) -> (Vec<&'static str>, Vec<(Endpoint, Endpo
     (kinds, cables)
 }
 
-// covers: CR-12
+// covers: CR-12, ring-branches
 #[test]
 fn a_ring_of_couplers_with_terminals_that_is_broken_from_the_start_has_its_place() {
     for (couplers, number) in (1..4).flat_map(|couplers| (0..=couplers).map(move |number| (couplers, number))) {
@@ -92,8 +93,9 @@ fn a_ring_of_couplers_with_terminals_that_is_broken_from_the_start_has_its_place
     }
 }
 
+// covers: CR-12, CR-18, ring-places
 #[test]
-fn each_of_two_breaks_is_told_once_with_its_place_whichever_comes_first_cr_12_cr_18() {
+fn each_of_two_breaks_is_told_once_with_its_place_whichever_comes_first() {
     for [first, second] in [[4, 11], [11, 4], [0, 9], [9, 0], [16, 5], [5, 16], [7, 8], [8, 7]] {
         let mut world = World::in_op(3, ring_of_16(Duration::from_micros(10)));
         let [one, other] = [first, second].map(|number| cable_of_ring(number, 16));
@@ -120,8 +122,9 @@ fn each_of_two_breaks_is_told_once_with_its_place_whichever_comes_first_cr_12_cr
     }
 }
 
+// covers: CR-18, ring-places
 #[test]
-fn a_subdevice_without_power_is_two_breaks_cr_18() {
+fn a_subdevice_without_power_is_two_breaks() {
     let mut world = World::in_op(4, ring_of_16(Duration::from_micros(10)));
     let mark = world.mark();
     world.power_off(DeviceIndex(6));

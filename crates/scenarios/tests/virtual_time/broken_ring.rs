@@ -40,8 +40,9 @@ fn with_downloads(scan: &Scan) -> Declaration {
     declaration
 }
 
+// covers: ring-phases
 #[test]
-fn a_ring_that_is_broken_from_the_start_comes_to_op_wherever_the_break_is_and_closes_when_healed() {
+fn a_ring_broken_anywhere_from_the_start_comes_to_op_and_closes_when_healed() {
     for detection in [FAST, Duration::from_millis(1)] {
         for cable in 0..=SIXTEEN.len() {
             let mut world = World::in_op(cable as u64, broken(cable, detection));
@@ -98,6 +99,7 @@ fn a_subdevice_comes_back_into_a_broken_ring() {
     }
 }
 
+// covers: ring-phases
 #[test]
 fn a_ring_that_breaks_during_scan_or_configuration_comes_to_op() {
     for at_us in (0..90_000).step_by(1_500) {
@@ -117,6 +119,7 @@ fn a_ring_that_breaks_during_scan_or_configuration_comes_to_op() {
     }
 }
 
+// covers: ring-phases
 #[test]
 fn a_break_and_its_repair_during_downloads_lose_no_object() {
     for after in [12, 14, 17, 20, 25, 30] {
@@ -141,7 +144,7 @@ fn a_break_and_its_repair_during_downloads_lose_no_object() {
     }
 }
 
-// Facts CR-18.
+// covers: CR-18, ring-phases
 #[test]
 fn two_breaks_isolate_a_piece_which_returns_without_losing_others() {
     for (first, second, isolated) in [(4, 7, 4..7), (10, 3, 3..10), (1, 2, 1..2), (0, 3, 0..3), (13, 16, 13..16)] {
@@ -186,7 +189,7 @@ fn two_breaks_isolate_a_piece_which_returns_without_losing_others() {
     }
 }
 
-// Facts CR-12.
+// covers: CR-12, ring-cut
 #[test]
 fn a_thousand_cycles_with_a_break_are_one_event() {
     let mut world = World::in_op(8, ring_of_16(FAST));

@@ -13,6 +13,7 @@ use scenarios::segments::plant;
 /// Longest acyclic frame: 32 us on the wire, and datagrams for few SubDevices.
 const LONGEST: usize = 400;
 
+// covers: byte-budget
 #[test]
 fn without_news_acyclic_frames_are_short_with_50_subdevices() {
     let (longest, frames) = (Rc::new(Cell::new(0)), Rc::new(Cell::new(0_u32)));

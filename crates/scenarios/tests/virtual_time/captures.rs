@@ -90,6 +90,7 @@ fn read(bytes: &[u8]) -> Capture {
     Capture::parse(bytes).expect("a capture")
 }
 
+// covers: capture
 #[test]
 fn what_a_main_device_sends_keeps_every_promise_on_one_link() {
     let verdict = judge(&short(), Some(CYCLE)).expect("a capture");
@@ -98,9 +99,9 @@ fn what_a_main_device_sends_keeps_every_promise_on_one_link() {
     assert_eq!(verdict.returned, verdict.sent[0]);
 }
 
-// Facts CR-01, CR-25.
+// covers: CR-01, CR-04, CR-24, CR-25, SM-01, SM-02, capture
 #[test]
-fn what_a_main_device_sends_keeps_every_promise_on_a_ring_that_breaks_closes_and_loses_a_subdevice() {
+fn what_is_sent_keeps_every_promise_on_a_ring_that_breaks_and_closes() {
     let verdict = judge(&eventful(), None).expect("a capture");
     println!("{verdict}");
     assert_eq!(verdict.broken, 0, "{verdict}");
@@ -116,6 +117,7 @@ fn what_a_main_device_sends_keeps_every_promise_on_a_ring_that_breaks_closes_and
     assert_eq!(verdict.windows.len(), 2);
 }
 
+// covers: capture
 #[test]
 fn a_segment_that_returns_as_a_whole_leaves_every_cycle_its_time() {
     let kinds: Vec<&str> = ["digital-output-8", "digital-input-8", "servo"].into_iter().cycle().take(40).collect();
@@ -139,6 +141,7 @@ fn a_segment_that_returns_as_a_whole_leaves_every_cycle_its_time() {
     assert!(windows.by_chance > 10, "too few acyclic frames to show anything: {verdict}");
 }
 
+// covers: capture
 #[test]
 fn a_tee_changes_nothing_and_records_each_link_and_direction() {
     let capture = read(&eventful());
@@ -177,6 +180,7 @@ fn assert_found(verdict: &Verdict, text: &str) {
     assert!(verdict.findings.iter().any(|finding| finding.contains(text)), "{text}: {verdict}");
 }
 
+// covers: capture
 #[test]
 fn the_judge_sees_each_single_bit_that_must_not_be_set() {
     let capture = read(&eventful());
@@ -206,6 +210,7 @@ fn the_judge_sees_each_single_bit_that_must_not_be_set() {
     }
 }
 
+// covers: capture
 #[test]
 fn the_judge_sees_frames_that_leave_once_or_come_back_twice_or_too_late() {
     let capture = read(&eventful());
@@ -243,8 +248,9 @@ fn the_judge_sees_frames_that_leave_once_or_come_back_twice_or_too_late() {
     assert_found(&late, "comes back after its id was used again");
 }
 
+// covers: capture
 #[test]
-fn the_judge_sees_acyclic_frames_that_are_in_the_way_of_a_cycle_and_tells_stalls_apart() {
+fn the_judge_sees_acyclic_frames_that_delay_a_cycle_apart_from_stalls() {
     let capture = read(&eventful());
     let acyclic = |p: &Packet| p.sent && p.interface == 0 && p.bytes[17] & 0x80 != 0;
     let cyclic = |p: &Packet| p.sent && p.interface == 0 && p.bytes[17] & 0x80 == 0;
@@ -272,6 +278,7 @@ fn the_judge_sees_acyclic_frames_that_are_in_the_way_of_a_cycle_and_tells_stalls
     assert!((1..5).contains(&windows.crossed_in_stalls), "{stall}");
 }
 
+// covers: capture
 #[test]
 fn any_damage_to_a_file_is_survived() {
     let file = short();

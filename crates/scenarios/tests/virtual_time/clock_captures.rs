@@ -1,5 +1,5 @@
 //! The set-up of distributed clocks in captures, judged from the file alone by `ci/check-clocks`: delays and offsets
-//! computed anew from what SubDevices latched and from their DL status (facts 7.1, 7.2, 7.5). Captures that were
+//! computed anew from what SubDevices latched and from their DL status (protocol 7.1, 7.2, 7.5). Captures that were
 //! tampered with show that the script sees what it looks for.
 
 use std::path::{Path, PathBuf};
@@ -127,7 +127,7 @@ impl Drop for Cases {
 }
 
 /// As often as declared (here 100 times), eight at a time, while states change.
-// covers: facts 7.2
+// covers: 7.2, dc-lock
 #[test]
 fn the_static_drift_phase_is_as_long_as_declared_in_bursts_beside_the_start_up() {
     let path = file();
@@ -166,8 +166,9 @@ fn with_gaps(count: usize) -> Vec<DeviceDescription> {
     all
 }
 
+// covers: 7.1, 7.2, dc-tools
 #[test]
-fn written_delays_and_offsets_are_those_that_a_capture_gives_facts_7_1_facts_7_2() {
+fn written_delays_and_offsets_are_those_that_a_capture_gives() {
     let mut cases = Cases::default();
     let options = NetworkOptions::default;
     cases.fine("line", line(clocked(12, 100), options()), "judged: 12 delays", |_| ());
@@ -181,7 +182,7 @@ fn written_delays_and_offsets_are_those_that_a_capture_gives_facts_7_1_facts_7_2
     cases.judge();
 }
 
-// covers: facts 7.5
+// covers: 7.5, dc-tools
 #[test]
 fn clocks_of_a_ring_that_breaks_and_of_a_subdevice_that_returns_keep_their_delays() {
     let mut cases = Cases::default();
@@ -237,16 +238,18 @@ fn fork() -> Network {
     wired(descriptions, &cables)
 }
 
+// covers: 7.1, dc-tools
 #[test]
-fn crossed_subdevices_and_branches_of_a_fork_without_a_clock_are_judged_facts_7_1() {
+fn crossed_subdevices_and_branches_of_a_fork_without_a_clock_are_judged() {
     let mut cases = Cases::default();
     cases.fine("crossed", crossed(), "judged: 6 delays", |_| ());
     cases.fine("fork without a clock", fork(), "judged: 6 delays", |_| ());
     cases.judge();
 }
 
+// covers: 7.5, 9.4, dc-tools
 #[test]
-fn rings_behind_junctions_are_judged_whole_and_broken_facts_7_5_9_4() {
+fn rings_behind_junctions_are_judged_whole_and_broken() {
     let mut cases = Cases::default();
     let network = || wired(clocked(7, 100), &RING_BEHIND_JUNCTION);
     cases.fine("ring behind a junction", network(), "judged: 63 delays", |run| {
@@ -340,8 +343,9 @@ impl Tampering {
     }
 }
 
+// covers: dc-tools
 #[test]
-fn delays_that_were_tampered_with_are_found_when_crossed_behind_forks_without_a_clock_and_in_rings() {
+fn tampered_delays_are_found_crossed_behind_clockless_forks_and_in_rings() {
     let mut cases = Cases::default();
     // Stations are numbered in the order in which the frame is processed: device 1 is the last.
     let tampering = Tampering::with(crossed(), |_| ());
@@ -364,6 +368,7 @@ fn delays_that_were_tampered_with_are_found_when_crossed_behind_forks_without_a_
     cases.judge();
 }
 
+// covers: dc-tools
 #[test]
 fn clocks_that_were_tampered_with_are_found() {
     let tampering = Tampering::with(line(clocked(6, 100), NetworkOptions::default()), |run| cycles(run, 20));

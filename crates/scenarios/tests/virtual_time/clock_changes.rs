@@ -1,5 +1,5 @@
 //! Distributed clocks while the segment changes: rings behind junctions, groups that come and go, trees, clocks that
-//! lose their power (facts 7.1, 7.5, 9.4).
+//! lose their power (protocol 7.1, 7.5, 9.4).
 
 use std::time::Duration;
 
@@ -50,7 +50,7 @@ fn change(world: &mut World, what: &str, act: impl FnOnce(&mut World)) -> usize 
     world.events(mark).iter().filter(|timed| matches!(timed.event, Event::DelaysChanged { .. })).count()
 }
 
-// covers: facts 7.5, facts 9.4
+// covers: 7.5, 9.4, dc-delays
 #[test]
 fn clocks_of_a_ring_behind_a_junction_stay_together_whole_and_broken_anywhere() {
     let mut world = world(1, junction_ring());
@@ -63,8 +63,9 @@ fn clocks_of_a_ring_behind_a_junction_stay_together_whole_and_broken_anywhere() 
     }
 }
 
+// covers: 7.2.1, dc-tools
 #[test]
-fn how_much_faster_a_clock_would_run_by_itself_is_known_after_the_lock_and_after_changes_facts_7_2_1() {
+fn the_free_running_rate_of_a_clock_is_known_after_lock_and_changes() {
     let free: Vec<i64> = clocked(7, 50).iter().map(|description| description.clock_drift_ppb).collect();
     let mut world = world(1, junction_ring());
     let is_right = |world: &World| {
@@ -81,8 +82,9 @@ fn how_much_faster_a_clock_would_run_by_itself_is_known_after_the_lock_and_after
     is_right(&world);
 }
 
+// covers: dc-delays
 #[test]
-fn a_ring_behind_a_junction_that_is_broken_from_the_start_has_its_delays_and_those_of_the_repaired_one() {
+fn a_local_ring_broken_from_the_start_has_right_delays_before_and_after_repair() {
     for cable in [3, 2] {
         let mut network = junction_ring();
         network.cut(CableId(cable));
@@ -95,6 +97,7 @@ fn a_ring_behind_a_junction_that_is_broken_from_the_start_has_its_delays_and_tho
     }
 }
 
+// covers: dc-delays
 #[test]
 fn a_local_ring_in_a_ring_of_two_links_keeps_its_clocks_through_breaks_of_either() {
     let mut world = world(3, wired(clocked(5, 50), &RING_IN_RING));
@@ -119,7 +122,7 @@ fn a_local_ring_in_a_ring_of_two_links_keeps_its_clocks_through_breaks_of_either
 }
 
 /// No frame comes back meanwhile, and rings are looked into one after the other.
-// covers: JR-02, facts 7.5
+// covers: JR-02, 7.5, dc-delays
 #[test]
 fn clocks_come_back_together_when_two_rings_behind_junctions_broke_at_once() {
     let mut world = world(10, wired(clocked(7, 50), &TWO_RINGS));
@@ -142,8 +145,9 @@ fn clocks_come_back_together_when_two_rings_behind_junctions_broke_at_once() {
     }
 }
 
+// covers: dc-ring
 #[test]
-fn a_ring_that_was_broken_from_the_start_has_the_delay_of_its_missing_cable_after_the_repair() {
+fn a_ring_broken_from_the_start_has_the_delay_of_its_cable_after_the_repair() {
     let count = 6;
     let mut cables: Vec<(Endpoint, Endpoint)> = (1..count).map(|device| (at(device - 1, B), at(device, A))).collect();
     cables.insert(0, (MAIN, at(0, A)));
@@ -168,8 +172,9 @@ fn a_ring_that_was_broken_from_the_start_has_the_delay_of_its_missing_cable_afte
 
 /// Nobody looks for rings behind junctions, and there is one: delays cannot be measured. That is told once, and once
 /// more when the segment has changed; with the ring broken all is well.
+// covers: 7.1, 9.4, dc-lock
 #[test]
-fn a_ring_that_nobody_looks_for_is_told_once_for_each_change_and_clocks_begin_when_it_is_open_facts_7_1_9_4() {
+fn a_ring_not_looked_for_is_reported_per_change_and_clocks_begin_when_open() {
     let mut world = World::with(9, junction_ring(), &Options::default(), |scan| with_clocks(scan, config()))
         .expect("it can be activated");
     let mark = world.beginning();
@@ -228,8 +233,9 @@ fn clocks_lock_though_frames_get_lost_at_random_from_the_start() {
     assert!(largest_spread(&mut world, &clocks, 200) <= 100, "{:?}", differences(world.network(), &clocks));
 }
 
+// covers: dc-remeasure
 #[test]
-fn every_cable_of_a_tree_may_go_and_come_though_one_has_no_clock_and_frames_get_lost_at_random() {
+fn delays_stay_right_when_any_cable_of_a_tree_goes_and_frames_get_lost() {
     let mut world = begun(5, tree(), config());
     lock(&mut world, Duration::from_secs(5));
     let mut dice = Dice::new(5);
@@ -261,7 +267,7 @@ fn every_cable_of_a_tree_may_go_and_come_though_one_has_no_clock_and_frames_get_
     }
 }
 
-// covers: facts 7.5
+// covers: 7.5, dc-lock
 #[test]
 fn a_reference_that_loses_its_power_is_replaced_and_comes_back_without_a_jump() {
     let count = 6;
@@ -329,8 +335,9 @@ fn two_places() -> Network {
 
 const TOOL: u16 = 5;
 
+// covers: dc-remeasure
 #[test]
-fn a_group_that_joins_late_and_then_elsewhere_has_the_delays_and_sync_signals_of_its_place() {
+fn a_group_that_joins_late_or_elsewhere_has_the_clocks_of_its_place() {
     let links = Tap::new(line(clocked(4, 50), NetworkOptions::default()));
     let infos = MainDevice::request(links, &Options::default()).scan().expect("a scan").subdevices;
     let expect = |config: SubDeviceConfig, info: &SubDeviceInfo| {
@@ -369,8 +376,9 @@ fn a_group_that_joins_late_and_then_elsewhere_has_the_delays_and_sync_signals_of
 
 /// Three without a clock; a group of three behind port 3 of the second one brings the first clocks of the segment, and
 /// one SubDevice without a clock between them.
+// covers: 7.2, dc-remeasure
 #[test]
-fn the_first_clocks_of_a_segment_may_come_with_a_group_and_come_again_facts_7_2() {
+fn the_first_clocks_of_a_segment_may_come_with_a_group_and_come_again() {
     let cables = [
         (MAIN, at(0, A)),
         (at(0, B), at(1, A)),

@@ -1,4 +1,4 @@
-//! Propagation delays of lines, against those of their cables (facts 7.1).
+//! Propagation delays of lines, against those of their cables (protocol 7.1).
 
 use std::time::Duration;
 
@@ -12,8 +12,9 @@ use scenarios::world::World;
 /// Time of a passage and of a cable.
 const HOP_NS: i64 = 300 + 50;
 
+// covers: 7.1, dc-delays
 #[test]
-fn delays_of_a_line_are_those_of_its_cables_facts_7_1() {
+fn delays_of_a_line_are_those_of_its_cables() {
     for count in [2, 7, 30] {
         let mut world = world(1, line(clocked(count, 100), NetworkOptions::default()), config());
         world.until(Duration::from_secs(1), "set up", |world| {
@@ -33,8 +34,9 @@ fn delays_of_a_line_are_those_of_its_cables_facts_7_1() {
     }
 }
 
+// covers: 7.1, dc-delays
 #[test]
-fn what_processing_takes_longer_than_forwarding_is_an_error_of_delays_unless_it_is_told_facts_7_1() {
+fn longer_processing_than_forwarding_is_an_error_of_delays_unless_declared() {
     const COUNT: usize = 6;
     const LONGER: u64 = 40;
     let mut options = NetworkOptions::default();
@@ -55,8 +57,9 @@ fn what_processing_takes_longer_than_forwarding_is_an_error_of_delays_unless_it_
 }
 
 /// A coupler, terminals and drives, each with passages of its own: what each is told of is exact.
+// covers: 7.1, dc-delays
 #[test]
-fn types_whose_passages_differ_have_exact_delays_where_each_is_told_facts_7_1() {
+fn types_whose_passages_differ_have_exact_delays_where_each_is_told() {
     const PASSAGES: [(u64, u64); 7] =
         [(550, 540), (150, 150), (150, 150), (750, 700), (750, 700), (150, 150), (300, 300)];
     let descriptions = || {
@@ -95,8 +98,9 @@ fn types_whose_passages_differ_have_exact_delays_where_each_is_told_facts_7_1() 
 }
 
 /// The longest line. That 200 clocks lock and stay together is among the figures (bin `figures`, clocks).
+// covers: 7.1, dc-delays
 #[test]
-fn two_hundred_clocks_in_a_line_have_their_delays_facts_7_1() {
+fn two_hundred_clocks_in_a_line_have_their_delays() {
     const COUNT: usize = 200;
     let short = ClockConfig { drift_distributions: 0, ..config() };
     let mut world = world(15, line(clocked(COUNT, 100), NetworkOptions::default()), short);

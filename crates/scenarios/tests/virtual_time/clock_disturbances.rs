@@ -1,4 +1,4 @@
-//! Propagation delays while frames of process data are on the wire: right, or not written (facts 7.1).
+//! Propagation delays while frames of process data are on the wire: right, or not written (protocol 7.1).
 
 use std::time::Duration;
 
@@ -25,18 +25,21 @@ fn all_right(shapes: impl Iterator<Item = Shape>, changes: u64) {
     assert!(sum.not_written.is_empty() && sum.right == sum.changes && sum.written > sum.changes, "{sum:?}");
 }
 
+// covers: 7.1, dc-remeasure
 #[test]
-fn delays_of_rings_of_any_length_that_break_are_right_facts_7_1() {
+fn delays_of_rings_of_any_length_that_break_are_right() {
     all_right([2, 3, 12, 16, 24, 40, 64].into_iter().map(Shape::Ring), 8);
 }
 
+// covers: 7.1, 9.4, dc-remeasure
 #[test]
-fn delays_of_rings_behind_junctions_that_break_are_right_facts_7_1_9_4() {
+fn delays_of_rings_behind_junctions_that_break_are_right() {
     all_right([2, 9, 14, 20, 32].into_iter().map(Shape::LocalRing), 8);
 }
 
+// covers: 7.1, 9.4, dc-remeasure
 #[test]
-fn delays_of_random_trees_with_rings_are_right_facts_7_1_9_4() {
+fn delays_of_random_trees_with_rings_are_right() {
     all_right((0..12).map(|_| Shape::Tree), 8);
 }
 
@@ -53,7 +56,7 @@ fn not_measured(event: &Event) -> bool {
 
 /// Frames leave as soon as the last ones are home, or several cycles are under way all the time: the cyclic half pauses
 /// when it is asked to, and where it may not, nothing is written and it is told why.
-// covers: facts 7.1
+// covers: 7.1, dc-remeasure
 #[test]
 fn with_frames_on_the_wire_all_the_time_cycles_pause_or_nothing_is_written() {
     const COUNT: usize = 24;
@@ -99,8 +102,9 @@ fn with_frames_on_the_wire_all_the_time_cycles_pause_or_nothing_is_written() {
 }
 
 /// Cycles of 1 ms leave time enough: nothing pauses, and clocks lock as without process data.
+// covers: 7.1, dc-remeasure
 #[test]
-fn cycles_of_a_millisecond_never_pause_for_a_measurement_facts_7_1() {
+fn cycles_of_a_millisecond_never_pause_for_a_measurement() {
     let mut world = world(22, ring(clocked(12, 50), NetworkOptions::default()), config());
     lock(&mut world, Duration::from_secs(4));
     for fault in [World::cut, World::heal] {

@@ -1,5 +1,5 @@
 //! Forks without a clock: delays behind them are measured branch by branch at the set-up, and where they cannot be,
-//! none is written and that is told (facts 7.1).
+//! none is written and that is told (protocol 7.1).
 
 use std::time::Duration;
 
@@ -46,8 +46,9 @@ const SPLITTERS: [(Endpoint, Endpoint); 8] = [
     (at(5, B), at(7, A)),
 ];
 
+// covers: 7.1, dc-delays
 #[test]
-fn delays_behind_splitters_without_a_clock_are_those_of_the_cables_facts_7_1() {
+fn delays_behind_splitters_without_a_clock_are_those_of_the_cables() {
     let mut world = world(&SPLITTERS, &[1, 5], config());
     world.until(Duration::from_secs(8), "everything in OP", World::all_in_op);
     lock(&mut world, Duration::from_secs(8));
@@ -75,6 +76,7 @@ fn delays_behind_splitters_without_a_clock_are_those_of_the_cables_facts_7_1() {
 }
 
 /// Nothing measures what is between branches of a splitter that no clock is in front of.
+// covers: dc-delays
 #[test]
 fn behind_a_splitter_without_a_clock_at_the_head_the_second_branch_is_told() {
     let cables =
@@ -97,6 +99,7 @@ fn behind_a_splitter_without_a_clock_at_the_head_the_second_branch_is_told() {
     }
 }
 
+// covers: dc-delays
 #[test]
 fn a_subdevice_with_sync0_whose_delay_is_hidden_stays_in_safeop_and_says_why() {
     let cables = [(MAIN, at(0, A)), (at(0, D), at(1, A)), (at(0, B), at(2, A))];
@@ -127,6 +130,7 @@ fn a_subdevice_with_sync0_whose_delay_is_hidden_stays_in_safeop_and_says_why() {
 }
 
 /// Random trees, a third of whose SubDevices have no clock: what is written is right, what is hidden is told.
+// covers: dc-delays
 #[test]
 fn delays_in_random_trees_with_gaps_are_right_or_not_written() {
     let seeds =

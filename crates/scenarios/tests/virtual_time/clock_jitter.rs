@@ -1,5 +1,5 @@
 //! Distributed clocks with a host that sends tens of microseconds late at random: a reference that loses its power
-//! comes back to OP, and SYNC0 stays together while cables of a ring go and come (facts 7.2, 7.3, 7.5).
+//! comes back to OP, and SYNC0 stays together while cables of a ring go and come (protocol 7.2, 7.3, 7.5).
 
 use std::time::Duration;
 
@@ -28,7 +28,7 @@ fn window_events(world: &World, since: Mark) -> usize {
     world.events(since).iter().filter(|timed| matches!(timed.event, Event::SyncWindow { .. })).count()
 }
 
-// covers: facts 7.2
+// covers: 7.2, dc-late-host
 #[test]
 fn a_reference_that_was_power_cycled_is_back_in_op_within_5_s_at_any_host_jitter() {
     const COUNT: usize = 6;
@@ -57,7 +57,7 @@ fn a_reference_that_was_power_cycled_is_back_in_op_within_5_s_at_any_host_jitter
     }
 }
 
-// covers: facts 7.5
+// covers: 7.5, dc-late-host
 #[test]
 fn sync0_stays_together_while_cables_go_and_come_though_the_host_sends_50_us_late() {
     const COUNT: usize = 8;

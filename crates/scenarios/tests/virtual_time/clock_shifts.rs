@@ -1,5 +1,5 @@
 //! Who follows whom: the reference clock the host (bus shift), the host's cycles the reference clock (master shift)
-//! (facts 7.4).
+//! (protocol 7.4).
 
 use std::time::Duration;
 
@@ -16,8 +16,9 @@ fn all(count: usize) -> Vec<usize> {
     (0..count).collect()
 }
 
+// covers: 7.4, dc-reference
 #[test]
-fn with_bus_shift_the_reference_follows_the_host_facts_7_4() {
+fn with_bus_shift_the_reference_follows_the_host() {
     let shift = ClockConfig { bus_shift: true, ..config() };
     let mut world = world(6, line(clocked(5, 50), NetworkOptions::default()), shift);
     world.run_cycles(6_000);
@@ -29,7 +30,7 @@ fn with_bus_shift_the_reference_follows_the_host_facts_7_4() {
     assert!(spread(network, &all(5)) <= 200);
 }
 
-// covers: facts 7.4
+// covers: 7.4, dc-reference
 #[test]
 fn the_reference_follows_the_time_of_the_application_and_is_led_to_a_given_time() {
     // The application's time runs 30 ppm faster than the host's.
@@ -62,8 +63,9 @@ fn the_reference_follows_the_time_of_the_application_and_is_led_to_a_given_time(
 
 /// Where the host says what time it is, the reference follows it through a break; where the reference does, cycles
 /// follow it, also when all frames meet it from the other side.
+// covers: CR-26, 7.5, dc-reference
 #[test]
-fn bus_shift_and_master_shift_go_on_through_a_cut_and_a_repair_cr_26_facts_7_5() {
+fn bus_shift_and_master_shift_go_on_through_a_cut_and_a_repair() {
     for cable in [0, 2] {
         let shift = ClockConfig { bus_shift: true, ..config() };
         let mut world = world(11, ring(clocked(4, 50), NetworkOptions::default()), shift);
@@ -113,8 +115,9 @@ fn bus_shift_and_master_shift_go_on_through_a_cut_and_a_repair_cr_26_facts_7_5()
     }
 }
 
+// covers: 7.4, dc-master-shift
 #[test]
-fn cycles_follow_the_reference_clock_though_the_host_wakes_late_facts_7_4() {
+fn cycles_follow_the_reference_clock_though_the_host_wakes_late() {
     let mut world = world(10, line(clocked(4, 80), NetworkOptions::default()), config());
     world.application_mut().set_trigger(Trigger::ReferenceClock { phase_ns: -250_000 });
     world.application_mut().links_mut().oversleep(Duration::from_micros(50));
@@ -134,8 +137,9 @@ fn cycles_follow_the_reference_clock_though_the_host_wakes_late_facts_7_4() {
 
 /// What the reference is told is up to 50 us late at random. It keeps near the host in the mean, so calmly that the
 /// others lock on it; nobody is told that they left their window, though the reference itself shows the host's jitter.
+// covers: 7.4, dc-reference
 #[test]
-fn with_bus_shift_clocks_lock_and_keep_their_window_though_the_host_sends_50_us_late_facts_7_4() {
+fn with_bus_shift_clocks_lock_and_keep_their_window_with_a_host_50_us_late() {
     const COUNT: usize = 5;
     let shift = ClockConfig { bus_shift: true, ..config() };
     for reference in [50_000, -100_000] {
@@ -167,8 +171,9 @@ fn with_bus_shift_clocks_lock_and_keep_their_window_though_the_host_sends_50_us_
 
 /// A clock that is moved by 6 us is told of when it has left the window, and when it is back; with bus shift each clock
 /// is looked at, without it the broadcast read of all.
+// covers: 7.2, dc-lock
 #[test]
-fn clocks_that_leave_their_window_and_come_back_are_told_facts_7_2() {
+fn clocks_that_leave_their_window_and_come_back_are_told() {
     for bus_shift in [false, true] {
         let shift = ClockConfig { bus_shift, ..config() };
         let mut world = world(20, line(clocked(3, 30), NetworkOptions::default()), shift);

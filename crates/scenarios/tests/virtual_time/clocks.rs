@@ -1,4 +1,4 @@
-//! Distributed clocks: delays, lock, spread, SYNC signals (facts 7).
+//! Distributed clocks: delays, lock, spread, SYNC signals (protocol 7).
 
 use std::time::Duration;
 
@@ -19,8 +19,9 @@ fn all(count: usize) -> Vec<usize> {
     (0..count).collect()
 }
 
+// covers: 7.2, dc-lock
 #[test]
-fn clocks_of_a_line_lock_and_stay_together_facts_7_2() {
+fn clocks_of_a_line_lock_and_stay_together() {
     let mut world = world(2, line(clocked(20, 50), NetworkOptions::default()), config());
     let mark = world.beginning();
     lock(&mut world, Duration::from_secs(3));
@@ -49,8 +50,9 @@ fn clocks_of_a_line_lock_and_stay_together_facts_7_2() {
 }
 
 /// The reference runs as fast as a clock may, others as slowly, and the other way round.
+// covers: 7.2.1, dc-lock
 #[test]
-fn clocks_anywhere_within_100_ppm_lock_and_stay_together_facts_7_2_1() {
+fn clocks_anywhere_within_100_ppm_lock_and_stay_together() {
     const COUNT: usize = 6;
     for reference in [100_000, -100_000] {
         let mut descriptions = clocked(COUNT, 100);
@@ -64,8 +66,9 @@ fn clocks_anywhere_within_100_ppm_lock_and_stay_together_facts_7_2_1() {
     }
 }
 
+// covers: 7.3, dc-sync
 #[test]
-fn sync0_comes_at_one_time_everywhere_and_where_it_was_wanted_facts_7_3() {
+fn sync0_comes_at_one_time_everywhere_and_where_it_was_wanted() {
     const COUNT: usize = 9;
     let network = line(clocked(COUNT, 50), NetworkOptions::default());
     let mut world = World::with(3, network, &Options::default(), |scan| {
@@ -96,10 +99,11 @@ fn sync0_comes_at_one_time_everywhere_and_where_it_was_wanted_facts_7_3() {
     }
 }
 
+// covers: dc-sync
 #[test]
 fn without_lock_a_subdevice_with_sync_stays_in_safeop_with_a_clear_error() {
     let mut descriptions = clocked(3, 0);
-    // Beyond what the control loop can take out (facts 7.2.1).
+    // Beyond what the control loop can take out (protocol 7.2.1).
     descriptions[2].clock_drift_ppb = 900_000;
     let mut world = World::with(4, line(descriptions, NetworkOptions::default()), &Options::default(), |scan| {
         let limit = Duration::from_secs(2);
@@ -120,6 +124,7 @@ fn without_lock_a_subdevice_with_sync_stays_in_safeop_with_a_clear_error() {
     assert!(!world.all_in_op());
 }
 
+// covers: dc-reference
 #[test]
 fn a_reference_that_the_application_chooses_is_followed() {
     let chosen = ClockConfig { reference: ReferenceClock::Declared(2), ..config() };
@@ -134,6 +139,7 @@ fn a_reference_that_the_application_chooses_is_followed() {
     assert!(spread(world.network(), &all(6)) <= 1_000, "{:?}", differences(world.network(), &all(6)));
 }
 
+// covers: dc-reference
 #[test]
 fn the_first_that_is_configured_is_the_reference_where_that_is_wanted() {
     let network = line(clocked(4, 30), NetworkOptions::default());
@@ -152,8 +158,9 @@ fn the_first_that_is_configured_is_the_reference_where_that_is_wanted() {
 
 /// The first clock leads all others though nobody declares its SubDevice, which is left in the state in which it was
 /// found.
+// covers: 7.2, dc-reference
 #[test]
-fn a_reference_that_nobody_declares_is_followed_and_left_alone_facts_7_2() {
+fn a_reference_that_nobody_declares_is_followed_and_left_alone() {
     let network = line(clocked(3, 30), NetworkOptions::default());
     let mut world = World::with(19, network, &Options::default(), |scan| {
         let clocks = Some(config());
@@ -167,6 +174,7 @@ fn a_reference_that_nobody_declares_is_followed_and_left_alone_facts_7_2() {
     assert_eq!(world.network().device(DeviceIndex(0)).al_status(), before);
 }
 
+// covers: dc-lock
 #[test]
 fn a_subdevice_that_lost_its_power_has_its_clock_back_in_op() {
     let network = line(clocked(6, 50), NetworkOptions::default());
@@ -187,8 +195,9 @@ fn a_subdevice_that_lost_its_power_has_its_clock_back_in_op() {
     assert!(world.network().devices().all(|device| device.al_status_code() != AlStatusCode::NO_SYNC));
 }
 
+// covers: 7.5, dc-ring
 #[test]
-fn a_closed_ring_has_the_delays_of_a_line_and_a_broken_one_too_facts_7_5() {
+fn a_closed_ring_has_the_delays_of_a_line_and_a_broken_one_too() {
     const COUNT: usize = 8;
     for cut in [None, Some(3), Some(1)] {
         let mut network = ring(clocked(COUNT, 50), NetworkOptions::default());
@@ -215,8 +224,9 @@ fn a_closed_ring_has_the_delays_of_a_line_and_a_broken_one_too_facts_7_5() {
     }
 }
 
+// covers: CR-26, 7.5, dc-ring
 #[test]
-fn a_cut_and_a_heal_at_any_cable_leave_no_clock_behind_facts_7_5() {
+fn a_cut_and_a_heal_at_any_cable_leave_no_clock_behind() {
     const COUNT: usize = 6;
     for cable in 0..=COUNT {
         let mut world = world(9, ring(clocked(COUNT, 50), NetworkOptions::default()), config());
@@ -246,7 +256,7 @@ fn a_cut_and_a_heal_at_any_cable_leave_no_clock_behind_facts_7_5() {
 
 /// Both copies of a frame leave at times of their own: between clocks of a part no host is in between, and across both
 /// parts only as far as the mean of what it does.
-// covers: facts 7.5
+// covers: 7.5, dc-ring
 #[test]
 fn clocks_of_an_open_ring_stay_together_though_copies_leave_up_to_5_us_apart() {
     const COUNT: usize = 6;
@@ -274,7 +284,7 @@ fn clocks_of_an_open_ring_stay_together_though_copies_leave_up_to_5_us_apart() {
 }
 
 /// Nobody has ever told the second part how fast the first one runs, and they are as far apart as clocks can be.
-// covers: facts 7.5
+// covers: 7.5, dc-ring
 #[test]
 fn a_ring_that_is_open_from_the_start_locks_though_copies_leave_up_to_5_us_apart() {
     let mut descriptions = clocked(6, 100);

@@ -45,6 +45,7 @@ fn refused(network: Network, change: impl Fn(usize, SubDeviceConfig) -> SubDevic
     }
 }
 
+// covers: declaration
 #[test]
 fn the_expected_product_is_compared_and_a_mismatch_names_both() {
     let text = refused(ring_of_16(FAST), |number, config| match number {
@@ -74,6 +75,7 @@ fn a_wildcard_takes_anybody() {
     world.settle();
 }
 
+// covers: declaration
 #[test]
 fn subdevices_are_found_by_alias_wherever_they_are() {
     let mut devices = descriptions(&SIXTEEN);
@@ -103,6 +105,7 @@ fn subdevices_are_found_by_alias_wherever_they_are() {
     );
 }
 
+// covers: topology
 #[test]
 fn an_alias_that_two_have_is_an_event_and_an_error_where_it_matters() {
     let mut devices = descriptions(&SIXTEEN);
@@ -123,6 +126,7 @@ fn an_alias_that_two_have_is_an_event_and_an_error_where_it_matters() {
     assert!(text.contains("alias 99 belongs to SubDevice 3 and to SubDevice 9"), "{text}");
 }
 
+// covers: declaration
 #[test]
 fn pdos_are_assigned_anew_where_the_subdevice_allows_it() {
     // The compact PDOs, without status.
@@ -148,6 +152,7 @@ fn pdos_are_assigned_anew_where_the_subdevice_allows_it() {
     assert!(world.left_op(mark).iter().all(|device| device.0 == 3));
 }
 
+// covers: declaration
 #[test]
 fn pdos_are_mapped_anew_where_the_subdevice_allows_it() {
     let outputs = || vec![PdoMapping::of(0x1600, [PdoEntry::new(0x60FF, 0, 32), PdoEntry::new(0x6040, 0, 16)])];
@@ -175,6 +180,7 @@ fn a_terminal_that_copies_al_control_takes_outputs_without_a_watchdog_too() {
     assert_ne!(world.network().device(DeviceIndex(0)).outputs(), [0]);
 }
 
+// covers: declaration
 #[test]
 fn objects_are_downloaded_expedited_and_normal_and_an_abort_is_told_with_its_text() {
     let mut world = declared(ring_of_16(FAST), |number, config| match number {
@@ -211,6 +217,7 @@ fn a_download_that_is_too_long_for_the_object_is_told_and_tried_again() {
 
 type Outcome = Rc<RefCell<Vec<Result<Vec<u8>, SdoError>>>>;
 
+// covers: declaration, sdo
 #[test]
 fn objects_are_uploaded_and_downloaded_in_op_while_process_data_goes_on() {
     let mut world = World::in_op(3, ring_of_16(FAST));

@@ -50,8 +50,9 @@ fn outputs(world: &World, device: usize) -> u16 {
     u16::from(bytes[0]) | bytes.get(1).map_or(0, |high| u16::from(*high) << 8)
 }
 
+// covers: copy
 #[test]
-fn inputs_are_outputs_of_another_subdevice_in_the_same_cycle_across_domains_and_cuts() {
+fn inputs_become_outputs_of_another_subdevice_in_the_same_cycle_across_cuts() {
     let mut world = world(1);
     let (fast, slow) = (whole(&world, FAST_IN), whole(&world, SLOW_IN));
     let (out, wide) = (whole(&world, FAST_OUT), whole(&world, OUT_16));
@@ -89,6 +90,7 @@ fn inputs_are_outputs_of_another_subdevice_in_the_same_cycle_across_domains_and_
     println!("{refused} words refused at start and around a cut and a healing");
 }
 
+// covers: copy
 #[test]
 fn outputs_hold_or_are_zero_while_their_source_is_away_and_follow_it_again() {
     let mut world = world(2);

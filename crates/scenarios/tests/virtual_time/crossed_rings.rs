@@ -1,5 +1,5 @@
 //! Rings in which SubDevices are plugged in the wrong way round, all of them where the two interfaces are swapped: what
-//! is told of them and of their breaks (facts 9.5, CR-12).
+//! is told of them and of their breaks (protocol 9.5, CR-12).
 
 use std::collections::BTreeMap;
 use std::time::Duration;
@@ -71,8 +71,9 @@ fn crossings_told(world: &World) -> (BTreeMap<Option<usize>, usize>, usize) {
     (crossed, swapped)
 }
 
+// covers: CR-12, LC-01, LC-07, ring-places
 #[test]
-fn breaks_of_a_ring_with_any_crossed_subdevices_have_their_right_place_and_each_is_told_once_cr_12_lc_01_lc_07() {
+fn breaks_with_any_crossed_subdevices_have_their_place_and_are_reported_once() {
     for crossed in 0..=ALL {
         let cables = cables(crossed);
         let mut world = World::in_op(crossed as u64, wired(&KINDS, &cables));
@@ -102,7 +103,7 @@ fn breaks_of_a_ring_with_any_crossed_subdevices_have_their_right_place_and_each_
     }
 }
 
-// covers: CR-19, LC-05
+// covers: CR-19, LC-05, ring-places
 #[test]
 fn a_ring_with_crossed_subdevices_that_is_broken_from_the_start_is_told_as_it_is() {
     for crossed in 0..=ALL {
@@ -153,7 +154,7 @@ fn sorted(mut ends: Ends) -> Ends {
     ends
 }
 
-// covers: CR-12
+// covers: CR-12, ring-branches
 #[test]
 fn places_in_random_rings_with_branches_and_crossed_subdevices_are_right_or_unknown() {
     let seeds = std::env::var("RINGCAT_SEEDS").ok().and_then(|it| it.parse().ok()).unwrap_or(60);

@@ -1,4 +1,4 @@
-//! SubDevices whose SyncManagers a configuration file declares (facts 8.1): it counts before their SII.
+//! SubDevices whose SyncManagers a configuration file declares (protocol 8.1): it counts before their SII.
 
 use std::time::Duration;
 
@@ -124,8 +124,9 @@ fn exchanges(world: &mut World) {
     assert!(world.compared() > 0, "images are those of the devices");
 }
 
+// covers: 8.1, sync-managers-declared
 #[test]
-fn a_mapping_that_differs_from_the_sii_is_that_of_the_file_and_nothing_else_is_written_facts_8_1() {
+fn a_mapping_that_differs_from_the_sii_is_taken_from_the_file_alone() {
     let mut world = world(segment(|_| ()), follow);
     exchanges(&mut world);
     assert_eq!(written(&world), downloads(), "those of the file in its order, none of ours");
@@ -146,8 +147,9 @@ fn a_mapping_that_differs_from_the_sii_is_that_of_the_file_and_nothing_else_is_w
     assert_eq!(written(&world), downloads());
 }
 
+// covers: 8.1, sync-managers-declared
 #[test]
-fn mailboxes_and_areas_of_the_file_count_where_the_sii_is_wrong_or_empty_facts_8_1() {
+fn mailboxes_and_areas_of_the_file_count_where_the_sii_is_wrong_or_empty() {
     // An SII with the mailboxes of another product, and one without mailbox, PDOs and SyncManagers.
     let moved = |described: &mut DeviceDescription| {
         let mailbox = described.mailbox.as_mut().expect("a servo has one");
@@ -172,8 +174,9 @@ fn mailboxes_and_areas_of_the_file_count_where_the_sii_is_wrong_or_empty_facts_8
     }
 }
 
+// covers: sync-managers-declared
 #[test]
-fn one_that_is_absent_has_the_place_that_the_file_gives_it_and_takes_it_when_it_comes() {
+fn an_absent_subdevice_has_its_place_from_the_file_and_takes_it_when_it_comes() {
     // The file was written for all of them.
     let mut main_device = MainDevice::request(Tap::new(segment(|_| ())), &Options::default());
     let all: Vec<SubDeviceInfo> = main_device.scan().expect("a scan").subdevices;
@@ -201,8 +204,9 @@ fn one_that_is_absent_has_the_place_that_the_file_gives_it_and_takes_it_when_it_
     assert_eq!(world.application().entry(DRIVE, 0x6041, 0), Some(entry), "nothing moves");
 }
 
+// covers: 3.1, sync-managers-declared
 #[test]
-fn what_does_not_fit_the_controller_is_refused_with_the_sync_manager_facts_3_1() {
+fn what_does_not_fit_the_controller_is_refused_with_the_sync_manager() {
     let refused = |change: fn(&mut Vec<DeclaredSyncManager>)| {
         let declare = |scan: &Scan| {
             let mut declaration = automatic(&scan.subdevices, CYCLE);

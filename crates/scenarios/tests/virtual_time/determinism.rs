@@ -30,6 +30,7 @@ fn run(seed: u64) -> (Fingerprint, usize) {
     (world.fingerprint(), world.events(world.beginning()).len())
 }
 
+// covers: determinism
 #[test]
 fn the_same_seed_gives_the_same_frames_and_events_bit_for_bit() {
     for seed in 0..4 {
@@ -39,6 +40,7 @@ fn the_same_seed_gives_the_same_frames_and_events_bit_for_bit() {
     }
 }
 
+// covers: determinism
 #[test]
 fn another_seed_gives_another_run() {
     assert_ne!(run(10).0, run(11).0);

@@ -17,6 +17,7 @@ use scenarios::world::{CYCLE, World};
 const FAST: Duration = Duration::from_micros(10);
 const OTHER: MacAddress = MacAddress([0x00, 0x00, 0x5E, 0x00, 0x53, 0x77]);
 
+// covers: lost-frames
 #[test]
 fn one_lost_frame_costs_one_cycle_and_one_corrupt_frame_no_more() {
     for ring in [true, false] {
@@ -53,7 +54,7 @@ fn in_a_closed_ring_the_unprocessed_copy_is_not_missed() {
     assert!(world.application().cyclic_counters().copies_lost > 0);
 }
 
-// Facts CR-04, CR-07.
+// covers: CR-04, CR-07, lost-frames
 #[test]
 fn a_frame_that_comes_back_late_or_twice_is_counted_and_never_taken_for_a_new_one() {
     // Up to 600 ms: more than 256 frames, after which frame ids come again.
@@ -91,6 +92,7 @@ fn patient(world: &mut World) {
     world.application_mut().exchange_mut().set_timeout(DomainId(0), 5 * CYCLE);
 }
 
+// covers: lost-frames
 #[test]
 fn a_domain_whose_frames_are_still_out_is_skipped_and_counted() {
     let mut world = World::in_op(3, line(descriptions(&SIXTEEN), NetworkOptions::default()));
@@ -121,6 +123,7 @@ fn foreign(index: u8) -> Vec<u8> {
     bytes
 }
 
+// covers: lost-frames
 #[test]
 fn frames_of_another_main_device_are_counted_and_handed_over() {
     let mut world = World::in_op(4, ring_of_16(FAST));

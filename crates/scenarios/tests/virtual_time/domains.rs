@@ -16,8 +16,9 @@ use scenarios::world::{CYCLE, World};
 
 const FAST: Duration = Duration::from_micros(10);
 
+// covers: domains
 #[test]
-fn process_data_that_needs_several_frames_is_complete_in_line_and_ring_and_survives_a_cut() {
+fn process_data_in_several_frames_is_complete_in_line_and_ring_through_a_cut() {
     let kinds = ["block", "digital-output-8", "block", "block", "servo", "block", "block", "block", "digital-input-8"];
     let mut world = World::in_op(1, line(descriptions(&kinds), NetworkOptions::default()));
     let sent = world.application().cyclic_counters().sent;
@@ -57,6 +58,7 @@ fn in_turn(scan: &Scan, periods: &[u32]) -> Declaration {
     declaration
 }
 
+// covers: domains
 #[test]
 fn domains_at_different_rates_are_exchanged_each_at_its_own() {
     let declare = |scan: &Scan| in_turn(scan, &[1, 4, 10]);
@@ -80,6 +82,7 @@ fn domains_at_different_rates_are_exchanged_each_at_its_own() {
     assert!(world.compared() > 10_000);
 }
 
+// covers: domains
 #[test]
 fn outputs_and_inputs_of_one_subdevice_may_be_in_different_domains() {
     let kinds = ["block", "servo", "digital-input-8"];
@@ -119,6 +122,7 @@ fn optional_analog_input(position: u16) -> SubDeviceConfig {
     SubDeviceConfig::at_position(position).optional().assign(3, Direction::Inputs, pdos)
 }
 
+// covers: domains
 #[test]
 fn an_optional_subdevice_that_is_absent_at_first_joins_when_it_appears() {
     let kinds = ["coupler", "digital-output-8", "analog-input-4"];
@@ -177,8 +181,9 @@ fn a_subdevice_that_nobody_declared_is_named_and_left_alone() {
     assert_eq!(SIXTEEN.len() - 1, world.application().states().len());
 }
 
-/// The PDI holds the SyncManager of the only inputs back from the beginning (facts 3.5): there never was another state
-/// than Zero.
+/// The PDI holds the SyncManager of the only inputs back from the beginning (protocol 3.5): there never was another
+/// state than Zero.
+// covers: lost-frames
 #[test]
 fn a_domain_that_is_silent_from_the_beginning_is_told_once() {
     let network = line(descriptions(&["digital-input-8"]), NetworkOptions::default());

@@ -1,4 +1,4 @@
-//! The EEPROM is EtherCAT's again however the way to PREOP ends, for which the PDI gets it (facts 3.8, 5.6).
+//! The EEPROM is EtherCAT's again however the way to PREOP ends, for which the PDI gets it (protocol 3.8, 5.6).
 
 use std::time::Duration;
 
@@ -46,7 +46,7 @@ fn a_refused_preop_gives_the_eeprom_back() {
 }
 
 #[test]
-fn a_subdevice_that_is_out_of_reach_on_the_way_to_preop_gives_the_eeprom_back_when_it_returns() {
+fn a_subdevice_lost_on_the_way_to_preop_gives_the_eeprom_back_on_return() {
     let mut world = world(AlState::PreOp, |_| ());
     world.until(Duration::from_secs(1), "the PDI has the EEPROM", belongs_to_pdi);
     for cable in [1, 2] {

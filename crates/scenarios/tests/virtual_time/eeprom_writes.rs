@@ -1,4 +1,4 @@
-//! EEPROMs are written word by word, read back, with every failure named; aliases; loading again (facts 3.8, 4).
+//! EEPROMs are written word by word, read back, with every failure named; aliases; loading again (protocol 3.8, 4).
 
 use std::time::Duration;
 
@@ -36,6 +36,7 @@ fn sii(error: ServiceError) -> SiiProgramError {
     }
 }
 
+// covers: eeprom
 #[test]
 fn an_image_is_written_while_process_data_goes_on_and_reads_back() {
     let mut world = world(1);
@@ -54,6 +55,7 @@ fn an_image_is_written_while_process_data_goes_on_and_reads_back() {
     assert_eq!((world.incomplete(mark), world.left_op(mark)), (0, Vec::new()));
 }
 
+// covers: eeprom
 #[test]
 fn what_is_no_image_is_refused_and_written_with_force() {
     let mut world = world(2);
@@ -81,6 +83,7 @@ fn what_is_no_image_is_refused_and_written_with_force() {
     assert_eq!(world.finish(LIMIT, reload), Ok(()));
 }
 
+// covers: eeprom
 #[test]
 fn an_eeprom_that_is_slow_busy_or_protected_is_waited_for_or_named() {
     let mut world = world(3);
@@ -113,8 +116,9 @@ fn an_eeprom_that_is_slow_busy_or_protected_is_waited_for_or_named() {
     assert!(matches!(error, SiiProgramError::Busy { .. } | SiiProgramError::Read(_)), "{error}");
 }
 
+// covers: 4.7, eeprom
 #[test]
-fn an_alias_has_its_checksum_and_counts_from_the_next_start_facts_4_7() {
+fn an_alias_has_its_checksum_and_counts_from_the_next_start() {
     let mut world = world(4);
     let alias = |world: &mut World, force| {
         let work = world.application_mut().engine_mut().start_alias_write(DEVICE.0, 0x0ABC, force);

@@ -1,5 +1,5 @@
 //! Networks from ENIs, end to end: the file is read, a segment is made of it, it comes to OP as the file says, and
-//! exchanges data through the variables of the file (facts 8).
+//! exchanges data through the variables of the file (protocol 8).
 
 mod cables;
 mod variants;
@@ -180,8 +180,9 @@ impl Plant {
     }
 }
 
+// covers: 8, eni-run
 #[test]
-fn files_of_tools_come_to_op_and_exchange_data_through_their_variables_facts_8() {
+fn files_of_tools_come_to_op_and_exchange_data_through_their_variables() {
     for (name, count) in REAL {
         let Some(file) = real(name) else { continue };
         let has_clocks = file.configuration.declaration.clocks.is_some();
@@ -200,6 +201,7 @@ fn files_of_tools_come_to_op_and_exchange_data_through_their_variables_facts_8()
 }
 
 /// Whatever files there are, beside the ones above: `sim --eni` and `run --eni` of each, as one program.
+// covers: eni-run
 #[test]
 fn every_file_there_is_comes_to_op_with_complete_working_counters_or_says_why_not() {
     let directory = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared/data/eni");
@@ -258,8 +260,9 @@ fn bring_up(path: &Path) -> Result<u32, String> {
     Ok(status.wkc)
 }
 
+// covers: 8, eni-run
 #[test]
-fn a_file_with_packed_bits_copies_and_a_mapping_of_its_own_works_on_one_link_and_on_a_ring_facts_8() {
+fn packed_bits_copies_and_a_mapping_of_a_file_work_on_line_and_ring() {
     for ring in [false, true] {
         let mut plant = activate(machine(), ring, ring).expect("it fits");
         plant.settle();
@@ -296,8 +299,9 @@ fn a_file_with_packed_bits_copies_and_a_mapping_of_its_own_works_on_one_link_and
 }
 
 /// A drive that knows nothing of the file's mapping but what the file tells it (SOEM#958).
+// covers: 8, eni-run
 #[test]
-fn a_mapping_that_is_not_that_of_the_sii_is_set_by_the_file_alone_facts_8() {
+fn a_mapping_that_is_not_that_of_the_sii_is_set_by_the_file_alone() {
     let file = machine();
     let mut segment = segment(&file.eni, &file.configuration, false);
     let drive = &mut segment.devices[DRIVE];
@@ -323,8 +327,9 @@ fn a_mapping_that_is_not_that_of_the_sii_is_set_by_the_file_alone_facts_8() {
     assert_eq!(plant.device(DRIVE).outputs(), [1, 2, 3, 4, 0, 0]);
 }
 
+// covers: CR-16, 9.2.2, eni-lrw
 #[test]
-fn an_lrw_of_a_file_is_refused_on_two_links_with_datagram_and_subdevices_unless_it_may_be_split_cr_16_facts_9_2_2() {
+fn an_lrw_of_a_file_is_refused_on_two_links_by_name_unless_it_may_be_split() {
     let files = std::iter::once(("machine", Some(machine()), vec![1, 2, 3, 4]));
     let real = [("rocos_bcr_eni.xml", vec![0, 1, 2]), ("rocos_eni7.xml", (0..7).collect())];
     let files = files.chain(real.into_iter().map(|(name, who)| (name, self::real(name), who)));
@@ -347,6 +352,7 @@ fn an_lrw_of_a_file_is_refused_on_two_links_with_datagram_and_subdevices_unless_
     }
 }
 
+// covers: eni-run
 #[test]
 fn a_network_that_is_not_the_one_of_the_file_is_told_for_each_subdevice() {
     let file = machine();
@@ -369,6 +375,7 @@ fn a_network_that_is_not_the_one_of_the_file_is_told_for_each_subdevice() {
     );
 }
 
+// covers: eni-run
 #[test]
 fn variables_tell_how_old_they_are_by_the_subdevice_that_they_come_from() {
     let mut plant = activate(machine(), false, false).expect("it fits");
@@ -397,6 +404,7 @@ const BY_HAND: &str = r#"<EtherCATConfig><Config>
 <ProcessImage><Outputs><ByteSize>2</ByteSize></Outputs></ProcessImage>
 </Config></EtherCATConfig>"#;
 
+// covers: eni-run
 #[test]
 fn places_for_more_than_a_subdevice_has_are_refused_with_both_numbers() {
     let image = |bits: &str, outputs_len: usize| {
@@ -416,6 +424,7 @@ fn places_for_more_than_a_subdevice_has_are_refused_with_both_numbers() {
 }
 
 /// Whatever numbers a file has, a segment is made and comes up or not, and an error says why.
+// covers: eni-run
 #[test]
 fn files_with_wrong_numbers_are_refused_or_followed_without_harm() {
     let text = std::str::from_utf8(MACHINE).expect("it is text");

@@ -65,8 +65,9 @@ fn start_download(
     })
 }
 
+// covers: 6.5, eoe
 #[test]
-fn the_throughput_of_tcp_does_not_depend_on_the_cycle_facts_6_5() {
+fn the_throughput_of_tcp_does_not_depend_on_the_cycle() {
     for cycle in [1, 10] {
         let network = line(segment(LARGE_MAILBOX, EoeEnd::Stack), NetworkOptions::default());
         let cycle = Duration::from_millis(cycle);
@@ -82,6 +83,7 @@ fn the_throughput_of_tcp_does_not_depend_on_the_cycle_facts_6_5() {
     }
 }
 
+// covers: byte-budget, eoe
 #[test]
 fn a_download_shares_the_mailbox_with_objects_and_files() {
     let mut world = world(2, 512, EoeEnd::Stack);
@@ -118,8 +120,9 @@ fn a_download_shares_the_mailbox_with_objects_and_files() {
     assert_eq!((world.incomplete(mark), world.left_op(mark)), (0, Vec::new()));
 }
 
+// covers: 6.2, eoe
 #[test]
-fn cuts_and_lost_mail_lose_no_frame_facts_6_2() {
+fn cuts_and_lost_mail_lose_no_frame() {
     let mut world = world(3, LARGE_MAILBOX, EoeEnd::Stack);
     let station = world.station_of(TERMINAL);
     let mailbox = world.mailbox(TERMINAL);
@@ -144,6 +147,7 @@ fn cuts_and_lost_mail_lose_no_frame_facts_6_2() {
     assert!(mail.repeats > 0 && mail.rewritten > 0, "{mail:?}");
 }
 
+// covers: eoe
 #[test]
 fn a_subdevice_that_leaves_takes_its_ethernet_down_and_brings_it_back() {
     let mut world = world(4, 256, EoeEnd::Loop);
@@ -179,6 +183,7 @@ fn a_subdevice_that_leaves_takes_its_ethernet_down_and_brings_it_back() {
     assert_eq!(mailbox.pop_unsolicited(Unsolicited::Ethernet), None);
 }
 
+// covers: eoe
 #[test]
 fn a_subdevice_that_takes_no_frames_stops_the_queue_and_nothing_grows() {
     let mut world = world(5, 256, EoeEnd::Loop);
@@ -200,8 +205,9 @@ fn a_subdevice_that_takes_no_frames_stops_the_queue_and_nothing_grows() {
     assert_eq!((status.queued, status.counters.tx_frames + status.counters.tx_dropped), (0, taken as u64));
 }
 
+// covers: 6.5, eoe
 #[test]
-fn addresses_and_filter_are_set_and_told_beside_frames_facts_6_5() {
+fn addresses_and_filter_are_set_and_told_beside_frames() {
     let mut world = world(6, 256, EoeEnd::Stack);
     let work = start_download(&mut world, TERMINAL, 20_000);
     let mailbox = world.mailbox(TERMINAL);
@@ -242,8 +248,9 @@ fn addresses_and_filter_are_set_and_told_beside_frames_facts_6_5() {
     assert_eq!(closed.cause, EoeFailure::Mailbox(MailboxError::Closed));
 }
 
+// covers: 6.5, eoe
 #[test]
-fn a_time_stamp_comes_with_the_number_of_its_frame_facts_6_5() {
+fn a_time_stamp_comes_with_the_number_of_its_frame() {
     let mut world = world(7, 128, EoeEnd::Nothing);
     let port = EthernetPort::open(&world.mailbox(TERMINAL)).expect("nobody else has it");
     let frame = vec![0x11; 300];
@@ -255,8 +262,9 @@ fn a_time_stamp_comes_with_the_number_of_its_frame_facts_6_5() {
     assert!(stamps.windows(2).all(|pair| pair[0].time_ns < pair[1].time_ns), "{stamps:?}");
 }
 
+// covers: 6.5, eoe
 #[test]
-fn declared_addresses_are_set_at_each_start_and_refused_ones_are_told_facts_6_5() {
+fn declared_addresses_are_set_at_each_start_and_refused_ones_are_told() {
     let address = Some(Ipv4Addr::new(10, 0, 0, 7));
     let settings = IpSettings { address, name: Some(b"axis".to_vec()), ..IpSettings::default() };
     let start = |settings: &IpSettings, subdevice: usize| {

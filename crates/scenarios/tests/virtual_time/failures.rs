@@ -25,8 +25,9 @@ fn all_well(world: &World) -> bool {
     world.all_in_op() && world.application().all_settled()
 }
 
+// covers: refused-states
 #[test]
-fn an_application_that_stands_still_for_longer_than_the_watchdog_finds_all_back_in_op() {
+fn an_application_that_stalls_beyond_the_watchdog_finds_all_back_in_op() {
     for network in [ring_of_16(FAST), line(descriptions(&SIXTEEN), NetworkOptions::default())] {
         let mut world = World::in_op(1, network);
         world.run_cycles(50);
@@ -56,6 +57,7 @@ fn an_application_that_stands_still_for_longer_than_the_watchdog_finds_all_back_
     }
 }
 
+// covers: refused-states
 #[test]
 fn every_fall_of_a_watchdog_is_told_once() {
     for network in [ring_of_16(FAST), line(descriptions(&SIXTEEN), NetworkOptions::default())] {
@@ -126,6 +128,7 @@ fn an_application_that_hangs_while_it_is_configured_is_named_and_configured_late
     }
 }
 
+// covers: refused-states
 #[test]
 fn a_refused_transition_is_named_with_its_code_and_tried_again() {
     for to in [AlState::PreOp, AlState::SafeOp, AlState::Op] {
@@ -146,6 +149,7 @@ fn a_refused_transition_is_named_with_its_code_and_tried_again() {
     }
 }
 
+// covers: refused-states
 #[test]
 fn a_subdevice_that_refuses_for_long_holds_up_nobody() {
     let mut network = ring_of_16(FAST);
@@ -162,9 +166,10 @@ fn a_subdevice_that_refuses_for_long_holds_up_nobody() {
     assert_eq!((last.delivery, last.stale.as_slice()), (Delivery::WithoutAbsent, [3].as_slice()));
 }
 
+// covers: refused-states
 #[test]
 fn a_corrupt_sii_is_told_with_what_was_expected_and_what_came() {
-    // Byte 8 is that of the vendor in word 8, byte 14 the checksum (facts 4.1).
+    // Byte 8 is that of the vendor in word 8, byte 14 the checksum (protocol 4.1).
     let mut network = ring_of_16(FAST);
     network.apply(Fault::CorruptSii { device: DeviceIndex(2), offset: 14, mask: 0x40 });
     network.apply(Fault::CorruptSii { device: DeviceIndex(5), offset: 16, mask: 0x80 });
@@ -190,7 +195,7 @@ fn a_subdevice_with_a_wrong_checksum_in_its_sii_is_told_and_holds_up_nobody() {
         if position.0 == 2 && what.contains("checksum: expected"))
     };
     assert!(world.saw(start, told));
-    // The controller does not load such an EEPROM, and without it the application does not run (facts 4.7).
+    // The controller does not load such an EEPROM, and without it the application does not run (protocol 4.7).
     let named = |event: &Event| {
         matches!(event, Event::ConfigurationFailed { subdevice: 2, reason }
         if reason.contains("expected PREOP"))
@@ -213,7 +218,7 @@ fn scan_error(network: Network) -> ScanError {
 }
 
 #[test]
-fn links_that_are_joined_without_any_subdevice_are_told_from_links_that_lead_nowhere() {
+fn links_joined_without_any_subdevice_differ_from_links_that_lead_nowhere() {
     let (main, redundant) = (Endpoint::Host(HostLink::Main), Endpoint::Host(HostLink::Redundant));
     let joined = SegmentBuilder::new().cable(main, redundant).build().expect("two links");
     let error = scan_error(joined);
@@ -244,6 +249,7 @@ fn a_count_that_does_not_settle_is_an_error_with_the_counts() {
     }
 }
 
+// covers: recovery
 #[test]
 fn a_whole_segment_that_loses_power_comes_back_by_itself() {
     for ring in [true, false] {
@@ -278,6 +284,7 @@ fn fmmu_thief(station: u16) -> Vec<u8> {
     bytes
 }
 
+// covers: refused-states
 #[test]
 fn a_subdevice_in_op_that_lost_its_fmmus_is_noticed_and_configured_anew() {
     let mut world = World::in_op(9, ring_of_16(FAST));

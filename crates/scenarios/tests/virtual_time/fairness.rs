@@ -62,8 +62,9 @@ fn answered(world: &mut World) -> (Vec<u32>, u64) {
     (counts.iter().map(|count| count.get()).collect(), most)
 }
 
+// covers: byte-budget
 #[test]
-fn a_long_file_and_a_flood_of_datagrams_leave_fifty_others_their_share_and_the_budget_holds() {
+fn a_long_file_and_a_flood_leave_fifty_others_their_share_of_the_budget() {
     let mut world = world(1);
     let (alone, most) = answered(&mut world);
     assert!(most <= BUDGET as u64, "{most} bytes in a cycle");

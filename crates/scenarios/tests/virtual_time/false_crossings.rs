@@ -1,5 +1,5 @@
 //! Cables that are cut and healed within milliseconds while frames get lost: in a ring no line is said to be crossed
-//! that is not, and one that is is told (facts 9.5).
+//! that is not, and one that is is told (protocol 9.5).
 //!
 //! `SEED=0..2000 cargo test -p scenarios --test virtual_time false_crossings::seeds -- --nocapture` runs many.
 
@@ -119,21 +119,24 @@ fn run(seed: u64, course: Course) -> Vec<String> {
 
 const COURSES: [Course; 4] = [Course::InOp, Course::Enhanced, Course::Scan, Course::Crossed];
 
+// covers: LC-01, crossed-lines
 #[test]
-fn cuts_healed_within_milliseconds_under_loss_cross_no_line_lc_01() {
+fn cuts_healed_within_milliseconds_under_loss_cross_no_line() {
     let told: Vec<String> = (0..150).flat_map(|seed| run(seed, Course::InOp)).collect();
     assert_eq!(told, Vec::<String>::new());
 }
 
+// covers: LC-03, crossed-lines
 #[test]
-fn the_same_with_enhanced_detection_and_at_the_scan_crosses_no_line_lc_03() {
+fn the_same_with_enhanced_detection_and_at_the_scan_crosses_no_line() {
     let both = |seed| [Course::Enhanced, Course::Scan].into_iter().flat_map(move |course| run(seed, course));
     let told: Vec<String> = (0..75).flat_map(both).collect();
     assert_eq!(told, Vec::<String>::new());
 }
 
+// covers: LC-01, crossed-lines
 #[test]
-fn a_line_that_is_crossed_is_told_in_spite_of_cuts_and_loss_lc_01() {
+fn a_line_that_is_crossed_is_told_in_spite_of_cuts_and_loss() {
     let told: Vec<String> = (0..75).flat_map(|seed| run(seed, Course::Crossed)).collect();
     assert_eq!(told, Vec::<String>::new());
 }

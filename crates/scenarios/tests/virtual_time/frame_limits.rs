@@ -51,6 +51,7 @@ fn too_many(world: &World) -> u64 {
     world.network().statistics().lost(LossCause::TooManyDatagrams)
 }
 
+// covers: frame-limit, sim-faults
 #[test]
 fn a_scan_that_fails_for_too_many_datagrams_says_how_many_to_set() {
     for beyond in BOTH {
@@ -71,6 +72,7 @@ fn a_scan_that_fails_for_too_many_datagrams_says_how_many_to_set() {
     }
 }
 
+// covers: frame-limit
 #[test]
 fn a_look_at_the_ring_that_fails_for_too_many_datagrams_says_so() {
     for beyond in BOTH {
@@ -85,6 +87,7 @@ fn a_look_at_the_ring_that_fails_for_too_many_datagrams_says_so() {
     }
 }
 
+// covers: frame-limit
 #[test]
 fn a_limit_that_was_set_too_high_is_said_too() {
     for beyond in BOTH {
@@ -95,6 +98,7 @@ fn a_limit_that_was_set_too_high_is_said_too() {
     assert!(error.to_string().contains("RingCAT needs 3"), "{error}");
 }
 
+// covers: frame-limit
 #[test]
 fn with_the_limit_set_no_frame_holds_more_and_all_else_is_as_without() {
     for beyond in BOTH {
@@ -136,6 +140,7 @@ fn busy(scan: &Scan) -> Declaration {
     declaration
 }
 
+// covers: frame-limit
 #[test]
 fn cyclic_frames_with_datagrams_of_their_own_for_each_subdevice_keep_the_limit() {
     for datagrams in [3, 4, 15] {
@@ -150,8 +155,9 @@ fn cyclic_frames_with_datagrams_of_their_own_for_each_subdevice_keep_the_limit()
     }
 }
 
+// covers: frame-limit
 #[test]
-fn subdevices_that_come_in_operation_and_are_too_many_for_a_frame_are_explained_once() {
+fn subdevices_that_join_and_are_too_many_for_a_frame_are_explained_once() {
     const PRESENT: usize = 3;
     let all = scan(segment(40, false, None), &Options::default()).expect("a scan").subdevices;
     for beyond in BOTH {
@@ -212,12 +218,14 @@ fn disturbed(seed: u64) -> Option<String> {
     }
 }
 
+// covers: frame-limit
 #[test]
 fn frames_that_are_lost_by_chance_make_no_limit() {
     let mistaken: Vec<String> = (0..300).filter_map(disturbed).collect();
     assert_eq!(mistaken, Vec::<String>::new());
 }
 
+// covers: frame-limit
 #[test]
 fn a_ring_closes_again_with_a_limit_that_drops() {
     let declare = |scan: &Scan| automatic(&scan.subdevices, CYCLE);

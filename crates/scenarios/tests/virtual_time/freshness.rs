@@ -56,6 +56,7 @@ fn junctions() -> Options {
 
 /// A ring behind a junction that breaks at one cable while the break at another is healed: the sum of the working
 /// counters is the one that was expected before, from other SubDevices.
+// covers: freshness
 #[test]
 fn an_absent_subdevice_keeps_its_last_inputs_when_a_break_moves() {
     let kinds = ["digital-input-8", "junction", "digital-input-8", "digital-input-8"];
@@ -84,7 +85,8 @@ fn an_absent_subdevice_keeps_its_last_inputs_when_a_break_moves() {
     assert_eq!(freshness[of(3)], Freshness::Fresh, "it is there again and says so in this frame");
 }
 
-/// Facts 5.2: FMMUs are set before SAFEOP is asked for. Some controllers look at them on the way there only.
+/// Protocol 5.2: FMMUs are set before SAFEOP is asked for. Some controllers look at them on the way there only.
+// covers: freshness
 #[test]
 fn subdevices_that_latch_their_fmmus_on_the_way_to_safeop_exchange_process_data() {
     let mut described = descriptions(&["coupler", "digital-input-8", "servo", "digital-output-8", "analog-input-4"]);
@@ -103,6 +105,7 @@ fn subdevices_that_latch_their_fmmus_on_the_way_to_safeop_exchange_process_data(
 
 /// One after the other joins again, each with its FMMUs set long before it is in SAFEOP: the others stay fresh in each
 /// cycle.
+// covers: freshness
 #[test]
 fn a_subdevice_on_its_slow_way_to_safeop_leaves_the_inputs_of_all_others_fresh() {
     let kinds = ["digital-input-8", "emulated-input-8", "servo", "emulated-output-8", "analog-input-4", "block"];
@@ -127,6 +130,7 @@ fn a_subdevice_on_its_slow_way_to_safeop_leaves_the_inputs_of_all_others_fresh()
 
 /// A SubDevice is out of reach while the MainDevice starts anew, and keeps its station address, FMMUs and state. In the
 /// new session another one has this address; it loses its power as the old one comes into reach again.
+// covers: freshness
 #[test]
 fn a_subdevice_of_an_earlier_session_is_not_taken_for_another_one() {
     let mut described = with_four_ports(&["digital-input-16"; 3]);
@@ -165,6 +169,7 @@ fn a_subdevice_of_an_earlier_session_is_not_taken_for_another_one() {
 
 /// FMMUs and SyncManagers are set before SAFEOP: a buffer of one byte is read from then on, though nothing has written
 /// it yet.
+// covers: freshness
 #[test]
 fn inputs_of_a_subdevice_below_safeop_are_not_fresh() {
     for (count, fmmus) in [(1, None), (3, None), (3, Some(1))] {
@@ -194,6 +199,7 @@ fn inputs_of_a_subdevice_below_safeop_are_not_fresh() {
 }
 
 /// One link, LRW: inputs come, outputs are not taken.
+// covers: freshness
 #[test]
 fn a_domain_is_not_complete_while_outputs_are_not_taken() {
     for kinds in [&["servo"][..], &["servo", "analog-input-4"]] {
@@ -218,6 +224,7 @@ fn a_domain_is_not_complete_while_outputs_are_not_taken() {
 }
 
 /// One with outputs is on its way from INIT, as was asked for, while another one loses its power: the sum is the same.
+// covers: freshness
 #[test]
 fn outputs_that_one_takes_on_its_way_do_not_stand_for_those_of_one_without_power() {
     let mut described = descriptions(&["digital-output-8"; 2]);
@@ -402,11 +409,13 @@ fn runs(seeds: Range<u64>) {
     assert_eq!(failed, [], "seeds that fail");
 }
 
+// covers: freshness
 #[test]
 fn what_is_called_fresh_was_put_into_this_frame_seeds_0_to_99() {
     runs(0..100);
 }
 
+// covers: freshness
 #[test]
 fn what_is_called_fresh_was_put_into_this_frame_seeds_100_to_199() {
     runs(100..200);

@@ -103,8 +103,9 @@ fn at_the_end() -> (Network, CableId) {
 /// Between two cycles, so that no frame is on its way there.
 const BETWEEN: Duration = Duration::from_micros(500);
 
+// covers: hot-connect
 #[test]
-fn a_group_joins_and_leaves_the_end_of_a_line_without_a_working_counter_error_on_the_others() {
+fn a_group_joins_and_leaves_a_line_without_working_counter_errors_elsewhere() {
     let (network, cable) = at_the_end();
     let mut world = world(network);
     assert_eq!(world.application().groups()[0].present, 0);
@@ -131,8 +132,9 @@ fn a_group_joins_and_leaves_the_end_of_a_line_without_a_working_counter_error_on
     assert!(world.left_op(world.beginning()).iter().all(|device| device.0 >= BASE.len()));
 }
 
+// covers: hot-connect
 #[test]
-fn a_group_that_is_torn_off_costs_the_others_nothing_where_it_has_a_domain_of_its_own() {
+fn a_torn_off_group_with_a_domain_of_its_own_costs_the_others_nothing() {
     let (network, cable) = at_the_end();
     let declare = |scan: &Scan| {
         let mut declaration = declare(scan);
@@ -157,6 +159,7 @@ fn a_group_that_is_torn_off_costs_the_others_nothing_where_it_has_a_domain_of_it
     assert!(world.left_op(mark).iter().all(|device| device.0 >= BASE.len()));
 }
 
+// covers: hot-connect
 #[test]
 fn a_group_joins_at_another_place_than_it_left() {
     // One place behind a branch of the junction, another at the end of the line: of two alike one has power.
@@ -193,6 +196,7 @@ fn a_group_joins_at_another_place_than_it_left() {
     }
 }
 
+// covers: hot-connect
 #[test]
 fn a_group_in_the_middle_of_a_ring_joins_while_the_others_stay_in_op() {
     let mut all = descriptions(&BASE);
@@ -216,8 +220,9 @@ fn a_group_in_the_middle_of_a_ring_joins_while_the_others_stay_in_op() {
     assert!(world.left_op(world.beginning()).is_empty());
 }
 
+// covers: 5.3, hot-connect
 #[test]
-fn a_group_is_there_from_the_beginning_and_found_by_its_identification_facts_5_3() {
+fn a_group_is_there_from_the_beginning_and_found_by_its_identification() {
     let mut head = tool();
     head[0].alias = 0;
     head[0].identification = Some(4711);
@@ -246,6 +251,7 @@ fn a_group_is_there_from_the_beginning_and_found_by_its_identification_facts_5_3
     assert!(world.all_in_op());
 }
 
+// covers: hot-connect
 #[test]
 fn a_group_that_breaks_off_is_told_and_its_rest_is_taken() {
     let mut all: Vec<_> = descriptions(&BASE).into_iter().chain(tool()).collect();
@@ -262,7 +268,7 @@ fn a_group_that_breaks_off_is_told_and_its_rest_is_taken() {
 
 /// Two groups beside each other, the break between them: each goes on in its half, and one that comes anew joins from
 /// the side that is left to it.
-// covers: CR-21
+// covers: CR-21, hot-connect
 #[test]
 fn groups_side_by_side_that_a_break_separates_go_on_and_join_from_their_own_side() {
     let mut second = tool();

@@ -66,6 +66,7 @@ fn second_session(
 
 /// The device that has a station address of this session keeps it, in OP and with all its inputs fresh, whether the one
 /// of the earlier session comes before or behind it in the order of frames, and whether or not they are alike.
+// covers: identity
 #[test]
 fn of_two_at_one_address_the_one_of_this_session_stays_and_the_other_one_loses_it() {
     let tree = [(MAIN, at(0, Port::A)), (at(0, Port::B), at(1, Port::A)), (at(0, Port::D), at(2, Port::A))];
@@ -121,6 +122,7 @@ fn of_two_at_one_address_the_one_of_this_session_stays_and_the_other_one_loses_i
 /// Branches of a junction with devices that are alike, without serial numbers: the one on the later branch has its
 /// power back first. A ring behind a junction whose first two are alike, the second one reached from the far end while
 /// the first has no power.
+// covers: identity
 #[test]
 fn of_several_alike_each_comes_back_to_its_own_place_whichever_is_there_first() {
     let branches = [

@@ -226,6 +226,7 @@ fn finish(tally: &Tally, what: &str) {
     assert!(tally.failures.is_empty(), "{} fail, the first: {}", tally.failures.len(), tally.failures[0]);
 }
 
+// covers: odd-sii
 #[test]
 fn odd_images_of_the_catalogue_hold_up_nobody_and_are_explained() {
     let mut tally = Tally::default();
@@ -235,6 +236,7 @@ fn odd_images_of_the_catalogue_hold_up_nobody_and_are_explained() {
     finish(&tally, "images of the catalogue");
 }
 
+// covers: odd-sii
 #[test]
 fn odd_images_of_real_devices_hold_up_nobody_and_are_explained() {
     let directory = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared/data/sii");

@@ -1,4 +1,4 @@
-//! Rings behind junctions on one link (facts 9.4): every cable cut and healed, in every mode.
+//! Rings behind junctions on one link (protocol 9.4): every cable cut and healed, in every mode.
 
 mod closed_ports;
 mod declared;
@@ -98,8 +98,9 @@ fn edge(world: &mut World, what: &str, act: impl FnOnce(&mut World)) -> Mark {
     mark
 }
 
+// covers: JR-01, JR-07, junctions
 #[test]
-fn every_cable_of_a_ring_behind_a_junction_is_cut_and_healed_in_op_jr_01_jr_07() {
+fn every_cable_of_a_ring_behind_a_junction_is_cut_and_healed_in_op() {
     for setting in [(JunctionMode::Automatic, &[][..]), (JunctionMode::Strict, &[STRICT])] {
         let mut world = in_op(1, one_ring(), setting);
         assert_eq!(told(&world, world.beginning()), [], "it is whole");
@@ -123,8 +124,9 @@ fn every_cable_of_a_ring_behind_a_junction_is_cut_and_healed_in_op_jr_01_jr_07()
     }
 }
 
+// covers: JR-03, junctions
 #[test]
-fn a_ring_behind_a_junction_that_is_broken_from_the_start_is_told_jr_03() {
+fn a_ring_behind_a_junction_that_is_broken_from_the_start_is_told() {
     for setting in [(JunctionMode::Automatic, &[][..]), (JunctionMode::Strict, &[STRICT])] {
         for cable in RING {
             let mut network = one_ring();
@@ -164,7 +166,7 @@ fn unknown(world: &World, mark: Mark) -> Vec<usize> {
     world.events(mark).iter().filter_map(rings).collect()
 }
 
-// covers: JR-03, JR-09
+// covers: JR-03, JR-09, junctions
 #[test]
 fn a_ring_that_closes_after_the_scan_is_told_as_unknown_unless_it_was_declared() {
     for (setting, expected) in [
@@ -188,8 +190,9 @@ fn a_ring_that_closes_after_the_scan_is_told_as_unknown_unless_it_was_declared()
     }
 }
 
+// covers: JR-03, JR-05, junctions
 #[test]
-fn a_declared_connection_makes_junction_redundancy_of_mode_disabled_which_is_the_default_jr_03_jr_05() {
+fn a_declared_connection_enables_junction_redundancy_disabled_by_default() {
     assert_eq!(Options::default().junctions, JunctionMode::Disabled);
     let mut world = in_op(11, one_ring(), (JunctionMode::Disabled, &[STRICT]));
     let mark = edge(&mut world, "cut", |world| world.cut(CableId(3)));
@@ -198,6 +201,7 @@ fn a_declared_connection_makes_junction_redundancy_of_mode_disabled_which_is_the
     assert_eq!((told(&world, mark), crossed(&world, mark)), (vec![changed(3, false)], 0));
 }
 
+// covers: junctions
 #[test]
 fn a_ring_behind_a_junction_that_breaks_during_start_up_comes_to_op() {
     for at_us in (0..60_000).step_by(4_000) {
@@ -232,8 +236,9 @@ fn a_cut_in_the_line_loses_what_is_behind_it_and_is_no_matter_of_the_ring() {
     assert!(world.left_op(mark).iter().all(|device| device.0 >= 5));
 }
 
+// covers: JR-04, crossed-lines
 #[test]
-fn without_junction_redundancy_a_ring_that_breaks_reads_as_a_crossed_line_jr_04() {
+fn without_junction_redundancy_a_ring_that_breaks_reads_as_a_crossed_line() {
     for cable in [2, 3, 4] {
         let mut world = in_op(7, one_ring(), (JunctionMode::Disabled, &[]));
         assert_eq!(crossed(&world, world.beginning()), 0);
@@ -301,6 +306,7 @@ fn random_segment(dice: &mut Dice) -> (Network, Vec<usize>, bool) {
     (wired(&kinds, &cables), ring, two_links)
 }
 
+// covers: junctions-in-ring
 #[test]
 fn random_segments_with_a_local_ring_deliver_the_same_with_and_without_one_break() {
     for seed in 0..12 {
@@ -322,6 +328,7 @@ fn random_segments_with_a_local_ring_deliver_the_same_with_and_without_one_break
     }
 }
 
+// covers: junctions-in-ring
 #[test]
 fn transfers_go_on_through_cuts_and_repairs_of_a_local_ring() {
     let mut world = in_op(9, one_ring(), (JunctionMode::Strict, &[STRICT]));
@@ -350,8 +357,9 @@ fn transfers_go_on_through_cuts_and_repairs_of_a_local_ring() {
 
 /// Ports change while others than whoever watches them read them: the look for crossed lines, and the clocks. What they
 /// read is no longer told to anybody else.
+// covers: JR-07, junctions
 #[test]
-fn a_repair_right_behind_a_break_is_told_in_time_whoever_else_looks_at_ports_jr_07() {
+fn a_repair_right_behind_a_break_is_told_in_time_whoever_else_looks_at_ports() {
     for with_clocks in [false, true] {
         let declare = |scan: &ringcat::Scan| {
             let mut declaration = automatic(&scan.subdevices, CYCLE);

@@ -32,6 +32,7 @@ fn is_well(world: &World) -> bool {
 }
 
 /// Each group of registers of a configuration, cleared behind the back of the engine in OP, SAFEOP and PREOP.
+// covers: recovery
 #[test]
 fn a_configuration_that_a_late_write_has_undone_is_told_and_written_again() {
     let registers: [(usize, AlState, RegisterAddress, usize); 8] = [
@@ -80,6 +81,7 @@ fn a_configuration_that_a_late_write_has_undone_is_told_and_written_again() {
 }
 
 /// Nothing is wrong with one that was led to SAFEOP and whose outputs flow in OP only.
+// covers: recovery
 #[test]
 fn one_for_op_only_that_was_led_to_safeop_is_left_in_peace() {
     let mut world = world();
@@ -92,6 +94,7 @@ fn one_for_op_only_that_was_led_to_safeop_is_left_in_peace() {
 }
 
 /// Frames are late by milliseconds while a SubDevice comes back from a blink of its power, from each moment of that on.
+// covers: recovery
 #[test]
 fn frames_that_are_late_while_a_subdevice_comes_back_undo_nothing_for_good() {
     for (seed, by) in (0..).zip([1_900, 2_900, 3_900, 5_900].map(Duration::from_micros)) {

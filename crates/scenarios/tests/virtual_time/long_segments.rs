@@ -53,6 +53,7 @@ fn is_complete(world: &World) -> bool {
     world.judged(world.beginning()).last().is_some_and(|judged| judged.delivery == Delivery::Complete)
 }
 
+// covers: large-segments
 #[test]
 fn segments_of_300_and_1000_come_to_op_with_all_their_process_data() {
     for count in COUNTS {
@@ -78,6 +79,7 @@ fn segments_of_300_and_1000_come_to_op_with_all_their_process_data() {
     }
 }
 
+// covers: large-segments
 #[test]
 fn breaks_at_both_sides_of_position_255_keep_all_inputs_and_have_their_places() {
     for count in COUNTS {
@@ -105,6 +107,7 @@ fn breaks_at_both_sides_of_position_255_keep_all_inputs_and_have_their_places() 
     }
 }
 
+// covers: large-segments
 #[test]
 fn a_subdevice_behind_position_255_that_loses_its_power_comes_back() {
     for is_ring in [false, true] {
@@ -121,8 +124,9 @@ fn a_subdevice_behind_position_255_that_loses_its_power_comes_back() {
     }
 }
 
+// covers: large-segments
 #[test]
-fn a_ring_that_is_broken_from_the_start_comes_to_op_with_more_than_255_at_either_side() {
+fn a_ring_broken_from_the_start_comes_to_op_with_more_than_255_per_side() {
     for (count, cable) in [(300, 20), (300, 280), (1_000, 256), (1_000, 744)] {
         let mut network = segment(count, true);
         network.advance_by(Duration::from_millis(10));
@@ -137,6 +141,7 @@ fn a_ring_that_is_broken_from_the_start_comes_to_op_with_more_than_255_at_either
     }
 }
 
+// covers: large-segments
 #[test]
 fn clocks_of_300_in_a_line_and_in_a_ring_lock() {
     for is_ring in [false, true] {

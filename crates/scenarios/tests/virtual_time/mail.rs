@@ -41,8 +41,9 @@ async fn write_and_read(mailbox: Mailbox, rounds: u16) -> Result<(), SdoError> {
     Ok(())
 }
 
+// covers: 6.1, mailbox
 #[test]
-fn a_lost_write_is_sent_again_with_its_counter_and_acted_upon_once_facts_6_1() {
+fn a_lost_write_is_sent_again_with_its_counter_and_acted_upon_once() {
     for lost in [Loss::of_write(0x1004, RECEIVE), Loss::of_write(0x1004, RECEIVE).on_the_way_back()] {
         for skip in 0..6 {
             let mut world = world(1);
@@ -58,8 +59,9 @@ fn a_lost_write_is_sent_again_with_its_counter_and_acted_upon_once_facts_6_1() {
     }
 }
 
+// covers: 6.2, mailbox
 #[test]
-fn a_lost_read_is_asked_for_again_with_the_repeat_bit_facts_6_2() {
+fn a_lost_read_is_asked_for_again_with_the_repeat_bit() {
     for lost in [Loss::of_read(0x1004, SEND), Loss::of_read(0x1004, SEND).on_the_way_back()] {
         for skip in 0..12 {
             let mut world = world(2);
@@ -74,6 +76,7 @@ fn a_lost_read_is_asked_for_again_with_the_repeat_bit_facts_6_2() {
     }
 }
 
+// covers: mailbox
 #[test]
 fn many_losses_in_a_row_are_survived() {
     let mut world = world(3);
@@ -87,6 +90,7 @@ fn many_losses_in_a_row_are_survived() {
     assert_eq!(world.application().links().losses_left(), 0);
 }
 
+// covers: mailbox
 #[test]
 fn cutting_and_healing_cables_during_transfers_loses_no_request_and_no_answer() {
     let mut world = world(4);
@@ -108,6 +112,7 @@ fn cutting_and_healing_cables_during_transfers_loses_no_request_and_no_answer() 
     }
 }
 
+// covers: mailbox
 #[test]
 fn a_late_answer_to_a_request_that_was_given_up_is_not_taken_for_that_to_the_next() {
     let mut world = world(5);
@@ -134,6 +139,7 @@ fn a_late_answer_to_a_request_that_was_given_up_is_not_taken_for_that_to_the_nex
     assert_eq!(number(&world, TERMINAL), 7);
 }
 
+// covers: mailbox
 #[test]
 fn while_a_subdevice_is_away_its_mailbox_is_closed_and_afterwards_it_works() {
     let mut world = world(6);
@@ -151,6 +157,7 @@ fn while_a_subdevice_is_away_its_mailbox_is_closed_and_afterwards_it_works() {
     assert_eq!(world.run(write_and_read(mailbox, 5)), Ok(()));
 }
 
+// covers: mailbox
 #[test]
 fn several_tasks_share_a_mailbox_and_each_gets_its_own_answers() {
     let mut world = world(7);
@@ -175,8 +182,9 @@ fn several_tasks_share_a_mailbox_and_each_gets_its_own_answers() {
     assert_eq!(mailbox.counters().unclaimed, 0);
 }
 
+// covers: mailbox
 #[test]
-fn an_idle_mailbox_costs_one_byte_every_few_milliseconds_and_answers_are_read_when_they_are_there() {
+fn an_idle_mailbox_costs_one_byte_per_poll_and_answers_are_read_when_there() {
     let mut world = world(8);
     let mailbox = world.mailbox(TERMINAL);
     let before = mailbox.counters();

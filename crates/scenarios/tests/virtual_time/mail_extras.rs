@@ -22,8 +22,9 @@ fn world(seed: u64) -> World {
     World::in_op(seed, ring(descriptions(&KINDS), options))
 }
 
+// covers: 6.3, pdo-mail
 #[test]
-fn pdos_are_sent_and_asked_for_by_mailbox_facts_6_3() {
+fn pdos_are_sent_and_asked_for_by_mailbox() {
     let mut world = world(1);
     let mailbox = world.mailbox(SERVO);
     let directory = world.application().directory().clone();
@@ -54,6 +55,7 @@ fn pdos_are_sent_and_asked_for_by_mailbox_facts_6_3() {
     assert_eq!(mailbox.counters().unclaimed, 0);
 }
 
+// covers: pdo-mail
 #[test]
 fn messages_of_the_applications_own_making_get_the_next_answer_or_none() {
     let mut world = world(2);
@@ -77,8 +79,9 @@ fn messages_of_the_applications_own_making_get_the_next_answer_or_none() {
     assert!(matches!(refused, Err(MailboxError::Error(_))), "{refused:?}");
 }
 
+// covers: 6.6, pdo-mail
 #[test]
-fn a_procedure_command_is_started_and_aborted_facts_6_6() {
+fn a_procedure_command_is_started_and_aborted() {
     let mut world = world(3);
     let mailbox = world.mailbox(ALL);
     let idn = Idn::standard(0, 99);

@@ -1,5 +1,5 @@
 //! Every fault of a device's mail and of the frames that carry it, with every protocol: what heals, heals unseen; what
-//! does not is told as what it is, and the next question is answered (facts 6.1, 6.2).
+//! does not is told as what it is, and the next question is answered (protocol 6.1, 6.2).
 
 use std::time::Duration;
 
@@ -83,8 +83,9 @@ fn question(world: &mut World, mut asker: Asker, number: u32) -> (Result<(), Str
     world.run(async move { (asker.ask(number).await, asker) })
 }
 
+// covers: 6.1, mailbox-faults
 #[test]
-fn every_protocol_bears_every_fault_of_mail_and_frames_facts_6_1() {
+fn every_protocol_bears_every_fault_of_mail_and_frames() {
     let mut seen = 0;
     for kind in KINDS {
         let options = NetworkOptions::default().with_detection_delay(Duration::from_micros(10));

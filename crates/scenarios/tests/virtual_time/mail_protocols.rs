@@ -104,6 +104,7 @@ fn start_all(world: &mut World) -> Vec<ringcat_engine::main_device::Pending<()>>
     ]
 }
 
+// covers: mailbox-faults
 #[test]
 fn all_protocols_of_one_device_work_at_once_while_process_data_goes_on() {
     let mut world = world(1);
@@ -117,6 +118,7 @@ fn all_protocols_of_one_device_work_at_once_while_process_data_goes_on() {
     assert_eq!((world.incomplete(mark), world.left_op(mark)), (0, Vec::new()));
 }
 
+// covers: mailbox-faults
 #[test]
 fn all_protocols_survive_cuts_lost_reads_and_lost_writes_at_once() {
     let mut world = world(2);
@@ -142,8 +144,9 @@ fn all_protocols_survive_cuts_lost_reads_and_lost_writes_at_once() {
     assert_eq!(counters.unclaimed, 0);
 }
 
+// covers: 6.1, mailbox-faults
 #[test]
-fn answers_that_come_twice_late_or_with_a_wrong_counter_are_told_apart_facts_6_1() {
+fn answers_that_come_twice_late_or_with_a_wrong_counter_are_told_apart() {
     let mut world = world(3);
     let faults = [
         MailFault::RepeatAnswers { count: 20 },
@@ -166,6 +169,7 @@ fn answers_that_come_twice_late_or_with_a_wrong_counter_are_told_apart_facts_6_1
     assert!(counters.duplicates >= 20, "{counters:?}");
 }
 
+// covers: mailbox-faults
 #[test]
 fn a_device_that_answers_no_more_is_given_up_in_time_and_serves_again_when_it_does() {
     let mut world = world(4);
@@ -186,8 +190,9 @@ fn a_device_that_answers_no_more_is_given_up_in_time_and_serves_again_when_it_do
     }
 }
 
+// covers: 6.1, mailbox-faults
 #[test]
-fn an_error_reply_ends_the_request_that_it_belongs_to_facts_6_1() {
+fn an_error_reply_ends_the_request_that_it_belongs_to() {
     let mut world = world(5);
     let detail = ErrorReply::NO_MORE_MEMORY;
     world.fault(Fault::Mail(DeviceIndex(ALL), MailFault::Refuse { count: 1, detail }));
@@ -219,8 +224,9 @@ fn refused_beside_another(world: &mut World, first_is_dropped: bool) -> [Result<
 }
 
 // The error reply goes to the one that waits, and the answer to that one is still on its way.
+// covers: 6.1, mailbox
 #[test]
-fn an_error_reply_that_may_be_anothers_confuses_no_later_answer_facts_6_1() {
+fn an_error_reply_that_may_be_anothers_confuses_no_later_answer() {
     for first_is_dropped in [false, true] {
         let mut world = world(5);
         // The drive has answered before, the vendor's protocol has not.
@@ -234,8 +240,9 @@ fn an_error_reply_that_may_be_anothers_confuses_no_later_answer_facts_6_1() {
     }
 }
 
+// covers: 6.3
 #[test]
-fn the_dictionary_is_listed_and_described_facts_6_3() {
+fn the_dictionary_is_listed_and_described() {
     let mut world = world(6);
     let mailbox = world.mailbox(ALL);
     let (lengths, list) = world.run(async move {
@@ -260,8 +267,9 @@ fn the_dictionary_is_listed_and_described_facts_6_3() {
     });
 }
 
+// covers: 6.3, mailbox-faults
 #[test]
-fn emergencies_are_events_and_kept_with_the_mailbox_facts_6_3() {
+fn emergencies_are_events_and_kept_with_the_mailbox() {
     let mut world = world(7);
     let mark = world.mark();
     let emergency = |code| Emergency { error_code: code, error_register: 1, data: [1, 2, 3, 4, 5] };
@@ -283,8 +291,9 @@ fn emergencies_are_events_and_kept_with_the_mailbox_facts_6_3() {
     assert_eq!(mailbox.emergency_overruns(), 0);
 }
 
+// covers: 6.4, mailbox-faults
 #[test]
-fn a_refused_file_names_code_and_text_and_busy_is_waited_for_facts_6_4() {
+fn a_refused_file_names_code_and_text_and_busy_is_waited_for() {
     let mut world = world(8);
     let mailbox = world.mailbox(ALL);
     let missing = world.run(async move {
@@ -304,8 +313,9 @@ fn a_refused_file_names_code_and_text_and_busy_is_waited_for_facts_6_4() {
     assert_eq!(written, Some(pattern(5000)));
 }
 
+// covers: 6.4, foe
 #[test]
-fn one_mebibyte_by_foe_takes_few_round_trips_per_packet_whatever_the_cycle_of_the_application_facts_6_4() {
+fn one_mebibyte_by_foe_takes_few_round_trips_per_packet_at_any_cycle() {
     for cycle in [Duration::from_millis(1), Duration::from_millis(10)] {
         let network = ring(descriptions(&KINDS), NetworkOptions::default());
         let declare = |scan: &ringcat::Scan| ringcat::automatic(&scan.subdevices, cycle);
@@ -336,6 +346,7 @@ fn one_mebibyte_by_foe_takes_few_round_trips_per_packet_whatever_the_cycle_of_th
     }
 }
 
+// covers: mailbox-faults
 #[test]
 fn mail_that_nobody_asked_for_is_kept_for_whoever_wants_it() {
     let mut world = world(10);
@@ -356,8 +367,9 @@ fn mail_that_nobody_asked_for_is_kept_for_whoever_wants_it() {
     assert_eq!(mailbox.unsolicited_overruns(Unsolicited::Voe), 8);
 }
 
+// covers: 6.3, sdo-information
 #[test]
-fn the_diagnosis_history_is_read_and_acknowledged_facts_6_3() {
+fn the_diagnosis_history_is_read_and_acknowledged() {
     let mut world = world(11);
     let mailbox = world.mailbox(ALL);
     let empty = world.run(async move { history::read_history(&mailbox, LIMITS).await }).unwrap();
@@ -386,8 +398,9 @@ fn the_diagnosis_history_is_read_and_acknowledged_facts_6_3() {
     assert!(!left.new_available);
 }
 
+// covers: 6.1, mailbox
 #[test]
-fn mail_of_all_who_can_show_it_is_found_with_one_read_facts_6_1() {
+fn mail_of_all_who_can_show_it_is_found_with_one_read() {
     let mut world = world(12);
     // The two that have mailboxes show a bit each: 0x080D.3 through their third FMMU.
     for device in [ALL, 3] {

@@ -17,6 +17,7 @@ use scenarios::world::{CYCLE, World};
 const LIMITS: Limits = (Duration::from_millis(100), Duration::from_secs(1));
 const KINDS: [&str; 3] = ["coupler", "all-protocols", "digital-output-8"];
 
+// covers: jobs, sdo
 #[test]
 fn objects_are_read_and_written_before_activation_which_configures_everything_anew() {
     let mut main_device =
@@ -38,6 +39,7 @@ fn objects_are_read_and_written_before_activation_which_configures_everything_an
     assert!(application.all_settled());
 }
 
+// covers: jobs, sdo
 #[test]
 fn requests_are_made_and_made_again_from_the_cyclic_thread() {
     let mut world = World::in_op(1, ring_of_16(Duration::from_micros(10)));
@@ -82,8 +84,9 @@ fn requests_are_made_and_made_again_from_the_cyclic_thread() {
     assert_eq!(request.failure(), Some(RequestFailure::Failed));
 }
 
+// covers: 6.4, foe
 #[test]
-fn firmware_is_written_through_boot_and_the_new_version_is_reported_facts_6_4() {
+fn firmware_is_written_through_boot_and_the_new_version_is_reported() {
     let network = line(descriptions(&KINDS), NetworkOptions::default());
     let mut main_device = MainDevice::request(Tap::new(network), &Options::default());
     main_device.scan().expect("a scan");

@@ -4,6 +4,7 @@ use std::time::Duration;
 
 use scenarios::start_lists::Lists;
 
+// covers: layout, start-lists
 #[test]
 fn a_hundred_drives_with_fifty_objects_each_start_in_little_more_than_one_of_them() {
     let all = Lists { drives: 100, objects: 50, mailbox: 128, period: Duration::from_millis(1) };

@@ -268,8 +268,9 @@ fn mailboxes_are_idle(world: &mut World, seed: u64) {
     assert_eq!(world.mailbox(ALL[0]).bus().stray_mails_dropped(), 0, "seed {seed}");
 }
 
+// covers: mailbox-faults
 #[test]
-fn whatever_happens_to_mail_each_answer_finds_its_question_and_nothing_stays_seeds_0_to_29() {
+fn each_answer_finds_its_request_and_no_mail_stays_whatever_happens() {
     let tally = Rc::new(Tally::default());
     let seeds = seeds();
     let runs = (seeds.end - seeds.start) as u32;

@@ -40,6 +40,7 @@ fn run(name: &str, target: Target, bytes: &[u8]) {
     target(bytes);
 }
 
+// covers: mail-judge
 #[test]
 fn corpora_hold_what_our_encoders_write_and_each_target_takes_it() {
     for (name, target) in TARGETS {
@@ -58,6 +59,7 @@ fn corpora_hold_what_our_encoders_write_and_each_target_takes_it() {
     }
 }
 
+// covers: mail-judge
 #[test]
 fn mutants_of_the_corpora_never_panic_and_what_decodes_survives_being_encoded() {
     let mut dice = Dice::new(4);
@@ -76,8 +78,9 @@ fn mutants_of_the_corpora_never_panic_and_what_decodes_survives_being_encoded() 
 /// Mutants of each own ENI.
 const ENI_MUTANTS: usize = 150;
 
+// covers: 8, eni-read
 #[test]
-fn mutants_of_an_eni_are_configurations_that_hold_together_or_errors_facts_8() {
+fn mutants_of_an_eni_are_configurations_that_hold_together_or_errors() {
     let runs = std::env::var("RINGCAT_ENI_MUTANTS").ok().and_then(|text| text.parse().ok()).unwrap_or(ENI_MUTANTS);
     let mut dice = Dice::new(8);
     for text in [eni::WHOLE, eni::GROUP] {
@@ -92,6 +95,7 @@ fn mutants_of_an_eni_are_configurations_that_hold_together_or_errors_facts_8() {
     }
 }
 
+// covers: mail-judge
 #[test]
 fn a_target_whose_decoder_breaks_is_found() {
     let broken: Target = |bytes| assert!(bytes.get(5) != Some(&0xFF), "a decoder that cannot bear this");

@@ -49,8 +49,9 @@ fn told(world: &World, text: &str) -> bool {
     })
 }
 
+// covers: 6.3, odd-sii
 #[test]
-fn pdos_that_the_sii_leaves_out_are_read_from_the_dictionary_facts_6_3() {
+fn pdos_that_the_sii_leaves_out_are_read_from_the_dictionary() {
     let devices = || with_sii("servo", |described| described.pdos.clear());
     let mut read = world(devices(), ReadPdos::Missing);
     read.settle();
@@ -68,6 +69,7 @@ fn pdos_that_the_sii_leaves_out_are_read_from_the_dictionary_facts_6_3() {
     assert_eq!(odd(&unread).pdos, []);
 }
 
+// covers: odd-sii
 #[test]
 fn where_sii_and_dictionary_disagree_the_dictionary_counts_and_that_is_told() {
     // The SII has a PDO of half the size.
@@ -94,6 +96,7 @@ fn where_sii_and_dictionary_disagree_the_dictionary_counts_and_that_is_told() {
     assert!(trusting.saw(trusting.beginning(), explained), "{:?}", troubles(trusting.events(trusting.beginning())));
 }
 
+// covers: odd-sii
 #[test]
 fn what_somebody_assigned_before_is_assigned_again_after_a_loss_of_power() {
     let mut devices = descriptions(&KINDS);
@@ -126,8 +129,9 @@ fn what_somebody_assigned_before_is_assigned_again_after_a_loss_of_power() {
     assert_eq!(settle(Some(true)), (AlStatus::new(AlState::Op), 8), "not the sixteen bytes of its default");
 }
 
+// covers: 4.4, odd-sii
 #[test]
-fn sync_managers_in_another_order_are_taken_as_the_sii_says_facts_4_4() {
+fn sync_managers_in_another_order_are_taken_as_the_sii_says() {
     let mut devices = descriptions(&KINDS);
     let device = &mut devices[ODD];
     device.sync_managers.swap(2, 3);
@@ -143,8 +147,9 @@ fn sync_managers_in_another_order_are_taken_as_the_sii_says_facts_4_4() {
     assert!(world.compared() > 0);
 }
 
+// covers: 3.11, odd-sii
 #[test]
-fn mailboxes_on_other_sync_managers_work_as_the_sii_says_facts_3_11() {
+fn mailboxes_on_other_sync_managers_work_as_the_sii_says() {
     for shows_mail in [true, false] {
         let mut devices = descriptions(&KINDS);
         let device = &mut devices[ODD];
@@ -185,6 +190,7 @@ fn mailboxes_on_other_sync_managers_work_as_the_sii_says_facts_3_11() {
     }
 }
 
+// covers: odd-sii
 #[test]
 fn an_sii_without_an_end_marker_is_told_and_used() {
     let mut devices = descriptions(&KINDS);
@@ -200,6 +206,7 @@ fn an_sii_without_an_end_marker_is_told_and_used() {
     assert!(told(&world, "no end marker"), "{:?}", world.events(world.beginning()));
 }
 
+// covers: odd-sii
 #[test]
 fn one_with_a_blank_eeprom_is_told_and_keeps_nobody_from_op() {
     for blank in [0x00, 0xFF] {
@@ -234,6 +241,7 @@ fn others_run_and_it_says(mut world: World, reason: &str) {
     assert_eq!(told.count(), 0, "it is told once");
 }
 
+// covers: odd-sii
 #[test]
 fn an_sii_that_cannot_be_followed_is_a_matter_of_its_subdevice_alone() {
     // Garbage in the mailbox words, with a checksum that does not fit.
@@ -264,8 +272,9 @@ fn an_sii_that_cannot_be_followed_is_a_matter_of_its_subdevice_alone() {
 }
 
 /// Places in the process image that are declared stay, as for one that is not there.
+// covers: odd-sii
 #[test]
-fn one_whose_damaged_sii_lacks_what_is_declared_keeps_its_places_and_holds_up_nobody() {
+fn a_damaged_sii_without_declared_parts_keeps_its_places_and_blocks_no_other() {
     let mut devices = descriptions(&KINDS);
     let mut cut = sii_image::build(&devices[ODD]);
     cut[128..].fill(0xFF);
@@ -317,8 +326,9 @@ fn damage_inside_a_category_does_not_spread_to_subdevices_alike() {
     }
 }
 
+// covers: odd-sii
 #[test]
-fn pdos_in_one_direction_or_of_size_0_and_default_lengths_mean_one_thing_to_both_sides() {
+fn pdos_one_way_or_of_size_0_and_default_lengths_mean_the_same_on_both_sides() {
     for kind in ["digital-input-8", "digital-output-8", "analog-input-4", "servo", "all-protocols"] {
         for change in 0..6 {
             let mut described = descriptions(&[kind]).remove(0);
@@ -338,6 +348,7 @@ fn pdos_in_one_direction_or_of_size_0_and_default_lengths_mean_one_thing_to_both
     }
 }
 
+// covers: odd-sii
 #[test]
 fn sync_managers_without_a_type_mean_one_thing_to_scan_run_and_simulator() {
     for kind in ["digital-input-8", "digital-output-8", "analog-input-4", "servo", "all-protocols"] {
@@ -386,6 +397,7 @@ fn in_op_as_it_says(described: &DeviceDescription, what: &str) -> World {
     last
 }
 
+// covers: odd-sii
 #[test]
 fn process_ram_beyond_eight_kibibytes_is_there_where_the_sii_uses_it() {
     let mut described = descriptions(&["all-protocols"]).remove(0);
@@ -398,6 +410,7 @@ fn process_ram_beyond_eight_kibibytes_is_there_where_the_sii_uses_it() {
     assert!(world.compared() > compared);
 }
 
+// covers: odd-sii
 #[test]
 fn a_dictionary_that_does_not_answer_costs_its_own_time_only() {
     let devices = with_sii("servo", |described| described.pdos.clear());

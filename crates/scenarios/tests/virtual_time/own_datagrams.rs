@@ -41,8 +41,9 @@ fn who(world: &mut World, position: u16) -> Option<u16> {
     (reply.wkc() == Wkc(1)).then(|| u16::from_le_bytes([reply.data[0], reply.data[1]]))
 }
 
+// covers: CR-09, CR-10, ring-equals-line, sim-frames
 #[test]
-fn positions_of_an_application_are_those_of_the_scan_whoever_is_missing_cr_09() {
+fn positions_of_an_application_are_those_of_the_scan_whoever_is_missing() {
     let mut world = World::in_op(1, segment());
     let stations: Vec<u16> = (0..KINDS.len()).map(|device| world.station_of(device)).collect();
     let all = |world: &mut World, missing: Option<usize>, what: &str| {
@@ -94,7 +95,7 @@ fn movable() -> Network {
 
 /// Whoever was unplugged, plugged in elsewhere or is new has the position that a rescan has shown, and nobody another
 /// one.
-// covers: CR-09, CR-17
+// covers: CR-09, CR-10, CR-17, ring-equals-line, sim-frames
 #[test]
 fn positions_of_an_application_are_those_of_a_rescan_that_took_over_the_cabling() {
     let declare = |scan: &Scan| {
@@ -153,7 +154,7 @@ fn refused(result: Result<World, Error>) -> (Vec<usize>, String) {
 }
 
 /// Whatever a declaration was read from, it has to be applied: there it is refused.
-// covers: CR-16
+// covers: CR-16, 9.2.2, ring-lrw
 #[test]
 fn declared_lrw_is_refused_with_rings_behind_junctions_and_hot_connect_groups_too() {
     let kinds = ["digital-output-8", "junction", "servo", "digital-input-8", "analog-input-4"];
@@ -179,7 +180,7 @@ fn declared_lrw_is_refused_with_rings_behind_junctions_and_hot_connect_groups_to
     assert!(subdevices == [1, 2, 3, 4, 5] && text.contains("[1, 2, 3, 4, 5]"), "{text}");
 }
 
-// covers: CR-16, facts 9.2.2
+// covers: CR-16, 9.2.2, ring-lrw
 #[test]
 fn an_lrw_of_the_applications_own_addresses_one_subdevice_on_two_links() {
     let mut world = World::in_op(5, segment());

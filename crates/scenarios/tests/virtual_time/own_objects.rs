@@ -1,4 +1,4 @@
-//! What a client of the mailbox gateway finds at address 0: objects of the MainDevice itself (facts 10.1, 10.2).
+//! What a client of the mailbox gateway finds at address 0: objects of the MainDevice itself (protocol 10.1, 10.2).
 
 use std::time::Duration;
 
@@ -94,8 +94,9 @@ fn write(world: &mut World, index: u16, sub_index: u8, data: &[u8]) -> Result<()
     })
 }
 
+// covers: 10.2, own-objects
 #[test]
-fn the_main_device_tells_what_was_declared_found_and_how_each_is_facts_10_2() {
+fn the_main_device_tells_what_was_declared_found_and_how_each_is() {
     let mut world = world();
     let mark = world.mark();
     assert_eq!(read(&mut world, 0x1008, 0, false), Ok(b"RingCAT".to_vec()));
@@ -154,7 +155,7 @@ fn the_main_device_tells_what_was_declared_found_and_how_each_is_facts_10_2() {
     assert_eq!((world.incomplete(mark), world.left_op(mark)), (0, vec![]), "process data goes on");
 }
 
-// covers: facts 10.2
+// covers: 10.2, own-objects
 #[test]
 fn what_the_objects_say_follows_a_break_damaged_frames_and_a_loss_until_it_is_reset() {
     let mut world = world();
@@ -188,8 +189,9 @@ fn what_the_objects_say_follows_a_break_damaged_frames_and_a_loss_until_it_is_re
     }
 }
 
+// covers: 10.2, own-objects
 #[test]
-fn what_goes_wrong_with_a_subdevice_is_counted_and_kept_in_the_history_facts_10_2() {
+fn what_goes_wrong_with_a_subdevice_is_counted_and_kept_in_the_history() {
     let mut world = world();
     world.judge_latched(false);
     let seen = |world: &mut World| [14, 17, 18, 19].map(|sub_index| number(world, 0xA002, sub_index));
@@ -239,7 +241,7 @@ fn what_goes_wrong_with_a_subdevice_is_counted_and_kept_in_the_history_facts_10_
     assert_eq!((complete[0], complete.len(), complete.last()), (19, 2 + 16 + 8 * 4 + 2 + 1, Some(&1)));
 }
 
-// covers: facts 6.3
+// covers: 6.3, own-objects
 #[test]
 fn detection_looks_at_the_whole_segment_and_lists_go_in_segments_and_fragments() {
     // So many that their addresses need two lists.
@@ -269,8 +271,9 @@ fn detection_looks_at_the_whole_segment_and_lists_go_in_segments_and_fragments()
     assert_eq!(read(&mut world, 0xF040, 1, true), Ok(stations));
 }
 
+// covers: 6.3, own-objects
 #[test]
-fn what_makes_no_sense_at_address_0_is_aborted_with_its_code_facts_6_3() {
+fn what_makes_no_sense_at_address_0_is_aborted_with_its_code() {
     let mut world = world();
     for (index, sub_index, complete, code) in [
         (0x2000, 0, false, AbortCode::OBJECT_DOES_NOT_EXIST),
@@ -325,6 +328,7 @@ fn anything(dice: &mut Dice) -> Vec<u8> {
     payload
 }
 
+// covers: own-objects
 #[test]
 fn any_bytes_at_address_0_are_borne_and_the_next_question_is_answered_seeds_0_to_9() {
     let mut world = world();

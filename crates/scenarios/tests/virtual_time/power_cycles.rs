@@ -79,8 +79,9 @@ fn assert_trouble(world: &World, since: Mark, subdevice: usize) {
     assert_eq!(troubles(world.events(since)), expected.iter().collect::<Vec<_>>());
 }
 
+// covers: recovery
 #[test]
-fn each_subdevice_of_a_ring_comes_back_from_a_power_cycle_and_costs_the_others_four_edges_at_most() {
+fn a_power_cycle_of_each_subdevice_of_a_ring_costs_the_others_four_edges_at_most() {
     let mut world = world(1, ring_of_16(Duration::from_micros(10)));
     let mut worst = 0;
     for (device, kind) in SIXTEEN.iter().enumerate() {
@@ -115,6 +116,7 @@ fn a_short_interruption_of_power_is_enough_to_be_configured_anew() {
     }
 }
 
+// covers: recovery
 #[test]
 fn the_last_subdevice_of_a_line_comes_back_while_the_others_stay_in_op() {
     let kinds = ["coupler", "digital-input-8", "digital-output-8", "servo"];
@@ -148,6 +150,7 @@ fn a_subdevice_that_loses_power_while_it_is_being_configured_comes_back_too() {
     }
 }
 
+// covers: recovery
 #[test]
 fn two_neighbours_of_a_ring_come_back_from_a_power_cycle_together() {
     let mut world = world(6, ring_of_16(Duration::from_micros(10)));

@@ -81,6 +81,7 @@ fn exchange(mut world: World, what: &str) {
     );
 }
 
+// covers: sim-files
 #[test]
 fn segments_of_all_real_images_come_to_op_and_exchange_process_data() {
     let Some((taken, mut refused)) = images() else { return };
@@ -106,6 +107,7 @@ fn segments_of_all_real_images_come_to_op_and_exchange_process_data() {
     }
 }
 
+// covers: sim-files
 #[test]
 fn real_images_are_read_alike_with_and_without_the_cache_and_with_4_and_8_bytes() {
     let Some((taken, _)) = images() else { return };

@@ -1,5 +1,5 @@
 //! Start-up commands that a configuration file brings: registers that are written and checked, objects that are read,
-//! time limits and comments (facts 8.2).
+//! time limits and comments (protocol 8.2).
 
 use std::time::Duration;
 
@@ -66,8 +66,9 @@ fn failure(mut world: World) -> String {
     reasons.unwrap_or_else(|| panic!("{:?}", troubles(world.events(world.beginning()))))
 }
 
+// covers: 8.2, startup-commands
 #[test]
-fn registers_are_written_and_checked_at_their_transitions_facts_8_2() {
+fn registers_are_written_and_checked_at_their_transitions() {
     let state = |transition, state: u8| check(transition, map::AL_STATUS, &[state, 0], &[0x0F, 0], 0);
     let mut world = world(&[
         state(Transition::So, 4),
@@ -95,8 +96,9 @@ fn registers_are_written_and_checked_at_their_transitions_facts_8_2() {
     assert_eq!(register(&world, map::WATCHDOG_DIVIDER), [0x34, 0x12]);
 }
 
+// covers: 8.2, startup-commands
 #[test]
-fn a_register_with_another_value_is_told_with_comment_expected_and_got_facts_8_2() {
+fn a_register_with_another_value_is_told_with_comment_expected_and_got() {
     let mut wrong = check(Transition::Ps, map::AL_STATUS, &[0x04, 0x00], &[0x0F, 0x00], 20);
     wrong.comment = Some("check device state for SAFEOP".to_owned());
     let text = failure(world(&[write(Transition::Ip, map::WATCHDOG_DIVIDER, &[0x34, 0x12]), wrong]));
@@ -105,8 +107,9 @@ fn a_register_with_another_value_is_told_with_comment_expected_and_got_facts_8_2
     assert_eq!(text, expected);
 }
 
+// covers: 8.2, startup-commands
 #[test]
-fn a_register_may_take_until_its_limit_to_hold_the_value_facts_8_2() {
+fn a_register_may_take_until_its_limit_to_hold_the_value() {
     // Outputs come some cycles after SAFEOP: bit 0 of the watchdog status is set when they do.
     let watched = |limit| check(Transition::So, map::WATCHDOG_STATUS, &[1, 0], &[1, 0], limit);
     let mut patient = world(&[watched(200)]);
@@ -116,8 +119,9 @@ fn a_register_may_take_until_its_limit_to_hold_the_value_facts_8_2() {
     assert!(text.contains("expected f0 00 (mask f0 00) within 30 ms, got 01 00"), "{text}");
 }
 
+// covers: 8.2, startup-commands
 #[test]
-fn a_write_that_nobody_takes_fails_only_where_it_must_be_taken_facts_8_2() {
+fn a_write_that_nobody_takes_fails_only_where_it_must_be_taken() {
     let text = failure(world(&[write(Transition::Ps, NOBODY, &[0; 4])]));
     assert!(text.starts_with("start-up command 0 (PREOP to SAFEOP): register 0x0e80:"), "{text}");
     let mut may = write(Transition::Ps, NOBODY, &[0; 4]);
@@ -129,6 +133,7 @@ fn a_write_that_nobody_takes_fails_only_where_it_must_be_taken_facts_8_2() {
     assert_eq!(troubles(world.events(world.beginning())), Vec::<&Event>::new());
 }
 
+// covers: startup-commands
 #[test]
 fn commands_to_registers_that_cannot_be_sent_are_refused_before_anything_is() {
     let refused = |wrong: &StartupCommand| {
@@ -154,8 +159,9 @@ fn upload(index: u16, sub_index: u8, expected: Option<&[u8]>) -> StartupCommand 
     StartupCommand { comment: Some("a look".to_owned()), ..command }
 }
 
+// covers: 8.2, startup-commands
 #[test]
-fn objects_are_read_and_compared_or_told_facts_8_2() {
+fn objects_are_read_and_compared_or_told() {
     let mut world = world(&[upload(0x2001, 7, Some(&[7, 0])), upload(0x2003, 2, None)]);
     world.settle();
     let read = world.events(world.beginning()).iter().filter_map(|timed| match &timed.event {
@@ -170,8 +176,9 @@ fn objects_are_read_and_compared_or_told_facts_8_2() {
     assert_eq!(text, "start-up command 0 (PREOP to SAFEOP) \"a look\": SDO 0x2001:07: expected 08 00, got 07 00");
 }
 
+// covers: 8.2, startup-commands
 #[test]
-fn a_command_may_have_a_time_limit_of_its_own_facts_8_2() {
+fn a_command_may_have_a_time_limit_of_its_own() {
     let slow = |device: &mut DeviceDescription| {
         device.mailbox.as_mut().expect("it has one").response_time = Duration::from_millis(60);
     };
@@ -187,7 +194,7 @@ fn a_command_may_have_a_time_limit_of_its_own_facts_8_2() {
     assert!(text.contains("25 ms"), "{text}");
 }
 
-// covers: facts 8.2
+// covers: 8.2, eni-commands
 #[test]
 fn a_look_that_may_take_an_hour_does_not_outlive_the_power_of_its_subdevice() {
     let mut world = world(&[check(Transition::Ps, map::AL_STATUS, &[8, 0], &[0x0F, 0], 3_600_000)]);

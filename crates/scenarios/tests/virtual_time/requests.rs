@@ -35,6 +35,7 @@ fn wait(world: &mut World, state: impl Fn() -> RequestState) -> u32 {
     cycles
 }
 
+// covers: jobs
 #[test]
 fn registers_are_read_and_written_from_the_cyclic_thread_within_two_cycles() {
     let mut world = world(1);
@@ -66,6 +67,7 @@ fn registers_are_read_and_written_from_the_cyclic_thread_within_two_cycles() {
     assert_eq!(nobody.failure(), Some(RequestFailure::Failed));
 }
 
+// covers: registers
 #[test]
 fn registers_of_any_length_are_read_and_written_by_a_service() {
     let mut world = world(2);
@@ -84,6 +86,7 @@ fn registers_of_any_length_are_read_and_written_by_a_service() {
     assert!(error.to_string().contains("there is no SubDevice 99"), "{error}");
 }
 
+// covers: jobs
 #[test]
 fn idns_are_read_and_written_from_the_cyclic_thread() {
     let mut world = world(3);
@@ -108,8 +111,9 @@ fn idns_are_read_and_written_from_the_cyclic_thread() {
     assert_eq!(request.failure(), Some(RequestFailure::Refused(SoeErrorCode::NO_IDN)));
 }
 
+// covers: jobs
 #[test]
-fn vendor_messages_are_written_and_read_by_a_handler_with_and_without_a_look_at_the_status() {
+fn a_handler_moves_vendor_messages_with_and_without_the_mailbox_status() {
     let mut world = world(4);
     let mut handler: VoeHandler = world.application_mut().engine_mut().create_voe_handler(ALL, 200);
     assert_eq!(handler.received_header(), None);
@@ -139,6 +143,7 @@ fn vendor_messages_are_written_and_read_by_a_handler_with_and_without_a_look_at_
     }
 }
 
+// covers: jobs
 #[test]
 fn a_request_that_is_cancelled_ends_and_the_next_one_is_not_disturbed() {
     let mut world = world(5);

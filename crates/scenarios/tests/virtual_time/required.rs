@@ -32,6 +32,7 @@ fn states(world: &World) -> Vec<AlStatus> {
     world.network().devices().map(|device| device.al_status()).collect()
 }
 
+// covers: mandatory
 #[test]
 fn a_mismatch_is_told_with_both_sides_and_leaves_that_one_alone() {
     let op = AlStatus::new(AlState::Op);
@@ -65,8 +66,9 @@ fn a_mismatch_is_told_with_both_sides_and_leaves_that_one_alone() {
     }
 }
 
+// covers: 5.3, mandatory
 #[test]
-fn an_identification_that_is_right_is_no_mismatch_facts_5_3() {
+fn an_identification_that_is_right_is_no_mismatch() {
     let declare = |declaration: &mut Declaration| {
         declaration.subdevices[2] = declaration.subdevices[2].clone().expect_identification(0x1234);
     };
@@ -78,8 +80,9 @@ fn an_identification_that_is_right_is_no_mismatch_facts_5_3() {
     assert!(error.to_string().contains("SubDevice 2: expected identification 0x00001234, got 0x00001235"), "{error}");
 }
 
+// covers: 4.3, mandatory
 #[test]
-fn an_identification_in_memory_is_read_there_facts_4_3() {
+fn an_identification_in_memory_is_read_there() {
     // Where the alias is loaded to, which some devices set by switches.
     let change = |devices: &mut Vec<DeviceDescription>| {
         devices[1].id_switch_address = Some(map::STATION_ALIAS.0);
@@ -96,6 +99,7 @@ fn an_identification_in_memory_is_read_there_facts_4_3() {
     assert_eq!(identifications, [None, Some(77), Some(0), None]);
 }
 
+// covers: mandatory
 #[test]
 fn everybody_may_be_required_those_that_are_optional_too() {
     let with = |required| {
@@ -114,6 +118,7 @@ fn everybody_may_be_required_those_that_are_optional_too() {
     assert!(world.saw(world.beginning(), |event| *event == Event::Missing { subdevice: 3, optional: true }));
 }
 
+// covers: mandatory
 #[test]
 fn a_mandatory_one_that_is_missing_is_told_and_may_come_later() {
     let declare = |declaration: &mut Declaration| declaration.required = Required::Nobody;

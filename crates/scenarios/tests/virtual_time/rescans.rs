@@ -53,6 +53,7 @@ fn declared(rescan: &Rescan) -> Vec<Option<usize>> {
     rescan.subdevices.iter().map(|found| index(found.who)).collect()
 }
 
+// covers: rescan
 #[test]
 fn a_rescan_finds_who_is_new_has_moved_or_is_gone_and_costs_no_working_counter() {
     let declare = |scan: &ringcat::Scan| {
@@ -101,8 +102,9 @@ fn a_rescan_finds_who_is_new_has_moved_or_is_gone_and_costs_no_working_counter()
     assert_eq!((gone.missing.as_slice(), gone.subdevices.len()), ([6].as_slice(), 7));
 }
 
+// covers: rescan
 #[test]
-fn a_rescan_of_a_ring_tells_the_places_whole_and_broken_and_ends_in_time_while_it_changes() {
+fn a_rescan_of_a_ring_gives_the_places_and_ends_in_time_while_it_changes() {
     let kinds = ["coupler", "digital-input-8", "digital-output-8", "digital-input-16", "digital-output-16"];
     let options = NetworkOptions::default().with_detection_delay(Duration::from_micros(10));
     let mut world = World::in_op(2, ring(descriptions(&kinds), options));
@@ -148,6 +150,7 @@ fn place(world: &World) -> Option<(Option<usize>, Option<usize>)> {
     world.application().ring_status().place.map(|cable| (node(cable.near), node(cable.far)))
 }
 
+// covers: rescan
 #[test]
 fn after_a_rescan_breaks_and_errors_of_cables_are_told_by_the_cabling_as_it_is() {
     const BRANCH: DeviceIndex = DeviceIndex(5);
@@ -211,7 +214,7 @@ fn after_a_rescan_breaks_and_errors_of_cables_are_told_by_the_cabling_as_it_is()
 }
 
 /// Frames meet the branch behind the port on which the ring goes on in another order while the ring is open (CR-09).
-// covers: CR-09, CR-17
+// covers: CR-09, CR-17, rescan
 #[test]
 fn a_break_that_changes_the_order_of_a_ring_with_a_branch_has_moved_nobody() {
     use ringcat_sim::frame::Port::{A, B, D};
@@ -235,8 +238,9 @@ fn a_break_that_changes_the_order_of_a_ring_with_a_branch_has_moved_nobody() {
 }
 
 /// The redundant copy meets the branch on port 2 of a closed ring: that is no break (CR-09).
+// covers: CR-09, CR-17, rescan
 #[test]
-fn after_a_rescan_of_a_closed_ring_with_a_branch_on_port_2_places_are_those_of_the_segment_cr_09_cr_17() {
+fn a_rescan_of_a_closed_ring_with_a_branch_on_port_2_gives_true_places() {
     use ringcat_sim::frame::Port::{A, B, D};
     use scenarios::segments::{MAIN, REDUNDANT, at, wired};
     const LEAVING: DeviceIndex = DeviceIndex(4);
@@ -296,7 +300,7 @@ fn after_a_rescan_of_a_closed_ring_with_a_branch_on_port_2_places_are_those_of_t
 
 /// Somebody like a declared one is at a place of the cabling as nobody's; when that one goes he takes over, where he
 /// is.
-// covers: CR-09, CR-17
+// covers: CR-09, CR-17, rescan
 #[test]
 fn a_stranger_that_becomes_a_member_has_the_place_that_a_rescan_found_him_at() {
     use ringcat_sim::frame::Port::{A, C, D};

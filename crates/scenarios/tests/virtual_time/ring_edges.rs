@@ -46,8 +46,9 @@ fn cut_after(world: &mut World, moment: Duration) -> ([u64; 2], Delivery, Vec<us
     result
 }
 
+// covers: ring-merge
 #[test]
-fn outputs_that_came_twice_at_a_cut_make_their_cycle_incomplete_when_the_second_copy_is_back() {
+fn outputs_doubled_at_a_cut_are_incomplete_when_the_second_copy_is_back() {
     let mut world = World::in_op(0, segment());
     let mut twice = Vec::new();
     for moment in (0..40_000).step_by(500).map(Duration::from_nanos) {
@@ -67,8 +68,9 @@ fn outputs_that_came_twice_at_a_cut_make_their_cycle_incomplete_when_the_second_
 }
 
 /// The other one has met everybody and brought all inputs. Nothing shows what the one did that was lost.
+// covers: ring-merge
 #[test]
-fn outputs_that_came_twice_at_a_cut_leave_their_cycle_complete_when_the_second_copy_is_lost() {
+fn outputs_doubled_at_a_cut_are_complete_when_the_second_copy_is_lost() {
     let mut world = World::in_op(0, segment());
     let mut twice = 0;
     for moment in (0..40_000).step_by(500).map(Duration::from_nanos) {

@@ -41,7 +41,7 @@ fn others(events: &[TimedEvent]) -> Vec<Event> {
     events.iter().map(|timed| &timed.event).filter(wanted).cloned().collect()
 }
 
-// covers: CR-11, CR-12
+// covers: CR-11, CR-12, ring-events
 #[test]
 fn each_edge_is_told_in_the_cycle_that_shows_it_and_its_place_within_five() {
     let mut world = World::in_op(1, ring_of_16(FAST));
@@ -82,8 +82,9 @@ fn each_edge_is_told_in_the_cycle_that_shows_it_and_its_place_within_five() {
     assert!(slowest <= PROMPT && slowest_place <= PLACED, "{slowest:?}, {slowest_place:?}");
 }
 
+// covers: CR-13, ring-status
 #[test]
-fn counts_states_carriers_and_the_place_can_be_asked_for_at_any_time_cr_13() {
+fn counts_states_carriers_and_the_place_can_be_asked_for_at_any_time() {
     let mut world = World::in_op(2, ring_of_16(FAST));
     world.run_cycles(10);
     let op = 1 << 3;
@@ -131,8 +132,9 @@ fn counts_states_carriers_and_the_place_can_be_asked_for_at_any_time_cr_13() {
     assert_eq!(world.application().ring_status().link(Link::Main).al_states, op);
 }
 
+// covers: CR-12, ring-events
 #[test]
-fn redundancy_is_a_state_of_its_own_apart_from_faults_of_the_bus_and_carriers_are_told_each_cr_12() {
+fn redundancy_bus_faults_and_carriers_are_reported_each_by_itself() {
     let mut world = small(3);
     let mark = world.mark();
     world.cut(CableId(2));
@@ -160,7 +162,7 @@ fn redundancy_is_a_state_of_its_own_apart_from_faults_of_the_bus_and_carriers_ar
     }
 }
 
-// covers: facts 9.2.1
+// covers: CR-06, 9.2.1, ring-events
 #[test]
 fn a_ring_that_passes_frames_one_way_only_has_lost_its_redundancy_and_nothing_else() {
     let mut world = small(4);
@@ -179,7 +181,7 @@ fn a_ring_that_passes_frames_one_way_only_has_lost_its_redundancy_and_nothing_el
     assert_eq!(others(world.events(mark)).last(), Some(&Event::RedundancyRegained));
 }
 
-// covers: CR-18
+// covers: CR-18, ring-events
 #[test]
 fn two_breaks_are_faults_of_the_bus_and_redundancy_comes_back_with_the_last_repair() {
     let mut world = small(5);
@@ -218,6 +220,7 @@ fn flap(world: &mut World, cable: usize, half_period: Duration, lasts: Duration)
     }
 }
 
+// covers: ring-flap
 #[test]
 fn a_cable_that_flaps_at_any_rate_floods_nobody_and_changes_no_state() {
     println!("half period us | cycles incomplete of all | events about ring and redundancy");
@@ -247,8 +250,9 @@ fn a_cable_that_flaps_at_any_rate_floods_nobody_and_changes_no_state() {
     }
 }
 
+// covers: ring-flap
 #[test]
-fn a_cable_that_flaps_in_one_direction_floods_nobody_and_changes_no_state_while_the_watchdog_is_fed() {
+fn a_cable_that_flaps_in_one_direction_changes_no_state_and_floods_no_log() {
     println!("direction, half period us | cycles incomplete of all | events about ring and redundancy");
     for (number, direction) in [Direction::AToB, Direction::BToA].into_iter().enumerate() {
         // Away from MAIN nobody behind the cable gets outputs meanwhile: for less than the watchdog of 100 ms.
@@ -281,6 +285,7 @@ fn a_cable_that_flaps_in_one_direction_floods_nobody_and_changes_no_state_while_
     }
 }
 
+// covers: ring-flap
 #[test]
 fn an_unsteady_ring_is_told_once_and_then_when_it_holds() {
     let mut world = small(30);
@@ -302,6 +307,7 @@ fn an_unsteady_ring_is_told_once_and_then_when_it_holds() {
     assert_eq!(ring_events(world.events(mark)).len(), 2);
 }
 
+// covers: cable-errors
 #[test]
 fn bursts_of_corrupt_frames_are_no_break_and_are_told_with_their_cable() {
     let mut world = small(31);

@@ -1,4 +1,4 @@
-//! The merged result of a split ring is that of the unsplit one (facts 9.3): random trees with a ring through them,
+//! The merged result of a split ring is that of the unsplit one (protocol 9.3): random trees with a ring through them,
 //! junctions and branches on any port, crossed SubDevices, random breaks of the ring, all commands. CR-05, CR-09.
 
 use std::time::Duration;
@@ -94,7 +94,7 @@ fn random(dice: &mut Dice, stations: &[u16]) -> Random {
     // Registers that say the same wherever a break is.
     let constant = RegisterAddress(*dice.pick(&[0x0000, 0x0010, 0x0130, 0x0600, 0x0800, USER_RAM]));
     let logical = Target::Logical(LogicalAddress(LOGICAL + dice.below(40) as u32));
-    // Of one SubDevice (facts 9.2.2).
+    // Of one SubDevice (protocol 9.2.2).
     let area = Target::Logical(LogicalAddress(LOGICAL + u32::from(MAPPED) * dice.below(stations.len() as u64) as u32));
     let commands = [
         (Command::Brd, Target::Broadcast(constant)),
@@ -116,7 +116,7 @@ fn random(dice: &mut Dice, stations: &[u16]) -> Random {
     let (command, target) = *dice.pick(&commands);
     let longest = if command == Command::Lrw { MAPPED.into() } else { 16 };
     let length = 1 + dice.below(longest) as u16;
-    // Reads leave as zeros (facts 9.3).
+    // Reads leave as zeros (protocol 9.3).
     let reads = matches!(command, Command::Aprd | Command::Brd | Command::Fprd | Command::Lrd | Command::Nop);
     let data = (0..length).map(|_| if reads { 0 } else { dice.below(256) as u8 }).collect();
     Random { command, target, data }
@@ -232,8 +232,9 @@ fn run(seed: u64) -> [usize; 3] {
     [compared, by_position, if reordered { by_position } else { 0 }]
 }
 
+// covers: CR-05, CR-09, CR-10, 9.3, ring-equals-line, sim-frames
 #[test]
-fn a_split_ring_answers_like_the_whole_one_seeds_0_to_59_cr_05_cr_09_facts_9_3() {
+fn a_split_ring_answers_like_the_whole_one_seeds_0_to_59() {
     let mut counts = [0; 3];
     for seed in 0..60 {
         counts.iter_mut().zip(run(seed)).for_each(|(count, more)| *count += more);

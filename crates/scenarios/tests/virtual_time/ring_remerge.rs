@@ -1,6 +1,6 @@
 //! A merge that was written apart from the engine (`remerge.py`, from the capture of both links alone) comes to the
 //! same inputs and to the same incomplete cycles as the engine printed as JSON, in runs with random breaks. CR-05,
-//! CR-06, CR-07, facts 9.3.
+//! CR-06, CR-07, protocol 9.3.
 
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -122,7 +122,7 @@ fn remerged(capture: &Path, images: &Path, seed: u64) -> Option<(usize, usize)> 
     numbers.next().zip(numbers.next())
 }
 
-// covers: CR-05, CR-06, CR-07, facts 9.3
+// covers: CR-05, CR-06, CR-07, 9.3, ring-merge
 #[test]
 fn a_merge_written_apart_comes_to_the_same_inputs_and_the_same_incomplete_cycles() {
     let (mut compared, mut incomplete) = (0, 0);

@@ -63,7 +63,7 @@ async fn all_services(mailbox: Mailbox) {
     assert_eq!(voe::exchange(&mailbox, &message, LIMITS).await.unwrap(), message);
 }
 
-// covers: CR-08, CR-20
+// covers: CR-08, CR-20, ring-goes-on
 #[test]
 fn every_mailbox_protocol_works_on_either_stub_while_process_data_goes_on() {
     for cable in 0..=KINDS.len() {
@@ -79,8 +79,9 @@ fn every_mailbox_protocol_works_on_either_stub_while_process_data_goes_on() {
     }
 }
 
+// covers: CR-09, CR-10, ring-goes-on
 #[test]
-fn registers_are_reached_by_station_and_by_position_behind_any_break_cr_09_cr_10() {
+fn registers_are_reached_by_station_and_by_position_behind_any_break() {
     let mut world = World::in_op(1, ring_of_16(FAST));
     let count = SIXTEEN.len() as u16;
     for cable in (0..=usize::from(count)).map(Some).chain([None]) {
@@ -115,8 +116,9 @@ fn registers_are_reached_by_station_and_by_position_behind_any_break_cr_09_cr_10
     }
 }
 
+// covers: CR-17, ring-goes-on
 #[test]
-fn a_subdevice_that_loses_its_power_on_either_stub_comes_back_with_its_eeprom_read_and_configured_cr_17() {
+fn a_subdevice_power_cycled_on_either_stub_is_read_and_configured_again() {
     // 7 and 8 are next to the break; behind 3 and 12 there are others, which return with them.
     for (device, gone) in [(7, 7..8), (8, 8..9), (3, 3..8), (12, 8..13)] {
         let mut world = World::in_op(device as u64, ring_of_16(FAST));
@@ -149,7 +151,7 @@ fn optional_analog_input(position: u16) -> SubDeviceConfig {
     SubDeviceConfig::at_position(position).optional().assign(3, Direction::Inputs, pdos)
 }
 
-// covers: CR-17, CR-21
+// covers: CR-17, CR-21, ring-goes-on
 #[test]
 fn an_optional_subdevice_on_either_side_of_a_break_joins_and_its_neighbours_go_on() {
     // It heads the redundant stub, or ends the main one: its neighbour across the break is configured beside it.
@@ -185,7 +187,7 @@ fn an_optional_subdevice_on_either_side_of_a_break_joins_and_its_neighbours_go_o
     }
 }
 
-// covers: CR-19
+// covers: CR-19, ring-goes-on
 #[test]
 fn a_ring_that_is_broken_from_start_to_end_is_started_stopped_and_started_again() {
     for cable in 0..=KINDS.len() {
@@ -216,7 +218,7 @@ fn with_lrw(scan: &Scan, lrw: LrwPolicy) -> ringcat::Declaration {
     ringcat::Declaration { lrw, ..automatic(&scan.subdevices, CYCLE) }
 }
 
-// covers: CR-16, facts 9.2.2
+// covers: CR-16, 9.2.2, ring-lrw
 #[test]
 fn an_explicit_lrw_is_refused_on_two_links_and_names_datagram_and_subdevices() {
     let refused = World::with(0, segment(), &Options::default(), |scan| with_lrw(scan, LrwPolicy::Explicit));
@@ -236,8 +238,9 @@ fn an_explicit_lrw_is_refused_on_two_links_and_names_datagram_and_subdevices() {
     world.settle();
 }
 
+// covers: CR-16, 9.2.2, ring-lrw
 #[test]
-fn one_lrw_per_subdevice_survives_any_break_and_counts_three_each_cr_16_facts_9_2_2() {
+fn one_lrw_per_subdevice_survives_any_break_and_counts_three_each() {
     let mut world = World::with(1, segment(), &Options::default(), |scan| with_lrw(scan, LrwPolicy::PerSubDevice))
         .expect("allowed");
     world.settle();
@@ -258,8 +261,9 @@ fn one_lrw_per_subdevice_survives_any_break_and_counts_three_each_cr_16_facts_9_
 }
 
 /// As a configuration file names them.
+// covers: CR-16, 9.2.2, ring-lrw
 #[test]
-fn an_lrw_that_a_file_names_is_refused_on_two_links_with_its_name_and_one_per_subdevice_is_allowed_cr_16_facts_9_2_2() {
+fn an_lrw_of_a_file_is_refused_on_two_links_and_one_per_subdevice_is_allowed() {
     let named = |subdevices: &[usize]| ringcat::ExplicitLrw {
         name: format!("frame 1, command {} \"cyclic cmd\"", subdevices[0]),
         logical: LogicalAddress(0x0100_0000),
@@ -288,8 +292,9 @@ fn an_lrw_that_a_file_names_is_refused_on_two_links_with_its_name_and_one_per_su
     assert_eq!((status.wkc, status.expected), (8, 8));
 }
 
+// covers: 9.7.1, ring-merge
 #[test]
-fn rings_work_with_both_encodings_of_the_source_address_facts_9_7_1() {
+fn rings_work_with_both_encodings_of_the_source_address() {
     for source_address in [MacCodec::FlagsFirst, MacCodec::IdLast] {
         let options = Options { source_address, ..Options::default() };
         let mut world = World::with(2, ring_of_16(FAST), &options, |scan| automatic(&scan.subdevices, CYCLE)).unwrap();

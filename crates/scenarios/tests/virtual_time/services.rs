@@ -32,7 +32,7 @@ fn in_line(seed: u64) -> World {
     World::in_op(seed, line(descriptions(&KINDS), options()))
 }
 
-// covers: facts 2.5
+// covers: 2.5, cable-errors
 #[test]
 fn error_counters_are_kept_beyond_255_on_a_period_and_read_and_cleared_on_demand() {
     let mut world = in_line(1);
@@ -77,8 +77,9 @@ fn error_counters_are_kept_beyond_255_on_a_period_and_read_and_cleared_on_demand
     assert!(world.finish(LIMIT, read).is_err() && world.application().engine().statistics(99).is_none());
 }
 
+// covers: registers
 #[test]
-fn a_subdevice_that_is_blocked_in_a_ring_is_cut_off_alone_and_comes_back_when_its_ports_are_opened() {
+fn a_subdevice_blocked_in_a_ring_is_cut_off_alone_until_its_ports_open() {
     let mut world = in_ring(2);
     let mark = world.mark();
     let block = world.application_mut().engine_mut().start_block(2);
@@ -103,7 +104,7 @@ fn a_subdevice_that_is_blocked_in_a_ring_is_cut_off_alone_and_comes_back_when_it
     assert!(error.to_string().contains("hangs on the main link"), "{error}");
 }
 
-// covers: facts 2.2
+// covers: 2.2, registers
 #[test]
 fn closing_a_port_of_a_line_takes_those_behind_it_and_opening_brings_them_back() {
     let mut world = in_line(3);
@@ -131,7 +132,7 @@ fn closing_a_port_of_a_line_takes_those_behind_it_and_opening_brings_them_back()
     assert!(world.finish(LIMIT, set).expect_err("no such port").to_string().contains("only 0 to 3"));
 }
 
-// covers: facts 3.2
+// covers: 3.2, registers
 #[test]
 fn a_controller_that_is_reset_starts_anew_and_comes_back_also_when_frames_are_lost() {
     for lost in [0, 1, 2, 3] {
@@ -154,6 +155,7 @@ fn a_controller_that_is_reset_starts_anew_and_comes_back_also_when_frames_are_lo
     }
 }
 
+// covers: own-datagrams
 #[test]
 fn datagrams_of_the_applications_own_bring_data_and_working_counter() {
     let mut world = in_ring(5);

@@ -1,5 +1,5 @@
 //! SubDevices with several areas of inputs: one that is dead is not hidden by another one that is not, though a
-//! SubDevice adds to a working counter once (facts 1.4).
+//! SubDevice adds to a working counter once (protocol 1.4).
 
 use std::time::Duration;
 
@@ -33,6 +33,7 @@ fn described(fmmus: Option<u8>) -> Vec<DeviceDescription> {
     described
 }
 
+// covers: freshness
 #[test]
 fn inputs_of_a_dead_sync_manager_are_not_fresh_beside_those_of_another_one() {
     for fmmus in [None, Some(2)] {

@@ -1,5 +1,5 @@
 //! EEPROMs that are slow, now and then or always, and frames that come late or not at all while they are read: a scan
-//! takes the time that is needed, never more than a bound, and finds what is there (facts 3.8, 5.4).
+//! takes the time that is needed, never more than a bound, and finds what is there (protocol 3.8, 5.4).
 
 use std::time::Duration;
 
@@ -40,8 +40,9 @@ fn scan(network: Network) -> (Result<Scan, Error>, Duration, usize) {
     (result, took, counted)
 }
 
+// covers: slow-eeproms
 #[test]
-fn an_eeprom_that_is_slow_at_every_word_is_given_up_after_30_s_and_named_with_the_word() {
+fn an_eeprom_slow_at_every_word_is_given_up_after_30_s_and_named_with_the_word() {
     let mut slow = terminal(Duration::from_millis(99));
     let mut image = ringcat_sim::device::Device::new(slow.clone()).controller.sii_image()[..128].to_vec();
     // Strings without end, within the EEPROM's size of 16 KByte.
@@ -69,6 +70,7 @@ fn an_eeprom_that_is_slow_at_every_word_is_given_up_after_30_s_and_named_with_th
     assert!((Duration::from_secs(30)..Duration::from_secs(31)).contains(&took), "{took:?}");
 }
 
+// covers: slow-eeproms
 #[test]
 fn one_slow_command_costs_its_own_time_and_not_that_of_every_word() {
     let (_, usual, _) = scan(network(vec![terminal(Duration::from_micros(500))]));
@@ -82,6 +84,7 @@ fn one_slow_command_costs_its_own_time_and_not_that_of_every_word() {
     }
 }
 
+// covers: slow-eeproms
 #[test]
 fn a_scan_after_one_of_a_slow_eeprom_reads_quick_ones_quickly() {
     let mut terminals = vec![terminal(Duration::from_micros(500)); 2];
@@ -97,7 +100,7 @@ fn a_scan_after_one_of_a_slow_eeprom_reads_quick_ones_quickly() {
     assert!(took < Duration::from_millis(60), "{took:?}");
 }
 
-// covers: TO-39
+// covers: TO-39, slow-eeproms
 #[test]
 fn late_and_lost_frames_while_eeproms_are_read_do_not_begin_the_scan_anew_seeds_0() {
     for seed in 0..40 {
@@ -125,8 +128,9 @@ fn late_and_lost_frames_while_eeproms_are_read_do_not_begin_the_scan_anew_seeds_
     }
 }
 
+// covers: slow-eeproms
 #[test]
-fn a_command_that_travels_again_because_its_answer_was_lost_is_refused_and_does_no_harm_seeds_0_to_19() {
+fn an_sii_command_sent_twice_after_a_lost_answer_does_no_harm() {
     for seed in 0..20 {
         let mut dice = Dice::new(seed);
         let busy = Duration::from_micros(*dice.pick(&[500, 3_000, 8_000]));

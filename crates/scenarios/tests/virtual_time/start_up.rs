@@ -1,4 +1,4 @@
-//! Power-on to OP: SubDevices that appear one after the other, and how long it takes (facts 5.6).
+//! Power-on to OP: SubDevices that appear one after the other, and how long it takes (protocol 5.6).
 
 use std::time::Duration;
 
@@ -24,8 +24,9 @@ fn slow_to_appear(from: usize, pause: Duration) -> Network {
     network
 }
 
+// covers: scan
 #[test]
-fn subdevices_that_appear_one_after_the_other_while_the_first_are_read_are_all_found() {
+fn subdevices_that_appear_while_the_first_are_read_are_all_found() {
     for pause_us in [300, 1_100, 2_500, 4_500] {
         for from in 0..KINDS.len() {
             let network = slow_to_appear(from, Duration::from_micros(pause_us));
@@ -48,6 +49,7 @@ fn subdevices_that_appear_one_after_the_other_while_the_first_are_read_are_all_f
     }
 }
 
+// covers: scan
 #[test]
 fn a_scan_that_has_read_everything_waits_until_the_count_has_settled() {
     let options = Options { settle: Duration::from_millis(200), ..Options::default() };
@@ -58,6 +60,7 @@ fn a_scan_that_has_read_everything_waits_until_the_count_has_settled() {
     assert!((200_000_000..202_000_000).contains(&now.0), "{now:?}");
 }
 
+// covers: scan
 #[test]
 fn a_count_that_never_settles_ends_the_scan_after_its_patience() {
     let mut network = line(descriptions(&KINDS), NetworkOptions::default());
@@ -77,6 +80,7 @@ fn a_count_that_never_settles_ends_the_scan_after_its_patience() {
     assert!((100_000_000..130_000_000).contains(&now.0), "{now:?}");
 }
 
+// covers: scan
 #[test]
 fn fifty_subdevices_are_in_op_after_60_ms_and_one_after_34() {
     for (count, limit) in [(1, 34), (10, 40), (50, 60)] {

@@ -91,7 +91,7 @@ fn expected() -> Vec<(AlState, String, Vec<u8>)> {
     all
 }
 
-// covers: facts 5.2
+// covers: 5.2, startup-commands
 #[test]
 fn objects_and_idns_are_written_at_their_transitions_in_the_declared_order() {
     let mut world = world(segment(|_| ()), many);
@@ -106,6 +106,7 @@ fn objects_and_idns_are_written_at_their_transitions_in_the_declared_order() {
     assert_eq!(troubles(world.events(world.beginning())), Vec::<&Event>::new());
 }
 
+// covers: startup-commands
 #[test]
 fn a_hundred_power_cycles_write_the_same_list_in_the_same_order_each_time() {
     let mut world = world(segment(|_| ()), many);
@@ -124,6 +125,7 @@ fn a_hundred_power_cycles_write_the_same_list_in_the_same_order_each_time() {
     assert_eq!(others.count(), 0, "those before it stay in OP");
 }
 
+// covers: startup-commands
 #[test]
 fn one_that_falls_out_of_op_gets_the_commands_of_the_way_back() {
     let mut world = world(segment(|_| ()), many);
@@ -136,8 +138,9 @@ fn one_that_falls_out_of_op_gets_the_commands_of_the_way_back() {
     assert_eq!(written(&world), expected()[expected().len() - 2..]);
 }
 
+// covers: 6.6, startup-commands
 #[test]
-fn a_refused_idn_is_told_with_its_number_and_code_facts_6_6() {
+fn a_refused_idn_is_told_with_its_number_and_code() {
     let mut world = world(segment(|_| ()), |config| {
         config.sdo(0x2001, 1, [1, 1]).idn_at(Transition::So, 0, Idn::standard(0, 1), [0xF4, 1])
     });
@@ -152,6 +155,7 @@ fn a_refused_idn_is_told_with_its_number_and_code_facts_6_6() {
     assert!(others.into_iter().all(|(_, device)| device.al_status().al_state() == Some(AlState::Op)));
 }
 
+// covers: watchdogs
 #[test]
 fn one_that_needs_a_pause_before_safeop_gets_it() {
     let network = || segment(|device| device.preop_settling = Duration::from_millis(60));
@@ -167,8 +171,9 @@ fn one_that_needs_a_pause_before_safeop_gets_it() {
     assert_eq!(troubles(patient.events(patient.beginning())), Vec::<&Event>::new());
 }
 
+// covers: 5.2, watchdogs
 #[test]
-fn the_eeprom_is_left_to_the_pdi_where_that_is_declared_facts_5_2() {
+fn the_eeprom_is_left_to_the_pdi_where_that_is_declared() {
     let owner = |world: &World| {
         let controller = &world.network().device(DeviceIndex(DRIVE)).controller;
         controller.register(map::SII_CONFIGURATION, 1)[0] & 1
@@ -186,8 +191,9 @@ fn the_eeprom_is_left_to_the_pdi_where_that_is_declared_facts_5_2() {
     assert_eq!(owner(&left), 1, "again on every re-entry");
 }
 
+// covers: 3.7, watchdogs
 #[test]
-fn watchdogs_are_written_before_safeop_facts_3_7() {
+fn watchdogs_are_written_before_safeop() {
     let mut world = world(segment(|_| ()), |config| config.watchdog(Some(0x1000), Some(700)).pdi_watchdog(900));
     world.settle();
     let controller = &world.network().device(DeviceIndex(DRIVE)).controller;
@@ -197,8 +203,9 @@ fn watchdogs_are_written_before_safeop_facts_3_7() {
     assert_eq!(u16::from_le_bytes(word(map::WATCHDOG_TIME_PROCESS_DATA)), 700);
 }
 
+// covers: 5.4, watchdogs
 #[test]
-fn a_state_change_may_have_a_limit_of_its_own_facts_5_4() {
+fn a_state_change_may_have_a_limit_of_its_own() {
     let slow = |device: &mut DeviceDescription| device.transitions.to_safeop = Duration::from_millis(80);
     let limit = Duration::from_millis(30);
     let mut world = world(segment(slow), |config| config.state_timeout(AlState::PreOp, AlState::SafeOp, limit));

@@ -52,6 +52,7 @@ fn registers(world: &World, device: usize) -> Vec<u8> {
     controller.register(map::FMMU_BASE, 64).iter().copied().chain(sync_managers).collect()
 }
 
+// covers: states
 #[test]
 fn each_of_16_goes_to_preop_init_and_safeop_and_back_and_no_cycle_misses_another() {
     let mut world = World::in_op(1, ring_of_16(Duration::from_micros(10)));
@@ -74,6 +75,7 @@ fn each_of_16_goes_to_preop_init_and_safeop_and_back_and_no_cycle_misses_another
     }
 }
 
+// covers: states
 #[test]
 fn in_preop_the_mailbox_works_and_inputs_are_not_fresh() {
     let mut world = World::in_op(2, line(descriptions(&KINDS), NetworkOptions::default()));
@@ -94,8 +96,9 @@ fn in_preop_the_mailbox_works_and_inputs_are_not_fresh() {
     assert_eq!(dictionary.read(0x2003, 2), Ok(7u32.to_le_bytes().as_slice()), "it never left PREOP downwards");
 }
 
+// covers: 6.4, states
 #[test]
-fn firmware_is_updated_through_boot_while_the_others_stay_in_op_facts_6_4() {
+fn firmware_is_updated_through_boot_while_the_others_stay_in_op() {
     let mut world = World::in_op(3, line(descriptions(&KINDS), NetworkOptions::default()));
     let mark = world.mark();
     assert_eq!(request(&mut world, DRIVE, AlState::Boot), Ok(()));
@@ -123,8 +126,9 @@ fn manager(world: &World, number: u8) -> (u16, u16, bool) {
     (register.start, register.length, register.activate.enable)
 }
 
+// covers: 3.11, odd-sii
 #[test]
-fn firmware_goes_through_boot_with_mailboxes_on_the_sync_managers_that_the_sii_names_facts_3_11() {
+fn firmware_goes_through_boot_with_mailboxes_on_sync_managers_of_the_sii() {
     for own in [false, true] {
         let mut devices = descriptions(&KINDS);
         let device = &mut devices[DRIVE];
@@ -186,6 +190,7 @@ fn mailbox_of(device: &DeviceDescription) -> MailboxLayout {
     device.mailbox.as_ref().expect("it has one").bootstrap
 }
 
+// covers: startup-commands
 #[test]
 fn commands_of_the_way_down_and_up_are_sent_in_order() {
     let declare = |scan: &Scan| {
@@ -222,8 +227,9 @@ fn commands_of_the_way_down_and_up_are_sent_in_order() {
 }
 
 /// Outputs of a terminal without a state machine of its own: nothing else keeps them from acting in SAFEOP.
+// covers: 4.4, sync-managers-declared
 #[test]
-fn a_sync_manager_for_op_only_is_off_in_safeop_on_the_way_up_and_down_facts_4_4() {
+fn a_sync_manager_for_op_only_is_off_in_safeop_on_the_way_up_and_down() {
     let mut devices = descriptions(&["coupler", "emulated-output-8", "digital-input-8"]);
     devices[1].sync_managers[0].enable = SiiSyncManager::ENABLE | SiiSyncManager::OP_ONLY;
     let mut world = World::in_op(6, line(devices, NetworkOptions::default()));
@@ -246,6 +252,7 @@ fn a_sync_manager_for_op_only_is_off_in_safeop_on_the_way_up_and_down_facts_4_4(
     }
 }
 
+// covers: states
 #[test]
 fn one_that_refuses_is_brought_back_and_the_refusal_is_told() {
     let mut world = World::in_op(5, line(descriptions(&KINDS), NetworkOptions::default()));
@@ -261,6 +268,7 @@ fn one_that_refuses_is_brought_back_and_the_refusal_is_told() {
     assert_eq!(state(&world, DRIVE), AlStatus::new(AlState::Op));
 }
 
+// covers: states
 #[test]
 fn the_state_that_was_requested_is_kept_over_a_loss_of_power() {
     let mut world = World::in_op(6, line(descriptions(&KINDS), NetworkOptions::default()));
@@ -282,6 +290,7 @@ fn the_state_that_was_requested_is_kept_over_a_loss_of_power() {
     assert!(world.left_op(mark).iter().all(|device| device.0 == last));
 }
 
+// covers: states
 #[test]
 fn one_that_is_lost_on_its_way_up_is_missed_as_before() {
     let mut world = World::in_op(8, line(descriptions(&KINDS), NetworkOptions::default()));
@@ -306,6 +315,7 @@ fn one_that_is_lost_on_its_way_up_is_missed_as_before() {
     assert!(is_missed(&world), "when it goes again");
 }
 
+// covers: states
 #[test]
 fn a_later_request_ends_an_earlier_one() {
     let mut world = World::in_op(7, line(descriptions(&KINDS), NetworkOptions::default()));

@@ -1,5 +1,5 @@
 //! Orderly stops of segments whose SubDevices are not all alike: undeclared ones, such as are in lower states, copy AL
-//! control or refuse (facts 5.3).
+//! control or refuse (protocol 5.3).
 
 use std::time::Duration;
 
@@ -55,6 +55,7 @@ fn statuses(main_device: &mut MainDevice<Tap>) -> Vec<AlStatus> {
 
 const INIT: AlStatus = AlStatus::new(AlState::Init);
 
+// covers: stop
 #[test]
 fn a_stop_to_any_state_leaves_undeclared_subdevices_where_they_are() {
     for state in [AlState::Init, AlState::PreOp, AlState::SafeOp] {
@@ -74,6 +75,7 @@ fn a_stop_to_any_state_leaves_undeclared_subdevices_where_they_are() {
     }
 }
 
+// covers: stop
 #[test]
 fn a_stop_raises_no_subdevice_that_is_in_a_lower_state() {
     let targets = [AlState::PreOp, AlState::Op, AlState::Init, AlState::SafeOp, AlState::PreOp, AlState::Op];
@@ -93,6 +95,7 @@ fn a_stop_raises_no_subdevice_that_is_in_a_lower_state() {
     }
 }
 
+// covers: stop
 #[test]
 fn a_subdevice_with_an_error_follows_and_its_error_is_acknowledged() {
     for state in [AlState::Init, AlState::PreOp, AlState::SafeOp] {
@@ -108,6 +111,7 @@ fn a_subdevice_with_an_error_follows_and_its_error_is_acknowledged() {
     }
 }
 
+// covers: stop
 #[test]
 fn a_subdevice_that_does_not_follow_is_named_with_its_status_and_holds_up_no_other() {
     for network in networks() {
@@ -122,6 +126,7 @@ fn a_subdevice_that_does_not_follow_is_named_with_its_status_and_holds_up_no_oth
     }
 }
 
+// covers: stop
 #[test]
 fn a_subdevice_that_refuses_is_named_with_its_code() {
     for network in networks() {
@@ -136,6 +141,7 @@ fn a_subdevice_that_refuses_is_named_with_its_code() {
     }
 }
 
+// covers: stop
 #[test]
 fn subdevices_that_are_not_there_hold_up_no_stop() {
     for state in [AlState::Init, AlState::PreOp] {
@@ -155,6 +161,7 @@ fn subdevices_that_are_not_there_hold_up_no_stop() {
     assert!(matches!(error, Error::Stop(_)), "{error}");
 }
 
+// covers: stop
 #[test]
 fn a_scan_clears_the_errors_of_all_though_one_stays_out_of_init() {
     for network in networks() {

@@ -80,6 +80,7 @@ fn strangers_that_keep_an_address_given_long_ago_do_not_share_it_with_others() {
     assert!(quiet <= 30, "one look a second, not a search without end: {quiet} datagrams");
 }
 
+// covers: identity
 #[test]
 fn one_with_the_address_of_a_member_gets_another_and_the_member_stays_in_op() {
     for (stranger, member) in [(5, 1), (5, 4), (0, 1)] {
@@ -109,7 +110,7 @@ fn one_with_the_address_of_a_member_gets_another_and_the_member_stays_in_op() {
 }
 
 #[test]
-fn a_stranger_that_another_main_device_has_configured_is_put_to_init_and_takes_no_part_in_our_process_data() {
+fn a_subdevice_configured_by_another_main_device_is_put_to_init_and_left_out() {
     let mut world = world(six(true), 5);
     let temporary = StationAddress(stations(&world)[5]);
     let ours =
@@ -132,6 +133,7 @@ fn a_stranger_that_another_main_device_has_configured_is_put_to_init_and_takes_n
     assert_eq!(status.wkc, status.expected);
 }
 
+// covers: identity
 #[test]
 fn another_one_with_the_address_of_an_absent_member_is_not_taken_for_it() {
     let mut world = world(six(true), 5);
@@ -155,6 +157,7 @@ fn another_one_with_the_address_of_an_absent_member_is_not_taken_for_it() {
     assert_eq!(stations(&world)[2], 0x1003);
 }
 
+// covers: identity
 #[test]
 fn neighbours_alike_keep_their_places_whichever_side_they_come_back_from() {
     let kinds = ["coupler", "digital-input-8", "digital-output-8", "digital-output-8", "digital-input-8"];
@@ -183,6 +186,7 @@ fn neighbours_alike_keep_their_places_whichever_side_they_come_back_from() {
 
 /// The first of two alike has its cables again at the moment in which the second one, who answered from the redundant
 /// side before, is told who it is: nobody takes the place of the one who has not been seen yet.
+// covers: identity
 #[test]
 fn neighbours_alike_keep_their_places_when_the_ring_closes_while_one_is_recognised() {
     let kinds = ["coupler", "digital-input-8", "digital-output-8", "digital-output-8", "digital-input-8"];
@@ -252,7 +256,7 @@ fn corrupt_sii(world: &mut World, device: DeviceIndex) {
 }
 
 #[test]
-fn while_a_stranger_is_read_for_seconds_others_are_noticed_when_they_go_and_come_back() {
+fn others_are_noticed_when_they_come_and_go_while_a_new_subdevice_is_read() {
     let mut world = world(six(true), 6);
     world.power_off(DeviceIndex(2));
     world.run_cycles(100);
@@ -269,6 +273,7 @@ fn while_a_stranger_is_read_for_seconds_others_are_noticed_when_they_go_and_come
     world.until(Duration::from_millis(500), "back", |world| world.application().states()[4] == SETTLED);
 }
 
+// covers: identity
 #[test]
 fn one_that_cannot_be_read_does_not_hide_those_behind_it() {
     let mut world = world(six(true), 6);
@@ -332,6 +337,7 @@ fn torture(seed: u64) {
     assert_eq!(states(&world), [AlState::Op; 8]);
 }
 
+// covers: identity
 #[test]
 fn after_any_cuts_and_power_cycles_everybody_is_back_and_who_it_was_seeds_0_to_149() {
     let failed: Vec<u64> = (0..150).filter(|seed| std::panic::catch_unwind(|| torture(*seed)).is_err()).collect();

@@ -29,17 +29,19 @@ fn crossed(events: &[TimedEvent]) -> Vec<(Option<u16>, Option<u8>)> {
     events.iter().filter_map(of).collect()
 }
 
+// covers: LC-01, LC-05, topology
 #[test]
-fn a_crossed_subdevice_in_a_line_is_located_lc_01_lc_05() {
+fn a_crossed_subdevice_in_a_line_is_located() {
     use Port::{A, B};
     let kinds = ["junction", "digital-output-8", "junction", "servo"];
     let cables = [(MAIN, at(0, A)), (at(0, B), at(1, A)), (at(1, B), at(2, B)), (at(2, A), at(3, A))];
     let world = in_op(wired(&kinds, &cables));
-    // Frames meet it on their way back, behind the one that hangs on it (facts 2.9).
+    // Frames meet it on their way back, behind the one that hangs on it (protocol 2.9).
     assert_eq!(crossed(world.events(world.beginning())), [(Some(3), Some(1))]);
     assert_eq!(world.device_of(3), Some(DeviceIndex(2)));
 }
 
+// covers: topology
 #[test]
 fn a_subdevice_without_a_cable_in_port_0_is_told_and_works() {
     use Port::{A, B};
@@ -51,8 +53,9 @@ fn a_subdevice_without_a_cable_in_port_0_is_told_and_works() {
     assert_eq!(crossed(world.events(world.beginning())), [(Some(2), Some(1))]);
 }
 
+// covers: LC-07, topology
 #[test]
-fn a_crossed_subdevice_in_a_closed_ring_is_located_and_works_lc_07() {
+fn a_crossed_subdevice_in_a_closed_ring_is_located_and_works() {
     use Port::{A, B};
     let kinds = ["junction", "digital-output-8", "servo", "digital-input-8"];
     let cables =
@@ -76,8 +79,9 @@ fn a_crossed_subdevice_in_a_closed_ring_is_located_and_works_lc_07() {
 
 /// Who has one port cannot pass the ring on (CR-22): everybody behind it is a stub of the redundant link, from the
 /// start and for good, and a break of that stub costs whoever is behind it.
+// covers: CR-22, topology
 #[test]
-fn a_subdevice_with_one_port_leaves_the_ring_open_and_that_is_told_cr_22() {
+fn a_subdevice_with_one_port_leaves_the_ring_open_and_that_is_told() {
     use Port::{A, B};
     let mut descriptions = descriptions(&["digital-output-8", "digital-input-8", "servo", "digital-input-16"]);
     descriptions[1].ports[1..].fill(PortKind::NotImplemented);
@@ -118,9 +122,10 @@ pub(crate) fn ring_with_branch(port: Port) -> Network {
     wired(&kinds, &cables)
 }
 
+// covers: topology
 #[test]
 fn a_ring_with_a_branch_keeps_all_in_op_when_any_cable_of_the_ring_is_cut() {
-    // On port 2 the branch is met by the redundant copy even in a closed ring (facts 2.9).
+    // On port 2 the branch is met by the redundant copy even in a closed ring (protocol 2.9).
     for port in [Port::C, Port::D] {
         let mut world = in_op(ring_with_branch(port));
         for cable in 0..6 {
@@ -216,15 +221,17 @@ fn enhanced(network: Network) -> World {
     world
 }
 
+// covers: LC-02, crossed-enhanced
 #[test]
-fn without_enhanced_detection_a_closed_ring_tells_that_something_is_crossed_and_not_where_lc_02() {
+fn without_enhanced_detection_a_closed_ring_shows_a_crossing_without_place() {
     let world = in_op(crossed_ring());
     assert_eq!(world.application().ring(), RingState::Closed);
     assert_eq!(crossed(world.events(world.beginning())), [(None, None)]);
 }
 
+// covers: LC-03, crossed-enhanced
 #[test]
-fn enhanced_detection_locates_crossings_at_the_scan_and_the_ring_is_closed_afterwards_lc_03() {
+fn enhanced_detection_locates_crossings_at_the_scan_and_closes_the_ring_again() {
     let world = enhanced(crossed_ring());
     let found = crossed(world.events(world.beginning()));
     let positions: Vec<Option<usize>> =
@@ -233,8 +240,9 @@ fn enhanced_detection_locates_crossings_at_the_scan_and_the_ring_is_closed_after
     assert_eq!(world.application().ring(), RingState::Closed);
 }
 
+// covers: LC-04, crossed-enhanced
 #[test]
-fn a_branch_on_port_2_of_a_closed_ring_is_suspicious_until_the_ring_is_opened_lc_04() {
+fn a_branch_on_port_2_of_a_closed_ring_is_suspicious_until_the_ring_is_opened() {
     let suspicious = in_op(ring_with_branch(Port::C));
     assert_eq!(crossed(suspicious.events(suspicious.beginning())), [(None, None)]);
     let known = enhanced(ring_with_branch(Port::C));
@@ -246,8 +254,9 @@ fn lost_links(world: &World) -> u8 {
     world.network().device(DeviceIndex(4)).controller.register(map::LOST_LINK_COUNTER, 4)[1]
 }
 
+// covers: LC-03, crossed-enhanced
 #[test]
-fn enhanced_detection_looks_again_when_ports_change_and_costs_two_edges_lc_03() {
+fn enhanced_detection_looks_again_when_ports_change_and_costs_two_edges() {
     let mut world = enhanced(ring_with_branch(Port::D));
     world.run_cycles(100);
     // The branch is pulled: ports change, the ring stays closed.
@@ -264,8 +273,9 @@ fn enhanced_detection_looks_again_when_ports_change_and_costs_two_edges_lc_03() 
     assert!(lost_links(&world) > before, "the redundant link was down in between");
 }
 
+// covers: LC-02, crossed-enhanced
 #[test]
-fn links_that_cannot_be_taken_down_say_so_and_the_ring_is_looked_at_as_it_is_lc_02() {
+fn links_that_cannot_be_taken_down_say_so_and_the_ring_is_looked_at_as_it_is() {
     let options = Options { enhanced_line_crossed: true, ..Options::default() };
     let mut tap = scenarios::tap::Tap::new(ring_with_branch(Port::C));
     tap.forbid_disconnecting();

@@ -149,6 +149,7 @@ impl Stamped {
     }
 }
 
+// covers: under-way
 #[test]
 fn a_way_of_three_cycles_costs_two_of_three_with_one_under_way_and_none_with_four() {
     for (under_way, most_skipped, least_skipped) in [(1, 140, 120), (4, 0, 0)] {
@@ -169,7 +170,7 @@ fn a_way_of_three_cycles_costs_two_of_three_with_one_under_way_and_none_with_fou
     }
 }
 
-// Facts CR-04, CR-06, CR-07.
+// covers: CR-04, CR-06, CR-07, under-way
 #[test]
 fn a_break_and_its_mending_cost_at_most_the_cycles_that_are_under_way() {
     for (under_way, way) in [(2, Duration::ZERO), (2, CYCLE * 3 / 4), (3, CYCLE * 7 / 4)] {
@@ -193,8 +194,9 @@ fn a_break_and_its_mending_cost_at_most_the_cycles_that_are_under_way() {
     }
 }
 
+// covers: under-way
 #[test]
-fn whatever_is_lost_or_broken_inputs_never_become_older_and_afterwards_all_is_complete() {
+fn inputs_never_become_older_whatever_breaks_and_all_is_complete_afterwards() {
     for seed in 0..8 {
         println!("seed {seed}");
         let mut dice = Dice::new(seed);
@@ -242,8 +244,9 @@ fn whatever_is_lost_or_broken_inputs_never_become_older_and_afterwards_all_is_co
 
 /// Rings behind junctions break and are mended, one cable or two at once, on one link and on two: at most what is under
 /// way is lost, and inputs that count as fresh are no older than that.
+// covers: JR-02, under-way
 #[test]
-fn breaks_behind_junctions_cost_at_most_the_cycles_that_are_under_way_and_no_old_input_counts_as_fresh_jr_02() {
+fn breaks_behind_junctions_cost_the_cycles_under_way_and_no_old_input_is_fresh() {
     let kinds = ["digital-input-8", "junction", "digital-input-8", "digital-input-16", "digital-input-8"];
     let one = [
         "digital-input-8",

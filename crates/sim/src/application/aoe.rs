@@ -1,4 +1,4 @@
-//! The AoE server of a device: a memory, the dictionary by ADS, states (facts 6.7).
+//! The AoE server of a device: a memory, the dictionary by ADS, states (protocol 6.7).
 //!
 //! In: the payload of an AoE message, the dictionary. Out: the answer. Index group [`MEMORY`] is a memory of
 //! [`MEMORY_BYTES`] bytes, group 0xF302 the object dictionary. Ports that the device does not have are told in the

@@ -1,7 +1,7 @@
 //! Where the inputs of a device come from: a constant, its own outputs, a function of time and outputs, a drive.
 //!
 //! In: virtual time and the valid outputs (zero in the safe state). Out: the bytes of the inputs. Nothing here
-//! reads a clock or draws a number, so two runs with the same frames give the same inputs (facts 11.4).
+//! reads a clock or draws a number, so two runs with the same frames give the same inputs (protocol 11.4).
 
 use core::fmt;
 

@@ -1,4 +1,4 @@
-//! The CoE server of a device (facts 6.3): tells the services apart; `transfer` serves SDOs, `information` SDO
+//! The CoE server of a device (protocol 6.3): tells the services apart; `transfer` serves SDOs, `information` SDO
 //! information, `pdo` PDOs by mailbox.
 //!
 //! In: the payload of a CoE message, the dictionary, the process data (mapped objects show what is in it), the state.

@@ -1,4 +1,4 @@
-//! The object dictionary of a simulated SubDevice (facts 6.3).
+//! The object dictionary of a simulated SubDevice (protocol 6.3).
 //!
 //! In: the device's description, from which the standard objects, the PDO mappings (0x16xx, 0x1Axx), the PDO
 //! assignments (0x1C10 + SyncManager) and the mapped objects follow; reads and writes by index and sub index.
@@ -80,7 +80,7 @@ impl Dictionary {
         if entry.access == Access::WriteOnly { Err(AbortCode::WRITE_ONLY) } else { Ok(&entry.value) }
     }
 
-    /// All entries from sub index 0 (padded to 16 bits) or 1 on, packed (facts 6.3, complete access).
+    /// All entries from sub index 0 (padded to 16 bits) or 1 on, packed (protocol 6.3, complete access).
     pub fn read_complete(&self, index: u16, from: u8) -> Result<Vec<u8>, AbortCode> {
         let object = self.object(index).ok_or(AbortCode::OBJECT_DOES_NOT_EXIST)?;
         let mut bytes = Vec::new();

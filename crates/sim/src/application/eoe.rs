@@ -1,4 +1,4 @@
-//! The EoE server of a device: frames in fragments, an IP stack or a loop behind them, addresses (facts 6.5).
+//! The EoE server of a device: frames in fragments, an IP stack or a loop behind them, addresses (protocol 6.5).
 //!
 //! In: the payload of an EoE message, virtual time. Out: the answer, and frames that the device sends of itself.
 //! [`reassembly`] puts fragments together, [`stack`] is an IP stack that answers ping and serves TCP. Time stamps are

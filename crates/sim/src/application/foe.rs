@@ -1,4 +1,4 @@
-//! The FoE server of a device: files to be read and written, a boot loader for its firmware (facts 6.4).
+//! The FoE server of a device: files to be read and written, a boot loader for its firmware (protocol 6.4).
 //!
 //! In: the payload of a FoE message, the state, virtual time. Out: the answer. [`files`] keeps what was written over
 //! power cycles, [`firmware`] says what an image is. In BOOT only the firmware is served; it is written in no other

@@ -1,4 +1,4 @@
-//! The application's mail: messages go to the servers, answers and news go out (facts 6).
+//! The application's mail: messages go to the servers, answers and news go out (protocol 6).
 //!
 //! In: AL events of the mailbox SyncManagers, the time, news of the device (emergencies, messages for the diagnosis
 //! history), faults. Out: what the MainDevice reads.

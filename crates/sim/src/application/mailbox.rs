@@ -1,4 +1,5 @@
-//! The SubDevice's end of the mailbox: counters, duplicates, answers in order, repeat of a lost one (facts 6.1, 6.2).
+//! The SubDevice's end of the mailbox: counters, duplicates, answers in order, repeat of a lost one (protocol 6.1,
+//! 6.2).
 //!
 //! In: AL events of the two mailbox SyncManagers, virtual time, [`faults`]. Out: messages for a protocol server and its
 //! answers in the send mailbox, some time later, with mail that nobody asked for in between. What the messages mean is
@@ -63,7 +64,7 @@ pub struct Mailbox {
 }
 
 impl Mailbox {
-    /// The mailbox is taken into use; the repeat request that stands in the register is none (facts 6.2.4).
+    /// The mailbox is taken into use; the repeat request that stands in the register is none (protocol 6.2, step 4).
     pub fn open(
         layout: MailboxLayout,
         (receive_manager, send_manager): (u8, u8),

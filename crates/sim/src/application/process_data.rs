@@ -13,7 +13,7 @@ use super::settings::{Area, Layout};
 use crate::controller::Controller;
 use crate::time::SimTime;
 
-/// Bit of SyncManager 0 in AL_EVENT (facts 3.5).
+/// Bit of SyncManager 0 in AL_EVENT (protocol 3.5).
 const SYNC_MANAGER_EVENT_SHIFT: u32 = 8;
 
 /// The bit of a SyncManager in AL_EVENT.

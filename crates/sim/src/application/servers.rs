@@ -1,4 +1,4 @@
-//! The protocol servers behind a device's mailbox, one per protocol that the SII announces (facts 6).
+//! The protocol servers behind a device's mailbox, one per protocol that the SII announces (protocol 6).
 //!
 //! In: a message's protocol and payload, the state, the rest of the application. Out: an answer. A protocol that is not
 //! announced, or that is not served in this state, gets the mailbox error "protocol not supported".

@@ -1,4 +1,4 @@
-//! Does the configuration that the MainDevice wrote suit the device? The checks of facts 5.2, codes of facts 5.5.
+//! Does the configuration that the MainDevice wrote suit the device? The checks of protocol 5.2, codes of protocol 5.5.
 //!
 //! In: SyncManager, watchdog and clock registers through the PDI, the description, the dictionary (whose PDO
 //! assignment decides the lengths). Out: the process data areas, or the AL status code of the refusal.
@@ -13,7 +13,7 @@ use crate::controller::Controller;
 use crate::description::DeviceDescription;
 use crate::time::SimTime;
 
-/// SyncManagers an application looks at; no controller has more (facts 3.1).
+/// SyncManagers an application looks at; no controller has more (protocol 3.1).
 pub const MAX_SYNC_MANAGERS: u8 = 16;
 /// First address of the process RAM; below it nothing is buffered.
 const RAM_START: u32 = 0x1000;

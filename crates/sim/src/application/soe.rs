@@ -1,4 +1,4 @@
-//! The SoE server of a device: drives with IDNs, elements in fragments, procedure commands (facts 6.6).
+//! The SoE server of a device: drives with IDNs, elements in fragments, procedure commands (protocol 6.6).
 //!
 //! In: the payload of a SoE message, the state, virtual time. Out: the answer, and notifications when a procedure
 //! command has ended. [`idn`] says what an IDN is.

@@ -1,4 +1,4 @@
-//! The EtherCAT state machine inside a SubDevice (facts 5.1, 5.3).
+//! The EtherCAT state machine inside a SubDevice (protocol 5.1, 5.3).
 //!
 //! In: AL control as the MainDevice wrote it, and the moments at which a transition is due. Out: what the
 //! application must do ([`Reaction`]) and what AL status and AL status code show. Whether the configuration suits
@@ -152,8 +152,9 @@ mod tests {
         StateMachine { state, ..StateMachine::default() }
     }
 
+    // covers: 5.1, sim-states
     #[test]
-    fn each_pair_of_states_begins_or_is_refused_as_facts_5_1_say() {
+    fn each_pair_of_states_begins_or_is_refused_as_the_state_machine_says() {
         for from in AlState::ALL {
             for to in AlState::ALL {
                 let mut machine = machine(from);

@@ -1,4 +1,4 @@
-//! From state to state: what an application checks before a transition and does at its end (facts 5.2).
+//! From state to state: what an application checks before a transition and does at its end (protocol 5.2).
 //!
 //! In: AL control, the moments at which transitions are due. Out: AL status, mailbox and process data switched on and
 //! off.
@@ -88,7 +88,7 @@ impl Application {
                 self.layout = layout;
                 Ok(())
             }
-            // SyncManagers for OP only have been switched on since (facts 4.4).
+            // SyncManagers for OP only have been switched on since (protocol 4.4).
             (AlState::SafeOp, AlState::Op) => {
                 let actual = settings::sync_managers(controller, now);
                 let ram_kib = controller.config().ram_kib;

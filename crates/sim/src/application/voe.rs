@@ -1,4 +1,4 @@
-//! The VoE server of a device: what comes goes back (facts 6.8).
+//! The VoE server of a device: what comes goes back (protocol 6.8).
 
 use ringcat_wire::mailbox::ErrorReply;
 use ringcat_wire::mailbox::voe::VoeMessage;

@@ -34,7 +34,7 @@ pub const fn sync_manager(start: u16, length: u16, control: u8, kind: SyncManage
     SyncManagerDescription { start, length, control, enable, kind }
 }
 
-/// SyncManagers of a device with mailbox: two mailboxes, outputs, inputs (facts 3.11).
+/// SyncManagers of a device with mailbox: two mailboxes, outputs, inputs (protocol 3.11).
 pub fn four_sync_managers(
     outputs: u16,
     outputs_control: u8,

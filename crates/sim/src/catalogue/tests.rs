@@ -46,6 +46,7 @@ fn sync_manager_lengths_are_those_of_the_assigned_pdos() {
     }
 }
 
+// covers: sim-devices
 #[test]
 fn a_description_comes_back_from_its_own_image() {
     for name in names() {

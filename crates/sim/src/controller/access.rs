@@ -1,8 +1,8 @@
-//! Reads and writes of address ranges by either side (facts 1.4, 2.5, 3.2, 3.8, 3.11).
+//! Reads and writes of address ranges by either side (protocol 1.4, 2.5, 3.2, 3.8, 3.11).
 //!
 //! In: a side, an address, bytes. Out: how many bytes were accessible; bytes that are not there or blocked change
-//! nothing (facts 1.4). EtherCAT's register writes and SyncManager accesses go into the [`super::pass::Pass`] and count
-//! at the end of the frame; RAM is written at once.
+//! nothing (protocol 1.4). EtherCAT's register writes and SyncManager accesses go into the [`super::pass::Pass`] and
+//! count at the end of the frame; RAM is written at once.
 
 use core::mem;
 
@@ -19,9 +19,9 @@ use super::sync_manager::Claim;
 const ADDRESS_END: u32 = 0x1_0000;
 /// First address at which a SyncManager can stand: digital outputs.
 const SYNC_MANAGER_AREA: u32 = map::DIGITAL_OUTPUTS.0 as u32;
-/// The register in which single bits can be written by FMMUs (facts 3.10).
+/// The register in which single bits can be written by FMMUs (protocol 3.10).
 const BITWISE: core::ops::Range<u32> = SYNC_MANAGER_AREA..SYNC_MANAGER_AREA + 4;
-/// Registers blocked while the SII interface is busy (facts 3.8).
+/// Registers blocked while the SII interface is busy (protocol 3.8).
 const SII_BLOCK: core::ops::Range<u32> = map::SII_CONTROL.0 as u32..map::SII_CONTROL.0 as u32 + 14;
 
 /// A part of an access: it ends at `until`, and its bytes lie at `address` where it is allowed.
@@ -181,7 +181,7 @@ impl Controller {
         fits.then_some(grant.address)
     }
 
-    /// Write protection (facts 3.2) and the state of the SII interface (facts 3.8).
+    /// Write protection (protocol 3.2) and the state of the SII interface (protocol 3.8).
     fn write_blocked(&self, side: Side, at: u32) -> bool {
         if SII_BLOCK.contains(&at) && !self.sii_writable(side) {
             return true;

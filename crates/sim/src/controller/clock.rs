@@ -1,4 +1,4 @@
-//! The local clock of distributed clocks and the receive-time latches (facts 3.12, 7.1, 7.2.1).
+//! The local clock of distributed clocks and the receive-time latches (protocol 3.12, 7.1, 7.2.1).
 //!
 //! In: virtual time, and the system times that EtherCAT writes. Out: local time, with the error of a free clock
 //! ([`oscillator`]) and steered by the control loop ([`control_loop`]), and which ports' receive times belong to a

@@ -1,4 +1,4 @@
-//! Registers of distributed clocks: what writing and reading them does (facts 3.12, 7.2.1, 7.3).
+//! Registers of distributed clocks: what writing and reading them does (protocol 3.12, 7.2.1, 7.3).
 
 use ringcat_wire::address::RegisterAddress;
 use ringcat_wire::register::{DcActivation, DcLatchControl, map};
@@ -159,7 +159,7 @@ impl Controller {
         self.sync_unit.wants_sync0() && self.sync0_pulses(now) == 0
     }
 
-    /// A buffer of a SyncManager was opened or handed over: the register keeps local time (facts 3.12).
+    /// A buffer of a SyncManager was opened or handed over: the register keeps local time (protocol 3.12).
     pub(super) fn note_buffer_event(&mut self, register: RegisterAddress, at: SimTime) {
         if self.config.features.dc {
             self.memory.set_u32(register, self.clock.local(at) as u32);

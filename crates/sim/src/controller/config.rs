@@ -8,7 +8,7 @@ use ringcat_wire::register::{Features, PortKind};
 
 use super::clock::ClockErrors;
 
-/// Most FMMUs and SyncManagers of a controller (facts 3.1).
+/// Most FMMUs and SyncManagers of a controller (protocol 3.1).
 pub const MAX_UNITS: u8 = 16;
 
 /// Hardware of a controller and its EEPROM.
@@ -47,11 +47,11 @@ pub struct ControllerConfig {
     /// The local clock when power comes.
     pub clock_start: u64,
     /// The controller has DC_LATCH_MODE (0x0936) and, while it is 0, does not latch the receive time of frames that
-    /// come in at another port than 0 before the processing unit has seen them (facts 3.12, 7.5).
+    /// come in at another port than 0 before the processing unit has seen them (protocol 3.12, 7.5).
     pub receive_time_latch_mode: bool,
     /// The controller does not tell frames apart when it latches receive times: a port has the time of the frame that
     /// came in there last when the latching one reaches the processing unit, or next where that has not come in yet
-    /// (facts 7.1).
+    /// (protocol 7.1).
     pub latches_any_frame: bool,
 }
 

@@ -1,4 +1,4 @@
-//! Error and lost-link counters (facts 2.5).
+//! Error and lost-link counters (protocol 2.5).
 //!
 //! In: damaged frames, PDI errors and writes. Out: counters that stay at 0xFF and are cleared in groups by any write of
 //! EtherCAT.

@@ -1,4 +1,4 @@
-//! Bits of the ECAT and AL event registers (facts 3.5).
+//! Bits of the ECAT and AL event registers (protocol 3.5).
 
 /// ECAT event: DL status changed; cleared by reading it.
 pub(super) const EVENT_DL_STATUS: u16 = 1 << 2;

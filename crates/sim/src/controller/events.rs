@@ -1,4 +1,4 @@
-//! ECAT and AL events, and the registers that mirror states: DL status and SyncManager status (facts 2.3, 3.5).
+//! ECAT and AL events, and the registers that mirror states: DL status and SyncManager status (protocol 2.3, 3.5).
 //!
 //! In: what happened. Out: registers 0x0110, 0x0210, 0x0220, 0x0805 + 8n, and the bits that the processing unit puts
 //! into the IRQ field of datagrams.
@@ -8,7 +8,7 @@ use ringcat_wire::register::{DlStatus, map};
 use super::Controller;
 use super::event_bits::{EVENT_DL_STATUS, EVENT_SYNC_MANAGER_ECAT, EVENT_SYNC_MANAGER_PDI, MIRRORED};
 
-/// Bits of ESC_CONFIGURATION that switch enhanced link detection on (facts 2.8).
+/// Bits of ESC_CONFIGURATION that switch enhanced link detection on (protocol 2.8).
 const ENHANCED_LINK_DETECTION: u8 = 0xF2;
 
 impl Controller {
@@ -28,7 +28,7 @@ impl Controller {
         }
     }
 
-    /// The bits for datagrams: pending and not masked (facts 1.2).
+    /// The bits for datagrams: pending and not masked (protocol 1.2).
     pub(super) fn refresh_irq(&mut self) {
         self.irq = self.memory.u16(map::ECAT_EVENT) & self.memory.u16(map::ECAT_EVENT_MASK);
     }
@@ -48,7 +48,7 @@ impl Controller {
         let status = DlStatus {
             pdi_operational: loaded,
             pdi_watchdog_ok: loaded && !self.pdi_watchdog.expired(),
-            // Active by default until the EEPROM is loaded (facts 2.8).
+            // Active by default until the EEPROM is loaded (protocol 2.8).
             enhanced_link_detection: !loaded || configuration & ENHANCED_LINK_DETECTION != 0,
             ports: self.ports.status(),
             reserved: 0,

@@ -1,4 +1,4 @@
-//! FMMUs: which logical bits are which physical bits (facts 3.10).
+//! FMMUs: which logical bits are which physical bits (protocol 3.10).
 //!
 //! In: the FMMU registers and the bit range of a datagram. Out: the pieces of that range that this controller maps, in
 //! one direction, the lower-numbered FMMU winning where several hit. Moving the bits is [`super::access`]'s.
@@ -147,7 +147,7 @@ mod tests {
 
     #[test]
     fn fourteen_bits_from_bit_3_end_with_bit_0_of_the_third_byte() {
-        // facts 3.10: the data sheet's example counts 5 + 8 + 1 bits.
+        // protocol 3.10: the data sheet's example counts 5 + 8 + 1 bits.
         let mut fmmus = Fmmus::default();
         fmmus.push(&fmmu(0x0001_0011, 3, (3, 0), 0x0F01, 1), false);
         let piece = fmmus.piece(0, Direction::Read, 0, u64::MAX).unwrap();

@@ -11,7 +11,7 @@ use ringcat_wire::command::Command;
 
 /// Accesses that are kept.
 const KEPT: usize = 64;
-/// Offset of the second byte of the source address, where a MainDevice keeps the number of a frame (facts 9.7.1).
+/// Offset of the second byte of the source address, where a MainDevice keeps the number of a frame (protocol 9.7.1).
 const FRAME_ID_AT: usize = 7;
 
 /// A logical datagram in which a SubDevice took part.

@@ -1,4 +1,4 @@
-//! The address space of a controller: its bytes, what exists where, and which side may write it (facts section 3).
+//! The address space of a controller: its bytes, what exists where, and which side may write it (protocol 3).
 //!
 //! In: addresses. Out: runs of addresses with equal rights, and little-endian access to the bytes. What a write causes
 //! is in [`super::registers`]; SyncManagers, protection and the SII interface restrict further in [`super::access`].
@@ -8,7 +8,7 @@ use ringcat_wire::register::map;
 
 use super::config::{ControllerConfig, MAX_UNITS};
 
-/// First address of user RAM: below it, writes take over with a good FCS only (facts 2.5).
+/// First address of user RAM: below it, writes take over with a good FCS only (protocol 2.5).
 pub(super) const USER_RAM: u32 = map::USER_RAM.0 as u32;
 /// First address of process RAM.
 pub(super) const PROCESS_RAM: u32 = map::PROCESS_RAM.0 as u32;
@@ -205,7 +205,7 @@ pub(super) struct Memory {
     dc: bool,
     dc_64bit: bool,
     latch_mode: bool,
-    /// Process RAM can be accessed: the SII is loaded (facts 3.13).
+    /// Process RAM can be accessed: the SII is loaded (protocol 3.13).
     pub process_ram_open: bool,
 }
 
@@ -345,7 +345,7 @@ impl Memory {
         self.set_array(address, value.to_le_bytes());
     }
 
-    /// Counts an 8-bit counter up to 0xFF (facts 2.5).
+    /// Counts an 8-bit counter up to 0xFF (protocol 2.5).
     pub fn count(&mut self, address: RegisterAddress) {
         self.set_u8(address, self.u8(address).saturating_add(1));
     }
@@ -362,7 +362,7 @@ impl Run {
     }
 }
 
-/// Rights inside the eight bytes of a SyncManager: EtherCAT writes +0..+4 and +6, the PDI +7 (facts 3.11).
+/// Rights inside the eight bytes of a SyncManager: EtherCAT writes +0..+4 and +6, the PDI +7 (protocol 3.11).
 fn sync_manager_run(run: &mut Run, address: u32, side: Side) {
     let base = address & !7;
     let (end, writable) = match (address & 7, side) {
@@ -397,7 +397,7 @@ mod tests {
 
     #[test]
     fn fmmus_and_sync_managers_end_with_their_count() {
-        // facts 3.1: an ET1200 has 3 FMMUs and 4 SyncManagers.
+        // protocol 3.1: an ET1200 has 3 FMMUs and 4 SyncManagers.
         let config = ControllerConfig { fmmu_count: 3, sync_manager_count: 4, ..ControllerConfig::default() };
         let memory = Memory::new(&config);
         assert_eq!(memory.run(0x0600, Side::Ecat), Run { end: 0x0630, exists: true, writable: true });
@@ -408,7 +408,7 @@ mod tests {
 
     #[test]
     fn a_32_bit_clock_has_only_the_low_halves() {
-        // facts 3.12.
+        // protocol 3.12.
         let mut config = ControllerConfig::default();
         config.features.dc_64bit = false;
         let memory = Memory::new(&config);

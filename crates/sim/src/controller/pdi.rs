@@ -1,4 +1,4 @@
-//! The local side of the controller, as the application sees it (facts 3.4, 3.5, 3.7, 3.11).
+//! The local side of the controller, as the application sees it (protocol 3.4, 3.5, 3.7, 3.11).
 //!
 //! In: reads and writes of the application. Out: bytes, under the rules of SyncManagers and the watchdog, and the
 //! events that reading and writing clears and raises.
@@ -33,7 +33,7 @@ impl Controller {
         self.powered && self.pdi_operational()
     }
 
-    /// Whether the EEPROM is loaded, so that PDI and process RAM are open (facts 3.13).
+    /// Whether the EEPROM is loaded, so that PDI and process RAM are open (protocol 3.13).
     pub fn pdi_operational(&self) -> bool {
         self.memory.process_ram_open
     }

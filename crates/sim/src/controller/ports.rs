@@ -1,4 +1,4 @@
-//! The four ports: links, loops, the order of travel, DL status (facts 2.1, 2.2, 2.3).
+//! The four ports: links, loops, the order of travel, DL status (protocol 2.1, 2.2, 2.3).
 //!
 //! In: link changes and loop modes. Out: which ports are open and the content of DL_STATUS. When a change raises an
 //! event or a counter is [`super::Controller`]'s matter.
@@ -21,8 +21,8 @@ pub(super) struct Ports {
     usable: [bool; 4],
     link: [bool; 4],
     open: [bool; 4],
-    /// The ports that frames pass, bit by bit: those that are open, and port 0 as the way back in when none is (facts
-    /// 2.2). At hand for every frame.
+    /// The ports that frames pass, bit by bit: those that are open, and port 0 as the way back in when none is
+    /// (protocol 2.2). At hand for every frame.
     passing: u8,
     modes: [LoopControl; 4],
     /// The frame that closed loops by writing DL_CONTROL, and the loops: it may still come back through them.
@@ -54,7 +54,7 @@ impl Ports {
         self.link[port.index()]
     }
 
-    /// Takes over a link state. Returns whether a lost link counts: it was open in mode Auto (facts 2.5).
+    /// Takes over a link state. Returns whether a lost link counts: it was open in mode Auto (protocol 2.5).
     pub fn set_link(&mut self, port: Port, up: bool) -> bool {
         let p = port.index();
         let lost = self.link[p] && !up && self.open[p] && self.modes[p] == LoopControl::Auto;
@@ -72,7 +72,7 @@ impl Ports {
         self.closing = frame.map(|frame| (frame, closed));
     }
 
-    /// Opens a port that has auto-closed and on which a valid frame came in (facts 2.2). Returns whether it did.
+    /// Opens a port that has auto-closed and on which a valid frame came in (protocol 2.2). Returns whether it did.
     pub fn reopen(&mut self, port: Port) -> bool {
         let p = port.index();
         let opens = !self.open[p] && self.link[p] && self.modes[p] == LoopControl::AutoClose;
@@ -113,7 +113,7 @@ impl Ports {
         !self.open[port.index()]
     }
 
-    /// Whether frames pass the port. Port 0 is the way back in when all loops are closed (facts 2.2).
+    /// Whether frames pass the port. Port 0 is the way back in when all loops are closed (protocol 2.2).
     pub fn passes(&self, port: Port) -> bool {
         self.passing & 1 << port.index() != 0
     }
@@ -133,7 +133,7 @@ impl Ports {
         self.closing.is_some_and(|(id, closed)| id == frame && closed[port.index()])
     }
 
-    /// Whether the circulating-frame rule holds: port 0 is closed, but not by force (facts 2.4).
+    /// Whether the circulating-frame rule holds: port 0 is closed, but not by force (protocol 2.4).
     pub fn breaks_circulation(&self) -> bool {
         matches!(self.modes[0], LoopControl::Auto | LoopControl::AutoClose) && !self.passes(Port::A)
     }

@@ -1,4 +1,4 @@
-//! The processing unit (EPU): what it does to a frame that passes (facts 1.4, 1.5, 2.4, 2.6).
+//! The processing unit (EPU): what it does to a frame that passes (protocol 1.4, 1.5, 2.4, 2.6).
 //!
 //! In: a frame and the times at which its first and last bit came in. Out: the frame with data, working counters, ADP,
 //! event bits and marks as the commands want it, or its destruction. The frame's FCS decides at the end whether
@@ -20,7 +20,7 @@ use super::pass::Pass;
 use crate::frame::{DatagramPlace, Fcs, FrameKind, SimFrame, UDP_CHECKSUM, is_udp};
 use crate::time::SimTime;
 
-/// Bit in the first byte of the source address that a processing unit sets (facts 2.6).
+/// Bit in the first byte of the source address that a processing unit sets (protocol 2.6).
 const PROCESSED: u8 = 0x02;
 /// Offset of the source address.
 const SOURCE: usize = 6;
@@ -65,7 +65,7 @@ impl Controller {
         true
     }
 
-    /// Sets the C bit in every datagram; `false` where one had it already or there is none to set (facts 2.4).
+    /// Sets the C bit in every datagram; `false` where one had it already or there is none to set (protocol 2.4).
     fn mark_circulating(&mut self, frame: &mut SimFrame) -> bool {
         let SimFrame { bytes, datagrams, .. } = frame;
         let field = |place: &DatagramPlace| usize::from(place.header) + LENGTH_HIGH;
@@ -153,7 +153,8 @@ impl Controller {
         }
     }
 
-    /// Whether a BWR or FPWR to this address latches the receive times: it writes the first byte of them (facts 3.12).
+    /// Whether a BWR or FPWR to this address latches the receive times: it writes the first byte of them (protocol
+    /// 3.12).
     fn latches(&self, at: u32, data: &[u8]) -> bool {
         let target = u32::from(map::DC_RECEIVE_TIME.0);
         at <= target && target < at + data.len() as u32 && self.config.features.dc

@@ -1,4 +1,4 @@
-//! What a write to registers does (facts 2.2, 2.5, 3).
+//! What a write to registers does (protocol 2.2, 2.5, 3).
 //!
 //! In: bytes that take over, from a frame with a good FCS or from the PDI. Out: the registers' new content and its
 //! consequences in the other parts of the controller.
@@ -15,9 +15,9 @@ use super::memory::Side;
 use crate::frame::Port;
 use crate::time::SimTime;
 
-/// How long temporary loop settings hold (facts 2.2).
+/// How long temporary loop settings hold (protocol 2.2).
 const TEMPORARY_LOOPS: Duration = Duration::from_secs(1);
-/// Bit 0 of ESC_CONFIGURATION: AL status follows AL control by itself (facts 3.4).
+/// Bit 0 of ESC_CONFIGURATION: AL status follows AL control by itself (protocol 3.4).
 const DEVICE_EMULATION: u8 = 0x01;
 /// Byte of DL_CONTROL with the loop settings.
 const DL_CONTROL_LOOPS: RegisterAddress = map::DL_CONTROL.offset(1);
@@ -84,7 +84,7 @@ impl Controller {
             0x01 => !(al_control_pending && block(map::AL_CONTROL, 2)),
             0x03 | 0x04 => !is_counter(address),
             0x05 => !block(map::SII_CONFIGURATION, 4),
-            // Start and length are writable only while the SyncManager is off (facts 3.11).
+            // Start and length are writable only while the SyncManager is off (protocol 3.11).
             0x08 => address & 7 > 3 || !self.sync_managers.enabled((address as usize & 0xFF) / SyncManager::LEN),
             0x09 => !block(map::DC_RECEIVE_TIME, 16) && !block(map::DC_SYSTEM_TIME, 8),
             _ => true,
@@ -166,7 +166,7 @@ impl Controller {
         self.memory.set_u16(map::WATCHDOG_STATUS, u16::from(self.process_data_watchdog.ok()));
     }
 
-    /// A complete write of a SyncManager with watchdog trigger (facts 3.7).
+    /// A complete write of a SyncManager with watchdog trigger (protocol 3.7).
     pub(super) fn trigger_process_data_watchdog(&mut self, now: SimTime) {
         self.process_data_watchdog.trigger(now);
         self.refresh_watchdog_status();
@@ -207,7 +207,8 @@ impl Controller {
         }
     }
 
-    /// Latches the receive times of the ports at which the frame has come in, and of the processing unit (facts 3.12).
+    /// Latches the receive times of the ports at which the frame has come in, and of the processing unit (protocol
+    /// 3.12).
     pub(super) fn latch_receive_times(&mut self, frame: u64, at_unit: SimTime) {
         let forwarding = !self.config.receive_time_latch_mode || self.memory.u8(map::DC_LATCH_MODE) & 1 != 0;
         for (port, at) in self.clock.latch(frame, at_unit, self.config.latches_any_frame) {

@@ -1,4 +1,4 @@
-//! Power and resets (facts 3.2, 4.7).
+//! Power and resets (protocol 3.2, 4.7).
 //!
 //! In: power, and the sequence R, E, S written to ESC_RESET_ECAT or ESC_RESET_PDI in three frames. Out: registers at
 //! their reset values and a first loading of the EEPROM. Frames between those of the sequence that do not write the

@@ -1,4 +1,4 @@
-//! The SII interface: commands to the EEPROM, who may give them, loading the configuration (facts 3.8, 4.7).
+//! The SII interface: commands to the EEPROM, who may give them, loading the configuration (protocol 3.8, 4.7).
 //!
 //! In: writes to 0x0500..0x050F and virtual time. Out: data, busy and error bits, and after loading the registers that
 //! come from the EEPROM. A command starts at the end of its frame and takes the configured time.
@@ -60,7 +60,7 @@ impl Controller {
         owner && !self.sii.is_busy()
     }
 
-    /// Write enable holds for one frame (facts 3.8).
+    /// Write enable holds for one frame (protocol 3.8).
     pub(super) fn clear_sii_write_enable(&mut self) {
         if self.sii.write_enabled {
             self.set_sii_write_enable(false);
@@ -213,7 +213,7 @@ impl Controller {
         }
     }
 
-    /// Takes over words 0 to 7, where their checksum is right. The alias counts only the first time (facts 2.7).
+    /// Takes over words 0 to 7, where their checksum is right. The alias counts only the first time (protocol 2.7).
     fn load_configuration(&mut self, first: bool) {
         let area =
             self.config.sii.get(..CONFIGURATION_AREA).and_then(|area| <[u8; CONFIGURATION_AREA]>::try_from(area).ok());

@@ -1,4 +1,4 @@
-//! SyncManagers: three buffers or a mailbox in front of a piece of RAM (facts 3.11).
+//! SyncManagers: three buffers or a mailbox in front of a piece of RAM (protocol 3.11).
 //!
 //! In: the register bytes of each SyncManager and accesses to its area. Out: whether an access is granted and to which
 //! bytes, and after complete accesses the status byte and events. An access by EtherCAT is complete only when its frame

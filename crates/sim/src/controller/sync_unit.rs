@@ -1,4 +1,4 @@
-//! SYNC and LATCH units (facts 3.12, 7.3).
+//! SYNC and LATCH units (protocol 3.12, 7.3).
 //!
 //! In: the registers as they are when DC_ACTIVATION is written, the system time. Out: when pulses come, whether a start
 //! time was plausible, the times that edges at the LATCH pins leave in the registers.
@@ -199,16 +199,18 @@ mod tests {
         unit
     }
 
+    // covers: 7.3
     #[test]
-    fn pulses_begin_at_the_start_time_and_follow_the_cycle_facts_7_3() {
+    fn pulses_begin_at_the_start_time_and_follow_the_cycle() {
         let unit = started(10_000, 5_000, true, BOTH);
         assert_eq!((unit.pulses(9_999), unit.pulses(10_000), unit.pulses(12_500)), (0, 1, 3));
         assert_eq!((unit.next_sync0(5_000), unit.next_sync0(10_001)), (Some(10_000), Some(11_000)));
         assert_eq!((unit.next_sync1(5_000), unit.next_sync1(10_301)), (Some(10_300), Some(11_300)));
     }
 
+    // covers: 3.12
     #[test]
-    fn a_signal_stays_until_it_is_acknowledged_facts_3_12() {
+    fn a_signal_stays_until_it_is_acknowledged() {
         let mut unit = started(10_000, 5_000, true, BOTH);
         assert!(!unit.is_active(0, 9_999) && unit.is_active(0, 10_000) && !unit.is_active(1, 10_299));
         unit.acknowledge(0, 10_200);
@@ -222,15 +224,17 @@ mod tests {
         assert!(pulsing.pulses(12_000) == 3 && !pulsing.is_active(0, 12_000));
     }
 
+    // covers: 7.3
     #[test]
-    fn a_start_in_the_past_never_comes_or_comes_after_the_wrap_facts_7_3() {
+    fn a_start_in_the_past_never_comes_or_comes_after_the_wrap() {
         assert_eq!(started(4_999, 5_000, true, BOTH).next_sync0(5_000), None);
         let narrow = started(4_999, 0x7_0000_1388, false, BOTH);
         assert_eq!(narrow.next_sync0(0x7_0000_1388), Some(0x8_0000_1387));
     }
 
+    // covers: 7.3, sim-clocks
     #[test]
-    fn an_implausible_start_is_refused_where_that_is_asked_for_facts_7_3() {
+    fn an_implausible_start_is_refused_where_that_is_asked_for() {
         let checked = DcActivation { start_plausibility: true, ..BOTH };
         let past = started(4_999, 5_000, true, checked);
         assert!(past.status().start_implausible && past.next_sync0(5_000).is_none());
@@ -239,8 +243,9 @@ mod tests {
         assert!(started(4_999 + (1 << 31), 5_000, true, near).status().sync0_pending);
     }
 
+    // covers: 7.3
     #[test]
-    fn sync1_with_a_longer_time_divides_sync0_facts_7_3() {
+    fn sync1_with_a_longer_time_divides_sync0() {
         let mut unit = SyncUnit::default();
         let settings = SyncSettings {
             start: 10_000,

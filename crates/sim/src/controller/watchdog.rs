@@ -1,4 +1,4 @@
-//! The process data and the PDI watchdog (facts 3.7).
+//! The process data and the PDI watchdog (protocol 3.7).
 //!
 //! In: triggers and the times in the registers. Out: states and the next expiry. Counters and events are
 //! [`super::Controller`]'s.
@@ -81,7 +81,7 @@ mod tests {
 
     #[test]
     fn the_reset_values_make_100_ms() {
-        // facts 3.7: (0x09C2 + 2) x 40 ns = 100 us, times 1000.
+        // protocol 3.7: (0x09C2 + 2) x 40 ns = 100 us, times 1000.
         let mut watchdog = Watchdog::new();
         watchdog.configure(0x09C2, 0x03E8);
         watchdog.trigger(SimTime(0));

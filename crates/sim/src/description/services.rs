@@ -1,5 +1,5 @@
-//! What stands behind the mailbox of a device beside its objects (facts 6.4 to 6.8). Which protocols there are at all
-//! says the SII.
+//! What stands behind the mailbox of a device beside its objects (protocol 6.4 to 6.8). Which protocols there are at
+//! all says the SII.
 
 use core::net::Ipv4Addr;
 use core::time::Duration;

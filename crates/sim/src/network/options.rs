@@ -28,7 +28,7 @@ pub struct NetworkOptions {
     /// Where random choices start from (the bit that a fault corrupts).
     pub seed: u64,
     /// From the loss of a signal to the moment the ends notice. Default 10 us (fast detection as DS1 demands it,
-    /// facts 2.8); plain PHYs take hundreds of milliseconds.
+    /// protocol 2.8); plain PHYs take hundreds of milliseconds.
     pub link_down_delay: Duration,
     /// From the return of a signal to the moment the ends notice. Default 10 us.
     pub link_up_delay: Duration,

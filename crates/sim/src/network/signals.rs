@@ -9,7 +9,7 @@ use crate::frame::Port;
 use crate::queue::Lane;
 use crate::time::SimTime;
 
-/// The order in which a frame travels through a controller (facts 2.1), as the successor of each port.
+/// The order in which a frame travels through a controller (protocol 2.1), as the successor of each port.
 const NEXT_PORT: [usize; 4] = [3, 2, 0, 1];
 
 impl Node {

@@ -22,13 +22,13 @@ pub enum LossCause {
     OpenPort,
     /// It reached a port or interface that had not detected the link yet.
     NoLink,
-    /// A port on its way opened or closed while it passed (facts 2.2: a running frame may be cut).
+    /// A port on its way opened or closed while it passed (protocol 2.2: a running frame may be cut).
     LoopChanged,
     /// The direction was blocked by a fault.
     Blocked,
     /// It was dropped by a fault.
     Dropped,
-    /// A controller destroyed it: closed port, circulating frame or forwarding rule (facts 2.2, 2.4, 2.6).
+    /// A controller destroyed it: closed port, circulating frame or forwarding rule (protocol 2.2, 2.4, 2.6).
     Destroyed,
     /// It came back with a wrong check sequence.
     BadCheckSequence,

@@ -54,7 +54,7 @@ pub(super) fn describe(
             description.name = if count > 1 { format!("{name}-{}", copy + 1) } else { name.clone() };
             check_name(&description.name, &plan)
                 .map_err(|message| error(message, entry.name.as_ref().map_or(here, |name| line(text, &name.span()))))?;
-            // Clocks that were switched on at different times (facts 11.3).
+            // Clocks that were switched on at different times (protocol 11.3).
             let start = random.next() >> 16;
             description.clock_start_ns = entry.clock_start_ns.unwrap_or(start);
             // No two devices share a MAC address.

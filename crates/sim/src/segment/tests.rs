@@ -65,6 +65,7 @@ fn devices_are_attached_one_behind_the_other_and_the_last_closes_the_ring() {
     assert!(Network::from_description(segment).is_ok());
 }
 
+// covers: sim-files
 #[test]
 fn branches_crossed_devices_and_listed_cables_are_plugged_in() {
     let segment = read(
@@ -196,6 +197,7 @@ const REFUSED: &[(&str, &str)] = &[
     ),
 ];
 
+// covers: sim-files
 #[test]
 fn errors_name_line_and_device() {
     let known = crate::catalogue::names().collect::<Vec<_>>().join(", ");
@@ -247,6 +249,7 @@ fn a_file_that_is_missing_is_named() {
     assert!(error.to_string().starts_with("nowhere/none.toml: cannot be read"));
 }
 
+// covers: sim-files
 #[test]
 fn the_example_segments_of_this_crate_can_be_made() {
     let directory = Path::new(env!("CARGO_MANIFEST_DIR")).join("segments");
@@ -293,6 +296,7 @@ mod any_text {
     }
 }
 
+// covers: sim-files
 #[test]
 fn mailbox_keys_change_sizes_times_and_what_stands_behind() {
     let segment = read(
@@ -328,6 +332,7 @@ fn mailbox_keys_change_sizes_times_and_what_stands_behind() {
     assert_eq!(servo, [0x1000, 0x1040, 0x1080, 0x1180]);
 }
 
+// covers: sim-files
 #[test]
 fn mailbox_keys_that_make_no_sense_are_refused_with_what_would() {
     let key = |key: &str| refused(&format!("[[device]]\ntype = \"all-protocols\"\n{key}\n"));
@@ -347,6 +352,7 @@ fn mailbox_keys_that_make_no_sense_are_refused_with_what_would() {
     assert!(without.contains("only for a device of the catalogue with a mailbox"), "{without}");
 }
 
+// covers: sim-files
 #[test]
 fn files_come_from_beside_the_segment_file() {
     let text = "[[device]]\ntype = \"soe-drive\"\nfiles = [\"demo.toml\"]\n";
@@ -356,6 +362,7 @@ fn files_come_from_beside_the_segment_file() {
     assert_eq!((name.as_str(), data), ("demo.toml", &std::fs::read(beside.join("demo.toml")).unwrap()));
 }
 
+// covers: sim-clocks
 #[test]
 fn what_is_not_ideal_about_a_clock_is_written_in_the_file() {
     let text = r#"
@@ -380,6 +387,7 @@ fn what_is_not_ideal_about_a_clock_is_written_in_the_file() {
     assert!(read("[[device]]\ntype = \"servo\"\nclock_bits = 0").unwrap().devices[0].dc.is_none());
 }
 
+// covers: sim-faults
 #[test]
 fn how_many_datagrams_a_frame_may_hold_is_written_in_the_file() {
     let limit = |keys: &str| {

@@ -16,7 +16,7 @@ use crate::description::{
 
 /// Time from a request to its answer for devices whose real one is not known.
 const RESPONSE_TIME: Duration = Duration::from_micros(200);
-/// A mailbox holds the header of a message (facts 6.1).
+/// A mailbox holds the header of a message (protocol 6.1).
 const SMALLEST_MAILBOX: u16 = 6;
 /// Bytes of an entry where an object with an entry per byte would have too many.
 const CHUNK: u16 = 31;
@@ -209,7 +209,7 @@ fn clock(sii: &Sii<'_>) -> Option<DcDescription> {
     (!modes.is_empty()).then_some(DcDescription { wide: true, modes, minimum_cycle_ns: 0 })
 }
 
-/// An image with a mailbox but without entries for its SyncManagers: 0 and 1 are meant (facts 3.11).
+/// An image with a mailbox but without entries for its SyncManagers: 0 and 1 are meant (protocol 3.11).
 fn fill_mailbox_managers(description: &mut DeviceDescription) {
     let Some(mailbox) = description.mailbox else {
         return;

@@ -10,7 +10,7 @@ fn the_image_of_a_coupler_has_these_bytes_in_front() {
     let mut description = catalogue::by_name("coupler").unwrap();
     description.alias = 0x1234;
     let image = build(&description);
-    // PDI none, device emulation, alias; the checksum is that of facts 4.1.
+    // PDI none, device emulation, alias; the checksum is that of protocol 4.1.
     assert_eq!(image[..10], [0x00, 0x01, 0, 0, 0, 0, 0, 0, 0x34, 0x12]);
     assert_eq!(image[14], ringcat_wire::sii::checksum(image.first_chunk().unwrap()));
     assert_eq!(image[0x7C..0x80], [0x01, 0x00, 0x01, 0x00], "2 KBit, version 1");
@@ -107,6 +107,7 @@ proptest! {
         prop_assert_eq!(again.pdos, description.pdos);
     }
 
+    // covers: robust
     #[test]
     fn any_image_makes_a_device_or_an_error(
         mut image in prop::collection::vec(any::<u8>(), 128..700),

@@ -83,12 +83,14 @@ fn exchange(network: &mut Network, frames: &[Vec<u8>]) -> Vec<usize> {
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(60))]
 
+    // covers: robust
     #[test]
     fn any_bytes_are_survived(frames in prop::collection::vec(prop::collection::vec(any::<u8>(), 0..200), 1..6)) {
         let mut network = everything();
         exchange(&mut network, &frames);
     }
 
+    // covers: robust
     #[test]
     fn any_datagrams_are_survived(
         frames in prop::collection::vec(prop::collection::vec(datagram(), 1..6), 1..12),

@@ -1,4 +1,4 @@
-//! Receive times across a tree: the numeric vector of facts 7.1.
+//! Receive times across a tree: the numeric vector of protocol 7.1.
 
 use core::time::Duration;
 
@@ -16,7 +16,7 @@ use ringcat_wire::time::DcTime32;
 
 use crate::wiring::{SETTLE, command, endpoint};
 
-/// The tree of facts 7.1: every pass takes 300 ns, each cable what is written behind it.
+/// The tree of protocol 7.1: every pass takes 300 ns, each cable what is written behind it.
 const CABLES: [(&str, &str, u64); 7] = [
     ("main", "1.0", 50),
     ("1.1", "2.0", 100),
@@ -69,11 +69,13 @@ fn check(network: &mut Network) {
 const EXPECTED: [(usize, u16, i32); 6] =
     [(1, 1, 3_880), (1, 2, 4_880), (2, 3, 1_460), (2, 1, 3_080), (5, 1, 720), (3, 1, 780)];
 
+// covers: sim-clocks
 #[test]
 fn receive_times_are_those_of_the_model() {
     check(&mut tree(|_| 0));
 }
 
+// covers: sim-clocks
 #[test]
 fn receive_times_survive_clocks_that_wrap_between_two_ports() {
     // The first bit reaches devices 2 and 3 this long after the start.

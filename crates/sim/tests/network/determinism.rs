@@ -59,6 +59,7 @@ fn run(seed: u64) -> u64 {
     hash
 }
 
+// covers: determinism
 #[test]
 fn the_same_seed_gives_the_same_run() {
     let first = run(7);
@@ -66,6 +67,7 @@ fn the_same_seed_gives_the_same_run() {
     assert_eq!(first, run(7));
 }
 
+// covers: determinism
 #[test]
 fn steps_of_any_size_give_the_same_run() {
     let times = |step_ns: u64| {

@@ -42,6 +42,7 @@ fn dropped_frames_are_counted_per_direction() {
     assert_eq!(network.statistics().lost(LossCause::Dropped), 4);
 }
 
+// covers: sim-faults
 #[test]
 fn a_doubled_frame_comes_back_twice_one_wire_time_apart() {
     let mut network = segment(&ring(2));
@@ -69,7 +70,7 @@ fn a_corrupted_frame_is_counted_by_the_controllers_and_refused_by_the_interface(
     assert_eq!(met(&mut network, Main), Some(vec![1, 2, 3]));
 }
 
-// covers: facts 2.5
+// covers: 2.5, sim-counters
 #[test]
 fn symbol_errors_are_counted_where_they_arrive_and_hurt_only_the_frames_they_are_in() {
     let mut network = segment(&ring(3));
@@ -97,6 +98,7 @@ fn symbol_errors_are_counted_where_they_arrive_and_hurt_only_the_frames_they_are
     assert_eq!((counted(&network, 0), counted(&network, 1)), (vec![0; 8], vec![0; 8]));
 }
 
+// covers: sim-faults
 #[test]
 fn a_corrupted_write_changes_no_register() {
     let mut network = segment("main-1.0");
@@ -113,6 +115,7 @@ fn a_corrupted_write_changes_no_register() {
     assert_eq!(address(&network), [0x34, 0x12]);
 }
 
+// covers: sim-faults
 #[test]
 fn a_delayed_frame_is_overtaken() {
     let mut network = segment(&ring(2));
@@ -128,6 +131,7 @@ fn a_delayed_frame_is_overtaken() {
     assert!(two.at - start > MILLISECOND && two.at - start < MILLISECOND + Duration::from_micros(20));
 }
 
+// covers: sim-faults
 #[test]
 fn a_cable_that_works_one_way_keeps_its_links() {
     let mut network = segment(&ring(2));
@@ -140,6 +144,7 @@ fn a_cable_that_works_one_way_keeps_its_links() {
     assert_eq!(travel(&mut network, Main), journey(Redundant, &[1, 2], 0x02, false));
 }
 
+// covers: sim-faults
 #[test]
 fn a_device_without_power_breaks_the_ring_at_both_its_ports_and_comes_back_reset() {
     let mut network = segment(&ring(3));
@@ -211,6 +216,7 @@ fn a_hung_application_answers_when_it_goes_on() {
     assert_eq!(al_status(&network), (0x02, 0));
 }
 
+// covers: sim-faults
 #[test]
 fn a_corrupted_eeprom_is_not_loaded_after_the_next_power_cycle() {
     let mut network = segment("main-1.0");

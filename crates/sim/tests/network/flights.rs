@@ -221,6 +221,7 @@ fn lives() -> impl Strategy<Value = (Vec<usize>, bool, Vec<Deed>)> {
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(150))]
 
+    // covers: sim-interfaces
     #[test]
     fn flights_and_hops_are_told_apart_by_nothing((kinds, ring, deeds) in lives()) {
         let mut flights = segment(&kinds, ring, true);

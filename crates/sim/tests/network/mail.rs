@@ -68,8 +68,9 @@ fn answers(mail: Option<Vec<u8>>) -> bool {
     mail.is_some_and(|mail| matches!(SdoResponse::decode(&mail), Ok(SdoResponse::UploadExpedited { data: [4], .. })))
 }
 
+// covers: 6.1, sim-mail-faults
 #[test]
-fn mail_goes_wrong_at_a_time_in_a_segment_facts_6_1() {
+fn mail_goes_wrong_at_a_time_in_a_segment() {
     let mut network = ready();
     assert_eq!(ask(&mut network, 1), 1);
     assert!(answers(fetch(&mut network)));
@@ -87,8 +88,9 @@ fn mail_goes_wrong_at_a_time_in_a_segment_facts_6_1() {
     assert!(fetch(&mut network).is_none());
 }
 
+// covers: 6.3, sim-mailbox
 #[test]
-fn an_emergency_needs_no_frame_to_wait_in_the_mailbox_facts_6_3() {
+fn an_emergency_needs_no_frame_to_wait_in_the_mailbox() {
     let mut network = ready();
     let emergency = Emergency { error_code: 0x7500, error_register: 1, data: [0; 5] };
     assert!(network.device_mut(SERVO).application.emergency(&emergency));

@@ -1,5 +1,5 @@
 //! The network of the simulator, driven through its public API: what way frames take, when they arrive, what faults do
-//! to them (facts 2, 9.4, 11.3; issue 2, part 3).
+//! to them (protocol 2, 9.4, 11.3; issue 2, part 3).
 
 mod any_frames;
 mod clocks;

@@ -80,6 +80,7 @@ fn outputs_written_by_frames_reach_the_terminal() {
     }
 }
 
+// covers: sim-controller
 #[test]
 fn without_frames_the_watchdog_takes_the_terminal_to_safeop_after_100_ms() {
     let mut network = operational();
@@ -140,6 +141,7 @@ fn a_cut_ring_keeps_the_terminal_in_op() {
     assert_eq!(network.device(TERMINAL).outputs(), [199]);
 }
 
+// covers: sim-faults
 #[test]
 fn an_interface_pads_short_frames_so_that_their_writes_count() {
     // APWR 0x1234 to the station address of position 1; some MainDevices leave the padding to the interface, and

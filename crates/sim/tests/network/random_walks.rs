@@ -1,4 +1,4 @@
-//! Random trees, rings and junction rings with random cuts against an independent walk of ports (facts 11.3).
+//! Random trees, rings and junction rings with random cuts against an independent walk of ports (protocol 11.3).
 
 use std::collections::BTreeMap;
 
@@ -121,6 +121,7 @@ fn agree(cables: &[(Plug, Plug)], changes: &[Vec<usize>]) -> Result<(), TestCase
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(400))]
 
+    // covers: sim-frames
     #[test]
     fn frames_take_the_way_of_the_model(
         cables in cables(),
@@ -133,6 +134,7 @@ proptest! {
         agree(&cables, &changes)?;
     }
 
+    // covers: sim-frames
     #[test]
     fn in_a_straight_ring_a_single_break_hides_nobody(count in 1usize..40, cut in any::<prop::sample::Index>()) {
         let mut cables: Vec<(Plug, Plug)> = vec![((0, 0), (1, 0))];

@@ -53,6 +53,7 @@ fn read_sii(network: &mut Network, word: u32) -> Vec<u8> {
     exchange(network, Command::Aprd, map::SII_DATA, &[0; READ]).0
 }
 
+// covers: sim-files
 #[test]
 fn a_device_from_a_real_image_shows_this_image_on_the_wire() {
     let Some((directory, names)) = images() else { return };

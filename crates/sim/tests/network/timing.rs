@@ -1,4 +1,4 @@
-//! When frames arrive, when links are noticed, and what a cut catches under way (facts 1.3, 2.2, 11.4).
+//! When frames arrive, when links are noticed, and what a cut catches under way (protocol 1.3, 2.2, 11.4).
 
 use core::time::Duration;
 
@@ -30,6 +30,7 @@ fn arrivals(network: &mut Network, link: HostLink, since: SimTime) -> Vec<u64> {
     std::iter::from_fn(|| network.receive(link)).map(|received| (received.at - since).as_nanos() as u64).collect()
 }
 
+// covers: sim-faults
 #[test]
 fn a_frame_needs_its_wire_time_the_hops_and_the_cables() {
     let mut network = segment_with("main-1.0 1.1-2.0", options());
@@ -44,6 +45,7 @@ fn a_frame_needs_its_wire_time_the_hops_and_the_cables() {
     assert_eq!(arrivals(&mut network, Main, start), [expected]);
 }
 
+// covers: sim-faults
 #[test]
 fn frames_sent_at_once_leave_one_behind_the_other() {
     let mut network = segment(&ring(3));
@@ -55,7 +57,7 @@ fn frames_sent_at_once_leave_one_behind_the_other() {
     }
     network.advance_by(SETTLE);
     let times = arrivals(&mut network, Redundant, start);
-    // facts 1.3: 60 + 24 byte times to the next frame, 1514 + 12 of the long one, 12 of gap, 72 of the last.
+    // protocol 1.3: 60 + 24 byte times to the next frame, 1514 + 12 of the long one, 12 of gap, 72 of the last.
     assert_eq!(times[1] - times[0], (84 + 1_526 - 72) * 80);
     assert_eq!(times[2] - times[1], (12 + 72) * 80);
 }
@@ -92,6 +94,7 @@ fn frames_that_nobody_fetches_fill_a_bounded_queue() {
     assert_eq!(network.statistics().link(Redundant).frames_received, 2);
 }
 
+// covers: sim-faults
 #[test]
 fn both_ends_notice_a_cut_and_a_heal_after_their_delays() {
     let options =
@@ -173,12 +176,13 @@ fn a_cut_before_the_frame_enters_the_cable_leaves_no_trace_behind_it() {
     assert_eq!(network.statistics().lost(LossCause::DeadCable), 1);
 }
 
+// covers: sim-faults
 #[test]
 fn a_cut_while_the_frame_is_in_the_cable_leaves_a_damaged_rest() {
     let mut network = cut_under_way(3_000);
     assert_eq!(network.receive(Redundant), None);
     assert_eq!(network.statistics().lost(LossCause::BadCheckSequence), 1);
-    // facts 2.5: the first controller counts it as invalid, the others as forwarded.
+    // protocol 2.5: the first controller counts it as invalid, the others as forwarded.
     let counters: Vec<_> = (0..4).map(|device| invalid_and_forwarded(&network, device)).collect();
     assert_eq!(counters, [(0, 0), (1, 0), (0, 1), (0, 1)]);
 }
@@ -249,6 +253,7 @@ fn an_interface_without_carrier_sends_nothing() {
     assert!(!network.carrier(Redundant));
 }
 
+// covers: sim-interfaces
 #[test]
 fn time_leaps_to_the_moment_the_last_frame_has_left_and_not_beyond() {
     let mut leaping = segment(&ring(3));
@@ -268,6 +273,7 @@ fn time_leaps_to_the_moment_the_last_frame_has_left_and_not_beyond() {
     assert_eq!(leaping.now(), start + ns(expected[1]));
 }
 
+// covers: sim-interfaces
 #[test]
 fn a_leap_ends_at_its_limit_and_the_next_one_goes_on() {
     let mut network = segment(&ring(3));
@@ -280,8 +286,9 @@ fn a_leap_ends_at_its_limit_and_the_next_one_goes_on() {
     assert_eq!(arrivals(&mut network, Redundant, start).len(), 1);
 }
 
+// covers: sim-interfaces
 #[test]
-fn devices_react_to_what_passed_in_a_leap_when_they_are_told_to_or_before_the_next_frame() {
+fn devices_react_to_what_passed_in_a_leap_on_demand_or_before_the_next_frame() {
     let request = |state: u8| command(Command::Bwr, Target::Broadcast(map::AL_CONTROL), &[state, 0]);
     let status = |network: &Network| network.device(DeviceIndex(0)).al_status();
     let mut network = segment(&ring(2));

@@ -1,4 +1,4 @@
-//! The ring, break and branch vectors of facts 2.9 and the junction geometry of facts 9.4, literally.
+//! The ring, break and branch vectors of protocol 2.9 and the junction geometry of protocol 9.4, literally.
 
 use ringcat_sim::cable::HostLink::{Main, Redundant};
 
@@ -15,7 +15,7 @@ fn copies(cables: &str, cuts: &[&str]) -> [Option<Journey>; 2] {
     [travel(&mut network, Main), travel(&mut network, Redundant)]
 }
 
-// Facts CR-02.
+// covers: CR-02, CR-03, sim-frames
 #[test]
 fn an_intact_ring_is_processed_once_and_crossed_once() {
     let [main, red] = copies(RING, &[]);
@@ -58,6 +58,7 @@ fn a_branch_on_port_3_is_served_by_the_main_copy() {
     assert_eq!(red, journey(Main, &[], 0x08, false));
 }
 
+// covers: sim-frames
 #[test]
 fn a_branch_on_port_2_is_served_by_the_red_copy() {
     let branched = format!("{RING} 2.2-5.0");
@@ -72,6 +73,7 @@ fn a_branch_on_port_2_is_served_by_the_red_copy() {
     assert_eq!(red, journey(Redundant, &[5, 2, 3, 4], 0x0A, true));
 }
 
+// covers: sim-frames
 #[test]
 fn a_device_cabled_backwards_is_served_by_the_red_copy() {
     let crossed = "main-1.0 1.1-2.0 2.1-3.1 3.0-4.0 4.1-red";
@@ -89,7 +91,7 @@ fn a_line_that_ends_in_an_unconnected_port_0_sets_the_c_bit() {
     assert_eq!(main, journey(Main, &[1, 3, 2], 0x02, true));
 }
 
-// Facts CR-03.
+// covers: CR-02, CR-03, sim-frames
 #[test]
 fn every_single_break_shares_the_devices_among_the_copies() {
     for count in [1, 2, 5, 16] {
@@ -144,9 +146,10 @@ fn a_local_ring_from_a_later_to_an_earlier_port_runs_backwards_until_it_breaks()
     }
 }
 
+// covers: sim-frames
 #[test]
 fn a_second_broken_local_ring_loses_every_frame() {
-    // facts 9.4, JR-02: two junctions (1 and 2), each with a ring of two from port 1 to port 2.
+    // protocol 9.4, JR-02: two junctions (1 and 2), each with a ring of two from port 1 to port 2.
     let cables = "main-1.0 1.1-3.0 3.1-4.0 4.1-1.2 1.3-2.0 2.1-5.0 5.1-6.0 6.1-2.2";
     let intact = copies(cables, &[])[0].clone();
     assert_eq!(intact, journey(Main, &[1, 2, 5, 6, 3, 4], 0x02, false));

@@ -91,7 +91,7 @@ pub struct Journey {
     pub back_on: HostLink,
     /// Aliases of the devices in the order in which their processing units were met.
     pub met: Vec<u16>,
-    /// First byte of its source address: 0x08 sent on the redundant link, 0x02 processed (facts 9.7.1).
+    /// First byte of its source address: 0x08 sent on the redundant link, 0x02 processed (protocol 9.7.1).
     pub flags: u8,
     /// Its C bit.
     pub circulating: bool,

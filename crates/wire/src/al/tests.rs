@@ -19,8 +19,9 @@ fn a_nibble_that_is_no_state_has_no_state() {
     }
 }
 
+// covers: 5.1, codec-registers
 #[test]
-fn the_transition_table_is_that_of_facts_5_1() {
+fn the_transition_table_is_complete() {
     use AlState::*;
     //         to: Init  PreOp  Boot   SafeOp Op
     let table = [
@@ -37,28 +38,31 @@ fn the_transition_table_is_that_of_facts_5_1() {
     }
 }
 
+// covers: codec-registers
 #[test]
 fn al_control_vectors() {
     assert_eq!(AlControl::new(AlState::Op).encode(), [0x08, 0x00]);
-    // facts 5.6: INIT with acknowledge.
+    // protocol 5.6: INIT with acknowledge.
     assert_eq!(AlControl::with_acknowledge(AlState::Init).encode(), [0x11, 0x00]);
     let identification = AlControl { identification: true, ..AlControl::new(AlState::PreOp) };
     assert_eq!(identification.encode(), [0x22, 0x00]);
     assert_eq!(AlControl::decode(&[0x22, 0x00]), identification);
 }
 
+// covers: codec-registers
 #[test]
 fn al_status_vectors() {
     assert_eq!(AlStatus::decode(&[0x14, 0x00]), AlStatus::with_error(AlState::SafeOp));
     assert_eq!(AlStatus::new(AlState::Op).encode(), [0x08, 0x00]);
     assert_eq!(AlStatus::from_bits(0x0014).to_string(), "SAFEOP+ERROR");
-    // facts 5.3: a broadcast read ORs SAFEOP and OP.
+    // protocol 5.3: a broadcast read ORs SAFEOP and OP.
     assert_eq!(AlStatus::from_bits(0x000C).al_state(), None);
     assert_eq!(AlStatus::from_bits(0x000C).to_string(), "state 0xc");
 }
 
+// covers: 5.5, codec-registers
 #[test]
-fn al_status_codes_have_the_numbers_of_facts_5_5() {
+fn al_status_codes_have_their_numbers() {
     let numbers: Vec<u16> = AlStatusCode::ALL.iter().map(|c| c.0).collect();
     let expected = [
         0x0000, 0x0001, 0x0002, 0x0003, 0x0004, 0x0006, 0x0007, 0x000E, 0x0011, 0x0012, 0x0013, 0x0014, 0x0015, 0x0016,

@@ -18,6 +18,7 @@ fn brd_al_status() -> ([u8; MIN_FRAME], usize) {
     (buffer, length)
 }
 
+// covers: 1.1, 1.2, codec-frames
 #[test]
 fn a_broadcast_read_of_al_status_has_these_bytes() {
     let mut expected = vec![
@@ -29,9 +30,10 @@ fn a_broadcast_read_of_al_status_has_these_bytes() {
     assert_eq!(&buffer[..length], &expected[..]);
 }
 
+// covers: 1.3, codec-frames
 #[test]
-fn lengths_are_those_of_the_seed_traces() {
-    // facts 1.3, check values: n commands / sum of data -> frame length without FCS.
+fn lengths_are_those_of_the_printed_traces() {
+    // protocol 1.3, check values: n commands / sum of data -> frame length without FCS.
     assert_eq!(frame_len([59, 0, 0, 0, 0, 0, 0, 0]), 171);
     assert_eq!(frame_len([74, 0, 0, 0, 0, 0, 0]), 174);
     assert_eq!(frame_len([65, 1409]), 1514);
@@ -40,11 +42,13 @@ fn lengths_are_those_of_the_seed_traces() {
     assert_eq!(frame_len([2]), 60);
 }
 
+// covers: 1.3, codec-frames
 #[test]
 fn a_full_frame_takes_123_microseconds() {
     assert_eq!(wire_time_ns(MAX_FRAME), 123_040);
 }
 
+// covers: 1.3, codec-frames
 #[test]
 fn one_datagram_carries_1486_bytes_and_not_one_more() {
     let mut buffer = [0; MAX_FRAME];
@@ -57,6 +61,7 @@ fn one_datagram_carries_1486_bytes_and_not_one_more() {
     assert_eq!(builder.finish(), MAX_FRAME);
 }
 
+// covers: 1.3, codec-frames
 #[test]
 fn a_vlan_tag_is_read_and_kept() {
     let mut buffer = [0; 100];
@@ -70,6 +75,7 @@ fn a_vlan_tag_is_read_and_kept() {
     assert_eq!(frame.datagrams().count(), 1);
 }
 
+// covers: 1.3, codec-frames
 #[test]
 fn ethercat_in_udp_is_read_and_kept() {
     let mut headers = [0; 28];
@@ -88,6 +94,7 @@ fn ethercat_in_udp_is_read_and_kept() {
     assert_eq!(Frame::parse(&buffer[..length]), Err(FrameError::NotEthercatUdp));
 }
 
+// covers: codec-frames
 #[test]
 fn errors_say_what_was_expected_and_what_came() {
     let (mut buffer, length) = brd_al_status();
@@ -120,6 +127,7 @@ fn padding_that_the_header_counts_in_is_surplus_and_kept() {
     assert_eq!(again, buffer);
 }
 
+// covers: 1.1, codec-frames
 #[test]
 fn other_ethercat_types_are_kept_as_bytes() {
     let (mut buffer, length) = brd_al_status();
@@ -133,6 +141,7 @@ fn other_ethercat_types_are_kept_as_bytes() {
 }
 
 proptest! {
+    // covers: codec-frames
     #[test]
     fn parsing_any_bytes_never_panics_and_what_parses_encodes_back(
         mut bytes in proptest::collection::vec(any::<u8>(), 0..200),
@@ -150,6 +159,7 @@ proptest! {
         }
     }
 
+    // covers: codec-frames
     #[test]
     fn what_is_built_parses_back(
         datagrams in proptest::collection::vec((0..15u8, any::<u8>(), any::<u32>(), 0..60usize), 1..8),

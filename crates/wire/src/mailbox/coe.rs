@@ -1,4 +1,4 @@
-//! CoE: the two bytes before every message (facts 6.3).
+//! CoE: the two bytes before every message (protocol 6.3).
 //!
 //! Behind them: SDO transfers in [`super::sdo`], the [`Emergency`], SDO information in [`SdoInformation`] with the
 //! descriptions it carries, a PDO as it is. Messages of the diagnosis history (object 0x10F3) are [`DiagnosisMessage`].
@@ -132,6 +132,7 @@ mod tests {
     use super::*;
     use proptest::prelude::*;
 
+    // covers: codec-mailbox
     #[test]
     fn each_service_has_its_header() {
         let vectors = [

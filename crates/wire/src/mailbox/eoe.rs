@@ -1,4 +1,4 @@
-//! EoE: Ethernet frames in fragments, and what an IP stack behind a SubDevice needs (facts 6.5).
+//! EoE: Ethernet frames in fragments, and what an IP stack behind a SubDevice needs (protocol 6.5).
 //!
 //! In goes or out comes the payload of a mailbox message of protocol EoE. Cutting frames into fragments and putting
 //! them together again is the matter of both ends; [`EoeFragment::max_data`] says how much fits.

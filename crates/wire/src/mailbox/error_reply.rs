@@ -1,4 +1,4 @@
-//! The payload of mailbox protocol 0: a SubDevice refuses a message (facts 6.1).
+//! The payload of mailbox protocol 0: a SubDevice refuses a message (protocol 6.1).
 
 use core::fmt;
 
@@ -82,6 +82,7 @@ mod tests {
     use proptest::prelude::*;
     use std::string::ToString;
 
+    // covers: codec-mailbox
     #[test]
     fn an_unsupported_protocol_is_refused_with_these_bytes() {
         let reply = ErrorReply::new(ErrorReply::UNSUPPORTED_PROTOCOL);

@@ -1,4 +1,4 @@
-//! FoE: reading and writing files (facts 6.4).
+//! FoE: reading and writing files (protocol 6.4).
 //!
 //! In goes or out comes the payload of a mailbox message of protocol FoE. Who sends which message when, packet numbers
 //! and the repetition after BUSY are the matter of both ends.
@@ -121,8 +121,9 @@ mod tests {
     use proptest::prelude::*;
     use std::string::ToString;
 
+    // covers: 6.3, 6.4, codec-mailbox
     #[test]
-    fn one_vector_for_every_opcode_facts_6_4() {
+    fn one_vector_for_every_opcode() {
         let vectors: [(FoeMessage<'_>, &[u8]); 7] = [
             (FoeMessage::Read { password: 0x1234_5678, name: b"log.txt" }, b"\x01\x00\x78\x56\x34\x12log.txt"),
             (FoeMessage::Write { password: 0, name: b"fw.efw" }, b"\x02\x00\x00\x00\x00\x00fw.efw"),
@@ -150,8 +151,9 @@ mod tests {
         assert_eq!(name, Ok(FoeMessage::Read { password: 0, name: b"a\x00b" }));
     }
 
+    // covers: 6.4, codec-mailbox
     #[test]
-    fn a_packet_has_the_mailbox_without_twelve_bytes_facts_6_4() {
+    fn a_packet_has_the_mailbox_without_twelve_bytes() {
         assert_eq!([128, 1024, 12, 4].map(FoeMessage::max_data), [116, 1012, 0, 0]);
     }
 

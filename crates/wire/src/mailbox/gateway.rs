@@ -1,4 +1,4 @@
-//! The mailbox gateway: mailbox messages in UDP and TCP (facts 10.1, ETG.8200).
+//! The mailbox gateway: mailbox messages in UDP and TCP (protocol 10.1, ETG.8200).
 //!
 //! In goes or out comes what a client sends: an EtherCAT header of type 5 and one mailbox message. A stream has one
 //! behind the other; [`frame_length`] says where one ends. Who may ask what is the gateway's matter.
@@ -101,8 +101,9 @@ mod tests {
 
     const BYTES: &[u8] = &[0x08, 0x50, 0x02, 0x00, 0xE9, 0x03, 0x00, 0x23, 0xAA, 0xBB];
 
+    // covers: 10.1, codec-mailbox
     #[test]
-    fn a_message_has_an_ethercat_header_of_type_5_facts_10_1() {
+    fn a_message_has_an_ethercat_header_of_type_5() {
         let header = Header { address: 1001, ..Header::new(Protocol::Coe, 2, 2) };
         let message = Message { header, payload: &[0xAA, 0xBB] };
         let mut out = [0xEE; 16];
@@ -115,8 +116,9 @@ mod tests {
         assert_eq!(PORT, 34_980);
     }
 
+    // covers: 10.1, codec-mailbox
     #[test]
-    fn type_and_lengths_are_checked_facts_10_1() {
+    fn type_and_lengths_are_checked() {
         let text = |bytes: &[u8]| decode(bytes).unwrap_err().to_string();
         assert_eq!(text(&[8]), "gateway message too short: expected 2 bytes, got 1");
         assert_eq!(text(&[0x08, 0x10, 0, 0, 0, 0, 0, 0, 0, 0]), "expected EtherCAT type 5, got 1");

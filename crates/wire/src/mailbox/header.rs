@@ -1,4 +1,4 @@
-//! The six bytes before every mailbox message (facts 6.1).
+//! The six bytes before every mailbox message (protocol 6.1).
 
 use core::fmt;
 
@@ -183,6 +183,7 @@ mod tests {
     use super::*;
     use proptest::prelude::*;
 
+    // covers: codec-mailbox
     #[test]
     fn a_coe_message_of_ten_bytes_has_this_header() {
         let header = Header::new(Protocol::Coe, 5, 10);
@@ -218,6 +219,7 @@ mod tests {
         }
     }
 
+    // covers: codec-mailbox
     #[test]
     fn counters_run_from_1_to_7_and_never_return_to_0() {
         assert_eq!([0, 1, 2, 3, 4, 5, 6, 7].map(next_counter), [1, 2, 3, 4, 5, 6, 7, 1]);
@@ -240,6 +242,7 @@ mod tests {
             prop_assert_eq!(Header::decode(&bytes).encode(), bytes);
         }
 
+        // covers: codec-mailbox
         #[test]
         fn any_mailbox_is_read_without_panic(bytes in proptest::collection::vec(any::<u8>(), 0..64)) {
             if let Ok(message) = Message::decode(&bytes) {

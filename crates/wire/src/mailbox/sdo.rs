@@ -1,4 +1,4 @@
-//! SDO upload and download, expedited, normal and in segments (facts 6.3).
+//! SDO upload and download, expedited, normal and in segments (protocol 6.3).
 //!
 //! In goes or out comes the payload of a mailbox message of protocol CoE: CoE header, command byte and what follows.
 //! Which message may follow which, toggles and time limits are the engine's matter.

@@ -1,4 +1,4 @@
-//! SoE: reading and writing the elements of IDNs of a drive (facts 6.6).
+//! SoE: reading and writing the elements of IDNs of a drive (protocol 6.6).
 //!
 //! In goes or out comes the payload of a mailbox message of protocol SoE. Data that does not fit into one mailbox comes
 //! in fragments; all but the last are marked incomplete and tell how many follow in place of the IDN. Putting them
@@ -193,8 +193,9 @@ mod tests {
     use proptest::prelude::*;
     use std::vec::Vec;
 
+    // covers: 6.6, codec-mailbox
     #[test]
-    fn one_vector_for_every_operation_facts_6_6() {
+    fn one_vector_for_every_operation() {
         use SoeOperation::*;
         let idn = Idn::standard(0, 15);
         let whole = |operation, drive, elements, data| SoeMessage::whole(operation, drive, elements, idn, data);
@@ -224,16 +225,18 @@ mod tests {
         }
     }
 
+    // covers: 6.6, codec-mailbox
     #[test]
-    fn a_fragment_has_a_count_in_place_of_the_idn_facts_6_6() {
+    fn a_fragment_has_a_count_in_place_of_the_idn() {
         let last = SoeMessage::decode(&[0x02, 0x40, 0x0F, 0x80]).unwrap();
         assert_eq!((last.idn(), last.fragments_left(), last.error_code()), (Some(Idn(0x800F)), 0, None));
         let more = SoeMessage::decode(&[0x0A, 0x40, 3, 0]).unwrap();
         assert_eq!((more.idn(), more.fragments_left()), (None, 3));
     }
 
+    // covers: 6.6
     #[test]
-    fn an_error_has_its_code_facts_6_6() {
+    fn an_error_has_its_code() {
         let error = SoeMessage::decode(&[0x12, 0x40, 1, 0, 0x01, 0x10]).unwrap();
         assert_eq!(error.error_code(), Some(SoeErrorCode::NO_IDN));
         assert_eq!(SoeMessage::decode(&[0x12, 0x40, 1, 0]).unwrap().error_code(), Some(SoeErrorCode::GENERAL));

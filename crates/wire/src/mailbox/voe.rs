@@ -1,4 +1,4 @@
-//! VoE: messages of a vendor (facts 6.8).
+//! VoE: messages of a vendor (protocol 6.8).
 
 use super::payload::{PayloadError, Pen, split};
 
@@ -38,8 +38,9 @@ mod tests {
     use super::*;
     use proptest::prelude::*;
 
+    // covers: 6.8, codec-mailbox
     #[test]
-    fn a_vendor_message_has_these_bytes_facts_6_8() {
+    fn a_vendor_message_has_these_bytes() {
         let message = VoeMessage { vendor_id: 0x0000_0C47, vendor_type: 0x0102, data: b"hello" };
         let bytes = b"\x47\x0C\x00\x00\x02\x01hello";
         let mut out = [0; 16];

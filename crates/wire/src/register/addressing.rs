@@ -1,4 +1,4 @@
-//! Station address and alias, write protection, reset: registers 0x0010..0x0041 (facts 3.2).
+//! Station address and alias, write protection, reset: registers 0x0010..0x0041 (protocol 3.2).
 
 use crate::address::StationAddress;
 

@@ -1,4 +1,4 @@
-//! Distributed clocks: receive times, system time, control loop, registers 0x0900..0x0936 (facts 3.12).
+//! Distributed clocks: receive times, system time, control loop, registers 0x0900..0x0936 (protocol 3.12).
 //!
 //! Times themselves are [`DcTime`] and [`DcTime32`].
 
@@ -83,7 +83,7 @@ number_register! {
 
 impl DcSpeedCounterDifference {
     /// How much faster than by itself the clock runs because of it, in parts per billion: Diff / (5 (Start + Diff + 2)
-    /// (Start - Diff + 2)), see facts 7.2.1. 0 where Diff is beyond what Start allows.
+    /// (Start - Diff + 2)), see protocol 7.2.1. 0 where Diff is beyond what Start allows.
     pub const fn deviation_ppb(self, start: DcSpeedCounterStart) -> i64 {
         let (diff, start) = (self.0 as i64, start.0 as i64);
         let product = 5 * (start + diff + 2) * (start - diff + 2);

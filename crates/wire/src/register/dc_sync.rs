@@ -1,4 +1,4 @@
-//! Distributed clocks: SYNC and LATCH units, registers 0x0980..0x09FF (facts 3.12; bits of the activation and SYNC
+//! Distributed clocks: SYNC and LATCH units, registers 0x0980..0x09FF (protocol 3.12; bits of the activation and SYNC
 //! status registers from the data sheet's register description).
 
 bit_register! {

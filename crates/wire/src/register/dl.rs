@@ -1,8 +1,8 @@
-//! The data link layer of a controller: loops, links, forwarding (facts 2.2, 2.3, 2.6, 3.3).
+//! The data link layer of a controller: loops, links, forwarding (protocol 2.2, 2.3, 2.6, 3.3).
 
 use super::view::Field;
 
-/// What a port does about its loop (facts 2.2).
+/// What a port does about its loop (protocol 2.2).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub enum LoopControl {
     /// Open while there is a link.
@@ -45,7 +45,7 @@ impl Field for [LoopControl; 4] {
 bit_register! {
     /// Register DL_CONTROL (0x0100).
     DlControl(u32, reset 0x0007_0001, reserved kept) {
-        /// Destroy frames that are not EtherCAT and mark the source address of those that are (facts 2.6).
+        /// Destroy frames that are not EtherCAT and mark the source address of those that are (protocol 2.6).
         forwarding_rule: bool = 0, 1;
         /// The loop settings hold for about one second.
         temporary: bool = 1, 1;

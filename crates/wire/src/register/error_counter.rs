@@ -1,4 +1,4 @@
-//! Error counters, registers 0x0300..0x0313 (facts 2.5). All saturate at 255; any write clears the group.
+//! Error counters, registers 0x0300..0x0313 (protocol 2.5). All saturate at 255; any write clears the group.
 
 /// Reception errors of one port, RX_ERROR_COUNTER (0x0300 + 2 x port).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]

@@ -1,4 +1,4 @@
-//! Event requests and their masks, registers 0x0200..0x0223 (facts 3.5).
+//! Event requests and their masks, registers 0x0200..0x0223 (protocol 3.5).
 
 bit_register! {
     /// Registers ECAT_EVENT (0x0210) and ECAT_EVENT_MASK (0x0200).

@@ -1,4 +1,4 @@
-//! FMMU: maps logical bits to physical ones (facts 3.10).
+//! FMMU: maps logical bits to physical ones (protocol 3.10).
 
 use crate::address::LogicalAddress;
 

@@ -1,4 +1,4 @@
-//! What a controller is and can do, registers 0x0000..0x0009 (facts 3.1).
+//! What a controller is and can do, registers 0x0000..0x0009 (protocol 3.1).
 
 use super::view::Field;
 

@@ -1,4 +1,4 @@
-//! LED overrides, registers 0x0138 and 0x0139 (facts 3.4; bits from the data sheet's register description).
+//! LED overrides, registers 0x0138 and 0x0139 (protocol 3.4; bits from the data sheet's register description).
 
 bit_register! {
     /// Registers RUN_LED (0x0138) and ERR_LED (0x0139).

@@ -1,4 +1,4 @@
-//! Addresses of all registers of a SubDevice controller, with the data sheet's names (facts section 3).
+//! Addresses of all registers of a SubDevice controller, with the data sheet's names (protocol 3).
 //!
 //! Sizes, access rights and reset values are in [`super::table()`]; typed views in [`super`].
 

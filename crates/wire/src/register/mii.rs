@@ -1,4 +1,4 @@
-//! Access to the PHYs, registers 0x0510..0x051B (facts 3.9; bits from the data sheet's register description).
+//! Access to the PHYs, registers 0x0510..0x051B (protocol 3.9; bits from the data sheet's register description).
 
 use super::view::Field;
 

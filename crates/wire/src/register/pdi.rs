@@ -1,4 +1,4 @@
-//! The process data interface, registers 0x0140..0x0153 (facts 3.5; bits of PDI_INFORMATION and the pin bits of
+//! The process data interface, registers 0x0140..0x0153 (protocol 3.5; bits of PDI_INFORMATION and the pin bits of
 //! SYNC_LATCH_CONFIGURATION from the data sheet's register description).
 
 use super::view::Field;

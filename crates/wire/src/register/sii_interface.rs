@@ -1,4 +1,4 @@
-//! Access to the EEPROM with the SubDevice information, registers 0x0500..0x050F (facts 3.8).
+//! Access to the EEPROM with the SubDevice information, registers 0x0500..0x050F (protocol 3.8).
 
 use super::view::Field;
 

@@ -1,4 +1,4 @@
-//! SyncManager: keeps accesses to process data and mailboxes consistent (facts 3.11).
+//! SyncManager: keeps accesses to process data and mailboxes consistent (protocol 3.11).
 
 use super::view::Field;
 

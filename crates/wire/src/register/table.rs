@@ -1,4 +1,4 @@
-//! The register table: size, access rights, reset value and groups of every register (facts section 3).
+//! The register table: size, access rights, reset value and groups of every register (protocol 3).
 
 use super::map;
 use crate::address::RegisterAddress;
@@ -31,39 +31,39 @@ impl Access {
 /// What a register belongs to.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum RegisterGroup {
-    /// What the controller is (facts 3.1).
+    /// What the controller is (protocol 3.1).
     Information,
-    /// Addresses, protection, reset (facts 3.2).
+    /// Addresses, protection, reset (protocol 3.2).
     Addressing,
-    /// Data link layer (facts 3.3).
+    /// Data link layer (protocol 3.3).
     DataLink,
-    /// Application layer (facts 3.4).
+    /// Application layer (protocol 3.4).
     ApplicationLayer,
-    /// Process data interface (facts 3.5).
+    /// Process data interface (protocol 3.5).
     Pdi,
-    /// Events (facts 3.5).
+    /// Events (protocol 3.5).
     Event,
-    /// Error counters (facts 2.5).
+    /// Error counters (protocol 2.5).
     ErrorCounter,
-    /// Watchdogs (facts 3.7).
+    /// Watchdogs (protocol 3.7).
     Watchdog,
-    /// EEPROM (facts 3.8).
+    /// EEPROM (protocol 3.8).
     Sii,
-    /// PHYs (facts 3.9).
+    /// PHYs (protocol 3.9).
     Mii,
-    /// FMMUs (facts 3.10).
+    /// FMMUs (protocol 3.10).
     Fmmu,
-    /// SyncManagers (facts 3.11).
+    /// SyncManagers (protocol 3.11).
     SyncManager,
-    /// Distributed clocks (facts 3.12).
+    /// Distributed clocks (protocol 3.12).
     DistributedClocks,
-    /// Depends on the controller (facts 3.13).
+    /// Depends on the controller (protocol 3.13).
     EscSpecific,
-    /// RAM (facts 3.13).
+    /// RAM (protocol 3.13).
     Ram,
 }
 
-/// Counters of which any write clears all (facts 2.5).
+/// Counters of which any write clears all (protocol 2.5).
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum ClearGroup {
     /// 0x0300..0x030B.
@@ -288,6 +288,7 @@ mod tests {
     use crate::register::{AlControl, AlEvent, AlStatus, DcFilterDifference, DcFilterSpeed, DcSpeedCounterStart};
     use crate::register::{DlControl, WatchdogDivider, WatchdogTime};
 
+    // covers: codec-registers
     #[test]
     fn every_address_of_the_map_has_its_row() {
         for &(name, address) in map::ALL {
@@ -298,6 +299,7 @@ mod tests {
         }
     }
 
+    // covers: codec-registers
     #[test]
     fn every_address_belongs_to_at_most_one_register() {
         for address in (0..=0xFFFF).map(RegisterAddress) {
@@ -323,6 +325,7 @@ mod tests {
         assert_eq!(name(0xFFFF), Some("PROCESS_RAM"));
     }
 
+    // covers: codec-registers
     #[test]
     fn reset_values_agree_with_the_views() {
         let reset = |address| find(address).map(|info| info.reset);
@@ -338,8 +341,9 @@ mod tests {
         assert_eq!(reset(map::DC_FILTER_SPEED), Some(u64::from(DcFilterSpeed::RESET)));
     }
 
+    // covers: codec-registers
     #[test]
-    fn access_rights_are_those_of_the_facts() {
+    fn access_rights_are_those_of_the_data_sheet() {
         let access = |address| find(address).map(|info| (info.ecat, info.pdi));
         assert_eq!(access(map::STATION_ADDRESS), Some((Access::ReadWrite, Access::Read)));
         assert_eq!(access(map::STATION_ALIAS), Some((Access::Read, Access::ReadWrite)));

@@ -14,6 +14,7 @@ macro_rules! vector {
     };
 }
 
+// covers: codec-registers
 #[test]
 fn information_vector_of_an_et1100() {
     let features = Features {
@@ -41,8 +42,9 @@ fn information_vector_of_an_et1100() {
     vector!(information, Information, [0x11, 0x00, 0x02, 0x00, 0x08, 0x08, 0x08, 0x1B, 0xEC, 0x00]);
 }
 
+// covers: 3.1
 #[test]
-fn features_name_the_bits_of_facts_3_1() {
+fn features_name_their_bits() {
     let features = Features {
         fmmu_byte_oriented: true,
         lrw_unsupported: true,
@@ -61,6 +63,7 @@ fn features_name_the_bits_of_facts_3_1() {
     vector!(rest, Features, [0x12, 0x01]);
 }
 
+// covers: codec-registers
 #[test]
 fn addressing_vectors() {
     vector!(StationAddress(0x1001), StationAddress, [0x01, 0x10]);
@@ -69,6 +72,7 @@ fn addressing_vectors() {
     assert_eq!(EscReset::SEQUENCE.map(|step| step.encode()), [[0x52], [0x45], [0x53]]);
 }
 
+// covers: 3.3, codec-registers
 #[test]
 fn dl_vectors() {
     vector!(DlControl::default(), DlControl, [0x01, 0x00, 0x07, 0x00]);
@@ -84,8 +88,9 @@ fn dl_vectors() {
     vector!(PhysicalOffset(0x0102), PhysicalOffset, [0x02, 0x01]);
 }
 
+// covers: 2.3, codec-registers
 #[test]
-fn dl_status_vectors_of_facts_2_3() {
+fn dl_status_examples_decode() {
     let open = PortStatus { link: true, loop_closed: false, communication: true };
     let closed = PortStatus { link: false, loop_closed: true, communication: false };
     let forced = PortStatus { link: true, loop_closed: true, communication: true };
@@ -98,6 +103,7 @@ fn dl_status_vectors_of_facts_2_3() {
     vector!(detection, DlStatus, [0x0C, 0x00]);
 }
 
+// covers: codec-registers
 #[test]
 fn al_vectors() {
     vector!(AlControl::from_bits(0x0014), AlControl, [0x14, 0x00]);
@@ -106,6 +112,7 @@ fn al_vectors() {
     vector!(LedOverride { code: 0x0D, enable: true, reserved: 0 }, LedOverride, [0x1D]);
 }
 
+// covers: codec-registers
 #[test]
 fn pdi_vectors() {
     for (control, code) in [
@@ -144,9 +151,10 @@ fn pdi_vectors() {
     vector!(ExtendedPdiConfiguration(0x0102), ExtendedPdiConfiguration, [0x02, 0x01]);
 }
 
+// covers: codec-registers
 #[test]
 fn event_vectors() {
-    // facts 5.6: mask for DL status alone.
+    // protocol 5.6: mask for DL status alone.
     vector!(EcatEvent { dl_status: true, ..EcatEvent::default() }, EcatEvent, [0x04, 0x00]);
     let event = EcatEvent { dc_latch: true, al_status: true, sync_managers: 0x81, ..EcatEvent::default() };
     vector!(event, EcatEvent, [0x19, 0x08]);
@@ -164,6 +172,7 @@ fn event_vectors() {
     assert_eq!(AlEvent::from_bits(AlEvent::MASK_RESET).sync_managers, 0xFFFF);
 }
 
+// covers: codec-registers
 #[test]
 fn error_counter_vectors() {
     let port = |invalid_frames, rx_errors| RxErrorCounter { invalid_frames, rx_errors };
@@ -180,6 +189,7 @@ fn error_counter_vectors() {
     vector!(counters, ErrorCounters, [1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15, 16, 17, 18, 19, 20]);
 }
 
+// covers: codec-registers
 #[test]
 fn the_default_watchdog_is_100_ms() {
     vector!(WatchdogDivider::default(), WatchdogDivider, [0xC2, 0x09]);
@@ -191,9 +201,10 @@ fn the_default_watchdog_is_100_ms() {
     vector!(WatchdogCounters { process_data: 3, pdi: 4 }, WatchdogCounters, [0x03, 0x04]);
 }
 
+// covers: codec-registers
 #[test]
 fn sii_vectors() {
-    // facts 3.8: write enable and write; reload is command 4.
+    // protocol 3.8: write enable and write; reload is command 4.
     vector!(SiiControl::request(SiiCommand::Write), SiiControl, [0x01, 0x02]);
     vector!(SiiControl::request(SiiCommand::Read), SiiControl, [0x00, 0x01]);
     vector!(SiiControl::request(SiiCommand::Reload), SiiControl, [0x00, 0x04]);
@@ -217,6 +228,7 @@ fn sii_vectors() {
     vector!(SiiData(0x0807_0605_0403_0201), SiiData, [1, 2, 3, 4, 5, 6, 7, 8]);
 }
 
+// covers: codec-registers
 #[test]
 fn mii_vectors() {
     let control = MiiControl { write_enable: true, command: MiiCommand::Write, busy: true, ..MiiControl::default() };
@@ -232,8 +244,9 @@ fn mii_vectors() {
     vector!(status, MiiPhyPortStatus, [0x03]);
 }
 
+// covers: 3.10, codec-registers
 #[test]
-fn the_fmmu_example_of_facts_3_10() {
+fn the_fmmu_example_of_14_bits_decodes() {
     let fmmu = Fmmu {
         logical_start: LogicalAddress(0x0001_0011),
         length: 3,
@@ -253,8 +266,9 @@ fn the_fmmu_example_of_facts_3_10() {
     assert_eq!(Fmmu { read: true, ..Fmmu::default() }.encode()[0x0B], 0x01);
 }
 
+// covers: 3.11
 #[test]
-fn typical_sync_manager_control_bytes_of_facts_3_11() {
+fn typical_sync_manager_control_bytes_decode() {
     let event = SyncManagerControl { pdi_event: true, ..SyncManagerControl::default() };
     let write = SyncManagerDirection::Write;
     let mailbox_out = SyncManagerControl { mode: SyncManagerMode::Mailbox, direction: write, ..event };
@@ -277,6 +291,7 @@ fn typical_sync_manager_control_bytes_of_facts_3_11() {
     vector!(odd, SyncManagerControl, [0x9B]);
 }
 
+// covers: codec-registers
 #[test]
 fn sync_manager_vector() {
     let status = SyncManagerStatus { write_event: true, mailbox_full: true, last_buffer: 3, ..Default::default() };
@@ -298,6 +313,7 @@ fn sync_manager_vector() {
     vector!(sync_manager, SyncManager, [0x00, 0x10, 0x80, 0x00, 0x26, 0x82, 0x83, 0x02]);
 }
 
+// covers: codec-registers
 #[test]
 fn clock_vectors() {
     vector!(DcTime(0x0102_0304_0506_0708), DcTime, [8, 7, 6, 5, 4, 3, 2, 1]);
@@ -319,6 +335,7 @@ fn clock_vectors() {
     vector!(DcLatchMode { forwarding_direction: true, reserved: 0 }, DcLatchMode, [0x01]);
 }
 
+// covers: codec-registers
 #[test]
 fn sync_and_latch_vectors() {
     let control = DcCyclicUnitControl { sync_by_pdi: true, latch1_by_pdi: true, ..DcCyclicUnitControl::default() };
@@ -340,6 +357,7 @@ fn sync_and_latch_vectors() {
     vector!(DcLatchStatus { positive_event: true, pin: true, ..Default::default() }, DcLatchStatus, [0x05]);
 }
 
+// covers: codec-registers
 #[test]
 fn esc_specific_vectors() {
     vector!(ProductId(0x0102), ProductId, [2, 1, 0, 0, 0, 0, 0, 0]);
@@ -388,8 +406,9 @@ mod any_bytes_round_trip {
     }
 }
 
+// covers: 7.2.1
 #[test]
-fn the_speed_counter_says_how_fast_its_clock_is_made_to_run_facts_7_2_1() {
+fn the_speed_counter_says_how_fast_its_clock_is_made_to_run() {
     let ppb = |diff: i16, start: u16| DcSpeedCounterDifference(diff).deviation_ppb(DcSpeedCounterStart(start));
     assert_eq!((ppb(0, 0x1000), ppb(1, 0x1000), ppb(-100, 0x1000)), (0, 11, -1_191));
     // 3969 / (5 * 8067 * 129)

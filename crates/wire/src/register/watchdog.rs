@@ -1,4 +1,4 @@
-//! Watchdogs, registers 0x0400..0x0443 (facts 3.7).
+//! Watchdogs, registers 0x0400..0x0443 (protocol 3.7).
 
 /// Nanoseconds of one tick of the watchdog divider.
 const TICK_NS: u64 = 40;

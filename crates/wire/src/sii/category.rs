@@ -1,4 +1,4 @@
-//! The chain of categories behind the fixed area (facts 4.2).
+//! The chain of categories behind the fixed area (protocol 4.2).
 
 use core::fmt;
 
@@ -189,6 +189,7 @@ mod tests {
         assert_eq!(header.data_len(), 32);
     }
 
+    // covers: 4.2, codec-sii
     #[test]
     fn only_unknown_kinds_with_bit_15_are_vendor_specific() {
         assert!(CategoryKind::from_code(0x8001).is_vendor_specific());

@@ -1,4 +1,4 @@
-//! Category DC: 24 bytes per operation mode of the distributed clock (facts 4.6).
+//! Category DC: 24 bytes per operation mode of the distributed clock (protocol 4.6).
 
 /// One operation mode.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
@@ -87,6 +87,7 @@ mod tests {
     use proptest::prelude::*;
     use std::vec::Vec;
 
+    // covers: codec-sii
     #[test]
     fn a_mode_with_sync0_and_sync1_has_these_bytes() {
         let bytes = [

@@ -1,4 +1,4 @@
-//! Category FMMU: one byte per FMMU says what it is meant for (facts 4.2).
+//! Category FMMU: one byte per FMMU says what it is meant for (protocol 4.2).
 
 /// What an FMMU is meant for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -67,6 +67,7 @@ mod tests {
     use super::*;
     use std::vec::Vec;
 
+    // covers: 4.2, codec-sii
     #[test]
     fn each_byte_is_one_fmmu() {
         let usages: Vec<_> = FmmuUsages::new(&[1, 2, 3, 0, 0xFF, 4]).collect();

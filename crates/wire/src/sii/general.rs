@@ -1,4 +1,4 @@
-//! Category GENERAL: names, mailbox details, ports (facts 4.3).
+//! Category GENERAL: names, mailbox details, ports (protocol 4.3).
 
 /// What CoE of a SubDevice can do.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
@@ -245,8 +245,9 @@ mod tests {
     use super::*;
     use proptest::prelude::*;
 
+    // covers: 4.3, codec-sii
     #[test]
-    fn every_field_is_where_facts_4_3_says() {
+    fn every_field_of_general_is_in_its_place() {
         let bytes = [
             0x02, 0x03, 0x01, 0x04, 0x00, 0x2F, 0x01, 0x01, 0x00, 0x02, 0x00, 0x1A, // up to the flags
             0x18, 0xFC, 0x02, 0x00, 0x31, 0x00, 0x80, 0x0F, // current, group, ports, ID switch

@@ -1,4 +1,4 @@
-//! The fixed area of the SII, words 0x00..0x40 (facts 4.1). Every byte is kept, reserved ones too.
+//! The fixed area of the SII, words 0x00..0x40 (protocol 4.1). Every byte is kept, reserved ones too.
 
 use super::checksum::{CHECKSUM_DISABLED, checksum};
 
@@ -242,7 +242,7 @@ mod tests {
     use super::*;
     use proptest::prelude::*;
 
-    /// A device with CoE and FoE, its mailboxes at 0x1000 and 0x1080, the checksum of facts 4.1 (80 06 81 06: CD).
+    /// A device with CoE and FoE, its mailboxes at 0x1000 and 0x1080, the checksum of protocol 4.1 (80 06 81 06: CD).
     fn literal() -> [u8; SiiHeader::LEN] {
         let mut bytes = [0; SiiHeader::LEN];
         let start: [u8; 58] = [
@@ -256,8 +256,9 @@ mod tests {
         bytes
     }
 
+    // covers: 4.1, codec-sii
     #[test]
-    fn every_field_is_where_facts_4_1_says() {
+    fn every_field_of_the_fixed_area_is_in_its_place() {
         let header = SiiHeader::decode(&literal());
         let expected = SiiHeader {
             pdi_control: 0x0680,
@@ -306,6 +307,7 @@ mod tests {
     }
 
     proptest! {
+        // covers: codec-sii
         #[test]
         fn any_fixed_area_round_trips(bytes in proptest::collection::vec(any::<u8>(), SiiHeader::LEN)) {
             let bytes: [u8; SiiHeader::LEN] = bytes.try_into().unwrap();

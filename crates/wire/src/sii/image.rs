@@ -1,4 +1,4 @@
-//! A whole SII image: fixed area, then categories up to the end marker (facts 4.1, 4.2).
+//! A whole SII image: fixed area, then categories up to the end marker (protocol 4.1, 4.2).
 
 use core::fmt;
 

@@ -1,4 +1,4 @@
-//! Categories TXPDO and RXPDO: PDOs back to back, each with its entries behind it (facts 4.5).
+//! Categories TXPDO and RXPDO: PDOs back to back, each with its entries behind it (protocol 4.5).
 
 use super::category::CategoryKind;
 
@@ -213,6 +213,7 @@ mod tests {
         0x01, 0x1A, 0x00, 0xFF, 0x02, 0x00, 0x00, 0x01, // PDO 0x1A01
     ];
 
+    // covers: 4.5, codec-sii
     #[test]
     fn two_pdos_follow_each_other_in_one_category() {
         let mut pdos = Pdos::new(&LITERAL);

@@ -1,4 +1,4 @@
-//! Category STRINGS: a count, then length and characters of each string (facts 4.2).
+//! Category STRINGS: a count, then length and characters of each string (protocol 4.2).
 
 /// The strings of an image, addressed by index from 1.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -69,6 +69,7 @@ mod tests {
     /// Three strings, the second one empty, and a padding byte.
     const LITERAL: [u8; 14] = [3, 6, b'E', b'K', b'1', b'1', b'0', b'0', 0, 3, b'B', b'u', b's', 0];
 
+    // covers: codec-sii
     #[test]
     fn index_1_is_the_first_string_and_index_0_is_none() {
         let strings = Strings::new(&LITERAL);

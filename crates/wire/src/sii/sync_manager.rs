@@ -1,4 +1,4 @@
-//! Category SYNCM: eight bytes per sync manager (facts 4.4).
+//! Category SYNCM: eight bytes per sync manager (protocol 4.4).
 
 /// What a sync manager is meant for.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
@@ -97,7 +97,7 @@ impl SiiSyncManager {
         self.enable & Self::ENABLE != 0
     }
 
-    /// What its control byte alone says it is for: a mailbox or process data, by its direction (facts 3.11). Some
+    /// What its control byte alone says it is for: a mailbox or process data, by its direction (protocol 3.11). Some
     /// images name no type. [`SyncManagerKind::Unused`] where mode or direction are reserved.
     pub const fn kind_of_control(&self) -> SyncManagerKind {
         match (self.control & 0x03, self.control & 0x0C) {
@@ -144,6 +144,7 @@ mod tests {
     use proptest::prelude::*;
     use std::vec::Vec;
 
+    // covers: codec-sii
     #[test]
     fn a_write_mailbox_and_an_input_have_these_bytes() {
         let data = [

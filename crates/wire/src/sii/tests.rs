@@ -68,6 +68,7 @@ fn every_category_of_an_image_is_found() {
     assert_eq!(modes, [(0x0300, 1)]);
 }
 
+// covers: codec-sii
 #[test]
 fn unknown_and_vendor_categories_are_kept_as_bytes() {
     let image = image(&CATEGORIES);
@@ -96,6 +97,7 @@ fn what_follows_the_end_marker_does_not_count() {
     assert_eq!((sii.used(), sii.end_marker, sii.categories().count()), (used, true, 9));
 }
 
+// covers: codec-sii
 #[test]
 fn a_broken_image_is_refused_with_its_reason() {
     let good = image(&CATEGORIES);
@@ -109,6 +111,7 @@ fn a_broken_image_is_refused_with_its_reason() {
     assert_eq!(cut.to_string(), "SII category STRINGS at byte 128 announces 12 bytes, 8 are left");
 }
 
+// covers: codec-sii
 #[test]
 fn the_literal_image_is_what_the_writer_writes() {
     let expected = image(&CATEGORIES);
@@ -195,6 +198,7 @@ fn content() -> impl Strategy<Value = Content> {
 }
 
 proptest! {
+    // covers: codec-sii
     #[test]
     fn any_bytes_are_parsed_without_panic(bytes in vec(any::<u8>(), 0..400)) {
         if let Ok(sii) = Sii::parse(&bytes) {
@@ -223,6 +227,7 @@ proptest! {
         }
     }
 
+    // covers: codec-sii
     #[test]
     fn what_the_writer_writes_parses_back(content in content(), alias in any::<u16>(), general in any::<[u8; 32]>()) {
         let (strings, usages, sync_managers, pdos, modes) = content;

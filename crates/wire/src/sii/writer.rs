@@ -1,4 +1,4 @@
-//! Writes an SII image into a buffer of the caller (facts 4.1, 4.2).
+//! Writes an SII image into a buffer of the caller (protocol 4.1, 4.2).
 
 use core::fmt;
 

@@ -1,11 +1,11 @@
-//! Commands of an ENI: what is sent, at which transitions, and what must come back (facts 8.1).
+//! Commands of an ENI: what is sent, at which transitions, and what must come back (protocol 8.1).
 
 use ringcat_wire::address::{LogicalAddress, RegisterAddress};
 use ringcat_wire::command::Command;
 
 use crate::eni::Place;
 
-/// A transition of the state machine at which commands are sent (facts 8.2); `Op` is OP to PREOP, `Po` the other
+/// A transition of the state machine at which commands are sent (protocol 8.2); `Op` is OP to PREOP, `Po` the other
 /// way.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum Transition {

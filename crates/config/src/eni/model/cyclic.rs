@@ -1,11 +1,11 @@
-//! What an ENI says of cycles and of the process image (facts 8.1).
+//! What an ENI says of cycles and of the process image (protocol 8.1).
 
 use std::fmt;
 
 use super::command::Datagram;
 use crate::eni::Place;
 
-/// A state in which a cyclic command is sent (facts 8.2: numbers count states, they are no AL codes).
+/// A state in which a cyclic command is sent (protocol 8.2: numbers count states, they are no AL codes).
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum CyclicState {
     /// 1, INIT.

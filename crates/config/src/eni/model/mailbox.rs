@@ -1,4 +1,4 @@
-//! What an ENI says of a mailbox: buffers, protocols, commands of each protocol (facts 8.1).
+//! What an ENI says of a mailbox: buffers, protocols, commands of each protocol (protocol 8.1).
 
 use super::command::Transition;
 use crate::eni::Place;
@@ -59,7 +59,7 @@ pub struct CoeCommand {
     pub comment: String,
     /// Milliseconds; 0 is the tool's default.
     pub timeout_ms: u32,
-    /// `Ccs`: 1 downloads, 2 uploads; some files have it the other way round (facts 8.2).
+    /// `Ccs`: 1 downloads, 2 uploads; some files have it the other way round (protocol 8.2).
     pub ccs: u8,
     /// Attribute `CompleteAccess`.
     pub complete_access: bool,

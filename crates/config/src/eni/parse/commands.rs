@@ -1,4 +1,4 @@
-//! Commands with a datagram: `InitCmd`, `IdentifyCmd` and what is alike in `Cmd` of a cycle (facts 8.2).
+//! Commands with a datagram: `InitCmd`, `IdentifyCmd` and what is alike in `Cmd` of a cycle (protocol 8.2).
 
 use ringcat_wire::address::{LogicalAddress, RegisterAddress};
 use ringcat_wire::command::{Addressing, Command};
@@ -8,7 +8,7 @@ use crate::eni::error::{EniError, Problem};
 use crate::eni::model::{Datagram, EcatCommand, Requires, Target, Transition, Validate};
 use crate::eni::quoted::shown;
 
-/// Bytes of a datagram at most (facts 1.3).
+/// Bytes of a datagram at most (protocol 1.3).
 const MAX_DATA: u16 = 1486;
 
 /// The commands in `InitCmds` of an element, but for those that are switched off as mailbox commands can be.

@@ -51,7 +51,7 @@ fn command(element: Element<'_>) -> Result<CyclicCommand, EniError> {
     })
 }
 
-/// Names, or ordinal numbers (facts 8.2: not AL codes).
+/// Names, or ordinal numbers (protocol 8.2: not AL codes).
 fn state(element: Element<'_>) -> Result<CyclicState, EniError> {
     Ok(match element.text().to_uppercase().as_str() {
         "1" | "INIT" => CyclicState::Init,

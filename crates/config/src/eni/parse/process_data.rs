@@ -7,9 +7,9 @@ use crate::eni::model::{
 };
 use crate::eni::quoted::shown;
 
-/// PDOs that can be assigned to a SyncManager: subindices of an object (facts 6.3).
+/// PDOs that can be assigned to a SyncManager: subindices of an object (protocol 6.3).
 const ASSIGNED: usize = 255;
-/// PDOs that a SubDevice can describe: 0x1600 to 0x17FF and 0x1A00 to 0x1BFF (facts 6.3).
+/// PDOs that a SubDevice can describe: 0x1600 to 0x17FF and 0x1A00 to 0x1BFF (protocol 6.3).
 const PDOS: usize = 1024;
 /// SyncManagers that a controller can have.
 const SYNC_MANAGERS: u8 = 16;

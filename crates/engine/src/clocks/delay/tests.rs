@@ -1,4 +1,4 @@
-//! The vectors of facts 7.1 and 7.5, and trees against a model of the wire that knows the truth.
+//! The vectors of protocol 7.1 and 7.5, and trees against a model of the wire that knows the truth.
 
 use super::*;
 use crate::clocks::FRACTION;
@@ -39,7 +39,7 @@ fn rounded(delays: &Delays, reference: usize) -> Vec<Option<i64>> {
     (0..delays.units.len()).map(|node| delays.between(reference, node)).collect()
 }
 
-/// S1..S7 of facts 7.1 as 0..6.
+/// S1..S7 of protocol 7.1 as 0..6.
 fn vector() -> (Topology, Vec<Option<PortTimes>>) {
     let topology = tree(7, &[(0, 1, 1), (1, 3, 4), (4, 1, 5), (1, 1, 2), (2, 1, 3), (0, 2, 6)]);
     let times = vec![
@@ -54,8 +54,9 @@ fn vector() -> (Topology, Vec<Option<PortTimes>>) {
     (topology, times)
 }
 
+// covers: 7.1, dc-delays
 #[test]
-fn the_tree_of_facts_7_1_has_its_delays() {
+fn the_example_tree_has_its_delays() {
     let (topology, times) = vector();
     let delays = propagation(&topology, &times);
     assert_eq!(rounded(&delays, 0), [0, 400, 2_280, 2_670, 770, 1_130, 4_380].map(Some));
@@ -64,8 +65,9 @@ fn the_tree_of_facts_7_1_has_its_delays() {
     assert_eq!(entry_ports(&topology), [0; 7]);
 }
 
+// covers: 7.1, dc-delays
 #[test]
-fn devices_without_a_clock_are_part_of_the_cable_facts_7_1() {
+fn devices_without_a_clock_are_part_of_the_cable() {
     // S1 - X - S2: 300 ns a pass, 100 ns a cable.
     let topology = tree(3, &[(0, 1, 1), (1, 1, 2)]);
     let delays = propagation(&topology, &[times([0, 1_600, 0, 0]), None, times([0; 4])]);
@@ -80,8 +82,9 @@ fn unknown(node: usize, fork: usize, range: Option<(i64, i64)>) -> Unknown {
     Unknown { node, fork: Some(fork), range: range.map(|(least, most)| (least << FRACTION, most << FRACTION)) }
 }
 
+// covers: 7.1, dc-delays
 #[test]
-fn behind_forks_without_a_clock_delays_are_known_within_branches_only_facts_7_1() {
+fn behind_forks_without_a_clock_delays_are_known_within_branches_only() {
     // A junction without a clock in front: what it does to the frame nobody measures, its branches are.
     let topology = tree(4, &[(0, 3, 1), (0, 1, 2), (2, 1, 3)]);
     let all = [None, times([0; 4]), times([0, 780, 0, 0]), times([0; 4])];
@@ -106,8 +109,9 @@ fn behind_forks_without_a_clock_delays_are_known_within_branches_only_facts_7_1(
 /// A clock, a fork without one, its branches: two and one clocks, and behind it a fork without a clock with two more.
 const FORKS: [(usize, u8, usize); 7] = [(0, 1, 1), (1, 3, 2), (2, 1, 3), (1, 1, 4), (1, 2, 5), (5, 3, 6), (5, 1, 7)];
 
+// covers: 7.1, dc-delays
 #[test]
-fn forks_without_a_clock_have_exact_delays_once_each_branch_was_open_facts_7_1() {
+fn forks_without_a_clock_have_exact_delays_once_each_branch_was_open() {
     let wiring = wiring(&tree(8, &FORKS));
     let stations = stations(8);
     let mut cables = Cables::default();
@@ -134,8 +138,9 @@ fn forks_without_a_clock_have_exact_delays_once_each_branch_was_open_facts_7_1()
     assert_eq!(run(&[]), []);
 }
 
+// covers: 7.5, dc-delays
 #[test]
-fn a_stub_that_is_entered_from_behind_keeps_its_differences_facts_7_5() {
+fn a_stub_that_is_entered_from_behind_keeps_its_differences() {
     // dc_delay.py: slaves 4 and 3 from the redundant link, the break in front of 3; the head is node 0.
     let mut topology = tree(2, &[(0, 1, 1)]);
     topology.main_count = 0;
@@ -214,7 +219,7 @@ fn errors(broken: Option<usize>, passages: &[Passage], cables: &mut Cables) -> V
     (0..7).map(|node| Some((delays.units[node]? - truth[node]) >> FRACTION)).collect()
 }
 
-// covers: facts 7.5, facts 9.4
+// covers: 7.5, 9.4, dc-delays
 #[test]
 fn a_local_ring_is_known_whole_from_what_it_was_open_and_broken_by_itself() {
     let mixed: Vec<Passage> = (0..7).map(|node| passage(150 * (node % 3) + 40, 140 * (node % 3))).collect();
@@ -232,6 +237,7 @@ fn a_local_ring_is_known_whole_from_what_it_was_open_and_broken_by_itself() {
     }
 }
 
+// covers: dc-ring
 #[test]
 fn a_closed_ring_is_what_was_measured_of_it_as_a_line_and_says_where_it_was_not() {
     let mut topology = tree(4, &[(0, 1, 1), (1, 1, 2), (2, 1, 3)]);
@@ -266,16 +272,18 @@ fn errors_of_line(passages: &[Passage], known: &[Passage]) -> Vec<i64> {
     delays.units.iter().zip(&truth).map(|(unit, truth)| (unit.unwrap() - truth) >> FRACTION).collect()
 }
 
+// covers: 7.1, dc-delays
 #[test]
-fn what_processing_takes_longer_than_forwarding_is_a_half_per_hop_unless_it_is_known_facts_7_1() {
+fn longer_processing_than_forwarding_is_a_half_per_hop_unless_known() {
     let passages = [passage(40, 0); 9];
     // The last one processes before the frame turns round: that is no passage of the way out.
     assert_eq!(errors_of_line(&passages, &[]), [0, -20, -40, -60, -80, -100, -120, -140, -140]);
     assert_eq!(errors_of_line(&passages, &passages), [0; 9]);
 }
 
+// covers: 7.1, dc-delays
 #[test]
-fn types_side_by_side_are_off_by_half_their_difference_unless_it_is_known_facts_7_1() {
+fn types_side_by_side_are_off_by_half_their_difference_unless_it_is_known() {
     // As coupler, terminals and drives may be.
     let passages: Vec<Passage> = [(550, 540), (150, 150), (150, 150), (750, 700), (750, 700), (150, 150), (150, 150)]
         .map(|(processed, forwarded)| passage(processed, forwarded))
@@ -295,6 +303,7 @@ fn types_side_by_side_are_off_by_half_their_difference_unless_it_is_known_facts_
 }
 
 proptest::proptest! {
+    // covers: dc-delays
     #[test]
     fn any_tree_with_clocks_everywhere_has_exact_delays(
         parents in proptest::collection::vec((0usize..1000, 0usize..3, 0i64..400), 1..40),

@@ -1,5 +1,5 @@
-//! How a reference follows another time: in a ring that is open the second one the first (facts 7.5), with bus shift
-//! the segment's reference the host (facts 7.4).
+//! How a reference follows another time: in a ring that is open the second one the first (protocol 7.5), with bus shift
+//! the segment's reference the host (protocol 7.4).
 //!
 //! In: how both times differ when a frame, or frames that left together, pass them. Out: what to tell the one that
 //! follows. Every telling has the jitter of the host's sending in it, and so has each difference. One that is far away,
@@ -263,8 +263,9 @@ mod tests {
         (0..count).map(|number| 7_000 + (number * 7_919) % 5_001)
     }
 
+    // covers: 7.5
     #[test]
-    fn jitter_of_the_host_is_no_reason_to_steer_facts_7_5() {
+    fn jitter_of_the_host_is_no_reason_to_steer() {
         let lead = after(Lead::begin(7_100, true, Instant(0)), jitter(5_000));
         assert_eq!((lead.mode, lead.steering_ns()), (Mode::Free, None));
         assert!((lead.gap - 9_500).abs() < 800, "{lead:?}");
@@ -288,8 +289,9 @@ mod tests {
         assert_eq!(back.steering_ns(), None);
     }
 
+    // covers: 7.4
     #[test]
-    fn one_that_follows_the_host_is_told_of_a_small_part_of_a_long_mean_facts_7_4() {
+    fn one_that_follows_the_host_is_told_of_a_small_part_of_a_long_mean() {
         // Up to 50 us of jitter around a difference of 4 us.
         let late = |count: i64| (0..count).map(|number| 4_000 + (number * 7_919) % 50_001 - 25_000);
         let lead = after(Lead::behind_host(Instant(0)), late(5_000));

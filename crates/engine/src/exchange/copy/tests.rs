@@ -60,8 +60,9 @@ fn cycle(exchange: &mut Exchange, now: &mut Instant, inputs: [Option<&[u8]>; 2])
     outputs
 }
 
+// covers: copy
 #[test]
-fn inputs_of_a_cycle_leave_as_outputs_with_its_frames_whatever_the_application_wrote() {
+fn copied_inputs_leave_with_the_cycle_whatever_the_application_wrote() {
     let (mut exchange, mut now) = (exchange(), Instant(0));
     // Eleven bits at bit 3 of SubDevice 0 to bit 5 of SubDevice 1.
     exchange.set_copies(&[CopyRule::new(entry(0, INPUTS + 3, 11), entry(1, 5, 11))]).unwrap();
@@ -76,6 +77,7 @@ fn inputs_of_a_cycle_leave_as_outputs_with_its_frames_whatever_the_application_w
     assert_eq!(exchange.counters().stale_copies, 1);
 }
 
+// covers: copy
 #[test]
 fn a_stale_source_is_refused_its_target_holds_the_last_value_or_is_zero() {
     let (mut exchange, mut now) = (exchange(), Instant(0));
@@ -101,6 +103,7 @@ fn a_stale_source_is_refused_its_target_holds_the_last_value_or_is_zero() {
     assert_eq!(cycle(&mut exchange, &mut now, [None, None])[1][..3], [7, 8, 9]);
 }
 
+// covers: copy
 #[test]
 fn a_table_that_makes_no_sense_is_refused_and_the_one_before_stays() {
     let mut exchange = exchange();
@@ -129,6 +132,7 @@ fn exchange_error(rules: &[CopyRule]) -> CopyError {
 }
 
 proptest! {
+    // covers: copy
     #[test]
     fn any_bits_are_copied_and_no_other_bit_changes(
         inputs in any::<[u8; 30]>(), outputs in any::<[u8; 30]>(),

@@ -59,6 +59,7 @@ fn inputs_of_an_older_cycle_never_overwrite_those_of_a_newer_one() {
     assert_eq!((counters.overtaken, counters.received, counters.lost, counters.incomplete), (1, 2, 0, 0));
 }
 
+// covers: under-way
 #[test]
 fn a_lost_cycle_is_given_up_when_a_newer_one_is_back_and_is_counted_once() {
     let mut ring = with_under_way(3);
@@ -107,9 +108,9 @@ fn a_cycle_is_waited_for_until_shortly_before_its_turn_comes_again() {
     }
 }
 
-// Facts 9.2.1.
+// covers: 9.2.1, under-way
 #[test]
-fn what_an_older_cycle_shows_of_the_ring_does_not_count_when_a_newer_one_was_heard_of() {
+fn what_an_older_cycle_shows_of_the_ring_does_not_count_after_a_newer_one() {
     let mut ring = with_under_way(2);
     let older = ring.send();
     ring.now += PERIOD;
@@ -152,6 +153,7 @@ struct Copy {
 }
 
 proptest! {
+    // covers: under-way
     #[test]
     fn inputs_are_those_of_the_newest_copy_that_a_subdevice_processed(
         cycles in 1u8..=4,

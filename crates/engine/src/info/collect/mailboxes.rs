@@ -1,4 +1,5 @@
-//! Where the mailboxes lie, as far as that can be: what the fixed area says, or else the SyncManagers (facts 4.1, 4.4).
+//! Where the mailboxes lie, as far as that can be: what the fixed area says, or else the SyncManagers (protocol 4.1,
+//! 4.4).
 
 use alloc::vec::Vec;
 

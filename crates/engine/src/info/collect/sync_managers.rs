@@ -1,4 +1,4 @@
-//! What each SyncManager is for, and what is missing for it (facts 4.4, 3.11).
+//! What each SyncManager is for, and what is missing for it (protocol 4.4, 3.11).
 
 use ringcat_wire::sii::{
     CategoryKind, FmmuUsage, PdoDirection, Pdos, SiiSyncManager, SiiSyncManagers, SyncManagerKind,

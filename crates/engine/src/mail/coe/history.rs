@@ -1,4 +1,4 @@
-//! The diagnosis history of a SubDevice (object 0x10F3, facts 6.3).
+//! The diagnosis history of a SubDevice (object 0x10F3, protocol 6.3).
 
 use alloc::vec::Vec;
 

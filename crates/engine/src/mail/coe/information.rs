@@ -1,4 +1,4 @@
-//! SDO information: which objects a SubDevice has, and what they are (facts 6.3).
+//! SDO information: which objects a SubDevice has, and what they are (protocol 6.3).
 
 use alloc::string::String;
 use alloc::vec;

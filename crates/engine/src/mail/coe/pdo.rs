@@ -1,4 +1,4 @@
-//! PDO assignment and mapping, as the SubDevice has them (facts 6.3: 0x1C10 + SyncManager, 0x16xx, 0x1Axx).
+//! PDO assignment and mapping, as the SubDevice has them (protocol 6.3: 0x1C10 + SyncManager, 0x16xx, 0x1Axx).
 
 use alloc::vec::Vec;
 

@@ -1,4 +1,4 @@
-//! PDOs by mailbox instead of with the process data (facts 6.3: RxPDO, TxPDO and the requests for them).
+//! PDOs by mailbox instead of with the process data (protocol 6.3: RxPDO, TxPDO and the requests for them).
 
 use alloc::vec::Vec;
 use core::fmt;

@@ -1,4 +1,4 @@
-//! Frames cut into the payloads of mailbox messages (facts 6.5).
+//! Frames cut into the payloads of mailbox messages (protocol 6.5).
 
 use alloc::vec;
 use alloc::vec::Vec;
@@ -61,8 +61,9 @@ mod tests {
         Fragments::new(&frame, 5, mailbox_size, false).map(Iterator::collect).unwrap_or_default()
     }
 
+    // covers: 6.5, eoe
     #[test]
-    fn all_but_the_last_are_whole_blocks_with_their_place_facts_6_5() {
+    fn all_but_the_last_are_whole_blocks_with_their_place() {
         // 128 bytes of mailbox, 10 of headers, 96 of data.
         let fragments = cut(200, 128);
         assert_eq!(fragments.iter().map(Vec::len).collect::<Vec<_>>(), [100, 100, 12]);

@@ -1,4 +1,4 @@
-//! Frames put together from fragments as they come (facts 6.5).
+//! Frames put together from fragments as they come (protocol 6.5).
 //!
 //! Frames are told apart by their number, so fragments of several may mix. A fragment that does not go on where its
 //! frame ended loses that frame; a fragment 0 begins anew. What a SubDevice sends takes no more memory than one frame
@@ -106,8 +106,9 @@ mod tests {
         Fragments::new(&alloc::vec![fill; length], number, 128, false).unwrap().collect()
     }
 
+    // covers: 6.5, eoe
     #[test]
-    fn fragments_of_sixteen_frames_that_mix_are_told_apart_facts_6_5() {
+    fn fragments_of_sixteen_frames_that_mix_are_told_apart() {
         let mut reassembly = Reassembly::default();
         let frames: Vec<_> = (0..16).map(|number| cut(number, 100 + usize::from(number), number)).collect();
         for frame in &frames {
@@ -119,8 +120,9 @@ mod tests {
         }
     }
 
+    // covers: 6.5, eoe
     #[test]
-    fn a_lost_fragment_loses_its_frame_and_no_other_facts_6_5() {
+    fn a_lost_fragment_loses_its_frame_and_no_other() {
         let mut reassembly = Reassembly::default();
         let [first, second] = [cut(1, 250, 1), cut(2, 250, 2)];
         take(&mut reassembly, &first[0]);
@@ -135,6 +137,7 @@ mod tests {
         assert_eq!(take(&mut reassembly, &next[0]), Outcome::Replaced(Some(alloc::vec![3; 60])));
     }
 
+    // covers: eoe
     #[test]
     fn what_claims_too_much_or_no_whole_blocks_is_lost() {
         let mut reassembly = Reassembly::default();

@@ -1,4 +1,4 @@
-//! IP parameters and address filter of a SubDevice: set and asked for (facts 6.5).
+//! IP parameters and address filter of a SubDevice: set and asked for (protocol 6.5).
 
 use alloc::vec;
 

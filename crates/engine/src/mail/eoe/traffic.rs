@@ -301,6 +301,7 @@ mod tests {
 
     const SECOND: u64 = 1_000_000_000;
 
+    // covers: eoe
     #[test]
     fn rates_are_those_of_the_last_full_second() {
         let mut rate = Rate::default();
@@ -312,6 +313,7 @@ mod tests {
         assert_eq!(rate.per_second(Instant(7 * SECOND)), (0, 0));
     }
 
+    // covers: eoe
     #[test]
     fn queues_are_bounded_and_what_does_not_fit_is_told_or_counted() {
         let mut traffic = Traffic::new();

@@ -1,4 +1,4 @@
-//! Procedure commands of drives: started, looked at, aborted (facts 6.6; IEC 61491: the value of the IDN is the
+//! Procedure commands of drives: started, looked at, aborted (protocol 6.6; IEC 61491: the value of the IDN is the
 //! command, its data state the acknowledgement).
 
 use ringcat_wire::mailbox::soe::{Idn, SoeElements};

@@ -1,4 +1,4 @@
-//! A SubDevice that is nothing but a mailbox: two SyncManagers, counters, the repeat request (facts 6.1, 6.2).
+//! A SubDevice that is nothing but a mailbox: two SyncManagers, counters, the repeat request (protocol 6.1, 6.2).
 
 use alloc::collections::VecDeque;
 use alloc::vec;

@@ -42,8 +42,9 @@ impl Bench {
     }
 }
 
+// covers: 6.2, mailbox
 #[test]
-fn a_mail_whose_read_was_lost_when_a_subdevice_stopped_answering_is_there_when_it_is_back_facts_6_2() {
+fn a_mail_whose_read_was_lost_at_an_outage_is_read_when_the_subdevice_is_back() {
     for noticed in (0..4000).step_by(50) {
         let mut bench = Bench::new(LinkSet::Single, 64);
         for code in 1..=3 {
@@ -59,8 +60,9 @@ fn a_mail_whose_read_was_lost_when_a_subdevice_stopped_answering_is_there_when_i
     }
 }
 
+// covers: 6.1, mailbox
 #[test]
-fn an_answer_that_waited_while_a_subdevice_was_away_is_not_taken_for_that_to_another_question_facts_6_1() {
+fn an_answer_that_waited_during_an_outage_answers_no_other_request() {
     let message = |text: &[u8]| Voe { vendor_id: 1, vendor_type: 1, data: text.to_vec() };
     let address = |idn| SoeAddress::value(1, Idn::standard(0, idn));
     let object = SdoAddress::new(0x2000, 1);
@@ -99,6 +101,7 @@ fn an_answer_that_waited_while_a_subdevice_was_away_is_not_taken_for_that_to_ano
     }
 }
 
+// covers: mailbox
 #[test]
 fn what_was_read_before_a_restart_and_comes_back_after_it_is_nobodys() {
     let mut bench = Bench::new(LinkSet::Single, 64);

@@ -56,8 +56,9 @@ impl Bench {
 
 type Outcome = alloc::rc::Rc<core::cell::RefCell<Option<Option<Result<Voe, MailboxError>>>>>;
 
+// covers: 6.6, mailbox
 #[test]
-fn late_fragments_of_which_the_first_came_when_nobody_waited_are_not_taken_for_those_of_the_next_facts_6_6() {
+fn late_fragments_begun_without_a_waiting_request_are_kept_from_the_next() {
     let mut bench = Bench::new(LinkSet::Single, 64);
     let (old, new) = (pattern(1, 150), pattern(2, 150));
     let address = SoeAddress::value(1, Idn::standard(0, 7));
@@ -79,9 +80,9 @@ fn late_fragments_of_which_the_first_came_when_nobody_waited_are_not_taken_for_t
 }
 
 // The write was taken, what came back of it was late, and meanwhile the reader brought the first fragment.
+// covers: mailbox
 #[test]
-fn late_fragments_of_which_the_first_came_before_the_request_was_known_to_be_written_are_not_taken_for_those_of_the_next()
- {
+fn late_fragments_begun_before_their_write_was_known_are_kept_from_the_next() {
     let mut bench = Bench::new(LinkSet::Single, 64);
     let (old, new) = (pattern(1, 150), pattern(2, 150));
     let address = SoeAddress::value(1, Idn::standard(0, 7));
@@ -110,8 +111,9 @@ fn late_fragments_of_which_the_first_came_before_the_request_was_known_to_be_wri
     assert_eq!(bench.mailbox.counters().unclaimed, 3);
 }
 
+// covers: mailbox
 #[test]
-fn the_answer_to_a_request_that_is_written_only_after_it_was_given_up_is_not_taken_for_that_to_the_next() {
+fn the_answer_to_a_request_written_after_it_was_abandoned_is_not_the_next_ones() {
     let limits = (Duration::from_secs(1), 10 * MS);
     let mut bench = Bench::new(LinkSet::Single, 64);
     let given_up = bench.ask_for(b"before", MS, limits);
@@ -130,8 +132,9 @@ fn the_answer_to_a_request_that_is_written_only_after_it_was_given_up_is_not_tak
     assert_eq!(bench.device.served, [1, 2], "both were written");
 }
 
+// covers: 6.1, mailbox
 #[test]
-fn an_error_reply_that_may_be_to_something_that_nobody_answers_leaves_the_request_that_it_ends_in_doubt_facts_6_1() {
+fn an_error_reply_of_unclear_cause_leaves_the_request_it_ends_in_doubt() {
     let mut bench = Bench::new(LinkSet::Single, 64);
     bench.device.delay = 3 * MS;
     bench.send_unanswered();
@@ -149,8 +152,9 @@ fn an_error_reply_that_may_be_to_something_that_nobody_answers_leaves_the_reques
     assert_eq!(second, Ok(message(b"second")));
 }
 
+// covers: 6.3, mailbox
 #[test]
-fn a_download_that_was_perhaps_not_what_was_refused_is_aborted_facts_6_3() {
+fn a_download_that_was_perhaps_not_what_was_refused_is_aborted() {
     for in_doubt in [false, true] {
         let mut bench = Bench::new(LinkSet::Single, 64);
         bench.device.delay = 3 * MS;
@@ -172,8 +176,9 @@ fn a_download_that_was_perhaps_not_what_was_refused_is_aborted_facts_6_3() {
     }
 }
 
+// covers: 6.4, mailbox
 #[test]
-fn a_file_that_is_surely_refused_with_an_error_reply_is_not_given_up_facts_6_4() {
+fn a_file_that_is_surely_refused_with_an_error_reply_is_not_given_up() {
     for in_doubt in [false, true] {
         let mut bench = Bench::new(LinkSet::Single, 64);
         bench.device.delay = 3 * MS;
@@ -194,8 +199,9 @@ fn a_file_that_is_surely_refused_with_an_error_reply_is_not_given_up_facts_6_4()
     }
 }
 
+// covers: 6.1, mailbox
 #[test]
-fn a_protocol_that_is_known_is_not_refused_because_ethernet_frames_are_facts_6_1() {
+fn a_protocol_that_is_known_is_not_refused_because_ethernet_frames_are() {
     let mut bench = Bench::new(LinkSet::Single, 64);
     bench.device.delay = 3 * MS;
     let mailbox = bench.mailbox.clone();
@@ -213,7 +219,7 @@ fn a_protocol_that_is_known_is_not_refused_because_ethernet_frames_are_facts_6_1
     assert_eq!(kept, Some(Protocol::Error));
 }
 
-// covers: facts 6.1
+// covers: 6.1, mailbox
 #[test]
 fn an_error_reply_to_something_else_does_not_end_the_wait_for_a_late_answer() {
     let mut bench = Bench::new(LinkSet::Single, 64);
@@ -229,6 +235,7 @@ fn an_error_reply_to_something_else_does_not_end_the_wait_for_a_late_answer() {
     assert_eq!(second.take(), Some(Some(Ok(message(b"second")))));
 }
 
+// covers: mailbox
 #[test]
 fn an_error_reply_that_comes_while_its_conversation_ends_is_kept_as_unasked_mail() {
     let mut bench = Bench::new(LinkSet::Single, 64);

@@ -24,8 +24,9 @@ use crate::mail::stream::{Bounded, Bytes};
 use crate::mail::voe::Voe;
 use crate::mail::{Lane, MailboxError, aoe, foe, raw, soe, voe};
 
+// covers: 6.3, sdo
 #[test]
-fn objects_of_any_size_are_written_and_read_in_segments_facts_6_3() {
+fn objects_of_any_size_are_written_and_read_in_segments() {
     for size in [24, 64, 128, 1024] {
         let mut bench = Bench::new(LinkSet::Single, size);
         // Around the limits: expedited, normal, first segment, less than seven bytes in the last one, and large.
@@ -50,8 +51,9 @@ fn objects_of_any_size_are_written_and_read_in_segments_facts_6_3() {
     }
 }
 
+// covers: 6.3, sdo
 #[test]
-fn what_is_larger_than_the_receiver_takes_is_aborted_facts_6_3() {
+fn what_is_larger_than_the_receiver_takes_is_aborted() {
     let mut bench = Bench::new(LinkSet::Single, 64);
     bench.device.server.objects.insert((0x2000, 1), pattern(1, 500));
     let mailbox = bench.mailbox.clone();
@@ -61,8 +63,9 @@ fn what_is_larger_than_the_receiver_takes_is_aborted_facts_6_3() {
     assert_eq!(bench.device.server.aborts, [AbortCode::OUT_OF_MEMORY]);
 }
 
+// covers: 6.3, sdo
 #[test]
-fn a_toggle_that_stands_still_is_aborted_facts_6_3() {
+fn a_toggle_that_stands_still_is_aborted() {
     let mut bench = Bench::new(LinkSet::Single, 64);
     bench.device.server.objects.insert((0x2000, 1), pattern(1, 500));
     bench.device.server.wrong_toggle = true;
@@ -73,6 +76,7 @@ fn a_toggle_that_stands_still_is_aborted_facts_6_3() {
     assert_eq!(bench.device.server.aborts, [AbortCode::TOGGLE_NOT_ALTERNATED]);
 }
 
+// covers: sdo
 #[test]
 fn a_transfer_that_is_dropped_is_aborted_and_the_next_one_is_not_disturbed() {
     let mut bench = Bench::new(LinkSet::Single, 64);
@@ -94,8 +98,9 @@ fn a_transfer_that_is_dropped_is_aborted_and_the_next_one_is_not_disturbed() {
     assert!(bench.device.server.aborts.len() > 30);
 }
 
+// covers: 6.3, sdo-information
 #[test]
-fn lists_objects_and_entries_come_in_fragments_facts_6_3() {
+fn lists_objects_and_entries_come_in_fragments() {
     let mut bench = Bench::new(LinkSet::Single, 40);
     for index in 0..300 {
         bench.device.server.objects.insert((0x2000 + index, 0), vec![0; 4]);
@@ -116,8 +121,9 @@ fn lists_objects_and_entries_come_in_fragments_facts_6_3() {
     assert_eq!(error.to_string(), "SDO information: refused by the SubDevice: 0x06020000 Object does not exist");
 }
 
+// covers: 6.3, sdo-information
 #[test]
-fn assignment_and_mapping_are_written_and_read_back_facts_6_3() {
+fn assignment_and_mapping_are_written_and_read_back() {
     let mut bench = Bench::new(LinkSet::Single, 128);
     let entries = [PdoEntry::new(0x6040, 0, 16), PdoEntry::new(0, 0, 8), PdoEntry::new(0x607A, 2, 32)];
     let pdos = vec![PdoMapping::of(0x1600, entries), PdoMapping::of(0x1601, [PdoEntry::new(0x6060, 0, 8)])];
@@ -130,8 +136,9 @@ fn assignment_and_mapping_are_written_and_read_back_facts_6_3() {
     assert_eq!(bench.device.server.objects[&(0x1600, 3)], [32, 2, 0x7A, 0x60]);
 }
 
+// covers: 6.3, sdo-information
 #[test]
-fn an_emergency_between_request_and_response_is_kept_and_told_facts_6_3() {
+fn an_emergency_between_request_and_response_is_kept_and_told() {
     let mut bench = Bench::new(LinkSet::Single, 128);
     bench.device.server.objects.insert((0x2000, 1), vec![1, 2, 3]);
     let emergency = Emergency { error_code: 0x5112, error_register: 4, data: [1, 2, 3, 4, 5] };
@@ -157,8 +164,9 @@ fn an_emergency_between_request_and_response_is_kept_and_told_facts_6_3() {
     assert_eq!(bench.mailbox.emergency_overruns(), 8);
 }
 
+// covers: 6.4, foe
 #[test]
-fn files_of_any_size_are_written_and_read_facts_6_4() {
+fn files_of_any_size_are_written_and_read() {
     let mut bench = Bench::new(LinkSet::Single, 64);
     let full = 64 - 12;
     for length in [0, 1, full - 1, full, full + 1, 2 * full, 10 * full, 5000] {
@@ -177,8 +185,9 @@ fn files_of_any_size_are_written_and_read_facts_6_4() {
     assert_eq!(bench.device.server.foe_errors, []);
 }
 
+// covers: 6.4, foe
 #[test]
-fn a_busy_subdevice_is_asked_again_and_its_progress_is_told_facts_6_4() {
+fn a_busy_subdevice_is_asked_again_and_its_progress_is_told() {
     let mut bench = Bench::new(LinkSet::Single, 64);
     let data = pattern(9, 200);
     bench.device.server.busy = 3;
@@ -205,8 +214,9 @@ fn a_busy_subdevice_is_asked_again_and_its_progress_is_told_facts_6_4() {
     assert_eq!(bench.device.server.foe_errors.len(), 1, "it is told that the transfer is over");
 }
 
+// covers: 6.4, foe
 #[test]
-fn code_and_text_of_a_refused_file_reach_the_user_facts_6_4() {
+fn code_and_text_of_a_refused_file_reach_the_user() {
     let mut bench = Bench::new(LinkSet::Single, 64);
     let mailbox = bench.mailbox.clone();
     let error = bench
@@ -222,8 +232,9 @@ fn code_and_text_of_a_refused_file_reach_the_user_facts_6_4() {
     assert!(matches!(error.unwrap_err().cause, FoeFailure::Refused { code: FoeErrorCode::NO_RIGHTS, .. }));
 }
 
+// covers: 6.6, soe
 #[test]
-fn idns_are_written_and_read_in_fragments_facts_6_6() {
+fn idns_are_written_and_read_in_fragments() {
     let mut bench = Bench::new(LinkSet::Single, 64);
     for length in [0, 2, 53, 54, 55, 108, 109, 3000] {
         let data = pattern(length as u32, length);
@@ -245,8 +256,9 @@ fn idns_are_written_and_read_in_fragments_facts_6_6() {
     assert_eq!(error.cause, SoeFailure::Drive);
 }
 
+// covers: 6.7, aoe
 #[test]
-fn ads_requests_are_answered_by_their_invoke_id_facts_6_7() {
+fn ads_requests_are_answered_by_their_invoke_id() {
     let mut bench = Bench::new(LinkSet::Single, 128);
     let address = |port| AmsAddress { net_id: NetId([1, 2, 3, 4, 5, 6]), port };
     let route = AoeRoute { target: address(0x1001), source: address(0x8000) };
@@ -264,8 +276,9 @@ fn ads_requests_are_answered_by_their_invoke_id_facts_6_7() {
     });
 }
 
+// covers: 6.8, voe
 #[test]
-fn vendor_messages_are_exchanged_and_received_unasked_facts_6_8() {
+fn vendor_messages_are_exchanged_and_received_unasked() {
     let mut bench = Bench::new(LinkSet::Single, 128);
     let message = Voe { vendor_id: 0x0C47, vendor_type: 3, data: b"hello".to_vec() };
     let (mailbox, sent) = (bench.mailbox.clone(), message.clone());
@@ -281,7 +294,7 @@ fn vendor_messages_are_exchanged_and_received_unasked_facts_6_8() {
     assert_eq!(result, Ok(message));
 }
 
-// covers: facts 6.1
+// covers: 6.1, mailbox-faults
 #[test]
 fn an_error_reply_goes_to_the_request_whose_protocol_is_unknown_to_the_subdevice() {
     let mut bench = Bench::new(LinkSet::Single, 128);
@@ -301,7 +314,7 @@ fn an_error_reply_goes_to_the_request_whose_protocol_is_unknown_to_the_subdevice
 }
 
 // Only the last fragment is answered: an error reply before that may be to any of them, or to what somebody else asked.
-// covers: facts 6.6
+// covers: 6.6, mailbox-faults
 #[test]
 fn an_error_reply_while_fragments_are_written_fails_the_write_whoever_else_waits() {
     let mut bench = Bench::new(LinkSet::Single, 64);

@@ -26,8 +26,9 @@ impl Bench {
     }
 }
 
+// covers: 6.1, pdo-mail
 #[test]
-fn mail_of_any_type_is_exchanged_refused_and_received_unasked_facts_6_1() {
+fn mail_of_any_type_is_exchanged_refused_and_received_unasked() {
     let mut bench = Bench::new(LinkSet::Single, 64);
     let own = Protocol::Other(OWN);
     assert_eq!(bench.exchange(OWN, b"question"), Ok(b"question".to_vec()));
@@ -62,6 +63,7 @@ fn mail_of_any_type_is_exchanged_refused_and_received_unasked_facts_6_1() {
     assert!(bench.mailbox.is_idle());
 }
 
+// covers: pdo-mail
 #[test]
 fn an_error_reply_that_nobody_waits_for_is_kept_as_unasked_mail() {
     let mut bench = Bench::new(LinkSet::Single, 64);
@@ -74,8 +76,9 @@ fn an_error_reply_that_nobody_waits_for_is_kept_as_unasked_mail() {
     assert_eq!(bench.unasked(Unsolicited::Other), [(Protocol::Error, reply)]);
 }
 
+// covers: 6.8, pdo-mail
 #[test]
-fn vendor_messages_that_are_no_answer_are_kept_whenever_they_come_facts_6_8() {
+fn vendor_messages_that_are_no_answer_are_kept_whenever_they_come() {
     let message = |vendor_id, data: &[u8]| Voe { vendor_id, vendor_type: 1, data: data.to_vec() };
     let payload = |message: &Voe| {
         let mut bytes = vec![0; 58];

@@ -161,11 +161,13 @@ fn storm(seed: u64, links: LinkSet, percent: u64, drops: bool) {
     assert!(steps.clone().all(|pair| pair[0] != pair[1]), "seed {seed}");
 }
 
+// covers: mailbox-faults
 #[test]
 fn all_protocols_run_side_by_side_over_one_mailbox() {
     storm(1, LinkSet::Single, 0, false);
 }
 
+// covers: mailbox-faults
 #[test]
 fn nothing_is_lost_or_mistaken_whatever_becomes_of_frames_seeds_0_to_99() {
     for seed in 0..100 {
@@ -174,17 +176,20 @@ fn nothing_is_lost_or_mistaken_whatever_becomes_of_frames_seeds_0_to_99() {
 }
 
 /// A mail was read four times in 200 ms, each time by a frame that came too late or after a repeat.
+// covers: mailbox-faults
 #[test]
 fn a_mail_that_comes_late_long_after_it_was_accepted_is_a_double_seed_2468() {
     storm(2468, LinkSet::Ring, 20, false);
 }
 
 /// A request was given up whose answer had begun before it was known to be written.
+// covers: mailbox-faults
 #[test]
-fn fragments_of_a_request_that_was_given_up_are_not_taken_for_those_of_the_next_seed_3580() {
+fn fragments_of_an_abandoned_request_are_not_taken_for_those_of_the_next() {
     storm(3580, LinkSet::Ring, 20, true);
 }
 
+// covers: mailbox-faults
 #[test]
 fn procedures_that_are_dropped_harm_nobody_seeds_0_to_99() {
     for seed in 0..100 {

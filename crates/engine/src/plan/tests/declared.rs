@@ -43,6 +43,7 @@ fn declared_sync_managers_take_the_place_of_the_sii_and_nothing_is_assigned() {
     assert_eq!((layout.receive_offset, layout.send_offset, layout.send_size), (0x1000, 0x1100, 0x100));
 }
 
+// covers: sync-managers-declared
 #[test]
 fn declared_bootstrap_mailboxes_take_the_place_of_the_sii() {
     let pair = [
@@ -55,7 +56,7 @@ fn declared_bootstrap_mailboxes_take_the_place_of_the_sii() {
 }
 
 #[test]
-fn entries_of_a_declared_sync_manager_lie_where_the_file_says_and_a_switched_off_one_has_no_place() {
+fn entries_of_a_declared_sync_manager_lie_where_the_file_places_them() {
     let entries = [PdoEntry::new(0x7000, 1, 12), PdoEntry::new(0, 0, 4), PdoEntry::new(0x7000, 2, 16)];
     let planned = plan(&with(|declared| declared[3].pdos = vec![PdoMapping::of(0x1600, entries)]), &device()).unwrap();
     let places: Vec<_> = planned.process_data[0].pdos[0].entries.iter().map(|e| (e.index, e.bit_offset)).collect();
@@ -69,6 +70,7 @@ fn entries_of_a_declared_sync_manager_lie_where_the_file_says_and_a_switched_off
     assert_eq!(planned.process_data[0].register.length, 4, "written as the file has it");
 }
 
+// covers: sync-managers-declared
 #[test]
 fn what_a_file_cannot_mean_is_refused() {
     let problem = |change: fn(&mut Vec<DeclaredSyncManager>)| problem(&with(change), &device());
@@ -89,6 +91,7 @@ fn what_a_file_cannot_mean_is_refused() {
     assert_eq!(problem(|declared| declared[3].pdos = vec![PdoMapping::from_sii(0x1777)]), unknown);
 }
 
+// covers: sync-managers-declared
 #[test]
 fn protocols_are_those_of_the_file_where_it_declares_mailboxes() {
     let silent = SubDeviceInfo { protocols: MailboxProtocols(0), ..device() };

@@ -1,4 +1,4 @@
-//! Who is connected to whom now, and what frames take from clock to clock (facts 7.1).
+//! Who is connected to whom now, and what frames take from clock to clock (protocol 7.1).
 //!
 //! Nothing here disturbs process data, so a measurement may be taken at any time. But a frame meets those in a whole
 //! ring only once, which measures nothing: at the set-up every ring is opened for a moment, with the bit that closes it
@@ -352,7 +352,7 @@ impl Clocks {
     }
 }
 
-/// Controllers that latch in one direction only are told in which the frame comes (facts 3.12, 7.5).
+/// Controllers that latch in one direction only are told in which the frame comes (protocol 3.12, 7.5).
 /// Returns whether none had to be.
 async fn enter_backwards(bus: &Bus, clocks: &SharedClocks, stations: &[StationAddress], entries: &[u8]) -> bool {
     let modes: Vec<(StationAddress, u8)> = {

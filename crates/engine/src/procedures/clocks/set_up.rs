@@ -1,5 +1,5 @@
-//! Delays, offsets and filters of all clocks (facts 7.1, 7.2): at the beginning, after each change of the segment, and
-//! of one clock that has lost its registers.
+//! Delays, offsets and filters of all clocks (protocol 7.1, 7.2): at the beginning, after each change of the segment,
+//! and of one clock that has lost its registers.
 
 use alloc::string::{String, ToString};
 use alloc::vec::Vec;

@@ -1,4 +1,4 @@
-//! SYNC signals of one SubDevice, and waiting until its clock is good enough for them (facts 7.3).
+//! SYNC signals of one SubDevice, and waiting until its clock is good enough for them (protocol 7.3).
 
 use core::fmt;
 use core::time::Duration;
@@ -14,9 +14,9 @@ use crate::procedures::shared_clocks::{Clocks, HiddenDelay, Node};
 use crate::procedures::shared_segment::SharedSegment;
 use crate::supervisor::{Bus, BusError};
 
-/// From the look at the clock to the first pulse at the least (facts 7.3).
+/// From the look at the clock to the first pulse at the least (protocol 7.3).
 const AHEAD_NS: u64 = 100_000_000;
-/// Signals are started when the clock differs by at most this (facts 7.2: as IgH does).
+/// Signals are started when the clock differs by at most this (protocol 7.2: as IgH does).
 const GOOD_ENOUGH_NS: u32 = 10_000;
 /// A segment that changes all the time is not waited for any longer.
 const MEASURING_LIMIT: Duration = Duration::from_secs(1);

@@ -1,4 +1,4 @@
-//! The static drift phase, who is locked, and whose time each link distributes (facts 7.2, 7.5).
+//! The static drift phase, who is locked, and whose time each link distributes (protocol 7.2, 7.5).
 //!
 //! Two procedures run side by side: one hands the reference time to all clocks many times, as fast as the segment
 //! allows, the other reads their differences, every millisecond until all are locked and now and again afterwards. When
@@ -42,7 +42,7 @@ const LONGEST_RETRY: Duration = Duration::from_secs(10);
 /// From the last change of the segment until it is measured again: a plug that is pushed in bounces.
 const SETTLE: Duration = Duration::from_millis(5);
 /// A ring that opened or closed explains ports that change within so long: in each part the way from clock to clock is
-/// what it was (facts 7.5), so that nobody has to wait for the measurement.
+/// what it was (protocol 7.5), so that nobody has to wait for the measurement.
 const EXPLAINED: Duration = Duration::from_millis(20);
 /// Between two tries to measure it.
 const AGAIN: Duration = Duration::from_millis(20);
@@ -338,7 +338,7 @@ fn judge(bus: &Bus, segment: &SharedSegment, answers: &[Option<Answer>]) {
         }
         all &= node.good >= config.lock_samples;
         if node.good >= config.lock_samples && !references.contains(&Some(position)) {
-            // What the loop makes up for, now that it has settled (facts 7.2.1).
+            // What the loop makes up for, now that it has settled (protocol 7.2.1).
             node.drift_ppb = -deviation_ppb;
         }
         largest = largest.max(magnitude);

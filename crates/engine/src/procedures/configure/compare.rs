@@ -9,7 +9,7 @@ use crate::event::Event;
 use crate::mail::coe::pdo;
 use crate::procedures::al_state::StateError;
 
-/// Codes that may mean that the sizes are wrong (facts 5.5).
+/// Codes that may mean that the sizes are wrong (protocol 5.5).
 const OF_SIZES: [AlStatusCode; 5] = [
     AlStatusCode::INVALID_SYNC_MANAGER_CONFIGURATION,
     AlStatusCode::INVALID_OUTPUT_CONFIGURATION,

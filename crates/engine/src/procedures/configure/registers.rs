@@ -1,4 +1,4 @@
-//! Commands to registers: written until the SubDevice takes them, read until they hold what they must (facts 8.2).
+//! Commands to registers: written until the SubDevice takes them, read until they hold what they must (protocol 8.2).
 
 use alloc::boxed::Box;
 use alloc::vec;

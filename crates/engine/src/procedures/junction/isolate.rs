@@ -3,7 +3,7 @@
 //! The second SubDevice with nothing on its port 0 destroys every frame, but all that are passed before it take part in
 //! it, among them the junction at which its ring begins. So a junction can be told blindly to leave its ring out, by
 //! closing both ports of the ring. One ring after the other is looked into while all others are left out; then the
-//! others are reached again, too. The settings are temporary (facts 2.2, DL control bit 1): what becomes of frames
+//! others are reached again, too. The settings are temporary (protocol 2.2, DL control bit 1): what becomes of frames
 //! meanwhile, the loops return to what they were within about a second. All loops of a junction are written at once,
 //! and nobody can be asked for them any more: those that somebody had closed on purpose are known from before
 //! ([`super::orders`]), and stay closed.

@@ -4,7 +4,7 @@
 //! closed for a moment, in one frame. If it is that cable, the ring is open there and all SubDevices still answer; any
 //! other pair of ports cuts somebody off. Where the ring is broken already, the end at the junction alone is closed,
 //! and those between the break and the closing cable, and nobody else, must fall silent. The loops return to what they
-//! were in any case: the setting is temporary (facts 2.2, DL control bit 1).
+//! were in any case: the setting is temporary (protocol 2.2, DL control bit 1).
 //!
 //! A try in vain says more than no: of a ring that is closed at its junction and somewhere in the middle the members
 //! behind that fall silent, up to the last one. So that one's cable is tried next, and a ring takes two or three tries,

@@ -1,4 +1,4 @@
-//! Which objects the MainDevice itself has (facts 10.2, ETG.1510), and what is told of their entries.
+//! Which objects the MainDevice itself has (protocol 10.2, ETG.1510), and what is told of their entries.
 
 use ringcat_wire::mailbox::coe::{DataType, DiagnosisHistory, DiagnosisMessage, ObjectCode};
 
@@ -303,8 +303,9 @@ mod tests {
     use super::*;
     use alloc::vec::Vec;
 
+    // covers: 10.2, own-objects
     #[test]
-    fn every_index_that_is_listed_is_an_object_and_no_other_is_facts_10_2() {
+    fn every_index_that_is_listed_is_an_object_and_no_other_is() {
         for declared in [0, 3, MAX_MODULES + 100] {
             let listed: Vec<u16> = Object::indices(declared).collect();
             assert!(listed.is_sorted_by(|one, next| one < next));
@@ -314,8 +315,9 @@ mod tests {
         assert_eq!(Object::indices(3).count(), 6 + 9 + 2 + 32 + 2);
     }
 
+    // covers: 10.2
     #[test]
-    fn subindices_ascend_and_only_four_entries_are_written_facts_10_2() {
+    fn subindices_ascend_and_only_four_entries_are_written() {
         let mut written = Vec::new();
         for index in Object::indices(1) {
             let object = Object::at(index, 1).unwrap();

@@ -1,4 +1,4 @@
-//! Entries about a SubDevice that its own dictionary answers, by mailbox, when a client asks (facts 6.3, 10.2).
+//! Entries about a SubDevice that its own dictionary answers, by mailbox, when a client asks (protocol 6.3, 10.2).
 
 use core::time::Duration;
 

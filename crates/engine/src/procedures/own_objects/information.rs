@@ -1,4 +1,4 @@
-//! SDO information about the objects of the MainDevice itself: lists, objects, entries, in fragments (facts 6.3).
+//! SDO information about the objects of the MainDevice itself: lists, objects, entries, in fragments (protocol 6.3).
 
 use alloc::vec;
 use alloc::vec::Vec;
@@ -123,8 +123,9 @@ mod tests {
         answer(&bytes, room, 40).unwrap()
     }
 
+    // covers: 6.3
     #[test]
-    fn the_list_comes_in_fragments_and_is_whole_facts_6_3() {
+    fn the_list_comes_in_fragments_and_is_whole() {
         let messages = ask(InformationOpcode::ListRequest, &ListType::All.code().to_le_bytes(), 64);
         let mut data = Vec::new();
         for (number, message) in messages.iter().enumerate() {
@@ -139,8 +140,9 @@ mod tests {
         assert!(Indices(&data[2..]).iter().eq(Object::indices(40)));
     }
 
+    // covers: 10.2
     #[test]
-    fn objects_and_entries_are_described_or_refused_facts_10_2() {
+    fn objects_and_entries_are_described_or_refused() {
         let messages = ask(InformationOpcode::ObjectRequest, &0xA027_u16.to_le_bytes(), 506);
         let part = SdoInformation::decode(&messages[0]).unwrap();
         let described = ObjectDescription::decode(part.data).unwrap();

@@ -1,4 +1,4 @@
-//! The diagnosis history of the MainDevice itself, object 0x10F3 (facts 6.3, 10.2): its entries as bytes, and back.
+//! The diagnosis history of the MainDevice itself, object 0x10F3 (protocol 6.3, 10.2): its entries as bytes, and back.
 
 use alloc::vec;
 use alloc::vec::Vec;
@@ -80,8 +80,9 @@ mod tests {
     use crate::time::Instant;
     use ringcat_wire::mailbox::coe::DiagnosisKind;
 
+    // covers: 6.3
     #[test]
-    fn a_message_has_these_bytes_facts_6_3() {
+    fn a_message_has_these_bytes() {
         let incident =
             Incident { at: Instant(0x0102), kind: DiagnosisKind::Error, number: 3, subdevice: Some(4), detail: 0x1B };
         assert_eq!(

@@ -1,4 +1,4 @@
-//! Uploads of the MainDevice's own objects: expedited, normal, in segments (facts 6.3).
+//! Uploads of the MainDevice's own objects: expedited, normal, in segments (protocol 6.3).
 
 use alloc::vec;
 use alloc::vec::Vec;
@@ -77,8 +77,9 @@ pub(super) fn encode(response: &SdoResponse<'_>) -> Vec<u8> {
 mod tests {
     use super::*;
 
+    // covers: 6.3, own-objects
     #[test]
-    fn a_value_of_any_length_arrives_whole_and_a_wrong_toggle_ends_it_facts_6_3() {
+    fn a_value_of_any_length_arrives_whole_and_a_wrong_toggle_ends_it() {
         let room = 32;
         for length in 0..200_usize {
             let data: Vec<u8> = (0..length).map(|byte| byte as u8).collect();

@@ -1,4 +1,4 @@
-//! Values of the MainDevice's own objects (facts 10.2), as of now: what registers say is read when somebody asks.
+//! Values of the MainDevice's own objects (protocol 10.2), as of now: what registers say is read when somebody asks.
 
 use alloc::vec;
 use alloc::vec::Vec;
@@ -287,8 +287,9 @@ fn neighbour(segment: &Segment, member: &Member, port: u8) -> Option<StationAddr
 mod tests {
     use super::*;
 
+    // covers: 10.2
     #[test]
-    fn a_list_has_255_addresses_and_the_next_has_the_rest_facts_10_2() {
+    fn a_list_has_255_addresses_and_the_next_has_the_rest() {
         let all: Vec<StationAddress> = (0..300).map(StationAddress).collect();
         let (first, second) = (addresses(0, &all), addresses(1, &all));
         assert_eq!((first.len(), first[0].clone(), first[254].clone()), (255, u16_(1, 0), u16_(255, 254)));

@@ -1,4 +1,4 @@
-//! The explicit device identification of SubDevices whose SII offers it (facts 4.3, 5.3).
+//! The explicit device identification of SubDevices whose SII offers it (protocol 4.3, 5.3).
 
 use ringcat_wire::address::{RegisterAddress, StationAddress};
 use ringcat_wire::register::EscConfiguration;

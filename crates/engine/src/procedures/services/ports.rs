@@ -1,4 +1,4 @@
-//! Ports of a SubDevice: opened and closed by DL control; SubDevices cut off from the others on purpose (facts 2.2).
+//! Ports of a SubDevice: opened and closed by DL control; SubDevices cut off from the others on purpose (protocol 2.2).
 
 pub use crate::segment::BlockedPort;
 

@@ -1,4 +1,4 @@
-//! Registers and memory of one SubDevice, any number of bytes (facts 3).
+//! Registers and memory of one SubDevice, any number of bytes (protocol 3).
 
 use alloc::vec::Vec;
 

@@ -1,4 +1,4 @@
-//! Resetting a SubDevice controller (facts 3.2): R, E, S in three frames to ESC_RESET_ECAT.
+//! Resetting a SubDevice controller (protocol 3.2): R, E, S in three frames to ESC_RESET_ECAT.
 
 use ringcat_wire::address::{StationAddress, Wkc};
 use ringcat_wire::command::Command;

@@ -1,4 +1,4 @@
-//! Reading error counters of SubDevices: on a period, on demand; clearing them (facts 2.5).
+//! Reading error counters of SubDevices: on a period, on demand; clearing them (protocol 2.5).
 
 use alloc::vec::Vec;
 

@@ -206,7 +206,7 @@ mod tests {
     }
 
     #[test]
-    fn one_subdevice_does_not_confirm_itself_and_two_that_differ_are_read_each_for_itself() {
+    fn one_subdevice_does_not_confirm_itself_and_two_that_differ_are_both_read() {
         let cache = SiiCache::new(true);
         for _ in 0..3 {
             claim(&cache, &area(1), 1).expect("one is not enough").settle(Vec::new(), contents(&area(1)));

@@ -1,4 +1,4 @@
-//! Words of an EEPROM through the SII interface of its controller (facts 3.8).
+//! Words of an EEPROM through the SII interface of its controller (protocol 3.8).
 //!
 //! A poll brings the data of a command along, and the next command travels behind it in the same frame: while the
 //! EEPROM is busy the controller refuses it, and where it was in time it goes on at once. Which word the data belongs
@@ -17,7 +17,7 @@ use super::pace::Pace;
 use crate::supervisor::{Bus, BusError};
 use crate::time::Instant;
 
-/// How long an EEPROM may be busy with one command (facts 5.4: 20 ms are usual; emulated ones take longer).
+/// How long an EEPROM may be busy with one command (protocol 5.4: 20 ms are usual; emulated ones take longer).
 const COMMAND_LIMIT: Duration = Duration::from_millis(100);
 /// How long a controller may take to load its EEPROM after power-on.
 const LOAD_LIMIT: Duration = Duration::from_millis(500);

@@ -1,4 +1,4 @@
-//! Writing an EEPROM: word by word, each read back (facts 3.8, 4.7); the alias; loading what was written.
+//! Writing an EEPROM: word by word, each read back (protocol 3.8, 4.7); the alias; loading what was written.
 //!
 //! Words that are right already are left alone. The configuration area goes last, so that a write that is cut off
 //! leaves the one that was there. Afterwards the EEPROM belongs to whom it belonged before.
@@ -204,7 +204,7 @@ pub async fn write(
 }
 
 /// Writes the alias, with the checksum that the configuration area then has; one that is wrong now is not made right
-/// unless `force` says so. The controller takes over an alias when it starts, not when it loads again (facts 4.7).
+/// unless `force` says so. The controller takes over an alias when it starts, not when it loads again (protocol 4.7).
 pub async fn write_alias(
     bus: &Bus,
     station: StationAddress,

@@ -30,7 +30,7 @@ const EXCHANGED: u16 = 3;
 async fn read(bus: &Bus) -> Result<Option<View>, BusError> {
     let ring = |bus: &Bus| bus.board().map(|board| board.ring()).unwrap_or_default();
     let before = ring(bus);
-    // Positions behind a break are counted from there (facts CR-09).
+    // Positions behind a break are counted from there (protocol CR-09).
     let counted = bus.brd(map::TYPE, 1).await?;
     let count = counted.wkc().0.min(MAX_SUBDEVICES);
     let read = bus.gather((0..count).map(Position), |bus, position| async move {

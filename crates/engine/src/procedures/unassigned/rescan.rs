@@ -1,5 +1,5 @@
 //! A look at the whole segment while process data goes on: who is at which place now, who has moved, who is not there
-//! (000 10.8).
+//! (Master Redundancy 10.8).
 //!
 //! Places are only read, and no process data: nobody's working counter changes. Those without a station address of ours
 //! are found and read by the search of whoever supervises, for which this waits.
@@ -265,6 +265,7 @@ mod tests {
         places.iter().zip(stays).filter(|(_, stays)| !stays).map(|(place, _)| *place).collect()
     }
 
+    // covers: rescan
     #[test]
     fn as_few_as_possible_have_moved() {
         assert_eq!(moved(&[]), []);

@@ -1,4 +1,4 @@
-//! The FMMU that shows whether a SubDevice has mail (facts 6.1): each has a bit of its own in the logical address
+//! The FMMU that shows whether a SubDevice has mail (protocol 6.1): each has a bit of its own in the logical address
 //! space, so that all answer one read together.
 
 use ringcat_wire::address::LogicalAddress;

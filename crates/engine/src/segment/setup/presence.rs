@@ -1,4 +1,4 @@
-//! The FMMU that shows a SubDevice's AL status in the frames of its process data (facts 3.4, 3.10).
+//! The FMMU that shows a SubDevice's AL status in the frames of its process data (protocol 3.4, 3.10).
 
 use ringcat_wire::address::LogicalAddress;
 use ringcat_wire::register::{Fmmu, SyncManagerMode, map};

@@ -15,7 +15,7 @@ use crate::supervisor::transfer::Request;
 
 impl Bus {
     /// Writes a mailbox of `size` bytes, once: its beginning and its last byte, which hands it over, in one frame
-    /// (facts 6.1). The working counter is that of the last byte.
+    /// (protocol 6.1). The working counter is that of the last byte.
     pub fn write_mail(
         &self,
         station: StationAddress,

@@ -14,7 +14,7 @@ use crate::supervisor::shared::Shared;
 use crate::supervisor::stray::Stray;
 use crate::supervisor::transfer::{Stage, TransferId};
 
-/// A lost datagram is sent again so often; the retry index in the source address has three bits (facts SM-04).
+/// A lost datagram is sent again so often; the retry index in the source address has three bits (protocol SM-04).
 const MAX_RETRIES: u8 = 7;
 
 impl Shared {
@@ -86,7 +86,7 @@ impl Shared {
         self.flights.slots[slot] = Some(flight);
     }
 
-    /// A broadcast shows how many SubDevices the main copy meets (facts CR-09).
+    /// A broadcast shows how many SubDevices the main copy meets (protocol CR-09).
     fn learn_main_count(&mut self, flight: &Flight) {
         let is_broadcast = |place: &&Place| matches!(place.command, Command::Brd | Command::Bwr);
         // One that no SubDevice has processed shows nothing.

@@ -181,7 +181,7 @@ fn put(builder: &mut FrameBuilder<'_>, request: &Request, index: u8, now: Instan
 }
 
 /// In an open ring the SubDevice at position `p` behind the break is the one at `p - main_count` on the redundant link;
-/// in a closed one nobody is addressed twice (facts CR-09).
+/// in a closed one nobody is addressed twice (protocol CR-09).
 fn adjust_auto_increment(frame: &mut [u8], places: &[Place], main_count: u16) {
     for place in places {
         if !matches!(place.command, Command::Aprd | Command::Apwr | Command::Aprw | Command::Armw) {

@@ -1,4 +1,4 @@
-//! Rings behind junctions (facts 9.4): vectors, and random trees with rings that are whole or broken at one place.
+//! Rings behind junctions (protocol 9.4): vectors, and random trees with rings that are whole or broken at one place.
 
 use std::vec;
 use std::vec::Vec;
@@ -13,8 +13,9 @@ use crate::topology::{Closing, RingCable, Topology, candidates};
 const JUNCTION: u8 = 0xAA;
 const CLOSING: Closing = Closing { head: at(0, 1), tail: at(3, 1) };
 
+// covers: JR-01
 #[test]
-fn a_whole_ring_behind_a_junction_is_a_branch_on_the_port_where_it_begins_jr_01() {
+fn a_whole_ring_behind_a_junction_is_a_branch_on_the_port_where_it_begins() {
     let nodes = [status(JUNCTION), status(PASS), status(PASS), status(PASS), status(END)];
     let topology = Topology::with_local_rings(&nodes, 5, &[CLOSING]);
     assert_eq!(parents(&topology), [None, Some((0, 3)), Some((1, 1)), Some((2, 1)), Some((0, 2))]);
@@ -29,7 +30,7 @@ fn a_whole_ring_behind_a_junction_is_a_branch_on_the_port_where_it_begins_jr_01(
     assert_eq!(topology.local_rings[0].cables, cables);
 }
 
-// covers: LC-06
+// covers: LC-06, junctions
 #[test]
 fn a_broken_ring_behind_a_junction_keeps_order_and_place_and_is_no_crossed_line() {
     // Between 10 and 11.
@@ -41,14 +42,16 @@ fn a_broken_ring_behind_a_junction_keeps_order_and_place_and_is_no_crossed_line(
     assert_eq!(topology.local_rings[0].cables.len(), 3);
 }
 
+// covers: JR-04
 #[test]
-fn without_junction_redundancy_a_broken_ring_reads_as_a_crossed_line_jr_04() {
+fn without_junction_redundancy_a_broken_ring_reads_as_a_crossed_line() {
     let nodes = [status(0x9A), status(END), status(HEAD), status(PASS)];
     let topology = Topology::build(&nodes, 4);
     assert!(topology.findings.contains(&super::Finding::CrossedLine { node: 2, entry_port: 1 }));
     assert!(topology.findings.contains(&super::Finding::UnconnectedPort0 { node: 2 }));
 }
 
+// covers: junctions
 #[test]
 fn open_ports_allow_every_member_to_be_the_last_of_its_ring() {
     let nodes = [status(JUNCTION), status(PASS), status(PASS), status(PASS), status(END)];
@@ -92,8 +95,9 @@ fn with_ring() -> impl Strategy<Value = WithRing> {
 }
 
 proptest! {
+    // covers: JR-02, junctions
     #[test]
-    fn any_ring_behind_a_junction_is_met_in_the_same_order_whole_and_broken_jr_02(
+    fn any_ring_behind_a_junction_is_met_in_the_same_order_whole_and_broken(
         WithRing { segment, closing } in with_ring(), cut in any::<prop::sample::Index>(), times in any::<bool>()
     ) {
         let whole = segment.walk();
@@ -123,6 +127,7 @@ proptest! {
         prop_assert_eq!(last(&again), last(&topology));
     }
 
+    // covers: junctions
     #[test]
     fn any_connections_and_status_words_give_a_tree_without_panic(
         nodes in proptest::collection::vec(any::<u8>(), 0..24),

@@ -1,4 +1,5 @@
-//! The walk of a frame over ports, as an oracle: facts 2.1, 2.4 and 11.3 in a few lines, on wiring instead of status.
+//! The walk of a frame over ports, as an oracle: protocol 2.1, 2.4 and 11.3 in a few lines, on wiring instead of
+//! status.
 
 use std::vec;
 use std::vec::Vec;

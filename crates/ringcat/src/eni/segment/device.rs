@@ -119,7 +119,7 @@ pub(super) fn tell_apart(eni: &Eni, devices: &mut [DeviceDescription]) {
     }
 }
 
-/// A letter per port (facts 8.1): K is EBUS, blank is none, others are Ethernet in some form.
+/// A letter per port (protocol 8.1): K is EBUS, blank is none, others are Ethernet in some form.
 fn ports(physics: &str) -> [PortKind; 4] {
     let mut ports = [PortKind::NotImplemented; 4];
     for (port, letter) in ports.iter_mut().zip(physics.chars()) {

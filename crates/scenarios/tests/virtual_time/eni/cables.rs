@@ -1,4 +1,4 @@
-//! The cables of a network held against `PreviousPort` of a file (facts 8.2).
+//! The cables of a network held against `PreviousPort` of a file (protocol 8.2).
 
 use ringcat::eni::segment;
 use ringcat::simulated::SimulatedSegment;
@@ -21,8 +21,9 @@ fn scanned(file: &EniFile, mut network: Network, cut: Option<CableId>) -> (Scan,
     (scan, told.iter().map(ToString::to_string).collect())
 }
 
+// covers: 8.2, eni-cabling
 #[test]
-fn cables_as_the_file_says_are_not_told_also_in_a_ring_that_is_open_facts_8_2() {
+fn cables_as_the_file_says_are_not_told_also_in_a_ring_that_is_open() {
     let file = machine();
     assert_eq!(scanned(&file, file.simulated(false).expect("a segment"), None).1, [""; 0]);
     assert_eq!(scanned(&file, file.simulated(true).expect("a segment"), None).1, [""; 0]);
@@ -34,8 +35,9 @@ fn cables_as_the_file_says_are_not_told_also_in_a_ring_that_is_open_facts_8_2() 
     }
 }
 
+// covers: 8.2, eni-cabling
 #[test]
-fn a_cable_that_is_plugged_in_elsewhere_is_told_with_both_places_facts_8_2() {
+fn a_cable_that_is_plugged_in_elsewhere_is_told_with_both_places() {
     let file = machine();
     let mut moved = segment(&file.eni, &file.configuration, false);
     moved.cables[DRIVE].a = Endpoint::Device(DeviceIndex(BUTTONS), Port::B);

@@ -33,8 +33,9 @@ fn get(plant: &Plant, name: &str) -> u64 {
     plant.image.read(plant.image.variable(name).expect("it is there"))
 }
 
+// covers: 8.2, eni-run
 #[test]
-fn a_hot_connect_group_of_a_file_has_its_places_from_the_start_and_takes_them_when_it_comes_facts_8_2() {
+fn a_hot_connect_group_of_a_file_has_its_places_from_the_start() {
     let group = "      <HotConnect><GroupName>Drive</GroupName><GroupMemberCnt>1</GroupMemberCnt>
         <IdentifyCmd><Comment>alias</Comment><Cmd>1</Cmd><Adp>0</Adp><Ado>18</Ado><Data>0000</Data>
           <Validate><Data>0700</Data><Timeout>100</Timeout></Validate></IdentifyCmd></HotConnect>
@@ -66,8 +67,9 @@ fn activate_on_any(network: Network, file: EniFile) -> Plant {
     plant
 }
 
+// covers: 8.1, eni-run
 #[test]
-fn tasks_of_a_file_are_domains_with_cycle_times_of_their_own_facts_8_1() {
+fn tasks_of_a_file_are_domains_with_cycle_times_of_their_own() {
     let slow = "    </Cyclic>
     <Cyclic>
       <CycleTime>4000</CycleTime>
@@ -95,8 +97,9 @@ fn tasks_of_a_file_are_domains_with_cycle_times_of_their_own_facts_8_1() {
     assert_eq!(domain(&plant, "Buttons.Channel 3"), Some(DomainId(0)));
 }
 
+// covers: 8.2, eni-run
 #[test]
-fn an_object_that_a_drive_refuses_is_told_with_the_comment_of_the_file_facts_8_2() {
+fn an_object_that_a_drive_refuses_is_told_with_the_comment_of_the_file() {
     let file = with(&[]);
     let mut segment = segment(&file.eni, &file.configuration, false);
     segment.devices[DRIVE].objects.clear();
@@ -115,8 +118,9 @@ fn an_object_that_a_drive_refuses_is_told_with_the_comment_of_the_file_facts_8_2
 
 /// Coupler, lamps, valves, buttons and back to the coupler, which has the drive on its port 2. The file knows nothing
 /// of it.
+// covers: JR-05, eni-run
 #[test]
-fn a_ring_behind_a_junction_is_declared_by_station_addresses_of_the_file_between_load_and_apply_jr_05() {
+fn a_local_ring_is_declared_by_station_addresses_between_load_and_apply() {
     let file = with(&[]);
     let mut segment = segment(&file.eni, &file.configuration, false);
     segment.devices[0].ports = [PortKind::Mii; 4];
@@ -146,8 +150,9 @@ fn a_ring_behind_a_junction_is_declared_by_station_addresses_of_the_file_between
 }
 
 /// As files of TwinCAT do with terminals: outputs that act in SAFEOP already would be dangerous.
+// covers: 8.2, sync-managers-declared
 #[test]
-fn outputs_that_a_file_switches_on_at_so_are_off_in_safeop_facts_8_2() {
+fn outputs_that_a_file_switches_on_at_so_are_off_in_safeop() {
     let set_sm = "<Data>000f010044000100</Data>";
     let text = String::from_utf8(MACHINE.to_vec()).expect("it is text");
     let lamps = text.find(set_sm).expect("the lamps have one");
@@ -198,8 +203,9 @@ fn with_commands_of_the_drive(commands: &str) -> EniFile {
     read(&[&text[..at], commands, &text[at..]].concat())
 }
 
+// covers: eni-run
 #[test]
-fn registers_that_a_file_checks_are_those_of_the_simulated_segment_where_an_eeprom_sets_them() {
+fn registers_that_a_file_checks_are_those_that_a_simulated_eeprom_sets() {
     let check = |ado: u16, data: &str, mask: &str| {
         format!(
             "<InitCmd><Transition>IP</Transition><Comment>check {ado}</Comment><Cmd>4</Cmd><Adp>1005</Adp>\
@@ -220,8 +226,9 @@ fn registers_that_a_file_checks_are_those_of_the_simulated_segment_where_an_eepr
     assert!(plant.events.iter().any(told), "{:?}", plant.events);
 }
 
+// covers: eni-run
 #[test]
-fn pdos_that_a_file_only_assigns_are_as_long_as_their_sync_manager_in_the_simulated_segment() {
+fn pdos_that_a_file_only_assigns_are_as_long_as_their_simulated_sync_manager() {
     let text = String::from_utf8(MACHINE.to_vec()).expect("it is text");
     let text = without(&text, "<TxPdo", "</TxPdo>", "#x6064");
     let text = without(&text, "<InitCmd>", "</InitCmd>", "<Index>6656<");
@@ -233,6 +240,7 @@ fn pdos_that_a_file_only_assigns_are_as_long_as_their_sync_manager_in_the_simula
 }
 
 /// The SII of the drive knows nothing of its inputs, and where it does not even have a mailbox for a dictionary.
+// covers: eni-run
 #[test]
 fn a_file_that_says_more_than_the_sii_of_its_subdevices_is_followed() {
     for is_cut in [false, true] {
@@ -252,8 +260,9 @@ fn a_file_that_says_more_than_the_sii_of_its_subdevices_is_followed() {
     }
 }
 
+// covers: eni-run
 #[test]
-fn process_data_beyond_eight_kibibytes_of_a_file_has_memory_in_the_simulated_segment() {
+fn process_data_of_a_file_beyond_eight_kibibytes_has_simulated_memory() {
     let file = with(&[
         ("<Data>0014060064000100</Data>", "<Data>0094060064000100</Data>"),
         ("<Data>02000001060000070014000201000000</Data>", "<Data>02000001060000070094000201000000</Data>"),

@@ -1,4 +1,4 @@
-//! Ports of junctions that were closed on purpose, while rings are looked into of which no frame comes back (facts
+//! Ports of junctions that were closed on purpose, while rings are looked into of which no frame comes back (protocol
 //! 2.2).
 
 use std::time::Duration;
@@ -16,7 +16,7 @@ use super::second_breaks::{ends_of_two, two_rings};
 use super::{change, in_op, told};
 
 /// Junctions are told with one order what to do about all of their ports: one that the application had closed stays so.
-// covers: facts 2.2
+// covers: 2.2, junctions
 #[test]
 fn a_port_that_is_closed_on_purpose_stays_closed_while_rings_are_looked_into() {
     for by_name in [false, true] {
@@ -97,8 +97,9 @@ fn close_port(world: &mut World, way: usize) -> Box<dyn FnMut() -> Option<bool>>
 
 /// The order to close a port and both breaks come within some milliseconds: what the junction had been told when it was
 /// asked last is out of date, and the answer to the order may never come back. A port that was closed stays closed.
+// covers: 2.2, junctions
 #[test]
-fn a_port_that_was_closed_right_before_two_rings_break_stays_closed_facts_2_2() {
+fn a_port_that_was_closed_right_before_two_rings_break_stays_closed() {
     let is_closed = |world: &World| {
         let bytes = world.network().device(DeviceIndex(3)).controller.register(map::DL_STATUS, 2);
         DlStatus::decode(&[bytes[0], bytes[1]]).ports[2].loop_closed

@@ -31,7 +31,7 @@ fn not_there(result: Result<World, Error>) -> Option<JunctionConnection> {
     }
 }
 
-// covers: JR-05, JR-06
+// covers: JR-05, JR-06, junctions
 #[test]
 fn a_ring_that_is_declared_to_close_elsewhere_is_refused_whole_and_broken() {
     // All but the last open ports allow as well as the truth.
@@ -56,8 +56,9 @@ fn a_ring_that_is_declared_to_close_elsewhere_is_refused_whole_and_broken() {
     assert_eq!(told(&world, mark), [changed(3, true)]);
 }
 
+// covers: JR-05, JR-06, junctions
 #[test]
-fn connections_of_two_rings_that_are_exchanged_or_of_a_line_are_refused_jr_05_jr_06() {
+fn connections_of_two_rings_that_are_exchanged_or_of_a_line_are_refused() {
     const KINDS: [&str; 7] =
         ["junction", "digital-output-8", "servo", "junction", "digital-input-8", "block", "analog-input-4"];
     let two = || wired(&KINDS, &TWO_RINGS);
@@ -97,7 +98,7 @@ fn connections_of_two_rings_that_are_exchanged_or_of_a_line_are_refused_jr_05_jr
     }
 }
 
-// covers: JR-05, JR-06
+// covers: JR-05, JR-06, junctions
 #[test]
 fn of_random_segments_the_right_connections_are_taken_and_wrong_ones_refused() {
     let (mut taken, mut wrong) = (0, 0);

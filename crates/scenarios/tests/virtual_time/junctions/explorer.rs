@@ -338,8 +338,9 @@ fn runs(seeds: impl IntoIterator<Item = u64>) {
     assert_eq!(failed, [], "seeds that fail");
 }
 
+// covers: CR-17, JR-07, junctions
 #[test]
-fn what_is_told_of_rings_groups_and_looks_at_random_is_what_was_done_jr_07_cr_17() {
+fn what_is_told_of_rings_groups_and_looks_at_random_is_what_was_done() {
     // The last ones showed faults.
     runs([0, 1, 2, 3, 12, 36, 70, 77]);
 }

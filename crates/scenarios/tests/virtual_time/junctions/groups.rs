@@ -83,6 +83,7 @@ const SETTINGS: [(bool, Setting<'static>); 4] = [
     (true, (JunctionMode::Strict, &[STRICT])),
 ];
 
+// covers: hot-connect
 #[test]
 fn a_group_behind_a_member_of_a_local_ring_joins_and_leaves_whole_and_broken() {
     let cables = [
@@ -207,7 +208,7 @@ const WITH_GROUP: [Option<usize>; 7] = [Some(0), Some(1), Some(2), Some(5), Some
 const WITHOUT_GROUP: [Option<usize>; 5] = [Some(0), Some(1), Some(2), Some(3), Some(4)];
 
 /// By itself, and otherwise when somebody asks for a rescan.
-// covers: JR-07, CR-17
+// covers: CR-17, JR-07, junctions, ring-events
 #[test]
 fn a_group_in_a_local_ring_is_a_piece_of_it_and_when_it_has_left_no_more() {
     let asked = SETTINGS.map(|setting| (false, setting));
@@ -271,8 +272,9 @@ fn a_group_in_a_local_ring_is_a_piece_of_it_and_when_it_has_left_no_more() {
 
 /// Broken and whole again, once each, the latter with its true place, however the break and the look at the segment
 /// meet.
+// covers: JR-07, junctions
 #[test]
-fn a_break_at_the_moment_of_a_groups_join_is_told_once_jr_07() {
+fn a_break_at_the_moment_of_a_groups_join_is_told_once() {
     for (number, cable) in [4, 3, 5, 4, 6, 2].into_iter().enumerate() {
         let (two_links, setting) = SETTINGS[number % SETTINGS.len()];
         let what = format!("{setting:?}, two links: {two_links}, cable {cable}");
@@ -296,8 +298,9 @@ fn a_break_at_the_moment_of_a_groups_join_is_told_once_jr_07() {
 }
 
 /// Two breaks of one ring, or one of each ring: nothing is taken over until the segment is whole but for the gap.
+// covers: junctions
 #[test]
-fn a_group_that_leaves_while_a_ring_is_broken_elsewhere_is_no_piece_of_it_once_that_is_mended() {
+fn a_group_that_left_while_a_ring_was_broken_is_no_piece_of_it_afterwards() {
     for (number, (cable, (two_links, setting))) in
         [(6, SETTINGS[0]), (2, SETTINGS[1]), (8, SETTINGS[2]), (7, SETTINGS[3])].into_iter().enumerate()
     {
@@ -326,6 +329,7 @@ fn a_group_that_leaves_while_a_ring_is_broken_elsewhere_is_no_piece_of_it_once_t
     }
 }
 
+// covers: hot-connect
 #[test]
 fn a_group_that_is_a_piece_of_a_local_ring_joins_and_leaves_without_anybody_looking() {
     for (seed, (two_links, setting)) in (10..).zip(SETTINGS) {

@@ -22,8 +22,9 @@ const KINDS: [&str; 8] = [
     "digital-input-16",
 ];
 
+// covers: JR-03, junctions
 #[test]
-fn four_rings_one_in_another_are_learned_whole_and_with_any_one_broken_jr_03() {
+fn four_rings_one_in_another_are_learned_whole_and_with_any_one_broken() {
     let mut cables = vec![
         (MAIN, at(0, A)),
         (at(0, D), at(1, A)),
@@ -74,8 +75,9 @@ fn four_rings_one_in_another_are_learned_whole_and_with_any_one_broken_jr_03() {
 
 /// A cable that was broken at the scan has an end that nobody knows: it is no cable of an interface, and is among the
 /// others once it has been whole.
+// covers: JR-07, cable-errors
 #[test]
-fn a_cable_of_a_local_ring_that_was_broken_at_the_scan_is_listed_with_its_ends_once_it_is_whole_jr_07() {
+fn a_local_cable_broken_at_the_scan_is_listed_with_its_ends_once_whole() {
     let cables = |world: &World| -> Vec<Cable> {
         world.application().engine().cable_errors().into_iter().map(|(cable, _)| cable).collect()
     };

@@ -28,8 +28,9 @@ const TWO_STRICT: [JunctionConnection; 2] = [
     JunctionConnection { head: 3, head_port: 1, tail: 5, tail_port: 1 },
 ];
 
+// covers: JR-02, junctions
 #[test]
-fn of_two_rings_either_may_break_and_a_second_break_is_told_for_what_it_is_jr_02() {
+fn of_two_rings_either_may_break_and_a_second_break_is_told_for_what_it_is() {
     for setting in [(JunctionMode::Automatic, &[][..]), (JunctionMode::Strict, &TWO_STRICT)] {
         let mut world = in_op(3, two_rings(), setting);
         for cable in [1, 2, 3, 5, 6, 7] {
@@ -76,7 +77,7 @@ pub fn ends_of_two(cable: usize) -> (PortOf, PortOf) {
 
 /// Both breaks of two rings come within one cycle, so that no frame can tell where. Nothing comes back, and that is
 /// said; then each ring is looked into while the other one is left out.
-// covers: JR-02
+// covers: JR-02, junctions
 #[test]
 fn two_rings_that_break_at_once_are_told_as_blocked_and_both_with_their_places() {
     let apart = [Duration::ZERO, Duration::from_micros(3), Duration::from_micros(400)];
@@ -127,7 +128,7 @@ fn two_rings_that_break_at_once_are_told_as_blocked_and_both_with_their_places()
 }
 
 /// The same in a closed ring of two links, in which copies of the redundant link come back and have met nobody.
-// covers: JR-02
+// covers: JR-02, junctions
 #[test]
 fn two_local_rings_that_break_in_a_ring_of_two_links_are_told_with_their_places_too() {
     let mut cables = TWO_RINGS.to_vec();
@@ -152,8 +153,9 @@ fn two_local_rings_that_break_in_a_ring_of_two_links_are_told_with_their_places_
 }
 
 /// A ring behind a member of another one, before the break of that one and behind it.
+// covers: JR-02, junctions
 #[test]
-fn of_a_ring_in_a_ring_that_break_at_once_both_are_told_with_their_places_jr_02() {
+fn of_a_ring_in_a_ring_that_break_at_once_both_are_told_with_their_places() {
     let kinds = ["junction", "junction", "digital-output-8", "servo", "digital-input-8", "digital-input-8"];
     let cables = [
         (MAIN, at(0, A)),
@@ -205,6 +207,7 @@ fn of_a_ring_in_a_ring_that_break_at_once_both_are_told_with_their_places_jr_02(
     }
 }
 
+// covers: junctions
 #[test]
 fn two_breaks_in_one_ring_cut_off_what_is_between_them_and_nobody_else() {
     let mut world = in_op(4, one_ring(), (JunctionMode::Automatic, &[]));
@@ -226,6 +229,7 @@ fn two_breaks_in_one_ring_cut_off_what_is_between_them_and_nobody_else() {
     assert!(matches!(told(&world, mark).last(), Some(Event::JunctionChanged { broken: false, breaks: 0, .. })));
 }
 
+// covers: junctions
 #[test]
 fn a_member_that_loses_its_power_breaks_the_ring_at_both_its_ports_and_comes_back() {
     let mut world = in_op(5, one_ring(), (JunctionMode::Strict, &[STRICT]));
@@ -246,8 +250,9 @@ fn ring_in_ring() -> Network {
     wired(&kinds, &RING_IN_RING)
 }
 
+// covers: JR-02, junctions-in-ring
 #[test]
-fn a_local_ring_in_a_ring_of_two_links_goes_on_with_one_break_anywhere_jr_02() {
+fn a_local_ring_in_a_ring_of_two_links_goes_on_with_one_break_anywhere() {
     let strict = JunctionConnection { head: 1, head_port: 1, tail: 3, tail_port: 1 };
     for setting in [(JunctionMode::Automatic, &[][..]), (JunctionMode::Strict, &[strict])] {
         let mut world = in_op(8, ring_in_ring(), setting);
@@ -284,7 +289,7 @@ fn a_local_ring_in_a_ring_of_two_links_goes_on_with_one_break_anywhere_jr_02() {
 
 /// Enhanced detection opens the ring of two links for a moment whenever ports change, and finds nobody crossed in a
 /// local ring that is entered from behind.
-// covers: LC-03, LC-06
+// covers: LC-03, LC-06, crossed-enhanced
 #[test]
 fn a_local_ring_that_breaks_is_no_crossed_line_for_enhanced_detection_either() {
     let strict = JunctionConnection { head: 1, head_port: 1, tail: 3, tail_port: 1 };

@@ -62,8 +62,9 @@ fn learned(world: &World) -> Vec<Closing> {
     learned
 }
 
+// covers: JR-03, junctions
 #[test]
-fn rings_of_any_length_are_learned_and_no_line_is_said_to_be_crossed_jr_03() {
+fn rings_of_any_length_are_learned_and_no_line_is_said_to_be_crossed() {
     let sizes: [&[usize]; 9] = [&[4], &[12], &[13], &[16], &[20], &[32], &[20, 20], &[32, 7], &[13, 16, 24]];
     for members in sizes {
         for two_links in [false, true] {
@@ -85,8 +86,9 @@ fn rings_of_any_length_are_learned_and_no_line_is_said_to_be_crossed_jr_03() {
 }
 
 /// Where the ring is broken at the scan as well.
+// covers: JR-03, junctions
 #[test]
-fn long_rings_that_are_broken_at_the_scan_are_learned_jr_03() {
+fn long_rings_that_are_broken_at_the_scan_are_learned() {
     for members in [13, 20, 32] {
         for broken in [1, members / 2, members - 1] {
             let what = format!("{members} members, cable {broken}");

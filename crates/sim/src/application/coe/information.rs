@@ -1,4 +1,4 @@
-//! SDO information: lists, objects and entries, in fragments where they do not fit (facts 6.3).
+//! SDO information: lists, objects and entries, in fragments where they do not fit (protocol 6.3).
 //!
 //! In: a request. Out: one message per fragment, or an error with an abort code.
 

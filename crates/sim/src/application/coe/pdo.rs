@@ -1,4 +1,4 @@
-//! PDOs by mailbox instead of with the process data (facts 6.3).
+//! PDOs by mailbox instead of with the process data (protocol 6.3).
 //!
 //! In: an RxPDO, whose values go to the objects that it maps; a request for a TxPDO or RxPDO. Out: that PDO with the
 //! present values. An RxPDO is not answered. The number of the CoE header is the distance of the PDO from 0x1600 or

@@ -1,4 +1,4 @@
-//! SDO transfers: expedited, normal and in segments, complete access, aborts (facts 6.3).
+//! SDO transfers: expedited, normal and in segments, complete access, aborts (protocol 6.3).
 
 use ringcat_wire::al::AlState;
 use ringcat_wire::mailbox::ErrorReply;

@@ -1,4 +1,4 @@
-//! Messages of the device in the diagnosis history of its dictionary, object 0x10F3 (facts 6.3, ETG.1020).
+//! Messages of the device in the diagnosis history of its dictionary, object 0x10F3 (protocol 6.3, ETG.1020).
 //!
 //! In: messages, acknowledgements of the MainDevice. Out: the entries of the object. Without the flag "acknowledge" a
 //! full history overwrites its oldest message, with it the new one is lost.

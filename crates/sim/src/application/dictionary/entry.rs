@@ -1,4 +1,4 @@
-//! One entry of an object: its value, when it may be written, what may be written (facts 6.3).
+//! One entry of an object: its value, when it may be written, what may be written (protocol 6.3).
 
 use ringcat_wire::al::AlState;
 use ringcat_wire::mailbox::coe::{AccessRights, DataType};

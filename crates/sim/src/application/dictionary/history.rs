@@ -1,4 +1,4 @@
-//! The diagnosis history, object 0x10F3: messages kept in a ring (facts 6.3, ETG.1020).
+//! The diagnosis history, object 0x10F3: messages kept in a ring (protocol 6.3, ETG.1020).
 //!
 //! In: messages of the device, acknowledgements of the MainDevice. Out: the entries of the object. Without the flag
 //! "acknowledge" a full history overwrites its oldest message, with it the new one is lost.

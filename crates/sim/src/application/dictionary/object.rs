@@ -1,4 +1,4 @@
-//! Objects as a description and a dictionary have them: a name, rules, entries (facts 6.3).
+//! Objects as a description and a dictionary have them: a name, rules, entries (protocol 6.3).
 
 use ringcat_wire::mailbox::coe::{DataType, ObjectCode};
 use ringcat_wire::sii::PdoDirection;

@@ -1,4 +1,4 @@
-//! Builds the objects of a dictionary from a device description (facts 6.3, standard objects).
+//! Builds the objects of a dictionary from a device description (protocol 6.3, standard objects).
 
 use std::collections::BTreeMap;
 

@@ -1,4 +1,4 @@
-//! Frames from their fragments (facts 6.5).
+//! Frames from their fragments (protocol 6.5).
 //!
 //! In: fragments as they come, frames told apart by their number. Out: whole frames. A fragment 0 begins anew; one that
 //! does not follow the one before discards its frame.
@@ -54,8 +54,9 @@ mod tests {
         EoeFragment { frame, number, blocks, last, time_requested: false, time_ns: None, data }
     }
 
+    // covers: 6.5
     #[test]
-    fn frames_whose_fragments_mix_are_told_apart_facts_6_5() {
+    fn frames_whose_fragments_mix_are_told_apart() {
         let mut reassembly = Reassembly::default();
         assert_eq!(reassembly.take(&fragment(1, 0, 2, false, &[1; 32])), None);
         assert_eq!(reassembly.take(&fragment(2, 0, 2, false, &[2; 32])), None);
@@ -64,8 +65,9 @@ mod tests {
         assert_eq!(reassembly.take(&fragment(1, 1, 1, true, &[1; 1])).unwrap(), [1; 33]);
     }
 
+    // covers: 6.5
     #[test]
-    fn a_new_fragment_0_discards_an_unfinished_frame_facts_6_5() {
+    fn a_new_fragment_0_discards_an_unfinished_frame() {
         let mut reassembly = Reassembly::default();
         assert_eq!(reassembly.take(&fragment(1, 0, 2, false, &[1; 32])), None);
         assert_eq!(reassembly.take(&fragment(1, 0, 1, true, &[3; 20])).unwrap(), [3; 20]);

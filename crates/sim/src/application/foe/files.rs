@@ -1,4 +1,4 @@
-//! What a device keeps over a power cycle: files and the firmware (facts 6.4).
+//! What a device keeps over a power cycle: files and the firmware (protocol 6.4).
 
 use std::collections::BTreeMap;
 

@@ -1,4 +1,4 @@
-//! One IDN of a simulated drive: its elements, what may be written, procedure commands (facts 6.6; IEC 61491).
+//! One IDN of a simulated drive: its elements, what may be written, procedure commands (protocol 6.6; IEC 61491).
 
 use core::time::Duration;
 

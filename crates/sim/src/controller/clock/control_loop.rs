@@ -1,4 +1,4 @@
-//! The control loop behind DC_SYSTEM_TIME (facts 7.2.1); `docs/dc.md` tells what is documented and what is a model.
+//! The control loop behind DC_SYSTEM_TIME (protocol 7.2.1); `docs/dc.md` tells what is documented and what is a model.
 //!
 //! In: the difference between the local copy of the system time and the received one, at each write of 0x0910. Out: how
 //! the local clock is steered until the next sample, and the contents of 0x092C and 0x0932.
@@ -119,7 +119,7 @@ mod tests {
         ControlLoop { mean: 0, difference: difference * NS }.steering(RESET)
     }
 
-    // covers: facts 7.2.1
+    // covers: 7.2.1
     #[test]
     fn one_unit_of_the_speed_counter_is_0_012_ppm_and_the_range_ends_near_760_ppm() {
         let second = 1_000_000_000 * NS;
@@ -130,7 +130,7 @@ mod tests {
         assert_eq!(ppb(limit(RESET)), 762_797);
     }
 
-    // covers: facts 7.2.1
+    // covers: 7.2.1
     #[test]
     fn phase_is_corrected_by_one_nanosecond_in_start_ticks_and_no_further_than_asked() {
         let steering = ControlLoop { mean: 640 * NS, difference: 0 }.steering(RESET);
@@ -139,8 +139,9 @@ mod tests {
         assert_eq!((added(205), added(410), added(10_000)), (-5, -10, -10));
     }
 
+    // covers: 7.2.1
     #[test]
-    fn the_mean_follows_with_the_depth_of_its_filter_facts_7_2_1() {
+    fn the_mean_follows_with_the_depth_of_its_filter() {
         let mut shallow = ControlLoop::default();
         shallow.sample(1_600 * NS, RESET);
         assert_eq!(shallow.difference_register(), 0x8000_0000 | 100);
@@ -153,8 +154,9 @@ mod tests {
         assert_eq!(shallow.difference_register(), 50);
     }
 
+    // covers: 7.2.1
     #[test]
-    fn no_difference_moves_the_speed_beyond_its_limit_facts_7_2_1() {
+    fn no_difference_moves_the_speed_beyond_its_limit() {
         for (dt, limit) in [(1i128 << 31, -3_969), (-(1i128 << 31), 3_969)] {
             let mut control = ControlLoop::default();
             for _ in 0..2_000 {

@@ -1,4 +1,4 @@
-//! How fast a free clock runs: a constant error and a slow wander, as temperature causes it (facts 11.4).
+//! How fast a free clock runs: a constant error and a slow wander, as temperature causes it (protocol 11.4).
 //!
 //! In: virtual time since power-on. Out: nanoseconds that the free clock has counted, with 24 fractional bits, as a
 //! pure function, so that the order of questions does not matter.

@@ -1,4 +1,4 @@
-//! The clock by itself: drift, jitter, and the control loop closed around it (facts 7.2.1).
+//! The clock by itself: drift, jitter, and the control loop closed around it (protocol 7.2.1).
 
 use super::*;
 
@@ -24,6 +24,7 @@ fn follow(clock: &mut Clock, from: SimTime, period_ns: u64, samples: u64) -> (Si
     (now, worst)
 }
 
+// covers: sim-clocks
 #[test]
 fn a_drift_of_100_ppm_is_100_us_in_a_second() {
     let mut clock = Clock::new(5, ClockErrors { drift_ppb: 100_000, ..ClockErrors::default() });
@@ -34,8 +35,9 @@ fn a_drift_of_100_ppm_is_100_us_in_a_second() {
     assert_eq!(slow.local(SimTime(1_000_000_000)), 999_900_000);
 }
 
+// covers: 7.2, sim-clocks
 #[test]
-fn fifteen_thousand_fast_samples_take_any_drift_out_facts_7_2() {
+fn fifteen_thousand_fast_samples_take_any_drift_out() {
     for ppm in [-100, -50, -1, 0, 10, 50, 100] {
         let mut clock = drifting(ppm);
         let (now, worst) = follow(&mut clock, SimTime::ZERO, 66_667, 15_000);
@@ -57,8 +59,9 @@ fn one_sample_per_millisecond_is_enough_within_seconds() {
     }
 }
 
+// covers: 7.2.1
 #[test]
-fn a_restart_of_the_filters_forgets_the_drift_facts_7_2_1() {
+fn a_restart_of_the_filters_forgets_the_drift() {
     let mut clock = drifting(50);
     let (now, _) = follow(&mut clock, SimTime::ZERO, 66_667, 15_000);
     let before = clock.local(now);
@@ -67,8 +70,9 @@ fn a_restart_of_the_filters_forgets_the_drift_facts_7_2_1() {
     assert_eq!(clock.local(SimTime(now.0 + 1_000_000_000)) - before, 1_000_050_000);
 }
 
+// covers: 7.5, sim-clocks
 #[test]
-fn a_payload_of_zero_drags_the_clock_to_its_limit_facts_7_5() {
+fn a_payload_of_zero_drags_the_clock_to_its_limit() {
     let mut clock = drifting(0);
     let mut now = SimTime(1_000_000_000);
     for _ in 0..1_000 {

@@ -1,4 +1,4 @@
-//! Distributed clocks: latches and times (facts 3.12, 7.1).
+//! Distributed clocks: latches and times (protocol 3.12, 7.1).
 
 use super::*;
 
@@ -22,8 +22,9 @@ fn local_first_bit(bench: &Bench) -> u64 {
     bench.controller.local_time(SimTime(bench.now.0 - FIRST_BIT))
 }
 
+// covers: 3.12
 #[test]
-fn a_write_to_0x0900_latches_every_port_the_frame_comes_in_at_facts_3_12() {
+fn a_write_to_0x0900_latches_every_port_the_frame_comes_in_at() {
     let mut bench = Bench::with(ControllerConfig { clock_start: 0xFFFF_F000, clock_errors: drift(20_000), ..config() });
     bench.link(Port::B, true);
     let mut frame = latch(&mut bench, Command::Bwr);
@@ -40,8 +41,9 @@ fn a_write_to_0x0900_latches_every_port_the_frame_comes_in_at_facts_3_12() {
     assert_eq!(receive_times(&bench), times);
 }
 
+// covers: 3.12, sim-clocks
 #[test]
-fn only_bwr_and_fpwr_latch_though_others_count_facts_3_12() {
+fn only_bwr_and_fpwr_latch_though_others_count() {
     let mut bench = Bench::new();
     for command in [Command::Apwr, Command::Brw, Command::Aprw, Command::Armw, Command::Frmw, Command::Fprw] {
         let mut frame = latch(&mut bench, command);
@@ -55,15 +57,17 @@ fn only_bwr_and_fpwr_latch_though_others_count_facts_3_12() {
     assert_ne!(receive_times(&bench)[0], 0);
 }
 
+// covers: 2.5
 #[test]
-fn a_damaged_frame_latches_nothing_facts_2_5() {
+fn a_damaged_frame_latches_nothing() {
     let mut bench = Bench::new();
     bench.damaged(&[(Command::Bwr, 0, 0x0900, &[0; 4])]);
     assert_eq!(receive_times(&bench), [0; 4]);
 }
 
+// covers: 7.1
 #[test]
-fn a_frame_entering_at_port_1_is_latched_where_it_came_in_facts_7_1() {
+fn a_frame_entering_at_port_1_is_latched_where_it_came_in() {
     for (latch_mode, expected) in [(false, true), (true, false)] {
         let mut bench = Bench::with(ControllerConfig { receive_time_latch_mode: latch_mode, ..config() });
         bench.link(Port::A, false);
@@ -80,8 +84,9 @@ fn a_frame_entering_at_port_1_is_latched_where_it_came_in_facts_7_1() {
     }
 }
 
+// covers: 3.12
 #[test]
-fn system_time_is_local_time_plus_offset_at_the_start_of_the_frame_facts_3_12() {
+fn system_time_is_local_time_plus_offset_at_the_start_of_the_frame() {
     let mut bench = Bench::with(ControllerConfig { clock_errors: drift(-50_000), ..config() });
     bench.write(0x0920, &0x0011_2233_4455_6677u64.to_le_bytes());
     let (data, wkc) = bench.read(0x0910, 8);
@@ -93,23 +98,26 @@ fn system_time_is_local_time_plus_offset_at_the_start_of_the_frame_facts_3_12() 
     assert_eq!(bench.pdi_read(0x0910, 8), Some(now.to_le_bytes().to_vec()));
 }
 
+// covers: 3.12
 #[test]
-fn a_negative_offset_is_one_in_twos_complement_facts_3_12() {
+fn a_negative_offset_is_one_in_twos_complement() {
     let mut bench = Bench::new();
     let local = bench.controller.local_time(bench.now);
     bench.write(0x0920, &(-1_000i64).to_le_bytes());
     assert_eq!(bench.controller.system_time(bench.now) - local, 10_000 - 1_000);
 }
 
+// covers: 3.12
 #[test]
-fn a_write_to_system_time_counts_and_is_not_stored_facts_3_12() {
+fn a_write_to_system_time_counts_and_is_not_stored() {
     let mut bench = Bench::new();
     assert_eq!(bench.one((Command::Frmw, 0x7777, 0x0910, &[9; 8])).1, 1);
     assert_eq!(u64::from_le_bytes(bench.read(0x0910, 8).0.try_into().unwrap()), local_first_bit(&bench));
 }
 
+// covers: 3.12, sim-clocks
 #[test]
-fn a_32_bit_clock_answers_four_bytes_and_one_without_clock_none_facts_3_12() {
+fn a_32_bit_clock_answers_four_bytes_and_one_without_clock_none() {
     let mut config = config();
     config.features.dc_64bit = false;
     let mut bench = Bench::with(ControllerConfig { clock_start: 0x1_0000_0000, ..config.clone() });
@@ -121,14 +129,16 @@ fn a_32_bit_clock_answers_four_bytes_and_one_without_clock_none_facts_3_12() {
     assert_eq!((bench.read(0x0910, 8).1, bench.one((Command::Bwr, 0, 0x0900, &[0; 4])).1), (0, 0));
 }
 
+// covers: 3.12
 #[test]
-fn reset_values_of_the_control_loop_facts_3_12() {
+fn reset_values_of_the_control_loop() {
     let mut bench = Bench::new();
     assert_eq!(bench.read(0x0930, 6).0, [0x00, 0x10, 0x00, 0x00, 0x04, 0x0C]);
 }
 
+// covers: 7.2.1, sim-clocks
 #[test]
-fn the_loop_takes_its_sample_at_the_start_of_a_good_frame_facts_7_2_1() {
+fn the_loop_takes_its_sample_at_the_start_of_a_good_frame() {
     let mut bench = Bench::new();
     bench.write(0x0928, &1_000u32.to_le_bytes());
     bench.now += Duration::from_micros(10);
@@ -146,8 +156,9 @@ fn the_loop_takes_its_sample_at_the_start_of_a_good_frame_facts_7_2_1() {
     assert_eq!(bench.register(0x0932), [0; 2]);
 }
 
+// covers: 7.5
 #[test]
-fn the_addressed_controller_of_a_multiple_write_does_not_move_itself_facts_7_5() {
+fn the_addressed_controller_of_a_multiple_write_does_not_move_itself() {
     let mut bench = Bench::new();
     for _ in 0..50 {
         assert_eq!(bench.one((Command::Armw, 0, 0x0910, &[0; 8])).1, 1);
@@ -155,8 +166,9 @@ fn the_addressed_controller_of_a_multiple_write_does_not_move_itself_facts_7_5()
     assert_eq!((bench.register(0x092C), bench.register(0x0932)), ([0; 4], [0; 2]));
 }
 
+// covers: 7.3, sim-clocks
 #[test]
-fn sync0_comes_at_its_start_time_in_system_time_facts_7_3() {
+fn sync0_comes_at_its_start_time_in_system_time() {
     for bits64 in [true, false] {
         let mut config = config();
         config.features.dc_64bit = bits64;
@@ -182,8 +194,9 @@ fn sync0_comes_at_its_start_time_in_system_time_facts_7_3() {
     }
 }
 
+// covers: 3.12, sim-clocks
 #[test]
-fn edges_at_latch_pins_leave_their_time_facts_3_12() {
+fn edges_at_latch_pins_leave_their_time() {
     let mut bench = Bench::new();
     bench.write(0x09A8, &[0x01]);
     let first = bench.controller.system_time(bench.now);
@@ -201,7 +214,7 @@ fn edges_at_latch_pins_leave_their_time_facts_3_12() {
     assert_eq!(bench.read(0x09B8, 8).0, second.to_le_bytes());
 }
 
-// covers: facts 3.12
+// covers: 3.12, sim-clocks
 #[test]
 fn a_sync_signal_without_a_pulse_length_stays_until_the_pdi_has_read_its_status() {
     let mut bench = Bench::new();
@@ -219,8 +232,9 @@ fn a_sync_signal_without_a_pulse_length_stays_until_the_pdi_has_read_its_status(
     assert_eq!(bench.read(0x098E, 2).0, [1, 1]);
 }
 
+// covers: 3.12, sim-clocks
 #[test]
-fn the_start_time_activates_a_sync_unit_that_waits_for_it_facts_3_12() {
+fn the_start_time_activates_a_sync_unit_that_waits_for_it() {
     for (bits64, activation) in [(true, 0x0A), (true, 0x1A), (false, 0x0A)] {
         let mut config = config();
         config.features.dc_64bit = bits64;
@@ -241,8 +255,9 @@ fn the_start_time_activates_a_sync_unit_that_waits_for_it_facts_3_12() {
     }
 }
 
+// covers: 3.12, sim-clocks
 #[test]
-fn buffer_changes_of_sync_managers_leave_their_time_facts_3_12() {
+fn buffer_changes_of_sync_managers_leave_their_time() {
     let mut bench = Bench::with(ControllerConfig { clock_start: 77, ..config() });
     bench.write(0x0810, &[0x00, 0x11, 4, 0, 0x24, 0, 1, 0]);
     let time = |bench: &Bench, at: u16| u32::from_le_bytes(bench.register(at));

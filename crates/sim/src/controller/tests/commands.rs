@@ -1,9 +1,10 @@
-//! Commands and working counters (facts 1.4), side effects and a bad FCS (facts 2.5).
+//! Commands and working counters (protocol 1.4), side effects and a bad FCS (protocol 2.5).
 
 use super::*;
 
+// covers: 1.4
 #[test]
-fn auto_increment_meets_zero_only_and_counts_up_facts_1_4() {
+fn auto_increment_meets_zero_only_and_counts_up() {
     let mut bench = Bench::new();
     let mut frame = bench.frame(&[(Command::Aprd, 0, 0x0000, &[0xEE]), (Command::Aprd, 0xFFFF, 0x0000, &[0xEE])]);
     bench.receive(&mut frame, Port::A);
@@ -15,8 +16,9 @@ fn auto_increment_meets_zero_only_and_counts_up_facts_1_4() {
     assert_eq!((adp(0), adp(1)), (1, 0));
 }
 
+// covers: 1.4
 #[test]
-fn broadcasts_count_up_and_combine_by_or_facts_1_4() {
+fn broadcasts_count_up_and_combine_by_or() {
     let mut bench = Bench::new();
     let mut frame = bench.frame(&[(Command::Brd, 7, 0x0000, &[0x40])]);
     bench.receive(&mut frame, Port::A);
@@ -26,16 +28,18 @@ fn broadcasts_count_up_and_combine_by_or_facts_1_4() {
     assert_eq!(bench.register(0x0010), [0x01, 0x10]);
 }
 
+// covers: 1.4
 #[test]
-fn brw_writes_what_came_in_and_returns_the_or_with_the_old_value_facts_1_4() {
+fn brw_writes_what_came_in_and_returns_the_or_with_the_old_value() {
     let mut bench = Bench::new();
     bench.write(0x0F80, &[0x0F]);
     assert_eq!(bench.one((Command::Brw, 0, 0x0F80, &[0x30])), (vec![0x3F], 3));
     assert_eq!(bench.register(0x0F80), [0x30]);
 }
 
+// covers: 2.7
 #[test]
-fn station_address_and_enabled_alias_match_facts_2_7() {
+fn station_address_and_enabled_alias_match() {
     let mut bench = Bench::new();
     bench.write(0x0010, &[0x01, 0x10]);
     assert_eq!(bench.one((Command::Fprd, 0x1001, 0x0004, &[0])), (vec![8], 1));
@@ -47,14 +51,16 @@ fn station_address_and_enabled_alias_match_facts_2_7() {
     }
 }
 
+// covers: 2.7
 #[test]
-fn address_0_is_a_station_address_like_others_facts_2_7() {
+fn address_0_is_a_station_address_like_others() {
     let mut bench = Bench::new();
     assert_eq!(bench.one((Command::Fprd, 0, 0x0000, &[0])), (vec![0x11], 1));
 }
 
+// covers: 1.4, sim-controller
 #[test]
-fn read_write_takes_the_old_value_and_counts_3_facts_1_4() {
+fn read_write_takes_the_old_value_and_counts_3() {
     let mut bench = Bench::new();
     bench.write(0x0F90, &[1, 2]);
     assert_eq!(bench.one((Command::Aprw, 0, 0x0F90, &[3, 4])), (vec![1, 2], 3));
@@ -63,8 +69,9 @@ fn read_write_takes_the_old_value_and_counts_3_facts_1_4() {
     assert_eq!(bench.one((Command::Aprw, 0, 0x0000, &[0x55])), (vec![0x11], 1));
 }
 
+// covers: 1.4, sim-controller
 #[test]
-fn the_physical_offset_moves_the_write_of_read_write_commands_facts_1_4() {
+fn the_physical_offset_moves_the_write_of_read_write_commands() {
     let mut bench = Bench::new();
     bench.write(0x0108, &[0x10, 0x00]);
     bench.one((Command::Fprw, 0, 0x0F90, &[5]));
@@ -73,8 +80,9 @@ fn the_physical_offset_moves_the_write_of_read_write_commands_facts_1_4() {
     assert_eq!(bench.register(0x0F90), [9]);
 }
 
+// covers: 1.4, sim-controller
 #[test]
-fn multiple_writes_read_at_the_addressed_and_write_at_the_others_facts_1_4() {
+fn multiple_writes_read_at_the_addressed_and_write_at_the_others() {
     let mut bench = Bench::new();
     bench.write(0x0010, &[0x01, 0x10]);
     bench.write(0x0F80, &[7]);
@@ -85,16 +93,18 @@ fn multiple_writes_read_at_the_addressed_and_write_at_the_others_facts_1_4() {
     assert_eq!(bench.register(0x0F80), [4]);
 }
 
+// covers: 1.4
 #[test]
-fn nop_and_reserved_commands_change_nothing_facts_1_4() {
+fn nop_and_reserved_commands_change_nothing() {
     let mut bench = Bench::new();
     for command in [Command::Nop, Command::Reserved(15), Command::Reserved(255)] {
         assert_eq!(bench.one((command, 0, 0x0000, &[0xEE])), (vec![0xEE], 0));
     }
 }
 
+// covers: 1.4, sim-controller
 #[test]
-fn bytes_that_are_not_there_change_nothing_but_the_others_count_facts_1_4() {
+fn bytes_that_are_not_there_change_nothing_but_the_others_count() {
     let mut bench = Bench::new();
     // 0x000A..0x000F do not exist.
     assert_eq!(bench.one((Command::Aprd, 0, 0x0009, &[0xEE, 0xEE])), (vec![0x00, 0xEE], 1));
@@ -108,8 +118,9 @@ fn bytes_that_are_not_there_change_nothing_but_the_others_count_facts_1_4() {
     assert_eq!(bench.one((Command::Aprd, 0, 0xFFFF, &[0xEE, 0xEE])), (vec![0xEE, 0xEE], 0));
 }
 
+// covers: 1.4
 #[test]
-fn lrw_and_brw_do_nothing_where_the_features_say_so_facts_1_4() {
+fn lrw_and_brw_do_nothing_where_the_features_say_so() {
     let mut config = config();
     (config.features.brw_unsupported, config.features.lrw_unsupported) = (true, true);
     let mut bench = Bench::with(config);
@@ -119,8 +130,9 @@ fn lrw_and_brw_do_nothing_where_the_features_say_so_facts_1_4() {
     assert_eq!(bench.one((Command::Lwr, 0, 1, &[1])).1, 1);
 }
 
+// covers: 1.4
 #[test]
-fn the_working_counter_wraps_facts_1_4() {
+fn the_working_counter_wraps() {
     let mut bench = Bench::new();
     let mut frame = bench.frame(&[(Command::Brd, 0, 0, &[0])]);
     let wkc = frame.datagrams[0].wkc();
@@ -129,8 +141,9 @@ fn the_working_counter_wraps_facts_1_4() {
     assert_eq!(returned(&frame, 0).1, 0);
 }
 
+// covers: 2.5, sim-controller
 #[test]
-fn registers_take_over_at_the_end_of_the_frame_facts_2_5() {
+fn registers_take_over_at_the_end_of_the_frame() {
     let mut bench = Bench::new();
     bench.write(0x0010, &[5, 0]);
     let answers = bench.exchange(&[(Command::Bwr, 0, 0x0010, &[6, 0]), (Command::Brd, 0, 0x0010, &[0, 0])]);
@@ -138,8 +151,9 @@ fn registers_take_over_at_the_end_of_the_frame_facts_2_5() {
     assert_eq!(bench.register(0x0010), [6, 0]);
 }
 
+// covers: 2.5, sim-controller
 #[test]
-fn a_bad_fcs_has_no_side_effects_on_registers_but_on_ram_facts_2_5() {
+fn a_bad_fcs_has_no_side_effects_on_registers_but_on_ram() {
     let mut bench = Bench::new();
     let answers = bench.damaged(&[
         (Command::Bwr, 0, 0x0010, &[5, 0]),
@@ -156,8 +170,9 @@ fn a_bad_fcs_has_no_side_effects_on_registers_but_on_ram_facts_2_5() {
     assert_eq!(bench.register(0x0210), [0x00, 0x00]);
 }
 
+// covers: 2.5
 #[test]
-fn a_frame_whose_last_datagram_leaves_it_is_an_epu_error_without_effects_facts_2_5() {
+fn a_frame_whose_last_datagram_leaves_it_is_an_epu_error_without_effects() {
     let mut bench = Bench::new();
     let mut frame = bench.frame(&[(Command::Bwr, 0, 0x0010, &[5, 0]), (Command::Nop, 0, 0, &[0; 30])]);
     let header = usize::from(frame.datagrams[1].header);

@@ -1,4 +1,4 @@
-//! Logical addressing (facts 1.4, 3.10).
+//! Logical addressing (protocol 1.4, 3.10).
 
 use super::*;
 
@@ -11,8 +11,9 @@ fn fmmu(logical: u16, length: u16, bits: (u8, u8), physical: (u16, u8), kind: u8
     [l[0], l[1], 0x01, 0x00, n[0], n[1], bits.0, bits.1, p[0], p[1], physical.1, kind, 1, 0, 0, 0]
 }
 
+// covers: 3.10, sim-controller
 #[test]
-fn fourteen_output_bits_go_to_their_place_and_no_further_facts_3_10() {
+fn fourteen_output_bits_go_to_their_place_and_no_further() {
     let mut bench = Bench::new();
     // Logical 0x00010011 bit 3 to 0x0F01 bit 1; the data sheet's example.
     bench.write(0x0600, &[0x11, 0x00, 0x01, 0x00, 3, 0, 3, 0, 0x01, 0x0F, 1, 2, 1]);
@@ -26,8 +27,9 @@ fn fourteen_output_bits_go_to_their_place_and_no_further_facts_3_10() {
     assert_eq!(bench.register(0x0F00), [0xFF, 0b0110_1011, 0b1100_0000, 0xFF]);
 }
 
+// covers: 1.4
 #[test]
-fn reads_change_mapped_bits_only_facts_1_4() {
+fn reads_change_mapped_bits_only() {
     let mut bench = Bench::new();
     bench.write(0x1000, &[0b0000_0110]);
     bench.write(0x0600, &fmmu(0, 1, (4, 5), (0x1000, 1), READ));
@@ -37,8 +39,9 @@ fn reads_change_mapped_bits_only_facts_1_4() {
     assert_eq!(bench.one((Command::Lrd, 1, 1, &[0xFF, 0xFF])), (vec![0xFF, 0xFF], 0));
 }
 
+// covers: 1.4
 #[test]
-fn lrw_counts_1_and_2_once_per_direction_not_per_fmmu_facts_1_4() {
+fn lrw_counts_1_and_2_once_per_direction_not_per_fmmu() {
     let mut bench = Bench::new();
     bench.write(0x1000, &[1, 2, 3, 4]);
     bench.write(0x0600, &fmmu(0, 2, (0, 7), (0x1000, 0), READ));
@@ -52,8 +55,9 @@ fn lrw_counts_1_and_2_once_per_direction_not_per_fmmu_facts_1_4() {
     assert_eq!((bench.one((Command::Lrd, 0, 1, &data)).1, bench.one((Command::Lwr, 0, 1, &data)).1), (1, 1));
 }
 
+// covers: 1.4
 #[test]
-fn lrw_writes_what_came_in_and_reads_what_was_there_facts_1_4() {
+fn lrw_writes_what_came_in_and_reads_what_was_there() {
     let mut bench = Bench::new();
     bench.write(0x1000, &[1, 2]);
     bench.write(0x0600, &fmmu(0, 2, (0, 7), (0x1000, 0), READ | WRITE));
@@ -61,8 +65,9 @@ fn lrw_writes_what_came_in_and_reads_what_was_there_facts_1_4() {
     assert_eq!(bench.register(0x1000), [5, 6]);
 }
 
+// covers: 3.10, sim-controller
 #[test]
-fn the_lower_numbered_fmmu_wins_facts_3_10() {
+fn the_lower_numbered_fmmu_wins() {
     let mut bench = Bench::new();
     bench.write(0x1000, &[1, 2, 3, 4]);
     bench.write(0x0600, &fmmu(1, 1, (0, 7), (0x1003, 0), READ | WRITE));
@@ -72,8 +77,9 @@ fn the_lower_numbered_fmmu_wins_facts_3_10() {
     assert_eq!(bench.register(0x1000), [10, 2, 12, 11]);
 }
 
+// covers: 3.10
 #[test]
-fn a_switched_off_fmmu_maps_nothing_facts_3_10() {
+fn a_switched_off_fmmu_maps_nothing() {
     let mut bench = Bench::new();
     bench.write(0x0600, &fmmu(0, 2, (0, 7), (0x1000, 0), READ));
     assert_eq!(bench.one((Command::Lrd, 0, 1, &[0])).1, 1);
@@ -81,8 +87,9 @@ fn a_switched_off_fmmu_maps_nothing_facts_3_10() {
     assert_eq!(bench.one((Command::Lrd, 0, 1, &[0])).1, 0);
 }
 
+// covers: 3.10
 #[test]
-fn bitwise_writes_elsewhere_lose_the_unmapped_bits_of_the_byte_facts_3_10() {
+fn bitwise_writes_elsewhere_lose_the_unmapped_bits_of_the_byte() {
     let mut bench = Bench::new();
     bench.write(0x1000, &[0xFF]);
     bench.write(0x0600, &fmmu(0, 1, (0, 1), (0x1000, 0), WRITE));
@@ -90,8 +97,9 @@ fn bitwise_writes_elsewhere_lose_the_unmapped_bits_of_the_byte_facts_3_10() {
     assert_eq!(bench.register(0x1000), [0x01]);
 }
 
+// covers: 3.10
 #[test]
-fn two_fmmus_write_their_bits_of_the_digital_outputs_in_one_frame_facts_3_10() {
+fn two_fmmus_write_their_bits_of_the_digital_outputs_in_one_frame() {
     let mut bench = Bench::new();
     bench.write(0x0600, &fmmu(0, 1, (0, 3), (0x0F00, 0), WRITE));
     bench.write(0x0610, &fmmu(4, 1, (4, 7), (0x0F00, 4), WRITE));
@@ -99,8 +107,9 @@ fn two_fmmus_write_their_bits_of_the_digital_outputs_in_one_frame_facts_3_10() {
     assert_eq!(bench.register(0x0F00), [0xA5]);
 }
 
+// covers: 3.10, sim-controller
 #[test]
-fn fmmu_data_obeys_the_sync_manager_facts_3_10() {
+fn fmmu_data_obeys_the_sync_manager() {
     let mut bench = Bench::new();
     bench.write(0x0800, &[0x00, 0x10, 4, 0, 0x24, 0, 1, 0]);
     bench.write(0x0600, &fmmu(0, 4, (0, 7), (0x1000, 0), WRITE));

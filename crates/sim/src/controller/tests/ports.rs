@@ -1,4 +1,4 @@
-//! Ports, loops, DL status, circulation, marks and counters (facts 2.1 to 2.6).
+//! Ports, loops, DL status, circulation, marks and counters (protocol 2.1 to 2.6).
 
 use super::*;
 
@@ -25,8 +25,9 @@ fn foreign(bench: &mut Bench) -> SimFrame {
     SimFrame::new(frame.id, frame.bytes)
 }
 
+// covers: 2.1, sim-frames
 #[test]
-fn the_order_is_0_epu_3_1_2_facts_2_1() {
+fn the_order_is_0_epu_3_1_2() {
     use Port::{A, B, C, D};
     let mut bench = with_links(&[A, B, C, D]);
     assert_eq!(pass(&mut bench, A), leaves(D, true));
@@ -40,15 +41,17 @@ fn the_order_is_0_epu_3_1_2_facts_2_1() {
     assert_eq!(pass(&mut bench, A), leaves(A, true));
 }
 
+// covers: 2.1
 #[test]
-fn a_frame_looped_at_closed_port_0_is_processed_facts_2_1() {
+fn a_frame_looped_at_closed_port_0_is_processed() {
     let mut bench = with_links(&[Port::B, Port::D]);
     assert_eq!(pass(&mut bench, Port::B), leaves(Port::D, true));
     assert_eq!(pass(&mut bench, Port::D), leaves(Port::B, false));
 }
 
+// covers: 1.5
 #[test]
-fn a_forwarded_frame_is_not_changed_facts_1_5() {
+fn a_forwarded_frame_is_not_changed() {
     let mut bench = with_links(&[Port::A, Port::B]);
     let mut frame = bench.frame(&[(Command::Bwr, 0, 0x0010, &[1, 0])]);
     let before = frame.clone();
@@ -56,8 +59,9 @@ fn a_forwarded_frame_is_not_changed_facts_1_5() {
     assert_eq!((frame, bench.register(0x0010)), (before, [0, 0]));
 }
 
+// covers: 2.3, sim-frames
 #[test]
-fn dl_status_shows_link_loop_and_communication_facts_2_3() {
+fn dl_status_shows_link_loop_and_communication() {
     let high = |ports: &[Port]| with_links(ports).register::<2>(0x0110);
     assert_eq!(high(&[Port::A, Port::B]), [0x37, 0x5A]);
     assert_eq!(high(&[Port::A]), [0x17, 0x56]);
@@ -67,8 +71,9 @@ fn dl_status_shows_link_loop_and_communication_facts_2_3() {
     assert_eq!(bench.register(0x0110), [0x97, 0xD6]);
 }
 
+// covers: 2.3, sim-controller
 #[test]
-fn a_change_of_dl_status_is_an_ecat_event_facts_2_3() {
+fn a_change_of_dl_status_is_an_ecat_event() {
     let mut bench = Bench::new();
     bench.read(0x0110, 2);
     assert_eq!(bench.register(0x0210), [0, 0]);
@@ -76,8 +81,9 @@ fn a_change_of_dl_status_is_an_ecat_event_facts_2_3() {
     assert_eq!(bench.register(0x0210), [4, 0]);
 }
 
+// covers: 2.2
 #[test]
-fn auto_close_stays_closed_until_dl_control_is_written_again_facts_2_2() {
+fn auto_close_stays_closed_until_dl_control_is_written_again() {
     let mut bench = with_links(&[Port::A, Port::B]);
     bench.write(0x0101, &[0x04]);
     assert_eq!(pass(&mut bench, Port::A), leaves(Port::B, true));
@@ -89,8 +95,9 @@ fn auto_close_stays_closed_until_dl_control_is_written_again_facts_2_2() {
     assert!(!bench.controller.loop_closed(Port::B));
 }
 
+// covers: 2.2, sim-frames
 #[test]
-fn auto_close_opens_with_a_valid_frame_on_the_closed_port_facts_2_2() {
+fn auto_close_opens_with_a_valid_frame_on_the_closed_port() {
     let mut bench = with_links(&[Port::A, Port::B]);
     bench.write(0x0101, &[0x04]);
     bench.link(Port::B, false);
@@ -104,23 +111,26 @@ fn auto_close_opens_with_a_valid_frame_on_the_closed_port_facts_2_2() {
     assert!(!bench.controller.loop_closed(Port::B));
 }
 
+// covers: 2.2
 #[test]
-fn a_forced_open_port_sends_without_link_facts_2_2() {
+fn a_forced_open_port_sends_without_link() {
     let mut bench = with_links(&[Port::A]);
     bench.write(0x0101, &[0x08]);
     assert_eq!(pass(&mut bench, Port::A), leaves(Port::B, true));
     assert_eq!(bench.register(0x0110), [0x17, 0x52]);
 }
 
+// covers: 2.2
 #[test]
-fn a_forced_closed_port_takes_no_frames_facts_2_2() {
+fn a_forced_closed_port_takes_no_frames() {
     let mut bench = with_links(&[Port::A, Port::B]);
     bench.write(0x0101, &[0x0C]);
     assert_eq!((pass(&mut bench, Port::A), pass(&mut bench, Port::B)), (leaves(Port::A, true), Passage::Destroyed));
 }
 
+// covers: 2.2
 #[test]
-fn the_frame_that_closes_a_port_still_comes_back_through_it_facts_2_2() {
+fn the_frame_that_closes_a_port_still_comes_back_through_it() {
     let mut bench = with_links(&[Port::A, Port::B]);
     let mut frame = bench.frame(&[(Command::Bwr, 0, 0x0101, &[0x0C])]);
     assert_eq!(bench.receive(&mut frame, Port::A), leaves(Port::B, true));
@@ -128,8 +138,9 @@ fn the_frame_that_closes_a_port_still_comes_back_through_it_facts_2_2() {
     assert_eq!(bench.receive(&mut frame, Port::B), leaves(Port::A, false));
 }
 
+// covers: 2.2, sim-frames
 #[test]
-fn temporary_loops_return_after_a_second_facts_2_2() {
+fn temporary_loops_return_after_a_second() {
     let mut bench = with_links(&[Port::A, Port::B]);
     bench.write(0x0100, &[0x03, 0x0C]);
     bench.wait(Duration::from_millis(999));
@@ -139,8 +150,9 @@ fn temporary_loops_return_after_a_second_facts_2_2() {
     assert_eq!(bench.register(0x0100), [0x01, 0x00, 0x07, 0x00]);
 }
 
+// covers: 2.2, sim-frames
 #[test]
-fn when_all_loops_are_closed_port_0_is_the_way_back_in_facts_2_2() {
+fn when_all_loops_are_closed_port_0_is_the_way_back_in() {
     let mut bench = with_links(&[Port::A, Port::B]);
     bench.write(0x0101, &[0xFF]);
     assert_eq!(bench.register(0x0110), [0x37, 0x5F]);
@@ -149,16 +161,18 @@ fn when_all_loops_are_closed_port_0_is_the_way_back_in_facts_2_2() {
     assert_eq!(pass(&mut bench, Port::A), leaves(Port::B, true));
 }
 
+// covers: 3.1
 #[test]
-fn a_port_that_does_not_exist_is_closed_facts_3_1() {
+fn a_port_that_does_not_exist_is_closed() {
     let mut bench = Bench::with(ControllerConfig { sii: image(), ..ControllerConfig::default() });
     bench.link(Port::C, true);
     bench.write(0x0101, &[0xA0]);
     assert!(bench.controller.loop_closed(Port::C) && bench.controller.loop_closed(Port::D));
 }
 
+// covers: CR-25, 2.4, sim-frames
 #[test]
-fn auto_closed_port_0_marks_frames_and_destroys_marked_ones_facts_2_4() {
+fn auto_closed_port_0_marks_frames_and_destroys_marked_ones() {
     let mut bench = with_links(&[Port::B]);
     let mut frame = bench.frame(&[(Command::Brd, 0, 0, &[0]), (Command::Nop, 0, 0, &[0])]);
     assert_eq!(bench.receive(&mut frame, Port::B), leaves(Port::B, true));
@@ -170,8 +184,9 @@ fn auto_closed_port_0_marks_frames_and_destroys_marked_ones_facts_2_4() {
     assert_eq!((bench.register(0x030C), returned(&frame, 0).1), ([1], 1));
 }
 
+// covers: 2.4
 #[test]
-fn port_0_closed_by_force_neither_marks_nor_destroys_facts_2_4() {
+fn port_0_closed_by_force_neither_marks_nor_destroys() {
     let mut bench = with_links(&[Port::A, Port::B]);
     bench.write(0x0101, &[0x03]);
     let mut frame = bench.frame(&[(Command::Brd, 0, 0, &[0])]);
@@ -181,8 +196,9 @@ fn port_0_closed_by_force_neither_marks_nor_destroys_facts_2_4() {
     }
 }
 
+// covers: SM-06, 2.6, sim-frames
 #[test]
-fn forwarding_rule_1_marks_ethercat_and_destroys_the_rest_facts_2_6() {
+fn forwarding_rule_1_marks_ethercat_and_destroys_the_rest() {
     let mut bench = with_links(&[Port::A, Port::B]);
     let mut frame = bench.frame(&[(Command::Nop, 0, 0, &[0])]);
     bench.receive(&mut frame, Port::A);
@@ -199,8 +215,9 @@ fn forwarding_rule_1_marks_ethercat_and_destroys_the_rest_facts_2_6() {
     assert_eq!(bench.receive(&mut other, Port::B), leaves(Port::A, false));
 }
 
+// covers: 2.6, sim-frames
 #[test]
-fn forwarding_rule_0_passes_everything_unmarked_facts_2_6() {
+fn forwarding_rule_0_passes_everything_unmarked() {
     let mut bench = with_links(&[Port::A, Port::B]);
     bench.write(0x0100, &[0x00]);
     let mut frame = bench.frame(&[(Command::Nop, 0, 0, &[0])]);
@@ -212,8 +229,9 @@ fn forwarding_rule_0_passes_everything_unmarked_facts_2_6() {
     assert_eq!(other, before);
 }
 
+// covers: 2.5, sim-counters
 #[test]
-fn a_symbol_error_in_a_frame_is_counted_once_beside_the_frame_facts_2_5() {
+fn a_symbol_error_in_a_frame_is_counted_once_beside_the_frame() {
     let (mut first, mut second) = (with_links(&[Port::A, Port::B]), with_links(&[Port::A, Port::B]));
     let mut frame = first.frame(&[(Command::Nop, 0, 0, &[0])]);
     (frame.fcs, frame.symbol_error) = (Fcs::Bad, true);
@@ -226,7 +244,7 @@ fn a_symbol_error_in_a_frame_is_counted_once_beside_the_frame_facts_2_5() {
     assert_eq!(second.register(0x0300), [0, 0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 0]);
 }
 
-// covers: facts 2.5
+// covers: 2.5, sim-counters
 #[test]
 fn the_first_controller_counts_an_invalid_frame_the_next_a_forwarded_error() {
     let (mut first, mut second) = (with_links(&[Port::A, Port::B]), with_links(&[Port::A, Port::B]));
@@ -243,8 +261,9 @@ fn the_first_controller_counts_an_invalid_frame_the_next_a_forwarded_error() {
     assert_eq!(first.register(0x0300), [0; 12]);
 }
 
+// covers: 2.5, sim-counters
 #[test]
-fn a_lost_link_counts_in_mode_auto_only_and_stops_at_255_facts_2_5() {
+fn a_lost_link_counts_in_mode_auto_only_and_stops_at_255() {
     let mut bench = with_links(&[Port::A]);
     for _ in 0..300 {
         bench.link(Port::B, true);
@@ -259,8 +278,9 @@ fn a_lost_link_counts_in_mode_auto_only_and_stops_at_255_facts_2_5() {
     assert_eq!(bench.register(0x0310), [0; 4]);
 }
 
+// covers: 2.5, sim-counters
 #[test]
-fn groups_of_counters_are_cleared_apart_facts_2_5() {
+fn groups_of_counters_are_cleared_apart() {
     let mut bench = with_links(&[Port::A]);
     let mut other = foreign(&mut bench);
     bench.receive(&mut other, Port::A);
@@ -270,7 +290,7 @@ fn groups_of_counters_are_cleared_apart_facts_2_5() {
     assert_eq!((bench.register(0x030C), bench.register(0x0310)), ([0], [1, 0, 0, 0]));
 }
 
-// covers: facts 2.5
+// covers: 2.5, sim-counters
 #[test]
 fn pdi_errors_count_beside_their_code_and_any_write_clears_both() {
     let mut bench = with_links(&[Port::A]);
@@ -285,7 +305,7 @@ fn pdi_errors_count_beside_their_code_and_any_write_clears_both() {
     assert_eq!(bench.register(0x030D), [0xFF, 0x01]);
 }
 
-// covers: facts 2.8
+// covers: 2.8, sim-counters
 #[test]
 fn dl_status_shows_enhanced_link_detection_as_the_eeprom_says() {
     for (configuration, shown) in [(0x00, 0), (0x01, 0), (0x02, 4), (0x10, 4), (0x80, 4), (0x0C, 0)] {
@@ -302,7 +322,7 @@ fn dl_status_shows_enhanced_link_detection_as_the_eeprom_says() {
     }
 }
 
-// covers: facts 3.9
+// covers: 3.9, sim-counters
 #[test]
 fn registers_that_are_not_modelled_do_not_answer() {
     let mut bench = with_links(&[Port::A]);
@@ -321,8 +341,9 @@ fn without_power_frames_end_and_links_are_gone() {
     assert_eq!(bench.register::<2>(0x0110)[0] & 0xF0, 0);
 }
 
+// covers: 2.4
 #[test]
-fn a_remnant_that_can_carry_no_c_bit_ends_where_port_0_has_closed_facts_2_4() {
+fn a_remnant_that_can_carry_no_c_bit_ends_where_port_0_has_closed() {
     // A cable was cut while the frame passed; in a loop of controllers the remnant would travel for ever.
     let mut bench = with_links(&[Port::B, Port::D]);
     let mut frame = bench.frame(&[(Command::Brd, 0, 0, &[0])]);

@@ -1,4 +1,4 @@
-//! What holds for any frame: nothing panics, and only what a controller may change is changed (facts 1.5).
+//! What holds for any frame: nothing panics, and only what a controller may change is changed (protocol 1.5).
 
 use super::*;
 use proptest::prelude::*;
@@ -56,8 +56,9 @@ fn fixed_part(frame: &SimFrame) -> Vec<u8> {
 proptest! {
     #![proptest_config(ProptestConfig { cases: 300, ..ProptestConfig::default() })]
 
+    // covers: 1.5
     #[test]
-    fn any_frames_pass_without_panic_and_keep_what_is_not_the_controllers_facts_1_5(
+    fn any_frames_pass_without_panic_and_keep_what_is_not_the_controllers(
         run in prop::collection::vec((frames(), fcs(), 0usize..4, any::<bool>()), 1..40),
         links in any::<[bool; 4]>(),
     ) {
@@ -84,8 +85,9 @@ proptest! {
         }
     }
 
+    // covers: 2.1
     #[test]
-    fn a_frame_ends_or_meets_the_processing_unit_at_most_once_facts_2_1(
+    fn a_frame_ends_or_meets_the_processing_unit_at_most_once(
         links in any::<[bool; 4]>(),
         loops in any::<u8>(),
         port in 0usize..4,

@@ -1,9 +1,10 @@
-//! Write protection (facts 3.2).
+//! Write protection (protocol 3.2).
 
 use super::*;
 
+// covers: 3.2, sim-controller
 #[test]
-fn protected_registers_need_the_enable_in_the_same_frame_facts_3_2() {
+fn protected_registers_need_the_enable_in_the_same_frame() {
     let mut bench = Bench::new();
     bench.write(0x0021, &[1]);
     assert_eq!(bench.write(0x0010, &[5, 0]), 0);
@@ -16,8 +17,9 @@ fn protected_registers_need_the_enable_in_the_same_frame_facts_3_2() {
     assert_eq!((bench.write(0x0F7F, &[1]), bench.write(0x0F80, &[1]), bench.write(0x1000, &[1])), (0, 1, 1));
 }
 
+// covers: 3.2, sim-controller
 #[test]
-fn esc_protection_concerns_all_memory_facts_3_2() {
+fn esc_protection_concerns_all_memory() {
     let mut bench = Bench::new();
     bench.write(0x0031, &[1]);
     assert_eq!((bench.write(0x0010, &[5, 0]), bench.write(0x0F80, &[1]), bench.write(0x1000, &[1])), (0, 0, 0));

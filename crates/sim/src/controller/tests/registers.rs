@@ -1,19 +1,21 @@
-//! AL control and status, events, addresses, reset (facts 2.7, 3.2, 3.4, 3.5).
+//! AL control and status, events, addresses, reset (protocol 2.7, 3.2, 3.4, 3.5).
 
 use super::*;
 use ringcat_wire::al::{AlState, AlStatus, AlStatusCode};
 use ringcat_wire::register::RegisterGroup;
 
+// covers: 3.1
 #[test]
-fn information_registers_show_the_configuration_facts_3_1() {
+fn information_registers_show_the_configuration() {
     let mut bench = Bench::new();
     assert_eq!(bench.read(0x0000, 10).0, [0x11, 0, 2, 0, 8, 8, 8, 0xFF, 0xFC, 0x00]);
     assert_eq!(bench.read(0x0100, 4).0, [0x01, 0x00, 0x07, 0x00]);
     assert_eq!((bench.read(0x0120, 2).0, bench.read(0x0130, 2).0), (vec![1, 0], vec![1, 0]));
 }
 
+// covers: 3
 #[test]
-fn ethercat_may_write_what_the_register_table_says_facts_3() {
+fn ethercat_may_write_what_the_register_table_says() {
     for info in ringcat_wire::register::table().iter().filter(|info| info.group != RegisterGroup::Mii) {
         let config = ControllerConfig { receive_time_latch_mode: true, ..config() };
         let mut bench = Bench::with(config);
@@ -23,8 +25,9 @@ fn ethercat_may_write_what_the_register_table_says_facts_3() {
     }
 }
 
+// covers: 3.4
 #[test]
-fn al_control_is_a_mailbox_to_the_application_facts_3_4() {
+fn al_control_is_a_mailbox_to_the_application() {
     let mut bench = Bench::new();
     assert_eq!(bench.write(0x0120, &[0x02, 0x00]), 1);
     assert_eq!(bench.controller.al_event(), 1);
@@ -36,8 +39,9 @@ fn al_control_is_a_mailbox_to_the_application_facts_3_4() {
     assert_eq!(bench.register(0x0120), [0x04, 0x00]);
 }
 
+// covers: 3.4
 #[test]
-fn al_status_written_by_the_application_is_an_ecat_event_until_read_facts_3_4() {
+fn al_status_written_by_the_application_is_an_ecat_event_until_read() {
     let mut bench = Bench::new();
     bench.read(0x0110, 2);
     let status = AlStatus::from_bits(0x0014);
@@ -49,8 +53,9 @@ fn al_status_written_by_the_application_is_an_ecat_event_until_read_facts_3_4() 
     assert_eq!(bench.register(0x0210), [0x08, 0x00]);
 }
 
+// covers: 3.4, sim-states
 #[test]
-fn with_device_emulation_al_status_follows_at_once_facts_3_4() {
+fn with_device_emulation_al_status_follows_at_once() {
     let mut sii = image();
     sii[1] |= 1;
     sign(&mut sii);
@@ -62,8 +67,9 @@ fn with_device_emulation_al_status_follows_at_once_facts_3_4() {
     assert_eq!(bench.register(0x0130), [0x14, 0x00]);
 }
 
+// covers: 1.2, sim-controller
 #[test]
-fn events_go_into_every_datagram_where_the_mask_lets_them_facts_1_2() {
+fn events_go_into_every_datagram_where_the_mask_lets_them() {
     let mut bench = Bench::new();
     let irq = |bench: &mut Bench| {
         let mut frame = bench.frame(&[(Command::Nop, 0, 0, &[0]), (Command::Aprd, 5, 0, &[0])]);
@@ -78,8 +84,9 @@ fn events_go_into_every_datagram_where_the_mask_lets_them_facts_1_2() {
     assert_eq!(irq(&mut bench), [0x0001, 0x0000]);
 }
 
+// covers: 2.7, sim-controller
 #[test]
-fn the_alias_comes_from_the_first_loading_only_facts_2_7() {
+fn the_alias_comes_from_the_first_loading_only() {
     let mut bench = Bench::new();
     assert_eq!(bench.register(0x0012), [0x34, 0x12]);
     bench.controller.sii_image_mut()[8] = 0x77;
@@ -92,8 +99,9 @@ fn the_alias_comes_from_the_first_loading_only_facts_2_7() {
     assert_eq!(bench.register(0x0012), [0x77, 0x12]);
 }
 
+// covers: 3.2, sim-controller
 #[test]
-fn res_in_three_frames_resets_the_controller_facts_3_2() {
+fn res_in_three_frames_resets_the_controller() {
     let mut bench = Bench::new();
     bench.write(0x0010, &[5, 0]);
     let starts = bench.controller.starts();
@@ -110,8 +118,9 @@ fn res_in_three_frames_resets_the_controller_facts_3_2() {
     assert_eq!(bench.read(0x0040, 1), (vec![0], 1));
 }
 
+// covers: 3.2
 #[test]
-fn res_in_one_frame_or_with_a_wrong_letter_resets_nothing_facts_3_2() {
+fn res_in_one_frame_or_with_a_wrong_letter_resets_nothing() {
     let mut bench = Bench::new();
     let starts = bench.controller.starts();
     let bwr = |letter: &'static [u8]| (Command::Bwr, 0, 0x0040, letter);

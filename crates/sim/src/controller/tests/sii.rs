@@ -1,4 +1,4 @@
-//! The SII interface and loading (facts 3.8, 4.7).
+//! The SII interface and loading (protocol 3.8, 4.7).
 
 use super::*;
 
@@ -8,8 +8,9 @@ fn status(bench: &mut Bench) -> [u8; 2] {
     bench.read(0x0502, 2).0.try_into().unwrap()
 }
 
+// covers: 3.8
 #[test]
-fn a_read_is_busy_and_then_yields_eight_bytes_facts_3_8() {
+fn a_read_is_busy_and_then_yields_eight_bytes() {
     let mut bench = Bench::new();
     assert_eq!(bench.write(0x0502, &[0x00, 0x01, 0x08, 0, 0, 0]), 1);
     assert_eq!(status(&mut bench), [0x40, 0x81]);
@@ -18,8 +19,9 @@ fn a_read_is_busy_and_then_yields_eight_bytes_facts_3_8() {
     assert_eq!(bench.read(0x0508, 8).0, [0x02, 0x00, 0x00, 0x00, 0x52, 0x30, 0xF0, 0x07]);
 }
 
+// covers: 3.8
 #[test]
-fn a_controller_with_short_reads_yields_four_bytes_facts_3_8() {
+fn a_controller_with_short_reads_yields_four_bytes() {
     let mut bench = Bench::with(ControllerConfig { eight_byte_reads: false, ..config() });
     bench.write(0x0502, &[0x00, 0x01, 0x08, 0, 0, 0]);
     bench.wait(BUSY);
@@ -27,8 +29,9 @@ fn a_controller_with_short_reads_yields_four_bytes_facts_3_8() {
     assert_eq!(bench.read(0x0508, 8).0, [0x02, 0, 0, 0, 0, 0, 0, 0]);
 }
 
+// covers: 3.8, sim-controller
 #[test]
-fn while_busy_the_registers_are_blocked_facts_3_8() {
+fn while_busy_the_registers_are_blocked() {
     let mut bench = Bench::new();
     bench.write(0x0502, &[0x00, 0x01, 0x08, 0, 0, 0]);
     assert_eq!((bench.write(0x0504, &[0x0A]), bench.write(0x0502, &[0, 1])), (0, 0));
@@ -36,8 +39,9 @@ fn while_busy_the_registers_are_blocked_facts_3_8() {
     assert_eq!(bench.write(0x0504, &[0x0A]), 1);
 }
 
+// covers: 3.8, sim-controller
 #[test]
-fn a_word_is_written_with_the_enable_in_the_same_frame_facts_3_8() {
+fn a_word_is_written_with_the_enable_in_the_same_frame() {
     let mut bench = Bench::new();
     bench.write(0x0504, &[0x04, 0, 0, 0, 0xCD, 0xAB]);
     bench.write(0x0502, &[0x01, 0x02]);
@@ -47,8 +51,9 @@ fn a_word_is_written_with_the_enable_in_the_same_frame_facts_3_8() {
     assert_eq!(status(&mut bench), [0x40, 0x00]);
 }
 
+// covers: 3.8
 #[test]
-fn a_write_without_enable_is_an_error_until_the_next_command_facts_3_8() {
+fn a_write_without_enable_is_an_error_until_the_next_command() {
     let mut bench = Bench::new();
     bench.write(0x0502, &[0x01]);
     bench.write(0x0502, &[0x00, 0x02]);
@@ -61,8 +66,9 @@ fn a_write_without_enable_is_an_error_until_the_next_command_facts_3_8() {
     assert_eq!(status(&mut bench), [0x40, 0x40]);
 }
 
+// covers: 3.8
 #[test]
-fn unknown_commands_and_writes_beyond_the_end_are_errors_facts_3_8() {
+fn unknown_commands_and_writes_beyond_the_end_are_errors() {
     let mut bench = Bench::new();
     bench.write(0x0502, &[0x00, 0x03]);
     assert_eq!(status(&mut bench), [0x40, 0x20]);
@@ -74,15 +80,17 @@ fn unknown_commands_and_writes_beyond_the_end_are_errors_facts_3_8() {
     assert_eq!((status(&mut bench), bench.read(0x0508, 8).0), ([0x40, 0x00], vec![0xFF; 8]));
 }
 
+// covers: 2.5
 #[test]
-fn a_damaged_frame_starts_no_command_facts_2_5() {
+fn a_damaged_frame_starts_no_command() {
     let mut bench = Bench::new();
     bench.damaged(&[(Command::Apwr, 0, 0x0502, &[0x00, 0x01])]);
     assert_eq!(status(&mut bench), [0x40, 0x00]);
 }
 
+// covers: 3.8, sim-controller
 #[test]
-fn the_pdi_takes_what_is_offered_and_can_be_forced_out_facts_3_8() {
+fn the_pdi_takes_what_is_offered_and_can_be_forced_out() {
     let mut bench = Bench::new();
     bench.pdi_write(0x0501, &[1]);
     assert_eq!(bench.register(0x0501), [0]);
@@ -104,16 +112,18 @@ fn the_pdi_takes_what_is_offered_and_can_be_forced_out_facts_3_8() {
     assert_eq!((bench.write(0x0504, &[1]), bench.register(0x0501)), (1, [0]));
 }
 
+// covers: 4.7
 #[test]
-fn loading_takes_over_the_configuration_area_facts_4_7() {
+fn loading_takes_over_the_configuration_area() {
     let bench = Bench::new();
     assert_eq!(bench.register(0x0140), [0x05, 0x0E]);
     assert_eq!((bench.register(0x0150), bench.register(0x0982)), ([0x03, 0x44], [0x64, 0x00]));
     assert_eq!((bench.register::<2>(0x0110)[0] & 1, bench.register(0x0502)), (1, [0x40, 0x00]));
 }
 
+// covers: 4.7
 #[test]
-fn until_it_is_loaded_the_data_link_layer_works_but_process_ram_is_closed_facts_4_7() {
+fn until_it_is_loaded_the_data_link_layer_works_but_process_ram_is_closed() {
     let mut bench = Bench::new();
     bench.controller.power_on(bench.now);
     bench.link(Port::A, true);
@@ -124,8 +134,9 @@ fn until_it_is_loaded_the_data_link_layer_works_but_process_ram_is_closed_facts_
     assert_eq!((bench.read(0x1000, 1).1, bench.pdi_read(0x0130, 1)), (1, Some(vec![1])));
 }
 
+// covers: 4.7, sim-controller
 #[test]
-fn a_wrong_checksum_keeps_pdi_and_process_ram_closed_until_a_good_reload_facts_4_7() {
+fn a_wrong_checksum_keeps_pdi_and_process_ram_closed_until_a_good_reload() {
     let mut sii = image();
     sii[14] ^= 1;
     let mut bench = Bench::with(ControllerConfig { sii, ..config() });
@@ -138,16 +149,18 @@ fn a_wrong_checksum_keeps_pdi_and_process_ram_closed_until_a_good_reload_facts_4
     assert_eq!((status(&mut bench), bench.read(0x1000, 1).1), ([0x40, 0x00], 1));
 }
 
+// covers: 4.1
 #[test]
-fn checksum_88a4_is_accepted_and_no_image_is_not_facts_4_1() {
+fn checksum_88a4_is_accepted_and_no_image_is_not() {
     let mut sii = image();
     sii[14..16].copy_from_slice(&[0xA4, 0x88]);
     assert!(Bench::with(ControllerConfig { sii, ..config() }).controller.pdi_operational());
     assert!(!Bench::with(ControllerConfig { sii: Vec::new(), ..config() }).controller.pdi_operational());
 }
 
+// covers: 3.8
 #[test]
-fn an_image_above_2_kbyte_has_two_address_bytes_facts_3_8() {
+fn an_image_above_2_kbyte_has_two_address_bytes() {
     let mut sii = image();
     sii.resize(4096, 0xFF);
     let mut bench = Bench::with(ControllerConfig { sii, ..config() });

@@ -1,4 +1,4 @@
-//! SyncManagers seen from both sides (facts 3.5, 3.11).
+//! SyncManagers seen from both sides (protocol 3.5, 3.11).
 
 use super::*;
 
@@ -20,8 +20,9 @@ fn buffers() -> Bench {
     bench
 }
 
+// covers: 3.11, sim-controller
 #[test]
-fn a_mailbox_is_full_after_the_write_and_empty_after_the_read_facts_3_11() {
+fn a_mailbox_is_full_after_the_write_and_empty_after_the_read() {
     let mut bench = mailboxes();
     assert_eq!(bench.pdi_read(0x1000, 16), None);
     assert_eq!(bench.write(0x1000, &[1; 16]), 1);
@@ -33,8 +34,9 @@ fn a_mailbox_is_full_after_the_write_and_empty_after_the_read_facts_3_11() {
     assert_eq!(bench.write(0x1000, &[2; 16]), 1);
 }
 
+// covers: 3.11
 #[test]
-fn reading_an_empty_mailbox_counts_nothing_and_changes_no_data_facts_3_11() {
+fn reading_an_empty_mailbox_counts_nothing_and_changes_no_data() {
     let mut bench = mailboxes();
     assert_eq!(bench.one((Command::Aprd, 0, 0x1080, &[0xEE; 16])), (vec![0xEE; 16], 0));
     assert!(bench.pdi_write(0x1080, &[7; 16]));
@@ -45,8 +47,9 @@ fn reading_an_empty_mailbox_counts_nothing_and_changes_no_data_facts_3_11() {
     assert_eq!(bench.read(0x1080, 16).1, 0);
 }
 
+// covers: 3.11
 #[test]
-fn a_mailbox_write_has_to_reach_the_last_byte_facts_3_11() {
+fn a_mailbox_write_has_to_reach_the_last_byte() {
     let mut bench = mailboxes();
     assert_eq!(bench.write(0x1000, &[1; 8]), 1);
     assert_eq!(bench.register(0x0805), [0x80]);
@@ -58,8 +61,9 @@ fn a_mailbox_write_has_to_reach_the_last_byte_facts_3_11() {
     assert_eq!(bench.register(0x0805), [0x02]);
 }
 
+// covers: 2.5
 #[test]
-fn a_bad_fcs_neither_fills_nor_empties_a_mailbox_facts_2_5() {
+fn a_bad_fcs_neither_fills_nor_empties_a_mailbox() {
     let mut bench = mailboxes();
     assert_eq!(bench.damaged(&[(Command::Apwr, 0, 0x1000, &[1; 16])])[0].1, 1);
     assert_eq!(bench.register(0x0805), [0x00]);
@@ -70,8 +74,9 @@ fn a_bad_fcs_neither_fills_nor_empties_a_mailbox_facts_2_5() {
     assert_eq!(bench.read(0x1080, 16), (vec![7; 16], 1));
 }
 
+// covers: 3.11
 #[test]
-fn each_side_has_its_direction_facts_3_11() {
+fn each_side_has_its_direction() {
     let mut bench = mailboxes();
     bench.write(0x1000, &[1; 16]);
     assert_eq!(bench.read(0x1000, 16).1, 0);
@@ -79,8 +84,9 @@ fn each_side_has_its_direction_facts_3_11() {
     assert_eq!(bench.write(0x1080, &[1; 16]), 0);
 }
 
+// covers: 3.11, sim-controller
 #[test]
-fn the_reader_always_gets_the_last_complete_buffer_facts_3_11() {
+fn the_reader_always_gets_the_last_complete_buffer() {
     let mut bench = buffers();
     assert_eq!(bench.pdi_read(0x1100, 4), None);
     for value in 1..=5 {
@@ -96,7 +102,7 @@ fn the_reader_always_gets_the_last_complete_buffer_facts_3_11() {
     assert_eq!(bench.read(0x1180, 4), (vec![5, 6, 7, 8], 1));
 }
 
-// covers: facts 3.1, facts 3.11
+// covers: 3.1, 3.11, sim-controller
 #[test]
 fn sequential_mode_is_not_announced_and_its_bit_changes_nothing() {
     let mut bench = buffers();
@@ -114,8 +120,9 @@ fn sequential_mode_is_not_announced_and_its_bit_changes_nothing() {
     }
 }
 
+// covers: 3.11
 #[test]
-fn inputs_that_were_never_written_are_not_there_facts_3_11() {
+fn inputs_that_were_never_written_are_not_there() {
     let mut bench = buffers();
     assert_eq!(bench.register(0x081D), [0x30]);
     assert_eq!(bench.read(0x1180, 4).1, 0);
@@ -124,14 +131,16 @@ fn inputs_that_were_never_written_are_not_there_facts_3_11() {
     assert_eq!(bench.read(0x1180, 4).1, 1);
 }
 
+// covers: 3.11
 #[test]
-fn the_other_two_buffers_are_not_addressable_facts_3_11() {
+fn the_other_two_buffers_are_not_addressable() {
     let mut bench = buffers();
     assert_eq!((bench.write(0x1104, &[1; 8]), bench.write(0x110C, &[1; 4])), (0, 1));
 }
 
+// covers: 3.11, sim-controller
 #[test]
-fn the_area_of_a_deactivated_sync_manager_is_locked_facts_3_11() {
+fn the_area_of_a_deactivated_sync_manager_is_locked() {
     let mut bench = buffers();
     bench.write(0x1100, &[1; 4]);
     bench.write(0x0816, &[0]);
@@ -146,16 +155,18 @@ fn the_area_of_a_deactivated_sync_manager_is_locked_facts_3_11() {
     assert_eq!(bench.write(0x1100, &[2; 4]), 1);
 }
 
+// covers: 3.13, sim-controller
 #[test]
-fn without_a_sync_manager_process_ram_is_accessed_directly_facts_3_13() {
+fn without_a_sync_manager_process_ram_is_accessed_directly() {
     let mut bench = Bench::new();
     assert_eq!(bench.write(0x1234, &[1, 2, 3]), 1);
     assert_eq!(bench.read(0x1233, 5), (vec![0, 1, 2, 3, 0], 1));
     assert_eq!(bench.pdi_read(0x1235, 1), Some(vec![2]));
 }
 
+// covers: 3.11
 #[test]
-fn start_and_length_are_writable_only_while_disabled_facts_3_11() {
+fn start_and_length_are_writable_only_while_disabled() {
     let mut bench = buffers();
     assert_eq!(bench.write(0x0810, &[0x00, 0x12, 8, 0]), 1);
     assert_eq!(bench.register(0x0810), [0x00, 0x11, 4, 0]);
@@ -166,8 +177,9 @@ fn start_and_length_are_writable_only_while_disabled_facts_3_11() {
     assert_eq!((bench.write(0x0815, &[0xFF]), bench.write(0x0817, &[0xFF])), (0, 0));
 }
 
+// covers: 3.11
 #[test]
-fn a_length_of_one_has_a_single_buffer_that_can_be_read_back_facts_3_11() {
+fn a_length_of_one_has_a_single_buffer_that_can_be_read_back() {
     let mut bench = Bench::new();
     bench.write(0x0800, &[0x00, 0x0F, 1, 0, 0x44, 0, 1, 0]);
     assert_eq!(bench.write(0x0F00, &[0xA5]), 1);
@@ -175,8 +187,9 @@ fn a_length_of_one_has_a_single_buffer_that_can_be_read_back_facts_3_11() {
     assert_eq!(bench.controller.digital_outputs(), Some([0xA5, 0, 0, 0]));
 }
 
+// covers: 3.5
 #[test]
-fn an_activation_change_is_an_al_event_until_the_pdi_reads_the_register_facts_3_5() {
+fn an_activation_change_is_an_al_event_until_the_pdi_reads_the_register() {
     let mut bench = mailboxes();
     // The repeat request is in the same register.
     bench.write(0x080E, &[0x03]);
@@ -189,16 +202,18 @@ fn an_activation_change_is_an_al_event_until_the_pdi_reads_the_register_facts_3_
     assert_eq!(bench.register(0x080F), [0x02]);
 }
 
+// covers: 6.2, sim-controller
 #[test]
-fn toggling_repeat_keeps_what_the_mailbox_holds_facts_6_2() {
+fn toggling_repeat_keeps_what_the_mailbox_holds() {
     let mut bench = mailboxes();
     bench.pdi_write(0x1080, &[7; 16]);
     bench.write(0x080E, &[0x03]);
     assert_eq!(bench.read(0x1080, 16), (vec![7; 16], 1));
 }
 
+// covers: 3.5, sim-controller
 #[test]
-fn ecat_events_mirror_sync_managers_that_ask_for_it_facts_3_5() {
+fn ecat_events_mirror_sync_managers_that_ask_for_it() {
     let mut bench = Bench::new();
     bench.write(0x0808, &[0x80, 0x10, 16, 0, 0x12, 0, 1, 0]);
     bench.read(0x0110, 2);

@@ -1,4 +1,4 @@
-//! Watchdogs (facts 3.7).
+//! Watchdogs (protocol 3.7).
 
 use super::*;
 
@@ -9,8 +9,9 @@ fn outputs() -> Bench {
     bench
 }
 
+// covers: 3.7, sim-controller
 #[test]
-fn without_outputs_for_100_ms_the_watchdog_expires_once_facts_3_7() {
+fn without_outputs_for_100_ms_the_watchdog_expires_once() {
     let mut bench = outputs();
     assert_eq!(bench.register(0x0440), [0, 0]);
     bench.write(0x1100, &[1, 2]);
@@ -30,8 +31,9 @@ fn without_outputs_for_100_ms_the_watchdog_expires_once_facts_3_7() {
     assert_eq!((bench.register(0x0440), bench.pdi_read(0x1100, 2)), ([1, 0], Some(vec![3, 4])));
 }
 
+// covers: 3.7, sim-controller
 #[test]
-fn divider_and_time_set_the_limit_facts_3_7() {
+fn divider_and_time_set_the_limit() {
     let mut bench = outputs();
     // (98 + 2) x 40 ns = 4 us, times 5.
     bench.write(0x0400, &[98, 0]);
@@ -40,8 +42,9 @@ fn divider_and_time_set_the_limit_facts_3_7() {
     assert_eq!(bench.controller.next_deadline(), Some(bench.now + Duration::from_micros(20)));
 }
 
+// covers: 3.7
 #[test]
-fn time_0_switches_the_watchdog_off_facts_3_7() {
+fn time_0_switches_the_watchdog_off() {
     let mut bench = outputs();
     bench.write(0x0420, &[0, 0]);
     assert_eq!(bench.register(0x0440), [1, 0]);
@@ -50,16 +53,18 @@ fn time_0_switches_the_watchdog_off_facts_3_7() {
     assert_eq!((bench.register(0x0440), bench.pdi_read(0x1100, 2)), ([1, 0], Some(vec![1, 2])));
 }
 
+// covers: 3.7
 #[test]
-fn an_incomplete_or_damaged_write_does_not_trigger_facts_3_7() {
+fn an_incomplete_or_damaged_write_does_not_trigger() {
     let mut bench = outputs();
     bench.write(0x1100, &[1]);
     bench.damaged(&[(Command::Apwr, 0, 0x1100, &[1, 2])]);
     assert_eq!(bench.register(0x0440), [0, 0]);
 }
 
+// covers: 3.7
 #[test]
-fn the_counters_are_cleared_together_and_stop_at_255_facts_3_7() {
+fn the_counters_are_cleared_together_and_stop_at_255() {
     let mut bench = outputs();
     for _ in 0..300 {
         bench.write(0x1100, &[1, 2]);
@@ -70,8 +75,9 @@ fn the_counters_are_cleared_together_and_stop_at_255_facts_3_7() {
     assert_eq!(bench.register(0x0442), [0, 0]);
 }
 
+// covers: 3.7
 #[test]
-fn the_pdi_watchdog_runs_from_when_the_application_stops_facts_3_7() {
+fn the_pdi_watchdog_runs_from_when_the_application_stops() {
     let mut bench = Bench::new();
     assert_eq!(bench.register::<2>(0x0110)[0] & 2, 2);
     bench.controller.set_pdi_alive(false, bench.now);

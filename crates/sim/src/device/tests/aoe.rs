@@ -1,4 +1,4 @@
-//! Facts 6.7 as a MainDevice sees them: memory, dictionary, states and device info by ADS.
+//! Protocol 6.7 as a MainDevice sees them: memory, dictionary, states and device info by ADS.
 
 use ringcat_wire::al::AlState;
 use ringcat_wire::mailbox::Protocol;
@@ -52,8 +52,9 @@ fn ask(client: &mut Client, request: &AdsRequest<'_>) -> Result<Vec<u8>, AdsErro
     }
 }
 
+// covers: 6.7, sim-mailbox
 #[test]
-fn a_memory_is_written_and_read_facts_6_7() {
+fn a_memory_is_written_and_read() {
     let mut client = client();
     let read = |offset, length| AdsRequest::Read { group: MEMORY, offset, length };
     assert_eq!(ask(&mut client, &AdsRequest::Write { group: MEMORY, offset: 8, data: &[1, 2, 3] }), Ok(Vec::new()));
@@ -68,8 +69,9 @@ fn a_memory_is_written_and_read_facts_6_7() {
     assert_eq!(ask(&mut client, &foreign), Err(AdsErrorCode::INVALID_INDEX_GROUP));
 }
 
+// covers: 6.7, sim-mailbox
 #[test]
-fn objects_are_read_and_written_by_ads_facts_6_7() {
+fn objects_are_read_and_written_by_ads() {
     let mut client = client();
     let group = index_group::SDO;
     let read = |offset, length| AdsRequest::Read { group, offset, length };
@@ -84,8 +86,9 @@ fn objects_are_read_and_written_by_ads_facts_6_7() {
     assert_eq!(ask(&mut client, &fixed), Err(AdsErrorCode::ACCESS_DENIED));
 }
 
+// covers: 6.7, sim-mailbox
 #[test]
-fn states_and_device_info_are_told_facts_6_7() {
+fn states_and_device_info_are_told() {
     let mut client = client();
     let (_, data) = send(&mut client, PORT, AdsCommand::ReadState, &[]);
     let result = AdsErrorCode::NO_ERROR;
@@ -103,8 +106,9 @@ fn states_and_device_info_are_told_facts_6_7() {
     assert_eq!(AdsResponse::decode(AdsCommand::ReadDeviceInfo, &data), Ok(info));
 }
 
+// covers: 6.7
 #[test]
-fn what_cannot_be_delivered_is_told_in_the_header_facts_6_7() {
+fn what_cannot_be_delivered_is_told_in_the_header() {
     let mut client = client();
     assert_eq!(send(&mut client, 9, AdsCommand::ReadState, &[]).0.error, AdsErrorCode::TARGET_PORT_NOT_FOUND);
     assert_eq!(send(&mut client, PORT, AdsCommand::AddNotification, &[]).0.error, AdsErrorCode::UNKNOWN_COMMAND);

@@ -1,4 +1,4 @@
-//! Facts 6.3 as a MainDevice sees them: transfers in segments, SDO information, emergencies, diagnosis history.
+//! Protocol 6.3 as a MainDevice sees them: transfers in segments, SDO information, emergencies, diagnosis history.
 
 use ringcat_wire::al::AlState;
 use ringcat_wire::mailbox::coe::{
@@ -90,16 +90,18 @@ fn download(client: &mut Client, index: u16, total: usize, data: &[u8]) -> Resul
     }
 }
 
+// covers: 6.3, sim-mailbox
 #[test]
-fn an_object_of_100_kb_is_uploaded_in_segments_facts_6_3() {
+fn an_object_of_100_kb_is_uploaded_in_segments() {
     let mut client = client();
     let object = upload(&mut client, LARGE, false, |_| false).unwrap();
     assert_eq!(object.len(), LARGE_OBJECT_BYTES);
     assert!(object.iter().enumerate().all(|(place, byte)| usize::from(*byte) == place % 251));
 }
 
+// covers: 6.3, sim-mailbox
 #[test]
-fn any_length_is_downloaded_and_read_back_facts_6_3() {
+fn any_length_is_downloaded_and_read_back() {
     let mut client = client();
     // Around the ends of the first message and of the segments, whole and one short of it.
     for length in [5, 1007, 1008, 1009, 1010, 2022, 2023, 2024, 3038, 3039, 60_000] {
@@ -109,8 +111,9 @@ fn any_length_is_downloaded_and_read_back_facts_6_3() {
     }
 }
 
+// covers: 6.3, sim-mailbox
 #[test]
-fn a_wrong_toggle_ends_the_transfer_facts_6_3() {
+fn a_wrong_toggle_ends_the_transfer() {
     let mut client = client();
     let result = upload(&mut client, LARGE, false, |number| number == 3);
     assert_eq!(result, Err(AbortCode::TOGGLE_NOT_ALTERNATED));
@@ -130,8 +133,9 @@ fn a_download_has_as_many_bytes_as_it_announced() {
     assert_eq!(upload(&mut client, LARGE, false, |_| false).unwrap().len(), LARGE_OBJECT_BYTES, "unchanged");
 }
 
+// covers: 6.3
 #[test]
-fn an_abort_ends_a_transfer_and_is_not_answered_facts_6_3() {
+fn an_abort_ends_a_transfer_and_is_not_answered() {
     let mut client = client();
     respond(&mut client, &SdoRequest::Upload { index: LARGE, sub_index: 0, complete_access: false });
     client.post_sdo(&SdoRequest::Abort { index: LARGE, sub_index: 0, code: AbortCode::GENERAL });
@@ -141,6 +145,7 @@ fn an_abort_ends_a_transfer_and_is_not_answered_facts_6_3() {
     assert!(matches!(SdoResponse::decode(&more), Ok(SdoResponse::Abort { code: AbortCode::UNKNOWN_COMMAND, .. })));
 }
 
+// covers: sim-mailbox
 #[test]
 fn complete_access_reads_a_record_with_every_data_type() {
     let mut client = client();
@@ -153,6 +158,7 @@ fn complete_access_reads_a_record_with_every_data_type() {
     assert_eq!(upload(&mut client, 0x2003, true, |_| false), Err(AbortCode::WRITE_ONLY));
 }
 
+// covers: sim-mailbox
 #[test]
 fn ranges_and_rights_of_an_entry_are_kept() {
     let mut client = client();
@@ -186,8 +192,9 @@ fn indices(bytes: &[u8]) -> Vec<u16> {
     bytes.chunks_exact(2).map(|pair| u16::from_le_bytes([pair[0], pair[1]])).collect()
 }
 
+// covers: 6.3, sim-mailbox
 #[test]
-fn lists_of_objects_are_told_by_their_rights_facts_6_3() {
+fn lists_of_objects_are_told_by_their_rights() {
     let mut client = client();
     let mut list = |kind: ListType| {
         let (opcode, data, _) = information(&mut client, InformationOpcode::ListRequest, &kind.code().to_le_bytes());
@@ -205,8 +212,9 @@ fn lists_of_objects_are_told_by_their_rights_facts_6_3() {
     assert_eq!(list(ListType::Lengths), [all.len() as u16, 1, 1, 1, 1]);
 }
 
+// covers: 6.3, sim-mailbox
 #[test]
-fn a_list_that_does_not_fit_comes_in_fragments_facts_6_3() {
+fn a_list_that_does_not_fit_comes_in_fragments() {
     let mut client = Client::new("servo", AlState::PreOp);
     let (_, data, fragments) = information(&mut client, InformationOpcode::ListRequest, &[1, 0]);
     let dictionary = client.bench.device.application.dictionary();
@@ -218,8 +226,9 @@ fn a_list_that_does_not_fit_comes_in_fragments_facts_6_3() {
     assert_eq!((data.len(), fragments), (6 + 300, 1));
 }
 
+// covers: 6.3, sim-mailbox
 #[test]
-fn objects_and_entries_are_described_facts_6_3() {
+fn objects_and_entries_are_described() {
     let mut client = client();
     let mut object = |index: u16| information(&mut client, InformationOpcode::ObjectRequest, &index.to_le_bytes()).1;
     let kinds = [
@@ -256,8 +265,9 @@ fn objects_and_entries_are_described_facts_6_3() {
     assert!(EntryDescription::decode(&bytes).unwrap().access.has(AccessRights::RX_MAPPABLE));
 }
 
+// covers: 6.3
 #[test]
-fn what_sdo_information_cannot_tell_is_an_error_with_a_code_facts_6_3() {
+fn what_sdo_information_cannot_tell_is_an_error_with_a_code() {
     let mut client = client();
     let mut error = |opcode, data: &[u8]| {
         let (opcode, bytes, _) = information(&mut client, opcode, data);
@@ -281,8 +291,9 @@ fn is_emergency(mail: &(Header, Vec<u8>), code: u16) -> bool {
         && Emergency::decode(rest.first_chunk().unwrap()).error_code == code
 }
 
+// covers: 6.3, sim-mailbox
 #[test]
-fn an_emergency_comes_between_a_request_and_its_answer_facts_6_3() {
+fn an_emergency_comes_between_a_request_and_its_answer() {
     let mut client = client();
     client.post_sdo(&SdoRequest::Upload { index: 0x1000, sub_index: 0, complete_access: false });
     assert!(client.bench.device.application.emergency(&emergency(0x3210)));
@@ -294,6 +305,7 @@ fn an_emergency_comes_between_a_request_and_its_answer_facts_6_3() {
     assert_eq!(client.upload(0x1001, 0), Ok(vec![0x11]));
 }
 
+// covers: sim-mailbox
 #[test]
 fn emergencies_wait_for_the_mailbox_and_too_many_are_dropped() {
     let mut client = client();
@@ -326,8 +338,9 @@ fn history(client: &mut Client, sub_index: u8) -> Vec<u8> {
     client.upload(DiagnosisHistory::INDEX, sub_index).unwrap()
 }
 
+// covers: 6.3, sim-mailbox
 #[test]
-fn the_diagnosis_history_is_a_ring_that_is_acknowledged_facts_6_3() {
+fn the_diagnosis_history_is_a_ring_that_is_acknowledged() {
     let mut client = client();
     assert_eq!((history(&mut client, 1), history(&mut client, 2)), (vec![20], vec![0]));
     for code in 1..=22 {
@@ -349,8 +362,9 @@ fn the_diagnosis_history_is_a_ring_that_is_acknowledged_facts_6_3() {
     assert_eq!((history(&mut client, 2), history(&mut client, 7)), (vec![0], Vec::new()));
 }
 
+// covers: 6.3, sim-mailbox
 #[test]
-fn flags_of_the_diagnosis_history_keep_messages_out_or_send_emergencies_facts_6_3() {
+fn flags_of_the_diagnosis_history_keep_messages_out_or_send_emergencies() {
     let mut client = client();
     let flags = |client: &mut Client, bits: u16| client.download(DiagnosisHistory::INDEX, 5, &bits.to_le_bytes());
     flags(&mut client, DiagnosisFlags::NO_WARNINGS).unwrap();
@@ -376,8 +390,9 @@ fn pdo(client: &mut Client, service: CoeService, number: u16, data: &[u8]) -> Op
     client.bench.fetch_mail()
 }
 
+// covers: 6.3, sim-mailbox
 #[test]
-fn pdos_come_and_go_by_mailbox_facts_6_3() {
+fn pdos_come_and_go_by_mailbox() {
     let mut client = Client::new("servo", AlState::PreOp);
     // Controlword, target position, target velocity, mode, gap.
     let command = [0x0F, 0, 0x44, 0x33, 0x22, 0x11, 0, 0, 0, 0, 8, 0];
@@ -398,8 +413,9 @@ fn pdos_come_and_go_by_mailbox_facts_6_3() {
     assert_eq!(refused(CoeService::TxPdoRemote, 0x1FF, &[]), ErrorReply::SERVICE_NOT_SUPPORTED);
 }
 
+// covers: 6.3, sim-mailbox
 #[test]
-fn a_pdo_by_mailbox_shows_process_data_and_does_not_touch_it_in_op_facts_6_3() {
+fn a_pdo_by_mailbox_shows_process_data_and_does_not_touch_it_in_op() {
     let mut client = Client::new("all-protocols", AlState::Op);
     client.bench.output(&[1, 2, 3, 4]);
     client.bench.pass(ANSWER);

@@ -1,4 +1,5 @@
-//! Facts 6.5 as a MainDevice sees them: frames in fragments, an IP stack behind them, addresses, filter, time stamps.
+//! Protocol 6.5 as a MainDevice sees them: frames in fragments, an IP stack behind them, addresses, filter, time
+//! stamps.
 
 use core::net::Ipv4Addr;
 use core::time::Duration;
@@ -152,8 +153,9 @@ fn ping(mac: &[u8], data: &[u8]) -> Vec<u8> {
     frame
 }
 
+// covers: 6.5, sim-mailbox
 #[test]
-fn the_stack_answers_arp_and_ping_of_any_size_facts_6_5() {
+fn the_stack_answers_arp_and_ping_of_any_size() {
     let mut client = addressed();
     let mut reassembly = Reassembly::default();
     send_frame(&mut client, 1, &arp_request());
@@ -181,8 +183,9 @@ fn the_stack_is_silent_without_an_address() {
     assert!(client.bench.fetch_mail().is_none());
 }
 
+// covers: 6.5, sim-mailbox
 #[test]
-fn a_file_is_downloaded_over_tcp_facts_6_5() {
+fn a_file_is_downloaded_over_tcp() {
     const BYTES: usize = 200_000;
     let mut client = addressed();
     let mut host = Host::new();
@@ -214,8 +217,9 @@ fn a_file_is_downloaded_over_tcp_facts_6_5() {
     assert!(body.len() == BYTES && body.bytes().enumerate().all(|(at, byte)| usize::from(byte) == 33 + at % 89));
 }
 
+// covers: 6.5, sim-mailbox
 #[test]
-fn a_loop_sends_frames_back_in_its_own_fragments_facts_6_5() {
+fn a_loop_sends_frames_back_in_its_own_fragments() {
     let mut client = with_end(EoeEnd::Loop);
     let mut reassembly = Reassembly::default();
     for (number, size) in [(1, 60), (2, FRAGMENT), (3, FRAGMENT + 1), (4, 1514)] {
@@ -226,8 +230,9 @@ fn a_loop_sends_frames_back_in_its_own_fragments_facts_6_5() {
     }
 }
 
+// covers: 6.5, sim-mailbox
 #[test]
-fn addresses_are_set_and_told_facts_6_5() {
+fn addresses_are_set_and_told() {
     let mut client = addressed();
     post(&mut client, EoeBody::GetIp);
     let bytes = answer(&mut client);
@@ -255,8 +260,9 @@ fn addresses_are_set_and_told_facts_6_5() {
     assert_eq!((addresses.address, addresses.gateway, addresses.name), (DEVICE, HOST, b"axis".to_vec()));
 }
 
+// covers: 6.5
 #[test]
-fn what_is_not_supported_is_told_facts_6_5() {
+fn what_is_not_supported_is_told() {
     let mut description = terminal();
     description.services.eoe.ip_support = false;
     description.services.eoe.filter_support = false;
@@ -275,8 +281,9 @@ fn what_is_not_supported_is_told_facts_6_5() {
     }
 }
 
+// covers: 6.5
 #[test]
-fn a_filter_is_set_and_told_facts_6_5() {
+fn a_filter_is_set_and_told() {
     let mut client = with_end(EoeEnd::Nothing);
     let filter = AddressFilter::new(&[[2; 6], [4; 6]], &[[0xF0; 6]], true).unwrap();
     post(&mut client, EoeBody::SetFilter(filter));
@@ -287,8 +294,9 @@ fn a_filter_is_set_and_told_facts_6_5() {
     assert_eq!(EoeMessage::decode(&bytes).unwrap().body, EoeBody::Filter(EoeResult::OK, filter));
 }
 
+// covers: 6.5
 #[test]
-fn a_time_stamp_is_told_when_it_is_asked_for_facts_6_5() {
+fn a_time_stamp_is_told_when_it_is_asked_for() {
     let mut client = with_end(EoeEnd::Nothing);
     let fragment =
         EoeFragment { frame: 9, number: 0, blocks: 2, last: true, time_requested: true, time_ns: None, data: &[1; 60] };
@@ -301,6 +309,7 @@ fn a_time_stamp_is_told_when_it_is_asked_for_facts_6_5() {
     assert!((before..=client.bench.now.0 as u32).contains(&time_ns));
 }
 
+// covers: sim-mailbox
 #[test]
 fn frames_that_nobody_reads_stop_the_stack_and_nothing_else() {
     let mut client = addressed();

@@ -1,4 +1,4 @@
-//! Facts 6.4 as a MainDevice sees them: files read and written, BUSY, errors, firmware through BOOT.
+//! Protocol 6.4 as a MainDevice sees them: files read and written, BUSY, errors, firmware through BOOT.
 
 use core::time::Duration;
 
@@ -93,8 +93,9 @@ fn read(client: &mut Client, name: &[u8], most: usize) -> Result<Vec<u8>, (FoeEr
     Ok(file)
 }
 
+// covers: 6.4, sim-mailbox
 #[test]
-fn files_of_any_size_are_written_and_read_back_facts_6_4() {
+fn files_of_any_size_are_written_and_read_back() {
     let mut client = client();
     for size in [0, 1, PACKET - 1, PACKET, PACKET + 1, 3 * PACKET, 40_000] {
         let file: Vec<u8> = (0..size).map(|place| (place * 5 % 241) as u8).collect();
@@ -103,6 +104,7 @@ fn files_of_any_size_are_written_and_read_back_facts_6_4() {
     }
 }
 
+// covers: sim-mailbox
 #[test]
 fn files_outlive_a_power_cycle() {
     let mut client = client();
@@ -114,8 +116,9 @@ fn files_outlive_a_power_cycle() {
     assert_eq!(client.bench.device.application.files().names().count(), 2);
 }
 
+// covers: 6.4, sim-mailbox
 #[test]
-fn what_cannot_be_done_is_told_with_code_and_text_facts_6_4() {
+fn what_cannot_be_done_is_told_with_code_and_text() {
     let mut client = client();
     let mut error = |message: &FoeMessage<'_>| failure(&ask(&mut client, message));
     let read = |name| FoeMessage::Read { password: 0, name };
@@ -127,8 +130,9 @@ fn what_cannot_be_done_is_told_with_code_and_text_facts_6_4() {
     assert_eq!(error(&FoeMessage::Acknowledge { packet: 1 }).0, FoeErrorCode::ILLEGAL);
 }
 
+// covers: 6.4
 #[test]
-fn a_wrong_packet_number_ends_the_transfer_facts_6_4() {
+fn a_wrong_packet_number_ends_the_transfer() {
     let mut client = client();
     ask(&mut client, &FoeMessage::Write { password: 0, name: b"a" });
     let error = ask(&mut client, &FoeMessage::Data { packet: 2, data: &[1] });
@@ -140,8 +144,9 @@ fn a_wrong_packet_number_ends_the_transfer_facts_6_4() {
     assert_eq!(failure(&error).0, FoeErrorCode::PACKET_NUMBER_WRONG);
 }
 
+// covers: 6.4
 #[test]
-fn a_file_that_is_too_large_fills_the_disk_facts_6_4() {
+fn a_file_that_is_too_large_fills_the_disk() {
     let mut description = catalogue::by_name("all-protocols").unwrap();
     description.services.foe.capacity = 3000;
     let mut client = Client::of(description, AlState::PreOp);
@@ -150,8 +155,9 @@ fn a_file_that_is_too_large_fills_the_disk_facts_6_4() {
     assert!(client.bench.device.application.files().file(b"large").is_none());
 }
 
+// covers: 6.4
 #[test]
-fn a_password_is_asked_for_facts_6_4() {
+fn a_password_is_asked_for() {
     let mut description = catalogue::by_name("all-protocols").unwrap();
     description.services.foe.password = 0x1234;
     let mut client = Client::of(description, AlState::PreOp);
@@ -161,8 +167,9 @@ fn a_password_is_asked_for_facts_6_4() {
     assert!(matches!(FoeMessage::decode(&right), Ok(FoeMessage::Data { packet: 1, .. })));
 }
 
+// covers: 6.4, sim-mailbox
 #[test]
-fn busy_and_errors_come_on_demand_facts_6_4() {
+fn busy_and_errors_come_on_demand() {
     let mut client = client();
     ask(&mut client, &FoeMessage::Write { password: 0, name: b"a" });
     let now = client.bench.now;
@@ -183,8 +190,9 @@ fn busy_and_errors_come_on_demand_facts_6_4() {
     assert_eq!(failure(&error), (FoeErrorCode::PROGRAM_ERROR, "told to fail".into()));
 }
 
+// covers: 6.4
 #[test]
-fn a_reader_that_is_busy_gets_the_packet_again_facts_6_4() {
+fn a_reader_that_is_busy_gets_the_packet_again() {
     let mut client = client();
     let first = ask(&mut client, &FoeMessage::Read { password: 0, name: b"log.txt" });
     assert_eq!(ask(&mut client, &FoeMessage::Busy { done: 0, entire: 0, text: b"" }), first);
@@ -214,8 +222,9 @@ fn leave_boot(client: &mut Client) -> (u16, AlStatusCode) {
     (status.bits(), code)
 }
 
+// covers: 6.4, sim-mailbox
 #[test]
-fn firmware_goes_through_boot_and_changes_the_version_facts_6_4() {
+fn firmware_goes_through_boot_and_changes_the_version() {
     let mut client = booted();
     let image = firmware::image("2.7.1", &[0x5A; 4 * BOOT_PACKET]);
     let busy = write(&mut client, FIRMWARE, &image, BOOT_PACKET).unwrap();
@@ -229,8 +238,9 @@ fn firmware_goes_through_boot_and_changes_the_version_facts_6_4() {
     assert_eq!(read(&mut client, FIRMWARE, PACKET), Ok(image));
 }
 
+// covers: 5.5, sim-mailbox
 #[test]
-fn firmware_that_does_not_arrive_whole_leaves_none_facts_5_5() {
+fn firmware_that_does_not_arrive_whole_leaves_none() {
     let mut client = booted();
     let image = firmware::image("2.7.1", &[0x5A; 4 * BOOT_PACKET]);
     let mut broken = image.clone();
@@ -249,8 +259,9 @@ fn firmware_that_does_not_arrive_whole_leaves_none_facts_5_5() {
     assert_eq!(leave_boot(&mut client).0, 0x0002);
 }
 
+// covers: 6.4
 #[test]
-fn only_the_firmware_is_served_in_boot_facts_6_4() {
+fn only_the_firmware_is_served_in_boot() {
     let mut client = booted();
     let error = ask(&mut client, &FoeMessage::Read { password: 0, name: b"log.txt" });
     assert_eq!(failure(&error).0, FoeErrorCode::NOT_BOOTSTRAP);

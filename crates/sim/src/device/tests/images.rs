@@ -27,6 +27,7 @@ fn length_from_sii(sii: &Sii<'_>, number: u8, entry: &SiiSyncManager) -> u16 {
     if bits > 0 { bits.div_ceil(8) as u16 } else { entry.length }
 }
 
+// covers: sim-files
 #[test]
 fn each_real_image_makes_a_device_that_goes_to_op_or_is_refused_with_a_reason() {
     let files = image_files();

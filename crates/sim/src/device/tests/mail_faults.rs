@@ -25,6 +25,7 @@ fn counter(client: &mut Client) -> Option<u8> {
     client.bench.fetch_mail().map(|(header, _)| header.counter)
 }
 
+// covers: sim-mail-faults
 #[test]
 fn a_lost_answer_leaves_the_request_done_and_a_lost_request_does_not() {
     for (fault, value) in [(MailFault::LoseAnswers { count: 1 }, 7), (MailFault::LoseRequests { count: 1 }, 1)] {
@@ -54,6 +55,7 @@ fn a_device_may_never_answer_again_until_it_is_healed() {
     assert_eq!(counter(&mut client), Some(1));
 }
 
+// covers: sim-mail-faults
 #[test]
 fn an_answer_comes_twice_with_one_counter() {
     let mut client = disturbed(MailFault::RepeatAnswers { count: 1 });
@@ -64,6 +66,7 @@ fn an_answer_comes_twice_with_one_counter() {
     assert_eq!(counter(&mut client), Some(2));
 }
 
+// covers: sim-mail-faults
 #[test]
 fn a_late_answer_is_overtaken_by_the_next() {
     let mut client = disturbed(MailFault::DelayAnswers { count: 1, by: Duration::from_millis(50) });
@@ -77,12 +80,14 @@ fn a_late_answer_is_overtaken_by_the_next() {
     assert!(matches!(SdoResponse::decode(&payload), Ok(SdoResponse::UploadExpedited { sub_index: 1, .. })));
 }
 
+// covers: sim-mail-faults
 #[test]
 fn a_wrong_counter_disturbs_the_count_once() {
     let mut client = disturbed(MailFault::WrongCounter { count: 1, counter: 5 });
     assert_eq!([counter(&mut client), counter(&mut client)], [Some(5), Some(1)]);
 }
 
+// covers: sim-mail-faults
 #[test]
 fn requests_are_refused_or_aborted() {
     let mut client = disturbed(MailFault::Refuse { count: 1, detail: ErrorReply::SERVICE_IN_WORK });
@@ -97,8 +102,9 @@ fn requests_are_refused_or_aborted() {
     assert_eq!(client.upload(0x1018, 0), Ok(vec![4]));
 }
 
+// covers: 6.1, sim-mail-faults
 #[test]
-fn a_full_mailbox_takes_nothing_for_a_while_facts_6_1() {
+fn a_full_mailbox_takes_nothing_for_a_while() {
     let mut client = disturbed(MailFault::Full { during: Duration::from_millis(30) });
     client.post_sdo(&REQUEST);
     client.bench.pass(Duration::from_millis(20));
@@ -109,8 +115,9 @@ fn a_full_mailbox_takes_nothing_for_a_while_facts_6_1() {
     assert!(client.bench.fetch_mail().is_some());
 }
 
+// covers: 6.3, sim-mail-faults
 #[test]
-fn an_emergency_comes_right_before_an_answer_facts_6_3() {
+fn an_emergency_comes_right_before_an_answer() {
     let mut client = disturbed(MailFault::EmergencyBefore { count: 1, code: 0x8130 });
     client.post_sdo(&REQUEST);
     let (first, emergency) = client.answer();

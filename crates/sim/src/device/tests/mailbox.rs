@@ -1,4 +1,4 @@
-//! Facts 6.1, 6.2, 6.3 as a MainDevice sees them.
+//! Protocol 6.1, 6.2, 6.3 as a MainDevice sees them.
 
 use ringcat_wire::al::AlState;
 use ringcat_wire::mailbox::coe::{CoeHeader, CoeService};
@@ -25,6 +25,7 @@ fn identity_and_names_are_uploaded() {
     assert_eq!(client.upload(0x1600, 1), Ok(vec![0x10, 0x00, 0x40, 0x60]));
 }
 
+// covers: sim-mailbox
 #[test]
 fn expedited_and_normal_downloads_are_kept() {
     let mut client = Client::new("analog-input-4", AlState::PreOp);
@@ -47,6 +48,7 @@ fn what_cannot_be_done_is_aborted_with_its_code() {
     assert_eq!(client.sdo(&SdoRequest::UploadSegment { toggle: false }), Err(AbortCode::UNKNOWN_COMMAND));
 }
 
+// covers: sim-mailbox
 #[test]
 fn a_changed_assignment_changes_the_length_that_safeop_asks_for() {
     let mut client = Client::new("analog-input-4", AlState::PreOp);
@@ -78,6 +80,7 @@ fn a_pdo_assigned_twice_is_an_invalid_mapping() {
     }
 }
 
+// covers: sim-mailbox
 #[test]
 fn a_mapping_can_be_configured() {
     let mut client = Client::new("servo", AlState::PreOp);
@@ -158,6 +161,7 @@ fn answers_count_from_1_to_7() {
     }
 }
 
+// covers: sim-mailbox
 #[test]
 fn a_lost_answer_is_repeated_with_its_counter() {
     let mut client = Client::new("servo", AlState::PreOp);
@@ -219,6 +223,7 @@ fn requests_in_a_row_are_answered_in_order_and_a_full_queue_leaves_the_mailbox_f
     }
 }
 
+// covers: sim-mailbox
 #[test]
 fn other_protocols_services_and_broken_headers_get_an_error_reply() {
     let mut described = catalogue::by_name("analog-input-4").unwrap();

@@ -132,6 +132,7 @@ fn cycle(bench: &mut Bench, control: u16, position: i32) -> (u16, i32) {
     (word, i32::from_le_bytes([inputs[2], inputs[3], inputs[4], inputs[5]]))
 }
 
+// covers: sim-devices
 #[test]
 fn a_servo_walks_its_state_machine_and_follows_the_target() {
     let mut bench = Bench::up_to(described("servo"), AlState::Op);

@@ -46,6 +46,7 @@ fn act() -> impl Strategy<Value = Act> {
 
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(64))]
+    // covers: robust
     #[test]
     fn any_sequence_of_writes_leaves_a_device_in_a_state(
         name in prop::sample::select(catalogue::names().collect::<Vec<_>>()),
@@ -115,8 +116,9 @@ fn mail() -> impl Strategy<Value = (Protocol, Vec<u8>)> {
 
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(128))]
+    // covers: 6, robust, sim-mailbox
     #[test]
-    fn any_mail_is_answered_within_bounds_and_the_device_goes_on_facts_6(
+    fn any_mail_is_answered_within_bounds_and_the_device_goes_on(
         letters in prop::collection::vec((mail(), any::<bool>()), 0..60),
     ) {
         let mut client = Client::new("all-protocols", AlState::PreOp);

@@ -28,6 +28,7 @@ fn information(client: &mut Client, opcode: InformationOpcode, data: &[u8]) -> (
     }
 }
 
+// covers: sim-drive
 #[test]
 fn the_drive_has_the_objects_that_drivers_ask_for() {
     let mut client = Client::new("servo", AlState::PreOp);
@@ -79,6 +80,7 @@ fn the_drive_has_the_objects_that_drivers_ask_for() {
     assert_eq!(client.upload(0x6502, 0), Ok(vec![0xAD, 0x03, 0, 0]), "modes 1, 3, 4, 6, 8, 9, 10");
 }
 
+// covers: sim-drive
 #[test]
 fn values_are_checked_with_the_abort_code_of_what_is_wrong() {
     use AbortCode as A;
@@ -113,6 +115,7 @@ fn values_are_checked_with_the_abort_code_of_what_is_wrong() {
     assert_eq!(client.upload(0x6060, 0), Ok(vec![8]), "what was refused changed nothing");
 }
 
+// covers: sim-drive
 #[test]
 fn outputs_are_mapped_to_rx_pdos_and_inputs_to_tx_pdos() {
     let mut client = Client::new("servo", AlState::PreOp);
@@ -124,6 +127,7 @@ fn outputs_are_mapped_to_rx_pdos_and_inputs_to_tx_pdos() {
     assert_eq!(client.download(0x1A01, 1, &0x6077_0010u32.to_le_bytes()), Ok(Vec::new()));
 }
 
+// covers: sim-drive
 #[test]
 fn entries_are_described_with_unit_default_and_range() {
     let mut client = Client::new("servo", AlState::PreOp);
@@ -147,6 +151,7 @@ fn entries_are_described_with_unit_default_and_range() {
     assert!(!status.access.has(AccessRights::WRITE_PREOP));
 }
 
+// covers: sim-drive
 #[test]
 fn sync_parameters_follow_the_distributed_clocks() {
     let mut client = Client::new("servo", AlState::PreOp);
@@ -169,6 +174,7 @@ fn sync_parameters_follow_the_distributed_clocks() {
     assert_eq!(client.upload(0x1C33, 1), Ok(vec![1, 0]));
 }
 
+// covers: sim-drive
 #[test]
 fn without_process_data_the_drive_still_says_what_it_does() {
     let mut client = Client::new("servo", AlState::PreOp);
@@ -176,6 +182,7 @@ fn without_process_data_the_drive_still_says_what_it_does() {
     assert_eq!(client.upload(0x60FE, 1), Ok(vec![1, 0, 0, 0]), "brake closed");
 }
 
+// covers: sim-drive
 #[test]
 fn a_device_has_the_name_of_its_type_whatever_its_segment_calls_it() {
     for kind in ["servo", "analog-input-4", "all-protocols"] {
@@ -186,6 +193,7 @@ fn a_device_has_the_name_of_its_type_whatever_its_segment_calls_it() {
     }
 }
 
+// covers: sim-drive
 #[test]
 fn analogue_terminals_describe_their_objects_as_real_ones_do() {
     for (name, index, expected) in

@@ -1,4 +1,4 @@
-//! Facts 6.6 as a MainDevice sees them: elements of IDNs, fragments both ways, errors, procedure commands.
+//! Protocol 6.6 as a MainDevice sees them: elements of IDNs, fragments both ways, errors, procedure commands.
 
 use core::time::Duration;
 
@@ -65,8 +65,9 @@ fn write(client: &mut Client, drive: u8, idn: Idn, data: &[u8]) -> Result<Vec<u8
     answer(client, SoeOperation::WriteResponse)
 }
 
+// covers: 6.6, sim-mailbox
 #[test]
-fn every_element_of_an_idn_is_read_facts_6_6() {
+fn every_element_of_an_idn_is_read() {
     let mut client = client();
     let idn = Idn::standard(0, 36);
     let mut element = |element| read(&mut client, 0, idn, element);
@@ -84,8 +85,9 @@ fn every_element_of_an_idn_is_read_facts_6_6() {
     assert_eq!(element(several), Ok(b"\x03\x00\x03\x00rpm\0\0\0\0".to_vec()), "in the order of the bits");
 }
 
+// covers: 6.6
 #[test]
-fn drives_have_values_of_their_own_facts_6_6() {
+fn drives_have_values_of_their_own() {
     let mut client = client();
     let idn = Idn::standard(0, 36);
     assert_eq!(write(&mut client, 1, idn, &(-5i32).to_le_bytes()), Ok(Vec::new()));
@@ -94,8 +96,9 @@ fn drives_have_values_of_their_own_facts_6_6() {
     assert_eq!(read(&mut client, 2, idn, VALUE), Err(SoeErrorCode::INVALID_DRIVE));
 }
 
+// covers: 6.6, sim-mailbox
 #[test]
-fn long_values_come_and_go_in_fragments_facts_6_6() {
+fn long_values_come_and_go_in_fragments() {
     let mut client = client();
     let value = read(&mut client, 0, CHARACTERISTIC, VALUE).unwrap();
     assert_eq!((value.len(), &value[..6]), (5004, &[0x88, 0x13, 0x20, 0x4E, 0, 1][..]));
@@ -108,8 +111,9 @@ fn long_values_come_and_go_in_fragments_facts_6_6() {
     }
 }
 
+// covers: 6.6, sim-mailbox
 #[test]
-fn what_cannot_be_done_is_told_with_its_code_facts_6_6() {
+fn what_cannot_be_done_is_told_with_its_code() {
     let mut client = client();
     let idn = Idn::standard(0, 36);
     assert_eq!(read(&mut client, 0, Idn::standard(0, 999), VALUE), Err(SoeErrorCode::NO_IDN));
@@ -129,8 +133,9 @@ fn what_cannot_be_done_is_told_with_its_code_facts_6_6() {
     assert_eq!(answer(&mut client, SoeOperation::WriteResponse), Err(SoeErrorCode::NAME_READ_ONLY));
 }
 
+// covers: 6.6
 #[test]
-fn configuration_is_written_in_preop_alone_facts_6_6() {
+fn configuration_is_written_in_preop_alone() {
     let telegram = Idn::standard(0, 15);
     let mut client = client();
     assert_eq!(write(&mut client, 0, telegram, &[5, 0]), Ok(Vec::new()));
@@ -139,8 +144,9 @@ fn configuration_is_written_in_preop_alone_facts_6_6() {
     assert_eq!(write(&mut client, 0, Idn::standard(0, 36), &[7, 0, 0, 0]), Ok(Vec::new()));
 }
 
+// covers: 6.6
 #[test]
-fn the_list_of_all_idns_is_complete_facts_6_6() {
+fn the_list_of_all_idns_is_complete() {
     let mut client = client();
     let list = read(&mut client, 0, Idn::standard(0, 17), VALUE).unwrap();
     let idns: Vec<Idn> = list[4..].chunks(2).map(|pair| Idn(u16::from_le_bytes([pair[0], pair[1]]))).collect();
@@ -153,8 +159,9 @@ fn the_list_of_all_idns_is_complete_facts_6_6() {
     assert_eq!(commands, Ok(vec![2, 0, 2, 0, 99, 0]));
 }
 
+// covers: 6.6, sim-mailbox
 #[test]
-fn a_procedure_command_takes_its_time_and_is_notified_facts_6_6() {
+fn a_procedure_command_takes_its_time_and_is_notified() {
     let mut client = client();
     let reset = Idn::standard(0, 99);
     let state = |client: &mut Client| read(client, 0, reset, SoeElements::DATA_STATE).unwrap()[0];
@@ -171,8 +178,9 @@ fn a_procedure_command_takes_its_time_and_is_notified_facts_6_6() {
     assert_eq!(state(&mut client), 0x00);
 }
 
+// covers: 6.6
 #[test]
-fn a_procedure_command_can_be_taken_back_facts_6_6() {
+fn a_procedure_command_can_be_taken_back() {
     let mut client = client();
     let reset = Idn::standard(0, 99);
     write(&mut client, 1, reset, &[3, 0]).unwrap();

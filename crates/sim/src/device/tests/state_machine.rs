@@ -1,4 +1,4 @@
-//! Facts 5.2, 5.3, 5.5 as a MainDevice sees them.
+//! Protocol 5.2, 5.3, 5.5 as a MainDevice sees them.
 
 use core::time::Duration;
 
@@ -48,6 +48,7 @@ fn wrong_settings(right: SyncManager, outputs: bool) -> Vec<(&'static str, SyncM
     ]
 }
 
+// covers: sim-devices
 #[test]
 fn each_device_of_the_catalogue_goes_up_to_op_and_back() {
     for name in catalogue::names() {
@@ -61,6 +62,7 @@ fn each_device_of_the_catalogue_goes_up_to_op_and_back() {
     }
 }
 
+// covers: sim-states
 #[test]
 fn wrong_process_data_sync_managers_are_refused_with_their_codes() {
     for name in catalogue::names().filter(|name| !catalogue::by_name(name).unwrap().emulation) {
@@ -82,6 +84,7 @@ fn wrong_process_data_sync_managers_are_refused_with_their_codes() {
     }
 }
 
+// covers: sim-states
 #[test]
 fn wrong_mailbox_sync_managers_are_0x0016() {
     for name in ["analog-input-4", "analog-output-4", "servo"] {
@@ -192,6 +195,7 @@ fn boot_needs_its_own_mailbox_settings() {
     assert_eq!(bench.request(AlState::Init), ok(AlState::Init));
 }
 
+// covers: sim-states
 #[test]
 fn a_transition_takes_its_time() {
     let mut description = catalogue::by_name("digital-input-8").unwrap();
@@ -316,6 +320,7 @@ fn an_emulated_device_copies_al_control() {
     }
 }
 
+// covers: sim-states
 #[test]
 fn the_identification_is_in_the_status_code() {
     let mut description = catalogue::by_name("servo").unwrap();

@@ -1,4 +1,4 @@
-//! Facts 6.8 as a MainDevice sees them, and all protocols side by side.
+//! Protocol 6.8 as a MainDevice sees them, and all protocols side by side.
 
 use ringcat_wire::al::AlState;
 use ringcat_wire::mailbox::soe::{Idn, SoeElements, SoeMessage, SoeOperation};
@@ -14,8 +14,9 @@ fn message(vendor_id: u32, data: &[u8]) -> Vec<u8> {
     payload
 }
 
+// covers: 6.8, sim-mailbox
 #[test]
-fn messages_of_the_vendor_come_back_facts_6_8() {
+fn messages_of_the_vendor_come_back() {
     let mut client = Client::new("all-protocols", AlState::PreOp);
     for size in [0, 1, 1012] {
         let payload = message(VENDOR_ID, &vec![0xA5; size]);
@@ -29,8 +30,9 @@ fn messages_of_the_vendor_come_back_facts_6_8() {
     assert_eq!(ErrorReply::decode(answer.first_chunk().unwrap()).detail, ErrorReply::SERVICE_NOT_SUPPORTED);
 }
 
+// covers: 6.1, robust, sim-mailbox
 #[test]
-fn protocols_side_by_side_answer_in_the_order_of_the_requests_facts_6_1() {
+fn protocols_side_by_side_answer_in_the_order_of_the_requests() {
     let mut client = Client::new("all-protocols", AlState::PreOp);
     let mut read = [0; 4];
     let request = SoeMessage::whole(SoeOperation::ReadRequest, 0, SoeElements::VALUE, Idn::standard(0, 11), &[]);
@@ -53,8 +55,9 @@ fn protocols_side_by_side_answer_in_the_order_of_the_requests_facts_6_1() {
     }
 }
 
+// covers: 6.1, robust, sim-mailbox
 #[test]
-fn a_protocol_that_the_sii_does_not_announce_is_refused_facts_6_1() {
+fn a_protocol_that_the_sii_does_not_announce_is_refused() {
     for name in ["servo", "ethernet-terminal", "soe-drive"] {
         let protocols = catalogue::by_name(name).unwrap().mailbox.unwrap().protocols;
         let mut client = Client::new(name, AlState::PreOp);

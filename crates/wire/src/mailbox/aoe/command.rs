@@ -1,4 +1,4 @@
-//! The data of ADS commands (facts 6.7; layout of the public ADS specification).
+//! The data of ADS commands (protocol 6.7; layout of the public ADS specification).
 
 use super::{AdsCommand, AdsErrorCode, PayloadError, Pen, split};
 

@@ -1,4 +1,4 @@
-//! Error codes of ADS (facts 6.7).
+//! Error codes of ADS (protocol 6.7).
 
 use core::fmt;
 

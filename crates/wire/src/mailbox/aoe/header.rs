@@ -1,4 +1,4 @@
-//! The header of every ADS message (facts 6.7).
+//! The header of every ADS message (protocol 6.7).
 
 use core::fmt;
 

@@ -15,8 +15,9 @@ const COMMANDS: [AdsCommand; 6] = [
     AdsCommand::ReadWrite,
 ];
 
+// covers: 6.7, codec-mailbox
 #[test]
-fn the_header_has_32_bytes_facts_6_7() {
+fn the_header_has_32_bytes() {
     let header = AmsHeader {
         target: address(2, 1000),
         source: address(1, 0x8001),
@@ -45,8 +46,9 @@ fn the_header_has_32_bytes_facts_6_7() {
     assert_eq!(header.target.net_id.to_string(), "192.168.0.1.3.2");
 }
 
+// covers: 6.7, codec-mailbox
 #[test]
-fn one_vector_for_every_request_facts_6_7() {
+fn one_vector_for_every_request() {
     let vectors: [(AdsRequest<'_>, &[u8]); 6] = [
         (AdsRequest::ReadDeviceInfo, &[]),
         (
@@ -73,8 +75,9 @@ fn one_vector_for_every_request_facts_6_7() {
     }
 }
 
+// covers: 6.7, codec-mailbox
 #[test]
-fn one_vector_for_every_response_facts_6_7() {
+fn one_vector_for_every_response() {
     let result = AdsErrorCode::NO_ERROR;
     let name = *b"Simulated slave\0";
     let vectors: [(AdsCommand, AdsResponse<'_>, &[u8]); 6] = [
@@ -103,6 +106,7 @@ fn one_vector_for_every_response_facts_6_7() {
     assert_eq!(failed.result().to_string(), "0x0702 Invalid index group");
 }
 
+// covers: codec-mailbox
 #[test]
 fn commands_without_a_known_layout_are_refused_with_their_code() {
     for code in [6, 7, 8, 99] {

@@ -1,4 +1,4 @@
-//! What SDO information tells about an object and about an entry (facts 6.3).
+//! What SDO information tells about an object and about an entry (protocol 6.3).
 //!
 //! In and out: the data of an [`SdoInformation`](super::SdoInformation), its fragments put together.
 
@@ -296,8 +296,9 @@ mod tests {
     use super::*;
     use proptest::prelude::*;
 
+    // covers: 6.3, codec-mailbox
     #[test]
-    fn an_object_description_has_these_bytes_facts_6_3() {
+    fn an_object_description_has_these_bytes() {
         let object = ObjectDescription {
             index: 0x1018,
             data_type: DataType::IDENTITY,
@@ -316,8 +317,9 @@ mod tests {
         }
     }
 
+    // covers: 6.3, codec-mailbox
     #[test]
-    fn an_entry_description_has_these_bytes_facts_6_3() {
+    fn an_entry_description_has_these_bytes() {
         let entry = EntryDescription {
             index: 0x8010,
             sub_index: 1,
@@ -368,6 +370,7 @@ mod tests {
             }
         }
 
+        // covers: codec-mailbox
         #[test]
         fn any_short_entry_reads_back(
             info in any::<u8>(),

@@ -1,4 +1,4 @@
-//! The diagnosis history, object 0x10F3 (facts 6.3 name it; layout of ETG.1020).
+//! The diagnosis history, object 0x10F3 (protocol 6.3 name it; layout of ETG.1020).
 //!
 //! Subindex 1 is the number of messages that the SubDevice keeps, 2 the subindex of the newest message, 3 that of the
 //! newest acknowledged one, 4 whether there are new ones, 5 flags, 6 and up the messages: octet strings that
@@ -257,8 +257,9 @@ mod tests {
     const MESSAGE: &[u8] = b"\x00\xE8\x34\x12\x12\x03\x07\x00\x08\x07\x06\x05\x04\x03\x02\x01\
         \x06\x00\xAD\xDE\x02\x20Ok\x00\x40\x09\x00";
 
+    // covers: 6.3, codec-mailbox
     #[test]
-    fn a_message_with_parameters_has_these_bytes_facts_6_3() {
+    fn a_message_with_parameters_has_these_bytes() {
         let message = DiagnosisMessage::decode(MESSAGE).unwrap();
         assert_eq!(message.code, 0x1234_0000 | u32::from(DiagnosisMessage::VENDOR_CODE));
         assert_eq!((message.kind, message.local_time, message.text), (DiagnosisKind::Error, true, 7));
@@ -277,6 +278,7 @@ mod tests {
         assert_eq!(written, message.parameters);
     }
 
+    // covers: codec-mailbox
     #[test]
     fn parameters_end_where_they_are_cut_off() {
         let message = DiagnosisMessage::decode(&MESSAGE[..23]).unwrap();

@@ -1,4 +1,4 @@
-//! The emergency message of CoE (facts 6.3), and what the error codes stand for (CiA 301).
+//! The emergency message of CoE (protocol 6.3), and what the error codes stand for (CiA 301).
 
 /// An emergency message, behind its CoE header. It comes unasked, also between a request and its response.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -80,14 +80,16 @@ mod tests {
     use super::*;
     use proptest::prelude::*;
 
+    // covers: codec-mailbox
     #[test]
     fn an_emergency_has_these_bytes() {
         let emergency = Emergency { error_code: 0x8130, error_register: 0x11, data: [1, 2, 3, 4, 5] };
         assert_eq!(emergency.encode(), [0x30, 0x81, 0x11, 1, 2, 3, 4, 5]);
     }
 
+    // covers: 6.3, codec-mailbox
     #[test]
-    fn an_error_code_belongs_to_a_class_facts_6_3() {
+    fn an_error_code_belongs_to_a_class() {
         let class = |error_code| Emergency { error_code, error_register: 0, data: [0; 5] }.class_name();
         let known = [
             (0x0000, "error reset or no error"),

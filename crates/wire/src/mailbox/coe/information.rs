@@ -1,4 +1,4 @@
-//! SDO information: the lists of objects of a SubDevice, one object, one entry, errors, in fragments (facts 6.3).
+//! SDO information: the lists of objects of a SubDevice, one object, one entry, errors, in fragments (protocol 6.3).
 //!
 //! In goes or out comes the payload of a mailbox message of protocol CoE. Data that does not fit into one mailbox comes
 //! in fragments: each but the last is marked incomplete, and each tells how many follow. Only the first begins with
@@ -215,8 +215,9 @@ mod tests {
     use std::string::ToString;
     use std::vec::Vec;
 
+    // covers: 6.3, 6.4, codec-mailbox
     #[test]
-    fn one_vector_for_every_opcode_facts_6_3() {
+    fn one_vector_for_every_opcode() {
         use InformationOpcode::*;
         let vectors: [(SdoInformation<'_>, &[u8]); 8] = [
             (SdoInformation::whole(ListRequest, &[1, 0]), &[0, 0x80, 1, 0, 0, 0, 1, 0]),
@@ -267,8 +268,9 @@ mod tests {
         assert_eq!(SdoInformation::decode(&[0, 0x80, 1, 0, 0]), Err(short));
     }
 
+    // covers: 6.3
     #[test]
-    fn list_types_have_the_codes_of_facts_6_3() {
+    fn list_types_have_their_codes() {
         for code in 0..=5 {
             assert_eq!(ListType::from_code(code).code(), code);
             assert_ne!(ListType::from_code(code), ListType::Other(code));

@@ -1,4 +1,4 @@
-//! Data types of CoE objects (facts 6.3).
+//! Data types of CoE objects (protocol 6.3).
 
 use core::fmt;
 
@@ -103,8 +103,9 @@ mod tests {
     use super::*;
     use std::string::ToString;
 
+    // covers: 6.3, codec-mailbox
     #[test]
-    fn the_data_types_of_facts_6_3_have_names_and_sizes() {
+    fn data_types_have_names_and_sizes() {
         assert_eq!(DataType::ALL.len(), 50);
         assert!(DataType::ALL.is_sorted_by(|a, b| a < b));
         for (code, name, bits) in [

@@ -1,4 +1,4 @@
-//! The filter for MAC addresses of an EoE SubDevice (facts 6.5).
+//! The filter for MAC addresses of an EoE SubDevice (protocol 6.5).
 
 use super::{PayloadError, Pen, split};
 

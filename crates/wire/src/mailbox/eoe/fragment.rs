@@ -1,4 +1,4 @@
-//! A part of an Ethernet frame (facts 6.5).
+//! A part of an Ethernet frame (protocol 6.5).
 
 use super::head::{FRAGMENT, LAST, OVERHEAD, TIME_APPENDED, TIME_REQUESTED};
 use crate::mailbox::payload::{PayloadError, Pen};

@@ -1,4 +1,4 @@
-//! The first word of an EoE message: its kind, the port that it is for, and flags of a fragment (facts 6.5).
+//! The first word of an EoE message: its kind, the port that it is for, and flags of a fragment (protocol 6.5).
 
 /// Bytes before the data: this word and one that depends on the kind.
 pub(super) const OVERHEAD: usize = 4;

@@ -1,4 +1,4 @@
-//! The addresses of an IP stack behind a SubDevice (facts 6.5).
+//! The addresses of an IP stack behind a SubDevice (protocol 6.5).
 
 use core::net::Ipv4Addr;
 

@@ -1,4 +1,4 @@
-//! Results of EoE requests (facts 6.5).
+//! Results of EoE requests (protocol 6.5).
 
 use core::fmt;
 

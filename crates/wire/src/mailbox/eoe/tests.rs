@@ -17,8 +17,9 @@ fn decoded(bytes: &[u8]) -> EoeMessage<'_> {
 const FIRST: EoeFragment<'_> =
     EoeFragment { frame: 5, number: 0, blocks: 3, last: false, time_requested: true, time_ns: None, data: &[7; 32] };
 
+// covers: 6.5, codec-mailbox
 #[test]
-fn fragments_have_these_bytes_facts_6_5() {
+fn fragments_have_these_bytes() {
     let first = encoded(EoeBody::Fragment(FIRST));
     assert_eq!(first[..5], [0x00, 0x04, 0xC0, 0x50, 7]);
     assert_eq!(decoded(&first), EoeMessage { port: 0, body: EoeBody::Fragment(FIRST) });
@@ -42,13 +43,15 @@ fn fragments_have_these_bytes_facts_6_5() {
     assert_eq!(EoeMessage { port: 0, body: EoeBody::Fragment(far) }.encode(&mut out), None);
 }
 
+// covers: 6.5
 #[test]
-fn a_fragment_has_whole_blocks_of_the_mailbox_facts_6_5() {
+fn a_fragment_has_whole_blocks_of_the_mailbox() {
     assert_eq!([128, 1024, 1486, 42, 41, 5].map(EoeFragment::max_data), [96, 992, 1472, 32, 0, 0]);
 }
 
+// covers: 6.5, codec-mailbox
 #[test]
-fn ip_parameters_have_fixed_places_and_little_endian_addresses_facts_6_5() {
+fn ip_parameters_have_fixed_places_and_little_endian_addresses() {
     let parameters = IpParameters {
         mac: Some([2, 0, 0, 0, 0, 1]),
         address: Some(Ipv4Addr::new(192, 168, 0, 1)),
@@ -67,8 +70,9 @@ fn ip_parameters_have_fixed_places_and_little_endian_addresses_facts_6_5() {
     assert_eq!(EoeMessage { port: 0, body: EoeBody::SetIp(long) }.encode(&mut [0; 256]), None);
 }
 
+// covers: 6.5, codec-mailbox
 #[test]
-fn packed_ip_parameters_are_understood_facts_6_5() {
+fn packed_ip_parameters_are_understood() {
     let bytes = [0x02, 0x01, 0, 0, 0x22, 0, 0, 0, 0x01, 0x00, 0xA8, 0xC0, b'a', b'b'];
     let expected =
         IpParameters { address: Some(Ipv4Addr::new(192, 168, 0, 1)), name: Some(b"ab"), ..IpParameters::default() };
@@ -77,8 +81,9 @@ fn packed_ip_parameters_are_understood_facts_6_5() {
     assert_eq!(EoeMessage::decode(&bytes[..11]), Err(short));
 }
 
+// covers: 6.5, codec-mailbox
 #[test]
-fn a_filter_has_sixteen_addresses_and_four_masks_facts_6_5() {
+fn a_filter_has_sixteen_addresses_and_four_masks() {
     let filter = AddressFilter::new(&[[1; 6], [2; 6]], &[[0xFF; 6]], true).unwrap();
     let bytes = encoded(EoeBody::SetFilter(filter));
     assert_eq!(bytes.len(), 4 + 2 + 96 + 24);
@@ -90,8 +95,9 @@ fn a_filter_has_sixteen_addresses_and_four_masks_facts_6_5() {
     assert_eq!(AddressFilter::new(&[], &[[0; 6]; 4], false), None);
 }
 
+// covers: 6.5
 #[test]
-fn requests_and_results_have_these_bytes_facts_6_5() {
+fn requests_and_results_have_these_bytes() {
     let vectors: [(EoeBody<'_>, &[u8]); 5] = [
         (EoeBody::TimeStamp { frame: 5, time_ns: 1 }, &[0x01, 0x01, 0x00, 0x50, 1, 0, 0, 0]),
         (EoeBody::SetIpDone(EoeResult::OK), &[0x03, 0x01, 0, 0]),
@@ -139,6 +145,7 @@ proptest! {
         }
     }
 
+    // covers: codec-mailbox
     #[test]
     fn any_fragment_reads_back(
         numbers in (0u8..16, 0u8..16, 0u8..64, 0u8..64),

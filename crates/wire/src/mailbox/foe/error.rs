@@ -1,4 +1,4 @@
-//! Error codes of FoE (facts 6.4).
+//! Error codes of FoE (protocol 6.4).
 
 use core::fmt;
 
@@ -68,16 +68,18 @@ mod tests {
     use super::*;
     use std::string::ToString;
 
+    // covers: 6.4
     #[test]
-    fn the_table_of_facts_6_4_is_complete_and_ascending() {
+    fn the_table_of_foe_errors_is_complete_and_ascending() {
         assert_eq!(FoeErrorCode::ALL.len(), 14);
         assert!(FoeErrorCode::ALL.is_sorted_by(|a, b| a < b));
         assert!(FoeErrorCode::ALL.iter().all(|code| code.name().is_some()));
         assert_eq!(FoeErrorCode::BOOTSTRAP_ONLY.to_string(), "0x8008 Bootstrap only");
     }
 
+    // covers: 6.4, codec-mailbox
     #[test]
-    fn codes_of_old_stacks_are_understood_facts_6_4() {
+    fn codes_of_old_stacks_are_understood() {
         assert_eq!(FoeErrorCode(1).to_string(), "0x0001 Not found");
         assert_eq!(FoeErrorCode(9).modern(), FoeErrorCode::NOT_BOOTSTRAP);
         assert_eq!(FoeErrorCode(10).name(), None);

@@ -1,4 +1,4 @@
-//! SDO abort codes (facts 6.3).
+//! SDO abort codes (protocol 6.3).
 
 use core::fmt;
 
@@ -84,8 +84,9 @@ mod tests {
         assert_eq!(AbortCode::OBJECT_DOES_NOT_EXIST.to_string(), "0x06020000 Object does not exist");
     }
 
+    // covers: 6.3, codec-mailbox
     #[test]
-    fn the_table_of_facts_6_3_is_complete_and_ascending() {
+    fn the_table_of_sdo_abort_codes_is_complete_and_ascending() {
         assert_eq!(AbortCode::ALL.len(), 36);
         assert!(AbortCode::ALL.is_sorted_by(|a, b| a < b));
         assert!(AbortCode::ALL.iter().all(|code| code.name().is_some()));

@@ -1,4 +1,4 @@
-//! Parts that SDO requests and responses share: command bits, addresses, expedited data, segments (facts 6.3).
+//! Parts that SDO requests and responses share: command bits, addresses, expedited data, segments (protocol 6.3).
 
 use super::{AbortCode, EXPEDITED_MAX_DATA, INITIATE_LEN, SEGMENT_MIN_DATA, SEGMENT_OVERHEAD, SdoError};
 use crate::bytes::u32_at;

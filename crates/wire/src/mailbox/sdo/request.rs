@@ -1,4 +1,4 @@
-//! SDO requests: what a MainDevice sends (facts 6.3).
+//! SDO requests: what a MainDevice sends (protocol 6.3).
 
 use super::codec::{ABORT, COMPLETE_ACCESS, EXPEDITED, Encoder, Head, TOGGLE, complete_access_bit};
 use super::{AbortCode, SdoError};

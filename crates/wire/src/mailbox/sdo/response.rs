@@ -1,4 +1,4 @@
-//! SDO responses: what a SubDevice answers (facts 6.3).
+//! SDO responses: what a SubDevice answers (protocol 6.3).
 
 use super::codec::{ABORT, COMPLETE_ACCESS, EXPEDITED, Encoder, Head, TOGGLE, complete_access_bit};
 use super::{AbortCode, SdoError};

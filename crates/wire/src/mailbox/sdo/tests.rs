@@ -17,6 +17,7 @@ fn encoded_response(response: &SdoResponse<'_>) -> Vec<u8> {
     out[..length].to_vec()
 }
 
+// covers: 6.7, codec-mailbox
 #[test]
 fn one_vector_for_every_request() {
     use SdoRequest::*;
@@ -73,6 +74,7 @@ fn one_vector_for_every_request() {
     }
 }
 
+// covers: 6.7, codec-mailbox
 #[test]
 fn one_vector_for_every_response() {
     use SdoResponse::*;
@@ -243,6 +245,7 @@ proptest! {
         }
     }
 
+    // covers: codec-mailbox
     #[test]
     fn any_bytes_never_panic_and_what_decodes_can_be_said_again(
         service in 2_u8..4,

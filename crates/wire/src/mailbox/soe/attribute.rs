@@ -1,4 +1,4 @@
-//! The attribute of an IDN, element 3 (facts 6.6; bits of IEC 61491).
+//! The attribute of an IDN, element 3 (protocol 6.6; bits of IEC 61491).
 
 /// How long the data of an IDN is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -82,8 +82,9 @@ impl IdnAttribute {
 mod tests {
     use super::*;
 
+    // covers: 6.6, codec-mailbox
     #[test]
-    fn the_length_is_in_bits_18_to_16_facts_6_6() {
+    fn the_length_is_in_bits_18_to_16() {
         for (bits, length) in [
             (0, IdnLength::Fixed(1)),
             (1, IdnLength::Fixed(2)),

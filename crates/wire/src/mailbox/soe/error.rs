@@ -1,4 +1,4 @@
-//! Error codes of SoE (facts 6.6).
+//! Error codes of SoE (protocol 6.6).
 
 use core::fmt;
 
@@ -90,8 +90,9 @@ mod tests {
     use super::*;
     use std::string::ToString;
 
+    // covers: 6.6, codec-mailbox
     #[test]
-    fn the_table_of_facts_6_6_is_complete_and_ascending() {
+    fn the_table_of_soe_errors_is_complete_and_ascending() {
         assert_eq!(SoeErrorCode::ALL.len(), 48);
         assert!(SoeErrorCode::ALL.is_sorted_by(|a, b| a < b));
         assert!(SoeErrorCode::ALL.iter().all(|code| code.name().is_some()));

@@ -1,4 +1,4 @@
-//! Identification numbers of the data of a drive (facts 6.6).
+//! Identification numbers of the data of a drive (protocol 6.6).
 
 use core::fmt;
 use core::str::FromStr;
@@ -83,8 +83,9 @@ mod tests {
     use proptest::prelude::*;
     use std::string::ToString;
 
+    // covers: 6.6
     #[test]
-    fn bit_15_is_p_and_bits_14_to_12_are_the_set_facts_6_6() {
+    fn bit_15_is_p_and_bits_14_to_12_are_the_set() {
         assert_eq!(Idn::standard(0, 15), Idn(0x000F));
         assert_eq!(Idn::product(2, 0x0123), Idn(0xA123));
         assert_eq!((Idn(0xA123).is_product(), Idn(0xA123).set(), Idn(0xA123).number()), (true, 2, 0x0123));
@@ -100,6 +101,7 @@ mod tests {
     }
 
     proptest! {
+        // covers: codec-mailbox
         #[test]
         fn any_idn_reads_back(code in any::<u16>()) {
             prop_assert_eq!(Idn(code).to_string().parse(), Ok(Idn(code)));

@@ -33,6 +33,7 @@ fn question(dialogue: &mut Dialogue, lane: Lane, payload: &[u8]) -> Question {
     }
 }
 
+// covers: gateway
 #[test]
 fn an_upload_in_segments_is_open_until_its_last_segment() {
     let mut dialogue = Dialogue::default();
@@ -55,8 +56,9 @@ fn an_upload_in_segments_is_open_until_its_last_segment() {
 }
 
 // Answers that are late are those to other questions of the same kind.
+// covers: 6.3, 6.6, gateway
 #[test]
-fn answers_are_known_by_what_was_asked_for_facts_6_3_facts_6_6() {
+fn answers_are_known_by_what_was_asked_for() {
     let mut dialogue = Dialogue::default();
     let upload = sdo(SdoRequest::Upload { index: 0x2001, sub_index: 110, complete_access: false });
     let asked = question(&mut dialogue, Lane::Coe, &upload);
@@ -95,6 +97,7 @@ fn answers_are_known_by_what_was_asked_for_facts_6_3_facts_6_6() {
     assert_eq!(dialogue.ask(Lane::Coe, &answer, SIZE), Err(ErrorReply::SERVICE_NOT_SUPPORTED));
 }
 
+// covers: gateway
 #[test]
 fn a_download_that_ends_in_the_middle_is_aborted_for_its_object() {
     let mut dialogue = Dialogue::default();
@@ -116,6 +119,7 @@ fn a_download_that_ends_in_the_middle_is_aborted_for_its_object() {
     assert!(!dialogue.is_open());
 }
 
+// covers: gateway
 #[test]
 fn a_file_is_open_from_its_request_to_its_last_packet() {
     let mut dialogue = Dialogue::default();
@@ -140,6 +144,7 @@ fn a_file_is_open_from_its_request_to_its_last_packet() {
     assert!(matches!(FoeMessage::decode(&error), Ok(FoeMessage::Error { .. })));
 }
 
+// covers: gateway
 #[test]
 fn what_must_not_pass_is_refused_with_its_code() {
     let mut dialogue = Dialogue::default();

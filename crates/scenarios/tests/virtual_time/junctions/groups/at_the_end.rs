@@ -16,8 +16,9 @@ const END: [(Endpoint, Endpoint); 8] = [
 
 /// The group is the end of the ring. Where it is away the ring ends at the one before it; until it is known who comes
 /// back it is nobody's, and the ring must be taken neither for another one nor for crossed lines.
+// covers: JR-03, JR-04, junctions
 #[test]
-fn a_group_that_is_the_end_of_a_local_ring_comes_back_as_what_it_was_jr_03_jr_04() {
+fn a_group_that_is_the_end_of_a_local_ring_comes_back_as_what_it_was() {
     let strict = [JunctionConnection { head: 1, head_port: 1, tail: 6, tail_port: 1 }];
     let settings = [(JunctionMode::Automatic, &[][..]), (JunctionMode::Strict, &strict)];
     for (number, (setting, looks)) in [(0, false), (1, true), (0, true), (1, true)].into_iter().enumerate() {
@@ -67,8 +68,9 @@ fn a_group_that_is_the_end_of_a_local_ring_comes_back_as_what_it_was_jr_03_jr_04
 }
 
 /// Nobody knows that it is a piece of the ring; but what is entered from where the ring closes is not crossed.
+// covers: JR-04, junctions
 #[test]
-fn a_group_that_was_never_seen_at_the_end_of_a_local_ring_is_no_crossed_line_when_the_ring_breaks_jr_04() {
+fn a_group_not_yet_seen_in_a_local_ring_is_no_crossed_line_when_it_breaks() {
     for (seed, two_links) in [(70, false), (71, true)] {
         let mut network = network(&END, two_links);
         GROUP.iter().for_each(|device| network.power_off(*device));

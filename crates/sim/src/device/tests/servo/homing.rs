@@ -26,6 +26,7 @@ fn home_on_machine(seen: &Feedback) -> i32 {
     seen.machine - seen.position + HOME_OFFSET
 }
 
+// covers: sim-drive
 #[test]
 fn each_method_finds_its_place_to_the_increment() {
     let table = [(17, -EDGE), (18, EDGE), (33, INDEX - INCREMENTS_PER_REVOLUTION), (34, INDEX), (35, 0), (37, 0)];
@@ -47,6 +48,7 @@ fn each_method_finds_its_place_to_the_increment() {
     }
 }
 
+// covers: sim-drive
 #[test]
 fn the_switch_is_approached_quickly_and_left_slowly() {
     let mut axis = homing(17);
@@ -59,6 +61,7 @@ fn the_switch_is_approached_quickly_and_left_slowly() {
     assert!((-14_500..=-12_000).contains(&overrun), "{overrun}");
 }
 
+// covers: sim-drive
 #[test]
 fn a_drive_on_its_switch_leaves_it_at_once() {
     let mut axis = homing(18);
@@ -79,6 +82,7 @@ fn a_drive_on_its_switch_leaves_it_at_once() {
     assert_eq!(home_on_machine(&axis.last), EDGE);
 }
 
+// covers: sim-drive
 #[test]
 fn status_bits_tell_how_far_homing_is() {
     let status = |axis: &Axis| axis.last.status & (BIT_13 | BIT_12 | TARGET_REACHED);
@@ -99,6 +103,7 @@ fn status_bits_tell_how_far_homing_is() {
     assert_eq!(status(&axis), BIT_12 | TARGET_REACHED, "it stays homed");
 }
 
+// covers: sim-drive
 #[test]
 fn software_limits_do_not_stop_homing_and_hold_afterwards() {
     let limits = [(0x607D, 1, -10_000, 4), (0x607D, 2, 10_000, 4), (0x6098, 0, 17, 1)];

@@ -16,6 +16,7 @@ fn limited(mode: i8) -> Axis {
     Axis::enabled(mode, &objects)
 }
 
+// covers: sim-drive
 #[test]
 fn no_mode_leaves_the_software_limits() {
     for mode in [MODE_CSP, MODE_CSV, MODE_CST, MODE_PROFILE_POSITION, MODE_PROFILE_VELOCITY, MODE_PROFILE_TORQUE] {
@@ -38,6 +39,7 @@ fn no_mode_leaves_the_software_limits() {
     }
 }
 
+// covers: sim-drive
 #[test]
 fn a_limit_lets_the_axis_back() {
     for mode in [MODE_CSV, MODE_CST, MODE_PROFILE_VELOCITY, MODE_PROFILE_TORQUE] {
@@ -50,6 +52,7 @@ fn a_limit_lets_the_axis_back() {
     }
 }
 
+// covers: sim-drive
 #[test]
 fn torque_stays_below_0x6072_and_the_limits_of_each_direction() {
     let objects = [(0x6072, 0, 800, 2), (0x60E0, 0, 500, 2), (0x60E1, 0, 1_500, 2)];
@@ -66,6 +69,7 @@ fn torque_stays_below_0x6072_and_the_limits_of_each_direction() {
     }
 }
 
+// covers: sim-drive
 #[test]
 fn speed_stays_below_0x6080_in_every_mode() {
     // 1,200 revolutions per minute are 20 per second.
@@ -81,6 +85,7 @@ fn speed_stays_below_0x6080_in_every_mode() {
     }
 }
 
+// covers: sim-drive
 #[test]
 fn profile_modes_stay_below_0x607f() {
     for mode in [MODE_PROFILE_POSITION, MODE_PROFILE_VELOCITY] {
@@ -92,6 +97,7 @@ fn profile_modes_stay_below_0x607f() {
     }
 }
 
+// covers: sim-drive
 #[test]
 fn a_following_error_is_a_fault_after_its_time_out() {
     for (window, time_out) in [(5_000, 0), (5_000, 20), (5_000, 60)] {
@@ -107,6 +113,7 @@ fn a_following_error_is_a_fault_after_its_time_out() {
     }
 }
 
+// covers: sim-drive
 #[test]
 fn a_following_error_that_ends_in_time_is_no_fault() {
     let mut axis = Axis::enabled(MODE_CSP, &[(0x6065, 0, 5_000, 4), (0x6066, 0, 100, 2)]);
@@ -130,6 +137,7 @@ fn one_in(many: u64, state: &mut u64) -> bool {
     random(state) % many < 1
 }
 
+// covers: sim-drive
 #[test]
 fn any_outputs_and_objects_leave_motor_and_load_within_their_physics() {
     use crate::application::servo::{ACCELERATION, BRAKE_TORQUE, PEAK_TORQUE};

@@ -5,6 +5,7 @@ use crate::application::servo::{
     MODE_CSP, MODE_CST, MODE_CSV, MODE_PROFILE_POSITION, MODE_PROFILE_TORQUE, MODE_PROFILE_VELOCITY,
 };
 
+// covers: sim-drive
 #[test]
 fn csp_follows_set_points_between_which_it_interpolates() {
     let mut axis = Axis::enabled(MODE_CSP, &[(0x6065, 0, 20_000, 4)]);
@@ -27,6 +28,7 @@ fn csp_follows_set_points_between_which_it_interpolates() {
     assert_eq!(axis.last.mode, MODE_CSP);
 }
 
+// covers: sim-drive
 #[test]
 fn csp_takes_as_long_to_a_set_point_as_0x60c2_says() {
     for (value, index, cycles) in [(8i64, -3i64, 8), (40, -4, 4), (2, -2, 20)] {
@@ -49,6 +51,7 @@ fn csp_takes_as_long_to_a_set_point_as_0x60c2_says() {
     }
 }
 
+// covers: sim-drive
 #[test]
 fn offsets_add_to_the_targets_of_the_cyclic_modes() {
     let mut axis = Axis::enabled(MODE_CSP, &[(0x60B0, 0, -250, 4)]);
@@ -65,6 +68,7 @@ fn offsets_add_to_the_targets_of_the_cyclic_modes() {
     assert_eq!(axis.last.torque, 100);
 }
 
+// covers: sim-drive
 #[test]
 fn csv_keeps_its_speed_and_loses_no_part_of_an_increment() {
     let mut axis = Axis::enabled(MODE_CSV, &[]);
@@ -79,6 +83,7 @@ fn csv_keeps_its_speed_and_loses_no_part_of_an_increment() {
     assert!(axis.last.has(BIT_12));
 }
 
+// covers: sim-drive
 #[test]
 fn cst_makes_the_torque_that_is_asked_for_in_the_next_step() {
     let mut axis = Axis::enabled(MODE_CST, &[]);
@@ -89,6 +94,7 @@ fn cst_makes_the_torque_that_is_asked_for_in_the_next_step() {
     }
 }
 
+// covers: sim-drive
 #[test]
 fn profile_position_is_a_trapezoid_and_ends_exactly_at_its_target() {
     let objects = [(0x6081, 0, 500_000, 4), (0x6083, 0, 5_000_000, 4), (0x6084, 0, 2_000_000, 4)];
@@ -114,6 +120,7 @@ fn profile_position_is_a_trapezoid_and_ends_exactly_at_its_target() {
     assert_eq!((axis.last.position, axis.last.velocity), (300_000, 0));
 }
 
+// covers: sim-drive
 #[test]
 fn profile_position_buffers_one_set_point_or_takes_it_at_once() {
     let mut axis = Axis::enabled(MODE_PROFILE_POSITION, &[]);
@@ -145,6 +152,7 @@ fn profile_position_buffers_one_set_point_or_takes_it_at_once() {
     assert!(farthest < 500_000, "it turned round: {farthest}");
 }
 
+// covers: sim-drive
 #[test]
 fn a_target_is_reached_when_it_was_in_its_window_for_the_window_time() {
     // Cycles in the window before the bit.
@@ -168,6 +176,7 @@ fn a_target_is_reached_when_it_was_in_its_window_for_the_window_time() {
     assert!((29..=31).contains(&cycles), "{cycles} ms");
 }
 
+// covers: sim-drive
 #[test]
 fn profile_position_goes_on_after_a_halt() {
     let mut axis = Axis::enabled(MODE_PROFILE_POSITION, &[]);
@@ -184,6 +193,7 @@ fn profile_position_goes_on_after_a_halt() {
     assert_eq!(axis.last.position, 800_000);
 }
 
+// covers: sim-drive
 #[test]
 fn a_target_from_before_is_not_taken_up_when_the_drive_is_enabled_again() {
     let mut axis = Axis::enabled(MODE_PROFILE_POSITION, &[]);
@@ -201,6 +211,7 @@ fn a_target_from_before_is_not_taken_up_when_the_drive_is_enabled_again() {
     assert_eq!(axis.last.position, at);
 }
 
+// covers: sim-drive
 #[test]
 fn profile_velocity_ramps_and_says_when_it_is_there() {
     let objects = [(0x6083, 0, 4_000_000, 4), (0x6084, 0, 1_000_000, 4)];
@@ -220,6 +231,7 @@ fn profile_velocity_ramps_and_says_when_it_is_there() {
     assert_eq!(axis.last.velocity, -100_000);
 }
 
+// covers: sim-drive
 #[test]
 fn profile_torque_rises_with_its_slope() {
     let mut axis = Axis::enabled(MODE_PROFILE_TORQUE, &[(0x6087, 0, 5_000, 4)]);
@@ -231,6 +243,7 @@ fn profile_torque_rises_with_its_slope() {
     }
 }
 
+// covers: sim-drive
 #[test]
 fn modes_change_without_a_jump_and_unknown_ones_are_not_taken() {
     let mut axis = Axis::at_speed(500_000, &[]);

@@ -15,6 +15,7 @@ fn energies(seen: &[Feedback]) -> (f64, f64, f64) {
     (work, heat, energy(&seen[seen.len() - 1]) - energy(&seen[0]))
 }
 
+// covers: sim-drive
 #[test]
 fn work_of_the_torque_is_energy_of_the_load_and_heat_of_friction() {
     for torque in [100, 500, -1_500, 3_000] {
@@ -30,6 +31,7 @@ fn work_of_the_torque_is_energy_of_the_load_and_heat_of_friction() {
     }
 }
 
+// covers: sim-drive
 #[test]
 fn a_load_without_torque_is_slowed_down_by_friction_alone() {
     let mut axis = Axis::at_speed(4_000_000, &[]);
@@ -43,6 +45,7 @@ fn a_load_without_torque_is_slowed_down_by_friction_alone() {
     assert_eq!(axis.last.torque, 0);
 }
 
+// covers: sim-drive
 #[test]
 fn acceleration_never_exceeds_what_the_torque_gives() {
     let mut axis = Axis::enabled(MODE_CSP, &[(0x6065, 0, -1, 4)]);
@@ -60,6 +63,7 @@ fn acceleration_never_exceeds_what_the_torque_gives() {
     assert_eq!((axis.last.position, axis.last.velocity, axis.last.torque), (1_000_000, 0, 0), "settled");
 }
 
+// covers: sim-drive
 #[test]
 fn the_motion_does_not_depend_on_reads_of_the_inputs() {
     let course = |looks: usize| {

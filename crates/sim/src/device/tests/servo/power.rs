@@ -6,6 +6,7 @@ use crate::application::servo::{ERROR_COMMUNICATION, ERROR_FOLLOWING, MODE_CSP, 
 /// Speed at which stops begin.
 const SPEED: i32 = 2_000_000;
 
+// covers: sim-drive
 #[test]
 fn each_transition_of_cia_402_by_command_is_made() {
     let way = [
@@ -49,6 +50,7 @@ fn each_transition_of_cia_402_by_command_is_made() {
     }
 }
 
+// covers: sim-drive
 #[test]
 fn a_drive_is_not_ready_until_it_has_tested_itself() {
     let mut bench = crate::device::tests::bench::Bench::new(described());
@@ -72,6 +74,7 @@ fn stop(axis: &mut Axis, control: u16) -> (usize, i32, u16) {
     (seen.len(), axis.last.position - start, axis.last.state())
 }
 
+// covers: sim-drive
 #[test]
 fn quick_stop_does_what_its_option_code_says() {
     // Distances are v*v/2a for 1e7 and 5e7 per second squared, and with 3,000 thousandths of the torque (1.5e8).
@@ -95,6 +98,7 @@ fn quick_stop_does_what_its_option_code_says() {
     }
 }
 
+// covers: sim-drive
 #[test]
 fn disable_operation_and_shutdown_stop_by_ramp_or_by_brake() {
     let (slow, brake) = (200_000, 40_000);
@@ -112,6 +116,7 @@ fn disable_operation_and_shutdown_stop_by_ramp_or_by_brake() {
     }
 }
 
+// covers: sim-drive
 #[test]
 fn halt_keeps_the_drive_enabled_and_ends_with_the_bit() {
     for (option, distance) in [(1, 200_000), (2, 40_000), (3, 13_333)] {
@@ -125,6 +130,7 @@ fn halt_keeps_the_drive_enabled_and_ends_with_the_bit() {
     }
 }
 
+// covers: sim-drive
 #[test]
 fn a_fault_stops_the_motor_and_then_waits_for_a_rising_reset() {
     for (option, longest) in [(0, 45), (1, 230), (2, 65), (3, 40)] {
@@ -147,6 +153,7 @@ fn a_fault_stops_the_motor_and_then_waits_for_a_rising_reset() {
     }
 }
 
+// covers: sim-drive
 #[test]
 fn a_reset_bit_that_was_set_before_the_fault_resets_nothing() {
     let mut axis = Axis::enabled(MODE_CSP, &[(0x6065, 0, 1_000, 4)]);
@@ -161,6 +168,7 @@ fn a_reset_bit_that_was_set_before_the_fault_resets_nothing() {
     assert_eq!(axis.cycle().state(), SWITCH_ON_DISABLED);
 }
 
+// covers: sim-drive
 #[test]
 fn lost_process_data_does_what_the_abort_connection_code_says() {
     for (option, state, error) in [
@@ -182,6 +190,7 @@ fn lost_process_data_does_what_the_abort_connection_code_says() {
     }
 }
 
+// covers: sim-drive
 #[test]
 fn the_brake_takes_the_energy_of_a_load_that_loses_its_torque() {
     let mut axis = Axis::at_speed(SPEED, &[]);
@@ -196,6 +205,7 @@ fn the_brake_takes_the_energy_of_a_load_that_loses_its_torque() {
     assert_eq!(seen[45].position, seen[59].position, "it holds");
 }
 
+// covers: sim-drive
 #[test]
 fn power_keeps_the_load_where_it_is_and_forgets_the_origin() {
     let mut axis = Axis::enabled(MODE_CSP, &[(0x607C, 0, 777, 4)]);
