@@ -4,6 +4,8 @@ use std::error::Error;
 use std::fmt;
 use std::io;
 
+use crate::permission;
+
 /// Why a link cannot be opened.
 #[derive(Clone, Debug, PartialEq, Eq)]
 #[non_exhaustive]
@@ -58,8 +60,8 @@ impl fmt::Display for LinkError {
             }
             LinkError::Permission { name } => write!(
                 f,
-                "not permitted to send and receive raw frames on {name}; run as root or permit it once with\n  \
-                 sudo setcap cap_net_raw,cap_net_admin,cap_ipc_lock,cap_sys_nice=ep $(which ringcat)"
+                "not permitted to send and receive raw frames on {name}; run as root or permit it once with\n  {}",
+                permission::setcap_command()
             ),
             LinkError::NotEthernet { name } => {
                 write!(f, "{name} is not an Ethernet interface; take the one that the first SubDevice is plugged into")
@@ -100,8 +102,8 @@ mod tests {
     fn a_missing_permission_is_told_with_the_line_that_grants_it() {
         for errno in [libc::EPERM, libc::EACCES] {
             let text = LinkError::from_errno("eth0", "socket", errno).to_string();
-            let line = "sudo setcap cap_net_raw,cap_net_admin,cap_ipc_lock,cap_sys_nice=ep $(which ringcat)";
-            assert!(text.contains("eth0") && text.ends_with(line), "{text}");
+            let line = permission::setcap_command();
+            assert!(text.contains("eth0") && text.ends_with(&line), "{text}");
         }
     }
 

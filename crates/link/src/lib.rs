@@ -25,6 +25,7 @@ pub mod listener;
 pub mod monotonic;
 pub mod packet_socket;
 pub mod pcapng;
+mod permission;
 pub mod realtime;
 mod receive_mode;
 pub mod recorder;

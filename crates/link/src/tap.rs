@@ -14,6 +14,7 @@ use std::mem::size_of;
 use std::os::fd::{AsRawFd, FromRawFd, OwnedFd};
 
 use crate::kernel::{self, errno};
+use crate::permission;
 
 const DEVICE: &CStr = c"/dev/net/tun";
 const TUNSETIFF: libc::c_ulong = 0x4004_54CA;
@@ -70,8 +71,8 @@ impl fmt::Display for TapError {
         match self {
             TapError::Permission { name } => write!(
                 f,
-                "not permitted to make the network interface {name}; run as root or permit it once with\n  \
-                 sudo setcap cap_net_raw,cap_net_admin,cap_ipc_lock,cap_sys_nice=ep $(which ringcat)"
+                "not permitted to make the network interface {name}; run as root or permit it once with\n  {}",
+                permission::setcap_command()
             ),
             TapError::NoDevice { errno } => write!(
                 f,

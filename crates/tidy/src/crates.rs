@@ -71,7 +71,7 @@ const ROOMS: &[Room] = &[
     Room {
         directory: "tidy",
         internal: Internal::Only(&[]),
-        external: External::Only(&["proc-macro2", "syn", "toml"]),
+        external: External::Only(&["proc-macro2", "serde_json", "syn", "toml"]),
     },
 ];
 

@@ -1,75 +1,129 @@
-//! `docs/FEATURES.md` is honest: every row of its table names tests that exist.
+//! `docs/FEATURES.md` is short and honest: every row that claims to work is covered by tests.
 //!
-//! In goes a tree, out come findings. A row is `| capability | state | tests |`; each test is its function's name in
-//! backticks; a path before it helps the reader where several have one name.
+//! In goes a tree, out come findings. A row is `| [capability](feature-tests.md#id) | state | limits |`; a test covers
+//! it with its id on a `// covers:` line. [`crate::evidence`] lists the tests of each row beside the page.
 
 use std::collections::BTreeSet;
 
 use crate::Finding;
-use crate::tokens::{Token, separator_at, tokens};
 use crate::tree::Tree;
+use crate::{covers, evidence};
 
 /// Where the table is.
 const PAGE: &str = "docs/FEATURES.md";
-/// What the second column may say.
-const STATES: [&str; 2] = ["works", "partly"];
+/// What the second column may say; the last one needs no test.
+const STATES: [&str; 3] = ["works", "partly", "not yet"];
+/// So many rows are read in two minutes.
+const MAX_ROWS: usize = 120;
+/// A capability with its limits is one line, without the link.
+const MAX_WORDS: usize = 170;
 
-/// Rows without a test, with an unknown state, or with a test that is not there.
-pub fn rows_without_test(tree: &Tree) -> Vec<Finding> {
-    let Some(page) = tree.file(PAGE) else {
-        return vec![Finding::new(PAGE, 0, "is missing")];
-    };
-    let tests: BTreeSet<String> = tree.rust().flat_map(|file| test_names(&tokens(&file.text))).collect();
-    let mut findings = Vec::new();
+/// A row of the table.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Row {
+    /// What it is called in `covers` lines; empty where the row has none.
+    pub id: String,
+    /// What can be done.
+    pub capability: String,
+    /// One of the states.
+    pub state: String,
+    /// What it does not do, and where figures end.
+    pub limits: String,
+    /// Line on the page.
+    pub line: usize,
+}
+
+/// All rows of a page, or what is wrong with one.
+fn rows(text: &str) -> Vec<Result<Row, Finding>> {
+    let mut rows = Vec::new();
     let mut in_table = false;
-    for (number, line) in page.text.lines().enumerate() {
-        let cells: Vec<&str> = line.trim().trim_matches('|').split('|').map(str::trim).collect();
-        if !line.trim_start().starts_with('|') {
+    for (number, line) in text.lines().enumerate() {
+        let line = line.trim();
+        let cells: Vec<&str> = line
+            .strip_prefix('|')
+            .map_or(Vec::new(), |row| row.strip_suffix('|').unwrap_or(row).split('|').map(str::trim).collect());
+        if cells.is_empty() {
             in_table = false;
         } else if cells.iter().all(|cell| cell.chars().all(|c| matches!(c, '-' | ':'))) {
             in_table = true;
         } else if in_table {
-            findings.extend(faults(&cells, &tests).into_iter().map(|text| Finding::new(PAGE, number + 1, text)));
+            rows.push(row(&cells, number + 1));
+        }
+    }
+    rows
+}
+
+fn row(cells: &[&str], line: usize) -> Result<Row, Finding> {
+    let [first, state, limits] = cells else {
+        return Err(Finding::new(PAGE, line, format!("a row has three cells, this one {}", cells.len())));
+    };
+    let linked = first.strip_prefix('[').and_then(|rest| rest.split_once("](feature-tests.md#"));
+    let (capability, id) = linked.map_or((*first, ""), |(capability, id)| (capability, id.trim_end_matches(')')));
+    let [capability, id, state, limits] = [capability, id, state, limits].map(str::to_owned);
+    Ok(Row { id, capability, state, limits, line })
+}
+
+/// Ids of all rows.
+pub fn ids(tree: &Tree) -> BTreeSet<String> {
+    let text = tree.file(PAGE).map_or("", |page| &page.text);
+    rows(text).into_iter().flatten().map(|row| row.id).filter(|id| !id.is_empty()).collect()
+}
+
+/// Rows without a test, with an unknown state, too long or too many.
+pub fn faults(tree: &Tree) -> Vec<Finding> {
+    let Some(page) = tree.file(PAGE) else {
+        return vec![Finding::new(PAGE, 0, "is missing")];
+    };
+    let tests = covers::all(tree);
+    let covered: BTreeSet<&String> = tests.iter().flat_map(|test| &test.covers).collect();
+    let rows = rows(&page.text);
+    let mut findings = Vec::new();
+    if rows.len() > MAX_ROWS {
+        findings.push(Finding::new(PAGE, 0, format!("{} rows, more than {MAX_ROWS}: join some", rows.len())));
+    }
+    let mut seen = BTreeSet::new();
+    for row in rows {
+        match row {
+            Ok(row) => {
+                if !row.id.is_empty() && !seen.insert(row.id.clone()) {
+                    findings.push(Finding::new(PAGE, row.line, format!("`{}` has a row already", row.id)));
+                }
+                findings.extend(faults_of(&row, &covered).into_iter().map(|text| Finding::new(PAGE, row.line, text)));
+            }
+            Err(finding) => findings.push(finding),
         }
     }
     findings
 }
 
-fn faults(cells: &[&str], tests: &BTreeSet<String>) -> Vec<String> {
-    let [_, state, named] = cells else {
-        return vec![format!("a row has three cells, this one {}", cells.len())];
-    };
+fn faults_of(row: &Row, covered: &BTreeSet<&String>) -> Vec<String> {
     let mut faults = Vec::new();
-    if !STATES.contains(state) {
-        faults.push(format!("state is one of {STATES:?}, got `{state}`"));
+    let claims = row.state != STATES[2];
+    if !STATES.contains(&row.state.as_str()) {
+        faults.push(format!("state is one of {STATES:?}, got `{}`", row.state));
     }
-    // Every second part is between backticks.
-    let names: Vec<&str> = named.split('`').skip(1).step_by(2).collect();
-    if names.is_empty() {
-        faults.push("names no test".to_owned());
+    if claims && row.id.is_empty() {
+        faults.push("the capability is no link `[...](feature-tests.md#id)`".to_owned());
+    } else if claims && !covered.contains(&row.id) {
+        faults.push(format!("no test covers `{}`: write `// covers: {}` above those that do", row.id, row.id));
     }
-    for name in names {
-        if !tests.contains(name.rsplit("::").next().unwrap_or(name)) {
-            faults.push(format!("there is no test `{name}`"));
-        }
+    let words = row.capability.len() + row.limits.len();
+    if words > MAX_WORDS {
+        faults
+            .push(format!("{words} characters, more than {MAX_WORDS}: limits at length go to the page of the matter"));
     }
     faults
 }
 
-/// Names of the functions with `#[test]`, also inside `proptest!`.
-pub fn test_names(tokens: &[Token]) -> Vec<String> {
-    let mut names = Vec::new();
-    let mut marked = false;
-    for (at, token) in tokens.iter().enumerate() {
-        let attribute = at >= 2 && tokens[at - 1].is('[') && tokens[at - 2].is('#');
-        if token.is_ident("test") && attribute && !separator_at(tokens, at + 1) {
-            marked = true;
-        } else if token.is_ident("fn") && marked {
-            names.extend(tokens.get(at + 1).and_then(Token::ident).map(str::to_owned));
-            marked = false;
-        }
+/// The page that lists the tests of each row.
+pub fn evidence(tree: &Tree) -> String {
+    let tests = covers::all(tree);
+    let mut text = evidence::opening("Tests of each feature");
+    let page = tree.file(PAGE).map_or("", |page| &page.text);
+    for row in rows(page).into_iter().flatten().filter(|row| !row.id.is_empty()) {
+        text += &format!("\n## {}\n\n{}\n\n{}", row.id, row.capability, evidence::list(&tests, &row.id));
     }
-    names
+    text
 }
 
 #[cfg(test)]
@@ -77,28 +131,45 @@ mod tests {
     use super::*;
     use crate::tree::File;
 
-    fn findings(row: &str) -> Vec<Finding> {
-        let source = "#[test] fn shown() {} fn not_a_test() {} proptest! { #[test] fn always(x in 0..1) {} }";
-        let page = format!("| capability | state | test |\n|---|---|---|\n{row}\n");
-        rows_without_test(&Tree { files: vec![File::new(PAGE, &page), File::new("crates/a/src/a.rs", source)] })
+    fn tree(rows: &str) -> Tree {
+        let page = format!("| capability | state | limits |\n|---|---|---|\n{rows}\n");
+        let source = "// covers: ring-cut\n#[test]\nfn shown() {}\n";
+        Tree { files: vec![File::new(PAGE, &page), File::new("crates/a/src/a.rs", source)] }
     }
 
     #[test]
-    fn a_row_passes_when_all_its_tests_exist() {
-        assert!(findings("| it works | works | `shown`, `module::always` |").is_empty());
+    fn a_row_passes_when_a_test_covers_it() {
+        assert!(faults(&tree("| [it works](feature-tests.md#ring-cut) | works | at most one |")).is_empty());
+        assert!(faults(&tree("| it will | not yet | |")).is_empty());
+        assert!(ids(&tree("| [it works](feature-tests.md#ring-cut) | works | |")).contains("ring-cut"));
     }
 
     #[test]
-    fn a_row_whose_test_is_missing_is_found() {
-        assert_eq!(findings("| it works | works | `shown` `gone` |").len(), 1);
-        assert_eq!(findings("| it works | works | `not_a_test` |").len(), 1);
-        assert_eq!(findings("| it works | works | - |").len(), 1);
-        assert_eq!(findings("| it works | maybe | `shown` |").len(), 1);
-        assert_eq!(findings("| it works | `shown` |").len(), 1);
+    fn a_row_whose_claim_is_not_covered_is_found() {
+        let long = format!("| [{}](feature-tests.md#ring-cut) | works | |", "a".repeat(171));
+        let twice = "| [a](feature-tests.md#ring-cut) | works | |\n".repeat(2);
+        let wrong = [
+            "| [it works](feature-tests.md#gone) | works | |",
+            "| it works | partly | |",
+            "| [it works](feature-tests.md#ring-cut) | maybe | |",
+            "| [it works](feature-tests.md#ring-cut) | works |",
+            &long,
+            &twice,
+        ];
+        for rows in wrong {
+            assert_eq!(faults(&tree(rows)).len(), 1, "{rows}");
+        }
+        assert_eq!(faults(&tree(&"| it will | not yet | |\n".repeat(121))).len(), 1);
+    }
+
+    #[test]
+    fn the_list_of_tests_names_them_under_their_row() {
+        let page = evidence(&tree("| [it works](feature-tests.md#ring-cut) | works | |"));
+        assert!(page.ends_with("## ring-cut\n\nit works\n\n* `shown` (a)\n"), "{page}");
     }
 
     #[test]
     fn a_missing_page_is_found() {
-        assert_eq!(rows_without_test(&Tree::default()).len(), 1);
+        assert_eq!(faults(&Tree::default()).len(), 1);
     }
 }

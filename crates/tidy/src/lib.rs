@@ -8,7 +8,11 @@
 //! * [`dependencies`]: what an application takes in with the library; examples and the program use it alone;
 //! * [`modules`]: allowed arrows between the modules of the engine;
 //! * [`safety`]: where `unsafe` may be written;
-//! * [`features`]: every row of `docs/FEATURES.md` names tests that exist;
+//! * [`protocol`]: sections and statements of `docs/protocol` that are cited exist;
+//! * [`covers`]: names of tests, and what their `// covers:` lines name;
+//! * [`features`]: every row of `docs/FEATURES.md` is covered by tests;
+//! * [`deny`]: licences, versions and sources of crates are as `deny.toml` wants them;
+//! * [`evidence`]: the lists of tests in `docs/` are current;
 //! * [`paths`]: the places that `docs/ARCHITECTURE.md` names exist;
 //! * [`toolchain`]: one minimum Rust version in all places that name it;
 //! * [`circles`]: the files of a crate name each other without circles, over [`names`] and [`arrows`];
@@ -16,7 +20,8 @@
 //! * [`words`]: words for people that stand for devices.
 //!
 //! The last three count ([`rules`]); what is not mended yet is in `known.toml`, which only shrinks ([`known`]).
-//! `cargo run -p tidy` prints it, with the longest chain of files of each crate.
+//! `cargo run -p tidy` prints it, with the longest chain of files of each crate. [`coverage`] lists what of the
+//! protocol no test covers.
 //!
 //! [`tokens`] is the little Rust lexer under some of them, so that words in comments and strings are not taken for
 //! code; the younger ones read with `syn`.
@@ -24,8 +29,12 @@
 
 pub mod arrows;
 pub mod circles;
+pub mod coverage;
+pub mod covers;
 pub mod crates;
+pub mod deny;
 pub mod dependencies;
+pub mod evidence;
 pub mod features;
 pub mod files;
 pub mod known;
@@ -33,6 +42,7 @@ pub mod limits;
 pub mod modules;
 pub mod names;
 pub mod paths;
+pub mod protocol;
 pub mod rules;
 pub mod safety;
 pub mod tokens;

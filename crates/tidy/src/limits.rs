@@ -6,9 +6,7 @@ use syn::spanned::Spanned;
 use syn::visit::{self, Visit};
 
 use crate::Finding;
-use crate::features::test_names;
 use crate::known::{self, Counts};
-use crate::tokens::tokens;
 use crate::tree::{File, Tree};
 
 /// Lines of a function, from `fn` to its closing brace: it fits a screen.
@@ -17,8 +15,6 @@ pub const FUNCTION_LINES: usize = 60;
 pub const FILE_LINES: usize = 500;
 /// Columns of a line.
 pub const COLUMNS: usize = 120;
-/// Characters of a test's name.
-pub const TEST_NAME: usize = 80;
 
 /// Functions with more than [`FUNCTION_LINES`] lines, each with its lines; tests count like all others.
 pub fn long_functions(tree: &Tree) -> Result<Counts, Finding> {
@@ -91,18 +87,6 @@ fn is_one_word(line: &str) -> bool {
     !line.trim_start_matches([' ', '-', '*', '>']).contains(' ')
 }
 
-/// Tests whose names have more than [`TEST_NAME`] characters.
-pub fn long_test_names(tree: &Tree) -> Counts {
-    let mut long = Counts::new();
-    for file in tree.rust() {
-        for name in test_names(&tokens(&file.text)).into_iter().filter(|name| name.chars().count() > TEST_NAME) {
-            let length = name.chars().count();
-            long.insert(format!("{}: {name}", file.path), length);
-        }
-    }
-    long
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -149,12 +133,5 @@ mod tests {
             assert_eq!(wide_lines(&tree("a.rs", line)).len(), 1);
         }
         assert_eq!(wide_lines(&tree("a.md", &"ab ".repeat(41))).len(), 1);
-    }
-
-    #[test]
-    fn names_of_tests_only_are_measured() {
-        let (short, long) = ("a".repeat(80), "b".repeat(81));
-        let text = format!("#[test] fn {short}() {{}} #[test] fn {long}() {{}} fn c{long}() {{}}");
-        assert_eq!(long_test_names(&tree("a.rs", &text)), [(format!("a.rs: {long}"), 81)].into());
     }
 }

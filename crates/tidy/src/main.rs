@@ -1,6 +1,8 @@
 //! `cargo run -p tidy`: what the rules find in this repository, with the longest chain of files of each crate.
 //!
-//! `cargo run -p tidy -- shrink` lowers `known.toml` to what is there; it refuses where a rule found more than before.
+//! `cargo run -p tidy -- coverage` lists what of `docs/protocol` no test covers, `-- tests` writes the lists of tests
+//! of each feature and each part of the protocol. `cargo run -p tidy -- shrink` lowers `known.toml` to what is there;
+//! it refuses where a rule found more than before.
 
 use std::path::Path;
 use std::process::ExitCode;
@@ -9,11 +11,20 @@ use tidy::circles::{Graph, crates};
 use tidy::known::{Counts, Known, PATH, file_of};
 use tidy::rules::RULES;
 use tidy::tree::Tree;
-use tidy::{Finding, arrows};
+use tidy::{Finding, arrows, coverage, evidence};
 
 fn main() -> ExitCode {
-    let shrink = std::env::args().nth(1).is_some_and(|word| word == "shrink");
-    match run(shrink) {
+    let done = match std::env::args().nth(1).as_deref() {
+        None => run(false),
+        Some("shrink") => run(true),
+        Some("coverage") => tree().map(|tree| print!("{}", coverage::report(&tree))),
+        Some("tests") => tree().and_then(|tree| write_evidence(&tree)),
+        Some(_) => {
+            eprintln!("usage: cargo run -p tidy [-- coverage | tests | shrink]");
+            return ExitCode::from(2);
+        }
+    };
+    match done {
         Ok(()) => ExitCode::SUCCESS,
         Err(finding) => {
             eprintln!("{finding}");
@@ -22,8 +33,21 @@ fn main() -> ExitCode {
     }
 }
 
+fn tree() -> Result<Tree, Finding> {
+    Tree::of_this_repository().map_err(|error| Finding::new(".", 0, error.to_string()))
+}
+
+fn write_evidence(tree: &Tree) -> Result<(), Finding> {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
+    for (path, text) in evidence::pages(tree) {
+        std::fs::write(root.join(path), text).map_err(|error| Finding::new(path, 0, error.to_string()))?;
+        println!("wrote {path}");
+    }
+    Ok(())
+}
+
 fn run(shrink: bool) -> Result<(), Finding> {
-    let tree = Tree::of_this_repository().map_err(|error| Finding::new(".", 0, error.to_string()))?;
+    let tree = tree()?;
     if !shrink {
         chains(&tree)?;
     }

@@ -17,11 +17,10 @@ pub struct Rule {
 }
 
 /// All of them.
-pub const RULES: [Rule; 6] = [
+pub const RULES: [Rule; 5] = [
     Rule { name: "circles", count: circles::sizes, mended: Mended::MustShrink },
     Rule { name: "long-functions", count: limits::long_functions, mended: Mended::MustShrink },
     Rule { name: "long-files", count: |tree| Ok(limits::long_files(tree)), mended: Mended::MustShrink },
     Rule { name: "wide-lines", count: |tree| Ok(limits::wide_lines(tree)), mended: Mended::MayShrink },
-    Rule { name: "long-test-names", count: |tree| Ok(limits::long_test_names(tree)), mended: Mended::MustShrink },
     Rule { name: "words", count: |tree| Ok(words::for_people(tree)), mended: Mended::MayShrink },
 ];

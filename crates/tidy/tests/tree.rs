@@ -5,7 +5,10 @@ use std::process::Command;
 use tidy::known::Known;
 use tidy::rules::RULES;
 use tidy::tree::Tree;
-use tidy::{Finding, crates, dependencies, features, files, modules, paths, safety, toolchain};
+use tidy::{
+    Finding, coverage, covers, crates, deny, dependencies, evidence, features, files, modules, paths, protocol, safety,
+    toolchain,
+};
 
 fn tree() -> Tree {
     Tree::of_this_repository().expect("the repository can be read")
@@ -94,7 +97,29 @@ fn pure_crates_forbid_unsafe_code() {
 // covers: tree
 #[test]
 fn every_feature_has_a_test() {
-    none(features::rows_without_test(&tree()));
+    none(features::faults(&tree()));
+}
+
+#[test]
+fn the_lists_of_tests_are_current() {
+    none(evidence::outdated(&tree()));
+}
+
+#[test]
+fn what_is_cited_of_the_protocol_exists() {
+    none(protocol::unresolved(&tree()));
+}
+
+#[test]
+fn names_of_tests_say_what_holds_in_80_characters() {
+    none(covers::unfit_names(&tree()));
+}
+
+#[test]
+fn what_tests_cover_exists() {
+    let tree = tree();
+    println!("{}", coverage::report(&tree));
+    none(covers::unresolved_covers(&tree, &features::ids(&tree)));
 }
 
 #[test]
@@ -138,11 +163,15 @@ fn lines_fit_120_columns() {
 }
 
 #[test]
-fn names_of_tests_fit_80_characters() {
-    only_what_is_known("long-test-names");
+fn devices_are_not_spoken_of_as_people() {
+    only_what_is_known("words");
 }
 
 #[test]
-fn devices_are_not_spoken_of_as_people() {
-    only_what_is_known("words");
+fn crates_from_elsewhere_are_as_deny_toml_wants_them() {
+    let root = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
+    let wishes = std::fs::read_to_string(root.join(deny::PAGE)).expect("deny.toml can be read");
+    let packages = deny::packages(&root).expect("cargo metadata works");
+    assert!(packages.len() > 50, "{} packages", packages.len());
+    none(deny::unwanted(&wishes, &packages));
 }

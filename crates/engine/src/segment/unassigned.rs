@@ -1,5 +1,5 @@
-//! SubDevices that answer but have no station address of ours. One that is no declared one keeps a temporary address and is
-//! looked at again when a declared one is lost.
+//! SubDevices that answer but have no station address of ours. One that is no declared one keeps a temporary address
+//! and is looked at again when a declared one is lost.
 
 use alloc::rc::Rc;
 use alloc::string::String;

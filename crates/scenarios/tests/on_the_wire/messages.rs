@@ -81,8 +81,10 @@ fn a_user_without_the_permission_is_told_the_line_that_grants_it() {
         }
         assert_eq!(output.status.code(), Some(2), "{errors}");
         assert!(errors.contains("not permitted to send and receive raw frames on main0; run as root or"), "{errors}");
-        let line = "sudo setcap cap_net_raw,cap_net_admin,cap_ipc_lock,cap_sys_nice=ep $(which ringcat)";
-        assert!(errors.contains(line), "{errors}");
+        let program = std::fs::canonicalize(&program).expect("the program has a file");
+        let capabilities = "cap_net_raw,cap_net_admin,cap_ipc_lock,cap_sys_nice=ep";
+        let line = format!("sudo setcap {capabilities} {}", program.display());
+        assert!(errors.contains(&line), "{errors}");
     }
 }
 
