@@ -18,6 +18,7 @@ extern crate alloc;
 #[cfg(test)]
 extern crate std;
 
+mod bell;
 pub mod board;
 pub mod clocks;
 pub mod config;

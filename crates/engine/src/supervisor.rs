@@ -42,6 +42,7 @@ pub use reply::{BusError, Elapsed, Reply};
 pub use signal::Signal;
 pub use stray::Stray;
 
+use crate::bell::Bell;
 use crate::board::Board;
 use crate::event::{Event, TimedEvent};
 use crate::link::{Link, LinkSet};
@@ -76,6 +77,11 @@ impl Supervisor {
     /// Hands over what the exchange posts; from now on its view of the ring counts.
     pub fn attach(&mut self, board: Arc<Board>) {
         self.shared.borrow_mut().board = Some(board);
+    }
+
+    /// Has procedures hear a bell.
+    pub(crate) fn hear(&mut self, bell: Bell) {
+        self.shared.borrow_mut().bell = bell;
     }
 
     /// How many datagrams a frame may hold.

@@ -29,8 +29,8 @@ use crate::links::Links;
 use crate::main_device::{Options, Refused};
 use crate::window::Window;
 
-/// A request waits for so long at most until the thread looks.
-const LONGEST_SLEEP: Duration = Duration::from_millis(1);
+/// A request, and what the cyclic half posts, waits for so long at most until the thread looks.
+const LONGEST_SLEEP: Duration = Duration::from_micros(500);
 /// And for so long when there was one of late: who asks one thing after the other is not to wait for each.
 const SHORT_SLEEP: Duration = Duration::from_micros(50);
 /// How long that is.

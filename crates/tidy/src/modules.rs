@@ -23,7 +23,8 @@ pub const ENGINE: &[(&str, &[&str])] = &[
     ("queue", &[]),
     ("direction", &[]),
     ("domain", &[]),
-    ("request", &[]),
+    ("bell", &[]),
+    ("request", &["bell"]),
     ("junction", &[]),
     // frames
     ("ring", &["time", "link"]),
@@ -38,16 +39,19 @@ pub const ENGINE: &[(&str, &[&str])] = &[
     ("layout", &["link", "ring", "direction", "domain"]),
     // what happened
     ("event", &["time", "link", "queue", "ring", "domain", "info", "topology", "ring_status"]),
+    // what is known of the segment, and what follows from what is seen
+    ("segment", &["time", "link", "ring", "board", "info", "topology", "ring_status", "config", "plan", "layout", "event",
+        "junction"]),
     // cyclic half
     ("exchange", &["time", "link", "queue", "domain", "ring", "board", "clocks", "layout", "event"]),
     // acyclic half
-    ("supervisor", &["time", "link", "queue", "ring", "board", "event"]),
+    ("supervisor", &["time", "bell", "link", "queue", "ring", "board", "event"]),
     ("mail", &["time", "config", "event", "supervisor"]),
-    ("procedures", &["time", "link", "queue", "ring", "board", "info", "topology", "ring_status", "config", "clocks",
-        "plan", "layout", "event", "supervisor", "mail", "request", "junction"]),
+    ("procedures", &["time", "bell", "link", "queue", "ring", "board", "info", "topology", "ring_status", "config", "clocks",
+        "plan", "layout", "event", "segment", "supervisor", "mail", "request", "junction"]),
     // both together
-    ("main_device", &["time", "link", "queue", "domain", "ring", "board", "info", "topology", "ring_status", "config",
-        "plan", "layout", "event", "exchange", "supervisor", "mail", "request", "junction", "procedures"]),
+    ("main_device", &["time", "bell", "link", "queue", "domain", "ring", "board", "info", "topology", "ring_status", "config",
+        "plan", "layout", "event", "segment", "exchange", "supervisor", "mail", "request", "junction", "procedures"]),
 ];
 
 /// Where the engine's sources are.

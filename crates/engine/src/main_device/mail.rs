@@ -68,21 +68,21 @@ impl MainDevice {
     /// A request for objects of a declared SubDevice of up to `size` bytes, to be made from the cyclic thread once the
     /// MainDevice is active. It may be created before or after activation; dropped, it is forgotten.
     pub fn create_sdo_request(&mut self, subdevice: usize, size: usize) -> SdoRequest {
-        let (request, served) = SdoRequest::new(subdevice, size);
+        let (request, served) = SdoRequest::new(subdevice, size, self.requests.bell());
         self.requests.add(served);
         request
     }
 
     /// A request for registers of a declared SubDevice of up to `size` bytes; as [`MainDevice::create_sdo_request`].
     pub fn create_register_request(&mut self, subdevice: usize, size: usize) -> RegisterRequest {
-        let (request, served) = RegisterRequest::new(subdevice, size);
+        let (request, served) = RegisterRequest::new(subdevice, size, self.requests.bell());
         self.requests.add(served);
         request
     }
 
     /// A request for IDNs of a declared SubDevice of up to `size` bytes; as [`MainDevice::create_sdo_request`].
     pub fn create_soe_request(&mut self, subdevice: usize, size: usize) -> SoeRequest {
-        let (request, served) = SoeRequest::new(subdevice, size);
+        let (request, served) = SoeRequest::new(subdevice, size, self.requests.bell());
         self.requests.add(served);
         request
     }
@@ -90,7 +90,7 @@ impl MainDevice {
     /// A handler of vendor messages of a declared SubDevice of up to `size` bytes; as
     /// [`MainDevice::create_sdo_request`].
     pub fn create_voe_handler(&mut self, subdevice: usize, size: usize) -> VoeHandler {
-        let (handler, served) = VoeHandler::new(subdevice, size);
+        let (handler, served) = VoeHandler::new(subdevice, size, self.requests.bell());
         self.requests.add(served);
         handler
     }

@@ -6,32 +6,38 @@ use core::cell::RefCell;
 use core::future::poll_fn;
 use core::pin::pin;
 use core::task::Poll;
-use core::time::Duration;
 
 use ringcat_wire::address::{RegisterAddress, StationAddress};
 use ringcat_wire::mailbox::soe::{Idn, SoeElements};
 
 use super::services::registers;
 use super::shared_segment::SharedSegment;
+use crate::bell::Bell;
 use crate::mail::coe::{self, SdoAddress, SdoError, SdoFailure};
 use crate::mail::soe::{self, SoeAddress, SoeError, SoeFailure};
 use crate::mail::voe::{self, Voe};
 use crate::mail::{Limits, Mailbox, MailboxError};
 use crate::request::{Access, Order, RequestFailure, Served, Subject};
 use crate::supervisor::{Bus, Signal};
-
-/// Pause between two looks at the requests.
-const PAUSE: Duration = Duration::from_micros(500);
+use crate::time::Instant;
 
 /// The requests that exist. A request whose other side is gone is forgotten.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Requests {
     all: Rc<RefCell<Vec<Served>>>,
+    bell: Bell,
 }
 
 impl Requests {
     pub(crate) fn add(&self, served: Served) {
-        self.all.borrow_mut().push(served);
+        let mut all = self.all.borrow_mut();
+        all.retain(|served| !served.is_abandoned());
+        all.push(served);
+    }
+
+    /// Rung by requests that are started or cancelled.
+    pub(crate) fn bell(&self) -> &Bell {
+        &self.bell
     }
 
     /// Nobody serves them any more.
@@ -52,9 +58,9 @@ impl Requests {
 
 /// Runs for ever.
 pub(crate) async fn serve_requests(bus: Bus, segment: SharedSegment, requests: Requests) {
-    let cancelled = bus.signal();
+    let (cancelled, rung) = (bus.signal(), bus.signal());
     loop {
-        bus.sleep(PAUSE).await;
+        let posted = bus.posted();
         if requests.any_cancelled() {
             cancelled.notify();
         }
@@ -68,6 +74,7 @@ pub(crate) async fn serve_requests(bus: Bus, segment: SharedSegment, requests: R
                 None => served.fail(RequestFailure::Failed),
             }
         }
+        bus.until_posted(posted, Instant::NEVER, &rung, || false).await;
     }
 }
 

@@ -124,6 +124,12 @@ impl SharedSegment {
         self.bus.until_posted(seen, until, &self.changed, || self.news.replace(false)).await;
     }
 
+    /// Waits until the cyclic half has posted something else than this, until a point of time, or until `ready`, which is asked
+    /// when something was observed or notified.
+    pub(super) async fn until_posted(&self, seen: Posted, until: Instant, ready: impl FnMut() -> bool) {
+        self.bus.until_posted(seen, until, &self.changed, ready).await;
+    }
+
     /// Waits until the model satisfies a condition.
     pub(super) async fn until<T>(&self, mut ready: impl FnMut(&Segment) -> Option<T>) -> T {
         self.changed.until(|| ready(&self.segment.borrow())).await

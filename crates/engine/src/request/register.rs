@@ -3,6 +3,7 @@
 use ringcat_wire::address::RegisterAddress;
 
 use super::slot::{Request, RequestRefused, Served, Subject, pair};
+use crate::bell::Bell;
 
 /// A request for registers of one SubDevice. It may be moved to the cyclic thread.
 ///
@@ -16,8 +17,8 @@ pub struct RegisterRequest {
 
 impl RegisterRequest {
     /// A request of up to `size` bytes to a declared SubDevice, and its other side.
-    pub(crate) fn new(subdevice: usize, size: usize) -> (RegisterRequest, Served) {
-        let (request, served) = pair(subdevice, size, Subject::Register { address: 0, length: 0 });
+    pub(crate) fn new(subdevice: usize, size: usize, bell: &Bell) -> (RegisterRequest, Served) {
+        let (request, served) = pair(subdevice, size, Subject::Register { address: 0, length: 0 }, bell);
         (RegisterRequest { request }, served)
     }
 

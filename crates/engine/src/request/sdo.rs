@@ -1,6 +1,7 @@
 //! SDO requests of a cyclic thread.
 
 use super::slot::{Request, RequestRefused, Served, Subject, pair};
+use crate::bell::Bell;
 
 /// A request for objects of one SubDevice. It may be moved to the cyclic thread.
 #[derive(Debug)]
@@ -10,9 +11,9 @@ pub struct SdoRequest {
 
 impl SdoRequest {
     /// A request of `size` bytes for an object of a declared SubDevice, and its other side.
-    pub(crate) fn new(subdevice: usize, size: usize) -> (SdoRequest, Served) {
+    pub(crate) fn new(subdevice: usize, size: usize, bell: &Bell) -> (SdoRequest, Served) {
         let subject = Subject::Object { index: 0, sub_index: 0, complete_access: false };
-        let (request, served) = pair(subdevice, size, subject);
+        let (request, served) = pair(subdevice, size, subject, bell);
         (SdoRequest { request }, served)
     }
 
@@ -45,7 +46,7 @@ mod tests {
     // covers: jobs, sdo
     #[test]
     fn a_request_goes_to_the_other_side_and_comes_back_with_what_was_read() {
-        let (mut request, served) = SdoRequest::new(3, 8);
+        let (mut request, served) = SdoRequest::new(3, 8, &Bell::default());
         assert_eq!((request.state(), served.take()), (RequestState::Unused, None));
         request.set_object(0x2000, 7, true).unwrap();
         request.set_timeout(Duration::from_millis(5)).unwrap();
@@ -68,7 +69,7 @@ mod tests {
 
     #[test]
     fn data_that_has_no_room_is_refused_and_failures_are_named() {
-        let (mut request, served) = SdoRequest::new(0, 2);
+        let (mut request, served) = SdoRequest::new(0, 2, &Bell::default());
         assert_eq!(request.write(&[1, 2, 3]), Err(RequestRefused::TooLong { bytes: 3, limit: 2 }));
         request.write(&[1, 2]).unwrap();
         assert_eq!(served.take().unwrap().access, Access::Write(vec![1, 2]));
@@ -88,7 +89,7 @@ mod tests {
 
     #[test]
     fn only_a_request_that_is_under_way_is_cancelled() {
-        let (mut request, served) = SdoRequest::new(0, 2);
+        let (mut request, served) = SdoRequest::new(0, 2, &Bell::default());
         request.cancel();
         assert!(!served.is_cancelled());
         request.read().unwrap();

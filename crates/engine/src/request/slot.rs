@@ -7,6 +7,8 @@ use core::sync::atomic::{AtomicBool, AtomicU8, AtomicU32, AtomicU64, Ordering};
 use core::time::Duration;
 
 use ringcat_wire::mailbox::sdo::AbortCode;
+
+use crate::bell::Bell;
 use ringcat_wire::mailbox::soe::SoeErrorCode;
 
 const UNUSED: u8 = 0;
@@ -138,6 +140,7 @@ struct Slot {
     /// Kind in the upper half, code in the lower.
     failure: AtomicU64,
     data: Box<[AtomicU8]>,
+    bell: Bell,
 }
 
 /// What requests of all kinds have in common, on the side of the application.
@@ -156,7 +159,7 @@ pub(crate) struct Served {
 const DEFAULT_TIMEOUT: Duration = Duration::from_secs(1);
 
 /// A request with `size` bytes of memory to a declared SubDevice, and its other side.
-pub(super) fn pair(subdevice: usize, size: usize, subject: Subject) -> (Request, Served) {
+pub(super) fn pair(subdevice: usize, size: usize, subject: Subject, bell: &Bell) -> (Request, Served) {
     let slot = Arc::new(Slot {
         subdevice,
         state: AtomicU8::new(UNUSED),
@@ -167,6 +170,7 @@ pub(super) fn pair(subdevice: usize, size: usize, subject: Subject) -> (Request,
         length: AtomicU32::new(0),
         failure: AtomicU64::new(0),
         data: (0..size).map(|_| AtomicU8::new(0)).collect(),
+        bell: bell.clone(),
     });
     (Request { slot: slot.clone() }, Served { slot })
 }
@@ -207,6 +211,7 @@ impl Request {
     fn start(&mut self, asked: u8) {
         self.slot.cancelled.store(false, Ordering::Relaxed);
         self.slot.state.store(asked, Ordering::Release);
+        self.slot.bell.ring();
     }
 
     pub(super) fn start_read(&mut self) -> Result<(), RequestRefused> {
@@ -232,6 +237,7 @@ impl Request {
     pub fn cancel(&self) {
         if self.state() == RequestState::Busy {
             self.slot.cancelled.store(true, Ordering::Release);
+            self.slot.bell.ring();
         }
     }
 

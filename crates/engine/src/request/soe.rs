@@ -3,6 +3,7 @@
 use ringcat_wire::mailbox::soe::{Idn, SoeElements};
 
 use super::slot::{Request, RequestRefused, Served, Subject, pair};
+use crate::bell::Bell;
 
 /// A request for elements of IDNs of one SubDevice. It may be moved to the cyclic thread.
 #[derive(Debug)]
@@ -12,9 +13,9 @@ pub struct SoeRequest {
 
 impl SoeRequest {
     /// A request of up to `size` bytes to a declared SubDevice, and its other side.
-    pub(crate) fn new(subdevice: usize, size: usize) -> (SoeRequest, Served) {
+    pub(crate) fn new(subdevice: usize, size: usize, bell: &Bell) -> (SoeRequest, Served) {
         let subject = Subject::Idn { drive: 0, idn: 0, elements: SoeElements::VALUE.0 };
-        let (request, served) = pair(subdevice, size, subject);
+        let (request, served) = pair(subdevice, size, subject, bell);
         (SoeRequest { request }, served)
     }
 

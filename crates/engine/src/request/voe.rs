@@ -1,6 +1,7 @@
 //! VoE handlers of a cyclic thread (IgH manual: VoE handlers).
 
 use super::slot::{Request, RequestRefused, RequestState, Served, Subject, pair};
+use crate::bell::Bell;
 
 /// Vendor messages to and from one SubDevice. It may be moved to the cyclic thread.
 #[derive(Debug)]
@@ -10,8 +11,8 @@ pub struct VoeHandler {
 
 impl VoeHandler {
     /// A handler of messages of up to `size` bytes, their header not counted, and its other side.
-    pub(crate) fn new(subdevice: usize, size: usize) -> (VoeHandler, Served) {
-        let (request, served) = pair(subdevice, size, Subject::Vendor { id: 0, kind: 0 });
+    pub(crate) fn new(subdevice: usize, size: usize, bell: &Bell) -> (VoeHandler, Served) {
+        let (request, served) = pair(subdevice, size, Subject::Vendor { id: 0, kind: 0 }, bell);
         (VoeHandler { request }, served)
     }
 

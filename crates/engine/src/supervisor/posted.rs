@@ -14,6 +14,8 @@ pub struct Posted {
     pub ring: RingWord,
     /// By [`crate::link::Link::index`].
     pub carriers: [Option<bool>; 2],
+    /// How often requests of a cyclic thread were started or cancelled.
+    pub requests: u32,
     /// How often clocks are not told a time since ports have changed.
     pub holds: u32,
 }

@@ -18,6 +18,7 @@ use super::silence::Silence;
 use super::stray::Strays;
 use super::task::{Task, TaskId};
 use super::transfer::{Request, Stage, Transfer, TransferId, Transfers};
+use crate::bell::Bell;
 use crate::board::Board;
 use crate::event::EventLog;
 use crate::link::LinkSet;
@@ -47,6 +48,7 @@ pub(crate) struct Shared {
     pub(crate) blocked: Option<(TransferId, Instant)>,
     pub(crate) link_order: LinkOrder,
     pub(super) watchers: Watchers,
+    pub(super) bell: Bell,
     /// Datagrams that a frame may hold.
     pub(crate) max_datagrams: usize,
     pub(crate) current: TaskId,
@@ -77,6 +79,7 @@ impl Shared {
             blocked: None,
             link_order: LinkOrder::default(),
             watchers: Watchers::default(),
+            bell: Bell::default(),
             max_datagrams: usize::MAX,
             current: TaskId(0),
             spawned: VecDeque::new(),

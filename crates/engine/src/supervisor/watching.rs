@@ -11,8 +11,12 @@ use crate::time::Instant;
 
 impl Shared {
     pub(super) fn posted(&self) -> Posted {
-        let Some(board) = &self.board else { return Posted { carriers: self.carriers, ..Posted::default() } };
+        let requests = self.bell.rung();
+        let Some(board) = &self.board else {
+            return Posted { carriers: self.carriers, requests, ..Posted::default() };
+        };
         Posted {
+            requests,
             supervision: board.supervision().map(|(_, supervision)| supervision),
             ring: board.ring(),
             carriers: self.carriers,

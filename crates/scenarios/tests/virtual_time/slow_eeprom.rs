@@ -100,7 +100,7 @@ fn a_scan_after_one_of_a_slow_eeprom_reads_quick_ones_quickly() {
     assert!(took < Duration::from_millis(60), "{took:?}");
 }
 
-// covers: TO-39, slow-eeproms
+// covers: slow-eeproms
 #[test]
 fn late_and_lost_frames_while_eeproms_are_read_do_not_begin_the_scan_anew_seeds_0() {
     for seed in 0..40 {

@@ -88,6 +88,7 @@ pub(in crate::procedures) async fn restore(bus: &Bus, segment: &SharedSegment, m
         }
         clocks.is_doubtful.get_or_insert(bus.now());
     }
+    segment.notify();
     // Its place is known when the segment has been measured with it.
     let until = bus.now() + MEASURING_LIMIT;
     while segment.clocks.access().is_doubtful.is_some() && bus.now() < until {

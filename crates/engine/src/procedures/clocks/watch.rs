@@ -101,7 +101,7 @@ pub(crate) async fn keep(bus: Bus, segment: SharedSegment) {
     let mut explained_until = Instant::default();
     segment.board.clocks.guard_ports();
     loop {
-        bus.sleep(PAUSE).await;
+        wait(&bus, &segment, next_look, bus.now() < explained_until).await;
         let now = (segment.board.ring().changes, answering(&segment));
         let changed = now != seen;
         if now.0 != seen.0 {
@@ -125,6 +125,17 @@ pub(crate) async fn keep(bus: Bus, segment: SharedSegment) {
             next_measurement = bus.now() + AGAIN;
         }
     }
+}
+
+/// Waits until there is something to do: at once where clocks are not as they should be, otherwise until something is posted
+/// or a clock has come back, or the next look is due.
+async fn wait(bus: &Bus, segment: &SharedSegment, next_look: Instant, is_explained: bool) {
+    let is_doubtful = || segment.clocks.access().is_doubtful.is_some();
+    let is_busy = is_explained || is_doubtful() || segment.board.clocks.is_held() || next_look <= bus.now();
+    if is_busy {
+        return bus.sleep(PAUSE).await;
+    }
+    segment.until_posted(bus.posted(), next_look, is_doubtful).await;
 }
 
 /// What became of a segment meanwhile.
