@@ -1,13 +1,17 @@
 //! Where the acyclic half runs: in the thread of the cycles, or in one of its own.
 
 use ringcat_engine::event::TimedEvent;
+use ringcat_engine::info::SubDeviceInfo;
 use ringcat_engine::link::Link;
 use ringcat_engine::main_device::{MainDevice as Engine, SubDeviceState};
 use ringcat_engine::ring_status::RingStatus;
 use ringcat_engine::supervisor::AcyclicCounters;
 use ringcat_engine::time::Instant;
 
+use crate::error::Error;
 use crate::links::Links;
+use crate::readiness::{KeptEvents, Reason};
+use crate::subdevice::{SubDeviceName, info};
 use crate::window::{Half, Window};
 
 /// What an application needs of the acyclic half, wherever that runs.
@@ -38,45 +42,80 @@ pub trait AcyclicHalf {
 
     /// Its counters. Not for the cyclic path.
     fn counters(&self) -> AcyclicCounters;
+
+    /// What the scan found about a declared SubDevice. Not for the cyclic path.
+    fn info(&self, subdevice: usize) -> Option<SubDeviceInfo>;
+
+    /// Looks at the events that wait; they stay to be taken. Not for the cyclic path.
+    fn keep_events(&mut self, now: Instant);
+
+    /// The declared SubDevices that are not in their states, and why. Not for the cyclic path.
+    ///
+    /// # Errors
+    /// Its thread is gone.
+    fn not_ready(&self) -> Result<Vec<(SubDeviceName, Reason)>, Error>;
 }
 
 /// The acyclic half in the thread of the cycles, on the same links: what tests and simple applications use.
 #[derive(Debug)]
-pub struct Inline(pub(crate) Engine);
+pub struct Inline {
+    pub(crate) engine: Engine,
+    events: KeptEvents,
+}
+
+impl Inline {
+    pub(crate) fn new(engine: Engine) -> Inline {
+        Inline { engine, events: KeptEvents::default() }
+    }
+}
 
 impl AcyclicHalf for Inline {
     const SHARES_LINKS: bool = true;
 
     fn receive(&mut self, link: Link, frame: &[u8], now: Instant) {
-        self.0.receive(link, frame, now);
+        self.engine.receive(link, frame, now);
     }
 
     fn work(&mut self, links: &mut impl Links, window: &Window) {
-        work(&mut self.0, links, window);
+        work(&mut self.engine, links, window);
     }
 
     fn wake(&self) -> Instant {
-        self.0.next_deadline().unwrap_or(Instant::NEVER)
+        self.engine.next_deadline().unwrap_or(Instant::NEVER)
     }
 
     fn states(&self) -> Vec<SubDeviceState> {
-        self.0.states()
+        self.engine.states()
     }
 
     fn all_settled(&self) -> bool {
-        self.0.all_settled()
+        self.engine.all_settled()
     }
 
     fn ring_status(&self) -> RingStatus {
-        self.0.ring_status()
+        self.engine.ring_status()
     }
 
     fn pop_event(&mut self, now: Instant) -> Option<TimedEvent> {
-        self.0.pop_event(now)
+        let Inline { engine, events } = self;
+        events.pop(|| engine.pop_event(now))
     }
 
     fn counters(&self) -> AcyclicCounters {
-        self.0.counters()
+        self.engine.counters()
+    }
+
+    fn info(&self, subdevice: usize) -> Option<SubDeviceInfo> {
+        info(&self.engine, subdevice)
+    }
+
+    fn keep_events(&mut self, now: Instant) {
+        let Inline { engine, events } = self;
+        events.take_in(|| engine.pop_event(now));
+    }
+
+    fn not_ready(&self) -> Result<Vec<(SubDeviceName, Reason)>, Error> {
+        Ok(self.events.failures.explain(&self.engine))
     }
 }
 

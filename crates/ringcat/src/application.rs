@@ -18,7 +18,7 @@ use ringcat_engine::clocks::Follower;
 use ringcat_engine::domain::{DomainId, DomainStatus};
 use ringcat_engine::event::{Event, TimedEvent};
 use ringcat_engine::exchange::{CopyError, CopyRule, CyclicCounters, Entry, Exchange};
-use ringcat_engine::main_device::{Active, Directory, MainDevice as Engine, SubDeviceState};
+use ringcat_engine::main_device::{Active, Directory, MainDevice as Engine, Pending, SubDeviceState};
 use ringcat_engine::ring::RingState;
 use ringcat_engine::ring::identity::{Class, class_of};
 use ringcat_engine::ring_status::RingStatus;
@@ -271,7 +271,37 @@ impl<L: Links, H: AcyclicHalf> Application<L, H> {
         &mut self.links
     }
 }
+
 impl<L: Links> Application<L, Inline> {
+    /// Runs cycles until work has ended that a service or a [`SubDevice`](crate::SubDevice) has begun, and hands out its
+    /// result. What is not done in time is given up.
+    ///
+    /// # Errors
+    /// [`Error::TimedOut`], or the work failed.
+    pub fn cycle_until<T, E>(
+        &mut self,
+        mut pending: Pending<Result<T, E>>,
+        limit: Duration,
+        mut work: impl FnMut(&mut ProcessData<'_>),
+    ) -> Result<T, Error>
+    where
+        Error: From<E>,
+    {
+        let end = self.now() + limit;
+        loop {
+            if let Some(result) = pending.take() {
+                return Ok(result?);
+            }
+            if !pending.is_running() {
+                return Err(Error::Gone);
+            }
+            if self.now() >= end {
+                return Err(Error::TimedOut { limit });
+            }
+            self.cycle(&mut work);
+        }
+    }
+
     /// An orderly stop: a few more cycles, with all outputs zero where `outputs` says so, then all SubDevices are taken
     /// down to a state. Hands back the MainDevice, which may scan again.
     ///
@@ -279,20 +309,20 @@ impl<L: Links> Application<L, Inline> {
     /// SubDevices that do not get to the state in time, or a bus that fails.
     pub fn stop(mut self, outputs: LastOutputs, state: AlState, limit: Duration) -> Result<MainDevice<L>, Error> {
         self.last_cycles(outputs);
-        self.acyclic.0.start_stop(state, limit, self.links.now());
-        let mut main_device = MainDevice::from_parts(self.links, self.acyclic.0, self.window.budget());
+        self.acyclic.engine.start_stop(state, limit, self.links.now());
+        let mut main_device = MainDevice::from_parts(self.links, self.acyclic.engine, self.window.budget());
         main_device.finish_stop()?;
         Ok(main_device)
     }
 
     /// The acyclic half, for what is not offered here.
     pub fn engine(&self) -> &Engine {
-        &self.acyclic.0
+        &self.acyclic.engine
     }
 
     /// The acyclic half, for what is not offered here.
     pub fn engine_mut(&mut self) -> &mut Engine {
-        &mut self.acyclic.0
+        &mut self.acyclic.engine
     }
 }
 

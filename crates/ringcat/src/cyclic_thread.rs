@@ -36,7 +36,6 @@ pub type Ended<L> = Result<Application<L, SupervisorThread>, Box<Panicked<L>>>;
 
 /// The closure of the cycles has panicked. The application is as it was, with all outputs zero: it can be stopped in
 /// order, or run cycles with another closure.
-#[derive(Debug)]
 pub struct Panicked<L> {
     /// The panic's message.
     pub message: String,
@@ -50,7 +49,13 @@ impl<L> fmt::Display for Panicked<L> {
     }
 }
 
-impl<L: fmt::Debug> std::error::Error for Panicked<L> {}
+impl<L> fmt::Debug for Panicked<L> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("Panicked").field("message", &self.message).finish_non_exhaustive()
+    }
+}
+
+impl<L> std::error::Error for Panicked<L> {}
 
 /// The application is dropped without an orderly stop: SubDevices with watchdogs leave OP by themselves.
 impl<L> From<Box<Panicked<L>>> for Error {

@@ -1,6 +1,7 @@
 //! What can go wrong before and after the cycles.
 
 use core::fmt;
+use std::time::Duration;
 
 use ringcat_engine::mail::coe::SdoError;
 use ringcat_engine::main_device::ActivateError;
@@ -11,6 +12,10 @@ use ringcat_engine::procedures::stop::StopError;
 use ringcat_engine::supervisor::BusError;
 #[cfg(feature = "sim")]
 use ringcat_sim::segment::SegmentError;
+
+use crate::mapped::{DoesNotFit, MapError};
+use crate::readiness::NotReady;
+use crate::subdevice::SubDeviceError;
 
 /// An error of the public API.
 #[derive(Debug)]
@@ -26,6 +31,19 @@ pub enum Error {
     Sdo(SdoError),
     /// A service besides the mailbox protocols failed.
     Service(ServiceError),
+    /// Something that was asked of one SubDevice was not done.
+    SubDevice(SubDeviceError),
+    /// SubDevices were not in their states in time.
+    NotReady(NotReady),
+    /// Process data is not as the application expects it.
+    Map(MapError),
+    /// A value has more bits than its place in the process data.
+    DoesNotFit(DoesNotFit),
+    /// Work did not end in time.
+    TimedOut {
+        /// The limit.
+        limit: Duration,
+    },
     /// The segment could not be stopped in order.
     Stop(StopError),
     /// The simulated segment cannot be built.
@@ -43,7 +61,7 @@ pub enum Error {
     },
     /// The closure that the cycles ran has panicked, with this message.
     Panicked(String),
-    /// The thread of the acyclic half has ended.
+    /// The thread of the acyclic half has ended, or the MainDevice was stopped meanwhile.
     Gone,
 }
 
@@ -55,6 +73,11 @@ impl fmt::Display for Error {
             Error::Configure(error) => error.fmt(f),
             Error::Sdo(error) => error.fmt(f),
             Error::Service(error) => error.fmt(f),
+            Error::SubDevice(error) => error.fmt(f),
+            Error::NotReady(error) => error.fmt(f),
+            Error::Map(error) => error.fmt(f),
+            Error::DoesNotFit(error) => error.fmt(f),
+            Error::TimedOut { limit } => write!(f, "not done within {} ms", limit.as_millis()),
             Error::Stop(StopError::Bus(BusError::Lost { .. })) => f.write_str(
                 "stop: no frame comes back on any interface, so SubDevices were not taken to INIT: they keep their state \
                  until their watchdogs expire. Are the cables of the host unplugged?",
@@ -66,47 +89,55 @@ impl fmt::Display for Error {
             #[cfg(feature = "gateway")]
             Error::Gateway { address, cause } => write!(f, "mailbox gateway on {address}: {cause}"),
             Error::Panicked(message) => write!(f, "the application's closure has panicked: {message}"),
-            Error::Gone => f.write_str("the supervisor thread has ended"),
+            Error::Gone => f.write_str("the supervisor thread has ended, or the MainDevice was stopped meanwhile"),
         }
     }
 }
 
-impl std::error::Error for Error {}
-
-impl From<ScanError> for Error {
-    fn from(error: ScanError) -> Error {
-        Error::Scan(error)
+impl std::error::Error for Error {
+    fn source(&self) -> Option<&(dyn std::error::Error + 'static)> {
+        match self {
+            Error::Scan(error) => Some(error),
+            Error::Activate(error) => Some(error),
+            Error::Configure(error) => Some(error),
+            Error::Sdo(error) => Some(error),
+            Error::Service(error) => Some(error),
+            Error::SubDevice(error) => Some(error),
+            Error::NotReady(error) => Some(error),
+            Error::Map(error) => Some(error),
+            Error::DoesNotFit(error) => Some(error),
+            Error::Stop(error) => Some(error),
+            #[cfg(feature = "sim")]
+            Error::Segment(error) => Some(error),
+            Error::Thread(error) => Some(error),
+            #[cfg(feature = "gateway")]
+            Error::Gateway { cause, .. } => Some(cause),
+            Error::TimedOut { .. } | Error::Panicked(_) | Error::Gone => None,
+        }
     }
 }
 
-impl From<ActivateError> for Error {
-    fn from(error: ActivateError) -> Error {
-        Error::Activate(error)
-    }
+macro_rules! errors {
+    ($($variant:ident($error:ty),)*) => {$(
+        impl From<$error> for Error {
+            fn from(error: $error) -> Error {
+                Error::$variant(error)
+            }
+        }
+    )*};
 }
 
-impl From<ConfigureError> for Error {
-    fn from(error: ConfigureError) -> Error {
-        Error::Configure(error)
-    }
-}
-
-impl From<SdoError> for Error {
-    fn from(error: SdoError) -> Error {
-        Error::Sdo(error)
-    }
-}
-
-impl From<ServiceError> for Error {
-    fn from(error: ServiceError) -> Error {
-        Error::Service(error)
-    }
-}
-
-impl From<StopError> for Error {
-    fn from(error: StopError) -> Error {
-        Error::Stop(error)
-    }
+errors! {
+    Scan(ScanError),
+    Activate(ActivateError),
+    Configure(ConfigureError),
+    Sdo(SdoError),
+    Service(ServiceError),
+    SubDevice(SubDeviceError),
+    NotReady(NotReady),
+    Map(MapError),
+    DoesNotFit(DoesNotFit),
+    Stop(StopError),
 }
 
 #[cfg(feature = "sim")]

@@ -54,25 +54,30 @@ pub mod event_log;
 pub mod gateway;
 pub mod histogram;
 mod job;
+mod limits;
 pub mod links;
 pub mod main_device;
+mod mapped;
 pub mod memory;
 pub mod news;
 mod pace;
 #[cfg(feature = "packet")]
 pub mod packet;
 mod process_data;
+mod readiness;
 pub mod services;
 #[cfg(feature = "sim")]
 pub mod shared_segment;
 #[cfg(feature = "sim")]
 pub mod simulated;
 mod states;
+mod subdevice;
 pub mod supervisor_thread;
 pub mod system_time;
 #[cfg(feature = "packet")]
 pub mod tee;
 pub mod text;
+mod value;
 pub mod window;
 
 pub use acyclic::{AcyclicHalf, Inline};
@@ -80,12 +85,17 @@ pub use application::{Application, LastOutputs};
 pub use cyclic_thread::{CyclicThread, Panicked};
 pub use error::Error;
 pub use job::Job;
+pub use limits::TransferLimits;
 pub use links::Links;
 pub use main_device::{MainDevice, Options, Refused, automatic};
+pub use mapped::{DoesNotFit, Input, MapError, Mapped, MappedObject, Output, OutputBits, Wanted};
 pub use pace::{Pace, Trigger};
 pub use process_data::ProcessData;
-pub use services::Services;
+pub use readiness::{NotReady, Reason};
+pub use services::{Background, Services};
+pub use subdevice::{Address, SubDevice, SubDeviceError, SubDeviceFailure, SubDeviceName};
 pub use supervisor_thread::SupervisorThread;
+pub use value::{Number, ObjectValue};
 
 pub use ringcat_engine::clocks::{Follower, phase_error};
 pub use ringcat_engine::config::{
@@ -102,11 +112,18 @@ pub use ringcat_engine::info::{Direction, SubDeviceInfo};
 pub use ringcat_engine::junction::{JunctionConnection, JunctionError, JunctionMode, Shown};
 pub use ringcat_engine::layout::LrwPolicy;
 pub use ringcat_engine::link::Link;
+pub use ringcat_engine::mail::aoe::{AoeDeviceInfo, AoeError, AoeRoute};
+pub use ringcat_engine::mail::coe::history::History;
+pub use ringcat_engine::mail::coe::information::{Entry as ObjectEntry, InformationError, Object};
 pub use ringcat_engine::mail::coe::{SdoAddress, SdoError, SdoFailure};
-pub use ringcat_engine::mail::{Limits, Mailbox};
+pub use ringcat_engine::mail::foe::{FoeError, FoeFailure, FoeOptions, FoeProgress};
+pub use ringcat_engine::mail::soe::command::CommandState;
+pub use ringcat_engine::mail::soe::{SoeAddress, SoeError, SoeFailure};
+pub use ringcat_engine::mail::voe::Voe;
+pub use ringcat_engine::mail::{Limits, Mailbox, MailboxError};
 pub use ringcat_engine::main_device::{
     ActivateError, Declaration, Directory, DomainConfig, DomainMember, ExplicitLrw, GroupState, MAX_DATAGRAMS,
-    MAX_UNDER_WAY, Pending, RawDatagram, Required, SubDeviceState,
+    MAX_UNDER_WAY, Pending, RawDatagram, Required, SubDeviceId, SubDeviceState,
 };
 pub use ringcat_engine::plan::{AreaPlan, MappedEntry, MappedPdo, PlanError, SubDevicePlan, plan};
 pub use ringcat_engine::procedures::configure::ConfigureError;
@@ -129,7 +146,11 @@ pub use ringcat_engine::ring_status::{Cable, CableErrors, LinkStatus, Redundancy
 pub use ringcat_engine::supervisor::{AcyclicCounters, BusError, Reply};
 pub use ringcat_engine::time::Instant;
 pub use ringcat_engine::topology::PortOf;
-pub use ringcat_wire::al::AlState;
+pub use ringcat_wire::address::{Position, RegisterAddress, StationAddress};
+pub use ringcat_wire::al::{AlState, AlStatus, AlStatusCode};
+pub use ringcat_wire::mailbox::coe::{DataType, ListType, ObjectCode};
+pub use ringcat_wire::mailbox::soe::Idn;
+pub use ringcat_wire::register::LoopControl;
 pub use ringcat_wire::source_address::MacCodec;
 
 #[cfg(feature = "eni")]

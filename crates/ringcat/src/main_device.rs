@@ -1,5 +1,6 @@
 //! A MainDevice on its links before it is active.
 
+use std::fmt;
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -272,7 +273,7 @@ impl<L: Links> MainDevice<L> {
         let check = self.engine.start_connection_check();
         let checked = self.finish(check).map_err(ActivateError::Junction);
         match checked.and_then(|()| self.engine.apply()) {
-            Ok(active) => Ok(Application::new(self.links, Inline(self.engine), active, window)),
+            Ok(active) => Ok(Application::new(self.links, Inline::new(self.engine), active, window)),
             Err(error) => Err(Box::new(Refused { error: error.into(), main_device: self })),
         }
     }
@@ -303,13 +304,31 @@ impl<L: Links> MainDevice<L> {
     }
 }
 
-/// A declaration that was not activated.
-#[derive(Debug)]
+/// A declaration that was not activated. As an error it drops the MainDevice; `?` turns it into an [`Error`] or into a
+/// `Box<dyn std::error::Error>`.
 pub struct Refused<M> {
     /// Why.
     pub error: Error,
     /// The MainDevice as it was.
     pub main_device: M,
+}
+
+impl<M> fmt::Debug for Refused<M> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("Refused").field("error", &self.error).finish_non_exhaustive()
+    }
+}
+
+impl<M> fmt::Display for Refused<M> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        self.error.fmt(f)
+    }
+}
+
+impl<M> std::error::Error for Refused<M> {
+    fn source(&self) -> Option<&(dyn std::error::Error + 'static)> {
+        self.error.source()
+    }
 }
 
 impl<M> From<Box<Refused<M>>> for Error {

@@ -1,10 +1,15 @@
 //! What an application works on within a cycle.
 
+use std::ops::Range;
+
 use ringcat_engine::domain::{DomainId, DomainStatus, Freshness};
 use ringcat_engine::exchange::{Entry, Exchange};
 use ringcat_engine::info::Direction;
-use ringcat_engine::main_device::Directory;
+use ringcat_engine::main_device::{Directory, SubDeviceId};
 use ringcat_engine::time::Instant;
+
+use crate::mapped::{DoesNotFit, Mapped, Output, OutputBits};
+use crate::value::Number;
 
 /// When a domain is due, and how it was judged last.
 #[derive(Debug)]
@@ -45,7 +50,7 @@ impl ProcessData<'_> {
         self.rates.get(domain.0).is_some_and(|rate| self.cycle.is_multiple_of(rate.divider))
     }
 
-    /// Value of an entry, zero-extended.
+    /// Value of an entry, zero-extended; [`ProcessData::get`] knows its type.
     pub fn read(&self, entry: &Entry) -> u64 {
         self.exchange.read(entry)
     }
@@ -55,9 +60,81 @@ impl ProcessData<'_> {
         entry.read_signed(self.exchange.image(entry.domain))
     }
 
-    /// Sets an entry.
+    /// Sets an entry to the lower bits of a value. What is written to an input is lost with the next frame; see
+    /// [`ProcessData::set`].
     pub fn write(&mut self, entry: &Entry, value: u64) {
         self.exchange.write(entry, value);
+    }
+
+    /// Value of an input, or of an output as it stands.
+    ///
+    /// ```
+    /// use ringcat::{Input, Output, ProcessData};
+    ///
+    /// /// Follows the axis where it is.
+    /// fn hold(data: &mut ProcessData<'_>, actual: Input<i32>, target: Output<i32>) {
+    ///     data.set(target, data.get(actual));
+    /// }
+    /// ```
+    ///
+    /// An input cannot be set:
+    ///
+    /// ```compile_fail
+    /// # use ringcat::{Input, ProcessData};
+    /// fn wrong(data: &mut ProcessData<'_>, actual: Input<i32>) {
+    ///     data.set(actual, 0);
+    /// }
+    /// ```
+    pub fn get<M: Mapped>(&self, place: M) -> M::Number {
+        M::Number::from_bits(self.exchange.read(&place.entry()))
+    }
+
+    /// Sets an output.
+    pub fn set<T: Number>(&mut self, output: Output<T>, value: T) {
+        self.exchange.write(&output.entry(), value.to_bits());
+    }
+
+    /// Sets an output of any number of bits.
+    ///
+    /// # Errors
+    /// The value has more bits; nothing is changed then.
+    pub fn set_bits(&mut self, output: OutputBits, value: u64) -> Result<(), DoesNotFit> {
+        let bits = output.unsigned(value)?;
+        self.exchange.write(&output.entry(), bits);
+        Ok(())
+    }
+
+    /// Sets an output of any number of bits to a signed value.
+    ///
+    /// # Errors
+    /// The value has more bits; nothing is changed then.
+    pub fn set_signed_bits(&mut self, output: OutputBits, value: i64) -> Result<(), DoesNotFit> {
+        let bits = output.signed(value)?;
+        self.exchange.write(&output.entry(), bits);
+        Ok(())
+    }
+
+    /// The process data of one SyncManager of a SubDevice; `None` where none of it is in a domain.
+    pub fn area(&self, subdevice: SubDeviceId, sync_manager: u8) -> Option<&[u8]> {
+        let (domain, range, _) = self.place_of(subdevice, sync_manager)?;
+        self.exchange.image(domain).get(range)
+    }
+
+    /// The outputs of one SyncManager of a SubDevice; `None` where none are in a domain, or they are inputs.
+    pub fn area_mut(&mut self, subdevice: SubDeviceId, sync_manager: u8) -> Option<&mut [u8]> {
+        let (domain, range, direction) = self.place_of(subdevice, sync_manager)?;
+        if direction == Direction::Inputs {
+            return None;
+        }
+        self.exchange.image_mut(domain).get_mut(range)
+    }
+
+    fn place_of(&self, subdevice: SubDeviceId, sync_manager: u8) -> Option<(DomainId, Range<usize>, Direction)> {
+        let areas = self.directory.areas(subdevice.0);
+        let area = areas.iter().find(|area| area.placed.area.sync_manager == sync_manager)?;
+        let start = area.placed.image_offset as usize;
+        let end = start + usize::from(area.placed.area.length);
+        Some((area.domain, start..end, area.direction))
     }
 
     /// A domain's whole image.

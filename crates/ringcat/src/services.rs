@@ -15,7 +15,7 @@
 use std::time::Duration;
 
 use ringcat_engine::mail::Limits;
-use ringcat_engine::mail::coe::{SdoAddress, SdoError};
+use ringcat_engine::mail::coe::{self, SdoAddress};
 use ringcat_engine::main_device::{MainDevice as Engine, Pending, RawDatagram};
 use ringcat_engine::procedures::configure::ConfigureError;
 use ringcat_engine::procedures::services::ServiceError;
@@ -35,6 +35,7 @@ use crate::error::Error;
 use crate::job::Job;
 use crate::links::Links;
 use crate::main_device::MainDevice;
+use crate::subdevice::{Address, Opening, SubDeviceError, start_with_mailbox};
 use crate::supervisor_thread::SupervisorThread;
 
 /// The services of the acyclic half, wherever it runs.
@@ -70,15 +71,23 @@ pub trait Services: Sized {
     fn immediately<T: Send + 'static>(self, act: impl FnOnce(&mut Engine) -> T + Send + 'static) -> Self::Immediate<T>;
 
     /// Reads an object of at most `limit` bytes, by the SubDevice's mailbox in PREOP, SAFEOP or OP. The time limits
-    /// are: until the mailbox takes a message, until its answer is there.
+    /// are: until the mailbox takes a message, until its answer is there. [`SubDevice`](crate::SubDevice) has this and the
+    /// other protocols with types.
+    ///
+    /// It fails before a scan, for a SubDevice that is not there or not declared, and for one without a mailbox, each with
+    /// an error of its own.
     fn sdo_upload(
         self,
         subdevice: usize,
         object: SdoAddress,
         limits: Limits,
         limit: usize,
-    ) -> Self::Outcome<Vec<u8>, SdoError> {
-        self.call(move |engine| engine.start_sdo_upload(subdevice, object, limits, limit))
+    ) -> Self::Outcome<Vec<u8>, SubDeviceError> {
+        let work = move |mailbox| async move { coe::read(&mailbox, object, limits, limit).await };
+        self.call(move |engine| {
+            let address = Address::of_number(engine, subdevice);
+            start_with_mailbox(engine, address, Opening::LeftAlone, None, work)
+        })
     }
 
     /// Writes an object; as [`Services::sdo_upload`].
@@ -88,8 +97,12 @@ pub trait Services: Sized {
         object: SdoAddress,
         data: Vec<u8>,
         limits: Limits,
-    ) -> Self::Outcome<(), SdoError> {
-        self.call(move |engine| engine.start_sdo_download(subdevice, object, data, limits))
+    ) -> Self::Outcome<(), SubDeviceError> {
+        let work = move |mailbox| async move { coe::write(&mailbox, object, &data, limits).await };
+        self.call(move |engine| {
+            let address = Address::of_number(engine, subdevice);
+            start_with_mailbox(engine, address, Opening::LeftAlone, None, work)
+        })
     }
 
     /// Before activation: brings a scanned SubDevice to PREOP, BOOT or back to INIT; in PREOP and BOOT its mailbox may

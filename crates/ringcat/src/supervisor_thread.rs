@@ -12,6 +12,7 @@ use std::thread::JoinHandle;
 use std::time::Duration;
 
 use ringcat_engine::event::{Event, TimedEvent};
+use ringcat_engine::info::SubDeviceInfo;
 use ringcat_engine::junction::JunctionConnection;
 use ringcat_engine::link::Link;
 use ringcat_engine::main_device::{ActivateError, Declaration, MainDevice as Engine, Pending, SubDeviceState};
@@ -27,6 +28,8 @@ use crate::error::Error;
 use crate::job::{Job, job};
 use crate::links::Links;
 use crate::main_device::{Options, Refused};
+use crate::readiness::{Failures, Reason};
+use crate::subdevice::{SubDeviceName, info};
 use crate::window::Window;
 
 /// A request, and what the cyclic half posts, waits for so long at most until the thread looks.
@@ -60,6 +63,7 @@ struct Rest {
     ring: RingStatus,
     counters: AcyclicCounters,
     events_dropped: u64,
+    failures: Failures,
 }
 
 /// A MainDevice whose acyclic half runs in a thread of its own: a handle, of which any thread may have one.
@@ -105,6 +109,7 @@ impl SupervisorThread {
                 tasks: Vec::new(),
                 events: outgoing,
                 events_dropped: 0,
+                failures: Failures::default(),
                 published: shared,
                 publish_at: Instant(0),
                 attentive_until: Instant(0),
@@ -344,6 +349,17 @@ impl AcyclicHalf for SupervisorThread {
     fn counters(&self) -> AcyclicCounters {
         SupervisorThread::counters(self)
     }
+
+    fn info(&self, subdevice: usize) -> Option<SubDeviceInfo> {
+        self.with(move |engine| info(engine, subdevice)).ok().flatten()
+    }
+
+    fn keep_events(&mut self, _now: Instant) {}
+
+    fn not_ready(&self) -> Result<Vec<(SubDeviceName, Reason)>, Error> {
+        let failures = self.rest().failures;
+        self.with(move |engine| failures.explain(engine))
+    }
 }
 
 /// A running application, or both parts for another try.
@@ -358,6 +374,7 @@ struct Worker<L> {
     tasks: Vec<Task>,
     events: SyncSender<TimedEvent>,
     events_dropped: u64,
+    failures: Failures,
     published: Arc<Published>,
     publish_at: Instant,
     /// Until when the next request is expected soon.
@@ -413,6 +430,7 @@ impl<L: Links> Worker<L> {
         let now = self.links.now();
         let mut any = false;
         while let Some(event) = self.engine.pop_event(now) {
+            self.failures.observe(&event.event);
             any |= !matches!(event.event, Event::Skipped { .. } | Event::Domain { .. });
             if self.events.try_send(event).is_err() {
                 self.events_dropped += 1;
@@ -432,6 +450,7 @@ impl<L: Links> Worker<L> {
             ring: self.engine.ring_status(),
             counters: self.engine.counters(),
             events_dropped: self.events_dropped + self.engine.events_dropped(),
+            failures: self.failures.clone(),
         };
         *self.published.rest.lock().unwrap_or_else(PoisonError::into_inner) = rest;
         self.published.settled.store(self.engine.all_settled(), Ordering::Release);

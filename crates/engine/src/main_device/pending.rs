@@ -38,6 +38,7 @@ impl<T: 'static> Pending<T> {
                 work.as_mut().poll(context).map(Some)
             });
             *own.result.borrow_mut() = result.await;
+            own.signal.notify();
         });
         Pending { slot, running }
     }
@@ -56,6 +57,11 @@ impl<T> Pending<T> {
     /// The result, once; `None` while the work goes on, and after it was taken.
     pub fn take(&mut self) -> Option<T> {
         self.slot.result.borrow_mut().take()
+    }
+
+    /// The result, for another procedure of the same MainDevice that waits for it.
+    pub async fn ended(self) -> T {
+        self.slot.signal.until(|| self.slot.result.borrow_mut().take()).await
     }
 
     /// Whether the work goes on. Work that a stop of the MainDevice has ended has no result.

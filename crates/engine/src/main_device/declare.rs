@@ -1,0 +1,86 @@
+//! A declaration, put together step by step.
+
+use alloc::vec;
+use core::fmt;
+use core::time::Duration;
+
+use super::declaration::{Declaration, DomainConfig, DomainMember, Required};
+use crate::config::{ClockConfig, SubDeviceConfig};
+use crate::domain::DomainId;
+use crate::layout::LrwPolicy;
+
+/// Index of a SubDevice in the declaration. It stays the same wherever the SubDevice is on the bus; where that is, a
+/// [`Position`](ringcat_wire::address::Position) says.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct SubDeviceId(pub usize);
+
+impl fmt::Display for SubDeviceId {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        self.0.fmt(f)
+    }
+}
+
+impl Declaration {
+    /// A declaration with one domain of this period, [`DomainId`] 0, and no SubDevices yet.
+    #[must_use]
+    pub fn with_period(period: Duration) -> Declaration {
+        Declaration { domains: vec![DomainConfig::new(period, vec![])], ..Declaration::default() }
+    }
+
+    /// Adds a SubDevice; all its process data belongs to the first domain, if there is one.
+    pub fn add(&mut self, config: SubDeviceConfig) -> SubDeviceId {
+        self.add_to(DomainId(0), config)
+    }
+
+    /// Adds a SubDevice; all its process data belongs to this domain. Where there is no such domain, the SubDevice is in
+    /// none.
+    pub fn add_to(&mut self, domain: DomainId, config: SubDeviceConfig) -> SubDeviceId {
+        let subdevice = self.subdevices.len();
+        self.subdevices.push(config);
+        if let Some(domain) = self.domains.get_mut(domain.0) {
+            domain.members.push(DomainMember { subdevice, sync_managers: None });
+        }
+        SubDeviceId(subdevice)
+    }
+
+    /// Adds a SubDevice to no domain; [`Declaration::assign`] puts single SyncManagers into domains.
+    pub fn add_without_domain(&mut self, config: SubDeviceConfig) -> SubDeviceId {
+        self.subdevices.push(config);
+        SubDeviceId(self.subdevices.len() - 1)
+    }
+
+    /// Adds a domain; its period is a multiple of the shortest one.
+    pub fn add_domain(&mut self, period: Duration) -> DomainId {
+        self.domains.push(DomainConfig::new(period, vec![]));
+        DomainId(self.domains.len() - 1)
+    }
+
+    /// Puts the process data of one SyncManager into a domain. Where there is no such domain, nothing happens.
+    pub fn assign(&mut self, domain: DomainId, subdevice: SubDeviceId, sync_manager: u8) {
+        if let Some(domain) = self.domains.get_mut(domain.0) {
+            let sync_managers = Some(vec![sync_manager]);
+            domain.members.push(DomainMember { subdevice: subdevice.0, sync_managers });
+        }
+    }
+
+    /// The same, with distributed clocks that are kept together.
+    #[must_use]
+    pub fn with_clocks(mut self, clocks: ClockConfig) -> Declaration {
+        self.clocks = Some(clocks);
+        self
+    }
+
+    /// The same, with this use of LRW.
+    #[must_use]
+    pub fn with_lrw(mut self, lrw: LrwPolicy) -> Declaration {
+        self.lrw = lrw;
+        self
+    }
+
+    /// The same; these SubDevices must be there for the activation.
+    #[must_use]
+    pub fn with_required(mut self, required: Required) -> Declaration {
+        self.required = required;
+        self
+    }
+}

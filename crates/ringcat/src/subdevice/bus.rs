@@ -1,0 +1,125 @@
+//! What needs no mailbox: states, registers, ports, the EEPROM, error counters.
+
+use ringcat_engine::info::SubDeviceInfo;
+use ringcat_engine::procedures::services::ports::BlockedPort;
+use ringcat_engine::procedures::services::statistics::Statistics;
+use ringcat_engine::procedures::sii::program::SiiWritten;
+use ringcat_wire::address::RegisterAddress;
+use ringcat_wire::al::{AlState, AlStatus, AlStatusCode};
+use ringcat_wire::register::{LoopControl, map};
+
+use super::{Address, SubDevice, SubDeviceError, SubDeviceFailure, info};
+use crate::services::Services;
+use crate::value::{Number, ObjectValue};
+
+/// Bytes from AL_STATUS to the end of AL_STATUS_CODE.
+const STATUS_BYTES: usize = 6;
+
+impl<S: Services> SubDevice<S> {
+    /// Brings it to a state while the others go on: INIT, PREOP, BOOT for new firmware, SAFEOP, OP. A declared SubDevice
+    /// is configured again on the way up, keeps the state also over a loss of power, and goes back to the state before
+    /// where it refuses. Before activation the states are INIT, PREOP and BOOT.
+    pub fn request_state(self, state: AlState) -> S::Outcome<(), SubDeviceError> {
+        let address = self.address;
+        self.ask(move |engine, number| {
+            match address {
+                Address::Declared(_) => engine.start_state_request(number, state),
+                Address::Scanned(_) => engine.start_visit(number, state),
+            }
+            .ended()
+        })
+    }
+
+    /// The state in which it is, read from it now. One that has left its state by itself, or has refused one, also has
+    /// the error flag and a code.
+    pub fn state(self) -> S::Outcome<(AlStatus, AlStatusCode), SubDeviceError> {
+        self.ask(move |engine, number| {
+            let read = engine.start_register_read(number, map::AL_STATUS, STATUS_BYTES);
+            async move {
+                let bytes = read.ended().await?;
+                let word = |at: usize| [bytes.get(at), bytes.get(at + 1)].map(|byte| byte.copied().unwrap_or(0));
+                Ok::<_, SubDeviceFailure>((AlStatus::decode(&word(0)), AlStatusCode::decode(&word(4))))
+            }
+        })
+    }
+
+    /// What the scan found about it; `None` for a declared SubDevice that was not there.
+    pub fn info(self) -> S::Outcome<Option<SubDeviceInfo>, SubDeviceError> {
+        self.ask(move |engine, number| {
+            let info = info(engine, number);
+            async move { Ok::<_, SubDeviceFailure>(info) }
+        })
+    }
+
+    /// Reads a register, or memory, of the size of the type.
+    pub fn register_read<T: Number + ObjectValue>(self, address: RegisterAddress) -> S::Outcome<T, SubDeviceError> {
+        self.ask(move |engine, number| {
+            let read = engine.start_register_read(number, address, <T as Number>::BYTES);
+            async move {
+                let bytes = read.ended().await?;
+                Ok::<T, SubDeviceFailure>(T::decode(bytes))
+            }
+        })
+    }
+
+    /// Reads `length` bytes of registers or memory.
+    pub fn register_read_bytes(self, address: RegisterAddress, length: usize) -> S::Outcome<Vec<u8>, SubDeviceError> {
+        self.ask(move |engine, number| engine.start_register_read(number, address, length).ended())
+    }
+
+    /// Writes a register or memory: a number or bytes. Where a frame is lost, it may be written twice.
+    pub fn register_write<T: ObjectValue>(self, address: RegisterAddress, value: T) -> S::Outcome<(), SubDeviceError> {
+        let data = value.encode();
+        self.ask(move |engine, number| engine.start_register_write(number, address, data).ended())
+    }
+
+    /// What a port does about its loop.
+    pub fn port(self, port: u8) -> S::Outcome<LoopControl, SubDeviceError> {
+        self.ask(move |engine, number| engine.start_port_read(number, port).ended())
+    }
+
+    /// Opens or closes a port. SubDevices behind one that is closed get no frames.
+    pub fn set_port(self, port: u8, control: LoopControl) -> S::Outcome<(), SubDeviceError> {
+        self.ask(move |engine, number| engine.start_port_set(number, port, control).ended())
+    }
+
+    /// Cuts it off by closing the ports of its neighbours; [`Services::open_blocked`] opens them again.
+    pub fn block(self) -> S::Outcome<Vec<BlockedPort>, SubDeviceError> {
+        self.ask(move |engine, number| engine.start_block(number).ended())
+    }
+
+    /// Resets its controller. A declared SubDevice is lost and found again, and configured anew.
+    pub fn reset_controller(self) -> S::Outcome<(), SubDeviceError> {
+        self.ask(move |engine, number| engine.start_reset(number).ended())
+    }
+
+    /// Reads its EEPROM, as large as it says that it is.
+    pub fn sii_read(self) -> S::Outcome<Vec<u8>, SubDeviceError> {
+        self.ask(move |engine, number| engine.start_sii_read(number).ended())
+    }
+
+    /// Writes its EEPROM; as [`Services::sii_write`].
+    pub fn sii_write(self, image: Vec<u8>, force: bool) -> S::Outcome<SiiWritten, SubDeviceError> {
+        self.ask(move |engine, number| engine.start_sii_write(number, image, force).ended())
+    }
+
+    /// Writes its alias; as [`Services::write_alias`].
+    pub fn write_alias(self, alias: u16, force: bool) -> S::Outcome<SiiWritten, SubDeviceError> {
+        self.ask(move |engine, number| engine.start_alias_write(number, alias, force).ended())
+    }
+
+    /// Has its controller load its configuration from the EEPROM again.
+    pub fn sii_reload(self) -> S::Outcome<(), SubDeviceError> {
+        self.ask(move |engine, number| engine.start_sii_reload(number).ended())
+    }
+
+    /// Reads its error counters now; it is a declared SubDevice.
+    pub fn read_statistics(self) -> S::Outcome<Statistics, SubDeviceError> {
+        self.ask(move |engine, number| engine.start_statistics_read(number).ended())
+    }
+
+    /// Clears its error counters, and what was kept of them; it is a declared SubDevice.
+    pub fn clear_statistics(self) -> S::Outcome<(), SubDeviceError> {
+        self.ask(move |engine, number| engine.start_statistics_clear(number).ended())
+    }
+}

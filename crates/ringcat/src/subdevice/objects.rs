@@ -1,0 +1,91 @@
+//! CoE: objects of a SubDevice, and what it says about them.
+
+use ringcat_engine::mail::coe::history::{self, History};
+use ringcat_engine::mail::coe::information::{self, Entry as ObjectEntry, Object};
+use ringcat_engine::mail::coe::{self, SdoAddress};
+use ringcat_wire::mailbox::coe::{ListType, ValueInfo};
+
+use super::{SubDevice, SubDeviceError, SubDeviceFailure};
+use crate::services::Services;
+use crate::value::ObjectValue;
+
+impl<S: Services> SubDevice<S> {
+    /// Reads one entry of an object: a number of exactly its size, bytes, or text.
+    ///
+    /// It fails where there is no such entry, or it has another size than the type.
+    pub fn sdo_read<T: ObjectValue>(self, index: u16, sub_index: u8) -> S::Outcome<T, SubDeviceError> {
+        self.read_object(SdoAddress::new(index, sub_index))
+    }
+
+    /// Reads all entries of an object at once, from subindex 0 on (complete access).
+    pub fn sdo_read_complete(self, index: u16) -> S::Outcome<Vec<u8>, SubDeviceError> {
+        self.read_object(SdoAddress::complete(index, 0))
+    }
+
+    fn read_object<T: ObjectValue>(self, object: SdoAddress) -> S::Outcome<T, SubDeviceError> {
+        let limits = self.limits;
+        self.ask_mailbox(move |mailbox| async move {
+            let bytes = coe::read(&mailbox, object, limits.of_message(), limits.bytes).await?;
+            match T::BYTES.filter(|expected| *expected != bytes.len()) {
+                Some(expected) => {
+                    Err(SubDeviceFailure::Size { what: format!("SDO {object}"), expected, got: bytes.len() })
+                }
+                None => Ok(T::decode(bytes)),
+            }
+        })
+    }
+
+    /// Writes one entry of an object.
+    pub fn sdo_write<T: ObjectValue>(self, index: u16, sub_index: u8, value: T) -> S::Outcome<(), SubDeviceError> {
+        self.write_object(SdoAddress::new(index, sub_index), value.encode())
+    }
+
+    /// Writes all entries of an object at once, from subindex 0 on (complete access).
+    pub fn sdo_write_complete(self, index: u16, data: Vec<u8>) -> S::Outcome<(), SubDeviceError> {
+        self.write_object(SdoAddress::complete(index, 0), data)
+    }
+
+    fn write_object(self, object: SdoAddress, data: Vec<u8>) -> S::Outcome<(), SubDeviceError> {
+        let limits = self.limits.of_message();
+        self.ask_mailbox(move |mailbox| async move { coe::write(&mailbox, object, &data, limits).await })
+    }
+
+    /// Indices of all objects that the SubDevice has (SDO information).
+    pub fn sdo_info(self) -> S::Outcome<Vec<u16>, SubDeviceError> {
+        self.sdo_list(ListType::All)
+    }
+
+    /// Indices of the objects in one of the SubDevice's lists.
+    pub fn sdo_list(self, list: ListType) -> S::Outcome<Vec<u16>, SubDeviceError> {
+        let limits = self.limits.of_message();
+        self.ask_mailbox(move |mailbox| async move { information::list(&mailbox, list, limits).await })
+    }
+
+    /// What the SubDevice says about an object: its name, its kind, its largest subindex.
+    pub fn sdo_object(self, index: u16) -> S::Outcome<Object, SubDeviceError> {
+        let limits = self.limits.of_message();
+        self.ask_mailbox(move |mailbox| async move { information::object(&mailbox, index, limits).await })
+    }
+
+    /// What the SubDevice says about an entry: its name, type, access rights, unit, default and range.
+    pub fn sdo_entry(self, index: u16, sub_index: u8) -> S::Outcome<ObjectEntry, SubDeviceError> {
+        let limits = self.limits.of_message();
+        let all = ValueInfo::UNIT | ValueInfo::DEFAULT | ValueInfo::MINIMUM | ValueInfo::MAXIMUM;
+        let work = move |mailbox| async move {
+            information::entry(&mailbox, (index, sub_index), ValueInfo(all), limits).await
+        };
+        self.ask_mailbox(work)
+    }
+
+    /// The diagnosis history (object 0x10F3) with all its messages.
+    pub fn diagnosis(self) -> S::Outcome<History, SubDeviceError> {
+        let limits = self.limits.of_message();
+        self.ask_mailbox(move |mailbox| async move { history::read_history(&mailbox, limits).await })
+    }
+
+    /// Acknowledges the messages of the diagnosis history up to the one at a subindex; 0 clears the history.
+    pub fn acknowledge_diagnosis(self, sub_index: u8) -> S::Outcome<(), SubDeviceError> {
+        let limits = self.limits.of_message();
+        self.ask_mailbox(move |mailbox| async move { history::acknowledge(&mailbox, sub_index, limits).await })
+    }
+}

@@ -1,0 +1,124 @@
+//! Process data by index and by name, with types; what is wrong is said before the cycles, with what is mapped.
+
+use std::error::Error as StdError;
+use std::time::Duration;
+
+use ringcat::simulated::SimulatedSegment;
+use ringcat::{
+    Application, Declaration, DomainId, DomainState, MainDevice, MapError, Options, SubDeviceConfig, SubDeviceId,
+    Wanted,
+};
+
+const SEGMENT: &str = "[segment]\nring = true\n[[device]]\ntype = \"servo\"\n[[device]]\ntype = \"digital-output-8\"\n\
+                       [[device]]\ntype = \"digital-input-8\"\n";
+const PERIOD: Duration = Duration::from_millis(1);
+const LIMIT: Duration = Duration::from_secs(20);
+
+struct Plant {
+    application: Application<SimulatedSegment>,
+    drive: SubDeviceId,
+    lamps: SubDeviceId,
+    buttons: SubDeviceId,
+}
+
+fn plant() -> Result<Plant, Box<dyn StdError>> {
+    let mut main_device = MainDevice::request(SimulatedSegment::from_toml(SEGMENT)?, &Options::default());
+    main_device.scan()?;
+    let mut declaration = Declaration::with_period(PERIOD);
+    let [drive, lamps, buttons] = [0, 1, 2].map(|at| declaration.add(SubDeviceConfig::at_position(at)));
+    Ok(Plant { application: main_device.activate(declaration)?, drive, lamps, buttons })
+}
+
+#[test]
+fn typed_values_arrive_at_the_subdevice_signed_and_come_back() -> Result<(), Box<dyn StdError>> {
+    let Plant { mut application, drive, lamps, .. } = plant()?;
+    let velocity = application.output::<i32>(drive, 0x60FF, 0)?;
+    let mode = application.output_named::<i8>(drive, "Mode of operation")?;
+    let shown = application.input_named::<i8>(drive, "Mode display")?;
+    let lamp = application.output_named::<bool>(lamps, "Channel 3.Output")?;
+    application.wait_until_op(LIMIT)?;
+    for _ in 0..20 {
+        application.cycle(|data| {
+            data.set(velocity, -70_000);
+            data.set(mode, 8);
+            data.set(lamp, true);
+        });
+    }
+    let outputs: Vec<Vec<u8>> =
+        application.links().network().devices().map(|device| device.outputs().to_vec()).collect();
+    assert_eq!(outputs[0][6..10], (-70_000i32).to_le_bytes());
+    assert_eq!(outputs[1], [0b100]);
+    application.cycle(|data| {
+        assert_eq!((data.get(velocity), data.get(shown), data.get(lamp)), (-70_000, 8, true));
+        // The slice of one SyncManager, and the whole image.
+        assert_eq!(data.area(lamps, 0), Some(&[0b100][..]));
+        assert!(data.area(lamps, 7).is_none() && data.image(DomainId(0)).len() >= 12 + 14 + 1 + 1);
+    });
+    Ok(())
+}
+
+#[test]
+fn inputs_cannot_be_written_and_errors_say_what_is_mapped() -> Result<(), Box<dyn StdError>> {
+    let Plant { mut application, drive, lamps, buttons } = plant()?;
+    let direction = application.output::<i32>(drive, 0x6064, 0).expect_err("the drive sends it");
+    assert_eq!(
+        direction.to_string(),
+        "SubDevice 0: 0x6064:00 is an input: the SubDevice sends it, so it cannot be set"
+    );
+    let width = application.output::<i16>(drive, 0x607A, 0).expect_err("it has 32 bits");
+    assert_eq!(width.to_string(), "SubDevice 0: 0x607a:00: i16 has 16 bits, 32 bits are mapped");
+    let missing = application.input::<bool>(buttons, 0x7000, 1).expect_err("it has inputs from 0x6000 on");
+    let text = missing.to_string();
+    assert!(text.starts_with("SubDevice 2 \""), "{text}");
+    assert!(text.contains("0x7000:01 is not mapped; mapped: 0x6000:01 \"Channel 1.Input\" (input, 1 bits)"), "{text}");
+    let ambiguous = application.output_named::<bool>(lamps, "Output").expect_err("all channels have one");
+    assert!(matches!(ambiguous, MapError::Ambiguous { ref found, .. } if found.len() == 8), "{ambiguous}");
+    let nameless = application.output_named::<bool>(lamps, "").expect_err("gaps have no name");
+    assert!(matches!(nameless, MapError::NotMapped { wanted: Wanted::Name(_), .. }), "{nameless}");
+    let undeclared = application.input::<u8>(SubDeviceId(9), 0x6000, 1).expect_err("three are declared");
+    assert_eq!(undeclared.to_string(), "SubDevice 9: not declared: the declaration has 3 SubDevices, from 0");
+    assert_eq!(application.mapped(drive)?.len(), 9);
+    application.cycle(|data| assert!(data.area_mut(buttons, 0).is_none() && data.area_mut(lamps, 0).is_some()));
+    Ok(())
+}
+
+#[test]
+fn a_value_that_does_not_fit_is_an_error_and_changes_nothing() -> Result<(), Box<dyn StdError>> {
+    let Plant { mut application, lamps, drive, .. } = plant()?;
+    let lamp = application.output_bits(lamps, 0x7010, 1)?;
+    let mode = application.output_bits(drive, 0x6060, 0)?;
+    application.cycle(|data| {
+        assert_eq!(data.set_bits(lamp, 1), Ok(()));
+        let error = data.set_bits(lamp, 2).expect_err("one bit");
+        assert_eq!(error.to_string(), "2 does not fit into 1 bits");
+        assert_eq!(data.read(&lamp.entry()), 1);
+        assert_eq!(data.set_signed_bits(mode, -128), Ok(()));
+        assert!(data.set_signed_bits(mode, -129).is_err() && data.set_signed_bits(mode, 128).is_err());
+        assert_eq!(data.read_signed(&mode.entry()), -128);
+    });
+    Ok(())
+}
+
+#[test]
+fn a_cycle_is_driven_in_its_parts_by_a_loop_of_the_applications_own() -> Result<(), Box<dyn StdError>> {
+    let Plant { mut application, lamps, .. } = plant()?;
+    let lamp = application.output::<bool>(lamps, 0x7000, 1)?;
+    let domain = DomainId(0);
+    let mut complete = 0;
+    for _ in 0..4_000 {
+        application.receive();
+        let status = application.process(domain);
+        complete = if status.state == DomainState::Complete { complete + 1 } else { 0 };
+        application.process_data().set(lamp, true);
+        assert!(application.queue(domain), "the cycle before has ended");
+        application.send();
+        application.links_mut().network_mut().advance_by(PERIOD);
+        while let Some(event) = application.pop_event() {
+            assert!(!matches!(event.event, ringcat::Event::ConfigurationFailed { .. }), "{event:?}");
+        }
+    }
+    assert!(application.all_settled() && complete > 1_000, "{complete} complete cycles in a row");
+    let outputs = application.links().network().devices().nth(1).map(|device| device.outputs().to_vec());
+    assert_eq!(outputs, Some(vec![1]));
+    Ok(())
+}
