@@ -6,25 +6,33 @@
 //! ```
 //! use std::time::Duration;
 //! use ringcat::simulated::SimulatedSegment;
-//! use ringcat::{Declaration, MainDevice, Options, automatic};
+//! use ringcat::{Declaration, MainDevice, Options, SubDeviceConfig};
 //!
-//! # fn main() -> Result<(), ringcat::Error> {
+//! # fn main() -> Result<(), Box<dyn std::error::Error>> {
 //! let segment = SimulatedSegment::from_toml("[segment]\nring = true\n[[device]]\ntype = \"digital-output-8\"\n")?;
 //! let mut main_device = MainDevice::request(segment, &Options::default());
-//! let found = main_device.scan()?;
-//! let declaration: Declaration = automatic(&found.subdevices, Duration::from_millis(1));
+//! main_device.scan()?;
+//! let mut declaration = Declaration::with_period(Duration::from_millis(1));
+//! let terminal = declaration.add(SubDeviceConfig::at_position(0));
 //! let mut application = main_device.activate(declaration)?;
-//! let output = application.entry(0, 0x7000, 1);
-//! while !application.all_settled() {
-//!     application.cycle(|data| {
-//!         if let Some(output) = output {
-//!             data.write(&output, 1);
-//!         }
-//!     });
+//! let lamp = application.output::<bool>(terminal, 0x7000, 1)?;
+//! application.wait_until_op(Duration::from_secs(10))?;
+//! for _ in 0..100 {
+//!     application.cycle(|data| data.set(lamp, true));
 //! }
 //! # Ok(())
 //! # }
 //! ```
+//!
+//! | for | see |
+//! |---|---|
+//! | process data with types | [`Application::input`], [`Application::output`], [`ProcessData`] |
+//! | objects, files, registers, states of one SubDevice | [`SubDevice`] |
+//! | cycles in a thread of their own | [`SupervisorThread`], [`CyclicThread`] |
+//! | distributed clocks | [`ClockConfig`], [`SyncSignals`], [`Trigger`] |
+//! | what happened | [`Event`], [`event_log`] |
+//!
+//! The module `guide` leads from here to a drive with clocks.
 //!
 //! Frames, time and waiting come from the [`Links`]; everything that EtherCAT is lives in [`ringcat_engine`].
 //!
@@ -52,6 +60,9 @@ mod error;
 pub mod event_log;
 #[cfg(feature = "gateway")]
 pub mod gateway;
+// The pages of docs/guide, for rustdoc and its tests.
+#[cfg(any(doc, doctest))]
+pub mod guide;
 pub mod histogram;
 mod job;
 mod limits;

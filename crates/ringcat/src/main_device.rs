@@ -29,6 +29,14 @@ use crate::services::Services;
 use crate::window::{DEFAULT_BUDGET, Window};
 
 /// How a MainDevice works. The addresses come from the links.
+///
+/// ```
+/// use std::time::Duration;
+/// use ringcat::Options;
+///
+/// let options = Options::default().with_patience(Duration::from_secs(20)).with_max_datagrams_per_frame(15);
+/// assert!(options.supervision);
+/// ```
 #[derive(Clone, Debug)]
 pub struct Options {
     /// Whether SII contents are kept and used for SubDevices with the same first 64 words.
@@ -80,6 +88,83 @@ impl Default for Options {
 }
 
 impl Options {
+    /// The same, with SII contents kept or not, see [`Options::sii_cache`].
+    #[must_use]
+    pub fn with_sii_cache(mut self, sii_cache: bool) -> Options {
+        self.sii_cache = sii_cache;
+        self
+    }
+
+    /// The same, with these dictionaries asked for PDOs, see [`Options::pdos`].
+    #[must_use]
+    pub fn with_pdos(mut self, pdos: ReadPdos) -> Options {
+        self.pdos = pdos;
+        self
+    }
+
+    /// The same, with or without the supervision datagram, see [`Options::supervision`].
+    #[must_use]
+    pub fn with_supervision(mut self, supervision: bool) -> Options {
+        self.supervision = supervision;
+        self
+    }
+
+    /// The same, with marks in source addresses written so, see [`Options::source_address`].
+    #[must_use]
+    pub fn with_source_address(mut self, source_address: MacCodec) -> Options {
+        self.source_address = source_address;
+        self
+    }
+
+    /// The same, with this time without a change at the beginning of a scan, see [`Options::settle`].
+    #[must_use]
+    pub fn with_settle(mut self, settle: Duration) -> Options {
+        self.settle = settle;
+        self
+    }
+
+    /// The same, with this time for the first SubDevice to answer, see [`Options::patience`].
+    #[must_use]
+    pub fn with_patience(mut self, patience: Duration) -> Options {
+        self.patience = patience;
+        self
+    }
+
+    /// The same, with this treatment of rings behind junctions, see [`Options::junctions`].
+    #[must_use]
+    pub fn with_junctions(mut self, junctions: JunctionMode) -> Options {
+        self.junctions = junctions;
+        self
+    }
+
+    /// The same, with or without a look at the cabling for hot connect groups, see [`Options::follow_groups`].
+    #[must_use]
+    pub fn with_follow_groups(mut self, follow_groups: bool) -> Options {
+        self.follow_groups = follow_groups;
+        self
+    }
+
+    /// The same, with or without a link taken down to find crossed lines, see [`Options::enhanced_line_crossed`].
+    #[must_use]
+    pub fn with_enhanced_line_crossed(mut self, enhanced_line_crossed: bool) -> Options {
+        self.enhanced_line_crossed = enhanced_line_crossed;
+        self
+    }
+
+    /// The same, with so many bytes per cycle for everything but process data, see [`Options::acyclic_bytes`].
+    #[must_use]
+    pub fn with_acyclic_bytes(mut self, acyclic_bytes: usize) -> Options {
+        self.acyclic_bytes = acyclic_bytes;
+        self
+    }
+
+    /// The same, with at most so many datagrams in a frame, see [`Options::max_datagrams_per_frame`].
+    #[must_use]
+    pub fn with_max_datagrams_per_frame(mut self, datagrams: u16) -> Options {
+        self.max_datagrams_per_frame = Some(datagrams);
+        self
+    }
+
     /// An engine for these links.
     pub(crate) fn engine(&self, links: &impl Links) -> Engine {
         let (main, redundant) = links.addresses();

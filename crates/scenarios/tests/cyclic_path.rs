@@ -293,3 +293,30 @@ fn the_image_of_an_eni_takes_no_memory() {
     assert_eq!((used, values), ((0, 0), CYCLES / 2 + CYCLES));
     assert!(application.exchange_mut().image(DomainId(0)).iter().any(|byte| byte & 2 != 0));
 }
+
+#[test]
+fn typed_process_data_takes_no_memory_in_a_cycle() {
+    let segment = "[segment]\nring = true\n[[device]]\ntype = \"servo\"\n[[device]]\ntype = \"digital-output-8\"\n";
+    let links = SimulatedSegment::from_toml(segment).expect("a good segment");
+    let mut main_device = ringcat::MainDevice::request(links, &ringcat::Options::default());
+    main_device.scan().expect("a scan");
+    let mut declaration = ringcat::Declaration::with_period(PERIOD);
+    let [drive, lamps] = [0, 1].map(|at| declaration.add(ringcat::SubDeviceConfig::at_position(at)));
+    let mut application = main_device.activate(declaration).expect("it fits");
+    let target = application.output::<i32>(drive, 0x607A, 0).expect("it is mapped");
+    let actual = application.input_named::<i32>(drive, "Position").expect("it is mapped");
+    let lamp = application.output_bits(lamps, 0x7000, 1).expect("it is mapped");
+    application.wait_until_op(Duration::from_secs(10)).expect("OP");
+    for value in 0..CYCLES {
+        application.cycle(|data| {
+            let memory = counted(|| {
+                data.set(target, data.get(actual).wrapping_add(1));
+                assert_eq!(data.set_bits(lamp, value % 2), Ok(()));
+                assert!(data.set_bits(lamp, 2).is_err());
+                let area = data.area_mut(lamps, 0).map(|area| area[0] |= 0x80);
+                assert!(area.is_some() && data.area(lamps, 0).is_some_and(|area| area[0] & 0x80 != 0));
+            });
+            assert_eq!(memory, (0, 0));
+        });
+    }
+}

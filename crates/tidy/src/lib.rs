@@ -6,6 +6,7 @@
 //! * [`files`]: length of files, forbidden names, the opening comment, marks of unfinished work;
 //! * [`crates`]: allowed arrows between crates;
 //! * [`dependencies`]: what an application takes in with the library; examples and the program use it alone;
+//! * [`interface`]: the list of public items of the library is kept in the repository;
 //! * [`modules`]: allowed arrows between the modules of the engine;
 //! * [`safety`]: where `unsafe` may be written;
 //! * [`protocol`]: sections and statements of `docs/protocol` that are cited exist;
@@ -37,6 +38,7 @@ pub mod dependencies;
 pub mod evidence;
 pub mod features;
 pub mod files;
+pub mod interface;
 pub mod known;
 pub mod limits;
 pub mod modules;

@@ -6,8 +6,8 @@ use tidy::known::Known;
 use tidy::rules::RULES;
 use tidy::tree::Tree;
 use tidy::{
-    Finding, coverage, covers, crates, deny, dependencies, evidence, features, files, modules, paths, protocol, safety,
-    toolchain,
+    Finding, coverage, covers, crates, deny, dependencies, evidence, features, files, interface, modules, paths,
+    protocol, safety, toolchain,
 };
 
 fn tree() -> Tree {
@@ -174,4 +174,19 @@ fn crates_from_elsewhere_are_as_deny_toml_wants_them() {
     let packages = deny::packages(&root).expect("cargo metadata works");
     assert!(packages.len() > 50, "{} packages", packages.len());
     none(deny::unwanted(&wishes, &packages));
+}
+
+/// After a change that is meant, `RINGCAT_WRITE_PUBLIC_ITEMS=1 cargo test -p tidy --test tree public` writes the list anew.
+#[test]
+fn the_list_of_public_items_is_up_to_date() {
+    let tree = tree();
+    let place = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../..").join(interface::LIST);
+    let items = interface::items(&tree);
+    println!("{} public items of the library", items.len());
+    if std::env::var_os("RINGCAT_WRITE_PUBLIC_ITEMS").is_some() {
+        std::fs::write(&place, items.join("\n") + "\n").expect("the list can be written");
+    }
+    let list = std::fs::read_to_string(&place).expect("the list can be read");
+    none(interface::changes(&tree, &list));
+    assert_eq!(list.lines().count(), items.len(), "an item is listed twice or no more");
 }
