@@ -1,5 +1,5 @@
-//! A CiA 402 drive in cyclic synchronous position mode with distributed clocks: it is switched on, moves there and back,
-//! and is switched off.
+//! A CiA 402 drive in cyclic synchronous position mode with distributed clocks: it is switched on, moves there and
+//! back, and is switched off.
 //!
 //! `cargo run -p ringcat --example csp_drive` on a simulated segment;
 //! `cargo run -p ringcat --example csp_drive -- eth1` (as root) on a network interface with one drive as its first

@@ -1,8 +1,8 @@
 //! Cycles in a thread of their own, and objects of a drive read from another thread meanwhile.
 //!
 //! `cargo run -p ringcat --example sdo_from_another_thread` on a simulated segment;
-//! `cargo run -p ringcat --example sdo_from_another_thread -- eth1` (as root) on a network interface whose first SubDevice
-//! is a drive.
+//! `cargo run -p ringcat --example sdo_from_another_thread -- eth1` (as root) on a network interface whose first
+//! SubDevice is a drive.
 
 use std::error::Error;
 use std::ops::ControlFlow;

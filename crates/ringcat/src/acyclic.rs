@@ -10,7 +10,7 @@ use ringcat_engine::time::Instant;
 
 use crate::error::Error;
 use crate::links::Links;
-use crate::readiness::{KeptEvents, Reason};
+use crate::not_ready::{KeptEvents, Reason};
 use crate::subdevice::{SubDeviceName, info};
 use crate::window::{Half, Window};
 

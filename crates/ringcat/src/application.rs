@@ -24,18 +24,15 @@ use ringcat_engine::ring::identity::{Class, class_of};
 use ringcat_engine::ring_status::RingStatus;
 use ringcat_engine::supervisor::AcyclicCounters;
 use ringcat_engine::time::Instant;
-use ringcat_wire::al::AlState;
 
 use crate::acyclic::{AcyclicHalf, Inline};
 use crate::cyclic::Cyclic;
 use crate::error::Error;
 use crate::histogram::Histogram;
 use crate::links::Links;
-use crate::main_device::MainDevice;
 use crate::news::News;
 use crate::pace::{Pace, Trigger};
 use crate::process_data::ProcessData;
-use crate::supervisor_thread::SupervisorThread;
 use crate::window::Window;
 
 /// Cycles with zeroed outputs before an orderly stop.
@@ -56,7 +53,7 @@ pub struct Application<L, H = Inline> {
     pub(crate) links: L,
     pub(crate) cyclic: Cyclic,
     pub(crate) acyclic: H,
-    window: Arc<Window>,
+    pub(crate) window: Arc<Window>,
 }
 
 impl<L: Links, H: AcyclicHalf> Application<L, H> {
@@ -167,7 +164,7 @@ impl<L: Links, H: AcyclicHalf> Application<L, H> {
 
     /// A few more cycles, with all outputs zero where `outputs` says so. Afterwards the wire belongs to the acyclic
     /// half.
-    fn last_cycles(&mut self, outputs: LastOutputs) {
+    pub(crate) fn last_cycles(&mut self, outputs: LastOutputs) {
         self.cyclic.set_trigger(Trigger::Time);
         for _ in 0..LAST_CYCLES {
             self.cycle(|data| {
@@ -273,8 +270,8 @@ impl<L: Links, H: AcyclicHalf> Application<L, H> {
 }
 
 impl<L: Links> Application<L, Inline> {
-    /// Runs cycles until work has ended that a service or a [`SubDevice`](crate::SubDevice) has begun, and hands out its
-    /// result. What is not done in time is given up.
+    /// Runs cycles until work has ended that a service or a [`SubDevice`](crate::SubDevice) has begun, and hands out
+    /// its result. What is not done in time is given up.
     ///
     /// # Errors
     /// [`Error::TimedOut`], or the work failed.
@@ -302,19 +299,6 @@ impl<L: Links> Application<L, Inline> {
         }
     }
 
-    /// An orderly stop: a few more cycles, with all outputs zero where `outputs` says so, then all SubDevices are taken
-    /// down to a state. Hands back the MainDevice, which may scan again.
-    ///
-    /// # Errors
-    /// SubDevices that do not get to the state in time, or a bus that fails.
-    pub fn stop(mut self, outputs: LastOutputs, state: AlState, limit: Duration) -> Result<MainDevice<L>, Error> {
-        self.last_cycles(outputs);
-        self.acyclic.engine.start_stop(state, limit, self.links.now());
-        let mut main_device = MainDevice::from_parts(self.links, self.acyclic.engine, self.window.budget());
-        main_device.finish_stop()?;
-        Ok(main_device)
-    }
-
     /// The acyclic half, for what is not offered here.
     pub fn engine(&self) -> &Engine {
         &self.acyclic.engine
@@ -323,23 +307,5 @@ impl<L: Links> Application<L, Inline> {
     /// The acyclic half, for what is not offered here.
     pub fn engine_mut(&mut self) -> &mut Engine {
         &mut self.acyclic.engine
-    }
-}
-
-impl<L: Links> Application<L, SupervisorThread> {
-    /// An orderly stop: a few more cycles, with all outputs zero where `outputs` says so, then all SubDevices are taken
-    /// down to a state. Hands back the MainDevice, which may scan again, and the links of the cycles.
-    ///
-    /// # Errors
-    /// SubDevices that do not get to the state in time, or a bus that fails.
-    pub fn stop(
-        mut self,
-        outputs: LastOutputs,
-        state: AlState,
-        limit: Duration,
-    ) -> Result<(SupervisorThread, L), Error> {
-        self.last_cycles(outputs);
-        self.acyclic.stop(state, limit)?;
-        Ok((self.acyclic, self.links))
     }
 }

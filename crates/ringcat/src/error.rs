@@ -14,7 +14,7 @@ use ringcat_engine::supervisor::BusError;
 use ringcat_sim::segment::SegmentError;
 
 use crate::mapped::{DoesNotFit, MapError};
-use crate::readiness::NotReady;
+use crate::not_ready::NotReady;
 use crate::subdevice::SubDeviceError;
 
 /// An error of the public API.

@@ -8,15 +8,15 @@ use std::future::Future;
 use std::pin::Pin;
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::task::{Context, Poll, Waker};
-use std::time::{Duration, Instant};
+use std::time::{Duration, Instant as WallClock};
 
 use ringcat_engine::main_device::{MainDevice as Engine, Pending};
+use ringcat_engine::time::Instant;
 
 use crate::error::Error;
-use crate::supervisor_thread::{SupervisorThread, Task};
 
-/// Work under way in the thread of a [`SupervisorThread`]. Dropped, it is aborted: an SDO transfer at the SubDevice,
-/// too.
+/// Work under way in the thread of a [`SupervisorThread`](crate::SupervisorThread). Dropped, it is aborted: an SDO
+/// transfer at the SubDevice, too.
 ///
 /// ```
 /// # use std::time::Duration;
@@ -31,7 +31,16 @@ use crate::supervisor_thread::{SupervisorThread, Task};
 /// ```
 pub struct Job<T> {
     slot: Arc<Slot<T>>,
-    supervisor: SupervisorThread,
+    thread: Box<dyn InOrder>,
+}
+
+/// Work under way in the thread: it has a turn in each of the thread's turns, until it says that it has ended.
+pub(crate) type Task = Box<dyn FnMut(&mut Engine, Instant) -> bool>;
+
+/// The thread, as jobs see it: what is asked of it is done in order. It goes on while there is one of these.
+pub(crate) trait InOrder: Send + Sync {
+    /// Waits until the thread has looked at everything that it was asked before.
+    fn catch_up(&self) -> Result<(), Error>;
 }
 
 /// The other end of a job, in the thread. Dropped without an answer, it says that there will be none.
@@ -86,9 +95,9 @@ impl<T> State<T> {
 }
 
 /// Both ends of a job.
-pub(crate) fn job<T>(supervisor: &SupervisorThread) -> (Job<T>, Reply<T>) {
+pub(crate) fn job<T>(thread: impl InOrder + 'static) -> (Job<T>, Reply<T>) {
     let slot = Arc::new(Slot { state: Mutex::new(State::Running(None)), changed: Condvar::new() });
-    (Job { slot: slot.clone(), supervisor: supervisor.clone() }, Reply { slot })
+    (Job { slot: slot.clone(), thread: Box::new(thread) }, Reply { slot })
 }
 
 impl<T: 'static> Reply<T> {
@@ -148,7 +157,7 @@ impl<T> Job<T> {
 
     /// Waits for the end, for so long at most; `None` where the work goes on.
     pub fn wait_for(&mut self, limit: Duration) -> Option<Result<T, Error>> {
-        let begin = Instant::now();
+        let begin = WallClock::now();
         let mut state = self.slot.state();
         loop {
             let left = limit.saturating_sub(begin.elapsed());
@@ -174,7 +183,7 @@ impl<T> Job<T> {
     pub fn abort(self) -> Result<(), Error> {
         self.slot.end(State::Aborted);
         // The thread looks at what it has under way in order: this comes behind the work.
-        self.supervisor.with(|_| ())
+        self.thread.catch_up()
     }
 }
 

@@ -71,6 +71,7 @@ pub mod main_device;
 mod mapped;
 pub mod memory;
 pub mod news;
+mod not_ready;
 mod pace;
 #[cfg(feature = "packet")]
 pub mod packet;
@@ -82,6 +83,7 @@ pub mod shared_segment;
 #[cfg(feature = "sim")]
 pub mod simulated;
 mod states;
+mod stop;
 mod subdevice;
 pub mod supervisor_thread;
 pub mod system_time;
@@ -89,6 +91,7 @@ pub mod system_time;
 pub mod tee;
 pub mod text;
 mod value;
+mod visit;
 pub mod window;
 
 pub use acyclic::{AcyclicHalf, Inline};
@@ -100,9 +103,9 @@ pub use limits::TransferLimits;
 pub use links::Links;
 pub use main_device::{MainDevice, Options, Refused, automatic};
 pub use mapped::{DoesNotFit, Input, MapError, Mapped, MappedObject, Output, OutputBits, Wanted};
+pub use not_ready::{NotReady, Reason};
 pub use pace::{Pace, Trigger};
 pub use process_data::ProcessData;
-pub use readiness::{NotReady, Reason};
 pub use services::{Background, Services};
 pub use subdevice::{Address, SubDevice, SubDeviceError, SubDeviceFailure, SubDeviceName};
 pub use supervisor_thread::SupervisorThread;

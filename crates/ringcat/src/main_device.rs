@@ -9,8 +9,7 @@ use ringcat_engine::event::TimedEvent;
 use ringcat_engine::info::SubDeviceInfo;
 use ringcat_engine::junction::{JunctionConnection, JunctionMode};
 use ringcat_engine::layout::LrwPolicy;
-use ringcat_engine::mail::coe::SdoAddress;
-use ringcat_engine::mail::{Limits, Mailbox};
+use ringcat_engine::mail::Mailbox;
 use ringcat_engine::main_device::{
     ActivateError, Declaration, DomainConfig, DomainMember, MainDevice as Engine, Options as Engineering, Pending,
 };
@@ -18,14 +17,12 @@ use ringcat_engine::procedures::dictionary::ReadPdos;
 use ringcat_engine::procedures::look_at_ring::{RingLook, look_at_ring};
 use ringcat_engine::procedures::scan::Scan;
 use ringcat_engine::supervisor::AcyclicCounters;
-use ringcat_wire::al::AlState;
 use ringcat_wire::source_address::MacCodec;
 
 use crate::acyclic::{Inline, carry_out_link_order};
 use crate::application::Application;
 use crate::error::Error;
 use crate::links::Links;
-use crate::services::Services;
 use crate::window::{DEFAULT_BUDGET, Window};
 
 /// How a MainDevice works. The addresses come from the links.
@@ -53,9 +50,9 @@ pub struct Options {
     pub patience: Duration,
     /// What becomes of rings behind junctions. A connection that is added makes it strict.
     pub junctions: JunctionMode,
-    /// Whether the cabling is looked at anew, as by [`Services::rescan`], when a hot connect group has joined or left,
-    /// as soon as nothing is broken: positions, places of breaks and errors of cables are then those of the segment as
-    /// it is. Without, a group has none until a rescan is asked for.
+    /// Whether the cabling is looked at anew, as by [`Services::rescan`](crate::Services::rescan), when a hot connect
+    /// group has joined or left, as soon as nothing is broken: positions, places of breaks and errors of cables are
+    /// then those of the segment as it is. Without, a group has none until a rescan is asked for.
     pub follow_groups: bool,
     /// Whether the redundant link may be taken down for a moment, when ports have changed, to find out where a line is
     /// crossed ([`Links::force_disconnect`]). Without, a closed ring shows only that there is a crossing.
@@ -254,37 +251,6 @@ impl<L: Links> MainDevice<L> {
         }
     }
 
-    /// Reads an object of at most `limit` bytes from a scanned SubDevice; one in INIT is brought to PREOP before. The
-    /// time limits are: until the mailbox takes a message, until its answer is there.
-    ///
-    /// # Errors
-    /// The SubDevice does not reach PREOP, or the transfer fails.
-    pub fn sdo_upload(
-        &mut self,
-        position: usize,
-        object: SdoAddress,
-        limits: Limits,
-        limit: usize,
-    ) -> Result<Vec<u8>, Error> {
-        self.visit(position)?;
-        Services::sdo_upload(self, position, object, limits, limit)
-    }
-
-    /// Writes an object of a scanned SubDevice; as [`MainDevice::sdo_upload`].
-    ///
-    /// # Errors
-    /// As [`MainDevice::sdo_upload`].
-    pub fn sdo_download(
-        &mut self,
-        position: usize,
-        object: SdoAddress,
-        data: &[u8],
-        limits: Limits,
-    ) -> Result<(), Error> {
-        self.visit(position)?;
-        Services::sdo_download(self, position, object, data.to_vec(), limits)
-    }
-
     /// The mailbox of a scanned SubDevice, for the functions of [`ringcat_engine::mail`]; see [`MainDevice::run`].
     pub fn mailbox(&self, position: usize) -> Option<Mailbox> {
         self.engine.mailbox(position)
@@ -298,13 +264,6 @@ impl<L: Links> MainDevice<L> {
 
     pub(crate) fn engine_mut(&mut self) -> &mut Engine {
         &mut self.engine
-    }
-
-    fn visit(&mut self, position: usize) -> Result<(), Error> {
-        if self.engine.mailbox(position).is_some_and(|mailbox| mailbox.is_open()) {
-            return Ok(());
-        }
-        self.bring_to(position, AlState::PreOp)
     }
 
     /// Waits for the end of work. Nothing here stops the engine meanwhile, so there is one.

@@ -7,67 +7,21 @@
 
 mod bits;
 mod error;
+mod place;
 mod search;
 
-use std::marker::PhantomData;
-
-use ringcat_engine::exchange::Entry;
 use ringcat_engine::info::Direction;
 use ringcat_engine::main_device::SubDeviceId;
 
 pub use bits::{DoesNotFit, OutputBits};
 pub use error::{MapError, MappedObject, Wanted};
+pub use place::{Input, Mapped, Output};
 
 use crate::acyclic::AcyclicHalf;
 use crate::application::Application;
 use crate::links::Links;
 use crate::value::Number;
 use search::Search;
-
-/// Process data that a SubDevice sends.
-#[derive(Debug, PartialEq, Eq)]
-pub struct Input<T> {
-    entry: Entry,
-    number: PhantomData<fn() -> T>,
-}
-
-/// Process data that a SubDevice receives.
-#[derive(Debug, PartialEq, Eq)]
-pub struct Output<T> {
-    entry: Entry,
-    number: PhantomData<fn() -> T>,
-}
-
-/// An [`Input`] or an [`Output`]: what can be read.
-pub trait Mapped {
-    /// Its type.
-    type Number: Number;
-
-    /// Its place in a domain's image.
-    fn entry(&self) -> Entry;
-}
-
-macro_rules! mapped {
-    ($($name:ident)*) => {$(
-        impl<T> Clone for $name<T> {
-            fn clone(&self) -> $name<T> {
-                *self
-            }
-        }
-
-        impl<T> Copy for $name<T> {}
-
-        impl<T: Number> Mapped for $name<T> {
-            type Number = T;
-
-            fn entry(&self) -> Entry {
-                self.entry
-            }
-        }
-    )*};
-}
-
-mapped! { Input Output }
 
 impl<L: Links, H: AcyclicHalf> Application<L, H> {
     /// What a declared SubDevice sends of this object. Not for the cyclic path, as all of these: they allocate.
@@ -98,7 +52,7 @@ impl<L: Links, H: AcyclicHalf> Application<L, H> {
     /// There is no such SubDevice, the object is not mapped, or it has another direction or number of bits.
     pub fn input<T: Number>(&self, subdevice: SubDeviceId, index: u16, sub_index: u8) -> Result<Input<T>, MapError> {
         let entry = self.search(subdevice)?.typed::<T>(&Wanted::Index { index, sub_index }, Direction::Inputs)?;
-        Ok(Input { entry, number: PhantomData })
+        Ok(Input::new(entry))
     }
 
     /// What a declared SubDevice receives of this object; as [`Application::input`].
@@ -107,7 +61,7 @@ impl<L: Links, H: AcyclicHalf> Application<L, H> {
     /// As [`Application::input`].
     pub fn output<T: Number>(&self, subdevice: SubDeviceId, index: u16, sub_index: u8) -> Result<Output<T>, MapError> {
         let entry = self.search(subdevice)?.typed::<T>(&Wanted::Index { index, sub_index }, Direction::Outputs)?;
-        Ok(Output { entry, number: PhantomData })
+        Ok(Output::new(entry))
     }
 
     /// What a declared SubDevice sends by this name, as its SII or dictionary gives it: `"Position"`, or with the PDO's
@@ -117,7 +71,7 @@ impl<L: Links, H: AcyclicHalf> Application<L, H> {
     /// As [`Application::input`], or several have the name.
     pub fn input_named<T: Number>(&self, subdevice: SubDeviceId, name: &str) -> Result<Input<T>, MapError> {
         let entry = self.search(subdevice)?.typed::<T>(&Wanted::Name(name.to_owned()), Direction::Inputs)?;
-        Ok(Input { entry, number: PhantomData })
+        Ok(Input::new(entry))
     }
 
     /// What a declared SubDevice receives by this name; as [`Application::input_named`].
@@ -126,7 +80,7 @@ impl<L: Links, H: AcyclicHalf> Application<L, H> {
     /// As [`Application::input_named`].
     pub fn output_named<T: Number>(&self, subdevice: SubDeviceId, name: &str) -> Result<Output<T>, MapError> {
         let entry = self.search(subdevice)?.typed::<T>(&Wanted::Name(name.to_owned()), Direction::Outputs)?;
-        Ok(Output { entry, number: PhantomData })
+        Ok(Output::new(entry))
     }
 
     /// An output with any number of bits up to 64, whose values are checked when they are set.

@@ -1,136 +1,19 @@
 //! Waiting until all SubDevices are in their states, with a limit and with reasons.
 
-use std::collections::VecDeque;
-use std::fmt;
 use std::thread::sleep;
 use std::time::{Duration, Instant as WallClock};
-
-use ringcat_engine::event::{Event, TimedEvent};
-use ringcat_engine::main_device::{MainDevice as Engine, SubDeviceId, SubDeviceState};
 
 use crate::acyclic::AcyclicHalf;
 use crate::application::Application;
 use crate::error::Error;
 use crate::links::Links;
+use crate::not_ready::{NotReady, Reason};
 use crate::process_data::ProcessData;
-use crate::subdevice::{Address, SubDeviceName};
+use crate::subdevice::SubDeviceName;
 use crate::supervisor_thread::SupervisorThread;
 
-/// Events that are kept for the application while it waits; older ones are dropped and counted.
-const KEPT: usize = 4096;
 /// Another thread looks this often.
 const LOOK: Duration = Duration::from_millis(1);
-
-/// SubDevices that were not in their states when the time was over.
-#[derive(Clone, Debug, PartialEq)]
-#[non_exhaustive]
-pub struct NotReady {
-    /// How long was waited.
-    pub limit: Duration,
-    /// Which are not there yet, and why.
-    pub subdevices: Vec<(SubDeviceName, Reason)>,
-}
-
-/// Why a SubDevice is not in its state.
-#[derive(Clone, Debug, PartialEq, Eq)]
-#[non_exhaustive]
-pub enum Reason {
-    /// It does not answer.
-    Absent,
-    /// It is being configured, or waits for the next attempt.
-    Configuring {
-        /// What the last attempt failed for, where one has.
-        failed: Option<String>,
-    },
-}
-
-impl fmt::Display for Reason {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Reason::Absent => f.write_str("does not answer"),
-            Reason::Configuring { failed: None } => f.write_str("is still being configured"),
-            Reason::Configuring { failed: Some(reason) } => write!(f, "configuration failed: {reason}"),
-        }
-    }
-}
-
-impl fmt::Display for NotReady {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "not in the declared states within {} ms", self.limit.as_millis())?;
-        for (at, (subdevice, reason)) in self.subdevices.iter().enumerate() {
-            let separator = if at == 0 { ": " } else { "; " };
-            write!(f, "{separator}{subdevice} {reason}")?;
-        }
-        Ok(())
-    }
-}
-
-impl std::error::Error for NotReady {}
-
-/// What configuration failed for last, by index in the declaration.
-#[derive(Clone, Debug, Default)]
-pub(crate) struct Failures(Vec<Option<String>>);
-
-impl Failures {
-    /// Learns from an event.
-    pub fn observe(&mut self, event: &Event) {
-        match event {
-            Event::ConfigurationFailed { subdevice, reason } => {
-                if self.0.len() <= *subdevice {
-                    self.0.resize(*subdevice + 1, None);
-                }
-                self.0[*subdevice] = Some(reason.clone());
-            }
-            Event::StateReached { subdevice, .. } | Event::Lost { subdevice } => {
-                if let Some(reason) = self.0.get_mut(*subdevice) {
-                    *reason = None;
-                }
-            }
-            _ => {}
-        }
-    }
-
-    /// Those that are not in their states, with their reasons.
-    pub fn explain(&self, engine: &Engine) -> Vec<(SubDeviceName, Reason)> {
-        let explain = |(index, state): (usize, SubDeviceState)| {
-            let name = SubDeviceName::of(engine, Address::Declared(SubDeviceId(index)));
-            let failed = self.0.get(index).cloned().flatten();
-            let reason = match state {
-                SubDeviceState::Absent => Reason::Absent,
-                SubDeviceState::Configuring | SubDeviceState::Settled(_) => Reason::Configuring { failed },
-            };
-            (name, reason)
-        };
-        engine.unsettled().into_iter().map(explain).collect()
-    }
-}
-
-/// Events that were looked at before the application took them.
-#[derive(Debug, Default)]
-pub(crate) struct KeptEvents {
-    events: VecDeque<TimedEvent>,
-    pub failures: Failures,
-    pub dropped: u64,
-}
-
-impl KeptEvents {
-    /// Looks at all events that wait, and keeps them.
-    pub fn take_in(&mut self, mut next: impl FnMut() -> Option<TimedEvent>) {
-        while let Some(event) = next() {
-            self.failures.observe(&event.event);
-            if self.events.len() == KEPT {
-                self.events.pop_front();
-                self.dropped += 1;
-            }
-            self.events.push_back(event);
-        }
-    }
-
-    /// The oldest event: one that was kept, or the next one.
-    pub fn pop(&mut self, next: impl FnOnce() -> Option<TimedEvent>) -> Option<TimedEvent> {
-        self.events.pop_front().or_else(|| next().inspect(|event| self.failures.observe(&event.event)))
-    }
-}
 
 impl<L: Links, H: AcyclicHalf> Application<L, H> {
     /// Runs cycles until every declared SubDevice is in its target state (OP unless declared otherwise), optional ones

@@ -71,11 +71,11 @@ pub trait Services: Sized {
     fn immediately<T: Send + 'static>(self, act: impl FnOnce(&mut Engine) -> T + Send + 'static) -> Self::Immediate<T>;
 
     /// Reads an object of at most `limit` bytes, by the SubDevice's mailbox in PREOP, SAFEOP or OP. The time limits
-    /// are: until the mailbox takes a message, until its answer is there. [`SubDevice`](crate::SubDevice) has this and the
-    /// other protocols with types.
+    /// are: until the mailbox takes a message, until its answer is there. [`SubDevice`](crate::SubDevice) has this and
+    /// the other protocols with types.
     ///
-    /// It fails before a scan, for a SubDevice that is not there or not declared, and for one without a mailbox, each with
-    /// an error of its own.
+    /// It fails before a scan, for a SubDevice that is not there or not declared, and for one without a mailbox, each
+    /// with an error of its own.
     fn sdo_upload(
         self,
         subdevice: usize,

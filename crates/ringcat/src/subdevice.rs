@@ -5,13 +5,13 @@
 //!
 //! | made by | form | a method returns |
 //! |---|---|---|
-//! | [`MainDevice::subdevice`] | before activation, by position; receives and sends until the end | `Result<T, Error>` |
+//! | [`MainDevice::subdevice`] | before activation, by position; waits for the end | `Result<T, Error>` |
 //! | [`SupervisorThread::subdevice`] | from any thread; waits for the end | `Result<T, Error>` |
-//! | [`Background::subdevice`] | from any thread, without waiting | [`Job`](crate::Job): a future, to wait for or poll |
+//! | [`Background::subdevice`] | from any thread, without waiting | [`Job`](crate::Job): a future |
 //! | [`Application::subdevice`] in one thread | goes on while cycles go on | [`Pending`](crate::Pending): polled |
 //!
-//! What is made from a thread's handle can be copied and used again and again. In one thread it borrows the application,
-//! so it is made anew for each use: `application.subdevice(drive).sdo_read::<u32>(0x6064, 0)`.
+//! What is made from a thread's handle can be copied and used again and again. In one thread it borrows the
+//! application, so it is made anew for each use: `application.subdevice(drive).sdo_read::<u32>(0x6064, 0)`.
 
 mod bus;
 mod error;
@@ -19,19 +19,21 @@ mod files;
 mod name;
 mod objects;
 mod protocols;
+mod resolve;
+mod start;
 
 use std::future::Future;
 use std::time::Duration;
 
-use ringcat_engine::mail::{Mailbox, MailboxError};
-use ringcat_engine::main_device::{MainDevice as Engine, Pending, SubDeviceId};
-use ringcat_engine::procedures::configure::ConfigureError;
+use ringcat_engine::mail::Mailbox;
+use ringcat_engine::main_device::{MainDevice as Engine, SubDeviceId};
 use ringcat_wire::address::Position;
-use ringcat_wire::al::AlState;
 
 pub use error::{SubDeviceError, SubDeviceFailure};
-pub(crate) use name::info;
 pub use name::{Address, SubDeviceName};
+pub(crate) use resolve::info;
+use start::start;
+pub(crate) use start::{Opening, start_with_mailbox};
 
 use crate::acyclic::Inline;
 use crate::application::Application;
@@ -74,8 +76,8 @@ impl<S: Services> SubDevice<S> {
         self
     }
 
-    /// The same, with a limit for the whole of what is asked. What is not done by then is given up: the SubDevice is told,
-    /// where its protocol can. Without, only single messages have limits.
+    /// The same, with a limit for the whole of what is asked. What is not done by then is given up: the SubDevice is
+    /// told, where its protocol can. Without, only single messages have limits.
     #[must_use]
     pub fn within(mut self, limit: Duration) -> SubDevice<S> {
         self.within = Some(limit);
@@ -109,89 +111,6 @@ impl<S: Services> SubDevice<S> {
         let opening = Opening::of(address);
         services.call(move |engine| start_with_mailbox(engine, address, opening, within, work))
     }
-}
-
-/// Starts work on a SubDevice, with its name in what goes wrong.
-fn start<T, E, W>(
-    engine: &mut Engine,
-    address: Address,
-    within: Option<Duration>,
-    work: impl FnOnce(&mut Engine, usize) -> W,
-) -> Pending<Result<T, SubDeviceError>>
-where
-    T: 'static,
-    SubDeviceFailure: From<E>,
-    W: Future<Output = Result<T, E>> + 'static,
-{
-    let subdevice = SubDeviceName::of(engine, address);
-    let bus = engine.bus();
-    let work = address.find(engine).map(|number| work(engine, number));
-    engine.start(async move {
-        let done = async { Ok(work?.await?) };
-        let result = match within {
-            None => done.await,
-            Some(limit) => bus.within(limit, done).await.unwrap_or(Err(SubDeviceFailure::TimedOut { limit })),
-        };
-        result.map_err(|failure| SubDeviceError { subdevice, failure })
-    })
-}
-
-/// Starts work in a SubDevice's mailbox.
-pub(crate) fn start_with_mailbox<T, E, W>(
-    engine: &mut Engine,
-    address: Address,
-    opening: Opening,
-    within: Option<Duration>,
-    work: impl FnOnce(Mailbox) -> W + 'static,
-) -> Pending<Result<T, SubDeviceError>>
-where
-    T: 'static,
-    SubDeviceFailure: From<E>,
-    W: Future<Output = Result<T, E>> + 'static,
-{
-    start::<T, SubDeviceFailure, _>(engine, address, within, move |engine, number| {
-        let mailbox = reach(engine, number, opening);
-        async move {
-            let (mailbox, visit) = mailbox?;
-            if let Some(visit) = visit {
-                visit.ended().await?;
-            }
-            Ok(work(mailbox).await?)
-        }
-    })
-}
-
-/// What is done about a mailbox that is not in use.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Opening {
-    /// Its SubDevice is brought to PREOP; for those that are not declared.
-    BringToPreOp,
-    /// Nothing.
-    LeftAlone,
-}
-
-impl Opening {
-    const fn of(address: Address) -> Opening {
-        match address {
-            Address::Scanned(_) => Opening::BringToPreOp,
-            Address::Declared(_) => Opening::LeftAlone,
-        }
-    }
-}
-
-/// A mailbox, and what brings its SubDevice to PREOP before it is used.
-type Reached = (Mailbox, Option<Pending<Result<(), ConfigureError>>>);
-
-fn reach(engine: &mut Engine, number: usize, opening: Opening) -> Result<Reached, SubDeviceFailure> {
-    let is_open = engine.mailbox(number).is_some_and(|mailbox| mailbox.is_open());
-    let has_none = || info(engine, number).is_some_and(|info| info.mailbox.is_none() && info.bootstrap.is_none());
-    if !is_open && has_none() {
-        return Err(SubDeviceFailure::NoMailbox);
-    }
-    let is_wanted = !is_open && opening == Opening::BringToPreOp;
-    let visit = is_wanted.then(|| engine.start_visit(number, AlState::PreOp));
-    let mailbox = engine.mailbox(number).ok_or(MailboxError::Closed)?;
-    Ok((mailbox, visit))
 }
 
 impl<L: Links> MainDevice<L> {

@@ -25,10 +25,10 @@ use ringcat_wire::al::AlState;
 use crate::acyclic::{AcyclicHalf, work};
 use crate::application::Application;
 use crate::error::Error;
-use crate::job::{Job, job};
+use crate::job::{InOrder, Job, Task, job};
 use crate::links::Links;
 use crate::main_device::{Options, Refused};
-use crate::readiness::{Failures, Reason};
+use crate::not_ready::{Failures, Reason};
 use crate::subdevice::{SubDeviceName, info};
 use crate::window::Window;
 
@@ -45,8 +45,6 @@ const EVENTS: usize = 4096;
 /// A thread that waits for a scan looks at other things this often.
 const MEANWHILE: Duration = Duration::from_millis(10);
 
-/// Work under way in the thread: it has a turn in each of the thread's turns, until it says that it has ended.
-pub(crate) type Task = Box<dyn FnMut(&mut Engine, Instant) -> bool>;
 /// What another thread asks for: it begins work. Work of the engine stays in the thread that made it.
 type Request = Box<dyn FnOnce(&mut Engine, Instant) -> Task + Send>;
 
@@ -132,7 +130,7 @@ impl SupervisorThread {
         &self,
         start: impl FnOnce(&mut Engine) -> Pending<T> + Send + 'static,
     ) -> Job<T> {
-        let (job, reply) = job(self);
+        let (job, reply) = job(self.clone());
         // Where the thread is gone the reply is dropped, and the job knows.
         let _ = self.begin(move |engine, _| reply.follow(start(engine)));
         job
@@ -140,7 +138,7 @@ impl SupervisorThread {
 
     /// Has the thread ask its engine a question again and again until there is an answer.
     fn ask<R: Send + 'static>(&self, question: impl FnMut(&mut Engine) -> Option<R> + Send + 'static) -> Job<R> {
-        let (job, reply) = job(self);
+        let (job, reply) = job(self.clone());
         let _ = self.begin(move |_, _| reply.answer(question));
         job
     }
@@ -266,7 +264,7 @@ impl SupervisorThread {
 
     /// Takes all SubDevices down to a state.
     pub(crate) fn stop(&self, state: AlState, limit: Duration) -> Result<(), Error> {
-        let (begun, reply) = job(self);
+        let (begun, reply) = job(self.clone());
         self.begin(move |engine, now| {
             engine.start_stop(state, limit, now);
             reply.answer(|engine| engine.stop_result())
@@ -306,6 +304,12 @@ impl SupervisorThread {
     /// Counters of everything but process data, at most some milliseconds old.
     pub fn counters(&self) -> AcyclicCounters {
         self.rest().counters
+    }
+}
+
+impl InOrder for SupervisorThread {
+    fn catch_up(&self) -> Result<(), Error> {
+        self.with(|_| ())
     }
 }
 

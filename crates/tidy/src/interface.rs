@@ -1,10 +1,10 @@
-//! The public items of the library `ringcat`, as its sources have them: a list that is kept in the repository, so that a
-//! review sees every change of the interface.
+//! The public items of the library `ringcat`, as its sources have them: a list that is kept in the repository, so that
+//! a review sees every change of the interface.
 //!
-//! In goes the tree, formatted by rustfmt; out comes a line for each item: what the crate root hands on, public types with
-//! their fields and variants, traits with their items, public functions, and the traits that types implement. Not in the
-//! list: what a macro makes, and what a type of a lower crate has besides its name. Items of private modules are listed
-//! where they are public, also if the crate root does not name them.
+//! In goes the tree, formatted by rustfmt; out comes a line for each item: what the crate root hands on, public types
+//! with their fields and variants, traits with their items, public functions, and the traits that types implement. Not
+//! in the list: what a macro makes, and what a type of a lower crate has besides its name. Items of private modules are
+//! listed where they are public, also if the crate root does not name them.
 
 use crate::Finding;
 use crate::tree::{File, Tree};

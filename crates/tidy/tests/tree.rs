@@ -176,7 +176,8 @@ fn crates_from_elsewhere_are_as_deny_toml_wants_them() {
     none(deny::unwanted(&wishes, &packages));
 }
 
-/// After a change that is meant, `RINGCAT_WRITE_PUBLIC_ITEMS=1 cargo test -p tidy --test tree public` writes the list anew.
+/// After a change that is meant, `RINGCAT_WRITE_PUBLIC_ITEMS=1 cargo test -p tidy --test tree public` writes the list
+/// anew.
 #[test]
 fn the_list_of_public_items_is_up_to_date() {
     let tree = tree();

@@ -32,8 +32,8 @@ impl Declaration {
         self.add_to(DomainId(0), config)
     }
 
-    /// Adds a SubDevice; all its process data belongs to this domain. Where there is no such domain, the SubDevice is in
-    /// none.
+    /// Adds a SubDevice; all its process data belongs to this domain. Where there is no such domain, the SubDevice is
+    /// in none.
     pub fn add_to(&mut self, domain: DomainId, config: SubDeviceConfig) -> SubDeviceId {
         let subdevice = self.subdevices.len();
         self.subdevices.push(config);

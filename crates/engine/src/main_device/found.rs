@@ -5,7 +5,6 @@ use ringcat_wire::address::StationAddress;
 use super::MainDevice;
 use super::states::SubDeviceState;
 use crate::info::SubDeviceInfo;
-use crate::segment::member::Phase;
 
 impl MainDevice {
     /// How many SubDevices the last scan found; `None` before one has ended well.
@@ -30,11 +29,12 @@ impl MainDevice {
         let Some(segment) = &self.segment else { return alloc::vec::Vec::new() };
         let access = segment.view();
         let members = access.members.iter().enumerate();
-        let unsettled = members.filter(|(_, member)| match member.phase {
-            Phase::Settled(_) => false,
-            Phase::Absent => !member.config.optional,
-            Phase::Configuring => true,
+        let states = members.map(|(index, member)| (index, member.phase.into(), member.config.optional));
+        let unsettled = states.filter(|(_, state, optional)| match state {
+            SubDeviceState::Settled(_) => false,
+            SubDeviceState::Absent => !optional,
+            SubDeviceState::Configuring => true,
         });
-        unsettled.map(|(index, member)| (index, member.phase.into())).collect()
+        unsettled.map(|(index, state, _)| (index, state)).collect()
     }
 }

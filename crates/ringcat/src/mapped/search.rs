@@ -52,8 +52,8 @@ impl Search {
         Ok(entry)
     }
 
-    /// The place of an object. One that is mapped in both directions is found in the one that is looked for; of one that is
-    /// mapped more than once in it by index, the first place.
+    /// The place of an object. One that is mapped in both directions is found in the one that is looked for; of one
+    /// that is mapped more than once in it by index, the first place.
     pub fn find(self, wanted: &Wanted, direction: Direction) -> Result<Entry, MapError> {
         let Search { subdevice, name, mapped } = self;
         let fits = |object: &&MappedObject| match wanted {
@@ -82,7 +82,8 @@ fn is_called(object: &MappedObject, name: &str) -> bool {
     !object.name.is_empty() && (object.name == name || with_pdo() == Some(object.name.as_str()))
 }
 
-/// Names of a PDO and of the entry in it that is this object; of the PDO that is assigned by default where several have it.
+/// Names of a PDO and of the entry in it that is this object; of the PDO that is assigned by default where several have
+/// it.
 fn names(pdos: &[PdoInfo], direction: Direction, object: (u16, u8)) -> (String, String) {
     let of_direction = || pdos.iter().filter(|pdo| pdo.direction == direction);
     let assigned = of_direction().filter(|pdo| pdo.sync_manager.is_some());

@@ -16,9 +16,9 @@ use crate::value::{Number, ObjectValue};
 const STATUS_BYTES: usize = 6;
 
 impl<S: Services> SubDevice<S> {
-    /// Brings it to a state while the others go on: INIT, PREOP, BOOT for new firmware, SAFEOP, OP. A declared SubDevice
-    /// is configured again on the way up, keeps the state also over a loss of power, and goes back to the state before
-    /// where it refuses. Before activation the states are INIT, PREOP and BOOT.
+    /// Brings it to a state while the others go on: INIT, PREOP, BOOT for new firmware, SAFEOP, OP. A declared
+    /// SubDevice is configured again on the way up, keeps the state also over a loss of power, and goes back to the
+    /// state before where it refuses. Before activation the states are INIT, PREOP and BOOT.
     pub fn request_state(self, state: AlState) -> S::Outcome<(), SubDeviceError> {
         let address = self.address;
         self.ask(move |engine, number| {

@@ -35,8 +35,8 @@ impl<S: Services> SubDevice<S> {
         self.foe_write_with(file, data, options, |_| ())
     }
 
-    /// Writes a file with a password or other limits; `progress` is told after each packet, in the thread of the acyclic
-    /// half.
+    /// Writes a file with a password or other limits; `progress` is told after each packet, in the thread of the
+    /// acyclic half.
     pub fn foe_write_with(
         self,
         file: impl Into<String>,
