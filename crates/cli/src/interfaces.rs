@@ -207,7 +207,11 @@ impl InterfaceArguments {
             SourceAddress::FlagsFirst => MacCodec::FlagsFirst,
             SourceAddress::IdLast => MacCodec::IdLast,
         };
-        Options { source_address, max_datagrams_per_frame: self.max_datagrams, ..Options::default() }
+        let options = Options::default().with_source_address(source_address);
+        match self.max_datagrams {
+            Some(datagrams) => options.with_max_datagrams_per_frame(datagrams),
+            None => options,
+        }
     }
 
     /// Opens the interfaces. Refuses where another MainDevice uses one of them, and fails where no cable is plugged in.

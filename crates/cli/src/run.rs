@@ -23,8 +23,8 @@ use ringcat::packet::PacketLinks;
 use ringcat::tee::Tee;
 use ringcat::text::{Names, address_of_sender, describe};
 use ringcat::{
-    CyclicThread, Declaration, DomainId, DomainState, Event, Instant, LastOutputs, Links, MAX_UNDER_WAY, Options,
-    ReadPdos, SubDeviceInfo, SubDeviceState, SupervisorThread, automatic,
+    CyclicThread, Declaration, DomainId, DomainState, Event, Instant, LastOutputs, Links, MAX_UNDER_WAY, ReadPdos,
+    SubDeviceInfo, SubDeviceState, SupervisorThread, automatic,
 };
 
 use crate::clock_options::ClockOptions;
@@ -125,13 +125,15 @@ pub fn run(arguments: &RunArguments) -> Result<Verdict, Failure> {
     let (mut cyclic, acyclic) = (recording.tee(cyclic), recording.tee(acyclic));
     let _awake = thread.prepare_process();
     let begin = now();
-    let options = Options {
-        junctions: arguments.junction.mode,
-        enhanced_line_crossed: arguments.enhanced_line_crossed,
-        // A file that declares all SyncManagers says what PDOs there are.
-        pdos: if network.as_ref().is_some_and(EniNetwork::is_complete) { ReadPdos::Never } else { ReadPdos::default() },
-        ..arguments.interfaces.options()
-    };
+    // A file that declares all SyncManagers says what PDOs there are.
+    let pdos =
+        if network.as_ref().is_some_and(EniNetwork::is_complete) { ReadPdos::Never } else { ReadPdos::default() };
+    let options = arguments
+        .interfaces
+        .options()
+        .with_junctions(arguments.junction.mode)
+        .with_enhanced_line_crossed(arguments.enhanced_line_crossed)
+        .with_pdos(pdos);
     let supervisor = SupervisorThread::start(acyclic, &options, move || thread.prepare_supervisor())?;
     let beside = arguments.beside.start(&supervisor, &arguments.interfaces)?;
     let mut others = 0;

@@ -57,6 +57,7 @@ impl fmt::Display for JunctionConnection {
 
 /// Why a connection is refused: the configuration is to blame.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[non_exhaustive]
 pub enum JunctionError {
     /// Nothing is loaded to which a connection could be added.
     NotLoaded,

@@ -35,6 +35,7 @@ use crate::window::{DEFAULT_BUDGET, Window};
 /// assert!(options.supervision);
 /// ```
 #[derive(Clone, Debug)]
+#[non_exhaustive]
 pub struct Options {
     /// Whether SII contents are kept and used for SubDevices with the same first 64 words.
     pub sii_cache: bool,

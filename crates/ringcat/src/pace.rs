@@ -25,6 +25,7 @@ pub enum Trigger {
 
 /// How well the cycles keep to their times. None of it is the wire's fault.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[non_exhaustive]
 pub struct Pace {
     /// Cycles that ran.
     pub cycles: u64,

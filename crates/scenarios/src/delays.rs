@@ -204,7 +204,7 @@ pub fn run(shape: Shape, seed: u64, changes: u64) -> Outcome {
     }
     let network = wired(devices, &plan.cables);
     let junctions = if plan.connections.is_empty() { JunctionMode::Disabled } else { JunctionMode::Strict };
-    let options = Options { junctions, ..Options::default() };
+    let options = Options::default().with_junctions(junctions);
     let config = ClockConfig { drift_distributions: 500, ..config() };
     let mut world = World::with_junctions(seed, network, &options, |scan| with_clocks(scan, config), &plan.connections)
         .unwrap_or_else(|error| panic!("seed {seed}, {shape:?}: {error}"));

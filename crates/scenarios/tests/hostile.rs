@@ -123,7 +123,7 @@ fn eeproms(seed: u64) {
         let right = network.device(device).controller.sii_image().to_vec();
         *network.device_mut(device).controller.sii_image_mut() = image(&mut dice, &right);
     }
-    let options = Options { sii_cache: !dice.one_in(3), ..Options::default() };
+    let options = Options::default().with_sii_cache(!dice.one_in(3));
     let links = Meddled::new(network, LIMIT, |_| Verdict::Arrives);
     work(MainDevice::request(links, &options), 200, || ());
 }
@@ -177,7 +177,7 @@ fn lie(dice: &mut Dice, frame: &mut Vec<u8>) -> Verdict {
 fn lies(seed: u64) {
     let mut dice = Dice::new(seed);
     let (network, expected) = segment(&mut dice, seed);
-    let options = Options { sii_cache: dice.one_in(2), ..Options::default() };
+    let options = Options::default().with_sii_cache(dice.one_in(2));
     let (one_in, left) = (*dice.pick(&[2, 10, 100]), Rc::new(Cell::new(0)));
     let lies_left = left.clone();
     let mut liar = dice;

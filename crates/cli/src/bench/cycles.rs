@@ -10,8 +10,8 @@ use clap::Args;
 use ringcat::AlState;
 use ringcat::packet::PacketLinks;
 use ringcat::{
-    AcyclicHalf, Application, Declaration, DomainId, LastOutputs, MAX_UNDER_WAY, MainDevice, Options, Scan,
-    SupervisorThread, Trigger, automatic,
+    AcyclicHalf, Application, Declaration, DomainId, LastOutputs, MAX_UNDER_WAY, MainDevice, Scan, SupervisorThread,
+    Trigger, automatic,
 };
 use ringcat_link::monotonic;
 
@@ -57,7 +57,7 @@ pub struct CyclesArguments {
 pub fn run(arguments: &CyclesArguments) -> Result<Verdict, Failure> {
     let thread = arguments.thread;
     let end = EndRequest::watch(thread.priority)?;
-    let options = Options { supervision: !arguments.unsupervised, ..arguments.interfaces.options() };
+    let options = arguments.interfaces.options().with_supervision(!arguments.unsupervised);
     if arguments.one_thread {
         let links = arguments.interfaces.open(thread)?;
         let _awake = thread.apply();

@@ -117,7 +117,9 @@ mod tests {
     use super::*;
 
     fn seen(counters: CyclicCounters, cycles: u64, skipped: u64) -> Seen {
-        Seen { counters, pace: Pace { cycles, skipped, ..Pace::default() } }
+        let mut pace = Pace::default();
+        (pace.cycles, pace.skipped) = (cycles, skipped);
+        Seen { counters, pace }
     }
 
     fn settled() -> Exchanged {

@@ -9,6 +9,7 @@ use crate::info::IdentityField;
 
 /// Why a declaration has no SubDevice.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum ConfigError {
     /// Another SubDevice is at its place.
     Mismatch {

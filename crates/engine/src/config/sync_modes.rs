@@ -14,6 +14,7 @@ const SYNC1: u16 = 0x0400;
 
 /// Why no SYNC signals follow from an operation mode.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[non_exhaustive]
 pub enum ModeError {
     /// It activates none.
     NoSignals {

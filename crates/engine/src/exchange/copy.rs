@@ -47,6 +47,7 @@ impl CopyRule {
 
 /// Why a table of copies cannot be used; rules are counted from 0.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum CopyError {
     /// The source does not lie in inputs of one SubDevice.
     Source {

@@ -20,6 +20,7 @@ pub struct InfoWarning {
 
 /// What is odd.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum SiiProblem {
     /// The fixed area is all 0xFF or all zero: the EEPROM was never written.
     Blank,

@@ -6,6 +6,7 @@ use ringcat_wire::datagram::MAX_DATA;
 
 /// Why domains cannot be laid out.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum LayoutError {
     /// An area is longer than a datagram can carry.
     AreaTooLong {

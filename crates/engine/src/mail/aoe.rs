@@ -23,6 +23,7 @@ pub struct AoeRoute {
 
 /// Why a request failed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum AoeError {
     /// The mailbox failed.
     Mailbox(MailboxError),
@@ -46,7 +47,15 @@ impl fmt::Display for AoeError {
     }
 }
 
-impl core::error::Error for AoeError {}
+impl core::error::Error for AoeError {
+    fn source(&self) -> Option<&(dyn core::error::Error + 'static)> {
+        match self {
+            AoeError::Mailbox(error) => Some(error),
+            AoeError::Malformed(error) => Some(error),
+            _ => None,
+        }
+    }
+}
 
 impl From<MailboxError> for AoeError {
     fn from(error: MailboxError) -> AoeError {

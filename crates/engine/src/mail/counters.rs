@@ -2,6 +2,7 @@
 
 /// Counters of one mailbox since the beginning.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[non_exhaustive]
 pub struct MailCounters {
     /// Mails that the SubDevice took.
     pub written: u64,

@@ -9,6 +9,7 @@ use crate::supervisor::BusError;
 
 /// Why there is no answer.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum MailboxError {
     /// The bus failed.
     Bus(BusError),
@@ -55,7 +56,14 @@ impl fmt::Display for MailboxError {
     }
 }
 
-impl core::error::Error for MailboxError {}
+impl core::error::Error for MailboxError {
+    fn source(&self) -> Option<&(dyn core::error::Error + 'static)> {
+        match self {
+            MailboxError::Bus(error) => Some(error),
+            _ => None,
+        }
+    }
+}
 
 impl From<BusError> for MailboxError {
     fn from(error: BusError) -> MailboxError {

@@ -51,6 +51,7 @@ pub struct SoeError {
 
 /// What happened to an access.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum SoeFailure {
     /// The mailbox failed.
     Mailbox(MailboxError),
@@ -84,7 +85,14 @@ impl fmt::Display for SoeError {
     }
 }
 
-impl core::error::Error for SoeError {}
+impl core::error::Error for SoeError {
+    fn source(&self) -> Option<&(dyn core::error::Error + 'static)> {
+        match &self.cause {
+            SoeFailure::Mailbox(error) => Some(error),
+            _ => None,
+        }
+    }
+}
 
 impl From<MailboxError> for SoeFailure {
     fn from(error: MailboxError) -> SoeFailure {

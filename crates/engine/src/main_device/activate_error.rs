@@ -15,6 +15,7 @@ use crate::segment::setup::SetupError;
 
 /// Why a declaration cannot be activated.
 #[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
 pub enum ActivateError {
     /// There is no scan result.
     NoScan,
@@ -209,4 +210,14 @@ fn fmt_sync_cycle(f: &mut fmt::Formatter<'_>, subdevice: usize, sync0: Duration,
     f.write_str("one must be a multiple of the other")
 }
 
-impl core::error::Error for ActivateError {}
+impl core::error::Error for ActivateError {
+    fn source(&self) -> Option<&(dyn core::error::Error + 'static)> {
+        match self {
+            ActivateError::Config { error, .. } => Some(error),
+            ActivateError::Setup { error, .. } => Some(error),
+            ActivateError::Junction(error) => Some(error),
+            ActivateError::Layout(error) => Some(error),
+            _ => None,
+        }
+    }
+}

@@ -33,6 +33,7 @@ pub enum PlanFault {
 
 /// What is wrong.
 #[derive(Clone, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum PlanProblem {
     /// Nothing is declared, and the EEPROM says nothing.
     NoSii,

@@ -22,6 +22,7 @@ const IDENTIFICATION_LIMIT: Duration = Duration::from_millis(50);
 
 /// Why a SubDevice is not in the requested state.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum StateError {
     /// The bus failed.
     Bus(BusError),
@@ -59,7 +60,14 @@ impl fmt::Display for StateError {
     }
 }
 
-impl core::error::Error for StateError {}
+impl core::error::Error for StateError {
+    fn source(&self) -> Option<&(dyn core::error::Error + 'static)> {
+        match self {
+            StateError::Bus(error) => Some(error),
+            _ => None,
+        }
+    }
+}
 
 impl From<BusError> for StateError {
     fn from(error: BusError) -> StateError {

@@ -15,6 +15,7 @@ use crate::supervisor::BusError;
 
 /// Why a service was not done.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum ServiceError {
     /// Nobody is declared, or was found, with this number.
     NoSubDevice {
@@ -90,7 +91,15 @@ impl fmt::Display for ServiceError {
     }
 }
 
-impl core::error::Error for ServiceError {}
+impl core::error::Error for ServiceError {
+    fn source(&self) -> Option<&(dyn core::error::Error + 'static)> {
+        match self {
+            ServiceError::Bus(error) => Some(error),
+            ServiceError::Sii(error) => Some(error),
+            _ => None,
+        }
+    }
+}
 
 impl From<SiiProgramError> for ServiceError {
     fn from(error: SiiProgramError) -> ServiceError {

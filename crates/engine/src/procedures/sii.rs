@@ -44,6 +44,7 @@ const CACHE_PAUSE: Duration = Duration::from_micros(500);
 
 /// Why an SII cannot be read.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum SiiReadError {
     /// The bus failed.
     Bus(BusError),
@@ -97,7 +98,14 @@ impl fmt::Display for SiiReadError {
     }
 }
 
-impl core::error::Error for SiiReadError {}
+impl core::error::Error for SiiReadError {
+    fn source(&self) -> Option<&(dyn core::error::Error + 'static)> {
+        match self {
+            SiiReadError::Bus(error) => Some(error),
+            _ => None,
+        }
+    }
+}
 
 impl From<BusError> for SiiReadError {
     fn from(error: BusError) -> SiiReadError {

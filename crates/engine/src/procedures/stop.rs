@@ -30,6 +30,7 @@ const ASKED_AGAIN: Duration = Duration::from_millis(20);
 
 /// Why not all SubDevices are known to be in the state.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum StopError {
     /// The bus failed.
     Bus(BusError),
@@ -75,7 +76,14 @@ impl fmt::Display for StopError {
     }
 }
 
-impl core::error::Error for StopError {}
+impl core::error::Error for StopError {
+    fn source(&self) -> Option<&(dyn core::error::Error + 'static)> {
+        match self {
+            StopError::Bus(error) => Some(error),
+            _ => None,
+        }
+    }
+}
 
 impl From<BusError> for StopError {
     fn from(error: BusError) -> StopError {

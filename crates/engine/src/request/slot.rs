@@ -41,6 +41,7 @@ pub enum RequestState {
 
 /// Why a request failed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum RequestFailure {
     /// The SubDevice aborted an SDO.
     Aborted(AbortCode),
@@ -58,6 +59,7 @@ pub enum RequestFailure {
 
 /// Why a request cannot be changed or started.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum RequestRefused {
     /// It is under way.
     Busy,

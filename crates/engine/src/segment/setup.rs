@@ -33,6 +33,7 @@ pub struct Setup {
 
 /// An area whose size on the SubDevice differs from that in the layout.
 #[derive(Clone, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum SetupError {
     /// The declaration does not fit the SubDevice.
     Plan(PlanError),
@@ -64,7 +65,14 @@ impl core::fmt::Display for SetupError {
     }
 }
 
-impl core::error::Error for SetupError {}
+impl core::error::Error for SetupError {
+    fn source(&self) -> Option<&(dyn core::error::Error + 'static)> {
+        match self {
+            SetupError::Plan(error) => Some(error),
+            _ => None,
+        }
+    }
+}
 
 impl Setup {
     /// Plans a SubDevice and gives its areas the logical addresses of the layout. Areas that no domain holds are

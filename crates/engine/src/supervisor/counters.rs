@@ -2,6 +2,7 @@
 
 /// Counters of the acyclic half.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[non_exhaustive]
 pub struct AcyclicCounters {
     /// Frames sent.
     pub sent: u64,

@@ -35,6 +35,7 @@ impl Reply {
 
 /// Why a datagram brought nothing back.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum BusError {
     /// Its frame was lost, also when it was sent again.
     Lost {

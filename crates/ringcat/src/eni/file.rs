@@ -179,6 +179,6 @@ impl EniFile {
 const fn in_its_place(error: &ConfigError) -> Option<Position> {
     match error {
         ConfigError::Mismatch { position, .. } => Some(*position),
-        ConfigError::Missing { .. } | ConfigError::Ambiguous { .. } | ConfigError::DeclaredTwice { .. } => None,
+        _ => None,
     }
 }

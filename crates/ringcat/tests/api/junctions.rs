@@ -17,7 +17,7 @@ const GOOD: JunctionConnection = JunctionConnection { head: 1, head_port: 1, tai
 
 fn requested(junctions: JunctionMode) -> MainDevice<SimulatedSegment> {
     let segment = SimulatedSegment::from_toml(SEGMENT).expect("the example is a segment");
-    MainDevice::request(segment, &Options { junctions, ..Options::default() })
+    MainDevice::request(segment, &Options::default().with_junctions(junctions))
 }
 
 fn junction_error(result: Result<(), Error>) -> JunctionError {

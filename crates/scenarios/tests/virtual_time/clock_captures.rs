@@ -85,7 +85,7 @@ impl Cases {
     /// The script must find nothing wrong, and say that it has judged so much.
     fn fine(&mut self, name: &'static str, network: Network, judged: &'static str, work: impl FnOnce(&mut Recorded)) {
         let path = file();
-        let options = Options { junctions: JunctionMode::Automatic, ..Options::default() };
+        let options = Options::default().with_junctions(JunctionMode::Automatic);
         recorded(&options, network, &path, work);
         self.all.push((path, Case::Fine(name, judged)));
     }
@@ -316,7 +316,7 @@ impl Tampering {
     /// Of a run.
     fn with(network: Network, work: impl FnOnce(&mut Recorded)) -> Tampering {
         let path = file();
-        let options = Options { junctions: JunctionMode::Automatic, ..Options::default() };
+        let options = Options::default().with_junctions(JunctionMode::Automatic);
         recorded(&options, network, &path, work);
         let original = Capture::parse(&std::fs::read(&path).expect("a capture")).expect("a capture");
         std::fs::remove_file(&path).expect("it was written");

@@ -21,7 +21,7 @@ fn all(network: &Network) -> Vec<usize> {
 }
 
 fn begun(seed: u64, network: Network, config: ClockConfig) -> World {
-    let options = Options { junctions: JunctionMode::Automatic, ..Options::default() };
+    let options = Options::default().with_junctions(JunctionMode::Automatic);
     World::with(seed, network, &options, |scan| with_clocks(scan, config))
         .unwrap_or_else(|error| panic!("seed {seed}: {error}"))
 }

@@ -267,7 +267,7 @@ fn controllers_of_all_kinds_are_read_alike() {
                 }
             }
             let network = ring(devices, NetworkOptions::default());
-            let options = Options { sii_cache, ..Options::default() };
+            let options = Options::default().with_sii_cache(sii_cache);
             let mut world =
                 World::with(4, network, &options, |scan| automatic(&scan.subdevices, CYCLE)).expect("activation");
             world.settle();

@@ -128,7 +128,7 @@ fn segment(dice: &mut Dice, seed: u64) -> (Network, bool) {
 fn run(seed: u64) {
     let mut dice = Dice::new(seed);
     let (network, closed) = segment(&mut dice, seed);
-    let options = Options { sii_cache: !dice.one_in(2), ..Options::default() };
+    let options = Options::default().with_sii_cache(!dice.one_in(2));
     let mut world = World::with(seed, network, &options, |scan| automatic(&scan.subdevices, CYCLE))
         .unwrap_or_else(|error| panic!("seed {seed}: {error}"));
     // Late and doubled frames leave their own traces in the devices.

@@ -206,7 +206,7 @@ fn a_subdevice_with_a_wrong_checksum_in_its_sii_is_told_and_holds_up_nobody() {
 }
 
 fn impatiently() -> Options {
-    Options { patience: Duration::from_millis(300), ..Options::default() }
+    Options::default().with_patience(Duration::from_millis(300))
 }
 
 fn scan_error(network: Network) -> ScanError {

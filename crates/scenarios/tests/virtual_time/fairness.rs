@@ -27,7 +27,7 @@ fn world(seed: u64) -> World {
     let mut kinds = vec!["coupler"];
     kinds.extend(["servo"; DRIVES]);
     kinds.push("all-protocols");
-    let options = Options { acyclic_bytes: BUDGET, ..Options::default() };
+    let options = Options::default().with_acyclic_bytes(BUDGET);
     let network = line(descriptions(&kinds), NetworkOptions::default());
     let declare = |scan: &ringcat::Scan| automatic(&scan.subdevices, CYCLE);
     let mut world = World::with(seed, network, &options, declare).expect("activation");

@@ -83,7 +83,7 @@ fn run(seed: u64, course: Course) -> Vec<String> {
             }
         }
     }
-    let options = Options { enhanced_line_crossed: course == Course::Enhanced, ..Options::default() };
+    let options = Options::default().with_enhanced_line_crossed(course == Course::Enhanced);
     let mut world =
         World::with(seed, network, &options, |scan| automatic(&scan.subdevices, CYCLE)).expect("activation");
     // Copies that are lost leave their own traces in the devices; what is fresh is the matter of others.

@@ -38,7 +38,7 @@ fn limited(count: usize, is_ring: bool, datagrams: u16, beyond: Beyond) -> Netwo
 }
 
 fn told(datagrams: u16) -> Options {
-    Options { max_datagrams_per_frame: Some(datagrams), ..Options::default() }
+    Options::default().with_max_datagrams_per_frame(datagrams)
 }
 
 fn scan(network: Network, options: &Options) -> Result<Scan, Error> {

@@ -51,7 +51,7 @@ fn with_four_ports(kinds: &[&str]) -> Vec<DeviceDescription> {
 }
 
 fn junctions() -> Options {
-    Options { junctions: JunctionMode::Automatic, ..Options::default() }
+    Options::default().with_junctions(JunctionMode::Automatic)
 }
 
 /// A ring behind a junction that breaks at one cable while the break at another is healed: the sum of the working

@@ -146,7 +146,7 @@ fn of_several_alike_each_comes_back_to_its_own_place_whichever_is_there_first() 
     ] {
         for last in 1..4 {
             let network = wired_with(described(&["junction", kind, kind, kind], true), cables);
-            let options = Options { junctions: JunctionMode::Automatic, ..Options::default() };
+            let options = Options::default().with_junctions(JunctionMode::Automatic);
             let declare = |scan: &ringcat::Scan| automatic(&scan.subdevices, CYCLE);
             let mut world = World::with(7, network, &options, declare).expect("it fits");
             world.settle();

@@ -45,7 +45,7 @@ fn ends(cable: usize) -> (PortOf, PortOf) {
 }
 
 fn world(seed: u64, network: Network, (mode, connections): Setting<'_>) -> World {
-    let options = Options { junctions: mode, ..Options::default() };
+    let options = Options::default().with_junctions(mode);
     let declare = |scan: &ringcat::Scan| automatic(&scan.subdevices, CYCLE);
     World::with_junctions(seed, network, &options, declare, connections).unwrap_or_else(|error| panic!("{error}"))
 }
@@ -366,7 +366,7 @@ fn a_repair_right_behind_a_break_is_told_in_time_whoever_else_looks_at_ports() {
             declaration.clocks = with_clocks.then(ringcat::ClockConfig::default);
             declaration
         };
-        let options = Options { junctions: JunctionMode::Strict, ..Options::default() };
+        let options = Options::default().with_junctions(JunctionMode::Strict);
         let mut world = World::with_junctions(70, one_ring(), &options, declare, &[STRICT]).expect("it fits");
         world.settle();
         world.run_cycles(300);

@@ -34,7 +34,7 @@ fn with_sii(kind: &str, other: impl FnOnce(&mut DeviceDescription)) -> Vec<Devic
 }
 
 fn world(devices: Vec<DeviceDescription>, pdos: ReadPdos) -> World {
-    let options = Options { pdos, ..Options::default() };
+    let options = Options::default().with_pdos(pdos);
     let network = line(devices, NetworkOptions::default());
     World::with(1, network, &options, |scan| automatic(&scan.subdevices, CYCLE)).expect("scan and activation")
 }
@@ -102,7 +102,7 @@ fn what_somebody_assigned_before_is_assigned_again_after_a_loss_of_power() {
     let mut devices = descriptions(&KINDS);
     devices[ODD] = descriptions(&["analog-input-4"]).remove(0);
     let links = Tap::new(line(devices, NetworkOptions::default()));
-    let options = Options { pdos: ReadPdos::Always, ..Options::default() };
+    let options = Options::default().with_pdos(ReadPdos::Always);
     let mut main_device = MainDevice::request(links, &options);
     main_device.scan().expect("a scan");
     main_device.bring_to(ODD, AlState::PreOp).expect("it goes there");

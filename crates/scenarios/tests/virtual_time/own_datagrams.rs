@@ -160,7 +160,7 @@ fn declared_lrw_is_refused_with_rings_behind_junctions_and_hot_connect_groups_to
     let kinds = ["digital-output-8", "junction", "servo", "digital-input-8", "analog-input-4"];
     let connection = JunctionConnection { head: 1, head_port: 1, tail: 3, tail_port: 1 };
     for (junctions, connections) in [(JunctionMode::Strict, &[connection][..]), (JunctionMode::Automatic, &[])] {
-        let options = Options { junctions, ..Options::default() };
+        let options = Options::default().with_junctions(junctions);
         let network = wired(&kinds, &RING_IN_RING);
         let result = World::with_junctions(2, network, &options, with_lrw, connections);
         assert_eq!(refused(result).0, [0, 2, 3, 4], "{junctions:?}");

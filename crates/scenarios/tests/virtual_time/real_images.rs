@@ -122,7 +122,7 @@ fn real_images_are_read_alike_with_and_without_the_cache_and_with_4_and_8_bytes(
                 description.name = format!("{}-{number}", description.name);
             }
             let network = line(descriptions, NetworkOptions::default());
-            let options = Options { sii_cache, ..Options::default() };
+            let options = Options::default().with_sii_cache(sii_cache);
             let mut main_device = ringcat::MainDevice::request(scenarios::tap::Tap::new(network), &options);
             let scan = main_device.scan().expect("a scan");
             (scan.subdevices, main_device.links_mut().network().now())

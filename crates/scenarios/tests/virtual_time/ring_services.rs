@@ -296,7 +296,7 @@ fn an_lrw_of_a_file_is_refused_on_two_links_and_one_per_subdevice_is_allowed() {
 #[test]
 fn rings_work_with_both_encodings_of_the_source_address() {
     for source_address in [MacCodec::FlagsFirst, MacCodec::IdLast] {
-        let options = Options { source_address, ..Options::default() };
+        let options = Options::default().with_source_address(source_address);
         let mut world = World::with(2, ring_of_16(FAST), &options, |scan| automatic(&scan.subdevices, CYCLE)).unwrap();
         world.settle();
         let mark = world.mark();

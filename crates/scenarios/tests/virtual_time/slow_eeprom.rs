@@ -89,7 +89,7 @@ fn one_slow_command_costs_its_own_time_and_not_that_of_every_word() {
 fn a_scan_after_one_of_a_slow_eeprom_reads_quick_ones_quickly() {
     let mut terminals = vec![terminal(Duration::from_micros(500)); 2];
     terminals[1].sii_busy = Duration::from_millis(20);
-    let options = Options { sii_cache: false, ..Options::default() };
+    let options = Options::default().with_sii_cache(false);
     let mut main_device = MainDevice::request(Tap::new(network(terminals)), &options);
     main_device.scan().expect("both can be read");
     let cable = ringcat_sim::cable::CableId(1);

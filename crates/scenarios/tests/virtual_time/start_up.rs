@@ -32,7 +32,7 @@ fn subdevices_that_appear_while_the_first_are_read_are_all_found() {
             let network = slow_to_appear(from, Duration::from_micros(pause_us));
             let mut tap = Tap::new(network);
             tap.set_limit(tap.now() + Duration::from_secs(1));
-            let options = Options { sii_cache: false, ..Options::default() };
+            let options = Options::default().with_sii_cache(false);
             let mut main_device = MainDevice::request(tap, &options);
             let mut counts = Vec::new();
             let scan = main_device.scan_with(|timed| {
@@ -52,7 +52,7 @@ fn subdevices_that_appear_while_the_first_are_read_are_all_found() {
 // covers: scan
 #[test]
 fn a_scan_that_has_read_everything_waits_until_the_count_has_settled() {
-    let options = Options { settle: Duration::from_millis(200), ..Options::default() };
+    let options = Options::default().with_settle(Duration::from_millis(200));
     let network = line(descriptions(&KINDS), NetworkOptions::default());
     let mut main_device = MainDevice::request(Tap::new(network), &options);
     assert_eq!(main_device.scan().expect("all are there").subdevices.len(), 5);
@@ -70,7 +70,7 @@ fn a_count_that_never_settles_ends_the_scan_after_its_patience() {
     }
     let mut tap = Tap::new(network);
     tap.set_limit(tap.now() + Duration::from_secs(1));
-    let options = Options { patience: Duration::from_millis(100), ..Options::default() };
+    let options = Options::default().with_patience(Duration::from_millis(100));
     let mut main_device = MainDevice::request(tap, &options);
     match main_device.scan() {
         Err(Error::Scan(ScanError::Unsettled { .. })) => {}

@@ -214,7 +214,7 @@ fn crossed_ring() -> Network {
 }
 
 fn enhanced(network: Network) -> World {
-    let options = Options { enhanced_line_crossed: true, ..Options::default() };
+    let options = Options::default().with_enhanced_line_crossed(true);
     let declare = |scan: &ringcat::Scan| automatic(&scan.subdevices, CYCLE);
     let mut world = World::with(0, network, &options, declare).expect("scan and activation");
     world.settle();
@@ -276,7 +276,7 @@ fn enhanced_detection_looks_again_when_ports_change_and_costs_two_edges() {
 // covers: LC-02, crossed-enhanced
 #[test]
 fn links_that_cannot_be_taken_down_say_so_and_the_ring_is_looked_at_as_it_is() {
-    let options = Options { enhanced_line_crossed: true, ..Options::default() };
+    let options = Options::default().with_enhanced_line_crossed(true);
     let mut tap = scenarios::tap::Tap::new(ring_with_branch(Port::C));
     tap.forbid_disconnecting();
     let mut main_device = ringcat::MainDevice::request(tap, &options);

@@ -77,7 +77,7 @@ impl Stamped {
     }
 
     fn on(seed: u64, network: Network, under_way: u8) -> Stamped {
-        let options = Options { junctions: JunctionMode::Automatic, ..Options::default() };
+        let options = Options::default().with_junctions(JunctionMode::Automatic);
         let declare = |scan: &ringcat::Scan| automatic(&scan.subdevices, CYCLE).with_under_way(under_way);
         let mut world = World::with(seed, network, &options, declare).expect("it fits");
         world.settle();

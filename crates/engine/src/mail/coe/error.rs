@@ -19,6 +19,7 @@ pub struct SdoError {
 
 /// What happened to an SDO transfer. Whatever is not the SubDevice's abort was followed by one of ours.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum SdoFailure {
     /// The mailbox failed.
     Mailbox(MailboxError),
@@ -70,4 +71,11 @@ impl fmt::Display for SdoError {
     }
 }
 
-impl core::error::Error for SdoError {}
+impl core::error::Error for SdoError {
+    fn source(&self) -> Option<&(dyn core::error::Error + 'static)> {
+        match &self.cause {
+            SdoFailure::Mailbox(error) => Some(error),
+            _ => None,
+        }
+    }
+}

@@ -21,6 +21,7 @@ const LONGEST: usize = 2 + 2 * 0x1_0000;
 
 /// Why there is no information.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum InformationError {
     /// The mailbox failed.
     Mailbox(MailboxError),
@@ -54,7 +55,15 @@ impl fmt::Display for InformationError {
     }
 }
 
-impl core::error::Error for InformationError {}
+impl core::error::Error for InformationError {
+    fn source(&self) -> Option<&(dyn core::error::Error + 'static)> {
+        match self {
+            InformationError::Mailbox(error) => Some(error),
+            InformationError::Malformed(error) => Some(error),
+            _ => None,
+        }
+    }
+}
 
 impl From<MailboxError> for InformationError {
     fn from(error: MailboxError) -> InformationError {

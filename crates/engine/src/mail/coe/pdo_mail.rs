@@ -18,6 +18,7 @@ const COUNT: u16 = 512;
 
 /// Why a PDO was not moved.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum PdoMailError {
     /// The mailbox failed, or the SubDevice refused.
     Mailbox(MailboxError),
@@ -37,7 +38,14 @@ impl fmt::Display for PdoMailError {
     }
 }
 
-impl core::error::Error for PdoMailError {}
+impl core::error::Error for PdoMailError {
+    fn source(&self) -> Option<&(dyn core::error::Error + 'static)> {
+        match self {
+            PdoMailError::Mailbox(error) => Some(error),
+            _ => None,
+        }
+    }
+}
 
 impl From<MailboxError> for PdoMailError {
     fn from(error: MailboxError) -> PdoMailError {

@@ -17,6 +17,7 @@ pub struct EoeError {
 
 /// What happened to a request.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum EoeFailure {
     /// The mailbox failed.
     Mailbox(MailboxError),
@@ -45,7 +46,14 @@ impl fmt::Display for EoeFailure {
     }
 }
 
-impl core::error::Error for EoeError {}
+impl core::error::Error for EoeError {
+    fn source(&self) -> Option<&(dyn core::error::Error + 'static)> {
+        match &self.cause {
+            EoeFailure::Mailbox(error) => Some(error),
+            _ => None,
+        }
+    }
+}
 
 impl From<MailboxError> for EoeFailure {
     fn from(error: MailboxError) -> EoeFailure {

@@ -45,6 +45,7 @@ pub struct TimeStamp {
 
 /// Why a frame was not taken for sending.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum QueueError {
     /// The mailbox is not in use: the SubDevice is in INIT or does not answer; or it has no room for a fragment.
     Down,

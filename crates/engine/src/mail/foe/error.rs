@@ -20,6 +20,7 @@ pub struct FoeError {
 
 /// What happened to a file transfer.
 #[derive(Clone, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum FoeFailure {
     /// The mailbox failed.
     Mailbox(MailboxError),
@@ -72,7 +73,14 @@ impl fmt::Display for FoeFailure {
     }
 }
 
-impl core::error::Error for FoeError {}
+impl core::error::Error for FoeError {
+    fn source(&self) -> Option<&(dyn core::error::Error + 'static)> {
+        match &self.cause {
+            FoeFailure::Mailbox(error) => Some(error),
+            _ => None,
+        }
+    }
+}
 
 impl From<MailboxError> for FoeFailure {
     fn from(error: MailboxError) -> FoeFailure {

@@ -16,6 +16,7 @@ use crate::supervisor::BusError;
 
 /// Why a SubDevice is not configured.
 #[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
 pub enum ConfigureError {
     /// The bus failed.
     Bus(BusError),
@@ -50,6 +51,7 @@ pub enum ConfigureError {
 
 /// What happened to a start-up command.
 #[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
 pub enum StartupError {
     /// CoE.
     Sdo(SdoError),
@@ -106,9 +108,29 @@ impl fmt::Display for StartupError {
     }
 }
 
-impl core::error::Error for ConfigureError {}
+impl core::error::Error for ConfigureError {
+    fn source(&self) -> Option<&(dyn core::error::Error + 'static)> {
+        match self {
+            ConfigureError::Bus(error) => Some(error),
+            ConfigureError::State(error) => Some(error),
+            ConfigureError::Sdo(error) => Some(error),
+            ConfigureError::Startup { error, .. } => Some(error),
+            ConfigureError::Unfit(error) => Some(error),
+            _ => None,
+        }
+    }
+}
 
-impl core::error::Error for StartupError {}
+impl core::error::Error for StartupError {
+    fn source(&self) -> Option<&(dyn core::error::Error + 'static)> {
+        match self {
+            StartupError::Sdo(error) => Some(error),
+            StartupError::Soe(error) => Some(error),
+            StartupError::Eoe(error) => Some(error),
+            _ => None,
+        }
+    }
+}
 
 impl From<BusError> for ConfigureError {
     fn from(error: BusError) -> ConfigureError {

@@ -26,6 +26,7 @@ pub struct RegisterError {
 
 /// What happened to a command to a register.
 #[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
 pub enum RegisterFailure {
     /// The SubDevice did not take it, or the bus failed.
     Bus(BusError),

@@ -11,6 +11,7 @@ use crate::supervisor::BusError;
 
 /// Why a scan ended without a result.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum ScanError {
     /// Frames came back, but no SubDevice had touched them.
     NoSubDevices,
@@ -70,7 +71,15 @@ impl fmt::Display for ScanError {
     }
 }
 
-impl core::error::Error for ScanError {}
+impl core::error::Error for ScanError {
+    fn source(&self) -> Option<&(dyn core::error::Error + 'static)> {
+        match self {
+            ScanError::Bus(error) => Some(error),
+            ScanError::Sii { error, .. } => Some(error),
+            _ => None,
+        }
+    }
+}
 
 impl From<BusError> for ScanError {
     fn from(error: BusError) -> ScanError {

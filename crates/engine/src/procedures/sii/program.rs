@@ -36,6 +36,7 @@ const CHECKSUM_WORD: usize = 7;
 
 /// Why an EEPROM was not written, or not loaded.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum SiiProgramError {
     /// The bus failed.
     Bus(BusError),
@@ -125,7 +126,15 @@ impl fmt::Display for SiiProgramError {
     }
 }
 
-impl core::error::Error for SiiProgramError {}
+impl core::error::Error for SiiProgramError {
+    fn source(&self) -> Option<&(dyn core::error::Error + 'static)> {
+        match self {
+            SiiProgramError::Bus(error) => Some(error),
+            SiiProgramError::Read(error) => Some(error),
+            _ => None,
+        }
+    }
+}
 
 impl From<BusError> for SiiProgramError {
     fn from(error: BusError) -> SiiProgramError {

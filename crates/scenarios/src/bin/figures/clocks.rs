@@ -138,7 +138,7 @@ fn junction(figures: &mut Figures) {
     let mut cables = vec![(MAIN, at(0, a)), (at(0, b), at(1, a)), (at(1, d), at(2, a))];
     cables.extend((3..8).map(|device| (at(device - 1, b), at(device, a))));
     cables.extend([(at(7, b), at(1, b)), (at(1, c), at(8, a)), (at(8, b), at(9, a))]);
-    let options = ringcat::Options { junctions: JunctionMode::Automatic, ..ringcat::Options::default() };
+    let options = ringcat::Options::default().with_junctions(JunctionMode::Automatic);
     let network = wired(clocked(10, 50), &cables);
     let mut world = World::with(5, network, &options, |scan| with_clocks(scan, config())).expect("it can be activated");
     lock(&mut world, Duration::from_secs(20));

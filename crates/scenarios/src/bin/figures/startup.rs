@@ -96,7 +96,7 @@ const fn period(count: usize) -> Duration {
 fn start(count: usize, eight_byte_reads: bool, cache: bool) -> Result<Start, Error> {
     let network = segment(count, eight_byte_reads, Links::One, HOP);
     let floor = floor(&network, if eight_byte_reads { 8 } else { 4 });
-    let options = Options { sii_cache: cache, ..Options::default() };
+    let options = Options::default().with_sii_cache(cache);
     let mut main_device = MainDevice::request(SimulatedSegment::new(network), &options);
     let found = main_device.scan()?;
     let scanned = Duration::from_nanos(main_device.links_mut().network().now().0);

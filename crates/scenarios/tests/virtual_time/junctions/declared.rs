@@ -18,7 +18,7 @@ fn connection((head, tail, tail_port): (usize, usize, u8)) -> JunctionConnection
 
 /// Which connection is refused as one that is not there.
 fn refused(seed: u64, network: Network, connections: &[JunctionConnection]) -> Option<JunctionConnection> {
-    let options = Options { junctions: JunctionMode::Strict, ..Options::default() };
+    let options = Options::default().with_junctions(JunctionMode::Strict);
     let declare = |scan: &ringcat::Scan| automatic(&scan.subdevices, CYCLE);
     not_there(World::with_junctions(seed, network, &options, declare, connections))
 }

@@ -46,7 +46,7 @@ fn world(seed: u64, network: Network, setting: Setting<'_>) -> World {
 
 /// `follow`: the cabling is looked at anew with each group that joins or leaves.
 fn world_that(follow: bool, seed: u64, network: Network, (mode, connections): Setting<'_>) -> World {
-    let options = Options { junctions: mode, follow_groups: follow, ..Options::default() };
+    let options = Options::default().with_junctions(mode).with_follow_groups(follow);
     let mut world = World::with_junctions(seed, network, &options, declare, connections).expect("it fits");
     world.until(LIMIT, "all that are there settled", |world| world.application().all_settled());
     world.run_cycles(60);

@@ -181,7 +181,7 @@ impl Plan {
         }
         before(&mut network);
         let junctions = if strict { JunctionMode::Strict } else { JunctionMode::Automatic };
-        let options = Options { junctions, ..Options::default() };
+        let options = Options::default().with_junctions(junctions);
         let connections: &[JunctionConnection] = if strict { &self.connections } else { &[] };
         let declare = |_: &Scan| self.declaration();
         World::with_junctions(seed, network, &options, declare, connections)

@@ -294,7 +294,7 @@ fn a_local_ring_in_a_ring_of_two_links_goes_on_with_one_break_anywhere() {
 fn a_local_ring_that_breaks_is_no_crossed_line_for_enhanced_detection_either() {
     let strict = JunctionConnection { head: 1, head_port: 1, tail: 3, tail_port: 1 };
     for (mode, connections) in [(JunctionMode::Automatic, &[][..]), (JunctionMode::Strict, &[strict])] {
-        let options = Options { junctions: mode, enhanced_line_crossed: true, ..Options::default() };
+        let options = Options::default().with_junctions(mode).with_enhanced_line_crossed(true);
         let declare = |scan: &ringcat::Scan| automatic(&scan.subdevices, CYCLE);
         let mut world = World::with_junctions(44, ring_in_ring(), &options, declare, connections).expect("it fits");
         world.settle();
