@@ -32,7 +32,7 @@ pub enum Error {
     /// A service besides the mailbox protocols failed.
     Service(ServiceError),
     /// Something that was asked of one SubDevice was not done.
-    SubDevice(SubDeviceError),
+    SubDevice(Box<SubDeviceError>),
     /// SubDevices were not in their states in time.
     NotReady(NotReady),
     /// Process data is not as the application expects it.
@@ -102,7 +102,7 @@ impl std::error::Error for Error {
             Error::Configure(error) => Some(error),
             Error::Sdo(error) => Some(error),
             Error::Service(error) => Some(error),
-            Error::SubDevice(error) => Some(error),
+            Error::SubDevice(error) => Some(&**error),
             Error::NotReady(error) => Some(error),
             Error::Map(error) => Some(error),
             Error::DoesNotFit(error) => Some(error),
@@ -133,11 +133,16 @@ errors! {
     Configure(ConfigureError),
     Sdo(SdoError),
     Service(ServiceError),
-    SubDevice(SubDeviceError),
     NotReady(NotReady),
     Map(MapError),
     DoesNotFit(DoesNotFit),
     Stop(StopError),
+}
+
+impl From<SubDeviceError> for Error {
+    fn from(error: SubDeviceError) -> Error {
+        Error::SubDevice(Box::new(error))
+    }
 }
 
 #[cfg(feature = "sim")]
