@@ -45,6 +45,7 @@
 //! | `eni` | networks from an ENI, its variables by name; what a file says as `config` |
 //! | `gateway` | the mailbox gateway over UDP and TCP |
 //! | `eoe` | network interfaces of the host for SubDevices that speak Ethernet over EtherCAT |
+//! | `tracing` | events of the acyclic half for a `tracing` subscriber |
 //!
 //! Without any of them an application brings its own [`Links`].
 
@@ -90,6 +91,8 @@ pub mod system_time;
 #[cfg(feature = "packet")]
 pub mod tee;
 pub mod text;
+#[cfg(feature = "tracing")]
+mod trace;
 mod value;
 mod visit;
 pub mod window;

@@ -63,9 +63,11 @@ impl std::error::Error for NotReady {}
 pub(crate) struct Failures(Vec<Option<String>>);
 
 impl Failures {
-    /// Learns from an event.
-    pub fn observe(&mut self, event: &Event) {
-        match event {
+    /// Learns from an event, and logs it. Each event comes here once, on its way to the application.
+    pub fn observe(&mut self, timed: &TimedEvent) {
+        #[cfg(feature = "tracing")]
+        crate::trace::tell(timed);
+        match &timed.event {
             Event::ConfigurationFailed { subdevice, reason } => {
                 if self.0.len() <= *subdevice {
                     self.0.resize(*subdevice + 1, None);
@@ -108,7 +110,7 @@ impl KeptEvents {
     /// Looks at all events that wait, and keeps them.
     pub fn take_in(&mut self, mut next: impl FnMut() -> Option<TimedEvent>) {
         while let Some(event) = next() {
-            self.failures.observe(&event.event);
+            self.failures.observe(&event);
             if self.events.len() == KEPT {
                 self.events.pop_front();
                 self.dropped += 1;
@@ -119,6 +121,6 @@ impl KeptEvents {
 
     /// The oldest event: one that was kept, or the next one.
     pub fn pop(&mut self, next: impl FnOnce() -> Option<TimedEvent>) -> Option<TimedEvent> {
-        self.events.pop_front().or_else(|| next().inspect(|event| self.failures.observe(&event.event)))
+        self.events.pop_front().or_else(|| next().inspect(|event| self.failures.observe(event)))
     }
 }

@@ -434,7 +434,7 @@ impl<L: Links> Worker<L> {
         let now = self.links.now();
         let mut any = false;
         while let Some(event) = self.engine.pop_event(now) {
-            self.failures.observe(&event.event);
+            self.failures.observe(&event);
             any |= !matches!(event.event, Event::Skipped { .. } | Event::Domain { .. });
             if self.events.try_send(event).is_err() {
                 self.events_dropped += 1;

@@ -10,14 +10,15 @@ use crate::tokens::tokens;
 use crate::tree::Tree;
 
 /// Features of `ringcat`, each by itself.
-pub const FEATURE_SETS: [&str; 6] = ["", "packet", "sim", "eni", "gateway", "eoe"];
+pub const FEATURE_SETS: [&str; 7] = ["", "packet", "sim", "eni", "gateway", "eoe", "tracing"];
 
 /// Sets that an application on network interfaces needs; they bring as little as possible.
 const SMALL: [&str; 2] = ["", "packet"];
 /// Crates from the registry in one of the small sets.
 pub const MAX_CRATES: usize = 12;
 /// Crates of the program, of the simulator, of files and of the gateway.
-const NOT_IN_SMALL: [&str; 8] = ["clap", "mio", "roxmltree", "serde_json", "signal-hook", "smoltcp", "strsim", "toml"];
+const NOT_IN_SMALL: [&str; 9] =
+    ["clap", "mio", "roxmltree", "serde_json", "signal-hook", "smoltcp", "strsim", "toml", "tracing"];
 
 /// Sources that name the library alone of this repository, and what else of it single ones may.
 const USERS: [(&str, &[&str]); 3] = [

@@ -1,0 +1,50 @@
+//! Events as `tracing` events, for an application that logs by a subscriber (feature `tracing`).
+//!
+//! The acyclic half tells each event once, in its own thread where it has one, with the target `ringcat`, the text of
+//! [`describe`] and the field `at_ns`. What stands in the way of process data or of redundancy is a warning, judgements
+//! of single cycles are for debugging, everything else is information. The cyclic half tells nothing by itself.
+
+use ringcat_engine::event::{Event, TimedEvent};
+use tracing::{Level, enabled, event};
+
+use crate::text::{Names, describe};
+
+const TARGET: &str = "ringcat";
+
+/// Tells an event.
+pub(crate) fn tell(timed: &TimedEvent) {
+    match level(&timed.event) {
+        Level::WARN if enabled!(target: TARGET, Level::WARN) => {
+            event!(target: TARGET, Level::WARN, at_ns = timed.at.0, "{}", describe(timed, &Names::default()));
+        }
+        Level::DEBUG if enabled!(target: TARGET, Level::DEBUG) => {
+            event!(target: TARGET, Level::DEBUG, at_ns = timed.at.0, "{}", describe(timed, &Names::default()));
+        }
+        Level::INFO if enabled!(target: TARGET, Level::INFO) => {
+            event!(target: TARGET, Level::INFO, at_ns = timed.at.0, "{}", describe(timed, &Names::default()));
+        }
+        _ => {}
+    }
+}
+
+const fn level(event: &Event) -> Level {
+    match event {
+        Event::Domain { .. } | Event::Skipped { .. } | Event::ScanProgress { .. } => Level::DEBUG,
+        Event::ScanFailed { .. }
+        | Event::RingOpened { .. }
+        | Event::BreakLocated { .. }
+        | Event::RedundancyLost { .. }
+        | Event::CableErrors { .. }
+        | Event::LinkDown { .. }
+        | Event::LineCrossed { .. }
+        | Event::StateError { .. }
+        | Event::ConfigurationFailed { .. }
+        | Event::Lost { .. }
+        | Event::Missing { .. }
+        | Event::Mismatch { .. }
+        | Event::ClocksFailed { .. }
+        | Event::Emergency { .. }
+        | Event::ForeignFrame { .. } => Level::WARN,
+        _ => Level::INFO,
+    }
+}
