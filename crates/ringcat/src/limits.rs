@@ -31,28 +31,33 @@ pub struct TransferLimits {
 impl Default for TransferLimits {
     fn default() -> TransferLimits {
         let Timeouts { mailbox_request, sdo, .. } = Timeouts::default();
-        TransferLimits { request: mailbox_request, answer: sdo, bytes: DEFAULT_BYTES }
+        TransferLimits::new(mailbox_request, sdo)
     }
 }
 
 impl TransferLimits {
+    /// These times for a message to be taken and for an answer, and at most 1 MiB to be read.
+    pub const fn new(request: Duration, answer: Duration) -> TransferLimits {
+        TransferLimits { request, answer, bytes: DEFAULT_BYTES }
+    }
+
     /// The same, with this time for a message to be taken.
     #[must_use]
-    pub fn request(mut self, limit: Duration) -> TransferLimits {
+    pub const fn request(mut self, limit: Duration) -> TransferLimits {
         self.request = limit;
         self
     }
 
     /// The same, with this time for an answer.
     #[must_use]
-    pub fn answer(mut self, limit: Duration) -> TransferLimits {
+    pub const fn answer(mut self, limit: Duration) -> TransferLimits {
         self.answer = limit;
         self
     }
 
     /// The same, with at most so many bytes to be read.
     #[must_use]
-    pub fn bytes(mut self, limit: usize) -> TransferLimits {
+    pub const fn bytes(mut self, limit: usize) -> TransferLimits {
         self.bytes = limit;
         self
     }

@@ -14,7 +14,6 @@
 
 use std::time::Duration;
 
-use ringcat_engine::mail::Limits;
 use ringcat_engine::mail::coe::{self, SdoAddress};
 use ringcat_engine::main_device::{MainDevice as Engine, Pending, RawDatagram};
 use ringcat_engine::procedures::configure::ConfigureError;
@@ -33,6 +32,7 @@ use crate::acyclic::Inline;
 use crate::application::Application;
 use crate::error::Error;
 use crate::job::Job;
+use crate::limits::TransferLimits;
 use crate::links::Links;
 use crate::main_device::MainDevice;
 use crate::subdevice::{Address, Opening, SubDeviceError, start_with_mailbox};
@@ -41,12 +41,12 @@ use crate::supervisor_thread::SupervisorThread;
 /// The services of the acyclic half, wherever it runs.
 ///
 /// ```
-/// use ringcat::{Error, Limits, SdoAddress, Services, SupervisorThread};
+/// use ringcat::{Error, SdoAddress, Services, SupervisorThread, TransferLimits};
 ///
 /// /// Reads one object, and another one in the background meanwhile.
-/// fn identity(supervisor: &SupervisorThread, limits: Limits) -> Result<(Vec<u8>, Vec<u8>), Error> {
-///     let name = supervisor.background().sdo_upload(1, SdoAddress::new(0x1008, 0), limits, 64);
-///     let vendor = supervisor.sdo_upload(1, SdoAddress::new(0x1018, 1), limits, 4)?;
+/// fn identity(supervisor: &SupervisorThread, limits: TransferLimits) -> Result<(Vec<u8>, Vec<u8>), Error> {
+///     let name = supervisor.background().sdo_upload(1, SdoAddress::new(0x1008, 0), limits.bytes(64));
+///     let vendor = supervisor.sdo_upload(1, SdoAddress::new(0x1018, 1), limits.bytes(4))?;
 ///     Ok((name.finish()?, vendor))
 /// }
 /// ```
@@ -70,9 +70,8 @@ pub trait Services: Sized {
     /// Does something with the engine that takes no time on the bus.
     fn immediately<T: Send + 'static>(self, act: impl FnOnce(&mut Engine) -> T + Send + 'static) -> Self::Immediate<T>;
 
-    /// Reads an object of at most `limit` bytes, by the SubDevice's mailbox in PREOP, SAFEOP or OP. The time limits
-    /// are: until the mailbox takes a message, until its answer is there. [`SubDevice`](crate::SubDevice) has this and
-    /// the other protocols with types.
+    /// Reads an object, by the SubDevice's mailbox in PREOP, SAFEOP or OP. [`SubDevice`](crate::SubDevice) has this and the
+    /// other protocols with types.
     ///
     /// It fails before a scan, for a SubDevice that is not there or not declared, and for one without a mailbox, each
     /// with an error of its own.
@@ -80,10 +79,9 @@ pub trait Services: Sized {
         self,
         subdevice: usize,
         object: SdoAddress,
-        limits: Limits,
-        limit: usize,
+        limits: TransferLimits,
     ) -> Self::Outcome<Vec<u8>, SubDeviceError> {
-        let work = move |mailbox| async move { coe::read(&mailbox, object, limits, limit).await };
+        let work = move |mailbox| async move { coe::read(&mailbox, object, limits.of_message(), limits.bytes).await };
         self.call(move |engine| {
             let address = Address::of_number(engine, subdevice);
             start_with_mailbox(engine, address, Opening::LeftAlone, None, work)
@@ -96,9 +94,9 @@ pub trait Services: Sized {
         subdevice: usize,
         object: SdoAddress,
         data: Vec<u8>,
-        limits: Limits,
+        limits: TransferLimits,
     ) -> Self::Outcome<(), SubDeviceError> {
-        let work = move |mailbox| async move { coe::write(&mailbox, object, &data, limits).await };
+        let work = move |mailbox| async move { coe::write(&mailbox, object, &data, limits.of_message()).await };
         self.call(move |engine| {
             let address = Address::of_number(engine, subdevice);
             start_with_mailbox(engine, address, Opening::LeftAlone, None, work)

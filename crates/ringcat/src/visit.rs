@@ -1,17 +1,16 @@
 //! Objects of SubDevices before activation: one in INIT is brought to PREOP first.
 
-use ringcat_engine::mail::Limits;
 use ringcat_engine::mail::coe::SdoAddress;
 use ringcat_wire::al::AlState;
 
 use crate::error::Error;
+use crate::limits::TransferLimits;
 use crate::links::Links;
 use crate::main_device::MainDevice;
 use crate::services::Services;
 
 impl<L: Links> MainDevice<L> {
-    /// Reads an object of at most `limit` bytes from a scanned SubDevice; one in INIT is brought to PREOP before. The
-    /// time limits are: until the mailbox takes a message, until its answer is there.
+    /// Reads an object of a scanned SubDevice; one in INIT is brought to PREOP before.
     ///
     /// # Errors
     /// The SubDevice does not reach PREOP, or the transfer fails.
@@ -19,11 +18,10 @@ impl<L: Links> MainDevice<L> {
         &mut self,
         position: usize,
         object: SdoAddress,
-        limits: Limits,
-        limit: usize,
+        limits: TransferLimits,
     ) -> Result<Vec<u8>, Error> {
         self.visit(position)?;
-        Services::sdo_upload(self, position, object, limits, limit)
+        Services::sdo_upload(self, position, object, limits)
     }
 
     /// Writes an object of a scanned SubDevice; as [`MainDevice::sdo_upload`].
@@ -35,7 +33,7 @@ impl<L: Links> MainDevice<L> {
         position: usize,
         object: SdoAddress,
         data: &[u8],
-        limits: Limits,
+        limits: TransferLimits,
     ) -> Result<(), Error> {
         self.visit(position)?;
         Services::sdo_download(self, position, object, data.to_vec(), limits)

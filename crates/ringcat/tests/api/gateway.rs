@@ -9,7 +9,9 @@ use std::time::{Duration, Instant};
 
 use ringcat::gateway::{Gateway, GatewayOptions};
 use ringcat::shared_segment::SharedSegment;
-use ringcat::{CyclicThread, Error, Limits, Options, SdoAddress, Services, SupervisorThread, automatic};
+use ringcat::{
+    CyclicThread, Error, Limits, Options, SdoAddress, Services, SupervisorThread, TransferLimits, automatic,
+};
 use ringcat_sim::network::Network;
 use ringcat_sim::segment::Segment;
 use ringcat_wire::mailbox::foe::FoeMessage;
@@ -21,6 +23,7 @@ const SEGMENT: &str = "[segment]\nring = true\n[[device]]\ntype = \"coupler\"\n[
 const PERIOD: Duration = Duration::from_millis(2);
 const LIMIT: Duration = Duration::from_secs(30);
 const LIMITS: Limits = (Duration::from_secs(5), Duration::from_secs(10));
+const TRANSFER: TransferLimits = TransferLimits::new(LIMITS.0, LIMITS.1);
 /// The SubDevice with all protocols, by index and by station address.
 const ALL: usize = 1;
 const NUMBER: u16 = 0x2001;
@@ -79,8 +82,8 @@ impl Bench {
     fn own_traffic(&self, value: u16) {
         let supervisor = self.cycles.supervisor();
         let object = SdoAddress::new(NUMBER, 200);
-        supervisor.sdo_download(ALL, object, value.to_le_bytes().to_vec(), LIMITS).expect("it can be written");
-        assert_eq!(supervisor.sdo_upload(ALL, object, LIMITS, 2).expect("it can be read"), value.to_le_bytes());
+        supervisor.sdo_download(ALL, object, value.to_le_bytes().to_vec(), TRANSFER).expect("it can be written");
+        assert_eq!(supervisor.sdo_upload(ALL, object, TRANSFER.bytes(2)).expect("it can be read"), value.to_le_bytes());
     }
 }
 
@@ -269,7 +272,7 @@ fn several_clients_and_our_own_traffic_share_a_mailbox_and_none_disturbs_another
         });
         for round in 0..5 {
             bench.own_traffic(0x5A00 + round);
-            let large = bench.cycles.supervisor().sdo_upload(ALL, SdoAddress::new(LARGE, 0), LIMITS, 200_000);
+            let large = bench.cycles.supervisor().sdo_upload(ALL, SdoAddress::new(LARGE, 0), TRANSFER.bytes(200_000));
             assert_eq!(large.expect("nobody is in our transfer").len(), 100_000);
         }
     });

@@ -15,13 +15,13 @@ use ringcat::sim::segment::Segment;
 use ringcat::simulated::SimulatedSegment;
 use ringcat::wire::address::RegisterAddress;
 use ringcat::{
-    AlState, Error, LastOutputs, Limits, MainDevice, Options, SdoAddress, Services, SupervisorThread, automatic,
+    AlState, Error, LastOutputs, MainDevice, Options, SdoAddress, Services, SupervisorThread, TransferLimits, automatic,
 };
 
 const SEGMENT: &str = "[segment]\nring = true\n[[device]]\ntype = \"coupler\"\n[[device]]\ntype = \"all-protocols\"\n";
 const PERIOD: Duration = Duration::from_millis(2);
 const LIMIT: Duration = Duration::from_secs(30);
-const LIMITS: Limits = (Duration::from_secs(5), Duration::from_secs(10));
+const TRANSFER: TransferLimits = TransferLimits::new(Duration::from_secs(5), Duration::from_secs(10));
 /// Type, revision and build of a controller.
 const TYPE: RegisterAddress = RegisterAddress(0x0000);
 /// An object that takes many segments.
@@ -91,7 +91,7 @@ fn a_job_is_waited_for_with_a_limit_polled_and_awaited() -> Result<(), Error> {
     let (supervisor, _cyclic) = supervisor()?;
     supervisor.scan()?;
     supervisor.bring_to(1, AlState::PreOp)?;
-    let start = || supervisor.background().sdo_upload(1, LARGE, LIMITS, 200_000);
+    let start = || supervisor.background().sdo_upload(1, LARGE, TRANSFER.bytes(200_000));
 
     let mut limited = start();
     assert!(limited.wait_for(Duration::ZERO).is_none(), "segments take time");
@@ -127,10 +127,10 @@ fn a_stop_ends_jobs_and_an_abort_leaves_the_mailbox_free() -> Result<(), Error> 
         std::thread::sleep(Duration::from_millis(1));
     }
     let supervisor = cycles.supervisor().clone();
-    let start = || supervisor.background().sdo_upload(1, LARGE, LIMITS, 200_000);
+    let start = || supervisor.background().sdo_upload(1, LARGE, TRANSFER.bytes(200_000));
     start().abort()?;
     drop(start());
-    assert_eq!(supervisor.sdo_upload(1, SdoAddress::new(0x2001, 7), LIMITS, 4)?.len(), 2);
+    assert_eq!(supervisor.sdo_upload(1, SdoAddress::new(0x2001, 7), TRANSFER.bytes(4))?.len(), 2);
 
     // Never ready: only the stop ends it.
     let endless = supervisor.start_job(|_| std::future::pending::<()>());

@@ -9,7 +9,8 @@ use std::time::{Duration, Instant};
 
 use ringcat::shared_segment::SharedSegment;
 use ringcat::{
-    Error, LastOutputs, Limits, Options, RawDatagram, RequestState, SdoAddress, Services, SupervisorThread, automatic,
+    Error, LastOutputs, Limits, Options, RawDatagram, RequestState, SdoAddress, Services, SupervisorThread,
+    TransferLimits, automatic,
 };
 use ringcat_engine::mail::coe;
 use ringcat_engine::mail::foe::{self, FoeOptions};
@@ -28,6 +29,7 @@ const LIMIT: Duration = Duration::from_secs(30);
 /// Memory that nothing uses.
 const USER_RAM: RegisterAddress = RegisterAddress(0x0F80);
 const LIMITS: Limits = (Duration::from_secs(5), Duration::from_secs(10));
+const TRANSFER: TransferLimits = TransferLimits::new(LIMITS.0, LIMITS.1);
 
 // covers: jobs
 #[test]
@@ -38,7 +40,7 @@ fn objects_and_files_are_moved_from_any_thread_and_requests_from_the_cyclic_one(
     let scan = supervisor.scan()?;
     // Before activation, in PREOP.
     supervisor.bring_to(1, AlState::PreOp)?;
-    let large = supervisor.sdo_upload(1, SdoAddress::new(0x2002, 0), LIMITS, 200_000)?;
+    let large = supervisor.sdo_upload(1, SdoAddress::new(0x2002, 0), TRANSFER.bytes(200_000))?;
     assert_eq!(large.len(), 100_000);
     let mut request = supervisor.create_sdo_request(1, 4)?;
     let application = supervisor.activate(automatic(&scan.subdevices, PERIOD), cyclic)?;
@@ -70,12 +72,13 @@ fn objects_and_files_are_moved_from_any_thread_and_requests_from_the_cyclic_one(
     }
     // During process data, by a handle of its own.
     let handle = cycles.supervisor().clone();
-    handle.sdo_download(1, SdoAddress::new(0x2001, 7), vec![0x34, 0x12], LIMITS)?;
+    handle.sdo_download(1, SdoAddress::new(0x2001, 7), vec![0x34, 0x12], TRANSFER)?;
     while read.load(Ordering::Relaxed) != 0x1234 {
         assert!(Instant::now() < end, "the cyclic thread reads what another one wrote");
         sleep(Duration::from_millis(1));
     }
-    let error = handle.sdo_upload(1, SdoAddress::new(0x7777, 0), LIMITS, 4).expect_err("there is no such object");
+    let error =
+        handle.sdo_upload(1, SdoAddress::new(0x7777, 0), TRANSFER.bytes(4)).expect_err("there is no such object");
     assert!(error.to_string().contains("0x06020000"), "{error}");
     let file = handle.run(|engine| {
         let mailbox = engine.mailbox(1);
@@ -90,7 +93,7 @@ fn objects_and_files_are_moved_from_any_thread_and_requests_from_the_cyclic_one(
     })?;
     assert_eq!(file, Ok(vec![7; 3000]));
     let (supervisor, _) = cycles.end()?.stop(LastOutputs::Zero, AlState::Init, LIMIT)?;
-    let gone = supervisor.sdo_upload(1, SdoAddress::new(0x2001, 7), LIMITS, 4).expect_err("it is in INIT");
+    let gone = supervisor.sdo_upload(1, SdoAddress::new(0x2001, 7), TRANSFER.bytes(4)).expect_err("it is in INIT");
     assert!(gone.to_string().contains("the mailbox is not in use"), "{gone}");
     Ok(())
 }

@@ -2,7 +2,9 @@
 
 use std::time::Duration;
 
-use ringcat::{Limits, MainDevice, Options, RequestFailure, RequestState, SdoAddress, Services, automatic};
+use ringcat::{
+    Limits, MainDevice, Options, RequestFailure, RequestState, SdoAddress, Services, TransferLimits, automatic,
+};
 use ringcat_engine::mail::foe::{self, FoeOptions};
 use ringcat_engine::mail::stream::Bytes;
 use ringcat_sim::application::foe::firmware;
@@ -15,6 +17,7 @@ use scenarios::tap::Tap;
 use scenarios::world::{CYCLE, World};
 
 const LIMITS: Limits = (Duration::from_millis(100), Duration::from_secs(1));
+const TRANSFER: TransferLimits = TransferLimits::new(LIMITS.0, LIMITS.1);
 const KINDS: [&str; 3] = ["coupler", "all-protocols", "digital-output-8"];
 
 // covers: jobs, sdo
@@ -24,13 +27,14 @@ fn objects_are_read_and_written_before_activation_which_configures_everything_an
         MainDevice::request(Tap::new(line(descriptions(&KINDS), NetworkOptions::default())), &Options::default());
     let scan = main_device.scan().expect("a scan");
     let object = SdoAddress::new(0x2001, 7);
-    main_device.sdo_download(1, object, &[0x34, 0x12], LIMITS).expect("it is there");
-    assert_eq!(main_device.sdo_upload(1, object, LIMITS, 2).expect("it is there"), [0x34, 0x12]);
-    let large = main_device.sdo_upload(1, SdoAddress::new(0x2002, 0), LIMITS, 200_000).expect("in segments");
+    main_device.sdo_download(1, object, &[0x34, 0x12], TRANSFER).expect("it is there");
+    assert_eq!(main_device.sdo_upload(1, object, TRANSFER.bytes(2)).expect("it is there"), [0x34, 0x12]);
+    let large = main_device.sdo_upload(1, SdoAddress::new(0x2002, 0), TRANSFER.bytes(200_000)).expect("in segments");
     assert_eq!(large.len(), 100_000);
-    let error = main_device.sdo_upload(1, SdoAddress::new(0x7777, 0), LIMITS, 2).expect_err("there is no such object");
+    let error =
+        main_device.sdo_upload(1, SdoAddress::new(0x7777, 0), TRANSFER.bytes(2)).expect_err("there is no such object");
     assert!(error.to_string().contains("0x06020000 Object does not exist"), "{error}");
-    let error = main_device.sdo_upload(2, object, LIMITS, 2).expect_err("it has no mailbox");
+    let error = main_device.sdo_upload(2, object, TRANSFER.bytes(2)).expect_err("it has no mailbox");
     assert!(error.to_string().contains("mailbox"), "{error}");
     let mut application = main_device.activate(automatic(&scan.subdevices, CYCLE)).expect("activation");
     for _ in 0..2000 {
@@ -91,7 +95,7 @@ fn firmware_is_written_through_boot_and_the_new_version_is_reported() {
     let mut main_device = MainDevice::request(Tap::new(network), &Options::default());
     main_device.scan().expect("a scan");
     let version = SdoAddress::new(0x100A, 0);
-    assert_eq!(main_device.sdo_upload(1, version, LIMITS, 50).expect("a version"), b"1.0");
+    assert_eq!(main_device.sdo_upload(1, version, TRANSFER.bytes(50)).expect("a version"), b"1.0");
     main_device.bring_to(1, AlState::Boot).expect("it has a boot loader");
     let image = firmware::image("2.7", &[0x5A; 20_000]);
     let mailbox = main_device.mailbox(1).expect("it was visited");
@@ -100,5 +104,5 @@ fn firmware_is_written_through_boot_and_the_new_version_is_reported() {
     });
     assert_eq!(written, Ok(20_000 + 4 + 1 + 3 + 4));
     main_device.bring_to(1, AlState::Init).expect("it leaves the boot loader");
-    assert_eq!(main_device.sdo_upload(1, version, LIMITS, 50).expect("a version"), b"2.7");
+    assert_eq!(main_device.sdo_upload(1, version, TRANSFER.bytes(50)).expect("a version"), b"2.7");
 }
