@@ -67,6 +67,10 @@ impl Inline {
     pub(crate) fn new(engine: Engine) -> Inline {
         Inline { engine, events: KeptEvents::default() }
     }
+
+    pub(crate) fn events_dropped(&self) -> u64 {
+        self.engine.events_dropped() + self.events.dropped
+    }
 }
 
 impl AcyclicHalf for Inline {

@@ -299,6 +299,11 @@ impl<L: Links> Application<L, Inline> {
         }
     }
 
+    /// Events that were not taken in time and that were dropped.
+    pub fn events_dropped(&self) -> u64 {
+        self.acyclic.events_dropped()
+    }
+
     /// The acyclic half, for what is not offered here.
     pub fn engine(&self) -> &Engine {
         &self.acyclic.engine

@@ -79,6 +79,8 @@ impl Failures {
                     *reason = None;
                 }
             }
+            // What is declared next has other indices.
+            Event::ScanFinished { .. } => self.0.clear(),
             _ => {}
         }
     }

@@ -7,9 +7,8 @@ use crate::acyclic::AcyclicHalf;
 use crate::application::Application;
 use crate::error::Error;
 use crate::links::Links;
-use crate::not_ready::{NotReady, Reason};
+use crate::not_ready::NotReady;
 use crate::process_data::ProcessData;
-use crate::subdevice::SubDeviceName;
 use crate::supervisor_thread::SupervisorThread;
 
 /// Another thread looks this often.
@@ -36,20 +35,17 @@ impl<L: Links, H: AcyclicHalf> Application<L, H> {
     ) -> Result<(), Error> {
         let end = self.now() + limit;
         loop {
-            if self.all_settled() {
+            // What a thread has published may be of the application before; the engine knows.
+            if self.all_settled() && self.acyclic.not_ready()?.is_empty() {
                 return Ok(());
             }
             if self.now() >= end {
-                return Err(NotReady { limit, subdevices: self.not_ready()? }.into());
+                return Err(NotReady { limit, subdevices: self.acyclic.not_ready()? }.into());
             }
             self.cycle(&mut work);
             let now = self.now();
             self.acyclic.keep_events(now);
         }
-    }
-
-    fn not_ready(&mut self) -> Result<Vec<(SubDeviceName, Reason)>, Error> {
-        self.acyclic.not_ready()
     }
 }
 
@@ -61,7 +57,7 @@ impl SupervisorThread {
     /// [`Error::NotReady`]: the time is over. [`Error::Gone`]: the thread is gone.
     pub fn wait_until_op(&self, limit: Duration) -> Result<(), Error> {
         let begin = WallClock::now();
-        while !self.all_settled() {
+        while !(self.all_settled() && self.not_ready()?.is_empty()) {
             if begin.elapsed() >= limit {
                 return Err(NotReady { limit, subdevices: self.not_ready()? }.into());
             }
