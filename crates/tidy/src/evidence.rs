@@ -85,7 +85,8 @@ mod tests {
 
     #[test]
     fn the_list_of_tests_names_them_under_their_row() {
-        let row = "| [it works](feature-tests.md#ring-cut) | works | |";
+        let row =
+            "| capability | state | limits |\n|---|---|---|\n| [it works](feature-tests.md#ring-cut) | works | |\n";
         let source = "// covers: ring-cut\n#[test]\nfn shown() {}\n";
         let files = vec![File::new(features::PAGE, row), File::new("crates/a/src/a.rs", source)];
         let page = of_features(&Tree { files });
