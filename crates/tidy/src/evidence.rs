@@ -13,7 +13,7 @@ use crate::tree::Tree;
 
 /// The pages, by path.
 pub fn pages(tree: &Tree) -> [(&'static str, String); 2] {
-    [("docs/feature-tests.md", features::evidence(tree)), ("docs/protocol-tests.md", of_protocol(tree))]
+    [("docs/feature-tests.md", of_features(tree)), ("docs/protocol-tests.md", of_protocol(tree))]
 }
 
 /// Pages that are not what the tests say.
@@ -21,6 +21,17 @@ pub fn outdated(tree: &Tree) -> Vec<Finding> {
     let current = |path: &str, text: &str| tree.file(path).is_some_and(|file| file.text == text);
     let old = pages(tree).into_iter().filter(|(path, text)| !current(path, text));
     old.map(|(path, _)| Finding::new(path, 0, "is out of date: run `cargo run -p tidy -- tests`")).collect()
+}
+
+/// The page that lists the tests of each row.
+fn of_features(tree: &Tree) -> String {
+    let tests = covers::all(tree);
+    let mut text = opening("Tests of each feature");
+    let page = tree.file(features::PAGE).map_or("", |page| &page.text);
+    for row in features::rows(page).into_iter().flatten().filter(|row| !row.id.is_empty()) {
+        text += &format!("\n## {}\n\n{}\n\n{}", row.id, row.capability, list(&tests, &row.id));
+    }
+    text
 }
 
 /// Statements first, then sections in their order; those that no test covers are left out.
@@ -39,7 +50,7 @@ fn of_protocol(tree: &Tree) -> String {
 }
 
 /// The heading of a page, and where it comes from.
-pub(crate) fn opening(title: &str) -> String {
+fn opening(title: &str) -> String {
     format!(
         "# {title}\n\nWritten by `cargo run -p tidy -- tests` from the `// covers:` lines of the tests; the tidy check \
          fails when it is\nout of date. In parentheses: the crate.\n"
@@ -47,7 +58,7 @@ pub(crate) fn opening(title: &str) -> String {
 }
 
 /// The tests that cover an id, one line each, in order.
-pub(crate) fn list(tests: &[Test], id: &str) -> String {
+fn list(tests: &[Test], id: &str) -> String {
     let covering = tests.iter().filter(|test| test.covers.iter().any(|covered| covered == id));
     let lines: BTreeSet<String> = covering.map(|test| format!("* `{}` ({})\n", test.name, test.home())).collect();
     lines.into_iter().collect()
@@ -70,5 +81,15 @@ mod tests {
         let written = pages(&tree).into_iter().map(|(path, text)| File::new(path, &text));
         tree.files.extend(written.collect::<Vec<_>>());
         assert!(outdated(&tree).is_empty());
+    }
+
+    #[test]
+    fn the_list_of_tests_names_them_under_their_row() {
+        let page = "| capability | state | limits |\n|---|---|---|\n\
+                    | [it works](feature-tests.md#ring-cut) | works | |\n";
+        let source = "// covers: ring-cut\n#[test]\nfn shown() {}\n";
+        let files = vec![File::new(features::PAGE, page), File::new("crates/a/src/a.rs", source)];
+        let page = of_features(&Tree { files });
+        assert!(page.ends_with("## ring-cut\n\nit works\n\n* `shown` (a)\n"), "{page}");
     }
 }

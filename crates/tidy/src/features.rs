@@ -6,11 +6,11 @@
 use std::collections::BTreeSet;
 
 use crate::Finding;
+use crate::covers;
 use crate::tree::Tree;
-use crate::{covers, evidence};
 
 /// Where the table is.
-const PAGE: &str = "docs/FEATURES.md";
+pub(crate) const PAGE: &str = "docs/FEATURES.md";
 /// What the second column may say; the last one needs no test.
 const STATES: [&str; 3] = ["works", "partly", "not yet"];
 /// So many rows are read in two minutes.
@@ -34,7 +34,7 @@ pub struct Row {
 }
 
 /// All rows of a page, or what is wrong with one.
-fn rows(text: &str) -> Vec<Result<Row, Finding>> {
+pub(crate) fn rows(text: &str) -> Vec<Result<Row, Finding>> {
     let mut rows = Vec::new();
     let mut in_table = false;
     for (number, line) in text.lines().enumerate() {
@@ -115,17 +115,6 @@ fn faults_of(row: &Row, covered: &BTreeSet<&String>) -> Vec<String> {
     faults
 }
 
-/// The page that lists the tests of each row.
-pub fn evidence(tree: &Tree) -> String {
-    let tests = covers::all(tree);
-    let mut text = evidence::opening("Tests of each feature");
-    let page = tree.file(PAGE).map_or("", |page| &page.text);
-    for row in rows(page).into_iter().flatten().filter(|row| !row.id.is_empty()) {
-        text += &format!("\n## {}\n\n{}\n\n{}", row.id, row.capability, evidence::list(&tests, &row.id));
-    }
-    text
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -160,12 +149,6 @@ mod tests {
             assert_eq!(faults(&tree(rows)).len(), 1, "{rows}");
         }
         assert_eq!(faults(&tree(&"| it will | not yet | |\n".repeat(121))).len(), 1);
-    }
-
-    #[test]
-    fn the_list_of_tests_names_them_under_their_row() {
-        let page = evidence(&tree("| [it works](feature-tests.md#ring-cut) | works | |"));
-        assert!(page.ends_with("## ring-cut\n\nit works\n\n* `shown` (a)\n"), "{page}");
     }
 
     #[test]
