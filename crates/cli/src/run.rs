@@ -47,6 +47,7 @@ use summary::{clock_account, final_account, summary};
 
 /// SubDevices have this long to get to INIT in the end.
 const STOP_LIMIT: Duration = Duration::from_secs(5);
+
 /// How to read what it prints.
 const SUMMARY_HELP: &str = "\
 All outputs stay zero. Watchdogs, process data and mailboxes are set up as each SubDevice's EEPROM (SII) says; with
