@@ -10,7 +10,8 @@ use clap::Args;
 use ringcat_link::{PacketSocket, ReceiveMode, Recorder, Sniffer, Tap, interface, monotonic};
 
 use crate::ending::EndRequest;
-use crate::interfaces::{Failure, describe_down, two_interfaces};
+use crate::failure::Failure;
+use crate::interfaces::{describe_down, two_interfaces};
 use crate::output::{say, write};
 use crate::recording::{DESCRIPTIONS, lines};
 use crate::times::time;
@@ -21,8 +22,8 @@ const LOOK: Duration = Duration::from_millis(200);
 
 /// What to do with the file.
 const ABOUT_CAPTURE: &str = "\
-Sees both directions of the interfaces and never sends; a MainDevice on them, of whatever make, does not notice. Open the
-file with Wireshark, or: tshark -r FILE.pcapng
+Sees both directions of the interfaces and never sends; a MainDevice on them, of whatever make, does not notice. Open
+the file with Wireshark, or: tshark -r FILE.pcapng
 
 Where the MainDevice is `ringcat scan` or `ringcat run`, --capture of these does the same without a second program.";
 

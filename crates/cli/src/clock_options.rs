@@ -10,14 +10,15 @@ use ringcat::{
     ClockConfig, ClockStatus, Declaration, ReferenceClock, SubDeviceInfo, SyncSignals, Trigger, system_time,
 };
 
-use crate::interfaces::{Failure, now};
-use crate::times::shift;
+use crate::failure::Failure;
+use crate::interfaces::now;
+use crate::times::{shift, us};
 use sync::{Sync, choose, sync};
 
 /// How `--sync` is explained.
-const SYNC_HELP: &str = "SYNC signals: auto (as the EEPROMs say, where they do), or POSITION:SYNC0[:SYNC1] with cycles and \
-    shifts, as in 3:1ms, 3:1ms+250us, 3:500us:1ms-100us; POSITION may be all, SYNC0 may be auto. Can be given more than \
-    once, what names a position counts";
+const SYNC_HELP: &str = "SYNC signals: auto (as the EEPROMs say, where they do), or POSITION:SYNC0[:SYNC1] with cycles \
+    and shifts, as in 3:1ms, 3:1ms+250us, 3:500us:1ms-100us; POSITION may be all, SYNC0 may be auto. Can be given more \
+    than once, what names a position counts";
 
 /// Options about clocks.
 #[derive(Args, Clone, Debug, Default)]
@@ -104,8 +105,8 @@ impl ClockOptions {
                 None => Err(format!("--reference {position}: there are SubDevices 0 to {}", found.len() - 1)),
                 Some(info) if info.controller.features.dc => Ok(()),
                 Some(info) => Err(format!(
-                    "--reference {position}: SubDevice {position} \"{}\" has no distributed clock; `ringcat clocks` lists \
-                     who has",
+                    "--reference {position}: SubDevice {position} \"{}\" has no distributed clock; `ringcat clocks` \
+                     lists who has",
                     info.name
                 )),
             },
@@ -142,15 +143,9 @@ fn in_front(reference: ReferenceClock, found: &[SubDeviceInfo], declaration: &De
     };
     let first = found[..position].iter().position(|info| info.controller.features.dc)?;
     Some(format!(
-        "the clock of position {first} is in front of the reference clock, position {position}: it follows what this host \
-         believes of that, and locks only as exactly as this host sends"
+        "the clock of position {first} is in front of the reference clock, position {position}: it follows what this \
+         host believes of that, and locks only as exactly as this host sends"
     ))
-}
-
-/// Nanoseconds in microseconds, without zeros behind the point that say nothing.
-pub fn us(ns: i64) -> String {
-    let text = format!("{:.3}", ns as f64 / 1e3);
-    text.trim_end_matches('0').trim_end_matches('.').to_owned()
 }
 
 /// SYNC signals in words, in microseconds.

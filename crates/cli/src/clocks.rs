@@ -19,12 +19,14 @@ use ringcat::packet::PacketLinks;
 use ringcat::tee::Tee;
 use ringcat::text::Names;
 use ringcat::{
-    AlState, ClockConfig, ClockStatus, CyclicThread, Instant, LastOutputs, SupervisorThread, SyncSignals, automatic,
+    AlState, Application, ClockConfig, ClockStatus, CyclicThread, Instant, LastOutputs, SupervisorThread, SyncSignals,
+    automatic,
 };
 
 use crate::clock_options::{ClockOptions, farthest};
 use crate::ending::EndRequest;
-use crate::interfaces::{Failure, InterfaceArguments, ThreadArguments, now};
+use crate::failure::Failure;
+use crate::interfaces::{InterfaceArguments, ThreadArguments, now};
 use crate::output::{counted, say};
 use crate::recording::RecordingArguments;
 use crate::run_log::{RunLog, Shown};
@@ -43,15 +45,15 @@ const LOOK: Duration = Duration::from_millis(10);
 
 /// How to read what it prints.
 const TABLE_HELP: &str = "\
-  delay       nanoseconds from the reference clock, as measured (register 0x0928); -: a fork without a clock hides it and
-              none was written; ~: the middle of what it can be (--estimate-delays)
+  delay       nanoseconds from the reference clock, as measured (register 0x0928); -: a fork without a clock hides it
+              and none was written; ~: the middle of what it can be (--estimate-delays)
   offset      from the clock's own time to system time (0x0920)
   drift       how much faster than the reference it would run by itself (0x0932)
   now, worst  its difference to the reference (0x092C): when it was read last, and the largest since it was locked
   SYNC        signals in microseconds: cycle, and shift with its sign
 
-Exit status: 0 all clocks locked and stayed within 1 us, their delays are known or estimated, and all SubDevices were in OP
-in the end, 1 they did not.";
+Exit status: 0 all clocks locked and stayed within 1 us, their delays are known or estimated, and all SubDevices were in
+OP in the end, 1 they did not.";
 
 /// Options of `ringcat clocks`.
 #[derive(Args, Debug)]
@@ -99,14 +101,8 @@ pub fn run(arguments: &ClocksArguments) -> Result<Verdict, Failure> {
     let mut declaration = automatic(&scan.subdevices, arguments.cycle);
     arguments.options.declare(&mut declaration, &scan.subdevices)?;
     let signals: Vec<Option<SyncSignals>> = declaration.subdevices.iter().map(|config| config.sync).collect();
-    let mut application = supervisor.activate(declaration, cyclic).map_err(ringcat::Error::from)?;
-    application.set_trigger(arguments.options.trigger(arguments.options.bus_shift));
-    let asked = end.clone();
-    let cycles = application.start_cycles(
-        move || thread.prepare_cycles(),
-        // Here too: this thread runs whatever starves.
-        move |_| if asked.is_asked() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) },
-    )?;
+    let application = supervisor.activate(declaration, cyclic).map_err(ringcat::Error::from)?;
+    let cycles = start_cycles(arguments, application, &end)?;
     let log = RunLog::new(EventLog::new(begin, names), surroundings);
     let mut watch = Watch { begin, log, end: &end, json: arguments.json };
     let mut course = Course::default();
@@ -144,6 +140,21 @@ pub fn run(arguments: &ClocksArguments) -> Result<Verdict, Failure> {
         }
     }
     Ok(verdict)
+}
+
+/// Gives the cycles a thread.
+fn start_cycles(
+    arguments: &ClocksArguments,
+    mut application: Application<Tee<PacketLinks>, SupervisorThread>,
+    end: &EndRequest,
+) -> Result<CyclicThread<Tee<PacketLinks>>, Failure> {
+    application.set_trigger(arguments.options.trigger(arguments.options.bus_shift));
+    let (thread, asked) = (arguments.thread, end.clone());
+    Ok(application.start_cycles(
+        move || thread.prepare_cycles(),
+        // Here too: this thread runs whatever starves.
+        move |_| if asked.is_asked() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) },
+    )?)
 }
 
 /// What did not hold.

@@ -3,6 +3,7 @@
 //! held.
 
 mod drive;
+mod incident;
 mod plan;
 mod report;
 mod watch;
@@ -17,9 +18,10 @@ use ringcat::simulated::SimulatedSegment;
 use ringcat::text::Names;
 use ringcat::{Application, Error, Event, MainDevice, Options, Scan, automatic};
 
-use crate::interfaces::Failure;
+use crate::failure::Failure;
 use crate::verdict::Verdict;
-use plan::{Incident, Plan};
+use incident::Incident;
+use plan::Plan;
 use report::Reporter;
 use watch::Watch;
 

@@ -14,7 +14,8 @@ use std::time::Duration;
 use ringcat::Instant;
 use ringcat_link::{HeldSignals, Signal, realtime};
 
-use crate::interfaces::{Failure, now};
+use crate::failure::Failure;
+use crate::interfaces::now;
 use crate::times::in_words;
 
 /// The thread looks at the time so often.

@@ -2,6 +2,7 @@
 
 mod details;
 mod json;
+mod words;
 
 use std::path::PathBuf;
 use std::time::Duration;
@@ -11,21 +12,23 @@ use ringcat::Direction;
 use ringcat::config::Configuration;
 use ringcat::config::eni::{Eni, SubDevice};
 use ringcat::eni::EniFile;
-use ringcat::{ConfigAddress, ReferenceClock, StartupAction, SubDeviceConfig, SyncManagerRole};
+use ringcat::{ConfigAddress, ReferenceClock, SubDeviceConfig, SyncManagerRole};
 
-use crate::interfaces::Failure;
+use crate::failure::Failure;
 use crate::output::{counted, say};
 use crate::verdict::Verdict;
+use words::{one_line, ranges, time};
 
 /// How to read what it prints.
 const ABOUT_ENI: &str = "\
 The file counts: SyncManagers, start-up commands, watchdogs and clocks are those of the file, also where the SII of a
-SubDevice says otherwise. What RingCAT does in its own way (state changes, addresses on the wire, FMMUs, delays of clocks) is
-held against the file and not listed. What is not followed is listed at the end, with the reason. An ENI comes from the tool
-that configured the network: TwinCAT (EtherCAT device, \"Export Configuration File\"), EC-Engineer (\"Export ENI\").
+SubDevice says otherwise. What RingCAT does in its own way (state changes, addresses on the wire, FMMUs, delays of
+clocks) is held against the file and not listed. What is not followed is listed at the end, with the reason. An ENI
+comes from the tool that configured the network: TwinCAT (EtherCAT device, \"Export Configuration File\"), EC-Engineer
+(\"Export ENI\").
 
-Exit status: 0 the file can be followed, 1 it describes no SubDevice, 2 it cannot be followed, and why is on the standard
-error output.";
+Exit status: 0 the file can be followed, 1 it describes no SubDevice, 2 it cannot be followed, and why is on the
+standard error output.";
 
 /// Options of `ringcat eni`.
 #[derive(Args, Debug)]
@@ -156,48 +159,6 @@ fn place(address: ConfigAddress) -> String {
     }
 }
 
-/// What a start-up command does.
-fn action(action: &StartupAction) -> String {
-    use ringcat::RegisterAccess;
-    let all = |complete: bool| if complete { ", complete access" } else { "" };
-    match action {
-        StartupAction::Sdo(sdo) => {
-            let object = format!("{:#06x}:{:02x}{}", sdo.index, sdo.sub_index, all(sdo.complete_access));
-            format!("SDO {object} = {}", hex(&sdo.data))
-        }
-        StartupAction::Upload(sdo) => {
-            let object = format!("{:#06x}:{:02x}{}", sdo.index, sdo.sub_index, all(sdo.complete_access));
-            match &sdo.expected {
-                Some(expected) => format!("SDO {object} must be {}", hex(expected)),
-                None => format!("SDO {object} is read"),
-            }
-        }
-        StartupAction::Idn(idn) => format!("drive {} {} = {}", idn.drive, idn.idn, hex(&idn.data)),
-        StartupAction::Ip(settings) => match settings.address {
-            Some(address) => format!("IP address {address}"),
-            None => "addresses for EoE".to_owned(),
-        },
-        StartupAction::Register(register) => match &register.access {
-            RegisterAccess::Write(data) => format!("register {} = {}", register.address, hex(data)),
-            RegisterAccess::Check { data, mask: None, .. } => {
-                format!("register {} must be {}", register.address, hex(data))
-            }
-            RegisterAccess::Check { data, mask: Some(mask), .. } => {
-                format!("register {} & {} must be {}", register.address, hex(mask), hex(data))
-            }
-        },
-    }
-}
-
-/// Bytes that are shown of longer data.
-const SHOWN_BYTES: usize = 16;
-
-fn hex(bytes: &[u8]) -> String {
-    let shown: Vec<String> = bytes.iter().take(SHOWN_BYTES).map(|byte| format!("{byte:02x}")).collect();
-    let more = if bytes.len() > SHOWN_BYTES { format!(" ... ({} bytes)", bytes.len()) } else { String::new() };
-    format!("{}{more}", shown.join(" "))
-}
-
 fn not_followed(configuration: &Configuration) -> Vec<String> {
     if configuration.notices.is_empty() && !configuration.declaration.subdevices.is_empty() {
         return vec![String::new(), "everything in the file is followed".to_owned()];
@@ -214,29 +175,6 @@ fn not_followed(configuration: &Configuration) -> Vec<String> {
         lines.push(format!("  {}{whom}", one_line(&notice.to_string())));
     }
     lines
-}
-
-/// Ascending numbers, with rows of them as ranges: `0-3, 5`.
-fn ranges(numbers: &[usize]) -> String {
-    let mut texts: Vec<String> = Vec::new();
-    for row in numbers.chunk_by(|a, b| a + 1 == *b) {
-        texts.push(match row {
-            [first, .., last] => format!("{first}-{last}"),
-            [first] => first.to_string(),
-            [] => continue,
-        });
-    }
-    texts.join(", ")
-}
-
-/// What a file calls something, without what would disturb a terminal.
-fn one_line(text: &str) -> String {
-    text.chars().map(|c| if c.is_control() { ' ' } else { c }).collect()
-}
-
-/// `1 ms`, `250 us`.
-fn time(duration: Duration) -> String {
-    format!("{duration:?}").replace('\u{b5}', "u")
 }
 
 #[cfg(test)]
@@ -294,12 +232,5 @@ mod tests {
         assert_eq!(json["tasks"][0]["period_ns"], 2_000_000);
         assert_eq!(json["lrw"][0]["subdevices"][0], 3);
         assert_eq!(json["not_followed"].as_array().unwrap().len(), configuration.notices.len());
-    }
-
-    // covers: eni-run
-    #[test]
-    fn rows_of_numbers_are_shown_as_ranges_and_names_cannot_disturb_a_terminal() {
-        assert_eq!(ranges(&[0, 1, 2, 5, 7, 8]), "0-2, 5, 7-8");
-        assert_eq!(one_line("a\u{1b}[31m\nb"), "a [31m b");
     }
 }

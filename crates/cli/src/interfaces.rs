@@ -7,12 +7,12 @@ use std::time::{Duration, Instant};
 
 use clap::{Args, ValueEnum};
 use ringcat::packet::PacketLinks;
-use ringcat::sim::segment::SegmentError;
-use ringcat::{Error, Link, MIN_DATAGRAMS_PER_FRAME, MacCodec, Options, ScanError};
+use ringcat::{Link, MIN_DATAGRAMS_PER_FRAME, MacCodec, Options};
+use ringcat_link::ReceiveMode;
 use ringcat_link::interface;
 use ringcat_link::realtime::{self, CpuLatency};
-use ringcat_link::{LinkError, ReceiveMode};
 
+use crate::failure::Failure;
 use crate::others::{check_frames, check_sockets};
 
 /// A hybrid wait spins for so long: most segments answer within.
@@ -21,50 +21,6 @@ const SPIN: Duration = Duration::from_micros(200);
 const LINK_UP_LIMIT: Duration = Duration::from_secs(3);
 /// Pause between two looks at the carrier.
 const LINK_PAUSE: Duration = Duration::from_millis(20);
-
-/// Why a command did not do what it was asked for, in words that say what to do.
-#[derive(Debug)]
-pub struct Failure(String);
-
-impl Failure {
-    /// In these words.
-    pub fn new(text: impl Into<String>) -> Failure {
-        Failure(text.into())
-    }
-}
-
-impl fmt::Display for Failure {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(&self.0)
-    }
-}
-
-impl From<LinkError> for Failure {
-    fn from(error: LinkError) -> Failure {
-        Failure(error.to_string())
-    }
-}
-
-impl From<SegmentError> for Failure {
-    fn from(error: SegmentError) -> Failure {
-        Failure(error.to_string())
-    }
-}
-
-impl From<Error> for Failure {
-    fn from(error: Error) -> Failure {
-        let advice = match &error {
-            Error::Scan(ScanError::NoSubDevices) => {
-                "; something sends the frames back unchanged: is this the cable to the SubDevices?"
-            }
-            Error::Scan(ScanError::Unsettled { .. }) => {
-                "; look for a loose cable or a power supply that comes and goes"
-            }
-            _ => "",
-        };
-        Failure(format!("{error}{advice}"))
-    }
-}
 
 /// How to wait for frames.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
@@ -183,7 +139,11 @@ pub struct InterfaceArguments {
     #[arg(long, value_name = "HOW", value_enum, default_value_t = SourceAddress::FlagsFirst)]
     pub source_address: SourceAddress,
     /// Put at most so many datagrams into a frame: some gateways and simulators take no more (often 15).
-    #[arg(long, value_name = "COUNT", value_parser = clap::value_parser!(u16).range(i64::from(MIN_DATAGRAMS_PER_FRAME)..))]
+    #[arg(
+        long,
+        value_name = "COUNT",
+        value_parser = clap::value_parser!(u16).range(i64::from(MIN_DATAGRAMS_PER_FRAME)..)
+    )]
     pub max_datagrams: Option<u16>,
     /// Go on although another MainDevice uses the interface. SubDevices then leave its OP.
     #[arg(long)]
@@ -277,7 +237,7 @@ impl InterfaceArguments {
             if Instant::now() >= until {
                 let text = down.iter().map(|name| describe_down(name)).collect::<Vec<_>>().join("\n");
                 if up.is_empty() {
-                    return Err(Failure(text));
+                    return Err(Failure::new(text));
                 }
                 eprintln!("ringcat: {text}");
                 return Ok(());

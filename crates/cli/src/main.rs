@@ -7,6 +7,7 @@ mod clocks;
 mod demo;
 mod ending;
 mod eni_summary;
+mod failure;
 mod interfaces;
 mod others;
 mod output;

@@ -14,7 +14,7 @@ use ringcat_link::interface::{UseWarning, exclusive_use};
 use ringcat_link::pcapng::Direction;
 use ringcat_link::{PacketSocket, ReceiveMode, Sniffer, monotonic};
 
-use crate::interfaces::Failure;
+use crate::failure::Failure;
 
 /// Frames are listened for so long: longer than the cycle of all but the slowest MainDevices.
 const LISTEN: Duration = Duration::from_millis(250);
@@ -28,7 +28,8 @@ const TAG: usize = 4;
 const COMMANDS: u8 = 1;
 
 /// What to do about it.
-const ADVICE: &str = "nothing was sent: stop the other one first. --force goes on all the same, and takes its SubDevices\n\
+const ADVICE: &str = "nothing was sent: stop the other one first. --force goes on all the same, and takes its \
+                      SubDevices\n\
                       out of OP. `ringcat capture` only listens";
 
 /// Tells how the interfaces are used otherwise, and refuses where another process has a socket for EtherCAT on one.

@@ -11,7 +11,8 @@ use ringcat::tee::Tee;
 use ringcat_link::recorder::Recorded;
 use ringcat_link::{Recorder, RecorderError};
 
-use crate::interfaces::{Failure, InterfaceArguments};
+use crate::failure::Failure;
+use crate::interfaces::InterfaceArguments;
 
 /// The option.
 #[derive(Args, Clone, Debug)]

@@ -7,7 +7,8 @@ use clap::Args;
 use ringcat::text::Names;
 use ringcat::{Cable, CableErrors, Link, MainDevice, Occupant, RingLook, RingState};
 
-use crate::interfaces::{Failure, InterfaceArguments, ThreadArguments};
+use crate::failure::Failure;
+use crate::interfaces::{InterfaceArguments, ThreadArguments};
 use crate::output::{counted, say};
 use crate::recording::RecordingArguments;
 use crate::times::time;
@@ -15,12 +16,13 @@ use crate::verdict::Verdict;
 
 /// How to read what it prints.
 const ABOUT_RING: &str = "\
-It only reads, so that a segment without a MainDevice stays as it is. Beside another MainDevice it refuses to begin: reading
-clears what that one waits for. Counters end at 255, and nothing here clears them: look at them twice (--for) to see which ones rise. A cable
-whose counter rises has a bad plug, or is bent, or lies beside something that disturbs it.
+It only reads, so that a segment without a MainDevice stays as it is. Beside another MainDevice it refuses to begin:
+reading clears what that one waits for. Counters end at 255, and nothing here clears them: look at them twice (--for) to
+see which ones rise. A cable whose counter rises has a bad plug, or is bent, or lies beside something that disturbs it.
 
-It knows nobody who does not answer: with two breaks, those between them are missing in the counts, the positions of those
-behind are lower, and the line break is named as if they did not exist. Compare the counts with what should be there.
+It knows nobody who does not answer: with two breaks, those between them are missing in the counts, the positions of
+those behind are lower, and the line break is named as if they did not exist. Compare the counts with what should be
+there.
 
 Exit status: 0 the ring is closed (or there is one link), 1 it is open or copies of frames are lost, 2 it could not be
 looked at.";
@@ -169,8 +171,8 @@ mod tests {
 
     use super::*;
 
-    const RING: &str = "[segment]\nring = true\n[[device]]\ntype = \"coupler\"\n[[device]]\ntype = \"digital-output-8\"\n\
-                        [[device]]\ntype = \"digital-input-8\"\n";
+    const RING: &str = "[segment]\nring = true\n[[device]]\ntype = \"coupler\"\n[[device]]\n\
+                        type = \"digital-output-8\"\n[[device]]\ntype = \"digital-input-8\"\n";
 
     fn look(cut: Option<usize>, corrupt: Option<usize>) -> RingLook {
         let mut segment = SimulatedSegment::from_toml(RING).unwrap();

@@ -7,13 +7,13 @@
 
 mod beside;
 mod eni;
+mod exchange;
 mod junction;
 mod live;
 mod reasons;
 mod summary;
 
 use std::ops::ControlFlow;
-use std::thread::sleep;
 use std::time::Duration;
 
 use clap::Args;
@@ -23,32 +23,30 @@ use ringcat::packet::PacketLinks;
 use ringcat::tee::Tee;
 use ringcat::text::{Names, address_of_sender, describe};
 use ringcat::{
-    CyclicThread, Declaration, DomainId, DomainState, Event, Instant, LastOutputs, Links, MAX_UNDER_WAY, ReadPdos,
-    SubDeviceInfo, SubDeviceState, SupervisorThread, automatic,
+    Application, ClockStatus, CyclicThread, Declaration, Event, Instant, LastOutputs, Links, MAX_UNDER_WAY, Options,
+    ReadPdos, Scan, SubDeviceInfo, SupervisorThread, automatic,
 };
 
 use crate::clock_options::ClockOptions;
 use crate::ending::EndRequest;
-use crate::interfaces::{Failure, InterfaceArguments, ThreadArguments, now};
+use crate::failure::Failure;
+use crate::interfaces::{InterfaceArguments, ThreadArguments, now};
 use crate::output::{counted, say};
-use crate::recording::{Recording, RecordingArguments};
-use crate::run_log::{RunLog, Shown};
+use crate::recording::RecordingArguments;
+use crate::run_log::RunLog;
 use crate::surroundings::Surroundings;
 use crate::times::{cycle, in_words, time};
 use crate::verdict::Verdict;
-use beside::{Beside, BesideArguments};
+use beside::BesideArguments;
 use eni::{EniArguments, EniNetwork, Watched};
+use exchange::Run;
 use junction::{Junctions, junctions};
 use live::Live;
 use reasons::{Exchanged, Seen};
 use summary::{clock_account, final_account, summary};
 
-/// From then to complete process data at the most, before that is told.
-const COMPLETE_LIMIT: Duration = Duration::from_secs(1);
 /// SubDevices have this long to get to INIT in the end.
 const STOP_LIMIT: Duration = Duration::from_secs(5);
-/// Pause between two looks at what the threads do.
-const LOOK: Duration = Duration::from_millis(1);
 
 /// How to read what it prints.
 const SUMMARY_HELP: &str = "\
@@ -56,11 +54,12 @@ All outputs stay zero. Watchdogs, process data and mailboxes are set up as each 
 --eni as the file says, and outputs as --set does.
 
 Ctrl-C ends it in order: outputs zero, all SubDevices to INIT; so do SIGTERM and SIGHUP. Exit status 0: all reached OP
-and stayed there, every cycle was complete, with two interfaces the ring is closed, and all clocks are locked where there
-are any. Otherwise 1, and the last line says what did not hold.
+and stayed there, every cycle was complete, with two interfaces the ring is closed, and all clocks are locked where
+there are any. Otherwise 1, and the last line says what did not hold.
 
-Distributed clocks are brought together with --clocks, or with any of --phase, --bus-shift, --reference and --sync; --for
-then counts from their lock. SubDevices with SYNC signals wait for it before OP. `ringcat clocks` tells more about them.
+Distributed clocks are brought together with --clocks, or with any of --phase, --bus-shift, --reference and --sync;
+--for then counts from their lock. SubDevices with SYNC signals wait for it before OP. `ringcat clocks` tells more about
+them.
 
 The summary tells three things apart:
   this machine   wake-ups that came late and cycles that were left out for that. Nothing on the cable is wrong: try
@@ -89,7 +88,12 @@ pub struct RunArguments {
     eni: EniArguments,
     /// Cycles that may be under way at once, for a cycle time that is shorter than the way of a frame through segment
     /// and host. Inputs are then as many cycles old as their way takes.
-    #[arg(long, value_name = "CYCLES", default_value = "1", value_parser = clap::value_parser!(u8).range(1..=i64::from(MAX_UNDER_WAY)))]
+    #[arg(
+        long,
+        value_name = "CYCLES",
+        default_value = "1",
+        value_parser = clap::value_parser!(u8).range(1..=i64::from(MAX_UNDER_WAY))
+    )]
     under_way: u8,
     /// Tell everything one by one, however often it comes. Otherwise what a bad time makes many of is counted.
     #[arg(long)]
@@ -113,6 +117,9 @@ pub struct RunArguments {
     enhanced_line_crossed: bool,
 }
 
+/// The application of this command: everything it exchanges may be recorded.
+type Recorded = Application<Tee<PacketLinks>, SupervisorThread>;
+
 /// Runs cycles. It has held where all SubDevices reached OP and stayed there, and every cycle afterwards was complete.
 pub fn run(arguments: &RunArguments) -> Result<Verdict, Failure> {
     arguments.interfaces.check_names()?;
@@ -125,23 +132,10 @@ pub fn run(arguments: &RunArguments) -> Result<Verdict, Failure> {
     let (mut cyclic, acyclic) = (recording.tee(cyclic), recording.tee(acyclic));
     let _awake = thread.prepare_process();
     let begin = now();
-    // A file that declares all SyncManagers says what PDOs there are.
-    let pdos =
-        if network.as_ref().is_some_and(EniNetwork::is_complete) { ReadPdos::Never } else { ReadPdos::default() };
-    let options = arguments
-        .interfaces
-        .options()
-        .with_junctions(arguments.junction.mode)
-        .with_enhanced_line_crossed(arguments.enhanced_line_crossed)
-        .with_pdos(pdos);
+    let options = options(arguments, network.as_ref());
     let supervisor = SupervisorThread::start(acyclic, &options, move || thread.prepare_supervisor())?;
     let beside = arguments.beside.start(&supervisor, &arguments.interfaces)?;
-    let mut others = 0;
-    let result = supervisor.scan_while(|| {
-        tell_events(&supervisor, &mut surroundings);
-        others += tell_of_others(&mut cyclic, &mut surroundings);
-    });
-    let scan = result.map_err(|error| surroundings.explain(error, others + supervisor.counters().foreign))?;
+    let scan = scan(&supervisor, &mut cyclic, &mut surroundings)?;
     let names = match &network {
         Some(network) => network.names(),
         None => Names(scan.subdevices.iter().map(|info| info.name.clone()).collect()),
@@ -152,46 +146,13 @@ pub fn run(arguments: &RunArguments) -> Result<Verdict, Failure> {
         network.undeclared(&scan.subdevices)
     });
     let period = declaration.domains.iter().map(|domain| domain.period).min().unwrap_or(arguments.cycle);
-    let domains = declaration.domains.len();
+    let (domains, clocks) = (declaration.domains.len(), declaration.clocks.is_some());
     say!("{} SubDevices; cycle {} us", scan.subdevices.len(), period.as_micros());
-    let trigger = declaration.clocks.as_ref().map(|clocks| arguments.clock_options.trigger(clocks.bus_shift));
-    let clocks = trigger.is_some();
-    supervisor.load(declaration)?;
-    let at_station = |station| network.as_ref().and_then(|network| network.at_station(station));
-    for connection in &arguments.junction.connections {
-        let connection = connection.resolve(at_station).map_err(Failure::new)?;
-        supervisor.add_junction_connection(connection)?;
-    }
-    let mut application = supervisor.apply(cyclic).map_err(|error| match &network {
-        Some(network) => network.explain(error.into()),
-        None => Failure::from(ringcat::Error::from(error)),
-    })?;
-    if let Some(trigger) = trigger {
-        application.set_trigger(trigger);
-    }
-    let (mut work, watched) = match &network {
-        Some(network) => {
-            let (work, watched) = network.work(application.directory())?;
-            application.set_copies(work.copies()).map_err(|error| Failure::new(error.to_string()))?;
-            (Some(work), watched)
-        }
-        None => (None, Watched::default()),
-    };
-    let asked = end.clone();
-    let cycles = application.start_cycles(
-        move || thread.prepare_cycles(),
-        move |data| {
-            if let Some(work) = &mut work {
-                work.cycle(data);
-            }
-            // Here too: this thread runs whatever starves.
-            if asked.is_asked() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
-        },
-    )?;
+    let application = activate(arguments, network.as_ref(), supervisor, declaration, cyclic)?;
+    let (cycles, watched) = start_cycles(arguments, network.as_ref(), application, &end)?;
     let ring = arguments.interfaces.redundant.is_some();
-    let live = Live::new(ring, clocks);
     let log = RunLog::new(EventLog::new(begin, names).one_by_one(arguments.tell_all), surroundings);
-    let mut run = Run { cycles, log, live, clocks, domains, beside, watched, recording };
+    let mut run = Run { cycles, log, live: Live::new(ring, clocks), clocks, domains, beside, watched, recording };
     let reached = run.reach_op(arguments.within, &end);
     let before = Seen::of(run.cycles.news());
     if reached.is_ok() {
@@ -208,13 +169,99 @@ pub fn run(arguments: &RunArguments) -> Result<Verdict, Failure> {
     if undeclared > 0 {
         reasons.push(format!("the file lacks {} of the bus", counted(undeclared, "SubDevice", "SubDevices")));
     }
+    finish(run, &status, &mut reasons);
+    let lasted = arguments.lasts.map_or_else(String::new, |lasts| format!(" for {}", in_words(lasts)));
+    let subdevices = counted(scan.subdevices.len(), "SubDevice", "SubDevices");
+    Ok(Verdict::of(reasons, format!("{subdevices} in OP{lasted}, every cycle complete")))
+}
+
+fn options(arguments: &RunArguments, network: Option<&EniNetwork>) -> Options {
+    // A file that declares all SyncManagers says what PDOs there are.
+    let pdos = if network.is_some_and(EniNetwork::is_complete) { ReadPdos::Never } else { ReadPdos::default() };
+    let options = arguments.interfaces.options();
+    options
+        .with_junctions(arguments.junction.mode)
+        .with_enhanced_line_crossed(arguments.enhanced_line_crossed)
+        .with_pdos(pdos)
+}
+
+/// Scans, and tells meanwhile of the cabling and of other MainDevices.
+fn scan(
+    supervisor: &SupervisorThread,
+    cyclic: &mut impl Links,
+    surroundings: &mut Surroundings,
+) -> Result<Scan, Failure> {
+    let mut others = 0;
+    let result = supervisor.scan_while(|| {
+        tell_events(supervisor, surroundings);
+        others += tell_of_others(cyclic, surroundings);
+    });
+    result.map_err(|error| surroundings.explain(error, others + supervisor.counters().foreign))
+}
+
+/// Activates what is declared, with the connections of junctions and what makes cycles begin.
+fn activate(
+    arguments: &RunArguments,
+    network: Option<&EniNetwork>,
+    supervisor: SupervisorThread,
+    declaration: Declaration,
+    cyclic: Tee<PacketLinks>,
+) -> Result<Recorded, Failure> {
+    let trigger = declaration.clocks.as_ref().map(|clocks| arguments.clock_options.trigger(clocks.bus_shift));
+    supervisor.load(declaration)?;
+    let at_station = |station| network.and_then(|network| network.at_station(station));
+    for connection in &arguments.junction.connections {
+        let connection = connection.resolve(at_station).map_err(Failure::new)?;
+        supervisor.add_junction_connection(connection)?;
+    }
+    let mut application = supervisor.apply(cyclic).map_err(|error| match network {
+        Some(network) => network.explain(error.into()),
+        None => Failure::from(ringcat::Error::from(error)),
+    })?;
+    if let Some(trigger) = trigger {
+        application.set_trigger(trigger);
+    }
+    Ok(application)
+}
+
+/// Gives the cycles a thread, with the work that a file asks for; also the variables of the file that are told.
+fn start_cycles(
+    arguments: &RunArguments,
+    network: Option<&EniNetwork>,
+    mut application: Recorded,
+    end: &EndRequest,
+) -> Result<(CyclicThread<Tee<PacketLinks>>, Watched), Failure> {
+    let (mut work, watched) = match network {
+        Some(network) => {
+            let (work, watched) = network.work(application.directory())?;
+            application.set_copies(work.copies()).map_err(|error| Failure::new(error.to_string()))?;
+            (Some(work), watched)
+        }
+        None => (None, Watched::default()),
+    };
+    let (thread, asked) = (arguments.thread, end.clone());
+    let cycles = application.start_cycles(
+        move || thread.prepare_cycles(),
+        move |data| {
+            if let Some(work) = &mut work {
+                work.cycle(data);
+            }
+            // Here too: this thread runs whatever starves.
+            if asked.is_asked() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+        },
+    )?;
+    Ok((cycles, watched))
+}
+
+/// Ends the cycles, tells how it went, and stops all SubDevices. What of that does not work is a reason.
+fn finish(run: Run, clocks: &[ClockStatus], reasons: &mut Vec<String>) {
     let application = run.cycles.end().unwrap_or_else(|panicked| {
         reasons.push(panicked.to_string());
         panicked.application
     });
     summary(&application, run.log.surroundings());
-    if clocks {
-        clock_account(&status, application.news(), run.log.events().names());
+    if run.clocks {
+        clock_account(clocks, application.news(), run.log.events().names());
     }
     run.watched.account();
     run.beside.account();
@@ -226,9 +273,6 @@ pub fn run(arguments: &RunArguments) -> Result<Verdict, Failure> {
         Err(error) => reasons.push(error.to_string()),
     }
     reasons.extend(run.recording.finish());
-    let lasted = arguments.lasts.map_or_else(String::new, |lasts| format!(" for {}", in_words(lasts)));
-    let subdevices = counted(scan.subdevices.len(), "SubDevice", "SubDevices");
-    Ok(Verdict::of(reasons, format!("{subdevices} in OP{lasted}, every cycle complete")))
 }
 
 /// What is to be activated: the file's network, or what was found as its SIIs say.
@@ -256,20 +300,6 @@ fn declare(
     Ok(declaration.with_under_way(arguments.under_way))
 }
 
-struct Run {
-    cycles: CyclicThread<Tee<PacketLinks>>,
-    log: RunLog,
-    live: Live,
-    /// Distributed clocks are in use.
-    clocks: bool,
-    /// How many domains there are.
-    domains: usize,
-    beside: Beside,
-    /// Variables of a file.
-    watched: Watched,
-    recording: Recording,
-}
-
 /// Tells of other MainDevices and of the cabling among the events of a scan.
 fn tell_events(supervisor: &SupervisorThread, surroundings: &mut Surroundings) {
     while let Some(event) = supervisor.pop_event() {
@@ -295,129 +325,4 @@ fn tell_of_others(links: &mut impl Links, surroundings: &mut Surroundings) -> u6
         }
     }) {}
     count
-}
-
-impl Run {
-    /// Tells what has happened since the last look.
-    fn look(&mut self) {
-        self.log.news(&self.cycles, now(), |shown| {
-            self.live.clear();
-            match shown {
-                Shown::Line(line) => say!("{line}"),
-                Shown::Warning(words) => eprintln!("ringcat: {words}"),
-            }
-        });
-        for words in self.beside.news() {
-            self.live.clear();
-            eprintln!("ringcat: {words}");
-        }
-        if let Some(words) = self.recording.failure() {
-            self.live.clear();
-            eprintln!("ringcat: {words}");
-        }
-        for line in self.watched.news(now()) {
-            self.live.clear();
-            say!("{line}");
-        }
-    }
-
-    fn clocks_locked(&self) -> bool {
-        !self.clocks || self.cycles.supervisor().with(|engine| engine.clocks_locked()).unwrap_or(false)
-    }
-
-    /// Until all SubDevices are in OP and all clocks are locked, and then until process data is complete, for a moment.
-    ///
-    /// # Errors
-    /// Why that does not come, in words.
-    fn reach_op(&mut self, limit: Duration, end: &EndRequest) -> Result<(), String> {
-        let until = now() + limit;
-        end.limit(until);
-        let (mut in_op, mut complete_until) = (false, until);
-        while !in_op || (!self.is_complete() && now() < complete_until) {
-            if let Some(by) = end.by() {
-                self.live.clear();
-                return Err(format!("ended by {by} before all SubDevices were in OP"));
-            }
-            if self.cycles.has_ended() {
-                return Err("the cycles ended before all SubDevices were in OP".to_owned());
-            }
-            if !in_op && now() >= until {
-                self.look();
-                self.live.clear();
-                self.tell_states(limit);
-                return Err(self.what_is_missing(limit));
-            }
-            self.look();
-            if !in_op && self.cycles.supervisor().all_settled() && self.clocks_locked() {
-                (in_op, complete_until) = (true, now() + COMPLETE_LIMIT);
-            }
-            self.live.show(now(), self.cycles.news(), self.cycles.supervisor(), self.log.events().names());
-            sleep(LOOK);
-        }
-        let reached = now();
-        self.look();
-        self.live.clear();
-        say!("{}", self.log.events().line(reached, "all SubDevices are in OP"));
-        for words in self.incomplete() {
-            say!("{}", self.log.events().line(reached, &format!("process data is not exchanged as declared: {words}")));
-        }
-        self.cycles.news().restart_histograms();
-        Ok(())
-    }
-
-    /// Domains whose last judgement is not complete, in words.
-    fn incomplete(&self) -> Vec<String> {
-        let judged = (0..self.domains).map(|domain| (domain, self.cycles.news().status(DomainId(domain))));
-        let incomplete = judged.filter(|(_, status)| status.state != DomainState::Complete);
-        incomplete
-            .map(|(domain, status)| {
-                let (wkc, expected) = (status.wkc, status.expected);
-                format!("domain {domain}: {}, working counter {wkc} of {expected}", status.in_words())
-            })
-            .collect()
-    }
-
-    fn is_complete(&self) -> bool {
-        self.incomplete().is_empty()
-    }
-
-    /// Why OP was not reached.
-    fn what_is_missing(&self, limit: Duration) -> String {
-        let limit = in_words(limit);
-        let states = self.cycles.supervisor().states();
-        let late = states.iter().filter(|state| **state != SubDeviceState::Settled(AlState::Op)).count();
-        if late == 0 {
-            return format!("not all clocks are locked within {limit}");
-        }
-        format!("{} of {} SubDevices not in OP within {limit}", late, states.len())
-    }
-
-    fn tell_states(&self, limit: Duration) {
-        let what = if self.clocks_locked() { "reached OP" } else { "reached OP with all clocks locked" };
-        say!("not all SubDevices {what} within {}:", in_words(limit));
-        for (subdevice, state) in self.cycles.supervisor().states().iter().enumerate() {
-            let state = live::word(*state);
-            let name = self.log.events().names().0.get(subdevice).map_or("", String::as_str);
-            say!("  SubDevice {subdevice} \"{name}\": {state}");
-        }
-        let clocks = self.cycles.supervisor().with(|engine| engine.clocks()).unwrap_or_default();
-        for clock in clocks.iter().filter(|clock| !clock.is_locked && !clock.is_reference) {
-            let difference = clock.difference_ns.map_or_else(|| "unknown".to_owned(), |ns| format!("{ns} ns"));
-            let name = clock.subdevice.and_then(|subdevice| self.log.events().names().0.get(subdevice));
-            let name = name.map_or_else(String::new, |name| format!(" \"{name}\""));
-            let position = clock.position;
-            say!("  the clock of position {position}{name} is not locked: its difference is {difference}");
-        }
-    }
-
-    fn exchange(&mut self, until: Instant, end: &EndRequest) {
-        end.limit(until);
-        while now() < until && !end.is_asked() && !self.cycles.has_ended() {
-            self.look();
-            self.live.show(now(), self.cycles.news(), self.cycles.supervisor(), self.log.events().names());
-            sleep(LOOK.min(until.since(now())));
-        }
-        self.look();
-        self.live.clear();
-    }
 }

@@ -4,7 +4,8 @@ use clap::Args;
 use ringcat::text::{Names, describe};
 use ringcat::{Event, MainDevice};
 
-use crate::interfaces::{Failure, InterfaceArguments, ThreadArguments};
+use crate::failure::Failure;
+use crate::interfaces::{InterfaceArguments, ThreadArguments};
 use crate::output::{counted, say};
 use crate::recording::RecordingArguments;
 use crate::surroundings::Surroundings;
@@ -15,8 +16,8 @@ use crate::verdict::Verdict;
 const ABOUT_SCAN: &str = "\
 A scan takes a segment that is in operation out of it: all SubDevices go to INIT. So it refuses to begin where another
 MainDevice uses the interface or sends into the segment; --force goes on all the same. It waits up to 5 s for the first
-SubDevice to answer. What is odd about the cables and EEPROMs goes to the standard error output, the table or JSON to the
-standard output.";
+SubDevice to answer. What is odd about the cables and EEPROMs goes to the standard error output, the table or JSON to
+the standard output.";
 
 /// Options of `ringcat scan`.
 #[derive(Args, Debug)]

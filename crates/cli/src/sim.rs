@@ -3,6 +3,7 @@
 mod doors;
 mod lateness;
 mod mail_orders;
+mod names;
 mod orders;
 mod plant;
 mod wires;
@@ -18,7 +19,8 @@ use ringcat::sim::segment::Segment;
 use ringcat_link::{CarrierWatch, monotonic};
 
 use crate::ending::EndRequest;
-use crate::interfaces::{Failure, ThreadArguments, two_interfaces};
+use crate::failure::Failure;
+use crate::interfaces::{ThreadArguments, two_interfaces};
 use crate::others::check_sockets;
 use crate::output::{counted, say};
 use crate::verdict::Verdict;
@@ -138,8 +140,8 @@ fn load(arguments: &SimArguments) -> Result<Network, Failure> {
     }
     match (network.host_cable(HostLink::Redundant), &arguments.redundant) {
         (None, Some(name)) => Err(Failure::new(format!(
-            "{path} is no ring, so nothing can be plugged into {name}: give its [segment] table `ring = true`, or leave \
-             --redundant out"
+            "{path} is no ring, so nothing can be plugged into {name}: give its [segment] table `ring = true`, or \
+             leave --redundant out"
         ))),
         (Some(_), _) | (None, None) => Ok(network),
     }

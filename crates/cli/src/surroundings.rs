@@ -16,7 +16,8 @@ use ringcat::wire::frame::MacAddress;
 use ringcat::{Classified, Error, Event, Identity, Link, Options, ScanError};
 use ringcat_link::{Listener, Sender};
 
-use crate::interfaces::{Failure, InterfaceArguments};
+use crate::failure::Failure;
+use crate::interfaces::InterfaceArguments;
 
 /// Bytes of the source address that MainDevices and controllers leave alone (protocol 9.7.1): they tell senders apart.
 const SENDER_MASK: [u8; 6] = [0, 0, 0, 0xFF, 0xFF, 0xFF];
@@ -58,8 +59,8 @@ impl Surroundings {
         }
         self.senders.push(sender);
         Some(format!(
-            "another MainDevice sends into this segment: frames from {} arrive on {} ({arrived_on}); the first bytes of \
-             the address may carry marks. Stop one of the two, or unplug its cable",
+            "another MainDevice sends into this segment: frames from {} arrive on {} ({arrived_on}); the first bytes \
+             of the address may carry marks. Stop one of the two, or unplug its cable",
             address(source),
             self.interfaces.name(arrived_on)
         ))
@@ -108,8 +109,8 @@ fn listen(interfaces: &InterfaceArguments, links: &PacketLinks, found: Arc<OnceL
         while let Some(heard) = listener.hear(&end) {
             if matches!(identity.classify(&heard.bytes), Classified::Ours(_)) {
                 eprintln!(
-                    "ringcat: frames sent on {} arrive on {}: a cable of this segment, such as the other end of a ring, \
-                     is plugged in there; {}",
+                    "ringcat: frames sent on {} arrive on {}: a cable of this segment, such as the other end of a \
+                     ring, is plugged in there; {}",
                     interfaces.main,
                     heard.interface,
                     interfaces.advice(&heard.interface)

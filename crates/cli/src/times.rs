@@ -57,6 +57,12 @@ pub fn shift(text: &str) -> Result<i64, String> {
     Ok(if text.starts_with('-') { -ns } else { ns })
 }
 
+/// Nanoseconds in microseconds, without zeros behind the point that say nothing.
+pub fn us(ns: i64) -> String {
+    let text = format!("{:.3}", ns as f64 / 1e3);
+    text.trim_end_matches('0').trim_end_matches('.').to_owned()
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

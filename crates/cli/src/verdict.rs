@@ -5,7 +5,7 @@
 
 use std::process::ExitCode;
 
-use crate::interfaces::Failure;
+use crate::failure::Failure;
 use crate::output::{self, say};
 
 /// What a command that ran has to say in the end.

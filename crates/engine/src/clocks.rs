@@ -10,8 +10,10 @@
 //! [`crate::exchange`].
 
 pub mod branches;
+pub mod cable_ends;
 pub mod cables;
 pub mod delay;
+pub mod delays;
 pub mod follow;
 pub mod measurement;
 mod places;
@@ -21,7 +23,8 @@ mod window;
 pub mod wiring;
 
 pub use cables::Cables;
-pub use delay::{Delays, Passage, PortTimes, Segment, Unknown};
+pub use delay::{Passage, PortTimes, Segment};
+pub use delays::{Delays, Unknown};
 pub use follow::{Follower, phase_error};
 pub use measurement::{Disagreement, Latched, Measurements};
 pub use start::first_pulse;

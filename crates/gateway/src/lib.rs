@@ -12,22 +12,26 @@
 #![forbid(unsafe_code)]
 
 mod connection;
+mod options;
 mod server;
+mod shared;
 
 use std::io;
-use std::net::{Ipv4Addr, SocketAddr};
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::net::SocketAddr;
+use std::sync::atomic::Ordering;
 use std::sync::mpsc::{Receiver, SyncSender, TryRecvError, sync_channel};
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::{Arc, PoisonError};
 use std::thread::JoinHandle;
 
 use mio::Waker;
 pub use ringcat_engine::mail::relay::RelayCounters;
 use ringcat_engine::mail::relay::Relayed;
 use ringcat_engine::main_device::MainDevice as Engine;
-use ringcat_wire::mailbox::gateway::PORT;
 
+pub use options::GatewayOptions;
 use server::Server;
+pub use shared::GatewayCounters;
+use shared::{FromClient, Shared};
 
 /// Messages on their way to the engine's thread.
 const MESSAGES: usize = 256;
@@ -35,56 +39,6 @@ const MESSAGES: usize = 256;
 const ANSWERS: usize = 1024;
 /// Messages that the engine's thread takes in one go.
 const TURN: usize = 64;
-
-/// Where the gateway listens.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct GatewayOptions {
-    /// Address and port, of UDP and TCP; port 0 is any that is free.
-    pub address: SocketAddr,
-    /// TCP connections at a time.
-    pub connections: usize,
-}
-
-impl Default for GatewayOptions {
-    /// This host only, the port of ETG.8200, 32 connections.
-    fn default() -> GatewayOptions {
-        GatewayOptions { address: SocketAddr::from((Ipv4Addr::LOCALHOST, PORT)), connections: 32 }
-    }
-}
-
-/// What the gateway has done.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct GatewayCounters {
-    /// Connections that were made.
-    pub connections: u64,
-    /// Connections that were ended because of what their client did or did not.
-    pub ended: u64,
-    /// Datagrams and messages that were dropped because too many came at once.
-    pub dropped: u64,
-    /// What became of the messages.
-    pub relay: RelayCounters,
-}
-
-#[derive(Debug, Default)]
-struct Shared {
-    ended: AtomicBool,
-    counters: Mutex<GatewayCounters>,
-}
-
-impl Shared {
-    fn count(&self, change: impl FnOnce(&mut GatewayCounters)) {
-        change(&mut self.counters.lock().unwrap_or_else(PoisonError::into_inner));
-    }
-}
-
-/// For the engine.
-#[derive(Debug, PartialEq, Eq)]
-enum FromClient {
-    /// A message with its EtherCAT header.
-    Message(u64, Vec<u8>),
-    /// The client has gone.
-    Gone(u64),
-}
 
 /// The gateway; it ends when this is dropped.
 #[derive(Debug)]
@@ -177,7 +131,7 @@ impl Passage {
 #[cfg(test)]
 mod tests {
     use std::io::{Read, Write};
-    use std::net::{TcpStream, UdpSocket};
+    use std::net::{Ipv4Addr, TcpStream, UdpSocket};
     use std::time::Duration;
 
     use ringcat_wire::mailbox::gateway::{HEADER_LEN, encode};

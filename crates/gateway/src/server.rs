@@ -14,7 +14,8 @@ use ringcat_engine::mail::relay::Relayed;
 use ringcat_wire::mailbox::gateway::{HEADER_LEN, MAX_LENGTH};
 
 use crate::connection::{Connection, Going};
-use crate::{FromClient, GatewayOptions, Shared};
+use crate::options::GatewayOptions;
+use crate::shared::{FromClient, Shared};
 
 const LISTENER: Token = Token(0);
 const DATAGRAMS: Token = Token(1);

@@ -58,7 +58,8 @@ mod tests {
 
     #[test]
     fn the_report_names_statements_and_sections_without_a_test() {
-        let page = "# 7. Clocks\n## 7.1 Delays\n## 7.2 Drift\n### 7.2.1 Loop\n## 9.2 Ring\n| CR-01 | a |\n| CR-02 | b |\n## 11.3 Model\n";
+        let page = "# 7. Clocks\n## 7.1 Delays\n## 7.2 Drift\n### 7.2.1 Loop\n## 9.2 Ring\n| CR-01 | a |\n\
+                    | CR-02 | b |\n## 11.3 Model\n";
         let source = "// covers: CR-02, 7.1\n#[test]\nfn a() {}\n";
         let files = vec![File::new("docs/protocol/a.md", page), File::new("crates/a/src/a.rs", source)];
         let expected = "CR: 1 of 2 covered; no test: CR-01\nsections: 1 of 2 covered; no test: 7.2.1\n";

@@ -15,9 +15,10 @@ use ringcat::{
 };
 use ringcat_link::monotonic;
 
-use super::quantile_us;
+use super::quantile::quantile_us;
 use crate::ending::EndRequest;
-use crate::interfaces::{Failure, InterfaceArguments, ThreadArguments};
+use crate::failure::Failure;
+use crate::interfaces::{InterfaceArguments, ThreadArguments};
 use crate::output::say;
 use crate::verdict::Verdict;
 
@@ -40,10 +41,20 @@ pub struct CyclesArguments {
     #[command(flatten)]
     thread: ThreadArguments,
     /// Cycles to be measured; 0 for the start-up alone.
-    #[arg(long, value_name = "CYCLES", default_value = "20000", value_parser = clap::value_parser!(u32).range(0..=10_000_000))]
+    #[arg(
+        long,
+        value_name = "CYCLES",
+        default_value = "20000",
+        value_parser = clap::value_parser!(u32).range(0..=10_000_000)
+    )]
     count: u32,
     /// Cycles that may be under way at once: one begins when the oldest is back.
-    #[arg(long, value_name = "CYCLES", default_value = "1", value_parser = clap::value_parser!(u8).range(1..=i64::from(MAX_UNDER_WAY)))]
+    #[arg(
+        long,
+        value_name = "CYCLES",
+        default_value = "1",
+        value_parser = clap::value_parser!(u8).range(1..=i64::from(MAX_UNDER_WAY))
+    )]
     under_way: u8,
     /// Leaves the supervision datagram out, for a comparison with those that send process data alone.
     #[arg(long)]

@@ -11,7 +11,8 @@ use ringcat::wire::source_address::PROCESSED;
 use ringcat_link::{PacketOptions, PacketSocket, monotonic, wait};
 
 use crate::ending::EndRequest;
-use crate::interfaces::{Failure, ThreadArguments};
+use crate::failure::Failure;
+use crate::interfaces::ThreadArguments;
 use crate::others::check_sockets;
 use crate::output::say;
 use crate::verdict::Verdict;

@@ -14,7 +14,8 @@ use ringcat_link::monotonic;
 
 use super::cycles::{DOMAIN, STOP_LIMIT, declare, reach_op};
 use crate::ending::EndRequest;
-use crate::interfaces::{Failure, InterfaceArguments, ThreadArguments};
+use crate::failure::Failure;
+use crate::interfaces::{InterfaceArguments, ThreadArguments};
 use crate::output::say;
 use crate::verdict::Verdict;
 
@@ -91,7 +92,8 @@ fn tries(
     for attempt in (1..=TRIES).take_while(|_| !end.is_asked()) {
         let Seen { cycles, skipped, stalled, latest, .. } = hold(application, period, end);
         say!(
-            "every {} us, try {attempt}: {cycles} cycles, {skipped} skipped, {stalled} more in stalls of the machine, the latest by {:.1} us",
+            "every {} us, try {attempt}: {cycles} cycles, {skipped} skipped, {stalled} more in stalls of the machine, \
+             the latest by {:.1} us",
             period.as_micros(),
             latest.as_nanos() as f64 / 1e3
         );

@@ -23,9 +23,10 @@ use ringcat_engine::queue::{Consumer, queue};
 use ringcat_engine::ring::Identity;
 use ringcat_link::{PacketOptions, PacketSocket, ReceiveMode, monotonic, wait};
 
-use super::quantile_us;
+use super::quantile::quantile_us;
 use crate::ending::EndRequest;
-use crate::interfaces::{Failure, ThreadArguments};
+use crate::failure::Failure;
+use crate::interfaces::ThreadArguments;
 use crate::others::{check_frames, check_sockets};
 use crate::output::say;
 use crate::verdict::Verdict;
@@ -55,7 +56,12 @@ pub struct RoundTripArguments {
     #[arg(long, value_name = "BYTES", default_value = "60", value_parser = clap::value_parser!(u16).range(60..=1514))]
     size: u16,
     /// Cycles of each client.
-    #[arg(long, value_name = "CYCLES", default_value = "100000", value_parser = clap::value_parser!(u32).range(1..=10_000_000))]
+    #[arg(
+        long,
+        value_name = "CYCLES",
+        default_value = "100000",
+        value_parser = clap::value_parser!(u32).range(1..=10_000_000)
+    )]
     count: u32,
     /// Pairs of blocks that these are divided into. With 0 the MainDevice runs alone, without blocks.
     #[arg(long, value_name = "PAIRS", default_value = "20", value_parser = clap::value_parser!(u32).range(0..=1000))]

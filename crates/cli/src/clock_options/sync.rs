@@ -4,8 +4,7 @@ use std::time::Duration;
 
 use ringcat::{SubDeviceInfo, SyncSignals};
 
-use crate::clock_options::us;
-use crate::times::{shift, time};
+use crate::times::{shift, time, us};
 
 /// AssignActivate without a word from the EEPROM: SYNC0, and SYNC0 with SYNC1.
 const SYNC0: u16 = 0x0300;

@@ -72,8 +72,8 @@ pub fn plot(course: &Course, clocks: &[ClockStatus]) -> String {
         // Writing into a String cannot fail.
         let _ = writeln!(
             svg,
-            "<path d=\"{path}\" fill=\"none\" stroke=\"{}\" stroke-width=\"1.2\" stroke-linejoin=\"round\"><title>{name} \
-             {}</title></path>",
+            "<path d=\"{path}\" fill=\"none\" stroke=\"{}\" stroke-width=\"1.2\" stroke-linejoin=\"round\"><title>\
+             {name} {}</title></path>",
             colour(number),
             clock.position
         );

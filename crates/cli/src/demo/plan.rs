@@ -2,78 +2,17 @@
 
 use std::time::Duration;
 
-use ringcat::sim::cable::{CableId, DeviceIndex, Endpoint, HostLink};
+use ringcat::sim::cable::{CableId, Endpoint, HostLink};
 use ringcat::sim::network::Network;
-use ringcat::text::Names;
 use ringcat::{Direction, Scan};
 
+use super::incident::Incident;
 use super::watch::Watch;
 
 /// How long every stretch lasts.
 const STRETCH: Duration = Duration::from_millis(1000);
 /// How long the SubDevice is without power.
 const OUTAGE: Duration = Duration::from_millis(500);
-
-/// What happens to the segment.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub enum Incident {
-    /// Nothing.
-    Calm,
-    /// The cable between two SubDevices is cut.
-    Cut {
-        /// The cable.
-        cable: CableId,
-        /// Positions of its ends.
-        ends: (usize, usize),
-    },
-    /// The same cable is healed.
-    Heal {
-        /// The cable.
-        cable: CableId,
-        /// Positions of its ends.
-        ends: (usize, usize),
-    },
-    /// A SubDevice loses its power.
-    PowerOff {
-        /// The device.
-        device: DeviceIndex,
-        /// Its position.
-        position: usize,
-    },
-    /// It gets it back.
-    PowerOn {
-        /// The device.
-        device: DeviceIndex,
-        /// Its position.
-        position: usize,
-    },
-}
-
-impl Incident {
-    /// Cable edges: each may cost one cycle.
-    pub fn edges(&self, cables_of_device: usize) -> u64 {
-        match self {
-            Incident::Calm => 0,
-            Incident::Cut { .. } | Incident::Heal { .. } => 1,
-            Incident::PowerOff { .. } | Incident::PowerOn { .. } => cables_of_device as u64,
-        }
-    }
-
-    /// In words.
-    pub fn describe(&self, names: &Names) -> String {
-        let name = |position: usize| match names.0.get(position) {
-            Some(name) => format!("{position} \"{name}\""),
-            None => position.to_string(),
-        };
-        match self {
-            Incident::Calm => "all are in OP".to_owned(),
-            Incident::Cut { ends: (a, b), .. } => format!("cutting the cable between {} and {}", name(*a), name(*b)),
-            Incident::Heal { ends: (a, b), .. } => format!("healing the cable between {} and {}", name(*a), name(*b)),
-            Incident::PowerOff { position, .. } => format!("switching off SubDevice {}", name(*position)),
-            Incident::PowerOn { position, .. } => format!("switching SubDevice {} on again", name(*position)),
-        }
-    }
-}
 
 /// An incident and how long the demonstration goes on after it.
 #[derive(Clone, Debug)]

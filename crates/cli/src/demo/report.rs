@@ -7,7 +7,8 @@ use ringcat::simulated::SimulatedSegment;
 use ringcat::text::{Names, describe};
 use ringcat::{Application, Event, Instant, Scan, SubDeviceState, TimedEvent};
 
-use super::plan::{Incident, Plan};
+use super::incident::Incident;
+use super::plan::Plan;
 use super::watch::{Account, Watch};
 use crate::output::{say, write};
 use crate::table;

@@ -12,7 +12,7 @@ use ringcat::wire::register::map;
 use ringcat::{Application, Direction, DomainId, DomainState, DomainStatus, Freshness};
 
 use super::drive::Drive;
-use super::plan::Incident;
+use super::incident::Incident;
 
 /// The only domain.
 const DOMAIN: DomainId = DomainId(0);

@@ -1,11 +1,10 @@
 //! The details of each SubDevice: SyncManagers, PDOs, start-up commands, places in the image.
 
-use ringcat::Direction;
+use ringcat::SyncSignals;
 use ringcat::config::Configuration;
 use ringcat::config::eni::Eni;
-use ringcat::{SyncManagerRole, SyncSignals};
 
-use super::{action, one_line, time};
+use super::words::{action, one_line, role, side, time};
 
 /// Lines for all SubDevices, then the variables of the image.
 pub(super) fn lines(model: &Eni, configuration: &Configuration) -> Vec<String> {
@@ -100,21 +99,5 @@ fn sync(signals: &SyncSignals) -> String {
     match signals.sync1_register_ns() {
         0 => first,
         later => format!("{first}, SYNC1 {later} ns after SYNC0"),
-    }
-}
-
-pub(super) const fn side(direction: Direction) -> &'static str {
-    match direction {
-        Direction::Outputs => "outputs",
-        Direction::Inputs => "inputs",
-    }
-}
-
-pub(super) const fn role(role: SyncManagerRole) -> &'static str {
-    match role {
-        SyncManagerRole::MailboxOut => "mail out",
-        SyncManagerRole::MailboxIn => "mail in",
-        SyncManagerRole::Outputs => "outputs",
-        SyncManagerRole::Inputs => "inputs",
     }
 }

@@ -5,12 +5,12 @@ use ringcat::config::{Configuration, ImageArea};
 use ringcat::{ConfigAddress, ReferenceClock, SubDeviceConfig};
 use serde_json::{Value, json};
 
-use super::action;
-use super::details::{role, side};
+use super::words::{action, role, side};
 
 /// Everything, with the details.
 pub(super) fn json(model: &Eni, configuration: &Configuration) -> Value {
     let declaration = &configuration.declaration;
+    let subdevices = (0..declaration.subdevices.len()).filter_map(|index| subdevice(index, configuration));
     let tasks = declaration.domains.iter().map(|domain| {
         let members = domain
             .members
@@ -43,7 +43,7 @@ pub(super) fn json(model: &Eni, configuration: &Configuration) -> Value {
         "version": model.version,
         "made_by": model.made_by,
         "cycle_ns": configuration.cycle.map(|cycle| cycle.as_nanos() as u64),
-        "subdevices": (0..declaration.subdevices.len()).filter_map(|index| subdevice(index, configuration)).collect::<Value>(),
+        "subdevices": subdevices.collect::<Value>(),
         "groups": configuration.groups,
         "tasks": tasks.collect::<Value>(),
         "lrw": lrw.collect::<Value>(),
@@ -76,6 +76,8 @@ fn subdevice(index: usize, configuration: &Configuration) -> Option<Value> {
         };
         declared.iter().map(one).collect::<Value>()
     });
+    let plugged_into =
+        facts.plugged_into.map(|(other, port)| json!({ "subdevice": other, "port": format!("{port:?}") }));
     let startup = config.startup.iter().map(|command| {
         json!({
             "transition": command.transition.to_string(),
@@ -101,7 +103,7 @@ fn subdevice(index: usize, configuration: &Configuration) -> Option<Value> {
         "product_code": config.expected.product_code,
         "revision": config.expected.revision,
         "serial": config.expected.serial,
-        "plugged_into": facts.plugged_into.map(|(other, port)| json!({ "subdevice": other, "port": format!("{port:?}") })),
+        "plugged_into": plugged_into,
         "sync_managers": sync_managers,
         "watchdog": {
             "divider": config.watchdog_divider,

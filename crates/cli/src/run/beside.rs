@@ -9,7 +9,8 @@ use ringcat::gateway::{Gateway, GatewayOptions};
 use ringcat::wire::mailbox::gateway::PORT;
 use ringcat_link::interface;
 
-use crate::interfaces::{Failure, InterfaceArguments};
+use crate::failure::Failure;
+use crate::interfaces::InterfaceArguments;
 use crate::output::say;
 
 /// Options for it.
@@ -24,7 +25,13 @@ pub struct BesideArguments {
     index: u16,
     /// Open the mailbox gateway (ETG.8200, UDP and TCP) on this address, 127.0.0.1:34980 by default. It knows no
     /// password: whoever reaches it may change SubDevices.
-    #[arg(long, value_name = "ADDR[:PORT]", num_args = 0..=1, default_missing_value = "127.0.0.1", value_parser = address)]
+    #[arg(
+        long,
+        value_name = "ADDR[:PORT]",
+        num_args = 0..=1,
+        default_missing_value = "127.0.0.1",
+        value_parser = address
+    )]
     gateway: Option<SocketAddr>,
 }
 
@@ -82,7 +89,8 @@ impl Beside {
             for EthernetInterface { name, subdevice, status, refused } in interfaces {
                 let counters = status.counters;
                 say!(
-                    "  {name} (SubDevice {}): to it {} frames, {} bytes, {} dropped; from it {} frames, {} bytes; {} incomplete, {} overrun, {refused} not taken by the host",
+                    "  {name} (SubDevice {}): to it {} frames, {} bytes, {} dropped; from it {} frames, \
+                     {} bytes; {} incomplete, {} overrun, {refused} not taken by the host",
                     subdevice.subdevice,
                     counters.tx_frames,
                     counters.tx_bytes,
@@ -98,7 +106,8 @@ impl Beside {
             let counters = gateway.counters();
             let relay = counters.relay;
             say!(
-                "  gateway: {} connections, {} ended by us; {} messages, {} answered, {} refused, {} without an answer, {} transfers ended",
+                "  gateway: {} connections, {} ended by us; {} messages, {} answered, \
+                 {} refused, {} without an answer, {} transfers ended",
                 counters.connections,
                 counters.ended,
                 relay.messages,

@@ -12,7 +12,7 @@ use ringcat::eni::{EniFile, EniImage, EniVariable, Value, VariableType};
 use ringcat::text::Names;
 use ringcat::{ActivateError, Declaration, Direction, Error, Instant, ProcessData, Scan, SubDeviceInfo};
 
-use crate::interfaces::Failure;
+use crate::failure::Failure;
 use crate::output::say;
 
 /// Values of a variable are told so often at most.
@@ -117,8 +117,9 @@ impl EniNetwork {
                 let names = self.names().0;
                 let who: Vec<&str> = lrw.subdevices.iter().filter_map(|at| Some(names.get(*at)?.as_str())).collect();
                 Failure::new(format!(
-                    "{}: an LRW of {} bytes over {} SubDevices ({}) cannot be used with two interfaces, because a break of \
-                     the ring would divide it: add --split-lrw to have it sent as LRD and LWR, or leave --redundant out",
+                    "{}: an LRW of {} bytes over {} SubDevices ({}) cannot be used with two interfaces, because a \
+                     break of the ring would divide it: add --split-lrw to have it sent as LRD and LWR, or leave \
+                     --redundant out",
                     lrw.name,
                     lrw.length,
                     who.len(),

@@ -5,8 +5,8 @@ use ringcat::{JunctionConnection, JunctionMode};
 /// How the option is explained.
 pub const HELP: &str = "Rings behind junctions: disabled, automatic (those that are there at the scan are learned), or \
     strict=HEAD:PORT-TAIL:PORT[,...] with the positions of the junction and of the last SubDevice of its ring, and the \
-    ports of the cable between them (head: port 1). With --eni, @ and the station address of the file may take the place of \
-    a position, as in @1001:1-@1004:1";
+    ports of the cable between them (head: port 1). With --eni, @ and the station address of the file may take the \
+    place of a position, as in @1001:1-@1004:1";
 
 /// A mode, and the connections that strict needs.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]

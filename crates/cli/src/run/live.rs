@@ -13,8 +13,8 @@ use ringcat::{
     SupervisorThread,
 };
 
-use crate::clock_options::us;
 use crate::output::write;
+use crate::times::us;
 
 /// It is drawn anew so often.
 const PERIOD: Duration = Duration::from_millis(500);

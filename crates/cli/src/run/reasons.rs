@@ -4,7 +4,8 @@ use ringcat::news::News;
 use ringcat::text::Names;
 use ringcat::{AlState, ClockStatus, CyclicCounters, Pace, RingState, SubDeviceState};
 
-use super::{Run, live};
+use super::exchange::Run;
+use super::live;
 use crate::output::counted;
 
 /// A cycle time is not kept where more cycles than this part were left out.

@@ -42,8 +42,8 @@ impl Lateness {
             return None;
         }
         let text = format!(
-            "the simulator was late {} times, by up to {:.3} ms (this machine stalled, or a frame was much work); frames \
-             were delayed by that",
+            "the simulator was late {} times, by up to {:.3} ms (this machine stalled, or a frame was much work); \
+             frames were delayed by that",
             self.count - self.told,
             self.longest_since.as_secs_f64() * 1e3
         );

@@ -2,8 +2,6 @@
 //!
 //! In goes a line of text, out comes an answer whose last line is `ok` or begins with `error:`.
 
-use std::fmt::Write as _;
-
 use ringcat::sim::cable::{CableId, DeviceIndex, Endpoint, HostLink};
 use ringcat::sim::device::Device;
 use ringcat::sim::fault::Fault;
@@ -11,6 +9,7 @@ use ringcat::sim::network::Network;
 use ringcat::wire::address::RegisterAddress;
 
 use super::mail_orders;
+use super::names::{describe_cable, describe_device, end_name};
 use super::plant::Plant;
 
 /// Most bytes of registers in one answer.
@@ -192,34 +191,14 @@ fn neighbours(device: DeviceIndex, network: &Network) -> Vec<String> {
     network.cables().filter_map(|cable| far(cable.a, cable.b)).map(|end| end_name(end, network)).collect()
 }
 
-fn end_name(end: Endpoint, network: &Network) -> String {
-    match end {
-        Endpoint::Device(device, _) => describe_device(device, network),
-        Endpoint::Host(link) => format!("the {link} interface"),
-    }
-}
-
-fn describe_device(device: DeviceIndex, network: &Network) -> String {
-    format!("{} \"{}\"", device.0, network.device(device).name())
-}
-
-/// A cable by what it joins.
-pub fn describe_cable(cable: CableId, network: &Network) -> String {
-    let mut text = String::from("cable between ");
-    if let Some(spec) = network.cables().nth(cable.0) {
-        // Writing into a String cannot fail.
-        let _ = write!(text, "{} and {}", end_name(spec.a, network), end_name(spec.b, network));
-    }
-    text
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
     use ringcat::sim::segment::Segment;
 
     const SEGMENT: &str = "[segment]\nring = true\n[[device]]\ntype = \"coupler\"\nname = \"head\"\n[[device]]\n\
-                           type = \"servo\"\nname = \"left-axis\"\n[[device]]\ntype = \"servo\"\nname = \"right-axis\"\n";
+                           type = \"servo\"\nname = \"left-axis\"\n\
+                           [[device]]\ntype = \"servo\"\nname = \"right-axis\"\n";
 
     fn plant() -> Plant {
         let segment = Segment::from_toml(SEGMENT, std::path::Path::new(".")).expect("a good segment");

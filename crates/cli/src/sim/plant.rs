@@ -10,7 +10,7 @@ use ringcat::sim::fault::Fault;
 use ringcat::sim::network::Network;
 use ringcat::sim::network::statistics::LossCause;
 
-use super::orders::describe_cable;
+use super::names::describe_cable;
 
 /// A segment under orders.
 #[derive(Debug)]

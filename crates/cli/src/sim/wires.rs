@@ -144,8 +144,8 @@ impl Wires {
             let LinkCounters { sent, received, down, busy, refused, overrun, truncated } = socket.counters();
             let unsent = down + busy + refused;
             format!(
-                "{link} interface: {received} frames received, {overrun} lost in a full ring, {truncated} too long, {sent} \
-                 sent, {unsent} not sent\n"
+                "{link} interface: {received} frames received, {overrun} lost in a full ring, {truncated} too long, \
+                 {sent} sent, {unsent} not sent\n"
             )
         };
         self.sockets.iter().map(line).collect::<String>() + &self.lateness.summary()

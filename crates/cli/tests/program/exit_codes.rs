@@ -25,7 +25,8 @@ const FILES: [(&str, &str); 7] = [
     ("broken.xml", "<EtherCATConfig><Config>"),
     (
         "nobody.xml",
-        "<EtherCATConfig Version=\"1.3\"><Config><Master><Info><Name>M</Name></Info></Master></Config></EtherCATConfig>",
+        "<EtherCATConfig Version=\"1.3\"><Config><Master><Info><Name>M</Name></Info>\
+         </Master></Config></EtherCATConfig>",
     ),
 ];
 

@@ -8,14 +8,8 @@
 use alloc::collections::BTreeMap;
 use alloc::vec::Vec;
 
-use ringcat_wire::address::StationAddress;
-
+use super::cable_ends::{End, Ends, ends};
 use super::sums::{Sum, solve};
-
-/// A port, by the station address of its SubDevice.
-pub type End = (StationAddress, u8);
-/// Both ends of a cable, the smaller one first.
-pub(super) type Ends = (End, End);
 
 /// Sums of cables that are kept: many more than a segment has forks without a clock.
 const MOST_SUMS: usize = 256;
@@ -99,10 +93,6 @@ impl Cables {
     }
 }
 
-pub(super) fn ends((one, other): (End, End)) -> Ends {
-    if one <= other { (one, other) } else { (other, one) }
-}
-
 fn sorted(cables: &[Ends]) -> Vec<Ends> {
     let mut cables = cables.to_vec();
     cables.sort_unstable();
@@ -111,6 +101,8 @@ fn sorted(cables: &[Ends]) -> Vec<Ends> {
 
 #[cfg(test)]
 mod tests {
+    use ringcat_wire::address::StationAddress;
+
     use super::*;
 
     // covers: dc-remeasure

@@ -6,7 +6,7 @@
 use alloc::vec;
 use alloc::vec::Vec;
 
-use super::delay::{Delays, Unknown};
+use super::delays::{Delays, Unknown};
 
 /// The least and the most, with fraction.
 pub(super) type Range = (i64, i64);

@@ -6,7 +6,7 @@
 use alloc::vec;
 use alloc::vec::Vec;
 
-use super::cables::Ends;
+use super::cable_ends::Ends;
 
 /// More cables than this are not solved for.
 const MOST_CABLES: usize = 512;

@@ -241,70 +241,70 @@ impl core::error::Error for PlanError {}
 impl fmt::Display for PlanProblem {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            PlanProblem::NoSii => f.write_str("the EEPROM is blank or cannot be read, and nothing is declared"),
-            PlanProblem::NoSuchSyncManager { sync_manager, available } => {
+            Self::NoSii => f.write_str("the EEPROM is blank or cannot be read, and nothing is declared"),
+            Self::NoSuchSyncManager { sync_manager, available } => {
                 write!(f, "SM {sync_manager} is declared, the controller has {available} SyncManagers")
             }
-            PlanProblem::UnknownSyncManager { sync_manager, described } => {
+            Self::UnknownSyncManager { sync_manager, described } => {
                 write!(f, "SM {sync_manager} has process data, the SII describes {described} SyncManagers only")
             }
-            PlanProblem::MailboxSyncManager { sync_manager } => {
+            Self::MailboxSyncManager { sync_manager } => {
                 write!(f, "SM {sync_manager} has process data, but it belongs to the mailbox")
             }
-            PlanProblem::Directions { sync_manager, expected, got } => {
+            Self::Directions { sync_manager, expected, got } => {
                 write!(f, "SM {sync_manager} is declared for {expected}, its PDO assignment for {got}")
             }
-            PlanProblem::UnknownPdo { sync_manager, pdo } => {
+            Self::UnknownPdo { sync_manager, pdo } => {
                 write!(f, "SM {sync_manager}: PDO {pdo:#06x} has no declared entries and is not in the SII")
             }
-            PlanProblem::PdoDirection { sync_manager, pdo, expected, got } => {
+            Self::PdoDirection { sync_manager, pdo, expected, got } => {
                 write!(f, "SM {sync_manager} is for {expected}, PDO {pdo:#06x} for {got}")
             }
-            PlanProblem::PdoTwice { pdo, first, second } => {
+            Self::PdoTwice { pdo, first, second } => {
                 write!(f, "PDO {pdo:#06x} is assigned to SM {first} and again to SM {second}")
             }
-            PlanProblem::TooMany { object, expected, got } => {
+            Self::TooMany { object, expected, got } => {
                 write!(f, "object {object:#06x} holds at most {expected} entries, got {got}")
             }
-            PlanProblem::TooLong { sync_manager, bits } => {
+            Self::TooLong { sync_manager, bits } => {
                 write!(f, "SM {sync_manager}: {bits} bits of process data, expected at most 524280")
             }
-            PlanProblem::NoMemory { sync_manager, start } => {
+            Self::NoMemory { sync_manager, start } => {
                 write!(f, "SM {sync_manager}: there is no memory of its direction at {start:#06x}")
             }
-            PlanProblem::OutsideMemory { sync_manager, start, bytes, memory_end } => {
+            Self::OutsideMemory { sync_manager, start, bytes, memory_end } => {
                 write!(f, "SM {sync_manager}: {bytes} bytes (all buffers) at {start:#06x} leave the memory, ")?;
                 write!(f, "which ends at {memory_end:#06x}")
             }
-            PlanProblem::Overlap { first, first_bytes, second, second_bytes } => {
+            Self::Overlap { first, first_bytes, second, second_bytes } => {
                 write!(f, "SM {first} ({:#06x}..{:#06x}) and ", first_bytes.0, first_bytes.1)?;
                 write!(f, "SM {second} ({:#06x}..{:#06x}) overlap", second_bytes.0, second_bytes.1)
             }
-            PlanProblem::TooFewFmmus { expected, got } => {
+            Self::TooFewFmmus { expected, got } => {
                 write!(f, "{expected} FMMUs are needed, the controller has {got}")
             }
-            PlanProblem::FixedProcessData { sync_manager, expected, got } => {
+            Self::FixedProcessData { sync_manager, expected, got } => {
                 write!(f, "SM {sync_manager}: the SII describes {expected} bits, {got} are declared, ")?;
                 f.write_str("and without CoE it cannot be changed")
             }
-            PlanProblem::NoCoe { index, sub_index } => {
+            Self::NoCoe { index, sub_index } => {
                 write!(f, "object {index:#06x}:{sub_index:02x} is to be written, but there is no CoE")
             }
-            PlanProblem::NoSoe { drive, idn } => {
+            Self::NoSoe { drive, idn } => {
                 write!(f, "{idn} of drive {drive} is to be written, but there is no SoE")
             }
-            PlanProblem::NoEoe => f.write_str("addresses are to be set, but there is no EoE"),
-            PlanProblem::DeclaredTwice { sync_manager } => write!(f, "SM {sync_manager} is declared twice"),
-            PlanProblem::DeclaredMailboxes { out, inward } => {
+            Self::NoEoe => f.write_str("addresses are to be set, but there is no EoE"),
+            Self::DeclaredTwice { sync_manager } => write!(f, "SM {sync_manager} is declared twice"),
+            Self::DeclaredMailboxes { out, inward } => {
                 write!(f, "expected a mailbox to the SubDevice and one from it, or none, got {out} and {inward}")
             }
-            PlanProblem::DeclaredControl { sync_manager, expected, got } => {
+            Self::DeclaredControl { sync_manager, expected, got } => {
                 write!(f, "SM {sync_manager} is declared for {expected}, its control byte for {got}")
             }
-            PlanProblem::DeclaredTooShort { sync_manager, expected, got } => {
+            Self::DeclaredTooShort { sync_manager, expected, got } => {
                 write!(f, "SM {sync_manager}: its PDO entries have {expected} bits, its length {got}")
             }
-            PlanProblem::RegisterCommand { register, data, mask } => {
+            Self::RegisterCommand { register, data, mask } => {
                 let mask = mask.map_or(String::new(), |mask| format!(" and {mask} of mask"));
                 write!(f, "a command to register {register} has {data} bytes of data{mask}")
             }

@@ -9,10 +9,12 @@
 //! SubDevices looks at too.
 
 mod measure;
+mod not_locked;
 mod set_up;
 mod signals;
 mod watch;
 
-pub use signals::NotLocked;
-pub(super) use signals::{SignalsError, restore, start_signals, wait_for_lock};
+pub use not_locked::NotLocked;
+pub(super) use not_locked::SignalsError;
+pub(super) use signals::{restore, start_signals, wait_for_lock};
 pub(crate) use watch::{begin, keep};

@@ -3,6 +3,7 @@
 mod compare;
 mod error;
 mod leave;
+mod register_error;
 mod registers;
 mod startup;
 
@@ -27,7 +28,7 @@ use crate::segment::{Observation, ProcessDataStep};
 use crate::supervisor::{Bus, BusError};
 
 pub use error::{ConfigureError, StartupError};
-pub use registers::{RegisterError, RegisterFailure, WrongValue};
+pub use register_error::{RegisterError, RegisterFailure, WrongValue};
 
 /// Cycles of the exchange that must have gone by before OP is requested, so that valid outputs are there (protocol
 /// 5.2). The first of them may have been queued without process data.

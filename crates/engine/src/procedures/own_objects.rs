@@ -9,52 +9,34 @@ mod in_its_dictionary;
 mod information;
 mod messages;
 mod rates;
+mod seen;
+mod shared;
 mod upload;
 mod values;
 
-use alloc::collections::BTreeMap;
 use alloc::rc::Rc;
 use alloc::vec;
 use alloc::vec::Vec;
-use core::cell::{Cell, RefCell};
 
-use ringcat_wire::address::StationAddress;
 use ringcat_wire::mailbox::coe::{CoeHeader, CoeService, ObjectCode};
 use ringcat_wire::mailbox::sdo::{AbortCode, SdoError, SdoRequest, SdoResponse};
 use ringcat_wire::mailbox::{ErrorReply, Header};
 
 use self::catalogue::Object;
 use self::detection::Detection;
-use self::rates::Rates;
+pub(crate) use self::seen::Seen;
+use self::shared::Shared;
 use self::upload::{Upload, abort, begin, encode};
 use super::services::statistics;
-use super::shared_segment::SharedSegment;
 use crate::mail::coe::SdoAddress;
 use crate::segment::Observation;
-use crate::supervisor::{AcyclicCounters, Bus};
+use crate::supervisor::Bus;
 
 /// Bytes of a message to or from address 0, mailbox header included: a long list goes in segments.
 const MAILBOX: usize = 512;
 const ROOM: usize = MAILBOX - Header::LEN;
 /// Clients that may have an upload in segments under way.
 const UPLOADS: usize = 64;
-
-/// What the objects are about, at the moment of a request.
-#[derive(Clone, Debug)]
-pub(crate) struct Seen {
-    pub bus: Bus,
-    /// Once active.
-    pub segment: Option<SharedSegment>,
-    /// Station addresses of the last scan, by position.
-    pub scanned: Vec<StationAddress>,
-    pub acyclic: AcyclicCounters,
-}
-
-impl Seen {
-    fn declared(&self) -> usize {
-        self.segment.as_ref().map_or(0, |segment| segment.view().members.len())
-    }
-}
 
 /// All entries of an object one after the other, behind their number in 16 bits where it is asked for. Texts have their
 /// full length, and what is longer than a byte begins at an even offset: one that reads the descriptions knows where.
@@ -76,18 +58,6 @@ fn whole(object: Object, values: &[(u8, Vec<u8>)], count: Option<u8>) -> Vec<u8>
 #[derive(Clone, Debug, Default)]
 pub(crate) struct OwnObjects {
     shared: Rc<Shared>,
-}
-
-#[derive(Debug, Default)]
-struct Shared {
-    /// By client.
-    uploads: RefCell<BTreeMap<u64, Upload>>,
-    detection: Rc<Detection>,
-    rates: RefCell<Rates>,
-    /// Frames that were lost when the diagnosis was reset, cyclic and acyclic ones.
-    forgotten: Cell<[u64; 2]>,
-    /// Wrong working counters at that time, by SubDevice.
-    forgotten_wkc: RefCell<Vec<u32>>,
 }
 
 impl OwnObjects {

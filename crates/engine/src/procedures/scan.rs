@@ -2,9 +2,13 @@
 //!
 //! All SubDevices are asked at once, one task each; their datagrams share frames by themselves.
 
+mod cabling;
 mod count;
 mod error;
+mod found;
 mod identification;
+mod options;
+mod stations;
 
 use alloc::rc::Rc;
 use alloc::string::ToString;
@@ -20,14 +24,18 @@ use ringcat_wire::address::{Position, RegisterAddress, StationAddress, Wkc};
 use ringcat_wire::al::{AlControl, AlState, AlStatus};
 use ringcat_wire::command::Command;
 use ringcat_wire::datagram::Target;
-use ringcat_wire::register::{DcReceiveTimes, DlStatus, EcatEvent, Fmmu, Information, PortKind, SyncManager, map};
+use ringcat_wire::register::{DcReceiveTimes, DlStatus, EcatEvent, Fmmu, Information, SyncManager, map};
 use ringcat_wire::sii::SiiHeader;
 
+use self::cabling::locate_crossings;
+pub(crate) use self::cabling::report_cabling;
 use self::count::Count;
 pub use self::error::ScanError;
+pub use self::found::Scan;
+pub use self::options::ScanOptions;
+pub use self::stations::{FIRST_STATION, MAX_SUBDEVICES, station_at};
 use super::al_state;
-use super::cabling::{Known, cabling, stays_closed};
-use super::dictionary::{ReadPdos, complete};
+use super::dictionary::complete;
 use super::frame_limit::probe;
 use super::junction::learn;
 use super::sii::{self, ChainEnd, SiiCache, SiiContents};
@@ -35,16 +43,10 @@ use crate::config::duplicate_aliases;
 use crate::event::Event;
 use crate::info::{InfoWarning, Readout, SiiProblem, SubDeviceInfo};
 use crate::junction::JunctionMode;
-use crate::link::LinkSet;
 use crate::ring::RingState;
-use crate::segment::{LineCheck, is_swapped};
 use crate::supervisor::{Bus, BusError, Reply};
-use crate::topology::{Closing, Finding, NodeStatus, PortOf, Topology, rings_shown};
+use crate::topology::{Closing, NodeStatus, Topology, rings_shown};
 
-/// Station address of the SubDevice at position 0; the others follow.
-pub const FIRST_STATION: u16 = 0x1001;
-/// SubDevices that a scan takes: what fits between [`FIRST_STATION`] and the end of the address space.
-pub const MAX_SUBDEVICES: u16 = u16::MAX - FIRST_STATION;
 /// Most SyncManagers and FMMUs that a controller can have.
 const MAX_CHANNELS: usize = 16;
 /// Pause between two looks whether all are in INIT.
@@ -58,36 +60,6 @@ const PROGRESS_STEPS: usize = 10;
 
 /// Byte of the SII that says how large the EEPROM is.
 const SIZE_AT: usize = 2 * 0x3E;
-
-/// How to scan.
-#[derive(Clone, Debug)]
-pub struct ScanOptions {
-    /// The count must stay the same for this long.
-    pub settle: Duration,
-    /// How long to wait for the first SubDevice.
-    pub patience: Duration,
-    /// SII contents read before.
-    pub cache: SiiCache,
-    /// What becomes of rings behind junctions.
-    pub junctions: JunctionMode,
-    /// Whether the redundant link may be taken down for a moment to find out where a line is crossed.
-    pub enhanced_line_crossed: bool,
-    /// Whose dictionaries are asked for PDOs.
-    pub pdos: ReadPdos,
-}
-
-/// What a scan found.
-#[derive(Clone, Debug)]
-pub struct Scan {
-    /// The SubDevices in the order of the processing units.
-    pub subdevices: Vec<SubDeviceInfo>,
-    /// How they are connected.
-    pub topology: Topology,
-    /// How many of them the main copy met.
-    pub main_count: usize,
-    /// How many the redundant copy met.
-    pub redundant_count: usize,
-}
 
 /// Scans the segment. Every SubDevice is in INIT afterwards. A scan that the segment disturbed by changing is begun
 /// again.
@@ -154,31 +126,7 @@ async fn attempt(bus: &Bus, options: &ScanOptions, expected: Count) -> Result<Sc
     if total > u32::from(MAX_SUBDEVICES) {
         return Err(ScanError::TooMany { count: total }.into());
     }
-    let contents = {
-        let settling = async { count::settle(bus, &expected, options.settle).await.map_err(Failure::Unsettled) };
-        let mut settling = pin!(settling);
-        let mut reading = pin!(identify(bus, total as u16, &options.cache));
-        let (mut settled, mut read) = (false, None);
-        // A count that changes ends the attempt at once, whatever reading has come to.
-        poll_fn(|context| {
-            if !settled && let Poll::Ready(result) = settling.as_mut().poll(context) {
-                if let Err(failure) = result {
-                    return Poll::Ready(Err(failure));
-                }
-                settled = true;
-            }
-            if read.is_none()
-                && let Poll::Ready(result) = reading.as_mut().poll(context)
-            {
-                read = Some(result);
-            }
-            if !settled {
-                return Poll::Pending;
-            }
-            read.take().map_or(Poll::Pending, |result| Poll::Ready(result.map_err(Failure::from)))
-        })
-        .await?
-    };
+    let contents = read_while_settling(bus, options, &expected).await?;
     bus.bwr(map::DC_RECEIVE_TIME, &[0; 4]).await?;
     let stations = (0..total as u16).map(Position).zip(contents);
     let describing = bus.gather(stations, |bus, (position, contents)| async move {
@@ -192,21 +140,8 @@ async fn attempt(bus: &Bus, options: &ScanOptions, expected: Count) -> Result<Sc
         let after = (counted.main.0, counted.redundant.0);
         return Err(ScanError::Changed { before: expected.pair(), after }.into());
     }
-    let statuses: Vec<NodeStatus> = subdevices.iter().map(node_status).collect();
     let (main_count, redundant_count) = (usize::from(expected.main.0), usize::from(expected.redundant.0));
-    let closings = match options.junctions {
-        JunctionMode::Automatic => learn(bus, &statuses, main_count, bus.ring() == RingState::Closed).await?,
-        JunctionMode::Disabled | JunctionMode::Strict => Vec::new(),
-    };
-    // Of rings that were not learned times of reception tell of crossed lines that are none.
-    let is_closed = bus.ring() == RingState::Closed;
-    let not_learned = match options.junctions {
-        JunctionMode::Automatic => rings_shown(&statuses, is_closed).saturating_sub(closings.len()),
-        JunctionMode::Disabled | JunctionMode::Strict => 0,
-    };
-    let untimed = |node: &NodeStatus| NodeStatus { receive_times: None, ..*node };
-    let statuses = if not_learned > 0 { statuses.iter().map(untimed).collect() } else { statuses };
-    let topology = Topology::with_local_rings(&statuses, main_count, &closings);
+    let Learned { topology, closings, not_learned } = connect(bus, options.junctions, &subdevices, main_count).await?;
     let mut scan = Scan { subdevices, topology, main_count, redundant_count };
     report_findings(bus, &scan);
     // Connections that are declared are not known yet.
@@ -221,6 +156,66 @@ async fn attempt(bus: &Bus, options: &ScanOptions, expected: Count) -> Result<Sc
         bus.report(Event::JunctionsNotLearned { rings: not_learned });
     }
     Ok(scan)
+}
+
+/// What the SubDevices of a count say about themselves, read while the count settles. One that changes ends the attempt
+/// at once, whatever reading has come to.
+async fn read_while_settling(bus: &Bus, options: &ScanOptions, expected: &Count) -> Result<Vec<Said>, Failure> {
+    let settling = async { count::settle(bus, expected, options.settle).await.map_err(Failure::Unsettled) };
+    let mut settling = pin!(settling);
+    let mut reading = pin!(identify(bus, expected.total() as u16, &options.cache));
+    let (mut settled, mut read) = (false, None);
+    poll_fn(|context| {
+        if !settled && let Poll::Ready(result) = settling.as_mut().poll(context) {
+            if let Err(failure) = result {
+                return Poll::Ready(Err(failure));
+            }
+            settled = true;
+        }
+        if read.is_none()
+            && let Poll::Ready(result) = reading.as_mut().poll(context)
+        {
+            read = Some(result);
+        }
+        if !settled {
+            return Poll::Pending;
+        }
+        read.take().map_or(Poll::Pending, |result| Poll::Ready(result.map_err(Failure::from)))
+    })
+    .await
+}
+
+/// How SubDevices are connected.
+struct Learned {
+    topology: Topology,
+    /// Closing cables of the rings behind junctions that were learned.
+    closings: Vec<Closing>,
+    /// Rings behind junctions that show but could not be learned.
+    not_learned: usize,
+}
+
+/// Finds out how they are connected, of which the main copy met the first `main_count`.
+async fn connect(
+    bus: &Bus,
+    junctions: JunctionMode,
+    subdevices: &[SubDeviceInfo],
+    main_count: usize,
+) -> Result<Learned, BusError> {
+    let statuses: Vec<NodeStatus> = subdevices.iter().map(node_status).collect();
+    let closings = match junctions {
+        JunctionMode::Automatic => learn(bus, &statuses, main_count, bus.ring() == RingState::Closed).await?,
+        JunctionMode::Disabled | JunctionMode::Strict => Vec::new(),
+    };
+    // Of rings that were not learned times of reception tell of crossed lines that are none.
+    let is_closed = bus.ring() == RingState::Closed;
+    let not_learned = match junctions {
+        JunctionMode::Automatic => rings_shown(&statuses, is_closed).saturating_sub(closings.len()),
+        JunctionMode::Disabled | JunctionMode::Strict => 0,
+    };
+    let untimed = |node: &NodeStatus| NodeStatus { receive_times: None, ..*node };
+    let statuses = if not_learned > 0 { statuses.iter().map(untimed).collect() } else { statuses };
+    let topology = Topology::with_local_rings(&statuses, main_count, &closings);
+    Ok(Learned { topology, closings, not_learned })
 }
 
 /// What one SubDevice says about itself: its SII and its identification.
@@ -308,11 +303,6 @@ async fn assign_addresses(bus: &Bus, count: u16) -> Result<(), BusError> {
         bus.apwr(position, map::STATION_ADDRESS, &station_at(position).0.to_le_bytes()).await
     });
     written.await.into_iter().collect()
-}
-
-/// The station address that a scan gives to a position.
-pub const fn station_at(position: Position) -> StationAddress {
-    StationAddress(FIRST_STATION + position.0)
 }
 
 async fn read_all(bus: &Bus, count: u16, cache: &SiiCache) -> Result<Vec<Said>, ScanError> {
@@ -429,91 +419,5 @@ fn report_findings(bus: &Bus, scan: &Scan) {
     }
     for duplicate in duplicate_aliases(&scan.subdevices) {
         bus.report(Event::DuplicateAlias { alias: duplicate.alias, first: duplicate.first, second: duplicate.second });
-    }
-}
-
-/// Finds out who is crossed while the redundant link is down; false where the ring is not closed or changes meanwhile.
-async fn locate_crossings(bus: &Bus, scan: &mut Scan) -> bool {
-    if !stays_closed(bus).await {
-        return false;
-    }
-    let Some(found) = cabling(bus, scan, true, &LineCheck::default()).await.map(|seen| seen.crossings) else {
-        return false;
-    };
-    let node = |station: StationAddress| scan.subdevices.iter().position(|info| info.station == station);
-    let exact = found.iter().filter_map(|crossing| {
-        Some(Finding::CrossedLine { node: node(crossing.subdevice?.0)?, entry_port: crossing.entry_port? })
-    });
-    let mut exact: Vec<Finding> = exact.collect();
-    if exact.len() < found.len() {
-        // It could not be disconnected, and only the ring shows that there is something.
-        return false;
-    }
-    let others = scan.topology.findings.iter().filter(|finding| !matches!(finding, Finding::CrossedLine { .. }));
-    exact.extend(others);
-    exact.sort_by_key(Finding::node);
-    scan.topology.findings = exact;
-    true
-}
-
-impl Known for Scan {
-    fn note_look(&self) {}
-
-    fn are_measuring(&self) -> bool {
-        false
-    }
-
-    fn ports(&self, station: StationAddress) -> [PortKind; 4] {
-        let info = self.subdevices.iter().find(|info| info.station == station);
-        info.map(|info| info.controller.ports).unwrap_or_default()
-    }
-
-    fn closings(&self, stations: &[StationAddress]) -> Vec<Closing> {
-        // Nobody has moved that shortly after.
-        let place = |at: PortOf| {
-            let station = self.subdevices.get(at.node)?.station;
-            Some(PortOf { node: stations.iter().position(|it| *it == station)?, port: at.port })
-        };
-        let rings = self.topology.local_rings.iter().map(|ring| ring.closing);
-        rings.filter_map(|it| Some(Closing { head: place(it.head)?, tail: place(it.tail)? })).collect()
-    }
-
-    fn are_known(&self, _: &[StationAddress]) -> bool {
-        true
-    }
-}
-
-/// What is odd about the cabling. `exact`: where lines are crossed is known, also in a closed ring.
-pub(crate) fn report_cabling(bus: &Bus, scan: &Scan, exact: bool) {
-    let swapped = bus.links() == LinkSet::Ring && is_swapped(&scan.topology);
-    if swapped {
-        bus.report(Event::InterfacesSwapped);
-    }
-    let position = |node: usize| scan.subdevices.get(node).map_or(Position(node as u16), |info| info.position);
-    for finding in &scan.topology.findings {
-        match *finding {
-            Finding::UnconnectedPort0 { node } => bus.report(Event::UnconnectedPort0 { position: position(node) }),
-            Finding::CrossedLine { .. } if swapped => {}
-            Finding::CrossedLine { node, entry_port } => {
-                bus.report(Event::LineCrossed { position: Some(position(node)), entry_port: Some(entry_port) })
-            }
-            Finding::ForcedOpen { .. }
-            | Finding::ClosedWithLink { .. }
-            | Finding::LinkWithoutCommunication { .. }
-            | Finding::Inconsistent { .. } => {
-                bus.report(Event::CablingOddity { position: position(finding.node()), what: finding.to_string() });
-            }
-        }
-    }
-    // In a closed ring only branches on port 2 and crossed SubDevices work on the redundant copy (protocol LC-04).
-    let crossed_known = scan.topology.findings.iter().any(|finding| matches!(finding, Finding::CrossedLine { .. }));
-    if bus.links() == LinkSet::Ring
-        && bus.ring() == RingState::Closed
-        && scan.redundant_count > 0
-        && !crossed_known
-        && !exact
-        && !swapped
-    {
-        bus.report(Event::LineCrossed { position: None, entry_port: None });
     }
 }

@@ -9,7 +9,7 @@ use core::time::Duration;
 use ringcat_wire::address::{Position, StationAddress};
 use ringcat_wire::register::PortKind;
 
-use crate::clocks::cables::End;
+use crate::clocks::cable_ends::End;
 use crate::clocks::{Cables, SyncWindow, Unknown, Wiring, branches, round};
 use crate::config::{ClockConfig, Passage, ReferenceClock, SubDeviceConfig};
 use crate::info::SubDeviceInfo;

@@ -4,23 +4,26 @@
 //! the same fixed area was read before, or is being read, only the category headers.
 
 mod cache;
+mod contents;
 mod eeprom;
+mod error;
 mod pace;
 pub mod program;
 
 use alloc::vec::Vec;
-use core::fmt;
 use core::time::Duration;
 
 use ringcat_wire::address::StationAddress;
 use ringcat_wire::command::Command;
 use ringcat_wire::datagram::Target;
-use ringcat_wire::register::{SiiControl, map};
-use ringcat_wire::sii::{Category, CategoryHeader, CategoryKind, Identity, SiiHeader};
+use ringcat_wire::register::map;
+use ringcat_wire::sii::{CategoryHeader, CategoryKind, Identity, SiiHeader};
 
 pub use cache::SiiCache;
 use cache::{FixedArea, Found};
-use eeprom::{Eeprom, LIMIT};
+pub use contents::{ChainEnd, SiiContents};
+use eeprom::Eeprom;
+pub use error::SiiReadError;
 use pace::Pace;
 
 use crate::supervisor::{Bus, BusError};
@@ -41,134 +44,6 @@ const HEADER_WORDS: u32 = (SiiHeader::LEN / 2) as u32;
 const FIXED_AREA: [(u32, u32); 2] = [(0x00, 0x24), (0x3E, 2)];
 /// Pause between two looks whether somebody else has read the same SII.
 const CACHE_PAUSE: Duration = Duration::from_micros(500);
-
-/// Why an SII cannot be read.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[non_exhaustive]
-pub enum SiiReadError {
-    /// The bus failed.
-    Bus(BusError),
-    /// The EEPROM stayed busy.
-    Busy {
-        /// Word address.
-        word: u32,
-    },
-    /// Reading the whole took too long.
-    TooSlow {
-        /// Word address that was to be read next.
-        word: u32,
-    },
-    /// The controller does not take the read command, again and again.
-    Refused {
-        /// Word address.
-        word: u32,
-    },
-    /// The EEPROM reported an error.
-    Command {
-        /// Word address.
-        word: u32,
-        /// What the control register said.
-        control: SiiControl,
-    },
-}
-
-impl SiiReadError {
-    /// A change of the segment or lost frames may be to blame, so that another try is worth it.
-    pub(super) const fn is_passing(&self) -> bool {
-        matches!(self, SiiReadError::Bus(_) | SiiReadError::Refused { .. })
-    }
-}
-
-impl fmt::Display for SiiReadError {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            SiiReadError::Bus(error) => error.fmt(f),
-            SiiReadError::Busy { word } => write!(f, "EEPROM still busy with word {word:#06x} after 100 ms"),
-            SiiReadError::TooSlow { word } => {
-                write!(f, "the EEPROM is slow: at word {word:#06x} after {} s", LIMIT.as_secs())
-            }
-            SiiReadError::Refused { word } => write!(
-                f,
-                "the controller does not take the command to read EEPROM word {word:#06x}: does the PDI hold the EEPROM?"
-            ),
-            SiiReadError::Command { word, control } => {
-                write!(f, "EEPROM error at word {word:#06x}: control register 0x0502 is {:#06x}", control.bits())
-            }
-        }
-    }
-}
-
-impl core::error::Error for SiiReadError {
-    fn source(&self) -> Option<&(dyn core::error::Error + 'static)> {
-        match self {
-            SiiReadError::Bus(error) => Some(error),
-            _ => None,
-        }
-    }
-}
-
-impl From<BusError> for SiiReadError {
-    fn from(error: BusError) -> SiiReadError {
-        SiiReadError::Bus(error)
-    }
-}
-
-/// What was read of an SII.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct SiiContents {
-    /// The fixed area; its reserved words from 0x24 on are not read and zero.
-    pub header: SiiHeader,
-    /// The categories that were wanted, each with the byte of its header and its data.
-    pub categories: Vec<(CategoryKind, usize, Vec<u8>)>,
-    /// How the chain of categories ended.
-    pub end: ChainEnd,
-}
-
-/// How a chain of categories ended.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum ChainEnd {
-    /// With the end marker at this byte, or with the last word of the EEPROM.
-    Sound {
-        /// The first byte that is no category.
-        at: usize,
-    },
-    /// With the end marker at this byte, behind the end of the EEPROM by its own size word.
-    BehindSize {
-        /// The end marker.
-        at: usize,
-    },
-    /// Without an end marker.
-    Open {
-        /// Where it was expected.
-        at: usize,
-    },
-    /// With a category that is longer than what is left of the EEPROM.
-    Beyond {
-        /// What it would have held.
-        kind: CategoryKind,
-        /// Its header.
-        at: usize,
-        /// Bytes that it announces.
-        announced: usize,
-        /// Bytes that are left.
-        left: usize,
-    },
-    /// The EEPROM cannot be read at all.
-    Unreadable,
-}
-
-impl SiiContents {
-    /// Of an EEPROM that cannot be read: as if it were erased.
-    pub(super) fn unreadable() -> SiiContents {
-        let header = SiiHeader::decode(&[0xFF; SiiHeader::LEN]);
-        SiiContents { header, categories: Vec::new(), end: ChainEnd::Unreadable }
-    }
-
-    /// The categories that were wanted, as they lie in the EEPROM.
-    pub fn categories(&self) -> impl Iterator<Item = Category<'_>> {
-        self.categories.iter().map(|(kind, offset, data)| Category { kind: *kind, offset: *offset, data })
-    }
-}
 
 /// Which categories the engine uses.
 const fn is_needed(kind: CategoryKind) -> bool {

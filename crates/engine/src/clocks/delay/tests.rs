@@ -2,6 +2,7 @@
 
 use super::*;
 use crate::clocks::FRACTION;
+use crate::clocks::delays::Unknown;
 use crate::topology::{Closing, LocalRing, Node, Topology};
 
 fn stations(count: usize) -> Vec<StationAddress> {

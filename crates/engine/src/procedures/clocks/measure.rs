@@ -327,8 +327,8 @@ async fn take(bus: &Bus, clocks: &SharedClocks, survey: &Survey) -> Result<Measu
 fn told(odd: &Disagreement, station: StationAddress) -> String {
     match odd.port {
         Some(port) => format!(
-            "receive times of station {station} at port {port} differ from measurement to measurement: frames of another \
-             sender on the wire spoil them"
+            "receive times of station {station} at port {port} differ from measurement to measurement: frames of \
+             another sender on the wire spoil them"
         ),
         None => format!(
             "the clock of station {station} does not go on from measurement to measurement like others: another sender \

@@ -1,11 +1,11 @@
 //! SYNC signals of one SubDevice, and waiting until its clock is good enough for them (protocol 7.3).
 
-use core::fmt;
 use core::time::Duration;
 
 use ringcat_wire::address::StationAddress;
-use ringcat_wire::register::{DcSystemTimeDifference, map};
+use ringcat_wire::register::map;
 
+use super::not_locked::{NotLocked, SignalsError};
 use super::set_up::set_up_one;
 use super::watch::drift_phase;
 use crate::clocks::{extend, first_pulse, start::whole_cycle};
@@ -22,42 +22,6 @@ const GOOD_ENOUGH_NS: u32 = 10_000;
 const MEASURING_LIMIT: Duration = Duration::from_secs(1);
 /// Pause between two looks.
 const PAUSE: Duration = Duration::from_millis(1);
-
-/// A clock did not come into its window.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct NotLocked {
-    /// How long that was waited for.
-    pub waited: Duration,
-    /// Its difference to the reference when it was read last.
-    pub difference_ns: Option<i32>,
-    /// The window.
-    pub window_ns: u32,
-    /// Its position where another clock of the segment is to blame.
-    pub other: Option<u16>,
-    /// Its delay is not known.
-    pub hidden: Option<HiddenDelay>,
-}
-
-impl fmt::Display for NotLocked {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        if let Some(hidden) = self.hidden {
-            f.write_str("its propagation delay is not known, ")?;
-            return match hidden.fork {
-                Some(fork) => write!(f, "since the fork at position {fork} has no clock"),
-                None => f.write_str("since it is not known what lies between it and the reference clock"),
-            };
-        }
-        match self.other {
-            Some(position) => write!(f, "the clock of position {position}")?,
-            None => f.write_str("its clock")?,
-        }
-        write!(f, " did not lock within {} ms: ", self.waited.as_millis())?;
-        match self.difference_ns {
-            Some(ns) => write!(f, "expected a difference of at most {} ns, got {ns} ns", self.window_ns),
-            None => f.write_str("its difference to the reference clock could not be read"),
-        }
-    }
-}
 
 /// Sets up anew what a clock has lost with its power, or what one that came later has never had.
 pub(in crate::procedures) async fn restore(bus: &Bus, segment: &SharedSegment, member: usize) -> Result<(), BusError> {
@@ -143,19 +107,6 @@ pub(in crate::procedures) async fn start_signals(
     Ok(bus.fpwr(station, map::DC_ACTIVATION, &[activation]).await?)
 }
 
-/// Why SYNC signals were not started.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(in crate::procedures) enum SignalsError {
-    Bus(BusError),
-    NotLocked(NotLocked),
-}
-
-impl From<BusError> for SignalsError {
-    fn from(error: BusError) -> SignalsError {
-        SignalsError::Bus(error)
-    }
-}
-
 async fn wait_until_about_right(
     bus: &Bus,
     segment: &SharedSegment,
@@ -218,9 +169,4 @@ async fn wait(
         }
         bus.sleep(PAUSE).await;
     }
-}
-
-/// The difference as a register value says it, in nanoseconds.
-pub(super) fn difference(bytes: [u8; 4]) -> i32 {
-    DcSystemTimeDifference::decode(&bytes).signed_ns()
 }

@@ -16,11 +16,10 @@ use alloc::vec::Vec;
 use ringcat_wire::address::{Position, StationAddress, Wkc};
 use ringcat_wire::command::Command;
 use ringcat_wire::datagram::Target;
-use ringcat_wire::register::{DcSpeedCounterDifference, DcSpeedCounterStart, map};
+use ringcat_wire::register::{DcSpeedCounterDifference, DcSpeedCounterStart, DcSystemTimeDifference, map};
 
 use super::measure::Opening;
 use super::set_up::{measure_again, set_filters, set_up, write_delays};
-use super::signals::difference;
 use crate::board::clocks::References;
 use crate::clocks::{SyncWindow, extend};
 use crate::event::Event;
@@ -270,7 +269,8 @@ async fn look(bus: &Bus, segment: &SharedSegment, is_explained: bool) {
         };
         let start = DcSpeedCounterStart(u16::from_le_bytes(*start));
         let deviation_ppb = DcSpeedCounterDifference(i16::from_le_bytes([*e, *f])).deviation_ppb(start);
-        Some(Answer { link: Some(link), difference_ns: Some(difference([*a, *b, *c, *d])), deviation_ppb })
+        let difference_ns = DcSystemTimeDifference::decode(&[*a, *b, *c, *d]).signed_ns();
+        Some(Answer { link: Some(link), difference_ns: Some(difference_ns), deviation_ppb })
     });
     let mut answers: Vec<Option<Answer>> = answers.await;
     look_in_front(bus, segment, &mut answers).await;

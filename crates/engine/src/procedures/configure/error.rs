@@ -4,7 +4,7 @@ use alloc::string::String;
 use alloc::vec::Vec;
 use core::fmt;
 
-use super::registers::{Hex, RegisterError};
+use super::register_error::{Hex, RegisterError};
 use crate::config::Transition;
 use crate::mail::coe::{SdoAddress, SdoError};
 use crate::mail::eoe::EoeError;

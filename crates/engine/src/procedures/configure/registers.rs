@@ -2,84 +2,17 @@
 
 use alloc::boxed::Box;
 use alloc::vec;
-use alloc::vec::Vec;
-use core::fmt;
 use core::time::Duration;
 
-use ringcat_wire::address::{RegisterAddress, StationAddress};
+use ringcat_wire::address::StationAddress;
 
 use super::BringUp;
+use super::register_error::{RegisterError, RegisterFailure, WrongValue};
 use crate::config::{RegisterAccess, RegisterCommand};
 use crate::supervisor::BusError;
 
 /// Pause between two attempts, and between two looks.
 const PAUSE: Duration = Duration::from_millis(1);
-
-/// A command to a register that failed.
-#[derive(Clone, Debug, PartialEq)]
-pub struct RegisterError {
-    /// The first register.
-    pub address: RegisterAddress,
-    /// What happened.
-    pub cause: RegisterFailure,
-}
-
-/// What happened to a command to a register.
-#[derive(Clone, Debug, PartialEq)]
-#[non_exhaustive]
-pub enum RegisterFailure {
-    /// The SubDevice did not take it, or the bus failed.
-    Bus(BusError),
-    /// The register holds something else.
-    Value(Box<WrongValue>),
-}
-
-/// What a register holds instead of what it must hold.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct WrongValue {
-    /// What it must hold.
-    pub expected: Vec<u8>,
-    /// Bits that count.
-    pub mask: Option<Vec<u8>>,
-    /// What it held last.
-    pub got: Vec<u8>,
-    /// So long it was looked at.
-    pub limit: Duration,
-}
-
-impl fmt::Display for RegisterError {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "register {}: ", self.address)?;
-        match &self.cause {
-            RegisterFailure::Bus(error) => error.fmt(f),
-            RegisterFailure::Value(wrong) => {
-                write!(f, "expected {}", Hex(&wrong.expected))?;
-                if let Some(mask) = &wrong.mask {
-                    write!(f, " (mask {})", Hex(mask))?;
-                }
-                write!(f, " within {} ms, got {}", wrong.limit.as_millis(), Hex(&wrong.got))
-            }
-        }
-    }
-}
-
-/// The first bytes of data, in the order in which they lie.
-pub(super) struct Hex<'a>(pub &'a [u8]);
-
-impl fmt::Display for Hex<'_> {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        /// Bytes that are shown.
-        const SHOWN: usize = 16;
-        for (number, byte) in self.0.iter().take(SHOWN).enumerate() {
-            write!(f, "{}{byte:02x}", if number == 0 { "" } else { " " })?;
-        }
-        match self.0.len() {
-            0 => f.write_str("nothing"),
-            length if length > SHOWN => write!(f, " ... ({length} bytes)"),
-            _ => Ok(()),
-        }
-    }
-}
 
 impl BringUp<'_> {
     pub(super) async fn register(&self, command: &RegisterCommand) -> Result<(), RegisterError> {

@@ -1,8 +1,9 @@
 //! Which objects the MainDevice itself has (protocol 10.2, ETG.1510), and what is told of their entries.
 
+use alloc::vec::Vec;
+
 use ringcat_wire::mailbox::coe::{DataType, DiagnosisHistory, DiagnosisMessage, ObjectCode};
 
-use super::messages::PARAMETERS;
 use crate::event::history::MESSAGES;
 
 /// SubDevices in one list of addresses.
@@ -15,6 +16,10 @@ pub(super) const MAX_MODULES: usize = LIST * LISTS as usize;
 /// Bytes of a text: so much is told of a longer one, and a shorter one is filled with zeros where a whole object is
 /// read.
 pub(super) const TEXT_BYTES: usize = 64;
+
+/// Bytes of the two parameters of each message of the diagnosis history: a station address (UNSIGNED16), a code
+/// (UNSIGNED32).
+pub(super) const PARAMETERS: usize = 2 + 2 + 2 + 4;
 
 const CONFIGURATION: u16 = 0x8000;
 const INFORMATION: u16 = 0x9000;
@@ -60,6 +65,9 @@ pub(super) struct Entry {
     pub bits: u16,
     pub writable: bool,
 }
+
+/// Subindices with their values, in ascending order, without subindex 0 of arrays and records.
+pub(super) type Values = Vec<(u8, Vec<u8>)>;
 
 const fn entry(sub_index: u8, data_type: DataType, name: &'static str) -> Entry {
     let bits = match data_type.bits() {
@@ -301,7 +309,6 @@ impl Object {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use alloc::vec::Vec;
 
     // covers: 10.2, own-objects
     #[test]

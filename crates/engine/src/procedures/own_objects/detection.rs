@@ -8,7 +8,7 @@ use core::time::Duration;
 use ringcat_wire::address::StationAddress;
 use ringcat_wire::mailbox::sdo::AbortCode;
 
-use super::Seen;
+use super::seen::Seen;
 use crate::procedures::unassigned::rescan::rescan;
 
 /// The segment has to hold still within.

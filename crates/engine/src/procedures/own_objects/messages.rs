@@ -7,13 +7,10 @@ use ringcat_wire::address::StationAddress;
 use ringcat_wire::mailbox::coe::{DataType, DiagnosisHistory, DiagnosisMessage, DiagnosisParameter};
 use ringcat_wire::mailbox::sdo::AbortCode;
 
-use super::values::Values;
+use super::catalogue::{PARAMETERS, Values};
 use crate::event::history::{Incident, MESSAGES};
 use crate::procedures::shared_segment::SharedSegment;
 use crate::supervisor::Bus;
-
-/// Bytes of the two parameters of each message: a station address (UNSIGNED16), a code (UNSIGNED32).
-pub(super) const PARAMETERS: usize = 2 + 2 + 2 + 4;
 
 /// All entries; places without a message are empty.
 pub(super) fn read(bus: &Bus, segment: Option<&SharedSegment>) -> Values {

@@ -2,7 +2,7 @@
 
 use core::time::Duration;
 
-use super::Seen;
+use super::seen::Seen;
 use crate::time::Instant;
 
 /// A rate is that of at least so long.

@@ -6,9 +6,11 @@ use alloc::vec::Vec;
 use ringcat_wire::address::StationAddress;
 use ringcat_wire::register::{DlStatus, map};
 
-use super::catalogue::{LIST, MAX_MODULES, Object, TEXT_BYTES};
+use super::catalogue::{LIST, MAX_MODULES, Object, TEXT_BYTES, Values};
 use super::in_its_dictionary::Asked;
-use super::{Seen, Shared, messages, rates};
+use super::seen::Seen;
+use super::shared::Shared;
+use super::{messages, rates};
 use crate::config::groups;
 use crate::info::SubDeviceInfo;
 use crate::procedures::services::statistics;
@@ -33,9 +35,6 @@ const ADDITIONAL_LINK: u8 = 1 << 3;
 /// Bits of the flags 0x8nnn:37, above the port of the redundant link.
 const GROUP_HEAD: u8 = 1 << 2;
 const GROUP_MEMBER: u8 = 1 << 3;
-
-/// Subindices with their values, in ascending order, without subindex 0 of arrays and records.
-pub(super) type Values = Vec<(u8, Vec<u8>)>;
 
 fn u8_(sub_index: u8, value: u8) -> (u8, Vec<u8>) {
     (sub_index, vec![value])

@@ -5,7 +5,8 @@ use core::time::Duration;
 use ringcat_wire::address::Wkc;
 use ringcat_wire::register::map;
 
-use super::{ScanError, ScanOptions};
+use super::error::ScanError;
+use super::options::ScanOptions;
 use crate::event::Event;
 use crate::supervisor::{Bus, BusError};
 use crate::time::Instant;

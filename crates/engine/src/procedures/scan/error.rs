@@ -4,7 +4,7 @@ use core::fmt;
 
 use ringcat_wire::address::Position;
 
-use super::MAX_SUBDEVICES;
+use super::stations::MAX_SUBDEVICES;
 use crate::procedures::sii::SiiReadError;
 use crate::ring::FrameLimit;
 use crate::supervisor::BusError;

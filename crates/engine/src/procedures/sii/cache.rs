@@ -12,7 +12,7 @@ use core::time::Duration;
 use ringcat_wire::address::StationAddress;
 use ringcat_wire::sii::{CategoryHeader, CategoryKind, SiiHeader};
 
-use super::SiiContents;
+use super::contents::SiiContents;
 
 /// Kinds of SubDevices that are kept, more than a segment has; beyond, the oldest is forgotten.
 const MAX_ENTRIES: usize = 1024;
@@ -172,7 +172,7 @@ impl Drop for Claim {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::procedures::sii::ChainEnd;
+    use crate::procedures::sii::contents::ChainEnd;
 
     fn area(number: usize) -> FixedArea {
         let mut area = [0; SiiHeader::LEN];

@@ -12,7 +12,7 @@ use ringcat_wire::command::Command;
 use ringcat_wire::datagram::Target;
 use ringcat_wire::register::{SiiCommand, SiiControl, map};
 
-use super::SiiReadError;
+use super::error::{LIMIT, SiiReadError};
 use super::pace::Pace;
 use crate::supervisor::{Bus, BusError};
 use crate::time::Instant;
@@ -21,8 +21,6 @@ use crate::time::Instant;
 const COMMAND_LIMIT: Duration = Duration::from_millis(100);
 /// How long a controller may take to load its EEPROM after power-on.
 const LOAD_LIMIT: Duration = Duration::from_millis(500);
-/// How long reading one SII may take: 64 KiB at 3 ms per command.
-pub(super) const LIMIT: Duration = Duration::from_secs(30);
 /// A command that the EEPROM did not acknowledge or the controller did not take is given again so often.
 const RETRIES: usize = 3;
 /// Bytes of control, address and data registers in one poll with 8-byte reads.

@@ -81,8 +81,8 @@ impl Segment {
         let since = *it.held_since.get_or_insert(now);
         if now.since(since) >= HOLD && !core::mem::replace(&mut it.reported, true) {
             let reason = format!(
-                "the SubDevice at position {} may be this one or another one of its kind that is missed: no cable tells \
-                 which, and it has no serial number",
+                "the SubDevice at position {} may be this one or another one of its kind that is missed: no cable \
+                 tells which, and it has no serial number",
                 it.position.0
             );
             effects.failed(index, reason);

@@ -1,0 +1,164 @@
+//! The exchange of process data: until all SubDevices are in OP, and then until its end, with what is told meanwhile.
+
+use std::thread::sleep;
+use std::time::Duration;
+
+use ringcat::packet::PacketLinks;
+use ringcat::tee::Tee;
+use ringcat::{AlState, CyclicThread, DomainId, DomainState, Instant, SubDeviceState};
+
+use super::beside::Beside;
+use super::eni::Watched;
+use super::live::{self, Live};
+use crate::ending::EndRequest;
+use crate::interfaces::now;
+use crate::output::say;
+use crate::recording::Recording;
+use crate::run_log::{RunLog, Shown};
+use crate::times::in_words;
+
+/// From then to complete process data at the most, before that is told.
+const COMPLETE_LIMIT: Duration = Duration::from_secs(1);
+/// Pause between two looks at what the threads do.
+const LOOK: Duration = Duration::from_millis(1);
+
+/// Cycles that run, and what is told of them.
+pub struct Run {
+    pub cycles: CyclicThread<Tee<PacketLinks>>,
+    pub log: RunLog,
+    pub live: Live,
+    /// Distributed clocks are in use.
+    pub clocks: bool,
+    /// How many domains there are.
+    pub domains: usize,
+    pub beside: Beside,
+    /// Variables of a file.
+    pub watched: Watched,
+    pub recording: Recording,
+}
+
+impl Run {
+    /// Tells what has happened since the last look.
+    fn look(&mut self) {
+        self.log.news(&self.cycles, now(), |shown| {
+            self.live.clear();
+            match shown {
+                Shown::Line(line) => say!("{line}"),
+                Shown::Warning(words) => eprintln!("ringcat: {words}"),
+            }
+        });
+        for words in self.beside.news() {
+            self.live.clear();
+            eprintln!("ringcat: {words}");
+        }
+        if let Some(words) = self.recording.failure() {
+            self.live.clear();
+            eprintln!("ringcat: {words}");
+        }
+        for line in self.watched.news(now()) {
+            self.live.clear();
+            say!("{line}");
+        }
+    }
+
+    fn clocks_locked(&self) -> bool {
+        !self.clocks || self.cycles.supervisor().with(|engine| engine.clocks_locked()).unwrap_or(false)
+    }
+
+    /// Until all SubDevices are in OP and all clocks are locked, and then until process data is complete, for a moment.
+    ///
+    /// # Errors
+    /// Why that does not come, in words.
+    pub fn reach_op(&mut self, limit: Duration, end: &EndRequest) -> Result<(), String> {
+        let until = now() + limit;
+        end.limit(until);
+        let (mut in_op, mut complete_until) = (false, until);
+        while !in_op || (!self.is_complete() && now() < complete_until) {
+            if let Some(by) = end.by() {
+                self.live.clear();
+                return Err(format!("ended by {by} before all SubDevices were in OP"));
+            }
+            if self.cycles.has_ended() {
+                return Err("the cycles ended before all SubDevices were in OP".to_owned());
+            }
+            if !in_op && now() >= until {
+                self.look();
+                self.live.clear();
+                self.tell_states(limit);
+                return Err(self.what_is_missing(limit));
+            }
+            self.look();
+            if !in_op && self.cycles.supervisor().all_settled() && self.clocks_locked() {
+                (in_op, complete_until) = (true, now() + COMPLETE_LIMIT);
+            }
+            self.live.show(now(), self.cycles.news(), self.cycles.supervisor(), self.log.events().names());
+            sleep(LOOK);
+        }
+        let reached = now();
+        self.look();
+        self.live.clear();
+        say!("{}", self.log.events().line(reached, "all SubDevices are in OP"));
+        for words in self.incomplete() {
+            say!("{}", self.log.events().line(reached, &format!("process data is not exchanged as declared: {words}")));
+        }
+        self.cycles.news().restart_histograms();
+        Ok(())
+    }
+
+    /// Domains whose last judgement is not complete, in words.
+    pub fn incomplete(&self) -> Vec<String> {
+        let judged = (0..self.domains).map(|domain| (domain, self.cycles.news().status(DomainId(domain))));
+        let incomplete = judged.filter(|(_, status)| status.state != DomainState::Complete);
+        incomplete
+            .map(|(domain, status)| {
+                let (wkc, expected) = (status.wkc, status.expected);
+                format!("domain {domain}: {}, working counter {wkc} of {expected}", status.in_words())
+            })
+            .collect()
+    }
+
+    fn is_complete(&self) -> bool {
+        self.incomplete().is_empty()
+    }
+
+    /// Why OP was not reached.
+    fn what_is_missing(&self, limit: Duration) -> String {
+        let limit = in_words(limit);
+        let states = self.cycles.supervisor().states();
+        let late = states.iter().filter(|state| **state != SubDeviceState::Settled(AlState::Op)).count();
+        if late == 0 {
+            return format!("not all clocks are locked within {limit}");
+        }
+        format!("{} of {} SubDevices not in OP within {limit}", late, states.len())
+    }
+
+    fn tell_states(&self, limit: Duration) {
+        let what = if self.clocks_locked() { "reached OP" } else { "reached OP with all clocks locked" };
+        say!("not all SubDevices {what} within {}:", in_words(limit));
+        for (subdevice, state) in self.cycles.supervisor().states().iter().enumerate() {
+            let state = live::word(*state);
+            let name = self.log.events().names().0.get(subdevice).map_or("", String::as_str);
+            say!("  SubDevice {subdevice} \"{name}\": {state}");
+        }
+        let clocks = self.cycles.supervisor().with(|engine| engine.clocks()).unwrap_or_default();
+        for clock in clocks.iter().filter(|clock| !clock.is_locked && !clock.is_reference) {
+            let difference = clock.difference_ns.map_or_else(|| "unknown".to_owned(), |ns| format!("{ns} ns"));
+            let name = clock.subdevice.and_then(|subdevice| self.log.events().names().0.get(subdevice));
+            let name = name.map_or_else(String::new, |name| format!(" \"{name}\""));
+            let position = clock.position;
+            say!("  the clock of position {position}{name} is not locked: its difference is {difference}");
+        }
+    }
+
+    /// Tells how the exchange goes, until a time or until an end is asked for.
+    pub fn exchange(&mut self, until: Instant, end: &EndRequest) {
+        end.limit(until);
+        while now() < until && !end.is_asked() && !self.cycles.has_ended() {
+            self.look();
+            self.live.show(now(), self.cycles.news(), self.cycles.supervisor(), self.log.events().names());
+            sleep(LOOK.min(until.since(now())));
+        }
+        self.look();
+        self.live.clear();
+    }
+}

@@ -1,0 +1,56 @@
+//! A clock that is not good enough for SYNC signals (protocol 7.3).
+
+use core::fmt;
+use core::time::Duration;
+
+use crate::procedures::shared_clocks::HiddenDelay;
+use crate::supervisor::BusError;
+
+/// A clock did not come into its window.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct NotLocked {
+    /// How long that was waited for.
+    pub waited: Duration,
+    /// Its difference to the reference when it was read last.
+    pub difference_ns: Option<i32>,
+    /// The window.
+    pub window_ns: u32,
+    /// Its position where another clock of the segment is to blame.
+    pub other: Option<u16>,
+    /// Its delay is not known.
+    pub hidden: Option<HiddenDelay>,
+}
+
+impl fmt::Display for NotLocked {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        if let Some(hidden) = self.hidden {
+            f.write_str("its propagation delay is not known, ")?;
+            return match hidden.fork {
+                Some(fork) => write!(f, "since the fork at position {fork} has no clock"),
+                None => f.write_str("since it is not known what lies between it and the reference clock"),
+            };
+        }
+        match self.other {
+            Some(position) => write!(f, "the clock of position {position}")?,
+            None => f.write_str("its clock")?,
+        }
+        write!(f, " did not lock within {} ms: ", self.waited.as_millis())?;
+        match self.difference_ns {
+            Some(ns) => write!(f, "expected a difference of at most {} ns, got {ns} ns", self.window_ns),
+            None => f.write_str("its difference to the reference clock could not be read"),
+        }
+    }
+}
+
+/// Why SYNC signals were not started.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(in crate::procedures) enum SignalsError {
+    Bus(BusError),
+    NotLocked(NotLocked),
+}
+
+impl From<BusError> for SignalsError {
+    fn from(error: BusError) -> SignalsError {
+        SignalsError::Bus(error)
+    }
+}

@@ -1,0 +1,23 @@
+//! What is kept from request to request.
+
+use alloc::collections::BTreeMap;
+use alloc::rc::Rc;
+use alloc::vec::Vec;
+use core::cell::{Cell, RefCell};
+
+use super::detection::Detection;
+use super::rates::Rates;
+use super::upload::Upload;
+
+/// What all clients share, and their uploads.
+#[derive(Debug, Default)]
+pub(super) struct Shared {
+    /// By client.
+    pub uploads: RefCell<BTreeMap<u64, Upload>>,
+    pub detection: Rc<Detection>,
+    pub rates: RefCell<Rates>,
+    /// Frames that were lost when the diagnosis was reset, cyclic and acyclic ones.
+    pub forgotten: Cell<[u64; 2]>,
+    /// Wrong working counters at that time, by SubDevice.
+    pub forgotten_wkc: RefCell<Vec<u32>>,
+}

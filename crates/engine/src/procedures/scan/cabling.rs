@@ -1,0 +1,102 @@
+//! What a scan shows about the cabling: crossed lines, swapped interfaces, odd ports (protocol 9.5).
+
+use alloc::string::ToString;
+use alloc::vec::Vec;
+
+use ringcat_wire::address::{Position, StationAddress};
+use ringcat_wire::register::PortKind;
+
+use super::found::Scan;
+use crate::event::Event;
+use crate::link::LinkSet;
+use crate::procedures::cabling::{Known, cabling, stays_closed};
+use crate::ring::RingState;
+use crate::segment::{LineCheck, is_swapped};
+use crate::supervisor::Bus;
+use crate::topology::{Closing, Finding, PortOf};
+
+/// Finds out who is crossed while the redundant link is down; false where the ring is not closed or changes meanwhile.
+pub(super) async fn locate_crossings(bus: &Bus, scan: &mut Scan) -> bool {
+    if !stays_closed(bus).await {
+        return false;
+    }
+    let Some(found) = cabling(bus, scan, true, &LineCheck::default()).await.map(|seen| seen.crossings) else {
+        return false;
+    };
+    let node = |station: StationAddress| scan.subdevices.iter().position(|info| info.station == station);
+    let exact = found.iter().filter_map(|crossing| {
+        Some(Finding::CrossedLine { node: node(crossing.subdevice?.0)?, entry_port: crossing.entry_port? })
+    });
+    let mut exact: Vec<Finding> = exact.collect();
+    if exact.len() < found.len() {
+        // It could not be disconnected, and only the ring shows that there is something.
+        return false;
+    }
+    let others = scan.topology.findings.iter().filter(|finding| !matches!(finding, Finding::CrossedLine { .. }));
+    exact.extend(others);
+    exact.sort_by_key(Finding::node);
+    scan.topology.findings = exact;
+    true
+}
+
+impl Known for Scan {
+    fn note_look(&self) {}
+
+    fn are_measuring(&self) -> bool {
+        false
+    }
+
+    fn ports(&self, station: StationAddress) -> [PortKind; 4] {
+        let info = self.subdevices.iter().find(|info| info.station == station);
+        info.map(|info| info.controller.ports).unwrap_or_default()
+    }
+
+    fn closings(&self, stations: &[StationAddress]) -> Vec<Closing> {
+        // Nobody has moved that shortly after.
+        let place = |at: PortOf| {
+            let station = self.subdevices.get(at.node)?.station;
+            Some(PortOf { node: stations.iter().position(|it| *it == station)?, port: at.port })
+        };
+        let rings = self.topology.local_rings.iter().map(|ring| ring.closing);
+        rings.filter_map(|it| Some(Closing { head: place(it.head)?, tail: place(it.tail)? })).collect()
+    }
+
+    fn are_known(&self, _: &[StationAddress]) -> bool {
+        true
+    }
+}
+
+/// What is odd about the cabling. `exact`: where lines are crossed is known, also in a closed ring.
+pub(crate) fn report_cabling(bus: &Bus, scan: &Scan, exact: bool) {
+    let swapped = bus.links() == LinkSet::Ring && is_swapped(&scan.topology);
+    if swapped {
+        bus.report(Event::InterfacesSwapped);
+    }
+    let position = |node: usize| scan.subdevices.get(node).map_or(Position(node as u16), |info| info.position);
+    for finding in &scan.topology.findings {
+        match *finding {
+            Finding::UnconnectedPort0 { node } => bus.report(Event::UnconnectedPort0 { position: position(node) }),
+            Finding::CrossedLine { .. } if swapped => {}
+            Finding::CrossedLine { node, entry_port } => {
+                bus.report(Event::LineCrossed { position: Some(position(node)), entry_port: Some(entry_port) })
+            }
+            Finding::ForcedOpen { .. }
+            | Finding::ClosedWithLink { .. }
+            | Finding::LinkWithoutCommunication { .. }
+            | Finding::Inconsistent { .. } => {
+                bus.report(Event::CablingOddity { position: position(finding.node()), what: finding.to_string() });
+            }
+        }
+    }
+    // In a closed ring only branches on port 2 and crossed SubDevices work on the redundant copy (protocol LC-04).
+    let crossed_known = scan.topology.findings.iter().any(|finding| matches!(finding, Finding::CrossedLine { .. }));
+    if bus.links() == LinkSet::Ring
+        && bus.ring() == RingState::Closed
+        && scan.redundant_count > 0
+        && !crossed_known
+        && !exact
+        && !swapped
+    {
+        bus.report(Event::LineCrossed { position: None, entry_port: None });
+    }
+}

@@ -1,0 +1,24 @@
+//! How to scan.
+
+use core::time::Duration;
+
+use crate::junction::JunctionMode;
+use crate::procedures::dictionary::ReadPdos;
+use crate::procedures::sii::SiiCache;
+
+/// How to scan.
+#[derive(Clone, Debug)]
+pub struct ScanOptions {
+    /// The count must stay the same for this long.
+    pub settle: Duration,
+    /// How long to wait for the first SubDevice.
+    pub patience: Duration,
+    /// SII contents read before.
+    pub cache: SiiCache,
+    /// What becomes of rings behind junctions.
+    pub junctions: JunctionMode,
+    /// Whether the redundant link may be taken down for a moment to find out where a line is crossed.
+    pub enhanced_line_crossed: bool,
+    /// Whose dictionaries are asked for PDOs.
+    pub pdos: ReadPdos,
+}
