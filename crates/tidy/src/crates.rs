@@ -60,7 +60,8 @@ const ROOMS: &[Room] = &[
             "ringcat-sim",
             "ringcat-wire",
         ]),
-        external: External::Only(&[]),
+        // Off unless an application asks for its feature.
+        external: External::Only(&["tracing"]),
     },
     Room {
         directory: "cli",

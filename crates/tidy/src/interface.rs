@@ -143,10 +143,11 @@ mod tests {
 
     #[test]
     fn public_items_are_listed_with_their_signatures_and_no_others() {
-        let text = "//! Text.\n\npub use crate::one::{\n    A, B,\n};\n\n/// It.\npub struct It<T> {\n    /// A field.\n    \
-                    pub field: u8,\n    hidden: T,\n}\n\nimpl<T> It<T> {\n    /// Long.\n    pub fn long(\n        \
-                    &self,\n        more: (u8, u8),\n    ) -> bool {\n        pub_like()\n    }\n\n    fn own(&self) \
-                    {}\n}\n\nimpl<T> Clone for It<T> {\n    fn clone(&self) -> It<T> {\n        todo()\n    }\n}\n\n\
+        let text = "//! Text.\n\npub use crate::one::{\n    A, B,\n};\n\n/// It.\npub struct It<T> {\n    \
+                    /// A field.\n    pub field: u8,\n    hidden: T,\n}\n\nimpl<T> It<T> {\n    /// Long.\n    \
+                    pub fn long(\n        &self,\n        more: (u8, u8),\n    ) -> bool {\n        \
+                    pub_like()\n    }\n\n    fn own(&self) {}\n}\n\nimpl<T> Clone for It<T> {\n    \
+                    fn clone(&self) -> It<T> {\n        it()\n    }\n}\n\n\
                     pub(crate) fn inner() {}\n\npub enum Either {\n    One,\n    Other { it: u8 },\n}\n\n\
                     pub const fn f() -> u8 {\n    1\n}\n\n#[cfg(test)]\nmod tests {\n    pub fn not_this() {}\n}\n";
         let expected = [

@@ -40,8 +40,7 @@ fn objects_and_files_are_moved_from_any_thread_and_requests_from_the_cyclic_one(
     let scan = supervisor.scan()?;
     // Before activation, in PREOP.
     supervisor.bring_to(1, AlState::PreOp)?;
-    let large = supervisor.sdo_upload(1, SdoAddress::new(0x2002, 0), TRANSFER.bytes(200_000))?;
-    assert_eq!(large.len(), 100_000);
+    assert_eq!(supervisor.sdo_upload(1, SdoAddress::new(0x2002, 0), TRANSFER.bytes(200_000))?.len(), 100_000);
     let mut request = supervisor.create_sdo_request(1, 4)?;
     let application = supervisor.activate(automatic(&scan.subdevices, PERIOD), cyclic)?;
     let read = Arc::new(AtomicU32::new(0));
