@@ -162,10 +162,13 @@ pub fn run(arguments: &RunArguments) -> Result<Verdict, Failure> {
     end.no_limit();
     let status = if clocks { run.cycles.supervisor().with(|engine| engine.clocks())? } else { Vec::new() };
     let mut reasons = match reached {
-        Ok(()) => Exchanged::look(&run, &before, ring, &status).reasons(run.log.events().names()),
+        Ok(()) => {
+            let exchanged = Exchanged::look(&run, &before, ring, &status).reasons(run.log.events().names());
+            exchanged.into_iter().chain(end.cut_short(arguments.lasts)).collect()
+        }
+        // It says what has ended the wait.
         Err(reason) => vec![reason],
     };
-    reasons.extend(end.cut_short(arguments.lasts).filter(|_| reasons.is_empty()));
     if undeclared > 0 {
         reasons.push(format!("the file lacks {} of the bus", counted(undeclared, "SubDevice", "SubDevices")));
     }

@@ -70,8 +70,8 @@ pub trait Services: Sized {
     /// Does something with the engine that takes no time on the bus.
     fn immediately<T: Send + 'static>(self, act: impl FnOnce(&mut Engine) -> T + Send + 'static) -> Self::Immediate<T>;
 
-    /// Reads an object, by the SubDevice's mailbox in PREOP, SAFEOP or OP. [`SubDevice`](crate::SubDevice) has this and the
-    /// other protocols with types.
+    /// Reads an object, by the SubDevice's mailbox in PREOP, SAFEOP or OP. [`SubDevice`](crate::SubDevice) has this and
+    /// the other protocols with types.
     ///
     /// It fails before a scan, for a SubDevice that is not there or not declared, and for one without a mailbox, each
     /// with an error of its own.

@@ -142,7 +142,8 @@ mod tests {
             proptest::prop_assert!(solved.is_none_or(|solved| solved == time(&wanted)));
             let is_told = sums.iter().any(|cables| {
                 let (mut one, mut other) = (cables.clone(), wanted.clone());
-                (one.sort_unstable(), other.sort_unstable());
+                one.sort_unstable();
+                other.sort_unstable();
                 one == other
             });
             proptest::prop_assert!(!is_told || solved.is_some());

@@ -124,8 +124,8 @@ impl SharedSegment {
         self.bus.until_posted(seen, until, &self.changed, || self.news.replace(false)).await;
     }
 
-    /// Waits until the cyclic half has posted something else than this, until a point of time, or until `ready`, which is asked
-    /// when something was observed or notified.
+    /// Waits until the cyclic half has posted something else than this, until a point of time, or until `ready`, which
+    /// is asked when something was observed or notified.
     pub(super) async fn until_posted(&self, seen: Posted, until: Instant, ready: impl FnMut() -> bool) {
         self.bus.until_posted(seen, until, &self.changed, ready).await;
     }

@@ -126,8 +126,8 @@ pub(crate) async fn keep(bus: Bus, segment: SharedSegment) {
     }
 }
 
-/// Waits until there is something to do: at once where clocks are not as they should be, otherwise until something is posted
-/// or a clock has come back, or the next look is due.
+/// Waits until there is something to do: at once where clocks are not as they should be, otherwise until something is
+/// posted or a clock has come back, or the next look is due.
 async fn wait(bus: &Bus, segment: &SharedSegment, next_look: Instant, is_explained: bool) {
     let is_doubtful = || segment.clocks.access().is_doubtful.is_some();
     let is_busy = is_explained || is_doubtful() || segment.board.clocks.is_held() || next_look <= bus.now();
