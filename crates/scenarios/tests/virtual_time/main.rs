@@ -22,6 +22,7 @@ mod declared_sync_managers;
 mod determinism;
 mod disturbed_frames;
 mod domains;
+mod double_faults;
 mod eeprom;
 mod eeprom_writes;
 mod eni;
