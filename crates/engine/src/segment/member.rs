@@ -1,6 +1,7 @@
 //! A SubDevice that the application declared: who it is, how far it is, what has happened to it.
 
 use alloc::rc::Rc;
+use core::time::Duration;
 
 use ringcat_wire::address::StationAddress;
 use ringcat_wire::al::AlState;
@@ -8,6 +9,7 @@ use ringcat_wire::al::AlState;
 use super::setup::{Setup, SetupError};
 use crate::config::SubDeviceConfig;
 use crate::info::SubDeviceInfo;
+use crate::time::Instant;
 
 /// How far a SubDevice is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -49,6 +51,44 @@ pub struct Member {
     pub(super) silent: u8,
     /// Process data does not wait for it though it is not lost.
     pub(super) suspended: bool,
+    /// What answers at its address while it is lost.
+    pub(super) mistaken: Mistaken,
+}
+
+/// First pause before what answers at the address of a lost SubDevice is asked again which one it is.
+const FIRST_PAUSE: Duration = Duration::from_millis(2);
+/// Longest pause: all are looked at so often anyway.
+const LONGEST_PAUSE: Duration = Duration::from_secs(1);
+/// So many times in a row are told.
+const PATIENCE: u32 = 10;
+
+/// What answers at the address of a lost SubDevice and is not known to be it. It loses the address; one that keeps it is
+/// asked again and again, after a pause that doubles.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(super) struct Mistaken {
+    times: u32,
+    until: Instant,
+}
+
+impl Mistaken {
+    /// Once more. Returns the pause before it is asked again; none after the first time.
+    pub fn again(&mut self, now: Instant) -> Option<Duration> {
+        self.times = self.times.saturating_add(1);
+        let doublings = self.times.checked_sub(2)?;
+        let pause = FIRST_PAUSE.saturating_mul(1 << doublings.min(16)).min(LONGEST_PAUSE);
+        self.until = now + pause;
+        Some(pause)
+    }
+
+    /// How long it is not asked.
+    pub fn pause(&self, now: Instant) -> Option<Duration> {
+        (now < self.until).then(|| self.until.since(now))
+    }
+
+    /// It keeps the address: to be told now.
+    pub fn is_to_tell(&self) -> bool {
+        self.times == PATIENCE
+    }
 }
 
 /// What has happened to a SubDevice.
@@ -101,6 +141,7 @@ impl Member {
             incidents: Incidents::default(),
             silent: 0,
             suspended: false,
+            mistaken: Mistaken::default(),
         }
     }
 }

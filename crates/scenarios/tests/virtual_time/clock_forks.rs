@@ -3,13 +3,14 @@
 
 use std::time::Duration;
 
-use ringcat::{ClockConfig, Event, Options, SyncSignals};
+use ringcat::{ClockConfig, Event, MainDevice, Options, SyncSignals};
 use ringcat_sim::cable::{CableId, DeviceIndex, Endpoint};
 use ringcat_sim::frame::Port::{A, B, C, D};
 use ringcat_wire::address::Position;
 use scenarios::clocks::{clocked, config, delay, lock, spread, wired, with_clocks};
 use scenarios::delays::{Shape, run};
 use scenarios::segments::{MAIN, at};
+use scenarios::tap::Tap;
 use scenarios::world::World;
 
 /// A world on these cables whose devices `without` have no clock.
@@ -96,6 +97,48 @@ fn behind_a_splitter_without_a_clock_at_the_head_the_second_branch_is_told() {
         // A long time after, nothing is told again.
         world.run_cycles(2_000);
         assert_eq!(delays_told(&world).len(), 2);
+    }
+}
+
+/// Two branches of a splitter come at once in operation: what they take together is seen, what each of them takes is
+/// not. That is told with the least and the most that it may be; the middle is written only where that is asked for.
+// covers: dc-delays
+#[test]
+fn a_delay_of_which_only_a_range_is_known_is_estimated_where_that_is_asked_for() {
+    for estimated_delays in [false, true] {
+        let mut descriptions = clocked(SPLITTERS.len(), 50);
+        [1, 5].into_iter().for_each(|device| descriptions[device].dc = None);
+        let mut main_device = MainDevice::request(Tap::new(wired(descriptions, &SPLITTERS)), &Options::default());
+        let scan = main_device.scan().expect("all are there");
+        let late = [CableId(2), CableId(4)];
+        late.into_iter().for_each(|cable| main_device.links_mut().network_mut().cut(cable));
+        let declaration = with_clocks(&scan, ClockConfig { estimated_delays, ..config() });
+        let mut application = main_device.activate(declaration).map_err(|it| it.error).expect("it fits");
+        (0..8_000).for_each(|_| application.cycle(|_| ()));
+        late.into_iter().for_each(|cable| application.links_mut().network_mut().heal(cable));
+        (0..6_000).for_each(|_| application.cycle(|_| ()));
+        let events: Vec<Event> = core::iter::from_fn(|| application.pop_event()).map(|timed| timed.event).collect();
+        let mut told = Vec::new();
+        for event in &events {
+            let Event::DelayUnknown { position, range_ns: Some(range), is_estimated, .. } = event else { continue };
+            told.push((usize::from(position.0), *range, *is_estimated));
+        }
+        assert!(!told.is_empty(), "{events:?}");
+        for (device, (least, most), is_estimated) in told {
+            let what = format!("device {device}, {least} to {most} ns");
+            assert_eq!(is_estimated, estimated_delays, "{what}");
+            let there_and_back = |cables: &[i64]| 2 * cables.iter().map(|cable| hop(*cable)).sum::<i64>();
+            let truth = match device {
+                2 => hop(1) + hop(2),
+                3 => hop(1) + hop(2) + hop(3),
+                4 => hop(1) + there_and_back(&[2, 3]) + hop(4),
+                other => panic!("device {other} is known: {events:?}"),
+            };
+            assert!((least - 20..=most + 20).contains(&truth), "{what}: it takes {truth} ns");
+            let written = i64::from(delay(application.links().network(), device));
+            let expected = if estimated_delays { (least + most) / 2 } else { 0 };
+            assert!((written - expected).abs() <= 20, "{what}: {written} ns are written");
+        }
     }
 }
 

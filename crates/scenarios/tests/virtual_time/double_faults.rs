@@ -45,6 +45,9 @@ const KINDS: [&str; 9] = [
 ];
 const STATES: [AlState; 5] = [AlState::Init, AlState::PreOp, AlState::SafeOp, AlState::Op, AlState::Op];
 
+/// Periods of domains, in cycles.
+const PERIODS: [&[u32]; 4] = [&[1, 1], &[1, 2], &[1, 3, 5], &[2, 1]];
+
 /// What cables connect.
 type Cables = Vec<(Endpoint, Endpoint)>;
 
@@ -140,7 +143,7 @@ fn random_devices(kinds: &[&str], dice: &mut Dice) -> Vec<DeviceDescription> {
 fn declare(scan: &Scan, dice: &mut Dice) -> Declaration {
     let mut declaration = automatic(&scan.subdevices, CYCLE);
     if dice.one_in(3) && scan.subdevices.len() > 1 {
-        let periods: &[u32] = dice.pick(&[&[1, 1][..], &[1, 2], &[1, 3, 5], &[2, 1]]);
+        let periods = *dice.pick(&PERIODS);
         let members = |first: usize| {
             let subdevices = (first..scan.subdevices.len()).step_by(periods.len());
             subdevices.map(|subdevice| DomainMember { subdevice, sync_managers: None }).collect::<Vec<_>>()

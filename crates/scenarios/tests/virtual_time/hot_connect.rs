@@ -1,5 +1,8 @@
 //! Hot connect groups: SubDevices in a row that come and go, at any place, while the others exchange process data.
+//!
+//! `SEED=0..300 cargo test -p scenarios --test virtual_time hot_connect::seeds -- --nocapture` runs many random ones.
 
+use std::ops::Range;
 use std::time::Duration;
 
 use ringcat::{
@@ -7,12 +10,15 @@ use ringcat::{
     SubDeviceConfig, SubDeviceInfo, automatic,
 };
 use ringcat_sim::cable::{CableId, DeviceIndex};
-use ringcat_sim::description::DeviceDescription;
+use ringcat_sim::description::{DeviceDescription, TransitionTimes};
 use ringcat_sim::fault::Fault;
 use ringcat_sim::frame::Port;
 use ringcat_sim::network::builder::SegmentBuilder;
 use ringcat_sim::network::{Network, NetworkOptions};
 use ringcat_wire::al::{AlState, AlStatus};
+use ringcat_wire::sii::{SiiSyncManager, SyncManagerKind};
+use scenarios::check::Delivery;
+use scenarios::dice::Dice;
 use scenarios::segments::{descriptions, devices, line, ring};
 use scenarios::tap::Tap;
 use scenarios::world::{CYCLE, Mark, World};
@@ -309,4 +315,105 @@ fn groups_side_by_side_that_a_break_separates_go_on_and_join_from_their_own_side
     world.run_cycles(100);
     assert_eq!(world.application().ring(), ringcat::RingState::Closed);
     assert!(both(&world) && world.left_op(mark).is_empty() && world.incomplete(mark) <= 1);
+}
+
+/// Devices of a line or a ring with the group at its end: some look at their FMMUs on the way to SAFEOP only, some have
+/// inputs or outputs in OP only, some are slow or have no FMMU to spare.
+fn random_network(dice: &mut Dice) -> (Network, usize) {
+    let mut all: Vec<DeviceDescription> = descriptions(&BASE).into_iter().chain(tool()).collect();
+    let limited = [SyncManagerKind::Inputs, SyncManagerKind::Outputs];
+    for it in &mut all {
+        it.latches_fmmus = dice.one_in(2);
+        let areas = it.sync_managers.iter().filter(|manager| limited.contains(&manager.kind) && manager.length > 0);
+        let needed = areas.count() as u8;
+        it.controller_fmmus = dice.pick(&[None, Some(needed.max(1)), Some(needed + 1)]).to_owned();
+        it.transitions = TransitionTimes::all(Duration::from_millis(*dice.pick(&[0, 0, 5, 30])));
+        let is_op_only = [dice.one_in(3), dice.one_in(3)];
+        for manager in it.sync_managers.iter_mut().filter(|manager| manager.length > 0) {
+            let place = limited.iter().position(|kind| *kind == manager.kind);
+            if place.is_some_and(|place| is_op_only[place]) {
+                manager.enable |= SiiSyncManager::ENABLE | SiiSyncManager::OP_ONLY;
+            }
+        }
+    }
+    let count = all.len();
+    let is_ring = dice.one_in(2);
+    let network = if is_ring { ring(all, NetworkOptions::default()) } else { line(all, NetworkOptions::default()) };
+    (network, count + usize::from(is_ring))
+}
+
+/// Cables, the group's and others, and devices come and go; each cycle is judged by the logs of the devices. Areas of
+/// process data that were found there.
+fn run(seed: u64) -> u64 {
+    let mut dice = Dice::new(seed ^ 0x4C07);
+    let (network, cables) = random_network(&mut dice);
+    let mut world = World::with(seed, network, &Options::default(), declare).expect("scan and activation");
+    world.judge_latched(false);
+    world.until(LIMIT, "all settled", |world| world.application().all_settled());
+    let lost = *dice.pick(&[0, 0, 10, 50]);
+    world.application_mut().links_mut().lose_per_mille(lost, seed);
+    let (mut cut, mut off) = (None, None);
+    for _ in 0..8 + dice.below(12) {
+        let delay = Duration::from_nanos(dice.below(1_000_000));
+        let fault = match (dice.below(4), cut.take(), off.take()) {
+            (0, _, Some(device)) => Fault::PowerOn(device),
+            (0 | 1, None, was) => {
+                off = was;
+                // The cable of the group in every second case.
+                let cable = if dice.one_in(2) { BASE.len() } else { dice.below(cables as u64) as usize };
+                Fault::Cut(*cut.insert(CableId(cable)))
+            }
+            (2, was, None) => {
+                cut = was;
+                let device = dice.below((BASE.len() + GROUP.len()) as u64) as usize;
+                Fault::PowerOff(*off.insert(DeviceIndex(device)))
+            }
+            (_, Some(cable), was) => {
+                off = was;
+                Fault::Heal(cable)
+            }
+            (_, None, Some(device)) => Fault::PowerOn(device),
+            (_, None, None) => Fault::Cut(*cut.insert(CableId(BASE.len()))),
+        };
+        world.fault_in(delay, fault);
+        let cycles = if dice.one_in(2) { 100 + dice.below(400) } else { 1 + dice.below(20) };
+        world.run_cycles(cycles);
+    }
+    world.application_mut().links_mut().lose_per_mille(0, seed);
+    (0..cables).for_each(|cable| world.heal(CableId(cable)));
+    (0..BASE.len() + GROUP.len()).for_each(|device| world.power_on(DeviceIndex(device)));
+    world.until(Duration::from_secs(20), "all back", |world| {
+        let last = world.judged(world.beginning()).last().map(|judged| judged.delivery);
+        world.all_in_op() && has_joined(world) && last == Some(Delivery::Complete)
+    });
+    world.run_cycles(20);
+    let mark = world.mark();
+    world.run_cycles(40);
+    assert!(world.judged(mark).iter().all(|judged| judged.stale.is_empty()), "{:?}", world.judged(mark).last());
+    world.proven()
+}
+
+fn runs(seeds: Range<u64>) {
+    let count = seeds.end - seeds.start;
+    let (mut proven, mut failed) = (0, Vec::new());
+    for seed in seeds {
+        match std::panic::catch_unwind(|| run(seed)) {
+            Ok(areas) => proven += areas,
+            Err(_) => failed.push(seed),
+        }
+    }
+    println!("hot connect: {count} seeds, {proven} areas proven, {} seeds failed", failed.len());
+    assert_eq!(failed, [], "seeds that fail");
+    assert!(proven > 1_000 * count, "{proven}");
+}
+
+// covers: hot-connect, freshness
+#[test]
+fn groups_of_any_devices_come_and_go_and_what_is_fresh_was_put_in_seeds_0_to_39() {
+    runs(0..40);
+}
+
+#[test]
+fn seeds_from_the_environment() {
+    crate::explorer::from_environment(|seed| println!("{} areas of process data proven", run(seed)), runs);
 }

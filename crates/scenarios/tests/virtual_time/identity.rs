@@ -119,6 +119,54 @@ fn of_two_at_one_address_the_one_of_this_session_stays_and_the_other_one_loses_i
     }
 }
 
+/// One with the address of another one from an earlier session, whose registers are write-protected, answers while the
+/// one of this session has no power: it cannot be made to give up the address. It is not taken for the other one, is
+/// asked less and less often, and that is told once. The one of this session comes back when it is gone.
+// covers: identity
+#[test]
+fn one_that_cannot_give_up_a_wrong_address_is_told_once_and_asked_ever_less_often() {
+    let tree = [(MAIN, at(0, Port::A)), (at(0, Port::B), at(1, Port::A)), (at(0, Port::D), at(2, Port::A))];
+    let described = described(&["digital-input-16"; 3], false);
+    let mut application =
+        activated(MainDevice::request(Tap::new(wired_with(described, &tree)), &Options::default()), 3);
+    // In the order of frames the branch at port D comes first: the one there has the second address.
+    let mut protect = application.engine_mut().start_register_write(1, map::REGISTER_WRITE_PROTECTION, vec![1]);
+    (0..10).for_each(|_| application.cycle(|_| ()));
+    protect.take().expect("it is done").expect("it is there");
+    application.links_mut().network_mut().cut(CableId(2));
+    let main_device = application.stop(LastOutputs::Zero, AlState::Init, Duration::from_secs(1)).expect("it stops");
+    let mut application = activated(main_device, 2);
+    let ours = station(application.links().network(), 1);
+    assert_eq!(ours, station(application.links().network(), 2), "the one out of reach has this address from before");
+    application.links_mut().network_mut().power_off(DeviceIndex(1));
+    (0..1_000).for_each(|_| application.cycle(|_| ()));
+    while application.pop_event().is_some() {}
+    let sent = |application: &Application<Tap>| {
+        application.links().network().statistics().link(ringcat_sim::cable::HostLink::Main).frames_sent
+    };
+    application.links_mut().network_mut().heal(CableId(2));
+    (0..3_000).for_each(|_| application.cycle(|_| ()));
+    assert_eq!(station(application.links().network(), 2), ours, "it cannot give it up");
+    let before = sent(&application);
+    (0..10_000).for_each(|_| application.cycle(|_| ()));
+    let acyclic = sent(&application) - before - 10_000;
+    assert!(acyclic < 1_000, "{acyclic} frames in 10 s beside those of process data");
+    assert_ne!(application.exchange().freshness(DOMAIN, 1), Freshness::Fresh);
+    let events: Vec<Event> = core::iter::from_fn(|| application.pop_event()).map(|timed| timed.event).collect();
+    let told = |event: &&Event| match event {
+        Event::ConfigurationFailed { subdevice: 1, reason } => reason.contains("does not give up the address"),
+        _ => false,
+    };
+    assert_eq!(events.iter().filter(told).count(), 1, "{events:?}");
+    assert_eq!(events.iter().find(|event| matches!(event, Event::Returned { subdevice: 1 })), None);
+    let network = application.links_mut().network_mut();
+    network.cut(CableId(2));
+    network.power_on(DeviceIndex(1));
+    (0..2_000).for_each(|_| application.cycle(|_| ()));
+    assert_eq!(application.exchange().status(DOMAIN).state, DomainState::Complete);
+    assert_eq!(application.exchange().freshness(DOMAIN, 1), Freshness::Fresh);
+}
+
 /// Branches of a junction with devices that are alike, without serial numbers: the one on the later branch has its
 /// power back first. A ring behind a junction whose first two are alike, the second one reached from the far end while
 /// the first has no power.

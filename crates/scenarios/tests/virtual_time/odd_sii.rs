@@ -271,6 +271,40 @@ fn an_sii_that_cannot_be_followed_is_a_matter_of_its_subdevice_alone() {
     others_run_and_it_says(world(devices, ReadPdos::Missing), reason);
 }
 
+/// It says that it has no place before the next activation and that it stays in SAFEOP, once; the others go on.
+// covers: odd-sii
+#[test]
+fn one_whose_sii_is_mended_in_operation_says_that_it_has_no_place_and_holds_up_nobody() {
+    let mut devices = descriptions(&KINDS);
+    let sound = sii_image::build(&devices[ODD]);
+    let mut beyond = devices[ODD].clone();
+    beyond.sync_managers[3].start = 0x2FFE;
+    devices[ODD].sii_image = Some(sii_image::build(&beyond));
+    let mut world = world(devices, ReadPdos::Missing);
+    world.run_cycles(400);
+    let write = world.application_mut().engine_mut().start_sii_write(ODD, sound, false);
+    world.finish(Duration::from_secs(20), write).expect("it can be written");
+    let mark = world.mark();
+    world.power_off(DeviceIndex(ODD));
+    world.run_cycles(100);
+    world.power_on(DeviceIndex(ODD));
+    let is_safe =
+        |world: &World| world.network().device(DeviceIndex(ODD)).al_status() == AlStatus::new(AlState::SafeOp);
+    world.until(Duration::from_secs(5), "it is in SAFEOP", is_safe);
+    world.until(Duration::from_secs(5), "all settled", |world| world.application().all_settled());
+    let says = |event: &Event| {
+        matches!(event, Event::PlanOddity { subdevice: ODD, what }
+            if what.contains("it has no place in the process image before the next activation, and stays in SAFEOP"))
+    };
+    let told = world.events(mark).iter().filter(|timed| says(&timed.event));
+    assert_eq!(told.count(), 1, "{:?}", world.events(mark));
+    assert_eq!(world.application().directory().areas(ODD).len(), 0);
+    let (mark, compared) = (world.mark(), world.compared());
+    world.run_cycles(3_000);
+    assert!(world.compared() > compared && world.incomplete(mark) == 0 && is_safe(&world));
+    assert_eq!(troubles(world.events(mark)), Vec::<&Event>::new());
+}
+
 /// Places in the process image that are declared stay, as for one that is not there.
 // covers: odd-sii
 #[test]

@@ -1,5 +1,6 @@
 //! What becomes of the declared SubDevices: each is a machine of its own, so that a hundred come back at once.
 
+use alloc::format;
 use alloc::rc::Rc;
 use alloc::string::ToString;
 use core::time::Duration;
@@ -8,14 +9,14 @@ use ringcat_wire::address::Wkc;
 use ringcat_wire::al::AlState;
 
 use crate::event::Event;
-use crate::info::SubDeviceInfo;
+use crate::info::{Direction, SubDeviceInfo};
 use crate::ring::RingState;
 use crate::segment::asked::Asked;
 use crate::segment::attention::Round;
 use crate::segment::effect::{Check, Effect, Effects, Shown, Task};
 use crate::segment::look::{Look, answers};
 use crate::segment::looked::Looked;
-use crate::segment::member::{Incidents, Member, Phase};
+use crate::segment::member::{Incidents, Member, Mistaken, Phase};
 use crate::segment::model::Segment;
 use crate::segment::observation::ProcessDataStep;
 use crate::segment::setup::Setup;
@@ -82,7 +83,9 @@ impl Segment {
             let Some(member) = self.members.get_mut(index) else { continue };
             match (look, member.phase) {
                 (Look::Unknown | Look::Doubled, _) => certain = false,
-                (Look::Silent, Phase::Absent) => member.silent = SILENT_LOOKS,
+                (Look::Silent, Phase::Absent) => {
+                    (member.silent, member.mistaken) = (SILENT_LOOKS, Mistaken::default());
+                }
                 (Look::Silent, Phase::Configuring | Phase::Settled(_)) => {
                     member.silent = (member.silent + 1).min(SILENT_LOOKS);
                     if member.silent >= needed {
@@ -98,7 +101,7 @@ impl Segment {
                 }
                 (Look::Answer { status, code, .. }, phase) => {
                     member.silent = 0;
-                    self.heard(index, phase, (*status, *code), effects);
+                    self.heard(index, phase, (*status, *code), now, effects);
                 }
             }
         }
@@ -106,7 +109,7 @@ impl Segment {
     }
 
     /// A member answered.
-    fn heard(&mut self, index: usize, phase: Phase, (status, code): Shown, effects: &mut Effects) {
+    fn heard(&mut self, index: usize, phase: Phase, (status, code): Shown, now: Instant, effects: &mut Effects) {
         let member = &mut self.members[index];
         match phase {
             Phase::Configuring => {}
@@ -125,7 +128,10 @@ impl Segment {
             // Its station address answers again: it has come back, if it is the same one.
             Phase::Absent => {
                 member.suspended = false;
-                self.start(index, Start::Unknown, None, Check::Return, effects);
+                match member.mistaken.pause(now) {
+                    Some(pause) => self.attention.again_in(pause, now),
+                    None => self.start(index, Start::Unknown, None, Check::Return, effects),
+                }
             }
         }
     }
@@ -195,16 +201,28 @@ impl Segment {
 
     /// What answers at a lost member's address is that member.
     pub(in crate::segment) fn observe_return(&mut self, index: usize, attempt: u32, effects: &mut Effects) {
-        if self.current(index, attempt).is_some() {
+        if let Some(member) = self.current(index, attempt) {
+            member.mistaken = Mistaken::default();
             effects.report(Event::Returned { subdevice: index });
         }
     }
 
-    /// What answers at a lost member's address is not known to be that member.
-    pub(in crate::segment) fn keep_absent(&mut self, index: usize, attempt: u32) {
-        if let Some(member) = self.current(index, attempt) {
-            member.phase = Phase::Absent;
-            self.attention.want();
+    /// What answers at a lost member's address is not known to be that member. It has lost the address, and the next
+    /// look finds it without one; unless it keeps the address.
+    pub(in crate::segment) fn keep_absent(&mut self, index: usize, attempt: u32, now: Instant, effects: &mut Effects) {
+        let Some(member) = self.current(index, attempt) else { return };
+        member.phase = Phase::Absent;
+        let (pause, station) = (member.mistaken.again(now), member.station);
+        if member.mistaken.is_to_tell() {
+            let reason = format!(
+                "what answers at its station address {:#06x} is not known to be it, and does not give up the address",
+                station.0
+            );
+            effects.failed(index, reason);
+        }
+        match pause {
+            Some(pause) => self.attention.again_in(pause, now),
+            None => self.attention.want(),
         }
     }
 
@@ -297,12 +315,7 @@ impl Segment {
         let Some(member) = members.get_mut(index) else { return };
         match Setup::new(index, &member.config, info, layout) {
             Ok(setup) => {
-                if member.unfit.take().is_some() && setup.plan.mapped_areas().count() > setup.process_data_fmmus() {
-                    let what =
-                        "its SII can be followed now: it has no place in the process image before the next activation";
-                    effects.report(Event::PlanOddity { subdevice: index, what: what.to_string() });
-                }
-                member.setup = Some(Rc::new(setup));
+                member.take_setup(index, setup, effects);
                 member.info = Some(info.clone());
             }
             // As before.
@@ -332,5 +345,24 @@ impl Segment {
     /// The member whose attempt of that number is under way.
     pub(in crate::segment) fn current(&mut self, index: usize, attempt: u32) -> Option<&mut Member> {
         self.members.get_mut(index).filter(|member| member.attempt == attempt)
+    }
+}
+
+impl Member {
+    /// Takes its configuration. What could not be followed at the activation has no place in the process image: without
+    /// outputs no SubDevice that has some goes to OP, so it is brought to SAFEOP only.
+    pub(in crate::segment) fn take_setup(&mut self, index: usize, setup: Setup, effects: &mut Effects) {
+        if self.unfit.take().is_some() && setup.plan.mapped_areas().count() > setup.process_data_fmmus() {
+            let has_outputs = setup.plan.mapped_areas().any(|(_, area)| area.direction == Direction::Outputs);
+            let mut what =
+                "its SII can be followed now: it has no place in the process image before the next activation"
+                    .to_string();
+            if has_outputs && self.target == AlState::Op {
+                self.target = AlState::SafeOp;
+                what.push_str(", and stays in SAFEOP without outputs");
+            }
+            effects.report(Event::PlanOddity { subdevice: index, what });
+        }
+        self.setup = Some(Rc::new(setup));
     }
 }

@@ -33,7 +33,7 @@ impl Segment {
             Observation::Delayed => self.delay_all(),
             Observation::Reached { index, attempt, state } => self.settle(index, attempt, state, effects),
             Observation::Returned { index, attempt } => self.observe_return(index, attempt, effects),
-            Observation::NotReturned { index, attempt } => self.keep_absent(index, attempt),
+            Observation::NotReturned { index, attempt } => self.keep_absent(index, attempt, now, effects),
             Observation::Unreachable { index, attempt } => {
                 if self.current(index, attempt).is_some() {
                     self.lose(index, effects);

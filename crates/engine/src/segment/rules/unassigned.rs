@@ -138,8 +138,7 @@ impl Segment {
         let Segment { members, layout, .. } = self;
         let Some(member) = members.get_mut(index) else { return };
         let Ok(setup) = Setup::new(index, &member.config, &info, layout) else { return };
-        member.setup = Some(Rc::new(setup));
-        member.unfit = None;
+        member.take_setup(index, setup, effects);
         member.info = Some(info);
         member.configured = false;
         self.unassigned.retain(|other| other.station != station);

@@ -101,3 +101,28 @@ fn long_rings_that_are_broken_at_the_scan_are_learned() {
         }
     }
 }
+
+/// More rings than are looked for: that is told, all exchange process data as if there were none, and no line is said to
+/// be crossed.
+// covers: JR-03, junctions
+#[test]
+fn rings_that_are_not_learned_are_told_and_hold_up_nobody() {
+    let (network, _, _) = rings(&[2; 17], false);
+    let mut world = in_op(72, network, (JunctionMode::Automatic, &[]));
+    let not_learned = |world: &World| -> Vec<usize> {
+        let events = world.events(world.beginning()).iter();
+        let rings = events.filter_map(|timed| match timed.event {
+            Event::JunctionsNotLearned { rings } => Some(rings),
+            _ => None,
+        });
+        rings.collect()
+    };
+    assert_eq!(not_learned(&world), [17]);
+    assert_eq!(learned(&world), []);
+    world.settle();
+    assert_eq!(crossed(&world, world.beginning()), 0);
+    // As many as are looked for.
+    let (network, closings, _) = rings(&[2; 16], false);
+    let world = in_op(73, network, (JunctionMode::Automatic, &[]));
+    assert_eq!((not_learned(&world), learned(&world)), (Vec::new(), closings));
+}
