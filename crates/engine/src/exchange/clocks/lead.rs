@@ -7,9 +7,9 @@
 //! near:
 //!
 //! * a second reference, which has followed the same clock as the first one and so differs by nanoseconds for seconds,
-//! is left alone; it is steered when its mean has drifted away, and then by a mean, in every cycle;
+//!   is left alone; it is steered when its mean has drifted away, and then by a mean, in every cycle;
 //! * one that follows the host is steered in every cycle, by a small part of a long mean. The written value is that
-//! much less than its last reading: the jitter of one cycle is taken back in the next.
+//!   much less than its last reading: the jitter of one cycle is taken back in the next.
 
 use crate::time::Instant;
 
