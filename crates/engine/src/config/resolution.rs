@@ -69,7 +69,7 @@ impl fmt::Display for ConfigError {
 impl core::error::Error for ConfigError {}
 
 /// Result for a declaration, or for a SubDevice without a declaration. Both are named by their index in the slices
-/// given to [`resolve`].
+/// given to `resolve`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Resolution {
     /// The declaration has its SubDevice.

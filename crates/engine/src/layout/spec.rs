@@ -62,10 +62,10 @@ pub struct Rules<'a> {
     pub lrw: LrwPolicy,
     /// By SubDevice; those beyond the end have a spare FMMU.
     pub witnesses: &'a [Witness],
-    /// Number of the session, modulo [`SESSIONS`]. Each session has logical addresses of its own, so that a SubDevice
+    /// Number of the session, modulo `SESSIONS`. Each session has logical addresses of its own, so that a SubDevice
     /// that was out of reach since an earlier session and still has its old FMMUs does not answer for another one.
     pub session: u32,
-    /// Largest number of datagrams in a frame, [`MIN_DATAGRAMS_PER_FRAME`] at least; `None`: as many as fit.
+    /// Largest number of datagrams in a frame, `MIN_DATAGRAMS_PER_FRAME` at least; `None`: as many as fit.
     pub max_datagrams: Option<usize>,
 }
 

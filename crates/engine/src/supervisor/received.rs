@@ -1,6 +1,6 @@
 //! Classification of a frame handed to the acyclic half.
 
-/// Classification of a frame handed to [`Supervisor::receive`].
+/// Classification of a frame handed to `Supervisor::receive`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Received {
     /// A copy of a frame that is in flight.
