@@ -101,7 +101,7 @@ pub struct Variable {
     pub image_bit: u32,
     /// Bits.
     pub bits: u32,
-    /// Whose process data it is; `None` where it is nobody's: then nothing writes or reads it.
+    /// The SubDevice with this process data; `None` where it belongs to none: then it is neither written nor read.
     pub subdevice: Option<usize>,
 }
 

@@ -1,7 +1,7 @@
-//! What the two halves of the engine tell each other without a queue: the latest value of a few words.
+//! What the two halves of the engine exchange without a queue: the latest value of a few words.
 //!
-//! The exchange posts what its supervision datagram saw and the state of the ring; the supervisor posts which
-//! SubDevices take part in process data. Readers look at the latest value, so nothing is lost when they are slow.
+//! The exchange posts the result of its supervision datagram and the state of the ring; the supervisor posts which
+//! SubDevices take part in process data. Readers use the latest value, so a slow reader blocks and loses nothing.
 
 pub mod clocks;
 mod rest;
@@ -15,24 +15,24 @@ use ringcat_wire::address::Wkc;
 use crate::link::Link;
 use crate::ring::RingState;
 
-/// What one supervision datagram brought back: a BRD of AL status.
+/// Result of one supervision datagram, a BRD of AL status.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Supervision {
-    /// SubDevices that the main copy met.
+    /// SubDevices that processed the main copy.
     pub main: Wkc,
-    /// SubDevices that the redundant copy met.
+    /// SubDevices that processed the redundant copy.
     pub redundant: Wkc,
     /// OR of the lower bytes of all AL status words, by the copy that read them.
     pub al_status: [u8; 2],
     /// OR of all ECAT event requests (register 0x0210 under its mask).
     pub irq: u16,
-    /// A copy came back on the link it was sent on: these are counts of an open ring, or of one link.
+    /// A copy came back on the link it was sent on: the counts are those of an open ring, or of one link.
     pub returned: bool,
 }
 
-/// Bits of both AL status bytes that are kept: the upper two say nothing (protocol 5.3).
+/// Bits of both AL status bytes that are kept: the upper two carry no information (protocol 5.3).
 const AL_MASK: u16 = 0x3F3F;
-/// Where [`Supervision::returned`] travels: among those that are left out of AL status.
+/// Bit of [`Supervision::returned`] in the packed word: one of those that [`AL_MASK`] leaves free.
 const RETURNED_BIT: u32 = 32 + 15;
 
 impl Supervision {
@@ -65,12 +65,12 @@ impl Supervision {
 pub struct RingWord {
     /// The state.
     pub state: RingState,
-    /// How often it changed, so that a quick double change is seen too.
+    /// Number of changes, so that a quick double change is seen too.
     pub changes: u32,
-    /// In an open ring the first copy that showed it: the link it was sent on and came back on, and the SubDevices it
-    /// met, where it carried a supervision datagram.
+    /// In an open ring the first copy that showed it: the link it was sent on and came back on, and the SubDevices that
+    /// processed it, where it carried a supervision datagram.
     pub returned: Option<(Link, u16)>,
-    /// The link whose copies do not come back though those of the other one cross the ring.
+    /// The link whose copies are lost though those of the other link pass the ring.
     pub dead_way: Option<Link>,
 }
 
@@ -134,9 +134,9 @@ pub struct Board {
     taking_part_changes: AtomicU32,
     /// SubDevices that may be missing without a domain being incomplete.
     optional: Vec<bool>,
-    /// One bit per SubDevice: it is away on purpose.
+    /// One bit per SubDevice: its absence is intended.
     excused: Vec<AtomicU64>,
-    /// One bit per SubDevice: its FMMUs are set, and it was not seen yet to give its inputs.
+    /// One bit per SubDevice: its FMMUs are set, but it has not been seen to deliver its inputs yet.
     unproven: Vec<AtomicU64>,
     /// Distributed clocks.
     pub clocks: clocks::ClockWords,
@@ -176,18 +176,18 @@ impl Board {
         self.optional.get(subdevice).copied().unwrap_or(false) || bit(&self.excused, subdevice)
     }
 
-    /// Says whether a SubDevice is away on purpose, so that no domain is incomplete without it.
+    /// Sets whether the absence of a SubDevice is intended, so that no domain is incomplete without it.
     pub fn set_excused(&self, subdevice: usize, excused: bool) {
         self.set(&self.excused, subdevice, excused);
     }
 
-    /// Says whether a SubDevice, whose FMMUs are set, has still to be seen to give its inputs: until then it is not
-    /// counted on for what its state lets it add to a working counter.
+    /// Sets whether a SubDevice with its FMMUs set has still to show that it delivers its inputs. Until then the
+    /// increment of the working counter that its AL state allows is not expected.
     pub fn set_unproven(&self, subdevice: usize, unproven: bool) {
         self.set(&self.unproven, subdevice, unproven);
     }
 
-    /// Whether a SubDevice has still to be seen to give its inputs.
+    /// Whether a SubDevice has still to show that it delivers its inputs.
     pub fn is_unproven(&self, subdevice: usize) -> bool {
         bit(&self.unproven, subdevice)
     }
@@ -205,25 +205,25 @@ impl Board {
         (count != 0).then(|| (count as u32, Supervision::unpack(self.supervision.load(Ordering::Relaxed))))
     }
 
-    /// The state of the ring; its changes are counted here.
+    /// Posts the state of the ring and counts its changes.
     pub(crate) fn post_ring(&self, word: RingWord) {
         let before = RingWord::unpack(self.ring.load(Ordering::Relaxed));
         let changes = before.changes.wrapping_add(u32::from(before.state != word.state));
         self.ring.store(RingWord { changes, ..word }.pack(), Ordering::Release);
     }
 
-    /// The state of the ring as the exchange sees it.
+    /// State of the ring as the exchange sees it.
     pub fn ring(&self) -> RingWord {
         RingWord::unpack(self.ring.load(Ordering::Acquire))
     }
 
-    /// So many cycles were sent, with so many frames.
+    /// Posts the number of cycles and frames sent.
     pub(crate) fn post_cycle(&self, cycles: u64, frames: u64) {
         self.frames[0].store(frames, Ordering::Relaxed);
         self.cycles.store(cycles, Ordering::Release);
     }
 
-    /// So many frames were lost.
+    /// Posts the number of frames lost.
     pub(crate) fn post_lost(&self, frames: u64) {
         self.frames[1].store(frames, Ordering::Relaxed);
     }
@@ -238,8 +238,8 @@ impl Board {
         CyclicFrames { sent: self.frames[0].load(Ordering::Relaxed), lost: self.frames[1].load(Ordering::Relaxed) }
     }
 
-    /// A datagram with process data of a SubDevice that takes part came back with a wrong working counter, or not at
-    /// all.
+    /// Counts a datagram with process data of a SubDevice that takes part, which came back with a wrong working counter
+    /// or not at all.
     pub(crate) fn count_wkc_error(&self, subdevice: usize) {
         if let Some(counter) = self.wkc_errors.get(subdevice) {
             // Single writer.
@@ -247,18 +247,18 @@ impl Board {
         }
     }
 
-    /// How many datagrams with process data of a SubDevice, while it took part, came back with a working counter that
-    /// is not that of all who take part, or did not come back; goes on at 0 behind the largest number.
+    /// Number of datagrams with process data of a SubDevice that, while it took part, came back with a working counter
+    /// other than that of all SubDevices that take part, or did not come back. Wraps to 0.
     pub fn wkc_errors(&self, subdevice: usize) -> u32 {
         self.wkc_errors.get(subdevice).map_or(0, |counter| counter.load(Ordering::Relaxed))
     }
 
-    /// Says whether a SubDevice takes part in process data. Indices beyond the board are ignored.
+    /// Sets whether a SubDevice takes part in process data. Indices beyond the board are ignored.
     pub fn set_taking_part(&self, subdevice: usize, takes_part: bool) {
         self.set(&self.taking_part, subdevice, takes_part);
     }
 
-    /// Sets a bit, and counts where it changes something.
+    /// Sets or clears a bit and counts the change, if it is one.
     fn set(&self, words: &[AtomicU64], subdevice: usize, set: bool) {
         let Some(word) = words.get(subdevice / 64) else { return };
         let bit = 1 << (subdevice % 64);
@@ -273,7 +273,7 @@ impl Board {
         bit(&self.taking_part, subdevice)
     }
 
-    /// Changes to who takes part, or is away on purpose, since the beginning.
+    /// Number of changes to the bits `taking_part`, `excused` and `unproven` since activation.
     pub(crate) fn taking_part_changes(&self) -> u32 {
         self.taking_part_changes.load(Ordering::Acquire)
     }

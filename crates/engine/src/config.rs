@@ -1,8 +1,8 @@
-//! What the application declares about each SubDevice: where it is expected, who it is, its process data, watchdog,
-//! start-up commands and time limits.
+//! What the application declares about each SubDevice: expected place, identity, process data, watchdog, start-up
+//! commands and time limits.
 //!
-//! Everything not declared comes from the SII. Which declaration belongs to which SubDevice of a scan is the matter
-//! of [`resolve`]; what follows for its registers, of [`crate::plan`].
+//! Everything not declared comes from the SII. [`resolve`] assigns declarations to the SubDevices of a scan;
+//! [`crate::plan`] derives the register values.
 
 mod address;
 mod builder;
@@ -43,7 +43,7 @@ pub use resolution::{ConfigError, Resolution};
 pub use resolve::{DuplicateAlias, duplicate_aliases, resolve};
 pub use sync_modes::ModeError;
 
-/// Who is expected; `None` matches any value.
+/// Expected identity; `None` matches any value.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub struct Expected {
     /// Vendor id.
@@ -85,13 +85,13 @@ pub enum Watchdog {
     /// As the SII says.
     #[default]
     Default,
-    /// They do.
+    /// Enabled.
     On,
-    /// They do not.
+    /// Disabled.
     Off,
 }
 
-/// What is to be different about a SyncManager.
+/// Settings of a SyncManager that override the SII.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct SyncManagerOverride {
     /// Its number.
@@ -102,27 +102,27 @@ pub struct SyncManagerOverride {
     pub watchdog: Watchdog,
 }
 
-/// What the application declares about one SubDevice. The default expects anybody at position 0, with everything else
-/// from the SII.
+/// What the application declares about one SubDevice. The default expects a SubDevice of any identity at position 0,
+/// with everything else from the SII.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct SubDeviceConfig {
     /// Where it is expected.
     pub address: ConfigAddress,
-    /// Who is expected.
+    /// Expected identity.
     pub expected: Expected,
     /// The segment works without it.
     pub optional: bool,
     /// Number of the [group](Group) to which it belongs.
     pub group: Option<usize>,
-    /// What is to be different about its SyncManagers.
+    /// SyncManagers with settings that override the SII.
     pub sync_managers: Vec<SyncManagerOverride>,
     /// PDOs of the SyncManagers named here; the others, and all where this is `None`, are as in the SII.
     pub pdos: Option<Vec<PdoAssignment>>,
-    /// All its SyncManagers as a configuration file writes them; `None` takes them from the SII. With them
-    /// `sync_managers` and `pdos` do not count, nothing is assigned or mapped, and the file's mailboxes take the place
-    /// of the SII's.
+    /// All its SyncManagers as a configuration file writes them; `None` takes them from the SII. When they are given,
+    /// `sync_managers` and `pdos` are ignored, nothing is assigned or mapped, and the file's mailboxes replace those of
+    /// the SII.
     pub declared: Option<Vec<DeclaredSyncManager>>,
-    /// Its mailboxes in BOOT as a configuration file writes them, first the one that the MainDevice writes; `None`
+    /// Its mailboxes in BOOT as a configuration file writes them, the one that the MainDevice writes first; `None`
     /// takes them from the SII.
     pub declared_bootstrap: Option<[DeclaredSyncManager; 2]>,
     /// Register WATCHDOG_DIVIDER.
@@ -131,21 +131,21 @@ pub struct SubDeviceConfig {
     pub watchdog_intervals: Option<u16>,
     /// Register WATCHDOG_TIME_PDI, in units of the divider; 0 switches the watchdog off.
     pub pdi_watchdog_intervals: Option<u16>,
-    /// Start-up commands. Those of a transition are sent in this order, all of them each time it is passed.
+    /// Start-up commands. Those of a transition are sent in this order, at each pass of the transition.
     pub startup: Vec<StartupCommand>,
-    /// The PDI keeps the EEPROM that it has on the way to PREOP. Whoever reads or writes the EEPROM takes it back.
+    /// The EEPROM is left to the PDI from the way to PREOP on. A later access by the MainDevice takes it back.
     pub sii_to_pdi: bool,
     /// Pause in PREOP before SAFEOP is requested, for SubDevices that need it.
     pub wait_before_safeop: Duration,
-    /// SYNC signals of its distributed clock; `None` runs it without them.
+    /// SYNC signals of its distributed clock; `None`: no SYNC signals.
     pub sync: Option<SyncSignals>,
-    /// What frames take through it; `None`: as [`ClockConfig::passage`] says.
+    /// Time that frames take through it; `None`: that of [`ClockConfig::passage`].
     pub passage: Option<Passage>,
     /// Time limits.
     pub timeouts: Timeouts,
-    /// Time limits of single state changes, which count before `timeouts`.
+    /// Time limits of single state changes; they override `timeouts`.
     pub state_timeouts: Vec<StateTimeout>,
-    /// State to which it is to be brought.
+    /// Target state.
     pub target: AlState,
 }
 

@@ -1,4 +1,4 @@
-//! What happened: the events of both halves.
+//! Events of both halves.
 
 mod cyclic;
 pub mod history;
@@ -25,41 +25,41 @@ use crate::ring_status::{Cable, CableErrors, RedundancyLoss};
 use crate::time::Instant;
 use crate::topology::{Closing, PortOf};
 
-/// An event with the time at which the engine saw it.
+/// An event with its time.
 #[derive(Clone, Debug, PartialEq)]
 pub struct TimedEvent {
-    /// The `now` of the call in which it was seen.
+    /// The `now` of the call in which the engine saw it.
     pub at: Instant,
     /// What happened.
     pub event: Event,
-    /// Who was at the positions of the cabling that the event names when it was seen, where that is known: for a cable
-    /// at its near end and at its far one.
+    /// The SubDevices at the cabling positions that the event names, where known, as of that time: for a cable the one
+    /// at its near end and the one at its far end.
     pub whom: [Option<Occupant>; 2],
 }
 
 impl TimedEvent {
-    /// An event that names nobody by a position of the cabling, or of whom nothing is known.
+    /// An event that names no cabling position, or one with an unknown SubDevice.
     pub const fn new(at: Instant, event: Event) -> TimedEvent {
         TimedEvent { at, event, whom: [None; 2] }
     }
 }
 
-/// What can happen. SubDevices that were declared are named by their index in the declaration, others by position.
+/// All events. Declared SubDevices are named by their index in the declaration, others by position.
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum Event {
     /// A scan counted the SubDevices on each link.
     Counted {
-        /// Met by the main copy.
+        /// SubDevices that processed the main copy.
         main: u16,
-        /// Met by the redundant copy.
+        /// SubDevices that processed the redundant copy.
         redundant: u16,
     },
-    /// SubDevices whose information a scan has read so far.
+    /// Progress of a scan: SubDevices with their information read.
     ScanProgress {
-        /// Done.
+        /// Number read.
         done: usize,
-        /// Of.
+        /// Number found.
         total: usize,
     },
     /// A scan ended.
@@ -67,99 +67,99 @@ pub enum Event {
         /// SubDevices found.
         subdevices: usize,
     },
-    /// Something that keeps a scan from being complete.
+    /// A problem that keeps a scan from being complete.
     ScanFailed {
         /// What and where.
         reason: String,
     },
-    /// Something odd in a SubDevice's SII that was worked around.
+    /// A fault in a SubDevice's SII that was worked around.
     SiiOddity {
-        /// Where.
+        /// Position.
         position: Position,
-        /// What.
+        /// The fault.
         what: String,
     },
-    /// Port 0 of a SubDevice is not connected though frames reach it: the frame is looped there and may pass no second
-    /// such place (protocol 2.4).
+    /// Port 0 of a SubDevice is not connected though frames reach it: the frame is looped there, and a second such
+    /// place destroys it (protocol 2.4).
     UnconnectedPort0 {
-        /// Where.
+        /// Position.
         position: Position,
     },
     /// A SubDevice is entered at a port other than 0: its cables are swapped (protocol LC-01).
     LineCrossed {
-        /// Where; `None` where only the ring shows that there is one (protocol LC-02).
+        /// Position; `None` where only the ring shows that there is one (protocol LC-02).
         position: Option<Position>,
         /// The port of entry, where known.
         entry_port: Option<u8>,
     },
-    /// All SubDevices of a ring are entered at another port than 0: the main link is plugged in where the redundant one
-    /// belongs, and the other way round (protocol LC-01). All works, as with any crossed line.
+    /// All SubDevices of a ring are entered at another port than 0: the cables of the main and the redundant link are
+    /// swapped (protocol LC-01). The ring works, as with any crossed line.
     InterfacesSwapped,
     /// A scan found a ring behind a junction (JR-03).
     JunctionLearned {
         /// Its closing cable, from the last SubDevice back to the junction; nodes are positions.
         closing: Closing,
     },
-    /// The ports show rings behind junctions of which a scan in mode automatic did not find out where they close:
-    /// frames got lost meanwhile, a junction does not close its ports on demand, or there are more than 16. Declared
-    /// connections ([`JunctionMode::Strict`](crate::junction::JunctionMode)) need no tries.
+    /// The ports show rings behind junctions whose closing cable a scan in mode automatic did not find: frames were
+    /// lost meanwhile, a junction does not close its ports on command, or there are more than 16 rings. Declared
+    /// connections ([`JunctionMode::Strict`](crate::junction::JunctionMode)) need no such test.
     JunctionsNotLearned {
-        /// How many.
+        /// Number of rings.
         rings: usize,
     },
-    /// A cable of a ring behind a junction broke or is whole again (JUNCTION_RED_CHANGE in Cable Redundancy). Nodes are
-    /// positions, of the cabling as it was found last.
+    /// A cable of a ring behind a junction broke or is restored (JUNCTION_RED_CHANGE in Cable Redundancy). Nodes are
+    /// positions of the cabling as it was last read.
     JunctionChanged {
-        /// The port from which frames come; `None` where the ring has not been seen whole yet.
+        /// The port from which frames come; `None` until the ring has been seen closed.
         near: Option<PortOf>,
-        /// The port that they reach. Behind a break it is port 0 of the SubDevice that is entered from behind; at the
-        /// closing cable it is the junction's.
+        /// The port that they reach. Behind a break it is port 0 of the SubDevice that is entered at another port; at
+        /// the closing cable it is the junction's.
         far: PortOf,
-        /// The SubDevice that they reach: its station address, `None` where nobody has one there.
+        /// Station address of the SubDevice that they reach; `None` where no SubDevice has one there.
         station: Option<StationAddress>,
         /// Indices in the declaration of the SubDevices at both ends, `near` first.
         declared: [Option<usize>; 2],
-        /// It broke.
+        /// The cable broke.
         broken: bool,
-        /// Broken cables of all such rings now. One is tolerated; with two, SubDevices between them in one ring are cut
-        /// off, or no frame comes back where they are in two rings (JR-02).
+        /// Broken cables of all such rings now. One is tolerated. With two in one ring the SubDevices between them are
+        /// isolated; with two in different rings no frame comes back (JR-02).
         breaks: usize,
     },
-    /// The ports show more rings behind junctions than are known: one was closed that was open when the segment was
-    /// scanned (JR-03), or is not declared. Its breaks read as crossed lines (JR-04) until it is.
+    /// The ports show more rings behind junctions than are known: a ring was closed that was open at the scan (JR-03),
+    /// or is not declared. Until it is known, its breaks are reported as crossed lines (JR-04).
     JunctionUnknown {
-        /// How many are not known.
+        /// Number of unknown rings.
         rings: usize,
     },
     /// No frame comes back while a ring behind a junction is open: with a second unconnected port 0 in one path, frames
-    /// are destroyed (JR-02). Or the cable of the only link is broken too. Where there are several such rings, each is
-    /// looked into then while its junctions leave the others out for a moment, and what is broken is told by
-    /// [`Event::JunctionChanged`].
+    /// are destroyed (JR-02). Or the cable of the only link is broken too. With several such rings, each is then
+    /// examined while the junctions isolate the others for a moment, and [`Event::JunctionChanged`] reports the broken
+    /// cables.
     JunctionsBlocked {
         /// True when it begins, false when frames come back.
         blocked: bool,
         /// Cables of such rings that are known to be broken.
         breaks: usize,
     },
-    /// The link layer cannot take a link down, so crossed lines in a closed ring have no place (LC-03).
+    /// The link layer cannot take a link down, so crossed lines in a closed ring cannot be located (LC-03).
     CannotDisconnect {
         /// The link.
         link: Link,
     },
-    /// Something else that is odd about a SubDevice's ports.
+    /// Another fault of a SubDevice's ports.
     CablingOddity {
-        /// Where.
+        /// Position.
         position: Position,
-        /// What.
+        /// The fault.
         what: String,
     },
-    /// Two SubDevices have one alias.
+    /// Two SubDevices have the same alias.
     DuplicateAlias {
         /// The alias.
         alias: u16,
         /// First SubDevice that has it.
         first: Position,
-        /// Second one.
+        /// Second SubDevice that has it.
         second: Position,
     },
     /// The ring opened (RED_LINEBRK in Cable Redundancy).
@@ -169,7 +169,7 @@ pub enum Event {
         /// SubDevices on the redundant link.
         redundant: u16,
     },
-    /// The place of the break, from the topology.
+    /// The break is located, from the topology.
     BreakLocated {
         /// The cable that is broken; its ends are ports of SubDevices by position, or interfaces of the host.
         cable: Cable,
@@ -180,37 +180,38 @@ pub enum Event {
         main: u16,
         /// SubDevices on the redundant link.
         redundant: u16,
-        /// The cable that is whole again: where the break was located last, if it was.
+        /// The cable that is restored: where the break was last located, if it was.
         place: Option<Cable>,
     },
-    /// The ring opens and closes so often that not every change is told any more: the next one when it has been steady
-    /// for a second.
+    /// The ring opens and closes so often that single changes are no longer reported: the next one is, when the ring
+    /// has been stable for a second.
     RingUnsteady {
-        /// How often it changed since activation.
+        /// Number of changes since activation.
         changes: u32,
     },
-    /// The next break isolates somebody. This is no fault of the bus: everybody is still reached.
+    /// The ring tolerates no further break: the next one isolates SubDevices. This is no fault of the bus: all
+    /// SubDevices are still reached.
     RedundancyLost {
-        /// Why.
+        /// Reason.
         cause: RedundancyLoss,
     },
     /// The ring is closed again and passes frames both ways.
     RedundancyRegained,
-    /// Frames get damaged on a cable, again and again. Told of each cable once in ten seconds at the most.
+    /// Frames are damaged repeatedly on a cable. Reported for each cable once in ten seconds at most.
     CableErrors {
-        /// Which cable.
+        /// The cable.
         cable: Cable,
-        /// What its ends have counted since it was told of last.
+        /// Errors that its ends counted since the last report.
         errors: CableErrors,
     },
-    /// An interface has no carrier any more.
+    /// An interface has lost its carrier.
     LinkDown {
-        /// Which one.
+        /// The interface.
         link: Link,
     },
     /// An interface has its carrier back.
     LinkUp {
-        /// Which one.
+        /// The interface.
         link: Link,
     },
     /// A SubDevice reached a state.
@@ -220,15 +221,15 @@ pub enum Event {
         /// The state.
         state: AlState,
     },
-    /// A SubDevice refused a state or fell out of one.
+    /// A SubDevice refused a state or left one by itself.
     StateError {
         /// Index in the declaration.
         subdevice: usize,
-        /// What was asked for; `None` where it fell by itself.
+        /// The requested state; `None` where it changed by itself.
         requested: Option<AlState>,
-        /// What AL status says.
+        /// Its AL status.
         status: AlStatus,
-        /// Why.
+        /// Reason.
         code: AlStatusCode,
     },
     /// A SubDevice no longer answers.
@@ -241,21 +242,21 @@ pub enum Event {
         /// Index in the declaration.
         subdevice: usize,
     },
-    /// The configuration of a SubDevice failed; it is tried again.
+    /// The configuration of a SubDevice failed; it is retried.
     ConfigurationFailed {
         /// Index in the declaration.
         subdevice: usize,
-        /// What and why.
+        /// Step and reason.
         reason: String,
     },
-    /// Something in a declaration that the SubDevice may not follow.
+    /// A setting in a declaration that the SubDevice may not follow.
     PlanOddity {
         /// Index in the declaration.
         subdevice: usize,
-        /// What.
+        /// The setting.
         what: String,
     },
-    /// A start-up command has read an object without a value that it must have.
+    /// A start-up command read an object with another value than required.
     StartupRead {
         /// Index in the declaration.
         subdevice: usize,
@@ -265,26 +266,26 @@ pub enum Event {
         index: u16,
         /// Subindex of the object.
         sub_index: u8,
-        /// What the command is for, in the words of its declaration.
+        /// Purpose of the command, as its declaration words it.
         comment: Option<String>,
-        /// What came.
+        /// The value read.
         data: Vec<u8>,
     },
-    /// A SubDevice sent a CoE emergency (protocol 6.3). The last ones of each SubDevice are kept with its mailbox, too.
+    /// A SubDevice sent a CoE emergency (protocol 6.3). The mailbox of each SubDevice also keeps its last ones.
     Emergency {
         /// Index in the declaration; before activation the position.
         subdevice: usize,
-        /// What it says.
+        /// Its content.
         emergency: Emergency,
     },
-    /// A SubDevice that was not declared answers.
+    /// A SubDevice without a declaration answers.
     Unexpected {
-        /// Where.
+        /// Position.
         position: Position,
-        /// Who.
+        /// Its identity.
         identity: Identity,
     },
-    /// A rescan found a declared SubDevice at another place among the others than the scan.
+    /// A rescan found a declared SubDevice at another place in the order than the scan did.
     Moved {
         /// Index in the declaration.
         subdevice: usize,
@@ -293,17 +294,17 @@ pub enum Event {
         /// Its place now.
         to: Position,
     },
-    /// Another SubDevice is where a declared one is expected. It is left alone.
+    /// A SubDevice of another identity is where a declared one is expected. It is not configured.
     Mismatch {
         /// Index in the declaration.
         subdevice: usize,
-        /// Where.
+        /// Position.
         position: Position,
-        /// What differs.
+        /// The field that differs.
         field: IdentityField,
-        /// What was declared.
+        /// Declared value.
         expected: u32,
-        /// What is there.
+        /// Value found.
         got: u32,
     },
     /// All SubDevices of a hot connect group are in the states that were declared.
@@ -311,39 +312,39 @@ pub enum Event {
         /// Its number.
         group: usize,
     },
-    /// Of a hot connect group that had joined not all SubDevices are in the states that were declared any more.
+    /// Not all SubDevices of a hot connect group that had joined are in the declared states any more.
     GroupLeft {
         /// Its number.
         group: usize,
     },
-    /// A declared SubDevice is not there.
+    /// A declared SubDevice is absent.
     Missing {
         /// Index in the declaration.
         subdevice: usize,
-        /// Whether the declaration allows that.
+        /// Whether the declaration allows its absence.
         optional: bool,
     },
     /// A frame of another MainDevice arrived (protocol MR-10). The first few are kept, all are counted.
     ForeignFrame {
-        /// Where it arrived.
+        /// The link on which it arrived.
         arrived_on: Link,
         /// Its bytes without FCS.
         bytes: Vec<u8>,
     },
-    /// Frames that hold more datagrams do not bring them back processed: a gateway or simulator takes fewer than fit.
-    /// Told once.
+    /// Frames with more datagrams than this come back unprocessed: a gateway or simulator processes fewer than fit.
+    /// Reported once.
     FrameLimit {
-        /// How many may be in a frame, and what becomes of more.
+        /// The limit, and what happens to further datagrams.
         limit: FrameLimit,
     },
-    /// The judgement of a domain changed.
+    /// The state of a domain changed.
     Domain {
         /// Number of the domain.
         domain: usize,
-        /// The new judgement.
+        /// The new state.
         status: DomainStatus,
     },
-    /// A domain was due while its frames were still out.
+    /// A domain was due while its previous frames were still on the wire.
     Skipped {
         /// Number of the domain.
         domain: usize,
@@ -353,39 +354,38 @@ pub enum Event {
         /// Largest |0x092C| in nanoseconds.
         largest_ns: u32,
     },
-    /// Another SubDevice's clock is the reference now.
+    /// The clock of another SubDevice is the reference now.
     ReferenceClock {
-        /// Where in the scan; `None` where nobody is left.
+        /// Position in the scan; `None` where no clock is left.
         position: Option<Position>,
     },
-    /// The segment has changed, and propagation delays with it (protocol 7.1).
+    /// The segment has changed, and with it the propagation delays (protocol 7.1).
     DelaysChanged {
-        /// Clocks with another delay.
+        /// Clocks with a new delay.
         clocks: usize,
         /// Largest change in nanoseconds.
         largest_ns: u32,
     },
-    /// The propagation delay of a SubDevice cannot be measured: a fork without a clock is in front of it, and times
-    /// that were latched show only what all branches of that take together (protocol 7.1). Told once, until it is
-    /// known.
+    /// The propagation delay of a SubDevice cannot be measured: a fork without a clock is in front of it, and the
+    /// latched times show only the sum of all its branches (protocol 7.1). Reported once, until the delay is known.
     DelayUnknown {
-        /// Where in the scan.
+        /// Position in the scan.
         position: Position,
-        /// Position of the fork; `None` where it is not known what is between this SubDevice and the reference.
+        /// Position of the fork; `None` where the way from the reference to this SubDevice is unknown.
         fork: Option<Position>,
-        /// The least and the most that it may be, in nanoseconds; `None` where nothing is known.
+        /// Lower and upper limit of the delay in nanoseconds; `None` where nothing is known.
         range_ns: Option<(i64, i64)>,
-        /// The middle of that was written. Otherwise no delay was.
+        /// The middle of the range was written. Otherwise no delay was.
         is_estimated: bool,
     },
-    /// Distributed clocks could not be set up or measured; it is tried again.
+    /// Distributed clocks could not be set up or measured; this is retried.
     ClocksFailed {
-        /// What and why.
+        /// Step and reason.
         reason: String,
     },
-    /// The differences of the clocks came into their window or left it.
+    /// The differences of the clocks entered or left the sync window.
     SyncWindow {
-        /// They are inside.
+        /// True: within the sync window.
         inside: bool,
         /// OR of all |0x092C| in nanoseconds: at most twice the largest.
         spread_ns: u32,
@@ -393,7 +393,8 @@ pub enum Event {
 }
 
 impl Event {
-    /// Positions of the cabling that it names; those of a scan and of a look since are others.
+    /// Cabling positions that the event names; positions of the scan differ from those of a later reading of the
+    /// cabling.
     fn positions(&self) -> [Option<usize>; 2] {
         match self {
             Event::BreakLocated { cable }

@@ -1,11 +1,11 @@
 //! The cyclic half: process data and one supervision datagram.
 //!
-//! A cycle of the application is: [`Exchange::receive`] for every frame that came in, [`Exchange::process`] for each
-//! domain, work on the images, [`Exchange::queue`] for each domain that is due, [`Exchange::send`]. None of them
-//! allocates, locks or waits; the work is bounded by what was planned at activation.
+//! One cycle of the application: [`Exchange::receive`] for every received frame, [`Exchange::process`] for each domain,
+//! work on the images, [`Exchange::queue`] for each domain that is due, [`Exchange::send`]. None of them allocates,
+//! locks or waits; the work is bounded by the layout planned at activation.
 //!
-//! A frame is over when its working counters are as expected, or all its copies are in, or at its deadline. Inputs are
-//! delivered as copies come, per SubDevice: see `place`.
+//! A flight (one round trip of a frame) ends when its working counters are as expected, when all its copies are
+//! received, or at its deadline. Inputs are delivered as copies arrive, per SubDevice: see `place`.
 
 mod access;
 mod clocks;
@@ -48,23 +48,23 @@ use foreign::ForeignFrames;
 use image::InputNumber;
 use missed::Missed;
 
-/// No frame has this id.
+/// Id that no frame has.
 const NO_FRAME: u16 = u16::MAX;
 
-/// What became of a frame that was handed to [`Exchange::receive`].
+/// Classification of a frame handed to [`Exchange::receive`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Received {
     /// A copy of a frame that is in flight.
     Taken,
-    /// A frame of ours whose answer was given up, or a copy that was there already.
+    /// A frame of this MainDevice that was given up, or a copy that was received before.
     Late,
-    /// A frame of ours with other datagrams than were sent.
+    /// A frame of this MainDevice with other datagrams than were sent.
     Corrupt,
     /// A frame of the acyclic half.
     Acyclic,
     /// A frame of another MainDevice; kept for [`Exchange::pop_foreign`].
     Foreign,
-    /// No EtherCAT frame.
+    /// Not an EtherCAT frame.
     Other,
 }
 
@@ -78,8 +78,7 @@ pub struct Exchange {
     sequence: Sequence,
     by_id: [u16; 256],
     frames: Vec<CyclicFrame>,
-    /// For each of the frames the one that takes its place when a SubDevice of it has its FMMUs, or that it has
-    /// replaced.
+    /// For each frame the one that replaces it when one of its SubDevices gets its FMMUs, or the one that it replaced.
     others: Vec<CyclicFrame>,
     domains: Vec<Domain>,
     evidence: Evidence,
@@ -87,13 +86,13 @@ pub struct Exchange {
     foreign: ForeignFrames,
     missed: Missed,
     copies: Copies,
-    /// The frame of which a copy was taken last.
+    /// The frame of the last copy taken.
     taken: u16,
     cycle: u64,
 }
 
 impl Exchange {
-    /// Builds the images and frames of a layout. This is the last time that memory is allocated.
+    /// Builds the images and frames of a layout. This is the last memory allocation.
     pub fn new(identity: Identity, links: LinkSet, layout: &Layout, board: Arc<Board>, events: Producer) -> Exchange {
         let (mut frames, mut others) = (Vec::new(), Vec::new());
         let mut domains = Vec::new();
@@ -131,7 +130,7 @@ impl Exchange {
         }
     }
 
-    /// Takes in a frame that arrived on a link. Any bytes are allowed.
+    /// Takes a received frame. Any bytes are allowed.
     pub fn receive(&mut self, arrived_on: Link, bytes: &[u8], _now: Instant) -> Received {
         let copy = match self.identity.classify(bytes) {
             Classified::Ours(copy) if copy.class == Class::Cyclic => copy,
@@ -177,8 +176,8 @@ impl Exchange {
         }
     }
 
-    /// Judges a domain: gives up its overdue frames and sums its working counters. With several cycles under way it
-    /// judges each that has come back, in the order in which they left; the newest one's judgement is what stays.
+    /// Judges a domain: gives up its overdue frames and sums its working counters. With several cycles on the wire it
+    /// judges each that has come back, in the order of departure; the state of the newest one stays.
     pub fn process(&mut self, id: DomainId, now: Instant) -> DomainStatus {
         let Some(domain) = self.domains.get_mut(id.0) else { return DomainStatus::default() };
         let mut judged = false;
@@ -212,8 +211,9 @@ impl Exchange {
         domain.status(false)
     }
 
-    /// Puts a domain's outputs into its frames, to go out with the next [`Exchange::send`]. A domain whose cycles are
-    /// all still under way is skipped, counted and reported; false then. Queued twice, it leaves with its last outputs.
+    /// Copies a domain's outputs into its frames, which leave with the next [`Exchange::send`]. A domain with all its
+    /// cycles still on the wire is skipped, counted and reported; the result is false then. A domain that is queued
+    /// twice sends its latest outputs.
     pub fn queue(&mut self, id: DomainId, now: Instant) -> bool {
         let Some(domain) = self.domains.get_mut(id.0) else { return false };
         let set = domain.next();
@@ -233,7 +233,7 @@ impl Exchange {
         true
     }
 
-    /// Makes frames of a domain ready to be loaded. False where they are still waited for.
+    /// Makes frames of a domain ready to be loaded. False while some are still expected.
     fn make_ready(&mut self, id: DomainId, set: Range<usize>, now: Instant) -> bool {
         let frames = &mut self.frames[set.clone()];
         if frames.iter().any(|frame| frame.is_waiting() && !frame.overdue(now)) {
@@ -253,7 +253,7 @@ impl Exchange {
         true
     }
 
-    /// Sends what was queued, every frame on all links, and ends the cycle.
+    /// Sends the queued frames, each on all links, and ends the cycle.
     pub fn send(&mut self, now: Instant, transmit: &mut impl FnMut(Link, &[u8])) {
         self.board.traffic.post_departure(self.cycle);
         for domain in &mut self.domains {
@@ -288,9 +288,9 @@ impl Exchange {
         self.board.post_cycle(self.cycle, self.counters.sent);
     }
 
-    /// Takes over who takes part in process data, which the supervisor has changed, for frames of a domain that are not
-    /// out. A frame gets its process data with the first SubDevice, and keeps it: whoever comes back with its FMMUs is
-    /// served at once.
+    /// Applies the supervisor's changes to the participation in process data, for frames of a domain that are not on
+    /// the wire. A frame gets its process data with the first SubDevice, and keeps it: a SubDevice that returns with
+    /// its FMMUs set takes part at once.
     #[cold]
     fn follow_board(&mut self, set: Range<usize>, changes: u32) {
         let board = &self.board;
@@ -303,8 +303,8 @@ impl Exchange {
     }
 }
 
-/// A cycle of a domain was incomplete, or is the first complete one. Changes are told, and once that a domain is silent
-/// from the beginning.
+/// A cycle of a domain was incomplete, or is the first complete one. Reports changes of state, and once that a domain
+/// has been silent since activation.
 #[cold]
 fn note_change(
     id: DomainId,
@@ -324,13 +324,13 @@ fn note_change(
     }
 }
 
-/// Counts wrong working counters of a judged cycle.
+/// Counts the wrong working counters of a judged cycle.
 #[cold]
 fn count_errors(frames: &[CyclicFrame], board: &Board) {
     frames.iter().for_each(|frame| frame.count_errors(board));
 }
 
-/// Gives up those frames of a domain's oldest cycle that are overdue. True where others are still waited for.
+/// Gives up the overdue frames of a domain's oldest cycle. True while others are still expected.
 #[cold]
 fn give_up_overdue(
     domain: &Domain,
@@ -340,7 +340,7 @@ fn give_up_overdue(
     missed: &mut Missed,
     counters: &mut CyclicCounters,
 ) -> bool {
-    // What was overtaken does not come any more, whatever time it is.
+    // Links keep the order of frames: a frame overtaken by a later one is lost, whatever the time.
     let now = if domain.is_overtaken(frames) { Instant::NEVER } else { now };
     let mut pending = false;
     for frame in frames[set].iter_mut().filter(|frame| frame.is_waiting()) {

@@ -1,9 +1,9 @@
 //! What a scan found about one SubDevice, in owned types (protocol 3.1, 4).
 //!
-//! In go what was read from the controller's registers ([`Readout`]), the fixed area of the SII and those categories
-//! that the scan fetched; out comes a [`SubDeviceInfo`]. Nothing in an SII keeps a SubDevice from being listed: what
-//! can be used is used, and what is odd lands in [`SubDeviceInfo::warnings`], with category and offset. What an SII
-//! leaves unfit for process data is refused by [`crate::plan`].
+//! Input: the controller's registers ([`Readout`]), the fixed area of the SII and the categories that the scan read.
+//! Output: a [`SubDeviceInfo`]. No fault of an SII keeps a SubDevice from being listed: valid parts are used, faults
+//! are listed in [`SubDeviceInfo::warnings`], with category and offset. [`crate::plan`] refuses an SII that is unfit
+//! for process data.
 
 mod collect;
 mod identity_field;
@@ -20,8 +20,8 @@ pub use subdevice::{ControllerInfo, PdoEntryInfo, PdoInfo, Readout, SubDeviceInf
 pub use warning::{InfoWarning, SiiProblem};
 
 impl SubDeviceInfo {
-    /// Puts together what was read. `categories` are those that the scan fetched, in any order; a category that the
-    /// image does not have is not there. Bytes that make no sense become warnings.
+    /// Combines what was read. `categories` are those that the scan read, in any order; a category that the image does
+    /// not have is left out. Invalid bytes become warnings.
     pub fn from_parts<'a>(
         readout: Readout,
         header: &SiiHeader,

@@ -1,27 +1,27 @@
-//! Junction redundancy as the application asks for it (protocol 9.4): the mode, and connections that it declares.
+//! Junction redundancy as the application requests it (protocol 9.4): the mode, and declared connections.
 //!
-//! A local ring leaves a junction through one port and comes back to it through another one. The cable that comes back,
-//! the *closing* cable, is what a connection names: its *head* is the junction, its *tail* the last SubDevice of the
-//! ring. What a connection must look like is checked here; whether it fits the segment, when it is applied.
+//! A local ring leaves a junction through one port and comes back to it through another one. A connection names the
+//! cable that comes back, the *closing* cable: its *head* is the junction, its *tail* the last SubDevice of the ring.
+//! The form of a connection is checked here, its match with the segment when it is applied.
 
 use core::fmt;
 
 /// Port of a junction to which the closing cable of a declared connection leads (JR-06).
 pub const HEAD_PORT: u8 = 1;
-/// Port at which the ring begins then: the one that frames pass before [`HEAD_PORT`] (protocol 9.4).
+/// Port at which the ring then begins: the one that frames pass before [`HEAD_PORT`] (protocol 9.4).
 pub const START_PORT: u8 = 3;
 /// Ports that a SubDevice can have.
 const PORTS: u8 = 4;
 
-/// What becomes of local rings (JR-03).
+/// Handling of local rings (JR-03).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum JunctionMode {
-    /// They are not known: one that breaks reads as a crossed line (JR-04).
+    /// Local rings are unknown: one that breaks is reported as a crossed line (JR-04).
     #[default]
     Disabled,
-    /// Those that are there at the scan are learned, and watched from then on.
+    /// Local rings that exist at the scan are learned, and watched from then on.
     Automatic,
-    /// Those that the application declares are watched, from the start on.
+    /// Local rings that the application declares are watched from the start on.
     Strict,
 }
 
@@ -35,7 +35,8 @@ impl fmt::Display for JunctionMode {
     }
 }
 
-/// The closing cable of a local ring, as the application declares it. SubDevices by their index in the declaration.
+/// The closing cable of a local ring, as the application declares it. SubDevices are named by their index in the
+/// declaration.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct JunctionConnection {
     /// The junction.
@@ -55,11 +56,11 @@ impl fmt::Display for JunctionConnection {
     }
 }
 
-/// Why a connection is refused: the configuration is to blame.
+/// Why a connection is refused: a fault of the configuration.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 #[non_exhaustive]
 pub enum JunctionError {
-    /// Nothing is loaded to which a connection could be added.
+    /// No declaration is loaded to which a connection could be added.
     NotLoaded,
     /// The head is not declared.
     UnknownHead(JunctionConnection),
@@ -69,9 +70,9 @@ pub enum JunctionError {
     HeadPort(JunctionConnection),
     /// The tail's port is 0, or no port.
     TailPort(JunctionConnection),
-    /// Head and tail are one port, or one of them is part of another connection.
+    /// Head and tail are the same port, or one of them is part of another connection.
     Taken(JunctionConnection),
-    /// The tail does not lie behind the head.
+    /// The tail is not behind the head.
     NotBehind(JunctionConnection),
     /// A SubDevice does not have one of the ports; the head needs [`START_PORT`] too.
     NoSuchPort {
@@ -84,27 +85,27 @@ pub enum JunctionError {
     },
     /// The mode is strict and there is no connection.
     NoConnection,
-    /// The closing cable is not there: the segment showed it when both of its ends were closed for a moment.
+    /// The closing cable does not exist: the segment showed it when both of its ends were closed for a moment.
     NotThere {
         /// The connection.
         connection: JunctionConnection,
-        /// What showed it.
+        /// The evidence.
         shown: Shown,
     },
 }
 
-/// What showed that no cable closes a ring where it was declared, when its ends were closed for a moment. Closed like
-/// that, a ring that is whole loses nobody, and one that is broken elsewhere those behind its break.
+/// Evidence that no cable closes a ring where it was declared, from closing both ends for a moment. Then an intact ring
+/// loses no SubDevice, and a ring that is broken elsewhere loses those behind its break.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Shown {
-    /// A SubDevice did not answer that would have.
+    /// A SubDevice did not answer that would have answered with the cable.
     CutOff {
-        /// Its position, the first one of them.
+        /// Position of the first of them.
         position: usize,
     },
     /// A SubDevice behind the break did answer.
     StillThere {
-        /// Its position, the first one of them.
+        /// Position of the first of them.
         position: usize,
     },
     /// No frame came back.
@@ -154,7 +155,7 @@ impl fmt::Display for JunctionError {
 impl core::error::Error for JunctionError {}
 
 impl JunctionConnection {
-    /// Checks a connection against those that were added before and against the number of declared SubDevices (JR-06).
+    /// Checks a connection against earlier ones and against the number of declared SubDevices (JR-06).
     pub fn check(&self, before: &[JunctionConnection], declared: usize) -> Result<(), JunctionError> {
         if self.head >= declared {
             return Err(JunctionError::UnknownHead(*self));

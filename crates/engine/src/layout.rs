@@ -1,13 +1,13 @@
-//! From who exchanges what to logical addresses, images and frames.
+//! Process data areas to logical addresses, images and frames.
 //!
-//! A domain is cut into chunks of whole areas that fit one frame, so that no SyncManager is spread over datagrams
-//! (protocol 3.11: an access must cover start and end). A chunk is one LRW, or an LWR and an LRD, over
-//! `[outputs of the chunk][inputs of the chunk]`; image and logical addresses follow the same order. Areas are aligned
-//! to bytes (protocol 3.10: bitwise FMMUs work in few places).
+//! A domain is cut into chunks of whole areas that fit one frame, so that no SyncManager is split over datagrams
+//! (protocol 3.11: an access must cover start and end). A chunk is one LRW, or an LWR and an LRD, over `[outputs of the
+//! chunk][inputs of the chunk]`; image and logical addresses follow the same order. Areas are aligned to bytes
+//! (protocol 3.10: few controllers support bitwise FMMUs).
 //!
-//! A working counter is a sum: where several SubDevices add to one, it does not say which of them did. So each of them
-//! shows its AL status in a presence datagram of the same frame, through an FMMU that it has to spare; one without has
-//! its inputs in a datagram of its own ([`Witness`]).
+//! A working counter is a sum: where several SubDevices add to it, it does not show which of them did. So each of them
+//! shows its AL status in a presence datagram of the same frame, through a spare FMMU; a SubDevice without a spare FMMU
+//! has its inputs in a datagram of its own ([`Witness`]).
 
 mod chunk;
 mod error;
@@ -29,12 +29,12 @@ pub use error::LayoutError;
 pub use plan::{PlacedArea, PlannedDatagram, PlannedDomain, PlannedFrame, PlannedPresence};
 pub use spec::{AreaSpec, Delivers, DomainSpec, LrwPolicy, Rules, Witness};
 
-/// Everything the exchange sends.
+/// All that the exchange sends.
 #[derive(Clone, Debug, Default)]
 pub struct Layout {
     /// By [`DomainId`].
     pub domains: Vec<PlannedDomain>,
-    /// Datagrams that a frame may hold.
+    /// Largest number of datagrams in a frame.
     most: Option<usize>,
 }
 
@@ -44,16 +44,17 @@ pub(crate) const SUPERVISION_LEN: usize = 2;
 const CLOCKS_LEN: usize = CLOCKS * (OVERHEAD + 4);
 const CLOCKS: usize = 3;
 const _: () = assert!(CLOCKS <= MIN_DATAGRAMS_PER_FRAME as usize);
-/// Where presence bytes lie: beyond all process data, which ends at 2 GiB, and below the mail bits.
+/// Logical address of presence bytes: beyond all process data, which ends at 2 GiB, and below the mail bits.
 const PRESENCE_AT: LogicalAddress = LogicalAddress(0xE000_0000);
-/// Sessions with logical addresses of their own: process data of the last one begins below 1 GiB.
+/// Number of sessions with logical addresses of their own: process data of the last one begins below 1 GiB.
 pub const SESSIONS: u32 = 1024;
-/// Process data of sessions is 1 MiB apart, their presence bytes 64 KiB: as many as SubDevices can be.
+/// Distance of the process data of two sessions: 1 MiB; of their presence bytes: 64 KiB, the largest number of
+/// SubDevices.
 const DATA_BITS: u32 = 20;
 const PRESENCE_BITS: u32 = 16;
 
 impl Layout {
-    /// As [`Layout::with`], with LRW where it is of use, and every SubDevice with an FMMU to spare.
+    /// As [`Layout::with`], with LRW where it helps, and a spare FMMU in every SubDevice.
     pub fn new(specs: &[DomainSpec], links: LinkSet, supervision: bool) -> Result<Layout, LayoutError> {
         let lrw = LrwPolicy::Automatic;
         Layout::with(specs, Rules { links, supervision, lrw, witnesses: &[], session: 0, max_datagrams: None })
@@ -72,7 +73,7 @@ impl Layout {
             let lrw = spec.lrw && (rules.links == LinkSet::Single || each);
             let cut = Cut { lrw, each, most };
             let domain = lay_out(spec, cut, LogicalAddress(logical), &mut witnesses)?;
-            // Domains start at multiples of four bytes: easier to read in a capture.
+            // Domains start at multiples of four bytes, which makes captures easier to read.
             let end = logical.checked_add(domain.image_len).filter(|end| *end < 1 << 31);
             logical = end.ok_or(LayoutError::TooLarge)?.next_multiple_of(4);
             layout.domains.push(domain);
@@ -84,7 +85,7 @@ impl Layout {
         Ok(layout)
     }
 
-    /// Logical address of the byte in which a SubDevice shows its AL status; `None` where it shows it nowhere.
+    /// Logical address of the byte in which a SubDevice shows its AL status; `None` where it has none.
     pub fn presence(&self, subdevice: usize) -> Option<LogicalAddress> {
         let presences =
             self.domains.iter().flat_map(|domain| &domain.frames).filter_map(|frame| frame.presence.as_ref());
@@ -125,7 +126,7 @@ impl Layout {
         self.check_in_flight()
     }
 
-    /// Where an area of a SubDevice lies, with its domain.
+    /// The place of a SubDevice's area, with its domain.
     pub fn area(&self, subdevice: usize, sync_manager: u8) -> Option<(DomainId, PlacedArea)> {
         self.domains.iter().enumerate().find_map(|(id, domain)| {
             let found =
@@ -136,27 +137,27 @@ impl Layout {
 }
 
 impl PlannedPresence {
-    /// Bytes of the datagram with its overhead.
+    /// Bytes of the datagram including overhead.
     pub fn bytes(&self) -> usize {
         OVERHEAD + self.members.len()
     }
 }
 
 impl PlannedFrame {
-    /// Bytes of all datagrams with their overhead.
+    /// Bytes of all datagrams including overhead.
     pub fn bytes(&self) -> usize {
         let supervision = if self.supervision { OVERHEAD + SUPERVISION_LEN } else { 0 };
         self.used() + supervision + if self.clocks { CLOCKS_LEN } else { 0 }
     }
 
-    /// Bytes of all datagrams of process data and presence with their overhead.
+    /// Bytes of all datagrams of process data and presence including overhead.
     fn used(&self) -> usize {
         let data = |d: &PlannedDatagram| OVERHEAD + usize::from(d.outputs) + usize::from(d.inputs);
         let presence = self.presence.as_ref().map_or(0, PlannedPresence::bytes);
         self.datagrams.iter().map(data).sum::<usize>() + presence
     }
 
-    /// Whether it may hold so many datagrams more.
+    /// Whether this number of further datagrams is allowed.
     fn takes(&self, more: usize, most: Option<usize>) -> bool {
         let clocks = if self.clocks { CLOCKS } else { 0 };
         let others = usize::from(self.presence.is_some()) + usize::from(self.supervision) + clocks;
@@ -210,7 +211,7 @@ impl PlannedDomain {
         Ok(frame)
     }
 
-    /// Gives areas that share their datagrams their place.
+    /// Gives areas with common datagrams their place.
     fn place_group(
         &mut self,
         frame: &mut PlannedFrame,
@@ -253,7 +254,7 @@ impl PlannedDomain {
     }
 }
 
-/// What each SubDevice adds to the working counter (protocol 1.4): once per datagram and direction.
+/// Increment of the working counter by each SubDevice (protocol 1.4): once per datagram and direction.
 fn contributions(command: Command, reads: &[PlacedArea], writes: &[PlacedArea]) -> Vec<(usize, Wkc)> {
     let write = if command == Command::Lrw { 2 } else { 1 };
     let mut contributions: Vec<(usize, Wkc)> = Vec::new();

@@ -3,7 +3,7 @@
 /// One of the two interfaces of a MainDevice.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum Link {
-    /// The first interface, MAIN in docs/protocol: frames sent here meet the SubDevices in order.
+    /// The first interface, MAIN in docs/protocol: frames sent here reach the SubDevices in order.
     Main,
     /// The second interface, RED: closes the ring.
     Redundant,
@@ -27,7 +27,7 @@ impl Link {
     }
 }
 
-/// Which interfaces a MainDevice has. One link is a ring of one: the same code runs on both sets.
+/// The interfaces of a MainDevice. One link is a ring of one: the same code runs on both sets.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum LinkSet {
     /// The main link alone.

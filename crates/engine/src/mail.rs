@@ -1,14 +1,15 @@
 //! Mailboxes: one router per SubDevice, and the protocols that share it (protocol 6, decision 0007).
 //!
-//! A [`Mailbox`] is the handle to a SubDevice's router. Procedures take a [`Lane`] of it, one per protocol, and talk: a
-//! request goes out with the next counter, what comes back goes to the lane to which it belongs. All lanes run side by
-//! side. What nobody asked for (emergencies, Ethernet frames, notifications) is kept in bounded rings. The parts:
+//! A [`Mailbox`] is the handle to a SubDevice's router. Procedures hold a [`Lane`] of it, one per protocol, and
+//! exchange messages: a request is written with the next counter, and a received mail is delivered to its lane. All
+//! lanes work in parallel. Unsolicited mail (emergencies, Ethernet frames, notifications) is kept in bounded rings. The
+//! parts:
 //!
-//! * `writer`, `reader`: the two directions, each a task that lives as long as it has something to do;
-//! * `delivery`: whose a mail is; `recent`: mail that came twice;
-//! * `talk`: a lane while somebody has it; `answer_time`: when to look for an answer;
-//! * [`coe`], [`eoe`], [`foe`], [`soe`], [`aoe`], [`voe`]: the protocols; [`relay`]: messages of others; [`raw`]: those
-//!   of the application's own making.
+//! * `writer`, `reader`: the two directions, each a task that lives as long as it has work;
+//! * `delivery`: the lane of a mail; `recent`: duplicate mail;
+//! * `talk`: a conversation that holds a lane; `answer_time`: when to poll for an answer;
+//! * [`coe`], [`eoe`], [`foe`], [`soe`], [`aoe`], [`voe`]: the protocols; [`relay`]: messages of gateway clients;
+//!   [`raw`]: messages that the application composes.
 
 mod answer_time;
 pub mod aoe;

@@ -1,11 +1,10 @@
 //! Declaration and scan result to register values: what has to be written to a SubDevice on its way to OP
 //! (protocol 3.10, 3.11, 5.2).
 //!
-//! In go a [`SubDeviceConfig`] and the [`SubDeviceInfo`] to which it belongs; out comes a [`SubDevicePlan`]: mailbox
-//! and process data SyncManagers, the layout of each process data area, watchdog registers, SDO downloads for PDO
-//! assignment and mapping. Where a configuration file declares the SyncManagers, it counts before the SII. Logical
-//! addresses are given later, when domains are laid out: [`fmmu`]. Writing all this, in which order and in which state,
-//! is the matter of the procedures.
+//! Input: a [`SubDeviceConfig`] and its [`SubDeviceInfo`]. Output: a [`SubDevicePlan`]: mailbox and process data
+//! SyncManagers, the layout of each process data area, watchdog registers, SDO downloads for PDO assignment and
+//! mapping. SyncManagers that a configuration file declares override the SII. Logical addresses are assigned later,
+//! when domains are laid out: [`fmmu`]. The procedures write all this, in the required order and states.
 
 mod areas;
 mod check;
@@ -33,8 +32,8 @@ const MAILBOX_OUT_CONTROL: u8 = 0x26;
 /// Control byte of the mailbox that the MainDevice reads, where the SII gives none (protocol 3.11).
 const MAILBOX_IN_CONTROL: u8 = 0x22;
 
-/// Plans one SubDevice. The error names SubDevice, SyncManager, PDO or object, what was expected and what came, and
-/// whether declaration or SII have to be mended.
+/// Plans one SubDevice. The error names SubDevice, SyncManager, PDO or object, the expected and the found value, and
+/// whether declaration or SII must be corrected.
 pub fn plan(config: &SubDeviceConfig, info: &SubDeviceInfo) -> Result<SubDevicePlan, PlanError> {
     plan_inner(config, info).map_err(|problem| {
         let fault = fault(config, info);
@@ -42,8 +41,8 @@ pub fn plan(config: &SubDeviceConfig, info: &SubDeviceInfo) -> Result<SubDeviceP
     })
 }
 
-/// Where a file declares the SyncManagers the SII has no part in it. Otherwise it is the SII where that alone does not
-/// do either, or is not what its maker wrote.
+/// Where a file declares the SyncManagers, the SII is not at fault. Otherwise it is, where it cannot be planned without
+/// a declaration either, or is damaged.
 fn fault(config: &SubDeviceConfig, info: &SubDeviceInfo) -> PlanFault {
     let is_unfit = || plan_inner(&SubDeviceConfig::from_info(info), info).is_err();
     if config.declared.is_none() && (info.is_doubtful() || is_unfit()) {
@@ -108,8 +107,7 @@ pub fn fmmu(area: &AreaPlan, logical: LogicalAddress) -> Fmmu {
     }
 }
 
-/// Without others that the SII names, SM 0 and 1 belong to the mailbox unless the SII gives one of them to process
-/// data.
+/// Unless the SII names others, SM 0 and 1 belong to the mailbox, except one that the SII uses for process data.
 fn mailbox_wanted(info: &SubDeviceInfo) -> bool {
     let (out, inward) = info.mailbox_sync_managers();
     let managers = [out, inward].into_iter().filter_map(|index| info.sync_managers.get(usize::from(index)));

@@ -1,9 +1,9 @@
-//! Requests that a cyclic thread makes and re-uses (Master Redundancy 5.8, IgH manual): no allocation, no lock, no
+//! Requests that a cyclic thread makes and reuses (Master Redundancy 5.8, IgH manual): no allocation, no lock, no
 //! waiting.
 //!
-//! A request has its own memory of a size given at its creation. The cyclic side owns it while it is not busy: it may
-//! change what it is about and its timeout, put in data, start it. The acyclic half takes it up, and gives it back with
-//! a result. One file per kind; what they have in common is in `slot`.
+//! A request has memory of its own, with a size given at its creation. The cyclic side owns it while it is not busy: it
+//! may change target and timeout, put in data, and start it. The acyclic half takes it up, and returns it with a
+//! result. One file per kind; the common part is in `slot`.
 
 mod register;
 mod sdo;
@@ -19,7 +19,7 @@ pub use voe::VoeHandler;
 
 pub(crate) use slot::{Access, Order, Served, Subject};
 
-/// Gives a kind of request what all have in common.
+/// Adds the common methods to a kind of request.
 macro_rules! requests {
     ($($kind:ty),*) => {$(
         impl core::ops::Deref for $kind {

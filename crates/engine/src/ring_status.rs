@@ -1,7 +1,8 @@
-//! What can be asked about the ring at any time: both links, who answers on each, where it is broken, since when.
+//! Status of the ring for queries at any time: both links, the SubDevices that answer on each, place and time of a
+//! break.
 //!
-//! Redundancy is a state of its own, apart from faults of the bus: a ring that is open exchanges everything and stands
-//! no further break. What SubDevices and domains say (lost, incomplete) is told elsewhere.
+//! Redundancy is a state of its own, apart from faults of the bus: an open ring exchanges all process data and
+//! tolerates no further break. The states of SubDevices and domains (lost, incomplete) are reported elsewhere.
 
 mod cables;
 
@@ -17,8 +18,8 @@ use crate::ring::RingState;
 use crate::time::Instant;
 use crate::topology::PortOf;
 
-/// A cable in the order of the ring. `None` is the interface of the host: MAIN at the near end, REDUNDANT at the far
-/// one.
+/// A cable in the order of the ring. `None` is an interface of the host: MAIN at the near end, REDUNDANT at the far
+/// end.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct Cable {
     /// The end that is nearer to MAIN.
@@ -42,19 +43,19 @@ impl fmt::Display for Cable {
     }
 }
 
-/// Who is at a position of the cabling.
+/// The SubDevice at a cabling position.
 ///
-/// Positions are not indices of the declaration: declared SubDevices may be missing, in another order, or behind a hot
-/// connect group, and others may be between them.
+/// Positions are not indices of the declaration: declared SubDevices may be missing, in another order, or in a hot
+/// connect group, and undeclared ones may be between them.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Occupant {
     /// Station address.
     pub station: StationAddress,
-    /// Index in the declaration; `None` where nobody declared it.
+    /// Index in the declaration; `None` for an undeclared SubDevice.
     pub declared: Option<usize>,
 }
 
-/// Whether another break would be survived.
+/// Whether the ring tolerates a further break.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Redundancy {
     /// There is one link.
@@ -62,13 +63,13 @@ pub enum Redundancy {
     None,
     /// No frame has shown it yet.
     Unknown,
-    /// The ring is closed, frames pass it both ways.
+    /// The ring is closed and passes frames both ways.
     Ready,
-    /// The next break isolates somebody.
+    /// The next break isolates SubDevices.
     Lost {
-        /// Why.
+        /// Reason.
         cause: RedundancyLoss,
-        /// When that was seen.
+        /// Time of detection.
         since: Instant,
     },
 }
@@ -78,7 +79,7 @@ pub enum Redundancy {
 pub enum RedundancyLoss {
     /// The ring is open.
     Open,
-    /// The ring passes frames one way only: the copies that are sent on this link do not come back.
+    /// The ring passes frames one way only: the copies sent on this link do not come back.
     OneWay(Link),
 }
 
@@ -94,9 +95,9 @@ impl fmt::Display for RedundancyLoss {
 /// One link (`ecrt_master_link_state` of the IgH manual).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct LinkStatus {
-    /// Whether the interface has a carrier; `None` where the links do not tell.
+    /// Whether the interface has a carrier; `None` where the link layer does not report it.
     pub carrier: Option<bool>,
-    /// SubDevices that the frames sent on this link met last. In a closed straight ring all are met by those of MAIN.
+    /// SubDevices that processed the last frames sent on this link. In a closed straight ring MAIN reaches all of them.
     pub answering: u16,
     /// AL states of these, ORed: bits 0 to 3 as in register AL_STATUS.
     pub al_states: u8,
@@ -108,9 +109,9 @@ impl LinkStatus {
         self.carrier.unwrap_or(self.answering > 0)
     }
 
-    /// Whether somebody who answers on this link is in a state.
+    /// Whether any SubDevice on this link is in a state.
     pub fn has(&self, state: AlState) -> bool {
-        // BOOT is a number of its own among the bits (protocol 5.1).
+        // BOOT is a separate number among the bits (protocol 5.1).
         self.al_states & state.code() == state.code()
     }
 }
@@ -127,17 +128,17 @@ impl Cable {
 pub struct RingStatus {
     /// Closed or open, as the frames show it.
     pub state: RingState,
-    /// Whether another break would be survived.
+    /// Whether the ring tolerates a further break.
     pub redundancy: Redundancy,
     /// By [`Link::index`].
     pub links: [LinkStatus; 2],
-    /// Where the ring is broken, once that is known.
+    /// Place of the break, once known.
     pub place: Option<Cable>,
-    /// Who is at the near and at the far end of that cable.
+    /// The SubDevices at the near and at the far end of that cable.
     pub place_ends: [Option<Occupant>; 2],
-    /// How often the ring opened and closed since activation, also where that was too often to be told each time.
+    /// Number of changes since activation, including those too frequent for an event each.
     pub changes: u32,
-    /// It changes too often to be told each time.
+    /// It changes too often for an event per change.
     pub unsteady: bool,
 }
 

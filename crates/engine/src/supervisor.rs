@@ -1,8 +1,8 @@
-//! The acyclic half: an executor for [`crate::procedures`], and frames for what they ask of the bus.
+//! The acyclic half: an executor for [`crate::procedures`], and the frames with their datagrams.
 //!
-//! [`Supervisor::receive`] takes in frames, [`Supervisor::poll`] lets procedures go on, [`Supervisor::transmit`] sends
-//! what they asked for within a byte budget, [`Supervisor::next_deadline`] says when it wants to be polled at the
-//! latest. Procedures see time only through the `now` of these calls.
+//! [`Supervisor::receive`] takes received frames, [`Supervisor::poll`] runs procedures, [`Supervisor::transmit`] sends
+//! their datagrams within a byte budget, [`Supervisor::next_deadline`] gives the latest time of the next poll.
+//! Procedures see time only through the `now` of these calls.
 
 mod alone;
 pub mod bus;
@@ -64,7 +64,7 @@ impl Supervisor {
         Supervisor { executor: executor::Executor::new(shared.clone()), shared }
     }
 
-    /// The handle that procedures work with.
+    /// The handle with which procedures use the bus.
     pub fn bus(&self) -> Bus {
         Bus::new(self.shared.clone())
     }
@@ -74,27 +74,27 @@ impl Supervisor {
         self.shared.borrow_mut().spawn(alloc::boxed::Box::pin(procedure));
     }
 
-    /// Hands over what the exchange posts; from now on its view of the ring counts.
+    /// Connects the board of the exchange, whose view of the ring counts from now on.
     pub fn attach(&mut self, board: Arc<Board>) {
         self.shared.borrow_mut().board = Some(board);
     }
 
-    /// Has procedures hear a bell.
+    /// Wakes procedures when a bell rings.
     pub(crate) fn hear(&mut self, bell: Bell) {
         self.shared.borrow_mut().bell = bell;
     }
 
-    /// How many datagrams a frame may hold.
+    /// Sets the largest number of datagrams in a frame.
     pub fn set_max_datagrams(&mut self, most: usize) {
         self.shared.borrow_mut().max_datagrams = most;
     }
 
-    /// What the links tell of their carriers.
+    /// Sets the carrier states that the links report.
     pub fn set_carriers(&mut self, carriers: [Option<bool>; 2]) {
         self.shared.borrow_mut().carriers = carriers;
     }
 
-    /// Takes in a frame that arrived on a link. Any bytes are allowed.
+    /// Takes a frame received on a link. Any bytes are allowed.
     pub fn receive(&mut self, arrived_on: Link, bytes: &[u8], now: Instant) -> Received {
         let shared = &mut *self.shared.borrow_mut();
         shared.now = now;
@@ -110,7 +110,7 @@ impl Supervisor {
         }
     }
 
-    /// Gives up overdue frames, fires timers, and lets procedures go on until all of them wait.
+    /// Gives up overdue frames, fires timers, and runs procedures until all of them wait.
     pub fn poll(&mut self, now: Instant) {
         {
             let shared = &mut *self.shared.borrow_mut();
@@ -123,20 +123,20 @@ impl Supervisor {
         self.executor.run();
     }
 
-    /// Sends what procedures asked for, at most about `budget` bytes (without overhead on the wire), every frame on all
-    /// links. Returns the bytes sent per link.
+    /// Sends the datagrams of procedures, about `budget` bytes at most (without overhead on the wire), every frame on
+    /// all links. Returns the bytes sent per link.
     pub fn transmit(&mut self, now: Instant, budget: usize, transmit: &mut impl FnMut(Link, &[u8])) -> usize {
         let shared = &mut *self.shared.borrow_mut();
         shared.now = now;
         shared.transmit(budget, transmit)
     }
 
-    /// When [`Supervisor::poll`] has something to do at the latest, frames received meanwhile aside.
+    /// Latest time at which [`Supervisor::poll`] has work to do, received frames aside.
     pub fn next_deadline(&self) -> Option<Instant> {
         self.shared.borrow().next_deadline()
     }
 
-    /// What a procedure asks of the link layer: a link, and whether it is to be disconnected. To be answered with
+    /// Request of a procedure to the link layer: a link, and whether to disconnect it. Answer it with
     /// [`Supervisor::answer_link_order`].
     pub fn take_link_order(&mut self) -> Option<(Link, bool)> {
         let shared = &mut *self.shared.borrow_mut();
@@ -145,14 +145,14 @@ impl Supervisor {
         Some((link, disconnect))
     }
 
-    /// Has a link brought back that was taken down for a procedure of another supervisor.
+    /// Requests the reconnection of a link that was taken down for a procedure of another supervisor.
     pub(crate) fn order_link(&mut self, disconnected: Option<Link>) {
         if let Some(link) = disconnected {
             self.shared.borrow_mut().link_order = LinkOrder::Given { link, disconnect: false };
         }
     }
 
-    /// Whether an order was carried out.
+    /// Reports whether an order was carried out.
     pub fn answer_link_order(&mut self, done: bool) {
         let order = &mut self.shared.borrow_mut().link_order;
         if *order == LinkOrder::Fetched {
@@ -160,7 +160,7 @@ impl Supervisor {
         }
     }
 
-    /// Whether procedures have asked for datagrams that were not sent yet.
+    /// Whether datagrams of procedures wait to be sent.
     pub fn wants_to_send(&self) -> bool {
         self.shared.borrow().wants_to_send()
     }
@@ -170,7 +170,7 @@ impl Supervisor {
         self.shared.borrow_mut().events.pop()
     }
 
-    /// Events that were dropped because nobody fetched them.
+    /// Number of events that were dropped because the application did not fetch them.
     pub fn events_dropped(&self) -> u64 {
         self.shared.borrow().events.dropped()
     }
@@ -180,7 +180,7 @@ impl Supervisor {
         self.shared.borrow().monitor.state()
     }
 
-    /// What is under way.
+    /// Work in progress.
     pub fn under_way(&self) -> UnderWay {
         UnderWay { procedures: self.executor.count(), datagrams: self.shared.borrow().transfers.count() }
     }
@@ -191,12 +191,12 @@ impl Supervisor {
     }
 }
 
-/// What is under way in the acyclic half. All of it ends: what grows from one quiet moment to another was forgotten.
+/// Work in progress in the acyclic half. All of it ends: numbers that grow between idle moments show a leak.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct UnderWay {
-    /// Procedures, those that run for ever among them.
+    /// Procedures, including those that never end.
     pub procedures: usize,
-    /// Datagrams that somebody waits for, or that were given up while they are in a frame.
+    /// Datagrams that a procedure waits for, or that were given up while they are in a frame.
     pub datagrams: usize,
 }
 

@@ -1,13 +1,13 @@
-//! Who hangs on which port of whom, from DL status and receive times (protocol 2.1 to 2.4, 2.9, 9.5).
+//! The connections between ports of SubDevices, from DL status and receive times (protocol 2.1 to 2.4, 2.9, 9.5).
 //!
-//! In goes what each SubDevice reported, in the order in which frames meet the processing units: first those that the
-//! frames of the main link met, then those of the redundant link. Out comes a tree and what is odd about the
-//! cabling. Status words are taken as they come: none makes this panic, what does not fit becomes a finding.
+//! Input: the registers of each SubDevice, in the order in which frames pass the processing units: first the SubDevices
+//! on the main link, then those on the redundant link. Output: a tree, and findings about the cabling. Any status word
+//! is allowed: none causes a panic, an inconsistent one becomes a finding.
 //!
-//! In a broken ring the SubDevices of the redundant link form a tree of their own. It is oriented like the intact
-//! ring, with the SubDevice next to the break as its head: that its port 0 is unconnected is the break, no finding.
+//! In a broken ring the SubDevices of the redundant link form a tree of their own, oriented like the intact ring, with
+//! the SubDevice next to the break as its head: its unconnected port 0 is the break, not a finding.
 //!
-//! Rings behind junctions ([`LocalRing`]) have to be known: open ports do not tell them from a tree.
+//! Rings behind junctions ([`LocalRing`]) must be known: open ports do not distinguish them from a tree.
 
 mod candidates;
 mod ends;
@@ -30,13 +30,13 @@ pub use tree::{Node, NodeStatus, Topology};
 use rings::Rings;
 
 impl Topology {
-    /// Builds the tree. The first `main_count` SubDevices are those that the frames of the main link met.
+    /// Builds the tree. The first `main_count` SubDevices are those on the main link.
     pub fn build(nodes: &[NodeStatus], main_count: usize) -> Topology {
         Topology::with_local_rings(nodes, main_count, &[])
     }
 
-    /// As [`Topology::build`], with rings behind junctions. Each of them is a branch on the port where it begins, whole
-    /// or broken; a connection that does not fit is left out.
+    /// As [`Topology::build`], with rings behind junctions. Each of them is a branch on the port where it begins,
+    /// closed or broken; a connection that does not fit is left out.
     pub fn with_local_rings(nodes: &[NodeStatus], main_count: usize, closings: &[Closing]) -> Topology {
         place::build(nodes, main_count.min(nodes.len()), &Rings::new(nodes, closings))
     }

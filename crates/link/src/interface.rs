@@ -1,4 +1,4 @@
-//! What network interfaces there are, whether a cable is plugged in, and who else uses one.
+//! The network interfaces of the host, whether a cable is plugged in, and which other programs use one.
 //!
 //! In go names, out come snapshots; nothing here is for the cyclic thread, some of it waits for locks of the kernel.
 //! All answers are about the network namespace of the calling thread.

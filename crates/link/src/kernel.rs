@@ -81,7 +81,7 @@ pub fn socket(domain: libc::c_int, kind: libc::c_int, protocol: libc::c_int) -> 
     if fd < 0 {
         return Err(errno());
     }
-    // SAFETY: the descriptor was just made and nobody else owns it.
+    // SAFETY: the descriptor was just made and has no other owner.
     Ok(unsafe { OwnedFd::from_raw_fd(fd) })
 }
 
@@ -166,7 +166,7 @@ pub fn index_of(name: &str) -> Option<u32> {
     (index != 0).then_some(index)
 }
 
-/// A socket to ask the kernel about interfaces with; anybody may open it.
+/// A socket to ask the kernel about interfaces with; it needs no privileges.
 pub fn question_socket() -> Result<OwnedFd, i32> {
     socket(libc::AF_INET, libc::SOCK_DGRAM, 0)
 }

@@ -4,7 +4,7 @@
 //! * [`filter`]: which frames the kernel puts into that ring;
 //! * [`listener`]: frames of one sender on all interfaces where they are not expected;
 //! * [`waiting`]: sleeping or spinning until a frame or a moment comes;
-//! * [`interface`], [`carrier`]: what interfaces there are, who else uses them, whether a cable is plugged in;
+//! * [`interface`], [`carrier`]: the interfaces of the host, their other users, whether a cable is plugged in;
 //! * [`tap`]: network interfaces of the host whose other end is this process;
 //! * [`monotonic`], [`realtime`]: the host's clock, scheduling, memory locking, processor latency;
 //! * [`signals`]: those that ask a program to end;

@@ -18,7 +18,7 @@ use crate::packet_socket;
 
 /// Bytes of a frame that are kept: the headers and the first datagrams.
 pub const KEPT: usize = 64;
-/// At most so many interfaces are left out; a filter has to stay small.
+/// Largest number of interfaces to exclude; a filter has to stay small.
 const MAX_LEFT_OUT: usize = 64;
 /// Where a packet socket is bound that is not bound to one interface.
 const ALL_INTERFACES: libc::c_int = 0;

@@ -7,7 +7,7 @@ pub fn now_ns() -> u64 {
     read(libc::CLOCK_MONOTONIC)
 }
 
-/// When it was this Unix time, as far as that is past and nobody has set that clock since.
+/// Time on the monotonic clock at this Unix time, provided it is past and the Unix clock was not set since.
 pub fn of_unix_ns(unix_ns: u64) -> u64 {
     let age = read(libc::CLOCK_REALTIME).saturating_sub(unix_ns);
     now_ns().saturating_sub(age)

@@ -49,7 +49,7 @@ impl Direction {
 pub struct Statistics {
     /// Frames seen, whether in the capture or not (`isb_ifrecv`).
     pub seen: u64,
-    /// Frames that whoever captured had no room for (`isb_ifdrop`).
+    /// Frames that the capturing program had no room for (`isb_ifdrop`).
     pub dropped: u64,
     /// Frames that the kernel had no room for (`isb_osdrop`).
     pub dropped_by_kernel: u64,

@@ -74,7 +74,7 @@ struct Shared {
     interfaces: usize,
     /// Queues of taps that the writing thread has not seen yet.
     new: Mutex<Vec<Consumer>>,
-    /// Unix time minus that of the frames; zero where nobody has set a clock.
+    /// Unix time minus that of the frames; zero where the clock was never set.
     clock: OnceLock<u64>,
     lost_by_kernel: Vec<AtomicU64>,
     end: AtomicBool,
@@ -163,7 +163,7 @@ impl Recorder {
 
 impl Drop for Recorder {
     fn drop(&mut self) {
-        // Whoever wants to know how it went calls `finish`.
+        // `finish` returns the result.
         let _ = self.end();
     }
 }
@@ -197,7 +197,7 @@ impl Tap {
 }
 
 fn unix_now_ns() -> u64 {
-    // A clock before 1970 is one that nobody has set.
+    // A clock before 1970 was never set.
     SystemTime::now().duration_since(UNIX_EPOCH).map_or(0, |time| time.as_nanos() as u64)
 }
 

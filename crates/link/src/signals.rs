@@ -69,7 +69,7 @@ impl HeldSignals {
         }
     }
 
-    /// Waits for one of them, at most so long.
+    /// Waits for one of them, up to a time limit.
     pub fn wait(&self, limit: Duration) -> Option<Signal> {
         let limit = timespec(u64::try_from(limit.as_nanos()).unwrap_or(u64::MAX));
         // SAFETY: the pointers are to a live set and a live time; what else the kernel knows of the signal is not asked

@@ -39,7 +39,7 @@ pub enum TapError {
         /// The kernel's answer.
         errno: i32,
     },
-    /// There is an interface of this name, or somebody else has it.
+    /// There is an interface of this name, or another program has it open.
     Taken {
         /// The name.
         name: String,
@@ -114,7 +114,7 @@ impl TapInterface {
                 errno => TapError::NoDevice { errno },
             });
         }
-        // SAFETY: the descriptor was just made and nobody else owns it.
+        // SAFETY: the descriptor was just made and has no other owner.
         let fd = unsafe { OwnedFd::from_raw_fd(fd) };
         let failed = |what, errno| TapError::from_errno(name, what, errno);
         let mut request = kernel::named(name).map_err(|errno| failed("its name", errno))?;
@@ -138,7 +138,7 @@ impl TapInterface {
         ioctl(&self.fd, TUNSETCARRIER, &mut value).is_ok()
     }
 
-    /// Whether it is still there: somebody else may have removed it (`ip link del`).
+    /// Whether it still exists: another program may have removed it (`ip link del`).
     pub fn exists(&self) -> bool {
         kernel::named(&self.name).is_ok_and(|mut request| ioctl(&self.fd, TUNGETIFF, &mut request).is_ok())
     }

@@ -1,7 +1,8 @@
-//! Prints how long the simulator takes for a hop of a frame over a device of a long line, and for a frame of process
-//! data through 50 terminals in OP. The best of several blocks counts, for neighbours on the machine only add to it.
+//! Measures the simulator's time for one hop of a frame over a device of a long line, and for a frame of process data
+//! through 50 terminals in OP. The best of several blocks counts, since other load of the machine only adds time.
 //!
-//! `cargo run --release -p ringcat-sim --example hops [devices] [frames] [--general]`; the last without flights.
+//! `cargo run --release -p ringcat-sim --example hops [devices] [frames] [--general]`; `--general` without precomputed
+//! flights.
 
 use std::time::{Duration, Instant};
 
@@ -16,7 +17,7 @@ use ringcat_wire::datagram::Target;
 use ringcat_wire::frame::{FrameBuilder, MAX_FRAME, MacAddress};
 use ringcat_wire::register::map;
 
-/// Frames that are sent before the line is let run.
+/// Frames sent before the measurement, for warm-up.
 const BURST: usize = 8;
 
 /// A frame of one datagram.
@@ -48,7 +49,7 @@ fn filled(command: Command, target: Target, data: &[u8]) -> Vec<u8> {
     bytes
 }
 
-/// Sends a frame and takes the answer.
+/// Sends a frame and takes the response.
 fn exchange(network: &mut Network, bytes: &[u8]) {
     network.send(HostLink::Main, bytes);
     network.advance_until_quiet(network.now() + Duration::from_millis(10));
@@ -83,7 +84,7 @@ fn operational(compiled: bool) -> Network {
     network
 }
 
-/// Outputs and inputs in one datagram, and the state of all.
+/// Outputs and inputs in one datagram, and the state of all SubDevices.
 fn process_data(outputs: u8) -> Vec<u8> {
     let mut buffer = vec![0; MAX_FRAME];
     let mut builder =
@@ -96,7 +97,7 @@ fn process_data(outputs: u8) -> Vec<u8> {
     buffer
 }
 
-/// The way there and back, and what the devices do afterwards.
+/// Measures the round trip, and the work of the devices afterwards.
 fn measure_process_data(compiled: bool) {
     let mut network = operational(compiled);
     let (mut way, mut reaction) = (f64::INFINITY, f64::INFINITY);

@@ -1,10 +1,10 @@
 //! The application behind a SubDevice controller: everything that the PDI side does (protocol 3.4, 5, 6).
 //!
-//! In: AL events and virtual time, through [`Application::run`], and faults. Out: AL status, answers in the mailbox,
-//! inputs and latched outputs. The parts: [`state_machine`] says what a request means, [`settings`] whether the
-//! configuration suits, [`process_data`] moves data, [`mailbox`] carries messages to the [`servers`], of which there is
-//! one per protocol: [`coe`] with its [`dictionary`], [`foe`], [`eoe`], [`soe`], [`aoe`], [`voe`]. [`behaviours`] and
-//! [`servo`] make inputs, `transitions` leads from state to state. Here they are put together.
+//! Input: AL events and virtual time, through [`Application::run`], and faults. Output: AL status, answers in the
+//! mailbox, inputs and latched outputs. The parts: [`state_machine`] evaluates state requests, [`settings`] checks the
+//! configuration, [`process_data`] moves data, [`mailbox`] passes messages to the [`servers`], one per protocol:
+//! [`coe`] with its [`dictionary`], [`foe`], [`eoe`], [`soe`], [`aoe`], [`voe`]. [`behaviours`] and [`servo`] make
+//! inputs, `transitions` leads from state to state. This module combines them.
 
 pub mod answer;
 pub mod aoe;
@@ -48,7 +48,7 @@ const EVENT_AL_CONTROL: u32 = 1 << 0;
 const EVENT_SYNC_MANAGER: u32 = 1 << 4;
 const EVENT_WATCHDOG: u32 = 1 << 6;
 
-/// A transition that is refused on purpose.
+/// A transition that is refused for a test.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 struct Refusal {
     to: AlState,
@@ -64,13 +64,13 @@ pub struct Application {
     process_data: ProcessData,
     mailbox: Option<Mailbox>,
     servers: Servers,
-    /// When the servers have something to do of themselves.
+    /// Next time at which the servers have work without a request.
     servers_due: Option<SimTime>,
-    /// What is kept without power.
+    /// Non-volatile data.
     files: FileStore,
     faults: MailFaults,
     layout: Layout,
-    /// Requests that were served, where they are recorded.
+    /// Served requests, where they are recorded.
     record: Option<Vec<ServedMail>>,
     /// Since when it is in PREOP.
     preop_since: SimTime,
@@ -78,13 +78,13 @@ pub struct Application {
     hanging: bool,
     interest: u32,
     polled: bool,
-    /// AL state that was seen last on a device whose controller runs the state machine alone.
+    /// Last AL state seen on a device whose controller emulates the state machine.
     emulated_state: AlState,
     last_run: SimTime,
 }
 
 impl Application {
-    /// The application of a device before power comes.
+    /// The application of a device before power-on.
     pub fn new(description: &DeviceDescription) -> Application {
         let mut application = Application {
             machine: StateMachine::default(),
@@ -109,7 +109,7 @@ impl Application {
         application
     }
 
-    /// Starts anew: power came, or the controller was reset. Faults and the source of the inputs stay.
+    /// Restarts: power came, or the controller was reset. Faults and the source of the inputs stay.
     pub fn restart(&mut self, description: &DeviceDescription, now: SimTime) {
         self.machine = StateMachine::default();
         self.dictionary = Dictionary::new(description);
@@ -129,12 +129,12 @@ impl Application {
         self.refusals.push(Refusal { to, code, times });
     }
 
-    /// A hanging application reacts to nothing.
+    /// A hanging application does not react.
     pub fn hang(&mut self, hanging: bool) {
         self.hanging = hanging;
     }
 
-    /// A transition is on its way; one out of OP makes the outputs safe at once.
+    /// A transition begins; one out of OP sets the outputs to the safe state at once.
     pub const fn is_changing_state(&self) -> bool {
         self.machine.pending().is_some()
     }
@@ -159,12 +159,12 @@ impl Application {
         &self.files
     }
 
-    /// The protocol servers; those of a mailbox that is closed know nothing.
+    /// The protocol servers; without an open mailbox they have no state.
     pub const fn servers(&self) -> &Servers {
         &self.servers
     }
 
-    /// Inputs come from this source from now on.
+    /// Sets the source of the inputs.
     pub fn set_source(&mut self, source: InputSource, description: &DeviceDescription, controller: &mut Controller) {
         self.process_data.set_source(source, controller, self.last_run);
         self.watch(description);
@@ -180,7 +180,7 @@ impl Application {
         !self.hanging && (self.polled || events & self.interest != 0)
     }
 
-    /// When [`Application::run`] has something to do without any frame.
+    /// Next time at which [`Application::run`] has work without a frame.
     pub fn next_deadline(&self) -> Option<SimTime> {
         if self.hanging {
             return None;
@@ -194,12 +194,12 @@ impl Application {
         [transition, answer, full, service].into_iter().flatten().min()
     }
 
-    /// The transition could be done but something else is missing.
+    /// The transition could be completed, but a condition is missing.
     fn is_waiting(&self, pending: Pending) -> bool {
         pending.at <= self.last_run
     }
 
-    /// Reacts to what happened at the controller.
+    /// Reacts to events of the controller.
     pub fn run(&mut self, description: &DeviceDescription, controller: &mut Controller, now: SimTime) {
         if self.hanging || !controller.pdi_operational() {
             return;
@@ -234,7 +234,7 @@ impl Application {
         }
     }
 
-    /// A SyncManager was switched on or off, or the last answer is asked for again (protocol 5.2, 6.2).
+    /// A SyncManager was enabled or disabled, or the last answer is requested again (protocol 5.2, 6.2).
     fn sync_managers_changed(&mut self, description: &DeviceDescription, controller: &mut Controller, now: SimTime) {
         let actual = settings::sync_managers(controller, now);
         let state = self.machine.state();
@@ -279,7 +279,7 @@ impl Application {
         }
     }
 
-    /// The controller copies AL control by itself; only the process data follows.
+    /// The controller copies AL control by itself; only the process data is updated here.
     fn run_emulated(&mut self, description: &DeviceDescription, controller: &mut Controller, now: SimTime) {
         let events = controller.al_event();
         let bytes = controller.register(map::AL_STATUS, AlStatus::LEN);
@@ -293,7 +293,7 @@ impl Application {
                 self.process_data.start(layout, &self.dictionary, controller, now);
             }
         }
-        // Outputs that no SyncManager watches stay valid whatever the watchdog says.
+        // Outputs without a watchdog at their SyncManager stay valid whatever the watchdog status.
         let alive = controller.process_data_watchdog_ok() || !self.process_data.is_watched();
         let operating = state == AlState::Op && alive;
         if !operating && self.process_data.outputs().iter().any(|byte| *byte != 0) {
@@ -307,7 +307,7 @@ impl Application {
         controller.set_al_status(self.machine.status(), self.machine.code(), now);
     }
 
-    /// Which events matter from now on.
+    /// Sets the mask of the relevant events.
     fn watch(&mut self, description: &DeviceDescription) {
         if description.emulation {
             self.polled = description.has_process_data();

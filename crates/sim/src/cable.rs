@@ -1,8 +1,8 @@
-//! Cables and what happens to a frame on the way through one (issue 2, part 3; protocol 11.4).
+//! Cables and their effect on a frame (issue 2, part 3; protocol 11.4).
 //!
-//! A cable is two legs, one for each direction. A leg knows where it leads, how long a bit takes, since when it
-//! carries a signal, and which faults wait for the frames that come along. What is decided here is the fate of a frame
-//! whose last bit is due at the far end; who sends and who receives is the network's business.
+//! A cable has two legs, one for each direction. A leg has its far end, its propagation delay, the start of its signal,
+//! and the faults for the next frames. This module decides the fate of a frame whose last bit is due at the far end;
+//! the network knows senders and receivers.
 
 use core::fmt;
 use core::time::Duration;
@@ -41,7 +41,7 @@ impl fmt::Display for HostLink {
     }
 }
 
-/// Where a cable can be plugged in.
+/// Possible ends of a cable.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Endpoint {
     /// A port of a device.
@@ -50,7 +50,7 @@ pub enum Endpoint {
     Host(HostLink),
 }
 
-/// A cable as it is given: both ends and how long a bit takes from one to the other (5 ns per metre, protocol 1.3).
+/// A cable: both ends and its propagation delay (5 ns per metre, protocol 1.3).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct CableSpec {
     /// One end.
@@ -98,17 +98,17 @@ impl LegId {
     }
 }
 
-/// What becomes of a frame whose last bit is due at the end of a leg.
+/// Fate of a frame whose last bit is due at the end of a leg.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Fate {
     /// It arrives whole.
     Arrives,
-    /// The signal went while the frame was arriving: only its beginning came through.
+    /// The signal was lost while the frame was arriving: only its beginning came through.
     Truncated {
         /// Time for which the receiver saw the frame.
         seen: Duration,
     },
-    /// Nothing of it arrives.
+    /// No part of it arrives.
     Lost,
 }
 
@@ -121,11 +121,11 @@ pub(crate) struct LegFaults {
     pub(crate) duplicate: u32,
     /// Frames still to be corrupted.
     pub(crate) corrupt: u32,
-    /// Frames still to be damaged by a symbol that is none.
+    /// Frames still to be damaged by an invalid symbol.
     pub(crate) symbol_errors: u32,
     /// Frames still to be delayed.
     pub(crate) delay: u32,
-    /// By how much they are delayed.
+    /// Their delay.
     pub(crate) delay_by: Duration,
     /// Every frame is lost although both ends have link.
     pub(crate) blocked: bool,
@@ -143,15 +143,15 @@ impl LegFaults {
 /// One direction of a cable.
 #[derive(Clone, Debug)]
 pub(crate) struct Leg {
-    /// Where it leads.
+    /// Its far end.
     pub(crate) to: Endpoint,
     /// Propagation delay.
     pub(crate) delay_ns: u64,
-    /// Whether the receiving end knows that there is a signal (detection takes time).
+    /// Whether the receiving end detects a signal (detection takes time).
     pub(crate) detected: bool,
-    /// Since when it knows.
+    /// Since when it detects it.
     pub(crate) detected_at: SimTime,
-    /// Whether any fault is set: spares the frames on healthy cables the look at each.
+    /// Whether any fault is set: avoids the check of each fault for frames on healthy cables.
     pub(crate) faulty: bool,
     /// The faults.
     pub(crate) faults: LegFaults,
@@ -161,7 +161,7 @@ pub(crate) struct Leg {
 }
 
 impl Leg {
-    /// A leg that has carried a signal for long.
+    /// A leg with a signal of long standing.
     pub(crate) fn new(to: Endpoint, delay_ns: u64) -> Leg {
         Leg {
             to,
@@ -197,7 +197,7 @@ impl Leg {
         self.refresh_faulty();
     }
 
-    /// Looks whether any fault is left.
+    /// Updates whether any fault is left.
     pub(crate) fn refresh_faulty(&mut self) {
         let LegFaults { drop, duplicate, corrupt, symbol_errors, delay, delay_by: _, blocked } = self.faults;
         self.faulty = blocked || [drop, duplicate, corrupt, symbol_errors, delay].iter().any(|left| *left > 0);

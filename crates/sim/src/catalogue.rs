@@ -1,7 +1,7 @@
-//! Devices out of the box, by name.
+//! Ready-made devices, by name.
 //!
-//! In: a name as segment files use it. Out: a [`DeviceDescription`] to be changed at will before a device is made of
-//! it. Vendor and product numbers are the simulator's own; SyncManager settings are like those of real terminals
+//! Input: a name as segment files use it. Output: a [`DeviceDescription`] that may be changed before a device is made
+//! of it. Vendor and product numbers are the simulator's own; SyncManager settings are like those of real terminals
 //! (protocol 3.11). Terminals are in `terminals`, the servo drive in `drive`, block and junctions in `machines`,
 //! devices for the mailbox in `protocols`.
 
@@ -19,7 +19,7 @@ pub use protocols::LARGE_OBJECT_BYTES;
 /// Makes a description.
 type Maker = fn(&str) -> DeviceDescription;
 
-/// All devices, in the order in which people are shown them.
+/// All devices, in the order of their presentation to users.
 const DEVICES: &[(&str, Maker)] = &[
     ("coupler", machines::coupler),
     ("junction", machines::junction),

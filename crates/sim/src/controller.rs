@@ -1,13 +1,13 @@
 //! One SubDevice controller (ESC), register by register (protocol 2, 3, 4.7, 11.4).
 //!
-//! In: frames at ports, link changes, accesses of the application, virtual time. Out: frames at ports, events for the
-//! application, deadlines. The network carries frames between controllers; the application behind the PDI makes a
-//! device of it. Not modelled: MII management, emulated EEPROMs, loops that enhanced link detection closes (see
-//! docs/segments.md).
+//! Input: frames at ports, link changes, accesses of the application, virtual time. Output: frames at ports, events for
+//! the application, deadlines. The network carries frames between controllers; with the application behind the PDI the
+//! controller is a device. Not modelled: MII management, emulated EEPROMs, loops that enhanced link detection closes
+//! (see docs/segments.md).
 //!
-//! A frame is handled when its last bit has come in. It makes its whole way inside at once: along 0-(EPU)-3-1-2 to the
-//! next open port. What happens by itself (watchdogs, busy EEPROM, temporary loops) is brought up to date at the next
-//! access, so that idle controllers cost nothing.
+//! A frame is processed when its last bit has arrived. It takes its whole internal path at once: along 0-(EPU)-3-1-2 to
+//! the next open port. Autonomous changes (watchdogs, busy EEPROM, temporary loops) are computed at the next access, so
+//! that idle controllers cost no time.
 
 mod access;
 mod clock;
@@ -56,27 +56,27 @@ use sync_manager::SyncManagers;
 use sync_unit::{LatchUnit, SyncUnit};
 use watchdog::Watchdog;
 
-/// What becomes of a frame that a controller received.
+/// Fate of a received frame.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Passage {
     /// It leaves by this port, which may be forced open without a link: the frame is lost then.
     Leaves {
         /// The port.
         port: Port,
-        /// Whether the processing unit was on the way.
+        /// Whether it passed the processing unit.
         processed: bool,
     },
-    /// It ends here.
+    /// It is destroyed here.
     Destroyed,
 }
 
-/// Where frames that come in at a port leave.
+/// Exit of frames that enter at a port.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Way {
     pub exit: Port,
-    /// Whether the processing unit is on the way.
+    /// Whether they pass the processing unit.
     pub processed: bool,
-    /// It holds while [`Controller::stays`] says so.
+    /// Valid as long as [`Controller::stays`] says so.
     pub port_changes: u32,
 }
 
@@ -98,23 +98,23 @@ pub struct Controller {
     sync_unit: SyncUnit,
     latch_units: [LatchUnit; 2],
     pass: Pass,
-    /// Loop settings as last written, and those that return when temporary ones end.
+    /// Loop settings as last written, and those restored when temporary ones end.
     lasting_loops: [LoopControl; 4],
     temporary_loops: Option<(SimTime, [LoopControl; 4])>,
-    /// The frame that brought the last letter of the reset sequence.
+    /// The frame with the last letter of the reset sequence.
     reset_frame: Option<u64>,
-    /// STATION_ADDRESS and the alias bit, at hand for every datagram.
+    /// STATION_ADDRESS and the alias bit, cached for every datagram.
     station: u16,
     alias_enabled: bool,
-    /// Bit 0 of DL_CONTROL, at hand for every frame.
+    /// Bit 0 of DL_CONTROL, cached for every frame.
     forwarding_rule: bool,
     /// ECAT events that are not masked.
     irq: u16,
-    /// When something happens by itself next.
+    /// Time of the next autonomous change.
     deadline: SimTime,
-    /// Counts how often that was found out.
+    /// Counts updates of that time.
     schedules: u32,
-    /// Logical datagrams that were answered, where a checker wants to know.
+    /// Logical datagrams that were answered, if a checker needs them.
     logical_log: LogicalLog,
 }
 
@@ -155,7 +155,7 @@ impl Controller {
         &self.config
     }
 
-    /// From now on logical datagrams that the SubDevice answers are logged.
+    /// Starts the log of logical datagrams that the SubDevice answers.
     pub fn log_logical(&mut self) {
         self.logical_log.turn_on();
     }
@@ -170,7 +170,7 @@ impl Controller {
         self.logical_log.accesses()
     }
 
-    /// Tells what the port's link detection found. Without power nothing is detected.
+    /// Sets the result of the port's link detection. Without power no link is detected.
     pub fn link_changed(&mut self, port: Port, up: bool, now: SimTime) {
         if !self.powered {
             return;
@@ -182,12 +182,12 @@ impl Controller {
         self.refresh_dl_status();
     }
 
-    /// Takes a frame whose last bit came in at `port` at `now` all the way to the port by which it leaves.
+    /// Takes a frame whose last bit arrived at `port` at `now`, and returns its exit.
     pub fn receive(&mut self, frame: &mut SimFrame, port: Port, now: SimTime) -> Passage {
         self.receive_between(frame, port, now.back_ns(frame.first_to_last_bit_ns()), now)
     }
 
-    /// [`Controller::receive`] for a caller who knows when the first bit came in.
+    /// [`Controller::receive`] with a known arrival of the first bit.
     #[inline]
     pub(crate) fn receive_between(
         &mut self,
@@ -215,7 +215,7 @@ impl Controller {
         self.travel(frame, port, returns, first_bit, now)
     }
 
-    /// Along 0-(EPU)-3-1-2 from `entry` to the next open port; a frame that came in through a port that it has closed
+    /// Along 0-(EPU)-3-1-2 from `entry` to the next open port; a frame that entered through a port that it has closed
     /// itself leaves through it too.
     fn travel(
         &mut self,
@@ -225,7 +225,7 @@ impl Controller {
         first_bit: SimTime,
         now: SimTime,
     ) -> Passage {
-        // What the frame itself opens or closes holds for the frames behind it.
+        // Ports that the frame itself opens or closes are changed for later frames only.
         let passing = self.ports.passing() | u8::from(returns) << entry.index();
         let mut processed = false;
         let mut at = entry;
@@ -243,7 +243,7 @@ impl Controller {
         }
     }
 
-    /// The way of frames that come in at a port, where they all take the same: not through one that breaks
+    /// The path of frames that enter at a port, where all of them take the same: not through one that breaks
     /// circulations.
     pub(crate) fn way(&self, entry: Port) -> Option<Way> {
         let open = self.powered && self.ports.link(entry) && self.ports.passes(entry);
@@ -265,12 +265,12 @@ impl Controller {
         }
     }
 
-    /// Whether a frame that comes in at a port may meet the processing unit.
+    /// Whether a frame that enters at a port may pass the processing unit.
     pub(crate) fn may_process(&self, entry: Port) -> bool {
         entry == Port::A || !self.ports.passes(Port::A)
     }
 
-    /// Whether a frame that comes in at a port gets to the processing unit without leaving first: all loops on its way
+    /// Whether a frame that enters at a port reaches the processing unit without leaving first: all loops on its way
     /// there are closed.
     pub(crate) fn turns_round(&self, entry: Port) -> bool {
         let mut at = entry;
@@ -283,7 +283,7 @@ impl Controller {
         entry != Port::A
     }
 
-    /// Whether ports and everything else stay as they are up to and including a time, unless somebody changes them.
+    /// Whether ports and everything else stay unchanged up to and including a time, without outside access.
     #[inline]
     pub(crate) fn stays(&self, port_changes: u32, until: SimTime) -> bool {
         self.ports.changes() == port_changes && self.deadline > until
@@ -306,8 +306,8 @@ impl Controller {
         self.ports.loop_closed(port)
     }
 
-    /// When something happens by itself to which the application has to react: a watchdog expires, the EEPROM is loaded
-    /// or has finished a command of the PDI.
+    /// Time of the next autonomous change to which the application has to react: a watchdog expires, the EEPROM is
+    /// loaded or has finished a command of the PDI.
     pub fn next_deadline(&self) -> Option<SimTime> {
         let sii = self.sii.is_loading() || self.sii_owned_by_pdi();
         let sii = if sii { self.sii.deadline() } else { SimTime::NEVER };
@@ -315,7 +315,7 @@ impl Controller {
         (self.powered && next != SimTime::NEVER).then_some(next)
     }
 
-    /// Brings everything that happens by itself up to date.
+    /// Applies all autonomous changes up to now.
     pub fn tick(&mut self, now: SimTime) {
         if !self.powered {
             return;
@@ -338,19 +338,19 @@ impl Controller {
         self.schedule();
     }
 
-    /// As long as this stays the same, [`Controller::next_deadline`] does.
+    /// Counts updates: equal counts mean an equal [`Controller::next_deadline`].
     pub(crate) fn schedules(&self) -> u32 {
         self.schedules
     }
 
-    /// Brings up to date what is due.
+    /// Applies due changes.
     pub(crate) fn catch_up(&mut self, now: SimTime) {
         if now >= self.deadline {
             self.tick(now);
         }
     }
 
-    /// Finds out when something happens by itself next.
+    /// Computes the time of the next autonomous change.
     fn schedule(&mut self) {
         self.schedules = self.schedules.wrapping_add(1);
         let loops = self.temporary_loops.map_or(SimTime::NEVER, |(until, _)| until);
@@ -365,8 +365,8 @@ impl Controller {
         self.clock.local(now)
     }
 
-    /// Registers and RAM as they are, without the effects of reading; what is brought up to date when read may be old.
-    /// Empty where the range leaves the address space.
+    /// Registers and RAM without the effects of reading; values computed at reads may be old. Empty where the range
+    /// leaves the address space.
     pub fn register(&self, address: RegisterAddress, len: usize) -> &[u8] {
         self.memory.span(address.0.into(), len)
     }

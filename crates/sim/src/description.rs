@@ -49,7 +49,7 @@ pub struct PdoDescription {
     pub sync_manager: Option<u8>,
     /// Flags of the SII entry, kept as they are.
     pub flags: u16,
-    /// What it carries, in order.
+    /// Its entries, in order.
     pub entries: Vec<PdoEntryDescription>,
 }
 
@@ -141,8 +141,8 @@ impl Default for TransitionTimes {
 pub struct DeviceDescription {
     /// Name of this device in the segment.
     pub name: String,
-    /// Name in the SII, where that is to be told from those of others: with it SIIs of the same structure differ in
-    /// their fixed area. `None`: `name`, and they do not.
+    /// Name in the SII, where it must differ from that of others: with it, SIIs of the same structure differ in their
+    /// fixed area. `None`: `name`, and the fixed areas are equal.
     pub name_in_sii: Option<String>,
     /// Order code, string of the SII.
     pub order_code: String,
@@ -169,7 +169,7 @@ pub struct DeviceDescription {
     pub sync_managers: Vec<SyncManagerDescription>,
     /// Process data objects, inputs and outputs.
     pub pdos: Vec<PdoDescription>,
-    /// Objects beside those that follow from the rest; they replace such with the same index.
+    /// Objects in addition to the derived ones; they replace those with the same index.
     pub objects: Vec<Object>,
     /// Mailbox, if there is one.
     pub mailbox: Option<MailboxDescription>,
@@ -207,13 +207,13 @@ pub struct DeviceDescription {
     pub forwarding_delay: Option<Duration>,
     /// Error of the local clock.
     pub clock_drift_ppb: i64,
-    /// How this changes in the course of time.
+    /// Change of the drift over time.
     pub clock_wander: Wander,
-    /// Arrivals of frames are seen by up to so much too late, at random.
+    /// Largest random delay of the detected arrival of a frame.
     pub receive_jitter: Duration,
     /// The controller latches receive times of frames in processing direction only, unless 0x0936 says otherwise.
     pub latches_processing_only: bool,
-    /// The controller does not tell frames apart when it latches receive times: other frames on the wire spoil them.
+    /// The controller does not distinguish frames when it latches receive times: other frames on the wire change them.
     pub latches_any_frame: bool,
     /// Local clock at power-on.
     pub clock_start_ns: u64,
@@ -224,7 +224,7 @@ pub struct DeviceDescription {
 }
 
 impl DeviceDescription {
-    /// What is not ideal about its clock.
+    /// Imperfections of its clock.
     pub fn clock_errors(&self) -> ClockErrors {
         ClockErrors { drift_ppb: self.clock_drift_ppb, wander: self.clock_wander, receive_jitter: self.receive_jitter }
     }

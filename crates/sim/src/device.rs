@@ -25,7 +25,7 @@ const FEATURES_DC_64: u16 = 0x000C;
 pub struct Device {
     /// The controller: ports, registers, EEPROM.
     pub controller: Controller,
-    /// What stands behind it.
+    /// The application behind the PDI.
     pub application: Application,
     /// What it is made from. Changes to it have no effect on registers and EEPROM.
     pub description: DeviceDescription,
@@ -73,12 +73,12 @@ impl Device {
         self.application.refuse(to, code, times);
     }
 
-    /// Something goes wrong with the mail of the device.
+    /// Sets a fault of the device's mail.
     pub fn disturb_mail(&mut self, fault: MailFault, now: SimTime) {
         self.application.disturb_mail(fault, now);
     }
 
-    /// Lets controller and application react to frames and to the time.
+    /// Runs controller and application up to now.
     pub fn run(&mut self, now: SimTime) {
         if !self.controller.is_powered() {
             return;
@@ -88,7 +88,7 @@ impl Device {
         self.application.run(&self.description, &mut self.controller, now);
     }
 
-    /// The application starts anew with the controller.
+    /// The application restarts with the controller.
     fn follow_restart(&mut self, now: SimTime) {
         let starts = self.controller.starts();
         if starts != self.starts {
@@ -102,7 +102,7 @@ impl Device {
         self.controller.starts() != self.starts || self.application.needs_run(self.controller.al_event())
     }
 
-    /// When [`Device::run`] has something to do without any frame.
+    /// Next time at which [`Device::run`] has work without a frame.
     pub fn next_deadline(&self) -> Option<SimTime> {
         if !self.controller.is_powered() {
             return None;
@@ -140,12 +140,12 @@ impl Device {
         self.application.process_data().latched()
     }
 
-    /// Inputs are these bytes from now on. A drive makes its own and ignores them.
+    /// Sets the inputs. A drive makes its own and ignores them.
     pub fn set_inputs(&mut self, bytes: &[u8]) {
         self.set_input_source(InputSource::Constant(bytes.into()));
     }
 
-    /// Inputs come from this source from now on. A drive makes its own and ignores it.
+    /// Sets the source of the inputs. A drive makes its own and ignores it.
     pub fn set_input_source(&mut self, source: InputSource) {
         self.application.set_source(source, &self.description, &mut self.controller);
     }

@@ -1,6 +1,6 @@
-//! Faults that a test or a demonstration can bring about, at once or at a time (issue 2, part 3).
+//! Faults that a test or a demonstration can cause, at once or at a time (issue 2, part 3).
 //!
-//! Faults on a cable concern the frames that reach its far end from then on, faults on a device its power, its
+//! Faults on a cable affect the frames that reach its far end from then on, faults on a device its power, its
 //! application, its EEPROM and its state machine.
 
 use core::time::Duration;
@@ -12,84 +12,85 @@ pub use crate::controller::SpoiltWrite;
 
 use crate::cable::{CableId, DeviceIndex, Direction};
 
-/// Something that goes wrong, or is put right again.
+/// A fault, or its repair.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Fault {
-    /// The cable carries nothing any more; both ends notice after their detection delay.
+    /// The cable is cut; both ends notice after their detection delay.
     Cut(CableId),
-    /// The cable is whole again; both ends notice after their detection delay.
+    /// The cable is restored; both ends notice after their detection delay.
     Heal(CableId),
-    /// The cable is whole again; the end that receives in one direction notices later than the other by so much.
+    /// The cable is restored; the receiving end of one direction notices later than the other.
     HealUnevenly {
-        /// Which cable.
+        /// The cable.
         cable: CableId,
-        /// Towards the end that is later.
+        /// Direction towards the later end.
         direction: Direction,
-        /// How much later.
+        /// Additional delay.
         by: Duration,
     },
-    /// The next frames on the cable disappear.
+    /// The next frames on the cable are lost.
     Drop {
-        /// Which cable.
+        /// The cable.
         cable: CableId,
-        /// Which direction; `None`: both, counted apart.
+        /// The direction; `None`: both, counted separately.
         direction: Option<Direction>,
-        /// How many frames.
+        /// Number of frames.
         count: u32,
     },
-    /// The next frames on the cable arrive twice, the second right behind the first.
+    /// The next frames on the cable arrive twice, the second directly after the first.
     Duplicate {
-        /// Which cable.
+        /// The cable.
         cable: CableId,
-        /// Which direction; `None`: both, counted apart.
+        /// The direction; `None`: both, counted separately.
         direction: Option<Direction>,
-        /// How many frames.
+        /// Number of frames.
         count: u32,
     },
-    /// One bit of the next frames on the cable is turned over, so that their check sequence is wrong.
+    /// One bit of the next frames on the cable is inverted, so that their check sequence is wrong.
     Corrupt {
-        /// Which cable.
+        /// The cable.
         cable: CableId,
-        /// Which direction; `None`: both, counted apart.
+        /// The direction; `None`: both, counted separately.
         direction: Option<Direction>,
-        /// How many frames.
+        /// Number of frames.
         count: u32,
     },
-    /// The next frames on the cable have something within them that is no symbol (RX_ER): they are damaged, and the
-    /// port that receives them counts that, too.
+    /// The next frames on the cable contain an invalid symbol (RX_ER): they are damaged, and the receiving port counts
+    /// the symbol, too.
     SymbolErrors {
-        /// Which cable.
+        /// The cable.
         cable: CableId,
-        /// Which direction; `None`: both, counted apart.
+        /// The direction; `None`: both, counted separately.
         direction: Option<Direction>,
-        /// How many frames.
+        /// Number of frames.
         count: u32,
     },
-    /// Between frames comes what is no symbol: ports that have link count it, and no frame is hurt.
+    /// Invalid symbols between frames: ports with a link count them, and no frame is damaged.
     IdleSymbolErrors {
-        /// Which cable.
+        /// The cable.
         cable: CableId,
-        /// Towards which end; `None`: both.
+        /// Direction; `None`: both.
         direction: Option<Direction>,
-        /// How many symbols.
+        /// Number of symbols.
         count: u32,
     },
-    /// The next frames on the cable arrive later than they should; frames behind them may overtake them.
+    /// The next frames on the cable are delayed; later frames may overtake them.
     Delay {
-        /// Which cable.
+        /// The cable.
         cable: CableId,
-        /// Which direction; `None`: both, counted apart.
+        /// The direction; `None`: both, counted separately.
         direction: Option<Direction>,
-        /// How many frames.
+        /// Number of frames.
         count: u32,
-        /// How much later.
+        /// Delay.
         by: Duration,
     },
-    /// One direction of the cable is dead while both ends still see link (as behind a media converter), or alive again.
+    /// One direction of the cable is dead while both ends still have a link (as behind a media converter), or alive
+    /// again.
     OneWay {
-        /// Which cable.
+        /// The cable.
         cable: CableId,
-        /// Which direction.
+        /// The direction.
         direction: Direction,
         /// Dead or alive.
         blocked: bool,
@@ -98,56 +99,56 @@ pub enum Fault {
     PowerOff(DeviceIndex),
     /// The device gets power: it loads its EEPROM, starts in INIT, and its links come up after their detection delay.
     PowerOn(DeviceIndex),
-    /// The application behind the controller hangs, or goes on; the controller itself works.
+    /// The application behind the controller hangs, or continues; the controller itself works.
     Hang(DeviceIndex, bool),
-    /// Bits of the EEPROM turn over.
+    /// Bits of the EEPROM are inverted.
     CorruptSii {
-        /// Which device.
+        /// The device.
         device: DeviceIndex,
         /// Byte in the EEPROM.
         offset: usize,
-        /// Bits to turn over.
+        /// Mask of the bits to invert.
         mask: u8,
     },
-    /// The next commands to the EEPROM take another time than usual.
+    /// The next commands to the EEPROM have another duration.
     SlowSii {
-        /// Which device.
+        /// The device.
         device: DeviceIndex,
-        /// How long each of them takes.
+        /// Duration of each.
         busy: Duration,
-        /// How many commands.
+        /// Number of commands.
         times: u32,
     },
-    /// The next writes of a word to the EEPROM go wrong.
+    /// The next writes of a word to the EEPROM fail.
     SpoilSiiWrites {
-        /// Which device.
+        /// The device.
         device: DeviceIndex,
-        /// How.
+        /// How they fail.
         how: SpoiltWrite,
-        /// How many.
+        /// Number of writes.
         times: u32,
     },
-    /// The device refuses to go to a state.
+    /// The device refuses a state.
     RefuseTransition {
-        /// Which device.
+        /// The device.
         device: DeviceIndex,
-        /// The state it refuses.
+        /// The refused state.
         to: AlState,
-        /// The AL status code it refuses it with.
+        /// The AL status code of the refusal.
         code: AlStatusCode,
-        /// How often it refuses.
+        /// Number of refusals.
         times: u32,
     },
-    /// Accesses of the application to its controller go wrong, as on a disturbed bus between both: they are counted,
-    /// and done all the same.
+    /// Accesses of the application to its controller are disturbed, as on a faulty bus between both: they are counted,
+    /// and succeed all the same.
     PdiErrors {
-        /// Which device.
+        /// The device.
         device: DeviceIndex,
-        /// What PDI_ERROR_CODE shows of the last one.
+        /// Content of PDI_ERROR_CODE for the last one.
         code: u8,
-        /// How many.
+        /// Number of accesses.
         count: u32,
     },
-    /// Something goes wrong with the mail of a device.
+    /// A fault of a device's mail.
     Mail(DeviceIndex, MailFault),
 }

@@ -1,8 +1,7 @@
-//! A frame on its way through the segment (protocol 1.1, 1.2, 1.3).
+//! A frame on its path through the segment (protocol 1.1, 1.2, 1.3).
 //!
-//! In: the bytes that a host sends. Out: [`SimFrame`], which carries the offsets of its datagrams so that no controller
-//! parses it again, and the state of its frame check sequence. What happens to it is the controllers' and the
-//! network's.
+//! Input: the bytes that a host sends. Output: [`SimFrame`], which carries the offsets of its datagrams so that no
+//! controller parses it again, and the state of its frame check sequence. Controllers and network process it.
 
 use ringcat_wire::datagram::{HEADER_LEN, OVERHEAD, WKC_LEN};
 use ringcat_wire::frame::{
@@ -57,7 +56,7 @@ pub enum Fcs {
     Marked,
 }
 
-/// What a controller takes a frame for.
+/// A frame's type as a controller sees it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum FrameKind {
     /// EtherCAT with datagrams (type 1), plain, behind a VLAN tag or in UDP.
@@ -84,17 +83,17 @@ pub struct SimFrame {
     pub bytes: Vec<u8>,
     /// The datagrams, in order; those before the first that leaves the frame. Empty unless `kind` is `Datagrams`.
     pub datagrams: Vec<DatagramPlace>,
-    /// What it is to a controller.
+    /// Its type for a controller.
     pub kind: FrameKind,
     /// Shorter than an Ethernet frame may be, or a datagram leaves the frame: an error to every processing unit.
     pub malformed: bool,
     /// State of the check sequence.
     pub fcs: Fcs,
-    /// There is something in it that is no symbol, and the port that receives it has not counted that yet.
+    /// It contains an invalid symbol that the receiving port has not counted yet.
     pub symbol_error: bool,
-    /// Unique number: for logs, and to tell the frame when it comes back to a controller.
+    /// Unique number: for logs, and to recognise the frame when it comes back to a controller.
     pub id: u64,
-    /// Datagrams behind so many are passed on as they are.
+    /// Number of datagrams that are processed; further ones are passed on unchanged.
     pub most_datagrams: usize,
 }
 
@@ -128,7 +127,7 @@ impl SimFrame {
         (self.symbol_error, self.most_datagrams) = (other.symbol_error, other.most_datagrams);
     }
 
-    /// Keeps the first `len` bytes only, as a cable leaves them that is cut while the frame passes.
+    /// Keeps the first `len` bytes only: the rest is lost when a cable is cut while the frame passes.
     pub fn truncate(&mut self, len: usize) {
         if len < self.bytes.len() {
             self.bytes.truncate(len);
@@ -137,7 +136,7 @@ impl SimFrame {
         }
     }
 
-    /// Has all datagrams behind so many passed on as they are.
+    /// Limits the number of datagrams that are processed; further ones are passed on unchanged.
     pub fn process_at_most(&mut self, most: usize) {
         self.most_datagrams = most;
         self.datagrams.truncate(most);

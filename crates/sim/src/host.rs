@@ -72,7 +72,7 @@ impl HostInterface {
         Some(end)
     }
 
-    /// Keeps a frame, or gives it back when there is no room.
+    /// Keeps a frame, or returns it when there is no room.
     pub(crate) fn deliver(&mut self, frame: Received) -> Result<(), Received> {
         if self.received.len() >= self.receive_limit {
             return Err(frame);

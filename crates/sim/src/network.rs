@@ -1,10 +1,10 @@
 //! A segment in virtual time: devices, the cables between them and the two interfaces of the MainDevice (issue 2,
 //! part 3; protocol 2, 9.1, 11.3, 11.4).
 //!
-//! In: frames of the MainDevice ([`Network::send`]), the time up to which things shall happen ([`Network::advance`]),
-//! and faults. Out: the frames that come back, with the time of their last bit ([`Network::receive`]), and the devices
-//! themselves for whoever wants to look inside. There is no other clock and no other chance than the seed: the same
-//! calls give the same run, bit for bit.
+//! Input: frames of the MainDevice ([`Network::send`]), the time up to which the segment runs ([`Network::advance`]),
+//! and faults. Output: the frames that come back, with the time of their last bit ([`Network::receive`]), and the
+//! devices themselves for inspection. There is no other clock and no other randomness than the seed: the same calls
+//! give the same run, bit for bit.
 //!
 //! # Model
 //!
@@ -197,11 +197,11 @@ impl Network {
         self.advance(to);
     }
 
-    /// Lets everything happen, in its order and at its time, until no frame is under way any more: the time goes on to
-    /// the moment at which the last one has left the segment, but not beyond `limit`.
+    /// Processes all events, in their order and at their times, until no frame is left in the segment: the time
+    /// advances to the moment at which the last one has left, but not beyond `limit`.
     ///
-    /// The devices react to what has passed them with [`Network::settle_all`], or when the next frame reaches them: who
-    /// wants answers as soon as possible takes the frames first.
+    /// The devices react to the frames that have passed them with [`Network::settle_all`], or when the next frame
+    /// reaches them: callers that need responses as soon as possible take the frames first.
     pub fn advance_until_quiet(&mut self, limit: SimTime) {
         self.leaping = true;
         self.pass_all_frames(limit);

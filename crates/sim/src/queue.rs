@@ -1,19 +1,19 @@
 //! The event queue: what happens next in virtual time (issue 2, part 3).
 //!
-//! In go events with the time at which they are due, out they come in the order of time; events of the same time come
-//! in the order in which they were put in, so that a run is the same every time. Events go into lanes, so that who
-//! wants to go ahead of some kinds of events sees when the others are due. The queue keeps its memory: once it has been
-//! as long as it gets, it allocates no more.
+//! Input: events with their due times. Output: the events in the order of time; events of the same time in the order of
+//! insertion, so that every run is the same. Events go into lanes, so that a caller that processes some kinds of events
+//! ahead of time sees when the others are due. The queue keeps its memory: after its largest length, it allocates no
+//! more.
 
 use std::cmp::Ordering;
 use std::collections::BinaryHeap;
 
 use crate::time::SimTime;
 
-/// Kinds of events that are told apart when somebody asks what is due next. Their order is one.
+/// Kinds of events with a query for the next due time each. Their order is common.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Lane {
-    /// Whatever has no lane of its own.
+    /// All events without a lane of their own.
     Any = 0,
     /// Frames of the main interface that enter the segment and change no ways.
     EntryMain = 1,
@@ -74,8 +74,8 @@ impl<E: Copy> EventQueue<E> {
         self.lanes[lane as usize].push(Entry { at, sequence: self.sequence, event });
     }
 
-    /// Puts in an event and takes out the earliest that is due by `limit`, the new one included: the step of a frame
-    /// from one device to the next, which mostly comes out at once.
+    /// Inserts an event and removes the earliest that is due by `limit`, the new one included: the step of a frame from
+    /// one device to the next, which is mostly the earliest.
     pub(crate) fn push_pop(&mut self, at: SimTime, event: E, limit: SimTime) -> Option<(SimTime, E)> {
         if self.next_at().is_none_or(|first| at < first) && at <= limit {
             return Some((at, event));

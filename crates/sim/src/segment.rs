@@ -1,8 +1,8 @@
 //! Segments from files (issue 2, part 3). The format is described in `docs/segments.md`.
 //!
-//! In: TOML text and the directory in which SII images are looked for. Out: [`Segment`], a description of all devices,
-//! cables and options from which [`Network::from_description`](crate::network::Network::from_description) makes a
-//! segment. An error names file, line and device.
+//! Input: TOML text and the directory of the SII images. Output: [`Segment`], a description of all devices, cables and
+//! options from which [`Network::from_description`](crate::network::Network::from_description) makes a segment. An
+//! error names file, line and device.
 
 mod devices;
 mod error;
@@ -23,7 +23,7 @@ pub const DEMO: &str = include_str!("../segments/demo.toml");
 
 /// A segment as a file describes it.
 ///
-/// Cable `n` is the one that attaches device `n`; behind these come the one that closes the ring, if there is one, and
+/// Cable `n` is the one that attaches device `n`; after these come the one that closes the ring, if there is one, and
 /// those that the file lists. (Devices that the file attaches by listed cables only shift the numbers.)
 #[derive(Clone, Debug)]
 pub struct Segment {

@@ -21,7 +21,7 @@ newtype!(
     StationAddress(u16), "{:#06x}"
 );
 newtype!(
-    /// Position of a SubDevice in the order in which a frame meets the processing units, from 0.
+    /// Position of a SubDevice in the order in which a frame passes the processing units, from 0.
     Position(u16), "{}"
 );
 newtype!(

@@ -20,10 +20,10 @@ pub const CIRCULATING: u16 = 0x4000;
 /// Bit "more datagrams follow" in the length field.
 pub const MORE: u16 = 0x8000;
 
-/// Whom a datagram addresses, and where.
+/// Addressed SubDevices and their registers or memory.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Target {
-    /// Nobody (NOP).
+    /// No SubDevice (NOP).
     None,
     /// The SubDevice at a position, counted by the frame itself.
     Position(Position, RegisterAddress),

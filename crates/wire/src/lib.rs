@@ -11,7 +11,7 @@
 //!
 //! # Panic contract
 //!
-//! Decoding any bytes never panics: what does not fit is an error that says what was expected and what came.
+//! Decoding any bytes never panics: a malformed part is an error that gives the expected and the received value.
 //! Unknown codes from the wire are kept, so that decode and encode are inverse.
 #![no_std]
 #![forbid(unsafe_code)]

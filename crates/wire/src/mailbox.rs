@@ -2,8 +2,8 @@
 //!
 //! [`Header`] stands before every message, [`Message`] is header and payload together; [`ErrorReply`] is the payload of
 //! protocol 0. One module per protocol reads and writes the others: [`coe`] with [`sdo`], [`foe`], [`eoe`], [`soe`],
-//! [`aoe`], [`voe`]; [`gateway`] is a message in UDP or TCP. Who sends what when, counters and repeats, fragments put
-//! together are the matter of both ends.
+//! [`aoe`], [`voe`]; [`gateway`] is a message in UDP or TCP. Both ends handle sequence, counters, repeats and the
+//! joining of fragments.
 
 pub mod aoe;
 pub mod coe;

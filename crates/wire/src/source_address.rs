@@ -22,7 +22,7 @@ pub const MAX_RETRY: u8 = 7;
 
 const RETRY_SHIFT: u32 = 4;
 
-/// What the source address of a frame says beside who sent it.
+/// Marks in a frame's source address besides the identity of its sender.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub struct SourceMarks {
     /// Sent on the redundant link.

@@ -153,8 +153,8 @@ fn plugged_into(eni: &Eni, stations: &HashMap<u16, usize>) -> Result<Vec<Option<
     Ok(plugged_into)
 }
 
-/// Protocol 8.2: 1 downloads. A file whose CoE commands all have data and say 2 has it the other way round: nobody
-/// configures a segment by reading only.
+/// Protocol 8.2: 1 downloads. A file whose CoE commands all have data and the value 2 has it reversed: no network is
+/// configured by reads only.
 fn ccs_is_reversed(eni: &Eni) -> bool {
     let mut commands = eni.subdevices.iter().flat_map(|subdevice| &subdevice.mailbox).flat_map(|mailbox| &mailbox.coe);
     let is_there = commands.clone().next().is_some();

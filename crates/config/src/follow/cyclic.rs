@@ -40,7 +40,7 @@ pub(super) struct Cyclic {
     pub cycle: Option<Duration>,
     /// There is a command that distributes the time.
     pub distributes: bool,
-    /// From whom.
+    /// The SubDevice whose time is distributed.
     pub reference: Option<usize>,
     /// The reference follows the host.
     pub bus_shift: bool,
@@ -129,8 +129,8 @@ fn of_process_data(
     }
 }
 
-/// Notes which pieces a command exchanges, by their bits in the logical address space. Returns the SubDevices that it
-/// meets, and the working counter that this gives.
+/// Records which pieces a command exchanges, by their bits in the logical address space. Returns the addressed
+/// SubDevices and the resulting working counter.
 fn cover(
     eni: &Eni,
     at: (usize, usize, usize),
@@ -199,7 +199,7 @@ fn of_registers(eni: &Eni, bus: &Bus, command: &CyclicCommand, cyclic: &mut Cycl
     }
 }
 
-/// Whom a command addresses.
+/// The SubDevice that a command addresses.
 fn addressed(eni: &Eni, bus: &Bus, command: Command, adp: u16) -> Option<usize> {
     if command.addressing() == Addressing::Station {
         return eni.subdevices.iter().position(|subdevice| subdevice.station == Some(adp));

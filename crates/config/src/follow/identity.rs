@@ -1,5 +1,5 @@
-//! Who a SubDevice must be: reads of the EEPROM through registers 0x0502 to 0x050B whose answers are compared, and the
-//! identification of hot connect groups (protocol 8.2).
+//! Expected identity of a SubDevice: reads of the EEPROM through registers 0x0502 to 0x050B whose answers are compared,
+//! and the identification of hot connect groups (protocol 8.2).
 
 use ringcat_engine::config::Expected;
 use ringcat_wire::register::map;
@@ -77,7 +77,7 @@ pub(super) fn marks(commands: &[EcatCommand]) -> Vec<(Mark, bool, Place)> {
     found
 }
 
-/// Who is expected: exactly what the commands compare. A file without commands means vendor and product of `Info`.
+/// Expected identity: exactly what the commands compare. A file without commands means vendor and product of `Info`.
 pub(super) fn expected(eni: &Eni, index: usize, complete: bool) -> Result<Expected, EniError> {
     let subdevice = &eni.subdevices[index];
     let mut expected = Expected::default();

@@ -70,7 +70,7 @@ pub(super) fn follow(
     Ok(image)
 }
 
-/// SyncManagers that somebody exchanges, by SubDevice: as a whole, and all of them where no command says who.
+/// SyncManagers that cyclic commands exchange, by SubDevice; all of them where no command names a SubDevice.
 fn exchanged(mappings: &[Vec<Piece>], covers: &[Vec<Option<Cover>>]) -> Vec<BTreeSet<u8>> {
     let any = covers.iter().flatten().any(Option::is_some);
     let of_subdevice = |(pieces, covers): (&Vec<Piece>, &Vec<Option<Cover>>)| {

@@ -44,7 +44,7 @@ impl Registers {
         self.bytes.range(address.0..end).map(|(_, (_, place))| *place).next_back()
     }
 
-    /// A register; bytes that nobody wrote are 0.
+    /// A register; bytes that were never written are 0.
     pub fn read<const N: usize>(&self, address: RegisterAddress) -> [u8; N] {
         let mut read = [0; N];
         for (offset, byte) in (0_u16..).zip(&mut read) {
@@ -53,12 +53,12 @@ impl Registers {
         read
     }
 
-    /// A register of 16 bits; `None` where nobody wrote it.
+    /// A register of 16 bits; `None` where it was never written.
     pub fn word(&self, address: RegisterAddress) -> Option<u16> {
         self.place(address, 2).map(|_| u16::from_le_bytes(self.read(address)))
     }
 
-    /// A register of 32 bits; `None` where nobody wrote it.
+    /// A register of 32 bits; `None` where it was never written.
     pub fn double_word(&self, address: RegisterAddress) -> Option<u32> {
         self.place(address, 4).map(|_| u32::from_le_bytes(self.read(address)))
     }

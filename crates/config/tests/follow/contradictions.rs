@@ -1,4 +1,4 @@
-//! What would make a wrong network is refused, with line, SubDevice, what was expected and what came.
+//! Contradictions are refused, with line, SubDevice, expected and found value.
 
 use crate::refused;
 

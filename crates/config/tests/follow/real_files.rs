@@ -74,7 +74,7 @@ fn drives_of_ec_engineer_have_sync_managers_clocks_and_one_lrw() {
         let [lrw] = &declaration.explicit_lrw[..] else { panic!("{name}: {:?}", declaration.explicit_lrw) };
         assert_eq!(lrw.subdevices.len(), *count, "{name}");
         assert_eq!(found.cycle, Some(Duration::from_millis(1)));
-        // Every variable of a drive is somebody's.
+        // Every variable of a drive belongs to a SubDevice.
         let drives = found.image.variables.iter().filter(|variable| variable.name.starts_with("Slave_"));
         assert!(drives.clone().count() >= 10 * count);
         assert!(drives.clone().all(|variable| variable.subdevice.is_some()), "{name}");

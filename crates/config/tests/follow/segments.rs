@@ -116,7 +116,7 @@ fn a_file_without_commands_leaves_the_rest_to_the_sii_and_expects_what_info_says
     assert!(has_notice(&configuration, &["Cyclic/CycleTime", "1ms is taken"]));
 }
 
-/// As users write it who have only start-up lists (users' pain: a mapping that differs from the SII).
+/// As users write it with start-up lists only (a common problem: a mapping that differs from the SII).
 // covers: 6.3, eni-commands
 #[test]
 fn a_file_with_nothing_but_coe_commands_says_with_them_how_long_process_data_is() {

@@ -1,7 +1,7 @@
-//! What the halves tell each other about distributed clocks.
+//! What the two halves exchange about distributed clocks.
 //!
-//! The supervisor posts whose time each copy of a cyclic frame distributes; the exchange posts what the broadcast read
-//! of the differences showed.
+//! The supervisor posts which reference clock each copy of a cyclic frame distributes; the exchange posts the result of
+//! the broadcast read of the time differences.
 
 use core::sync::atomic::{AtomicBool, AtomicU32, AtomicU64, Ordering};
 
@@ -9,19 +9,20 @@ use ringcat_wire::address::StationAddress;
 
 use crate::link::Link;
 
-/// Whose time the copies of cyclic frames distribute.
+/// Reference clocks that the copies of cyclic frames distribute.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct References {
-    /// On the copy sent on the main link; `None`: that copy distributes nothing.
+    /// Reference on the copy sent on the main link; `None`: that copy distributes no time.
     pub main: Option<StationAddress>,
-    /// On the copy sent on the redundant link.
+    /// Reference on the copy sent on the redundant link.
     pub redundant: Option<StationAddress>,
-    /// Where both do: the redundant one is the reference of the segment, and the main one is steered towards it.
+    /// Where both copies have a reference: the redundant one is the reference of the segment, and the main one is
+    /// steered towards it.
     pub redundant_leads: bool,
 }
 
 impl References {
-    /// The one on a copy.
+    /// The reference on the copy sent on a link.
     pub const fn on(self, link: Link) -> Option<StationAddress> {
         match link {
             Link::Main => self.main,
@@ -29,7 +30,7 @@ impl References {
         }
     }
 
-    /// The link of the segment's reference, and that of the one that is steered towards it.
+    /// The link of the segment's reference, and that of the reference steered towards it.
     pub const fn leader(self) -> (Option<Link>, Option<Link>) {
         match (self.main.is_some(), self.redundant.is_some()) {
             (true, true) if self.redundant_leads => (Some(Link::Redundant), Some(Link::Main)),
@@ -44,7 +45,7 @@ impl References {
 /// The shared words.
 #[derive(Debug, Default)]
 pub struct ClockWords {
-    /// Stations in the lower half, the leader in bit 32, and in the upper 31 bits how often they were posted.
+    /// Stations in the lower half, the leader in bit 32, number of posts in the upper 31 bits.
     references: AtomicU64,
     spread: AtomicU32,
     is_window_watched: AtomicBool,
@@ -52,7 +53,8 @@ pub struct ClockWords {
     are_some_in_front: AtomicBool,
     spread_count: AtomicU32,
     are_ports_guarded: AtomicBool,
-    /// How often the exchange stopped handing out a time, and how many of these times the supervisor has answered.
+    /// How often the exchange stopped the distribution of time, and up to which of these stops the supervisor has
+    /// answered.
     holds: AtomicU32,
     answered: AtomicU32,
 }
@@ -70,7 +72,7 @@ impl ClockWords {
         self.references.store(word, Ordering::Release);
     }
 
-    /// The references, and how often they were posted.
+    /// The references, and the number of posts.
     pub fn references(&self) -> (References, u32) {
         let word = self.references.load(Ordering::Acquire);
         let station = |bits: u64| Some(StationAddress(bits as u16)).filter(|station| station.0 != 0);
@@ -79,7 +81,7 @@ impl ClockWords {
         (references, (word >> CHANGE) as u32)
     }
 
-    /// From now on the exchange stops handing out a time when ports have changed.
+    /// From now on the exchange stops the distribution of time when ports have changed.
     pub(crate) fn guard_ports(&self) {
         self.are_ports_guarded.store(true, Ordering::Relaxed);
     }
@@ -88,28 +90,28 @@ impl ClockWords {
         self.are_ports_guarded.load(Ordering::Relaxed)
     }
 
-    /// No time is handed out until the supervisor has answered that.
+    /// Stops the distribution of time until the supervisor answers.
     pub(crate) fn hold(&self) {
         let holds = self.holds.load(Ordering::Relaxed);
         self.holds.store(holds.wrapping_add(1), Ordering::Release);
     }
 
-    /// How often that was.
+    /// Number of stops so far.
     pub(crate) fn holds(&self) -> u32 {
         self.holds.load(Ordering::Acquire)
     }
 
-    /// What has changed up to the hold of that number is known.
+    /// All changes up to the stop with this number are known; the distribution may go on.
     pub(crate) fn answer(&self, holds: u32) {
         self.answered.store(holds, Ordering::Release);
     }
 
-    /// Whether nobody is to be told a time.
+    /// Whether the distribution of time is stopped.
     pub(crate) fn is_held(&self) -> bool {
         self.holds() != self.answered.load(Ordering::Acquire)
     }
 
-    /// From now on the exchange reports when the differences come into their window and leave it.
+    /// From now on the exchange reports when the differences enter the sync window and leave it.
     pub(crate) fn watch_window(&self) {
         self.is_window_watched.store(true, Ordering::Relaxed);
     }
@@ -118,8 +120,8 @@ impl ClockWords {
         self.is_window_watched.load(Ordering::Relaxed)
     }
 
-    /// The segment's reference is told the time of the host or of the application: its own difference shows how
-    /// punctual that is, and counts no longer.
+    /// The segment's reference is steered towards the time of the host or of the application. Its own difference then
+    /// shows the jitter of the host and no longer counts.
     pub(crate) fn lead_reference(&self) {
         self.is_reference_led.store(true, Ordering::Relaxed);
     }
@@ -128,13 +130,13 @@ impl ClockWords {
         self.is_reference_led.load(Ordering::Relaxed)
     }
 
-    /// Whether there are clocks that frames meet before the reference they follow: they are told what the host
-    /// believes.
+    /// Sets whether frames pass clocks before the reference that these follow: such clocks receive the time that the
+    /// host predicts.
     pub(crate) fn post_in_front(&self, some: bool) {
         self.are_some_in_front.store(some, Ordering::Relaxed);
     }
 
-    /// Whether some difference shows how punctual the host is, so that the OR of all says nothing.
+    /// Whether some difference shows the jitter of the host, so that the OR of all differences carries no information.
     pub(crate) fn is_host_told(&self) -> bool {
         self.is_reference_led() || self.are_some_in_front.load(Ordering::Relaxed)
     }

@@ -5,11 +5,11 @@ use crate::link::{Link, LinkSet};
 use crate::ring::Sequence;
 
 impl Board {
-    /// After how many departures no cyclic frame is under way, but for copies on links that are silent (a bit each);
-    /// `None` while some are, and also where the last one was lost.
+    /// Number of the departure after which no cyclic frame is on the wire, copies on silent links (a bit each)
+    /// excepted; `None` while some are, and also where the last one was lost.
     pub(crate) fn at_rest(&self, links: LinkSet, silent: u8) -> Option<u32> {
         let cycles = self.cycles() as u32;
-        // Frames and their numbers are counted together.
+        // Cycles and sequence numbers of frames count alike.
         let last = Sequence::of_frame(self.frames().sent).number();
         let home = self.traffic.home(links, silent);
         let is_home = |link: &Link| home[link.index()] == last;

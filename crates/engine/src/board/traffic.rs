@@ -1,9 +1,9 @@
-//! What the exchange posts about its frames on the wire, so that a frame of the other half can be alone there (protocol
-//! 7.1).
+//! What the exchange posts about its frames on the wire, so that the acyclic half can send a frame while no other is on
+//! the wire (protocol 7.1).
 //!
 //! Single writer: the exchange. It posts a departure before it hands the first frame to a link, the cycle when it has
-//! handed over the last one (`Board::post_cycle`), and the last frame of which a copy came home, by link. A link hands
-//! frames over in their order, so when a copy of the last one is home, those before it are home or lost.
+//! handed over the last one (`Board::post_cycle`), and the last frame of which a copy returned, by link. A link keeps
+//! the order of frames, so when a copy of the last frame has returned, the earlier ones have returned or are lost.
 
 use core::sync::atomic::{AtomicU16, AtomicU32, AtomicU64, Ordering};
 
@@ -14,13 +14,13 @@ use crate::time::Instant;
 /// The words.
 #[derive(Debug)]
 pub struct Traffic {
-    /// Number of the departure that has begun last, from 0 on; before the first one, that before 0.
+    /// Number of the latest departure, from 0 on; the predecessor of 0 before the first one.
     begun: AtomicU32,
-    /// The last frame of which all copies came home.
+    /// The last frame of which all copies returned.
     home: AtomicU16,
-    /// The last frame of which a copy came home and not yet all, by the link it was sent on.
+    /// The last frame of which one copy but not yet all returned, by the link it was sent on.
     half_home: [AtomicU16; 2],
-    /// Until when the supervisor asks for a pause.
+    /// End of the pause that the supervisor asks for.
     pause_until: AtomicU64,
 }
 
@@ -38,18 +38,18 @@ impl Traffic {
         self.begun.store(cycle as u32, Ordering::Release);
     }
 
-    /// All copies of a frame are home.
+    /// All copies of a frame have returned.
     pub(crate) fn post_home(&self, sequence: Sequence) {
         self.home.store(sequence.number(), Ordering::Release);
     }
 
-    /// A copy came home, others have not.
+    /// One copy of a frame returned, others have not.
     pub(crate) fn post_half_home(&self, sent_on: Link, sequence: Sequence) {
         self.half_home[sent_on.index()].store(sequence.number(), Ordering::Release);
     }
 
-    /// The last frame that is home but for copies on silent links (a bit each), by link; the same for both where none
-    /// is.
+    /// The last frame of which all copies returned, those on silent links (a bit each) excepted, by link; the same for
+    /// both links where none is silent.
     pub(crate) fn home(&self, links: LinkSet, silent: u8) -> [u16; 2] {
         if links.mask() & silent == 0 {
             return [self.home.load(Ordering::Acquire); 2];
@@ -57,17 +57,17 @@ impl Traffic {
         [0, 1].map(|link: usize| self.half_home[link].load(Ordering::Acquire))
     }
 
-    /// How many departures there were, those that have only begun included.
+    /// Number of departures, including one that has only begun.
     pub(crate) fn departures(&self) -> u32 {
         self.begun.load(Ordering::Acquire).wrapping_add(1)
     }
 
-    /// Asks for cycles to begin no earlier than this.
+    /// Asks the exchange to begin no cycle earlier than this.
     pub(crate) fn ask_for_pause(&self, until: Instant) {
         self.pause_until.store(until.0, Ordering::Relaxed);
     }
 
-    /// Until when cycles are to wait; long ago where nothing was asked.
+    /// Time before which no cycle is to begin; in the distant past without a request.
     pub fn pause_until(&self) -> Instant {
         Instant(self.pause_until.load(Ordering::Relaxed))
     }

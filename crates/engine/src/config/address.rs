@@ -7,27 +7,27 @@ use crate::info::SubDeviceInfo;
 /// Where a SubDevice is expected.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum ConfigAddress {
-    /// Position in the configured order, from 0. Where an optional SubDevice is absent, those behind it stand one place
-    /// nearer to the start of the segment. Members of [groups](super::Group) are not counted.
+    /// Position in the configured order, from 0. Where an optional SubDevice is absent, the following ones move one
+    /// position towards the start of the segment. Members of [groups](super::Group) are not counted.
     Position(u16),
     /// `offset` SubDevices behind the one with this alias; alias 0 counts from the start of the segment.
     Alias {
         /// The alias.
         alias: u16,
-        /// SubDevices behind it.
+        /// Number of SubDevices behind it.
         offset: u16,
     },
     /// `offset` SubDevices behind the one with this explicit device identification (protocol 5.3).
     Identification {
         /// The identification.
         value: u16,
-        /// SubDevices behind it.
+        /// Number of SubDevices behind it.
         offset: u16,
     },
 }
 
 impl ConfigAddress {
-    /// SubDevices behind the one with the alias or identification.
+    /// Number of SubDevices behind the one with the alias or identification.
     pub(super) fn offset(self) -> usize {
         match self {
             ConfigAddress::Alias { offset, .. } | ConfigAddress::Identification { offset, .. } => offset.into(),
@@ -35,7 +35,7 @@ impl ConfigAddress {
         }
     }
 
-    /// So many places behind.
+    /// The address this number of places further behind.
     pub(super) fn behind(self, places: u16) -> ConfigAddress {
         match self {
             ConfigAddress::Alias { alias, .. } => ConfigAddress::Alias { alias, offset: places },
@@ -53,7 +53,7 @@ impl ConfigAddress {
         }
     }
 
-    /// What tells the SubDevice from which the address counts.
+    /// The alias or identification from which the address counts, for messages.
     pub(super) fn mark(self) -> impl fmt::Display {
         struct Mark(ConfigAddress);
         impl fmt::Display for Mark {

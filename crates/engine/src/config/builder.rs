@@ -1,4 +1,4 @@
-//! How an application says what it declares about a SubDevice.
+//! Builder methods with which an application declares a SubDevice.
 
 use alloc::vec::Vec;
 use core::time::Duration;
@@ -13,22 +13,22 @@ use super::{
 use crate::info::{Direction, PdoEntryInfo, PdoInfo, SubDeviceInfo};
 
 impl SubDeviceConfig {
-    /// Anybody at a position.
+    /// A SubDevice of any identity at a position.
     pub fn at_position(position: u16) -> SubDeviceConfig {
         SubDeviceConfig { address: ConfigAddress::Position(position), ..SubDeviceConfig::default() }
     }
 
-    /// Anybody `offset` SubDevices behind the one with an alias.
+    /// A SubDevice of any identity, `offset` places behind the one with an alias.
     pub fn at_alias(alias: u16, offset: u16) -> SubDeviceConfig {
         SubDeviceConfig { address: ConfigAddress::Alias { alias, offset }, ..SubDeviceConfig::default() }
     }
 
-    /// Anybody with an explicit device identification, wherever it is.
+    /// A SubDevice of any identity with an explicit device identification, at any place.
     pub fn at_identification(value: u16) -> SubDeviceConfig {
         SubDeviceConfig { address: ConfigAddress::Identification { value, offset: 0 }, ..SubDeviceConfig::default() }
     }
 
-    /// The SubDevice that a scan found: at its position, of its vendor and product, everything else from its SII.
+    /// The SubDevice that a scan found: at its position, with its vendor and product; everything else from its SII.
     pub fn from_info(info: &SubDeviceInfo) -> SubDeviceConfig {
         SubDeviceConfig::at_position(info.position.0)
             .expect_product(info.identity.vendor_id, info.identity.product_code)
@@ -77,7 +77,7 @@ impl SubDeviceConfig {
         self
     }
 
-    /// Declares a SyncManager; a later declaration of the same one replaces the earlier.
+    /// Overrides the settings of a SyncManager; a later call for the same one replaces the earlier.
     #[must_use]
     pub fn sync_manager(mut self, index: u8, direction: Direction, watchdog: Watchdog) -> SubDeviceConfig {
         self.sync_managers.retain(|sync_manager| sync_manager.index != index);
@@ -85,7 +85,7 @@ impl SubDeviceConfig {
         self
     }
 
-    /// Declares the PDOs of a SyncManager; a later declaration for the same one replaces the earlier.
+    /// Declares the PDOs of a SyncManager; a later call for the same one replaces the earlier.
     #[must_use]
     pub fn assign(mut self, sync_manager: u8, direction: Direction, pdos: Vec<PdoMapping>) -> SubDeviceConfig {
         let assignments = self.pdos.get_or_insert_with(Vec::new);
@@ -94,7 +94,7 @@ impl SubDeviceConfig {
         self
     }
 
-    /// Declares the PDOs that a SubDevice of this kind has, so that there is a place for them while it is absent.
+    /// Declares the PDOs that a SubDevice of this type has, so that they have a place in the image while it is absent.
     #[must_use]
     pub fn pdos_of(mut self, info: &SubDeviceInfo) -> SubDeviceConfig {
         for sync_manager in 0..info.controller.sync_manager_count {
@@ -108,7 +108,7 @@ impl SubDeviceConfig {
         self
     }
 
-    /// Declares the watchdog: divider and, in units of it, the time for process data.
+    /// Sets the watchdog: divider and, in units of it, the process data time.
     #[must_use]
     pub fn watchdog(mut self, divider: Option<u16>, intervals: Option<u16>) -> SubDeviceConfig {
         self.watchdog_divider = divider;
@@ -116,20 +116,20 @@ impl SubDeviceConfig {
         self
     }
 
-    /// Declares the time of the PDI watchdog, in units of the divider.
+    /// Sets the PDI watchdog time, in units of the divider.
     #[must_use]
     pub fn pdi_watchdog(mut self, intervals: u16) -> SubDeviceConfig {
         self.pdi_watchdog_intervals = Some(intervals);
         self
     }
 
-    /// Appends an SDO download before SAFEOP.
+    /// Appends an SDO download in PREOP, before SAFEOP is requested.
     #[must_use]
     pub fn sdo(self, index: u16, sub_index: u8, data: impl Into<Vec<u8>>) -> SubDeviceConfig {
         self.sdo_at(Transition::Ps, index, sub_index, data)
     }
 
-    /// Appends an SDO download with complete access before SAFEOP, from subindex 0 or 1.
+    /// Appends an SDO download with complete access in PREOP, before SAFEOP is requested, from subindex 0 or 1.
     #[must_use]
     pub fn sdo_complete(self, index: u16, sub_index: u8, data: impl Into<Vec<u8>>) -> SubDeviceConfig {
         let sdo = SdoDownload { index, sub_index, complete_access: true, data: data.into() };
@@ -149,14 +149,14 @@ impl SubDeviceConfig {
         self.startup(transition, StartupAction::Sdo(sdo))
     }
 
-    /// Appends a write of the value of an IDN at a transition: in PREOP for [`Transition::Ps`], in SAFEOP for
+    /// Appends the write of an IDN's value at a transition: in PREOP for [`Transition::Ps`], in SAFEOP for
     /// [`Transition::So`].
     #[must_use]
     pub fn idn_at(self, transition: Transition, drive: u8, idn: Idn, data: impl Into<Vec<u8>>) -> SubDeviceConfig {
         self.startup(transition, StartupAction::Idn(IdnWrite { drive, idn, data: data.into() }))
     }
 
-    /// Appends a setting of the addresses behind EoE, before SAFEOP.
+    /// Appends the setting of the IP parameters behind EoE, before SAFEOP is requested.
     #[must_use]
     pub fn ip(self, settings: IpSettings) -> SubDeviceConfig {
         self.startup(Transition::Ps, StartupAction::Ip(settings))
@@ -183,7 +183,7 @@ impl SubDeviceConfig {
         self
     }
 
-    /// Sets the time limit of one state change; a later one for the same change replaces the earlier.
+    /// Sets the time limit of one state change; a later call for the same change replaces the earlier.
     #[must_use]
     pub fn state_timeout(mut self, from: AlState, to: AlState, limit: Duration) -> SubDeviceConfig {
         self.state_timeouts.retain(|own| (own.from, own.to) != (from, to));
@@ -191,7 +191,7 @@ impl SubDeviceConfig {
         self
     }
 
-    /// Limit of a state change.
+    /// Time limit of a state change.
     pub fn limit(&self, from: AlState, to: AlState) -> Duration {
         let own = self.state_timeouts.iter().find(|own| (own.from, own.to) == (from, to));
         own.map_or_else(|| self.timeouts.transition(from, to), |own| own.limit)
@@ -211,7 +211,7 @@ impl SubDeviceConfig {
         self
     }
 
-    /// Sets the state to which it is to be brought.
+    /// Sets the target state.
     #[must_use]
     pub fn target(mut self, target: AlState) -> SubDeviceConfig {
         self.target = target;

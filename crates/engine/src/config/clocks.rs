@@ -1,8 +1,8 @@
-//! What the application declares about distributed clocks: of the whole segment, and of one SubDevice (protocol 7).
+//! Distributed clocks as the application declares them: for the whole segment, and for one SubDevice (protocol 7).
 
 use core::time::Duration;
 
-/// Whose clock all others follow.
+/// The reference clock that all other clocks follow.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub enum ReferenceClock {
     /// The first SubDevice with a clock, declared or not.
@@ -10,55 +10,55 @@ pub enum ReferenceClock {
     FirstWithClock,
     /// The first SubDevice with a clock among those for which SYNC signals are declared.
     FirstConfigured,
-    /// The one with this index in the declaration. SubDevices that frames meet before it follow the host's idea of its
-    /// time, not the time itself: a reference in front of all others is more exact.
+    /// The SubDevice with this index in the declaration. SubDevices that frames pass before it receive the time that
+    /// the host predicts, not the reference time itself: a reference in front of all others is more exact.
     Declared(usize),
 }
 
-/// What a frame takes through a SubDevice's controller from port to port (protocol 7.1). No register tells it, and
-/// receive times show only there and back together. Only differences count, between both ways and between SubDevices:
-/// what is left out of all of them is measured with the cables. By half of what is left out of some the delay to the
-/// next one is wrong.
+/// Time that a frame takes through a SubDevice's controller from port to port (protocol 7.1). No register gives it, and
+/// receive times show only the sum of both ways. Only differences count, between both ways and between SubDevices: a
+/// part common to all SubDevices is measured together with the cables. A part that is missing for some of them makes
+/// the delay to the next SubDevice wrong by half of it.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub struct Passage {
-    /// Nanoseconds of a passage on which its processing unit meets the frame.
+    /// Nanoseconds of a pass through the processing unit.
     pub processing_ns: u16,
-    /// Nanoseconds of one on which the frame is only forwarded: back, or through a part that is entered from behind.
+    /// Nanoseconds of a pass on which the frame is only forwarded: on the way back, or through a SubDevice that is
+    /// entered at another port than 0.
     pub forwarding_ns: u16,
 }
 
 /// Distributed clocks of the segment.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct ClockConfig {
-    /// Whose clock all others follow. Where it is lost, the next one with a clock is chosen.
+    /// The reference clock that all other clocks follow. When it is lost, the next SubDevice with a clock takes over.
     pub reference: ReferenceClock,
     /// System time when the host's monotonic time is zero, in nanoseconds (protocol 3.12: since 2000).
     pub epoch: u64,
     /// The reference clock follows the host (bus shift). Otherwise it runs free.
     pub bus_shift: bool,
-    /// Measurements of propagation delays, of which the mean is taken.
+    /// Number of measurements of the propagation delays; their mean is used.
     pub measurements: u32,
-    /// What frames take through SubDevices for which [`SubDeviceConfig::passage`](crate::config::SubDeviceConfig) says
-    /// nothing.
+    /// Passage times of SubDevices without a [`SubDeviceConfig::passage`](crate::config::SubDeviceConfig) of their own.
     pub passage: Passage,
-    /// Distributions of the reference time that the static drift phase sends as fast as the segment allows, beside the
-    /// cyclic ones (protocol 7.2: about 15,000).
+    /// Number of distributions of the reference time that the static drift compensation sends as fast as the segment
+    /// allows, in addition to the cyclic ones (protocol 7.2: about 15,000).
     pub drift_distributions: u32,
-    /// A clock is locked when |0x092C| was at most this for [`ClockConfig::lock_samples`] samples.
+    /// A clock is locked when |0x092C| stayed at or below this for [`ClockConfig::lock_samples`] samples.
     pub lock_window_ns: u32,
     /// See [`ClockConfig::lock_window_ns`].
     pub lock_samples: u32,
     /// How long a SubDevice with SYNC signals is held in SAFEOP until all clocks are locked.
     pub lock_limit: Duration,
-    /// The broadcast read of 0x092C beyond which clocks count as out of their window. It is the OR of all magnitudes:
-    /// at most twice the largest.
+    /// Limit of the broadcast read of 0x092C beyond which the clocks are out of the sync window. The read is the OR of
+    /// all magnitudes: at most twice the largest.
     pub sync_window_ns: u32,
-    /// Where process data is on the wire all the time, the cyclic half may be asked to begin a cycle later while
-    /// propagation delays are measured: once for each of [`ClockConfig::measurements`], by about two round trips.
-    /// Otherwise they are not measured there, which is told.
+    /// Permits delayed cycles. Where process data is on the wire all the time, the acyclic half may ask for a later
+    /// start of a cycle while propagation delays are measured: once per measurement ([`ClockConfig::measurements`]), by
+    /// about two round trips. Otherwise the delays are not measured there, and an event reports it.
     pub pauses: bool,
-    /// Where a fork without a clock hides the delay of a SubDevice, the middle of what it can be is written, which is
-    /// told with its limits. Otherwise no delay is written there, and SubDevices with SYNC signals stay in SAFEOP.
+    /// Where a fork without a clock hides the delay of a SubDevice, the middle of the possible range is written, and an
+    /// event reports the range. Otherwise no delay is written there, and SubDevices with SYNC signals stay in SAFEOP.
     pub estimated_delays: bool,
 }
 
@@ -88,11 +88,11 @@ pub struct SyncSignals {
     pub assign_activate: u16,
     /// Cycle of SYNC0 in nanoseconds; 0 is a single pulse.
     pub sync0_cycle_ns: u32,
-    /// SYNC0 comes so much after the multiples of the cycle in system time; negative: before.
+    /// Shift of SYNC0 after the multiples of the cycle in system time; negative: before them.
     pub sync0_shift_ns: i32,
-    /// Cycle of SYNC1 in nanoseconds: 0 or that of SYNC0, or a multiple of it.
+    /// Cycle of SYNC1 in nanoseconds: 0, that of SYNC0, or a multiple of it.
     pub sync1_cycle_ns: u32,
-    /// SYNC1 comes so much after SYNC0; what is negative counts back from the next SYNC0.
+    /// Shift of SYNC1 after SYNC0; a negative value counts back from the next SYNC0.
     pub sync1_shift_ns: i32,
 }
 
@@ -108,7 +108,7 @@ impl SyncSignals {
         }
     }
 
-    /// Value of DC_SYNC1_CYCLE: time from SYNC0 to SYNC1, and beyond a whole cycle the division of SYNC0.
+    /// Value of DC_SYNC1_CYCLE: time from SYNC0 to SYNC1; from a whole cycle on it divides SYNC0.
     pub const fn sync1_register_ns(&self) -> u32 {
         let longer = self.sync1_cycle_ns.saturating_sub(self.sync0_cycle_ns);
         let shift = match self.sync0_cycle_ns {

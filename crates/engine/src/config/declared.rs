@@ -1,5 +1,4 @@
-//! SyncManagers as a network configuration file writes them (ETG.2100, protocol 8.1): such a file counts before the
-//! SII.
+//! SyncManagers as a network configuration file writes them (ETG.2100, protocol 8.1). Such a file overrides the SII.
 
 use alloc::vec::Vec;
 
@@ -8,16 +7,16 @@ use ringcat_wire::register::SyncManager;
 use super::pdo::PdoMapping;
 use crate::info::Direction;
 
-/// What a SyncManager is for.
+/// Purpose of a SyncManager.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum SyncManagerRole {
     /// Mailbox that the MainDevice writes.
     MailboxOut,
     /// Mailbox that the MainDevice reads.
     MailboxIn,
-    /// Process data that the SubDevice takes.
+    /// Process data that the SubDevice receives.
     Outputs,
-    /// Process data that the SubDevice gives.
+    /// Process data that the SubDevice sends.
     Inputs,
 }
 
@@ -32,25 +31,26 @@ impl SyncManagerRole {
     }
 }
 
-/// A SyncManager as a configuration file writes it. Its registers are written as they are; PDO assignment and mapping
-/// are the matter of the file's own start-up commands.
+/// A SyncManager as a configuration file writes it. Its registers are written as given; PDO assignment and mapping are
+/// done by the file's own start-up commands.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct DeclaredSyncManager {
     /// Its number.
     pub index: u8,
-    /// What it is for.
+    /// Its purpose.
     pub role: SyncManagerRole,
-    /// Start, length, control and activate byte; the other two are left 0. One that is not enabled has no place in the
+    /// Start, length, control and activate byte; the other two are left 0. A disabled SyncManager has no place in the
     /// process image.
     pub register: SyncManager,
-    /// It is switched on on the way to OP only, and off when OP is left (commands of SO and OS in the file).
+    /// It is enabled on the way to OP only, and disabled when OP is left (commands of SO and OS in the file).
     pub op_only: bool,
-    /// PDOs in its area, in order: where entries lie. May be empty; with entries they need no more than its length.
+    /// PDOs in its area, in order; they give the places of the entries. May be empty. The entries may need less than
+    /// its length.
     pub pdos: Vec<PdoMapping>,
 }
 
 impl DeclaredSyncManager {
-    /// Bytes of process data with their direction; `None` for mailboxes.
+    /// Number, direction and length in bytes of its process data; `None` for mailboxes.
     pub fn area(&self) -> Option<(u8, Direction, u16)> {
         let length = if self.register.activate.enable { self.register.length } else { 0 };
         self.role.direction().map(|direction| (self.index, direction, length))

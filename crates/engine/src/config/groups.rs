@@ -1,7 +1,7 @@
-//! Hot connect groups: SubDevices in a row that may be there or not, at any place of the segment.
+//! Hot connect groups: consecutive SubDevices that may be present or absent, at any place of the segment.
 //!
 //! The first one, the head, is found by alias or explicit device identification; the others follow it in the order of
-//! the processing units. What the scan found is matched here, those that come later by the procedures.
+//! the processing units. This module matches what the scan found; the procedures match groups that join later.
 
 use alloc::collections::BTreeMap;
 use alloc::vec::Vec;
@@ -25,7 +25,7 @@ impl Group {
         Group { members: Vec::from([head]) }
     }
 
-    /// Appends the one behind. Where it is declared does not matter.
+    /// Appends the next SubDevice. The address in its declaration is ignored.
     #[must_use]
     pub fn then(mut self, member: SubDeviceConfig) -> Group {
         self.members.push(member);
@@ -55,7 +55,7 @@ pub fn groups<'a>(configs: impl IntoIterator<Item = &'a SubDeviceConfig>) -> Vec
     groups.into_values().collect()
 }
 
-/// Finds a group in a scan: its head, then those behind it as long as they are the right ones.
+/// Finds a group in a scan: its head, then the following SubDevices as long as they match.
 pub(super) fn find(
     configs: &[SubDeviceConfig],
     members: &[usize],

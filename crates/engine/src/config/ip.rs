@@ -3,7 +3,7 @@
 use alloc::vec::Vec;
 use core::net::Ipv4Addr;
 
-/// The addresses of the IP stack behind a SubDevice; what is `None` is not set, or was not told.
+/// IP parameters behind a SubDevice; `None`: not set, or not reported.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct IpSettings {
     /// MAC address.

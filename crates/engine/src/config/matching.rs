@@ -1,10 +1,10 @@
-//! Whether the SubDevice at a place is the declared one, and where an alias or identification is.
+//! Whether the SubDevice at a place matches its declaration, and where an alias or identification is.
 
 use super::resolution::{ConfigError, Resolution};
 use super::{ConfigAddress, SubDeviceConfig};
 use crate::info::SubDeviceInfo;
 
-/// The SubDevice with this index, where it is the expected one.
+/// The SubDevice with this index, if it is the expected one.
 pub(super) fn at_place(
     configs: &[SubDeviceConfig],
     infos: &[SubDeviceInfo],
@@ -33,7 +33,7 @@ pub(super) fn missing(declared: &SubDeviceConfig, config: usize, error: ConfigEr
     if declared.optional { Resolution::Absent { config, error } } else { Resolution::Failed { config, error } }
 }
 
-/// The one SubDevice with the alias or identification of an address.
+/// The only SubDevice with the alias or identification of an address.
 pub(super) fn bearer(address: ConfigAddress, infos: &[SubDeviceInfo]) -> Result<Option<usize>, ConfigError> {
     let mut bearers = infos.iter().enumerate().filter(|(_, info)| address.is_borne_by(info));
     match (bearers.next(), bearers.next()) {

@@ -11,11 +11,11 @@ pub struct PdoEntry {
     pub index: u16,
     /// Subindex of the object.
     pub sub_index: u8,
-    /// Bits.
+    /// Length in bits.
     pub bit_length: u8,
 }
 
-/// A PDO and what it maps.
+/// A PDO and its mapping.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct PdoMapping {
     /// Index of the PDO mapping object.
@@ -31,7 +31,7 @@ pub struct PdoAssignment {
     pub sync_manager: u8,
     /// Its direction.
     pub direction: Direction,
-    /// Its PDOs in order; none switches it off.
+    /// Its PDOs in order; an empty list disables it.
     pub pdos: Vec<PdoMapping>,
 }
 
@@ -48,7 +48,7 @@ impl PdoMapping {
 }
 
 impl PdoEntry {
-    /// An object's bits.
+    /// An entry of this length in bits.
     pub const fn new(index: u16, sub_index: u8, bit_length: u8) -> PdoEntry {
         PdoEntry { index, sub_index, bit_length }
     }

@@ -1,5 +1,5 @@
-//! Registers that are written or looked at whenever a SubDevice passes a transition: raw commands of a configuration
-//! file (ECatCmd of ETG.2100, protocol 8.2).
+//! Register commands at a transition of a SubDevice: raw commands of a configuration file (ECatCmd of ETG.2100,
+//! protocol 8.2), which write or check a register at each pass.
 
 use alloc::vec::Vec;
 use core::time::Duration;
@@ -7,18 +7,18 @@ use core::time::Duration;
 use ringcat_wire::address::RegisterAddress;
 use ringcat_wire::datagram::MAX_DATA;
 
-/// What a command does with a register.
+/// Action of a command on a register.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum RegisterAccess {
     /// Writes it.
     Write(Vec<u8>),
-    /// Reads it until what comes, masked, is what is expected.
+    /// Reads it until the masked data is as expected.
     Check {
         /// What is expected.
         data: Vec<u8>,
-        /// Bits that count; all of them where there is none. As long as the data.
+        /// Mask of the bits that count; without one all of them count. As long as the data.
         mask: Option<Vec<u8>>,
-        /// So long the value may take to come; zero looks once.
+        /// Time limit for the value to come; zero reads once.
         limit: Duration,
     },
 }
@@ -26,19 +26,19 @@ pub enum RegisterAccess {
 /// A command to a register of one SubDevice.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct RegisterCommand {
-    /// The first register.
+    /// Address of the first register.
     pub address: RegisterAddress,
-    /// What is done with it.
+    /// Action.
     pub access: RegisterAccess,
-    /// How often a command is sent again that the SubDevice did not take.
+    /// Number of retries for a command that the SubDevice did not process.
     pub retries: u8,
-    /// The SubDevice must take it; otherwise a write that it does not take is none of our concern (without `Cnt` in the
-    /// file). What is checked must always be answered.
+    /// The SubDevice must process it. Otherwise a write without a response is ignored (no `Cnt` in the file). A check
+    /// always needs a response.
     pub required: bool,
 }
 
 impl RegisterCommand {
-    /// Bytes of data and of the mask.
+    /// Length of data and mask in bytes.
     pub fn lengths(&self) -> (usize, Option<usize>) {
         match &self.access {
             RegisterAccess::Write(data) => (data.len(), None),
@@ -46,7 +46,7 @@ impl RegisterCommand {
         }
     }
 
-    /// Whether it can be sent.
+    /// Whether it is valid.
     pub(crate) fn is_sound(&self) -> bool {
         let (data, mask) = self.lengths();
         let fits = (1..=MAX_DATA).contains(&data) && usize::from(self.address.0) + data <= 0x1_0000;

@@ -1,4 +1,4 @@
-//! What became of a declaration, or of a SubDevice that was found.
+//! Result of the resolution for a declaration or for a SubDevice that was found.
 
 use core::fmt;
 
@@ -31,14 +31,14 @@ pub enum ConfigError {
     },
     /// Several SubDevices have the alias or the identification.
     Ambiguous {
-        /// Of the one that they are looked for by.
+        /// The address with the alias or identification.
         address: ConfigAddress,
         /// Position of the first one.
         first: Position,
         /// Position of the second one.
         second: Position,
     },
-    /// An earlier declaration has the SubDevice already.
+    /// An earlier declaration already has the SubDevice.
     DeclaredTwice {
         /// Position of the SubDevice.
         position: Position,
@@ -68,8 +68,8 @@ impl fmt::Display for ConfigError {
 
 impl core::error::Error for ConfigError {}
 
-/// What became of a declaration, or of a SubDevice that nobody declared. Both are named by their index in the slices
-/// given to [`resolve`].
+/// Result for a declaration, or for a SubDevice without a declaration. Both are named by their index in the slices
+/// given to `resolve`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Resolution {
     /// The declaration has its SubDevice.
@@ -79,21 +79,21 @@ pub enum Resolution {
         /// The SubDevice.
         info: usize,
     },
-    /// An optional SubDevice is not there.
+    /// An optional SubDevice is absent.
     Absent {
         /// The declaration.
         config: usize,
-        /// What is there instead, if anything.
+        /// The SubDevice found in its place, if any.
         error: ConfigError,
     },
-    /// The declaration has no SubDevice though it needs one.
+    /// A declaration that requires a SubDevice has none.
     Failed {
         /// The declaration.
         config: usize,
         /// Why.
         error: ConfigError,
     },
-    /// Nobody declared the SubDevice.
+    /// The SubDevice has no declaration.
     Extra {
         /// The SubDevice.
         info: usize,

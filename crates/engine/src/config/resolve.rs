@@ -1,4 +1,4 @@
-//! Which declaration belongs to which SubDevice of a scan.
+//! Assigns declarations to the SubDevices of a scan.
 
 use alloc::vec;
 use alloc::vec::Vec;
@@ -29,7 +29,7 @@ impl fmt::Display for DuplicateAlias {
     }
 }
 
-/// All SubDevices that have the alias of an earlier one.
+/// All SubDevices with the alias of an earlier one.
 pub fn duplicate_aliases(infos: &[SubDeviceInfo]) -> Vec<DuplicateAlias> {
     let mut by_alias: Vec<&SubDeviceInfo> = infos.iter().filter(|info| info.alias != 0).collect();
     by_alias.sort_by_key(|info| info.alias);
@@ -45,12 +45,12 @@ pub fn duplicate_aliases(infos: &[SubDeviceInfo]) -> Vec<DuplicateAlias> {
     duplicates
 }
 
-/// Finds the SubDevice of each declaration: one [`Resolution`] per declaration in their order, then the SubDevices that
-/// nobody declared.
+/// Finds the SubDevice of each declaration: one [`Resolution`] per declaration in their order, then the SubDevices
+/// without a declaration.
 ///
-/// Groups are found first, wherever they are; positions count those that belong to none. Where an optional SubDevice is
-/// absent, declarations by position that come behind it are looked for one place nearer to the start. With several ways
-/// to leave optional ones out, the one with the fewest errors counts.
+/// Groups are found first, at any place; positions count the SubDevices that belong to no group. Where an optional
+/// SubDevice is absent, the following declarations by position are searched one place nearer to the start. Of several
+/// ways to leave optional ones out, the one with the fewest errors is taken.
 pub fn resolve(configs: &[SubDeviceConfig], infos: &[SubDeviceInfo]) -> Vec<Resolution> {
     let mut resolutions = vec![None; configs.len()];
     for members in groups(configs) {
@@ -91,7 +91,7 @@ impl Segment<'_> {
     }
 }
 
-/// Declarations by position, in that order: position and index.
+/// Declarations by position, sorted: position and index.
 fn by_position(configs: &[SubDeviceConfig]) -> Vec<(usize, usize)> {
     let mut found: Vec<_> = configs
         .iter()
@@ -108,8 +108,8 @@ fn by_position(configs: &[SubDeviceConfig]) -> Vec<(usize, usize)> {
     found
 }
 
-/// For declaration n of those by position and `absent` optional ones left out before it: the fewest errors that are
-/// still to come.
+/// For declaration n of those by position, with `absent` optional ones left out before it: the fewest errors in the
+/// rest.
 struct Skips {
     /// Cost of taking declaration n as present, and as absent.
     costs: Vec<[u32; 2]>,
@@ -147,7 +147,7 @@ impl Skips {
     }
 }
 
-/// Finds one by alias or identification.
+/// Finds a SubDevice by alias or identification.
 fn by_mark(configs: &[SubDeviceConfig], infos: &[SubDeviceInfo], config: usize) -> Resolution {
     let address = configs[config].address;
     match bearer(address, infos) {
@@ -156,7 +156,7 @@ fn by_mark(configs: &[SubDeviceConfig], infos: &[SubDeviceInfo], config: usize) 
     }
 }
 
-/// Gives each SubDevice to one declaration only and appends those that nobody declared.
+/// Gives each SubDevice to one declaration only, and appends the SubDevices without a declaration.
 fn claim(mut resolutions: Vec<Resolution>, infos: &[SubDeviceInfo]) -> Vec<Resolution> {
     let mut owners: Vec<Option<usize>> = vec![None; infos.len()];
     for resolution in &mut resolutions {

@@ -1,4 +1,4 @@
-//! Start-up commands: objects, IDNs, addresses and registers that are written whenever a SubDevice passes a transition
+//! Start-up commands: objects, IDNs, IP parameters and registers that are written at each pass of a transition
 //! (protocol 5.1, 6.3, 6.5, 6.6).
 
 use alloc::string::String;
@@ -12,9 +12,9 @@ use ringcat_wire::mailbox::soe::Idn;
 use super::ip::IpSettings;
 use super::register::RegisterCommand;
 
-/// A transition at which start-up commands are sent. Towards OP they come before the upper state is requested, on the
-/// way back before the lower one is. INIT has no mailbox: of the commands of IP those to registers are sent in INIT,
-/// before the mailbox is set up, the others as soon as PREOP is reached.
+/// A transition at which start-up commands are sent. Towards OP they are sent before the upper state is requested, on
+/// the way back before the lower one is. INIT has no mailbox: of the commands of IP, those to registers are sent in
+/// INIT before the mailbox is set up, the others as soon as PREOP is reached.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Transition {
     /// INIT to PREOP.
@@ -30,7 +30,7 @@ pub enum Transition {
 }
 
 impl Transition {
-    /// State before and behind it.
+    /// State before and after it.
     pub const fn states(self) -> (AlState, AlState) {
         match self {
             Transition::Ip => (AlState::Init, AlState::PreOp),
@@ -54,11 +54,11 @@ impl fmt::Display for Transition {
 pub struct SdoDownload {
     /// Index of the object.
     pub index: u16,
-    /// Subindex; with complete access 0 or 1, where to start.
+    /// Subindex; with complete access the start, 0 or 1.
     pub sub_index: u8,
-    /// All entries at once.
+    /// Complete access.
     pub complete_access: bool,
-    /// What to write, little-endian.
+    /// Data to write, little-endian.
     pub data: Vec<u8>,
 }
 
@@ -67,35 +67,35 @@ pub struct SdoDownload {
 pub struct SdoUpload {
     /// Index of the object.
     pub index: u16,
-    /// Subindex; with complete access 0 or 1, where to start.
+    /// Subindex; with complete access the start, 0 or 1.
     pub sub_index: u8,
-    /// All entries at once.
+    /// Complete access.
     pub complete_access: bool,
-    /// What must come, little-endian, or the configuration fails; with `None` what comes is told by an event.
+    /// Required value, little-endian; another value fails the configuration. With `None` an event reports the value.
     pub expected: Option<Vec<u8>>,
 }
 
-/// A write of the value of an IDN.
+/// A write of an IDN's value.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct IdnWrite {
     /// Drive of the SubDevice, 0..=7.
     pub drive: u8,
     /// The IDN.
     pub idn: Idn,
-    /// What to write, little-endian; lists with their two lengths in front.
+    /// Data to write, little-endian; lists start with their two lengths.
     pub data: Vec<u8>,
 }
 
-/// What a start-up command does.
+/// Action of a start-up command.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum StartupAction {
-    /// CoE.
+    /// SDO download.
     Sdo(SdoDownload),
-    /// CoE, the other way.
+    /// SDO upload.
     Upload(SdoUpload),
-    /// SoE.
+    /// SoE write.
     Idn(IdnWrite),
-    /// EoE: the addresses behind it.
+    /// EoE: sets the IP parameters.
     Ip(IpSettings),
     /// A register of its controller.
     Register(RegisterCommand),
@@ -104,18 +104,18 @@ pub enum StartupAction {
 /// A start-up command.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct StartupCommand {
-    /// When.
+    /// The transition.
     pub transition: Transition,
-    /// What.
+    /// The action.
     pub action: StartupAction,
-    /// So long one message of a mailbox command may take; `None`: as long as the SubDevice's time limits say.
+    /// Time limit of one message of a mailbox command; `None`: that of the SubDevice's time limits.
     pub limit: Option<Duration>,
-    /// What it is for, in the words of whoever wrote it, for messages.
+    /// Purpose as its author wrote it, for messages.
     pub comment: Option<String>,
 }
 
 impl StartupCommand {
-    /// A command with the usual time limit and without a comment.
+    /// A command with the default time limit and without a comment.
     pub const fn new(transition: Transition, action: StartupAction) -> StartupCommand {
         StartupCommand { transition, action, limit: None, comment: None }
     }

@@ -1,4 +1,4 @@
-//! SYNC signals as an operation mode in the SII wants them (protocol 4.6, 7.3).
+//! SYNC signals of an operation mode in the SII (protocol 4.6, 7.3).
 
 use core::fmt;
 use core::time::Duration;
@@ -7,28 +7,28 @@ use ringcat_wire::sii::DcMode;
 
 use super::SyncSignals;
 
-/// Bits of the activation register 0x0981: the unit works, SYNC0, SYNC1.
+/// Bits of the activation register 0x0981: unit enabled, SYNC0, SYNC1.
 const UNIT: u16 = 0x0100;
 const SYNC0: u16 = 0x0200;
 const SYNC1: u16 = 0x0400;
 
-/// Why no SYNC signals follow from an operation mode.
+/// Why an operation mode gives no SYNC signals.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 #[non_exhaustive]
 pub enum ModeError {
-    /// It activates none.
+    /// It activates no signal.
     NoSignals {
         /// Its AssignActivate word.
         assign_activate: u16,
     },
-    /// The cycle of SYNC0 is no whole number of nanoseconds, or none of 32 bits.
+    /// The cycle of SYNC0 is not a whole number of nanoseconds, or does not fit 32 bits.
     Sync0Cycle {
-        /// Cycles of the MainDevice for one of SYNC0; negative: cycles of SYNC0 in one of the MainDevice.
+        /// Cycles of the MainDevice per cycle of SYNC0; negative: cycles of SYNC0 per cycle of the MainDevice.
         factor: i16,
     },
-    /// SYNC1 would come more often than SYNC0, which controllers cannot do, or less often than 32 bits can say.
+    /// SYNC1 would be faster than SYNC0, which controllers cannot do, or its cycle does not fit 32 bits.
     Sync1Cycle {
-        /// Cycles of SYNC0 for one of SYNC1.
+        /// Cycles of SYNC0 per cycle of SYNC1.
         factor: i16,
     },
 }
@@ -58,11 +58,10 @@ impl SyncSignals {
     /// The signals of an operation mode of the SII, for a MainDevice with this cycle.
     ///
     /// The cycle of SYNC0 is that of the mode, or the MainDevice's times the factor; a negative factor divides, 0
-    /// counts as
-    /// 1. That of SYNC1 is that of SYNC0 times its factor. Shifts are signed.
+    /// counts as 1. The cycle of SYNC1 is that of SYNC0 times its factor. Shifts are signed.
     ///
     /// # Errors
-    /// A mode without signals, or with cycles that do not exist.
+    /// A mode without signals, or with impossible cycles.
     pub fn from_mode(mode: &DcMode, cycle: Duration) -> Result<SyncSignals, ModeError> {
         if !SyncSignals::are_in(mode) {
             return Err(ModeError::NoSignals { assign_activate: mode.assign_activate });

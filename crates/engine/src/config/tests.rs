@@ -26,7 +26,7 @@ fn found(config: usize, info: usize) -> Resolution {
     Resolution::Found { config, info }
 }
 
-/// Not at its position, among so many.
+/// The error for a position beyond the segment, with the number of SubDevices.
 fn absent(config: usize, position: u16, present: usize) -> Resolution {
     let error = ConfigError::Missing { address: ConfigAddress::Position(position), present };
     Resolution::Absent { config, error }

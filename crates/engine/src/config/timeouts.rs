@@ -15,13 +15,13 @@ pub struct Timeouts {
     pub back_to_init: Duration,
     /// OP to SAFEOP, OP or SAFEOP to PREOP.
     pub back_to_safeop: Duration,
-    /// Until a mailbox takes a request.
+    /// Until a mailbox accepts a request.
     pub mailbox_request: Duration,
-    /// Until the answer to an SDO request is there.
+    /// Until the response to an SDO request is available.
     pub sdo: Duration,
-    /// Until the answer to a SoE request is there.
+    /// Until the response to a SoE request is available.
     pub soe: Duration,
-    /// Until the answer to an EoE request is there.
+    /// Until the response to an EoE request is available.
     pub eoe: Duration,
 }
 
@@ -52,12 +52,12 @@ impl Timeouts {
     }
 }
 
-/// The limit of one state change, where it is not that of [`Timeouts`].
+/// The limit of one state change, where it differs from [`Timeouts`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct StateTimeout {
     /// State before.
     pub from: AlState,
-    /// State behind.
+    /// State after.
     pub to: AlState,
     /// Limit.
     pub limit: Duration,

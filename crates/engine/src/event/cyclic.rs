@@ -1,27 +1,27 @@
-//! Events of the exchange, which reach the acyclic half as words of a queue.
+//! Events of the exchange, which reach the acyclic half as words in a queue.
 
 use super::Event;
 use crate::domain::{DomainState, DomainStatus};
 use crate::queue::WORDS;
 
-/// Events of the exchange, which travel as words.
+/// Events of the exchange, which are packed into words.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum CyclicEvent {
-    /// The judgement of a domain changed.
+    /// The state of a domain changed.
     Domain {
         /// Number of the domain.
         domain: u16,
-        /// The new judgement.
+        /// The new state.
         status: DomainStatus,
     },
-    /// A domain was due while its frames were still out.
+    /// A domain was due while its previous frames were still on the wire.
     Skipped {
         /// Number of the domain.
         domain: u16,
     },
-    /// The differences of the clocks came into their window or left it.
+    /// The differences of the clocks entered or left the sync window.
     SyncWindow {
-        /// They are inside.
+        /// True: within the sync window.
         inside: bool,
         /// OR of all magnitudes in nanoseconds.
         spread_ns: u32,
@@ -58,7 +58,7 @@ impl CyclicEvent {
         }
     }
 
-    /// Back from words; `None` for words that [`CyclicEvent::pack`] does not make.
+    /// Unpacks words; `None` for words that [`CyclicEvent::pack`] does not make.
     pub const fn unpack(words: [u64; WORDS]) -> Option<CyclicEvent> {
         let domain = (words[0] >> 16) as u16;
         match words[0] & 0xFF {
@@ -87,7 +87,7 @@ impl CyclicEvent {
         }
     }
 
-    /// As an event for the application.
+    /// The event as the application receives it.
     pub fn event(self) -> Event {
         match self {
             CyclicEvent::Domain { domain, status } => Event::Domain { domain: domain.into(), status },

@@ -1,8 +1,8 @@
-//! The history of what happened to SubDevices and cables: what object 0x10F3 of the MainDevice holds (protocol 6.3,
+//! Diagnosis history: events of SubDevices and cables, the content of object 0x10F3 of the MainDevice (protocol 6.3,
 //! 10.2).
 //!
-//! In go the events of the acyclic half, out come messages in places that are used in turns, oldest first. Like that of
-//! a SubDevice it is bounded, and says when something was lost.
+//! Input: the events of the acyclic half. Output: messages in slots that are used in turn, oldest first. Like the
+//! history of a SubDevice it is bounded, and shows when messages were lost.
 
 use alloc::vec::Vec;
 
@@ -12,9 +12,9 @@ use ringcat_wire::mailbox::sdo::AbortCode;
 use super::Event;
 use crate::time::Instant;
 
-/// Messages that are kept: an incident tells a handful.
+/// Number of messages kept: one incident causes about five.
 pub const MESSAGES: u8 = 50;
-/// What may be set of the flags. The MainDevice sends no emergencies.
+/// Flags that may be set. The MainDevice sends no emergencies.
 const SETTINGS: u16 = DiagnosisFlags::NO_INFORMATION
     | DiagnosisFlags::NO_WARNINGS
     | DiagnosisFlags::NO_ERRORS
@@ -23,20 +23,20 @@ const SETTINGS: u16 = DiagnosisFlags::NO_INFORMATION
 /// One message.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Incident {
-    /// When.
+    /// Time.
     pub at: Instant,
-    /// How grave.
+    /// Severity.
     pub kind: DiagnosisKind,
-    /// Number of what happened (docs/mailbox-gateway.md).
+    /// Number of the text (docs/mailbox-gateway.md).
     pub number: u16,
-    /// Index in the declaration of the SubDevice that it happened to.
+    /// Index in the declaration of the SubDevice concerned.
     pub subdevice: Option<usize>,
-    /// A code that belongs to it; 0 where there is none.
+    /// Additional code; 0 where there is none.
     pub detail: u32,
 }
 
 impl Incident {
-    /// What is kept of an event; `None` for one that is not.
+    /// The message for an event; `None` for an event that is not kept.
     fn new(at: Instant, event: &Event) -> Option<Incident> {
         use DiagnosisKind::{Error, Information, Warning};
         let (number, kind, subdevice, detail) = match *event {
@@ -65,22 +65,22 @@ impl Incident {
     }
 }
 
-/// The messages, where the next one goes, and what was acknowledged.
+/// The messages, the next slot, and the acknowledgement.
 #[derive(Clone, Debug, Default)]
 pub struct History {
-    /// By place; grows up to [`MESSAGES`].
+    /// By slot; grows up to [`MESSAGES`].
     incidents: Vec<Incident>,
-    /// Place of the newest.
+    /// Slot of the newest message.
     newest: Option<u8>,
     /// Subindex that was acknowledged last; 0 for none.
     acknowledged: u8,
-    /// The newest ones that were not acknowledged.
+    /// Number of the newest messages that were not acknowledged.
     unacknowledged: u8,
     flags: u16,
 }
 
 impl History {
-    /// Takes in an event, if it is one that is kept.
+    /// Takes in an event, if it is kept.
     pub(super) fn note(&mut self, at: Instant, event: &Event) {
         if let Some(incident) = Incident::new(at, event) {
             self.keep(incident);
@@ -108,7 +108,7 @@ impl History {
             None => self.incidents.push(incident),
         }
         if self.acknowledged == place + DiagnosisHistory::FIRST_MESSAGE {
-            // That message is there no more.
+            // That message has been overwritten.
             self.acknowledged = 0;
         }
         self.newest = Some(place);
@@ -126,7 +126,7 @@ impl History {
         self.newest.map_or(0, |place| place + DiagnosisHistory::FIRST_MESSAGE)
     }
 
-    /// Subindex of the message that was acknowledged last; 0 where none was, or it is there no more.
+    /// Subindex of the message that was acknowledged last; 0 where there is none, or where it has been overwritten.
     pub fn acknowledged(&self) -> u8 {
         self.acknowledged
     }
@@ -136,12 +136,12 @@ impl History {
         self.unacknowledged > 0
     }
 
-    /// Settings, and whether something was lost.
+    /// Settings, and whether messages were lost.
     pub fn flags(&self) -> DiagnosisFlags {
         DiagnosisFlags(self.flags)
     }
 
-    /// Acknowledges the message at a subindex and those before it; 0 forgets all.
+    /// Acknowledges the message at a subindex and the earlier ones; 0 deletes all.
     pub fn acknowledge(&mut self, sub_index: u8) -> Result<(), AbortCode> {
         if sub_index == 0 {
             *self = History { flags: self.flags & SETTINGS, ..History::default() };
@@ -150,7 +150,7 @@ impl History {
         let place = sub_index.checked_sub(DiagnosisHistory::FIRST_MESSAGE).ok_or(AbortCode::VALUE_TOO_LOW)?;
         let newest = self.newest.filter(|_| usize::from(place) < self.incidents.len());
         let newest = newest.ok_or(AbortCode::VALUE_TOO_HIGH)?;
-        // The ring goes on behind its end.
+        // The slots wrap around.
         let behind = (newest + MESSAGES - place) % MESSAGES;
         self.unacknowledged = self.unacknowledged.min(behind);
         self.acknowledged = sub_index;
@@ -158,7 +158,7 @@ impl History {
         Ok(())
     }
 
-    /// Sets what may be set.
+    /// Sets the flags that may be set.
     pub fn set_flags(&mut self, flags: u16) -> Result<(), AbortCode> {
         if flags & !(SETTINGS | DiagnosisFlags::LOST) != 0 {
             return Err(AbortCode::VALUE_RANGE);

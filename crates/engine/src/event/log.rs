@@ -1,4 +1,4 @@
-//! The events of one half until somebody fetches them: bounded, the oldest are dropped and counted.
+//! The events of one half until the application fetches them: bounded; the oldest are dropped and counted.
 
 use alloc::collections::VecDeque;
 use alloc::vec::Vec;
@@ -7,7 +7,7 @@ use super::history::History;
 use super::{Event, Occupant, TimedEvent};
 use crate::time::Instant;
 
-/// Frames of other MainDevices among them: a collision must be seen, not archived.
+/// Frames of other MainDevices among them: enough to notice a collision, not to archive it.
 const FOREIGN_KEPT: usize = 8;
 /// Events kept until the application fetches them; beyond, the oldest is dropped and counted.
 const KEPT: usize = 4096;
@@ -23,23 +23,23 @@ pub struct EventLog {
 }
 
 impl EventLog {
-    /// From now on these are at the positions of the cabling, in its order.
+    /// Sets the SubDevices at the cabling positions, in their order.
     pub fn set_occupants(&mut self, occupants: Vec<Occupant>) {
         self.occupants = occupants;
     }
 
-    /// Who is at positions of the cabling.
+    /// The SubDevices at cabling positions.
     pub fn occupants(&self, positions: [Option<usize>; 2]) -> [Option<Occupant>; 2] {
         positions.map(|position| self.occupants.get(position?).copied())
     }
 
-    /// Appends an event, with those who are at the positions of the cabling that it names.
+    /// Appends an event, with the SubDevices at the cabling positions that it names.
     pub fn push(&mut self, at: Instant, event: Event) {
         let whom = self.occupants(event.positions());
         self.push_of(at, event, whom);
     }
 
-    /// Appends an event about somebody.
+    /// Appends an event with given SubDevices.
     pub fn push_of(&mut self, at: Instant, event: Event, whom: [Option<Occupant>; 2]) {
         self.history.note(at, &event);
         if matches!(event, Event::ForeignFrame { .. }) {
@@ -56,12 +56,12 @@ impl EventLog {
         self.events.push_back(TimedEvent { at, event, whom });
     }
 
-    /// What is remembered of them, whoever takes them.
+    /// The diagnosis history, which keeps its messages independently of the events fetched.
     pub fn history(&mut self) -> &mut History {
         &mut self.history
     }
 
-    /// Takes the oldest.
+    /// Takes the oldest event.
     pub fn pop(&mut self) -> Option<TimedEvent> {
         let event = self.events.pop_front()?;
         if matches!(event.event, Event::ForeignFrame { .. }) {
@@ -70,7 +70,7 @@ impl EventLog {
         Some(event)
     }
 
-    /// Events that were dropped because nobody fetched them.
+    /// Number of events that were dropped because the application did not fetch them.
     pub fn dropped(&self) -> u64 {
         self.dropped
     }

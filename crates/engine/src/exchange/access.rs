@@ -1,4 +1,4 @@
-//! What applications read and set between the steps of a cycle.
+//! Values that applications read and set between the steps of a cycle.
 
 use core::time::Duration;
 
@@ -16,31 +16,31 @@ impl Exchange {
         self.domains.len()
     }
 
-    /// A domain's image: its SubDevices' outputs and inputs. Its address does not change.
+    /// Image of a domain: outputs and inputs of its SubDevices. Its address does not change.
     pub fn image(&self, id: DomainId) -> &[u8] {
         self.domains.get(id.0).map_or(&[], Domain::image)
     }
 
-    /// A domain's image, to write outputs. What is written into inputs is overwritten by the next delivery.
+    /// Image of a domain, to write outputs. Writes to inputs are overwritten by the next delivery.
     pub fn image_mut(&mut self, id: DomainId) -> &mut [u8] {
         self.domains.get_mut(id.0).map_or(&mut [], Domain::image_mut)
     }
 
-    /// The last judgement of a domain.
+    /// The last state of a domain.
     pub fn status(&self, id: DomainId) -> DomainStatus {
         let Some(domain) = self.domains.get(id.0) else { return DomainStatus::default() };
         let pending = domain.oldest().is_some_and(|set| self.frames[set].iter().any(CyclicFrame::is_waiting));
         domain.status(pending)
     }
 
-    /// How old a SubDevice's inputs in a domain are.
+    /// Age of a SubDevice's inputs in a domain.
     pub fn freshness(&self, id: DomainId, subdevice: usize) -> Freshness {
         let Some(domain) = self.domains.get(id.0) else { return Freshness::Never };
         domain.freshness(subdevice)
     }
 
-    /// The AL status (register 0x0130, lower byte) that a SubDevice showed in the cycle of its domain that was judged
-    /// last; zero where it did not answer. `None` before the first, and where its frames show it nowhere
+    /// The AL status (register 0x0130, lower byte) that a SubDevice showed in the last judged cycle of its domain; zero
+    /// where it did not answer. `None` before the first cycle, and where its frames do not show it
     /// ([`crate::layout::Witness`]).
     pub fn al_status(&self, subdevice: usize) -> Option<u8> {
         let judged = |frame: &&CyclicFrame| {
@@ -52,24 +52,24 @@ impl Exchange {
         newest.map(|(_, status)| status)
     }
 
-    /// Sets the inputs that are copied to outputs in every cycle, in place of those that were before: when a domain is
-    /// queued, behind everything that the application wrote. Not for the cyclic path: this allocates.
+    /// Sets the inputs that are copied to outputs in every cycle, replacing the previous table. The copies are made
+    /// when a domain is queued, after all writes of the application. Not for the cyclic path: this allocates.
     ///
     /// # Errors
-    /// Sources that are no inputs, targets that are no outputs or have two sources, different lengths; nothing is
-    /// changed then.
+    /// Sources that are not inputs, targets that are not outputs or have two sources, different lengths; the table
+    /// stays unchanged then.
     pub fn set_copies(&mut self, rules: &[CopyRule]) -> Result<(), CopyError> {
         self.copies = Copies::new(rules, &self.domains, &self.frames)?;
         Ok(())
     }
 
-    /// Whether a copy, by its place in the table, was refused the last time because its source was stale.
+    /// Whether a copy, by its index in the table, was refused the last time because its source was stale.
     pub fn is_copy_stale(&self, rule: usize) -> bool {
         self.copies.is_stale(rule)
     }
 
-    /// Overrides how long a domain's frames are waited for; the default is as many periods as cycles may be under way,
-    /// less a quarter of a period.
+    /// Sets the deadline of a domain's frames; the default is one period per cycle that may be on the wire, less a
+    /// quarter of a period.
     pub fn set_timeout(&mut self, id: DomainId, timeout: Duration) {
         if let Some(domain) = self.domains.get_mut(id.0) {
             domain.set_timeout(timeout);
@@ -86,31 +86,31 @@ impl Exchange {
         entry.write(self.image_mut(entry.domain), value);
     }
 
-    /// Whether a domain has all its cycles under way, so that it would be skipped now.
+    /// Whether all cycles of a domain are on the wire, so that it would be skipped now.
     pub fn is_full(&self) -> bool {
         self.domains.iter().any(|domain| domain.is_full(&self.frames))
     }
 
-    /// When the frame left of which a copy was taken last.
+    /// When the frame left of which the last copy was taken.
     pub fn taken_left_at(&self) -> Instant {
         let Some(frame) = self.frames.get(usize::from(self.taken)) else { return Instant::NEVER };
         let timeout_ns = self.domains.get(frame.domain()).map_or(0, Domain::timeout_ns);
         Instant(frame.deadline().0.saturating_sub(timeout_ns))
     }
 
-    /// Whether frames are out that have not returned as expected. Those that are overdue count until they are given up.
+    /// Whether frames are on the wire that have not returned as expected. Overdue frames count until they are given up.
     pub fn in_flight(&self) -> bool {
         self.frames.iter().any(CyclicFrame::is_waiting)
     }
 
-    /// Whether copies of frames are out that may still come: also second ones, of frames whose inputs are delivered.
+    /// Whether copies of frames may still come back, including second copies of frames whose inputs are delivered.
     pub fn awaits_copies(&self) -> bool {
         self.frames.iter().any(|frame| frame.is_waiting() || frame.is_delivered())
     }
 
     /// Cycles that begin earlier than this disturb a measurement of propagation delays that found no time without
-    /// frames on the wire; long ago where nothing of the kind is asked for. It may be taken back at any time.
-    /// Applications that send all the time in a loop of their own look at this before they send.
+    /// frames on the wire; in the distant past without such a request. The request may be withdrawn at any time.
+    /// Applications that send continuously in their own loop check this before they send.
     pub fn pause_until(&self) -> Instant {
         self.board.traffic.pause_until()
     }
@@ -120,13 +120,13 @@ impl Exchange {
         self.evidence.monitor.state()
     }
 
-    /// Says what the application chose about distributed clocks.
+    /// Sets the application's choices about distributed clocks.
     pub fn set_up_clocks(&mut self, setup: ClockSetup) {
         self.evidence.clocks.set_up(setup);
     }
 
-    /// The application's time now, in nanoseconds of system time: what bus shift leads the reference clock to. Without
-    /// it, host time plus the epoch of the configuration counts.
+    /// Sets the application's time now, in nanoseconds of system time: bus shift leads the reference clock to it.
+    /// Without it, host time plus the epoch of the configuration is used.
     pub fn set_application_time(&mut self, time: u64, now: Instant) {
         self.evidence.clocks.set_application_time(time, now);
     }
@@ -136,7 +136,7 @@ impl Exchange {
         self.evidence.clocks.application_time(now)
     }
 
-    /// The next frame steers the reference clock towards this time, once. What follows it follows.
+    /// The next frame sets the reference clock towards this time, once. The other clocks follow.
     pub fn sync_reference_to(&mut self, time: u64) {
         self.evidence.clocks.want_reference_at(time);
     }

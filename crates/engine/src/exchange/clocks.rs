@@ -1,10 +1,11 @@
 //! Distributed clocks in the cyclic frames (protocol 7.2, 7.4, 7.5).
 //!
-//! Three datagrams ride in one frame: an FRMW of 0x0910 that hands the reference's time to all others, an FPWR of
-//! 0x0910 that steers a clock (the reference towards the host, on the other copy a second one towards the first), a BRD
-//! of 0x092C. What the supervisor posts on the board says whose time each copy distributes. The FRMW leaves with the
-//! predicted time of the reference: whoever the frame meets before the reference, or without one, takes what was sent.
-//! When ports have changed, or a ring has closed, nothing is handed out until the supervisor knows what delays are now.
+//! Three datagrams travel in one frame: an FRMW of 0x0910 that distributes the reference's time, an FPWR of 0x0910 that
+//! steers a clock (the reference towards the host, on the other copy a second reference towards the first), and a BRD
+//! of 0x092C. The supervisor posts on the board which reference each copy distributes. The FRMW leaves with the
+//! predicted time of the reference: SubDevices that process it before the reference, or without one, take this
+//! prediction. When ports have changed, or a ring has closed, no time is distributed until the supervisor knows the new
+//! delays.
 
 use ringcat_wire::address::{RegisterAddress, StationAddress, Wkc};
 use ringcat_wire::datagram::HEADER_LEN;
@@ -27,18 +28,18 @@ pub(crate) const CLOCK_DATA: usize = 4;
 /// Event requests in the header of a datagram.
 const IRQ_AT: usize = HEADER_LEN - 2;
 
-/// What the application chose.
+/// Choices of the application.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct ClockSetup {
     /// System time when host time is zero.
     pub epoch: u64,
     /// The reference follows the host.
     pub bus_shift: bool,
-    /// The OR of all differences beyond which the clocks are out of their window.
+    /// Limit for the OR of all differences beyond which the clocks are out of the sync window.
     pub sync_window_ns: u32,
 }
 
-/// The reference clock was read.
+/// A reading of the reference clock.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct ReferenceTime {
     /// System time when the frame passed the reference clock, in nanoseconds.
@@ -48,13 +49,14 @@ pub struct ReferenceTime {
 }
 
 impl ReferenceTime {
-    /// What the reference clock shows when a frame sent at `now` passes it, as long as both clocks run alike.
+    /// Predicted time of the reference clock when a frame sent at `now` passes it, provided both clocks run at the same
+    /// rate.
     pub const fn at(self, now: Instant) -> u64 {
         self.time.wrapping_add(now.0.wrapping_sub(self.sent_at.0))
     }
 }
 
-/// Where the datagrams are in a frame: offsets of their headers.
+/// Offsets of the datagrams' headers in the frame.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Places {
     pub sync_at: usize,
@@ -62,35 +64,35 @@ pub(crate) struct Places {
     pub spread_at: usize,
 }
 
-/// What a copy carries.
+/// Content of the datagrams in a copy.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Payload {
     sync: Option<(StationAddress, u32)>,
     steer: Option<(StationAddress, u32)>,
 }
 
-/// What the copies of a flight brought back.
+/// Result of the datagrams in the copies of a flight.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Seen {
     pub sent_at: Instant,
-    /// Which references it distributed, by how often they had been posted.
+    /// References that it distributed, by number of posts.
     pub references: u32,
-    /// Low half of the distributed time and working counter, by the link the copy was sent on.
+    /// Low half of the distributed time and working counter, by the link on which the copy was sent.
     sync: [(u32, Wkc); 2],
     spread: u32,
     spread_wkc: u16,
-    /// What SubDevices ask for, as far as they are let (protocol 3.5).
+    /// Events that SubDevices request, under their mask (protocol 3.5).
     events: u16,
 }
 
 impl Places {
-    /// Writes what a copy is to carry.
+    /// Writes the content of a copy.
     pub(crate) fn write(&self, bytes: &mut [u8], payload: &Payload) {
         write(bytes, self.sync_at, payload.sync);
         write(bytes, self.steer_at, payload.steer);
     }
 
-    /// Takes in a copy.
+    /// Takes the result of a copy.
     pub(crate) fn read(&self, seen: &mut Seen, sent_on: Link, bytes: &[u8]) {
         let (time, wkc) = data_at(bytes, self.sync_at);
         seen.sync[sent_on.index()] = (time, Wkc(wkc));
@@ -103,8 +105,8 @@ impl Places {
     }
 }
 
-/// Address and data of a datagram. One that is not wanted addresses nobody, at a register that takes nothing: the
-/// command of both copies stays the same.
+/// Address and data of a datagram. An unused one addresses no SubDevice, at a register without effect: the command of
+/// both copies stays the same.
 fn write(bytes: &mut [u8], at: usize, content: Option<(StationAddress, u32)>) {
     let (station, register, data) = match content {
         Some((station, data)) => (station, map::DC_SYSTEM_TIME, data),
@@ -124,26 +126,26 @@ fn data_at(bytes: &[u8], at: usize) -> (u32, u16) {
     }
 }
 
-/// The clocks as the exchange sees them.
+/// State of the clocks as the exchange sees it.
 #[derive(Debug, Default)]
 pub(crate) struct Clocks {
     setup: ClockSetup,
     references: References,
     changes: u32,
-    /// The last frame said that ports have changed.
+    /// The last frame reported a change of ports.
     ports_changed: bool,
     /// The reference on each copy.
     times: [Option<ReferenceTime>; 2],
-    /// What the last one showed, for the time without any.
+    /// Last reading, used while there is no reference.
     last: Option<ReferenceTime>,
-    /// How the steered reference differs from the other one.
+    /// Difference between the steered reference and the other one.
     lead: Option<Lead>,
-    /// How the segment's reference differs from the time that it is led to, and what that was last.
+    /// Difference between the segment's reference and the time that it is led to, and its last value.
     behind: Option<Lead>,
     led: Option<ReferenceTime>,
-    /// The application's time, and when it said so.
+    /// The application's time, and when it was set.
     application: Option<ReferenceTime>,
-    /// The reference is to have this time when the next frame passes it.
+    /// Time that the reference is to have when the next frame passes it.
     wanted: Option<u64>,
     spread_ns: Option<u32>,
     window: SyncWindow,
@@ -154,7 +156,7 @@ impl Clocks {
         self.setup = setup;
     }
 
-    /// The application's time now, from which the references are predicted and to which bus shift leads.
+    /// The application's time now: base of the predictions and target of bus shift.
     pub(crate) fn set_application_time(&mut self, time: u64, now: Instant) {
         self.application = Some(ReferenceTime { time, sent_at: now });
     }
@@ -176,14 +178,14 @@ impl Clocks {
         self.spread_ns
     }
 
-    /// What the reference on a copy will show when a frame sent now passes it.
+    /// Predicted reading of the reference on a copy when a frame sent now passes it.
     fn predicted(&self, link: Link, now: Instant) -> u64 {
         let [main, redundant] = self.times;
         let (own, other) = if link == Link::Main { (main, redundant) } else { (redundant, main) };
         own.or(other).or(self.last).map_or_else(|| self.application_time(now), |time| time.at(now))
     }
 
-    /// What the copies of a frame that leaves now carry.
+    /// Content of the copies of a frame that leaves now.
     pub(crate) fn depart(&mut self, board: &Board, now: Instant) -> [Payload; 2] {
         let (references, changes) = board.clocks.references();
         if changes != self.changes {
@@ -201,7 +203,7 @@ impl Clocks {
         payloads
     }
 
-    /// Other references were posted.
+    /// Takes over newly posted references.
     #[cold]
     fn follow(&mut self, references: References, changes: u32, now: Instant) {
         self.last = self.reference_time().or(self.last);
@@ -220,8 +222,8 @@ impl Clocks {
         (self.references, self.changes) = (references, changes);
     }
 
-    /// Who is told another time than its own, and which, by the link of the copy: in an open ring each copy meets its
-    /// own reference, and the one that leads may follow the host while the other one follows it.
+    /// The references that receive another time than their own, and that time, by the link of the copy. In an open ring
+    /// each copy passes a reference of its own; the leading one may follow the host while the other one follows it.
     fn steering(&mut self, board: &Board, now: Instant) -> [Option<(StationAddress, u32)>; 2] {
         let (leader, steered) = self.references.leader();
         let to_host = self.leading(leader, board, now);
@@ -232,8 +234,8 @@ impl Clocks {
         }
     }
 
-    /// What the segment's reference is told: the time of the host or of the application, and once it is known by how
-    /// much it differs from that, what it shows itself, less a part of that.
+    /// Time written to the segment's reference: that of the host or of the application. Once the difference to that is
+    /// known, its own reading corrected by a part of the difference.
     fn leading(&mut self, leader: Option<Link>, board: &Board, now: Instant) -> Option<(StationAddress, u32)> {
         let leader = leader?;
         let station = self.references.on(leader)?;
@@ -252,28 +254,28 @@ impl Clocks {
         Some((station, told as u32))
     }
 
-    /// What a second reference is told, so that it follows the first one.
+    /// Time written to a second reference, so that it follows the first one.
     fn following(&self, steered: Link, now: Instant) -> Option<(StationAddress, u32)> {
         let own = self.times[steered.index()]?;
         let too_much = self.lead?.steering_ns()?;
         Some((self.references.on(steered)?, own.at(now).wrapping_sub(too_much as u64) as u32))
     }
 
-    /// Which references frames that leave now distribute, by how often they were posted.
+    /// References that frames leaving now distribute, by number of posts.
     pub(crate) fn changes(&self) -> u32 {
         self.changes
     }
 
-    /// A flight is over.
+    /// Evaluates the end of a flight.
     pub(crate) fn observe(&mut self, seen: &Seen, arrivals: Arrivals, board: &Board, events: &mut Producer) {
         let mut is_closed = false;
-        // One that left before others were posted has read clocks that are references no more.
+        // A flight that left before the latest post read clocks that are references no more.
         if seen.references == self.changes {
             let steered = self.observe_references(seen, board.clocks.is_window_watched());
             is_closed = steered && arrivals.verdict() == Some(RingState::Closed);
         }
         let ports_changed = EcatEvent::from_bits(seen.events).dl_status;
-        // With a ring that is closed again, and with other cables in use, delays are not what they were.
+        // A ring that has closed, or a change of cables, changes the delays.
         let mut is_held = board.clocks.is_held();
         let is_told = is_held || board.clocks.references().1 != self.changes;
         if (is_closed && !is_told) || (ports_changed && !self.ports_changed && board.clocks.are_ports_guarded()) {
@@ -282,16 +284,16 @@ impl Clocks {
         }
         self.ports_changed = ports_changed;
         if seen.spread_wkc > 0 {
-            // While nobody is told a time, differences are those of a frame that came another way. A reference that is
-            // steered, and clocks in front of one, show how punctual the host is; there the supervisor looks at each of
-            // the others.
+            // While no time is distributed, differences are those of a frame that took another way. A steered reference
+            // and the clocks in front of a reference show the jitter of the host; the supervisor checks each of the
+            // other clocks then.
             let is_steered = self.references.leader().1.is_some() || board.clocks.is_host_told();
             let is_meant = !is_held && !is_steered;
             self.judge_spread(seen.spread, is_meant, board, events);
         }
     }
 
-    /// What the references showed; whether one of them is steered towards the other.
+    /// Evaluates the readings of the references; whether one of them is steered towards the other.
     fn observe_references(&mut self, seen: &Seen, together: bool) -> bool {
         let (leader, steered) = self.references.leader();
         let mut fresh = 0;
@@ -312,14 +314,14 @@ impl Clocks {
             let leader = if steered == Link::Main { Link::Redundant } else { Link::Main };
             let time = |link: Link| self.times[link.index()].map_or(0, |time| time.time);
             let difference = time(steered).wrapping_sub(time(leader)) as i64;
-            // Clocks that were all locked have followed one until now.
+            // Clocks that were all locked have followed one clock until now.
             let begin = Lead::begin(difference, together, seen.sent_at);
             self.lead = Some(self.lead.map_or(begin, |lead| lead.go_on(difference, seen.sent_at)));
         }
         true
     }
 
-    /// The segment's reference showed this time to a frame.
+    /// Takes the time that the segment's reference showed to a frame.
     fn observe_led(&mut self, time: u64, sent_at: Instant) {
         let wanted = match self.led {
             Some(led) if led.sent_at == sent_at => led.time,

@@ -1,8 +1,8 @@
-//! Copies from inputs of one SubDevice to outputs of another, within a cycle (Master Redundancy 10.8): what came in
-//! with this cycle's frames leaves with its next ones, whatever the application does. Devices of functional safety talk
-//! this way.
+//! Copies inputs of one SubDevice to outputs of another within a cycle (Master Redundancy 10.8): inputs received with
+//! this cycle's frames leave with its next ones, independently of the application. Devices of functional safety
+//! communicate this way.
 //!
-//! A copy is refused where its source is stale: the outputs keep what was copied last, or become zero. The table is
+//! A copy is refused where its source is stale: the outputs keep the last copied value, or become zero. The table is
 //! checked and split into words when it is set; afterwards a copy is bounded work without allocation.
 
 use alloc::boxed::Box;
@@ -15,10 +15,10 @@ use super::entry::Entry;
 use super::flight::CyclicFrame;
 use super::image::InputNumber;
 
-/// What outputs show while their source is stale.
+/// Value of the outputs while their source is stale.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum WhenStale {
-    /// What was copied last; zero before the first copy.
+    /// The last copied value; zero before the first copy.
     #[default]
     Hold,
     /// Zero.
@@ -32,14 +32,14 @@ pub struct CopyRule {
     pub source: Entry,
     /// The outputs, of as many bits, in the same or another domain.
     pub target: Entry,
-    /// What the outputs show while the source is stale.
+    /// Value of the outputs while the source is stale.
     pub when_stale: WhenStale,
-    /// The source is stale when it is older than this many cycles: 0 is what came in for this cycle.
+    /// The source is stale when it is older than this many cycles; 0 means inputs received for this cycle.
     pub max_age: u64,
 }
 
 impl CopyRule {
-    /// A copy that is refused where its source did not come in for this cycle; the outputs hold their value then.
+    /// A copy that is refused where its source was not received for this cycle; the outputs hold their value then.
     pub const fn new(source: Entry, target: Entry) -> CopyRule {
         CopyRule { source, target, when_stale: WhenStale::Hold, max_age: 0 }
     }
@@ -92,14 +92,14 @@ impl fmt::Display for CopyError {
 
 impl core::error::Error for CopyError {}
 
-/// Inputs of one SubDevice, and where it is noted when they came.
+/// Inputs of one SubDevice, and the record of their arrival.
 #[derive(Debug)]
 struct Source {
     domain: usize,
     subdevice: usize,
     /// All its inputs.
     inputs: Box<[InputNumber]>,
-    /// Cycles since the oldest of these came, as of the copying that is under way.
+    /// Age in cycles of the oldest of these, as of the current copying.
     age: u64,
 }
 
@@ -182,12 +182,12 @@ impl Copies {
         self.pieces.is_empty()
     }
 
-    /// Whether the source of a rule was stale when it was last copied, or it never was.
+    /// Whether the source of a rule was stale at its last copy, or it was never copied.
     pub(super) fn is_stale(&self, rule: usize) -> bool {
         self.stale.get(rule).copied().unwrap_or(true)
     }
 
-    /// Copies everything whose target is in a domain. Returns how many words had a stale source.
+    /// Copies all rules with their target in a domain. Returns the number of words with a stale source.
     pub(super) fn run(&mut self, target: usize, domains: &mut [Domain], cycle: u64) -> u64 {
         let Some(range) = self.by_domain.get(target).cloned().filter(|range| !range.is_empty()) else { return 0 };
         for source in &mut self.sources {
@@ -221,19 +221,19 @@ impl Source {
 fn find(domain: usize, subdevice: usize, domains: &[Domain], frames: &[CyclicFrame]) -> Option<Source> {
     let of = domains.get(domain)?;
     let mut inputs: Vec<InputNumber> = of.frames().flat_map(|frame| frames[frame].inputs_of(subdevice)).collect();
-    // Each is there once per cycle that may be under way.
+    // Each is there once per cycle that may be on the wire.
     inputs.sort_unstable_by_key(|input| (input.datagram, input.part));
     inputs.dedup();
     Some(Source { domain, subdevice, inputs: inputs.into(), age: u64::MAX })
 }
 
-/// Bytes of an image that an entry touches.
+/// Bytes of an image that an entry covers.
 fn bytes(entry: &Entry) -> Range<usize> {
     let end = entry.bit_offset as usize + usize::from(entry.bit_length);
     entry.byte_offset()..end.div_ceil(8)
 }
 
-/// Whose inputs these are.
+/// The SubDevice with these inputs.
 fn of_inputs(entry: &Entry, domains: &[Domain], frames: &[CyclicFrame]) -> Option<usize> {
     let domain = domains.get(entry.domain.0)?;
     domain.frames().find_map(|frame| frames[frame].whose_inputs(bytes(entry)))

@@ -1,4 +1,4 @@
-//! What the cyclic half counts.
+//! Counters of the cyclic half.
 
 /// Counters of the cyclic half since activation. A frame is counted once, whatever number of copies it has.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -9,37 +9,37 @@ pub struct CyclicCounters {
     pub bytes: u64,
     /// Frames whose copies all came back.
     pub received: u64,
-    /// Frames of which no copy came back in time: late, damaged or missing ([`CyclicCounters::missing`]), each only
-    /// one.
+    /// Frames of which no copy came back in time: late, damaged or missing ([`CyclicCounters::missing`]), each counted
+    /// as one of these.
     pub lost: u64,
-    /// Of the lost ones, those of which a copy came afterwards.
+    /// Of the lost frames, those of which a copy came later.
     pub lost_late: u64,
-    /// Of the lost ones, those of which a damaged copy came.
+    /// Of the lost frames, those of which a damaged copy came.
     pub lost_damaged: u64,
-    /// Frames of which one copy of two came back in time, and not complete.
+    /// Frames of which one copy of two came back in time, and which were incomplete.
     pub half: u64,
-    /// Frames that were complete without their second copy, which did not come before the frame was to leave again.
+    /// Frames that were complete without their second copy, which did not come before the frame left again.
     pub copies_lost: u64,
-    /// Frames that came back behind a newer one of their domain: what it brought in was not overwritten.
+    /// Frames that came back after a newer one of their domain; the newer inputs were not overwritten.
     pub overtaken: u64,
     /// Copies that came too late or twice.
     pub late: u64,
-    /// Frames of ours that came back with other datagrams than were sent.
+    /// Frames of this MainDevice that came back with other datagrams than were sent.
     pub corrupt: u64,
     /// Frames of other MainDevices.
     pub foreign: u64,
     /// Frames that are not EtherCAT.
     pub other: u64,
-    /// Domains that were due while all their cycles were still under way.
+    /// Domains that were due while all their cycles were still on the wire.
     pub skipped: u64,
-    /// Judgements that were not complete, summed over domains.
+    /// Incomplete cycles, summed over domains.
     pub incomplete: u64,
     /// Words that were not copied from inputs to outputs because their source was stale.
     pub stale_copies: u64,
 }
 
 impl CyclicCounters {
-    /// Of the lost frames, those of which nothing has come.
+    /// Of the lost frames, those that never came back.
     pub const fn missing(&self) -> u64 {
         self.lost.saturating_sub(self.lost_late).saturating_sub(self.lost_damaged)
     }

@@ -1,8 +1,7 @@
-//! A domain: image, judgement of its working counters, freshness of its SubDevices, and which of its cycles are under
-//! way.
+//! A domain: image, state of its working counters, age of its SubDevices' inputs, and its cycles on the wire.
 //!
-//! Inputs of a SubDevice are fresh where it put them into frames of the cycle that was judged last, all of them; those
-//! of one that did not keep their last value.
+//! Inputs of a SubDevice are fresh where it put all of them into frames of the last judged cycle; otherwise they keep
+//! their last value.
 
 use alloc::boxed::Box;
 use alloc::vec::Vec;
@@ -14,7 +13,7 @@ use super::image::{Image, InputNumber};
 use crate::domain::{DomainState, DomainStatus, Freshness};
 use crate::layout::PlannedDomain;
 
-/// What is kept per SubDevice.
+/// Record of one SubDevice.
 #[derive(Debug)]
 struct Member {
     subdevice: usize,
@@ -22,13 +21,14 @@ struct Member {
     inputs: Box<[InputNumber]>,
 }
 
-/// Cycles that may stay silent behind the moment in which SubDevices begin to take part: those that are under way, and
-/// the first ones with process data of theirs.
+/// Cycles without an answer that are tolerated after SubDevices begin to take part: those on the wire at that time, and
+/// the first ones with their process data.
 const SILENT_CYCLES: u8 = 16;
 
 /// A domain of the exchange.
 ///
-/// Its frames lie in sets, one per cycle that may be under way, each with all frames of a cycle. They take turns.
+/// Its frames lie in sets, one per cycle that may be on the wire, each with all frames of a cycle. The sets are used in
+/// turn.
 #[derive(Debug)]
 pub struct Domain {
     image: Image,
@@ -36,33 +36,33 @@ pub struct Domain {
     frames: Range<usize>,
     /// Frames of a set.
     set: usize,
-    /// First frame of the oldest set that was queued and not judged.
+    /// First frame of the oldest set that was queued and not judged yet.
     oldest: usize,
     /// First frame of the set that was queued last.
     newest: usize,
-    /// Sets that were queued and not judged.
+    /// Number of sets that were queued and not judged yet.
     out: usize,
-    /// The newest set has not left since it was queued.
+    /// The newest set was queued and has not left yet.
     unsent: bool,
     timeout_ns: u64,
     members: Vec<Member>,
     status: DomainStatus,
     told: Told,
-    /// When, as a cycle plus one, the flight that was judged last had left.
+    /// Departure of the last judged flight, as a cycle plus one.
     judged: u64,
 }
 
-/// What was told of a domain's state.
+/// Last reported state of a domain.
 #[derive(Clone, Copy, Debug)]
 enum Told {
-    /// Nothing: no SubDevice has answered so far. So many cycles were judged since SubDevices take part.
+    /// None: no SubDevice has answered so far. Cycles judged since SubDevices take part.
     Nothing { silent: u8 },
-    /// At least one state.
+    /// At least one state was reported.
     Something,
 }
 
 impl Domain {
-    /// `first` is the place of the domain's frames among `frames`, which ends with them.
+    /// `first` is the index of the domain's first frame in `frames`; its frames are the last ones there.
     pub(crate) fn new(planned: &PlannedDomain, first: usize, frames: &[CyclicFrame]) -> Domain {
         let contributions =
             planned.frames.iter().flat_map(|frame| &frame.datagrams).flat_map(|datagram| &datagram.contributions);
@@ -82,7 +82,7 @@ impl Domain {
             newest: frames.len() - set,
             out: 0,
             unsent: false,
-            // Until shortly before its turn comes again.
+            // Until shortly before the set is used again.
             timeout_ns: whole_ns(planned.period.saturating_mul(planned.under_way.into()) - planned.period / 4),
             members: subdevices.into_iter().map(member).collect(),
             status: DomainStatus { expected, ..DomainStatus::default() },
@@ -99,22 +99,22 @@ impl Domain {
         &mut self.image.bytes
     }
 
-    /// Where inputs are delivered.
+    /// Targets for the delivery of inputs.
     pub(crate) fn inputs_mut(&mut self) -> &mut Image {
         &mut self.image
     }
 
-    /// Places of the frames of all sets.
+    /// Indices of the frames of all sets.
     pub(crate) fn frames(&self) -> Range<usize> {
         self.frames.clone()
     }
 
-    /// Places of the frames that are to be judged next; `None` where all were judged.
+    /// Indices of the frames to judge next; `None` where all are judged.
     pub(crate) fn oldest(&self) -> Option<Range<usize>> {
         (self.out > 0).then(|| self.oldest..self.oldest + self.set)
     }
 
-    /// Places of the frames that are to be queued next.
+    /// Indices of the frames to queue next.
     pub(crate) fn next(&self) -> Range<usize> {
         let at = if self.unsent { self.newest } else { self.after(self.newest) };
         at..at + self.set
@@ -126,8 +126,8 @@ impl Domain {
         if next == self.frames.end { self.frames.start } else { next }
     }
 
-    /// Whether the frames of a cycle that left after the oldest one have all come back: on each link frames come in the
-    /// order in which they left.
+    /// Whether all frames of a cycle that left after the oldest one have come back: on each link frames come in the
+    /// order of departure.
     pub(crate) fn is_overtaken(&self, frames: &[CyclicFrame]) -> bool {
         let mut at = self.oldest;
         (1..self.out).any(|_| {
@@ -137,7 +137,7 @@ impl Domain {
         })
     }
 
-    /// Whether every set is out, and none has come back.
+    /// Whether every set is on the wire, and none has come back.
     pub(crate) fn is_full(&self, frames: &[CyclicFrame]) -> bool {
         let mut sets = frames[self.frames()].chunks(self.set.max(1));
         self.set > 0 && sets.all(|set| set.iter().any(CyclicFrame::is_waiting))
@@ -151,7 +151,7 @@ impl Domain {
         self.timeout_ns = whole_ns(timeout);
     }
 
-    /// Puts the outputs into the frames of the next set, which begins there and is ready, to leave in this cycle.
+    /// Puts the outputs into the frames of the next set, which is then ready to leave in this cycle.
     // Inlined on purpose: a cycle has few instructions to spare (bin `cycle`).
     #[inline(always)]
     pub(crate) fn load(&mut self, next: usize, frames: &mut [CyclicFrame], cycle: u64) {
@@ -166,7 +166,7 @@ impl Domain {
         }
         self.newest = next;
         if self.out > 0 && next == self.oldest {
-            // Nobody judged it.
+            // It was never judged.
             self.oldest = self.after(self.oldest);
         } else {
             self.out += 1;
@@ -174,7 +174,7 @@ impl Domain {
         self.unsent = true;
     }
 
-    /// Places of the frames that leave now; `None` where nothing was queued.
+    /// Indices of the frames that leave now; `None` where none is queued.
     pub(crate) fn leave(&mut self) -> Option<Range<usize>> {
         core::mem::take(&mut self.unsent).then(|| self.newest..self.newest + self.set)
     }
@@ -183,7 +183,7 @@ impl Domain {
         self.status.skipped += 1;
     }
 
-    /// The last judgement.
+    /// The last state.
     pub(crate) fn state(&self) -> DomainState {
         self.status.state
     }
@@ -192,9 +192,9 @@ impl Domain {
         DomainStatus { pending, ..self.status }
     }
 
-    /// Judges the oldest cycle under way, which left in cycle `left` minus one: the sum of its working counters, and
-    /// whether each datagram had just what it should. True where it was complete like the one before; else
-    /// [`Domain::change_state`] is to follow.
+    /// Judges the oldest cycle on the wire, which left in cycle `left` minus one: the sum of its working counters, and
+    /// whether each datagram has exactly the expected one. True where it was complete like the one before; otherwise
+    /// [`Domain::change_state`] follows.
     pub(crate) fn judge(&mut self, wkc: u32, complete: bool, left: u64) -> bool {
         self.status.wkc = wkc;
         self.oldest = self.after(self.oldest);
@@ -203,8 +203,8 @@ impl Domain {
         complete && wkc > 0 && self.status.state == DomainState::Complete
     }
 
-    /// The state of what was judged, of which any copy returned or none. True where it is to be told: it is another one
-    /// than before, or process data stays silent from the beginning though SubDevices take part.
+    /// Updates the state after a judged cycle of which any copy returned or none. True where the state is to be
+    /// reported: it has changed, or process data has been silent since activation though SubDevices take part.
     pub(crate) fn change_state(&mut self, wkc: u32, complete: bool, returned: bool, is_awaited: bool) -> bool {
         self.status.returned = returned;
         let state = match (wkc, complete) {
@@ -226,17 +226,17 @@ impl Domain {
         }
     }
 
-    /// Whether SubDevices with process data in it take part.
+    /// Whether SubDevices with process data in the domain take part.
     pub(crate) fn is_awaited(&self, takes_part: impl Fn(usize) -> bool) -> bool {
         self.members.iter().any(|member| takes_part(member.subdevice))
     }
 
-    /// When these inputs came last: a cycle, plus one.
+    /// When these inputs last arrived: a cycle, plus one.
     pub(crate) fn came(&self, input: InputNumber) -> u64 {
         self.image.moment(input).came
     }
 
-    /// When, as a cycle plus one, the flight had left that was judged last.
+    /// Departure of the last judged flight, as a cycle plus one.
     pub(crate) fn judged(&self) -> u64 {
         self.judged
     }
@@ -244,7 +244,7 @@ impl Domain {
     pub(crate) fn freshness(&self, subdevice: usize) -> Freshness {
         let found = self.members.binary_search_by_key(&subdevice, |member| member.subdevice);
         let Some(member) = found.ok().and_then(|number| self.members.get(number)) else { return Freshness::Never };
-        // When, as a cycle plus one, the oldest of its inputs had left.
+        // Departure of the oldest of its inputs, as a cycle plus one.
         match member.inputs.iter().map(|input| self.image.moment(*input).left).min().unwrap_or(0) {
             0 => Freshness::Never,
             left if left >= self.judged => Freshness::Fresh,
@@ -253,7 +253,7 @@ impl Domain {
     }
 }
 
-/// A duration in the unit of the hot path, as long as it gets.
+/// A duration in the unit of the hot path, limited to its range.
 fn whole_ns(duration: Duration) -> u64 {
     u64::try_from(duration.as_nanos()).unwrap_or(u64::MAX)
 }

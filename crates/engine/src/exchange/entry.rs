@@ -9,7 +9,7 @@ pub struct Entry {
     pub domain: DomainId,
     /// First bit in the domain's image.
     pub bit_offset: u32,
-    /// Number of bits, 1..=64 for typed access; longer ones are reached through the image.
+    /// Number of bits, 1..=64 for typed access; longer entries are accessed through the image.
     pub bit_length: u16,
 }
 
@@ -24,7 +24,7 @@ impl Entry {
         (self.bit_offset % 8) as u8
     }
 
-    /// Reads up to 64 bits, zero-extended. What lies outside the image reads as zero.
+    /// Reads up to 64 bits, zero-extended. Bits outside the image read as zero.
     pub fn read(&self, image: &[u8]) -> u64 {
         let mut bytes = [0; 9];
         let (start, span) = self.span();
@@ -74,7 +74,7 @@ impl Entry {
         self.write(image, value as u64);
     }
 
-    /// Writes the lower bits of `value`; the other bits of the image stay. Outside the image nothing is written.
+    /// Writes the lower bits of `value`; the other bits of the image stay. Writes outside the image are ignored.
     pub fn write(&self, image: &mut [u8], value: u64) {
         let (start, span) = self.span();
         let Some(target) = image.get_mut(start..start + span) else { return };

@@ -1,7 +1,7 @@
-//! What flights that are over show of the ring, the SubDevices and the clocks, and who is told.
+//! Evaluates finished flights for the ring, the SubDevices and the clocks, and posts the results.
 //!
-//! With several cycles under way, or domains of several periods, flights may end in another order than they left in.
-//! What an older one shows counts only until a newer one was heard of.
+//! With several cycles on the wire, or domains of several periods, flights may end in another order than that of
+//! departure. The result of an older flight counts only until a newer one returned.
 
 use super::clocks::Clocks;
 use super::flight::CyclicFrame;
@@ -14,12 +14,12 @@ use crate::ring::{RingMonitor, RingState};
 pub(super) struct Evidence {
     pub monitor: RingMonitor,
     pub clocks: Clocks,
-    /// When, as a cycle plus one, the newest flight that was heard of had left.
+    /// Departure of the newest flight that returned, as a cycle plus one.
     newest: u64,
 }
 
 impl Evidence {
-    /// A copy is in, and the other one may never come: an open ring is told at once.
+    /// One copy is received, and the other one may never come: an open ring is reported at once.
     pub fn hear_early(&mut self, frame: &CyclicFrame, board: &Board) {
         if frame.arrivals().returned != 0 && self.monitor.state() != RingState::Open && frame.left() >= self.newest {
             self.newest = frame.left();
@@ -34,7 +34,7 @@ impl Evidence {
         }
     }
 
-    /// A flight is over: what it proves about the ring and what its supervision datagram saw go on the board.
+    /// Evaluates a finished flight: posts its evidence about the ring and the result of its supervision datagram.
     // Inlined on purpose: a cycle has few instructions to spare (bin `cycle`).
     #[inline(always)]
     pub fn close(&mut self, frame: &mut CyclicFrame, board: &Board, events: &mut Producer) {
@@ -43,7 +43,7 @@ impl Evidence {
             if let Some(seen) = frame.clocks_seen() {
                 self.clocks.observe(seen, frame.arrivals(), board, events);
             }
-            // Counts first: whoever sees the change finds those that belong to it.
+            // Counts first: a reader that sees the change then finds the matching counts.
             if let Some(supervision) = frame.supervision() {
                 board.post_supervision(supervision);
             }

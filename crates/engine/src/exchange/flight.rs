@@ -1,10 +1,10 @@
-//! A frame of a domain and its flights: load, depart, receive the copies, judge, deliver or give up.
+//! A frame of a domain and its flights (round trips): load, depart, receive the copies, judge, deliver or give up.
 //!
-//! What is here is out at most once, so its bytes are built once: a flight changes the frame id, the Idx bytes and the
-//! outputs. Reads leave as zeros and working counters as zero, because what comes back is never written here. A domain
-//! with several cycles under way has each of its frames as many times; they share the image. Each copy is judged by
-//! itself, and its inputs are delivered when it comes ([`super::place`]).
-//! While no SubDevice could answer its process data, a frame leaves without it: see [`CyclicFrame::vacant`].
+//! A frame here is on the wire at most once at a time, so its bytes are built once: a flight changes the frame id, the
+//! Idx bytes and the outputs. Reads leave as zeros and working counters as zero, because returned bytes are never
+//! written here. A domain with several cycles on the wire has each of its frames that many times; they share the image.
+//! Each copy is judged by itself, and its inputs are delivered when it arrives ([`super::place`]).
+//! While no SubDevice can answer its process data, a frame leaves without it: see [`CyclicFrame::vacant`].
 
 use alloc::boxed::Box;
 use alloc::vec::Vec;
@@ -25,39 +25,39 @@ use crate::link::Link;
 use crate::ring::{Arrivals, Class, FrameCopy, Identity, Sequence};
 use crate::time::Instant;
 
-/// What a received copy did to its flight.
+/// Effect of a received copy on its flight.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Step {
     /// Another copy is still expected.
     Waiting,
-    /// All copies are in.
+    /// All copies are received.
     Finished,
-    /// Not the flight that is out, or a copy that was there.
+    /// It does not belong to the current flight, or is a duplicate.
     Late,
-    /// Not what was sent.
+    /// Its content is not what was sent.
     Corrupt,
 }
 
-/// A datagram's first eight bytes, as far as no controller changes them (protocol 1.5): command, Idx, length, M bit.
+/// The parts of a datagram's first eight bytes that no controller changes (protocol 1.5): command, Idx, length, M bit.
 #[derive(Debug)]
 struct Header {
     at: usize,
     sent: u64,
 }
 
-/// Address and C bit are left out of [`Header`].
+/// Address and C bit are not part of [`Header`].
 const HEADER_MASK: u64 = 0x0000_0000_0000_FFFF | !(CIRCULATING as u64) << 48;
 
-/// How far a flight is.
+/// Stage of a flight.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Stage {
-    /// Nothing is out.
+    /// No flight is on the wire.
     Idle,
-    /// Out, not delivered.
+    /// On the wire, not delivered.
     Waiting,
-    /// Complete and delivered, the second copy is not in.
+    /// Complete and delivered; the second copy has not arrived.
     Delivered,
-    /// Not complete at its deadline; what comes now is late.
+    /// Incomplete at its deadline; copies that arrive now are late.
     GivenUp,
 }
 
@@ -74,11 +74,11 @@ pub(crate) struct CyclicFrame {
     deadline: Instant,
     /// Cycle, plus one, in which it left.
     left: u64,
-    /// Changes on the board that were taken over.
+    /// Number of changes on the board that are applied.
     followed: u32,
     /// Sum of the working counters of process data over the copies received so far.
     wkc: u32,
-    /// Every process data datagram has just what it should.
+    /// Every process data datagram has exactly the expected working counter.
     complete: bool,
     seen: Supervision,
     /// Offset of the supervision datagram's header.
@@ -91,24 +91,24 @@ pub(crate) struct CyclicFrame {
     presence: Option<Presence>,
     /// Number of the first inputs in the image.
     first: InputNumber,
-    /// What is known of copies, as they were looked at last.
+    /// Results for the copies, as of the last evaluation.
     views: Views,
-    /// Newer inputs were there when this flight came.
+    /// Newer inputs were in the image when this flight came back.
     is_overtaken: bool,
     tx: Box<[u8]>,
 }
 
-/// What is known of copies by the link they were sent on. It holds for the next flight too, while copies come back as
-/// before.
+/// Results for the copies, by the link on which they were sent. They stay valid for the next flight while copies come
+/// back unchanged.
 #[derive(Clone, Copy, Debug, Default)]
 struct Views {
-    /// They were looked at since something changed on the board.
+    /// The copies were evaluated since the last change on the board.
     looked: [bool; 2],
-    /// The copy is complete by itself.
+    /// The copy alone is complete.
     is_enough: [bool; 2],
     /// Both copies together are complete.
     are_enough: bool,
-    /// Some SubDevice processed both.
+    /// At least one SubDevice processed both.
     are_doubled: bool,
 }
 
@@ -149,20 +149,20 @@ impl CyclicFrame {
         }
     }
 
-    /// A frame that takes the place of this one while no SubDevice of it has its FMMUs: without process data, which
-    /// nobody could answer. Its working counters are zero, and it answers for the same inputs and outputs.
+    /// A frame that replaces this one while none of its SubDevices has its FMMUs: without process data, which no
+    /// SubDevice would answer. Its working counters are zero, and it stands for the same inputs and outputs.
     pub(crate) fn vacant(&self, identity: &Identity, planned: &PlannedFrame) -> CyclicFrame {
         let bare = PlannedFrame { datagrams: Vec::new(), presence: None, ..*planned };
         let places = self.places.iter().map(Place::outside).collect();
         CyclicFrame { places, ..CyclicFrame::new(identity, self.all_links, self.domain, &bare, self.first) }
     }
 
-    /// Whether it leaves without its process data.
+    /// Whether it leaves without process data.
     pub(crate) fn is_vacant(&self) -> bool {
         self.places.iter().any(Place::is_outside)
     }
 
-    /// Whether process data of a SubDevice that takes part belongs into the frame.
+    /// Whether the frame needs process data, because a SubDevice with process data in it takes part.
     pub(crate) fn concerns(&self, takes_part: impl Fn(usize) -> bool) -> bool {
         self.places.iter().any(|place| place.concerns(&takes_part))
     }
@@ -175,7 +175,7 @@ impl CyclicFrame {
         self.stage == Stage::Waiting
     }
 
-    /// Delivered without its second copy.
+    /// Complete without its second copy.
     pub(crate) fn is_delivered(&self) -> bool {
         self.stage == Stage::Delivered
     }
@@ -188,22 +188,22 @@ impl CyclicFrame {
         now >= self.deadline
     }
 
-    /// The flight that is out, or was.
+    /// Id of the current or last flight.
     pub(crate) fn sequence(&self) -> Sequence {
         self.sequence
     }
 
-    /// Until when it is waited for.
+    /// Its deadline.
     pub(crate) fn deadline(&self) -> Instant {
         self.deadline
     }
 
-    /// Whether it may be loaded: nothing is out, and so many changes to who takes part were taken over.
+    /// Whether it may be loaded: it is not on the wire, and this number of changes on the board is applied.
     pub(crate) fn is_ready(&self, changes: u32) -> bool {
         self.stage == Stage::Idle && self.followed == changes
     }
 
-    /// Cycle, plus one, in which it left or is to leave.
+    /// Cycle of departure, plus one.
     pub(crate) fn left(&self) -> u64 {
         self.left
     }
@@ -219,7 +219,7 @@ impl CyclicFrame {
         self.stage = Stage::Idle;
     }
 
-    /// What copies showed before that did not come back this time counts no longer.
+    /// Results of copies that did not come back this time are dropped.
     #[cold]
     fn forget_missing(&mut self) {
         for link in Link::ALL.into_iter().filter(|link| self.arrivals.arrived & link.bit() == 0) {
@@ -236,8 +236,8 @@ impl CyclicFrame {
         self.wkc
     }
 
-    /// Whether every process data datagram of the flight has just the working counter it should have: a sum over
-    /// datagrams could hide one that is short behind one that is over.
+    /// Whether every process data datagram of the flight has exactly the expected working counter. A sum over datagrams
+    /// could hide a shortfall of one behind an excess of another.
     pub(crate) fn is_complete(&self) -> bool {
         self.complete
     }
@@ -248,13 +248,13 @@ impl CyclicFrame {
         self.places.iter().for_each(|place| place.count_errors(board, links));
     }
 
-    /// What the supervision datagram of this flight saw, if it has one and anything came back.
+    /// Result of this flight's supervision datagram, if it has one and any copy came back.
     pub(crate) fn supervision(&self) -> Option<Supervision> {
         let seen = Supervision { returned: self.arrivals.returned != 0, ..self.seen };
         (self.supervision_at.is_some() && self.arrivals.arrived != 0).then_some(seen)
     }
 
-    /// Copies the outputs in, to leave in this cycle, and forgets the flight before.
+    /// Copies the outputs in, to leave in this cycle, and clears the previous flight.
     pub(crate) fn load(&mut self, image: &[u8], cycle: u64) {
         self.left = cycle + 1;
         for place in &mut self.places {
@@ -270,7 +270,7 @@ impl CyclicFrame {
         }
     }
 
-    /// Where the datagrams of distributed clocks are, if there are any.
+    /// Offsets of the datagrams of distributed clocks, if there are any.
     pub(crate) fn clocks(&self) -> Option<Places> {
         self.clocks
     }
@@ -281,12 +281,12 @@ impl CyclicFrame {
         self.clocks_seen.references = references;
     }
 
-    /// What they brought back, if there are any.
+    /// Result of the datagrams of distributed clocks, if there are any.
     pub(crate) fn clocks_seen(&self) -> Option<&Seen> {
         self.clocks.map(|_| &self.clocks_seen)
     }
 
-    /// Starts a flight of what was loaded; returns the bytes of the main copy.
+    /// Starts a flight of the loaded frame; returns the bytes of the main copy.
     pub(crate) fn depart(&mut self, identity: &Identity, sequence: Sequence, deadline: Instant) -> &mut [u8] {
         let index = sequence.index(Class::Cyclic);
         if self.index != index {
@@ -299,7 +299,7 @@ impl CyclicFrame {
         &mut self.tx
     }
 
-    /// Changes the Idx of all datagrams, which is due once in 256 frames.
+    /// Changes the Idx of all datagrams, needed once in 256 frames.
     fn write_index(&mut self, index: u8) {
         for header in &mut self.headers {
             self.tx[header.at + 1] = index;
@@ -308,7 +308,7 @@ impl CyclicFrame {
         self.index = index;
     }
 
-    /// Takes in a copy. Delivers into the image as soon as the flight is complete.
+    /// Takes a copy. Delivers into the image as soon as the flight is complete.
     pub(crate) fn receive(
         &mut self,
         copy: FrameCopy,
@@ -346,7 +346,7 @@ impl CyclicFrame {
         if finished { Step::Finished } else { Step::Waiting }
     }
 
-    /// Puts inputs into the image one by one: a newer flight has perhaps not brought everything, or the other copy has.
+    /// Delivers inputs one by one: a newer flight, or the other copy, may have brought only some of them.
     #[cold]
     fn deliver_singly(
         &mut self,
@@ -369,7 +369,7 @@ impl CyclicFrame {
         bytes.len() >= self.tx.len() && self.headers.iter().all(|header| header_at(bytes, header.at) == header.sent)
     }
 
-    /// Adds the working counters of a copy; true where every process data datagram has just what it should.
+    /// Adds the working counters of a copy; true where every process data datagram has exactly the expected one.
     fn count(&mut self, sent_on: Link, bytes: &[u8], first: bool) -> bool {
         let link = sent_on.index();
         let mut as_seen =
@@ -404,7 +404,7 @@ impl CyclicFrame {
         complete
     }
 
-    /// Finds out what a copy brought that is not like the one before it.
+    /// Evaluates the datagrams of a copy that differ from the copy before.
     #[cold]
     fn look(&mut self, link: usize, bytes: &[u8]) {
         let once = self.presence.as_mut().is_some_and(|presence| presence.look(link, bytes));
@@ -419,13 +419,14 @@ impl CyclicFrame {
         self.views.are_doubled = self.places.iter().any(Place::is_doubled);
     }
 
-    /// The deadline is over. True where nothing at all came back.
+    /// The deadline has passed. True where no copy came back.
     pub(crate) fn give_up(&mut self) -> bool {
         self.stage = Stage::GivenUp;
         self.arrivals.arrived == 0
     }
 
-    /// Takes over who takes part, and who may be missing. What is out has come back or is given up.
+    /// Applies changes of participation, and of the SubDevices that may be missing. What was on the wire has come back
+    /// or is given up.
     pub(crate) fn follow(&mut self, changes: u32, board: &Board) {
         self.followed = changes;
         self.views = Views::default();
@@ -452,18 +453,18 @@ impl CyclicFrame {
         self.places.len()
     }
 
-    /// The SubDevice in whose inputs bytes of the image lie, all of them.
+    /// The SubDevice whose inputs contain all the given bytes of the image.
     pub(crate) fn whose_inputs(&self, bytes: Range<usize>) -> Option<usize> {
         self.places.iter().find_map(|place| place.whose_inputs(&bytes))
     }
 
-    /// Whether bytes of the image lie in outputs, all of them.
+    /// Whether outputs contain all the given bytes of the image.
     pub(crate) fn has_outputs(&self, bytes: Range<usize>) -> bool {
         self.places.iter().any(|place| place.outputs.holds(&bytes))
     }
 }
 
-/// What [`Header`] keeps of the datagram there; of bytes beyond the end, zero.
+/// The [`Header`] of the datagram at an offset; zero for bytes beyond the end.
 fn header_at(bytes: &[u8], at: usize) -> u64 {
     bytes.get(at..).and_then(<[u8]>::first_chunk).map_or(0, |head| u64::from_le_bytes(*head)) & HEADER_MASK
 }

@@ -7,7 +7,7 @@ use ringcat_wire::frame::MAX_FRAME_VLAN;
 
 use crate::link::Link;
 
-/// Frames kept; more are counted only. A collision must be seen, not archived.
+/// Number of frames kept; further ones are only counted. Enough to notice a collision, not to archive it.
 const KEPT: usize = 4;
 
 #[derive(Debug)]
@@ -20,7 +20,7 @@ struct Kept {
 /// A frame of another MainDevice.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct ForeignFrame<'a> {
-    /// Where it arrived.
+    /// The link on which it arrived.
     pub arrived_on: Link,
     /// Its bytes without FCS.
     pub bytes: &'a [u8],

@@ -1,58 +1,59 @@
-//! A domain's image, and when inputs came into it.
+//! Image of a domain, and the arrival times of its inputs.
 //!
-//! With several cycles under way, flights of the same datagram share this: inputs of an older cycle never overwrite
+//! With several cycles on the wire, flights of the same datagram share this: inputs of an older cycle never overwrite
 //! those of a newer one.
 
 use alloc::boxed::Box;
 use alloc::vec;
 use alloc::vec::Vec;
 
-/// When inputs came. Cycles are counted from 1 here, so that zero is never.
+/// Times of inputs. Cycles count from 1 here, so that zero means never.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(crate) struct Moment {
-    /// Cycle in which the flight that brought them left.
+    /// Cycle in which the flight with them left.
     pub left: u64,
-    /// Cycle in which it came back.
+    /// Cycle in which that flight came back.
     pub came: u64,
 }
 
 /// Inputs of a SubDevice in a datagram, by their numbers in the image.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct InputNumber {
-    /// Of the datagram.
+    /// Number of the datagram.
     pub datagram: usize,
-    /// Of the part of it.
+    /// Number of the part within it.
     pub part: usize,
 }
 
-/// The image, and when what came into it: by datagram where all its inputs came together, by datagram and link where
-/// some did, and by their parts.
+/// The image, and when its inputs arrived: by datagram where all inputs came together, by datagram and link where some
+/// did, and by part.
 #[derive(Debug)]
 pub(crate) struct Image {
     pub bytes: Box<[u8]>,
     pub datagrams: Box<[Moment]>,
     pub parts: Box<[Moment]>,
     shares: Box<[[Share; 2]]>,
-    /// Shares that were found so far.
+    /// Shares found so far.
     found: u32,
-    /// When, as a cycle plus one, the newest flight of which anything came had left.
+    /// Departure of the newest flight of which any copy returned, as a cycle plus one.
     pub newest: u64,
 }
 
-/// The inputs of a datagram that come with the copies on a link, as long as these bring the same ones: in an open ring.
+/// The inputs of a datagram that arrive with the copies on one link in an open ring, as long as their selection stays
+/// the same.
 #[derive(Clone, Debug, Default)]
 struct Share {
-    /// Number of this share, by which it is known again; 0 is none.
+    /// Number that identifies this share; 0 is none.
     number: u32,
     moment: Moment,
     /// Number of the datagram's first part.
     first: usize,
-    /// Which of the datagram's parts.
+    /// Its parts of the datagram.
     parts: Box<[bool]>,
 }
 
 impl Image {
-    /// `parts`: how many each datagram has.
+    /// `parts`: number of parts of each datagram.
     pub fn new(bytes: usize, parts: impl Iterator<Item = usize>) -> Image {
         let mut first = 0;
         let mut shares = Vec::new();
@@ -71,7 +72,7 @@ impl Image {
         }
     }
 
-    /// When inputs came last.
+    /// Last arrival of inputs.
     pub fn moment(&self, input: InputNumber) -> Moment {
         let of = |moments: &[Moment], number: usize| moments.get(number).copied().unwrap_or_default();
         let shares = self.shares.get(input.datagram).into_iter().flatten();
@@ -80,7 +81,8 @@ impl Image {
         moments.into_iter().chain(shared.map(|share| share.moment)).max_by_key(|moment| moment.left).unwrap_or_default()
     }
 
-    /// Inputs of a share, by its number, came again. False where the copies on this link brought others the last time.
+    /// Inputs of a share, by its number, arrived again. False where the last copies on this link brought another
+    /// selection.
     #[inline]
     pub fn note_share(&mut self, datagram: usize, link: usize, number: u32, moment: Moment) -> bool {
         let Some(share) = self.shares.get_mut(datagram).map(|shares| &mut shares[link]) else { return true };
@@ -91,7 +93,7 @@ impl Image {
         is_same
     }
 
-    /// Copies on a link bring these inputs from now on; the number by which they are known.
+    /// From now on copies on a link bring these inputs; returns the number of the share.
     #[cold]
     pub fn take_share(&mut self, datagram: usize, link: usize, is_part: impl Fn(usize) -> bool, moment: Moment) -> u32 {
         let Some(share) = self.shares.get_mut(datagram).map(|shares| &mut shares[link]) else { return 0 };

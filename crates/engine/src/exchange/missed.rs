@@ -1,17 +1,17 @@
-//! What became of frames of which no copy came back in time: they came too late, came damaged, or never came.
+//! Fate of frames of which no copy came back in time: late, damaged, or never back.
 //!
-//! Known by their sequence for as long as 256 newer frames take. Nothing here is in the way of a frame that comes back
-//! in time.
+//! A frame is remembered by its sequence number until 256 newer frames have left. Frames that come back in time are not
+//! affected.
 
 use alloc::boxed::Box;
 
 use super::counters::CyclicCounters;
 use crate::ring::Sequence;
 
-/// What is known of a frame.
+/// Fate of a frame.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 enum Fate {
-    /// Nothing, or it came in time.
+    /// Unknown, or it came in time.
     #[default]
     None,
     /// A damaged copy of it came.
@@ -41,7 +41,7 @@ impl Missed {
         *self.at(sequence) = (sequence, Fate::Damaged);
     }
 
-    /// No copy came in time, at least none that was intact.
+    /// No intact copy came in time.
     #[cold]
     pub(crate) fn give_up(&mut self, sequence: Sequence, counters: &mut CyclicCounters) {
         counters.lost += 1;
@@ -83,7 +83,7 @@ mod tests {
         for given_up in [missing, late, damaged] {
             missed.give_up(given_up, &mut counters);
         }
-        // Both copies of one, another one's that was in time, and one's that was damaged.
+        // Both copies of one frame, a copy of another one that was in time, and a copy of a damaged one.
         [late, late, in_time, damaged].into_iter().for_each(|sequence| missed.late(sequence, &mut counters));
         let expected = CyclicCounters { lost: 3, lost_late: 1, lost_damaged: 1, late: 4, ..CyclicCounters::default() };
         assert_eq!(counters, expected);

@@ -1,9 +1,9 @@
-//! A process data datagram within a frame: where its bytes lie, who adds what to its working counter, whose inputs a
-//! copy brought.
+//! A process data datagram within a frame: where its bytes lie, which SubDevice adds how much to its working counter,
+//! which inputs a copy brought.
 //!
-//! A working counter that only one SubDevice adds to is exact. Where several do, the presence datagram of the same copy
-//! tells who processed it; the working counter has to be what they add. Each copy is judged by itself: in a ring that
-//! closes or breaks both may have been processed by the same SubDevice.
+//! A working counter to which only one SubDevice adds is exact. Where several add, the presence datagram of the same
+//! copy shows which of them processed it; the working counter must equal the sum of their increments. Each copy is
+//! judged by itself: in a ring that closes or breaks the same SubDevice may have processed both.
 
 use alloc::boxed::Box;
 use alloc::vec::Vec;
@@ -18,12 +18,12 @@ use super::presence::{Passed, Presence};
 use crate::board::Board;
 use crate::layout::{PlacedArea, PlannedDatagram};
 
-/// Offsets of what is in no frame lie behind this.
+/// Offsets of data that is in no frame lie beyond this.
 const OUTSIDE: usize = 2 * MAX_FRAME;
-/// What an LRW adds for inputs alone, where a SubDevice has both.
+/// Increment of an LRW for inputs alone, where a SubDevice has both directions.
 const INPUTS_OF_LRW: Wkc = Wkc(1);
 
-/// Bytes that are copied between frame and image.
+/// Bytes copied between frame and image.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Span {
     pub frame_at: usize,
@@ -35,33 +35,34 @@ pub(crate) struct Span {
 #[derive(Clone, Copy, Debug)]
 struct Segment {
     subdevice: usize,
-    /// Place of the SubDevice among the contributions.
+    /// Index of the SubDevice among the contributions.
     contribution: usize,
     span: Span,
 }
 
-/// What a SubDevice adds, and what is known of it.
+/// Contribution of a SubDevice, and its state.
 #[derive(Clone, Debug)]
 struct Contribution {
     subdevice: usize,
     wkc: Wkc,
-    /// Some of the inputs are its own.
+    /// The datagram contains inputs of it.
     has_inputs: bool,
-    /// Place in the presence datagram.
+    /// Index in the presence datagram.
     witness: Option<usize>,
-    /// It takes part in process data, and was seen to give its inputs.
+    /// It takes part in process data, and has been seen to deliver its inputs.
     is_proven: bool,
-    /// Without it the datagram is not complete.
+    /// It is required: without it the datagram is incomplete.
     required: bool,
-    /// It is on its way, with its FMMUs set: it takes outputs, which must not stand for those of another one.
+    /// It is being brought up with its FMMUs set: it takes outputs, whose increment must not be taken for that of
+    /// another SubDevice.
     is_mapped: bool,
     /// By link: the copy brought its inputs.
     met: [bool; 2],
-    /// By link: it did to the copy all that it does, in whatever state it is.
+    /// By link: it processed the copy completely, in any state.
     did: [bool; 2],
 }
 
-/// What a copy brought, by the link it was sent on.
+/// Result of a copy, by the link on which it was sent.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(crate) enum Brought {
     /// No inputs.
@@ -73,16 +74,16 @@ pub(crate) enum Brought {
     All,
 }
 
-/// What is known of the copies sent on a link.
+/// Results for the copies sent on a link.
 #[derive(Debug, Default)]
 struct View {
     wkc: Wkc,
     brought: Brought,
-    /// Working counter and presence fit together.
+    /// Working counter and presence are consistent.
     is_sure: bool,
-    /// The inputs that came, neighbours joined. Room for all of them is there from the beginning.
+    /// The received inputs, neighbours joined. Memory for all of them is reserved at activation.
     runs: Vec<Span>,
-    /// Number of this share of the inputs in the image, 0 before it is known.
+    /// Number of this share of the inputs in the image, 0 until it is known.
     share: u32,
 }
 
@@ -134,8 +135,7 @@ impl Place {
         }
     }
 
-    /// The same place in a frame that does not carry it: nothing is copied from or to there, the working counter is
-    /// zero.
+    /// The same place in a frame without this datagram: no bytes are copied from or to it, its working counter is zero.
     pub fn outside(&self) -> Place {
         let span = |span: Span| Span { frame_at: span.frame_at + OUTSIDE, ..span };
         let segment = |segment: &Segment| Segment { span: span(segment.span), ..*segment };
@@ -151,7 +151,7 @@ impl Place {
         }
     }
 
-    /// Whether the frame does not carry it.
+    /// Whether the frame does not contain it.
     pub fn is_outside(&self) -> bool {
         self.wkc_at >= OUTSIDE
     }
@@ -168,22 +168,23 @@ impl Place {
         self.segments.len()
     }
 
-    /// Whether process data of a SubDevice that takes part belongs into it.
+    /// Whether a SubDevice with process data in it takes part.
     pub fn concerns(&self, takes_part: impl Fn(usize) -> bool) -> bool {
         self.contributions.iter().any(|it| takes_part(it.subdevice))
     }
 
-    /// Whether a copy's working counter is that of the last one that was looked at.
+    /// Whether a copy has the same working counter as the last one evaluated.
     #[inline]
     pub fn is_as_seen(&self, link: usize, wkc: u16) -> bool {
         self.views[link].wkc.0 == wkc
     }
 
-    /// Looks at a copy: whose inputs are in it, and who took it. `once`: no SubDevice processed it more than once.
+    /// Evaluates a copy: which inputs are in it, and which SubDevices processed it. `once`: no SubDevice processed it
+    /// more than once.
     pub fn look(&mut self, link: usize, wkc: Wkc, presence: Option<&Presence>, once: bool) {
         self.views[link].wkc = wkc;
         self.views[link].is_sure = match &mut self.contributions[..] {
-            // No SubDevice can have processed what was not there.
+            // The datagram was not in the frame: no SubDevice can have processed it.
             all if self.wkc_at >= OUTSIDE => {
                 all.iter_mut().for_each(|it| it.forget(link));
                 true
@@ -192,7 +193,7 @@ impl Place {
             all if all.iter().all(|it| it.witness.is_some()) => {
                 once && presence.is_some_and(|presence| meet(all, link, wkc, presence))
             }
-            // Outputs of SubDevices that cannot show themselves: the sum over both copies counts.
+            // Outputs of SubDevices without a presence byte: the sum over both copies counts.
             all => {
                 all.iter_mut().for_each(|it| it.forget(link));
                 true
@@ -204,7 +205,7 @@ impl Place {
         self.gather(link);
     }
 
-    /// Puts the inputs together that a copy brought.
+    /// Collects the inputs that a copy brought.
     fn gather(&mut self, link: usize) {
         let Place { views, segments, contributions, .. } = self;
         let view = &mut views[link];
@@ -225,8 +226,8 @@ impl Place {
         };
     }
 
-    /// Whether copies on these links, as they were looked at, bring just what they should: each required SubDevice
-    /// processed one of them and its inputs count, and none processed both.
+    /// Whether copies on these links, as last evaluated, bring exactly what is expected: each required SubDevice
+    /// processed one of them and its inputs are valid, and none processed both.
     pub fn is_complete(&self, links: [bool; 2]) -> bool {
         let arrived = || self.views.iter().zip(links).filter(|(_, arrived)| *arrived).map(|(view, _)| view);
         let sum = arrived().fold(0, |sum, view| sum + u32::from(view.wkc.0));
@@ -235,7 +236,7 @@ impl Place {
             let needed = needed.map(|it| u32::from(it.wkc.0)).sum();
             return (needed..=u32::from(self.expected.0)).contains(&sum);
         }
-        // Those of one that is below SAFEOP, or was not seen to give them yet, are not fresh.
+        // Inputs of a SubDevice below SAFEOP, or not yet seen to deliver them, are not fresh.
         let brings = |it: &Contribution| {
             !it.required || !it.has_inputs || it.met.iter().zip(links).any(|(met, arrived)| *met && arrived)
         };
@@ -250,17 +251,17 @@ impl Place {
         arrived().all(|view| view.is_sure) && self.contributions.iter().all(is_met)
     }
 
-    /// Whether some SubDevice processed the copies on both links, as they were looked at.
+    /// Whether any SubDevice processed the copies on both links, as last evaluated.
     pub fn is_doubled(&self) -> bool {
         self.contributions.iter().any(|it| it.did == [true; 2])
     }
 
-    /// Whether only the sum over both copies tells who took it.
+    /// Whether only the sum over both copies shows which SubDevices processed it.
     fn is_summed(&self) -> bool {
         self.contributions.len() > 1 && self.contributions.iter().any(|it| it.witness.is_none())
     }
 
-    /// Counts an error for each SubDevice that was counted on and processed none of the copies that came, or both.
+    /// Counts an error for each expected SubDevice that processed none of the received copies, or both.
     pub fn count_errors(&self, board: &Board, links: [bool; 2]) {
         if self.is_complete(links) {
             return;
@@ -271,7 +272,7 @@ impl Place {
         expected.filter(|it| is_summed || processed(it) != 1).for_each(|it| board.count_wkc_error(it.subdevice));
     }
 
-    /// Puts the inputs that a copy brought into the image, where nothing newer is.
+    /// Puts the inputs of a copy into the image, except where it has newer ones.
     #[inline]
     pub fn deliver(&mut self, link: usize, bytes: &[u8], image: &mut Image, moment: Moment) {
         let view = &self.views[link];
@@ -293,8 +294,8 @@ impl Place {
         }
     }
 
-    /// As [`Place::deliver`], for inputs one by one: those are left out that came later or with the other copy of the
-    /// flight. False where something newer was there.
+    /// As [`Place::deliver`], for inputs one by one: inputs with a newer value, or a value from the other copy of the
+    /// flight, are left out. False where something newer was there.
     #[cold]
     pub fn deliver_singly(&self, link: usize, bytes: &[u8], image: &mut Image, moment: Moment) -> bool {
         let mut newest = true;
@@ -319,7 +320,7 @@ impl Place {
         InputNumber { datagram: self.datagram, part: self.first_part + segment }
     }
 
-    /// Takes over who takes part, and without whom it is complete.
+    /// Applies which SubDevices take part, and which may be missing.
     pub fn follow(&mut self, board: &Board) {
         for contribution in &mut self.contributions {
             let takes_part = board.takes_part(contribution.subdevice);
@@ -335,7 +336,7 @@ impl Place {
         numbered.filter(move |(_, segment)| segment.subdevice == subdevice).map(|(number, _)| self.number_of(number))
     }
 
-    /// The SubDevice in whose inputs bytes of the image lie, all of them.
+    /// The SubDevice whose inputs contain all the given bytes of the image.
     pub fn whose_inputs(&self, bytes: &Range<usize>) -> Option<usize> {
         self.segments.iter().find(|segment| segment.span.holds(bytes)).map(|segment| segment.subdevice)
     }
@@ -364,15 +365,15 @@ impl Contribution {
     fn meet_alone(&mut self, link: usize, wkc: Wkc, command: Command) -> bool {
         let has_both = command == Command::Lrw && self.wkc == Wkc(3);
         self.did[link] = wkc == self.wkc;
-        // Below SAFEOP its inputs are whatever its memory holds.
+        // Below SAFEOP its inputs are undefined memory content.
         self.met[link] = self.is_proven && (wkc == self.wkc || (has_both && wkc == INPUTS_OF_LRW));
         wkc.0 <= self.wkc.0
     }
 }
 
-/// Who of several processed a copy. Those that take part and are in a state in which they give their inputs did so; the
-/// working counter has to hold what they add, and no more than the others that are there can have added. False where it
-/// does not.
+/// Determines which of several SubDevices processed a copy: those that take part and are in a state in which they
+/// deliver inputs. The working counter must contain their increments, and at most the increments that the others
+/// present can have added. False where it does not.
 fn meet(all: &mut [Contribution], link: usize, wkc: Wkc, presence: &Presence) -> bool {
     let (mut sure, mut others) = (0, 0);
     for contribution in all.iter_mut() {
@@ -387,7 +388,7 @@ fn meet(all: &mut [Contribution], link: usize, wkc: Wkc, presence: &Presence) ->
     }
     let wkc = u32::from(wkc.0);
     if wkc == sure + others {
-        // Everyone that is there did all that it does. Below SAFEOP inputs are whatever the memory holds.
+        // Every SubDevice present added its full increment. Below SAFEOP inputs are undefined memory content.
         for contribution in all.iter_mut() {
             let passed = contribution.witness.map_or(Passed::Not, |place| presence.passed(link, place));
             contribution.met[link] = passed == Passed::Delivering;
@@ -398,17 +399,17 @@ fn meet(all: &mut [Contribution], link: usize, wkc: Wkc, presence: &Presence) ->
 }
 
 impl Span {
-    /// Whether bytes of the image are in it, all of them.
+    /// Whether it contains all the given bytes of the image.
     pub fn holds(&self, image: &Range<usize>) -> bool {
         self.image_at <= image.start && image.end <= self.image_at + self.length
     }
 
-    /// Whether another one begins where this one ends.
+    /// Whether another one follows directly.
     fn reaches(&self, next: &Span) -> bool {
         self.frame_at + self.length == next.frame_at && self.image_at + self.length == next.image_at
     }
 
-    /// From the image into the frame.
+    /// Copies from the image into the frame.
     pub fn load(&self, image: &[u8], frame: &mut [u8]) {
         copy(image, self.image_at, frame, self.frame_at, self.length);
     }

@@ -1,9 +1,9 @@
 //! The presence datagram of a frame: the AL status of each SubDevice whose process data shares a working counter
 //! (protocol 1.4, 3.4, 3.10).
 //!
-//! In: a copy of the frame that came back. Out: which SubDevices processed it, once each, and in which state. A byte
-//! that stayed zero belongs to a SubDevice that is not there or has lost its FMMUs, because no AL status is zero. What
-//! a copy shows is mostly what the one before on the same link showed: then nothing is looked at anew.
+//! Input: a copy of the frame that came back. Output: which SubDevices processed it, once each, and in which state. A
+//! byte that stayed zero belongs to a SubDevice that is absent or has lost its FMMUs, because no AL status is zero. A
+//! copy mostly shows the same as the one before on its link: then it is not evaluated again.
 
 use alloc::boxed::Box;
 use alloc::vec;
@@ -19,18 +19,18 @@ pub(crate) struct Presence {
     /// Offset of its data in the frame.
     at: usize,
     members: Box<[(usize, Delivers)]>,
-    /// Data and working counter of the last copy that was looked at, by the link it was sent on.
+    /// Data and working counter of the last evaluated copy, by the link on which it was sent.
     seen: [Box<[u8]>; 2],
 }
 
 /// How a SubDevice processed a copy.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Passed {
-    /// Not at all, as far as its FMMUs show.
+    /// Not processed, as far as its FMMUs show.
     Not,
-    /// In a state in which it may or may not give its inputs and take outputs.
+    /// Processed in a state in which it may or may not deliver its inputs and take outputs.
     Somehow,
-    /// In a state in which it gives its inputs.
+    /// Processed in a state in which it delivers its inputs.
     Delivering,
 }
 
@@ -41,18 +41,18 @@ impl Presence {
         Presence { at, members: planned.members.iter().copied().collect(), seen: [seen(), seen()] }
     }
 
-    /// Place of a SubDevice among the bytes.
+    /// Index of a SubDevice among the bytes.
     pub fn place(&self, subdevice: usize) -> Option<usize> {
         self.members.iter().position(|(member, _)| *member == subdevice)
     }
 
-    /// Whether a copy shows just what the last one showed that was looked at.
+    /// Whether a copy shows exactly the same as the last one evaluated.
     #[inline]
     pub fn is_as_seen(&self, link: usize, frame: &[u8]) -> bool {
         frame.get(self.at..self.at + self.seen[link].len()).is_some_and(|now| *now == *self.seen[link])
     }
 
-    /// Looks at a copy. False where SubDevices processed it more than once: its working counter is not the number of
+    /// Evaluates a copy. False where SubDevices processed it more than once: its working counter is not the number of
     /// bytes.
     pub fn look(&mut self, link: usize, frame: &[u8]) -> bool {
         let length = self.seen[link].len();
@@ -63,12 +63,12 @@ impl Presence {
         usize::from(u16::from_le_bytes([wkc[0], wkc[1]])) == present
     }
 
-    /// A copy did not come back: it showed nothing.
+    /// A copy did not come back: it shows no SubDevice.
     pub fn forget(&mut self, link: usize) {
         self.seen[link].fill(0);
     }
 
-    /// How the SubDevice at a place processed the copy that was looked at last.
+    /// How the SubDevice at an index processed the last evaluated copy.
     pub fn passed(&self, link: usize, place: usize) -> Passed {
         let (Some((_, delivers)), Some(status)) = (self.members.get(place), self.seen[link].get(place)) else {
             return Passed::Not;
@@ -82,7 +82,7 @@ impl Presence {
         }
     }
 
-    /// The AL status that a SubDevice showed last on either link; `None` where it is not one of these.
+    /// The AL status that a SubDevice showed last on either link; `None` for a SubDevice without a byte here.
     pub fn al_status(&self, subdevice: usize) -> Option<u8> {
         let place = self.place(subdevice)?;
         Some(self.seen.iter().fold(0, |status, seen| status | seen.get(place).copied().unwrap_or(0)))

@@ -1,6 +1,6 @@
 //! The bytes of a cyclic frame as it leaves each time, built once from its plan.
 //!
-//! In: what the layout planned. Out: a frame with zeros as data, and where its datagrams are.
+//! Input: the planned layout. Output: a frame with zeros as data, and the places of its datagrams.
 
 use alloc::vec;
 use alloc::vec::Vec;
@@ -18,10 +18,10 @@ use super::presence::Presence;
 use crate::layout::{PlannedFrame, PlannedPresence, SUPERVISION_LEN};
 use crate::ring::Identity;
 
-/// Data of the datagram of a frame that has nothing else to carry.
+/// Data of the datagram in a frame that carries nothing else.
 const NOTHING_LEN: usize = 2;
 
-/// A frame and what is in it.
+/// A frame and its content.
 #[derive(Debug, Default)]
 pub(super) struct Template {
     /// The frame.

@@ -61,7 +61,7 @@ impl Ring {
         Ring { exchange, board, events, now: Instant(0) }
     }
 
-    /// Queues and sends; returns the copies, which must be alike but for the mark of the redundant one.
+    /// Queues and sends; returns the copies, which must be equal except for the mark of the redundant one.
     fn send(&mut self) -> [Vec<u8>; 2] {
         assert!(self.exchange.queue(DOMAIN, self.now));
         let mut copies = [vec![], vec![]];
@@ -92,7 +92,7 @@ impl Ring {
     }
 }
 
-/// What these SubDevices make of a frame; their inputs are `base` plus their number.
+/// Answer of these SubDevices to a frame; their inputs are `base` plus their number.
 fn meet(frame: &mut [u8], subdevices: &[usize], base: u8) {
     frame[6] |= 0x02;
     for subdevice in subdevices {
@@ -211,13 +211,13 @@ fn inputs_of_those_that_take_part_are_new_and_the_missing_one_keeps_its_last() {
     }
 }
 
-/// The copies of a frame that one SubDevice with an input did not process, and another one that is not counted on did.
+/// The copies of a frame that one SubDevice with an input did not process, but another one that is not expected did.
 // covers: freshness
 #[test]
 fn a_sum_that_fits_by_chance_makes_no_inputs_fresh() {
     let mut ring = Ring::new();
     for (who, base) in [(&[0, 1, 2][..], 0x10), (&[0, 2][..], 0x20)] {
-        // The engine still believes that 2 is not there, and 1 is.
+        // The engine still assumes that 2 is absent and 1 present.
         ring.board.set_taking_part(2, who.len() == 3);
         let [mut main, redundant] = ring.send();
         meet(&mut main, who, base);
@@ -245,8 +245,8 @@ fn a_subdevice_that_processed_both_copies_does_not_stand_for_one_that_is_gone() 
     assert_eq!(ring.freshness(), [Freshness::Fresh, Freshness::Fresh, Freshness::Never]);
 }
 
-/// One SubDevice on its way to SAFEOP takes outputs and may answer reads with what its memory holds: those of the
-/// others stay fresh, its own are not.
+/// One SubDevice on its way to SAFEOP takes outputs and may answer reads with undefined memory content: the inputs of
+/// the others stay fresh, its own do not.
 #[test]
 fn a_subdevice_below_safeop_costs_the_others_nothing_and_is_not_fresh() {
     for gives in [false, true] {
@@ -265,7 +265,7 @@ fn a_subdevice_below_safeop_costs_the_others_nothing_and_is_not_fresh() {
     }
 }
 
-/// What a SubDevice in PREOP whose FMMUs are set makes of a frame.
+/// Answer to a frame of a SubDevice in PREOP whose FMMUs are set.
 fn frame_of_one_in_preop(frame: &mut [u8], subdevice: usize, gives_inputs: bool) {
     frame[PRESENCE_AT + subdevice] |= 0x02;
     for at in [LWR_WKC_AT, PRESENCE_WKC_AT, BRD_WKC_AT] {
@@ -346,7 +346,7 @@ fn late_double_and_corrupt_copies_change_nothing() {
         assert_eq!(ring.receive(Link::Redundant, &wrong), Received::Corrupt, "byte {at}");
     }
     assert_eq!(ring.receive(Link::Redundant, &main[..74]), Received::Corrupt);
-    // The C bit is the controllers' to set.
+    // The C bit is set by controllers.
     main[23] |= 0x40;
     meet(&mut main, &[0, 1, 2], 0x10);
     assert_eq!(ring.receive(Link::Redundant, &main), Received::Taken);

@@ -20,7 +20,7 @@ use parts::{Parts, fixed_area, whole, within};
 
 /// Byte offsets in the fixed area, for warnings.
 const CHECKSUM_AT: usize = 2 * 0x07;
-/// Bytes of the fixed area that a scan reads without a gap.
+/// Bytes of the fixed area that a scan reads in one piece.
 const READ_BYTES: usize = 2 * 0x24;
 
 /// See [`SubDeviceInfo::from_parts`].
@@ -39,7 +39,7 @@ pub(super) fn collect(readout: Readout, header: &SiiHeader, parts: &[Category<'_
         receive_times: readout.receive_times,
         ..SubDeviceInfo::default()
     };
-    // Reserved words behind are not read.
+    // The reserved words that follow are not read.
     let bytes = &header.encode()[..READ_BYTES];
     if [0x00, 0xFF].iter().any(|erased| bytes.iter().all(|byte| byte == erased)) {
         info.warnings.push(InfoWarning { category: None, offset: None, problem: SiiProblem::Blank });
@@ -77,13 +77,13 @@ fn collect_header(info: &mut SubDeviceInfo, header: &SiiHeader) {
 fn collect_general(info: &mut SubDeviceInfo, parts: &Parts<'_, '_>, strings: &Strings<'_>) {
     let kind = CategoryKind::General;
     let Some(category) = parts.first(kind, &mut info.warnings) else {
-        // Where there are no categories at all, that is told.
+        // An image without any category is reported as such.
         if !parts.parts.is_empty() {
             info.warnings.push(InfoWarning { category: Some(kind), offset: None, problem: SiiProblem::Missing });
         }
         return;
     };
-    // A short category counts as far as it goes; what is missing is zero.
+    // A short category is used as far as it goes; the rest is zero.
     let mut bytes = [0; General::LEN];
     let got = category.data.len().min(General::LEN);
     bytes[..got].copy_from_slice(&category.data[..got]);
@@ -116,11 +116,11 @@ fn collect_pdos(info: &mut SubDeviceInfo, direction: PdoDirection, category: &Ca
     if rest.len() < Pdo::HEADER_LEN {
         return whole(category, Pdo::HEADER_LEN, &mut info.warnings);
     }
-    // What is erased is no PDO, and was told.
+    // An erased entry is not a PDO; a warning was given.
     if rest.iter().all(|byte| *byte == 0xFF) {
         return;
     }
-    // Entries beyond the end of the category: those that are there count.
+    // Entries beyond the end of the category: those within it are used.
     let got = (rest.len() - Pdo::HEADER_LEN) / PdoEntry::LEN;
     let mut cut = Vec::from(rest);
     let expected = usize::from(core::mem::replace(&mut cut[2], got as u8));
@@ -130,7 +130,7 @@ fn collect_pdos(info: &mut SubDeviceInfo, direction: PdoDirection, category: &Ca
     }
 }
 
-/// Takes over the PDO that begins at a byte of a category's data.
+/// Takes the PDO that begins at a byte of a category's data.
 fn push_pdo(
     info: &mut SubDeviceInfo,
     direction: PdoDirection,
@@ -140,12 +140,12 @@ fn push_pdo(
 ) {
     let own = Direction::from(direction);
     let problem = sync_manager_problem(info, own, pdo);
-    // One that is assigned to where it cannot be is not assigned.
+    // An assignment to an impossible SyncManager is dropped.
     let sync_manager = pdo.sync_manager.filter(|_| problem.is_none());
     info.warnings.extend(problem.map(|problem| within(category, offset, problem)));
     let name = text(strings, pdo.name, category, offset + 5, &mut info.warnings);
     let mut entries = Vec::with_capacity(usize::from(pdo.entry_count));
-    // What is erased is no entry, and was told.
+    // An erased entry is not a PDO entry; a warning was given.
     for (number, entry) in pdo.entries().enumerate().filter(|(_, entry)| !entry.is_erased()) {
         let name_at = offset + Pdo::HEADER_LEN + number * PdoEntry::LEN + 3;
         entries.push(PdoEntryInfo {
@@ -160,7 +160,7 @@ fn push_pdo(
     info.pdos.push(PdoInfo { index, direction: own, sync_manager, name, flags, entries });
 }
 
-/// What is odd about the SyncManager to which a PDO is assigned.
+/// Fault of the SyncManager to which a PDO is assigned.
 fn sync_manager_problem(info: &SubDeviceInfo, own: Direction, pdo: &Pdo<'_>) -> Option<SiiProblem> {
     let number = pdo.sync_manager?;
     let Some(sync_manager) = info.sync_managers.get(usize::from(number)) else {
@@ -175,7 +175,7 @@ fn sync_manager_problem(info: &SubDeviceInfo, own: Direction, pdo: &Pdo<'_>) -> 
     (!fits).then_some(SiiProblem::PdoDirection { pdo: pdo.index, sync_manager: number })
 }
 
-/// A string by index, empty for none. Bytes that are not UTF-8 are taken as Latin-1; what is no printable character,
+/// A string by index, empty for none. Bytes that are not UTF-8 are read as Latin-1; a character that is not printable,
 /// such as a line break, becomes a space.
 fn text(
     strings: &Strings<'_>,

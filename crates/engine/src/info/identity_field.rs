@@ -1,8 +1,8 @@
-//! The parts of who a SubDevice is, by which it may be expected.
+//! The fields of a SubDevice's identity by which it may be expected.
 
 use core::fmt;
 
-/// A part of who a SubDevice is.
+/// A field of a SubDevice's identity.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum IdentityField {
     /// Vendor id.
@@ -15,7 +15,7 @@ pub enum IdentityField {
     MinimumRevision,
     /// Serial number.
     Serial,
-    /// Explicit device identification (protocol 5.3); 0 is that of a SubDevice without one.
+    /// Explicit device identification (protocol 5.3); 0 for a SubDevice without one.
     Identification,
 }
 

@@ -1,4 +1,4 @@
-//! What is known of a SubDevice after a scan: registers of its controller, and what its SII says (protocol 3.1, 4).
+//! Result of a scan for a SubDevice: registers of its controller, and content of its SII (protocol 3.1, 4).
 
 use alloc::string::String;
 use alloc::vec::Vec;
@@ -13,7 +13,7 @@ use ringcat_wire::sii::{
 use super::warning::{InfoWarning, SiiProblem};
 use crate::direction::Direction;
 
-/// What the controller of a SubDevice is and can do.
+/// Type and features of a SubDevice's controller.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct ControllerInfo {
     /// TYPE.
@@ -120,8 +120,8 @@ pub struct SubDeviceInfo {
     pub identification: Option<u16>,
     /// The controller.
     pub controller: ControllerInfo,
-    /// The controller copies AL control into AL status by itself: no application, and no acknowledge bit (protocol
-    /// 3.4).
+    /// The controller copies AL control into AL status by itself (device emulation): no application, and no acknowledge
+    /// bit (protocol 3.4).
     pub device_emulation: bool,
     /// Register DL_STATUS at the time of the scan.
     pub dl_status: DlStatus,
@@ -139,44 +139,44 @@ pub struct SubDeviceInfo {
     pub mailbox: Option<MailboxLayout>,
     /// Mailboxes in BOOT; `None` where it has none.
     pub bootstrap: Option<MailboxLayout>,
-    /// Mailbox protocols that it speaks.
+    /// Mailbox protocols that it supports.
     pub protocols: MailboxProtocols,
-    /// What its CoE can do.
+    /// Its CoE features.
     pub coe: CoeDetails,
     /// Flags of the general category.
     pub flags: GeneralFlags,
-    /// Physical address of the ID switch, meant where the flags name identification in memory.
+    /// Physical address of the ID switch, valid where the flags name identification in memory.
     pub id_switch_address: u16,
-    /// Kind of port 0..3 as the SII says, a nibble per port, raw (protocol 4.3).
+    /// Kind of port 0..3 as the SII gives it, a nibble per port, raw (protocol 4.3).
     pub physical_ports: u16,
-    /// Current from the EBUS in milliamperes; negative where it feeds.
+    /// Current from the EBUS in milliamperes; negative where it supplies current.
     pub ebus_current_ma: i16,
-    /// SyncManagers, SM 0 first. The type of one that the SII gives none is what its PDOs or its control byte say.
+    /// SyncManagers, SM 0 first. Without a type in the SII, the type comes from its PDOs or its control byte.
     pub sync_managers: Vec<SiiSyncManager>,
-    /// What each FMMU is meant for, FMMU 0 first.
+    /// Purpose of each FMMU, FMMU 0 first.
     pub fmmu_usages: Vec<FmmuUsage>,
     /// PDOs of both directions: outputs first, each direction in the order of the SII.
     pub pdos: Vec<PdoInfo>,
-    /// SyncManagers whose PDOs are those of the dictionary, read online.
+    /// SyncManagers with PDOs that were read online from the dictionary.
     pub read_online: Vec<u8>,
     /// Operation modes of the distributed clock.
     pub dc_modes: Vec<DcMode>,
-    /// What is odd in the SII.
+    /// Faults of the SII.
     pub warnings: Vec<InfoWarning>,
 }
 
 impl SubDeviceInfo {
-    /// The EEPROM was never written, or does not give its contents: nothing is known of the SubDevice.
+    /// The EEPROM was never written, or cannot be read: nothing is known of the SubDevice.
     pub fn is_blank(&self) -> bool {
         self.warnings.iter().any(|it| matches!(it.problem, SiiProblem::Blank | SiiProblem::Unreadable))
     }
 
-    /// What the SII says cannot be trusted: it is blank, cut short, or its checksum is wrong.
+    /// The SII cannot be trusted: it is blank, cut short, or its checksum is wrong.
     pub fn is_doubtful(&self) -> bool {
         self.warnings.iter().any(|warning| warning.problem.is_grave())
     }
 
-    /// Takes over the PDOs that were read online when the same SubDevice was met before.
+    /// Takes over the PDOs that were read online at an earlier scan of the same SubDevice.
     pub(crate) fn keep_read_online(&mut self, known: &SubDeviceInfo) {
         if !known.read_online.is_empty() {
             self.pdos.clone_from(&known.pdos);
@@ -194,14 +194,14 @@ impl SubDeviceInfo {
         self.pdos.iter().filter(move |pdo| pdo.sync_manager == Some(sync_manager))
     }
 
-    /// SyncManagers of the mailboxes: that of the one which the MainDevice writes, that of the one which it reads. As
-    /// the SII says where it names both, else 0 and 1 (protocol 3.11).
+    /// SyncManagers of the mailboxes: the one that the MainDevice writes, the one that it reads. As the SII says where
+    /// it names both, else 0 and 1 (protocol 3.11).
     pub fn mailbox_sync_managers(&self) -> (u8, u8) {
         self.sync_managers_of(self.mailbox.as_ref())
     }
 
-    /// SyncManagers of the mailboxes in BOOT: to the SubDevice, and from it. Those at their places where the SII names
-    /// some, else the same as otherwise.
+    /// SyncManagers of the mailboxes in BOOT: to the SubDevice, and from it. Those that cover the mailboxes' addresses
+    /// where the SII names some, else the same as in PREOP.
     pub fn boot_sync_managers(&self) -> (u8, u8) {
         self.sync_managers_of(self.bootstrap.as_ref())
     }
@@ -215,7 +215,7 @@ impl SubDeviceInfo {
         out.zip(of(SyncManagerKind::MailboxIn, layout.map(|layout| layout.send_offset))).unwrap_or((0, 1))
     }
 
-    /// Whether LRW reaches it: neither controller nor SII says no.
+    /// Whether it supports LRW: neither controller nor SII denies it.
     pub fn lrw_supported(&self) -> bool {
         !self.controller.features.lrw_unsupported && !self.flags.not_lrw()
     }

@@ -66,7 +66,7 @@ fn general() -> Vec<u8> {
     general
 }
 
-/// Categories one behind the other, from the end of the fixed area on.
+/// Categories in a row, from the end of the fixed area on.
 fn placed<'a>(categories: &[(CategoryKind, &'a [u8])]) -> Vec<Category<'a>> {
     let mut offset = SiiHeader::LEN;
     let mut place = |(kind, data): &(CategoryKind, &'a [u8])| {
@@ -149,7 +149,7 @@ fn mailboxes_that_cannot_be_there_are_not_believed() {
 fn a_sync_manager_without_a_type_is_for_what_its_pdos_or_its_control_byte_say() {
     let mut data = SYNC_MANAGERS.to_vec();
     (8..32).step_by(8).for_each(|at| data[at + 7] = 0);
-    // PDOs count before the control byte.
+    // PDOs override the control byte.
     data[3 * 8 + 4] = 0x64;
     let info = info(&[(CategoryKind::SyncManager, &data), (CategoryKind::TxPdo, TX_PDO)]);
     use SyncManagerKind::{Inputs, MailboxIn, MailboxOut, Outputs};
@@ -234,7 +234,7 @@ fn a_pdo_with_more_entries_than_the_category_holds_keeps_those_there() {
     let info = info(&[(CategoryKind::SyncManager, SYNC_MANAGERS), (CategoryKind::TxPdo, &data)]);
     assert_eq!(info.pdos[0].entries.len(), 1);
     let problem = SiiProblem::PdoEntries { pdo: 0x1A00, expected: 3, got: 1 };
-    // Behind 128 bytes, four SyncManagers and two headers.
+    // After 128 bytes, four SyncManagers and two headers.
     assert!(info.warnings.contains(&warning(CategoryKind::TxPdo, 168, problem)));
     assert_eq!(
         warning(CategoryKind::TxPdo, 168, problem).to_string(),

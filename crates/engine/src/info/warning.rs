@@ -1,4 +1,4 @@
-//! What is odd in an SII, and where (protocol 4; users meet all of it in the field).
+//! Faults of an SII, and their place (protocol 4; all of them occur in real devices).
 
 use core::fmt;
 
@@ -7,39 +7,39 @@ use ringcat_wire::sii::{CategoryKind, MailboxLayout, SyncManagerKind};
 /// A mailbox holds at least the header of a message (protocol 6.1).
 pub(super) const MAILBOX_HEADER: u16 = 6;
 
-/// Something odd in the SII of a SubDevice.
+/// A fault in the SII of a SubDevice.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct InfoWarning {
     /// Category; `None` for the fixed area.
     pub category: Option<CategoryKind>,
-    /// Byte of the EEPROM from which on it is odd; `None` where it is no matter of one place.
+    /// Byte of the EEPROM at which the fault begins; `None` where it has no single place.
     pub offset: Option<usize>,
-    /// What is odd.
+    /// The fault.
     pub problem: SiiProblem,
 }
 
-/// What is odd.
+/// The kind of fault.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum SiiProblem {
     /// The fixed area is all 0xFF or all zero: the EEPROM was never written.
     Blank,
-    /// The EEPROM does not give its contents.
+    /// The EEPROM cannot be read.
     Unreadable,
-    /// Nothing follows the fixed area.
+    /// No category follows the fixed area.
     NoCategories,
-    /// There is no category of this kind, which every device has.
+    /// A category is missing that every device has.
     Missing,
     /// A category goes on beyond the end of the EEPROM; it is left out.
     Beyond {
-        /// Bytes that it announces.
+        /// Announced length in bytes.
         announced: usize,
         /// Bytes that are left.
         left: usize,
     },
-    /// The categories go on beyond the size that the EEPROM says it has; they count.
+    /// The categories extend beyond the size that the EEPROM announces; they are used.
     Size {
-        /// Bytes that it says.
+        /// Announced bytes.
         size: usize,
         /// Where the categories end.
         end: usize,
@@ -49,46 +49,46 @@ pub enum SiiProblem {
         /// Erased bytes.
         bytes: usize,
     },
-    /// The mailboxes cannot be where the SII puts them; they are left unused.
+    /// The mailboxes cannot be at the place that the SII gives; they are not used.
     Mailbox {
-        /// Where the SII puts them.
+        /// Place that the SII gives.
         layout: MailboxLayout,
         /// First byte behind the memory of the controller.
         memory_end: u32,
     },
-    /// Something needs SyncManagers, and the SII describes none.
+    /// SyncManagers are needed, and the SII describes none.
     NoSyncManagers,
     /// Process data without a mailbox in which a dictionary could describe it, and without PDOs.
     NoPdos {
         /// The SyncManager.
         sync_manager: u8,
     },
-    /// A SyncManager without a type; its PDOs or its control byte say what it is for.
+    /// A SyncManager without a type; its type comes from its PDOs or its control byte.
     NoType {
         /// The SyncManager.
         sync_manager: u8,
         /// The type in the SII.
         got: u8,
-        /// What it is taken for.
+        /// Assumed type.
         taken: SyncManagerKind,
     },
-    /// The low byte of word 7 does not fit the first seven words.
+    /// The low byte of word 7 is not the checksum of the first seven words.
     Checksum {
-        /// The checksum that belongs to the first seven words.
+        /// Checksum of the first seven words.
         expected: u8,
         /// Word 7.
         got: u16,
     },
     /// The chain of categories has no end marker.
     NoEndMarker,
-    /// The category announces more bytes than are there, or is shorter than what it holds.
+    /// The category announces more bytes than are present, or is shorter than its content.
     Short {
         /// Bytes expected.
         expected: usize,
-        /// Bytes there.
+        /// Bytes present.
         got: usize,
     },
-    /// A category that should be there once comes again; the first one counts.
+    /// A category that may occur only once occurs again; the first one is used.
     Repeated,
     /// One mailbox of a pair has no size; both are left unused.
     HalfMailbox {
@@ -102,7 +102,7 @@ pub enum SiiProblem {
         /// The protocols word.
         protocols: u16,
     },
-    /// A string index that the strings do not have.
+    /// An index beyond the strings of the SII.
     NoString {
         /// The index.
         index: u8,
@@ -114,13 +114,13 @@ pub enum SiiProblem {
         /// Entries in the SII.
         got: usize,
     },
-    /// A PDO announces more entries than the category holds; those there are used.
+    /// A PDO announces more entries than the category holds; those within it are used.
     PdoEntries {
         /// Index of the PDO.
         pdo: u16,
         /// Entries announced.
         expected: usize,
-        /// Entries there.
+        /// Entries present.
         got: usize,
     },
     /// A PDO is assigned to a SyncManager that the SII does not describe.
@@ -137,7 +137,7 @@ pub enum SiiProblem {
         /// The SyncManager.
         sync_manager: u8,
     },
-    /// The dictionary of the SubDevice has other PDOs for a SyncManager than the SII; the dictionary counts.
+    /// The dictionary of the SubDevice has other PDOs for a SyncManager than the SII; the dictionary is used.
     Dictionary {
         /// The SyncManager.
         sync_manager: u8,
@@ -146,7 +146,7 @@ pub enum SiiProblem {
         /// Bits of process data in the dictionary.
         dictionary: u32,
     },
-    /// Mode or direction in the control byte of a SyncManager are not those of its type; the type counts.
+    /// Mode or direction in the control byte of a SyncManager differ from its type; the type is used.
     Control {
         /// The SyncManager.
         sync_manager: u8,
@@ -156,7 +156,7 @@ pub enum SiiProblem {
 }
 
 impl SiiProblem {
-    /// The image is not what its maker wrote.
+    /// The image is not as its vendor wrote it: it is damaged.
     pub(super) const fn is_grave(&self) -> bool {
         match self {
             SiiProblem::Blank
@@ -188,7 +188,7 @@ impl SiiProblem {
 }
 
 impl InfoWarning {
-    /// The place in the EEPROM that it is about.
+    /// The place in the EEPROM.
     fn fmt_place(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match (self.category, self.offset) {
             (Some(category), Some(offset)) => write!(f, "byte {offset:#06x}, category {category}: "),
@@ -209,7 +209,7 @@ fn fmt_mailboxes(f: &mut fmt::Formatter<'_>, layout: &MailboxLayout, memory_end:
     )
 }
 
-/// What a SyncManager of a kind is for.
+/// Purpose of a SyncManager of a type.
 const fn purpose(kind: SyncManagerKind) -> &'static str {
     match kind {
         SyncManagerKind::MailboxOut => "the mailbox to the SubDevice",

@@ -1,8 +1,8 @@
-//! Which areas travel in one frame, and which of them share their datagrams.
+//! Which areas travel in one frame, and which of them share datagrams.
 //!
-//! In: the areas of a domain in order, and how each SubDevice is witnessed. Out: chunks that fit a frame. Within one,
-//! areas of witnessed SubDevices share datagrams; those of the others have their own where a shared working counter
-//! would hide whether their inputs came.
+//! Input: the areas of a domain in order, and how the inputs of each SubDevice are witnessed. Output: chunks that fit a
+//! frame. Within a chunk, areas of SubDevices with a presence byte share datagrams; the others have datagrams of their
+//! own where a shared working counter would hide missing inputs.
 
 use alloc::collections::BTreeSet;
 use alloc::vec;
@@ -19,7 +19,7 @@ use crate::direction::Direction;
 /// Room for datagrams in a frame.
 const ROOM: usize = MAX_DATA + OVERHEAD;
 
-/// How SubDevices are witnessed. Each shows its AL status in one frame: in another one it is alone.
+/// Witness of each SubDevice. Each shows its AL status in one frame; in other frames it has datagrams of its own.
 pub(super) struct Witnesses<'a> {
     known: &'a [Witness],
     shown: BTreeSet<usize>,
@@ -40,7 +40,7 @@ impl<'a> Witnesses<'a> {
         }
     }
 
-    /// A presence datagram of these SubDevices, which show themselves nowhere else from now on.
+    /// A presence datagram of these SubDevices, which from now on have no byte elsewhere.
     pub fn presence(&mut self, subdevices: &[usize]) -> Option<PlannedPresence> {
         let member = |subdevice: usize| match self.of(subdevice) {
             Witness::Mapped(delivers) => Some((subdevice, delivers)),
@@ -54,7 +54,7 @@ impl<'a> Witnesses<'a> {
     }
 }
 
-/// Areas that share their datagrams: one LRW, or an LWR and an LRD.
+/// Areas with common datagrams: one LRW, or an LWR and an LRD.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Group {
     pub outputs: Vec<AreaSpec>,
@@ -90,8 +90,8 @@ impl Group {
 /// Areas that travel in one frame.
 #[derive(Clone, Debug)]
 pub(super) struct Chunk {
-    /// First those that share their datagrams, behind them outputs of SubDevices that are not witnessed, then one group
-    /// for each other SubDevice.
+    /// First the areas with common datagrams, then outputs of SubDevices without a presence byte, then one group for
+    /// each other SubDevice.
     groups: Vec<Group>,
     /// SubDevices that can show their AL status, in the order of their areas.
     witnessed: Vec<usize>,
@@ -119,14 +119,14 @@ impl Chunk {
         self.groups.iter().all(Group::is_empty)
     }
 
-    /// Whether a frame takes it.
+    /// Whether it fits a frame.
     fn fits(&self, most: Option<usize>) -> bool {
         let presence = usize::from(self.witnessed.len() > 1);
         let datagrams = self.groups.iter().map(Group::datagrams).sum::<usize>() + presence;
         self.used() <= ROOM && most.is_none_or(|most| datagrams <= most)
     }
 
-    /// Bytes of all datagrams at most.
+    /// Largest length of all datagrams in bytes.
     fn used(&self) -> usize {
         let presence = if self.witnessed.len() > 1 { OVERHEAD + self.witnessed.len() } else { 0 };
         self.groups.iter().map(Group::used).sum::<usize>() + presence
@@ -137,8 +137,8 @@ impl Chunk {
         let Some(subdevice) = areas.first().map(|area| area.subdevice) else { return };
         let lrw = self.groups[SHARED].lrw;
         let has_inputs = areas.iter().any(|area| area.direction == Direction::Inputs);
-        // It adds to a working counter once, whatever part of its inputs came: each further area has a datagram of its
-        // own.
+        // The SubDevice increments a working counter once, whatever part of its inputs is in the frame: each further
+        // area needs a datagram of its own.
         let has_some = |group: &Group| group.inputs.iter().any(|area| area.subdevice == subdevice);
         let mut is_further = self.groups.iter().any(has_some);
         let (further, first): (Vec<AreaSpec>, Vec<AreaSpec>) = areas
@@ -158,7 +158,7 @@ impl Chunk {
         }
         let mut own = Group { lrw, ..Group::default() };
         for area in &first {
-            // Outputs alone are no secret: a sum tells whether all took them.
+            // Outputs alone may share: the sum tells whether all SubDevices took them.
             let is_plain = area.direction == Direction::Outputs && !(lrw && has_inputs);
             if is_plain { self.groups[PLAIN].add(*area) } else { own.add(*area) }
         }
@@ -192,7 +192,7 @@ pub(super) fn chunks(
         let subdevice = group[0].subdevice;
         let witness =
             |shown: &BTreeSet<usize>| if shown.contains(&subdevice) { Witness::Alone } else { witnesses.of(subdevice) };
-        // A SubDevice's areas stay together where they can: fewer working counters to look at.
+        // A SubDevice's areas stay together where possible: fewer working counters to evaluate.
         let mut whole = chunk.with(group, witness(&shown));
         if !chunk.is_empty() && (each || !whole.fits(most)) {
             shown.extend(chunk.witnessed.iter().copied());

@@ -1,4 +1,4 @@
-//! Why process data cannot be laid out.
+//! Errors of the layout of process data.
 
 use core::fmt;
 
@@ -19,9 +19,9 @@ pub enum LayoutError {
     },
     /// Logical addresses or images beyond 2 GiB.
     TooLarge,
-    /// More frames than may be in flight at once.
+    /// More frames than may be on the wire at once.
     TooManyFrames {
-        /// Frames that would be needed.
+        /// Number of frames needed.
         frames: usize,
     },
 }

@@ -1,4 +1,4 @@
-//! What a layout consists of: domains, their frames, and the datagrams in these.
+//! Parts of a layout: domains, their frames, and the datagrams in these.
 
 use alloc::vec::Vec;
 use core::time::Duration;
@@ -8,7 +8,7 @@ use ringcat_wire::command::Command;
 
 use super::spec::{AreaSpec, Delivers};
 
-/// Where an area came to lie.
+/// Place of an area.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct PlacedArea {
     /// The area.
@@ -26,13 +26,13 @@ pub struct PlannedDatagram {
     pub command: Command,
     /// Logical address.
     pub logical: LogicalAddress,
-    /// First byte in the image of what the datagram covers.
+    /// First byte in the image that the datagram covers.
     pub image_offset: u32,
     /// Bytes of outputs, at the beginning of the data.
     pub outputs: u16,
     /// Bytes of inputs, behind the outputs.
     pub inputs: u16,
-    /// Working counter that each SubDevice adds.
+    /// Increment of the working counter by each SubDevice.
     pub contributions: Vec<(usize, Wkc)>,
     /// Input areas, to deliver them one by one.
     pub input_areas: Vec<PlacedArea>,
@@ -65,7 +65,7 @@ pub struct PlannedFrame {
 pub struct PlannedDomain {
     /// From the specification.
     pub period: Duration,
-    /// From the specification: each frame may be out so many times.
+    /// From the specification: how often each frame may be on the wire at once.
     pub under_way: u8,
     /// Bytes of the image.
     pub image_len: u32,

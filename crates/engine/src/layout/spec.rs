@@ -1,4 +1,4 @@
-//! What a layout is made from: areas, domains, and the rules that all of them keep.
+//! Input of a layout: areas, domains, and common rules.
 
 use alloc::vec::Vec;
 use core::time::Duration;
@@ -19,29 +19,30 @@ pub struct AreaSpec {
     pub length: u16,
 }
 
-/// Where LRW is used instead of LWR and LRD (protocol 9.2.2).
+/// Use of LRW instead of LWR and LRD (protocol 9.2.2).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum LrwPolicy {
-    /// On one link, where every SubDevice of a domain knows it; never on two.
+    /// On one link, where every SubDevice of a domain supports it; never on two links.
     #[default]
     Automatic,
-    /// As the application or its configuration says so: refused with two links, or where a SubDevice does not know it.
+    /// As the application or its configuration requests; refused with two links, or where a SubDevice does not support
+    /// it.
     Explicit,
     /// One datagram per SubDevice, with LRW where it has outputs and inputs. Allowed with two links too, because one
-    /// copy meets all that a datagram addresses.
+    /// copy reaches all that a datagram addresses.
     PerSubDevice,
 }
 
-/// How a frame shows whether a SubDevice put its inputs into it.
+/// How a frame shows whether a SubDevice delivered its inputs.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Witness {
-    /// By its AL status, which an FMMU of it maps into the frame: in these states its inputs are there.
+    /// By its AL status, which one of its FMMUs maps into the frame: in these states its inputs are valid.
     Mapped(Delivers),
-    /// By the working counter of a datagram that no other SubDevice answers.
+    /// By the working counter of a datagram that addresses no other SubDevice.
     Alone,
 }
 
-/// In which AL states a SubDevice whose FMMUs and SyncManagers are set gives its inputs.
+/// AL states in which a SubDevice with FMMUs and SyncManagers set delivers its inputs.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Delivers {
     /// In SAFEOP and OP.
@@ -50,7 +51,7 @@ pub enum Delivers {
     InOp,
 }
 
-/// What a layout has to follow.
+/// Rules of a layout.
 #[derive(Clone, Copy, Debug)]
 pub struct Rules<'a> {
     /// Links that frames leave on.
@@ -59,35 +60,35 @@ pub struct Rules<'a> {
     pub supervision: bool,
     /// Where LRW is used.
     pub lrw: LrwPolicy,
-    /// By SubDevice; those behind the end have an FMMU to spare.
+    /// By SubDevice; those beyond the end have a spare FMMU.
     pub witnesses: &'a [Witness],
-    /// Number of the session, modulo [`SESSIONS`]: each has logical addresses of its own, so that a SubDevice that was
-    /// out of reach since an earlier one and still has its FMMUs does not answer for another one.
+    /// Number of the session, modulo `SESSIONS`. Each session has logical addresses of its own, so that a SubDevice
+    /// that was out of reach since an earlier session and still has its old FMMUs does not answer for another one.
     pub session: u32,
-    /// Datagrams that a frame may hold, [`MIN_DATAGRAMS_PER_FRAME`] at least; `None`: as many as fit.
+    /// Largest number of datagrams in a frame, `MIN_DATAGRAMS_PER_FRAME` at least; `None`: as many as fit.
     pub max_datagrams: Option<usize>,
 }
 
-/// What a domain exchanges.
+/// Content of a domain.
 #[derive(Clone, Debug)]
 pub struct DomainSpec {
-    /// How often the application exchanges it.
+    /// Period of its exchange by the application.
     pub period: Duration,
-    /// How many of its cycles may be under way at once.
+    /// Largest number of its cycles on the wire at once.
     pub under_way: u8,
-    /// Whether every SubDevice of the domain knows LRW (protocol 3.1, features bit 9).
+    /// Whether every SubDevice of the domain supports LRW (protocol 3.1, features bit 9).
     pub lrw: bool,
-    /// Areas in the order in which they lie in the image; those of a SubDevice stand together.
+    /// Areas in the order of the image; those of a SubDevice are adjacent.
     pub areas: Vec<AreaSpec>,
 }
 
-/// How the areas of a domain are cut into frames.
+/// Rules for cutting the areas of a domain into frames.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Cut {
-    /// One LRW in the place of an LWR and an LRD.
+    /// One LRW instead of an LWR and an LRD.
     pub(super) lrw: bool,
     /// Every SubDevice has datagrams of its own.
     pub(super) each: bool,
-    /// Datagrams that a frame may hold.
+    /// Largest number of datagrams in a frame.
     pub(super) most: Option<usize>,
 }

@@ -17,7 +17,7 @@ fn spec(areas: Vec<AreaSpec>) -> DomainSpec {
     DomainSpec { period: Duration::from_millis(1), under_way: 1, lrw: true, areas }
 }
 
-/// Two links, and datagrams of its own for each SubDevice.
+/// Two links, and separate datagrams for each SubDevice.
 fn each(supervision: bool) -> Rules<'static> {
     Rules {
         links: LinkSet::Ring,
@@ -73,7 +73,7 @@ fn one_lrw_per_subdevice_is_allowed_on_two_links() {
     assert!(layout.domains[0].frames.iter().all(|frame| frame.used() <= MAX_DATA + OVERHEAD));
 }
 
-/// Two inputs and outputs each of SubDevices that are witnessed like this, one frame.
+/// Two inputs and outputs each of SubDevices with this witness, one frame.
 fn witnessed(witnesses: &[Witness], links: LinkSet) -> PlannedFrame {
     let pair = |n: usize| [area(n, 2, Direction::Outputs, 2), area(n, 3, Direction::Inputs, 2)];
     let areas: Vec<_> = (0..witnesses.len()).flat_map(pair).collect();
@@ -163,7 +163,7 @@ fn an_area_beyond_a_datagram_is_refused_with_its_name() {
     let error = Layout::new(&[spec(vec![area(7, 3, Direction::Inputs, 1487)])], LinkSet::Single, false).unwrap_err();
     assert_eq!(error, LayoutError::AreaTooLong { subdevice: 7, sync_manager: 3, length: 1487 });
     let full = Layout::new(&[spec(vec![area(7, 3, Direction::Inputs, 1486)])], LinkSet::Single, true).unwrap();
-    // No room for supervision beside it: a frame of its own.
+    // No room left for the supervision datagram: it has a frame of its own.
     assert_eq!(full.domains[0].frames.len(), 2);
     assert!(full.domains[0].frames[1].supervision);
 }
@@ -203,7 +203,7 @@ proptest! {
         for frame in &domain.frames {
             let supervision = if frame.supervision { OVERHEAD + SUPERVISION_LEN } else { 0 };
             prop_assert!(frame.used() + supervision <= MAX_DATA + OVERHEAD);
-            // No sum of working counters hides whose inputs came.
+            // No sum of working counters hides a missing input.
             for datagram in frame.datagrams.iter().filter(|d| d.inputs > 0 && d.contributions.len() > 1) {
                 let shown = |subdevice| frame.presence.iter().flat_map(|it| &it.members).any(|(s, _)| *s == subdevice);
                 prop_assert!(datagram.contributions.iter().all(|(subdevice, _)| shown(*subdevice)));

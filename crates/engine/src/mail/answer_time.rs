@@ -1,49 +1,50 @@
-//! When to look for an answer, learnt from those before.
+//! When to poll for an answer, learnt from earlier answers.
 //!
-//! Reading too early costs a datagram as long as the mailbox, reading late costs time. So the first look comes when the
-//! answer should be there; it reads at once where that was right last time, and looks at the status byte otherwise.
-//! When all was well for a while, an earlier look is tried. Times are those at which an access that nothing delayed
-//! would have been asked for: how long datagrams wait for their turn on a busy wire is no matter of the SubDevice.
+//! Reading too early costs a datagram as long as the mailbox, reading late costs time. So the first poll is at the
+//! expected time; it reads at once where that was right last time, and polls the status byte otherwise. After a series
+//! of good polls an earlier one is tried. Times are those without queueing: how long datagrams wait for a busy wire
+//! does not depend on the SubDevice.
 
 use core::time::Duration;
 
-/// Shortest pause between two looks: about a round trip on a network interface.
+/// Shortest pause between two polls: about a round trip on a network interface.
 const SHORTEST_PAUSE: Duration = Duration::from_micros(100);
-/// Longest pause between two looks.
+/// Longest pause between two polls.
 const LONGEST_PAUSE: Duration = Duration::from_millis(1);
-/// The pause is this part of the time that was waited so far.
+/// The pause is this part of the time waited so far.
 const PAUSE_PART: u32 = 8;
-/// A try to look earlier is earlier by half of what is not known, and by this part at least.
+/// An earlier poll is earlier by half of the uncertainty, and by this part at least.
 const EARLIER_PART: u32 = 16;
-/// After a try in vain, so many answers are taken at the usual time before the next; four times as many after another.
+/// After an earlier poll in vain, the number of answers at the usual time before the next attempt; four times as many
+/// after each further failure.
 const FIRST_PATIENCE: u32 = 4;
-/// Most of them: a SubDevice whose answers become quicker is followed after so many.
+/// Largest such number: it limits how long a SubDevice that becomes faster stays unnoticed.
 const LONGEST_PATIENCE: u32 = 32;
-/// A round trip that has become longer is believed by this part of it each time.
+/// A longer round trip is taken over by this part of it each time.
 const FADING_PART: u32 = 32;
 
-/// Learns how long answers take.
+/// Learns the response times.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct AnswerTime {
-    /// They were there by then.
+    /// Answers were available after this time.
     usual: Duration,
-    /// At this time one was not there.
+    /// After this time an answer was not available yet.
     vain: Duration,
-    /// The last answer was there at the first look.
+    /// The last answer was available at the first poll.
     hit: bool,
-    /// Answers that were there at the first look since the last try to look earlier.
+    /// Answers available at the first poll since the last earlier poll.
     calm: u32,
-    /// How many there must be before the next try.
+    /// Number of them required before the next earlier poll.
     patience: u32,
 }
 
 impl AnswerTime {
-    /// How long after the request the first look is due.
+    /// Time from the request to the first poll.
     pub(super) fn first_look(&self) -> Duration {
         if self.is_trying() { self.usual - self.unknown().max(self.step()) / 2 } else { self.usual }
     }
 
-    /// Whether the first look had better be a read.
+    /// Whether the first poll should read the mailbox at once.
     pub(super) fn is_sure(&self) -> bool {
         self.hit
     }
@@ -56,17 +57,17 @@ impl AnswerTime {
         self.usual.saturating_sub(self.vain)
     }
 
-    /// Twice the least that a try is earlier.
+    /// Twice the minimum by which an earlier poll is earlier.
     fn step(&self) -> Duration {
         self.usual / EARLIER_PART * 2
     }
 
-    /// Pause to the next look when an answer is not there after `waited`.
+    /// Pause to the next poll when no answer is available after `waited`.
     pub(super) fn pause(waited: Duration) -> Duration {
         (waited / PAUSE_PART).clamp(SHORTEST_PAUSE, LONGEST_PAUSE)
     }
 
-    /// An answer was found `after` its request; the last look before found nothing at `vain`.
+    /// An answer was found `after` its request; the last poll before it, at `vain`, found nothing.
     pub(super) fn took(&mut self, after: Duration, vain: Option<Duration>) {
         let is_known = self.usual != Duration::ZERO;
         let trying = is_known && self.is_trying();
@@ -76,7 +77,7 @@ impl AnswerTime {
             if self.vain >= self.usual {
                 self.vain = Duration::ZERO;
             }
-            // A try that has shown something is followed by another.
+            // A successful attempt is followed by another.
             self.calm += u32::from(!trying);
             return;
         };
@@ -91,12 +92,12 @@ impl AnswerTime {
     }
 }
 
-/// The shortest way to the SubDevice and back of late.
+/// The shortest recent round trip to the SubDevice.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct ShortestTrip(Option<Duration>);
 
 impl ShortestTrip {
-    /// An access took so long, waiting for its turn included. Returns how long one takes that need not wait.
+    /// Takes the duration of an access including queueing. Returns the estimated duration without queueing.
     pub(super) fn took(&mut self, trip: Duration) -> Duration {
         let shortest = self.0.map_or(trip, |shortest| trip.min(shortest + shortest / FADING_PART));
         self.0 = Some(shortest);
@@ -108,7 +109,7 @@ impl ShortestTrip {
 mod tests {
     use super::*;
 
-    /// Asks as the reader does; returns the looks that found nothing.
+    /// Polls as the reader does; returns the polls that found nothing.
     fn ask(time: &mut AnswerTime, real: Duration) -> u32 {
         let (mut at, mut vain, mut looks) = (time.first_look(), None, 0);
         while at < real {

@@ -12,12 +12,12 @@ use super::lane::Lane;
 use super::talk::Limits;
 use super::{Mailbox, MailboxError};
 
-/// Who asks whom.
+/// Source and target of a request.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct AoeRoute {
     /// NetId and port in the SubDevice.
     pub target: AmsAddress,
-    /// Our own NetId and port.
+    /// NetId and port of the MainDevice.
     pub source: AmsAddress,
 }
 
@@ -27,11 +27,11 @@ pub struct AoeRoute {
 pub enum AoeError {
     /// The mailbox failed.
     Mailbox(MailboxError),
-    /// It did not reach its port.
+    /// It did not reach its ADS port.
     Undelivered(AdsErrorCode),
-    /// The port refused.
+    /// The ADS port refused.
     Refused(AdsErrorCode),
-    /// The answer cannot be read.
+    /// The answer is malformed.
     Malformed(PayloadError),
 }
 
@@ -76,7 +76,7 @@ pub struct AoeDeviceInfo {
     pub name: String,
 }
 
-/// Reads `length` bytes at most.
+/// Reads at most `length` bytes.
 pub async fn read(
     mailbox: &Mailbox,
     route: AoeRoute,
@@ -98,7 +98,7 @@ pub async fn write(
     request(mailbox, route, &AdsRequest::Write { group, offset, data }, limits, |_| Some(())).await
 }
 
-/// Writes, then reads `read_length` bytes at most.
+/// Writes, then reads at most `read_length` bytes.
 pub async fn read_write(
     mailbox: &Mailbox,
     route: AoeRoute,
@@ -152,7 +152,7 @@ async fn data(mailbox: &Mailbox, route: AoeRoute, asked: &AdsRequest<'_>, limits
     request(mailbox, route, asked, limits, data).await
 }
 
-/// Sends a request and takes the response with its invoke id.
+/// Sends a request and waits for the response with its invoke id.
 async fn request<T>(
     mailbox: &Mailbox,
     route: AoeRoute,

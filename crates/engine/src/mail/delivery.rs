@@ -1,4 +1,4 @@
-//! Whose a mail is (decision 0007).
+//! Delivers a mail to its lane (decision 0007).
 
 use alloc::rc::Rc;
 
@@ -14,7 +14,7 @@ use super::unsolicited::{Unclaimed, Unsolicited};
 use crate::event::Event;
 use crate::time::Instant;
 
-/// SoE services that are answers; the others come unasked (protocol 6.6).
+/// SoE services that are answers; the others are unsolicited (protocol 6.6).
 const SOE_ANSWERS: [u8; 2] = [2, 4];
 /// Offset of the flags in an AoE header, and the bit of an answer (protocol 6.7).
 const AOE_FLAGS_AT: usize = 18;
@@ -22,7 +22,7 @@ const AOE_RESPONSE: u8 = 0x01;
 /// EoE types that are answers: set IP, set filter, get IP, get filter (protocol 6.5).
 const EOE_ANSWERS: [u8; 4] = [3, 5, 7, 9];
 
-/// Takes in the content of the send mailbox. Any bytes are allowed. True where somebody waited for it.
+/// Takes the content of the send mailbox. Any bytes are allowed. True where a conversation waited for it.
 pub(super) fn deliver(room: &Rc<Room>, mail: &[u8], way: Way, sent: Instant) -> bool {
     let wanted = {
         let state = &mut *room.state();
@@ -44,7 +44,7 @@ pub(super) fn deliver(room: &Rc<Room>, mail: &[u8], way: Way, sent: Instant) -> 
 }
 
 fn is_double(state: &mut State, message: &Message<'_>, way: Way, sent: Instant) -> bool {
-    // What a repeat brings may be the mail before the one that was lost.
+    // A repeat may bring the mail before the lost one.
     let way = if state.repeated && way == Way::Usual { Way::Repeat } else { way };
     let double = state.recent.is_double(message.header.counter, message.payload, way, sent);
     state.repeated &= double || way != Way::Repeat;
@@ -54,7 +54,7 @@ fn is_double(state: &mut State, message: &Message<'_>, way: Way, sent: Instant) 
 fn sort(room: &Rc<Room>, state: &mut State, message: &Message<'_>) -> bool {
     let payload = message.payload;
     let first = payload.first().copied().unwrap_or(0);
-    // Frames are not answered, but whoever sends some knows them.
+    // Frames have no answer, but the sender of frames knows EoE.
     state.lanes[Lane::Frames.place()].proven |= message.header.protocol == Protocol::Eoe;
     match message.header.protocol {
         Protocol::Error => refused(state, message, room.bus.now()),
@@ -96,7 +96,7 @@ fn coe(room: &Rc<Room>, state: &mut State, message: &Message<'_>) -> bool {
             room.bus.report(Event::Emergency { subdevice: room.subdevice, emergency });
             false
         }
-        // An abort has the service of a request, whoever sends it.
+        // An abort has the service of a request in both directions.
         CoeService::SdoRequest | CoeService::SdoResponse | CoeService::SdoInformation => {
             answer(state, Lane::Coe, message)
         }
@@ -112,11 +112,11 @@ fn coe(room: &Rc<Room>, state: &mut State, message: &Message<'_>) -> bool {
     }
 }
 
-/// To whoever waits in a lane; without one, onto a shelf.
+/// To the conversation in the lane; without one, into a ring.
 fn answer(state: &mut State, lane: Lane, message: &Message<'_>) -> bool {
     let arrival = Arrival::Payload(message.payload.to_vec());
     let own = &mut state.lanes[lane.place()];
-    // Whoever talks takes one after the other; the oldest is not what is waited for.
+    // A conversation takes one answer at a time; the oldest in the queue is not the expected one.
     let oldest = if own.is_full() { own.take() } else { None };
     let wanted = own.arrive(arrival, state.seen, is_last(lane, message.payload));
     if let Some(oldest) = oldest {
@@ -128,7 +128,7 @@ fn answer(state: &mut State, lane: Lane, message: &Message<'_>) -> bool {
     wanted
 }
 
-/// Whether a mail ends an answer: of SoE and of SDO information there may be further parts.
+/// Whether a mail ends an answer: SoE and SDO information may have further parts.
 pub(super) fn is_last(lane: Lane, payload: &[u8]) -> bool {
     match lane {
         Lane::Soe => SoeMessage::decode(payload).is_ok_and(|part| part.error || !part.incomplete),
@@ -137,7 +137,7 @@ pub(super) fn is_last(lane: Lane, payload: &[u8]) -> bool {
     }
 }
 
-/// What came for a lane and was not what somebody waited for: mail that nobody asked for, or a late answer.
+/// A mail for a lane without a conversation that waits for it: unsolicited mail, or a late answer.
 pub(super) fn put_aside(state: &mut State, lane: Lane, arrival: Arrival) {
     let (shelf, protocol, payload) = match arrival {
         Arrival::Payload(payload) => (lane.shelf(), lane.protocol(), payload),
@@ -155,10 +155,10 @@ fn shelve(state: &mut State, message: &Message<'_>, kind: Unsolicited) -> bool {
     false
 }
 
-/// An error reply does not say to what. It goes to the request that waits; of several, first to one whose protocol the
-/// SubDevice has not shown to know, then to the oldest. Whoever writes a message in parts is told, too. It is certain
-/// only where it can be to nothing else, neither to a request that was given up nor to a message that nobody answers;
-/// else the answer to the request that it ends may still come.
+/// An error reply does not name its request. It goes to the waiting request; of several, first to one of a protocol
+/// that the SubDevice has not shown to support, then to the oldest. A sender of a message in parts is informed, too.
+/// The cause is certain only where the reply can belong to nothing else: neither to a request that was given up nor to
+/// a message without an answer. Otherwise the answer to the ended request may still come.
 fn refused(state: &mut State, message: &Message<'_>, now: Instant) -> bool {
     let Some(bytes) = message.payload.first_chunk() else {
         state.counters.malformed += 1;
@@ -173,7 +173,7 @@ fn refused(state: &mut State, message: &Message<'_>, now: Instant) -> bool {
     let is_waiting = |lane: &LaneState| lane.waiting().is_some();
     let is_late = |lane: &LaneState| !lane.settling && lane.late_until.is_some_and(|until| now < until);
     let may_be_to = |lane: &LaneState| is_waiting(lane) || is_late(lane) || lane.is_unanswered(now);
-    // Only a protocol that is not known is refused for itself.
+    // Only an unknown protocol is refused as such.
     let unknown = reply.detail == ErrorReply::UNSUPPORTED_PROTOCOL
         && state.lanes.iter().any(|lane| !lane.proven && may_be_to(lane));
     let in_question = |lane: &LaneState| !(unknown && lane.proven);

@@ -1,13 +1,13 @@
 //! EoE: Ethernet through a mailbox, and the addresses of the IP stack behind it (protocol 6.5).
 //!
-//! An [`EthernetPort`] takes whole Ethernet frames for a SubDevice and gives out those that come from it. Its task cuts
-//! frames into fragments and writes them in a lane of its own, so that they take turns with every other protocol; what
-//! is read is put together as it comes. Nothing in here waits for the application's cycle: fragments follow one another
-//! as fast as the SubDevice takes and gives them. The parts:
+//! An [`EthernetPort`] takes whole Ethernet frames for a SubDevice and returns those received from it. Its task cuts
+//! frames into fragments and writes them in a lane of its own, so that they take turns with the other protocols;
+//! received fragments are joined as they arrive. No part waits for the application's cycle: fragments follow one
+//! another as fast as the SubDevice accepts and sends them. The parts:
 //!
 //! * `fragments`, `reassembly`: frames to fragments and back;
 //! * `traffic`: queues and counters of one mailbox; [`port`]: the handle;
-//! * [`settings`]: IP parameters and address filter; [`error`]: why they were not set or told.
+//! * [`settings`]: IP parameters and address filter; [`error`]: why setting or reading them failed.
 
 pub mod error;
 mod fragments;

@@ -1,4 +1,4 @@
-//! Why there is no answer.
+//! Why a request has no answer.
 
 use core::fmt;
 use core::time::Duration;
@@ -7,7 +7,7 @@ use ringcat_wire::mailbox::ErrorReply;
 
 use crate::supervisor::BusError;
 
-/// Why there is no answer.
+/// Why a request has no answer.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum MailboxError {
@@ -15,21 +15,21 @@ pub enum MailboxError {
     Bus(BusError),
     /// The mailbox is not in use: the SubDevice has none, is in INIT, or does not answer.
     Closed,
-    /// The message does not fit.
+    /// The message is too long.
     TooLong {
         /// Bytes of the message.
         bytes: usize,
-        /// Bytes that fit.
+        /// Longest possible length.
         limit: usize,
     },
     /// The SubDevice did not empty its receive mailbox in time.
     Full {
-        /// How long was waited.
+        /// Time waited.
         limit: Duration,
     },
     /// No answer in time.
     NoAnswer {
-        /// How long was waited.
+        /// Time waited.
         limit: Duration,
     },
     /// The SubDevice answered with a mailbox error.

@@ -1,4 +1,4 @@
-//! FoE: files of a SubDevice, read into a sink and written from a source, piece by piece (protocol 6.4).
+//! FoE: files of a SubDevice, read into a sink and written from a source, packet by packet (protocol 6.4).
 
 mod error;
 mod read;
@@ -17,16 +17,16 @@ use super::lane::Lane;
 use super::talk::{Limits, Talk};
 use super::{Mailbox, MailboxError};
 
-/// What a transfer needs to know besides the file.
+/// Parameters of a transfer besides the file name.
 #[derive(Clone, Copy, Debug)]
 pub struct FoeOptions {
     /// Password, 0 for none.
     pub password: u32,
     /// Time limits of one message.
     pub limits: Limits,
-    /// Pause before a message is sent again that the SubDevice was too busy to take.
+    /// Pause before a message is repeated after BUSY.
     pub busy_pause: Duration,
-    /// How long it may be busy without a sign of progress.
+    /// Longest BUSY without progress.
     pub busy_limit: Duration,
 }
 
@@ -41,36 +41,36 @@ impl Default for FoeOptions {
     }
 }
 
-/// How far a transfer is.
+/// Progress of a transfer.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum FoeProgress {
-    /// So many bytes are through.
+    /// Bytes transferred.
     Bytes(u64),
     /// The SubDevice is busy.
     Busy {
-        /// So much is done.
+        /// Part done.
         done: u16,
-        /// Of so much.
+        /// Total.
         entire: u16,
-        /// What it is doing.
+        /// Its comment.
         text: String,
     },
 }
 
-/// A transfer under way. Dropped before its end, the SubDevice is told that it is over.
+/// A transfer in progress. When it is dropped before its end, the SubDevice receives an FoE error.
 struct Transfer<P> {
     talk: Talk,
     options: FoeOptions,
     progress: P,
     /// Payload of a message.
     payload: alloc::vec::Vec<u8>,
-    /// The SubDevice waits for us, or we for it.
+    /// The SubDevice waits for a message of the MainDevice, or the reverse.
     busy: bool,
-    /// Since when it has been busy without progress, and how far it was.
+    /// Start of BUSY without progress, and the progress then.
     since: Option<(crate::time::Instant, u16)>,
 }
 
-/// What the SubDevice said to a message.
+/// Response of the SubDevice to a message.
 enum Said<T> {
     Answer(T),
     Busy,
@@ -84,7 +84,7 @@ impl<P: FnMut(FoeProgress)> Transfer<P> {
         Ok(Transfer { talk, options, progress, payload, busy: false, since: None })
     }
 
-    /// Sends a message, again while the SubDevice is busy, and returns what `accept` takes for the answer.
+    /// Sends a message, repeats it while the SubDevice is busy, and returns what `accept` recognises as the answer.
     async fn ask<T>(
         &mut self,
         message: &FoeMessage<'_>,
@@ -123,7 +123,7 @@ impl<P: FnMut(FoeProgress)> Transfer<P> {
         };
         self.busy = true;
         let answer = self.talk.ask(&self.payload[..length], self.options.limits, heard).await.inspect_err(|error| {
-            // A file that the SubDevice surely does not open is not to be given up.
+            // A file that the SubDevice certainly did not open needs no abort.
             let opens = matches!(message, FoeMessage::Read { .. } | FoeMessage::Write { .. });
             if opens && matches!(error, MailboxError::Error(_)) && self.talk.late_mark().is_none() {
                 self.busy = false;
@@ -155,7 +155,7 @@ impl<P: FnMut(FoeProgress)> Transfer<P> {
             return;
         }
         if let Some(length) = (FoeMessage::Error { code, text }).encode(&mut self.payload) {
-            // A mailbox that is closed has nobody to tell.
+            // A closed mailbox needs no message.
             let _ = self.talk.post(&self.payload[..length]);
         }
     }

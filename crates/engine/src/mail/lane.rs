@@ -1,4 +1,4 @@
-//! Lanes: what may be under way in one mailbox side by side, one conversation each.
+//! Lanes: the parallel conversations of one mailbox, one per protocol.
 
 use alloc::collections::VecDeque;
 use alloc::vec::Vec;
@@ -11,11 +11,11 @@ use super::error::MailboxError;
 use super::unsolicited::Unsolicited;
 use crate::time::Instant;
 
-/// Answers that may wait in a lane; whoever talks takes one after the other.
+/// Answers that may wait in a lane; a conversation takes one at a time.
 const INBOX: usize = 8;
-/// Messages that may wait to be written in a lane.
+/// Messages that may wait in a lane to be written.
 const OUTBOX: usize = 64;
-/// How long after a message to which no answer is waited for an error reply may still be to it.
+/// Time in which an error reply may still belong to a message without an answer.
 const UNANSWERED_LIMIT: Duration = Duration::from_secs(1);
 
 /// One conversation at a time; different lanes run side by side.
@@ -33,14 +33,14 @@ pub enum Lane {
     Voe,
     /// Ethernet: the settings of its addresses.
     Eoe,
-    /// Ethernet: its frames. Nobody answers them.
+    /// Ethernet: its frames, which have no answer.
     Frames,
-    /// Mail of a type that no other lane knows: the lower four bits of the type byte. All such types have one lane.
+    /// Mail of a type without a lane of its own: the lower four bits of the type byte. All such types share one lane.
     Other(u8),
 }
 
 impl Lane {
-    /// How many there are.
+    /// Number of lanes.
     pub(super) const COUNT: usize = 8;
 
     /// The lanes of the protocols.
@@ -73,7 +73,7 @@ impl Lane {
         }
     }
 
-    /// Its place among all.
+    /// Its index among all lanes.
     pub(super) const fn place(self) -> usize {
         match self {
             Lane::Coe => 0,
@@ -87,7 +87,7 @@ impl Lane {
         }
     }
 
-    /// Where mail of it goes for which nobody waits.
+    /// Ring for its mail without a waiting conversation.
     pub(super) const fn shelf(self) -> Unsolicited {
         match self {
             Lane::Voe => Unsolicited::Voe,
@@ -104,26 +104,26 @@ pub(super) struct Outgoing {
     pub id: u32,
     pub lane: Lane,
     pub payload: Vec<u8>,
-    /// How long the SubDevice may refuse it.
+    /// How long the SubDevice may leave the mailbox full.
     pub limit: Duration,
-    /// Who sends it: the turn of a talk.
+    /// The sender: turn of a conversation.
     pub turn: u32,
-    /// How long an answer is waited for, where one is.
+    /// Time limit of the answer, if there is one.
     pub asks: Option<Duration>,
 }
 
 /// A request that was written.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Asked {
-    /// When it was written, or when the last part of its answer came.
+    /// When it was written, or when the last part of its answer was received.
     pub at: Instant,
-    /// How long the answer, or its next part, is waited for.
+    /// Time limit of the answer, or of its next part.
     pub limit: Duration,
-    /// Whether it was looked for.
+    /// Whether the reader has polled for it.
     pub looked: bool,
-    /// How long after that the last look found nothing.
+    /// Time after that at which the last poll found nothing.
     pub vain: Option<Duration>,
-    /// A part of the answer is there, and whoever asked has not said that more is to come.
+    /// A part of the answer is received, and the conversation has not asked for more.
     pub answered: bool,
 }
 
@@ -133,63 +133,64 @@ impl Asked {
     }
 }
 
-/// What came for a lane.
+/// Received mail for a lane.
 #[derive(Debug, PartialEq, Eq)]
 pub(super) enum Arrival {
     /// Payload of a message of its protocol.
     Payload(Vec<u8>),
-    /// The SubDevice refused a message; whether it may have been another one, so that an answer may still come.
+    /// The SubDevice refused a message. The flag says whether it may have been another message, so that an answer may
+    /// still come.
     Refused(ErrorReply, bool),
 }
 
 /// State of one lane.
 #[derive(Debug, Default)]
 pub(super) struct LaneState {
-    /// Who wants to talk; the first one does.
+    /// Queue for the lane; the first one holds it.
     pub turns: VecDeque<u32>,
     pub outbox: VecDeque<Outgoing>,
     inbox: VecDeque<Arrival>,
-    /// The message that was written last, or not.
+    /// The last message to be written, written or not.
     pub written: Option<(u32, Result<(), MailboxError>)>,
     pub asked: Option<Asked>,
     /// Until when the answer to a request that was given up, or its next part, may still come.
     pub late_until: Option<Instant>,
-    /// How long each part of it may take.
+    /// Time limit of each part of it.
     late_limit: Duration,
-    /// How long it may take, while nothing can be read.
+    /// Time it may still take, while no mail can be read.
     late_for: Option<Duration>,
-    /// Whoever talks waits for that answer and has asked for nothing.
+    /// The conversation waits for that answer and has sent no request.
     pub settling: bool,
-    /// A request is being written: its turn.
+    /// A request is being written, with its turn.
     writing: Option<u32>,
-    /// Until when an error reply may be to a message to which no answer is waited for.
+    /// Until when an error reply may belong to a message without an answer.
     pub unanswered_until: Option<Instant>,
-    /// What the last request was about, so that its answer can be told from that to another one.
+    /// Mark of the last request, which distinguishes its answer from others.
     pub mark: u16,
-    /// CoE header of the PDO that was asked for by mailbox.
+    /// CoE header of the PDO requested by mailbox.
     pub pdo: Option<[u8; 2]>,
-    /// The message that was written last has mail of this type as its answer.
+    /// The answer to the last message written has this mail type.
     pub expected: Option<Protocol>,
-    /// Whatever comes in the protocol of the lane is taken for the answer, unless it surely comes unasked.
+    /// Any mail of the lane's protocol is taken for the answer, unless it is certainly unsolicited.
     pub any: bool,
     pub answer_time: AnswerTime,
-    /// A message is written in parts, of which only the last one is answered, or was until lately: until then an error
-    /// reply may be to one of them.
+    /// A message is written in parts with an answer to the last one only, or was until recently: until then an error
+    /// reply may belong to one of them.
     pub parts_until: Option<Instant>,
-    /// An error reply that came meanwhile.
+    /// An error reply that was received meanwhile.
     pub refusal: Option<ErrorReply>,
-    /// The SubDevice has answered in this lane: it knows the protocol.
+    /// The SubDevice has answered in this lane: it supports the protocol.
     pub proven: bool,
 }
 
 impl LaneState {
-    /// Forgets everything but who wants to talk and how long answers take.
+    /// Clears everything except the queue for the lane and the response times.
     pub(super) fn reset(&mut self) {
         let LaneState { turns, answer_time, .. } = core::mem::take(self);
         *self = LaneState { turns, answer_time, ..LaneState::default() };
     }
 
-    /// As [`LaneState::reset`], but the SubDevice still has what it was given: an answer may come when it is back.
+    /// As [`LaneState::reset`], but the SubDevice keeps its messages: an answer may come when it is reachable again.
     pub(super) fn suspend(&mut self, now: Instant) {
         let late = self.late_until.filter(|until| *until > now).map(|_| self.late_limit);
         let late_for = self.asked.map(|asked| asked.limit).into_iter().chain(late).chain(self.late_for).max();
@@ -200,7 +201,7 @@ impl LaneState {
         self.unanswered_until = unanswered;
     }
 
-    /// The SubDevice is back.
+    /// The SubDevice is reachable again.
     pub(super) fn resume(&mut self, now: Instant) {
         if let Some(limit) = self.late_for.take() {
             self.late_from(now, limit);
@@ -208,32 +209,32 @@ impl LaneState {
         self.unanswered_until = self.unanswered_until.map(|_| now + UNANSWERED_LIMIT);
     }
 
-    /// The answer to a request that was given up may still come, each part of it within a time.
+    /// The answer to a request that was given up may still come, each part of it within a time limit.
     pub(super) fn late_from(&mut self, now: Instant, limit: Duration) {
         (self.late_until, self.late_limit) = (Some(now + limit), limit);
     }
 
-    /// A part of that answer has come: the next one may take as long again.
+    /// A part of that answer was received: the next one may take as long again.
     pub(super) fn late_goes_on(&mut self, now: Instant) {
         self.late_until = self.late_until.map(|until| until.max(now + self.late_limit));
     }
 
-    /// The talk of a turn gives its request up; `open` where not all of the answer has come.
+    /// The conversation of a turn gives its request up; `open` where the answer is incomplete.
     pub(super) fn give_up(&mut self, turn: u32, open: bool, now: Instant, limit: Duration) {
         let unanswered = self.asked.take().is_some_and(|asked| !asked.answered);
-        // Who has only waited for the answer to what others asked leaves that as it is.
+        // A conversation that only waited for the answer to an earlier one's request leaves that as it is.
         if core::mem::take(&mut self.settling) {
             return;
         }
         if self.writing == Some(turn) {
-            // The time of its answer begins when it is written.
+            // The time limit of its answer starts when it is written.
             (self.late_until, self.late_limit) = (Some(Instant::NEVER), limit);
         } else if unanswered || open {
             self.late_from(now, limit);
         }
     }
 
-    /// Whether an error reply may be to a message to which no answer is waited for.
+    /// Whether an error reply may belong to a message without an answer.
     pub(super) fn is_unanswered(&self, now: Instant) -> bool {
         self.unanswered_until.is_some_and(|until| now < until)
     }
@@ -246,7 +247,7 @@ impl LaneState {
         self.outbox.len() < OUTBOX
     }
 
-    /// A message of a talk is about to be written. Its answer may come before it is known that it was.
+    /// A message of a conversation is about to be written. Its answer may come before the write is confirmed.
     pub(super) fn writing(&mut self, message: &Outgoing, now: Instant) {
         match message.asks {
             Some(_) => self.writing = Some(message.turn),
@@ -258,11 +259,11 @@ impl LaneState {
         }
     }
 
-    /// A message of a talk was handed to the SubDevice, or may have been.
+    /// A message of a conversation was written to the SubDevice, or may have been.
     pub(super) fn wrote(&mut self, message: &Outgoing, result: Result<(), MailboxError>, now: Instant) {
         let arrived = match result {
             Ok(()) => true,
-            // Frames that were lost may have been lost on their way back.
+            // Lost frames may have been lost on the way back.
             Err(MailboxError::Bus(_)) => true,
             Err(_) => false,
         };
@@ -288,26 +289,26 @@ impl LaneState {
         self.written = Some((message.id, result));
     }
 
-    /// When the answer that is waited for is looked for first.
+    /// Time of the first poll for the expected answer.
     pub(super) fn due(&self) -> Option<Instant> {
         self.waiting().map(|asked| asked.at + self.answer_time.first_look())
     }
 
-    /// A look that began then, for all one knows, has found nothing.
+    /// A poll that presumably began then found nothing.
     pub(super) fn looked_in_vain(&mut self, seen: Instant) {
         if let Some(asked) = self.asked.as_mut().filter(|asked| asked.looked) {
             asked.vain = Some(seen.since(asked.at));
         }
     }
 
-    /// The request whose answer is looked for.
+    /// The request of the answer that the reader polls for.
     pub(super) fn waiting(&self) -> Option<&Asked> {
         self.asked.as_ref().filter(|asked| !asked.answered)
     }
 
-    /// An answer, or what may be one, for whoever talks. False where nobody waits for one.
+    /// Takes an answer, or a possible one, for the conversation. False where none waits.
     ///
-    /// `seen` is when it was there, for all one knows; `last` says that no further part of it follows.
+    /// `seen` is its presumed time of availability; `last`: no further part of it follows.
     pub(super) fn arrive(&mut self, arrival: Arrival, seen: Instant, last: bool) -> bool {
         let Some(asked) = &mut self.asked else {
             if last {

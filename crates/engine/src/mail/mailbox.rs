@@ -16,8 +16,8 @@ use super::unsolicited::{Unclaimed, Unsolicited};
 use crate::supervisor::Bus;
 use crate::time::Instant;
 
-/// The handle to a SubDevice's mailbox and its router; copies of it are the same mailbox. It lasts longer than the
-/// SubDevice's being there: while the mailbox is not in use, everything asked of it ends with [`MailboxError::Closed`].
+/// The handle to a SubDevice's mailbox and its router; copies of it are the same mailbox. It outlives the absence of
+/// the SubDevice: while the mailbox is not in use, every request ends with [`MailboxError::Closed`].
 #[derive(Clone, Debug)]
 pub struct Mailbox {
     room: Rc<Room>,
@@ -29,8 +29,8 @@ impl Mailbox {
         Mailbox { room: Room::new(bus, subdevice) }
     }
 
-    /// The SubDevice has entered PREOP or BOOT with this mailbox: counters begin anew. `send_manager` is the
-    /// SyncManager of the mailbox that is read.
+    /// The SubDevice has entered PREOP or BOOT with this mailbox: counters restart. `send_manager` is the SyncManager
+    /// of the mailbox that the MainDevice reads.
     pub(crate) fn open(&self, station: StationAddress, layout: MailboxLayout, send_manager: u8) {
         self.room.close();
         self.room.open(Session::new(station, layout, send_manager, self.room.bus.now()));
@@ -41,12 +41,12 @@ impl Mailbox {
         self.room.close();
     }
 
-    /// The SubDevice does not answer; it may come back with the mailbox as it is.
+    /// The SubDevice does not answer; it may return with its mailbox unchanged.
     pub(crate) fn suspend(&self) {
         self.room.suspend();
     }
 
-    /// The SubDevice answers again and never was in INIT.
+    /// The SubDevice answers again and was never in INIT meanwhile.
     pub(crate) fn resume(&self) {
         self.room.resume();
     }
@@ -56,7 +56,7 @@ impl Mailbox {
         self.room.is_full();
     }
 
-    /// Has the reader look once whether the SubDevice has mail.
+    /// Makes the reader poll once whether the SubDevice has mail.
     pub(super) fn look_for_mail(&self) {
         self.room.look_once();
     }
@@ -70,8 +70,8 @@ impl Mailbox {
         self.room.look().open
     }
 
-    /// Whether nothing is under way in it: nobody talks or waits to, nothing waits to be written or to be fetched by
-    /// whoever talks, and nobody writes or reads.
+    /// Whether it is idle: no conversation holds or waits for a lane, no message waits to be written or to be fetched
+    /// by a conversation, and neither writer nor reader runs.
     pub fn is_idle(&self) -> bool {
         let state = self.room.look();
         let at_work = |time: Option<u32>| time == Some(state.time);
@@ -84,7 +84,7 @@ impl Mailbox {
         state.session.filter(|_| state.open).map(|session| session.station)
     }
 
-    /// Station address of the SubDevice and the register that says whether it has mail, while the mailbox may be used.
+    /// Station address of the SubDevice and the register that shows whether it has mail, while the mailbox may be used.
     pub(crate) fn send_status(&self) -> Option<(StationAddress, RegisterAddress)> {
         let state = self.room.look();
         state.session.filter(|_| state.open).map(|session| (session.station, session.send_status()))
@@ -92,7 +92,7 @@ impl Mailbox {
 
     /// Waits for a lane to be free, and takes it.
     pub async fn talk(&self, lane: Lane) -> Result<Talk, MailboxError> {
-        // Types that have a lane of their own have no other.
+        // Types with a lane of their own use only that.
         let lane = if let Lane::Other(code) = lane { Lane::of(code) } else { lane };
         Talk::take(&self.room, lane).await
     }
@@ -107,43 +107,43 @@ impl Mailbox {
         self.room.look().counters
     }
 
-    /// Code of the last error that the SubDevice has told in any protocol, in the protocol's own numbers: an SDO abort,
-    /// the detail of an error reply, an error of FoE, SoE or AoE; 0 for none.
+    /// Code of the last error that the SubDevice has reported in any protocol, in the protocol's own numbers: an SDO
+    /// abort, the detail of an error reply, an error of FoE, SoE or AoE; 0 for none.
     pub fn last_protocol_error(&self) -> u32 {
         self.room.look().last_error
     }
 
-    /// Forgets that error; `before` is the one before it.
+    /// Clears that error; `before` is the previous one.
     pub(crate) fn forget_protocol_error(&self, before: u32) {
         self.room.state().last_error = before;
     }
 
-    /// Takes the oldest emergency that is kept, with the time at which it was read. Each was an event, too.
+    /// Takes the oldest kept emergency, with the time at which it was read. Each was an event, too.
     pub fn pop_emergency(&self) -> Option<(Instant, Emergency)> {
         self.room.state().shelves.emergencies().pop()
     }
 
-    /// Forgets all emergencies that are kept.
+    /// Drops all kept emergencies.
     pub fn clear_emergencies(&self) {
         self.room.state().shelves.emergencies().clear();
     }
 
-    /// Emergencies that were not kept because there were too many.
+    /// Number of emergencies that were not kept because there were too many.
     pub fn emergency_overruns(&self) -> u64 {
         self.room.state().shelves.emergencies().overruns()
     }
 
-    /// Takes the oldest mail of a kind that nobody asked for.
+    /// Takes the oldest unsolicited mail of a kind.
     pub fn pop_unsolicited(&self, kind: Unsolicited) -> Option<Unclaimed> {
         self.room.state().shelves.ring(kind).pop()
     }
 
-    /// Mails of a kind that were not kept because nobody took them in time.
+    /// Mails of a kind that were not kept because the ring was full.
     pub fn unsolicited_overruns(&self, kind: Unsolicited) -> u64 {
         self.room.state().shelves.ring(kind).overruns()
     }
 
-    /// Waits for a time for mail of a kind that nobody asked for; `None` where none came.
+    /// Waits for unsolicited mail of a kind; `None` where none came within the time.
     pub(super) async fn unsolicited_within(
         &self,
         kind: Unsolicited,
@@ -157,7 +157,7 @@ impl Mailbox {
         self.room.bus.within(limit, self.room.news.until(ready)).await.unwrap_or(Ok(None))
     }
 
-    /// Waits for mail of a kind that nobody asked for.
+    /// Waits for unsolicited mail of a kind.
     pub async fn unsolicited(&self, kind: Unsolicited) -> Unclaimed {
         self.room.news.until(|| self.pop_unsolicited(kind)).await
     }

@@ -1,4 +1,4 @@
-//! The errors that SubDevices tell in their mails, in the numbers of each protocol (protocol 6.1, 6.3, 6.4, 6.6, 6.7).
+//! Errors in the mail of SubDevices, in the numbers of each protocol (protocol 6.1, 6.3, 6.4, 6.6, 6.7).
 
 use ringcat_wire::mailbox::aoe::{AdsErrorCode, AdsResponse, AmsHeader};
 use ringcat_wire::mailbox::coe::{CoeHeader, CoeService, InformationOpcode, SdoInformation};
@@ -7,8 +7,8 @@ use ringcat_wire::mailbox::sdo::SdoResponse;
 use ringcat_wire::mailbox::soe::SoeMessage;
 use ringcat_wire::mailbox::{ErrorReply, Message, Protocol};
 
-/// The error that a mail tells, if it tells one: the code of an SDO abort, the detail of an error reply, the code of
-/// FoE, SoE or ADS. Any bytes are allowed.
+/// The error in a mail, if there is one: the code of an SDO abort, the detail of an error reply, the code of FoE, SoE
+/// or ADS. Any bytes are allowed.
 pub(super) fn told_by(message: &Message<'_>) -> Option<u32> {
     let payload = message.payload;
     let code = match message.header.protocol {
@@ -31,7 +31,7 @@ pub(super) fn told_by(message: &Message<'_>) -> Option<u32> {
 
 fn coe(payload: &[u8]) -> Option<u32> {
     match CoeHeader::decode(payload.first_chunk()?).service {
-        // An abort has the service of a request, whoever sends it.
+        // An abort has the service of a request in both directions.
         CoeService::SdoRequest | CoeService::SdoResponse => match SdoResponse::decode(payload).ok()? {
             SdoResponse::Abort { code, .. } => Some(code.0),
             _ => None,

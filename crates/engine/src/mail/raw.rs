@@ -1,7 +1,7 @@
-//! Messages of the application's own making: any payload, in the lane of a protocol or of any other type of mail
+//! Messages that the application composes: any payload, in the lane of a protocol or of any other mail type
 //! ([`Lane::of`]).
 //!
-//! Header and counter are the router's, so that they do not disturb other conversations.
+//! The router sets header and counter, so that other conversations are not disturbed.
 
 use alloc::vec::Vec;
 use core::time::Duration;
@@ -10,13 +10,13 @@ use super::lane::Lane;
 use super::talk::Limits;
 use super::{Mailbox, MailboxError};
 
-/// Sends a message and waits until the SubDevice has it. An answer to it is kept as mail that nobody asked for.
+/// Sends a message and waits until the SubDevice accepted it. An answer to it is kept as unsolicited mail.
 pub async fn send(mailbox: &Mailbox, lane: Lane, payload: &[u8], limit: Duration) -> Result<(), MailboxError> {
     mailbox.talk(lane).await?.send(payload, limit).await
 }
 
-/// Sends a message and waits for the next one that comes back in the lane, whatever it is, but for what surely comes
-/// unasked: emergencies and PDOs (CoE), notifications (SoE), requests (AoE), Ethernet frames (EoE).
+/// Sends a message and waits for the next mail in the lane, whatever its content, except certainly unsolicited mail:
+/// emergencies and PDOs (CoE), notifications (SoE), requests (AoE), Ethernet frames (EoE).
 pub async fn exchange(mailbox: &Mailbox, lane: Lane, payload: &[u8], limits: Limits) -> Result<Vec<u8>, MailboxError> {
     let mut talk = mailbox.talk(lane).await?;
     talk.settle().await?;

@@ -1,6 +1,6 @@
-//! Reading: when there is mail, or while somebody waits for an answer (protocol 6.1, 6.2).
+//! Reads mail when there is some, or while a conversation waits for an answer (protocol 6.1, 6.2).
 //!
-//! A lost read is healed with the repeat request. What comes is handed to `delivery`.
+//! A lost read is recovered with the repeat request. Received mail is passed to `delivery`.
 
 use alloc::rc::Rc;
 use core::time::Duration;
@@ -16,11 +16,11 @@ use super::room::{Room, Session};
 use crate::supervisor::{Bus, BusError};
 use crate::time::Instant;
 
-/// How long a SubDevice may take to repeat its last mail.
+/// Time limit for a SubDevice to repeat its last mail.
 const REPEAT_LIMIT: Duration = Duration::from_millis(100);
-/// Pause between two looks whether it did.
+/// Pause between two polls for that.
 const REPEAT_PAUSE: Duration = Duration::from_micros(200);
-/// Pause after a failed access, so that a SubDevice that is gone is not asked without end.
+/// Pause after a failed access, so that a SubDevice that is unreachable does not cause continuous traffic.
 const FAILURE_PAUSE: Duration = Duration::from_millis(5);
 
 /// Kinds of accesses.
@@ -47,22 +47,22 @@ pub(super) fn start(room: &Rc<Room>) {
     room.bus.spawn(async move { run(own, time).await });
 }
 
-/// What the reader does next.
+/// Next step of the reader.
 enum Step {
-    /// Nobody waits and there is no sign of mail.
+    /// No conversation waits, and there is no sign of mail.
     End,
-    /// Ask for the mail of a lost read again.
+    /// Request the mail of a lost read again.
     Repeat,
     /// Read the mailbox.
     Read,
-    /// Look at its status.
+    /// Poll its status.
     Look,
     /// Wait.
     Wait(Instant),
 }
 
 async fn run(room: Rc<Room>, time: u32) {
-    // When the next look is due, after one in vain, and the next access of any kind, after one that failed.
+    // Times of the next poll, after one in vain, and of the next access of any kind, after a failed one.
     let (mut next_look, mut hold) = (Instant::default(), Instant::default());
     while let Some(session) = room.session(time) {
         while let Some(stray) = room.bus.stray_mail(session.station) {
@@ -71,7 +71,7 @@ async fn run(room: Rc<Room>, time: u32) {
                 state.counters.strays += 1;
                 state.seen = room.bus.now();
             }
-            // What was read from a mailbox of before, and comes back in the time of this one, is nobody's.
+            // Content read from a mailbox of an earlier session is dropped when it arrives in this one.
             if stray.sent_at >= session.since {
                 delivery::deliver(&room, &stray.mail, Way::Stray, stray.sent_at);
             }
@@ -83,7 +83,7 @@ async fn run(room: Rc<Room>, time: u32) {
                 let tasks = room.look().tasks;
                 let more = || (room.session(time).is_none() || room.look().tasks != tasks).then_some(());
                 if room.bus.within(limit, room.work.until(more)).await.is_ok() {
-                    // Somebody else's answer may come sooner.
+                    // The answer of another lane may come sooner.
                     next_look = room.bus.now();
                 }
                 continue;
@@ -104,7 +104,7 @@ async fn run(room: Rc<Room>, time: u32) {
     }
 }
 
-/// What is due.
+/// The step that is due.
 fn step(room: &Rc<Room>, next_look: Instant, hold: Instant) -> Step {
     let now = room.bus.now();
     let state = &mut *room.state();
@@ -138,8 +138,8 @@ fn step(room: &Rc<Room>, next_look: Instant, hold: Instant) -> Step {
     if sure { Step::Read } else { Step::Look }
 }
 
-/// When the first of the answers that are waited for should be looked for, and whether it will surely be there then.
-/// Fragments of Ethernet frames are looked for while some have passed of late.
+/// When to poll for the first of the expected answers, and whether it will certainly be available then. The reader
+/// polls for fragments of Ethernet frames while some were transferred recently.
 fn first_look(state: &super::room::State, now: Instant) -> Option<(Instant, bool)> {
     if state.blocked || (state.ethernet.lively(now).is_some() && !state.waiting()) {
         return Some((Instant::default(), false));
@@ -148,12 +148,12 @@ fn first_look(state: &super::room::State, now: Instant) -> Option<(Instant, bool
         let asked = lane.waiting()?;
         Some((lane.due()?, !asked.looked && lane.answer_time.is_sure()))
     });
-    // One that is due now comes first: it may be a read.
+    // An answer due now comes first: the poll may read it at once.
     let ethernet = state.ethernet.lively(now).map(|_| (now, false));
     looks.chain(ethernet).min_by_key(|(due, _)| *due)
 }
 
-/// Pause after a look in vain: a part of the time that the oldest answer was waited for, or the time since the last
+/// Pause after a poll in vain: a part of the time that the oldest answer was waited for, or of the time since the last
 /// fragment of an Ethernet frame.
 fn pause(room: &Rc<Room>, now: Instant) -> Duration {
     let state = room.look();
@@ -162,13 +162,13 @@ fn pause(room: &Rc<Room>, now: Instant) -> Duration {
     pause.unwrap_or(AnswerTime::pause(Duration::ZERO))
 }
 
-/// When an access that began then and has just ended would have begun, had it not waited for its turn.
+/// Presumed start of an access that began then and has just ended, had it not been queued.
 fn asked_at(bus: &Bus, begun: Instant, trip: &mut ShortestTrip) -> Instant {
     let took = bus.now().since(begun);
     begun + (took - trip.took(took).min(took))
 }
 
-/// Looks at the status of the send mailbox; notes where it is full.
+/// Polls the status of the send mailbox; records where it is full.
 async fn look(room: &Rc<Room>, session: &Session) -> Result<bool, MailboxError> {
     room.state().counters.looks += 1;
     let begun = room.bus.now();
@@ -192,7 +192,7 @@ async fn read(room: &Rc<Room>, time: u32, session: &Session) -> Result<bool, Mai
     room.state().reading = true;
     let reply = room.bus.read_mail(session.station, register, usize::from(session.layout.send_size)).await;
     if room.session(time).is_none() {
-        // The mailbox may be the same after a while in which it could not be used.
+        // The mailbox may be the same after a time in which it was unusable.
         let lasts = room.look().session.is_some_and(|now| now.since == session.since);
         if let Ok(reply) = reply
             && lasts
@@ -222,7 +222,7 @@ async fn read(room: &Rc<Room>, time: u32, session: &Session) -> Result<bool, Mai
                 state.counters.read += 1;
             }
             let wanted = delivery::deliver(room, &reply.data, Way::Usual, begun);
-            // What comes unasked seldom comes alone.
+            // Unsolicited mail rarely comes alone.
             if !wanted && !room.look().waiting() && room.look().ethernet.lively(room.bus.now()).is_none() {
                 look(room, session).await?;
             }
@@ -235,7 +235,7 @@ async fn read(room: &Rc<Room>, time: u32, session: &Session) -> Result<bool, Mai
     }
 }
 
-/// Asks for the last mail again; it is in the mailbox then.
+/// Requests the last mail again; it is in the mailbox then.
 async fn repeat(room: &Rc<Room>, session: &Session) -> Result<bool, MailboxError> {
     request_repeat(&room.bus, session).await?;
     let state = &mut *room.state();
@@ -246,8 +246,8 @@ async fn repeat(room: &Rc<Room>, session: &Session) -> Result<bool, MailboxError
     Ok(true)
 }
 
-/// Asks for the last mail again: toggles the repeat request and waits for its acknowledgement (protocol 6.2). One that
-/// does not come in time is no matter: what is read next is then what would have come next.
+/// Requests the last mail again: toggles the repeat request and waits for its acknowledgement (protocol 6.2). A missing
+/// acknowledgement does no harm: the next read brings the mail that would have come next.
 async fn request_repeat(bus: &Bus, session: &Session) -> Result<(), BusError> {
     let register = map::sync_manager(session.send_manager);
     let at = register.offset(SyncManager::ACTIVATE);

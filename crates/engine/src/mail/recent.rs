@@ -1,40 +1,40 @@
-//! Mail that comes twice (protocol 6.1, 6.2).
+//! Duplicate mail (protocol 6.1, 6.2).
 //!
 //! A repeat brings a mail with its old counter, and so does a frame that comes back late; some SubDevices send an
-//! answer twice. A mail is a double when its counter is not zero and counter and content are those of a mail of late.
-//! Content is compared because there are SubDevices whose counter stands still.
+//! answer twice. A mail is a duplicate when its counter is not zero, and counter and content are those of a recent
+//! mail. The content is compared because some SubDevices never change their counter.
 
 use alloc::collections::VecDeque;
 use core::time::Duration;
 
 use crate::time::Instant;
 
-/// Where there was no disturbance, only a SubDevice that sends its mail twice brings doubles: the last mail again.
+/// Without a disturbance, only a SubDevice that sends its mail twice causes duplicates: of the last mail.
 const USUAL: usize = 1;
-/// A repeat brings the last mail or the one before; late ones may have come in between. Less than a turn of the
+/// A repeat brings the last mail or the one before; late ones may have come in between. Less than a wrap of the
+/// counter.
 /// counter.
 const AFTER_REPEAT: usize = 5;
-/// A late read brings what the mailbox held when it was sent: a mail that was accepted by one of so many reads that
-/// were sent before it, after repeats, or after it, by the repeat that healed it. A turn of the counter brings others;
-/// a place or two is uncertain.
+/// A late read brings the content of the mailbox at the time of the read: a mail that was accepted by one of this
+/// number of reads before it, after repeats, or after it, by the repeat that recovered it. After a wrap of the counter
+/// it would be another mail; the order of sending is uncertain by a read or two.
 const AROUND_LATE: usize = 4;
-/// How long mails are remembered for those that come late; frames come back 100 ms late at most, or count as lost.
+/// Time for which mails are remembered to detect late ones; frames come back 100 ms late at most, or count as lost.
 const KEPT_FOR: Duration = Duration::from_millis(400);
-/// Mails that are remembered at most: a mailbox that is read every 100 us fills no more in the time of the longest
-/// delay.
+/// Largest number of remembered mails: a mailbox that is read every 100 us gives no more in the longest delay.
 const KEPT: usize = 1024;
 const FNV_OFFSET: u64 = 0xCBF2_9CE4_8422_2325;
 const FNV_PRIME: u64 = 0x0000_0100_0000_01B3;
 
-/// How a mail came.
+/// How a mail was received.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Way {
     /// By a read of its own.
     Usual,
     /// After a repeat request.
     Repeat,
-    /// Beside the read that was waited for: by one that was given up before it came back, and may have been healed
-    /// meanwhile, or by the second copy of one.
+    /// Beside the expected read: by one that was given up before it came back, and may have been recovered meanwhile,
+    /// or by the second copy of one.
     Stray,
 }
 
@@ -48,8 +48,8 @@ struct Known {
     sent: Instant,
 }
 
-/// The mails that were accepted last, in the order in which their reads were sent: that in which the SubDevice gave
-/// them away, but for those that were repeated.
+/// The last accepted mails, in the order in which their reads were sent: the order in which the SubDevice handed them
+/// over, except for repeated ones.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Recent {
     /// Newest first.
@@ -57,8 +57,8 @@ pub(super) struct Recent {
 }
 
 impl Recent {
-    /// Whether a mail was there before; one that was not is noted. `sent` is when the read was sent that brought it, or
-    /// any time between that and the end of the read before.
+    /// Whether a mail is a duplicate; a new one is recorded. `sent` is when its read was sent, or any time between that
+    /// and the end of the previous read.
     pub(super) fn is_double(&mut self, counter: u8, content: &[u8], way: Way, sent: Instant) -> bool {
         if counter == 0 {
             return false;
@@ -122,7 +122,7 @@ mod tests {
         let mut recent = Recent::default();
         let at = |ms: u64| Instant(ms * 1_000_000);
         let mut is_double = |counter, way, ms| recent.is_double(counter, b"x", way, at(ms));
-        // Each counter, then a pause of 300 ms in which one mail is repeated again and again, then each counter again.
+        // Each counter, then a pause of 300 ms with one mail repeated continuously, then each counter again.
         for turn in 0..2 {
             for counter in 1..=7 {
                 assert!(!is_double(counter, Way::Usual, 310 * turn + u64::from(counter)));

@@ -1,10 +1,10 @@
-//! Mailbox messages of somebody else: clients of a gateway talk to SubDevices through our mailboxes (protocol 10.1).
+//! Mailbox messages of gateway clients, which reach SubDevices through the mailboxes of the MainDevice (protocol 10.1).
 //!
-//! A [`Desk`] takes whole messages and gives out answers, with the address and the counter that the client used;
-//! towards the SubDevice the router counts for itself. A message waits for the lane of its protocol like any procedure
-//! of ours, so it disturbs nobody's transfer; while a transfer of its client is under way (`dialogue` knows) the lane
-//! stays with that client, for a while: one that pauses too long, leaves, or keeps others waiting loses its transfer,
-//! and the SubDevice is told so. All queues are bounded, and clients take turns.
+//! A [`Desk`] takes whole messages and returns answers, with the address and the counter of the client; towards the
+//! SubDevice the router uses its own counter. A message waits for the lane of its protocol like any procedure, so it
+//! disturbs no other transfer. While a transfer of a client is in progress (`dialogue` tracks it) the lane is reserved
+//! for that client, for a limited time: a client that pauses too long, disconnects, or keeps others waiting loses its
+//! transfer, and the SubDevice receives an abort. All queues are bounded, and clients take turns.
 
 mod desk;
 mod dialogue;

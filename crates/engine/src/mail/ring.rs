@@ -1,8 +1,8 @@
-//! A bounded queue that keeps the oldest and counts what did not fit.
+//! A bounded queue that keeps the oldest items and counts the dropped ones.
 
 use alloc::collections::VecDeque;
 
-/// A bounded queue. What comes when it is full is not taken, and counted.
+/// A bounded queue. Items that arrive while it is full are dropped and counted.
 #[derive(Debug)]
 pub(super) struct Ring<T> {
     entries: VecDeque<T>,

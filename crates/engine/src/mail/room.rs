@@ -1,4 +1,4 @@
-//! What the tasks and handles of one mailbox share.
+//! Common state of the tasks and handles of one mailbox.
 
 mod work;
 
@@ -18,8 +18,8 @@ use super::unsolicited::Shelves;
 use crate::supervisor::{Bus, Signal};
 use crate::time::Instant;
 
-/// What the SubDevice and we have counted so far. It lasts from PREOP to INIT, also while the SubDevice does not
-/// answer.
+/// Counters of the SubDevice and of the MainDevice. A session lasts from PREOP to INIT, also while the SubDevice does
+/// not answer.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Session {
     pub station: StationAddress,
@@ -28,49 +28,49 @@ pub(super) struct Session {
     pub send_manager: u8,
     /// Counter of the last message sent.
     pub counter: u8,
-    /// When it began.
+    /// Start of the session.
     pub since: Instant,
 }
 
-/// The part that changes.
+/// The mutable part.
 #[derive(Debug)]
 pub(super) struct State {
     pub session: Option<Session>,
-    /// The mails of the session that were accepted last.
+    /// The last accepted mails of the session.
     pub recent: Recent,
     /// The session may be used.
     pub open: bool,
-    /// Counts openings and closings, so that tasks of an earlier time end.
+    /// Counts openings and closings, so that tasks of an earlier session end.
     pub time: u32,
     pub lanes: [LaneState; Lane::COUNT],
-    /// Lane whose turn it is to write.
+    /// Lane with the next turn to write.
     pub next_lane: usize,
     pub next_id: u32,
-    /// The time in which a writer runs, and a reader.
+    /// The session in which a writer and a reader run.
     pub writer: Option<u32>,
     pub reader: Option<u32>,
     /// The send mailbox is known to be full.
     pub full: bool,
-    /// Somebody wants to know whether the send mailbox is full.
+    /// A poll is requested whether the send mailbox is full.
     pub curious: bool,
-    /// When the mail that is read was there, for all one knows.
+    /// Presumed time at which the mail being read became available.
     pub seen: Instant,
-    /// How long accesses take: looks, and reads.
+    /// Duration of accesses: polls, and reads.
     pub trips: [ShortestTrip; 2],
-    /// The receive mailbox is full, and may stay so until the send mailbox is read.
+    /// The receive mailbox is full, and may stay full until the send mailbox is read.
     pub blocked: bool,
-    /// A read was lost: its mail has to be asked for again.
+    /// A read was lost: its mail must be requested again.
     pub repeat: bool,
-    /// A read is under way.
+    /// A read is on the wire.
     pub reading: bool,
-    /// How often there was something new for the reader.
+    /// Number of notifications of the reader.
     pub tasks: u32,
-    /// A repeat may bring mail that was there before.
+    /// A repeat may bring mail that was received before.
     pub repeated: bool,
     pub shelves: Shelves,
     pub ethernet: Traffic,
     pub counters: MailCounters,
-    /// Code of the last error that the SubDevice has told; 0 for none.
+    /// Code of the last error that the SubDevice reported; 0 for none.
     pub last_error: u32,
 }
 
@@ -81,9 +81,9 @@ pub(super) struct Room {
     /// Index in the declaration, before activation the position; for events.
     pub subdevice: usize,
     state: RefCell<State>,
-    /// Something changed for those that talk or listen.
+    /// Notifies conversations and receivers.
     pub news: Signal,
-    /// Something changed for the reader.
+    /// Notifies the reader.
     pub work: Signal,
 }
 
@@ -125,7 +125,7 @@ impl Room {
         self.state.borrow()
     }
 
-    /// The session, while it is open and the time is still `time`.
+    /// The session, while it is open and still the one of `time`.
     pub(super) fn session(&self, time: u32) -> Option<Session> {
         let state = self.look();
         if state.open && state.time == time { state.session } else { None }
@@ -141,7 +141,7 @@ impl Room {
         self.tell();
     }
 
-    /// The mailbox cannot be used, and what it held is gone; everything under way ends.
+    /// The mailbox cannot be used, and its content is lost; all requests end.
     pub(super) fn close(&self) {
         {
             let state = &mut *self.state();
@@ -155,8 +155,8 @@ impl Room {
         self.tell();
     }
 
-    /// The mailbox cannot be used until it is taken up again; everything under way ends. What was read from it, perhaps
-    /// in vain, has to be asked for again.
+    /// The mailbox cannot be used until it is resumed; all requests end. Mail of reads that may be lost has to be
+    /// requested again.
     pub(super) fn suspend(&self) {
         {
             let state = &mut *self.state();
@@ -195,7 +195,7 @@ impl State {
         self.ethernet.reset();
     }
 
-    /// Whether mail is waited for.
+    /// Whether a conversation waits for mail.
     pub(super) fn waiting(&self) -> bool {
         self.blocked || self.lanes.iter().any(|lane| lane.waiting().is_some())
     }

@@ -1,4 +1,4 @@
-//! SoE: elements of the IDNs of a drive, read and written, in fragments where they are long (protocol 6.6).
+//! SoE: reads and writes elements of IDNs, in fragments where they are long (protocol 6.6).
 
 pub mod command;
 
@@ -16,14 +16,14 @@ use super::{Mailbox, MailboxError};
 /// Drives of a SubDevice.
 const DRIVES: u8 = 8;
 
-/// Which element of which IDN of which drive.
+/// An element of an IDN of a drive.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct SoeAddress {
     /// Drive of the SubDevice, 0..=7.
     pub drive: u8,
     /// The IDN.
     pub idn: Idn,
-    /// One element, or several to be read at once.
+    /// One element, or several to read at once.
     pub elements: SoeElements,
 }
 
@@ -43,13 +43,13 @@ impl fmt::Display for SoeAddress {
 /// Why an access failed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct SoeError {
-    /// What was accessed.
+    /// The element.
     pub address: SoeAddress,
-    /// What happened.
+    /// The cause.
     pub cause: SoeFailure,
 }
 
-/// What happened to an access.
+/// Cause of a failed access.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum SoeFailure {
@@ -59,14 +59,14 @@ pub enum SoeFailure {
     Refused(SoeErrorCode),
     /// There is no such drive.
     Drive,
-    /// Fragments are missing, or come in another order than they say.
+    /// Fragments are missing or out of order.
     Fragments {
-        /// Fragments that should have followed.
+        /// Number of fragments that should have followed.
         expected: u16,
-        /// Fragments that follow.
+        /// Number of fragments that follow.
         got: u16,
     },
-    /// More than is taken.
+    /// Longer than accepted.
     TooLong(Overflow),
 }
 
@@ -100,13 +100,13 @@ impl From<MailboxError> for SoeFailure {
     }
 }
 
-/// Reads elements of at most `limit` bytes together; several follow each other in the order of their bits.
+/// Reads elements of at most `limit` bytes together; several follow one another in the order of their bits.
 pub async fn read(mailbox: &Mailbox, address: SoeAddress, limits: Limits, limit: usize) -> Result<Vec<u8>, SoeError> {
     read_inner(mailbox, address, limits, limit).await.map_err(|cause| SoeError { address, cause })
 }
 
-/// Writes an element. Fragments are not answered, only the last one is: where an error reply comes meanwhile, whatever
-/// it is to, the write has failed, and what the SubDevice has then is not known.
+/// Writes an element. Only the last fragment has an answer: after an error reply meanwhile, whatever its cause, the
+/// write has failed, and the value in the SubDevice is unknown.
 pub async fn write(mailbox: &Mailbox, address: SoeAddress, data: &[u8], limits: Limits) -> Result<(), SoeError> {
     write_inner(mailbox, address, data, limits).await.map_err(|cause| SoeError { address, cause })
 }
@@ -190,7 +190,7 @@ fn encode(message: &SoeMessage<'_>, payload: &mut [u8]) -> Result<usize, SoeFail
     message.encode(payload).ok_or(SoeFailure::Mailbox(MailboxError::TooLong { bytes, limit }))
 }
 
-/// A message that belongs to the answer: its data, and how many fragments follow.
+/// A message of the answer: its data, and the number of fragments that follow.
 fn answer(payload: &[u8], operation: SoeOperation, address: SoeAddress) -> Option<Result<(Vec<u8>, u16), SoeFailure>> {
     let message = SoeMessage::decode(payload).ok()?;
     let ours = message.idn().is_none_or(|idn| idn == address.idn);
@@ -199,7 +199,7 @@ fn answer(payload: &[u8], operation: SoeOperation, address: SoeAddress) -> Optio
     }
     Some(match message.error_code() {
         Some(code) => Err(SoeFailure::Refused(code)),
-        // The mark counts, not the number.
+        // Only the incomplete flag counts, not the number.
         None => Ok((message.data.to_vec(), if message.incomplete { message.number.max(1) } else { 0 })),
     })
 }

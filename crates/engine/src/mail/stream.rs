@@ -1,28 +1,28 @@
-//! Where the bytes of a transfer come from and go to, piece by piece, so that no transfer needs memory for all of it.
+//! Sources and sinks of transfer data, piece by piece, so that no transfer needs memory for all of it.
 
 use alloc::vec::Vec;
 
-/// What a transfer sends.
+/// Data to send.
 pub trait Source {
-    /// Bytes in all, where that is known before.
+    /// Total length in bytes, where known in advance.
     fn total(&self) -> Option<u64>;
 
-    /// Puts the next bytes into `room` and returns how many; fewer than fit only at the end.
+    /// Copies the next bytes into `room` and returns their number; fewer than fit only at the end.
     fn fill(&mut self, room: &mut [u8]) -> usize;
 }
 
-/// The receiver takes no more.
+/// The receiver's limit is exceeded.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Overflow {
-    /// Bytes that it would have had to take.
+    /// Bytes needed.
     pub bytes: u64,
-    /// Bytes that it takes.
+    /// Limit in bytes.
     pub limit: u64,
 }
 
-/// What takes the bytes of a transfer.
+/// Receiver of transfer data.
 pub trait Sink {
-    /// The transfer begins (again, where the SubDevice was asked twice); `total` bytes will come, where it says.
+    /// The transfer begins, or begins again where a request was repeated; `total` bytes will come, where announced.
     fn begin(&mut self, total: Option<u64>) -> Result<(), Overflow>;
 
     /// Takes the next bytes.
@@ -65,12 +65,12 @@ pub struct Bounded {
 }
 
 impl Bounded {
-    /// Takes up to `limit` bytes.
+    /// Accepts up to `limit` bytes.
     pub const fn new(limit: usize) -> Bounded {
         Bounded { bytes: Vec::new(), limit }
     }
 
-    /// What came.
+    /// The received bytes.
     pub fn into_bytes(self) -> Vec<u8> {
         self.bytes
     }
@@ -80,7 +80,7 @@ impl Sink for Bounded {
     fn begin(&mut self, total: Option<u64>) -> Result<(), Overflow> {
         self.bytes.clear();
         let limit = self.limit as u64;
-        // Room is made as bytes come: a size that a SubDevice only claims costs nothing.
+        // Memory is allocated as bytes arrive: a size that a SubDevice merely claims costs nothing.
         match total {
             Some(bytes) if bytes > limit => Err(Overflow { bytes, limit }),
             Some(_) | None => Ok(()),

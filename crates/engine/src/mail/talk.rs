@@ -1,4 +1,4 @@
-//! A lane while somebody has it: sending, and waiting for what belongs to it.
+//! A conversation that holds a lane: it sends, and waits for its answers.
 
 use alloc::rc::Rc;
 use core::time::Duration;
@@ -12,33 +12,33 @@ use super::reader;
 use super::room::Room;
 use crate::time::Instant;
 
-/// Time limits: until the mailbox takes the request, until the answer is there.
+/// Time limits: until the mailbox accepts the request, until the answer is available.
 pub type Limits = (Duration, Duration);
 
-/// Messages without an answer may stay in the mailbox for so long.
+/// Longest time that messages without an answer may stay in the mailbox.
 const POST_LIMIT: Duration = Duration::from_millis(100);
 
-/// How long after the end of a conversation an error reply may still be to one of its parts.
+/// Time after the end of a conversation in which an error reply may still belong to one of its parts.
 const PARTS_LIMIT: Duration = Duration::from_secs(1);
 
-/// Parts of an answer that comes late, at most: they are counted with 16 bits (protocol 6.3, 6.6).
+/// Largest number of parts of a late answer: they are counted with 16 bits (protocol 6.3, 6.6).
 const LATE_PARTS: usize = 1 << 16;
 
-/// A lane of a mailbox, held by one conversation. Dropped, it is free for the next; what was asked and not answered is
-/// remembered, so that its answer is not taken for another's.
+/// A lane of a mailbox, held by one conversation. When it is dropped, the lane is free for the next; a request without
+/// its answer is remembered, so that this answer is not taken for that to another request.
 #[derive(Debug)]
 pub struct Talk {
     room: Rc<Room>,
     lane: Lane,
     turn: u32,
     time: u32,
-    /// How long answers may take; late ones may take as long again.
+    /// Time limit of answers; late ones may take as long again.
     limit: Duration,
-    /// A request was written, and not all of its answer has come.
+    /// A request was written, and its answer is incomplete.
     open: bool,
 }
 
-/// A place in the queue for a lane; dropped while waiting, it is given up.
+/// A place in the queue for a lane; dropped while waiting, it leaves the queue.
 struct Turn {
     room: Rc<Room>,
     lane: Lane,
@@ -88,7 +88,7 @@ impl Talk {
         if state.time != self.time { Err(MailboxError::Closed) } else { Ok(work(&mut state.lanes[self.lane.place()])) }
     }
 
-    /// Bytes of payload that a message may have in both directions.
+    /// Largest payload of a message in both directions, in bytes.
     pub fn capacity(&self) -> usize {
         let state = self.room.look();
         state.session.map_or(0, |session| {
@@ -96,24 +96,24 @@ impl Talk {
         })
     }
 
-    /// Bytes of payload that a message to the SubDevice may have.
+    /// Largest payload of a message to the SubDevice, in bytes.
     pub fn room(&self) -> usize {
         let state = self.room.look();
         state.session.map_or(0, |session| usize::from(session.layout.receive_size).saturating_sub(Header::LEN))
     }
 
-    /// Bytes of the receive and the send mailbox, header included.
+    /// Lengths of the receive and the send mailbox, header included.
     pub fn mailbox_sizes(&self) -> (usize, usize) {
         let state = self.room.look();
         state.session.map_or((0, 0), |session| (session.layout.receive_size.into(), session.layout.send_size.into()))
     }
 
-    /// Whether somebody waits for the lane.
+    /// Whether another conversation waits for the lane.
     pub fn is_wanted(&self) -> bool {
         self.with(|lane| lane.turns.len() > 1).unwrap_or(true)
     }
 
-    /// A number that no other request of this mailbox has had of late.
+    /// A number that no other recent request of this mailbox has.
     pub fn number(&mut self) -> u32 {
         let state = &mut *self.room.state();
         state.next_id = state.next_id.wrapping_add(1);
@@ -125,7 +125,7 @@ impl Talk {
         self.room.bus.now()
     }
 
-    /// Waits, unless the mailbox is closed meanwhile.
+    /// Waits, until the mailbox is closed at the latest.
     pub async fn pause(&self, pause: Duration) -> Result<(), MailboxError> {
         let closed = || self.with(|_| ()).err();
         match self.room.bus.within(pause, self.room.news.until(closed)).await {
@@ -134,28 +134,27 @@ impl Talk {
         }
     }
 
-    /// What the next request is about: a number by which [`Talk::late_mark`] tells requests apart.
+    /// Mark of the next request: a number by which [`Talk::late_mark`] distinguishes requests.
     pub fn mark(&mut self, mark: u16) {
         let _ = self.with(|lane| lane.mark = mark);
     }
 
-    /// A PDO with this CoE header is what the next request asks for; others are kept as mail that nobody asked for.
+    /// The next request asks for a PDO with this CoE header; other PDOs are kept as unsolicited mail.
     pub(super) fn expect_pdo(&mut self, header: Option<[u8; 2]>) {
         let _ = self.with(|lane| lane.pdo = header);
     }
 
-    /// Whatever comes in the protocol of the lane is taken for the answer to the next request, but for what surely
-    /// comes unasked.
+    /// Any mail of the lane's protocol is taken for the answer to the next request, except certainly unsolicited mail.
     pub(super) fn expect_any(&mut self, any: bool) {
         let _ = self.with(|lane| lane.any = any);
     }
 
-    /// The mark of a request that was given up and whose answer may still come.
+    /// The mark of a request that was given up and may still be answered.
     pub fn late_mark(&self) -> Option<u16> {
         self.with(|lane| lane.late_until.map(|_| lane.mark)).ok().flatten()
     }
 
-    /// The answer that was late has come, or never will.
+    /// The late answer was received, or cannot come any more.
     pub fn forget_late(&mut self) {
         let _ = self.with(|lane| lane.late_until = None);
     }
@@ -166,8 +165,8 @@ impl Talk {
         let _ = self.with(|lane| lane.late_from(now, limit));
     }
 
-    /// Waits until the answer to a request that was given up before has come or cannot come any more, all parts of it,
-    /// in protocols whose answers do not say to what they belong.
+    /// Waits until all parts of the answer to an earlier request that was given up are received or cannot come any
+    /// more, in protocols whose answers do not name their request.
     pub async fn settle(&mut self) -> Result<(), MailboxError> {
         for _ in 0..LATE_PARTS {
             let now = self.room.bus.now();
@@ -175,7 +174,7 @@ impl Talk {
             self.limit = until.since(now);
             self.with(|lane| lane.settling = true)?;
             self.look_on()?;
-            // A request that is only written now has its time from then on.
+            // The time limit of a request that is written only now starts then.
             let ready = || {
                 let heard = |lane: &mut LaneState| match lane.take() {
                     Some(arrival) => Some(Some(arrival)),
@@ -203,7 +202,8 @@ impl Talk {
         Ok(())
     }
 
-    /// Begins a message in parts, of which only the last one is answered: what is refused meanwhile may be one of them.
+    /// Begins a message in parts with an answer to the last one only: an error reply meanwhile may belong to one of
+    /// them.
     pub(super) fn begin_parts(&mut self) {
         let _ = self.with(|lane| (lane.parts_until, lane.refusal) = (Some(Instant::NEVER), None));
     }
@@ -211,37 +211,37 @@ impl Talk {
     /// Ends a message in parts.
     ///
     /// # Errors
-    /// An error reply came meanwhile: a part may be missing.
+    /// An error reply was received meanwhile: a part may be missing.
     pub(super) fn end_parts(&mut self) -> Result<(), MailboxError> {
         self.check_parts()?;
         self.with(|lane| lane.parts_until = None)
     }
 
-    /// Whether all parts so far were taken, for all one knows.
+    /// Whether all parts so far were accepted, as far as known.
     pub(super) fn check_parts(&self) -> Result<(), MailboxError> {
         self.with(|lane| lane.refusal)?.map_or(Ok(()), |reply| Err(MailboxError::Error(reply)))
     }
 
-    /// The answer is there, all of it.
+    /// The answer is complete.
     pub fn complete(&mut self) {
         self.open = false;
         let _ = self.with(|lane| lane.asked = None);
         self.put_aside();
     }
 
-    /// Sends a message to which no answer is waited for. It is written even when the talk ends.
+    /// Sends a message without an answer. It is written even when the conversation ends.
     pub fn post(&mut self, payload: &[u8]) -> Result<(), MailboxError> {
         self.with(|_| ())?;
         self.room.queue(self.lane, payload.to_vec(), POST_LIMIT, (self.turn, None)).map(drop)
     }
 
-    /// Sends a message and waits until the SubDevice has it.
+    /// Sends a message and waits until the SubDevice has accepted it.
     pub async fn send(&mut self, payload: &[u8], limit: Duration) -> Result<(), MailboxError> {
         self.write(payload, limit, None).await
     }
 
-    /// Sends a request and waits for the mail that `accept` takes for its answer; other mail of the lane is dropped and
-    /// counted.
+    /// Sends a request and waits for the mail that `accept` recognises as its answer; other mail of the lane is dropped
+    /// and counted.
     pub async fn ask<T>(
         &mut self,
         payload: &[u8],
@@ -262,7 +262,7 @@ impl Talk {
     ) -> Result<T, MailboxError> {
         self.limit = limits.1;
         self.put_aside();
-        // Its answer may begin before it is known that it was written.
+        // Its answer may begin before the write is confirmed.
         self.open = true;
         self.write(payload, limits.0, Some(limits.1)).await.inspect_err(|_| self.open = false)?;
         self.answer(limits.1, accept).await
@@ -279,7 +279,7 @@ impl Talk {
         self.answer(limit, accept).await
     }
 
-    /// Lets the reader look for more.
+    /// Makes the reader poll for more.
     fn look_on(&mut self) -> Result<(), MailboxError> {
         let (now, limit) = (self.room.bus.now(), self.limit);
         self.with(|lane| {
@@ -342,7 +342,7 @@ impl Talk {
         }
     }
 
-    /// What was asked is no longer waited for; its answer may come late.
+    /// The request is given up; its answer may come late.
     fn give_up(&mut self) {
         let (now, limit, turn) = (self.room.bus.now(), self.limit, self.turn);
         let open = core::mem::take(&mut self.open);
@@ -350,7 +350,7 @@ impl Talk {
         self.put_aside();
     }
 
-    /// What came and was not taken is mail that nobody asked for.
+    /// Received mail that was not taken becomes unsolicited mail.
     fn put_aside(&self) {
         let state = &mut *self.room.state();
         if state.time != self.time {
@@ -361,7 +361,7 @@ impl Talk {
         }
     }
 
-    /// Parts that were written may still be refused.
+    /// Written parts may still be refused.
     fn leave_parts(&mut self) {
         let now = self.room.bus.now();
         let _ = self.with(|lane| {
@@ -371,7 +371,8 @@ impl Talk {
         });
     }
 
-    /// A message that was queued and not written yet when the talk ends is taken back, unless nobody waits for it.
+    /// A message that was queued and not written yet when the conversation ends is withdrawn, unless it needs no
+    /// answer.
     fn withdraw(&mut self) {
         let withdraw = |lane: &mut LaneState| {
             let queued = lane.outbox.len();

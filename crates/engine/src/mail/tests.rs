@@ -1,5 +1,5 @@
-//! The router and its protocols against a SubDevice that is nothing but a mailbox, undisturbed and with frames lost,
-//! late and doubled. Time is virtual, chance comes from a seed.
+//! The router and its protocols against a SubDevice that consists of a mailbox only, undisturbed and with frames lost,
+//! late and duplicated. Time is virtual, random numbers come from a seed.
 
 mod device;
 mod interrupted;
@@ -30,10 +30,10 @@ use crate::time::Instant;
 const LIMITS: Limits = (Duration::from_millis(100), Duration::from_secs(1));
 const MAIN: MacAddress = MacAddress([0, 0, 0x5E, 0, 0x53, 1]);
 const REDUNDANT: MacAddress = MacAddress([0, 0, 0x5E, 0, 0x53, 2]);
-/// Time of a frame there and back.
+/// Round-trip time of a frame.
 const ROUND_TRIP: Duration = Duration::from_micros(50);
 
-/// What becomes of a frame.
+/// Fate of a frame.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Fate {
     Passes,
@@ -41,7 +41,7 @@ enum Fate {
     LostBack,
     /// Comes back later.
     Late(Duration),
-    /// In a ring at the edge of its repair: both copies meet the SubDevice.
+    /// At a ring's transition to closed: both copies reach the SubDevice.
     MetTwice,
 }
 
@@ -75,7 +75,7 @@ impl Bench {
         result
     }
 
-    /// Sends what is to be sent and lets time go on to the next thing that happens, a millisecond at most.
+    /// Sends queued frames and advances time to the next event, by a millisecond at most.
     fn step(&mut self, mut fate: impl FnMut() -> Fate) {
         self.supervisor.poll(self.now);
         let mut sent = Vec::new();
@@ -112,7 +112,7 @@ impl Bench {
         }
     }
 
-    /// Runs work to its end.
+    /// Runs a future to its end.
     fn run<T: 'static>(&mut self, work: impl Future<Output = T> + 'static) -> T {
         let result = self.start(work);
         let end = self.now + Duration::from_secs(60);
@@ -125,7 +125,7 @@ impl Bench {
         }
     }
 
-    /// Lets time pass.
+    /// Advances time.
     fn pass(&mut self, time: Duration) {
         let end = self.now + time;
         while self.now < end {

@@ -1,4 +1,4 @@
-//! Mail that nobody asked for: kept until somebody takes it, bounded, with a count of what did not fit.
+//! Unsolicited mail: kept until the application takes it, bounded, with a count of dropped mail.
 
 use alloc::vec::Vec;
 
@@ -8,14 +8,14 @@ use ringcat_wire::mailbox::coe::Emergency;
 use super::ring::Ring;
 use crate::time::Instant;
 
-/// Emergencies that are kept.
+/// Number of emergencies kept.
 const EMERGENCIES: usize = 32;
-/// Fragments of Ethernet frames that are kept: a frame of 1,518 bytes in the smallest fragments, and some more.
+/// Number of Ethernet fragments kept: a frame of 1,518 bytes in the smallest fragments, and some more.
 const ETHERNET: usize = 64;
-/// Mails of each other kind that are kept.
+/// Number of mails kept of each other kind.
 const OTHERS: usize = 32;
 
-/// Kinds of mail that nobody asks for.
+/// Kinds of unsolicited mail.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Unsolicited {
     /// Fragments of Ethernet frames (EoE).
@@ -26,16 +26,16 @@ pub enum Unsolicited {
     Aoe,
     /// Messages of the vendor protocol (VoE).
     Voe,
-    /// Everything else, late answers among them.
+    /// All other mail, including late answers.
     Other,
 }
 
-/// A mail that nobody asked for.
+/// An unsolicited mail.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Unclaimed {
     /// Its protocol.
     pub protocol: Protocol,
-    /// What follows the mailbox header.
+    /// The data after the mailbox header.
     pub payload: Vec<u8>,
 }
 

@@ -1,4 +1,4 @@
-//! VoE: messages of a vendor to and from a SubDevice (protocol 6.8). What they mean is the vendor's matter.
+//! VoE: messages of a vendor to and from a SubDevice (protocol 6.8). Their meaning is vendor-specific.
 
 use alloc::vec;
 use alloc::vec::Vec;
@@ -11,7 +11,7 @@ use super::talk::{Limits, Talk};
 use super::unsolicited::Unsolicited;
 use super::{Mailbox, MailboxError};
 
-/// Pause between two looks for a message: this one at first, growing to the longest.
+/// Pause between two polls for a message: this one at first, growing to the longest.
 const FIRST_PAUSE: Duration = Duration::from_micros(200);
 /// Longest pause.
 const LONGEST_PAUSE: Duration = Duration::from_millis(2);
@@ -21,13 +21,13 @@ const LONGEST_PAUSE: Duration = Duration::from_millis(2);
 pub struct Voe {
     /// Vendor, as in the identity.
     pub vendor_id: u32,
-    /// Kind of message, the vendor's own.
+    /// Vendor-specific type of the message.
     pub vendor_type: u16,
     /// The data.
     pub data: Vec<u8>,
 }
 
-/// Sends a message and waits until the SubDevice has it.
+/// Sends a message and waits until the SubDevice has accepted it.
 pub async fn send(mailbox: &Mailbox, message: &Voe, limit: Duration) -> Result<(), MailboxError> {
     let mut talk = mailbox.talk(Lane::Voe).await?;
     let payload = encode(&talk, message)?;
@@ -43,13 +43,13 @@ pub async fn exchange(mailbox: &Mailbox, message: &Voe, limits: Limits) -> Resul
     talk.ask(&payload, limits, accept).await
 }
 
-/// Waits for a message that is no answer to [`exchange`], and looks for it at the mailbox's status meanwhile. What
-/// cannot be read is left out.
+/// Waits for a message that is not an answer to [`exchange`], and polls the mailbox's status meanwhile. Malformed
+/// messages are skipped.
 pub async fn receive(mailbox: &Mailbox, limit: Duration) -> Result<Voe, MailboxError> {
     wait(mailbox, limit, Mailbox::look_for_mail).await
 }
 
-/// As [`receive`], but reads the mailbox without a look at its status.
+/// As [`receive`], but reads the mailbox without polling its status.
 pub async fn receive_directly(mailbox: &Mailbox, limit: Duration) -> Result<Voe, MailboxError> {
     wait(mailbox, limit, Mailbox::is_full).await
 }

@@ -1,7 +1,7 @@
-//! Writing: one message after the other, the lanes in turn (protocol 6.1).
+//! Writes one message after the other, the lanes in turn (protocol 6.1).
 //!
-//! A lost write is sent again with the same counter until the SubDevice takes it, which drops it where the first one
-//! had arrived. No other message goes out meanwhile: one in between would make the old counter look new.
+//! A lost write is repeated with the same counter until the SubDevice accepts it; a SubDevice that received the first
+//! one drops the repetition. No other message is sent meanwhile: it would make the old counter look new.
 
 use alloc::rc::Rc;
 use alloc::vec::Vec;
@@ -19,7 +19,7 @@ use super::room::{Room, Session};
 const FIRST_PAUSE: Duration = Duration::from_micros(100);
 /// Longest pause.
 const LONGEST_PAUSE: Duration = Duration::from_millis(1);
-/// A write is lost so often before it is given up, however long that takes.
+/// Number of losses after which a write is given up, whatever its duration.
 const RETRIES: usize = 5;
 
 /// Starts a writer unless one runs.
@@ -107,7 +107,7 @@ async fn write(room: &Rc<Room>, time: u32, session: &Session, message: &Outgoing
         if room.session(time).is_none() {
             return Err(MailboxError::Closed);
         }
-        // A SubDevice that cannot get rid of its own mail takes no other.
+        // A SubDevice that cannot send its own mail accepts no other.
         room.state().blocked = true;
         reader::start(room);
         bus.sleep(pause).await;

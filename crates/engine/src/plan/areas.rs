@@ -1,4 +1,5 @@
-//! The process data area of each SyncManager: which PDOs, where each entry lies, how long (protocol 3.11, 4.2 to 4.5).
+//! The process data area of each SyncManager: its PDOs, the place of each entry, its length (protocol 3.11, 4.2 to
+//! 4.5).
 
 use alloc::collections::BTreeSet;
 use alloc::vec::Vec;
@@ -13,7 +14,7 @@ use crate::info::{Direction, PdoInfo, SubDeviceInfo};
 
 /// Base of the PDO assignment objects: 0x1C10 + number of the SyncManager.
 pub(super) const ASSIGNMENT_BASE: u16 = 0x1C10;
-/// PDOs of an assignment, entries of a PDO: subindices 1 to 254.
+/// Largest number of PDOs in an assignment, and of entries in a PDO: subindices 1 to 254.
 const MAX_OBJECT_ENTRIES: usize = 254;
 
 /// Plans all process data SyncManagers, in the order of their numbers.
@@ -33,16 +34,16 @@ pub(super) fn areas(
     Ok(areas)
 }
 
-/// Numbers of the SyncManagers that have process data or are declared to have some.
+/// Numbers of the SyncManagers with process data, from the SII or the declaration.
 fn numbers(config: &SubDeviceConfig, info: &SubDeviceInfo, mailbox: &[SmPlan]) -> BTreeSet<u8> {
     let declared = config.sync_managers.iter().map(|sm| sm.index);
     let assigned = config.pdos.iter().flatten().map(|assignment| assignment.sync_manager);
-    // An SII that assigns a PDO to a mailbox is wrong; the scan has warned.
+    // An SII that assigns a PDO to a mailbox is wrong; the scan gave a warning.
     let of_mailbox = |index: &u8| mailbox.iter().any(|sm| sm.index == *index);
     let by_pdo = info.pdos.iter().filter_map(|pdo| pdo.sync_manager).filter(move |index| !of_mailbox(index));
     let by_kind = (0..).zip(&info.sync_managers).filter(|(_, sm)| kind_direction(sm).is_some()).map(|(index, _)| index);
     let described = by_pdo.chain(by_kind);
-    // An assignment by the SII to a SyncManager that does not exist is wrong too; a declaration of one is an error.
+    // An SII that assigns to a missing SyncManager is wrong too; such a declaration is an error.
     let exists = |index: &u8| usize::from(*index) < info.sync_managers.len();
     declared.chain(assigned).chain(described.filter(exists)).collect()
 }
@@ -58,7 +59,7 @@ fn kind_direction(sm: &SiiSyncManager) -> Option<Direction> {
     }
 }
 
-/// Plans one SyncManager; `None` for a virtual one, behind which there is no hardware.
+/// Plans one SyncManager; `None` for a virtual one, which has no hardware.
 fn area(config: &SubDeviceConfig, info: &SubDeviceInfo, index: u8) -> Result<Option<AreaPlan>, PlanProblem> {
     let available = info.controller.sync_manager_count;
     if index >= available {
@@ -76,7 +77,7 @@ fn area(config: &SubDeviceConfig, info: &SubDeviceInfo, index: u8) -> Result<Opt
         None => sii_pdos(info.assigned_pdos(index).filter(|pdo| pdo.direction == direction)),
     };
     let bits: u64 = pdos.iter().flat_map(|pdo| &pdo.entries).map(|entry| u64::from(entry.bit_length)).sum();
-    // A dictionary that was read and names none has none: then the default length of the SII is not meant.
+    // The dictionary was read and assigns no PDO: then the default length of the SII does not apply.
     let is_known = assignment.is_some() || !pdos.is_empty() || info.read_online.contains(&index);
     let length = if is_known {
         let too_long = PlanProblem::TooLong { sync_manager: index, bits };
@@ -88,7 +89,7 @@ fn area(config: &SubDeviceConfig, info: &SubDeviceInfo, index: u8) -> Result<Opt
     };
     let override_ = config.sync_managers.iter().find(|declared| declared.index == index);
     let mut register = sync_manager(sii.start, length, sii.control);
-    // Process data has three buffers, whatever the control byte says of the mode.
+    // Process data has three buffers, whatever mode the control byte gives.
     register.control.mode = SyncManagerMode::Buffered;
     register.control.direction = match direction {
         Direction::Outputs => SyncManagerDirection::Write,
@@ -110,7 +111,7 @@ fn area(config: &SubDeviceConfig, info: &SubDeviceInfo, index: u8) -> Result<Opt
     }))
 }
 
-/// Declarations count before the type in the SII, that before its PDOs, these before its control byte.
+/// In order of precedence: declarations, the type in the SII, its PDOs, its control byte.
 fn direction(
     config: &SubDeviceConfig,
     info: &SubDeviceInfo,
@@ -169,7 +170,7 @@ fn declared_pdos(
     Ok(mapped)
 }
 
-/// Places entries back to back, from bit `bit` on.
+/// Places of adjacent entries, from bit `bit` on.
 pub(super) fn place(entries: impl Iterator<Item = (u16, u8, u8)>, bit: &mut u32) -> Vec<MappedEntry> {
     entries
         .map(|(index, sub_index, bit_length)| {
@@ -198,7 +199,7 @@ fn pdo_twice(areas: &[AreaPlan]) -> Result<(), PlanProblem> {
     }
 }
 
-/// Bytes that a SyncManager occupies: three buffers, but one where it is a mailbox or a single byte.
+/// Bytes that a SyncManager occupies: three buffers; one buffer for a mailbox or a single byte.
 pub(super) fn occupied(register: &ringcat_wire::register::SyncManager) -> u32 {
     let length = u32::from(register.length);
     match register.control.mode {

@@ -43,7 +43,7 @@ pub(super) fn check(info: &SubDeviceInfo, mailbox: &[SmPlan], areas: &[AreaPlan]
     }
 }
 
-/// Which start-up commands a SubDevice can be given.
+/// Start-up commands that a SubDevice supports.
 #[derive(Clone, Copy)]
 pub(super) struct Speaks {
     coe: bool,
@@ -52,7 +52,7 @@ pub(super) struct Speaks {
 }
 
 impl Speaks {
-    /// As its SII says; a configuration file that declares its mailboxes knows better.
+    /// From its SII; a configuration file that declares its mailboxes overrides it.
     pub(super) fn new(config: &SubDeviceConfig, info: &SubDeviceInfo, mailbox: bool) -> Speaks {
         let declared = config.declared.is_some();
         let protocols = info.protocols;
@@ -64,7 +64,7 @@ impl Speaks {
     }
 }
 
-/// Whether a SubDevice can be given a start-up command.
+/// Whether a SubDevice supports a start-up command.
 pub(super) fn command(speaks: Speaks, action: &StartupAction) -> Result<(), PlanProblem> {
     match action {
         StartupAction::Sdo(SdoDownload { index, sub_index, .. })
@@ -89,7 +89,7 @@ pub(super) fn command(speaks: Speaks, action: &StartupAction) -> Result<(), Plan
     }
 }
 
-/// Memory below the process RAM, and what can be exchanged there.
+/// Memory below the process RAM, and the direction possible there.
 struct Memory {
     start: u32,
     end: u32,
@@ -100,7 +100,7 @@ const WRITTEN: &[SyncManagerDirection] = &[SyncManagerDirection::Write];
 const READ: &[SyncManagerDirection] = &[SyncManagerDirection::Read];
 const BOTH: &[SyncManagerDirection] = &[SyncManagerDirection::Write, SyncManagerDirection::Read];
 
-/// Digital outputs, general purpose outputs and inputs, user RAM (protocol 3.13). All else is registers.
+/// Digital outputs, general purpose outputs and inputs, user RAM (protocol 3.13). The rest is registers.
 const BELOW_PROCESS_RAM: [Memory; 4] = [
     Memory { start: 0x0F00, end: 0x0F04, directions: WRITTEN },
     Memory { start: 0x0F10, end: 0x0F18, directions: WRITTEN },
@@ -133,7 +133,7 @@ fn inside(info: &SubDeviceInfo, span: &Span) -> Result<(), PlanProblem> {
             let no_memory = PlanProblem::NoMemory { sync_manager: span.index, start: span.start };
             BELOW_PROCESS_RAM.iter().find(holds).ok_or(no_memory)?.end
         }
-        // A controller that does not say how much it has.
+        // A controller that does not give its RAM size.
         (false, 0) => 0x1_0000,
         (false, kib) => u32::from(PROCESS_RAM) + 1024 * u32::from(kib),
     };

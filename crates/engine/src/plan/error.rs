@@ -1,4 +1,4 @@
-//! Why a SubDevice cannot be set up as declared. Most of it is a wrong declaration, some of it a wrong SII.
+//! Why a SubDevice cannot be set up as declared: mostly a wrong declaration, sometimes a wrong SII.
 
 use alloc::format;
 use alloc::string::String;
@@ -16,26 +16,26 @@ pub struct PlanError {
     pub position: Position,
     /// Its station address.
     pub station: StationAddress,
-    /// What is wrong.
+    /// The problem.
     pub problem: PlanProblem,
-    /// With what.
+    /// Where the fault is.
     pub fault: PlanFault,
 }
 
-/// What has to be mended.
+/// What must be corrected.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum PlanFault {
     /// The declaration.
     Declaration,
-    /// The SII: without any declaration the SubDevice cannot be set up either, or its image is damaged.
+    /// The SII: the SubDevice cannot be set up without any declaration either, or its image is damaged.
     Sii,
 }
 
-/// What is wrong.
+/// The problem.
 #[derive(Clone, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum PlanProblem {
-    /// Nothing is declared, and the EEPROM says nothing.
+    /// Nothing is declared, and the EEPROM is empty.
     NoSii,
     /// A SyncManager that the controller does not have.
     NoSuchSyncManager {
@@ -44,7 +44,7 @@ pub enum PlanProblem {
         /// SyncManagers of the controller.
         available: u8,
     },
-    /// Process data for a SyncManager whose place the SII does not give.
+    /// Process data for a SyncManager that the SII does not describe.
     UnknownSyncManager {
         /// Its number.
         sync_manager: u8,
@@ -65,7 +65,7 @@ pub enum PlanProblem {
         /// Direction of its PDO assignment.
         got: Direction,
     },
-    /// A PDO without declared entries that the SII does not describe.
+    /// A PDO without declared entries, and without entries in the SII.
     UnknownPdo {
         /// The SyncManager to which it is assigned.
         sync_manager: u8,
@@ -94,21 +94,21 @@ pub enum PlanProblem {
     },
     /// More PDOs in an assignment, or entries in a PDO, than their object can hold.
     TooMany {
-        /// Object: 0x1C10 + n for the assignment of SM n, or the PDO.
+        /// The object: 0x1C10 + n for the assignment of SM n, or the PDO.
         object: u16,
-        /// Entries that it can hold.
+        /// Largest number of entries.
         expected: usize,
-        /// Entries asked for.
+        /// Requested entries.
         got: usize,
     },
-    /// More process data than a SyncManager can hold.
+    /// More process data than fits a SyncManager.
     TooLong {
         /// The SyncManager.
         sync_manager: u8,
-        /// Bits asked for.
+        /// Requested bits.
         bits: u64,
     },
-    /// An area that does not lie in the memory of the controller.
+    /// An area outside the memory of the controller.
     OutsideMemory {
         /// The SyncManager.
         sync_manager: u8,
@@ -119,18 +119,18 @@ pub enum PlanProblem {
         /// First byte behind the memory.
         memory_end: u32,
     },
-    /// An area among the registers, where there is no memory for its direction.
+    /// An area among the registers, without memory for its direction.
     NoMemory {
         /// The SyncManager.
         sync_manager: u8,
         /// First byte.
         start: u16,
     },
-    /// Two areas share bytes; one with three buffers takes three times its length.
+    /// Two areas overlap; one with three buffers takes three times its length.
     Overlap {
         /// The SyncManager of the first area.
         first: u8,
-        /// Bytes of the first area, all buffers included: start and first byte behind.
+        /// Bytes of the first area, all buffers included: start and first byte after it.
         first_bytes: (u16, u32),
         /// The SyncManager of the second area.
         second: u8,
@@ -144,13 +144,13 @@ pub enum PlanProblem {
         /// FMMUs of the controller.
         got: u8,
     },
-    /// Other process data is asked for than the SII describes, and there is no CoE to tell the SubDevice.
+    /// The requested process data differs from the SII, and without CoE the SubDevice cannot be informed.
     FixedProcessData {
         /// The SyncManager.
         sync_manager: u8,
         /// Bits that the SII describes.
         expected: u64,
-        /// Bits asked for.
+        /// Requested bits.
         got: u64,
     },
     /// An SDO download for a SubDevice without CoE.
@@ -167,18 +167,18 @@ pub enum PlanProblem {
         /// The IDN.
         idn: Idn,
     },
-    /// Addresses for a SubDevice without EoE.
+    /// IP parameters for a SubDevice without EoE.
     NoEoe,
     /// A configuration file declares a SyncManager twice.
     DeclaredTwice {
         /// Its number.
         sync_manager: u8,
     },
-    /// A configuration file declares other mailboxes than one of each direction or none.
+    /// A configuration file declares neither no mailbox nor one of each direction.
     DeclaredMailboxes {
-        /// Those that the MainDevice writes.
+        /// Mailboxes that the MainDevice writes.
         out: usize,
-        /// Those that it reads.
+        /// Mailboxes that the MainDevice reads.
         inward: usize,
     },
     /// A configuration file declares a SyncManager for one direction, with a control byte for the other.
@@ -199,7 +199,7 @@ pub enum PlanProblem {
         /// Bits of its length.
         got: u64,
     },
-    /// A command to a register has no data, more than a datagram carries, some beyond the last register, or a mask of
+    /// A register command has no data, more than a datagram carries, data beyond the last register, or a mask of
     /// another length.
     RegisterCommand {
         /// The register.
@@ -211,15 +211,15 @@ pub enum PlanProblem {
     },
 }
 
-/// What the application asked for and the SubDevice may not follow. The plan takes it as asked for.
+/// A request of the application that the SubDevice may not follow. The plan contains it as requested.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum PlanWarning {
-    /// Another PDO assignment than the SII describes, but the SII says that it cannot be changed. It is not written.
+    /// The PDO assignment differs from the SII, which says that it is fixed. It is not written.
     FixedAssignment {
         /// The SyncManager.
         sync_manager: u8,
     },
-    /// Another mapping than the SII describes, but the SII says that it cannot be changed. It is not written.
+    /// The mapping differs from the SII, which says that it is fixed. It is not written.
     FixedMapping {
         /// Index of the PDO.
         pdo: u16,

@@ -1,7 +1,6 @@
-//! SDO downloads that tell a SubDevice its PDO assignment and mapping where they are not those of its SII
-//! (protocol 5.2, 6.3).
+//! SDO downloads of PDO assignment and mapping, where they differ from the SII (protocol 5.2, 6.3).
 //!
-//! Per SyncManager: the assignment is emptied, the mapping of each changed PDO is emptied, written and counted, the
+//! Per SyncManager: the assignment is emptied; the mapping of each changed PDO is emptied, written and counted; the
 //! assignment is written and counted.
 
 use alloc::vec::Vec;
@@ -22,7 +21,7 @@ pub(super) fn assign_sdos(
     let mut sdos = Vec::new();
     for area in areas {
         let declared = config.pdos.iter().flatten().any(|assignment| assignment.sync_manager == area.sync_manager);
-        // What was read may have been written by somebody before, and be gone after the next loss of power.
+        // The assignment that was read may be volatile, written by another program, and lost at the next power failure.
         let read = info.read_online.contains(&area.sync_manager) && info.coe.pdo_assign();
         if !declared && !read {
             continue;
@@ -54,11 +53,11 @@ fn assignment_differs(info: &SubDeviceInfo, area: &AreaPlan) -> bool {
     !area.pdos.iter().map(|pdo| pdo.index).eq(theirs)
 }
 
-/// Without CoE other names for the same number of bits do no harm.
+/// Without CoE, other names for the same number of bits do no harm.
 fn fixed(info: &SubDeviceInfo, area: &AreaPlan) -> Result<(), PlanProblem> {
     let described: u64 = info.assigned_pdos(area.sync_manager).map(|pdo| u64::from(pdo.bit_length())).sum();
     let declared: u64 = area.pdos.iter().flat_map(|pdo| &pdo.entries).map(|entry| u64::from(entry.bit_length)).sum();
-    // No PDO declared switches the SyncManager off, no PDO described leaves its length open.
+    // An empty declaration disables the SyncManager; without PDOs in the SII its length is undefined.
     if declared == 0 || described == 0 || described == declared {
         return Ok(());
     }
@@ -73,13 +72,13 @@ fn of_area(
     sdos: &mut Vec<SdoDownload>,
     warnings: &mut Vec<PlanWarning>,
 ) {
-    // An SII without CoE details says nothing about them.
+    // An SII without CoE details gives no information about them.
     let unknown = info.coe.0 == 0;
     let can_assign = unknown || info.coe.pdo_assign();
     let can_map = unknown || info.coe.pdo_configuration();
     let object = ASSIGNMENT_BASE + u16::from(area.sync_manager);
     let map = can_map && !changed.is_empty();
-    // A PDO cannot be mapped anew while it is assigned.
+    // An assigned PDO cannot be mapped.
     let assign = can_assign && (reassigned || map);
     if reassigned && !can_assign {
         warnings.push(PlanWarning::FixedAssignment { sync_manager: area.sync_manager });

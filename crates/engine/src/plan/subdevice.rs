@@ -1,4 +1,4 @@
-//! The plan of one SubDevice: SyncManagers, areas of process data, and what they map.
+//! The plan of one SubDevice: SyncManagers, areas of process data, and their mapping.
 
 use alloc::vec::Vec;
 
@@ -10,7 +10,7 @@ use super::error::PlanWarning;
 use crate::config::SdoDownload;
 use crate::info::Direction;
 
-/// A SyncManager to be written.
+/// A SyncManager to write.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct SmPlan {
     /// Its number.
@@ -19,7 +19,7 @@ pub struct SmPlan {
     pub register: SyncManager,
 }
 
-/// An entry of a PDO and where it lies.
+/// An entry of a PDO and its place.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct MappedEntry {
     /// Index of the object; 0 is a gap.
@@ -28,7 +28,7 @@ pub struct MappedEntry {
     pub sub_index: u8,
     /// First bit, counted from the start of the area.
     pub bit_offset: u32,
-    /// Bits.
+    /// Length in bits.
     pub bit_length: u8,
 }
 
@@ -50,57 +50,56 @@ pub struct AreaPlan {
     pub direction: Direction,
     /// First physical byte.
     pub physical: u16,
-    /// Bytes; 0 where the SyncManager is switched off and needs no FMMU.
+    /// Length in bytes; 0 where the SyncManager is disabled and needs no FMMU.
     pub length: u16,
     /// Registers of the SyncManager.
     pub register: SyncManager,
-    /// To be enabled on the way to OP only, not for SAFEOP (protocol 4.4).
+    /// Enabled on the way to OP only, not for SAFEOP (protocol 4.4).
     pub op_only: bool,
-    /// Its PDOs; none where the SII names a length only.
+    /// Its PDOs; none where the SII gives only a length.
     pub pdos: Vec<MappedPdo>,
 }
 
-/// What has to be written to a SubDevice.
+/// Values to write to a SubDevice.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct SubDevicePlan {
     /// Its station address.
     pub station: StationAddress,
-    /// Mailbox SyncManagers for PREOP: first the one that the MainDevice writes. None or two.
+    /// Mailbox SyncManagers for PREOP, the one that the MainDevice writes first. None or two.
     pub mailbox: Vec<SmPlan>,
     /// Mailbox SyncManagers for BOOT. None or two.
     pub bootstrap: Vec<SmPlan>,
     /// Process data areas by SyncManager number. Each of them gets an FMMU unless its length is 0.
     pub process_data: Vec<AreaPlan>,
-    /// SyncManagers of the controller to be switched off before SAFEOP: neither mailbox nor process data.
+    /// SyncManagers of the controller to disable before SAFEOP: neither mailbox nor process data.
     pub unused: Vec<u8>,
-    /// SDO downloads that make PDO assignment and mapping what they are planned to be; they come after the start-up
-    /// commands of PREOP.
+    /// SDO downloads for the planned PDO assignment and mapping, after the start-up commands of PREOP.
     pub assign_sdos: Vec<SdoDownload>,
-    /// LRW reaches the SubDevice.
+    /// The SubDevice supports LRW.
     pub lrw_supported: bool,
-    /// Watchdog registers to be written before SAFEOP.
+    /// Watchdog registers to write before SAFEOP.
     pub watchdog: Vec<(RegisterAddress, Vec<u8>)>,
-    /// What the application asked for and the SubDevice may not follow.
+    /// Requests of the application that the SubDevice may not follow.
     pub warnings: Vec<PlanWarning>,
 }
 
 impl SubDevicePlan {
-    /// Areas that need an FMMU, with its number: in the order of the SyncManagers.
+    /// Areas that need an FMMU, with the FMMU's number, in the order of the SyncManagers.
     pub fn mapped_areas(&self) -> impl Iterator<Item = (u8, &AreaPlan)> {
         (0..).zip(self.process_data.iter().filter(|area| area.length > 0))
     }
 
-    /// Some of its SyncManagers are for OP only: then none of its process data flows before.
+    /// Some of its SyncManagers are for OP only: then no process data is exchanged before.
     pub fn is_op_only(&self) -> bool {
         self.mapped_areas().any(|(_, area)| area.op_only)
     }
 
-    /// Where the mailboxes lie from PREOP on; `None` where there are none.
+    /// Mailboxes from PREOP on; `None` where there are none.
     pub fn mailbox_layout(&self) -> Option<MailboxLayout> {
         layout_of(&self.mailbox)
     }
 
-    /// Where the mailboxes lie in BOOT; `None` where there are none.
+    /// Mailboxes in BOOT; `None` where there are none.
     pub fn bootstrap_layout(&self) -> Option<MailboxLayout> {
         layout_of(&self.bootstrap)
     }

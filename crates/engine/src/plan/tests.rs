@@ -187,7 +187,7 @@ fn another_assignment_is_emptied_written_and_counted() {
     assert_eq!(sdos(&plan), expected);
     assert_eq!(plan.process_data[1].length, 5);
     assert_eq!(plan.process_data[1].pdos[1].entries[0].bit_offset, 8);
-    // SM 2 was not named: as in the SII.
+    // SM 2 was not declared: as in the SII.
     assert_eq!(plan.process_data[0].length, 3);
 }
 

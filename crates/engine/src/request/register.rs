@@ -7,16 +7,16 @@ use crate::bell::Bell;
 
 /// A request for registers of one SubDevice. It may be moved to the cyclic thread.
 ///
-/// It travels in a frame of the acyclic half, within a millisecond or so: the frames of a cycle are built once at
-/// activation, are checked against what was sent, and are expected back at a known time; a guest in them would make
-/// each cycle's length a matter of who asks.
+/// It travels in a frame of the acyclic half, within about a millisecond. Cyclic frames are built once at activation,
+/// are compared with what was sent, and are expected back at a known time; a register datagram in them would make the
+/// length of each cycle depend on requests.
 #[derive(Debug)]
 pub struct RegisterRequest {
     pub(super) request: Request,
 }
 
 impl RegisterRequest {
-    /// A request of up to `size` bytes to a declared SubDevice, and its other side.
+    /// A request of up to `size` bytes to a declared SubDevice, and its acyclic side.
     pub(crate) fn new(subdevice: usize, size: usize, bell: &Bell) -> (RegisterRequest, Served) {
         let (request, served) = pair(subdevice, size, Subject::Register { address: 0, length: 0 }, bell);
         (RegisterRequest { request }, served)

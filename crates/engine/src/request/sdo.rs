@@ -10,14 +10,14 @@ pub struct SdoRequest {
 }
 
 impl SdoRequest {
-    /// A request of `size` bytes for an object of a declared SubDevice, and its other side.
+    /// A request of `size` bytes for an object of a declared SubDevice, and its acyclic side.
     pub(crate) fn new(subdevice: usize, size: usize, bell: &Bell) -> (SdoRequest, Served) {
         let subject = Subject::Object { index: 0, sub_index: 0, complete_access: false };
         let (request, served) = pair(subdevice, size, subject, bell);
         (SdoRequest { request }, served)
     }
 
-    /// Turns to another object of the same SubDevice.
+    /// Changes to another object of the same SubDevice.
     pub fn set_object(&mut self, index: u16, sub_index: u8, complete_access: bool) -> Result<(), RequestRefused> {
         self.request.set_subject(Subject::Object { index, sub_index, complete_access })
     }

@@ -1,4 +1,4 @@
-//! The memory of a request, and the words through which both sides talk: whoever has it is said by its state.
+//! Memory of a request and the words with which both sides communicate; its state shows which side owns it.
 
 use alloc::boxed::Box;
 use alloc::sync::Arc;
@@ -26,16 +26,16 @@ const FAILED: u64 = 4;
 const REFUSED: u64 = 5;
 const CANCELLED: u64 = 6;
 
-/// How far a request is.
+/// State of a request.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum RequestState {
-    /// It was not started, or changed since.
+    /// It was not started, or was changed since.
     Unused,
-    /// It is under way: nothing about it can be changed.
+    /// It is in progress: it cannot be changed.
     Busy,
-    /// It has worked; what was read is there.
+    /// It succeeded; read data is available.
     Success,
-    /// It has failed.
+    /// It failed.
     Error,
 }
 
@@ -49,9 +49,9 @@ pub enum RequestFailure {
     Refused(SoeErrorCode),
     /// It took longer than its timeout.
     Timeout,
-    /// What was read has more bytes than the request has room for.
+    /// The read data is longer than the memory of the request.
     TooLong,
-    /// The SubDevice is not there, or its mailbox failed.
+    /// The SubDevice is absent, or its mailbox failed.
     Failed,
     /// It was cancelled.
     Cancelled,
@@ -61,7 +61,7 @@ pub enum RequestFailure {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum RequestRefused {
-    /// It is under way.
+    /// It is in progress.
     Busy,
     /// The data is longer than its memory.
     TooLong {
@@ -72,7 +72,7 @@ pub enum RequestRefused {
     },
 }
 
-/// What a request is about.
+/// Target of a request.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Subject {
     Object { index: u16, sub_index: u8, complete_access: bool },
@@ -109,23 +109,23 @@ impl Subject {
     }
 }
 
-/// What is to be done.
+/// Action.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) enum Access {
     Read,
-    /// Read without a look whether there is something to read.
+    /// Read without polling the mailbox's status.
     ReadDirectly,
     Write(Vec<u8>),
 }
 
-/// What is asked for.
+/// Target and action.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) struct Order {
     pub subdevice: usize,
     pub subject: Subject,
     pub access: Access,
     pub timeout: Duration,
-    /// Bytes that fit.
+    /// Size of the memory in bytes.
     pub room: usize,
 }
 
@@ -135,7 +135,7 @@ struct Slot {
     state: AtomicU8,
     cancelled: AtomicBool,
     subject: AtomicU64,
-    /// What an answer says it is about.
+    /// Header data of an answer.
     answered: AtomicU64,
     timeout_us: AtomicU32,
     length: AtomicU32,
@@ -145,22 +145,22 @@ struct Slot {
     bell: Bell,
 }
 
-/// What requests of all kinds have in common, on the side of the application.
+/// Application side of a request of any kind.
 #[derive(Debug)]
 pub struct Request {
     slot: Arc<Slot>,
 }
 
-/// The side of the acyclic half.
+/// Acyclic side of a request.
 #[derive(Clone, Debug)]
 pub(crate) struct Served {
     slot: Arc<Slot>,
 }
 
-/// Time that a request takes at most where nothing else was said.
+/// Default time limit of a request.
 const DEFAULT_TIMEOUT: Duration = Duration::from_secs(1);
 
-/// A request with `size` bytes of memory to a declared SubDevice, and its other side.
+/// A request with `size` bytes of memory to a declared SubDevice, and its acyclic side.
 pub(super) fn pair(subdevice: usize, size: usize, subject: Subject, bell: &Bell) -> (Request, Served) {
     let slot = Arc::new(Slot {
         subdevice,
@@ -178,7 +178,7 @@ pub(super) fn pair(subdevice: usize, size: usize, subject: Subject, bell: &Bell)
 }
 
 impl Request {
-    /// How far it is.
+    /// Its state.
     pub fn state(&self) -> RequestState {
         match self.slot.state.load(Ordering::Acquire) {
             UNUSED => RequestState::Unused,
@@ -199,10 +199,10 @@ impl Request {
         Ok(())
     }
 
-    /// Sets the time that the request may take in all, for all later uses, up to an hour.
+    /// Sets the total time limit of the request for all later uses, up to an hour.
     ///
     /// # Errors
-    /// It is under way.
+    /// It is in progress.
     pub fn set_timeout(&mut self, timeout: Duration) -> Result<(), RequestRefused> {
         self.check()?;
         let micros = timeout.as_micros().clamp(1, 3_600_000_000) as u32;
@@ -235,7 +235,7 @@ impl Request {
         Ok(())
     }
 
-    /// Has a request that is under way end as soon as the acyclic half looks, with [`RequestFailure::Cancelled`].
+    /// Ends a request in progress with [`RequestFailure::Cancelled`], as soon as the acyclic half handles it.
     pub fn cancel(&self) {
         if self.state() == RequestState::Busy {
             self.slot.cancelled.store(true, Ordering::Release);
@@ -247,7 +247,7 @@ impl Request {
         self.slot.data.len()
     }
 
-    /// Bytes that were read or written last.
+    /// Number of bytes last read or written.
     pub fn len(&self) -> usize {
         self.slot.length.load(Ordering::Relaxed) as usize
     }
@@ -257,7 +257,7 @@ impl Request {
         self.len() == 0
     }
 
-    /// Copies the data out, as much as fits, and returns how much that is. Nothing while the request is busy.
+    /// Copies the data out, as much as fits, and returns its length. 0 while the request is busy.
     pub fn data(&self, out: &mut [u8]) -> usize {
         if self.state() == RequestState::Busy {
             return 0;
@@ -274,7 +274,7 @@ impl Request {
         (word != 0 && self.state() == RequestState::Success).then_some(Subject::unpack(word))
     }
 
-    /// Why it failed, where it did.
+    /// Reason of its failure, if it failed.
     pub fn failure(&self) -> Option<RequestFailure> {
         if self.state() != RequestState::Error {
             return None;
@@ -306,17 +306,17 @@ impl Slot {
 }
 
 impl Served {
-    /// Whether nobody has the other side any more.
+    /// Whether the application side was dropped.
     pub(crate) fn is_abandoned(&self) -> bool {
         Arc::strong_count(&self.slot) == 1
     }
 
-    /// Whether the application no longer wants a request that is under way.
+    /// Whether the application has cancelled a request in progress.
     pub(crate) fn is_cancelled(&self) -> bool {
         self.slot.cancelled.load(Ordering::Acquire)
     }
 
-    /// Takes the request up, where it was started.
+    /// Takes the request up, if it was started.
     pub(crate) fn take(&self) -> Option<Order> {
         let slot = &*self.slot;
         let length = slot.length.load(Ordering::Relaxed) as usize;
@@ -336,7 +336,7 @@ impl Served {
         })
     }
 
-    /// Gives the request back: with what was read, `None` for a write, and what the answer says it is about.
+    /// Returns the request: with the read data, `None` for a write, and the header data of the answer.
     pub(crate) fn succeed(&self, read: Option<&[u8]>, answered: Option<Subject>) {
         let fits = read.is_none_or(|data| self.slot.put(data).is_ok());
         if fits {
@@ -347,7 +347,7 @@ impl Served {
         }
     }
 
-    /// Gives the request back.
+    /// Returns the request.
     pub(crate) fn fail(&self, failure: RequestFailure) {
         let word = match failure {
             RequestFailure::Aborted(code) => ABORTED << 32 | u64::from(code.0),
@@ -361,7 +361,7 @@ impl Served {
         self.slot.state.store(ERROR, Ordering::Release);
     }
 
-    /// Gives the request back where it waits or runs: nobody will serve it any more.
+    /// Returns the request where it waits or runs: it will not be served any more.
     pub(crate) fn end(&self) {
         let state = self.slot.state.load(Ordering::Acquire);
         if matches!(state, READ_ASKED | DIRECT_READ_ASKED | WRITE_ASKED | RUNNING) {

@@ -12,25 +12,25 @@ pub struct SoeRequest {
 }
 
 impl SoeRequest {
-    /// A request of up to `size` bytes to a declared SubDevice, and its other side.
+    /// A request of up to `size` bytes to a declared SubDevice, and its acyclic side.
     pub(crate) fn new(subdevice: usize, size: usize, bell: &Bell) -> (SoeRequest, Served) {
         let subject = Subject::Idn { drive: 0, idn: 0, elements: SoeElements::VALUE.0 };
         let (request, served) = pair(subdevice, size, subject, bell);
         (SoeRequest { request }, served)
     }
 
-    /// Turns to the value of another IDN of a drive, 0..=7, of the same SubDevice.
+    /// Changes to the value of another IDN of a drive, 0..=7, of the same SubDevice.
     ///
     /// # Errors
-    /// It is under way.
+    /// It is in progress.
     pub fn set_idn(&mut self, drive: u8, idn: Idn) -> Result<(), RequestRefused> {
         self.set_elements(drive, idn, SoeElements::VALUE)
     }
 
-    /// Turns to other elements of an IDN: one, or several to be read at once.
+    /// Changes to other elements of an IDN: one, or several to be read at once.
     ///
     /// # Errors
-    /// It is under way.
+    /// It is in progress.
     pub fn set_elements(&mut self, drive: u8, idn: Idn, elements: SoeElements) -> Result<(), RequestRefused> {
         self.request.set_subject(Subject::Idn { drive, idn: idn.0, elements: elements.0 })
     }
@@ -38,7 +38,7 @@ impl SoeRequest {
     /// Starts to read.
     ///
     /// # Errors
-    /// It is under way.
+    /// It is in progress.
     pub fn read(&mut self) -> Result<(), RequestRefused> {
         self.request.start_read()
     }
@@ -46,7 +46,7 @@ impl SoeRequest {
     /// Starts to write.
     ///
     /// # Errors
-    /// It is under way, or its memory is shorter than the data.
+    /// It is in progress, or its memory is shorter than the data.
     pub fn write(&mut self, data: &[u8]) -> Result<(), RequestRefused> {
         self.request.start_write(data)
     }

@@ -10,7 +10,7 @@ pub struct VoeHandler {
 }
 
 impl VoeHandler {
-    /// A handler of messages of up to `size` bytes, their header not counted, and its other side.
+    /// A handler of messages of up to `size` bytes, without their header, and its acyclic side.
     pub(crate) fn new(subdevice: usize, size: usize, bell: &Bell) -> (VoeHandler, Served) {
         let (request, served) = pair(subdevice, size, Subject::Vendor { id: 0, kind: 0 }, bell);
         (VoeHandler { request }, served)
@@ -19,12 +19,12 @@ impl VoeHandler {
     /// Sets the header of all messages that are written from now on.
     ///
     /// # Errors
-    /// It is under way.
+    /// It is in progress.
     pub fn set_send_header(&mut self, vendor_id: u32, vendor_type: u16) -> Result<(), RequestRefused> {
         self.request.set_subject(Subject::Vendor { id: vendor_id, kind: vendor_type })
     }
 
-    /// Vendor and type of the message that was read.
+    /// Vendor and type of the read message.
     pub fn received_header(&self) -> Option<(u32, u16)> {
         match self.request.answered() {
             Some(Subject::Vendor { id, kind }) => Some((id, kind)),
@@ -32,20 +32,20 @@ impl VoeHandler {
         }
     }
 
-    /// Starts to read the oldest message that the SubDevice has sent, or its next one. Whether there is one is told by
-    /// the status of its mailbox.
+    /// Starts to read the oldest message that the SubDevice has sent, or its next one. The status of its mailbox shows
+    /// whether there is one.
     ///
     /// # Errors
-    /// It is under way.
+    /// It is in progress.
     pub fn read(&mut self) -> Result<(), RequestRefused> {
         self.request.start_read()
     }
 
-    /// As [`VoeHandler::read`], but the mailbox is read at once, and again and again, without a look at its status: for
-    /// SubDevices that answer at once, or whose status cannot be trusted.
+    /// As [`VoeHandler::read`], but reads the mailbox at once and repeatedly, without polling its status: for
+    /// SubDevices that answer at once, or with an unreliable status.
     ///
     /// # Errors
-    /// It is under way.
+    /// It is in progress.
     #[doc(alias = "read_nosync")]
     pub fn read_directly(&mut self) -> Result<(), RequestRefused> {
         self.request.start_read_directly()
@@ -54,12 +54,12 @@ impl VoeHandler {
     /// Starts to send a message with the header that was set.
     ///
     /// # Errors
-    /// It is under way, or its memory is shorter than the data.
+    /// It is in progress, or its memory is shorter than the data.
     pub fn write(&mut self, data: &[u8]) -> Result<(), RequestRefused> {
         self.request.start_write(data)
     }
 
-    /// To be called once per cycle while it says busy. The work is done by the acyclic half.
+    /// Call this once per cycle while it is busy. The acyclic half does the work.
     pub fn execute(&mut self) -> RequestState {
         self.state()
     }

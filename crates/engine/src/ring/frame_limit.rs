@@ -1,16 +1,16 @@
-//! How many datagrams a frame may hold, where that is fewer than fit.
+//! Largest number of datagrams in a frame, where fewer than fit are processed.
 
 use core::fmt;
 
-/// Fewest datagrams that a frame must be able to hold: those of the distributed clocks belong together.
+/// Smallest possible limit: the datagrams of the distributed clocks must stay in one frame.
 pub const MIN_DATAGRAMS_PER_FRAME: u16 = 3;
 
-/// Fewer datagrams come back than fit a frame.
+/// Fewer datagrams are processed than fit a frame.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct FrameLimit {
-    /// So many may be in a frame.
+    /// Largest number of datagrams in a frame.
     pub datagrams: u16,
-    /// Whether a frame that holds more comes back, with the others as they were sent; otherwise it does not come back.
+    /// Whether a longer frame comes back, with the further datagrams unprocessed; otherwise it does not come back.
     pub returns: bool,
 }
 

@@ -1,8 +1,8 @@
-//! Marks that a MainDevice puts on its frames, and how it finds them again.
+//! Marks that a MainDevice puts on its frames, and their recognition.
 //!
-//! The source address carries the identity of the MainDevice, the bit of the link the copy was sent on, and the lower 8
-//! bits of the frame's sequence number (protocol 9.7.1, 9.7.2). The Idx of every datagram carries the class bit and 7
-//! further bits, so that a frame that was delayed by more than 256 others is never taken for a new one.
+//! The source address carries the identity of the MainDevice, the bit of the link on which the copy was sent, and the
+//! lower 8 bits of the frame's sequence number (protocol 9.7.1, 9.7.2). The Idx of every datagram carries the class bit
+//! and 7 further bits, so that a frame that was delayed by more than 256 others is never taken for a new one.
 
 use ringcat_wire::datagram;
 use ringcat_wire::frame::{ETHERCAT_HEADER_LEN, ETHERNET_HEADER_LEN, ETHERTYPE, MacAddress};
@@ -14,18 +14,18 @@ use crate::link::Link;
 const SOURCE_AT: usize = 6;
 /// Offset of the EtherType, which follows the source address.
 const ETHERTYPE_AT: usize = SOURCE_AT + 6;
-/// Offset of the byte whose upper half is the type of the EtherCAT part.
+/// Offset of the byte with the EtherCAT type in its upper half.
 const KIND_AT: usize = ETHERNET_HEADER_LEN + 1;
 /// Offset of the first datagram.
 pub(crate) const DATAGRAMS_AT: usize = ETHERNET_HEADER_LEN + ETHERCAT_HEADER_LEN;
 /// Offset of the first datagram's Idx.
 const FIRST_INDEX_AT: usize = DATAGRAMS_AT + 1;
-/// Bit of the source address that tells the copies apart (protocol SM-01).
+/// Bit of the source address that distinguishes the copies (protocol SM-01).
 const REDUNDANT_BIT: u8 = 0x08;
-/// Bit of Idx that tells the classes apart.
+/// Bit of Idx that distinguishes the classes.
 const CLASS_BIT: u8 = 0x80;
 
-/// Which half of the engine a frame belongs to.
+/// The half of the engine that sent a frame.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Class {
     /// Sent by the exchange.
@@ -45,7 +45,7 @@ impl Sequence {
         Sequence((self.0 + 1) & 0x7FFF)
     }
 
-    /// That of the frame with this count, from 1 on: before the first one it is 0.
+    /// Number of the frame with this count, from 1 on; 0 before the first frame.
     pub const fn of_frame(count: u64) -> Sequence {
         Sequence(count as u16 & 0x7FFF)
     }
@@ -75,37 +75,38 @@ impl Sequence {
     }
 }
 
-/// A copy of a frame of ours.
+/// A copy of a frame of this MainDevice.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct FrameCopy {
-    /// Which half sent it.
+    /// The half that sent it.
     pub class: Class,
-    /// Which frame it is.
+    /// Its sequence number.
     pub sequence: Sequence,
     /// The link it was sent on.
     pub sent_on: Link,
 }
 
-/// What a received frame is.
+/// Classification of a received frame.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Classified {
-    /// A copy of one of our frames.
+    /// A copy of a frame of this MainDevice.
     Ours(FrameCopy),
     /// An EtherCAT frame of another MainDevice (protocol MR-10).
     Foreign,
-    /// No EtherCAT frame with datagrams.
+    /// Not an EtherCAT frame with datagrams.
     Other,
 }
 
-/// Who we are on the wire.
+/// Identity of this MainDevice on the wire.
 #[derive(Clone, Copy, Debug)]
 pub struct Identity {
     codec: MacCodec,
     main: MacAddress,
     id_at: usize,
-    /// The frame id's place in the eight bytes from the source address on, in bits.
+    /// Position of the frame id in the eight bytes from the source address on, in bits.
     id_shift: u32,
-    /// Bits of the eight bytes from the source address on that tell our frames: identity and EtherType.
+    /// Bits of the eight bytes from the source address on that identify frames of this MainDevice: identity and
+    /// EtherType.
     own_mask: u64,
     /// These bits with the identity of the main and of the redundant interface.
     own: [u64; 2],
@@ -127,7 +128,7 @@ impl Identity {
         Identity { codec, main, id_at, id_shift: 8 * (id_at - SOURCE_AT) as u32, own_mask, own }
     }
 
-    /// The source address of the main copy of frame zero, to put into a frame that is being built.
+    /// The source address of the main copy of frame zero, for a frame under construction.
     pub fn source(&self) -> MacAddress {
         self.marked(Sequence::default(), 0)
     }
@@ -136,7 +137,8 @@ impl Identity {
         self.codec.encode(self.main, &SourceMarks { frame_id: sequence.frame_id(), retry, ..SourceMarks::default() })
     }
 
-    /// Writes the source address of the main copy into a built frame. `retry` counts resends (protocol SM-04).
+    /// Writes the source address of the main copy into a built frame. `retry` is the number of retries (protocol
+    /// SM-04).
     pub(crate) fn stamp(&self, frame: &mut [u8], sequence: Sequence, retry: u8) {
         frame[SOURCE_AT..SOURCE_AT + 6].copy_from_slice(&self.marked(sequence, retry).0);
     }
@@ -155,12 +157,13 @@ impl Identity {
         }
     }
 
-    /// Tells what a received frame is. Any bytes are allowed; only plain Ethernet frames can be ours.
+    /// Classifies a received frame. Any bytes are allowed; only untagged Ethernet frames can be frames of this
+    /// MainDevice.
     pub fn classify(&self, bytes: &[u8]) -> Classified {
         let Some(head) = bytes.first_chunk::<{ DATAGRAMS_AT + datagram::OVERHEAD }>() else {
             return Classified::Other;
         };
-        // Slices of a constant length: the compiler loads eight bytes at once.
+        // Slices of constant length: the compiler loads eight bytes at once.
         let mut word = [0; 8];
         word.copy_from_slice(&head[SOURCE_AT..SOURCE_AT + 8]);
         let word = u64::from_le_bytes(word);
@@ -181,8 +184,8 @@ impl Identity {
     }
 }
 
-/// The half that a received frame is for, without knowing who we are: the class bit of its first datagram. Foreign
-/// frames go by the same bit. `None` where there is no first datagram.
+/// The half for which a received frame is, without the identity of the MainDevice: the class bit of its first datagram.
+/// Foreign frames are classified by the same bit. `None` where there is no first datagram.
 pub fn class_of(bytes: &[u8]) -> Option<Class> {
     let index = *bytes.get(FIRST_INDEX_AT)?;
     Some(if index & CLASS_BIT == 0 { Class::Cyclic } else { Class::Acyclic })

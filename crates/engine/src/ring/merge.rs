@@ -1,15 +1,15 @@
-//! What becomes of two copies of a datagram (protocol 9.3). Decided by command and by which copy was worked on, never
-//! by comparing data. Working counters are always added.
+//! Combines two copies of a datagram (protocol 9.3). The command and the working counters decide, never a comparison of
+//! data. Working counters are always added.
 
 use ringcat_wire::address::Wkc;
 use ringcat_wire::command::Command;
 
 use crate::link::Link;
 
-/// How the data of two copies becomes one.
+/// How to combine the data of two copies.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum MergeRule {
-    /// Nothing was read: the data is what was sent.
+    /// Nothing was read: the data is unchanged.
     AsSent,
     /// Broadcast and logical reads, sent as zeros: each bit belongs to one SubDevice, or is an OR of all.
     Or,
@@ -17,7 +17,7 @@ pub enum MergeRule {
     /// (protocol 9.2.2).
     Answered,
     /// The copy that was sent on this link, because the addressed SubDevice is visible there (ARMW, FRMW: every other
-    /// SubDevice counts too, so the working counter cannot tell).
+    /// SubDevice also increments the working counter, which therefore does not show it).
     SentOn(Link),
 }
 
@@ -53,7 +53,7 @@ impl MergeRule {
     }
 }
 
-/// ORs `source` into `target`, as far as the shorter of them goes.
+/// ORs `source` into `target`, over the length of the shorter one.
 pub(crate) fn or_into(target: &mut [u8], source: &[u8]) {
     for (to, from) in target.iter_mut().zip(source) {
         *to |= from;

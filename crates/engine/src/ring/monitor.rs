@@ -1,7 +1,7 @@
 //! Whether the ring is closed, judged from where the copies of frames arrive (protocol 9.2.1).
 //!
-//! A copy that comes back on the link it was sent on is proof of an open ring, copies that crossed prove a closed one;
-//! what is missing proves nothing (a single loss, or a break that the controllers have not noticed yet).
+//! A copy that comes back on the link it was sent on proves an open ring, copies that crossed prove a closed one;
+//! missing copies prove nothing (a single loss, or a break that the controllers have not noticed yet).
 
 use crate::link::Link;
 
@@ -17,7 +17,7 @@ pub enum RingState {
     Open,
 }
 
-/// Where the copies of one frame arrived, by the link they were sent on.
+/// Links on which the copies of one frame arrived, by the link on which they were sent.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Arrivals {
     /// Bit `sent_on` set: the copy arrived.
@@ -27,7 +27,7 @@ pub struct Arrivals {
 }
 
 impl Arrivals {
-    /// Notes a copy; false where it was noted before.
+    /// Records a copy; false for a duplicate.
     pub(crate) fn note(&mut self, sent_on: Link, arrived_on: Link) -> bool {
         let new = self.arrived & sent_on.bit() == 0;
         self.arrived |= sent_on.bit();
@@ -37,7 +37,7 @@ impl Arrivals {
         new
     }
 
-    /// What the frame proves about the ring.
+    /// Evidence of the frame about the ring.
     pub const fn verdict(self) -> Option<RingState> {
         match (self.arrived, self.returned) {
             (_, returned) if returned != 0 => Some(RingState::Open),
@@ -47,25 +47,25 @@ impl Arrivals {
     }
 }
 
-/// Flights in a row of which the same one copy came back, crossed, until the other direction counts as dead. A few are
-/// single losses.
+/// Number of consecutive flights of which only the same copy came back, crossed, after which the other direction counts
+/// as dead. Fewer may be single losses.
 const ONE_WAY_AFTER: u16 = 50;
 
 /// Follows the state of the ring.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct RingMonitor {
     state: RingState,
-    /// Flights in a row of which just one copy came back, by the link it was sent on.
+    /// Consecutive flights of which exactly one copy came back, by the link on which it was sent.
     alone: [u16; 2],
 }
 
 impl RingMonitor {
-    /// The state now.
+    /// The current state.
     pub const fn state(&self) -> RingState {
         self.state
     }
 
-    /// The link on which frames are sent in vain: the copies of the other one come back, crossed, and these do not.
+    /// The link whose frames are lost: the copies of the other link come back, crossed, and these do not.
     pub fn dead_way(&self) -> Option<Link> {
         match self.alone.map(|flights| flights >= ONE_WAY_AFTER) {
             [true, _] => Some(Link::Redundant),
@@ -74,7 +74,7 @@ impl RingMonitor {
         }
     }
 
-    /// Takes in one frame; true where the state changed (protocol CR-12: once per change) or a direction died or
+    /// Evaluates one frame; true where the state changed (protocol CR-12: once per change) or a direction died or
     /// revived.
     pub fn observe(&mut self, arrivals: Arrivals) -> bool {
         let Some(verdict) = arrivals.verdict() else { return self.observe_alone(arrivals) };
@@ -86,7 +86,7 @@ impl RingMonitor {
         core::mem::replace(&mut self.state, verdict) != verdict || revived
     }
 
-    /// One copy crossed, or none came back, which says nothing about either way.
+    /// One copy crossed, or none came back, which proves nothing about either state.
     #[cold]
     fn observe_alone(&mut self, arrivals: Arrivals) -> bool {
         let before = self.dead_way();

@@ -1,7 +1,7 @@
-//! The cables of a segment, from its topology, and the errors that the ports at their ends have counted.
+//! The cables of a segment, from its topology, and the error counters of the ports at their ends.
 //!
-//! A controller counts an invalid frame where it is seen first (protocol 2.5): at the receiving end of the cable that
-//! damaged it. Controllers behind count it as forwarded, which says nothing about their own cables.
+//! A controller counts an invalid frame where it is detected first (protocol 2.5): at the receiving end of the cable
+//! that damaged it. The controllers after it count it as forwarded, which says nothing about their own cables.
 
 use alloc::vec::Vec;
 use core::fmt;
@@ -12,22 +12,22 @@ use super::Cable;
 use crate::link::LinkSet;
 use crate::topology::{PortOf, Topology};
 
-/// What the ports at both ends of a cable have counted.
+/// Errors counted by the ports at both ends of a cable.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct CableErrors {
-    /// Frames that arrived damaged at either end and were damaged here.
+    /// Frames that arrived damaged at either end and were damaged on this cable.
     pub invalid_frames: u64,
-    /// Losses of the link at either end.
+    /// Link losses at either end.
     pub lost_links: u64,
 }
 
 impl CableErrors {
-    /// Nothing was counted.
+    /// All counters zero.
     pub const fn is_none(&self) -> bool {
         self.invalid_frames == 0 && self.lost_links == 0
     }
 
-    /// Both together.
+    /// Sum of both.
     #[must_use]
     pub const fn plus(self, other: CableErrors) -> CableErrors {
         CableErrors {
@@ -43,15 +43,15 @@ impl fmt::Display for CableErrors {
     }
 }
 
-/// What one port has counted. Symbol errors are left out: they come with every plug that is pulled.
+/// Errors counted by one port. Symbol errors are left out: every unplugged cable causes some.
 pub fn port_errors(counters: &ErrorCounters, port: u8) -> CableErrors {
     let at = usize::from(port & 3);
     CableErrors { invalid_frames: counters.rx[at].invalid_frames.into(), lost_links: counters.lost_link[at].into() }
 }
 
-/// All cables: those that lead to the SubDevices, in their order, then those that close rings behind junctions, that of
-/// the redundant link last. A broken one is among them, but for one of a ring behind a junction of which an end is not
-/// known.
+/// All cables: those that lead to the SubDevices, in their order, then those that close rings behind junctions, last
+/// that of the redundant link. Broken cables are included, except a broken cable of a ring behind a junction with an
+/// unknown end.
 pub fn cables(topology: &Topology, links: LinkSet) -> Vec<Cable> {
     let port = |node: usize| PortOf { node, port: topology.nodes[node].entry_port };
     let mut cables = Vec::with_capacity(topology.nodes.len() + 1);
@@ -64,7 +64,7 @@ pub fn cables(topology: &Topology, links: LinkSet) -> Vec<Cable> {
                 let usual = || last_leaf(topology, topology.main_count).map(|last| loose_end(topology, last));
                 topology.main_end.or_else(usual)
             }
-            // The interfaces are swapped: frames of the redundant link meet everybody.
+            // The interfaces are swapped: frames of the redundant link reach all SubDevices.
             None if is_swapped => {
                 cables.push(Cable { near: Some(port(node)), far: None });
                 continue;
@@ -86,15 +86,15 @@ pub fn cables(topology: &Topology, links: LinkSet) -> Vec<Cable> {
     cables
 }
 
-/// Where the line of the first so many SubDevices ends: the last one that has nobody behind it, since frames meet
-/// crossed SubDevices on their way back.
+/// End of the line of the first `count` SubDevices: the last one without a successor, since frames reach crossed
+/// SubDevices on their way back.
 fn last_leaf(topology: &Topology, count: usize) -> Option<usize> {
     let is_leaf = |node: &usize| topology.nodes[*node].children.iter().all(Option::is_none);
     (0..count).rev().find(is_leaf).or(count.checked_sub(1))
 }
 
-/// The port at which a line ends: of those without a neighbour the usual way on, port 1 or for a crossed SubDevice 0,
-/// or else the next in the order of travel.
+/// The port at which a line ends: of the ports without a neighbour the usual exit, port 1 or for a crossed SubDevice
+/// port 0, otherwise the next in the order of travel.
 fn loose_end(topology: &Topology, node: usize) -> PortOf {
     let it = &topology.nodes[node];
     let is_loose = |port: &u8| *port != it.entry_port && it.children[usize::from(*port)].is_none();

@@ -1,9 +1,10 @@
-//! A frame that is alone on the wire: what SubDevices latch of it no other frame has spoiled (protocol 7.1).
+//! A frame that is alone on the wire, so that no other frame changes the times that SubDevices latch of it (protocol
+//! 7.1).
 //!
-//! In: a datagram that asks for that ([`Bus::alone`]). It waits until all acyclic frames are home or lost and no cyclic
-//! one is under way; nothing acyclic follows until all its copies are in. The cyclic half knows nothing of it: it posts
-//! when it sends ([`Board::at_rest`]), and where it has sent meanwhile, the answer counts for nothing
-//! ([`BusError::Disturbed`]). Where it pauses on request, that can be asked for.
+//! Input: a datagram that requires this ([`Bus::alone`]). It waits until all acyclic frames have returned or are lost
+//! and no cyclic frame is on the wire; no acyclic frame follows until all its copies are received. The cyclic half is
+//! not involved: it posts its departures ([`Board::at_rest`]), and where it has sent meanwhile, the answer is discarded
+//! ([`BusError::Disturbed`]). A procedure may also ask it for a pause.
 
 mod latch;
 mod send;
@@ -18,47 +19,47 @@ use crate::time::Instant;
 
 pub(crate) use latch::Turn;
 
-/// Between two looks whether the cyclic half is at rest.
+/// Pause between two checks whether the cyclic half is at rest.
 const LOOK: Duration = Duration::from_micros(20);
-/// A cyclic half that has not sent for so long has nothing under way.
+/// A cyclic half that has not sent for this time has no frame on the wire.
 const SILENCE: Duration = Duration::from_millis(25);
 
-/// How far the first one that waits is.
+/// Stage of the first waiting datagram.
 #[derive(Clone, Copy, Debug, Default)]
 enum Stage {
-    /// Nothing is to be alone, or acyclic frames are on the wire.
+    /// No datagram waits to be alone, or acyclic frames are on the wire.
     #[default]
     Idle,
-    /// Cyclic frames are, of which these were home when the wait began.
+    /// Cyclic frames are on the wire; the frames that had returned when the wait began.
     Waiting { until: Instant, home: [u16; 2] },
-    /// It is on the wire; how often the cyclic half had sent.
+    /// It is on the wire; number of cyclic departures until then.
     UnderWay { departures: u32 },
 }
 
-/// Datagrams that are to be alone.
+/// Datagrams to be sent alone.
 #[derive(Debug, Default)]
 pub(crate) struct Alone {
-    /// Each with the links on which copies are known not to come home, a bit each.
+    /// Each with the links on which copies are known not to return, a bit each.
     waiting: VecDeque<(TransferId, u8)>,
     stage: Stage,
-    /// Departures of the cyclic half when it was looked at, and since when they were as many.
+    /// Departures of the cyclic half at the last check, and since when their number is unchanged.
     departures: (u32, Instant),
-    /// What SubDevices have latched is being read.
+    /// The times latched by SubDevices are being read.
     is_taken: bool,
 }
 
 impl Alone {
-    /// Whether one waits or is on the wire, so that nothing else may leave.
+    /// Whether one waits or is on the wire, so that no other frame may leave.
     pub(super) fn is_held(&self) -> bool {
         !self.waiting.is_empty()
     }
 
-    /// When to look again whether it may go.
+    /// Time of the next check whether it may leave.
     pub(super) fn next_deadline(&self, now: Instant) -> Option<Instant> {
         (self.is_held() && !matches!(self.stage, Stage::UnderWay { .. })).then_some(now + LOOK)
     }
 
-    /// How often the cyclic half has sent, where nothing of it is under way.
+    /// Number of cyclic departures, where no cyclic frame is on the wire.
     fn at_rest(&mut self, board: &Board, links: LinkSet, silent: u8, now: Instant) -> Option<u32> {
         let departures = board.traffic.departures();
         if departures != self.departures.0 {

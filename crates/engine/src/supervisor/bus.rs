@@ -1,4 +1,4 @@
-//! What procedures do: ask the bus for datagrams, wait, start other procedures, report events.
+//! The interface of procedures: send datagrams, wait, start other procedures, report events.
 
 mod future;
 mod link;
@@ -30,7 +30,7 @@ use crate::ring::RingState;
 use crate::time::Instant;
 use future::TransferFuture;
 
-/// The handle of a procedure to the bus.
+/// The handle of a procedure on the bus.
 #[derive(Clone)]
 pub struct Bus {
     pub(super) shared: Rc<RefCell<Shared>>,
@@ -41,7 +41,7 @@ impl Bus {
         Bus { shared }
     }
 
-    /// The time of the call that lets the procedure run.
+    /// The time of the current call.
     pub fn now(&self) -> Instant {
         self.shared.borrow().now
     }
@@ -60,12 +60,12 @@ impl Bus {
         }
     }
 
-    /// Whether the interfaces have carriers, by [`crate::link::Link::index`]; `None` where the links do not tell.
+    /// Whether the interfaces have carriers, by [`crate::link::Link::index`]; `None` where the links do not report it.
     pub fn carriers(&self) -> [Option<bool>; 2] {
         self.shared.borrow().carriers
     }
 
-    /// What the exchange posts, once there is one.
+    /// The board of the exchange, once there is one.
     pub fn board(&self) -> Option<alloc::sync::Arc<Board>> {
         self.shared.borrow().board.clone()
     }
@@ -76,30 +76,30 @@ impl Bus {
         shared.events.push(shared.now, event);
     }
 
-    /// Reports an event about a SubDevice of which it is known who it is.
+    /// Reports an event with its SubDevice.
     pub(crate) fn report_of(&self, event: Event, who: Occupant) {
         let shared = &mut *self.shared.borrow_mut();
         shared.events.push_of(shared.now, event, [Some(who), None]);
     }
 
-    /// Says who is at the positions of the cabling: events that name some of these say whom they mean.
+    /// Sets the SubDevices at the cabling positions; events that name positions then contain them.
     pub(crate) fn set_occupants(&self, occupants: Vec<Occupant>) {
         self.shared.borrow_mut().events.set_occupants(occupants);
     }
 
-    /// Who is at positions of the cabling.
+    /// The SubDevices at cabling positions.
     pub(crate) fn occupants(&self, positions: [Option<usize>; 2]) -> [Option<Occupant>; 2] {
         self.shared.borrow().events.occupants(positions)
     }
 
-    /// What is remembered of the events.
+    /// The diagnosis history.
     pub(crate) fn history<T>(&self, work: impl FnOnce(&mut History) -> T) -> T {
         work(self.shared.borrow_mut().events.history())
     }
 
-    /// Sends a datagram as often as needed and returns what came back, whatever its working counter. `expected` is the
-    /// working counter at which a second copy need not be waited for. Commands that read and write at once are sent
-    /// once: a second time they would read what they wrote.
+    /// Sends a datagram, with retries, and returns the reply, whatever its working counter. `expected` is the working
+    /// counter with which a second copy need not be awaited. Commands that read and write at once are sent once: a
+    /// retry would read the written value.
     pub fn transfer(
         &self,
         command: Command,
@@ -111,12 +111,13 @@ impl Bus {
         self.submit(Request { expected, resend, ..Request::once(command, target, data) })
     }
 
-    /// Positions from here on live behind the redundant link (protocol CR-09). Broadcasts show it, too.
+    /// Number of SubDevices on the main link: higher positions are on the redundant link (protocol CR-09). Broadcasts
+    /// update it, too.
     pub(crate) fn set_main_count(&self, count: u16) {
         self.shared.borrow_mut().main_count = count;
     }
 
-    /// Like [`Bus::transfer`], but sent once: for accesses that must not happen twice.
+    /// Like [`Bus::transfer`], but sent once: for accesses that must not be repeated.
     pub fn transfer_once(
         &self,
         command: Command,
@@ -126,8 +127,8 @@ impl Bus {
         self.submit(Request { expected: Some(Wkc(1)), ..Request::once(command, target, data) })
     }
 
-    /// So many datagrams that read one byte of a register of all SubDevices, once, in a frame that holds nothing else.
-    /// The reply is that of the last one.
+    /// Sends this number of datagrams that read one byte of a register of all SubDevices, once, in a frame of their
+    /// own. The reply is that of the last one.
     pub(crate) fn fill_frame(
         &self,
         register: RegisterAddress,
@@ -137,13 +138,13 @@ impl Bus {
         self.submit(Request { before, ..Request::once(Command::Brd, Target::Broadcast(register), vec![0; 1]) })
     }
 
-    /// How many datagrams a frame may hold as this MainDevice was told.
+    /// Largest number of datagrams in a frame, as set for this MainDevice.
     pub(crate) fn max_datagrams(&self) -> usize {
         self.shared.borrow().max_datagrams
     }
 
-    /// A datagram of the application's own: its answer is that of all copies, whatever its working counter. Where it
-    /// may be sent again when its frame is lost, `resend` says so.
+    /// A datagram that the application composes: the answer combines all copies, whatever its working counter. `resend`
+    /// allows a retry after a loss.
     pub fn datagram(
         &self,
         command: Command,
@@ -154,8 +155,8 @@ impl Bus {
         self.submit(Request { resend, ..Request::once(command, target, data) })
     }
 
-    /// Exchanges a register for other data: each SubDevice with this station address hands its old value on with the
-    /// datagram, so that only the first one on each link gets what is sent there. Sent once.
+    /// Exchanges a register value: each SubDevice with this station address passes its old value on in the datagram, so
+    /// that only the first one on each link receives the sent data. Sent once.
     pub fn exchange(
         &self,
         station: StationAddress,
@@ -169,9 +170,9 @@ impl Bus {
         self.submit(Request { redundant, ..Request::once(command, target, data) })
     }
 
-    /// Hands the time of one SubDevice's clock to all others, once: on each link that of a station of its own. Where
-    /// nobody on a link has the station, or before it does, SubDevices get `time`, which is right at `at`, as what it
-    /// is when the frame leaves. `expected` as for [`Bus::transfer`].
+    /// Distributes the time of one SubDevice's clock once, on each link that of a station of its own. Where no
+    /// SubDevice on a link has the station, or in front of it, SubDevices receive `time`, which is right at `at`,
+    /// adjusted to the departure of the frame. `expected` as for [`Bus::transfer`].
     pub fn distribute_time(
         &self,
         stations: [StationAddress; 2],
@@ -188,20 +189,20 @@ impl Bus {
         })
     }
 
-    /// Something to wait for that another procedure brings about.
+    /// A signal from another procedure.
     pub fn signal(&self) -> Signal {
         Signal::new(self.shared.clone())
     }
 
     pub(super) fn submit(&self, mut request: Request) -> TransferFuture {
-        // Clocks of both stubs are distributed on purpose: neither copy is the right one.
+        // Clocks of both stubs are distributed on purpose: neither copy is preferred.
         if self.links() == LinkSet::Ring && request.redundant_station.is_none() && request.lead.is_none() {
             request.lead = request.witness();
         }
         TransferFuture::new(self.shared.clone(), request)
     }
 
-    /// Starts a procedure that goes on by itself.
+    /// Starts an independent procedure.
     pub fn spawn(&self, procedure: impl Future<Output = ()> + 'static) {
         self.shared.borrow_mut().spawn(Box::pin(procedure));
     }

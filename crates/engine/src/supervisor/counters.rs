@@ -1,4 +1,4 @@
-//! What the acyclic half counts.
+//! Counters of the acyclic half.
 
 /// Counters of the acyclic half.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -16,20 +16,20 @@ pub struct AcyclicCounters {
     pub half: u64,
     /// Copies that came too late or twice.
     pub late: u64,
-    /// Frames of ours that came back with other datagrams than were sent.
+    /// Frames of this MainDevice that came back with other datagrams than were sent.
     pub corrupt: u64,
     /// Frames of other MainDevices.
     pub foreign: u64,
     /// Datagrams sent.
     pub datagrams: u64,
-    /// Datagrams that were sent again because their frame was lost.
+    /// Datagrams that were repeated because their frame was lost.
     pub resent: u64,
     /// Datagrams that were given up because their frame was lost.
     pub timed_out: u64,
 }
 
 impl AcyclicCounters {
-    /// Both together.
+    /// Sum of both.
     #[must_use]
     pub const fn plus(self, other: AcyclicCounters) -> AcyclicCounters {
         AcyclicCounters {

@@ -1,7 +1,7 @@
 //! A single-threaded executor for procedures.
 //!
-//! Procedures wait for nothing but transfers, timers and groups of this engine, and each of these knows the task that
-//! waits: completions carry a task id and wake just that task, so no waker and no synchronisation is needed.
+//! Procedures wait only for transfers, timers and groups of this engine, and each of these stores its waiting task:
+//! completions carry a task id and wake exactly that task, so that neither wakers nor synchronisation are needed.
 
 use alloc::rc::Rc;
 use alloc::vec::Vec;
@@ -22,12 +22,12 @@ impl Executor {
         Executor { shared, tasks: Vec::new(), free: Vec::new() }
     }
 
-    /// How many tasks there are.
+    /// Number of tasks.
     pub(crate) fn count(&self) -> usize {
         self.tasks.len() - self.free.len()
     }
 
-    /// Polls tasks that were woken, and new ones, until all wait.
+    /// Polls new and woken tasks until all of them wait.
     pub(crate) fn run(&mut self) {
         let mut context = Context::from_waker(Waker::noop());
         loop {

@@ -1,4 +1,4 @@
-//! An acyclic frame under way, and the datagrams in it: what its copies have brought so far.
+//! An acyclic frame on the wire, its datagrams, and the content of the copies received so far.
 
 use alloc::vec::Vec;
 
@@ -23,34 +23,34 @@ pub(super) struct Place {
     pub command: Command,
     pub expected: Option<Wkc>,
     pub mail: Option<StationAddress>,
-    /// The datagram before it tells which copy meets the addressed SubDevice.
+    /// The datagram before it shows which copy reaches the addressed SubDevice.
     pub witness: bool,
-    /// The link whose copy met it.
+    /// The link whose copy reached it.
     pub visible: Link,
     pub wkc: [Wkc; 2],
-    /// Its procedure has the reply.
+    /// The reply was delivered to its procedure.
     pub answered: bool,
 }
 
-/// A frame under way.
+/// A frame on the wire.
 #[derive(Debug)]
 pub(super) struct Flight {
     pub sequence: Sequence,
     pub places: Vec<Place>,
-    /// The first copy, with later ones merged in; before the first, what was sent.
+    /// The first copy, with later ones merged in; before the first copy, the frame as sent.
     pub bytes: Vec<u8>,
     pub arrivals: Arrivals,
     pub sent_at: Instant,
-    /// When the interface has sent it, if it sends nothing else meanwhile.
+    /// When the interface finishes sending it, if it sends nothing else meanwhile.
     pub left_at: Instant,
     pub deadline: Instant,
-    /// Bytes of its reads of mailboxes, while they are under way.
+    /// Bytes of its mailbox reads, while it is on the wire.
     pub reads: usize,
-    /// Answered already; kept so that the second copy is recognised.
+    /// Already answered; kept to recognise the second copy.
     pub answered: bool,
-    /// Links on which copies are known not to come home, a bit each.
+    /// Links on which copies are known not to return, a bit each.
     pub deaf: u8,
-    /// No copy is waited for, because the link is silent on which the missing one was sent; no room is kept for it.
+    /// No copy is awaited, because the link of the missing one is silent; it does not count against the window.
     pub released: bool,
 }
 
@@ -73,7 +73,7 @@ impl Default for Flight {
 }
 
 impl Flight {
-    /// Another one in the same memory, with nothing in it.
+    /// A new, empty flight in the same memory.
     pub fn begin(&mut self, sequence: Sequence) {
         self.sequence = sequence;
         self.places.clear();
@@ -84,7 +84,8 @@ impl Flight {
         (self.released, self.deaf) = (false, 0);
     }
 
-    /// Everything controllers never change is as sent (protocol 1.5): command, Idx, length, M bit of every datagram.
+    /// All fields that controllers never change are as sent (protocol 1.5): command, Idx, length, M bit of every
+    /// datagram.
     pub fn is_what_was_sent(&self, bytes: &[u8]) -> bool {
         if bytes.len() < self.bytes.len() {
             return false;
@@ -97,7 +98,7 @@ impl Flight {
         })
     }
 
-    /// The reads of mailboxes in it.
+    /// Its mailbox reads.
     pub fn mail_reads(&self) -> impl Iterator<Item = Overdue> {
         let Flight { sequence, sent_at, .. } = *self;
         self.places.iter().filter_map(move |place| {
@@ -106,7 +107,7 @@ impl Flight {
         })
     }
 
-    /// The reads of mailboxes that a copy has answered before: a second one brings another mail.
+    /// Its mailbox reads that an earlier copy has answered: a second copy brings another mail.
     pub fn second_reads(&self) -> Vec<Overdue> {
         let answered = |read: &Overdue| {
             self.places.iter().any(|place| place.header_at == read.header_at && place.total() != Wkc(0))
@@ -114,7 +115,7 @@ impl Flight {
         self.mail_reads().filter(answered).collect()
     }
 
-    /// Takes in a copy that was found to be ours.
+    /// Takes a copy that was identified as a frame of this MainDevice.
     pub fn take(&mut self, sent_on: Link, bytes: &[u8], first: bool) {
         for place in &mut self.places {
             let data_at = place.header_at + HEADER_LEN;
@@ -126,7 +127,7 @@ impl Flight {
             if witnessed {
                 place.visible = sent_on;
             }
-            // OR of the event requests (protocol 9.3); both copies have them behind the length.
+            // OR of the event requests (protocol 9.3); both copies have them after the length.
             let irq = place.header_at + 8;
             if first {
                 self.bytes[data.clone()].copy_from_slice(&bytes[data]);
@@ -145,26 +146,26 @@ impl Flight {
         self.arrivals.arrived & links.mask() == links.mask()
     }
 
-    /// The links on which a copy has not come home, a bit each.
+    /// The links whose copy has not returned, a bit each.
     pub fn misses(&self, links: LinkSet) -> u8 {
         links.mask() & !self.arrivals.arrived
     }
 
-    /// One copy crossed the ring and one returned: it opened or closed meanwhile, and SubDevices were met twice or not
-    /// at all.
+    /// One copy crossed the ring and one returned: the ring opened or closed meanwhile, and SubDevices processed the
+    /// frame twice or not at all.
     pub fn straddled_a_change(&self) -> bool {
         self.arrivals.arrived == LinkSet::Ring.mask() && self.arrivals.returned.count_ones() == 1
     }
 
-    /// A copy came back on its own link, so that it met all whom it can meet, and those that are missing were sent on
-    /// links that are silent.
+    /// A copy came back on its own link, so that it passed all SubDevices it can reach, and the missing copies were
+    /// sent on silent links.
     pub fn has_all_but(&self, silent: u8, links: LinkSet) -> bool {
         self.arrivals.returned != 0 && (self.arrivals.arrived | silent) & links.mask() == links.mask()
     }
 }
 
 impl Place {
-    /// A request whose data is at a place in the frame.
+    /// A request with its data at an offset in the frame.
     pub fn new(transfer: TransferId, request: &Request, data_at: usize) -> Place {
         Place {
             transfer,
@@ -184,7 +185,7 @@ impl Place {
         self.wkc[0].plus(self.wkc[1])
     }
 
-    /// One SubDevice is addressed, and it has done what the command says.
+    /// It addresses one SubDevice, which executed the command.
     pub fn is_answered_by_one(&self) -> bool {
         match self.command {
             Command::Aprd | Command::Apwr | Command::Fprd | Command::Fpwr => self.total() == Wkc(1),
@@ -197,7 +198,7 @@ impl Place {
         self.expected.is_some_and(|expected| self.total() == expected)
     }
 
-    /// What the frame of this number, sent at this time, brought back.
+    /// The reply of the frame with this number, sent at this time.
     pub fn reply(&self, bytes: &[u8], (frame, sent_at): (Sequence, Instant)) -> Reply {
         let data_at = self.header_at + HEADER_LEN;
         Reply {

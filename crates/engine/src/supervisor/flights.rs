@@ -1,4 +1,4 @@
-//! Acyclic frames under way: packing requests and sending them (`send`), what comes home (`receive`).
+//! Acyclic frames on the wire: packing and sending (`send`), receiving (`receive`).
 
 mod receive;
 mod send;
@@ -14,10 +14,10 @@ use crate::link::LinkSet;
 use crate::ring::{MAX_IN_FLIGHT, Sequence};
 use crate::time::Instant;
 
-/// Frames in flight at once: enough to fill the wire over the round trip of a thousand SubDevices (2 ms at 123 us a
-/// frame), few enough that a full transmit queue is no reason to give a frame up.
+/// Frames on the wire at once: enough to fill the wire over the round trip of a thousand SubDevices (2 ms at 123 us a
+/// frame), few enough that no frame is given up because of a full transmit queue.
 const WINDOW: usize = 32;
-/// Flights are found by the lower bits of their sequence number.
+/// Flights are indexed by the lower bits of their sequence number.
 const SLOTS: usize = 128;
 
 const _: () = assert!(WINDOW <= MAX_IN_FLIGHT && MAX_IN_FLIGHT <= SLOTS);
@@ -25,12 +25,12 @@ const _: () = assert!(WINDOW <= MAX_IN_FLIGHT && MAX_IN_FLIGHT <= SLOTS);
 pub(crate) struct Flights {
     slots: Vec<Option<Flight>>,
     in_flight: usize,
-    /// Of these, those that no longer count against the window.
+    /// Number of flights that no longer count against the window.
     released: usize,
     sequence: Sequence,
-    /// Flights that ended, for their memory.
+    /// Ended flights, kept for reuse of their memory.
     spare: Vec<Flight>,
-    /// The redundant copy of the frame that is being sent.
+    /// The redundant copy of the frame being sent.
     redundant: Box<[u8]>,
 }
 
@@ -62,7 +62,7 @@ impl Flights {
         room && self.slots[Self::slot(self.sequence.next())].is_none()
     }
 
-    /// Whether frames are under way of which a copy may still come home, but for those on links that are silent.
+    /// Whether copies of frames on the wire may still return, those on silent links excepted.
     pub(super) fn are_under_way(&self, links: LinkSet, silent: u8) -> bool {
         let is_waited_for = |flight: &Flight| !flight.released && flight.misses(links) & !silent != 0;
         self.in_flight > self.released && self.slots.iter().flatten().any(is_waited_for)
@@ -75,7 +75,7 @@ impl Flights {
         }
     }
 
-    /// Takes a flight that ends from its slot.
+    /// Takes an ending flight from its slot.
     fn take(&mut self, slot: usize) -> Option<Flight> {
         let flight = self.slots[slot].take()?;
         self.in_flight -= 1;

@@ -1,7 +1,6 @@
-//! Procedures that are started together and waited for together.
+//! Procedures that are started together and awaited together.
 //!
-//! They end with whoever waits: those of a group that is dropped do nothing more, so that what is begun anew is not
-//! disturbed by what is left of the last try.
+//! They end with the procedure that waits: those of a dropped group stop, so that they do not disturb a new attempt.
 
 use alloc::boxed::Box;
 use alloc::rc::Rc;
@@ -14,13 +13,13 @@ use core::time::Duration;
 use super::bus::Bus;
 use super::task::TaskId;
 
-/// So many SubDevices are asked at a time where there is no hurry: a frame of 32 us where each is asked for four FMMUs.
+/// SubDevices per step where there is no hurry: a frame of 32 us with four FMMUs of each.
 pub(crate) const TURN: usize = 5;
-/// Pause between two such turns.
+/// Pause between two such steps.
 pub(crate) const TURN_PAUSE: Duration = Duration::from_micros(250);
 
 impl Bus {
-    /// Runs a procedure for each item, all at once, and returns what they return in the order of the items.
+    /// Runs a procedure for each item in parallel, and returns their results in the order of the items.
     pub async fn gather<I, T, F>(&self, items: impl IntoIterator<Item = I>, procedure: impl Fn(Bus, I) -> F) -> Vec<T>
     where
         T: 'static,
@@ -41,8 +40,8 @@ impl Bus {
         results.take().into_iter().flatten().collect()
     }
 
-    /// As [`Bus::gather`], a few at a time with pauses: for what is not urgent, so that frames are short and cyclic
-    /// ones hardly ever wait behind them.
+    /// As [`Bus::gather`], in small steps with pauses: for work without urgency, so that frames are short and cyclic
+    /// ones hardly ever wait for them.
     pub async fn gather_in_turns<I, T, F>(&self, items: Vec<I>, procedure: impl Fn(Bus, I) -> F) -> Vec<T>
     where
         T: 'static,
@@ -57,7 +56,7 @@ impl Bus {
         results
     }
 
-    /// A group of procedures that can be waited for together.
+    /// A group of procedures that can be awaited together.
     pub fn group(&self) -> Group {
         Group { bus: self.clone(), state: Rc::default() }
     }
@@ -67,11 +66,11 @@ impl Bus {
 struct State {
     running: Cell<usize>,
     waiter: Cell<Option<TaskId>>,
-    /// Nobody waits any more.
+    /// The group was dropped.
     dropped: Cell<bool>,
 }
 
-/// Procedures that were started together. Waiting costs one wake when the last of them ends.
+/// Procedures started together. Waiting costs one wake when the last of them ends.
 pub struct Group {
     bus: Bus,
     state: Rc<State>,
@@ -85,7 +84,7 @@ impl Group {
         let shared = self.bus.shared.clone();
         let mut procedure = Box::pin(procedure);
         self.bus.spawn(poll_fn(move |context| {
-            // What is dropped here gives up the datagrams that it waits for.
+            // A dropped procedure gives up its datagrams.
             if !state.dropped.get() && procedure.as_mut().poll(context).is_pending() {
                 return Poll::Pending;
             }

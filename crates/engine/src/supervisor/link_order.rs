@@ -1,16 +1,16 @@
-//! What a procedure asks of the link layer itself, which is outside: to take a link down, and to bring it back.
+//! Order of a procedure to the link layer: disconnect a link, or reconnect it.
 //!
-//! The runtime fetches the order ([`super::Supervisor::take_link_order`]), carries it out where it can, and says
-//! whether it could. Nobody has to: an order that nobody fetches counts as refused.
+//! The runtime fetches the order ([`super::Supervisor::take_link_order`]), carries it out if possible, and reports the
+//! result. This is optional: an order that the runtime does not fetch counts as refused.
 
 use crate::link::Link;
 
-/// The order under way, if there is one.
+/// The current order, if there is one.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(crate) enum LinkOrder {
     #[default]
     None,
-    /// Nobody has fetched it yet.
+    /// Not fetched yet.
     Given { link: Link, disconnect: bool },
     /// It is being carried out.
     Fetched,

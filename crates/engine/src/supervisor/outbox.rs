@@ -1,12 +1,12 @@
-//! Datagrams that wait to be sent: reads of mailboxes behind everything else, and few at a time.
+//! Datagrams that wait to be sent: mailbox reads after all others, and few at a time.
 //!
-//! A SubDevice works while its answer is waited for, and rests until the next request reaches it. So requests go before
-//! reads, which are long: those of a hundred SubDevices would keep the wire busy for a millisecond, in which nobody had
-//! anything to do. What was handed to the interface cannot be overtaken, so only as many reads are under way as keep
-//! the wire busy until the first of them is back.
+//! A SubDevice works while the MainDevice waits for its answer, and idles until its next request. So requests go before
+//! reads, which are long: those of a hundred SubDevices would occupy the wire for a millisecond, in which all
+//! SubDevices idle. Datagrams handed to the interface cannot be overtaken, so the number of reads on the wire is
+//! limited to those that keep the wire busy until the first of them is back.
 //!
-//! Requests go first as long as whoever makes them has not had more than his part of the wire ([`super::turns`]):
-//! otherwise those who send without pause would keep the answers of all others waiting.
+//! Requests go first as long as their SubDevice has not used more than its share of the wire ([`super::turns`]):
+//! otherwise continuous requests would delay the answers of all other SubDevices.
 
 use core::time::Duration;
 
@@ -17,23 +17,23 @@ use super::transfer::TransferId;
 use super::turns::{Accounts, Turn, Turns};
 use crate::time::Instant;
 
-/// Bytes of reads under way besides those that fill the wire for the time of a round trip.
+/// Bytes of reads on the wire, beyond those that fill it for a round trip.
 const AHEAD: usize = 2 * MAX_FRAME;
-/// A read that waited for so long goes before everything else.
+/// A read that waited for this time goes before all others.
 const PATIENCE: Duration = Duration::from_millis(5);
-/// A way through the segment that has become longer is believed by this part of it each time.
+/// A longer round trip is taken over by this part of it each time.
 const FADING_PART: u32 = 256;
 
-/// Which of the two queues.
+/// The two queues.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Rank {
-    /// Everything else.
+    /// All other datagrams.
     First,
     /// Reads of mailboxes.
     Read,
 }
 
-/// A read that waits.
+/// A waiting read.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 struct Read {
     id: TransferId,
@@ -47,18 +47,18 @@ pub(crate) struct Outbox {
     accounts: Accounts,
     first: Turns<TransferId>,
     reads: Turns<Read>,
-    /// Bytes of these.
+    /// Length of the waiting reads in bytes.
     waiting: usize,
-    /// Bytes of reads that were packed and are not back.
+    /// Length of the reads that were packed and have not returned, in bytes.
     under_way: usize,
-    /// When the interface has sent what it was given.
+    /// When the interface finishes sending.
     free_at: Instant,
-    /// The shortest way through the segment of late.
+    /// The shortest recent round trip.
     way: Option<Duration>,
 }
 
 impl Outbox {
-    /// Queues a datagram that takes so many bytes of a frame.
+    /// Queues a datagram that takes this number of bytes in a frame.
     pub(crate) fn push(&mut self, id: TransferId, rank: Rank, target: Target, bytes: usize, now: Instant) {
         let waiting = [self.first.front().map(|(turn, _)| turn), self.reads.front().map(|(turn, _)| turn)];
         let now_is = waiting.iter().flatten().map(|turn| turn.round).min().unwrap_or(0);
@@ -72,7 +72,7 @@ impl Outbox {
         }
     }
 
-    /// What goes next, into a frame that may hold reads or not. It is not overtaken by what comes later.
+    /// The next datagram, for a frame that may hold reads or not. Later datagrams do not overtake it.
     pub(crate) fn front(&self, reads: bool, now: Instant) -> Option<(TransferId, Rank)> {
         let read = self.reads.front().filter(|_| reads);
         match (self.first.front(), read) {
@@ -94,7 +94,7 @@ impl Outbox {
         }
     }
 
-    /// It is packed, or nobody wants it any more.
+    /// It was packed, or its procedure gave it up.
     pub(crate) fn pop(&mut self, rank: Rank) {
         match rank {
             Rank::First => _ = self.first.pop(),
@@ -105,18 +105,18 @@ impl Outbox {
         }
     }
 
-    /// Whether anything waits that may go now.
+    /// Whether a datagram waits that may leave now.
     pub(crate) fn is_ready(&self, now: Instant) -> bool {
         !self.first.is_empty() || (!self.reads.is_empty() && self.may_read(now))
     }
 
-    /// When reads that wait for others to share their frame go without them.
+    /// Time after which waiting reads no longer wait to share a frame.
     pub(crate) fn next_deadline(&self, now: Instant) -> Option<Instant> {
         (!self.reads.is_empty() && self.has_room() && self.free_at > now).then_some(self.free_at)
     }
 
-    /// Whether the next frame may hold reads: one that has room left, a full one, or, as soon as the interface has
-    /// nothing else to send, any. Many short frames take more of the wire.
+    /// Whether the next frame may hold reads: a frame with room left, a full frame, or any frame as soon as the
+    /// interface is idle. Many short frames take more of the wire.
     pub(crate) fn may_read(&self, now: Instant) -> bool {
         let worthwhile = !self.first.is_empty() || self.waiting >= MAX_FRAME || self.free_at <= now;
         worthwhile && self.has_room()
@@ -128,24 +128,24 @@ impl Outbox {
         self.under_way + self.waiting.min(MAX_FRAME) <= limit
     }
 
-    /// A frame is handed to the interface. Returns when it begins to leave at the earliest, and when it has left.
+    /// A frame is handed to the interface. Returns its earliest start and end of sending.
     pub(crate) fn hand_over(&mut self, length: usize, now: Instant) -> (Instant, Instant) {
         let begins = self.free_at.max(now);
         self.free_at = begins + Duration::from_nanos(wire_time_ns(length));
         (begins, self.free_at)
     }
 
-    /// So many bytes of reads were packed.
+    /// Reads of this length were packed.
     pub(crate) fn set_out(&mut self, bytes: usize) {
         self.under_way += bytes;
     }
 
-    /// They are back, or lost.
+    /// Reads of this length returned, or were lost.
     pub(crate) fn came_back(&mut self, bytes: usize) {
         self.under_way = self.under_way.saturating_sub(bytes);
     }
 
-    /// A frame came back so long after it had left.
+    /// A frame returned this long after it had left.
     pub(crate) fn took(&mut self, way: Duration) {
         self.way = Some(self.way.map_or(way, |shortest| way.min(shortest + shortest / FADING_PART)));
     }
@@ -184,7 +184,7 @@ mod tests {
         assert_eq!(outbox.front(false, Instant(20)), None, "this frame holds no reads");
     }
 
-    /// What somebody has waiting all the time: datagrams of so many bytes, or a question and then its answer.
+    /// Continuous load of a SubDevice: datagrams of this length, or a request followed by its answer.
     #[derive(Clone, Copy, Debug)]
     enum Wish {
         Datagrams(usize),
@@ -212,12 +212,12 @@ mod tests {
             owners.insert(id, (owner, bytes));
         };
         for (owner, wish) in wishes.iter().enumerate() {
-            // Who sends datagrams has asked for a thousand at once.
+            // The sender of datagrams has queued a thousand at once.
             let count = if matches!(wish, Wish::Datagrams(_)) { 1000 } else { 1 };
             (0..count).for_each(|_| ask(&mut outbox, &mut owners, &mut transfers, owner, Rank::First));
         }
         let mut had = [0i64; 7];
-        // How far one has been ahead of another at any time, at least and at most.
+        // Lead of one over the other at any time, smallest and largest.
         let mut ahead = [[(0, 0); 7]; 7];
         for _ in 0..20_000 {
             let (id, rank) = outbox.front(true, Instant(0)).expect("plenty");

@@ -1,18 +1,18 @@
-//! What became of a frame that was handed to the acyclic half.
+//! Classification of a frame handed to the acyclic half.
 
-/// What became of a frame that was handed to [`Supervisor::receive`].
+/// Classification of a frame handed to `Supervisor::receive`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Received {
     /// A copy of a frame that is in flight.
     Taken,
-    /// A frame that was given up, or a copy that was there already.
+    /// A frame that was given up, or a duplicate copy.
     Late,
-    /// A frame of ours with other datagrams than were sent.
+    /// A frame of this MainDevice with other datagrams than were sent.
     Corrupt,
     /// A frame of the cyclic half.
     Cyclic,
     /// A frame of another MainDevice.
     Foreign,
-    /// No EtherCAT frame.
+    /// Not an EtherCAT frame.
     Other,
 }

@@ -1,4 +1,4 @@
-//! What a datagram brought back, or why it brought nothing.
+//! The reply to a datagram, or the reason why there is none.
 
 use alloc::vec::Vec;
 use core::fmt;
@@ -9,10 +9,10 @@ use ringcat_wire::datagram::{MAX_DATA, Target};
 use crate::ring::Sequence;
 use crate::time::Instant;
 
-/// What a datagram brought back, merged from all copies.
+/// The reply to a datagram, merged from all copies.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Reply {
-    /// The data; for writes, what was sent.
+    /// The data; for writes, as sent.
     pub data: Vec<u8>,
     /// Working counter of the copy sent on the main link.
     pub main: Wkc,
@@ -20,9 +20,9 @@ pub struct Reply {
     pub redundant: Wkc,
     /// OR of the ECAT event requests.
     pub irq: u16,
-    /// The frame that it came with: datagrams of one frame were met at the same time.
+    /// The frame that carried it: datagrams of one frame are processed at the same time.
     pub frame: Sequence,
-    /// When that was handed to the links.
+    /// When that frame was handed to the links.
     pub sent_at: Instant,
 }
 
@@ -33,52 +33,52 @@ impl Reply {
     }
 }
 
-/// Why a datagram brought nothing back.
+/// Why a datagram has no reply.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum BusError {
-    /// Its frame was lost, also when it was sent again.
+    /// Its frame was lost, also when it was repeated.
     Lost {
-        /// Whom it addressed.
+        /// Its target.
         target: Target,
-        /// How often it was sent again.
+        /// Number of retries.
         retries: u8,
     },
     /// It is longer than a frame can carry.
     TooLong {
-        /// Whom it addresses.
+        /// Its target.
         target: Target,
         /// Bytes of data.
         length: usize,
     },
-    /// Not the expected number of SubDevices answered.
+    /// Another number of SubDevices answered than expected.
     Wkc {
-        /// Whom it addressed.
+        /// Its target.
         target: Target,
         /// Expected.
         expected: Wkc,
-        /// Came.
+        /// Received.
         got: Wkc,
     },
-    /// It was to be alone on the wire, and that was never empty.
+    /// It was to be alone on the wire, but the wire was never free.
     Busy {
-        /// Whom it addressed.
+        /// Its target.
         target: Target,
     },
-    /// It was to be alone on the wire, and the cyclic half sent meanwhile.
+    /// It was to be alone on the wire, but the cyclic half sent meanwhile.
     Disturbed {
-        /// Whom it addressed.
+        /// Its target.
         target: Target,
     },
-    /// An LRW of which both copies met somebody: neither has what the other one read (protocol 9.2.2).
+    /// An LRW that SubDevices processed on both copies: neither copy has the data read into the other (protocol 9.2.2).
     Split {
-        /// Whom it addressed.
+        /// Its target.
         target: Target,
     },
 }
 
 impl BusError {
-    /// The same of a datagram that was asked for with another target.
+    /// The same error for a datagram with another target.
     #[must_use]
     pub(crate) fn asked_of(mut self, asked: Target) -> BusError {
         let (BusError::Lost { target, .. }
@@ -136,6 +136,6 @@ impl fmt::Display for BusError {
 
 impl core::error::Error for BusError {}
 
-/// A time limit ran out.
+/// A time limit expired.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Elapsed;

@@ -1,21 +1,21 @@
-//! How long to wait for the copies of a frame, learnt from those that came back.
+//! Deadline of a frame's copies, learnt from received copies.
 //!
-//! A frame that is lost at the edge of a cut should cost a few round trips and no more; one that a thousand SubDevices
-//! or a busy host delay must not be taken for lost.
+//! A frame lost at the moment of a cut should cost only a few round trips; a frame delayed by a thousand SubDevices or
+//! by a busy host must not be taken for lost.
 
 use core::time::Duration;
 
-/// Longest wait, also before anything was learnt: far beyond any round trip with a full window queued before it.
+/// Longest deadline, also initially: far beyond any round trip with a full window queued before it.
 const LONGEST: Duration = Duration::from_millis(20);
-/// What is added to a multiple of the round trip: hosts are late at times.
+/// Margin added to a multiple of the round trip, for late hosts.
 const MARGIN: Duration = Duration::from_millis(2);
-/// Waits are so many of the longest recent round trips.
+/// Factor on the longest recent round trip.
 const FACTOR: u32 = 4;
 
-/// Learns round trips.
+/// Learns round-trip times.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct RoundTrip {
-    /// The longest one of late; it fades.
+    /// The longest recent one; it decays.
     longest: Option<Duration>,
 }
 
@@ -26,14 +26,14 @@ impl RoundTrip {
         self.longest = Some(faded.max(time));
     }
 
-    /// A copy came back when it had been given up.
+    /// A copy came back after it was given up.
     pub(crate) fn was_late(&mut self) {
         if let Some(longest) = &mut self.longest {
             *longest = (*longest * 2 + MARGIN / 2).min(LONGEST);
         }
     }
 
-    /// How long to wait for a frame whose datagrams were lost so often before. Each loss doubles it.
+    /// Deadline of a frame whose datagrams were lost this number of times before. Each loss doubles it.
     pub(crate) fn wait(&self, losses: u8) -> Duration {
         let Some(longest) = self.longest else { return LONGEST };
         let wait = longest * FACTOR + MARGIN;

@@ -1,4 +1,4 @@
-//! What the executor, the procedures and the frames share.
+//! Common state of the executor, the procedures and the frames.
 
 use alloc::collections::{BinaryHeap, VecDeque};
 use alloc::sync::Arc;
@@ -38,18 +38,18 @@ pub(crate) struct Shared {
     pub(crate) alone: Alone,
     pub(crate) flights: Flights,
     pub(crate) silence: Silence,
-    /// By link, where the links tell.
+    /// By link, where the links report it.
     pub(crate) carriers: [Option<bool>; 2],
     pub(crate) strays: Strays,
     pub(crate) round_trip: RoundTrip,
-    /// SubDevices that the main copy of the last broadcast met: positions from here on live behind the redundant link.
+    /// SubDevices that processed the main copy of the last broadcast: higher positions are on the redundant link.
     pub(crate) main_count: u16,
-    /// The first datagram of the outbox where it was too long for the send window, and since when.
+    /// The first datagram of the outbox while it is too long for the send window, and since when.
     pub(crate) blocked: Option<(TransferId, Instant)>,
     pub(crate) link_order: LinkOrder,
     pub(super) watchers: Watchers,
     pub(super) bell: Bell,
-    /// Datagrams that a frame may hold.
+    /// Largest number of datagrams in a frame.
     pub(crate) max_datagrams: usize,
     pub(crate) current: TaskId,
     pub(crate) spawned: VecDeque<Task>,
@@ -100,7 +100,7 @@ impl Shared {
         self.ready.pop_front()
     }
 
-    /// Wakes the current task at a point of time.
+    /// Wakes the current task at a time.
     pub(crate) fn wake_at(&mut self, at: Instant) {
         self.timers.push(Reverse((at, self.current)));
     }
@@ -135,7 +135,7 @@ impl Shared {
         }
     }
 
-    /// Queues a datagram for the current task. One that no frame can carry fails at once.
+    /// Queues a datagram for the current task. One that fits no frame fails at once.
     pub(crate) fn request(&mut self, request: Request) -> TransferId {
         let length = request.data.len();
         let fits = length <= MAX_DATA;
@@ -153,7 +153,7 @@ impl Shared {
         id
     }
 
-    /// The procedure no longer waits for a transfer.
+    /// The procedure gave up a transfer.
     pub(crate) fn abandon(&mut self, id: TransferId) {
         let Some(transfer) = self.transfers.find(id) else { return };
         match transfer.stage {

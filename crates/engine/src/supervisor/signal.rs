@@ -1,4 +1,4 @@
-//! Waiting for what another procedure does.
+//! Signals between procedures.
 
 use alloc::rc::Rc;
 use alloc::vec::Vec;
@@ -10,7 +10,7 @@ use core::task::Poll;
 use super::shared::Shared;
 use super::task::TaskId;
 
-/// Wakes procedures that wait for a condition which other procedures bring about.
+/// Wakes procedures that wait for a condition which other procedures fulfil.
 #[derive(Clone)]
 pub struct Signal {
     shared: Rc<RefCell<Shared>>,
@@ -22,7 +22,7 @@ impl Signal {
         Signal { shared, waiting: Rc::default() }
     }
 
-    /// Lets all that wait look at their condition again.
+    /// Makes all waiting procedures check their condition again.
     pub fn notify(&self) {
         let mut shared = self.shared.borrow_mut();
         for task in self.waiting.borrow_mut().drain(..) {
@@ -30,7 +30,7 @@ impl Signal {
         }
     }
 
-    /// A procedure is to be woken by the next [`Signal::notify`].
+    /// Registers a procedure for the next [`Signal::notify`].
     pub(super) fn register(&self, task: TaskId) {
         let mut waiting = self.waiting.borrow_mut();
         if !waiting.contains(&task) {
@@ -38,7 +38,7 @@ impl Signal {
         }
     }
 
-    /// Waits until `ready` gives something; it is asked now and after each [`Signal::notify`].
+    /// Waits until `ready` returns a value; it is called now and after each [`Signal::notify`].
     pub async fn until<T>(&self, mut ready: impl FnMut() -> Option<T>) -> T {
         poll_fn(|_| {
             if let Some(value) = ready() {

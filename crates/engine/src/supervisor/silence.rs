@@ -1,15 +1,15 @@
-//! Whether a link is silent: nothing of what is sent on it comes back.
+//! Detects silent links, whose sent copies do not come back.
 //!
-//! A reply that needs both copies would wait for the one on a dead link (a cut host cable) until its deadline, again
-//! and again. A link that has been silent for long while the other one proves the ring open is not waited for. Sending
-//! on it goes on, so that it is noticed when copies come back.
+//! A reply that needs both copies would wait for the one on a dead link (a cut host cable) until its deadline, each
+//! time. A copy is not awaited on a link that has been silent for long while the other one proves the ring open.
+//! Sending on it continues, to notice when copies come back.
 
 use core::time::Duration;
 
 use crate::link::Link;
 use crate::time::Instant;
 
-/// Silence after which a link is not waited for: several frame timeouts, so that a burst of losses is not mistaken.
+/// Silence after which copies on a link are not awaited: several frame timeouts, longer than a burst of losses.
 const SILENCE: Duration = Duration::from_millis(30);
 
 /// Since when the copies sent on each link have not come back.

@@ -1,8 +1,7 @@
-//! Mail that came back when nobody waited for it any more (decision 0007).
+//! Mail that came back after its read was given up (decision 0007).
 //!
-//! Reading a mailbox empties it, so that what a read brings back must not be thrown away: not when both copies passed
-//! the SubDevice at the edge of a ring's repair and each read another mail, and not when the frame was given up before
-//! it came back.
+//! Reading a mailbox empties it, so the result must not be dropped: neither when both copies passed the SubDevice at
+//! the moment in which a ring closed and each read another mail, nor when the frame was given up before it came back.
 
 use alloc::collections::VecDeque;
 use alloc::vec::Vec;
@@ -14,9 +13,9 @@ use ringcat_wire::datagram::HEADER_LEN;
 use crate::ring::Sequence;
 use crate::time::Instant;
 
-/// Stray mails that wait for their router; beyond, the oldest is dropped and counted.
+/// Stray mails that wait for their router; beyond this, the oldest is dropped and counted.
 const KEPT: usize = 64;
-/// Reads that were given up and are remembered, in case that they come back.
+/// Given-up reads that are remembered, in case they come back.
 const REMEMBERED: usize = 64;
 
 /// A frame that comes back later than this counts as lost.
@@ -42,7 +41,7 @@ pub struct Stray {
 }
 
 impl Overdue {
-    /// Its data in a frame, where it was answered.
+    /// Its data in a frame, if it was answered.
     pub(crate) fn mail(&self, bytes: &[u8]) -> Option<Vec<u8>> {
         let start = self.header_at + HEADER_LEN;
         let data = bytes.get(start..start + self.length)?;
@@ -68,7 +67,7 @@ impl Strays {
         self.overdue.push_back(read);
     }
 
-    /// A frame came back late: keeps the mail that is in it.
+    /// A frame came back late: keeps its mail.
     pub(crate) fn late(&mut self, sequence: Sequence, bytes: &[u8], now: Instant) {
         for at in (0..self.overdue.len()).rev() {
             let read = self.overdue[at];
@@ -82,7 +81,7 @@ impl Strays {
         }
     }
 
-    /// Keeps a mail for whoever reads that mailbox next.
+    /// Keeps a mail for the next reader of that mailbox.
     pub(crate) fn keep(&mut self, station: StationAddress, stray: Stray) {
         if self.mails.len() >= KEPT {
             self.mails.pop_front();
@@ -102,7 +101,7 @@ impl Strays {
         self.mails.iter().any(|(of, _)| *of == station)
     }
 
-    /// Mails that nobody fetched in time.
+    /// Number of mails that were not fetched in time.
     pub(crate) fn dropped(&self) -> u64 {
         self.dropped
     }

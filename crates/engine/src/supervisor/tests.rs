@@ -1,4 +1,4 @@
-//! The acyclic half against hand-made answers: packing, pairing, resending, giving up, timers.
+//! The acyclic half against hand-made answers: packing, pairing, retries, giving up, timers.
 
 use alloc::rc::Rc;
 use alloc::vec;
@@ -457,7 +457,7 @@ fn a_datagram_that_was_given_up_does_not_make_a_later_one_starve() {
     assert_eq!(offer(&mut bench, 100), 0, "it has not waited yet");
     bench.pass(Duration::from_micros(500));
     assert!(offer(&mut bench, 1_500) > 1_000);
-    // Nor does one that takes the place of another.
+    // Nor does a frame that takes its slot.
     ask(&mut bench);
     offer(&mut bench, 100);
     bench.pass(Duration::from_micros(900));

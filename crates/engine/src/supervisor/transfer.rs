@@ -1,4 +1,4 @@
-//! Datagrams that procedures asked for, from the request to the reply.
+//! Datagrams of procedures, from the request to the reply.
 
 use alloc::vec::Vec;
 
@@ -11,36 +11,35 @@ use super::reply::{BusError, Reply};
 use super::task::TaskId;
 use crate::time::Instant;
 
-/// What is asked of the bus.
+/// A request to the bus.
 #[derive(Clone, Debug)]
 pub(crate) struct Request {
     pub command: Command,
     pub target: Target,
     /// Data to send; zeros for reads.
     pub data: Vec<u8>,
-    /// Data of the redundant copy, where it is not the same; of the same length.
+    /// Data of the redundant copy, where it differs; of the same length.
     pub redundant: Option<Vec<u8>>,
-    /// Station that the redundant copy addresses, where it is not the same.
+    /// Station that the redundant copy addresses, where it differs.
     pub redundant_station: Option<StationAddress>,
-    /// The working counter at which waiting for a second copy is pointless.
+    /// The working counter with which a second copy need not be awaited.
     pub expected: Option<Wkc>,
-    /// Whether a lost datagram may be sent again: false where reading or writing twice is not the same as once.
+    /// Whether a lost datagram may be repeated: false where two accesses differ from one.
     pub resend: bool,
-    /// A datagram that goes before it in the same frame: a part of the same mail, or its [`Request::witness`].
+    /// A datagram that precedes it in the same frame: a part of the same mail, or its [`Request::witness`].
     pub lead: Option<(Command, Target, Vec<u8>)>,
-    /// A read of this SubDevice's mailbox: what each copy reads matters, also when it comes late.
+    /// A read of this SubDevice's mailbox: the content of each copy counts, also when it comes late.
     pub mail: Option<StationAddress>,
-    /// So many more of the same go before it, in a frame that holds nothing else.
+    /// Number of further datagrams of the same kind before it, in a frame of their own.
     pub before: usize,
-    /// No other frame is to be on the wire while it is; the links on which copies are known not to come home, a bit
-    /// each.
+    /// No other frame may be on the wire with it; the links on which copies are known not to return, a bit each.
     pub alone: Option<u8>,
-    /// The data is a system time of 32 bits that was right then; it leaves as what it is when the frame does.
+    /// The data is a system time of 32 bits that was right then; it is adjusted to the departure of the frame.
     pub time_at: Option<Instant>,
 }
 
 impl Request {
-    /// A datagram that is sent once, both copies alike, and waits for both.
+    /// A datagram that is sent once, with both copies equal, and waits for both.
     pub(crate) const fn once(command: Command, target: Target, data: Vec<u8>) -> Request {
         Request {
             command,
@@ -58,26 +57,26 @@ impl Request {
         }
     }
 
-    /// Sets a time in the data forward to now.
+    /// Advances a time in the data to now.
     pub(super) fn let_run(&self, data: &mut [u8], now: Instant) {
         if let (Some(at), Some(bytes)) = (self.time_at, data.first_chunk_mut::<4>()) {
             *bytes = u32::from_le_bytes(*bytes).wrapping_add(now.0.wrapping_sub(at.0) as u32).to_le_bytes();
         }
     }
 
-    /// Datagrams that it takes.
+    /// Number of its datagrams.
     pub(super) fn datagrams(&self) -> usize {
         1 + usize::from(self.lead.is_some()) + self.before
     }
 
-    /// Bytes of a frame that it takes.
+    /// Its length in a frame in bytes.
     pub(super) fn bytes(&self) -> usize {
         let lead = self.lead.as_ref().map_or(0, |(_, _, data)| OVERHEAD + data.len());
         lead + (1 + self.before) * (OVERHEAD + self.data.len())
     }
 
-    /// A read of the SubDevice that ARMW and FRMW address: which copy meets it, their own working counters do not tell,
-    /// because all others count too (protocol 9.3).
+    /// A read of the SubDevice that ARMW and FRMW address. It shows which copy reaches that SubDevice; the working
+    /// counters of ARMW and FRMW do not, because all other SubDevices increment them too (protocol 9.3).
     pub(crate) fn witness(&self) -> Option<(Command, Target, Vec<u8>)> {
         let (command, target) = match (self.command, self.target) {
             (Command::Armw, Target::Position(position, _)) => (Command::Aprd, Target::Position(position, map::TYPE)),
@@ -89,17 +88,17 @@ impl Request {
     }
 }
 
-/// What a [`Request::witness`] takes in a frame: a datagram of one byte.
+/// Length of a [`Request::witness`] in a frame: a datagram of one byte.
 pub(super) const WITNESS_BYTES: usize = OVERHEAD + 1;
 
-/// How far a transfer is.
+/// Stage of a transfer.
 #[derive(Debug)]
 pub(crate) enum Stage {
-    /// Waits to be packed into a frame.
+    /// Waits for a frame.
     Queued,
-    /// Is in a frame that is out.
+    /// Is in a frame on the wire.
     InFlight,
-    /// The procedure may fetch it.
+    /// Its reply can be fetched.
     Done(Result<Reply, BusError>),
 }
 
@@ -109,27 +108,27 @@ pub(crate) struct Transfer {
     pub stage: Stage,
     pub task: TaskId,
     pub retries: u8,
-    /// The procedure no longer waits: freed as soon as it is not in a frame.
+    /// The procedure gave it up: freed as soon as it is in no frame.
     pub abandoned: bool,
 }
 
 #[cfg(test)]
 impl Transfer {
-    /// A datagram to nobody.
+    /// A datagram without a target.
     pub(crate) fn for_test() -> Transfer {
         let request = Request::once(Command::Nop, Target::None, Vec::new());
         Transfer { request, stage: Stage::Queued, task: TaskId(0), retries: 0, abandoned: false }
     }
 }
 
-/// A transfer in the table; the generation tells re-used places apart.
+/// Index of a transfer in the table; the generation distinguishes reused entries.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) struct TransferId {
     index: u32,
     generation: u32,
 }
 
-/// All transfers that exist.
+/// All existing transfers.
 #[derive(Debug, Default)]
 pub(crate) struct Transfers {
     entries: Vec<(u32, Option<Transfer>)>,
@@ -148,7 +147,7 @@ impl Transfers {
         TransferId { index, generation: entry.0 }
     }
 
-    /// How many there are.
+    /// Number of transfers.
     pub(crate) fn count(&self) -> usize {
         self.entries.len() - self.free.len()
     }

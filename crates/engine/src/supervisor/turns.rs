@@ -1,11 +1,11 @@
 //! Datagrams that wait to be sent, in fair turns between SubDevices.
 //!
-//! Everybody who is addressed has an account, on which everything counts that is sent to him, reads of his mailbox
-//! included. Time is cut into rounds; in each of them everybody may send a share of bytes, in the order of asking. Who
-//! asks for more than that waits for later rounds, and whoever comes meanwhile goes first: a long file transfer, or a
-//! thousand datagrams to one SubDevice at once, keep nobody else from the wire. Of those who have something waiting all
-//! the time, each gets as many bytes as any other, to within a datagram of each and a share. As long as nobody asks for
-//! more than his share, the order is that of asking.
+//! Each addressed SubDevice has an account of the bytes sent to it, its mailbox reads included. Time is cut into
+//! rounds; in each round every SubDevice may use a share of bytes, in the order of requests. A SubDevice with more data
+//! waits for later rounds, and newly addressed ones go first: neither a long file transfer nor a thousand datagrams to
+//! one SubDevice at once keep the others from the wire. SubDevices that always have data waiting get the same number of
+//! bytes each, to within one datagram of each and one share. While no SubDevice needs more than its share, the order is
+//! that of requests.
 
 use alloc::collections::{BTreeMap, BinaryHeap};
 use core::cell::Cell;
@@ -13,19 +13,19 @@ use core::cmp::Reverse;
 
 use ringcat_wire::datagram::Target;
 
-/// Bytes that everybody may send in a round: a question and its answer with a small mailbox. Were it more, who asks and
-/// waits would fall behind those who always have something to send.
+/// Share of a SubDevice in a round, in bytes: a request and its answer with a small mailbox. With a larger share,
+/// SubDevices that wait for each answer would fall behind those with continuous data.
 pub(super) const SHARE: u64 = 256;
-/// Accounts that are kept while others wait; beyond, those that owe nothing are looked for and forgotten. Where most of
-/// them owe something, the next look waits until there are twice as many, so that looking costs each datagram little.
+/// Number of accounts kept while datagrams wait; beyond it, accounts without debt are searched and dropped. Where most
+/// of them have debt, the next search waits until there are twice as many, which keeps its cost per datagram low.
 const ACCOUNTS: usize = 4096;
 
-/// Who is addressed.
+/// Target of a datagram.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 enum Account {
     Station(u16),
     Position(u16),
-    /// Broadcasts and what has no address of one SubDevice.
+    /// Broadcasts and datagrams without the address of one SubDevice.
     Everybody,
 }
 
@@ -39,27 +39,27 @@ impl Account {
     }
 }
 
-/// When something leaves.
+/// Turn of a datagram.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(super) struct Turn {
-    /// The round, at [`SHARE`] bytes each.
+    /// The round, of [`SHARE`] bytes each.
     pub round: u64,
     order: u64,
 }
 
-/// What was sent to whom, or is waiting to be.
+/// Accounts of bytes sent or waiting, by target.
 #[derive(Debug, Default)]
 pub(super) struct Accounts {
-    /// Bytes up to which each account is used, on a scale on which a round has [`SHARE`] bytes.
+    /// Bytes used by each account, on a scale on which a round has [`SHARE`] bytes.
     used: BTreeMap<Account, u64>,
-    /// Accounts at which those that owe nothing are forgotten; at least [`ACCOUNTS`].
+    /// Number of accounts at which those without debt are dropped; at least [`ACCOUNTS`].
     limit: usize,
     order: u64,
 }
 
 impl Accounts {
-    /// The turn of something that takes so many bytes of a frame. `now` is the round of what has waited longest:
-    /// whoever had nothing to send before has no right to what he did not use.
+    /// The turn of a datagram of this length. `now` is the round of the oldest waiting datagram: a target without
+    /// traffic before has no claim to the unused rounds.
     pub(super) fn turn(&mut self, target: Target, bytes: usize, now: u64) -> Turn {
         let begin = now * SHARE;
         if self.used.len() >= self.limit.max(ACCOUNTS) {
@@ -73,18 +73,18 @@ impl Accounts {
         Turn { round: from / SHARE, order: self.order }
     }
 
-    /// Nothing waits anywhere: nobody owes anybody anything.
+    /// No datagram waits: all accounts are cleared.
     pub(super) fn forget(&mut self) {
         self.used.clear();
         self.limit = 0;
     }
 }
 
-/// What waits, in turns.
+/// Waiting datagrams, by turn.
 #[derive(Debug)]
 pub(super) struct Turns<T> {
     waiting: BinaryHeap<Reverse<(Turn, T)>>,
-    /// The latest round of what was next once.
+    /// The latest round of a datagram that was once next.
     settled: Cell<u64>,
 }
 
@@ -99,23 +99,23 @@ impl<T: Ord> Turns<T> {
         self.waiting.is_empty()
     }
 
-    /// Queues what has this turn. What was next once is not overtaken by it.
+    /// Queues a datagram with its turn. It does not overtake a datagram that was once next.
     pub(super) fn push(&mut self, turn: Turn, what: T) {
         let round = turn.round.max(self.settled.get());
         self.waiting.push(Reverse((Turn { round, ..turn }, what)));
     }
 
-    /// What leaves next.
+    /// The next datagram.
     pub(super) fn front(&self) -> Option<(Turn, &T)> {
         self.waiting.peek().map(|Reverse((turn, what))| (*turn, what))
     }
 
-    /// What has this turn is next.
+    /// The datagram with this turn is next.
     pub(super) fn settle(&self, turn: Turn) {
         self.settled.set(self.settled.get().max(turn.round));
     }
 
-    /// Takes what [`Turns::front`] showed.
+    /// Takes the datagram that [`Turns::front`] showed.
     pub(super) fn pop(&mut self) -> Option<T> {
         let Reverse((_, what)) = self.waiting.pop()?;
         if self.waiting.is_empty() {
@@ -150,7 +150,7 @@ mod tests {
             self.turns.push(turn, station);
         }
 
-        /// Who leaves next.
+        /// Targets in the order of sending.
         fn next(&mut self) -> Option<u16> {
             let (turn, _) = self.turns.front()?;
             self.turns.settle(turn);
@@ -176,7 +176,7 @@ mod tests {
         for station in 0..=u16::MAX {
             accounts.turn(target(station), 16, 0);
         }
-        // From 4,096 on, each look leaves all of them: 8,192, 16,384, and so on.
+        // From 4,096 on, each search keeps all of them: 8,192, 16,384, and so on.
         assert_eq!((accounts.used.len(), accounts.limit), (1 << 16, 1 << 16));
     }
 
@@ -189,7 +189,7 @@ mod tests {
         bench.ask(2, 60);
         let before = core::iter::from_fn(|| bench.next()).take_while(|station| *station == 1).count();
         assert!(before <= 3, "{before} datagrams of 100 bytes");
-        // From now on both ask again and again: the bytes are shared.
+        // From here both request continuously: they share the bytes.
         let mut served = [0u32; 3];
         (0..50).for_each(|_| bench.ask(2, 300));
         for _ in 0..160 {
@@ -206,7 +206,7 @@ mod tests {
         (0..3).for_each(|_| bench.ask(1, 1500));
         bench.next();
         bench.next();
-        // It waits for a wider window; others come.
+        // It waits for a wider window; others are queued.
         let (turn, _) = bench.turns.front().expect("one is left");
         bench.turns.settle(turn);
         (2..500).for_each(|station| bench.ask(station, 60));

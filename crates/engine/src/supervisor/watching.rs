@@ -1,4 +1,4 @@
-//! Waiting for what the cyclic half posts and the links tell, instead of looking for it again and again.
+//! Waits for words of the cyclic half and of the links, instead of polling them.
 
 use core::future::poll_fn;
 use core::task::Poll;
@@ -24,12 +24,12 @@ impl Shared {
         }
     }
 
-    /// Whether a procedure waits for what has been posted.
+    /// Whether a procedure waits for posted words.
     pub(super) fn is_posted(&self) -> bool {
         !self.watchers.waiting.is_empty() && self.posted() != self.watchers.seen
     }
 
-    /// Wakes the procedures that wait for something else to be posted.
+    /// Wakes the procedures that wait for another posted word.
     pub(super) fn wake_watchers(&mut self) {
         if !self.is_posted() {
             return;
@@ -42,13 +42,13 @@ impl Shared {
 }
 
 impl Bus {
-    /// What is posted now.
+    /// The currently posted words.
     pub(crate) fn posted(&self) -> Posted {
         self.shared.borrow().posted()
     }
 
-    /// Waits until something else is posted than this, until a point of time, or until `ready`, which is asked after
-    /// each notification of `signal`.
+    /// Waits until other words than these are posted, until a time, or until `ready` returns a value; `ready` is called
+    /// after each notification of `signal`.
     pub(crate) async fn until_posted(
         &self,
         seen: Posted,

@@ -1,7 +1,7 @@
-//! Rings behind junctions that would explain the open ports of a segment (protocol 9.4).
+//! Rings behind junctions that could explain the open ports of a segment (protocol 9.4).
 //!
-//! In: what SubDevices report of their ports. Out: sets of closing cables that would fit. Which of them it is, frames
-//! have to show.
+//! Input: the port status of the SubDevices. Output: sets of closing cables that fit. Frames have to show which of them
+//! is right.
 
 use alloc::vec::Vec;
 
@@ -11,16 +11,16 @@ use super::port::PortOf;
 use super::rings::unconnected;
 use super::tree::{NodeStatus, Topology};
 
-/// Sets of closing cables that would explain the open ports, those first whose tails are met early; at most `most`.
+/// Sets of closing cables that could explain the open ports, those with early tails first; at most `most`.
 ///
-/// Open ports alone do not tell where a ring ends: whatever follows the junction could as well hang on its last member.
-/// Whoever asks has to find out which of these it is. Where the redundant link meets somebody (a broken ring, or
-/// branches that only its frames meet), nothing is looked for.
+/// Open ports alone do not show where a ring ends: any SubDevice after the junction could as well be connected to the
+/// ring's last member. The caller has to find out which set is right. Where the redundant link reaches SubDevices (a
+/// broken ring, or branches that only its frames pass), there is no search.
 pub fn candidates(nodes: &[NodeStatus], main_count: usize, ring_closed: bool, most: usize) -> Vec<Vec<Closing>> {
     candidates_with(nodes, main_count, ring_closed, most, (&[], &[]))
 }
 
-/// As [`candidates`], with those among them that are known to be right, and without those known to be wrong.
+/// As [`candidates`], with some that are known to be right, and without those known to be wrong.
 pub(crate) fn candidates_with(
     nodes: &[NodeStatus],
     main_count: usize,
@@ -42,7 +42,7 @@ pub(crate) fn candidates_with(
     search.found
 }
 
-/// How many rings behind junctions the open ports show: each has two more than its members need.
+/// Number of rings behind junctions that the open ports show: each has two more than its members need.
 pub(crate) fn rings_shown(nodes: &[NodeStatus], ring_closed: bool) -> usize {
     let further = |node: &NodeStatus| (1..4).filter(|port| open(node, *port)).count();
     let open_ports: usize = nodes.iter().map(further).sum();
@@ -50,13 +50,13 @@ pub(crate) fn rings_shown(nodes: &[NodeStatus], ring_closed: bool) -> usize {
     open_ports.saturating_sub(usize::from(ring_closed) + hanging) / 2
 }
 
-/// The cabling with these rings, also where one has been made longer behind its known tail and is broken: frames come
-/// from where it closes though somebody behind the tail has nothing on port 0. Members that nobody knows of are entered
-/// from behind then, and not crossed.
+/// The cabling with these rings, including one that was extended behind its known tail and is broken: then frames come
+/// from its closing end though a SubDevice behind the tail has no connection on port 0. Its unknown members are entered
+/// at another port than 0 then, and not crossed.
 pub(crate) fn with_longer_rings(nodes: &[NodeStatus], main_count: usize, closings: &[Closing]) -> Topology {
     let mut topology = Topology::with_local_rings(nodes, main_count, closings);
     let mut closings = closings.to_vec();
-    // Broken where it closes now, it is a line that leads on behind its known tail.
+    // Broken at its known closing cable, it is a line that continues behind its known tail.
     let is_line = |it: &Closing| {
         let head = nodes.get(it.head.node).map(|node| node.dl_status.ports[usize::from(it.head.port & 3)]);
         head.is_some_and(|port| !port.communication)
@@ -83,7 +83,7 @@ pub(crate) fn with_longer_rings(nodes: &[NodeStatus], main_count: usize, closing
             closings[at].tail = tail;
             let longer = Topology::with_local_rings(nodes, main_count, &closings);
             let is_explained = crossed(&longer).all(|node| node <= head.node || node > tail.node);
-            // No more is left open than what leads to the redundant link.
+            // No port stays open but the one that leads to the redundant link.
             let is_explained = is_explained && longer.open_ports.len() <= 1;
             if is_explained && crossed(&longer).count() < crossed(&topology).count() {
                 topology = longer;
@@ -95,7 +95,7 @@ pub(crate) fn with_longer_rings(nodes: &[NodeStatus], main_count: usize, closing
     topology
 }
 
-/// Who is entered at another port than 0, as it seems.
+/// SubDevices that seem to be entered at another port than 0.
 fn crossed(topology: &Topology) -> impl Iterator<Item = usize> + '_ {
     topology.findings.iter().filter_map(|finding| match finding {
         Finding::CrossedLine { node, .. } | Finding::UnconnectedPort0 { node } => Some(*node),
@@ -113,20 +113,20 @@ fn tail_of(topology: &Topology, head: PortOf) -> Option<PortOf> {
         .map(|closing| closing.tail)
 }
 
-/// SubDevices by which a ring may have been made longer.
+/// SubDevices by which a ring may have been extended.
 const MOST_LONGER: usize = 64;
 
-/// Steps of a search: enough for all places where a ring of a thousand SubDevices may close.
+/// Steps of a search: enough for all possible closing ports of a ring of a thousand SubDevices.
 const STEPS: usize = 200_000;
 
-/// Local rings that are looked for.
+/// Number of local rings searched.
 const MOST_RINGS: usize = 16;
 
 struct Search<'s> {
     nodes: &'s [NodeStatus],
     right: &'s [Closing],
     wrong: &'s [Closing],
-    /// Ports that stay open in the end.
+    /// Number of ports that stay open in the end.
     spare: usize,
     rings: usize,
     most: usize,
@@ -166,7 +166,7 @@ impl Search<'_> {
 }
 
 impl Search<'_> {
-    /// Neither wrong nor in the place of one that is right.
+    /// Neither wrong nor in the place of a known ring.
     fn may_be(&self, closing: &Closing) -> bool {
         let takes_from =
             |right: &Closing| right != closing && (right.head == closing.head || right.tail == closing.tail);
@@ -174,7 +174,7 @@ impl Search<'_> {
     }
 }
 
-/// The cable that a frame would take if it left through the next slot and came back through the one below it.
+/// The cable of a frame that leaves through the next slot and returns through the one below it.
 fn closing_at(slots: &[PortOf], nodes: &[NodeStatus]) -> Option<Closing> {
     let [.., head, tail] = *slots else { return None };
     // A ring begins at a port that frames pass before the one at which they come back.

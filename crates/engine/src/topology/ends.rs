@@ -1,5 +1,5 @@
-//! The ends of a broken cable by what the ports themselves say: it does not depend on who was taken for whose
-//! neighbour, which is an assumption while SubDevices are crossed or hang on a port 2 (LC-02).
+//! The ends of a broken cable from the port status: independent of the assumed neighbours, which are uncertain while
+//! SubDevices are crossed or connected to a port 2 (LC-02).
 
 use alloc::vec::Vec;
 
@@ -7,11 +7,11 @@ use ringcat_wire::register::DlStatus;
 
 use super::{Finding, Node, PortOf, Topology};
 
-/// Both ends of a cable, the first nearer to MAIN as far as that is known. `None` is an interface: MAIN where it is the
-/// first one, REDUNDANT the second.
+/// Both ends of a cable, the first nearer to MAIN as far as known. `None` is an interface: MAIN as the first, REDUNDANT
+/// as the second end.
 pub type Ends = (Option<PortOf>, Option<PortOf>);
 
-/// Whether neighbours in a ring are an assumption: where somebody is or may be crossed, and in an open ring with
+/// Whether neighbours in a ring are an assumption: where SubDevices are or may be crossed, and in an open ring with
 /// branches.
 pub fn are_doubtful(topology: &Topology) -> bool {
     let odd = |finding: &Finding| matches!(finding, Finding::CrossedLine { .. } | Finding::Inconsistent { .. });
@@ -22,9 +22,9 @@ pub fn are_doubtful(topology: &Topology) -> bool {
         || (was_open && (topology.nodes.iter().any(branches) || topology.open_ports.iter().any(|at| at.port > 1)))
 }
 
-/// The ends of the cable at which a ring is open, from the ports of all SubDevices now. `counts` is how many of them
-/// live on each link now. Both ends have to be seen, and everybody: the neighbours of one without power are not the
-/// ends of one cable.
+/// The ends of the cable at which a ring is open, from the current ports of all SubDevices. `counts` are the current
+/// numbers of SubDevices on each link. Both ends and all SubDevices must be visible: the neighbours of a SubDevice
+/// without power are not the ends of one cable.
 pub fn ends_of_break(topology: &Topology, dl_status: &[Option<DlStatus>], counts: [u16; 2]) -> Option<Ends> {
     if dl_status.contains(&None) || dl_status.len() != topology.nodes.len() {
         return None;
@@ -36,13 +36,13 @@ pub fn ends_of_break(topology: &Topology, dl_status: &[Option<DlStatus>], counts
         (&[end], [0, _]) => Some((None, Some(end))),
         (&[end], [_, 0]) => Some((Some(end), None)),
         (&[near, far], _) if near.node != far.node => Some((Some(near), Some(far))),
-        // It was open there when it was looked at.
+        // It was already open there at the last look.
         (&[], [main, _]) if usize::from(main) == topology.main_count => seam(topology, dl_status),
         _ => None,
     }
 }
 
-/// Ports that led somewhere when the segment was looked at, those of rings behind junctions left out.
+/// Ports that were connected at the last look, those of rings behind junctions left out.
 fn seen(topology: &Topology) -> Vec<PortOf> {
     let mut seen = topology.open_ports.clone();
     for (node, it) in topology.nodes.iter().enumerate() {
@@ -57,7 +57,7 @@ fn seen(topology: &Topology) -> Vec<PortOf> {
     seen
 }
 
-/// The ends of the cable that was broken already when the segment was looked at, as far as they are certain.
+/// The ends of a cable that was already broken at the last look, as far as certain.
 pub fn seam(topology: &Topology, dl_status: &[Option<DlStatus>]) -> Option<Ends> {
     let is_down = |at: &PortOf| {
         let status = dl_status.get(at.node).copied().flatten();

@@ -1,11 +1,11 @@
-//! What can be odd about the cabling.
+//! Possible findings about the cabling.
 
 use core::fmt;
 
-/// Something odd about the cabling.
+/// A finding about the cabling.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Finding {
-    /// Nothing is plugged into port 0: frames pass at most one such SubDevice (protocol 2.4).
+    /// Port 0 is not connected: frames pass at most one such SubDevice (protocol 2.4).
     UnconnectedPort0 {
         /// Position of the SubDevice.
         node: usize,
@@ -17,28 +17,28 @@ pub enum Finding {
         /// Port at which they enter.
         entry_port: u8,
     },
-    /// A port is held open without a link: frames get lost there.
+    /// A port is forced open without a link: frames are lost there.
     ForcedOpen {
         /// Position of the SubDevice.
         node: usize,
         /// The port.
         port: u8,
     },
-    /// A port is kept closed though there is communication on it: forced, or auto-close and not opened again.
+    /// A port is closed though there is communication on it: forced closed, or auto-close and not opened again.
     ClosedWithLink {
         /// Position of the SubDevice.
         node: usize,
         /// The port.
         port: u8,
     },
-    /// A physical link, but no communication.
+    /// A physical link without communication.
     LinkWithoutCommunication {
         /// Position of the SubDevice.
         node: usize,
         /// The port.
         port: u8,
     },
-    /// What it reports does not fit the others; it stands in the tree without a parent or with ports left over.
+    /// Its status is inconsistent with the others; it is in the tree without a parent or with ports left over.
     Inconsistent {
         /// Position of the SubDevice.
         node: usize,

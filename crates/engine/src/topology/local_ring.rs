@@ -1,17 +1,18 @@
-//! Rings behind a junction (protocol 9.4): how they lie in the tree, and which cables they have.
+//! Rings behind a junction (protocol 9.4): their place in the tree, and their cables.
 //!
 //! A local ring leaves its junction through one port, passes its members, and comes back through a later one; frames
-//! meet the members in the same order whether it is whole or broken at one place. So the tree has it as a branch on the
-//! port where it begins, with the two ports of the closing cable left out: whole and broken, it reads the same.
+//! pass the members in the same order whether it is closed or broken at one place. So the tree contains it as a branch
+//! on the port where it begins, without the two ports of the closing cable: the same tree for a closed and a broken
+//! ring.
 
 use alloc::vec::Vec;
 
 use super::port::PortOf;
 
-/// The cable through which a local ring comes back to its junction.
+/// The cable through which a local ring returns to its junction.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub struct Closing {
-    /// The junction, and the port at which frames come back.
+    /// The junction, and its port at which frames return.
     pub head: PortOf,
     /// The last SubDevice of the ring, and the port through which they leave it.
     pub tail: PortOf,
@@ -20,7 +21,7 @@ pub struct Closing {
 /// A cable of a local ring.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct RingCable {
-    /// The port from which frames come. `None` where it is not known: the ring was broken there when it was looked at.
+    /// The port from which frames come. `None` where unknown: the ring was broken there at the last look.
     pub near: Option<PortOf>,
     /// The port that they reach.
     pub far: PortOf,
@@ -29,10 +30,10 @@ pub struct RingCable {
 /// A ring behind a junction.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct LocalRing {
-    /// Where it closes.
+    /// Its closing cable.
     pub closing: Closing,
-    /// Its cables in the order in which frames run, the closing one last. From the break on where it was broken when it
-    /// was looked at.
+    /// Its cables in the order of travel, the closing one last. Where it was broken at the last look, only those from
+    /// the break on.
     pub cables: Vec<RingCable>,
 }
 

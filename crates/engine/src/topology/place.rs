@@ -1,8 +1,8 @@
-//! Follows the walk of a frame through the segment and hangs each SubDevice where the walk must have met it.
+//! Follows the path of a frame through the segment and attaches each SubDevice where the frame must have reached it.
 //!
-//! A SubDevice entered at port 0 is met before what hangs on its ports 3, 1, 2. One that is entered elsewhere is met
-//! only when the frame is about to leave it through port 0 or has come back there (protocol 2.1): what hangs on its
-//! ports before that was met earlier and is taken over ([`Walk::take_over`]).
+//! A SubDevice entered at port 0 is passed before those on its ports 3, 1, 2. One entered at another port is passed
+//! only when the frame is about to leave it through port 0 or has come back there (protocol 2.1): SubDevices on its
+//! ports before that were passed earlier and are taken over ([`Walk::take_over`]).
 
 use alloc::vec;
 use alloc::vec::Vec;
@@ -14,30 +14,30 @@ use super::port::PortOf;
 use super::rings::Rings;
 use super::tree::{Node, NodeStatus, Topology};
 
-/// Order in which a frame passes the ports (protocol 2.1). The processing unit is behind port 0.
+/// Order in which a frame passes the ports (protocol 2.1). The processing unit follows port 0.
 pub(super) const TRAVEL: [u8; 4] = [0, 3, 1, 2];
 
-/// Where the next SubDevice may hang: a port of another one, or (`None`) the link.
+/// Possible place of the next SubDevice: a port of another one, or (`None`) the link.
 pub(super) type Slot = Option<PortOf>;
 
-/// A SubDevice that was hung somewhere.
+/// An attached SubDevice.
 struct Placed {
     node: usize,
     slot: Slot,
-    /// Open slots when it was hung: once there are no more than these, all behind it has been met.
+    /// Number of open slots when it was attached: with no more than these, all SubDevices behind it have been passed.
     level: usize,
 }
 
-/// The walk so far.
+/// State of the walk.
 pub(super) struct Walk<'s> {
     status: &'s [NodeStatus],
     rings: &'s Rings,
     pub(super) trust_times: bool,
     pub(super) nodes: Vec<Node>,
-    /// Slots that the frame will still come to, the next one last.
+    /// Slots that the frame will still reach, the next one last.
     pub(super) slots: Vec<Slot>,
     placed: Vec<Placed>,
-    /// Where in `placed` each SubDevice is.
+    /// Index of each SubDevice in `placed`.
     placed_at: Vec<usize>,
     /// Ports that are open but lead to no SubDevice.
     pub(super) open_ports: Vec<PortOf>,
@@ -46,8 +46,8 @@ pub(super) struct Walk<'s> {
 
 /// See [`Topology::build`].
 pub(super) fn build(status: &[NodeStatus], main_count: usize, rings: &Rings) -> Topology {
-    // In a closed ring frames come in from both sides, and the earlier one need not be that which the processing unit
-    // meets: receive times say nothing about crossed lines (LC-02). A closed ring leaves a slot over.
+    // In a closed ring frames come in from both sides, and the earlier one need not be the one that the processing unit
+    // processes: receive times say nothing about crossed lines (LC-02). A closed ring leaves one slot over.
     let mut walk = Walk::along_main(status, rings, main_count, false);
     if walk.slots.is_empty() {
         walk = Walk::along_main(status, rings, main_count, true);
@@ -68,8 +68,8 @@ pub(super) fn build(status: &[NodeStatus], main_count: usize, rings: &Rings) -> 
             Some(head)
         }
         (None, None) => {
-            // A closed ring: the frame of the main link left through the next slot; what comes behind it, frames of
-            // the redundant link meet. Where the main link met nobody, the other one is all there is.
+            // A closed ring: the frame of the main link left through the next slot; SubDevices behind it are passed by
+            // frames of the redundant link. Where the main link reached none, the redundant link has all of them.
             if !rest.is_empty() && walk.slots.last() != Some(&None) {
                 walk.leave();
             }
@@ -94,7 +94,7 @@ pub(super) fn build(status: &[NodeStatus], main_count: usize, rings: &Rings) -> 
 }
 
 impl<'s> Walk<'s> {
-    /// Hangs those that the frames of the main link met.
+    /// Attaches the SubDevices on the main link.
     fn along_main(status: &'s [NodeStatus], rings: &'s Rings, main_count: usize, trust_times: bool) -> Walk<'s> {
         let mut walk = Walk {
             status,
@@ -111,19 +111,18 @@ impl<'s> Walk<'s> {
         walk
     }
 
-    /// Whether frames pass a port. Those of closing cables are left out of the tree.
+    /// Whether frames pass a port. Ports of closing cables are left out of the tree.
     pub(super) fn is_open(&self, node: usize, port: u8) -> bool {
         let state = self.status[node].dl_status.ports[usize::from(port)];
         self.exists(node, port) && state.communication && !state.loop_closed && !self.rings.closes(node, port)
     }
 
-    /// Whether it is a member of a broken local ring with nothing on its port 0.
+    /// Whether it is a member of a broken local ring with port 0 unconnected.
     pub(super) fn is_orphan(&self, node: usize) -> bool {
         self.rings.orphans.contains(&node)
     }
 
-    /// Where a stub ends that goes the usual way from port to port: at the one SubDevice with a single port that leads
-    /// on.
+    /// End of a stub that takes the usual way from port to port: the only SubDevice with a single continuing port.
     pub(super) fn loose_end(&self, stub: core::ops::Range<usize>) -> Option<PortOf> {
         let mut end = None;
         for node in stub {
@@ -138,9 +137,9 @@ impl<'s> Walk<'s> {
         end.filter(|at| self.exists(at.node, at.port))
     }
 
-    /// Where a stub ends: at the end of its usual way, or at a port without a link that this has passed, where what was
-    /// taken for the line is a branch, as the terminals of a coupler are. Cables join ports of one kind, and `towards`
-    /// is that of the other end. `None` where several ports may be it.
+    /// End of a stub: the end of its usual way, or a port without a link that this has passed, where the assumed line
+    /// is a branch, like the terminals of a coupler. Cables join ports of one kind, and `towards` is that of the other
+    /// end. `None` where several ports are possible.
     pub(super) fn certain_end(&self, stub: core::ops::Range<usize>, towards: PortKind) -> Option<PortOf> {
         let is_loose = |at: &PortOf| self.exists(at.node, at.port) && !self.is_open(at.node, at.port);
         let ports = |node: usize| (0..4).map(move |port| PortOf { node, port });
@@ -148,7 +147,7 @@ impl<'s> Walk<'s> {
         let usual = self.loose_end(stub.clone());
         let of_others = || stub.clone().filter(|node| usual.is_none_or(|end| end.node != *node)).flat_map(ports);
         if !self.joins_like_kinds() || (usual.is_some() && !of_others().any(|at| is_loose(&at))) {
-            // Kinds say nothing, or there is no choice but that of the last one's ports.
+            // Kinds give no information, or only the ports of the last one are possible.
             return usual;
         }
         let own = usual.and_then(|end| [end].into_iter().chain(ports(end.node).filter(is_loose)).find(fits));
@@ -160,7 +159,7 @@ impl<'s> Walk<'s> {
         }
     }
 
-    /// Whether all cables that are known join ports of one kind, as real ones do.
+    /// Whether all known cables join ports of one kind, as real ones do.
     fn joins_like_kinds(&self) -> bool {
         let kind_above =
             |node: &Node| node.parent.map_or(PortKind::Mii, |(node, port)| self.kind(PortOf { node, port }));
@@ -172,7 +171,7 @@ impl<'s> Walk<'s> {
         self.status[at.node].ports[usize::from(at.port & 3)]
     }
 
-    /// Whether the controller has the port. One that claims to have none is not believed.
+    /// Whether the controller has the port. A controller that claims to have none is not believed.
     fn exists(&self, node: usize, port: u8) -> bool {
         let kinds = &self.status[node].ports;
         kinds[usize::from(port)] != PortKind::NotImplemented || *kinds == [PortKind::NotImplemented; 4]
@@ -184,7 +183,7 @@ impl<'s> Walk<'s> {
         (1..4).map(move |step| TRAVEL[(at + step) % 4]).filter(move |port| self.is_open(node, *port))
     }
 
-    /// The open port at which the frame came in first by its receive times (LC-05); `None` where they do not say.
+    /// The open port at which the frame came in first by its receive times (LC-05); `None` where they do not show it.
     pub(super) fn earliest(&self, node: usize) -> Option<u8> {
         let trusted = self.trust_times && !self.rings.untimed[node];
         let times = self.status[node].receive_times.filter(|_| trusted)?;
@@ -200,7 +199,7 @@ impl<'s> Walk<'s> {
         (0..4).filter(|port| self.is_open(node, *port)).map(|port| times[usize::from(port)].wrapping_sub(first)).max()
     }
 
-    /// Hangs the SubDevice that the frame met next.
+    /// Attaches the SubDevice that the frame passed next.
     pub(super) fn place(&mut self, node: usize) {
         if self.is_orphan(node) {
             return self.orphan(node);
@@ -218,7 +217,7 @@ impl<'s> Walk<'s> {
             self.expect_children(node, entry);
             return;
         }
-        // Nowhere to hang it: only a SubDevice that was passed before it was met can come here.
+        // No place left: only a SubDevice that was entered before its processing unit was passed can be here.
         let swapped = (1..4).rev().find(|port| self.is_open(node, *port));
         if !swapped.is_some_and(|entry| self.is_open(node, 0) && self.take_over(node, entry)) {
             self.findings.push(Finding::Inconsistent { node });
@@ -233,14 +232,14 @@ impl<'s> Walk<'s> {
             if self.is_open(node, 0) {
                 return 0;
             }
-            // With the last one on the way nothing was met before the SubDevice itself.
+            // With only the last port on the way, no SubDevice was passed before this one.
             TRAVEL.into_iter().rev().find(|port| self.is_open(node, *port)).unwrap_or(0)
         };
         self.earliest(node).unwrap_or_else(by_ports)
     }
 
-    /// Hangs a SubDevice that is entered at another port than 0 above those that the frame met on its way through it.
-    /// False where there are none: then it is not so.
+    /// Attaches a SubDevice that is entered at another port than 0 above those that the frame passed on its way through
+    /// it. False where there are none: then it is not entered there.
     fn take_over(&mut self, node: usize, entry: u8) -> bool {
         let passed: Vec<u8> = self.passed_before(node, entry);
         let mut taken = Vec::new();
@@ -269,7 +268,7 @@ impl<'s> Walk<'s> {
         true
     }
 
-    /// Open ports that a frame coming in at `entry` passes before it meets the processing unit.
+    /// Open ports that a frame entering at `entry` passes before the processing unit.
     fn passed_before(&self, node: usize, entry: u8) -> Vec<u8> {
         if entry == 0 {
             return Vec::new();
@@ -279,8 +278,8 @@ impl<'s> Walk<'s> {
         to_unit.filter(|port| self.is_open(node, *port)).collect()
     }
 
-    /// The smallest tree behind which nothing is missing, or, with the time that the frame spent behind the SubDevice
-    /// that is to take it over, the largest that fits.
+    /// The smallest complete tree; or, with the time that the frame spent behind the SubDevice that takes it over, the
+    /// largest that fits.
     fn last_complete(&self, span: Option<u32>) -> Option<usize> {
         let complete = |at: usize| self.placed.get(at).filter(|placed| self.slots.len() <= placed.level);
         let mut at = self.placed.len().checked_sub(1)?;
@@ -299,7 +298,7 @@ impl<'s> Walk<'s> {
         Some(at)
     }
 
-    /// Takes a tree off its slot, which is free again.
+    /// Detaches a tree from its slot, which is free again.
     fn unhang(&mut self, at: usize) -> usize {
         let Placed { node, slot, .. } = self.placed[at];
         self.placed.truncate(at);
@@ -310,7 +309,7 @@ impl<'s> Walk<'s> {
         node
     }
 
-    /// Hangs a SubDevice into a slot that was popped.
+    /// Attaches a SubDevice to a slot that was popped.
     pub(super) fn hang(&mut self, node: usize, slot: Slot, entry_port: u8) {
         self.nodes[node].entry_port = entry_port;
         if let Some(parent) = slot {
@@ -325,7 +324,7 @@ impl<'s> Walk<'s> {
         self.nodes[parent.node].children[usize::from(parent.port)] = Some(child);
     }
 
-    /// Slots for what hangs on the ports that the frame passes after it met the SubDevice.
+    /// Slots for the ports that the frame passes after the SubDevice's processing unit.
     pub(super) fn expect_children(&mut self, node: usize, entry: u8) {
         let passed = self.passed_before(node, entry);
         let after: Vec<u8> = self.open_after(node, entry).filter(|port| !passed.contains(port)).collect();
@@ -337,7 +336,7 @@ impl<'s> Walk<'s> {
         self.open_ports.extend(self.slots.pop().flatten());
     }
 
-    /// The walk is over: slots that it still expected lead to no SubDevice.
+    /// The walk is over: the remaining slots lead to no SubDevice.
     pub(super) fn close(&mut self) {
         while !self.slots.is_empty() {
             self.leave();
@@ -361,7 +360,7 @@ impl<'s> Walk<'s> {
         }
     }
 
-    /// Hangs a member of a broken ring that has nothing on its port 0 nowhere, as if it were entered there.
+    /// Leaves a member of a broken ring with an unconnected port 0 unattached, as if it were entered there.
     pub(super) fn orphan(&mut self, node: usize) {
         self.hang(node, None, 0);
         self.expect_children(node, 0);

@@ -17,7 +17,7 @@ impl fmt::Display for PortOf {
     }
 }
 
-/// A cable or neighbourhood of two SubDevices.
+/// A connection between two SubDevices.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct Connection {
     /// The side nearer to the main link.

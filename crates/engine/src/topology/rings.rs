@@ -1,4 +1,4 @@
-//! Local rings while a tree is built, and afterwards: their members, and which cables they have in it.
+//! Local rings during and after the construction of a tree: their members, and their cables in it.
 
 use alloc::vec::Vec;
 
@@ -6,18 +6,18 @@ use super::local_ring::{Closing, LocalRing, RingCable};
 use super::port::PortOf;
 use super::tree::{NodeStatus, Topology};
 
-/// The local rings among the SubDevices that frames meet in this order.
+/// The local rings among the SubDevices, in the order in which frames pass them.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Rings {
     closings: Vec<Closing>,
-    /// Members of broken rings that have nothing on their port 0.
+    /// Members of broken rings with port 0 unconnected.
     pub(super) orphans: Vec<usize>,
-    /// SubDevices whose receive times say nothing about their place: some port never receives, or frames pass twice.
+    /// SubDevices whose receive times do not show their place: some port never receives, or frames pass twice.
     pub(super) untimed: Vec<bool>,
 }
 
 impl Rings {
-    /// Rings that close like this. A broken one is that which holds a SubDevice with nothing on its port 0.
+    /// Rings with these closing cables. A ring is broken if it has a SubDevice with port 0 unconnected.
     pub(super) fn new(status: &[NodeStatus], closings: &[Closing]) -> Rings {
         let count = status.len();
         let fits = |closing: &&Closing| closing.head.node < closing.tail.node && closing.tail.node < count;
@@ -52,20 +52,20 @@ impl Rings {
     }
 }
 
-/// Nothing leads to its port 0, though frames reach it.
+/// Port 0 is unconnected, though frames reach the SubDevice.
 pub(super) fn unconnected(status: &NodeStatus) -> bool {
     let port = status.dl_status.ports[0];
     !port.communication || port.loop_closed
 }
 
 impl Topology {
-    /// Whether a SubDevice is a member of a local ring that is broken before it, from where is not known.
+    /// Whether a SubDevice is a member of a local ring that is broken before it, with an unknown other end.
     pub(crate) fn is_behind_unknown_cable(&self, node: usize) -> bool {
         let mut cables = self.local_rings.iter().flat_map(|ring| &ring.cables);
         cables.any(|cable| cable.near.is_none() && cable.far.node == node)
     }
 
-    /// Hangs a member of a broken local ring where the cable begins that is broken: as it hangs when the ring is whole.
+    /// Attaches a member of a broken local ring where the broken cable begins: its place in the closed ring.
     pub fn hang_behind_break(&mut self, near: PortOf, node: usize) {
         let port = usize::from(near.port & 3);
         let is_free = self.nodes.get(near.node).is_some_and(|parent| parent.children[port].is_none());

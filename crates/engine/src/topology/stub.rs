@@ -1,8 +1,8 @@
 //! The SubDevices of the redundant link in a broken ring, as a tree that is oriented like the intact ring.
 //!
-//! Frames of the redundant link run up the trunk from the link to the break without meeting a processing unit, pass the
-//! branches that lie behind the trunk's ports on that way, and meet the units of the trunk on the way back, the one
-//! next to the break first (protocol 2.9). So branches come before the head in the order, and the rest behind it.
+//! Frames of the redundant link run up the trunk from the link to the break without passing a processing unit, pass the
+//! branches behind the trunk's ports on that way, and pass the units of the trunk on the way back, the one next to the
+//! break first (protocol 2.9). So branches come before the head in the order, and the rest after it.
 
 use alloc::vec::Vec;
 use core::ops::Range;
@@ -11,7 +11,7 @@ use super::place::{Slot, TRAVEL, Walk};
 use super::{Finding, PortOf};
 
 impl Walk<'_> {
-    /// Hangs the SubDevices of the redundant link; `head` is the one with nothing on its port 0.
+    /// Attaches the SubDevices of the redundant link; `head` is the one with port 0 unconnected.
     pub(super) fn stub(&mut self, range: Range<usize>, head: usize) {
         let mut branches = Vec::new();
         for node in range.start..head {
@@ -34,13 +34,13 @@ impl Walk<'_> {
         }
     }
 
-    /// Hangs a SubDevice of the trunk and says through which port the trunk goes on towards the link: the one at which
-    /// frames of the redundant link come in. Branches on ports behind it were met before.
+    /// Attaches a SubDevice of the trunk and returns the port through which the trunk continues towards the link: the
+    /// one at which frames of the redundant link come in. Branches on ports behind it were passed before.
     fn trunk(&mut self, node: usize, slot: Slot, branches: &mut Vec<usize>, trunk: &mut Slot) {
         self.hang(node, slot, 0);
         let ports: Vec<u8> = TRAVEL[1..].iter().copied().filter(|port| self.is_open(node, *port)).collect();
         let by_time = self.earliest(node).and_then(|entry| ports.iter().position(|port| *port == entry));
-        // Without receive times the branches that were met before belong as near to the break as they fit.
+        // Without receive times the branches that were passed before are placed as near to the break as they fit.
         let by_ports = || ports.len().checked_sub(1 + branches.len().min(ports.len().saturating_sub(1)));
         let Some(on) = by_time.or_else(by_ports) else {
             *trunk = None;
@@ -61,16 +61,17 @@ impl Walk<'_> {
 /// A SubDevice of a plain stub, from the break on.
 pub(super) struct Link {
     pub(super) node: usize,
-    /// It is plugged in the wrong way round.
+    /// It is crossed: IN and OUT are swapped.
     crossed: bool,
 }
 
-/// Stubs without branches in which SubDevices are crossed. Frames of the redundant link meet those on their way to the
-/// break, and the others on their way back. So where the last one is in the order tells of all who is crossed; how both
-/// kinds follow each other, only receive times do.
+/// Stubs without branches that contain crossed SubDevices. Frames of the redundant link pass these on their way to the
+/// break, and the others on their way back. So the place of the last one in the order shows the number of crossed ones;
+/// only receive times show how both kinds alternate.
 impl Walk<'_> {
     /// The SubDevices of the redundant link, from the break on, where the ring is open, has no branches, and some of
-    /// them are crossed. Not where all are and nobody else is there: that is a line on the redundant link.
+    /// them are crossed. Not where all SubDevices are crossed and there are no others: that is a line on the redundant
+    /// link.
     pub(super) fn crossed_stub(&mut self, main_count: usize) -> Option<Vec<Link>> {
         let rest = main_count..self.nodes.len();
         if main_count > 0 {
@@ -78,7 +79,7 @@ impl Walk<'_> {
         }
         let PortOf { node: end, port } = self.loose_end(rest.clone())?;
         let crossed = port != 0;
-        // Those that were met before the last one; it itself where nothing is plugged in behind it.
+        // Those that were passed before the last one; including it where nothing is plugged in behind it.
         let met_first = rest.start..end + usize::from(crossed);
         if met_first.is_empty() || (main_count == 0 && met_first == rest) {
             return None;
@@ -98,7 +99,7 @@ impl Walk<'_> {
         Some(chain)
     }
 
-    /// Hangs the SubDevices of the redundant link one behind the other.
+    /// Attaches the SubDevices of the redundant link in a row.
     pub(super) fn chain(&mut self, chain: &[Link]) {
         let mut slot = None;
         for link in chain {

@@ -96,7 +96,7 @@ fn a_junction_has_its_branches_in_the_order_3_1_2() {
 
 #[test]
 fn a_branch_on_port_2_of_a_closed_ring_is_met_by_the_redundant_link() {
-    // Protocol 2.9: S5 on port 2 of S2; the main copy meets 1 2 3 4 and leaves at S4 port 1, the other one meets S5.
+    // Protocol 2.9: S5 on port 2 of S2; the main copy visits 1 2 3 4 and leaves at S4 port 1, the other one visits S5.
     let nodes = [status(PASS), status(0x6A), status(PASS), status(PASS), status(END)];
     let topology = Topology::build(&nodes, 4);
     assert_eq!(parents(&topology), [None, Some((0, 1)), Some((1, 1)), Some((2, 1)), Some((1, 2))]);
@@ -279,7 +279,7 @@ proptest! {
         let seen = segment.walk();
         prop_assert_eq!(seen.main_count, cut);
         let mut status = seen.status(times);
-        // With more ports several could be where a stub ends.
+        // With more ports, several could be the end of a stub.
         let two = [PortKind::Mii, PortKind::Mii, PortKind::NotImplemented, PortKind::NotImplemented];
         status.iter_mut().for_each(|status| status.ports = two);
         let topology = Topology::build(&status, cut);

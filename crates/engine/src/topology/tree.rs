@@ -1,4 +1,4 @@
-//! The tree of a segment: which SubDevice hangs on which port of which other one, and what can be asked of that.
+//! The tree of a segment: which port connects each SubDevice to which other one, and queries on it.
 
 use alloc::vec::Vec;
 
@@ -9,7 +9,7 @@ use super::local_ring::LocalRing;
 use super::port::{Connection, PortOf};
 use crate::info::SubDeviceInfo;
 
-/// What a SubDevice reported about its ports.
+/// Port registers of a SubDevice.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct NodeStatus {
     /// Register DL_STATUS.
@@ -29,7 +29,7 @@ impl From<&SubDeviceInfo> for NodeStatus {
 /// A SubDevice in the tree.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Node {
-    /// SubDevice and port on which it hangs; `None` for the first one of a link.
+    /// SubDevice and port to which it is connected; `None` for the first one of a link.
     pub parent: Option<(usize, u8)>,
     /// Its own port towards the parent or the link.
     pub entry_port: u8,
@@ -42,26 +42,26 @@ pub struct Node {
 pub struct Topology {
     /// SubDevices by position.
     pub nodes: Vec<Node>,
-    /// SubDevices in front, met by the frames of the main link.
+    /// Number of SubDevices on the main link.
     pub main_count: usize,
     /// Head of the tree on the redundant link, next to the break; `None` in a closed ring or without a second link.
     pub redundant_head: Option<usize>,
-    /// Where the SubDevices of the main link end in an open ring, or all of them where only the redundant link meets
-    /// any and enters each at port 0. Not where branches leave several ports that a cable of the ring could be missing
-    /// from.
+    /// End of the main link's SubDevices in an open ring, or of all of them where only the redundant link reaches any
+    /// and enters each at port 0. `None` where branches leave several ports at which a cable of the ring could be
+    /// missing.
     pub main_end: Option<PortOf>,
     /// Ports that are open but lead to no SubDevice: the redundant link, or a device that is no SubDevice. In the order
     /// in which frames of the main link, then of the redundant link, pass them.
     pub open_ports: Vec<PortOf>,
-    /// What is odd, by position.
+    /// Findings, by position.
     pub findings: Vec<Finding>,
     /// Rings behind a junction, as far as they are known.
     pub local_rings: Vec<LocalRing>,
 }
 
 impl Topology {
-    /// Whether neighbours are an assumption: frames of both links meet SubDevices though no break separates them. Who
-    /// of them is crossed, or hangs on a port 2, does not show as long as the ring is closed (LC-02).
+    /// Whether neighbours are an assumption: frames of both links reach SubDevices though no break separates them.
+    /// Which of them are crossed, or connected to a port 2, cannot be seen as long as the ring is closed (LC-02).
     pub fn is_assumed(&self) -> bool {
         self.redundant_head.is_none() && self.main_count < self.nodes.len()
     }

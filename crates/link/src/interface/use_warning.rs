@@ -1,4 +1,4 @@
-//! Who else uses an interface that EtherCAT wants for itself.
+//! Other users of an interface that EtherCAT needs exclusively.
 //!
 //! In goes a name, out come [`UseWarning`]s whose text says what to do. Each is a warning: a machine may be set up so
 //! on purpose, and a test bench often is.
@@ -97,7 +97,7 @@ impl fmt::Display for UseWarning {
     }
 }
 
-/// Who else uses this interface. Nothing about an interface that is not there.
+/// Other users of this interface. Empty for an interface that does not exist.
 pub fn exclusive_use(name: &str) -> Vec<UseWarning> {
     let Some(interface) = super::list().into_iter().find(|interface| interface.name == name) else {
         return Vec::new();
@@ -128,7 +128,7 @@ fn addresses(name: &str) -> Vec<IpAddr> {
     }
     let mut at = list;
     while !at.is_null() {
-        // SAFETY: an entry of the list that getifaddrs returned and nobody has freed yet.
+        // SAFETY: an entry of the list that getifaddrs returned and that is not freed yet.
         let entry = unsafe { &*at };
         // SAFETY: names in the list are strings with their end.
         if unsafe { CStr::from_ptr(entry.ifa_name) }.to_bytes() == name.as_bytes() {

@@ -66,7 +66,7 @@ pub struct Consumer {
     read: u64,
 }
 
-/// A queue of `bytes`, rounded up to a power of two, for frames of so many interfaces.
+/// A queue of `bytes`, rounded up to a power of two, for frames of this number of interfaces.
 pub fn queue(bytes: usize, interfaces: usize) -> (Producer, Consumer) {
     let words = bytes.div_ceil(WORD).clamp(2 * HEAD, 1 << 28).next_power_of_two();
     let shared = Arc::new(Shared {

@@ -162,7 +162,7 @@ fn a_capture_is_complete_when_its_recorder_is_dropped() {
     drop(recorder);
     let kinds: Vec<u32> = blocks(&scratch.0).iter().map(|(kind, _)| *kind).collect();
     assert_eq!(kinds, [0x0A0D_0D0A, 1, 6, 5]);
-    // Nobody writes any more, and nobody is stopped by that.
+    // The writer has ended, and no producer is blocked by that.
     tap.record(0, Direction::In, 0, &[1; 60]);
 }
 

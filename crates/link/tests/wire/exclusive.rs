@@ -1,4 +1,4 @@
-//! Who else uses an interface.
+//! Other users of an interface.
 
 use std::io::{BufRead, BufReader, Read};
 use std::process::Stdio;

@@ -36,7 +36,7 @@ fn a_tap_interface_has_its_name_address_and_carrier_and_passes_frames_both_ways(
         assert!(tap.set_carrier(true));
         assert_eq!(found().map(|found| found.carrier), Some(true));
         bench.near.ip(&["addr", "add", "192.0.2.1/24", "dev", "eoe0s7"]);
-        // A request for an address of nobody: the host asks who has it.
+        // A request for an unused address: the host sends an ARP request.
         let socket = std::net::UdpSocket::bind("192.0.2.1:0").expect("the address is there");
         socket.send_to(b"x", "192.0.2.9:9").expect("it is queued");
         let mut room = [0; 2048];

@@ -1,13 +1,13 @@
-//! What a message in the mailbox leads to: protocol servers say it, the mailbox sends it.
+//! Result of a mailbox message: a protocol server gives it, the mailbox sends it.
 
-/// What a message leads to.
+/// Result of a message.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Answer {
     /// Answers of the same protocol, one message each.
     Payloads(Vec<Vec<u8>>),
     /// An error reply of the mailbox with this detail.
     Error(u16),
-    /// Nothing.
+    /// No answer.
     Silence,
 }
 

@@ -1,8 +1,7 @@
 //! The AoE server of a device: a memory, the dictionary by ADS, states (protocol 6.7).
 //!
-//! In: the payload of an AoE message, the dictionary. Out: the answer. Index group [`MEMORY`] is a memory of
-//! [`MEMORY_BYTES`] bytes, group 0xF302 the object dictionary. Ports that the device does not have are told in the
-//! header.
+//! Input: the payload of an AoE message, the dictionary. Output: the answer. Index group [`MEMORY`] is a memory of
+//! [`MEMORY_BYTES`] bytes, group 0xF302 the object dictionary. The header of the answer reports a missing port.
 
 use ringcat_wire::al::AlState;
 use ringcat_wire::mailbox::aoe::{AdsErrorCode, AdsRequest, AdsResponse, AmsHeader, index_group};
@@ -23,7 +22,7 @@ const ADS_RUN: u16 = 5;
 const ADS_STOP: u16 = 6;
 const COMPLETE_ACCESS: u32 = 1 << 8;
 
-/// The server with what it remembers between two messages.
+/// The server with its state between messages.
 #[derive(Clone, Debug)]
 pub struct AoeServer {
     ports: Vec<u16>,
@@ -42,7 +41,7 @@ impl AoeServer {
         AoeServer { ports: description.ports.clone(), name, memory: vec![0; MEMORY_BYTES], ads_state: ADS_RUN }
     }
 
-    /// Serves one message. `room` is what the answer may have behind the mailbox header.
+    /// Serves one message. `room` is the largest length of the answer after the mailbox header.
     pub fn serve(&mut self, payload: &[u8], room: usize, state: AlState, dictionary: &mut Dictionary) -> Answer {
         let (header, data) = match AmsHeader::decode(payload) {
             Ok(message) => message,
@@ -199,7 +198,7 @@ fn read_response(bytes: &Result<Vec<u8>, AdsErrorCode>) -> AdsResponse<'_> {
     }
 }
 
-/// An answer whose header tells why there is no other.
+/// An answer with only an error in its header.
 fn refused(header: &AmsHeader, error: AdsErrorCode) -> Answer {
     Answer::payload(AmsHeader { error, ..header.response(0) }.encode().to_vec())
 }

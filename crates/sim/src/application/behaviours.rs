@@ -1,7 +1,7 @@
-//! Where the inputs of a device come from: a constant, its own outputs, a function of time and outputs, a drive.
+//! Sources of a device's inputs: a constant, its own outputs, a function of time and outputs, a drive.
 //!
-//! In: virtual time and the valid outputs (zero in the safe state). Out: the bytes of the inputs. Nothing here
-//! reads a clock or draws a number, so two runs with the same frames give the same inputs (protocol 11.4).
+//! Input: virtual time and the valid outputs (zero in the safe state). Output: the bytes of the inputs. No clock and no
+//! random number is used, so two runs with the same frames give the same inputs (protocol 11.4).
 
 use core::fmt;
 
@@ -10,10 +10,10 @@ use crate::time::SimTime;
 /// Computes inputs from the time and the outputs that are valid now.
 pub type InputFunction = fn(SimTime, outputs: &[u8], inputs: &mut [u8]);
 
-/// Where inputs come from. What is longer than the inputs is cut, what is shorter leaves zeros.
+/// Source of the inputs. Longer values are cut, shorter ones are filled with zeros.
 #[derive(Clone)]
 pub enum InputSource {
-    /// The same bytes until somebody sets others.
+    /// The same bytes until the test changes them.
     Constant(Vec<u8>),
     /// The device's own valid outputs.
     Outputs,
@@ -77,7 +77,7 @@ pub fn sawtooth_16(now: SimTime, _outputs: &[u8], inputs: &mut [u8]) {
     }
 }
 
-/// A bit pattern that counts up once per 10 ms. For digital inputs that shall move by themselves.
+/// A bit pattern that counts up once per 10 ms, for digital inputs that change by themselves.
 pub fn counter_10_ms(now: SimTime, _outputs: &[u8], inputs: &mut [u8]) {
     let count = (now.0 / 10_000_000).to_le_bytes();
     for (byte, value) in inputs.iter_mut().zip(count) {

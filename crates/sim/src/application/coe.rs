@@ -1,8 +1,8 @@
-//! The CoE server of a device (protocol 6.3): tells the services apart; `transfer` serves SDOs, `information` SDO
+//! The CoE server of a device (protocol 6.3): selects the service; `transfer` serves SDOs, `information` SDO
 //! information, `pdo` PDOs by mailbox.
 //!
-//! In: the payload of a CoE message, the dictionary, the process data (mapped objects show what is in it), the state.
-//! Out: the payloads of the answer. Emergencies are sent by whoever makes them; what is no request gets the mailbox
+//! Input: the payload of a CoE message, the dictionary, the process data (values of mapped objects), the state. Output:
+//! the payloads of the answer. Emergencies are sent by other modules; a message that is not a request gets the mailbox
 //! error "service not supported".
 
 mod information;
@@ -19,14 +19,14 @@ use transfer::Transfer;
 pub use super::dictionary::MAX_TRANSFER_BYTES;
 pub use objects::Objects;
 
-/// The server with what it remembers between two messages.
+/// The server with its state between messages.
 #[derive(Clone, Debug, Default)]
 pub struct CoeServer {
     transfer: Transfer,
 }
 
 impl CoeServer {
-    /// Serves one message. `room` is what each payload of the answer may have behind the mailbox header.
+    /// Serves one message. `room` is the largest payload of each answer after the mailbox header.
     pub fn serve(&mut self, payload: &[u8], room: usize, objects: &mut Objects<'_>) -> Answer {
         let Some(header) = payload.first_chunk() else {
             return Answer::Error(ErrorReply::SIZE_TOO_SHORT);

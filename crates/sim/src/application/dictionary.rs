@@ -1,10 +1,10 @@
 //! The object dictionary of a simulated SubDevice (protocol 6.3).
 //!
-//! In: the device's description, from which the standard objects, the PDO mappings (0x16xx, 0x1Axx), the PDO
-//! assignments (0x1C10 + SyncManager) and the mapped objects follow; reads and writes by index and sub index.
-//! Out: bytes or an abort code. What an entry is says `entry`, the diagnosis history is in `history`,
-//! synchronisation in `sync`. The SDO services around it are in [`coe`](super::coe), what the process data looks like
-//! with a given assignment in [`process_data`](super::process_data).
+//! Input: the device's description, from which the standard objects, the PDO mappings (0x16xx, 0x1Axx), the PDO
+//! assignments (0x1C10 + SyncManager) and the mapped objects follow; reads and writes by index and sub index. Output:
+//! bytes or an abort code. `entry` defines entries, `history` the diagnosis history, `sync` the synchronisation
+//! parameters. The SDO services are in [`coe`](super::coe), the process data of a given assignment in
+//! [`process_data`](super::process_data).
 
 mod diagnosis;
 mod entry;
@@ -38,7 +38,7 @@ pub struct Dictionary {
 }
 
 impl Dictionary {
-    /// The dictionary that follows from a description; it has PDO lists even where no CoE makes them visible.
+    /// The dictionary of a description; it has PDO lists even where no CoE makes them visible.
     pub fn new(description: &DeviceDescription) -> Dictionary {
         Dictionary { objects: objects::build(description), unacknowledged: 0, revision: 0 }
     }
@@ -53,7 +53,7 @@ impl Dictionary {
         self.objects.binary_search_by_key(&index, |object| object.index).ok().map(|place| &self.objects[place])
     }
 
-    /// As long as this stays the same, all values do.
+    /// Counts changes: equal counts mean equal values.
     pub const fn revision(&self) -> u32 {
         self.revision
     }
@@ -66,7 +66,7 @@ impl Dictionary {
         })
     }
 
-    /// An object that is about to change.
+    /// An object before a change.
     fn object_mut(&mut self, index: u16) -> Option<&mut Object> {
         self.revision = self.revision.wrapping_add(1);
         let place = self.objects.binary_search_by_key(&index, |object| object.index).ok()?;
@@ -156,7 +156,7 @@ impl Dictionary {
         }
     }
 
-    /// Whether so many bytes may be written to an entry by SDO in `state`, whatever they are.
+    /// Whether this number of bytes may be written to an entry by SDO in `state`, whatever their values.
     pub fn check_access(&self, index: u16, sub_index: u8, length: usize, state: AlState) -> Result<(), AbortCode> {
         let object = self.object(index).ok_or(AbortCode::OBJECT_DOES_NOT_EXIST)?;
         let entry = object.entry(sub_index).ok_or(AbortCode::SUB_INDEX_DOES_NOT_EXIST)?;
@@ -199,7 +199,7 @@ impl Dictionary {
         }
     }
 
-    /// Whether an entry may be mapped in this direction. One that says nothing about directions may in both.
+    /// Whether an entry may be mapped in this direction. Without a direction in its rights, it may be in both.
     fn check_mapped(&self, direction: PdoDirection, data: &[u8]) -> Result<(), AbortCode> {
         let mapped = MappedEntry::decode(data).ok_or(AbortCode::LENGTH_TOO_SHORT)?;
         if mapped.bit_length == 0 {

@@ -1,8 +1,7 @@
-//! The EoE server of a device: frames in fragments, an IP stack or a loop behind them, addresses (protocol 6.5).
+//! The EoE server of a device: frames in fragments, an IP stack or a loop behind them, IP parameters (protocol 6.5).
 //!
-//! In: the payload of an EoE message, virtual time. Out: the answer, and frames that the device sends of itself.
-//! [`reassembly`] puts fragments together, [`stack`] is an IP stack that answers ping and serves TCP. Time stamps are
-//! those of virtual time.
+//! Input: the payload of an EoE message, virtual time. Output: the answer, and frames of the device. [`reassembly`]
+//! joins fragments, [`stack`] is an IP stack that answers ping and serves TCP. Time stamps are in virtual time.
 
 mod addresses;
 pub mod frames;
@@ -24,12 +23,12 @@ use stack::Stack;
 
 pub use addresses::Addresses;
 
-/// Messages of the device's own that wait until the mailbox has room.
+/// Messages of the device that wait for room in the mailbox.
 const MAX_WAITING: usize = 64;
 /// Room of messages without a frame: the address filter is the longest.
 const MAX_OTHER: usize = 128;
 
-/// The server with what it remembers between two messages.
+/// The server with its state between messages.
 #[derive(Clone, Debug)]
 pub struct EoeServer {
     ip_support: bool,
@@ -42,7 +41,7 @@ pub struct EoeServer {
     waiting: VecDeque<Vec<u8>>,
 }
 
-/// What stands behind the fragments.
+/// Receiver of the frames.
 #[derive(Clone, Debug)]
 enum End {
     Stack(Box<Stack>),
@@ -79,17 +78,17 @@ impl EoeServer {
         }
     }
 
-    /// The addresses as they are set now.
+    /// The current addresses.
     pub const fn addresses(&self) -> &Addresses {
         &self.addresses
     }
 
-    /// The address filter as it is set now.
+    /// The current address filter.
     pub const fn filter(&self) -> &AddressFilter {
         &self.filter
     }
 
-    /// Serves one message. `room` is what each message to the MainDevice may have behind the mailbox header.
+    /// Serves one message. `room` is the largest length of each message to the MainDevice after the mailbox header.
     pub fn serve(&mut self, payload: &[u8], room: usize, now: SimTime) -> Answer {
         let message = match EoeMessage::decode(payload) {
             Ok(message) => message,
@@ -141,9 +140,9 @@ impl EoeServer {
         if payloads.is_empty() { Answer::Silence } else { Answer::Payloads(payloads) }
     }
 
-    /// Lets the stack do what is due; its frames wait for the mailbox.
+    /// Runs the due work of the stack; its frames wait for the mailbox.
     pub fn let_stack_work(&mut self, room: usize, now: SimTime) {
-        // A stack whose frames do not leave stops.
+        // A stack with blocked output stops.
         while self.waiting.len() < MAX_WAITING {
             let End::Stack(stack) = &mut self.end else {
                 return;
@@ -156,16 +155,16 @@ impl EoeServer {
         }
     }
 
-    /// When the stack has something to do of itself.
+    /// Next time at which the stack has work without input.
     pub fn next_deadline(&mut self, now: SimTime) -> Option<SimTime> {
         match &mut self.end {
-            // With frames that wait for the mailbox it is the mailbox that goes on.
+            // While frames wait for the mailbox, the mailbox determines the progress.
             End::Stack(stack) if self.waiting.is_empty() => stack.next_deadline(now),
             End::Stack(_) | End::Loop | End::Nothing => None,
         }
     }
 
-    /// A message of the device's own that waits for the mailbox.
+    /// A message of the device that waits for the mailbox.
     pub fn next_message(&mut self) -> Option<Vec<u8>> {
         self.waiting.pop_front()
     }

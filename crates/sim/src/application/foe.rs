@@ -1,9 +1,8 @@
 //! The FoE server of a device: files to be read and written, a boot loader for its firmware (protocol 6.4).
 //!
-//! In: the payload of a FoE message, the state, virtual time. Out: the answer. [`files`] keeps what was written over
-//! power cycles, [`firmware`] says what an image is. In BOOT only the firmware is served; it is written in no other
-//! state. Erasing the old one takes its time, during which the sender hears BUSY; a firmware that does not arrive whole
-//! leaves the device without one.
+//! Input: the payload of a FoE message, the state, virtual time. Output: the answer. [`files`] keeps written files over
+//! power cycles, [`firmware`] defines images. In BOOT only the firmware is served; it can be written in no other state.
+//! Erasing the old firmware takes time, with BUSY as answer; an incomplete firmware leaves the device without one.
 
 pub mod files;
 pub mod firmware;
@@ -18,27 +17,27 @@ use files::FileStore;
 
 /// Most text that an error carries.
 const MAX_TEXT: usize = 64;
-/// What BUSY counts up to.
+/// Total of the BUSY progress.
 const BUSY_ENTIRE: u16 = 100;
 
-/// What a transfer works on.
+/// Context of a transfer.
 #[derive(Debug)]
 pub struct Files<'a> {
     /// What the device says about itself.
     pub description: &'a FoeDescription,
-    /// What is kept.
+    /// Non-volatile files.
     pub store: &'a mut FileStore,
     /// The device is in BOOT.
     pub boot: bool,
-    /// Data bytes of each packet to the device but the last.
+    /// Data bytes of each packet to the device except the last.
     pub receive_data: usize,
-    /// Data bytes of each packet from the device but the last.
+    /// Data bytes of each packet from the device except the last.
     pub send_data: usize,
     /// The present time.
     pub now: SimTime,
 }
 
-/// The server with what it remembers between two messages.
+/// The server with its state between messages.
 #[derive(Clone, Debug, Default)]
 pub struct FoeServer {
     transfer: Option<Transfer>,
@@ -100,7 +99,7 @@ impl FoeServer {
         Ok(encode(&FoeMessage::Acknowledge { packet: 0 }))
     }
 
-    /// The packet of a file that is being read, once more or for the first time.
+    /// The packet of a file that is being read, first time or repeated.
     fn again(&self, files: &Files<'_>) -> Result<Answer, Failure> {
         let Some(Transfer::Read { data, packet }) = &self.transfer else {
             return Err(Failure(FoeErrorCode::ILLEGAL, "nothing is being read"));
@@ -169,7 +168,7 @@ impl Files<'_> {
     }
 }
 
-/// What holds for reading and writing.
+/// Common conditions of reading and writing.
 fn check(password: u32, name: &[u8], files: &Files<'_>) -> Result<(), Failure> {
     if name.is_empty() {
         return Err(Failure(FoeErrorCode::ILLEGAL, "no name"));
@@ -183,7 +182,7 @@ fn check(password: u32, name: &[u8], files: &Files<'_>) -> Result<(), Failure> {
     Ok(())
 }
 
-/// How far the erasing is.
+/// Progress of erasing.
 fn busy(until: SimTime, files: &Files<'_>) -> Answer {
     let left = until.since(files.now).as_nanos() * u128::from(BUSY_ENTIRE);
     let left = left.div_ceil(files.description.erase_time.as_nanos().max(1));

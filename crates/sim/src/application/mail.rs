@@ -1,7 +1,7 @@
-//! The application's mail: messages go to the servers, answers and news go out (protocol 6).
+//! The application's mail: passes messages to the servers, sends answers and unsolicited mail (protocol 6).
 //!
-//! In: AL events of the mailbox SyncManagers, the time, news of the device (emergencies, messages for the diagnosis
-//! history), faults. Out: what the MainDevice reads.
+//! Input: AL events of the mailbox SyncManagers, the time, emergencies and diagnosis messages of the device, faults.
+//! Output: mail that the MainDevice reads.
 
 use ringcat_wire::mailbox::Protocol;
 use ringcat_wire::mailbox::coe::{DiagnosisFlags, DiagnosisMessage, DiagnosisParameter, Emergency};
@@ -15,33 +15,33 @@ use crate::controller::Controller;
 use crate::description::DeviceDescription;
 use crate::time::SimTime;
 
-/// Error code of the emergency that tells of a new message in the diagnosis history: device specific.
+/// Error code of the emergency for a new message in the diagnosis history: device specific.
 const NEW_DIAGNOSIS: u16 = 0xFF00;
 /// Object 0x1001.
 const ERROR_REGISTER: u16 = 0x1001;
 /// Most bytes of a message in the diagnosis history.
 const MAX_DIAGNOSIS: usize = 256;
 
-/// Requests that a record keeps; later ones are not recorded.
+/// Capacity of a record; later requests are not recorded.
 const MAX_RECORDED: usize = 1 << 18;
 
 impl Application {
-    /// Begins to record the requests that are served; those that came before are forgotten. A restart ends nothing.
+    /// Starts to record served requests; earlier ones are dropped. A restart of the device does not end the record.
     pub fn record_mail(&mut self) {
         self.record = Some(Vec::new());
     }
 
-    /// Requests that were served since the record began, the oldest first.
+    /// Requests served since the record began, the oldest first.
     pub fn served_mail(&self) -> &[ServedMail] {
         self.record.as_deref().unwrap_or_default()
     }
 
-    /// Something goes wrong with the mail.
+    /// Sets a fault of the mail.
     pub fn disturb_mail(&mut self, fault: MailFault, now: SimTime) {
         self.faults.add(fault, now);
     }
 
-    /// Sends a message that nobody asked for; false without a mailbox in use, or where too many wait.
+    /// Sends an unsolicited message; false without a mailbox in use, or with too many waiting.
     pub fn post(&mut self, protocol: Protocol, payload: Vec<u8>) -> bool {
         let ready = self.last_run;
         self.mailbox.as_mut().is_some_and(|mailbox| mailbox.post(protocol, payload, ready))
@@ -53,7 +53,7 @@ impl Application {
         self.post(Protocol::Coe, emergency_payload(emergency))
     }
 
-    /// Keeps a message in the diagnosis history, with the present time and these parameters; an emergency tells of it
+    /// Adds a message to the diagnosis history, with the present time and these parameters; an emergency reports it
     /// where the flags say so. False where it is not kept.
     pub fn diagnose(&mut self, message: &DiagnosisMessage<'_>, parameters: &[DiagnosisParameter<'_>]) -> bool {
         let mut bytes = vec![0; MAX_DIAGNOSIS];
@@ -92,7 +92,7 @@ impl Application {
         let (Some(mailbox), Some(declared)) = (&mut self.mailbox, description.mailbox) else {
             return;
         };
-        // An answer that leaves makes room for the message that waits.
+        // An answer that leaves makes room for the waiting message.
         mailbox.send(controller, now);
         let servers = &mut self.servers;
         if let Some(message) = mailbox.take(controller, events, &self.faults, now) {

@@ -1,9 +1,9 @@
 //! The SubDevice's end of the mailbox: counters, duplicates, answers in order, repeat of a lost one (protocol 6.1,
 //! 6.2).
 //!
-//! In: AL events of the two mailbox SyncManagers, virtual time, [`faults`]. Out: messages for a protocol server and its
-//! answers in the send mailbox, some time later, with mail that nobody asked for in between. What the messages mean is
-//! the servers' matter ([`servers`](super::servers)).
+//! Input: AL events of the two mailbox SyncManagers, virtual time, [`faults`]. Output: messages for a protocol server
+//! and, some time later, its answers in the send mailbox, with unsolicited mail in between. The servers
+//! ([`servers`](super::servers)) interpret the messages.
 
 pub mod faults;
 pub mod record;
@@ -21,15 +21,15 @@ use crate::controller::Controller;
 use crate::time::SimTime;
 use faults::MailFaults;
 
-/// Answers that may wait for the send mailbox; with more, messages stay in the receive mailbox.
+/// Answers that may wait for the send mailbox; beyond this, messages stay in the receive mailbox.
 const MAX_ANSWERS: usize = 4;
 
-/// Messages that servers send of themselves and that may wait; behind more of them a request would wait too long.
+/// Unsolicited messages of servers that may wait; more of them would delay requests too long.
 const MAX_OWN: usize = 2;
-/// Messages that may wait for the send mailbox, answers and others together; more of the others are dropped.
+/// Messages that may wait for the send mailbox, answers and others together; further others are dropped.
 const MAX_POSTED: usize = 64;
 
-/// A message on its way to the send mailbox.
+/// A message that waits for the send mailbox.
 #[derive(Clone, Debug)]
 struct Queued {
     ready: SimTime,
@@ -40,9 +40,9 @@ struct Queued {
 
 #[derive(Clone, Debug)]
 enum Mail {
-    /// One that gets its counter when it is sent, unless a fault gives it this one.
+    /// A new message, which gets its counter when it is sent, unless a fault gives it this one.
     New { protocol: Protocol, address: u16, payload: Vec<u8>, counter: Option<u8> },
-    /// One that was sent before, byte for byte.
+    /// A repeated message, byte for byte.
     Again(Vec<u8>),
 }
 
@@ -55,7 +55,7 @@ pub struct Mailbox {
     received_counter: u8,
     sent_counter: u8,
     queue: VecDeque<Queued>,
-    /// The answer put into the send mailbox last, and the one before it.
+    /// The last answer put into the send mailbox, and the one before it.
     last: Option<Vec<u8>>,
     before_last: Option<Vec<u8>>,
     repeat: bool,
@@ -64,7 +64,8 @@ pub struct Mailbox {
 }
 
 impl Mailbox {
-    /// The mailbox is taken into use; the repeat request that stands in the register is none (protocol 6.2, step 4).
+    /// The mailbox is opened; the value of the repeat request in the register is the initial one (protocol 6.2, step
+    /// 4).
     pub fn open(
         layout: MailboxLayout,
         (receive_manager, send_manager): (u8, u8),
@@ -88,12 +89,12 @@ impl Mailbox {
         mailbox
     }
 
-    /// Places and sizes.
+    /// Addresses and lengths.
     pub const fn layout(&self) -> &MailboxLayout {
         &self.layout
     }
 
-    /// AL events that call for a step.
+    /// AL events that require a step.
     pub fn events(&self, faults: &MailFaults) -> u32 {
         let takes = self.queue.len() < MAX_ANSWERS && faults.full_until().is_none();
         let receive = if takes { event_bit(self.receive_manager) } else { 0 };
@@ -101,12 +102,12 @@ impl Mailbox {
         receive | send
     }
 
-    /// When the next message is ready.
+    /// When the next message is ready for sending.
     pub fn next_deadline(&self) -> Option<SimTime> {
         if self.blocked { None } else { self.queue.iter().map(|queued| queued.ready).min() }
     }
 
-    /// Takes the message that is in the receive mailbox, if there is one and an answer to it may be queued.
+    /// Takes the message in the receive mailbox, if there is one and its answer can be queued.
     pub fn take(
         &mut self,
         controller: &mut Controller,
@@ -122,7 +123,7 @@ impl Mailbox {
         controller.pdi_read(RegisterAddress(self.layout.receive_offset), &mut bytes, now).then_some(bytes)
     }
 
-    /// Serves one message with `server`, which gets protocol and payload. Its answers are sent at `ready` or later.
+    /// Serves one message with `server`, which receives protocol and payload. Its answers are sent at `ready` or later.
     pub fn serve(
         &mut self,
         bytes: &[u8],
@@ -161,22 +162,22 @@ impl Mailbox {
         }
     }
 
-    /// Few enough messages wait that servers may add what nobody asked for.
+    /// Whether few enough messages wait that servers may add unsolicited ones.
     pub fn has_room(&self) -> bool {
         self.queue.len() < MAX_OWN
     }
 
-    /// Bytes behind the header that a message from the MainDevice may have.
+    /// Largest payload of a message from the MainDevice, after the header.
     pub fn receive_room(&self) -> usize {
         usize::from(self.layout.receive_size).saturating_sub(Header::LEN)
     }
 
-    /// Bytes behind the header that a message to the MainDevice may have.
+    /// Largest payload of a message to the MainDevice, after the header.
     pub fn room(&self) -> usize {
         usize::from(self.layout.send_size).saturating_sub(Header::LEN)
     }
 
-    /// Sends a message that nobody asked for; false where too many wait.
+    /// Sends an unsolicited message; false with too many waiting.
     pub fn post(&mut self, protocol: Protocol, payload: Vec<u8>, ready: SimTime) -> bool {
         if self.queue.len() >= MAX_POSTED || payload.len() > self.room() {
             return false;
@@ -215,12 +216,12 @@ impl Mailbox {
         let header = Header { address, ..Header::new(protocol, counter, length) };
         let mut bytes = header.encode().to_vec();
         bytes.extend_from_slice(&payload);
-        // The last byte of the SyncManager gives the mailbox away.
+        // The last byte of the SyncManager completes the mailbox.
         bytes.resize(usize::from(self.layout.send_size), 0);
         bytes
     }
 
-    /// Puts the next message that is ready into the send mailbox if there is room.
+    /// Puts the next ready message into the send mailbox if there is room.
     pub fn send(&mut self, controller: &mut Controller, now: SimTime) {
         self.blocked = false;
         let Some(place) = self.queue.iter().position(|queued| queued.ready <= now) else {
@@ -231,7 +232,7 @@ impl Mailbox {
         };
         let bytes = self.encode(mail);
         if !controller.pdi_write(RegisterAddress(self.layout.send_offset), &bytes, now) {
-            // It has its counter and stays the next one.
+            // It has its counter and remains the next one.
             self.queue.push_front(Queued { ready, mail: Mail::Again(bytes), twice });
             self.blocked = true;
             return;
@@ -240,11 +241,11 @@ impl Mailbox {
             self.queue.push_front(Queued { ready: now, mail: Mail::Again(bytes.clone()), twice: false });
         }
         self.before_last = self.last.replace(bytes);
-        // What is ready too waits until this one is read.
+        // Further ready messages wait until this one is read.
         self.blocked = self.queue.iter().any(|next| next.ready <= now);
     }
 
-    /// The activation of a SyncManager changed: repeats the last answer if that is what the MainDevice asks for.
+    /// The activation of a SyncManager changed: repeats the last answer if the MainDevice requests it.
     pub fn check_repeat(&mut self, controller: &mut Controller, now: SimTime) {
         let manager = self.read_send_manager(controller, now);
         if manager.activate.repeat_request == self.repeat {
@@ -252,7 +253,7 @@ impl Mailbox {
         }
         self.repeat = manager.activate.repeat_request;
         let lost = if manager.status.mailbox_full {
-            // The message that waits was put there after the lost one had been read; it goes second.
+            // The waiting message was put there after the lost one had been read; it goes second.
             if let Some(waiting) = self.last.take() {
                 self.queue.push_front(Queued { ready: now, mail: Mail::Again(waiting), twice: false });
             }
@@ -268,7 +269,7 @@ impl Mailbox {
         self.acknowledge_repeat(controller, now);
     }
 
-    /// Switching a SyncManager off and on again discards what is in it.
+    /// Disabling and enabling a SyncManager discards its content.
     fn empty_send_mailbox(&self, controller: &mut Controller, now: SimTime) {
         for deactivate in [true, false] {
             self.write_pdi_control(deactivate, !self.repeat, controller, now);

@@ -1,7 +1,7 @@
 //! Process data of a simulated SubDevice: outputs taken from the SyncManagers, inputs put into them.
 //!
-//! In: the areas that were found right ([`Layout`]), AL events, virtual time. Out: the outputs that are valid (zero in
-//! the safe state) and inputs in the buffers. Whether outputs may be used is the state machine's matter.
+//! Input: the checked areas ([`Layout`]), AL events, virtual time. Output: the valid outputs (zero in the safe state)
+//! and inputs in the buffers. The state machine decides whether outputs may be used.
 
 use ringcat_wire::address::RegisterAddress;
 
@@ -21,21 +21,21 @@ pub const fn event_bit(sync_manager: u8) -> u32 {
     1 << (SYNC_MANAGER_EVENT_SHIFT + sync_manager as u32)
 }
 
-/// What makes inputs.
+/// Source of the inputs.
 #[derive(Clone, Debug)]
 enum Source {
     Terminal(InputSource),
     Servo(Box<Servo>),
 }
 
-/// Images, areas and what happened to them.
+/// Images, areas and event counts.
 #[derive(Clone, Debug)]
 pub struct ProcessData {
     layout: Layout,
     output_mapping: Mapping,
     input_mapping: Mapping,
     received: Vec<u8>,
-    /// Room for what was received before.
+    /// Buffer of the previously received outputs.
     before: Vec<u8>,
     outputs: Vec<u8>,
     inputs: Vec<u8>,
@@ -80,7 +80,7 @@ impl ProcessData {
         self.latched
     }
 
-    /// Outputs have come since SAFEOP was entered, or there are none to wait for.
+    /// Outputs were received since SAFEOP was entered, or there are none to wait for.
     pub fn outputs_seen(&self) -> bool {
         self.seen || !self.layout.outputs.iter().any(|area| area.event)
     }
@@ -103,7 +103,7 @@ impl ProcessData {
         }
     }
 
-    /// Value of a mapped object as it is in the process data now, or of one that the drive knows.
+    /// Current value of an object that is mapped in the process data, or that the drive computes.
     pub fn value(&self, index: u16, sub_index: u8) -> Option<u64> {
         let output = || self.output_mapping.value(index, sub_index, &self.outputs);
         let mapped = self.input_mapping.value(index, sub_index, &self.inputs).or_else(output);
@@ -115,14 +115,14 @@ impl ProcessData {
         self.output_mapping.find(index, sub_index).is_some()
     }
 
-    /// AL events that call for an exchange.
+    /// AL events that require an exchange.
     pub fn events(&self) -> u32 {
         let outputs = self.layout.outputs.iter().filter(|area| area.event);
         let inputs = self.layout.inputs.iter().filter(|area| area.event && self.varies());
         outputs.chain(inputs).fold(0, |mask, area| mask | event_bit(area.sync_manager))
     }
 
-    /// Some SyncManager raises no event although its content matters: it has to be looked at after each frame.
+    /// A relevant SyncManager raises no event: it is checked after each frame.
     pub fn is_polled(&self) -> bool {
         let silent = |areas: &[Area]| areas.iter().any(|area| !area.event);
         silent(&self.layout.outputs) || self.varies() && silent(&self.layout.inputs)
@@ -170,7 +170,7 @@ impl ProcessData {
         self.refresh(controller, now);
     }
 
-    /// Power comes, or goes: a drive starts anew.
+    /// Power comes or goes: a drive restarts.
     pub fn power_on(&mut self, now: SimTime) {
         if let Source::Servo(servo) = &mut self.source {
             servo.power_on(now);
@@ -191,7 +191,7 @@ impl ProcessData {
         }
     }
 
-    /// What was received last becomes valid: OP begins.
+    /// The last received outputs become valid: OP begins.
     pub fn operate(&mut self, dictionary: &Dictionary, controller: &mut Controller, now: SimTime) {
         if self.outputs.is_empty() {
             return;
@@ -268,7 +268,7 @@ impl ProcessData {
         }
     }
 
-    /// Inputs come from this source from now on. A drive makes its own and ignores it.
+    /// Sets the source of the inputs. A drive makes its own and ignores it.
     pub fn set_source(&mut self, new: InputSource, controller: &mut Controller, now: SimTime) {
         match &mut self.source {
             Source::Terminal(source) => *source = new,

@@ -1,7 +1,7 @@
 //! The protocol servers behind a device's mailbox, one per protocol that the SII announces (protocol 6).
 //!
-//! In: a message's protocol and payload, the state, the rest of the application. Out: an answer. A protocol that is not
-//! announced, or that is not served in this state, gets the mailbox error "protocol not supported".
+//! Input: a message's protocol and payload, the state, the rest of the application. Output: an answer. A protocol that
+//! is not announced, or not served in this state, gets the mailbox error "protocol not supported".
 
 use ringcat_wire::al::AlState;
 use ringcat_wire::mailbox::foe::FoeMessage;
@@ -20,18 +20,18 @@ use super::voe;
 use crate::description::{DeviceDescription, MailboxDescription};
 use crate::time::SimTime;
 
-/// What servers share with the rest of the application while they serve.
+/// Context of the servers.
 #[derive(Debug)]
 pub struct Surroundings<'a> {
     /// What the device says about itself.
     pub description: &'a DeviceDescription,
-    /// What it announces.
+    /// Announced protocols.
     pub declared: MailboxDescription,
     /// Present state.
     pub state: AlState,
-    /// Bytes of each answer behind the mailbox header.
+    /// Largest length of each answer after the mailbox header.
     pub room: usize,
-    /// Bytes of each request behind the mailbox header.
+    /// Largest length of each request after the mailbox header.
     pub receive_room: usize,
     /// The present time.
     pub now: SimTime,
@@ -43,7 +43,7 @@ pub struct Surroundings<'a> {
     pub process_data: &'a ProcessData,
 }
 
-/// The servers of one device with what they remember between two messages.
+/// The servers of one device with their state between messages.
 #[derive(Clone, Debug, Default)]
 pub struct Servers {
     coe: CoeServer,
@@ -67,7 +67,7 @@ impl Servers {
         }
     }
 
-    /// Ethernet over EtherCAT, where the device speaks it.
+    /// Ethernet over EtherCAT, where the device supports it.
     pub const fn eoe(&self) -> Option<&EoeServer> {
         self.eoe.as_ref()
     }
@@ -83,7 +83,7 @@ impl Servers {
         let boot = state == AlState::Boot;
         let unsupported = Answer::Error(ErrorReply::UNSUPPORTED_PROTOCOL);
         match protocol {
-            // Errors are never answered, or two ends would answer each other for ever.
+            // Errors are never answered, or two ends would answer each other endlessly.
             Protocol::Error => Answer::Silence,
             Protocol::Foe if declared.protocols.foe() => {
                 let mut files = Files {
@@ -118,7 +118,7 @@ impl Servers {
         }
     }
 
-    /// Does what is due without any request.
+    /// Runs due work that needs no request.
     pub fn work(&mut self, room: usize, now: SimTime) {
         if let Some(eoe) = &mut self.eoe {
             eoe.let_stack_work(room, now);
@@ -128,14 +128,14 @@ impl Servers {
         }
     }
 
-    /// When there is something to do without any request.
+    /// Next time with work that needs no request.
     pub fn next_deadline(&mut self, now: SimTime) -> Option<SimTime> {
         let ethernet = self.eoe.as_mut().and_then(|eoe| eoe.next_deadline(now));
         let command = self.soe.as_ref().and_then(SoeServer::next_deadline);
         ethernet.into_iter().chain(command).min()
     }
 
-    /// A message that nobody asked for and that waits for the mailbox.
+    /// An unsolicited message that waits for the mailbox.
     pub fn next_message(&mut self) -> Option<(Protocol, Vec<u8>)> {
         let command = self.soe.as_mut().and_then(SoeServer::next_message).map(|message| (Protocol::Soe, message));
         command.or_else(|| self.eoe.as_mut().and_then(EoeServer::next_message).map(|message| (Protocol::Eoe, message)))

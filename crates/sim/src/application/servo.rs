@@ -1,13 +1,13 @@
 //! A CiA 402 drive with a motor and a load that have inertia: profile and cyclic modes, homing, brake, fault reactions.
 //!
-//! In: objects of the outputs and of the dictionary (`parameters`), virtual time. Out: the objects that
+//! Input: objects of the outputs and of the dictionary (`parameters`), virtual time. Output: the objects that
 //! [`Servo::value`] knows, among them statusword, position, velocity and torque. The drive computes in steps of
 //! [`STEP_NS`], whose times do not depend on frames. Units are increments, seconds and thousandths of the rated torque.
 //!
-//! A step asks the power state machine ([`power`]) what to do (`Order`), lets the mode move the set-point, makes the
-//! torque with a position loop around a velocity loop (`motion`), and moves the motor. `homing` looks for the origin,
-//! `status` says what the application sees. Position and velocity of the motor are those of the machine, whose position
-//! 0 is where it first got power; `origin` is what homing adds to that.
+//! A step runs the power state machine ([`power`]), which gives the action (`Order`), lets the mode move the set-point,
+//! computes the torque with a position loop around a velocity loop (`motion`), and moves the motor. `homing` searches
+//! the origin, `status` gives the values for the application. Position and velocity of the motor are those of the
+//! machine, whose position 0 is the position at first power-on; `origin` is the offset found by homing.
 
 mod axis;
 mod homing;
@@ -33,9 +33,9 @@ pub use axis::{
 };
 pub use power::{DriveCommand, DriveState};
 
-/// The drive tests itself for so long after power-on.
+/// Duration of the drive's self-test after power-on.
 const SELF_TEST_NS: u64 = 10_000_000;
-/// Steps that are made up for at most after a time in which nothing looked at the drive.
+/// Largest number of steps made up for after a time without access to the drive.
 const MAX_STEPS: u64 = 80_000;
 
 const NEW_SET_POINT: u16 = 0x0010;
@@ -54,7 +54,7 @@ pub struct Servo {
     remote: bool,
     mode: i8,
     parameters: Parameters,
-    /// Revision of the dictionary that the parameters have.
+    /// Revision of the dictionary from which the parameters were read.
     revision: Option<u32>,
     motor: Motor,
     /// Position of the application where that of the machine is 0.
@@ -62,14 +62,14 @@ pub struct Servo {
     set_position: f64,
     set_velocity: f64,
     set_torque: f64,
-    /// Where the set-point goes to, how many steps it has for that (cyclic), and where to next (profile).
+    /// Target of the set-point, number of steps to it (cyclic), and the next target (profile).
     goal: Option<f64>,
     steps_left: u32,
     next_goal: Option<f64>,
     acknowledged: bool,
     homing: Homing,
     limited: bool,
-    /// Since when the following error is too large, and the target reached, in seconds.
+    /// Time for which the following error has been too large, and the target reached, in seconds.
     lagging: f64,
     settled: f64,
     error_code: u16,
@@ -83,7 +83,7 @@ impl Servo {
         self.state
     }
 
-    /// Power comes: the load stands where it is, what homing found is lost.
+    /// Power comes: the load is at its last position, the result of homing is lost.
     pub fn power_on(&mut self, now: SimTime) {
         let motor = Motor { velocity: 0.0, torque: 0.0, ..self.motor };
         let ready_at = SimTime(now.0.saturating_add(SELF_TEST_NS));
@@ -125,7 +125,7 @@ impl Servo {
         }
     }
 
-    /// What was commanded before is not taken up again when the drive is enabled, or comes back to a mode.
+    /// Earlier commands are dropped when the drive is enabled, or returns to a mode.
     fn forget_targets(&mut self) {
         (self.goal, self.next_goal, self.acknowledged) = (None, None, false);
         self.homing = Homing::NotStarted;
@@ -167,7 +167,7 @@ impl Servo {
         }
     }
 
-    /// Outputs are no longer valid: 0x6007 says what an enabled drive does, any other switches off.
+    /// Outputs are no longer valid: 0x6007 gives the action of an enabled drive, any other drive switches off.
     pub fn release(&mut self, now: SimTime) {
         self.advance(now);
         self.remote = false;
@@ -186,7 +186,7 @@ impl Servo {
     fn fail(&mut self, code: u16) {
         self.error_code = code;
         self.state = if self.stands_still() { DriveState::Fault } else { DriveState::FaultReactionActive };
-        // It stops from where it is, not on the way to where it should be.
+        // It stops from its actual position, not from the set-point.
         self.track_motor(self.motor.velocity);
     }
 
@@ -252,7 +252,7 @@ impl Servo {
         }
     }
 
-    /// Transitions that wait for the motor, or for nothing where the drive function is off.
+    /// Transitions that wait for the motor, or occur at once where the drive function is off.
     fn leave(&mut self, order: Order) {
         if order != Order::Off && !self.stands_still() {
             return;
@@ -267,7 +267,7 @@ impl Servo {
         };
     }
 
-    /// Supervises the following error, and how long the target is reached.
+    /// Supervises the following error, and the time within the target window.
     fn watch(&mut self) {
         let window = self.parameters.following_window;
         let lags = window.is_some_and(|window| self.following_error().abs() > window);
@@ -279,7 +279,7 @@ impl Servo {
         }
     }
 
-    /// The place on the machine of a position of the application that is less than half a range of the encoder away.
+    /// The machine position of an application position that is less than half the encoder range away.
     fn on_machine(&self, position: i32) -> f64 {
         let here = (self.set_position + self.origin).round();
         here - self.origin + f64::from(position.wrapping_sub(here as i64 as i32))

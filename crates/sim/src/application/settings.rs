@@ -1,7 +1,7 @@
-//! Does the configuration that the MainDevice wrote suit the device? The checks of protocol 5.2, codes of protocol 5.5.
+//! Checks the configuration that the MainDevice wrote (protocol 5.2), with codes of protocol 5.5.
 //!
-//! In: SyncManager, watchdog and clock registers through the PDI, the description, the dictionary (whose PDO
-//! assignment decides the lengths). Out: the process data areas, or the AL status code of the refusal.
+//! Input: SyncManager, watchdog and clock registers through the PDI, the description, the dictionary (whose PDO
+//! assignment gives the lengths). Output: the process data areas, or the AL status code of the refusal.
 
 use ringcat_wire::address::RegisterAddress;
 use ringcat_wire::al::AlStatusCode;
@@ -13,7 +13,7 @@ use crate::controller::Controller;
 use crate::description::DeviceDescription;
 use crate::time::SimTime;
 
-/// SyncManagers an application looks at; no controller has more (protocol 3.1).
+/// Number of SyncManagers checked; no controller has more (protocol 3.1).
 pub const MAX_SYNC_MANAGERS: u8 = 16;
 /// First address of the process RAM; below it nothing is buffered.
 const RAM_START: u32 = 0x1000;
@@ -70,8 +70,8 @@ pub fn mailbox_matches(description: &DeviceDescription, layout: &MailboxLayout, 
         && matches(back, layout.send_offset, layout.send_size, SyncManagerDirection::Read)
 }
 
-/// Numbers of the SyncManagers of mailboxes with this layout: to the device, from the device. Those at its places where
-/// there are some, as for BOOT, else the first ones.
+/// Numbers of the SyncManagers of mailboxes with this layout: to the device, from the device. Those at the mailbox
+/// addresses where there are any, as for BOOT, else the first ones.
 pub fn mailbox_numbers(description: &DeviceDescription, layout: &MailboxLayout) -> (u8, u8) {
     let of = |kind, start| {
         let at_place = description.sync_managers.iter().position(|entry| (entry.kind, entry.start) == (kind, start));
@@ -81,7 +81,7 @@ pub fn mailbox_numbers(description: &DeviceDescription, layout: &MailboxLayout) 
     out.zip(of(SyncManagerKind::MailboxIn, layout.send_offset)).unwrap_or((0, 1))
 }
 
-/// Checks the SyncManagers of the process data and says where the process data is. One for OP only may be off.
+/// Checks the SyncManagers of the process data and returns their areas. One for OP only may be off.
 pub fn process_data(
     description: &DeviceDescription,
     dictionary: &Dictionary,
@@ -108,7 +108,7 @@ pub fn process_data(
             | SyncManagerKind::MailboxIn
             | SyncManagerKind::Other(_) => continue,
         };
-        // Behind a virtual one there is no hardware.
+        // A virtual SyncManager has no hardware.
         if entry.enable & SiiSyncManager::VIRTUAL != 0 {
             continue;
         }
@@ -135,7 +135,7 @@ pub fn process_data(
     Ok(layout)
 }
 
-/// Where the process data is on a device that checks nothing: whatever the SyncManagers say.
+/// Areas of the process data on a device without checks: as set in the SyncManagers.
 pub fn unchecked(description: &DeviceDescription, actual: &[SyncManager]) -> Layout {
     let mut layout = Layout::default();
     for (number, (entry, manager)) in (0u8..).zip(description.sync_managers.iter().zip(actual)) {
@@ -164,7 +164,7 @@ fn area(number: u8, manager: &SyncManager) -> Area {
     }
 }
 
-/// Bytes that a SyncManager must have: with CoE those of the PDOs that are assigned now, otherwise those of the SII.
+/// Required length of a SyncManager: with CoE that of the assigned PDOs, otherwise that of the SII.
 fn expected_length(description: &DeviceDescription, dictionary: &Dictionary, number: u8) -> u32 {
     if description.has_coe() {
         return dictionary.assigned_bits(number).div_ceil(8);

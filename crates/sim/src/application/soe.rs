@@ -1,7 +1,7 @@
 //! The SoE server of a device: drives with IDNs, elements in fragments, procedure commands (protocol 6.6).
 //!
-//! In: the payload of a SoE message, the state, virtual time. Out: the answer, and notifications when a procedure
-//! command has ended. [`idn`] says what an IDN is.
+//! Input: the payload of a SoE message, the state, virtual time. Output: the answer, and notifications when a procedure
+//! command has ended. [`idn`] defines an IDN.
 
 pub mod idn;
 
@@ -16,7 +16,7 @@ use crate::description::SoeDescription;
 use crate::time::SimTime;
 use idn::IdnObject;
 
-/// Most bytes of an element that is written in fragments.
+/// Largest element that is written in fragments, in bytes.
 const MAX_ELEMENT: usize = 1 << 16;
 /// Notifications that wait for the mailbox; more are dropped.
 const MAX_NOTIFICATIONS: usize = 64;
@@ -24,7 +24,7 @@ const MAX_NOTIFICATIONS: usize = 64;
 const ALL_IDNS: Idn = Idn::standard(0, 17);
 const ALL_COMMANDS: Idn = Idn::standard(0, 25);
 
-/// The server with what it remembers between two messages.
+/// The server with its state between messages.
 #[derive(Clone, Debug)]
 pub struct SoeServer {
     drives: Vec<Vec<IdnObject>>,
@@ -38,7 +38,7 @@ struct Fragments {
     drive: u8,
     elements: SoeElements,
     data: Vec<u8>,
-    /// How many follow.
+    /// Number of fragments that follow.
     left: u16,
 }
 
@@ -57,7 +57,7 @@ impl SoeServer {
         self.drives.get(usize::from(drive))?.iter().find(|object| object.idn == idn)
     }
 
-    /// Serves one message. `room` is what each message to the MainDevice may have behind the mailbox header.
+    /// Serves one message. `room` is the largest length of each message to the MainDevice after the mailbox header.
     pub fn serve(&mut self, payload: &[u8], room: usize, state: AlState, now: SimTime) -> Answer {
         let Ok(message) = SoeMessage::decode(payload) else {
             return Answer::Error(ErrorReply::SIZE_TOO_SHORT);
@@ -95,7 +95,7 @@ impl SoeServer {
     fn write(&mut self, message: &SoeMessage<'_>, room: usize, state: AlState, now: SimTime) -> Answer {
         let SoeMessage { drive, elements, data, .. } = *message;
         let left = if message.incomplete { message.number } else { 0 };
-        // Only fragments of one element follow each other, each with one less to follow than the one before.
+        // Only fragments of one element may follow each other, with a decreasing count.
         let begun = self.written.take().filter(|begun| begun.drive == drive && begun.elements == elements);
         let mut whole = match begun {
             Some(begun) if begun.left.checked_sub(1) == Some(left) => begun.data,
@@ -127,7 +127,7 @@ impl SoeServer {
         drive.iter_mut().find(|object| object.idn == idn).ok_or(SoeErrorCode::NO_IDN)
     }
 
-    /// Ends the procedure commands that are due; each is notified.
+    /// Ends the due procedure commands; each causes a notification.
     pub fn let_commands_end(&mut self, now: SimTime) {
         for (number, drive) in (0u8..).zip(&mut self.drives) {
             for object in drive {
@@ -145,7 +145,7 @@ impl SoeServer {
         self.drives.iter().flatten().filter_map(IdnObject::running_until).min()
     }
 
-    /// A message of the device's own that waits for the mailbox.
+    /// A message of the device that waits for the mailbox.
     pub fn next_message(&mut self) -> Option<Vec<u8>> {
         self.notifications.pop_front()
     }

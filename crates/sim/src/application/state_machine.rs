@@ -1,8 +1,8 @@
 //! The EtherCAT state machine inside a SubDevice (protocol 5.1, 5.3).
 //!
-//! In: AL control as the MainDevice wrote it, and the moments at which a transition is due. Out: what the
-//! application must do ([`Reaction`]) and what AL status and AL status code show. Whether the configuration suits
-//! is not decided here but in [`settings`](super::settings).
+//! Input: AL control as the MainDevice wrote it, and the end times of transitions. Output: the action of the
+//! application ([`Reaction`]) and the values of AL status and AL status code. [`settings`](super::settings) checks the
+//! configuration.
 
 use core::time::Duration;
 
@@ -11,29 +11,29 @@ use ringcat_wire::al::{AlControl, AlState, AlStatus, AlStatusCode, transition_al
 use crate::description::TransitionTimes;
 use crate::time::SimTime;
 
-/// What a request leads to.
+/// Result of a request.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Reaction {
-    /// Nothing: an error is not acknowledged yet.
+    /// None: an error is not acknowledged yet.
     Ignore,
-    /// AL status is shown anew.
+    /// AL status is written again.
     Report,
     /// The configuration is checked and a transition to this state begins.
     Begin(AlState),
 }
 
-/// A transition on its way.
+/// A transition in progress.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Pending {
-    /// Where to.
+    /// Target state.
     pub to: AlState,
-    /// When the application is done with it.
+    /// When the application completes it.
     pub at: SimTime,
-    /// When the application stops waiting for what else it needs.
+    /// When the application stops waiting for further conditions.
     pub give_up: SimTime,
 }
 
-/// State, error and the transition on its way.
+/// State, error and the transition in progress.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct StateMachine {
     state: AlState,
@@ -49,17 +49,17 @@ impl Default for StateMachine {
 }
 
 impl StateMachine {
-    /// Present state; the old one while a transition is on its way.
+    /// Present state; the old one during a transition.
     pub const fn state(&self) -> AlState {
         self.state
     }
 
-    /// The transition on its way.
+    /// The transition in progress.
     pub const fn pending(&self) -> Option<Pending> {
         self.pending
     }
 
-    /// What AL status shows.
+    /// Value of AL status.
     pub const fn status(&self) -> AlStatus {
         let mut status = AlStatus::new(self.state);
         status.error = self.error.is_some();
@@ -67,7 +67,7 @@ impl StateMachine {
         status
     }
 
-    /// What AL status code shows: the error, or the identification where it was asked for.
+    /// Value of AL status code: the error, or the requested identification.
     pub const fn code(&self) -> AlStatusCode {
         match (self.error, self.identification) {
             (Some(code), _) => code,
@@ -111,18 +111,18 @@ impl StateMachine {
         Reaction::Report
     }
 
-    /// A transition begins that takes `takes`; what else it needs must be there `patience` later.
+    /// A transition with this duration begins; its other conditions must be met within `patience` after that.
     pub fn begin(&mut self, to: AlState, now: SimTime, takes: Duration, patience: Duration) {
         let at = now + takes;
         self.pending = Some(Pending { to, at, give_up: at + patience });
     }
 
-    /// The transition on its way is given up for another request.
+    /// The transition in progress is given up for another request.
     pub fn abandon(&mut self) {
         self.pending = None;
     }
 
-    /// The transition on its way is done. Returns the state that was left.
+    /// The transition in progress is complete. Returns the previous state.
     pub fn complete(&mut self) -> AlState {
         let from = self.state;
         if let Some(pending) = self.pending.take() {
@@ -132,7 +132,7 @@ impl StateMachine {
     }
 }
 
-/// How long a transition takes.
+/// Duration of a transition.
 pub const fn duration(times: &TransitionTimes, from: AlState, to: AlState) -> Duration {
     match (from, to) {
         (_, AlState::Init) => times.to_init,

@@ -1,7 +1,6 @@
-//! From state to state: what an application checks before a transition and does at its end (protocol 5.2).
+//! Transitions between states: the checks before them and the actions at their end (protocol 5.2).
 //!
-//! In: AL control, the moments at which transitions are due. Out: AL status, mailbox and process data switched on and
-//! off.
+//! Input: AL control, the end times of transitions. Output: AL status; enables and disables mailbox and process data.
 
 use core::time::Duration;
 
@@ -88,7 +87,7 @@ impl Application {
                 self.layout = layout;
                 Ok(())
             }
-            // SyncManagers for OP only have been switched on since (protocol 4.4).
+            // SyncManagers for OP only were enabled since (protocol 4.4).
             (AlState::SafeOp, AlState::Op) => {
                 let actual = settings::sync_managers(controller, now);
                 let ram_kib = controller.config().ram_kib;

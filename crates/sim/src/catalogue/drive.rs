@@ -1,7 +1,7 @@
-//! The servo drive: what its SII says, and its objects by CiA 402 (IEC 61800-7-201) and ETG.6010.
+//! The servo drive: its SII, and its objects by CiA 402 (IEC 61800-7-201) and ETG.6010.
 //!
-//! Each object that the drive computes with has its default and its range here; what they do is in
-//! [`servo`](crate::application::servo).
+//! Each object that the drive uses has its default and its range here; [`servo`](crate::application::servo) implements
+//! them.
 
 use ringcat_wire::mailbox::coe::AccessRights;
 use ringcat_wire::sii::{CoeDetails, DcMode, FmmuUsage, PdoDirection};
@@ -102,22 +102,22 @@ fn number(data_type: u8, access: Access, value: i64) -> Entry {
     Entry::new(0, data_type, access, &value.to_le_bytes()[..length])
 }
 
-/// What the drive says.
+/// Status objects.
 fn actual(data_type: u8) -> Entry {
     number(data_type, Access::ReadOnly, 0).allow(AccessRights::TX_MAPPABLE)
 }
 
-/// What is commanded with the process data.
+/// Command objects in the process data.
 fn command(data_type: u8, value: i64) -> Entry {
     number(data_type, Access::ReadWrite, value).allow(AccessRights::RX_MAPPABLE)
 }
 
-/// What is set once.
+/// Settings.
 fn setting(data_type: u8, value: i64) -> Entry {
     number(data_type, Access::ReadWrite, value).allow(AccessRights::SETTING)
 }
 
-/// What never changes.
+/// Constant objects.
 fn constant(data_type: u8, value: i64) -> Entry {
     number(data_type, Access::ReadOnly, value)
 }

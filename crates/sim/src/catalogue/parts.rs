@@ -93,8 +93,8 @@ pub fn channel_settings(index: u16) -> Object {
     Object::record(index, "Settings", entries)
 }
 
-/// Synchronisation of a SyncManager (ETG.1020): free running or with its event, and with SYNC0 or not. Type and cycle
-/// are what the MainDevice sets, and what distributed clocks say when SAFEOP is entered.
+/// Synchronisation of a SyncManager (ETG.1020): free running or with its event, and with SYNC0 or not. The MainDevice
+/// sets type and cycle, or distributed clocks give them when SAFEOP is entered.
 pub fn sync_parameters(index: u16, name: &str, minimum_cycle_ns: u32, sync0: bool) -> Object {
     let sync0 = if sync0 { SyncParameters::SYNC0 } else { 0 };
     let types = SyncParameters::FREE_RUN | SyncParameters::SYNCHRONOUS | sync0;

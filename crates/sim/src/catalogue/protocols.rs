@@ -1,4 +1,4 @@
-//! Devices whose business is the mailbox: one that speaks every protocol, an Ethernet terminal, a SERCOS drive.
+//! Devices for mailbox tests: one with every protocol, an Ethernet terminal, a SERCOS drive.
 
 use core::time::Duration;
 

@@ -16,7 +16,7 @@ const DIGITAL_START: u16 = 0x1000;
 const DIGITAL_OUTPUT_REGISTER: u16 = 0x0F00;
 const PDI_DIGITAL_IO: u8 = 0x04;
 const SPI: u8 = 0x05;
-/// What CoE of an analogue terminal can do.
+/// CoE features of an analogue terminal.
 const ANALOGUE_COE: u8 = CoeDetails::SDO_INFORMATION | CoeDetails::PDO_ASSIGN | CoeDetails::COMPLETE_ACCESS;
 /// Smallest cycle of an analogue terminal.
 const ANALOGUE_CYCLE_NS: u32 = 100_000;

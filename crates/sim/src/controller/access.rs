@@ -1,8 +1,8 @@
 //! Reads and writes of address ranges by either side (protocol 1.4, 2.5, 3.2, 3.8, 3.11).
 //!
-//! In: a side, an address, bytes. Out: how many bytes were accessible; bytes that are not there or blocked change
-//! nothing (protocol 1.4). EtherCAT's register writes and SyncManager accesses go into the [`super::pass::Pass`] and
-//! count at the end of the frame; RAM is written at once.
+//! Input: a side, an address, bytes. Output: the number of accessible bytes; missing or blocked bytes change nothing
+//! (protocol 1.4). EtherCAT's register writes and SyncManager accesses go into the [`super::pass::Pass`] and take
+//! effect at the end of the frame; RAM is written at once.
 
 use core::mem;
 
@@ -120,7 +120,7 @@ impl Controller {
         }
     }
 
-    /// What a write does before its frame ends.
+    /// Effect of a write before its frame ends.
     fn note_ecat_write(&mut self, address: u32) {
         if address == map::REGISTER_WRITE_ENABLE.0.into() {
             self.pass.register_write_enable = true;
@@ -129,7 +129,7 @@ impl Controller {
         }
     }
 
-    /// The longest part from `at` that is answered alike.
+    /// The longest part from `at` with a uniform answer.
     fn part(&mut self, side: Side, write: bool, at: u32, end: u32) -> Part {
         let run = self.memory.run(at, side);
         let mut until = run.end.min(end);
@@ -199,7 +199,7 @@ impl Controller {
             && !self.pass.register_write_enable
     }
 
-    /// What reading registers causes, and registers that are filled in when read. A part never holds two of them.
+    /// Side effects of register reads, and registers that are computed when read. A part never holds two of them.
     fn note_read(&mut self, side: Side, at: u32, until: u32) {
         let reads = |address: ringcat_wire::address::RegisterAddress, len: u32| {
             at < u32::from(address.0) + len && u32::from(address.0) < until

@@ -17,14 +17,14 @@ use crate::time::SimTime;
 use control_loop::{ControlLoop, Steering};
 use oscillator::{FRACTION, Oscillator};
 
-/// What is not ideal about a clock.
+/// Imperfections of a clock.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct ClockErrors {
     /// How much it runs ahead of virtual time, in parts per billion.
     pub drift_ppb: i64,
-    /// How this changes in the course of time.
+    /// Change of the drift over time.
     pub wander: Wander,
-    /// Every arrival of a frame is seen by up to so much too late, at random.
+    /// Largest random delay of the detected arrival of a frame.
     pub receive_jitter: Duration,
 }
 
@@ -37,14 +37,14 @@ pub(super) struct Clock {
     jitter_ns: u64,
     control: ControlLoop,
     steering: Steering,
-    /// What the free clock had counted when steering began, and local time then, both with fraction.
+    /// Count of the free clock when steering began, and local time then, both with fraction.
     anchor: (i128, i128),
     arrivals: [Option<(u64, SimTime)>; 4],
     /// The frame whose further arrivals are latched.
     latching: Option<u64>,
-    /// Ports at which the next arrival is latched whatever frame it is, where frames are not told apart.
+    /// Ports at which the next arrival is latched, of any frame, where frames are not distinguished.
     armed: [bool; 4],
-    /// The last frame that latched, and when the processing unit met it.
+    /// The last latching frame, and the time at which the processing unit processed it.
     latched: Option<(u64, SimTime)>,
 }
 
@@ -77,12 +77,12 @@ impl Clock {
         self.start.wrapping_add((self.counted(now).1 >> FRACTION) as u64)
     }
 
-    /// Local time that the controller notes for the first bit of a frame at a port.
+    /// Local time that the controller records for the first bit of a frame at a port.
     pub fn stamp(&self, port: Port, first_bit: SimTime) -> u64 {
         self.local(self.seen(port, first_bit))
     }
 
-    /// When the controller sees the first bit of a frame.
+    /// When the controller detects the first bit of a frame.
     fn seen(&self, port: Port, first_bit: SimTime) -> SimTime {
         if self.jitter_ns == 0 {
             return first_bit;
@@ -94,7 +94,7 @@ impl Clock {
         SimTime(first_bit.0.saturating_add((hash >> 11) % (self.jitter_ns + 1)))
     }
 
-    /// What the free and the steered clock have counted since power-on, with fraction.
+    /// Counts of the free and the steered clock since power-on, with fraction.
     fn counted(&self, now: SimTime) -> (i128, i128) {
         let free = self.oscillator.counted(i128::from(now.0) - i128::from(self.started.0));
         let since = free - self.anchor.0;
@@ -110,7 +110,7 @@ impl Clock {
         self.steer(first_bit, self.control.steering(settings));
     }
 
-    /// Forgets what the loop has learned: the clock runs free.
+    /// Resets the loop: the clock runs free.
     pub fn restart_loop(&mut self, now: SimTime) {
         self.control = ControlLoop::default();
         self.steer(now, Steering::FREE);
@@ -140,20 +140,20 @@ impl Clock {
         at
     }
 
-    /// Notes the first bit of a frame at a port. Returns whether it is latched: a latching frame that came back, or
-    /// what is taken for one.
+    /// Records the first bit of a frame at a port. Returns whether it is latched: a latching frame that came back, or
+    /// any frame where frames are not distinguished.
     pub fn arrived(&mut self, port: Port, frame: u64, first_bit: SimTime) -> bool {
         self.arrivals[port.index()] = Some((frame, first_bit));
         core::mem::take(&mut self.armed[port.index()]) || self.latching == Some(frame)
     }
 
-    /// Starts latching `frame`, which the processing unit meets at `at_unit`; yields the arrivals it has had so far.
-    /// Where frames are not told apart (`any`) it yields the last arrival at each port, and the next one at the others
-    /// counts.
+    /// Starts latching `frame`, which the processing unit processes at `at_unit`; yields the arrivals it has had so
+    /// far. Where frames are not distinguished (`any`) it yields the last arrival at each port, and the next one at the
+    /// other ports counts.
     pub fn latch(&mut self, frame: u64, at_unit: SimTime, any: bool) -> impl Iterator<Item = (Port, SimTime)> + use<> {
         let arrivals = self.arrivals;
         self.latched = Some((frame, at_unit));
-        // It has come in here before, or another one after it.
+        // It has entered here before, or another one after it.
         let since = arrivals.iter().flatten().filter(|(id, _)| *id == frame).map(|(_, at)| *at).min();
         let is_in = move |id: u64, at: SimTime| id == frame || (any && since.is_none_or(|since| at >= since));
         self.latching = (!any).then_some(frame);
@@ -164,7 +164,7 @@ impl Clock {
         })
     }
 
-    /// The last frame that latched, and when the processing unit met it.
+    /// The last latching frame, and the time at which the processing unit processed it.
     pub const fn latched(&self) -> Option<(u64, SimTime)> {
         self.latched
     }

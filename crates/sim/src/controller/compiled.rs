@@ -1,9 +1,9 @@
-//! What logical datagrams do here, found once for all that are alike.
+//! Effect of logical datagrams on this controller, computed once for all equal ones.
 //!
-//! In: a datagram's command, address and length, and the FMMUs and SyncManagers as they are. Out: the pieces of memory
-//! that it touches, which are then moved without a search. Only what is plain is compiled: whole bytes, each piece in
-//! one area of process RAM or the AL status, nothing read where something is written. Everything else goes the way of
-//! [`super::processing`]. A write to a register that matters throws everything away.
+//! Input: a datagram's command, address and length, and the current FMMUs and SyncManagers. Output: the affected pieces
+//! of memory, which are then copied without a search. Only simple cases are compiled: whole bytes, each piece in one
+//! area of process RAM or the AL status, no byte both read and written. All others are handled by
+//! [`super::processing`]. A write to a relevant register discards all results.
 
 mod known;
 
@@ -19,8 +19,8 @@ use known::{AL_STATUS, FREE, Known, Move, PIECES};
 pub(super) use known::Compiled;
 
 impl Controller {
-    /// Moves the data of a logical datagram that concerns this controller. What was read and what was written, each if
-    /// anything was; `None` where it is not plain enough.
+    /// Copies the data of a logical datagram that concerns this controller. Returns what was read and what was written,
+    /// each if anything was; `None` for a case that is not simple.
     pub(super) fn logical_compiled(&mut self, command: Command, address: u32, data: &mut [u8]) -> Option<(bool, bool)> {
         let len = u16::try_from(data.len()).ok()?;
         let known = match self.compiled.find(command, address, len) {
@@ -49,7 +49,7 @@ impl Controller {
         Some((read, written))
     }
 
-    /// Where a piece lies at the moment, if its SyncManager grants the access.
+    /// Current address of a piece, if its SyncManager grants the access.
     #[inline]
     fn piece_address(&mut self, piece: Move) -> Option<u32> {
         let (start, end) = (u32::from(piece.physical), u32::from(piece.physical) + u32::from(piece.len));

@@ -42,16 +42,16 @@ pub struct ControllerConfig {
     pub sii_load_time: Duration,
     /// One read command yields 8 bytes (otherwise 4).
     pub eight_byte_reads: bool,
-    /// What is not ideal about the local clock.
+    /// Imperfections of the local clock.
     pub clock_errors: ClockErrors,
     /// The local clock when power comes.
     pub clock_start: u64,
     /// The controller has DC_LATCH_MODE (0x0936) and, while it is 0, does not latch the receive time of frames that
     /// come in at another port than 0 before the processing unit has seen them (protocol 3.12, 7.5).
     pub receive_time_latch_mode: bool,
-    /// The controller does not tell frames apart when it latches receive times: a port has the time of the frame that
-    /// came in there last when the latching one reaches the processing unit, or next where that has not come in yet
-    /// (protocol 7.1).
+    /// The controller does not distinguish frames when it latches receive times: a port has the time of the last frame
+    /// that arrived there before the latching one reaches the processing unit, or of the next one where none has
+    /// arrived yet (protocol 7.1).
     pub latches_any_frame: bool,
 }
 

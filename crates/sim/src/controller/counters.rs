@@ -46,7 +46,7 @@ impl Controller {
         }
     }
 
-    /// Counts what is no symbol, within a frame or between two.
+    /// Counts an invalid symbol, within a frame or between two.
     pub fn count_symbol_error(&mut self, port: Port) {
         self.memory.count(map::RX_ERROR_COUNTER.offset(2 * port.index() as u16 + 1));
     }

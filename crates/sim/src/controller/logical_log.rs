@@ -1,7 +1,7 @@
-//! A log of the logical datagrams in which a SubDevice took part: the evidence from inside of it, for checkers.
+//! A log of the logical datagrams that a SubDevice processed: evidence from inside the SubDevice, for checkers.
 //!
-//! In: each logical datagram that the processing unit answered, with the marks by which a MainDevice knows its frame.
-//! Out: what the data of that datagram was when it left the SubDevice. The log is off unless a checker asks for it, and
+//! Input: each logical datagram that the processing unit answered, with the marks by which a MainDevice recognises its
+//! frame. Output: the data of that datagram when it left the SubDevice. The log is off unless a checker enables it, and
 //! holds the newest accesses only.
 
 use std::collections::VecDeque;
@@ -14,7 +14,7 @@ const KEPT: usize = 64;
 /// Offset of the second byte of the source address, where a MainDevice keeps the number of a frame (protocol 9.7.1).
 const FRAME_ID_AT: usize = 7;
 
-/// A logical datagram in which a SubDevice took part.
+/// A logical datagram that a SubDevice processed.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct LogicalAccess {
     /// Byte 1 of the frame's source address, and Idx of the datagram.
@@ -29,7 +29,7 @@ pub struct LogicalAccess {
     pub written: bool,
     /// The data as it left the SubDevice.
     pub data: Vec<u8>,
-    /// What was moved: a SubDevice adds to the working counter once for all that it reads, whatever part of it its
+    /// Copied pieces: a SubDevice increments the working counter once for all that it reads, whatever part its
     /// SyncManagers refuse.
     pub moved: Vec<Moved>,
 }

@@ -1,7 +1,7 @@
-//! What the frame in the processing unit asks for, kept until its FCS is known to be good (protocol 2.5).
+//! Effects of the frame in the processing unit, kept until its FCS is known to be good (protocol 2.5).
 //!
-//! In: writes to shadowed registers and reads with side effects, in the order of the datagrams. Out: the same, to be
-//! carried out by [`super::Controller`] at the end of the frame or to be forgotten.
+//! Input: writes to shadowed registers and reads with side effects, in the order of the datagrams. Output: the same,
+//! for [`super::Controller`] to apply at the end of the frame, or to discard.
 
 use crate::time::SimTime;
 

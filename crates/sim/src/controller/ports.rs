@@ -27,7 +27,7 @@ pub(super) struct Ports {
     modes: [LoopControl; 4],
     /// The frame that closed loops by writing DL_CONTROL, and the loops: it may still come back through them.
     closing: Option<(u64, [bool; 4])>,
-    /// Counts whatever may change the way of a frame.
+    /// Counts all changes that may change the path of a frame.
     changes: u32,
 }
 
@@ -93,7 +93,7 @@ impl Ports {
         self.note_passing();
     }
 
-    /// Ways have to be found anew.
+    /// Paths have to be computed again.
     pub fn note_change(&mut self) {
         self.changes = self.changes.wrapping_add(1);
     }
@@ -118,7 +118,7 @@ impl Ports {
         self.passing & 1 << port.index() != 0
     }
 
-    /// As long as this stays the same, frames take the same way, but for one that closed ports itself.
+    /// Counts changes: equal counts mean equal paths, except for a frame that closed ports itself.
     pub const fn changes(&self) -> u32 {
         self.changes
     }

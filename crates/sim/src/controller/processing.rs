@@ -250,7 +250,7 @@ impl Controller {
         any
     }
 
-    /// The end of a frame: what it asked for takes effect, or is forgotten.
+    /// The end of a frame: its effects are applied, or discarded.
     fn finish_frame(&mut self, good: bool, now: SimTime) {
         let mut left = self.pass.sync_managers;
         while left != 0 {

@@ -126,7 +126,7 @@ impl Controller {
         }
     }
 
-    /// Device emulation: nobody behind the PDI answers requests of states.
+    /// Device emulation: no application answers state requests.
     fn emulates(&self) -> bool {
         self.memory.u8(map::ESC_CONFIGURATION) & DEVICE_EMULATION != 0
     }
@@ -224,8 +224,8 @@ impl Controller {
         }
     }
 
-    /// The frame that latched receive times last, by its number in the simulation, and when the processing unit met it:
-    /// the truth that no MainDevice can see.
+    /// The last frame that latched receive times, by its number in the simulation, and the time at which the processing
+    /// unit processed it: the exact values, which no MainDevice can see.
     pub const fn latched(&self) -> Option<(u64, SimTime)> {
         self.clock.latched()
     }

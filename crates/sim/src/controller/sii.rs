@@ -1,4 +1,4 @@
-//! The SII interface: commands to the EEPROM, who may give them, loading the configuration (protocol 3.8, 4.7).
+//! The SII interface: commands to the EEPROM, its owner, loading the configuration (protocol 3.8, 4.7).
 //!
 //! In: writes to 0x0500..0x050F and virtual time. Out: data, busy and error bits, and after loading the registers that
 //! come from the EEPROM. A command starts at the end of its frame and takes the configured time.
@@ -24,7 +24,7 @@ const CONFIGURATION_AREA: usize = 16;
 const CHECKED: usize = 14;
 /// Images that need two address bytes are larger than 16 KBit.
 const ONE_ADDRESS_BYTE: usize = 2048;
-/// What is read beyond the end of the image.
+/// Value of bytes beyond the end of the image.
 const ERASED: u8 = 0xFF;
 
 impl Controller {
@@ -100,7 +100,7 @@ impl Controller {
         }
     }
 
-    /// The PDI can take what is offered, and give it back.
+    /// The PDI can accept the offered interface, and return it.
     fn sii_pdi_access_written(&mut self, value: u8) {
         let wanted = SiiPdiAccess::from_bits(value).pdi_access;
         let offered = self.memory.u8(map::SII_CONFIGURATION) & 1 != 0;
@@ -144,12 +144,12 @@ impl Controller {
         }
     }
 
-    /// So many of the next commands take another time than usual.
+    /// Sets the duration of this number of commands.
     pub fn slow_sii(&mut self, busy: Duration, times: u32) {
         self.sii.slow = (times, busy);
     }
 
-    /// So many of the next writes go wrong.
+    /// Makes this number of writes fail.
     pub fn spoil_sii_writes(&mut self, how: SpoiltWrite, times: u32) {
         self.sii.spoilt = (times, how);
     }

@@ -4,8 +4,8 @@
 //! bytes, and after complete accesses the status byte and events. An access by EtherCAT is complete only when its frame
 //! had a good FCS, so [`SyncManagers::finish_frame`] decides; the PDI's accesses are complete at once.
 //!
-//! Not configured areas are free. The area of a SyncManager that is switched off, by either side, is locked. The second
-//! and third buffer are not addressable. Areas of one byte, and areas in register space, have a single buffer.
+//! Areas without a SyncManager are free. The area of a SyncManager that is disabled, by either side, is locked. The
+//! second and third buffer are not addressable. Areas of one byte, and areas in register space, have a single buffer.
 
 use ringcat_wire::register::{SyncManager, SyncManagerDirection, SyncManagerMode};
 
@@ -26,14 +26,14 @@ enum Buffering {
     Invalid,
 }
 
-/// Whose turn an access is.
+/// The side whose access is due.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Role {
     Writer,
     Reader,
 }
 
-/// What the SyncManagers say about an access that starts at an address.
+/// Decision of the SyncManagers about an access that starts at an address.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Claim {
     /// Up to this address no SyncManager is concerned.
@@ -55,7 +55,7 @@ pub(super) struct Grant {
     pub completed: bool,
 }
 
-/// What an access completed.
+/// Result of a completed access.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(super) struct Completion {
     /// A complete write that triggers the process data watchdog.
@@ -133,7 +133,7 @@ impl SyncManagers {
         self.units.get(n).is_some_and(|unit| unit.enabled)
     }
 
-    /// Who is responsible for `address`.
+    /// The SyncManager of `address`.
     pub fn claim(&self, address: u32, end: u32) -> Claim {
         let mut free_until = end;
         let mut hidden_until = None;
@@ -228,7 +228,7 @@ impl Unit {
         unit
     }
 
-    /// What makes the buffers what they are.
+    /// Properties that determine the buffers.
     fn layout(&self) -> (u32, u32, bool, bool, Buffering) {
         (self.start, self.length, self.enabled, self.ecat_writes, self.buffering)
     }
@@ -388,7 +388,7 @@ mod tests {
             assert_ne!(Some(at), last, "round {round}");
             managers.finish_frame(0, true);
             if round % 3 == 0 {
-                // A reader opens the newest buffer and dawdles.
+                // A reader opens the newest buffer and reads slowly.
                 let grant = managers.access(0, Side::Pdi, false, 0x1000, 0x1001).unwrap();
                 assert!(grant.opened && !grant.completed);
                 assert_eq!(grant.address, at);

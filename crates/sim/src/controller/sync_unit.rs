@@ -215,7 +215,7 @@ mod tests {
         assert!(!unit.is_active(0, 9_999) && unit.is_active(0, 10_000) && !unit.is_active(1, 10_299));
         unit.acknowledge(0, 10_200);
         assert!(!unit.is_active(0, 10_999) && unit.is_active(1, 10_300));
-        // Pulses that nobody has acknowledged are one.
+        // Pulses without an acknowledgement count as one.
         unit.acknowledge(0, 14_500);
         assert!(!unit.is_active(0, 14_999) && unit.is_active(0, 15_000));
         let settings = SyncSettings { start: 10_000, sync0_cycle_ns: 1_000, wide: true, ..SyncSettings::default() };

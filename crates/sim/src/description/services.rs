@@ -1,5 +1,5 @@
-//! What stands behind the mailbox of a device beside its objects (protocol 6.4 to 6.8). Which protocols there are at
-//! all says the SII.
+//! Services behind the mailbox of a device, besides its objects (protocol 6.4 to 6.8). The SII says which protocols
+//! exist.
 
 use core::net::Ipv4Addr;
 use core::time::Duration;
@@ -48,7 +48,7 @@ impl Default for FoeDescription {
     }
 }
 
-/// What stands behind the fragments of Ethernet frames.
+/// Receiver of Ethernet frames.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum EoeEnd {
     /// An IP stack: answers ARP and ping, serves TCP.
@@ -62,7 +62,7 @@ pub enum EoeEnd {
 /// Ethernet of a device.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct EoeDescription {
-    /// What stands behind it.
+    /// The receiver.
     pub end: EoeEnd,
     /// MAC address until another one is set.
     pub mac: [u8; 6],

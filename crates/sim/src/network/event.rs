@@ -1,18 +1,18 @@
-//! What the queue of a segment holds.
+//! Events of a segment's queue.
 
 use super::pool::Slot;
 use crate::cable::{HostLink, LegId};
 
-/// Something that is due.
+/// A due event.
 #[derive(Clone, Copy, Debug)]
 pub(super) enum Event {
     /// The last bit of a frame that changes no ways reaches the end of its first leg.
     Entry { slot: Slot, link: HostLink, leg: LegId },
-    /// The last bit of a frame reaches the end of a leg. `meddled`: the faults of the leg have had their turn.
+    /// The last bit of a frame reaches the end of a leg. `meddled`: the faults of the leg are already applied.
     Arrival { slot: Slot, leg: LegId, meddled: bool },
-    /// The end of a leg notices whether there is a signal, unless it has changed again since.
+    /// The end of a leg detects a signal or its loss, unless it has changed again since.
     Detection { leg: LegId, epoch: u32 },
-    /// A device has something to do by itself.
+    /// A device has work without a frame.
     Wake { device: u32 },
     /// A scheduled fault.
     Fault { number: u32 },

@@ -7,7 +7,7 @@ use crate::queue::Lane;
 use crate::time::SimTime;
 
 impl Network {
-    /// Brings about a fault at a time, or at once where that has passed.
+    /// Causes a fault at a time, or at once where that has passed.
     ///
     /// # Panics
     /// When the device, the cable or the byte of the EEPROM does not exist.
@@ -21,7 +21,7 @@ impl Network {
         self.queue.push(Lane::Any, at.max(self.now), Event::Fault { number: free as u32 });
     }
 
-    /// Brings about a fault now.
+    /// Causes a fault now.
     ///
     /// # Panics
     /// When the device, the cable or the byte of the EEPROM does not exist.
@@ -94,7 +94,7 @@ impl Network {
         }
     }
 
-    /// The ends of a cable that receive a signal see what is no symbol.
+    /// The receiving ends of a cable detect invalid symbols.
     fn disturb_idle(&mut self, cable: CableId, direction: Option<Direction>, count: u32) {
         for candidate in Direction::ALL {
             let leg = self.leg_mut(cable, candidate);
@@ -106,7 +106,7 @@ impl Network {
         }
     }
 
-    /// A fault on something that does not exist is a mistake of the test, which must not pass unseen.
+    /// A fault on a missing cable or device is a mistake of the test, which must be reported.
     fn check(&self, fault: &Fault) {
         match *fault {
             Fault::Cut(cable)

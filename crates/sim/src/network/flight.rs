@@ -1,12 +1,12 @@
-//! Frames fly along a [`Route`] in one go, as far as nothing else happens.
+//! Moves frames along a [`Route`] in one step, up to the next other event.
 //!
-//! A frame that cannot change the way of frames goes from one processing unit to the next, and on to the end, at the
-//! times that hop by hop ([`super::traffic`]) would give. What it does to a device is done by the same code.
+//! A frame that cannot change the paths of frames moves from one processing unit to the next, and on to the end, at the
+//! same times as hop by hop ([`super::traffic`]). Its effect on a device is computed by the same code.
 //!
-//! Frames of the same kind that enter behind it, or at the other end, may do so meanwhile: they do not overtake it,
-//! each processing unit belongs to the way of one interface, and a frame that only passes by leaves no trace. Anything
-//! else that is due, in the segment or in a device, ends the flight there, and the frame goes on hop by hop. The same
-//! holds for the limit of the caller, which may look at the devices or change the segment then.
+//! Frames of the same kind that enter after it, or at the other end, may do so meanwhile: they do not overtake it, each
+//! processing unit belongs to the path of one interface, and a frame that only passes by leaves no trace. Any other due
+//! event, in the segment or in a device, ends the flight there, and the frame continues hop by hop. So does the time
+//! limit of the caller, which may then inspect the devices or change the segment.
 
 use super::Network;
 use super::event::Event;
@@ -27,7 +27,7 @@ impl Network {
                 self.find_route(link);
             }
             let route = &self.routes[link as usize];
-            // What is due at this very time has its own order.
+            // Events that are due at this very time have their own order.
             let alone = self.horizon(link) >= self.now;
             if alone && route.wiring == Some(self.wiring) && first_bit >= route.since {
                 return self.fly(slot, link);
@@ -36,12 +36,12 @@ impl Network {
         self.arrive(slot, leg, false)
     }
 
-    /// Something about cables, links or power has changed.
+    /// Cables, links or power have changed.
     pub(super) fn wiring_changed(&mut self) {
         self.wiring = self.wiring.wrapping_add(1);
     }
 
-    /// Takes a frame as far along its route as nothing else happens. Returns its next hop, if that is not the end.
+    /// Moves a frame along its route up to the next other event. Returns its next hop, if that is not the end.
     fn fly(&mut self, slot: Slot, link: HostLink) -> Option<(SimTime, Event)> {
         let mut route = core::mem::take(&mut self.routes[link as usize]);
         let entered = self.now;
@@ -63,7 +63,7 @@ impl Network {
         None
     }
 
-    /// Does everything up to the hop whose place it returns.
+    /// Processes everything up to the hop whose index it returns.
     fn follow(&mut self, slot: Slot, link: HostLink, route: &mut Route) -> usize {
         let entered = self.now;
         let time = |hop: &Hop| SimTime(entered.0.saturating_add(hop.after_ns));
@@ -108,13 +108,13 @@ impl Network {
         }
     }
 
-    /// Up to here a frame of an interface can go without meeting anything else.
+    /// Time up to which a frame of an interface can move without another event.
     fn horizon(&self, link: HostLink) -> SimTime {
         let horizon = self.limit.min(self.queue.next_in(Lane::Any).back_ns(1));
         if !self.until_received {
             return horizon;
         }
-        // Whoever gets the first frame may change the segment then.
+        // The receiver of the first frame may change the segment then.
         let other = if link == HostLink::Main { HostLink::Redundant } else { HostLink::Main };
         let entry = self.queue.next_in(other.entry_lane());
         let route = &self.routes[other as usize];
@@ -122,7 +122,7 @@ impl Network {
         horizon.min(self.queue.next_in(Lane::Exit)).min(SimTime(entry.0.saturating_add(there)))
     }
 
-    /// Finds the way of frames of an interface, if it leads through healthy cables and back to an interface.
+    /// Finds the path of frames of an interface, if it leads through cables without faults and back to an interface.
     fn find_route(&mut self, link: HostLink) {
         let mut route = core::mem::take(&mut self.routes[link as usize]);
         route.hops.clear();

@@ -4,46 +4,48 @@ use core::time::Duration;
 
 use crate::device::Device;
 
-/// What becomes of datagrams that are too many for a frame.
+/// Handling of datagrams beyond the limit of a frame.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Beyond {
-    /// They come back as they were sent.
+    /// They come back unchanged.
     Unprocessed,
     /// The whole frame does not come back.
     Dropped,
 }
 
-/// How many datagrams a frame may hold, as other simulators and some gateways have it.
+/// Largest number of processed datagrams in a frame, as in other simulators and some gateways.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct DatagramLimit {
-    /// So many.
+    /// The limit.
     pub datagrams: u16,
-    /// What becomes of more.
+    /// Handling of further ones.
     pub beyond: Beyond,
 }
 
 /// Properties of a segment that belong to no single device.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct NetworkOptions {
-    /// Where random choices start from (the bit that a fault corrupts).
+    /// Seed of random choices (the bit that a fault inverts).
     pub seed: u64,
-    /// From the loss of a signal to the moment the ends notice. Default 10 us (fast detection as DS1 demands it,
-    /// protocol 2.8); plain PHYs take hundreds of milliseconds.
+    /// Detection time of a lost signal. Default 10 us (fast detection as DS1 demands it, protocol 2.8); plain PHYs take
+    /// hundreds of milliseconds.
     pub link_down_delay: Duration,
-    /// From the return of a signal to the moment the ends notice. Default 10 us.
+    /// Detection time of a returning signal. Default 10 us.
     pub link_up_delay: Duration,
-    /// Delay of a passage through a device with its processing unit, for devices that say nothing. Default 300 ns.
+    /// Delay of a pass through a device with its processing unit, for devices without a value of their own. Default 300
+    /// ns.
     pub processing_delay: Duration,
-    /// Delay of a passage through a device without its processing unit, for devices that say nothing. Default 300 ns.
+    /// Delay of a pass through a device without its processing unit, for devices without a value of their own. Default
+    /// 300 ns.
     pub forwarding_delay: Duration,
     /// Frames that an interface of the MainDevice queues for sending. Default 256.
     pub transmit_queue: usize,
     /// Frames that an interface of the MainDevice keeps until they are fetched. Default 256.
     pub receive_queue: usize,
-    /// How many datagrams a frame may hold. Default: as many as fit.
+    /// Largest number of processed datagrams in a frame. Default: as many as fit.
     pub max_datagrams: Option<DatagramLimit>,
-    /// Frames fly in one go where nothing else happens, instead of hop by hop. What can be seen is the same, bit for
-    /// bit; it takes a fraction of the computing. Default true.
+    /// Frames move in one step where no other event occurs, instead of hop by hop. The observable result is the same,
+    /// bit for bit, at a fraction of the computing time. Default true.
     pub compiled: bool,
 }
 
@@ -64,7 +66,7 @@ impl Default for NetworkOptions {
 }
 
 impl NetworkOptions {
-    /// The same delay for every passage through a device.
+    /// The same delay for every pass through a device.
     #[must_use]
     pub const fn with_hop_delay(mut self, delay: Duration) -> NetworkOptions {
         self.processing_delay = delay;
@@ -72,7 +74,7 @@ impl NetworkOptions {
         self
     }
 
-    /// The same delay for noticing that a link goes and that it comes.
+    /// The same detection time for lost and for returning links.
     #[must_use]
     pub const fn with_detection_delay(mut self, delay: Duration) -> NetworkOptions {
         self.link_down_delay = delay;
@@ -80,7 +82,7 @@ impl NetworkOptions {
         self
     }
 
-    /// Delay of a passage through a device, with its processing unit or without.
+    /// Delay of a pass through a device, with its processing unit or without.
     pub(super) fn passage(&self, device: &Device, processed: bool) -> Duration {
         if processed {
             device.description.processing_delay.unwrap_or(self.processing_delay)

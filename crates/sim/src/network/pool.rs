@@ -1,16 +1,15 @@
-//! Frames that travel, in slots that are used again: once a segment has had as many frames under way as it gets,
-//! sending allocates no more.
+//! Frames in the segment, in reused slots: after the largest number of frames at once, sending allocates no more.
 
 use crate::frame::SimFrame;
 
-/// Buffers kept for frames to come; more than that are let go.
+/// Number of buffers kept for later frames; further ones are freed.
 const SPARE_BUFFERS: usize = 1_024;
 
 /// Number of a slot.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Slot(u32);
 
-/// The frames under way.
+/// The frames in the segment.
 #[derive(Debug, Default)]
 pub(crate) struct FramePool {
     frames: Vec<SimFrame>,
@@ -48,23 +47,23 @@ impl FramePool {
         &mut self.frames[slot.0 as usize]
     }
 
-    /// Frames that have not gone as far as they go.
+    /// Number of frames still in the segment.
     pub(crate) fn under_way(&self) -> usize {
         self.frames.len() - self.free.len()
     }
 
-    /// The frame goes no further.
+    /// The frame has reached its end.
     pub(crate) fn remove(&mut self, slot: Slot) {
         self.free.push(slot);
     }
 
-    /// The frame goes no further; its bytes are handed out.
+    /// The frame has reached its end; its bytes are returned.
     pub(crate) fn remove_bytes(&mut self, slot: Slot) -> Vec<u8> {
         self.free.push(slot);
         core::mem::take(&mut self.frames[slot.0 as usize].bytes)
     }
 
-    /// Takes a buffer for frames to come.
+    /// Takes a buffer for later frames.
     pub(crate) fn give_back(&mut self, bytes: Vec<u8>) {
         if self.spare.len() < SPARE_BUFFERS && bytes.capacity() > 0 {
             self.spare.push(bytes);

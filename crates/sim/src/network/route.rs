@@ -1,8 +1,8 @@
-//! The way of frames through a segment in which nothing else happens: found once, then flown in one go (`flight`).
+//! The path of frames through a segment without other events: computed once, then used in one step (`flight`).
 //!
-//! Hop by hop ([`super::traffic`]) a frame costs the same at every device, also where it only passes by on its way
-//! back. As long as cables and ports stay as they are, all frames of an interface take the same way, and it is known
-//! beforehand at which devices they meet a processing unit.
+//! Hop by hop ([`super::traffic`]) a frame costs the same at every device, even where it only passes by on its way
+//! back. As long as cables and ports do not change, all frames of an interface take the same path, and the devices
+//! whose processing units they pass are known in advance.
 
 use ringcat_wire::command::Command;
 use ringcat_wire::register::map;
@@ -19,23 +19,23 @@ pub(super) struct Hop {
     pub(super) after_ns: u64,
 }
 
-/// A hop that has to be looked at: the first one into a device, or one through its processing unit.
+/// A hop that needs processing: the first one into a device, or one through its processing unit.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Stop {
-    /// Place among the hops.
+    /// Index among the hops.
     pub(super) hop: u32,
     pub(super) device: u32,
-    /// The device's ports are as they were found while this has not changed.
+    /// The device's ports are unchanged as long as this is.
     pub(super) port_changes: u32,
     pub(super) processed: bool,
 }
 
-/// The way of frames from an interface of the MainDevice.
+/// The path of frames from an interface of the MainDevice.
 #[derive(Debug, Default)]
 pub(super) struct Route {
-    /// State of the wiring that it was found in; `None` where there is no way, or it has to be found anew.
+    /// State of the wiring for which it was computed; `None` where there is no path, or it must be computed again.
     pub(super) wiring: Option<u32>,
-    /// Frames whose first bit comes later than this are not met by what has happened before.
+    /// Frames whose first bit comes later than this are not affected by earlier events.
     pub(super) since: SimTime,
     /// All hops, that into the interface at the end included.
     pub(super) hops: Vec<Hop>,
@@ -43,7 +43,7 @@ pub(super) struct Route {
 }
 
 impl Route {
-    /// It has to be found anew, if the ports of a device are not as they were.
+    /// It must be computed again, if the ports of a device have changed.
     pub(super) fn refuse(&mut self, changed: bool) {
         if changed {
             self.wiring = None;

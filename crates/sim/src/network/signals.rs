@@ -74,7 +74,7 @@ impl Network {
         }
     }
 
-    /// Lets a device react to what has happened to it, and sees to it that it is woken in time.
+    /// Lets a device react to past events, and schedules its next wake-up.
     pub(super) fn settle(&mut self, index: usize) {
         let node = &mut self.nodes[index];
         if node.device.needs_run() {
@@ -88,7 +88,7 @@ impl Network {
         }
     }
 
-    /// Has a device react to a frame when that has left the segment.
+    /// Makes a device react to a frame when that has left the segment.
     pub(super) fn settle_later(&mut self, index: usize, frame: u64) {
         let node = &mut self.nodes[index];
         if !node.device.needs_run() && !node.has_news() {
@@ -99,7 +99,7 @@ impl Network {
         }
     }
 
-    /// Has a device react to the frames that have passed it, before another one does.
+    /// Makes a device react to the frames that have passed it, before another one passes.
     pub(super) fn settle_before(&mut self, index: usize, frame: u64) {
         if self.nodes[index].unsettled_by.is_some_and(|by| by != frame) {
             self.settle_if_due(index);
@@ -112,7 +112,7 @@ impl Network {
         }
     }
 
-    /// Has all devices react to what passed them while time leapt.
+    /// Makes all devices react to frames that passed them during a leap of time.
     pub fn settle_all(&mut self) {
         if self.unsettled.is_empty() {
             return;
@@ -124,7 +124,7 @@ impl Network {
         self.unsettled = unsettled;
     }
 
-    /// Wakes a device at a time, or earlier if that is arranged already. A deadline can have passed when it is set: a
+    /// Wakes a device at a time, unless an earlier wake-up is scheduled. A deadline can have passed when it is set: a
     /// watchdog time that was shortened, an application that hung meanwhile.
     pub(super) fn wake_at(&mut self, index: usize, at: SimTime) {
         let at = at.max(self.now);
@@ -135,8 +135,8 @@ impl Network {
         }
     }
 
-    /// The time has come that was arranged. Deadlines move away under way (a watchdog that was triggered), so the
-    /// device is asked anew.
+    /// The scheduled time has come. Deadlines may have moved meanwhile (a watchdog that was triggered), so the device
+    /// gives its deadline again.
     pub(super) fn wake(&mut self, index: usize) {
         let node = &mut self.nodes[index];
         if node.wake_at > self.now {
@@ -159,7 +159,7 @@ impl Network {
         self.refresh_signal(cable);
     }
 
-    /// Makes a cable whole again.
+    /// Restores a cable.
     ///
     /// # Panics
     /// When there is no cable with this number.
@@ -168,13 +168,14 @@ impl Network {
         self.refresh_signal(cable);
     }
 
-    /// Makes a cable whole again, one end of which notices later than the other.
+    /// Restores a cable, with a later detection at one end.
     pub(super) fn heal_unevenly(&mut self, cable: CableId, later: Direction, by: Duration) {
         self.cables[cable.0].cut = false;
         self.refresh_signal_unevenly(cable, |direction| if direction == later { by } else { Duration::ZERO });
     }
 
-    /// Takes the power from a device. Its ports are dead at once; its neighbours notice.
+    /// Switches the power of a device off. Its ports are dead at once; its neighbours notice after their detection
+    /// delay.
     ///
     /// # Panics
     /// When there is no device with this number.
@@ -191,7 +192,7 @@ impl Network {
         }
     }
 
-    /// Gives a device its power back. Its links come up after their detection delay.
+    /// Switches the power of a device on. Its links come up after their detection delay.
     ///
     /// # Panics
     /// When there is no device with this number.
@@ -223,7 +224,7 @@ impl Network {
         }
     }
 
-    /// Finds out whether a cable carries a signal; if that changed, its ends notice later.
+    /// Computes whether a cable carries a signal; after a change, its ends notice later.
     fn refresh_signal(&mut self, id: CableId) {
         self.refresh_signal_unevenly(id, |_| Duration::ZERO);
     }
@@ -248,7 +249,7 @@ impl Network {
         }
     }
 
-    /// The end of a leg notices whether there is a signal.
+    /// The end of a leg detects a signal or its loss.
     pub(super) fn detect(&mut self, id: LegId, epoch: u32) {
         if self.cables[id.cable().0].epoch != epoch {
             return;

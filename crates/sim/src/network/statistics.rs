@@ -1,10 +1,10 @@
-//! Counters of a segment: what the MainDevice's links carried and why frames did not come back.
+//! Counters of a segment: frames on the MainDevice's links, and causes of lost frames.
 
 use std::fmt;
 
 use crate::cable::HostLink;
 
-/// Why a frame went no further.
+/// Why a frame was lost.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum LossCause {
     /// It was sent on an interface without carrier or without cable.
@@ -32,7 +32,7 @@ pub enum LossCause {
     Destroyed,
     /// It came back with a wrong check sequence.
     BadCheckSequence,
-    /// Nobody fetched the received frames, and their queue was full.
+    /// The received frames were not fetched, and their queue was full.
     ReceiveQueueFull,
 }
 
@@ -75,7 +75,7 @@ impl LossCause {
     ];
 }
 
-/// What one interface of the MainDevice carried. Bytes are those of the frames without check sequence.
+/// Traffic of one interface of the MainDevice. Bytes are those of the frames without check sequence.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct LinkStatistics {
     /// Frames that went onto the wire.
@@ -97,22 +97,22 @@ pub struct Statistics {
 }
 
 impl Statistics {
-    /// What an interface of the MainDevice carried.
+    /// Traffic of an interface of the MainDevice.
     pub fn link(&self, link: HostLink) -> LinkStatistics {
         self.links[link as usize]
     }
 
-    /// Frames lost for one reason.
+    /// Frames lost for one cause.
     pub fn lost(&self, cause: LossCause) -> u64 {
         self.lost[cause as usize]
     }
 
-    /// Frames lost for any reason.
+    /// Frames lost for any cause.
     pub fn lost_in_all(&self) -> u64 {
         self.lost.iter().sum()
     }
 
-    /// Passages of frames through devices.
+    /// Number of passes of frames through devices.
     pub fn hops(&self) -> u64 {
         self.hops
     }

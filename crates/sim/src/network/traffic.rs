@@ -1,4 +1,4 @@
-//! Frames under way: from an interface of the MainDevice through cables and devices back to one.
+//! Frames in the segment: from an interface of the MainDevice through cables and devices back to one.
 
 use core::time::Duration;
 
@@ -91,7 +91,7 @@ impl Network {
         self.statistics.hops += 1;
         let id = self.frames.frame(slot).id;
         if self.nodes[index].device.controller.may_process(from) {
-            // Turned round by a loop that closed meanwhile, the processing unit has seen no beginning of it.
+            // Turned round by a loop that closed meanwhile: the processing unit has not seen its beginning.
             let node = &self.nodes[index];
             if node.device.controller.turns_round(from) && node.interrupted(from, Port::A, first_bit) {
                 return self.lose_hop(slot, LossCause::LoopChanged);
@@ -101,7 +101,7 @@ impl Network {
         let frame = self.frames.frame_mut(slot);
         let node = &mut self.nodes[index];
         let passage = node.device.controller.receive_between(frame, from, first_bit, self.now);
-        // A frame that only passes by gives the application nothing to do.
+        // A frame that only passes by needs no reaction of the application.
         if !matches!(passage, Passage::Leaves { processed: false, .. }) {
             if self.leaping {
                 self.settle_later(index, id);
@@ -141,7 +141,7 @@ impl Network {
         counters.bytes_received += length;
     }
 
-    /// The faults of a leg have their turn with a frame that is due at its end.
+    /// Applies the faults of a leg to a frame that is due at its end.
     fn meddle(&mut self, slot: Slot, id: LegId) -> Option<(SimTime, Event)> {
         let leg = &mut self.legs[id.index()];
         if leg.faults.blocked {
@@ -170,7 +170,7 @@ impl Network {
         Some((at, Event::Arrival { slot, leg: id, meddled: true }))
     }
 
-    /// Turns over one bit of a frame.
+    /// Inverts one bit of a frame.
     fn corrupt(&mut self, slot: Slot) {
         let frame = self.frames.frame_mut(slot);
         let mut bytes = core::mem::take(&mut frame.bytes);
@@ -178,7 +178,7 @@ impl Network {
         if let Some(byte) = bytes.get_mut(bit / 8) {
             *byte ^= 1 << (bit % 8);
         }
-        // The bit may be one of a datagram's length: the datagrams have to be found anew.
+        // The bit may be part of a datagram's length: the datagrams must be found again.
         let fcs = if frame.fcs == Fcs::Good { Fcs::Bad } else { frame.fcs };
         let most = frame.most_datagrams;
         *frame = SimFrame { fcs, ..SimFrame::new(frame.id, bytes) };

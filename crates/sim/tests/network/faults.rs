@@ -87,7 +87,7 @@ fn symbol_errors_are_counted_where_they_arrive_and_hurt_only_the_frames_they_are
     assert_eq!(network.statistics().lost(LossCause::BadCheckSequence), 1);
     assert_eq!(counted(&network, 1), [1, 0xFF, 0, 0, 0, 0, 0, 0]);
     assert_eq!(counted(&network, 2), [0; 8]);
-    // Nobody hears anything on a cable that is cut.
+    // A cut cable carries no signal.
     network.apply(Fault::Cut(cable));
     network.advance_by(SETTLE);
     let clear = command(Command::Bwr, Target::Broadcast(map::RX_ERROR_COUNTER), &[0]);

@@ -127,7 +127,7 @@ fn a_local_ring_from_an_earlier_to_a_later_port_is_always_served() {
         for place in ["3.1", "3.0"] {
             assert_eq!(main(&[place]), journey(Main, &all, 0x02, true), "{start} -> {back} cut at {place}");
         }
-        // The closing cable: nobody's port 0 hangs in the air.
+        // The closing cable: no port 0 is unconnected.
         assert_eq!(main(&["5.1"]), journey(Main, &all, 0x02, false), "{start} -> {back} cut at the end");
     }
 }

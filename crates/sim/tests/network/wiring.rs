@@ -1,4 +1,4 @@
-//! Segments from one line of text, and a frame that tells whom it met.
+//! Segments from one line of text, and a frame that records the SubDevices that it passes.
 
 use core::time::Duration;
 
@@ -76,7 +76,7 @@ pub fn ring(count: usize) -> String {
     format!("main-1.0 {} {count}.1-red", inner.join(" "))
 }
 
-/// Cuts the cable that is plugged in at `place` and lets everybody notice.
+/// Cuts the cable that is plugged in at `place` and waits for its detection.
 pub fn cut(network: &mut Network, place: &str) -> CableId {
     let cable = network.cable_at(endpoint(place)).unwrap();
     network.cut(cable);

@@ -79,7 +79,7 @@ impl<'a> EoeMessage<'a> {
             SET_FILTER_REQUEST => EoeBody::SetFilter(AddressFilter::decode(data)?),
             SET_FILTER_RESPONSE => EoeBody::SetFilterDone(result),
             GET_IP_REQUEST => EoeBody::GetIp,
-            // Who has nothing to tell tells only that.
+            // A response without parameters contains only its result.
             GET_IP_RESPONSE if result != EoeResult::OK && data.is_empty() => {
                 EoeBody::Ip(result, IpParameters::default())
             }

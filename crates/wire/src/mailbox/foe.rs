@@ -1,7 +1,7 @@
 //! FoE: reading and writing files (protocol 6.4).
 //!
-//! In goes or out comes the payload of a mailbox message of protocol FoE. Who sends which message when, packet numbers
-//! and the repetition after BUSY are the matter of both ends.
+//! Converts the payload of mailbox messages of protocol FoE. Both ends handle the sequence of messages, packet numbers
+//! and the repetition after BUSY.
 
 mod error;
 
@@ -56,7 +56,7 @@ pub enum FoeMessage<'a> {
     Busy {
         /// So much is done.
         done: u16,
-        /// Of so much.
+        /// Total.
         entire: u16,
         /// What the other end is doing.
         text: &'a [u8],

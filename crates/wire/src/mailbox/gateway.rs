@@ -1,7 +1,7 @@
 //! The mailbox gateway: mailbox messages in UDP and TCP (protocol 10.1, ETG.8200).
 //!
-//! In goes or out comes what a client sends: an EtherCAT header of type 5 and one mailbox message. A stream has one
-//! behind the other; [`frame_length`] says where one ends. Who may ask what is the gateway's matter.
+//! Converts the messages of a client: an EtherCAT header of type 5 and one mailbox message. In a stream they follow one
+//! another; [`frame_length`] says where one ends. The gateway handles access rights.
 
 use core::fmt;
 

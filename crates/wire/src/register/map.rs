@@ -114,7 +114,7 @@ registers! {
     /// Expirations of the PDI watchdog.
     WATCHDOG_COUNTER_PDI = 0x0443;
 
-    /// Who may use the EEPROM.
+    /// Owner of the EEPROM interface.
     SII_CONFIGURATION = 0x0500;
     /// Whether the PDI uses the EEPROM.
     SII_PDI_ACCESS = 0x0501;

@@ -5,7 +5,7 @@ use super::view::Field;
 /// Buffer type of a SyncManager.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub enum SyncManagerMode {
-    /// Three buffers: always the last complete value, nobody waits.
+    /// Three buffers: always the last complete value, neither side waits.
     #[default]
     Buffered,
     /// One buffer with hand-shake.

@@ -2,7 +2,7 @@
 
 use super::checksum::{CHECKSUM_DISABLED, checksum};
 
-/// Who a SubDevice is.
+/// Identity of a SubDevice.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub struct Identity {
     /// Vendor id as assigned by ETG.

@@ -1,86 +1,88 @@
-//! How a reference follows another time: in a ring that is open the second one the first (protocol 7.5), with bus shift
-//! the segment's reference the host (protocol 7.4).
+//! Control loop with which a reference follows another time: in an open ring the second reference follows the first
+//! (protocol 7.5), with bus shift the segment's reference follows the host (protocol 7.4).
 //!
-//! In: how both times differ when a frame, or frames that left together, pass them. Out: what to tell the one that
-//! follows. Every telling has the jitter of the host's sending in it, and so has each difference. One that is far away,
-//! since it has never followed the other, is taken there as fast as its loop can. Once it is near:
+//! Input: the difference of both times when one frame, or frames that left together, pass them. Output: the time to
+//! write to the follower. Every write contains the sending jitter of the host, and so does each difference. A clock
+//! that is far away, because it has never followed the other, is brought near as fast as its own loop can. Once it is
+//! near:
 //!
 //! * a second reference, which has followed the same clock as the first one and so differs by nanoseconds for seconds,
-//!   is left alone; it is told something when its mean has strayed, and then of a mean, in every cycle;
-//! * one that follows the host is told in every cycle, but of a small part of a long mean. What it is told is that much
-//!   less than what it showed last: the jitter of one cycle is taken back in the next.
+//!   is left alone; it is steered when its mean has drifted away, and then by a mean, in every cycle;
+//! * one that follows the host is steered in every cycle, by a small part of a long mean. The written value is that
+//!   much less than its last reading: the jitter of one cycle is taken back in the next.
 
 use crate::time::Instant;
 
-/// Cycles of which the mean says by how much the ways from the host to both references differ, at the least. Of
-/// references that have followed one clock until now, so many that the mean is as exact as [`EXACT_NS`].
+/// Fewest cycles whose mean tells the difference between the ways from the host to both references. Of references that
+/// have followed one clock until now, the number that makes the mean as exact as [`EXACT_NS`].
 const GAP_CYCLES: u32 = 16;
-/// And at the most: clocks that are left alone come apart meanwhile.
+/// Most cycles of that mean: free-running clocks drift apart meanwhile.
 const MOST_GAP_CYCLES: u32 = 4_096;
-/// How exact means are to be though the host sends late at random.
+/// Required accuracy of means in spite of random sending delays of the host.
 const EXACT_NS: i64 = 300;
-/// The longest mean, as a depth: what clocks that are left alone do within it is not to be more than the jitter.
+/// Depth of the longest mean: the drift of free-running clocks within it must not exceed the jitter.
 const MOST_DEPTH: u32 = 10;
-/// The jitter is a mean of this depth.
+/// Depth of the mean of the jitter.
 const NOISE_DEPTH: u32 = 9;
-/// Jitter counts for at most so much: a stall of the host is none.
+/// Upper limit of the jitter that counts: a stall of the host is no jitter.
 const MOST_NOISE_NS: i64 = 100_000;
-/// Where there is much jitter, difference and change per cycle are estimated that slowly, as shifts.
+/// With much jitter, the filter constants of difference and change per cycle, as shifts.
 const CALM_DEPTH: u32 = 8;
 const CALM_CHANGE_DEPTH: u32 = 2 * CALM_DEPTH + 1;
-/// The clock is told of this part of the difference, as a shift, and of its change in so many cycles: a loop in the
-/// controller takes out a 64th of what it is told, and adds to its speed what it was told.
+/// Part of the difference that is written to the clock, as a shift, and the number of cycles of its change: a loop in
+/// the controller takes out a 64th of the written difference, and adds it to its speed.
 const CALM_SHARE: u32 = 5;
 const CALM_AHEAD: i64 = 32;
-/// There it is far away only beyond so many times the usual limit.
+/// Factor on the usual limit beyond which such a clock counts as far away.
 const CALM_FAR: i64 = 4;
 /// Fractional bits of the change per cycle.
 const CHANGE_FRACTION: u32 = 24;
 /// Fractional bits of nanoseconds.
 const FRACTION: u32 = 8;
-/// Parts of what was not expected by which the difference and its change are corrected, as shifts.
+/// Filter gains of the difference and of its change for the unexpected part, as shifts.
 const DIFFERENCE_DEPTH: u32 = 3;
 const CHANGE_DEPTH: u32 = 8;
-/// What is not expected counts for at most so much.
+/// Upper limit of the unexpected part.
 const UNEXPECTED_NS: i64 = 20_000;
-/// A difference is at most this: it may come of nonsense on the wire.
+/// Upper limit of a difference: frames may carry nonsense.
 const ABSURD_NS: i64 = 1 << 40;
-/// A time between two differences counts for at most so much.
+/// Upper limit of the time between two differences.
 const LONGEST_NS: u64 = 10_000_000;
-/// From here on a clock that was left alone is steered.
+/// From this difference on a clock that was left alone is steered.
 const FREE_NS: i64 = 1_000;
-/// It is left alone again when it has been as near as this for so many cycles.
+/// It is left alone again after this number of cycles within this difference.
 const CALM_NS: i64 = 500;
 const CALM_CYCLES: u32 = 1_000;
-/// A difference that was seen longer ago than this says nothing.
+/// A difference older than this is not used.
 const FRESH_NS: u64 = 100_000_000;
-/// It is told of at most this difference at a time.
+/// Largest difference written at a time.
 const MOST_NS: i64 = 50_000;
-/// Far away, a change of the difference counts like the difference that it would lead to within this time: without
-/// that, the loop in the controller swings for seconds at the pace of cycles.
+/// Far away, a change of the difference counts like the difference that it would lead to within this time: otherwise
+/// the loop in the controller oscillates for seconds at the rate of the cycles.
 const FORESIGHT_NS: i64 = 150_000_000;
-/// Clocks never differ by more than what their loops can take out.
+/// Clocks never differ by more than their loops can take out.
 const MOST_PPB: i64 = 800_000;
 
-/// Who follows whom.
+/// Which clock follows which.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 struct Law {
     /// Filter depth of the difference that decides what to do.
     slow_depth: u32,
-    /// There a difference is at most so far from the mean: a stall of the host says nothing about clocks.
+    /// With this, a difference is limited to this distance from the mean: a stall of the host says nothing about
+    /// clocks.
     outlier_ns: i64,
-    /// From here on it is far away.
+    /// From this difference on the clock is far away.
     far_ns: i64,
     /// Until it has been nearer than this for [`CALM_CYCLES`].
     settled_ns: i64,
-    /// One that is near is told of this part of the long mean, as a shift; `None`: of all of a short one, and it is
-    /// left alone when it may be.
+    /// Near, this part of the long mean is written, as a shift; `None`: all of a short mean, and the clock may be left
+    /// alone.
     share: Option<u32>,
 }
 
 /// A second reference and the first one.
 const SECOND: Law = Law { slow_depth: 6, outlier_ns: 3_000, far_ns: 5_000, settled_ns: FREE_NS, share: None };
-/// A reference and the host, which sends tens of microseconds late.
+/// A reference and the host, which sends with a jitter of tens of microseconds.
 const HOST: Law = Law { slow_depth: 7, outlier_ns: 50_000, far_ns: 10_000, settled_ns: 5_000, share: Some(4) };
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -90,39 +92,38 @@ enum Mode {
     Far,
 }
 
-/// How the time of a steered reference differs from that of the segment's, when frames that left together pass them.
+/// Difference between a steered reference and that of the segment, when frames that left together pass them.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Lead {
     law: Law,
-    /// What it differs when both show the same: their ways from the host are not equally long.
+    /// The difference when both show the same time: their ways from the host are not equally long.
     gap: i64,
-    /// Sum of the differences that this is the mean of, and how many they are to be at the most.
+    /// Sum of the differences of this mean, and their largest number.
     sum: i64,
     most_cycles: u32,
-    /// Differences so far, as long as they say what the gap is; then [`MOST_GAP_CYCLES`].
+    /// Number of differences so far, while they determine the gap; then [`MOST_GAP_CYCLES`].
     cycles: u32,
-    /// How far differences are from their mean, in the mean; while the gap is not known, the sum of that.
+    /// Mean deviation of the differences from their mean; while the gap is not known, the sum of the deviations.
     noise: i64,
     /// Filter depth of the difference that decides what to do.
     depth: u32,
-    /// Nanoseconds that it is ahead, with fraction, and how fast this changes.
+    /// Nanoseconds by which it is ahead, with fraction, and the rate of change.
     ahead: i64,
     change_ppb: i64,
-    /// Where there is much jitter: nanoseconds that it is ahead and how this changes per cycle, with
-    /// [`CHANGE_FRACTION`].
+    /// With much jitter: nanoseconds by which it is ahead, and their change per cycle, with [`CHANGE_FRACTION`].
     calm_ahead: i64,
     calm_change: i64,
     /// A longer mean, with as many fractional bits as its depth.
     slow: i64,
     seen_at: Instant,
     mode: Mode,
-    /// Cycles in a row that were near.
+    /// Consecutive cycles in which it was near.
     calm: u32,
 }
 
 impl Lead {
-    /// A second reference and the first one, which show the same: because they have followed one clock until now
-    /// (`together`), or because nothing better is known.
+    /// A second reference and the first one, which show the same time: because they have followed one clock until now
+    /// (`together`), or as an assumption.
     pub const fn begin(difference: i64, together: bool, seen_at: Instant) -> Lead {
         let most_cycles = if together { MOST_GAP_CYCLES } else { GAP_CYCLES };
         let (gap, sum, cycles, noise) = (difference, difference, 1, 0);
@@ -146,18 +147,18 @@ impl Lead {
         }
     }
 
-    /// A reference that is to show what the host does, which it has never followed.
+    /// A reference that is to show the host's time, which it has never followed.
     pub const fn behind_host(seen_at: Instant) -> Lead {
         let (law, depth, mode) = (HOST, HOST.slow_depth, Mode::Far);
         Lead { law, depth, cycles: MOST_GAP_CYCLES, mode, ..Lead::begin(0, false, seen_at) }
     }
 
-    /// Whether what was seen still holds.
+    /// Whether the last difference is recent enough.
     pub const fn is_fresh(&self, now: Instant) -> bool {
         now.0.saturating_sub(self.seen_at.0) <= FRESH_NS
     }
 
-    /// Another difference was seen.
+    /// Takes another difference.
     pub fn go_on(self, difference: i64, seen_at: Instant) -> Lead {
         if self.cycles < MOST_GAP_CYCLES {
             return self.find_gap(difference.clamp(-ABSURD_NS, ABSURD_NS), seen_at);
@@ -187,7 +188,7 @@ impl Lead {
         let (mode, calm) = match self.mode {
             _ if far > far_ns => (Mode::Far, 0),
             Mode::Far if calm >= CALM_CYCLES => (Mode::Near, 0),
-            // Clocks that are left alone come apart by more than can be seen soon enough.
+            // Free-running clocks drift apart by more than can be detected in time.
             Mode::Free if is_noisy => (Mode::Near, 0),
             Mode::Near if share.is_none() && !is_noisy && calm >= CALM_CYCLES => (Mode::Free, 0),
             Mode::Free if far > FREE_NS => (Mode::Near, 0),
@@ -196,7 +197,7 @@ impl Lead {
         Lead { ahead, change_ppb, slow, seen_at, mode, calm, noise, depth, calm_ahead, calm_change, ..self }
     }
 
-    /// Takes a difference into the gap, as long as that is not known well enough.
+    /// Takes a difference into the gap, until that is known well enough.
     fn find_gap(self, difference: i64, seen_at: Instant) -> Lead {
         let cycles = self.cycles + 1;
         let sum = self.sum.saturating_add(difference);
@@ -211,25 +212,25 @@ impl Lead {
         known.hear(mean)
     }
 
-    /// Jitter of this size: the more there is, the longer means have to be. They never get shorter.
+    /// Takes the size of the jitter: the more there is, the longer means have to be. They never get shorter.
     fn hear(self, jitter: i64) -> Lead {
         if self.law.share.is_some() || self.mode == Mode::Far {
             return self;
         }
         let noise = self.noise - (self.noise >> NOISE_DEPTH) + jitter.saturating_abs().min(MOST_NOISE_NS);
         let ratio = ((noise >> NOISE_DEPTH) / EXACT_NS).unsigned_abs();
-        // A mean of depth d has a 2^(d + 1)th of the square of the jitter.
+        // A mean of depth d has a 2^(d + 1)th of the variance of the jitter.
         let wanted = (2 * ratio.max(1).ilog2()).min(MOST_DEPTH);
         let depth = self.depth.max(wanted);
         Lead { noise, depth, slow: self.slow << (depth - self.depth), ..self }
     }
 
-    /// A difference is at most so far from the mean; jitter is no outlier.
+    /// Limits a difference to a distance from the mean; jitter itself is no outlier.
     fn outlier(&self, least: i64) -> i64 {
         least.max(4 * (self.noise >> NOISE_DEPTH))
     }
 
-    /// By how much it is to be told that it is ahead; `None`: nothing.
+    /// Difference to write, as nanoseconds ahead; `None`: nothing is written.
     pub fn steering_ns(&self) -> Option<i64> {
         let ahead = self.ahead >> FRACTION;
         let told = match (self.mode, self.law.share) {
@@ -258,7 +259,7 @@ mod tests {
         })
     }
 
-    /// Up to 5 us, from a difference that means that both show the same.
+    /// Jitter up to 5 us, around a difference at which both show the same time.
     fn jitter(count: i64) -> impl Iterator<Item = i64> {
         (0..count).map(|number| 7_000 + (number * 7_919) % 5_001)
     }
@@ -307,7 +308,7 @@ mod tests {
 
     #[test]
     fn one_that_is_far_away_is_told_where_it_will_be() {
-        // 100 ppm fast, seen from the beginning.
+        // 100 ppm fast, observed from the beginning.
         let lead = after(Lead::begin(0, true, Instant(0)), (1..400).map(|cycle| cycle * 100));
         assert_eq!(lead.mode, Mode::Far);
         let told = lead.steering_ns().expect("it is far away");

@@ -39,7 +39,7 @@ fn entry(domain: usize, bit_offset: u32, bit_length: u16) -> Entry {
     Entry { domain: DomainId(domain), bit_offset, bit_length }
 }
 
-/// One cycle: judges, queues, sends; each SubDevice answers with these inputs, `None` for not at all. Returns the
+/// One cycle: judges, queues, sends; each SubDevice answers with these inputs, `None` for no answer. Returns the
 /// outputs that left.
 fn cycle(exchange: &mut Exchange, now: &mut Instant, inputs: [Option<&[u8]>; 2]) -> [Vec<u8>; 2] {
     now.0 += 1_000_000;
@@ -91,7 +91,7 @@ fn a_stale_source_is_refused_its_target_holds_the_last_value_or_is_zero() {
     let fresh = cycle(&mut exchange, &mut now, [None, Some(&[])]);
     assert_eq!((&fresh[1][..3], fresh[0][0]), (&[1, 2, 3][..], 1));
     for age in 1..5u64 {
-        // The application cannot bring its own value in.
+        // The application cannot write a value of its own there.
         exchange.image_mut(DomainId(1))[..3].fill(0x77);
         let outputs = cycle(&mut exchange, &mut now, [None, Some(&[])]);
         assert_eq!(outputs[1][..3], [1, 0, 3]);

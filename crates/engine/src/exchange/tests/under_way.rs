@@ -1,4 +1,4 @@
-//! Several cycles under way: flights that come back in any order or not at all.
+//! Several cycles on the wire: flights that come back in any order or not at all.
 
 use proptest::collection::vec as list;
 use proptest::prelude::*;
@@ -123,7 +123,7 @@ fn what_an_older_cycle_shows_of_the_ring_does_not_count_after_a_newer_one() {
     assert_eq!((count, seen.main, seen.redundant), (1, Wkc(1), Wkc(2)));
 }
 
-/// What a flight meets.
+/// Fate of a flight.
 #[derive(Clone, Copy, Debug)]
 enum Way {
     Closed,
@@ -135,17 +135,17 @@ fn way() -> impl Strategy<Value = Way> {
     prop_oneof![3 => Just(Way::Closed), 2 => (0..=3usize).prop_map(Way::Cut), 1 => (0..3usize).prop_map(Way::Without)]
 }
 
-/// A flight as the model knows it.
+/// A flight in the model.
 #[derive(Debug)]
 struct Flight {
     base: u8,
     way: Way,
-    /// Copies that were taken.
+    /// Copies received so far.
     taken: usize,
     complete: bool,
 }
 
-/// A copy under way: the number of its flight, where it arrives, how many SubDevices it met.
+/// A copy on the wire: the number of its flight, the link of its arrival, the number of SubDevices that processed it.
 struct Copy {
     flight: usize,
     link: Link,

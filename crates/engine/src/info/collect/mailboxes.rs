@@ -1,5 +1,4 @@
-//! Where the mailboxes lie, as far as that can be: what the fixed area says, or else the SyncManagers (protocol 4.1,
-//! 4.4).
+//! Place of the mailboxes: from the fixed area, otherwise from the SyncManagers (protocol 4.1, 4.4).
 
 use alloc::vec::Vec;
 
@@ -16,10 +15,10 @@ const PROTOCOLS_AT: usize = 2 * 0x1C;
 /// Mailboxes lie in process RAM.
 const PROCESS_RAM: u32 = 0x1000;
 
-/// The SyncManagers must have been collected.
+/// The SyncManagers must have been collected before.
 pub(super) fn collect(info: &mut SubDeviceInfo, header: &SiiHeader) {
     let memory_end = match info.controller.ram_kib {
-        // A controller that does not say how much it has.
+        // A controller that does not give its RAM size.
         0 => 0x1_0000,
         kib => PROCESS_RAM + 1024 * u32::from(kib),
     };
@@ -29,7 +28,7 @@ pub(super) fn collect(info: &mut SubDeviceInfo, header: &SiiHeader) {
     if protocols == 0 || info.mailbox.is_some() {
         return;
     }
-    // One that speaks has mailboxes: its SyncManagers may tell where.
+    // A SubDevice with mailbox protocols has mailboxes: its SyncManagers may give their place.
     let described = of_sync_managers(info).filter(|layout| is_possible(layout, memory_end));
     info.mailbox = described;
     if described.is_none() {
@@ -37,7 +36,7 @@ pub(super) fn collect(info: &mut SubDeviceInfo, header: &SiiHeader) {
     }
 }
 
-/// A mailbox pair, `None` where it has no size. Vendors leave 0xFFFF in fields that they do not use.
+/// A mailbox pair, `None` where it has no size. Vendors leave 0xFFFF in unused fields.
 fn pair(
     layout: &MailboxLayout,
     offset: usize,
@@ -56,7 +55,7 @@ fn pair(
     None
 }
 
-/// They hold messages, lie in the process RAM, and apart from each other.
+/// They are long enough for messages, lie in the process RAM, and do not overlap.
 fn is_possible(layout: &MailboxLayout, memory_end: u32) -> bool {
     let span = |offset: u16, size: u16| (u32::from(offset), u32::from(offset) + u32::from(size));
     let (out, inward) = (span(layout.receive_offset, layout.receive_size), span(layout.send_offset, layout.send_size));

@@ -1,4 +1,4 @@
-//! Categories of an SII that were read, and warnings about them by their place.
+//! Categories of an SII that were read, and warnings with their place.
 
 use alloc::vec::Vec;
 
@@ -6,7 +6,7 @@ use ringcat_wire::sii::{Category, CategoryKind};
 
 use crate::info::warning::{InfoWarning, SiiProblem};
 
-/// Erased bytes at the end of a category that are more than padding.
+/// Number of erased bytes at the end of a category that is more than padding.
 const ERASED: usize = 4;
 
 /// The categories that were read.
@@ -19,7 +19,7 @@ impl<'a> Parts<'_, 'a> {
         self.parts.iter().filter(move |part| part.kind == kind).copied()
     }
 
-    /// The first category of a kind; more of them are odd.
+    /// The first category of a kind; more than one is a fault.
     pub(super) fn first(&self, kind: CategoryKind, warnings: &mut Vec<InfoWarning>) -> Option<Category<'a>> {
         let mut all = self.all(kind);
         let first = all.next();
@@ -33,7 +33,7 @@ impl<'a> Parts<'_, 'a> {
         first
     }
 
-    /// Categories that end erased: an image that was cut short ends so, with the rest of an empty EEPROM behind it.
+    /// Categories with an erased end: an image that was cut short ends like this, followed by an empty EEPROM.
     pub(super) fn erased(&self) -> impl Iterator<Item = InfoWarning> {
         let has_text = |kind| {
             matches!(kind, CategoryKind::Strings | CategoryKind::General | CategoryKind::SyncManager | CategoryKind::Dc)
@@ -53,12 +53,12 @@ pub(super) fn fixed_area(offset: usize, problem: SiiProblem) -> InfoWarning {
     InfoWarning { category: None, offset: Some(offset), problem }
 }
 
-/// A warning about what begins at a byte of a category's data.
+/// A warning about a fault at a byte of a category's data.
 pub(super) fn within(category: &Category<'_>, at: usize, problem: SiiProblem) -> InfoWarning {
     InfoWarning { category: Some(category.kind), offset: Some(category.data_offset() + at), problem }
 }
 
-/// Warns about a category that does not end with a whole entry. Padding to a word is no entry.
+/// Warns about a category that does not end with a whole entry. Padding to a word is not an entry.
 pub(super) fn whole(category: &Category<'_>, entry: usize, warnings: &mut Vec<InfoWarning>) {
     let data = category.data;
     let got = data.len() % entry;

@@ -1,4 +1,4 @@
-//! What each SyncManager is for, and what is missing for it (protocol 4.4, 3.11).
+//! Purpose of each SyncManager, and what it lacks (protocol 4.4, 3.11).
 
 use ringcat_wire::sii::{
     CategoryKind, FmmuUsage, PdoDirection, Pdos, SiiSyncManager, SiiSyncManagers, SyncManagerKind,
@@ -10,12 +10,12 @@ use crate::info::warning::{InfoWarning, SiiProblem};
 
 const KIND: CategoryKind = CategoryKind::SyncManager;
 
-/// The SyncManagers with what they are for.
+/// The SyncManagers with their purposes.
 pub(super) fn collect(info: &mut SubDeviceInfo, parts: &Parts<'_, '_>) {
     let available = usize::from(info.controller.sync_manager_count);
     let mut beyond = None;
     for category in parts.all(KIND) {
-        // What follows an erased one was erased, too; that was told.
+        // Entries after an erased one are erased too; a warning was given.
         let described = SiiSyncManagers::new(category.data).take_while(|manager| !manager.is_erased());
         for (place, manager) in described.enumerate() {
             let at = place * SiiSyncManager::LEN;
@@ -38,8 +38,8 @@ pub(super) fn collect(info: &mut SubDeviceInfo, parts: &Parts<'_, '_>) {
     }
 }
 
-/// As its type says. Without one, as the PDOs say that belong to it (so does SOEM), then as its control byte does (so
-/// does IgH); one that is neither used nor has a length is for nothing.
+/// As its type says; without a type as its PDOs say (like SOEM), otherwise as its control byte says (like IgH). A
+/// SyncManager that is unused or has no length has no purpose.
 fn kind(parts: &Parts<'_, '_>, number: usize, manager: &SiiSyncManager) -> SyncManagerKind {
     match manager.kind {
         SyncManagerKind::MailboxOut
@@ -63,7 +63,7 @@ fn kind(parts: &Parts<'_, '_>, number: usize, manager: &SiiSyncManager) -> SyncM
     }
 }
 
-/// What is odd about one.
+/// Fault of one.
 fn check(info: &SubDeviceInfo, number: usize, manager: &SiiSyncManager, taken: &SiiSyncManager) -> Option<SiiProblem> {
     let sync_manager = u8::try_from(number).unwrap_or(u8::MAX);
     let beyond = number >= usize::from(info.controller.sync_manager_count);
@@ -79,7 +79,7 @@ fn check(info: &SubDeviceInfo, number: usize, manager: &SiiSyncManager, taken: &
     wrong.then_some(SiiProblem::Control { sync_manager, control: manager.control })
 }
 
-/// What an image that lost its end looks like, though each category in it is sound.
+/// Typical for an image without its end, though each of its categories is sound.
 pub(super) fn check_completeness(info: &mut SubDeviceInfo, parts: &Parts<'_, '_>) {
     let exchanges = info.fmmu_usages.iter().any(|usage| matches!(usage, FmmuUsage::Outputs | FmmuUsage::Inputs));
     let needed = exchanges || info.mailbox.is_some() || !info.pdos.is_empty();

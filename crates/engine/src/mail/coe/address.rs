@@ -1,15 +1,15 @@
-//! Which object a transfer is about.
+//! Address of an object.
 
 use core::fmt;
 
-/// Which object.
+/// An object, or an entry of one.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct SdoAddress {
     /// Index.
     pub index: u16,
     /// Subindex.
     pub sub_index: u8,
-    /// All entries at once.
+    /// Complete access.
     pub complete_access: bool,
 }
 

@@ -17,7 +17,7 @@ pub async fn write(mailbox: &Mailbox, object: SdoAddress, data: &[u8], limits: L
     download(mailbox, object, limits, &mut Bytes::new(data)).await
 }
 
-/// Writes an object of any size; each of `limits` counts for one message.
+/// Writes an object of any size; each of `limits` applies to one message.
 pub async fn download(
     mailbox: &Mailbox,
     object: SdoAddress,

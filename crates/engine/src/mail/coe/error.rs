@@ -13,11 +13,11 @@ use crate::mail::stream::Overflow;
 pub struct SdoError {
     /// The object.
     pub object: SdoAddress,
-    /// What happened.
+    /// The cause.
     pub cause: SdoFailure,
 }
 
-/// What happened to an SDO transfer. Whatever is not the SubDevice's abort was followed by one of ours.
+/// Cause of a failed SDO transfer. Except for the SubDevice's own abort, the MainDevice aborted the transfer.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum SdoFailure {
@@ -27,24 +27,24 @@ pub enum SdoFailure {
     Aborted(AbortCode),
     /// The SubDevice did not alternate the toggle bit.
     Toggle,
-    /// The SubDevice sent a segment without data that was not the last one.
+    /// The SubDevice sent an empty segment that was not the last one.
     EmptySegment,
     /// The SubDevice announced another size than it sent.
     Size {
-        /// Bytes that it announced.
+        /// Announced bytes.
         announced: u64,
-        /// Bytes that came, until they were too many or the last one was there.
+        /// Bytes received until they were too many or the last segment was received.
         got: u64,
     },
-    /// The receiver does not take so much.
+    /// The receiver does not accept this size.
     TooLong(Overflow),
-    /// The size of what is to be written is not known, or beyond 32 bits.
+    /// The size of the data to write is unknown, or exceeds 32 bits.
     UnknownSize,
-    /// The source ended before its size.
+    /// The source ended before its announced size.
     SourceEnded {
-        /// Bytes that it had.
+        /// Bytes that it delivered.
         got: u64,
-        /// Bytes that it announced.
+        /// Announced bytes.
         announced: u64,
     },
 }

@@ -20,9 +20,9 @@ pub struct History {
     pub newest: u8,
     /// Subindex of the newest message that was acknowledged; 0 where none was.
     pub acknowledged: u8,
-    /// There are messages that were not acknowledged.
+    /// Some messages were not acknowledged.
     pub new_available: bool,
-    /// Settings and signs of lost messages.
+    /// Settings and flags of lost messages.
     pub flags: DiagnosisFlags,
     /// Subindex and bytes of each message, the oldest first; a
     /// [`DiagnosisMessage`](ringcat_wire::mailbox::coe::DiagnosisMessage) reads them.
@@ -39,7 +39,7 @@ pub async fn read_history(mailbox: &Mailbox, limits: Limits) -> Result<History, 
     let flags = flags.first_chunk().map_or(0, |bytes| u16::from_le_bytes(*bytes));
     let first = DiagnosisHistory::FIRST_MESSAGE;
     let last = first.saturating_add(maximum.saturating_sub(1));
-    // The one behind the newest is the oldest, once all places have been used.
+    // Once all slots have been used, the one after the newest is the oldest.
     let places =
         (first..=last).cycle().skip_while(|place| newest >= first && newest <= last && *place != newest).skip(1);
     let mut messages = Vec::new();
@@ -48,7 +48,7 @@ pub async fn read_history(mailbox: &Mailbox, limits: Limits) -> Result<History, 
             match read(mailbox, at(place), limits, LONGEST).await {
                 Ok(bytes) if bytes.is_empty() => {}
                 Ok(bytes) => messages.push((place, bytes)),
-                // A place that was never used.
+                // A slot that was never used.
                 Err(error) if is_unused(&error) => {}
                 Err(error) => return Err(error),
             }

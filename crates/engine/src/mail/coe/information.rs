@@ -1,4 +1,4 @@
-//! SDO information: which objects a SubDevice has, and what they are (protocol 6.3).
+//! SDO information: the objects of a SubDevice, and their descriptions (protocol 6.3).
 
 use alloc::string::String;
 use alloc::vec;
@@ -16,10 +16,10 @@ use super::transfer::settle;
 use crate::mail::lane::Lane;
 use crate::mail::{Limits, Mailbox, MailboxError, Talk};
 
-/// Longest answer: a list of all indices that there can be.
+/// Longest answer: a list of all possible indices.
 const LONGEST: usize = 2 + 2 * 0x1_0000;
 
-/// Why there is no information.
+/// Why SDO information failed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum InformationError {
@@ -27,16 +27,16 @@ pub enum InformationError {
     Mailbox(MailboxError),
     /// The SubDevice refused.
     Refused(AbortCode),
-    /// Fragments are missing, or come in another order than they say.
+    /// Fragments are missing or out of order.
     Fragments {
-        /// Fragments that should have followed.
+        /// Number of fragments that should have followed.
         expected: u16,
-        /// Fragments that follow.
+        /// Number of fragments that follow.
         got: u16,
     },
-    /// More than any list can have.
+    /// Longer than any possible list.
     TooLong,
-    /// The answer cannot be read.
+    /// The answer is malformed.
     Malformed(PayloadError),
 }
 
@@ -86,7 +86,7 @@ pub struct Object {
     pub data_type: DataType,
     /// Largest subindex.
     pub max_sub_index: u8,
-    /// What it is.
+    /// Object code.
     pub code: ObjectCode,
     /// Name.
     pub name: String,
@@ -131,7 +131,7 @@ pub async fn lengths(mailbox: &Mailbox, limits: Limits) -> Result<[u16; 5], Info
     Ok(*counts.first_chunk().ok_or(short)?)
 }
 
-/// What an object is.
+/// Description of an object.
 pub async fn object(mailbox: &Mailbox, index: u16, limits: Limits) -> Result<Object, InformationError> {
     let (request, response) = (InformationOpcode::ObjectRequest, InformationOpcode::ObjectResponse);
     let data = ask(mailbox, request, &index.to_le_bytes(), response, 2, limits).await?;
@@ -139,7 +139,7 @@ pub async fn object(mailbox: &Mailbox, index: u16, limits: Limits) -> Result<Obj
     Ok(Object { index, data_type, max_sub_index, code, name: text(name) })
 }
 
-/// What an entry is; `wanted` says which optional parts are asked for.
+/// Description of an entry; `wanted` selects the optional parts.
 pub async fn entry(
     mailbox: &Mailbox,
     (index, sub_index): (u16, u8),
@@ -164,16 +164,17 @@ pub async fn entry(
     })
 }
 
-/// Bytes as text; what is no UTF-8 is replaced.
+/// Bytes as text; invalid UTF-8 is replaced.
 fn text(bytes: &[u8]) -> String {
     let end = bytes.iter().rposition(|byte| *byte != 0).map_or(0, |last| last + 1);
     String::from_utf8_lossy(&bytes[..end]).into_owned()
 }
 
-/// A fragment of an answer: its data, and how many follow.
+/// A fragment of an answer: its data, and the number of fragments that follow.
 type Fragment = (Vec<u8>, u16);
 
-/// Asks, and puts the fragments of the answer together. The first `key` bytes of the request begin the answer, too.
+/// Sends a request and joins the fragments of the answer. The answer also starts with the first `key` bytes of the
+/// request.
 async fn ask(
     mailbox: &Mailbox,
     request: InformationOpcode,
@@ -208,14 +209,14 @@ async fn next(talk: &mut Talk, response: InformationOpcode, limits: Limits) -> R
     talk.more(limits.1, |payload| take(payload, response, &[])).await?
 }
 
-/// A message that belongs to the answer.
+/// Whether a message belongs to the answer.
 fn take(payload: &[u8], response: InformationOpcode, key: &[u8]) -> Option<Result<Fragment, InformationError>> {
     let message = SdoInformation::decode(payload).ok()?;
     if message.opcode == InformationOpcode::Error {
         return Some(message.abort_code().map_err(Into::into).and_then(|code| Err(InformationError::Refused(code))));
     }
     let ours = message.opcode == response && message.data.starts_with(key);
-    // The mark counts, not the number: there are SubDevices that count down to 1.
+    // Only the incomplete flag counts, not the number: some SubDevices count down to 1.
     let left = if message.incomplete { message.fragments_left.max(1) } else { 0 };
     ours.then(|| Ok((message.data.to_vec(), left)))
 }

@@ -1,4 +1,4 @@
-//! PDO assignment and mapping, as the SubDevice has them (protocol 6.3: 0x1C10 + SyncManager, 0x16xx, 0x1Axx).
+//! PDO assignment and mapping of a SubDevice (protocol 6.3: 0x1C10 + SyncManager, 0x16xx, 0x1Axx).
 
 use alloc::vec::Vec;
 
@@ -6,10 +6,10 @@ use super::{SdoAddress, SdoError, read, write};
 use crate::config::{PdoEntry, PdoMapping};
 use crate::mail::{Limits, Mailbox};
 
-/// Index of the PDO assignment of SyncManager 0; that of SyncManager n is n further on.
+/// Index of the PDO assignment of SyncManager 0; that of SyncManager n is n higher.
 const ASSIGNMENT_BASE: u16 = 0x1C10;
 
-/// The PDOs that are assigned to a SyncManager, with what they map.
+/// The PDOs assigned to a SyncManager, with their mapping.
 pub async fn read_assignment(mailbox: &Mailbox, sync_manager: u8, limits: Limits) -> Result<Vec<PdoMapping>, SdoError> {
     let object = ASSIGNMENT_BASE + u16::from(sync_manager);
     let mut pdos = Vec::new();
@@ -21,7 +21,7 @@ pub async fn read_assignment(mailbox: &Mailbox, sync_manager: u8, limits: Limits
     Ok(pdos)
 }
 
-/// What a PDO maps.
+/// The mapping of a PDO.
 pub async fn read_mapping(mailbox: &Mailbox, pdo: u16, limits: Limits) -> Result<Vec<PdoEntry>, SdoError> {
     let mut entries = Vec::new();
     for sub_index in 1..=count(mailbox, pdo, limits).await? {
@@ -31,8 +31,8 @@ pub async fn read_mapping(mailbox: &Mailbox, pdo: u16, limits: Limits) -> Result
     Ok(entries)
 }
 
-/// Assigns PDOs to a SyncManager, and maps those for which entries are given. The SubDevice must be in PREOP. When this
-/// fails, the assignment is as far as it came; a further one begins anew.
+/// Assigns PDOs to a SyncManager, and maps those with given entries. The SubDevice must be in PREOP. After an error the
+/// assignment may be incomplete; the next call starts again.
 pub async fn write_assignment(
     mailbox: &Mailbox,
     sync_manager: u8,
@@ -40,7 +40,7 @@ pub async fn write_assignment(
     limits: Limits,
 ) -> Result<(), SdoError> {
     let object = ASSIGNMENT_BASE + u16::from(sync_manager);
-    // A PDO cannot be mapped anew while it is assigned.
+    // An assigned PDO cannot be mapped.
     write(mailbox, SdoAddress::new(object, 0), &[0], limits).await?;
     for pdo in pdos {
         if let Some(entries) = &pdo.entries {
@@ -69,7 +69,7 @@ async fn count(mailbox: &Mailbox, object: u16, limits: Limits) -> Result<u8, Sdo
     value::<1>(mailbox, SdoAddress::new(object, 0), limits).await.map(|[count]| count)
 }
 
-/// The first bytes of a value; what a shorter one lacks is 0.
+/// The first bytes of a value; missing bytes are 0.
 async fn value<const N: usize>(mailbox: &Mailbox, object: SdoAddress, limits: Limits) -> Result<[u8; N], SdoError> {
     let bytes = read(mailbox, object, limits, 4).await?;
     let mut value = [0; N];

@@ -10,21 +10,21 @@ use super::transfer::settle;
 use crate::mail::lane::Lane;
 use crate::mail::{Limits, Mailbox, MailboxError};
 
-/// The first RxPDO and the first TxPDO; the number in the header counts from there.
+/// The first RxPDO and the first TxPDO; the number in the header counts from them.
 const RX_BASE: u16 = 0x1600;
 const TX_BASE: u16 = 0x1A00;
-/// PDOs of each direction.
+/// Number of PDOs in each direction.
 const COUNT: u16 = 512;
 
-/// Why a PDO was not moved.
+/// Why a PDO transfer failed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum PdoMailError {
     /// The mailbox failed, or the SubDevice refused.
     Mailbox(MailboxError),
-    /// Not a PDO of the direction: expected 0x1600..=0x17FF to the SubDevice, these or 0x1A00..=0x1BFF from it.
+    /// Index outside the direction: expected 0x1600..=0x17FF to the SubDevice, these or 0x1A00..=0x1BFF from it.
     Index {
-        /// What was given.
+        /// The given index.
         pdo: u16,
     },
 }
@@ -53,7 +53,7 @@ impl From<MailboxError> for PdoMailError {
     }
 }
 
-/// Sends an RxPDO, which is not answered: one that the SubDevice refuses is counted as an unclaimed error reply.
+/// Sends an RxPDO, which has no answer: a refusal by the SubDevice is counted as an unclaimed error reply.
 pub async fn send(mailbox: &Mailbox, pdo: u16, data: &[u8], limit: Duration) -> Result<(), PdoMailError> {
     let number = number(pdo, RX_BASE).ok_or(PdoMailError::Index { pdo })?;
     let mut talk = mailbox.talk(Lane::Coe).await?;
@@ -62,7 +62,7 @@ pub async fn send(mailbox: &Mailbox, pdo: u16, data: &[u8], limit: Duration) -> 
     Ok(talk.send(&payload, limit).await?)
 }
 
-/// Asks for a TxPDO, or for an RxPDO as the SubDevice has it.
+/// Requests a TxPDO, or an RxPDO with its current value.
 pub async fn receive(mailbox: &Mailbox, pdo: u16, limits: Limits) -> Result<Vec<u8>, PdoMailError> {
     let (number, request, service) = match (number(pdo, TX_BASE), number(pdo, RX_BASE)) {
         (Some(number), _) => (number, CoeService::TxPdoRemote, CoeService::TxPdo),

@@ -1,4 +1,4 @@
-//! What uploads and downloads share: the lane, aborts, and telling late answers from others.
+//! Common parts of uploads and downloads: the lane, aborts, and the detection of late answers.
 
 use alloc::vec;
 
@@ -9,18 +9,18 @@ use super::error::{SdoError, SdoFailure};
 use crate::mail::lane::Lane;
 use crate::mail::{Limits, Mailbox, MailboxError, Talk};
 
-/// Objects that every CoE device has; one that it lacks is answered with an abort, which does as well.
+/// Objects of every CoE device; the abort for a missing one serves as well.
 const DEVICE_TYPE: u16 = 0x1000;
 const IDENTITY: u16 = 0x1018;
-/// Attempts to ask for it, where it is not certain that an error reply was to that.
+/// Attempts to read it, where an error reply may belong to another message.
 const FENCES: usize = 3;
 
-/// A transfer under way. Ended before its time, by an error or because nobody wants it any more, it is aborted.
+/// A transfer in progress. When it ends early, by an error or because it is dropped, it is aborted.
 pub(super) struct Transfer {
     pub talk: Talk,
     pub object: SdoAddress,
     limits: Limits,
-    /// The SubDevice may wait for us.
+    /// The SubDevice may wait for the next message.
     busy: bool,
     payload: alloc::vec::Vec<u8>,
 }
@@ -35,7 +35,7 @@ impl Transfer {
         Ok(Transfer { talk, object, limits, busy: false, payload })
     }
 
-    /// Sends a request and waits for the response that `accept` takes for its own. An abort is one.
+    /// Sends a request and waits for the response that `accept` recognises. An abort is one.
     pub(super) async fn exchange<T>(
         &mut self,
         request: &SdoRequest<'_>,
@@ -46,7 +46,7 @@ impl Transfer {
             let (bytes, limit) = (INITIATE_LEN, self.payload.len());
             return Err(self.failed(SdoFailure::Mailbox(MailboxError::TooLong { bytes, limit })));
         };
-        // In segments the object is not named; there an abort without one is understood, too.
+        // Segments do not name the object; there an abort without an object is accepted, too.
         let in_segments = matches!(request, SdoRequest::DownloadSegment { .. } | SdoRequest::UploadSegment { .. });
         let accept = |payload: &[u8]| match SdoResponse::decode(payload).ok()? {
             SdoResponse::Abort { index, sub_index, code } => {
@@ -66,7 +66,7 @@ impl Transfer {
                 Err(self.abort(AbortCode::PROTOCOL_TIMEOUT, SdoFailure::Mailbox(error)))
             }
             Err(error) => {
-                // What the SubDevice refused or never got is not under way.
+                // A request that the SubDevice refused or never received is not in progress.
                 let doubtful = self.talk.late_mark().is_some();
                 self.busy = in_segments || doubtful || matches!(error, MailboxError::Bus(_));
                 Err(self.failed(SdoFailure::Mailbox(error)))
@@ -74,7 +74,7 @@ impl Transfer {
         }
     }
 
-    /// The transfer is through.
+    /// The transfer is complete.
     pub(super) fn done(&mut self) {
         self.busy = false;
     }
@@ -95,7 +95,7 @@ impl Transfer {
         }
         let SdoAddress { index, sub_index, .. } = self.object;
         if let Some(length) = (SdoRequest::Abort { index, sub_index, code }).encode(&mut self.payload) {
-            // A mailbox that is closed has no transfer to abort.
+            // A closed mailbox has no transfer to abort.
             let _ = self.talk.post(&self.payload[..length]);
         }
     }
@@ -107,9 +107,9 @@ impl Drop for Transfer {
     }
 }
 
-/// After a request that was given up, its answer may still come, and be taken for that to the next request for the same
-/// object. So another object is asked for first: a SubDevice answers in order, and with that answer in hand older ones
-/// have come or never will.
+/// The answer to a request that was given up may still come, and be taken for the answer to the next request for the
+/// same object. So another object is read first: a SubDevice answers in order, so after that answer no older one can
+/// come.
 pub(in crate::mail) async fn settle(talk: &mut Talk, limits: Limits) -> Result<(), MailboxError> {
     let mut result = Ok(());
     for _ in 0..FENCES {
@@ -120,10 +120,10 @@ pub(in crate::mail) async fn settle(talk: &mut Talk, limits: Limits) -> Result<(
         result = ask_fence(talk, fence, limits).await;
         match result {
             Ok(()) => return Ok(()),
-            // Refused for sure it is an answer, too; else it may have been something else that was refused.
+            // A certain refusal is an answer, too; otherwise the refusal may belong to another message.
             Err(MailboxError::Error(_)) => {}
             Err(error) => {
-                // Where nothing was asked, all is as before.
+                // Where the request was not sent, nothing has changed.
                 if talk.late_mark().is_none() {
                     talk.mark(late);
                     talk.expect_late(limits.1);

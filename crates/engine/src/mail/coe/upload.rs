@@ -17,13 +17,13 @@ pub async fn read(mailbox: &Mailbox, object: SdoAddress, limits: Limits, limit: 
     Ok(sink.into_bytes())
 }
 
-/// The beginning of an object: its size, and as much of it as came with it.
+/// The beginning of an object: its size, and the data that came with it.
 struct First {
     total: u64,
     data: Vec<u8>,
 }
 
-/// Reads an object of any size; each of `limits` counts for one message.
+/// Reads an object of any size; each of `limits` applies to one message.
 pub async fn upload(
     mailbox: &Mailbox,
     object: SdoAddress,
@@ -69,7 +69,7 @@ pub async fn upload(
         }
         toggle = !toggle;
     }
-    // All is there, though no segment was marked as the last one.
+    // All data is received, though no segment was marked as the last one.
     transfer.done();
     Ok(())
 }

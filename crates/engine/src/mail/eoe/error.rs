@@ -1,4 +1,4 @@
-//! Why addresses or the filter were not set or told.
+//! Errors of reading and setting IP parameters or the address filter.
 
 use core::fmt;
 
@@ -6,16 +6,16 @@ use ringcat_wire::mailbox::eoe::EoeResult;
 
 use crate::mail::MailboxError;
 
-/// Why addresses or the filter of a SubDevice were not set or told.
+/// Why IP parameters or the filter of a SubDevice were not set or read.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct EoeError {
     /// Port of the SubDevice.
     pub port: u8,
-    /// What happened.
+    /// The cause.
     pub cause: EoeFailure,
 }
 
-/// What happened to a request.
+/// Cause of a failed request.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum EoeFailure {

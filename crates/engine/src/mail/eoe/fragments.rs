@@ -9,7 +9,7 @@ use ringcat_wire::mailbox::eoe::{BLOCK, EoeBody, EoeFragment, EoeMessage};
 #[derive(Debug)]
 pub(super) struct Fragments<'a> {
     frame: &'a [u8],
-    /// Number of the frame.
+    /// Frame number.
     number: u8,
     /// Data bytes of each fragment but the last.
     piece: usize,
@@ -18,7 +18,7 @@ pub(super) struct Fragments<'a> {
 }
 
 impl<'a> Fragments<'a> {
-    /// The fragments of a frame for a mailbox of this size (header included); `None` where none fits.
+    /// The fragments of a frame for a mailbox of this size (header included); `None` where a fragment does not fit.
     pub(super) fn new(frame: &'a [u8], number: u8, mailbox_size: usize, wants_time: bool) -> Option<Fragments<'a>> {
         let piece = EoeFragment::max_data(mailbox_size);
         (piece > 0).then_some(Fragments { frame, number, piece, wants_time, next: 0 })
@@ -36,7 +36,7 @@ impl Iterator for Fragments<'_> {
         let blocks = if self.next == 0 { self.frame.len().div_ceil(BLOCK) } else { begin / BLOCK };
         let fragment = EoeFragment {
             frame: self.number,
-            // A number or place beyond six bits is refused by the encoder, and ends the frame.
+            // The encoder refuses a number or offset beyond six bits, which ends the frame.
             number: u8::try_from(self.next).unwrap_or(u8::MAX),
             blocks: u8::try_from(blocks).unwrap_or(u8::MAX),
             last,
@@ -67,7 +67,7 @@ mod tests {
         // 128 bytes of mailbox, 10 of headers, 96 of data.
         let fragments = cut(200, 128);
         assert_eq!(fragments.iter().map(Vec::len).collect::<Vec<_>>(), [100, 100, 12]);
-        // Fragment 0 says how long the frame is, in blocks; the others where they belong. Frame 5.
+        // Fragment 0 gives the length of the frame in blocks, the others their offset. Frame 5.
         assert_eq!(fragments[0][..6], [0x00, 0x00, 0xC0, 0x51, 0, 1], "7 blocks");
         assert_eq!(fragments[1][..6], [0x00, 0x00, 0xC1, 0x50, 96, 97], "from block 3");
         assert_eq!(fragments[2][..6], [0x00, 0x01, 0x82, 0x51, 192, 193], "from block 6, the last");

@@ -1,4 +1,4 @@
-//! The handle to the Ethernet of one SubDevice, and the task that sends.
+//! The handle to the Ethernet of one SubDevice, and the sending task.
 
 use alloc::rc::Rc;
 use core::time::Duration;
@@ -11,20 +11,20 @@ use crate::mail::talk::Talk;
 use crate::mail::{Mailbox, MailboxError};
 use ringcat_wire::mailbox::eoe::EoeFragment;
 
-/// A SubDevice may leave a fragment in its mailbox for so long; then its frame is dropped, as a network does.
+/// Longest time that a SubDevice may leave a fragment in its mailbox; then its frame is dropped, as a network does.
 const SEND_LIMIT: Duration = Duration::from_millis(500);
 
-/// The Ethernet of one SubDevice: frames to it and from it. There is one port for a mailbox; dropped, it ends.
+/// The Ethernet of one SubDevice: frames to it and from it. A mailbox has one port at most, which ends when dropped.
 ///
-/// It lasts longer than the SubDevice's being there. While the mailbox is not in use it is down: frames are refused,
-/// and those that waited are dropped and counted.
+/// It outlives the absence of the SubDevice. While the mailbox is not in use the port is down: frames are refused, and
+/// queued frames are dropped and counted.
 #[derive(Debug)]
 pub struct EthernetPort {
     room: Rc<Room>,
 }
 
 impl EthernetPort {
-    /// Opens the port of a mailbox; `None` where somebody has it.
+    /// Opens the port of a mailbox; `None` where it is open already.
     pub fn open(mailbox: &Mailbox) -> Option<EthernetPort> {
         let room = mailbox.room().clone();
         let attachment = {
@@ -40,18 +40,18 @@ impl EthernetPort {
         Some(EthernetPort { room })
     }
 
-    /// Whether frames can be sent and may come.
+    /// Whether frames can be sent and received.
     pub fn is_up(&self) -> bool {
         is_up(&self.room)
     }
 
-    /// Takes a frame, without check sequence, to be sent.
+    /// Queues a frame, without check sequence, for sending.
     pub fn send(&self, frame: &[u8]) -> Result<(), QueueError> {
         self.queue(frame, false).map(drop)
     }
 
-    /// As [`EthernetPort::send`], and asks the SubDevice when it sends the frame on: the answer is a [`TimeStamp`] with
-    /// the number that is returned.
+    /// As [`EthernetPort::send`], and requests the time at which the SubDevice forwards the frame: the answer is a
+    /// [`TimeStamp`] with the returned number.
     pub fn send_with_time(&self, frame: &[u8]) -> Result<u8, QueueError> {
         self.queue(frame, true)
     }
@@ -65,17 +65,17 @@ impl EthernetPort {
         Ok(number)
     }
 
-    /// Frames that can be taken for sending now; 0 while it is down.
+    /// Number of frames that can be queued now; 0 while it is down.
     pub fn room(&self) -> usize {
         if self.is_up() { self.room.look().ethernet.room() } else { 0 }
     }
 
-    /// Waits until a frame can be taken for sending.
+    /// Waits until a frame can be queued.
     pub async fn ready(&self) {
         self.room.news.until(|| (self.room() > 0).then_some(())).await;
     }
 
-    /// Takes the oldest frame that has come.
+    /// Takes the oldest received frame.
     pub fn pop_frame(&self) -> Option<EthernetFrame> {
         self.room.state().ethernet.pop_received()
     }
@@ -85,12 +85,12 @@ impl EthernetPort {
         self.room.news.until(|| self.pop_frame()).await
     }
 
-    /// Takes the oldest time stamp that has come.
+    /// Takes the oldest received time stamp.
     pub fn pop_time_stamp(&self) -> Option<TimeStamp> {
         self.room.state().ethernet.pop_time_stamp()
     }
 
-    /// Counters, rates, what waits.
+    /// Counters, rates, queue length.
     pub fn status(&self) -> EthernetStatus {
         let up = self.is_up();
         self.room.state().ethernet.status(up, self.room.bus.now())
@@ -116,7 +116,7 @@ fn is_up(room: &Room) -> bool {
     })
 }
 
-/// Sends frames as they are queued, for as long as there is the port.
+/// Sends queued frames until the port is dropped.
 async fn send_all(room: Rc<Room>, attachment: u32) {
     loop {
         let work = || {
@@ -132,14 +132,14 @@ async fn send_all(room: Rc<Room>, attachment: u32) {
         if !room.news.until(work).await {
             return;
         }
-        // Closed meanwhile: the frames are gone, too.
+        // It was closed meanwhile: the frames are dropped, too.
         let Ok(mut talk) = Talk::take(&room, Lane::Frames).await else { continue };
         while let Some(frame) = next(&room, attachment) {
             let result = send(&mut talk, &frame).await;
             let now = room.bus.now();
             room.state().ethernet.sent(frame.bytes.len(), result.is_ok(), now);
             if result == Err(MailboxError::Closed) {
-                // It may be open again, and then wants another talk.
+                // It may be open again, and then needs a new conversation.
                 break;
             }
         }
@@ -154,7 +154,7 @@ fn next(room: &Rc<Room>, attachment: u32) -> Option<Outgoing> {
         }
         traffic.next_outgoing()
     };
-    // Somebody may wait for room.
+    // A sender may wait for room.
     room.news.notify();
     frame
 }

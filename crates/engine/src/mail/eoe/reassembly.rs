@@ -1,8 +1,8 @@
-//! Frames put together from fragments as they come (protocol 6.5).
+//! Joins fragments to frames as they arrive (protocol 6.5).
 //!
-//! Frames are told apart by their number, so fragments of several may mix. A fragment that does not go on where its
-//! frame ended loses that frame; a fragment 0 begins anew. What a SubDevice sends takes no more memory than one frame
-//! for each number.
+//! Frames are distinguished by their number, so fragments of several may be interleaved. A fragment that does not
+//! continue its frame drops that frame; a fragment 0 starts a new one. A SubDevice can occupy memory for one frame per
+//! number at most.
 
 use alloc::vec::Vec;
 
@@ -11,20 +11,20 @@ use ringcat_wire::mailbox::eoe::{BLOCK, EoeFragment};
 /// Frame numbers.
 const NUMBERS: usize = 16;
 
-/// What a fragment led to.
+/// Result of a fragment.
 #[derive(Debug, PartialEq, Eq)]
 pub(super) enum Outcome {
-    /// More of the frame is to come.
+    /// The frame is incomplete.
     Part,
     /// The whole frame.
     Frame(Vec<u8>),
     /// The fragment belongs to no frame, or its frame cannot be completed.
     Lost,
-    /// The fragment begins a frame, and the frame of this number before it was not complete.
+    /// The fragment starts a frame, and the previous frame with this number was incomplete.
     Replaced(Option<Vec<u8>>),
 }
 
-/// Frames of which fragments are missing.
+/// Incomplete frames.
 #[derive(Debug, Default)]
 pub(super) struct Reassembly {
     frames: [Option<Partial>; NUMBERS],
@@ -33,9 +33,9 @@ pub(super) struct Reassembly {
 #[derive(Debug)]
 struct Partial {
     bytes: Vec<u8>,
-    /// Number of the fragment that has to come next.
+    /// Number of the next expected fragment.
     next: u8,
-    /// Bytes that fragment 0 announced, rounded up to blocks.
+    /// Length that fragment 0 announced, rounded up to blocks.
     announced: usize,
 }
 
@@ -65,14 +65,14 @@ impl Reassembly {
         }
     }
 
-    /// Forgets all that is not complete.
+    /// Drops all incomplete frames.
     pub(super) fn clear(&mut self) {
         *self = Reassembly::default();
     }
 }
 
 impl Partial {
-    /// False where the fragment does not belong here.
+    /// False where the fragment does not belong to this frame.
     fn append(&mut self, fragment: &EoeFragment<'_>) -> bool {
         let goes_on = fragment.number == self.next && fragment.offset() == self.bytes.len();
         let whole = fragment.last || (!fragment.data.is_empty() && fragment.data.len().is_multiple_of(BLOCK));
@@ -131,7 +131,7 @@ mod tests {
         assert_eq!(take(&mut reassembly, &first[1]), Outcome::Lost, "its frame is gone");
         take(&mut reassembly, &second[1]);
         assert_eq!(take(&mut reassembly, &second[2]), Outcome::Frame(alloc::vec![2; 250]));
-        // The last fragment is lost: the number comes again sixteen frames later.
+        // The last fragment is lost: the frame number is used again sixteen frames later.
         take(&mut reassembly, &first[0]);
         let next = cut(3, 60, 1);
         assert_eq!(take(&mut reassembly, &next[0]), Outcome::Replaced(Some(alloc::vec![3; 60])));

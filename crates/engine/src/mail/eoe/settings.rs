@@ -1,4 +1,4 @@
-//! IP parameters and address filter of a SubDevice: set and asked for (protocol 6.5).
+//! Sets and reads IP parameters and address filter of a SubDevice (protocol 6.5).
 
 use alloc::vec;
 
@@ -37,7 +37,7 @@ impl From<IpParameters<'_>> for IpSettings {
     }
 }
 
-/// Sets addresses behind a port of the SubDevice; 0 is the SubDevice itself or any.
+/// Sets the IP parameters at a port of the SubDevice; 0 is the SubDevice itself or any.
 pub async fn set_ip(mailbox: &Mailbox, port: u8, settings: &IpSettings, limits: Limits) -> Result<(), EoeError> {
     let parameters = settings.parameters().map_err(|cause| EoeError { port, cause })?;
     request(mailbox, port, EoeBody::SetIp(parameters), limits, |body| match body {
@@ -47,7 +47,7 @@ pub async fn set_ip(mailbox: &Mailbox, port: u8, settings: &IpSettings, limits: 
     .await
 }
 
-/// Asks for the addresses behind a port of the SubDevice.
+/// Reads the IP parameters at a port of the SubDevice.
 pub async fn ask_ip(mailbox: &Mailbox, port: u8, limits: Limits) -> Result<IpSettings, EoeError> {
     request(mailbox, port, EoeBody::GetIp, limits, |body| match body {
         EoeBody::Ip(result, parameters) => Some((result, parameters.into())),
@@ -65,7 +65,7 @@ pub async fn set_filter(mailbox: &Mailbox, port: u8, filter: AddressFilter, limi
     .await
 }
 
-/// Asks for the address filter of a port of the SubDevice.
+/// Reads the address filter of a port of the SubDevice.
 pub async fn ask_filter(mailbox: &Mailbox, port: u8, limits: Limits) -> Result<AddressFilter, EoeError> {
     request(mailbox, port, EoeBody::GetFilter, limits, |body| match body {
         EoeBody::Filter(result, filter) => Some((result, filter)),

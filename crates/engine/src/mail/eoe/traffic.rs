@@ -1,4 +1,4 @@
-//! What passes through one mailbox as Ethernet: queues, counters, rates.
+//! Ethernet traffic of one mailbox: queues, counters, rates.
 
 use alloc::collections::VecDeque;
 use alloc::vec::Vec;
@@ -12,15 +12,16 @@ use crate::mail::answer_time::AnswerTime;
 use crate::mail::ring::Ring;
 use crate::time::Instant;
 
-/// Shortest frame: its header.
+/// Shortest frame: its Ethernet header.
 const MIN_FRAME: usize = 14;
-/// Frames that may wait to be sent: some twenty milliseconds of what a mailbox carries. Who sends more has to wait.
+/// Frames that may be queued for sending: about twenty milliseconds of a mailbox's throughput. Faster senders have to
+/// wait.
 pub const QUEUE: usize = 32;
-/// Frames that are kept until somebody takes them.
+/// Received frames that are kept until the application takes them.
 const RECEIVED: usize = 64;
-/// Time stamps that are kept until somebody takes them.
+/// Time stamps that are kept until the application takes them.
 const TIME_STAMPS: usize = 16;
-/// For so long after a fragment others are looked for; afterwards whoever watches the mail finds them.
+/// Time after a fragment in which the reader polls for others; later, the mail watch finds them.
 const LIVELY: Duration = Duration::from_millis(20);
 /// Rates are those of the last full second.
 const RATE_PERIOD: Duration = Duration::from_secs(1);
@@ -30,11 +31,11 @@ const RATE_PERIOD: Duration = Duration::from_secs(1);
 pub struct EthernetFrame {
     /// The frame, without check sequence.
     pub bytes: Vec<u8>,
-    /// When it arrived at the SubDevice, where that says so: lower half of the time, nanoseconds.
+    /// When it arrived at the SubDevice, if that reports it: lower half of the time, nanoseconds.
     pub time_ns: Option<u32>,
 }
 
-/// When a SubDevice sent on a frame for which that was asked.
+/// When a SubDevice forwarded a frame with a requested time stamp.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct TimeStamp {
     /// Number of the frame, as [`super::EthernetPort::send_with_time`] returned it.
@@ -43,17 +44,17 @@ pub struct TimeStamp {
     pub time_ns: u32,
 }
 
-/// Why a frame was not taken for sending.
+/// Why a frame was not queued for sending.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum QueueError {
     /// The mailbox is not in use: the SubDevice is in INIT or does not answer; or it has no room for a fragment.
     Down,
-    /// Enough frames wait; another can be taken after [`super::EthernetPort::ready`].
+    /// The queue is full; room becomes available after [`super::EthernetPort::ready`].
     Full,
-    /// It is no Ethernet frame: of 14 to 1,518 bytes.
+    /// Not an Ethernet frame of 14 to 1,518 bytes.
     Length {
-        /// Its bytes.
+        /// Its length in bytes.
         bytes: usize,
     },
 }
@@ -75,29 +76,28 @@ impl core::error::Error for QueueError {}
 /// Counters of one SubDevice's Ethernet.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct EthernetCounters {
-    /// Frames that the SubDevice took.
+    /// Frames that the SubDevice accepted.
     pub tx_frames: u64,
     /// Their bytes.
     pub tx_bytes: u64,
-    /// Frames that were taken for sending and did not get through: the SubDevice went away, or took no mail for too
-    /// long.
+    /// Queued frames that were not delivered: the SubDevice became unreachable, or did not accept mail for too long.
     pub tx_dropped: u64,
-    /// Frames that came from the SubDevice.
+    /// Frames received from the SubDevice.
     pub rx_frames: u64,
     /// Their bytes.
     pub rx_bytes: u64,
-    /// Frames that came and that nobody took in time.
+    /// Received frames that the application did not take in time.
     pub rx_overruns: u64,
-    /// Frames of which fragments did not come, or did not fit together.
+    /// Frames with missing or inconsistent fragments.
     pub rx_lost: u64,
-    /// Messages that make no sense.
+    /// Malformed messages.
     pub malformed: u64,
 }
 
-/// How things stand.
+/// Status of the port.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct EthernetStatus {
-    /// Frames can be sent and may come.
+    /// Frames can be sent and received.
     pub up: bool,
     /// Counters since the port was opened.
     pub counters: EthernetCounters,
@@ -105,7 +105,7 @@ pub struct EthernetStatus {
     pub tx_rate: (u64, u64),
     /// Bytes and frames per second from the SubDevice.
     pub rx_rate: (u64, u64),
-    /// Frames that wait to be sent, of [`QUEUE`].
+    /// Frames queued for sending, of [`QUEUE`].
     pub queued: usize,
 }
 
@@ -150,9 +150,9 @@ impl Rate {
 /// The Ethernet of one mailbox.
 #[derive(Debug)]
 pub(in crate::mail) struct Traffic {
-    /// Somebody has a port. Without one, fragments are unasked mail like any other.
+    /// A port is open. Without one, fragments are handled as unsolicited mail.
     pub attached: bool,
-    /// Which port that is.
+    /// Number of that port.
     pub attachment: u32,
     outgoing: VecDeque<Outgoing>,
     number: u8,
@@ -162,7 +162,7 @@ pub(in crate::mail) struct Traffic {
     counters: EthernetCounters,
     tx_rate: Rate,
     rx_rate: Rate,
-    /// When a fragment passed last, either way.
+    /// When a fragment was last sent or received.
     last_fragment: Option<Instant>,
 }
 
@@ -183,7 +183,7 @@ impl Traffic {
         }
     }
 
-    /// What was under way when the mailbox was closed or opened is gone.
+    /// Frames in progress when the mailbox was closed or opened are dropped.
     pub(in crate::mail) fn reset(&mut self) {
         self.counters.tx_dropped += self.outgoing.len() as u64;
         self.outgoing.clear();
@@ -191,7 +191,7 @@ impl Traffic {
         self.last_fragment = None;
     }
 
-    /// Takes a frame for sending; returns its number.
+    /// Queues a frame for sending; returns its number.
     pub(super) fn queue(&mut self, bytes: &[u8], wants_time: bool) -> Result<u8, QueueError> {
         if !(MIN_FRAME..=MAX_FRAME).contains(&bytes.len()) {
             return Err(QueueError::Length { bytes: bytes.len() });
@@ -204,7 +204,7 @@ impl Traffic {
         Ok(self.number)
     }
 
-    /// Frames that may still be queued.
+    /// Number of frames that may still be queued.
     pub(super) fn room(&self) -> usize {
         QUEUE - self.outgoing.len()
     }
@@ -217,7 +217,7 @@ impl Traffic {
         self.outgoing.pop_front()
     }
 
-    /// A frame was sent or not.
+    /// A frame was sent, or failed.
     pub(super) fn sent(&mut self, bytes: usize, arrived: bool, now: Instant) {
         if arrived {
             self.counters.tx_frames += 1;
@@ -233,7 +233,7 @@ impl Traffic {
         self.last_fragment = Some(now);
     }
 
-    /// Takes a message that is no answer.
+    /// Takes a message that is not an answer.
     pub(in crate::mail) fn take(&mut self, payload: &[u8], now: Instant) {
         match EoeMessage::decode(payload).map(|message| message.body) {
             Ok(EoeBody::Fragment(fragment)) => {
@@ -273,13 +273,13 @@ impl Traffic {
         self.time_stamps.pop()
     }
 
-    /// For how long no fragment has passed, where others may follow soon.
+    /// Time since the last fragment, while more are expected soon.
     pub(in crate::mail) fn lively(&self, now: Instant) -> Option<Duration> {
         let idle = now.since(self.last_fragment.filter(|_| self.attached)?);
         (idle < LIVELY).then_some(idle)
     }
 
-    /// Pause to the next look for a fragment.
+    /// Pause to the next poll for a fragment.
     pub(in crate::mail) fn pause(&self, now: Instant) -> Option<Duration> {
         self.lively(now).map(AnswerTime::pause)
     }

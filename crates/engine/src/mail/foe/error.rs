@@ -14,36 +14,36 @@ use crate::mail::stream::Overflow;
 pub struct FoeError {
     /// Name of the file.
     pub file: String,
-    /// What happened.
+    /// The cause.
     pub cause: FoeFailure,
 }
 
-/// What happened to a file transfer.
+/// Cause of a failed file transfer.
 #[derive(Clone, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum FoeFailure {
     /// The mailbox failed.
     Mailbox(MailboxError),
-    /// The SubDevice refused or gave up.
+    /// The SubDevice refused or aborted.
     Refused {
-        /// Why.
+        /// Error code.
         code: FoeErrorCode,
-        /// What it says about it; may be empty.
+        /// Error text; may be empty.
         text: String,
     },
     /// A packet came with another number than expected.
     Packet {
         /// Expected.
         expected: u32,
-        /// Came.
+        /// Received.
         got: u32,
     },
     /// The SubDevice was busy without progress.
     BusyForTooLong {
-        /// For so long.
+        /// Duration.
         limit: Duration,
     },
-    /// The receiver does not take so much.
+    /// The receiver does not accept this size.
     TooLong(Overflow),
     /// The mailbox has no room for data.
     SmallMailbox,

@@ -10,7 +10,7 @@ use super::{FoeOptions, FoeProgress, Transfer};
 use crate::mail::Mailbox;
 use crate::mail::stream::Sink;
 
-/// Reads a file; returns its length in bytes. `progress` is told after each packet.
+/// Reads a file; returns its length in bytes. `progress` is called after each packet.
 pub async fn read(
     mailbox: &Mailbox,
     file: &str,
@@ -49,7 +49,7 @@ async fn run(
         (transfer.progress)(FoeProgress::Bytes(bytes));
         let acknowledge = FoeMessage::Acknowledge { packet };
         if data.len() < full {
-            // The file is whole; whether the SubDevice hears of it is its matter.
+            // The file is complete, whether or not the last acknowledgement reaches the SubDevice.
             transfer.busy = false;
             let length = acknowledge.encode(&mut transfer.payload).ok_or(FoeFailure::SmallMailbox)?;
             transfer.talk.send(&transfer.payload[..length], options.limits.0).await?;
@@ -60,14 +60,14 @@ async fn run(
     }
 }
 
-/// Sends a message to which a packet is the answer.
+/// Sends a message whose answer is a packet.
 async fn next<P: FnMut(FoeProgress)>(
     transfer: &mut Transfer<P>,
     message: &FoeMessage<'_>,
     expected: u32,
 ) -> Result<Vec<u8>, FoeFailure> {
     let accept = |answer: FoeMessage<'_>| match answer {
-        // The last packet once more: its acknowledgement crossed it.
+        // The last packet again: it crossed its acknowledgement.
         FoeMessage::Data { packet, .. } if packet == expected.wrapping_sub(1) => None,
         FoeMessage::Data { packet, data } if packet == expected => Some(Ok(data.to_vec())),
         FoeMessage::Data { packet, .. } => Some(Err(packet)),

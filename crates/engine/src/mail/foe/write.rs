@@ -10,7 +10,7 @@ use super::{FoeOptions, FoeProgress, Transfer};
 use crate::mail::Mailbox;
 use crate::mail::stream::Source;
 
-/// Writes a file; returns its length in bytes. `progress` is told after each packet.
+/// Writes a file; returns its length in bytes. `progress` is called after each packet.
 pub async fn write(
     mailbox: &Mailbox,
     file: &str,
@@ -44,7 +44,7 @@ async fn run(
         transfer.ask(&FoeMessage::Data { packet, data: &data[..count] }, acknowledged(packet)).await?;
         bytes += count as u64;
         (transfer.progress)(FoeProgress::Bytes(bytes));
-        // A packet that is not full ends the file, an empty one where the last full one was the end.
+        // A short packet ends the file, an empty one if the last one was full.
         if count < full {
             transfer.busy = false;
             return Ok(bytes);
@@ -52,7 +52,7 @@ async fn run(
     }
 }
 
-/// The acknowledgement of a packet; others are of packets that were sent again while the SubDevice was busy.
+/// The acknowledgement of a packet; others belong to packets that were repeated while the SubDevice was busy.
 fn acknowledged(expected: u32) -> impl FnMut(FoeMessage<'_>) -> Option<()> {
     move |answer| match answer {
         FoeMessage::Acknowledge { packet } => (packet == expected).then_some(()),

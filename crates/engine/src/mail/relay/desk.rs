@@ -1,4 +1,4 @@
-//! Where clients' messages wait, and the tasks that carry them to the mailboxes.
+//! Queues of client messages, and the tasks that pass them to the mailboxes.
 
 use alloc::boxed::Box;
 use alloc::collections::{BTreeMap, VecDeque};
@@ -24,52 +24,52 @@ use crate::time::Instant;
 const PER_CLIENT: usize = 8;
 /// Messages of all clients that may wait in one lane.
 const QUEUE: usize = 64;
-/// Answers that are kept until somebody takes them.
+/// Answers that are kept until the gateway takes them.
 const ANSWERS: usize = 1024;
-/// Until a SubDevice takes a message, and until it answers; files may have to be erased first.
+/// Time limit until a SubDevice accepts a message, and until it answers; files may have to be erased first.
 const LIMITS: Limits = (Duration::from_millis(500), Duration::from_secs(1));
 const FILE_LIMITS: Limits = (Duration::from_millis(500), Duration::from_secs(3));
-/// Who has waited for so long has asked again or gone.
+/// A client whose message has waited for so long has repeated it or disconnected.
 const STALE: Duration = Duration::from_secs(5);
-/// For so long a client may pause within a transfer.
+/// Longest pause of a client within a transfer.
 const PAUSE: Duration = Duration::from_secs(1);
-/// A transfer that others wait for may take so long.
+/// Longest transfer while others wait.
 const PATIENCE: Duration = Duration::from_secs(10);
 
 /// An answer for a client.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Relayed {
-    /// The client, as it was named with its message.
+    /// The client, as named with its message.
     pub client: u64,
     /// EtherCAT header of type 5 and the mailbox message.
     pub bytes: Vec<u8>,
 }
 
-/// What passed.
+/// Counters.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct RelayCounters {
-    /// Messages that came from clients.
+    /// Messages from clients.
     pub messages: u64,
     /// Answers of SubDevices, error replies among them.
     pub answers: u64,
-    /// Messages that were refused with an error of ours.
+    /// Messages that the MainDevice refused with an error reply.
     pub refused: u64,
-    /// Messages that were not answered: the SubDevice did not, or is not there.
+    /// Messages without an answer: the SubDevice did not answer, or is absent.
     pub unanswered: u64,
-    /// Transfers that were ended because their client paused, left, or kept others waiting.
+    /// Transfers that were ended because their client paused, disconnected, or kept others waiting.
     pub ended: u64,
-    /// Messages that are none.
+    /// Malformed messages.
     pub malformed: u64,
 }
 
-/// What the MainDevice itself will answer: payloads of the same protocol, or the detail of an error reply.
+/// Pending answer of the MainDevice itself: payloads of the same protocol, or the detail of an error reply.
 pub type OwnAnswer = Pin<Box<dyn Future<Output = Result<Vec<Vec<u8>>, u16>>>>;
 
-/// Who is asked.
+/// Target of a message.
 pub enum Asked {
     /// A SubDevice, through its mailbox.
     SubDevice(Mailbox),
-    /// The MainDevice itself. Its answer is worked on when it is the message's turn.
+    /// The MainDevice itself. The answer is prepared when it is the message's turn.
     Own(OwnAnswer),
 }
 
@@ -84,9 +84,9 @@ struct Job {
 #[derive(Default)]
 struct Queue {
     jobs: VecDeque<Job>,
-    /// A task carries its messages.
+    /// A task is processing its messages.
     served: bool,
-    /// Number of the turn that a client had last.
+    /// Number of the last turn of a client.
     turns: BTreeMap<u64, u64>,
     turn: u64,
 }
@@ -98,7 +98,7 @@ struct State {
     counters: RelayCounters,
 }
 
-/// Takes messages of clients and gives out answers.
+/// Takes messages of clients and returns answers.
 pub struct Desk {
     shared: Rc<Shared>,
 }
@@ -116,13 +116,13 @@ impl core::fmt::Debug for Desk {
 }
 
 impl Desk {
-    /// A desk at which nobody waits.
+    /// A desk without messages.
     pub fn new(bus: &Bus) -> Desk {
         Desk { shared: Rc::new(Shared { bus: bus.clone(), state: RefCell::default(), news: bus.signal() }) }
     }
 
-    /// Takes a client's message, EtherCAT header included. `find` knows who has its address, and whether he speaks its
-    /// protocol. What cannot be passed on is answered with an error reply.
+    /// Takes a client's message, EtherCAT header included. `find` returns the target with its address, and whether the
+    /// target supports its protocol. A message that cannot be passed on is answered with an error reply.
     pub fn take(&self, client: u64, bytes: &[u8], find: impl FnOnce(&Message<'_>) -> Result<Asked, u16>) {
         self.shared.state.borrow_mut().counters.messages += 1;
         let Ok(message) = gateway::decode(bytes) else {
@@ -164,13 +164,13 @@ impl Desk {
         self.shared.news.notify();
     }
 
-    /// A client has gone: what it asked for is forgotten, a transfer of it is ended.
+    /// A client has disconnected: its messages are dropped, its transfer is ended.
     pub fn forget(&self, client: u64) {
         {
             let state = &mut *self.shared.state.borrow_mut();
             for queue in state.queues.values_mut() {
                 queue.jobs.retain(|job| job.client != client);
-                // No turn is left: whoever carries its transfer sees that.
+                // Without a turn, the task that processes its transfer ends it.
                 queue.turns.remove(&client);
             }
             state.answers.retain(|answer| answer.client != client);
@@ -183,14 +183,14 @@ impl Desk {
         self.shared.state.borrow_mut().answers.pop_front()
     }
 
-    /// What passed.
+    /// Counters.
     pub fn counters(&self) -> RelayCounters {
         self.shared.state.borrow().counters
     }
 }
 
 impl State {
-    /// Puts an answer where the client finds it; false where it does not fit.
+    /// Puts an answer into the queue of the client; false where it does not fit.
     fn put(&mut self, job: &Job, protocol: Protocol, payload: &[u8]) -> bool {
         let header = Header { protocol, length: payload.len() as u16, ..job.header };
         let mut bytes = vec![0; gateway::HEADER_LEN + Header::LEN + payload.len()];
@@ -218,7 +218,7 @@ impl Shared {
         self.state.borrow_mut().refuse(job, detail);
     }
 
-    /// The next message: of the client whose last turn is the longest ago. `None` where there is none.
+    /// The next message: of the client with the oldest last turn. `None` where there is none.
     fn next(&self, key: (u16, usize)) -> Option<Job> {
         let now = self.bus.now();
         let state = &mut *self.state.borrow_mut();
@@ -241,7 +241,7 @@ impl Shared {
         job
     }
 
-    /// The next message of a client, `None` in it where the client has left.
+    /// The next message of a client; the inner `None` means that the client has disconnected.
     fn next_of(&self, key: (u16, usize), client: u64) -> Option<Option<Job>> {
         let state = &mut *self.state.borrow_mut();
         let queue = state.queues.get_mut(&key)?;
@@ -259,7 +259,7 @@ impl Shared {
     }
 }
 
-/// Carries the messages for one SubDevice and lane, until there are none.
+/// Processes the messages for one SubDevice and lane, until there are none.
 async fn serve(shared: Rc<Shared>, key: (u16, usize), mailbox: Mailbox, lane: Lane) {
     while let Some(job) = shared.next(key) {
         let talk = async {
@@ -295,7 +295,7 @@ async fn settle(talk: &mut Talk, lane: Lane) -> Result<(), MailboxError> {
     }
 }
 
-/// One message and its answers, and what belongs to the same transfer.
+/// One message and its answers, and the rest of the same transfer.
 async fn converse(shared: &Rc<Shared>, key: (u16, usize), mut talk: Talk, lane: Lane, first: Job) {
     let (client, begin) = (first.client, shared.bus.now());
     let mut dialogue = Dialogue::default();
@@ -319,7 +319,7 @@ async fn converse(shared: &Rc<Shared>, key: (u16, usize), mut talk: Talk, lane: 
     }
     shared.state.borrow_mut().counters.ended += 1;
     if let Some(end) = dialogue.end() {
-        // A mailbox that is closed has no transfer to end.
+        // A closed mailbox has no transfer to end.
         let _ = talk.post(&end);
     }
 }

@@ -1,4 +1,4 @@
-//! What follows a message of a client: an answer or none, one or several, and whether a transfer is under way then.
+//! Expected answers to a client's message: none, one or several, and whether a transfer is in progress then.
 
 use alloc::vec;
 use alloc::vec::Vec;
@@ -17,32 +17,32 @@ const EOE_REQUESTS: [u8; 4] = [2, 4, 6, 8];
 const EOE_TYPE: u8 = 0x0F;
 /// Bytes of the vendor before a vendor message.
 const VENDOR_LEN: usize = 4;
-/// Bytes that messages which end a transfer have at most.
+/// Longest message that ends a transfer, in bytes.
 const END_LEN: usize = 64;
 
-/// What a client's message asks for.
+/// Expectation of a client's message.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) enum Asks {
-    /// An answer that [`Question`] knows.
+    /// An answer that [`Question`] recognises.
     Answer(Question),
-    /// Nothing.
+    /// No answer.
     Nothing,
 }
 
-/// By what an answer is known.
+/// How to recognise an answer.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) enum Question {
     /// Beginning of an SDO transfer, with index and subindex.
     Initiate(u16, u8),
     /// Part of an SDO transfer.
     Segment,
-    /// SDO information: the answer, and what it begins with.
+    /// SDO information: the answer, and its first bytes.
     Information(InformationOpcode, Vec<u8>),
     /// A packet of a file, or its acknowledgement.
     File {
-        /// The number of the packet that has to come.
+        /// Number of the expected packet.
         data: Option<u32>,
-        /// The number that has to be acknowledged.
+        /// Number to be acknowledged.
         acknowledge: Option<u32>,
     },
     /// SoE of an IDN of a drive.
@@ -60,7 +60,7 @@ pub(super) enum Question {
 enum Transfer {
     #[default]
     None,
-    /// An object: index, subindex, bytes that are still to come where it is an upload.
+    /// An object: index, subindex, bytes left where it is an upload.
     Object(u16, u8),
     /// A file.
     File,
@@ -70,15 +70,15 @@ enum Transfer {
     Fragments,
 }
 
-/// What is known of a client's transfer in one lane.
+/// State of a client's transfer in one lane.
 #[derive(Debug, Default)]
 pub(super) struct Dialogue {
     transfer: Transfer,
-    /// A request whose answer decides: what the transfer is if it is well.
+    /// A request that decides by its answer: the transfer that a success starts.
     pending: Transfer,
 }
 
-/// The lane for messages of a protocol, or the error for who asks for it.
+/// The lane for messages of a protocol, or the error reply for the client.
 pub(super) fn lane(protocol: Protocol, payload: &[u8]) -> Result<Lane, u16> {
     match protocol {
         Protocol::Aoe => Ok(Lane::Aoe),
@@ -86,7 +86,7 @@ pub(super) fn lane(protocol: Protocol, payload: &[u8]) -> Result<Lane, u16> {
         Protocol::Foe => Ok(Lane::Foe),
         Protocol::Soe => Ok(Lane::Soe),
         Protocol::Voe => Ok(Lane::Voe),
-        // Frames belong to the network interface.
+        // Frames belong to the network interface of the host.
         Protocol::Eoe if payload.first().is_some_and(|first| EOE_REQUESTS.contains(&(first & EOE_TYPE))) => {
             Ok(Lane::Eoe)
         }
@@ -96,13 +96,13 @@ pub(super) fn lane(protocol: Protocol, payload: &[u8]) -> Result<Lane, u16> {
 }
 
 impl Dialogue {
-    /// A transfer is under way.
+    /// A transfer is in progress.
     pub(super) fn is_open(&self) -> bool {
         self.transfer != Transfer::None
     }
 
-    /// A message of the client goes to the SubDevice, whose receive mailbox has this size. The error is for the client:
-    /// no such service passes.
+    /// A client's message goes to the SubDevice, whose receive mailbox has this size. The error is for the client: such
+    /// a service is not relayed.
     pub(super) fn ask(&mut self, lane: Lane, payload: &[u8], mailbox_size: usize) -> Result<Asks, u16> {
         self.pending = self.transfer.clone();
         match lane {
@@ -182,7 +182,7 @@ impl Dialogue {
                 Asks::Nothing
             }
             FoeMessage::Acknowledge { packet } => answer(Some(packet.wrapping_add(1)), None),
-            // A client that is busy gets the packet again.
+            // A client that is busy receives the packet again.
             FoeMessage::Busy { .. } => answer(None, None),
             FoeMessage::Error { .. } => {
                 self.transfer = Transfer::None;
@@ -206,7 +206,7 @@ impl Dialogue {
         })
     }
 
-    /// An answer to the question has come, from a send mailbox of this size; true where more of it follows unasked.
+    /// An answer was received from a send mailbox of this size; true where more parts follow.
     pub(super) fn answered(&mut self, question: &Question, payload: &[u8], mailbox_size: usize) -> bool {
         let pending = core::mem::take(&mut self.pending);
         let mut more = false;
@@ -223,7 +223,7 @@ impl Dialogue {
                 }
                 Ok(FoeMessage::Data { .. }) => Transfer::File,
                 Ok(FoeMessage::Acknowledge { .. }) => pending,
-                // The client sends its message again; that one counts.
+                // The client repeats its message; the repeated one counts.
                 Ok(FoeMessage::Busy { .. }) => Transfer::File,
                 _ => Transfer::None,
             },
@@ -240,7 +240,7 @@ impl Dialogue {
         more
     }
 
-    /// What tells the SubDevice that the transfer has ended; nothing where none is under way or no message says so.
+    /// The message that ends the transfer for the SubDevice; empty where none is in progress or no such message exists.
     pub(super) fn end(&mut self) -> Option<Vec<u8>> {
         let mut out = vec![0; END_LEN];
         let length = match core::mem::take(&mut self.transfer) {
@@ -258,7 +258,7 @@ impl Dialogue {
         Some(out)
     }
 
-    /// The request was written and its answer did not come: the SubDevice may be in the middle of what was asked.
+    /// The request was written and its answer did not come: the SubDevice may be in the middle of the transfer.
     pub(super) fn unanswered(&mut self) {
         let pending = core::mem::take(&mut self.pending);
         if !self.is_open() {
@@ -268,7 +268,7 @@ impl Dialogue {
 }
 
 impl Question {
-    /// The object that is asked for, where that is known.
+    /// The requested object, where known.
     pub(super) fn index(&self) -> Option<u16> {
         match self {
             Question::Initiate(index, _) => Some(*index),
@@ -276,7 +276,7 @@ impl Question {
         }
     }
 
-    /// Whether a mail is a further part of the answer. Of the dictionary, only the first part says what it is about.
+    /// Whether a mail is a further part of the answer. For SDO information, only the first part names its subject.
     pub(super) fn goes_on(&self, payload: &[u8]) -> bool {
         match self {
             Question::Information(answer, _) => SdoInformation::decode(payload)
@@ -327,7 +327,7 @@ impl Question {
     }
 }
 
-/// A question about the dictionary. Answers begin with what was asked for: the kind of a list, an index, a subindex.
+/// A question about the dictionary. Answers start with the request: the kind of a list, an index, a subindex.
 fn ask_information(payload: &[u8]) -> Result<Asks, u16> {
     let request = SdoInformation::decode(payload).map_err(|_| ErrorReply::SIZE_TOO_SHORT)?;
     let (answer, length) = match request.opcode {

@@ -1,4 +1,4 @@
-//! What gives the tasks of a mailbox something to do: they are started where none runs.
+//! Work for the tasks of a mailbox: starts them where they do not run.
 
 use alloc::rc::Rc;
 use alloc::vec::Vec;
@@ -40,7 +40,7 @@ impl Room {
         Ok(id)
     }
 
-    /// The mailbox may be used as before.
+    /// The mailbox can be used again, unchanged.
     pub(in crate::mail) fn resume(self: &Rc<Room>) {
         {
             let state = &mut *self.state();
@@ -57,7 +57,7 @@ impl Room {
         reader::start(self);
     }
 
-    /// There may be mail.
+    /// There is mail, or there may be.
     pub(in crate::mail) fn is_full(self: &Rc<Room>) {
         {
             let state = &mut *self.state();
@@ -67,7 +67,7 @@ impl Room {
         reader::start(self);
     }
 
-    /// There might be mail: the reader looks once.
+    /// There may be mail: the reader polls once.
     pub(in crate::mail) fn look_once(self: &Rc<Room>) {
         self.state().curious = true;
         reader::start(self);

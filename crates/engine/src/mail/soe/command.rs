@@ -1,5 +1,5 @@
-//! Procedure commands of drives: started, looked at, aborted (protocol 6.6; IEC 61491: the value of the IDN is the
-//! command, its data state the acknowledgement).
+//! Procedure commands of drives: start, state, abort (protocol 6.6; IEC 61491: the value of the IDN is the command, its
+//! data state the acknowledgement).
 
 use ringcat_wire::mailbox::soe::{Idn, SoeElements};
 
@@ -8,7 +8,7 @@ use crate::mail::{Limits, Mailbox};
 
 /// Set and enabled.
 const START: u16 = 0x0003;
-/// Neither set nor enabled: what was started is aborted, what has ended is acknowledged.
+/// Neither set nor enabled: aborts a running command, acknowledges one that has ended.
 const CANCEL: u16 = 0x0000;
 
 /// Data state of a procedure command.
@@ -21,7 +21,7 @@ impl CommandState {
         self.0 & 1 != 0
     }
 
-    /// It is at work.
+    /// It is being executed.
     pub const fn is_running(self) -> bool {
         self.0 & 0x04 != 0
     }
@@ -31,23 +31,23 @@ impl CommandState {
         self.0 & 0x08 != 0
     }
 
-    /// It was set and has ended well.
+    /// It was set and has ended without error.
     pub const fn is_done(self) -> bool {
         self.is_set() && !self.is_running() && !self.has_failed()
     }
 }
 
-/// Starts a command; [`state`] says how far it is.
+/// Starts a command; [`state`] gives its progress.
 pub async fn start(mailbox: &Mailbox, drive: u8, idn: Idn, limits: Limits) -> Result<(), SoeError> {
     write(mailbox, SoeAddress::value(drive, idn), &START.to_le_bytes(), limits).await
 }
 
-/// Aborts a command that is at work, or acknowledges one that has ended, so that it can be started again.
+/// Aborts a command that is being executed, or acknowledges one that has ended, so that it can be started again.
 pub async fn abort(mailbox: &Mailbox, drive: u8, idn: Idn, limits: Limits) -> Result<(), SoeError> {
     write(mailbox, SoeAddress::value(drive, idn), &CANCEL.to_le_bytes(), limits).await
 }
 
-/// How far a command is.
+/// State of a command.
 pub async fn state(mailbox: &Mailbox, drive: u8, idn: Idn, limits: Limits) -> Result<CommandState, SoeError> {
     let address = SoeAddress { drive, idn, elements: SoeElements::DATA_STATE };
     let bytes = read(mailbox, address, limits, 2).await?;

@@ -1,4 +1,4 @@
-//! A SubDevice that is nothing but a mailbox: two SyncManagers, counters, the repeat request (protocol 6.1, 6.2).
+//! A SubDevice that consists of a mailbox only: two SyncManagers, counters, the repeat request (protocol 6.1, 6.2).
 
 use alloc::collections::VecDeque;
 use alloc::vec;
@@ -18,7 +18,7 @@ const STATUS: u16 = 0x080D;
 const ACTIVATE: u16 = 0x080E;
 const PDI_CONTROL: u16 = 0x080F;
 
-/// What the application answers.
+/// Answers of the application.
 pub trait Server {
     fn serve(&mut self, protocol: Protocol, payload: &[u8]) -> Vec<(Protocol, Vec<u8>)>;
 }
@@ -36,7 +36,7 @@ pub struct Device<S> {
     received_counter: u8,
     sent_counter: u8,
     repeat: bool,
-    /// Counters of the messages that were served, for the checks.
+    /// Counters of the served messages, for the checks.
     pub served: Vec<u8>,
 }
 
@@ -61,7 +61,7 @@ impl<S: Server> Device<S> {
         }
     }
 
-    /// A mail that nobody asked for.
+    /// Queues unsolicited mail.
     pub fn say(&mut self, protocol: Protocol, payload: &[u8], now: Instant) {
         self.sent_counter = next_counter(self.sent_counter);
         let mut mail = Header::new(protocol, self.sent_counter, payload.len() as u16).encode().to_vec();
@@ -70,7 +70,7 @@ impl<S: Server> Device<S> {
         self.queue.push_back((now, mail));
     }
 
-    /// A mail that nobody asked for, before all that wait.
+    /// Queues unsolicited mail before all waiting mail.
     pub fn cut_in(&mut self, protocol: Protocol, payload: &[u8], now: Instant) {
         self.say(protocol, payload, now);
         if let Some(mail) = self.queue.pop_back() {
@@ -78,9 +78,9 @@ impl<S: Server> Device<S> {
         }
     }
 
-    /// Lets the application work.
+    /// Runs the application.
     pub fn run(&mut self, now: Instant) {
-        // With many answers queued it takes no more.
+        // With many answers queued it accepts no further message.
         if self.queue.len() < 4
             && let Some(mail) = self.received.take()
             && let Ok(message) = Message::decode(&mail)
@@ -151,7 +151,7 @@ impl<S: Server> Device<S> {
                 }
                 free
             }
-            // The last byte hands it over.
+            // The last byte completes the write.
             (Command::Fpwr, at) if at == self.layout.receive_offset + self.layout.receive_size - 1 => {
                 let complete = self.received.is_none() && !self.begun.is_empty();
                 if complete {

@@ -1,4 +1,4 @@
-//! A SubDevice that does not answer for a while, and comes back with its mailbox as it was or anew.
+//! A SubDevice that does not answer for a time, and returns with its mailbox unchanged or reset.
 
 use alloc::vec;
 use alloc::vec::Vec;
@@ -51,7 +51,7 @@ fn a_mail_whose_read_was_lost_at_an_outage_is_read_when_the_subdevice_is_back() 
             bench.device.say(Protocol::Coe, &emergency(code), bench.now);
         }
         bench.mailbox.is_full();
-        // The first read reaches the SubDevice; neither its answer nor anything after it is seen.
+        // The first read reaches the SubDevice; its answer and all later frames are lost.
         bench.step(|| Fate::LostBack);
         bench.is_away(Duration::from_micros(noticed));
         bench.mailbox.is_full();
@@ -71,7 +71,7 @@ fn an_answer_that_waited_during_an_outage_answers_no_other_request() {
         let (old, new) = (pattern(1, 20), pattern(2, 20));
         bench.device.server.idns.insert((1, 7), old.clone());
         bench.device.server.objects.insert((0x2000, 1), old);
-        // One question per protocol; all reach the SubDevice, and no answer is fetched.
+        // One request per protocol; all reach the SubDevice, and no answer is fetched.
         bench.device.delay = Duration::from_millis(2);
         let [a, b, c] = core::array::from_fn(|_| bench.mailbox.clone());
         let lost = (
@@ -86,7 +86,7 @@ fn an_answer_that_waited_during_an_outage_answers_no_other_request() {
         assert_eq!(lost.0.take(), Some(Err(MailboxError::Closed)), "noticed after {noticed} us");
         assert!(matches!(lost.1.take(), Some(Err(error)) if error.cause == SoeFailure::Mailbox(MailboxError::Closed)));
         assert!(lost.2.take().is_some_and(|result| result.is_err()));
-        // The values are others now.
+        // The values have changed.
         bench.device.server.idns.insert((1, 7), new.clone());
         bench.device.server.objects.insert((0x2000, 1), new.clone());
         let [a, b, c] = core::array::from_fn(|_| bench.mailbox.clone());
@@ -109,7 +109,7 @@ fn what_was_read_before_a_restart_and_comes_back_after_it_is_nobodys() {
     bench.mailbox.is_full();
     bench.step(|| Fate::Late(Duration::from_millis(60)));
     bench.pass(Duration::from_millis(10));
-    // It lost its power and is in PREOP again; the first mail of the new time is another one.
+    // It lost its power and is in PREOP again; the first mail of the new session is another one.
     bench.mailbox.suspend();
     let layout = bench.device.layout;
     bench.mailbox.open(StationAddress(STATION), layout, 1);

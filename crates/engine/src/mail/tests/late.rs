@@ -1,5 +1,4 @@
-//! What comes late: fragments of an answer that nobody waits for any more, and error replies that may be to something
-//! else.
+//! Late mail: fragments of an answer that was given up, and error replies that may belong to another message.
 
 use alloc::vec;
 use alloc::vec::Vec;
@@ -29,13 +28,13 @@ fn message(text: &[u8]) -> Voe {
 }
 
 impl Bench {
-    /// Begins a vendor message and its answer; after a time nobody waits for it any more.
+    /// Begins a vendor message and its answer, then gives it up after a time.
     fn ask_for(&mut self, text: &[u8], time: Duration, limits: Limits) -> Outcome {
         let (mailbox, bus, message) = (self.mailbox.clone(), self.supervisor.bus(), message(text));
         self.start(async move { bus.within(time, voe::exchange(&mailbox, &message, limits)).await.ok() })
     }
 
-    /// A message of a protocol of the vendor's own that nobody answers.
+    /// A message of a vendor-specific protocol without an answer.
     fn send_unanswered(&mut self) {
         let mailbox = self.mailbox.clone();
         assert_eq!(self.run(async move { raw::send(&mailbox, Lane::of(9), &[0], LIMITS.0).await }), Ok(()));
@@ -68,7 +67,7 @@ fn late_fragments_begun_without_a_waiting_request_are_kept_from_the_next() {
     bench.until_served(1);
     bench.pass(MS);
     bench.device.server.idns.insert((1, 7), new.clone());
-    // One of the three is read before anybody asks again.
+    // One of the three is read before the next request.
     bench.mailbox.is_full();
     while bench.mailbox.counters().unclaimed == 0 {
         bench.step(|| Fate::Passes);
@@ -79,7 +78,7 @@ fn late_fragments_begun_without_a_waiting_request_are_kept_from_the_next() {
     assert_eq!(bench.mailbox.counters().unclaimed, 3);
 }
 
-// The write was taken, what came back of it was late, and meanwhile the reader brought the first fragment.
+// The write was accepted, its response was late, and meanwhile the reader brought the first fragment.
 // covers: mailbox
 #[test]
 fn late_fragments_begun_before_their_write_was_known_are_kept_from_the_next() {
@@ -209,7 +208,7 @@ fn a_protocol_that_is_known_is_not_refused_because_ethernet_frames_are() {
         bench.run(async move { voe::exchange(&mailbox, &message(b"first"), LIMITS).await }),
         Ok(message(b"first"))
     );
-    // The server does not know EoE; its error reply is there before the answer.
+    // The server does not support EoE; its error reply arrives before the answer.
     let mailbox = bench.mailbox.clone();
     bench.start(async move { mailbox.talk(Lane::Frames).await?.send(&[0; 12], LIMITS.0).await });
     let second = bench.ask_for(b"second", LIMITS.1, LIMITS);
@@ -240,7 +239,7 @@ fn an_error_reply_to_something_else_does_not_end_the_wait_for_a_late_answer() {
 fn an_error_reply_that_comes_while_its_conversation_ends_is_kept_as_unasked_mail() {
     let mut bench = Bench::new(LinkSet::Single, 64);
     let (mailbox, asking) = (bench.mailbox.clone(), bench.mailbox.clone());
-    // Nobody answers this; whoever asks has gone when the error reply has just been sorted.
+    // This message has no answer; the conversation has ended when the error reply is delivered.
     let ended = bench.start(async move {
         let mut exchange = pin!(raw::exchange(&asking, Lane::of(9), &[0], LIMITS));
         poll_fn(|context| {

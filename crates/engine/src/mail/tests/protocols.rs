@@ -283,7 +283,7 @@ fn vendor_messages_are_exchanged_and_received_unasked() {
     let message = Voe { vendor_id: 0x0C47, vendor_type: 3, data: b"hello".to_vec() };
     let (mailbox, sent) = (bench.mailbox.clone(), message.clone());
     assert_eq!(bench.run(async move { voe::exchange(&mailbox, &sent, LIMITS).await }), Ok(message.clone()));
-    // Sent without waiting, its echo comes unasked.
+    // Sent without waiting, its echo is unsolicited.
     let (mailbox, sent) = (bench.mailbox.clone(), message.clone());
     let result = bench.run(async move {
         voe::send(&mailbox, &sent, LIMITS.0).await?;
@@ -303,7 +303,7 @@ fn an_error_reply_goes_to_the_request_whose_protocol_is_unknown_to_the_subdevice
     let object = bench.start(async move { read(&mailbox, SdoAddress::new(0x2000, 1), LIMITS, 2000).await });
     bench.pass(Duration::from_millis(3));
     let mailbox = bench.mailbox.clone();
-    // The simulated server does not speak EoE.
+    // The simulated server does not support EoE.
     let refused = bench.run(async move {
         let mut talk = mailbox.talk(Lane::Eoe).await?;
         talk.ask(&[6, 0, 0, 0], LIMITS, |_| Some(())).await
@@ -313,14 +313,14 @@ fn an_error_reply_goes_to_the_request_whose_protocol_is_unknown_to_the_subdevice
     assert_eq!(object.borrow_mut().take(), Some(Ok(pattern(1, 2000))));
 }
 
-// Only the last fragment is answered: an error reply before that may be to any of them, or to what somebody else asked.
+// Only the last fragment has an answer: an earlier error reply may belong to any of them, or to another message.
 // covers: 6.6, mailbox-faults
 #[test]
 fn an_error_reply_while_fragments_are_written_fails_the_write_whoever_else_waits() {
     let mut bench = Bench::new(LinkSet::Single, 64);
     let address = SoeAddress::value(1, Idn::standard(0, 7));
     let mailbox = bench.mailbox.clone();
-    // Nobody answers a CoE message of this kind.
+    // A CoE message of this kind has no answer.
     let other = bench.start(async move { raw::exchange(&mailbox, Lane::Coe, &[0, 0x60, 0, 0], LIMITS).await });
     let mailbox = bench.mailbox.clone();
     let write = bench.start(async move { soe::write(&mailbox, address, &pattern(1, 900), LIMITS).await });

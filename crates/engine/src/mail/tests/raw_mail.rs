@@ -1,4 +1,4 @@
-//! Mail of the application's own making, and what comes while somebody else's answer is waited for.
+//! Mail that the application composes, and mail that arrives while another answer is awaited.
 
 use alloc::vec;
 use alloc::vec::Vec;
@@ -12,7 +12,7 @@ use crate::link::LinkSet;
 use crate::mail::voe::{self, Voe};
 use crate::mail::{Lane, MailboxError, Unsolicited, raw};
 
-/// The only type that the SubDevice knows besides those of the lanes.
+/// The only type that the SubDevice supports besides those of the lanes.
 const OWN: u8 = 9;
 
 impl Bench {
@@ -32,7 +32,7 @@ fn mail_of_any_type_is_exchanged_refused_and_received_unasked() {
     let mut bench = Bench::new(LinkSet::Single, 64);
     let own = Protocol::Other(OWN);
     assert_eq!(bench.exchange(OWN, b"question"), Ok(b"question".to_vec()));
-    // A lane number beside its own lane is that lane.
+    // The number of a type with its own lane selects that lane.
     let mailbox = bench.mailbox.clone();
     let coe = bench.run(async move { raw::exchange(&mailbox, Lane::Other(3), &[0, 0x90, 7, 7], LIMITS).await });
     assert_eq!(coe, Ok(vec![0, 0x90, 7, 7]), "a service of CoE that nobody knows");
@@ -44,7 +44,7 @@ fn mail_of_any_type_is_exchanged_refused_and_received_unasked() {
         }
     }
     assert_eq!(bench.unasked(Unsolicited::Other), []);
-    // Unasked, and an answer that nobody waits for.
+    // Unsolicited mail, and an answer without a waiting request.
     bench.device.say(own, b"news", bench.now);
     bench.device.say(Protocol::Other(12), b"more", bench.now);
     let mailbox = bench.mailbox.clone();
@@ -55,7 +55,7 @@ fn mail_of_any_type_is_exchanged_refused_and_received_unasked() {
     bench.pass(Duration::from_millis(5));
     let more = (Protocol::Other(12), b"more".to_vec());
     assert_eq!(bench.unasked(Unsolicited::Other), [(own, b"news".to_vec()), more, (own, b"echo".to_vec())]);
-    // Another type is no answer.
+    // Another type is not an answer.
     bench.device.say(Protocol::Other(12), b"more", bench.now);
     assert_eq!(bench.exchange(OWN, &[0]), Err(MailboxError::NoAnswer { limit: LIMITS.1 }));
     assert_eq!(bench.unasked(Unsolicited::Other), [(Protocol::Other(12), b"more".to_vec())]);
@@ -87,13 +87,13 @@ fn vendor_messages_that_are_no_answer_are_kept_whenever_they_come() {
         bytes.truncate(length);
         bytes
     };
-    // Before the answer, and right behind it.
+    // Before the answer, and directly after it.
     for behind in [false, true] {
         for other in [message(1, b"a"), message(2, b"b")] {
             let mut bench = Bench::new(LinkSet::Single, 64);
             let asked = message(1, b"question");
             if !behind && other.vendor_id == asked.vendor_id {
-                // Nothing tells it from the answer.
+                // It cannot be distinguished from the answer.
                 continue;
             }
             if !behind {

@@ -1,4 +1,4 @@
-//! An application that speaks CoE, FoE, SoE, AoE and VoE, for a [`Device`](super::device::Device).
+//! An application that supports CoE, FoE, SoE, AoE and VoE, for a [`Device`](super::device::Device).
 
 use alloc::collections::BTreeMap;
 use alloc::string::String;
@@ -26,7 +26,7 @@ pub struct Everything {
     pub idns: BTreeMap<(u8, u16), Vec<u8>>,
     pub files: BTreeMap<Vec<u8>, Vec<u8>>,
     pub memory: BTreeMap<(u32, u32), Vec<u8>>,
-    /// Aborts that came.
+    /// Aborts received.
     pub aborts: Vec<AbortCode>,
     pub foe_errors: Vec<(u32, String)>,
     /// The next messages of FoE are answered with BUSY.
@@ -55,7 +55,7 @@ impl Server for Everything {
                 match service {
                     Some(CoeService::SdoRequest) => self.sdo(payload),
                     Some(CoeService::SdoInformation) => self.information(payload),
-                    // A service of the vendor's own.
+                    // A vendor-specific service.
                     Some(CoeService::Other(9)) => vec![(Protocol::Coe, payload.to_vec())],
                     _ => Vec::new(),
                 }
@@ -64,7 +64,7 @@ impl Server for Everything {
             Protocol::Soe => self.soe(payload),
             Protocol::Aoe => self.aoe(payload),
             Protocol::Voe => vec![(Protocol::Voe, payload.to_vec())],
-            // A protocol of the vendor's own: nothing for a first byte of 0.
+            // A vendor-specific protocol: no answer for a first byte of 0.
             Protocol::Other(9) if payload.first() == Some(&0) => Vec::new(),
             Protocol::Other(9) => vec![(Protocol::Other(9), payload.to_vec())],
             _ => vec![(Protocol::Error, ErrorReply::new(ErrorReply::UNSUPPORTED_PROTOCOL).encode().to_vec())],

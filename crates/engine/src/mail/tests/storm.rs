@@ -1,4 +1,4 @@
-//! All protocols at once over one mailbox, while frames are lost, late and doubled, and procedures are dropped.
+//! All protocols at once over one mailbox, while frames are lost, late and duplicated, and procedures are dropped.
 
 use alloc::rc::Rc;
 use alloc::vec;
@@ -22,10 +22,10 @@ use crate::mail::stream::{Bounded, Bytes};
 use crate::mail::voe::Voe;
 use crate::mail::{Limits, Mailbox, aoe, foe, soe, voe};
 
-/// Long, so that what is lost is healed before.
+/// Long enough for the recovery of losses.
 const LIMITS: Limits = (Duration::from_secs(5), Duration::from_secs(5));
 
-/// Chance from a seed (xorshift).
+/// Random numbers from a seed (xorshift).
 struct Dice(u64);
 
 impl Dice {
@@ -37,7 +37,7 @@ impl Dice {
     }
 }
 
-/// Works that ended well, by kind.
+/// Successful transfers, by kind.
 type Done = Rc<RefCell<[u32; 5]>>;
 
 async fn objects(mailbox: Mailbox, done: Done) {
@@ -89,7 +89,7 @@ async fn vendor(mailbox: Mailbox, done: Done) {
     done.borrow_mut()[4] += 1;
 }
 
-/// What becomes of a frame.
+/// Fate of a frame.
 fn fate(dice: &mut Dice, percent: u64, links: LinkSet) -> Fate {
     if dice.below(100) >= percent {
         return Fate::Passes;
@@ -103,7 +103,7 @@ fn fate(dice: &mut Dice, percent: u64, links: LinkSet) -> Fate {
     }
 }
 
-/// One run; `percent` of the frames meet with something.
+/// One run; `percent` of the frames are disturbed.
 fn storm(seed: u64, links: LinkSet, percent: u64, drops: bool) {
     let mut dice = Dice(seed.wrapping_mul(0x9E37_79B9_7F4A_7C15) | 1);
     let mut bench = Bench::new(links, 64);
@@ -128,7 +128,7 @@ fn storm(seed: u64, links: LinkSet, percent: u64, drops: bool) {
             bench.device.say(Protocol::Coe, &mail, bench.now);
         }
         if drops && dice.below(60) == 0 {
-            // Somebody else wants something and loses patience.
+            // Another request, which is given up early.
             let (mailbox, bus) = (bench.mailbox.clone(), bench.supervisor.bus());
             let (limit, which) = (Duration::from_micros(dice.below(3000)), dice.below(3));
             bench.start(async move {
@@ -157,7 +157,7 @@ fn storm(seed: u64, links: LinkSet, percent: u64, drops: bool) {
     let counters = bench.mailbox.counters();
     assert_eq!(heard, (1..=said).collect::<Vec<_>>(), "seed {seed}: each emergency once, {counters:?}");
     let steps = bench.device.served.windows(2);
-    // A message that was never taken leaves a gap; nothing is served twice in a row.
+    // A message that was never accepted leaves a gap; no message is served twice in a row.
     assert!(steps.clone().all(|pair| pair[0] != pair[1]), "seed {seed}");
 }
 
@@ -182,7 +182,7 @@ fn a_mail_that_comes_late_long_after_it_was_accepted_is_a_double_seed_2468() {
     storm(2468, LinkSet::Ring, 20, false);
 }
 
-/// A request was given up whose answer had begun before it was known to be written.
+/// A request was given up whose answer had begun before the write was confirmed.
 // covers: mailbox-faults
 #[test]
 fn fragments_of_an_abandoned_request_are_not_taken_for_those_of_the_next() {

@@ -30,7 +30,7 @@ fn with(change: impl FnOnce(&mut Vec<DeclaredSyncManager>)) -> SubDeviceConfig {
 
 #[test]
 fn declared_sync_managers_take_the_place_of_the_sii_and_nothing_is_assigned() {
-    // What is declared otherwise does not count beside them.
+    // Other declarations are ignored beside them.
     let config = with(|_| ()).assign(2, Direction::Outputs, vec![PdoMapping::from_sii(0x1601)]);
     let plan = plan(&config, &device()).unwrap();
     let mailbox: Vec<_> = plan.mailbox.iter().map(|sm| (sm.index, sm.register.encode())).collect();

@@ -1,4 +1,4 @@
-//! Asking for a frame that is alone on the wire, and for the right to have it latched.
+//! Sends a frame alone on the wire, and manages the exclusive right to latch times with it.
 
 use alloc::rc::Rc;
 use alloc::vec::Vec;
@@ -15,16 +15,16 @@ use crate::supervisor::reply::{BusError, Reply};
 use crate::supervisor::shared::Shared;
 use crate::supervisor::transfer::Request;
 
-/// Between two looks whether others have read what their frame has latched.
+/// Pause between two checks whether another procedure has read its latched times.
 const TURN_LOOK: Duration = Duration::from_micros(100);
 
 impl Bus {
-    /// Sends a datagram once, alone on the wire, and returns what came back, whatever its working counter. Copies on
-    /// the link that is `deaf` are known not to come home.
+    /// Sends a datagram once, alone on the wire, and returns the reply, whatever its working counter. Copies on the
+    /// link `deaf` are known not to return.
     ///
-    /// The future fails with [`BusError::Busy`] where the wire was never empty, with [`BusError::Disturbed`] where a
-    /// cyclic frame left while it was under way, with [`BusError::Lost`] where a copy did not come back, or one of
-    /// cyclic frames.
+    /// The future fails with [`BusError::Busy`] where the wire was never free, with [`BusError::Disturbed`] where a
+    /// cyclic frame left while it was on the wire, with [`BusError::Lost`] where a copy of it, or of cyclic frames, did
+    /// not return.
     pub(crate) fn alone(
         &self,
         command: Command,
@@ -35,7 +35,7 @@ impl Bus {
         self.submit(Request { alone: Some(deaf.map_or(0, Link::bit)), ..Request::once(command, target, data) })
     }
 
-    /// Waits for the right to have frames latched.
+    /// Waits for the exclusive right to latch.
     pub(crate) async fn latch_turn(&self) -> Turn {
         while core::mem::replace(&mut self.shared.borrow_mut().alone.is_taken, true) {
             self.sleep(TURN_LOOK).await;
@@ -43,7 +43,7 @@ impl Bus {
         Turn { shared: self.shared.clone() }
     }
 
-    /// Asks the cyclic half not to begin a cycle for a time.
+    /// Asks the cyclic half to begin no cycle for a time.
     pub(crate) fn ask_for_pause(&self, time: Duration) {
         let shared = self.shared.borrow();
         if let Some(board) = &shared.board {
@@ -52,7 +52,7 @@ impl Bus {
     }
 }
 
-/// The right to have frames latched, until it is dropped: latches hold until the next frame of this kind.
+/// The exclusive right to latch, until it is dropped: latched times hold until the next frame of this kind.
 pub(crate) struct Turn {
     shared: Rc<RefCell<Shared>>,
 }

@@ -1,4 +1,4 @@
-//! When a datagram that is to be alone leaves, and what became of it.
+//! Decides when a datagram leaves alone, and evaluates the result.
 
 use core::time::Duration;
 
@@ -10,11 +10,11 @@ use crate::supervisor::reply::{BusError, Reply};
 use crate::supervisor::shared::Shared;
 use crate::supervisor::transfer::TransferId;
 
-/// A wire that is never empty for so long is waited for no longer; meanwhile nothing acyclic is sent.
+/// Longest wait for a free wire; meanwhile no acyclic frame is sent.
 const LIMIT: Duration = Duration::from_millis(4);
 
 impl Shared {
-    /// The datagram that leaves now and alone, if one may, and the links on which copies are known not to come home.
+    /// The datagram that may leave alone now, if any, and the links on which copies are known not to return.
     pub(in crate::supervisor) fn next_alone(&mut self) -> Option<(TransferId, u8)> {
         let (id, deaf) = loop {
             let (id, deaf) = *self.alone.waiting.front()?;
@@ -45,8 +45,8 @@ impl Shared {
         Some((id, deaf))
     }
 
-    /// Gives up one that waits for the cyclic half for too long. Where frames of that come home all the time, it has to
-    /// pause; where some do not, they were lost.
+    /// Gives up a datagram that waits for the cyclic half for too long. Where cyclic frames keep returning, a pause is
+    /// needed; where some do not, they were lost.
     pub(in crate::supervisor) fn expire_alone(&mut self) {
         let Stage::Waiting { until, home: before } = self.alone.stage else { return };
         let Some((id, deaf)) = self.alone.waiting.front().copied().filter(|_| self.now >= until) else { return };
@@ -59,7 +59,7 @@ impl Shared {
         self.finish(id, Err(if come_home { BusError::Busy { target } } else { BusError::Lost { target, retries: 0 } }));
     }
 
-    /// What became of a datagram, if it was to be alone and was not.
+    /// Result for a datagram that was to be alone, if it was not.
     pub(in crate::supervisor) fn judge_alone(
         &mut self,
         id: TransferId,

@@ -10,7 +10,7 @@ use crate::supervisor::reply::{BusError, Reply};
 use crate::supervisor::shared::Shared;
 use crate::supervisor::transfer::{Request, Stage, TransferId};
 
-/// Waits for the reply to a datagram. Dropped before, the reply is thrown away when it comes.
+/// Waits for the reply to a datagram. When it is dropped earlier, the reply is discarded.
 pub(in crate::supervisor) struct TransferFuture {
     shared: Rc<RefCell<Shared>>,
     request: Option<Request>,

@@ -1,4 +1,4 @@
-//! A link that a procedure has taken down, and brought back.
+//! Disconnects a link for a procedure, and reconnects it.
 
 use core::time::Duration;
 
@@ -6,14 +6,14 @@ use super::Bus;
 use crate::link::Link;
 use crate::supervisor::link_order::LinkOrder;
 
-/// Pause between two looks for the answer.
+/// Pause between two polls for the answer.
 const PAUSE: Duration = Duration::from_micros(100);
-/// So long the runtime may take.
+/// Time limit of the runtime.
 const LIMIT: Duration = Duration::from_secs(1);
 
 impl Bus {
-    /// Has a link forcibly disconnected, or connected again. False where the link layer cannot do that; whoever has
-    /// disconnected one has to connect it again. For one procedure at a time.
+    /// Disconnects or reconnects a link. False where the link layer cannot do that; the procedure that disconnected a
+    /// link must reconnect it. For one procedure at a time.
     pub async fn force_disconnect(&self, link: Link, disconnect: bool) -> bool {
         self.shared.borrow_mut().link_order = LinkOrder::Given { link, disconnect };
         let until = self.now() + LIMIT;
@@ -25,7 +25,7 @@ impl Bus {
                 return done;
             }
         }
-        // Fetched and not answered: it may still be carried out, and the answer is for nobody.
+        // The order was fetched but not answered: it may still be carried out, and its answer is dropped.
         self.shared.borrow_mut().link_order = LinkOrder::None;
         false
     }

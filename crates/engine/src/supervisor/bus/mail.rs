@@ -1,4 +1,4 @@
-//! Mailboxes as memory of a SubDevice: written and read once, with what comes back late.
+//! Reads and writes mailboxes as memory of a SubDevice, once each, and keeps late mail.
 
 use alloc::vec;
 use alloc::vec::Vec;
@@ -14,7 +14,7 @@ use crate::supervisor::stray::Stray;
 use crate::supervisor::transfer::Request;
 
 impl Bus {
-    /// Writes a mailbox of `size` bytes, once: its beginning and its last byte, which hands it over, in one frame
+    /// Writes a mailbox of `size` bytes, once: its beginning and its last byte, which completes the write, in one frame
     /// (protocol 6.1). The working counter is that of the last byte.
     pub fn write_mail(
         &self,
@@ -25,7 +25,7 @@ impl Bus {
     ) -> impl Future<Output = Result<Reply, BusError>> {
         let at = |offset: u16| Target::Station(station, register.offset(offset));
         let (command, expected) = (Command::Fpwr, Some(Wkc(1)));
-        // A second datagram has a cost of its own.
+        // A second datagram has overhead of its own.
         let (lead, target, data) = if mail.len() + OVERHEAD < usize::from(size) {
             (Some((command, at(0), mail)), at(size - 1), vec![0; 1])
         } else {
@@ -36,7 +36,7 @@ impl Bus {
         self.submit(Request { expected, lead, ..Request::once(command, target, data) })
     }
 
-    /// Reads a mailbox, once. What a second copy reads, and what comes back late, is kept for [`Bus::stray_mail`].
+    /// Reads a mailbox, once. The mail of a second copy, and late mail, is kept for [`Bus::stray_mail`].
     pub fn read_mail(
         &self,
         station: StationAddress,
@@ -48,7 +48,7 @@ impl Bus {
         self.submit(Request { expected, mail, ..Request::once(command, target, data) })
     }
 
-    /// The oldest mail of a SubDevice that came back when nobody waited for it any more.
+    /// Takes the oldest mail of a SubDevice that came back after its read was given up.
     pub fn stray_mail(&self, station: StationAddress) -> Option<Stray> {
         self.shared.borrow_mut().strays.take(station)
     }
@@ -58,7 +58,7 @@ impl Bus {
         self.shared.borrow().strays.has(station)
     }
 
-    /// Stray mails of all SubDevices that nobody fetched in time.
+    /// Number of stray mails of all SubDevices that were not fetched in time.
     pub fn stray_mails_dropped(&self) -> u64 {
         self.shared.borrow().strays.dropped()
     }

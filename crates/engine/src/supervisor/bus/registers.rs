@@ -1,4 +1,4 @@
-//! Registers of one SubDevice, which must answer, or of all.
+//! Reads and writes registers of one SubDevice, which must answer, or of all SubDevices.
 
 use alloc::vec;
 use alloc::vec::Vec;

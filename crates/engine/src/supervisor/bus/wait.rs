@@ -1,4 +1,4 @@
-//! Waiting: for a time, for at most a time, for several things at once.
+//! Waits for a time, with a time limit, or for several futures.
 
 use alloc::vec::Vec;
 use core::future::{Future, poll_fn};
@@ -23,7 +23,7 @@ impl Bus {
         self.sleep_until(until).await;
     }
 
-    /// Waits until a point of time.
+    /// Waits until a time.
     pub async fn sleep_until(&self, until: Instant) {
         let mut armed = false;
         poll_fn(|_| {
@@ -40,7 +40,7 @@ impl Bus {
         .await;
     }
 
-    /// Lets a future run at most for a time; then it is dropped, and what it asked of the bus is abandoned.
+    /// Runs a future with a time limit; after that it is dropped, and its datagrams are abandoned.
     pub async fn within<F: Future>(&self, limit: Duration, future: F) -> Result<F::Output, Elapsed> {
         let mut future = pin!(future);
         let until = self.now() + limit;
@@ -62,7 +62,7 @@ impl Bus {
         .await
     }
 
-    /// Runs two futures at once: what both ask of the bus first leaves in one frame, if it fits, in their order.
+    /// Runs two futures in parallel: their first datagrams leave in one frame, if they fit, in their order.
     pub async fn both<A: Future, B: Future>(&self, first: A, second: B) -> (A::Output, B::Output) {
         let (mut first, mut second) = (pin!(first), pin!(second));
         let (mut a, mut b) = (None, None);
@@ -84,7 +84,7 @@ impl Bus {
         .await
     }
 
-    /// Sends datagrams at once, in one frame if they fit, and waits for all replies; the first error counts.
+    /// Sends datagrams together, in one frame if they fit, and waits for all replies; returns the first error.
     pub async fn transfer_all(
         &self,
         datagrams: impl IntoIterator<Item = (Command, Target, Vec<u8>)>,

@@ -1,4 +1,4 @@
-//! Acyclic frames that come home: pairing and merging the copies, answering or giving up.
+//! Received acyclic frames: pairs and merges the copies, answers procedures or gives up.
 
 use ringcat_wire::address::Wkc;
 use ringcat_wire::command::Command;
@@ -14,11 +14,11 @@ use crate::supervisor::shared::Shared;
 use crate::supervisor::stray::Stray;
 use crate::supervisor::transfer::{Stage, TransferId};
 
-/// A lost datagram is sent again so often; the retry index in the source address has three bits (protocol SM-04).
+/// Number of retries of a lost datagram; the retry index in the source address has three bits (protocol SM-04).
 const MAX_RETRIES: u8 = 7;
 
 impl Shared {
-    /// Takes in a copy of an acyclic frame.
+    /// Takes a copy of an acyclic frame.
     pub(in crate::supervisor) fn receive(&mut self, copy: FrameCopy, arrived_on: Link, bytes: &[u8]) -> Received {
         self.silence.came_back(copy.sent_on);
         let slot = Flights::slot(copy.sequence);
@@ -56,8 +56,8 @@ impl Shared {
         Received::Taken
     }
 
-    /// Hands replies to procedures: those with the expected working counter at once, all when no further copy is
-    /// waited for. What was met while the ring changed is lost.
+    /// Passes replies to procedures: those with the expected working counter at once, all others when no further copy
+    /// is awaited. Replies of a frame that crossed a change of the ring count as lost.
     fn answer(&mut self, slot: usize, enough: bool) {
         let Some(mut flight) = self.flights.slots[slot].take() else { return };
         let straddled = flight.straddled_a_change();
@@ -86,10 +86,10 @@ impl Shared {
         self.flights.slots[slot] = Some(flight);
     }
 
-    /// A broadcast shows how many SubDevices the main copy meets (protocol CR-09).
+    /// A broadcast shows how many SubDevices process the main copy (protocol CR-09).
     fn learn_main_count(&mut self, flight: &Flight) {
         let is_broadcast = |place: &&Place| matches!(place.command, Command::Brd | Command::Bwr);
-        // One that no SubDevice has processed shows nothing.
+        // A broadcast without any SubDevice shows nothing.
         let met = |place: &&Place| place.total() != Wkc(0);
         if let Some(place) = flight.places.iter().rfind(is_broadcast).filter(met) {
             self.main_count = place.wkc[Link::Main.index()].0;
@@ -114,7 +114,7 @@ impl Shared {
         self.wake(task);
     }
 
-    /// Gives up flights whose deadline is over.
+    /// Gives up flights after their deadline.
     pub(in crate::supervisor) fn expire_flights(&mut self) {
         if self.flights.in_flight == 0 {
             return;
@@ -127,8 +127,8 @@ impl Shared {
         }
     }
 
-    /// Datagrams that one copy answered as expected are done, and those to one SubDevice that has answered (CR-06); the
-    /// others count as lost: the copy that is missing may have been the one that reached the SubDevice.
+    /// Completes datagrams that one copy answered as expected, and those to one SubDevice that answered (CR-06). The
+    /// others count as lost: the missing copy may have been the one that reached the SubDevice.
     fn expire(&mut self, slot: usize) {
         let Some(flight) = self.flights.take(slot) else { return };
         self.monitor.observe(flight.arrivals);
@@ -156,7 +156,7 @@ impl Shared {
         self.flights.spare.push(flight);
     }
 
-    /// Whether the copies of a datagram say different things, so that none can stand for the other.
+    /// Whether the copies of a datagram differ, so that neither can replace the other.
     fn is_apart(&mut self, id: TransferId) -> bool {
         let transfer = self.transfers.find(id);
         transfer.is_some_and(|it| it.request.redundant.is_some() || it.request.redundant_station.is_some())

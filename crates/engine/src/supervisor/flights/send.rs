@@ -1,4 +1,4 @@
-//! Acyclic frames on their way out: packing requests, sending on all links.
+//! Sends acyclic frames: packs requests, sends on all links.
 
 use core::time::Duration;
 
@@ -16,11 +16,11 @@ use crate::supervisor::shared::Shared;
 use crate::supervisor::transfer::{Request, Stage, TransferId, WITNESS_BYTES};
 use crate::time::Instant;
 
-/// A datagram that fits no send window goes out after this time all the same, and delays a cycle once.
+/// A datagram that fits no send window is sent after this time all the same, and delays one cycle.
 const STARVED: Duration = Duration::from_millis(10);
 
 impl Shared {
-    /// Packs what waits in the outbox into frames and sends them, within the budget and the window.
+    /// Packs datagrams from the outbox into frames and sends them, within the budget and the window.
     pub(in crate::supervisor) fn transmit(&mut self, budget: usize, transmit: &mut impl FnMut(Link, &[u8])) -> usize {
         let mut used = 0;
         while self.flights.has_room() && used < budget {
@@ -64,8 +64,8 @@ impl Shared {
         used
     }
 
-    /// Whether a first datagram that is too long for the window has waited for so long that it goes out all the same:
-    /// it may be too long for every window.
+    /// Whether a first datagram that is too long for the window has waited long enough to be sent all the same: it may
+    /// be too long for every window.
     fn is_starved(blocked: &mut Option<(TransferId, Instant)>, first: TransferId, now: Instant) -> bool {
         let (_, since) = *blocked.insert(blocked.filter(|(id, _)| *id == first).unwrap_or((first, now)));
         now.since(since) >= STARVED
@@ -143,7 +143,7 @@ impl Shared {
         self.launch(flight, length, 0)
     }
 
-    /// A frame of so many bytes is ready to leave; `None` where nothing is in it.
+    /// Gives a frame of this length for sending; `None` where it is empty.
     fn launch(&mut self, mut flight: Flight, length: usize, retry: u8) -> Option<Flight> {
         let sequence = flight.sequence;
         flight.bytes.truncate(length);
@@ -161,7 +161,7 @@ impl Shared {
     }
 }
 
-/// Appends the datagrams of a request. Returns where the data of its own is; `None` where they do not fit.
+/// Appends the datagrams of a request. Returns the offset of its own data; `None` where they do not fit.
 fn put(builder: &mut FrameBuilder<'_>, request: &Request, index: u8, now: Instant) -> Option<usize> {
     if let Some((command, target, lead)) = &request.lead {
         let at = builder.datagram(*command, index, *target, lead.len())?;
@@ -181,7 +181,7 @@ fn put(builder: &mut FrameBuilder<'_>, request: &Request, index: u8, now: Instan
 }
 
 /// In an open ring the SubDevice at position `p` behind the break is the one at `p - main_count` on the redundant link;
-/// in a closed one nobody is addressed twice (protocol CR-09).
+/// in a closed one no SubDevice is addressed twice (protocol CR-09).
 fn adjust_auto_increment(frame: &mut [u8], places: &[Place], main_count: u16) {
     for place in places {
         if !matches!(place.command, Command::Aprd | Command::Apwr | Command::Aprw | Command::Armw) {

@@ -70,7 +70,7 @@ struct WithRing {
     closing: Closing,
 }
 
-/// All ways in which one more cable makes a local ring of which frames meet every SubDevice in the order of before.
+/// All ways in which one more cable makes a local ring that keeps the order in which frames pass the SubDevices.
 fn rings_of(tree: &Segment) -> Vec<WithRing> {
     let before = tree.walk().order;
     let free = tree.free_ports();

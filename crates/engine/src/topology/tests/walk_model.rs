@@ -8,7 +8,7 @@ use ringcat_wire::register::{DlStatus, PortKind};
 
 use crate::topology::NodeStatus;
 
-/// What a cable ends in.
+/// The end of a cable.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum End {
     Main,
@@ -16,7 +16,7 @@ pub enum End {
     Port(usize, u8),
 }
 
-/// SubDevices and what is plugged into their ports.
+/// SubDevices and the connections of their ports.
 #[derive(Clone, Debug, Default)]
 pub struct Segment {
     links: Vec<[Option<End>; 4]>,
@@ -26,7 +26,7 @@ pub struct Segment {
     parents: Vec<Option<(usize, u8)>>,
 }
 
-/// What the frames of both links met.
+/// SubDevices that the frames of both links pass.
 pub struct Seen {
     /// SubDevices in the order of the processing units.
     pub order: Vec<usize>,
@@ -133,7 +133,7 @@ impl Segment {
 }
 
 impl Seen {
-    /// What the SubDevices report, in the order of the processing units.
+    /// Reports of the SubDevices, in the order of the processing units.
     pub fn status(&self, times: bool) -> Vec<NodeStatus> {
         let of = |node: &usize| {
             let mut bits = 0;

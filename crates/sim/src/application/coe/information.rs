@@ -124,8 +124,8 @@ fn entry(request: EntryRequest, dictionary: &Dictionary) -> Data {
     Ok(bytes)
 }
 
-/// A gap between two entries of a record: an entry without type and bits. MainDevices that list an object ask for each
-/// sub index up to the last, and take an error as one of the device.
+/// A gap between two entries of a record: an entry without type and bits. MainDevices that list an object read each sub
+/// index up to the last, and take an error for a fault of the device.
 fn gap(request: EntryRequest) -> Data {
     let EntryRequest { index, sub_index, value_info } = request;
     let name = format!("SubIndex {sub_index:03}");
@@ -148,7 +148,7 @@ fn gap(request: EntryRequest) -> Data {
     Ok(bytes)
 }
 
-/// The data in as many messages as it takes. Each has an even number of bytes, so that no index is torn.
+/// The data in the number of messages needed. Each has an even number of bytes, so that no index is split.
 fn fragments(opcode: InformationOpcode, data: &[u8], room: usize) -> Answer {
     let most = (room.saturating_sub(SdoInformation::OVERHEAD) & !1).max(2);
     let pieces: Vec<&[u8]> = if data.is_empty() { vec![data] } else { data.chunks(most).collect() };

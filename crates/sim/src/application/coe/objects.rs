@@ -1,11 +1,11 @@
-//! What the services of CoE work on.
+//! Context of the CoE services.
 
 use ringcat_wire::al::AlState;
 
 use crate::application::dictionary::Dictionary;
 use crate::application::process_data::ProcessData;
 
-/// What a transfer works on.
+/// Context of a transfer.
 #[derive(Debug)]
 pub struct Objects<'a> {
     /// The objects.
@@ -14,8 +14,8 @@ pub struct Objects<'a> {
     pub process_data: &'a ProcessData,
     /// Present state; some objects are writable in PREOP alone.
     pub state: AlState,
-    /// Complete access is served.
+    /// Complete access is supported.
     pub complete_access: bool,
-    /// SDO information is served.
+    /// SDO information is supported.
     pub information: bool,
 }

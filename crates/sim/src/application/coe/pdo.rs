@@ -1,7 +1,7 @@
 //! PDOs by mailbox instead of with the process data (protocol 6.3).
 //!
-//! In: an RxPDO, whose values go to the objects that it maps; a request for a TxPDO or RxPDO. Out: that PDO with the
-//! present values. An RxPDO is not answered. The number of the CoE header is the distance of the PDO from 0x1600 or
+//! Input: an RxPDO, whose values go to the mapped objects; a request for a TxPDO or RxPDO. Output: that PDO with the
+//! present values. An RxPDO has no answer. The number of the CoE header is the distance of the PDO from 0x1600 or
 //! 0x1A00.
 
 use ringcat_wire::al::AlState;
@@ -28,7 +28,7 @@ pub fn receive(number: u16, data: &[u8], objects: &mut Objects<'_>) -> Answer {
     let mut at = 0;
     for entry in mapped {
         let length = usize::from(entry.bit_length);
-        // What comes with the process data in OP goes before what comes by mailbox.
+        // In OP, process data overrides values received by mailbox.
         let cyclic = objects.state == AlState::Op && objects.process_data.is_output(entry.index, entry.sub_index);
         if entry.index != 0 && !cyclic {
             let mut value = vec![0; length.div_ceil(8)];
@@ -40,7 +40,7 @@ pub fn receive(number: u16, data: &[u8], objects: &mut Objects<'_>) -> Answer {
     Answer::Silence
 }
 
-/// Sends a PDO that is asked for.
+/// Sends a requested PDO.
 pub fn send(service: CoeService, number: u16, room: usize, objects: &Objects<'_>) -> Answer {
     let (base, direction) = match service {
         CoeService::TxPdo => (TX_BASE, PdoDirection::Tx),
@@ -65,7 +65,7 @@ pub fn send(service: CoeService, number: u16, room: usize, objects: &Objects<'_>
     if payload.len() > room { Answer::Error(ErrorReply::INVALID_SIZE) } else { Answer::payload(payload) }
 }
 
-/// What a PDO maps; `None` where there is no such PDO.
+/// The mapping of a PDO; `None` where there is no such PDO.
 fn mapping(index: u16, direction: PdoDirection, objects: &Objects<'_>) -> Option<Vec<MappedEntry>> {
     objects.dictionary.object(index).filter(|object| object.role == ObjectRole::Mapping(direction))?;
     Some(objects.dictionary.mapped(index).collect())

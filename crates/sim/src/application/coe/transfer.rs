@@ -10,7 +10,7 @@ use super::objects::Objects;
 use crate::application::answer::Answer;
 use crate::application::dictionary::MAX_TRANSFER_BYTES;
 
-/// An object on its way in segments.
+/// A segmented transfer of an object.
 #[derive(Clone, Debug, Default)]
 pub struct Transfer {
     open: Option<Open>,
@@ -21,18 +21,18 @@ struct Open {
     index: u16,
     sub_index: u8,
     complete_access: bool,
-    /// The toggle that the next segment must have.
+    /// Expected toggle of the next segment.
     toggle: bool,
-    /// Everything of an upload, what has come of a download.
+    /// All data of an upload, the received data of a download.
     data: Vec<u8>,
     way: Way,
 }
 
 #[derive(Clone, Copy, Debug)]
 enum Way {
-    /// So much was sent.
+    /// Bytes sent.
     Upload { sent: usize },
-    /// So much is announced.
+    /// Announced bytes.
     Download { total: usize },
 }
 
@@ -55,7 +55,7 @@ impl Transfer {
                 self.open = None;
                 Answer::Silence
             }
-            // A new transfer ends the one before.
+            // A new transfer ends the previous one.
             SdoRequest::DownloadExpedited { index, sub_index, complete_access, data } => {
                 self.open = None;
                 download(index, sub_index, complete_access, data, objects)
@@ -171,7 +171,7 @@ impl Transfer {
     }
 }
 
-/// Whether a download in segments makes sense, before its data is there.
+/// Whether a download in segments is possible, before its data arrives.
 fn check_download(
     index: u16,
     sub_index: u8,
@@ -206,7 +206,7 @@ fn write(index: u16, sub_index: u8, complete: bool, data: &[u8], objects: &mut O
     objects.dictionary.write(index, sub_index, data, objects.state)
 }
 
-/// Outputs that come with the process data are not written by mailbox in OP.
+/// Outputs exchanged as process data cannot be written by mailbox in OP.
 fn check_unmapped(index: u16, sub_index: u8, objects: &Objects<'_>) -> Result<(), AbortCode> {
     let mapped = objects.state == AlState::Op && objects.process_data.is_output(index, sub_index);
     if mapped { Err(AbortCode::MAPPED_TO_RX_PDO) } else { Ok(()) }
@@ -219,7 +219,7 @@ fn check_complete(sub_index: u8, objects: &Objects<'_>) -> Result<(), AbortCode>
     if sub_index > 1 { Err(AbortCode::SUB_INDEX_DOES_NOT_EXIST) } else { Ok(()) }
 }
 
-/// The value in the process data goes before the one in the dictionary.
+/// The value in the process data overrides the one in the dictionary.
 fn read(index: u16, sub_index: u8, objects: &Objects<'_>) -> Result<Vec<u8>, AbortCode> {
     let mut value = objects.dictionary.read(index, sub_index)?.to_vec();
     if let Some(current) = objects.process_data.value(index, sub_index) {

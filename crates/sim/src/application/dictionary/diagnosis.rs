@@ -1,7 +1,7 @@
 //! Messages of the device in the diagnosis history of its dictionary, object 0x10F3 (protocol 6.3, ETG.1020).
 //!
-//! In: messages, acknowledgements of the MainDevice. Out: the entries of the object. Without the flag "acknowledge" a
-//! full history overwrites its oldest message, with it the new one is lost.
+//! Input: messages, acknowledgements of the MainDevice. Output: the entries of the object. Without the flag
+//! "acknowledge" a full history overwrites its oldest message, with it the new one is lost.
 
 use ringcat_wire::mailbox::coe::{DiagnosisFlags, DiagnosisHistory, DiagnosisKind};
 
@@ -62,12 +62,12 @@ impl Dictionary {
             self.unacknowledged = 0;
         } else {
             let newest = self.history_value(DiagnosisHistory::NEWEST_MESSAGE);
-            // The ring goes on behind its end.
+            // The slots wrap around.
             let behind = if newest >= place { newest - place } else { room - (place - newest) };
             self.unacknowledged = self.unacknowledged.min(behind);
         }
         self.set_history(DiagnosisHistory::NEW_AVAILABLE, &[u8::from(self.unacknowledged > 0)]);
-        // Room for messages again: nothing more is lost.
+        // There is room for messages again: no further ones are lost.
         let flags = self.diagnosis_flags().unwrap_or_default().0 & !DiagnosisFlags::LOST;
         self.set_history(DiagnosisHistory::FLAGS, &flags.to_le_bytes());
     }

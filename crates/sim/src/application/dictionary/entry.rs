@@ -1,10 +1,10 @@
-//! One entry of an object: its value, when it may be written, what may be written (protocol 6.3).
+//! One entry of an object: its value and the conditions of writes (protocol 6.3).
 
 use ringcat_wire::al::AlState;
 use ringcat_wire::mailbox::coe::{AccessRights, DataType};
 use ringcat_wire::mailbox::sdo::AbortCode;
 
-/// Most bytes of an object: what a download announces is kept until its end.
+/// Largest object in bytes: the announced length of a download is buffered until its end.
 pub const MAX_TRANSFER_BYTES: usize = 1 << 20;
 /// Longest value that has a default and a range: one number.
 const MAX_NUMBER: usize = 8;
@@ -31,15 +31,15 @@ pub struct Entry {
     pub data_type: u8,
     /// When it may be written.
     pub access: Access,
-    /// The value, little-endian. Its length is fixed, except for a domain.
+    /// The value, little-endian, of fixed length except for a domain.
     pub value: Vec<u8>,
-    /// Name for people; empty: that of the object.
+    /// Name; empty: that of the object.
     pub name: String,
-    /// Rights beside those that the access gives: mappable, backup, setting.
+    /// Rights besides those of the access: mappable, backup, setting.
     more_rights: u16,
     /// Smallest and largest value of a number.
     range: Option<(i64, i64)>,
-    /// The only numbers that it takes, where these are few.
+    /// The only allowed numbers, where these are few.
     choices: &'static [i64],
     /// Unit for SDO information.
     unit: Option<u16>,
@@ -85,7 +85,7 @@ impl Entry {
         Entry { range: Some((minimum, maximum)), ..self }
     }
 
-    /// The same, a number that is only written where it is one of these.
+    /// The same, a number that accepts only one of these values.
     pub fn one_of(self, choices: &'static [i64]) -> Entry {
         Entry { choices, ..self }
     }
@@ -114,7 +114,7 @@ impl Entry {
         self.data_type().bits().unwrap_or(bits)
     }
 
-    /// Rights as SDO information tells them.
+    /// Rights in the form of SDO information.
     pub fn rights(&self) -> AccessRights {
         let by_access = match self.access {
             Access::ReadOnly => AccessRights::READ,
@@ -130,7 +130,7 @@ impl Entry {
         self.default.as_deref().filter(|default| default.len() == usize::from(self.bit_length()).div_ceil(8))
     }
 
-    /// Smallest and largest value, where there are such.
+    /// Smallest and largest value, if defined.
     pub fn range_bytes(&self) -> Option<(Vec<u8>, Vec<u8>)> {
         let length = usize::from(self.bit_length()).div_ceil(8);
         let bytes = |value: i64| value.to_le_bytes().get(..length).map(<[u8]>::to_vec);
@@ -138,7 +138,7 @@ impl Entry {
         Some((bytes(minimum)?, bytes(maximum)?))
     }
 
-    /// Whether so many bytes may be written in `state`, whatever they are.
+    /// Whether this number of bytes may be written in `state`, whatever their values.
     pub(super) fn check_access(&self, length: usize, state: AlState) -> Result<(), AbortCode> {
         match self.access {
             Access::ReadOnly => return Err(AbortCode::READ_ONLY),
@@ -155,7 +155,7 @@ impl Entry {
         if length < least { Err(AbortCode::LENGTH_TOO_SHORT) } else { Ok(()) }
     }
 
-    /// Whether the value is one of those that the entry takes.
+    /// Whether the entry accepts the value.
     pub(super) fn check_value(&self, data: &[u8]) -> Result<(), AbortCode> {
         let value = self.number(data);
         if !self.choices.is_empty() && !self.choices.contains(&value) {
@@ -170,7 +170,7 @@ impl Entry {
         if value < minimum { Err(AbortCode::VALUE_TOO_LOW) } else { Ok(()) }
     }
 
-    /// The number that the bytes are, its first eight bytes where it is longer.
+    /// The bytes as a number, from the first eight bytes of longer values.
     pub(super) fn number(&self, data: &[u8]) -> i64 {
         let signed = matches!(
             self.data_type(),

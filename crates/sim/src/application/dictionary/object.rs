@@ -6,13 +6,13 @@ use ringcat_wire::sii::PdoDirection;
 use super::entry::{Access, Entry};
 use crate::data_type;
 
-/// Index of the PDO assignment of SyncManager 0; that of SyncManager n is n further on.
+/// Index of the PDO assignment of SyncManager 0; that of SyncManager n is n higher.
 pub const ASSIGNMENT_BASE: u16 = 0x1C10;
 
-/// Entries that a configurable mapping may have.
+/// Largest number of entries of a configurable mapping.
 pub(super) const MAX_MAPPED_ENTRIES: usize = 32;
 
-/// What rules apply beyond the access of the entries.
+/// Rules beyond the access of the entries.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ObjectRole {
     /// None.
@@ -53,7 +53,7 @@ impl Object {
         Object { index, name: name.into(), role: ObjectRole::Plain, entries: all }
     }
 
-    /// What SDO information calls it: one value is a variable, entries of one type an array.
+    /// Its object code in SDO information: a single value is a variable, entries of one type an array.
     pub fn code(&self) -> ObjectCode {
         let mut values = self.entries.iter().filter(|entry| entry.sub_index != 0);
         let Some(first) = values.next() else {

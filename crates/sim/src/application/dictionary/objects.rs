@@ -23,7 +23,7 @@ pub(super) fn build(description: &DeviceDescription) -> Vec<Object> {
     objects.into_values().collect()
 }
 
-/// What the device is called by its maker: the order code, not the name that this one has in its segment.
+/// The vendor's name of the device: the order code, not its name in the segment.
 pub fn type_name(description: &DeviceDescription) -> &str {
     if description.order_code.is_empty() { &description.name } else { &description.order_code }
 }

@@ -1,5 +1,5 @@
-//! Synchronisation parameters, objects 0x1C32 and 0x1C33 (ETG.1020): what a MainDevice sets and distributed clocks make
-//! of it.
+//! Synchronisation parameters, objects 0x1C32 and 0x1C33 (ETG.1020): set by a MainDevice, and updated from distributed
+//! clocks.
 
 use super::Dictionary;
 

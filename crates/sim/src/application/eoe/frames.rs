@@ -1,4 +1,4 @@
-//! Frames on their way into an IP stack (smoltcp) and out of it.
+//! Frames into and out of an IP stack (smoltcp).
 
 use std::collections::VecDeque;
 
@@ -8,7 +8,7 @@ use smoltcp::time::Instant;
 /// Longest frame without check sequence.
 const MAX_FRAME: usize = 1514;
 
-/// Two queues that are an interface to a stack. Who fills the one into the stack bounds it.
+/// Two queues that form an interface of a stack. The code that fills the input queue bounds it.
 #[derive(Debug)]
 pub struct Frames {
     /// Into the stack.
@@ -19,17 +19,17 @@ pub struct Frames {
 }
 
 impl Frames {
-    /// Empty queues. While so many frames wait to be taken the stack begins none by itself.
+    /// Empty queues. While this number of frames waits for collection, the stack starts no new one by itself.
     pub const fn new(ready: usize) -> Frames {
         Frames { received: VecDeque::new(), sent: VecDeque::new(), ready }
     }
 }
 
-/// A frame that the stack takes.
+/// A frame for the stack.
 #[derive(Debug)]
 pub struct Received(Vec<u8>);
 
-/// Where the stack puts a frame.
+/// Buffer for a frame of the stack.
 #[derive(Debug)]
 pub struct Sending<'a>(&'a mut VecDeque<Vec<u8>>);
 

@@ -1,7 +1,7 @@
-//! Frames from their fragments (protocol 6.5).
+//! Joins fragments to frames (protocol 6.5).
 //!
-//! In: fragments as they come, frames told apart by their number. Out: whole frames. A fragment 0 begins anew; one that
-//! does not follow the one before discards its frame.
+//! Input: fragments in order of arrival, with frames distinguished by their number. Output: whole frames. A fragment 0
+//! starts a frame; a fragment out of order discards its frame.
 
 use ringcat_wire::mailbox::eoe::{BLOCK, EoeFragment};
 
@@ -10,7 +10,7 @@ const MAX_FRAME: usize = 48 * BLOCK;
 /// Frame numbers.
 const FRAMES: usize = 16;
 
-/// Frames of which fragments are missing.
+/// Incomplete frames.
 #[derive(Clone, Debug, Default)]
 pub struct Reassembly {
     frames: [Option<Partial>; FRAMES],
@@ -20,12 +20,12 @@ pub struct Reassembly {
 struct Partial {
     data: Vec<u8>,
     next: u8,
-    /// Bytes that fragment 0 announced, rounded up to blocks.
+    /// Length that fragment 0 announced, rounded up to blocks.
     announced: usize,
 }
 
 impl Reassembly {
-    /// Takes a fragment; a frame when it was the last one that was missing.
+    /// Takes a fragment; returns the frame when it was the last missing one.
     pub fn take(&mut self, fragment: &EoeFragment<'_>) -> Option<Vec<u8>> {
         let place = &mut self.frames[usize::from(fragment.frame) % FRAMES];
         if fragment.number == 0 {

@@ -1,7 +1,8 @@
 //! An IP stack behind an EoE device (smoltcp): answers ARP and ping, serves TCP.
 //!
-//! In: frames, virtual time. Out: frames. Port 7 sends back what comes; port 80 answers `GET /bytes/N` with N bytes and
-//! any other request with the device's name. Nothing is random: the seed of the sequence numbers is the MAC address.
+//! Input: frames, virtual time. Output: frames. Port 7 echoes; port 80 answers `GET /bytes/N` with N bytes and any
+//! other request with the device's name. No random numbers are used: the seed of the sequence numbers is the MAC
+//! address.
 
 use core::fmt;
 use core::fmt::Write as _;
@@ -19,20 +20,20 @@ use crate::time::SimTime;
 
 /// Frames that wait for the stack; more are dropped, as a network does.
 const MAX_RECEIVED: usize = 16;
-/// Frames that it may have ready.
+/// Frames that it may have ready for sending.
 const MAX_READY: usize = 16;
 /// Connections at a time, of each service.
 const CONNECTIONS: usize = 4;
 const BUFFER: usize = 16 * 1024;
 const ECHO_PORT: u16 = 7;
 const WEB_PORT: u16 = 80;
-/// Longest request that is looked at.
+/// Longest request that is evaluated.
 const MAX_REQUEST: usize = 1024;
 /// Most bytes of an answer.
 const MAX_BYTES: usize = 1 << 26;
-/// Least time from one step of the stack to the next that it wants of itself.
+/// Shortest time between two steps that the stack requests itself.
 const LEAST_WAIT: Duration = Duration::from_micros(10);
-/// Rounds that the stack works on one frame at most.
+/// Largest number of rounds of the stack for one frame.
 const MAX_ROUNDS: usize = 8;
 
 /// The stack.
@@ -49,12 +50,12 @@ struct Connection {
     handle: SocketHandle,
     port: u16,
     request: Vec<u8>,
-    /// Head of the answer, and bytes behind it that are still to be sent.
+    /// Head of the answer, and number of bytes left to send after it.
     answer: Option<(Vec<u8>, Range<usize>)>,
 }
 
 impl Clone for Stack {
-    /// A stack with the same addresses; connections are not taken along.
+    /// A stack with the same addresses, without its connections.
     fn clone(&self) -> Stack {
         Stack::new(&self.addresses)
     }
@@ -67,7 +68,7 @@ impl fmt::Debug for Stack {
 }
 
 impl Stack {
-    /// A stack that listens.
+    /// A listening stack.
     pub fn new(addresses: &Addresses) -> Stack {
         let mut frames = Frames::new(MAX_READY);
         let mut config = Config::new(HardwareAddress::Ethernet(EthernetAddress(addresses.mac)));
@@ -87,21 +88,21 @@ impl Stack {
         stack
     }
 
-    /// Other addresses from now on; they have been found to make sense.
+    /// Sets other, valid addresses.
     pub fn set_addresses(&mut self, addresses: &Addresses) {
         self.addresses = addresses.clone();
         self.interface.set_hardware_addr(HardwareAddress::Ethernet(EthernetAddress(addresses.mac)));
         self.interface.update_ip_addrs(|known| {
             known.clear();
             if !addresses.address.is_unspecified() {
-                // There is room for one.
+                // The capacity is one.
                 let _ = known.push(IpCidr::new(addresses.address.into(), addresses.prefix()));
             }
         });
         let routes = self.interface.routes_mut();
         routes.remove_default_ipv4_route();
         if !addresses.gateway.is_unspecified() {
-            // There is room for one.
+            // The capacity is one.
             let _ = routes.add_default_ipv4_route(addresses.gateway);
         }
     }
@@ -113,7 +114,7 @@ impl Stack {
         }
     }
 
-    /// Does what is due; the next frame to send.
+    /// Runs the due work; returns the next frame to send.
     pub fn work(&mut self, now: SimTime) -> Option<Vec<u8>> {
         for _ in 0..MAX_ROUNDS {
             if let Some(frame) = self.frames.sent.pop_front() {
@@ -128,7 +129,7 @@ impl Stack {
         self.frames.sent.pop_front()
     }
 
-    /// When the stack has something to do of itself.
+    /// Next time at which the stack has work without input.
     pub fn next_deadline(&mut self, now: SimTime) -> Option<SimTime> {
         let at = self.interface.poll_at(instant(now), &self.sockets)?;
         let micros = u64::try_from(at.total_micros()).unwrap_or(0);
@@ -154,7 +155,7 @@ impl Connection {
             return socket.listen(self.port).is_ok();
         }
         let moved = if self.port == ECHO_PORT { echo(socket) } else { self.serve_web(socket, addresses) };
-        // The other end has nothing more to say, and everything is answered.
+        // The other end has closed, and all requests are answered.
         let over = socket.state() == tcp::State::CloseWait && !socket.can_recv() && self.answer.is_none();
         if over {
             socket.close();
@@ -215,7 +216,7 @@ fn echo(socket: &mut tcp::Socket<'_>) -> bool {
     moved
 }
 
-/// A byte of what `/bytes/N` answers: none is like those around it.
+/// A byte of the answer to `/bytes/N`: it differs from its neighbours.
 fn body_byte(number: usize) -> u8 {
     b'!' + (number % 89) as u8
 }

@@ -1,13 +1,13 @@
-//! What a device keeps over a power cycle: files and the firmware (protocol 6.4).
+//! Non-volatile data of a device: files and the firmware (protocol 6.4).
 
 use std::collections::BTreeMap;
 
 use crate::description::FoeDescription;
 
-/// Most files.
+/// Largest number of files.
 const MAX_FILES: usize = 64;
 
-/// Files by name, and which firmware runs.
+/// Files by name, and the running firmware.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct FileStore {
     files: BTreeMap<Vec<u8>, Vec<u8>>,
@@ -15,20 +15,20 @@ pub struct FileStore {
     firmware: Firmware,
 }
 
-/// What the boot loader found.
+/// Result of the boot loader.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 enum Firmware {
-    /// What the device left the factory with.
+    /// The original firmware.
     #[default]
     Original,
-    /// What was written.
+    /// A written firmware.
     Version(String),
-    /// Nothing that can run.
+    /// No valid firmware.
     Erased,
 }
 
 impl FileStore {
-    /// The files that a device is delivered with.
+    /// The files at delivery.
     pub fn new(description: &FoeDescription) -> FileStore {
         let files = description.files.iter().map(|(name, data)| (name.clone().into_bytes(), data.clone())).collect();
         FileStore { files, capacity: description.capacity, firmware: Firmware::Original }
@@ -44,13 +44,13 @@ impl FileStore {
         self.files.keys().map(Vec::as_slice)
     }
 
-    /// Most bytes that a file of this name may have.
+    /// Largest size of a file of this name, in bytes.
     pub fn room_for(&self, name: &[u8]) -> usize {
         let others: usize = self.files.iter().filter(|(other, _)| *other != name).map(|(_, data)| data.len()).sum();
         self.capacity.saturating_sub(others)
     }
 
-    /// Keeps a file in place of one with this name; false where there are too many or no room.
+    /// Stores a file, replacing one of this name; false without a free entry or space.
     pub fn keep(&mut self, name: &[u8], data: Vec<u8>) -> bool {
         let fits = data.len() <= self.room_for(name);
         let fits = fits && (self.files.len() < MAX_FILES || self.files.contains_key(name));
@@ -60,7 +60,7 @@ impl FileStore {
         fits
     }
 
-    /// Version of the firmware that was written; `None` for the original one.
+    /// Version of the written firmware; `None` for the original one.
     pub fn version(&self) -> Option<&str> {
         match &self.firmware {
             Firmware::Version(version) => Some(version),
@@ -68,7 +68,7 @@ impl FileStore {
         }
     }
 
-    /// There is a firmware that can run.
+    /// There is a valid firmware.
     pub fn has_firmware(&self) -> bool {
         self.firmware != Firmware::Erased
     }

@@ -1,4 +1,4 @@
-//! Images of firmware for simulated devices: what their boot loader takes.
+//! Firmware images that the boot loader of simulated devices accepts.
 //!
 //! Magic `RCFW`, length of the version (u8), version, program, sum of all bytes before (u32, little-endian).
 
@@ -18,7 +18,7 @@ pub fn image(version: &str, program: &[u8]) -> Vec<u8> {
     image
 }
 
-/// The version of an image, or why the boot loader does not take it.
+/// The version of an image, or why the boot loader refuses it.
 pub(super) fn check(image: &[u8]) -> Result<String, (FoeErrorCode, &'static str)> {
     let foreign = (FoeErrorCode::FIRMWARE_DOES_NOT_FIT, "no firmware of this device");
     let (content, checksum) = image.split_last_chunk().ok_or(foreign)?;

@@ -1,7 +1,7 @@
-//! What goes wrong with a device's mail on purpose (issue 4).
+//! Faults of a device's mail for tests (issue 4).
 //!
-//! In: [`MailFault`]s from a test. Out: what happens to the next messages. Faults outlive the mailbox: they hold until
-//! they are used up, or until [`MailFault::Heal`].
+//! Input: [`MailFault`]s from a test. Output: their effect on the next messages. Faults outlive the mailbox: they hold
+//! until they are used up, or until [`MailFault::Heal`].
 
 use core::time::Duration;
 
@@ -14,88 +14,88 @@ use crate::application::answer::Answer;
 use crate::application::coe::emergency_payload;
 use crate::time::SimTime;
 
-/// Something that goes wrong with the mail of a device.
+/// A fault of a device's mail.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum MailFault {
-    /// The next requests are carried out but not answered; `u32::MAX` for a device that answers no more.
+    /// The next requests are executed but not answered; `u32::MAX` for a device that no longer answers.
     LoseAnswers {
-        /// How many answers.
+        /// Number of answers.
         count: u32,
     },
-    /// The next requests are taken and forgotten: neither carried out nor answered.
+    /// The next requests are accepted and dropped: neither executed nor answered.
     LoseRequests {
-        /// How many requests.
+        /// Number of requests.
         count: u32,
     },
-    /// The next answers come twice, with the same counter.
+    /// The next answers are sent twice, with the same counter.
     RepeatAnswers {
-        /// How many answers.
+        /// Number of answers.
         count: u32,
     },
-    /// The next answers come later; what is behind them may overtake them.
+    /// The next answers are delayed; later answers may overtake them.
     DelayAnswers {
-        /// How many answers.
+        /// Number of answers.
         count: u32,
-        /// How much later.
+        /// Delay.
         by: Duration,
     },
-    /// The next answers have this counter, which the counting does not know of.
+    /// The next answers have this counter, without an effect on the count.
     WrongCounter {
-        /// How many answers.
+        /// Number of answers.
         count: u32,
         /// The counter, 0..=7.
         counter: u8,
     },
-    /// Right before the next answers comes an emergency.
+    /// An emergency directly precedes the next answers.
     EmergencyBefore {
-        /// How many answers.
+        /// Number of answers.
         count: u32,
         /// Error code of the emergency.
         code: u16,
     },
     /// The next requests are answered with an error reply of the mailbox.
     Refuse {
-        /// How many requests.
+        /// Number of requests.
         count: u32,
         /// Detail of the error reply.
         detail: u16,
     },
     /// The next SDO requests are answered with an abort.
     AbortSdo {
-        /// How many requests.
+        /// Number of requests.
         count: u32,
-        /// Why.
+        /// Abort code.
         code: AbortCode,
     },
-    /// The next FoE messages are answered with BUSY; their sender has to repeat them.
+    /// The next FoE messages are answered with BUSY; the sender has to repeat them.
     BusyFoe {
-        /// How many messages.
+        /// Number of messages.
         count: u32,
     },
     /// The next FoE message is answered with an error.
     FailFoe {
-        /// Why.
+        /// Error code.
         code: FoeErrorCode,
     },
-    /// Nothing is taken from the mailbox for a while: it stays full.
+    /// No message is taken from the mailbox for a while: it stays full.
     Full {
-        /// How long.
+        /// Duration.
         during: Duration,
     },
-    /// All of this is over.
+    /// Clears all faults.
     Heal,
 }
 
-/// What happens to an answer.
+/// Effect on an answer.
 #[derive(Clone, Debug, Default)]
 pub struct Fate {
-    /// It comes so much later.
+    /// Delay.
     pub delay: Duration,
-    /// It comes twice.
+    /// It is sent twice.
     pub twice: bool,
     /// It has this counter.
     pub counter: Option<u8>,
-    /// This CoE message goes before it.
+    /// This CoE message precedes it.
     pub before: Option<Vec<u8>>,
 }
 
@@ -110,17 +110,17 @@ pub struct MailFaults {
     emergency: (u32, u16),
     refuse: (u32, u16),
     abort: (u32, Option<AbortCode>),
-    /// How many are left, of how many.
+    /// Number left, and total.
     busy: (u32, u32),
     fail: Option<FoeErrorCode>,
     full_until: Option<SimTime>,
 }
 
-/// What stands in a BUSY.
+/// Content of a BUSY.
 const BUSY_ENTIRE: u16 = 100;
 
 impl MailFaults {
-    /// Adds a fault; one of the same kind is replaced.
+    /// Adds a fault, replacing one of the same kind.
     pub fn add(&mut self, fault: MailFault, now: SimTime) {
         match fault {
             MailFault::LoseAnswers { count } => self.lose_answers = count,
@@ -138,17 +138,17 @@ impl MailFaults {
         }
     }
 
-    /// Until when nothing is taken from the mailbox.
+    /// End of the time in which no message is taken.
     pub const fn full_until(&self) -> Option<SimTime> {
         self.full_until
     }
 
-    /// The time goes on.
+    /// Time advances.
     pub fn advance(&mut self, now: SimTime) {
         self.full_until = self.full_until.filter(|until| *until > now);
     }
 
-    /// The answer to a request that is not served; `None` where it is.
+    /// The answer to a request that is not served; `None` for one that is.
     pub fn instead_of_serving(&mut self, protocol: Protocol, payload: &[u8]) -> Option<Answer> {
         if use_up(&mut self.lose_requests) {
             return Some(Answer::Silence);
@@ -197,7 +197,7 @@ impl MailFaults {
         Some(Answer::payload(bytes))
     }
 
-    /// What happens to an answer; `None` where it is lost.
+    /// Effect on an answer; `None` where it is lost.
     pub fn answer(&mut self) -> Option<Fate> {
         if use_up(&mut self.lose_answers) {
             return None;
@@ -212,7 +212,7 @@ impl MailFaults {
     }
 }
 
-/// One less; true where there was one. The largest number lasts for ever.
+/// Decrements; true where the count was not zero. The largest number never decreases.
 fn use_up(count: &mut u32) -> bool {
     if *count != u32::MAX {
         *count = match count.checked_sub(1) {

@@ -1,4 +1,4 @@
-//! Requests that a device served, for tests to look at.
+//! Record of the requests that a device served, for tests.
 
 use ringcat_wire::al::AlState;
 use ringcat_wire::mailbox::Protocol;
@@ -8,12 +8,12 @@ use crate::time::SimTime;
 /// A request that was served.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct ServedMail {
-    /// When.
+    /// Time.
     pub at: SimTime,
-    /// In which state.
+    /// AL state.
     pub state: AlState,
     /// Protocol.
     pub protocol: Protocol,
-    /// What follows the mailbox header.
+    /// Data after the mailbox header.
     pub payload: Vec<u8>,
 }

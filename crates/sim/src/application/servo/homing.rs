@@ -1,4 +1,4 @@
-//! Homing: looks for a limit switch or an index pulse and makes the origin of the positions from it.
+//! Homing: searches for a limit switch or an index pulse, which gives the origin of the positions.
 
 use super::Servo;
 use super::axis::{INCREMENTS_PER_REVOLUTION, INDEX_PULSE, LIMIT_SWITCH};
@@ -38,7 +38,7 @@ impl Servo {
         }
     }
 
-    /// It is on its way to where home is.
+    /// Moving to the home position.
     pub(super) const fn is_homing(&self) -> bool {
         matches!(self.homing, Homing::ToSwitch(_) | Homing::FromSwitch(_) | Homing::ToIndex(_))
     }

@@ -1,4 +1,4 @@
-//! The loops that make the torque of the motor, the profiles that move the set-point.
+//! The loops that compute the torque of the motor, and the profiles that move the set-point.
 
 use super::Servo;
 use super::axis::{
@@ -9,9 +9,9 @@ use super::axis::{
 /// Speed follows the set-point with this gain, position with that, per second.
 const VELOCITY_GAIN: f64 = 2_000.0;
 const POSITION_GAIN: f64 = 250.0;
-/// Part of the torque that the position loop counts on when it comes near its set-point.
+/// Part of the torque that the position loop assumes near its set-point.
 const BRAKING_RESERVE: f64 = 0.8;
-/// Part of the deceleration that is counted on before a software limit.
+/// Part of the deceleration that is assumed before a software limit.
 const LIMIT_RESERVE: f64 = 0.9;
 
 impl Servo {
@@ -54,7 +54,7 @@ impl Servo {
                 let (slope, offset) = if self.mode == MODE_CST { (f64::INFINITY, torque_offset) } else { (slope, 0.0) };
                 self.set_torque += (aim - self.set_torque).clamp(-slope, slope);
                 self.track_motor(self.motor.velocity);
-                // A velocity loop takes over where the axis would leave its speed or its positions.
+                // A velocity loop takes over where the axis would exceed its speed or position limits.
                 let wanted = self.set_torque + offset;
                 let torque = wanted.clamp(self.velocity_loop(low), self.velocity_loop(high));
                 self.limited |= torque != wanted;
@@ -67,12 +67,12 @@ impl Servo {
         }
     }
 
-    /// The set-point is where the motor is.
+    /// Sets the set-point to the motor's position.
     pub(super) fn track_motor(&mut self, velocity: f64) {
         (self.set_position, self.set_velocity) = (self.motor.position, velocity);
     }
 
-    /// Changes the speed of the set-point towards `wanted`, as far as the limits let it.
+    /// Changes the speed of the set-point towards `wanted`, within the limits.
     pub(super) fn ramp_to(&mut self, wanted: f64, acceleration: f64, deceleration: f64) {
         let (low, high) = self.velocity_limits(self.set_position, deceleration);
         let aim = wanted.clamp(low, high);
@@ -95,7 +95,7 @@ impl Servo {
         }
     }
 
-    /// Straight to the goal in the steps that are left.
+    /// Straight to the goal in the remaining steps.
     pub(super) fn interpolate(&mut self) {
         let goal = self.goal.map_or(self.set_position, |goal| self.within_limits(goal));
         let fastest = self.parameters.max_motor_speed;
@@ -106,10 +106,10 @@ impl Servo {
         self.steps_left = self.steps_left.saturating_sub(1);
     }
 
-    /// Torque for the set-point: as fast back to it as the loop allows, but no faster than the motor can brake again.
+    /// Torque for the set-point: returns as fast as the loop allows, limited to speeds from which the motor can brake.
     pub(super) fn position_loop(&self, velocity_offset: f64) -> f64 {
         let p = &self.parameters;
-        // The motor has its step still before it, the set-point has made it.
+        // The step of the set-point is done, that of the motor follows.
         let error = self.following_error() - self.set_velocity * STEP;
         let torque = p.max_torque.min(p.positive_torque).min(p.negative_torque).min(PEAK_TORQUE);
         let most = braking_speed(error.abs(), BRAKING_RESERVE * torque * ACCELERATION);
@@ -122,7 +122,7 @@ impl Servo {
         (velocity - self.motor.velocity) * VELOCITY_GAIN / ACCELERATION + FRICTION * velocity
     }
 
-    /// Software limits on the machine; none while homing looks for where they are.
+    /// Software limits on the machine; none while homing searches for the origin.
     pub(super) fn software_limits(&self) -> Option<(f64, f64)> {
         let (low, high) = self.parameters.position_limits;
         let limited = low < high && (low, high) != (i32::MIN, i32::MAX) && self.mode != MODE_HOMING;

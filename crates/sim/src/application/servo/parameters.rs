@@ -1,14 +1,14 @@
-//! What a drive is told: objects that it reads, from the outputs where they are mapped, else from the dictionary.
+//! Parameters of a drive: objects that it reads, from the outputs where they are mapped, else from the dictionary.
 //!
-//! In: objects as index, sub index and value. Out: numbers in the units that the drive computes with: increments,
-//! seconds, thousandths of the rated torque. Objects that the drive does not read are ignored.
+//! Input: objects as index, sub index and value. Output: numbers in the units of the drive: increments, seconds,
+//! thousandths of the rated torque. Objects that the drive does not read are ignored.
 
 use super::axis::INCREMENTS_PER_REVOLUTION;
 
 /// Objects of the drive as numbers; the fields are in the order of their indices.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(super) struct Parameters {
-    /// 0x6007: what happens without valid outputs.
+    /// 0x6007: reaction to the loss of valid outputs.
     pub abort_connection_option: i16,
     /// 0x6040.
     pub controlword: u16,
@@ -76,7 +76,7 @@ impl Parameters {
         let positive = f64::from(value as u32);
         let milliseconds = f64::from(value as u16) / 1e3;
         let window = (value as u32 != u32::MAX).then_some(positive);
-        // Nothing could ever begin to move, or stop.
+        // Otherwise no motion could start or stop.
         let rate = positive.max(1.0);
         match (index, sub_index) {
             (0x6007, 0) => self.abort_connection_option = word,

@@ -1,6 +1,6 @@
-//! What a drive is doing: the order of its power stage, and how far homing has come.
+//! Phase of a drive: the action of its power stage, and the progress of homing.
 
-/// How far homing has come. Directions are -1.0 and 1.0.
+/// Progress of homing. Directions are -1.0 and 1.0.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(super) enum Homing {
     #[default]
@@ -13,13 +13,13 @@ pub(super) enum Homing {
     Failed,
 }
 
-/// What the power stage does in a step.
+/// Action of the power stage in a step.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Order {
     /// No torque, brake closed.
     Off,
-    /// Slow down with so much per second, and hold the position then; infinite: with all torque.
+    /// Decelerate at this rate, then hold the position; infinite: with full torque.
     Stop(f64),
-    /// Do what the mode says.
+    /// Follow the mode.
     Follow,
 }

@@ -1,9 +1,9 @@
-//! What a drive says: statusword, actual values, and whether a target is reached.
+//! Status of a drive: statusword, actual values, and whether a target is reached.
 
 use super::phase::Homing;
 use super::*;
 
-/// Torque has reached its target within so much.
+/// Tolerance of a reached torque target.
 const TORQUE_WINDOW: f64 = 10.0;
 const VOLTAGE_ENABLED: u16 = 0x0010;
 const REMOTE: u16 = 0x0200;
@@ -72,7 +72,7 @@ impl Servo {
         }
     }
 
-    /// What the drive knows about itself; numbers are sign-extended.
+    /// Values that the drive computes; numbers are sign-extended.
     pub fn value(&self, index: u16, sub_index: u8) -> Option<u64> {
         let number = |value: f64| value.round() as i64 as u64;
         let brake = !self.state.has_torque() || self.order() == Order::Off;

@@ -1,4 +1,5 @@
-//! The control loop behind DC_SYSTEM_TIME (protocol 7.2.1); `docs/dc.md` tells what is documented and what is a model.
+//! The control loop behind DC_SYSTEM_TIME (protocol 7.2.1); `docs/dc.md` says which parts are documented and which are
+//! a model.
 //!
 //! In: the difference between the local copy of the system time and the received one, at each write of 0x0910. Out: how
 //! the local clock is steered until the next sample, and the contents of 0x092C and 0x0932.

@@ -2,7 +2,7 @@
 
 use ringcat_wire::command::Command;
 
-/// Datagrams that are remembered: those of a cycle.
+/// Number of datagrams remembered: those of a cycle.
 const REMEMBERED: usize = 4;
 
 /// Most pieces of one.
@@ -28,18 +28,18 @@ pub(super) struct Move {
     pub(super) physical: u16,
 }
 
-/// What is known of a kind of datagram.
+/// Result for a kind of datagram.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Known {
     pub(super) command: Command,
     pub(super) address: u32,
     pub(super) len: u16,
-    /// How many of the moves it makes; `None` where it has to be worked out each time.
+    /// Number of its moves; `None` where each datagram must be evaluated.
     pub(super) count: Option<u8>,
     pub(super) moves: [Move; PIECES],
 }
 
-/// The kinds of datagrams that were met last.
+/// The most recent kinds of datagrams.
 #[derive(Clone, Debug, Default)]
 pub(in crate::controller) struct Compiled {
     known: [Option<Known>; REMEMBERED],
@@ -47,7 +47,7 @@ pub(in crate::controller) struct Compiled {
 }
 
 impl Compiled {
-    /// What was found holds no more.
+    /// The results are no longer valid.
     pub fn forget(&mut self) {
         self.known = [None; REMEMBERED];
     }

@@ -1,4 +1,4 @@
-//! What the SII interface is doing, beside its registers.
+//! Activity of the SII interface, besides its registers.
 
 use core::time::Duration;
 
@@ -7,7 +7,7 @@ use ringcat_wire::register::SiiCommand;
 use crate::controller::spoilt_write::SpoiltWrite;
 use crate::time::SimTime;
 
-/// What the interface is doing.
+/// Activity of the interface.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Task {
     Idle,
@@ -28,9 +28,9 @@ pub(in crate::controller) struct SiiInterface {
     pub(super) command: Option<SiiCommand>,
     /// Bit 0 of SII_CONTROL, at hand for every frame.
     pub(super) write_enabled: bool,
-    /// So many of the next commands take this long.
+    /// Number and duration of the next commands with another duration.
     pub(super) slow: (u32, Duration),
-    /// So many of the next writes go wrong in this way.
+    /// Number and fault of the next failing writes.
     pub(super) spoilt: (u32, SpoiltWrite),
 }
 

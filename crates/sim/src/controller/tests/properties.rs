@@ -1,4 +1,4 @@
-//! What holds for any frame: nothing panics, and only what a controller may change is changed (protocol 1.5).
+//! Properties of any frame: no panic, and only fields that a controller may change are changed (protocol 1.5).
 
 use super::*;
 use proptest::prelude::*;

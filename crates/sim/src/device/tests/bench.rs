@@ -19,14 +19,14 @@ use crate::time::SimTime;
 
 /// Time from one frame to the next.
 const STEP: Duration = Duration::from_micros(20);
-/// More than any transition takes.
+/// Longer than any transition.
 const TRANSITION: Duration = Duration::from_millis(3);
 
 pub struct Bench {
     pub device: Device,
     pub now: SimTime,
     frames: u64,
-    /// The mailboxes of BOOT are meant, not those of PREOP.
+    /// Use the mailboxes of BOOT, not those of PREOP.
     bootstrap: bool,
 }
 
@@ -111,7 +111,7 @@ impl Bench {
         }
     }
 
-    /// Virtual time passes.
+    /// Advances virtual time.
     pub fn pass(&mut self, duration: Duration) {
         let end = self.now + duration;
         while let Some(at) = self.device.next_deadline().filter(|at| *at <= end) {
@@ -151,7 +151,7 @@ impl Bench {
         (status, AlStatusCode(self.read_u16(map::AL_STATUS_CODE)))
     }
 
-    /// Asks for a state and waits.
+    /// Requests a state and waits.
     pub fn request(&mut self, state: AlState) -> (AlStatus, AlStatusCode) {
         self.control(AlControl::new(state))
     }
@@ -168,7 +168,7 @@ impl Bench {
         self.status()
     }
 
-    /// The mailboxes of BOOT are meant from now on, or those of PREOP.
+    /// From now on uses the mailboxes of BOOT, or those of PREOP.
     pub fn use_bootstrap(&mut self, bootstrap: bool) {
         self.bootstrap = bootstrap;
     }

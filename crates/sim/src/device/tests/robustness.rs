@@ -1,4 +1,4 @@
-//! Whatever a MainDevice writes, a device neither panics nor leaves its states.
+//! A device neither panics nor leaves its states, whatever a MainDevice writes.
 
 use core::time::Duration;
 
@@ -11,7 +11,7 @@ use super::bench::Bench;
 use super::client::Client;
 use crate::catalogue;
 
-/// Something a MainDevice might do, sensible or not.
+/// A possible access of a MainDevice, reasonable or not.
 #[derive(Clone, Debug)]
 enum Act {
     Write(u16, Vec<u8>),

@@ -1,4 +1,5 @@
-//! The objects of the drive and of analogue terminals: what drivers ask for is there, described, and checks its values.
+//! The objects of the drive and of analogue terminals: those that drivers read exist, are described, and check their
+//! values.
 
 use ringcat_wire::al::AlState;
 use ringcat_wire::mailbox::Protocol;

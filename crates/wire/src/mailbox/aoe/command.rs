@@ -245,7 +245,7 @@ impl<'a> Fields<'a> {
         Ok(u32::from_le_bytes(*field))
     }
 
-    /// A length and so many bytes.
+    /// A length and this number of bytes.
     fn counted(&mut self) -> Result<&'a [u8], PayloadError> {
         let length = usize::try_from(self.long()?).unwrap_or(usize::MAX);
         self.0.get(..length).ok_or(PayloadError::Short { what: "ADS data", expected: length, got: self.0.len() })

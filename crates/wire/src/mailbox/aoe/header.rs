@@ -86,9 +86,9 @@ impl AdsCommand {
 /// The header of a message.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct AmsHeader {
-    /// Who it is for.
+    /// Receiver.
     pub target: AmsAddress,
-    /// Who sent it.
+    /// Sender.
     pub source: AmsAddress,
     /// What it is for.
     pub command: AdsCommand,

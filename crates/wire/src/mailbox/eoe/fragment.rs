@@ -3,7 +3,7 @@
 use super::head::{FRAGMENT, LAST, OVERHEAD, TIME_APPENDED, TIME_REQUESTED};
 use crate::mailbox::payload::{PayloadError, Pen};
 
-/// Offsets and sizes are counted in blocks of so many bytes.
+/// Offsets and sizes are counted in blocks of this number of bytes.
 pub const BLOCK: usize = 32;
 
 const OFFSET_SHIFT: u16 = 6;

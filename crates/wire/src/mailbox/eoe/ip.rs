@@ -35,8 +35,8 @@ pub struct IpParameters<'a> {
 }
 
 impl<'a> IpParameters<'a> {
-    /// Decodes flags and fields. Whoever sends all 58 bytes has each field at its place, whoever sends fewer has
-    /// packed those that are there.
+    /// Decodes flags and fields. A message of all 58 bytes has each field at its place, a shorter one has the present
+    /// fields packed.
     pub(super) fn decode(data: &'a [u8]) -> Result<IpParameters<'a>, PayloadError> {
         let (flags, rest) = split(data, "EoE IP parameters")?;
         let mut fields = Fields { flags: u32::from_le_bytes(*flags), fixed: rest.len() >= FIELDS_LEN, rest };

@@ -118,7 +118,7 @@ impl<'a> SdoResponse<'a> {
             }
             SdoResponse::DownloadSegmentDone { toggle } => encoder.toggle(DOWNLOAD_SEGMENT, toggle),
             SdoResponse::UploadSegment { toggle, last, data } => encoder.segment(UPLOAD_SEGMENT, toggle, last, data),
-            // Who aborts uses the service "SDO request", whichever side it is.
+            // An abort uses the service "SDO request" in both directions.
             SdoResponse::Abort { index, sub_index, code } => {
                 let encoder = Encoder { service: CoeService::SdoRequest, ..encoder };
                 encoder.initiate(ABORT, 0, (index, sub_index), code.0)

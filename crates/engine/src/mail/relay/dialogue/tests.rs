@@ -55,7 +55,7 @@ fn an_upload_in_segments_is_open_until_its_last_segment() {
     assert_eq!(dialogue.end(), None);
 }
 
-// Answers that are late are those to other questions of the same kind.
+// Late answers belong to other questions of the same kind.
 // covers: 6.3, 6.6, gateway
 #[test]
 fn answers_are_known_by_what_was_asked_for() {
@@ -109,7 +109,7 @@ fn a_download_that_ends_in_the_middle_is_aborted_for_its_object() {
     let code = AbortCode::PROTOCOL_TIMEOUT;
     assert_eq!(dialogue.end(), Some(sdo(SdoRequest::Abort { index: 0x2002, sub_index: 3, code })));
     assert!(!dialogue.is_open());
-    // All in one, and refused ones, leave nothing behind.
+    // Expedited and refused transfers leave no state.
     let small = SdoRequest::DownloadExpedited { index: 1, sub_index: 0, complete_access: false, data: &[1] };
     let asked = question(&mut dialogue, Lane::Coe, &sdo(small));
     dialogue.answered(&asked, &reply(SdoResponse::DownloadDone { index: 1, sub_index: 0 }), SIZE);
@@ -157,7 +157,7 @@ fn what_must_not_pass_is_refused_with_its_code() {
     for lane in Lane::ALL {
         for length in 0..40 {
             for byte in [0, 1, 2, 3, 4, 5, 6, 0x20, 0xFF] {
-                // Any bytes.
+                // Random bytes.
                 let _ = dialogue.ask(lane, &vec![byte; length], SIZE);
                 let _ = dialogue.end();
             }

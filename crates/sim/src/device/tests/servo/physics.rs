@@ -1,4 +1,4 @@
-//! Energy, friction, acceleration: what cannot be otherwise.
+//! Energy, friction, acceleration: laws that every motion must obey.
 
 use super::*;
 use crate::application::servo::{ACCELERATION, FRICTION, MODE_CSP, MODE_CST, MODE_CSV, PEAK_TORQUE};

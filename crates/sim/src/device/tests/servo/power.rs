@@ -65,7 +65,7 @@ fn a_drive_is_not_ready_until_it_has_tested_itself() {
     assert_eq!(state(&bench), SWITCH_ON_DISABLED, "transition 1");
 }
 
-/// Stops from [`SPEED`] and tells for how long it moved, how far, and in which state it stands.
+/// Stops from [`SPEED`]; returns duration, distance and final state.
 fn stop(axis: &mut Axis, control: u16) -> (usize, i32, u16) {
     axis.control = control;
     let start = axis.cycle().position;
