@@ -102,8 +102,8 @@ fn long_rings_that_are_broken_at_the_scan_are_learned() {
     }
 }
 
-/// More rings than are looked for: that is told, all exchange process data as if there were none, and no line is said to
-/// be crossed.
+/// More rings than are looked for: that is told, all exchange process data as if there were none, and no line is said
+/// to be crossed.
 // covers: JR-03, junctions
 #[test]
 fn rings_that_are_not_learned_are_told_and_hold_up_nobody() {
