@@ -2,7 +2,7 @@
 //!
 //! [`MainDevice::new`] starts with the acyclic half alone. A scan runs as its first procedure. [`MainDevice::activate`]
 //! takes the application's declaration, lays out process data, starts the configuration of all SubDevices and the
-//! supervision, and hands out the [`Exchange`] for the application's cyclic thread.
+//! supervision, and hands out the [`Exchange`](crate::exchange::Exchange) for the application's cyclic thread.
 
 mod activate;
 mod activate_error;

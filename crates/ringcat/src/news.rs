@@ -250,6 +250,16 @@ impl News {
             stale_copies,
         ];
         store(&self.counters, &numbers);
+        self.publish_rates(rates);
+        if self.restart.load(Ordering::Relaxed) {
+            self.restart.store(false, Ordering::Relaxed);
+            self.round_trips.clear();
+            self.wake_ups.clear();
+            self.phase_errors.clear();
+        }
+    }
+
+    fn publish_rates(&self, rates: &[Rate]) {
         for (words, rate) in self.domains.iter().zip(rates) {
             let state = match rate.status.state {
                 DomainState::Zero => 0,
@@ -259,12 +269,6 @@ impl News {
             let counted = u64::from(rate.status.wkc) | u64::from(rate.status.expected) << 32;
             let returned = u64::from(rate.status.returned) << 7;
             store(words, &[counted, state | returned | rate.status.skipped << 8]);
-        }
-        if self.restart.load(Ordering::Relaxed) {
-            self.restart.store(false, Ordering::Relaxed);
-            self.round_trips.clear();
-            self.wake_ups.clear();
-            self.phase_errors.clear();
         }
     }
 }

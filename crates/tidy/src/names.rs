@@ -15,7 +15,7 @@ use syn::{Attribute, Item, ItemMod, UseTree};
 use crate::Finding;
 use crate::tree::Tree;
 
-/// Index of a module in [`Program::modules`].
+/// Index of a module in `Program::modules`.
 pub type ModuleId = usize;
 /// Index of a file in [`Program::sources`].
 pub type FileId = usize;

@@ -3,7 +3,7 @@
 //! A frame meets the members of a whole ring only once, and what is between them cannot be measured then. It was while
 //! the ring was open: at the set-up, which opens it for that, or while it was broken. Where SubDevices without a clock
 //! are in between, times show the sum of several cables; what follows from such sums is known as well
-//! ([`super::sums`]).
+//! (`clocks::sums`).
 
 use alloc::collections::BTreeMap;
 use alloc::vec::Vec;

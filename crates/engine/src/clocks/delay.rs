@@ -4,7 +4,7 @@
 //! branch: what its clock says the branch took, less what the SubDevices in the branch say that they took, is the time
 //! on cables. SubDevices without a clock are part of the cable. There and back a cable takes as long, and what is known
 //! about cables ([`Cables`]) counts: what follows from that is a delay. What does not, behind a fork without a clock,
-//! is none: clocks there are a group whose place within the branch is not known ([`places`](super::places)).
+//! is none: clocks there are a group whose place within the branch is not known (`clocks::places`).
 
 use alloc::vec;
 use alloc::vec::Vec;

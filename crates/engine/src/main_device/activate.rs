@@ -89,13 +89,7 @@ impl MainDevice {
             ring: self.first_ring_status(),
             carriers: bus.carriers(),
         };
-        let choices = Choices {
-            enhanced_line_crossed: self.options.enhanced_line_crossed,
-            junctions: self.options.junctions,
-            // Without supervision it is not found out which unassigned SubDevices are members.
-            follow_groups: self.options.follow_groups && self.options.supervision,
-        };
-        let model = Segment::new(known, board.clone(), choices);
+        let model = Segment::new(known, board.clone(), self.choices());
         bus.set_occupants(model.occupants());
         let segment = SharedSegment::new(bus.clone(), model, board.clone(), beside);
         self.supervisor.attach(board);
@@ -105,6 +99,15 @@ impl MainDevice {
         let periods = specs.iter().map(|spec| spec.period).collect();
         let under_way = specs.iter().map(|spec| spec.under_way).max().unwrap_or(1);
         Ok(Active { exchange, directory, periods, under_way })
+    }
+
+    fn choices(&self) -> Choices {
+        Choices {
+            enhanced_line_crossed: self.options.enhanced_line_crossed,
+            junctions: self.options.junctions,
+            // Without supervision it is not found out which unassigned SubDevices are members.
+            follow_groups: self.options.follow_groups && self.options.supervision,
+        }
     }
 
     /// The domains, and where their process data lies.

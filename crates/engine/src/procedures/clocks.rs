@@ -8,6 +8,7 @@
 //! What they know about the clocks is in [`SharedClocks`](super::shared_clocks::SharedClocks), which the bring-up of
 //! SubDevices looks at too.
 
+mod changes;
 mod measure;
 mod not_locked;
 mod set_up;

@@ -1,5 +1,5 @@
 //! SubDevices that answer but have no station address of ours: found, read, and given the address of the declared
-//! SubDevice that they are, as the model tells ([`crate::segment::unassigned`]).
+//! SubDevice that they are, as the model tells (`segment::unassigned`).
 //!
 //! Each is read by a procedure of its own, so that one whose EEPROM is slow or broken keeps no other waiting.
 

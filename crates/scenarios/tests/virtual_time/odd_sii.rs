@@ -274,7 +274,7 @@ fn an_sii_that_cannot_be_followed_is_a_matter_of_its_subdevice_alone() {
 /// It says that it has no place before the next activation and that it stays in SAFEOP, once; the others go on.
 // covers: odd-sii
 #[test]
-fn one_whose_sii_is_mended_in_operation_says_that_it_has_no_place_and_holds_up_nobody() {
+fn one_whose_sii_is_mended_in_operation_says_that_it_has_no_place_yet() {
     let mut devices = descriptions(&KINDS);
     let sound = sii_image::build(&devices[ODD]);
     let mut beyond = devices[ODD].clone();

@@ -18,6 +18,7 @@ use ringcat_wire::command::Command;
 use ringcat_wire::datagram::Target;
 use ringcat_wire::register::{DcSpeedCounterDifference, DcSpeedCounterStart, DcSystemTimeDifference, map};
 
+use super::changes::{Change, SETTLE, answering, wait_for_change};
 use super::measure::Opening;
 use super::set_up::{measure_again, set_filters, set_up, write_delays};
 use crate::board::clocks::References;
@@ -38,8 +39,6 @@ const ROUTINE: Duration = Duration::from_millis(100);
 const RETRY: Duration = Duration::from_millis(100);
 /// The longest time between two of them.
 const LONGEST_RETRY: Duration = Duration::from_secs(10);
-/// From the last change of the segment until it is measured again: a plug that is pushed in bounces.
-const SETTLE: Duration = Duration::from_millis(5);
 /// A ring that opened or closed explains ports that change within so long: in each part the way from clock to clock is
 /// what it was (protocol 7.5), so that nobody has to wait for the measurement.
 const EXPLAINED: Duration = Duration::from_millis(20);
@@ -137,33 +136,6 @@ async fn wait(bus: &Bus, segment: &SharedSegment, next_look: Instant, is_explain
     segment.until_posted(bus.posted(), next_look, is_doubtful).await;
 }
 
-/// What became of a segment meanwhile.
-#[derive(Clone, Copy, PartialEq, Eq)]
-enum Change {
-    None,
-    /// Somebody answers where nobody did: so it is when cycles begin, which is nothing new.
-    FirstAnswer,
-    Segment,
-}
-
-/// Waits, until the segment has changed and is at rest again at the longest.
-async fn wait_for_change(bus: &Bus, segment: &SharedSegment, limit: Duration) -> Change {
-    segment.board.clocks.guard_ports();
-    let state = || (segment.board.ring().changes, segment.board.clocks.holds(), answering(segment));
-    let (until, mut seen) = (bus.now() + limit, state());
-    let (mut change, mut changed_at) = (Change::None, bus.now());
-    while bus.now() < until && (change == Change::None || bus.now() < changed_at + SETTLE) {
-        bus.sleep(PAUSE).await;
-        let now = state();
-        if now != seen {
-            let is_first = seen.2 == (0, 0) && change != Change::Segment;
-            change = if is_first { Change::FirstAnswer } else { Change::Segment };
-            (seen, changed_at) = (now, bus.now());
-        }
-    }
-    change
-}
-
 /// Measures the segment after a change.
 async fn measure_once(bus: &Bus, segment: &SharedSegment, since: Instant) {
     let hold = || segment.board.clocks.post_references(References::default());
@@ -188,11 +160,6 @@ fn is_anybody_open(segment: &SharedSegment) -> bool {
     let clocks = segment.clocks.access();
     let samples = clocks.config.as_ref().map_or(0, |config| config.lock_samples);
     clocks.nodes.iter().any(|node| node.has_clock && node.link.is_some() && node.good < samples)
-}
-
-/// How many SubDevices answered on each link.
-fn answering(segment: &SharedSegment) -> (u16, u16) {
-    segment.board.supervision().map_or((0, 0), |(_, seen)| (seen.main.0, seen.redundant.0))
 }
 
 /// Hands the reference time out, many times. One of these runs at a time.
