@@ -62,8 +62,8 @@ const LONGEST_PAUSE: Duration = Duration::from_secs(1);
 /// So many times in a row are told.
 const PATIENCE: u32 = 10;
 
-/// What answers at the address of a lost SubDevice and is not known to be it. It loses the address; one that keeps it is
-/// asked again and again, after a pause that doubles.
+/// What answers at the address of a lost SubDevice and is not known to be it. It loses the address; one that keeps it
+/// is asked again and again, after a pause that doubles.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(super) struct Mistaken {
     times: u32,

@@ -187,7 +187,7 @@ impl Run {
         STAMPED.set(0);
         let (kinds, cables) = random_wiring(&mut dice);
         let network = wired_with(random_devices(&kinds, &mut dice), &cables);
-        let options = Options { junctions: JunctionMode::Automatic, ..Options::default() };
+        let options = Options::default().with_junctions(JunctionMode::Automatic);
         let mut domains = 0;
         let declare = |scan: &Scan| {
             let declaration = declare(scan, &mut dice);
