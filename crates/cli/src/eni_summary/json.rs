@@ -76,8 +76,6 @@ fn subdevice(index: usize, configuration: &Configuration) -> Option<Value> {
         };
         declared.iter().map(one).collect::<Value>()
     });
-    let plugged_into =
-        facts.plugged_into.map(|(other, port)| json!({ "subdevice": other, "port": format!("{port:?}") }));
     let startup = config.startup.iter().map(|command| {
         json!({
             "transition": command.transition.to_string(),
@@ -103,7 +101,7 @@ fn subdevice(index: usize, configuration: &Configuration) -> Option<Value> {
         "product_code": config.expected.product_code,
         "revision": config.expected.revision,
         "serial": config.expected.serial,
-        "plugged_into": plugged_into,
+        "plugged_into": facts.plugged_into.map(plugged_into),
         "sync_managers": sync_managers,
         "watchdog": {
             "divider": config.watchdog_divider,
@@ -113,6 +111,10 @@ fn subdevice(index: usize, configuration: &Configuration) -> Option<Value> {
         "sync": sync,
         "startup": startup.collect::<Value>(),
     }))
+}
+
+fn plugged_into((other, port): (usize, impl std::fmt::Debug)) -> Value {
+    json!({ "subdevice": other, "port": format!("{port:?}") })
 }
 
 fn address(config: &SubDeviceConfig) -> Value {
