@@ -249,7 +249,8 @@ impl Ring {
                 let is_of_both = seen == count && counts.0 > 0 && counts.1 > 0;
                 Some(if is_of_both { counts } else { derived })
             }
-            // Another frame may have shown the change, and these are still counts of the open ring.
+            // Another frame may have shown the change, and these are still counts of the ring as it was before.
+            (RingState::Open, _) if !supervision.returned => None,
             (RingState::Closed, _) if supervision.returned => None,
             (RingState::Closed, _) if supervision.total().0 == self.steady => Some(counts),
             _ => self.settled(number, counts),

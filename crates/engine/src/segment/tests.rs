@@ -202,6 +202,26 @@ fn a_cut_cable_is_told_in_the_cycle_that_shows_it_and_its_place_by_the_next_look
 }
 
 #[test]
+fn counts_of_the_closed_ring_are_not_taken_for_those_of_the_open_one() {
+    let mut ring = Ring::closed(8);
+    ring.now += QUIET;
+    // A frame without a supervision datagram has shown the cut; results of before it come in, one after the other.
+    ring.counts(8, 0, RingState::Open);
+    ring.words.ring.returned = None;
+    for _ in 0..4 {
+        if let Some((_, seen)) = &mut ring.words.supervision {
+            seen.returned = false;
+        }
+        assert_eq!(told(&ring.cycle()), []);
+    }
+    let changes = ring.words.ring.changes;
+    ring.counts(3, 5, RingState::Open);
+    (ring.words.ring.changes, ring.words.ring.returned) = (changes, None);
+    let events: Vec<Event> = (0..4).flat_map(|_| told(&ring.cycle())).collect();
+    assert!(events.contains(&Event::RingOpened { main: 3, redundant: 5 }), "{events:?}");
+}
+
+#[test]
 fn what_is_opened_on_purpose_is_no_news_and_ends_without_any() {
     for disturbance in [Disturbance::OpenByLink, Disturbance::OpenByPort] {
         let mut ring = Ring::closed(4);
