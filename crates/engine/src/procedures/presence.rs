@@ -9,8 +9,7 @@ use super::shared_segment::SharedSegment;
 use crate::event::Event;
 use crate::info::Direction;
 use crate::plan::AreaPlan;
-use crate::segment::member::Phase;
-use crate::segment::{Observation, ProcessDataStep};
+use crate::segment::Observation;
 use crate::supervisor::Bus;
 
 /// Pause between two looks whether inputs are there; it doubles up to the longest.
@@ -21,14 +20,14 @@ const LONGEST_PAUSE: Duration = Duration::from_millis(50);
 const LATE: Duration = Duration::from_secs(1);
 
 /// Looks until a SubDevice gives all its inputs, which datagrams of its own show, or is gone.
-pub(super) async fn prove_inputs(bus: Bus, segment: SharedSegment, index: usize) {
+pub(super) async fn prove_inputs(bus: Bus, segment: SharedSegment, index: usize, mapping: u32) {
     let known = segment.view().members.get(index).and_then(|member| Some((member.station, member.setup.clone()?)));
     let Some((station, setup)) = known else { return };
     let is_input = |area: &&AreaPlan| area.direction == Direction::Inputs;
     let mut missing: Vec<&AreaPlan> = setup.plan.mapped_areas().map(|(_, area)| area).filter(is_input).collect();
     let (mut pause, late) = (PAUSE, bus.now() + LATE);
     let mut is_reported = false;
-    while segment.board.is_unproven(index) && segment.view().members[index].phase != Phase::Absent {
+    while segment.board.is_unproven(index) && segment.view().members[index].is_mapped_as(mapping) {
         let mut left = Vec::new();
         for area in missing {
             let read = bus.fprd(station, RegisterAddress(area.physical), usize::from(area.length)).await;
@@ -37,7 +36,7 @@ pub(super) async fn prove_inputs(bus: Bus, segment: SharedSegment, index: usize)
             }
         }
         if left.is_empty() {
-            return segment.observe(Observation::ProcessData { index, step: ProcessDataStep::Proven });
+            return segment.observe(Observation::Proven { index, mapping });
         }
         if bus.now() >= late && !core::mem::replace(&mut is_reported, true) {
             let sync_manager = left[0].sync_manager;

@@ -21,7 +21,7 @@ pub(crate) async fn reconcile(bus: Bus, segment: SharedSegment) {
             Task::BringUp { index, attempt, from, told, check } => {
                 bus.spawn(bring_up_member(own_bus, own, (index, attempt), from, told, check));
             }
-            Task::ProveInputs { index } => bus.spawn(prove_inputs(own_bus, own, index)),
+            Task::ProveInputs { index, mapping } => bus.spawn(prove_inputs(own_bus, own, index, mapping)),
             Task::ReadUnassigned { station } => bus.spawn(read_unassigned(own_bus, own, station)),
             Task::ExamineCabling { in_control } => bus.spawn(examine(own_bus, own, in_control)),
             Task::IsolateRings => bus.spawn(isolate_rings(own_bus, own)),

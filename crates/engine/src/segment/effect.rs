@@ -72,6 +72,8 @@ pub enum Task {
     ProveInputs {
         /// The member.
         index: usize,
+        /// Number of the mapping that they prove.
+        mapping: u32,
     },
     /// The SII of a SubDevice without a declaration is read.
     ReadUnassigned {

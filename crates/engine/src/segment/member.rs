@@ -47,6 +47,8 @@ pub struct Member {
     pub unfit: Option<SetupError>,
     /// What has happened to it since activation.
     pub incidents: Incidents,
+    /// How often its process data was mapped, or counted on anew: inputs that were read before prove nothing.
+    pub(super) mapping: u32,
     /// Silent looks in a row.
     pub(super) silent: u8,
     /// Process data does not wait for it though it is not lost.
@@ -112,6 +114,11 @@ impl Member {
         state == AlState::Op || (state == AlState::SafeOp && early())
     }
 
+    /// It answers, and its process data has not been mapped or counted on anew since this number.
+    pub fn is_mapped_as(&self, mapping: u32) -> bool {
+        self.phase != Phase::Absent && self.mapping == mapping
+    }
+
     /// Another attempt to configure it begins; one that is under way ends. Returns its number.
     pub(super) fn begin_attempt(&mut self) -> u32 {
         self.phase = Phase::Configuring;
@@ -139,6 +146,7 @@ impl Member {
             setup,
             unfit: None,
             incidents: Incidents::default(),
+            mapping: 0,
             silent: 0,
             suspended: false,
             mistaken: Mistaken::default(),

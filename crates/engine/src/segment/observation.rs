@@ -36,8 +36,6 @@ pub enum ProcessDataStep {
     Mapped,
     /// It is counted on, for its inputs as soon as they were seen.
     Joined,
-    /// It was seen to give its inputs.
-    Proven,
 }
 
 /// Something that was observed.
@@ -121,6 +119,13 @@ pub enum Observation<'a> {
         index: usize,
         /// What it does.
         step: ProcessDataStep,
+    },
+    /// A member was seen to give all its inputs.
+    Proven {
+        /// The member.
+        index: usize,
+        /// Number of the mapping for which they were read.
+        mapping: u32,
     },
     /// The application wants a member in another state.
     Requested {

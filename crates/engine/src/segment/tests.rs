@@ -293,6 +293,22 @@ fn an_attempt_that_is_over_changes_nothing() {
 }
 
 #[test]
+fn inputs_that_were_read_before_a_mapping_prove_nothing_of_it() {
+    let mut ring = Ring::closed(1);
+    let step = |step| Observation::ProcessData { index: 0, step };
+    ring.observe(step(ProcessDataStep::Joined));
+    let before = ring.segment.members[0].mapping;
+    ring.observe(step(ProcessDataStep::Left));
+    ring.observe(step(ProcessDataStep::Mapped));
+    assert!(ring.segment.board.is_unproven(0));
+    ring.observe(Observation::Proven { index: 0, mapping: before });
+    assert!(ring.segment.board.is_unproven(0), "they were read before");
+    let mapping = ring.segment.members[0].mapping;
+    ring.observe(Observation::Proven { index: 0, mapping });
+    assert!(!ring.segment.board.is_unproven(0));
+}
+
+#[test]
 fn a_carrier_that_goes_and_comes_is_told_once_each() {
     let mut ring = Ring::closed(2);
     ring.words.carriers[1] = Some(false);

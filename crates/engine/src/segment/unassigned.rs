@@ -77,7 +77,7 @@ impl UnassignedSubDevice {
         UnassignedSubDevice { station, between, behind, position, from_main, reported, held_since: None, knowledge }
     }
 
-    /// It is known, as well as it will be for now, that it is none of the declared ones.
+    /// It is known to be none of the declared ones, or cannot be read.
     pub fn is_settled(&self) -> bool {
         self.reported || matches!(self.knowledge, Knowledge::Unreadable(_))
     }

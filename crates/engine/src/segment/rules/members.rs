@@ -268,8 +268,8 @@ impl Segment {
         step: ProcessDataStep,
         effects: &mut Effects,
     ) {
-        let Some(setup) = self.members.get(index).map(|member| member.setup.clone()) else { return };
-        let is_seen_alone = setup.as_ref().is_some_and(|setup| setup.presence_fmmu.is_some());
+        let Some(member) = self.members.get_mut(index) else { return };
+        let is_seen_alone = member.setup.as_ref().is_some_and(|setup| setup.presence_fmmu.is_some());
         match step {
             ProcessDataStep::Off => self.board.set_taking_part(index, false),
             ProcessDataStep::Unmapped => self.board.set_unproven(index, false),
@@ -279,17 +279,26 @@ impl Segment {
             }
             // SyncManagers for OP only are still off.
             ProcessDataStep::Mapped => {
-                let is_op_only = setup.is_some_and(|setup| setup.plan.is_op_only());
+                member.mapping = member.mapping.wrapping_add(1);
+                let is_op_only = member.setup.as_ref().is_some_and(|setup| setup.plan.is_op_only());
                 self.board.set_unproven(index, is_seen_alone || !is_op_only);
             }
             ProcessDataStep::Joined => {
+                member.mapping = member.mapping.wrapping_add(1);
+                let mapping = member.mapping;
                 self.board.set_unproven(index, is_seen_alone);
                 self.board.set_taking_part(index, true);
                 if is_seen_alone {
-                    effects.start(Task::ProveInputs { index });
+                    effects.start(Task::ProveInputs { index, mapping });
                 }
             }
-            ProcessDataStep::Proven => self.board.set_unproven(index, false),
+        }
+    }
+
+    /// A member was seen to give all inputs of a mapping. One that is over proves nothing of the next.
+    pub(in crate::segment) fn observe_proof(&mut self, index: usize, mapping: u32) {
+        if self.members.get(index).is_some_and(|member| member.mapping == mapping) {
+            self.board.set_unproven(index, false);
         }
     }
 

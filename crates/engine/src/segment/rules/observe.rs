@@ -42,6 +42,7 @@ impl Segment {
             Observation::Configured { index, is } => self.set_configured(index, is),
             Observation::Undone { index, attempt, reason } => self.observe_undone(index, attempt, &reason, effects),
             Observation::ProcessData { index, step } => self.observe_process_data(index, step, effects),
+            Observation::Proven { index, mapping } => self.observe_proof(index, mapping),
             Observation::Requested { index, state } => self.request(index, state),
             Observation::Refused { index, attempt, before } => self.refuse(index, attempt, before),
             Observation::ReadAgain { index, info } => self.observe_info(index, info, effects),
