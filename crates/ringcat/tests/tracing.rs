@@ -49,6 +49,7 @@ impl Subscriber for Lines {
     fn exit(&self, _: &Id) {}
 }
 
+// covers: api
 #[test]
 fn events_reach_a_subscriber_once_with_their_levels() -> Result<(), Box<dyn Error>> {
     let lines = Lines::default();

@@ -29,6 +29,7 @@ fn plant() -> Result<Plant, Box<dyn StdError>> {
     Ok(Plant { application: main_device.activate(declaration)?, drive, lamps, buttons })
 }
 
+// covers: api
 #[test]
 fn typed_values_arrive_at_the_subdevice_signed_and_come_back() -> Result<(), Box<dyn StdError>> {
     let Plant { mut application, drive, lamps, .. } = plant()?;
@@ -57,6 +58,7 @@ fn typed_values_arrive_at_the_subdevice_signed_and_come_back() -> Result<(), Box
     Ok(())
 }
 
+// covers: api
 #[test]
 fn inputs_cannot_be_written_and_errors_say_what_is_mapped() -> Result<(), Box<dyn StdError>> {
     let Plant { mut application, drive, lamps, buttons } = plant()?;
@@ -82,6 +84,7 @@ fn inputs_cannot_be_written_and_errors_say_what_is_mapped() -> Result<(), Box<dy
     Ok(())
 }
 
+// covers: api
 #[test]
 fn a_value_that_does_not_fit_is_an_error_and_changes_nothing() -> Result<(), Box<dyn StdError>> {
     let Plant { mut application, lamps, drive, .. } = plant()?;
@@ -99,6 +102,7 @@ fn a_value_that_does_not_fit_is_an_error_and_changes_nothing() -> Result<(), Box
     Ok(())
 }
 
+// covers: api
 #[test]
 fn a_cycle_is_driven_in_its_parts_by_a_loop_of_the_applications_own() -> Result<(), Box<dyn StdError>> {
     let Plant { mut application, lamps, .. } = plant()?;

@@ -35,6 +35,7 @@ fn main_device() -> Result<MainDevice<SimulatedSegment>, Error> {
     Ok(main_device)
 }
 
+// covers: api
 #[test]
 fn waiting_for_op_says_which_subdevice_is_missing_and_why() -> Result<(), Box<dyn StdError>> {
     let mut application = main_device()?.activate(declaration())?;

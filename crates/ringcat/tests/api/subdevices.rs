@@ -42,6 +42,7 @@ fn failure<T: std::fmt::Debug>(result: Result<T, Error>) -> SubDeviceFailure {
     }
 }
 
+// covers: api
 #[test]
 fn before_a_scan_without_a_mailbox_and_not_declared_are_different_errors() -> Result<(), Box<dyn StdError>> {
     let mut main_device = main_device()?;
@@ -71,6 +72,7 @@ fn before_a_scan_without_a_mailbox_and_not_declared_are_different_errors() -> Re
     Ok(())
 }
 
+// covers: api
 #[test]
 fn objects_files_idns_and_registers_before_activation_by_position() -> Result<(), Box<dyn StdError>> {
     let mut main_device = main_device()?;
@@ -105,6 +107,7 @@ fn objects_files_idns_and_registers_before_activation_by_position() -> Result<()
     Ok(())
 }
 
+// covers: api
 #[test]
 fn firmware_is_written_through_boot_and_the_new_version_is_reported() -> Result<(), Box<dyn StdError>> {
     let mut main_device = main_device()?;
@@ -117,6 +120,7 @@ fn firmware_is_written_through_boot_and_the_new_version_is_reported() -> Result<
     Ok(())
 }
 
+// covers: api
 #[test]
 fn an_overall_limit_ends_what_takes_too_long() -> Result<(), Box<dyn StdError>> {
     let mut main_device = main_device()?;
@@ -150,6 +154,7 @@ fn work_that_does_not_end_in_time_beside_cycles_is_given_up() -> Result<(), Box<
     Ok(())
 }
 
+// covers: api
 #[test]
 fn any_thread_uses_a_subdevice_while_cycles_run() -> Result<(), Box<dyn StdError>> {
     let segment = Segment::from_toml(SEGMENT, Path::new("."))?;
