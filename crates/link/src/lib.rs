@@ -29,7 +29,7 @@ mod permission;
 pub mod realtime;
 mod receive_mode;
 pub mod recorder;
-mod ring;
+mod rx_ring;
 pub mod signals;
 pub mod sniffer;
 pub mod tap;

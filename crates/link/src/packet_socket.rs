@@ -14,7 +14,7 @@ use crate::interface;
 use crate::kernel::{self, Membership, Statistics};
 use crate::monotonic;
 use crate::receive_mode::ReceiveMode;
-use crate::ring::{self, Ring, Seen, Taken};
+use crate::rx_ring::{self, RxRing, Seen, Taken};
 
 /// The group that EtherCAT frames may be sent to instead of broadcast.
 pub const GROUP_ADDRESS: [u8; 6] = [0x01, 0x01, 0x05, 0x01, 0x00, 0x00];
@@ -81,7 +81,7 @@ pub(crate) struct Passing {
 #[derive(Debug)]
 pub struct PacketSocket {
     // Before the descriptor, so that it is unmapped first.
-    ring: Ring,
+    ring: RxRing,
     fd: OwnedFd,
     interface: String,
     mac: [u8; 6],
@@ -113,10 +113,10 @@ impl PacketSocket {
         if !passing.all {
             attach(raw, &mut filter::program(options.filter)).map_err(failed("attaching the filter"))?;
         }
-        let layout = ring::layout(options.ring_frames);
+        let layout = rx_ring::layout(options.ring_frames);
         kernel::set_option(raw, libc::SOL_PACKET, kernel::PACKET_RX_RING, &layout)
             .map_err(failed("making the receive ring"))?;
-        let ring = Ring::map(raw, &layout).map_err(failed("mapping the receive ring"))?;
+        let ring = RxRing::map(raw, &layout).map_err(failed("mapping the receive ring"))?;
         let protocol = if options.keep_vlan_tags || passing.outgoing || passing.all {
             libc::ETH_P_ALL as u16
         } else {

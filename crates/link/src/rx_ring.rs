@@ -53,7 +53,7 @@ pub struct Seen<'a> {
 
 /// The mapped ring.
 #[derive(Debug)]
-pub struct Ring {
+pub struct RxRing {
     base: NonNull<u8>,
     slots: usize,
     head: usize,
@@ -62,7 +62,7 @@ pub struct Ring {
 }
 
 // SAFETY: the mapping belongs to this value alone; nothing about it is bound to a thread.
-unsafe impl Send for Ring {}
+unsafe impl Send for RxRing {}
 
 /// The layout for at least `frames` slots.
 pub fn layout(frames: u32) -> RingRequest {
@@ -80,9 +80,9 @@ pub fn layout(frames: u32) -> RingRequest {
     }
 }
 
-impl Ring {
+impl RxRing {
     /// Maps the ring of a socket that was made with this layout.
-    pub fn map(fd: libc::c_int, layout: &RingRequest) -> Result<Ring, i32> {
+    pub fn map(fd: libc::c_int, layout: &RingRequest) -> Result<RxRing, i32> {
         let slots = layout.frame_count as usize;
         let (access, flags) = (libc::PROT_READ | libc::PROT_WRITE, libc::MAP_SHARED | libc::MAP_POPULATE);
         // SAFETY: the kernel chooses the place; nothing that exists is mapped over.
@@ -90,7 +90,7 @@ impl Ring {
         if base == libc::MAP_FAILED {
             return Err(io::Error::last_os_error().raw_os_error().unwrap_or(0));
         }
-        NonNull::new(base.cast()).map(|base| Ring { base, slots, head: 0, stamp_unix_ns: 0 }).ok_or(libc::ENOMEM)
+        NonNull::new(base.cast()).map(|base| RxRing { base, slots, head: 0, stamp_unix_ns: 0 }).ok_or(libc::ENOMEM)
     }
 
     /// Whether a frame waits.
@@ -116,7 +116,7 @@ impl Ring {
         self.stamp_unix_ns
     }
 
-    /// As [`Ring::take`], of all frames, those that this host sent and the beginnings of long ones included; false
+    /// As [`RxRing::take`], of all frames, those that this host sent and the beginnings of long ones included; false
     /// where there is none.
     pub fn take_seen(&mut self, take: &mut dyn FnMut(Seen<'_>)) -> bool {
         self.take_slot(|status, slot| show(status, slot, take)) != Taken::Nothing
@@ -149,7 +149,7 @@ impl Ring {
     }
 }
 
-impl Drop for Ring {
+impl Drop for RxRing {
     fn drop(&mut self) {
         // SAFETY: this is the mapping made in `map`; no reference into it outlives `self`.
         unsafe { libc::munmap(self.base.as_ptr().cast(), self.slots * SLOT) };
