@@ -1,9 +1,9 @@
-//! Round trip of a bare frame over a pair of interfaces: what no MainDevice on this machine can be faster than.
+//! Round trip of a bare frame over a pair of interfaces: the lower limit for every MainDevice on this machine.
 //!
 //! `echo_floor echo IF` answers every EtherCAT frame as a segment would: it counts the first datagram's WKC up and sets
 //! bit 0x02 of the source address. `echo_floor ping IF [--size 60] [--count 100000] [--receive busy|block|hybrid]`
-//! measures. `echo_floor` alone, as root, makes two namespaces with a cable and does both there for all modes and two
-//! sizes. `--cpu N` ties either end to a processor.
+//! measures. `echo_floor` alone, as root, creates two namespaces with a cable and measures there in all modes with two
+//! sizes. `--cpu N` pins either end to a processor.
 
 use std::error::Error;
 use std::io::{BufRead, BufReader};
@@ -15,9 +15,9 @@ use ringcat_link::{PacketOptions, PacketSocket, ReceiveMode, realtime, wait};
 
 type Outcome = Result<(), Box<dyn Error>>;
 
-/// Frames before the measured ones.
+/// Frames sent before the measured frames.
 const WARM_UP: usize = 1000;
-/// A frame that takes longer is lost.
+/// A frame is lost if it does not return within this time.
 const LOST_AFTER_NS: u64 = 1_000_000_000;
 /// Where the first datagram's data starts: Ethernet header 14, EtherCAT header 2, datagram header 10.
 const DATA: usize = 26;
@@ -54,7 +54,7 @@ fn open(interface: &str, receive: ReceiveMode) -> Result<PacketSocket, Box<dyn E
     Ok(PacketSocket::open(interface, &PacketOptions { receive, ..PacketOptions::default() })?)
 }
 
-/// Answers until it is killed.
+/// Answers frames until the process is killed.
 fn echo(interface: &str, receive: ReceiveMode) -> Outcome {
     let mut socket = open(interface, receive)?;
     let mut answer = [0; 2048];
@@ -89,8 +89,8 @@ fn frame(size: usize) -> Vec<u8> {
     frame
 }
 
-/// Sends a frame and waits for it to come back: how long that took, and whether it came back as it should. None where
-/// it is lost. Late ones of earlier rounds are passed over.
+/// Sends a frame and waits for its return: the time it took, and whether its content is correct. None if it is lost.
+/// Late frames of earlier rounds are skipped.
 fn round_trip(socket: &mut PacketSocket, receive: ReceiveMode, frame: &[u8]) -> Option<(u64, bool)> {
     let sent = now_ns();
     socket.send(frame);
@@ -135,7 +135,7 @@ fn ping(interface: &str, receive: ReceiveMode, size: usize, count: usize) -> Out
     Ok(())
 }
 
-/// What has to be removed at the end.
+/// Namespaces to remove at the end.
 struct Namespaces(Vec<String>);
 
 impl Drop for Namespaces {
@@ -181,7 +181,7 @@ fn both() -> Outcome {
     for (receive, count) in [("busy", "300000"), ("hybrid", "300000"), ("block", "20000")] {
         let far = ["echo", "far", "--receive", receive, "--cpu", "1"];
         let mut echo = Echo(inside(b, &far).stdout(Stdio::piped()).spawn()?);
-        // Ready when it says so.
+        // The process prints a line when it is ready.
         let output = echo.0.stdout.take().ok_or("no output")?;
         BufReader::new(output).read_line(&mut String::new())?;
         for size in ["60", "1500"] {

@@ -1,8 +1,8 @@
-//! Whether cables are plugged in, polled in a thread of its own.
+//! Carrier state of interfaces, polled by a thread.
 //!
-//! In go the names of interfaces and a period; the states are read from anywhere without a system call. The question
-//! (`ETHTOOL_GLINK`) waits for a lock of the kernel, so it has no place in the cyclic thread; the kernel's own
-//! notification is not used, it is late or missing on some devices.
+//! Input: names of interfaces and a period. Any thread reads the states without a system call. `ETHTOOL_GLINK` waits
+//! for a lock of the kernel, so the cyclic thread must not call it. The kernel's own link notification is late or
+//! missing for some devices and is not used.
 
 use std::os::fd::{AsRawFd, OwnedFd};
 use std::sync::Arc;
@@ -33,7 +33,7 @@ impl Carrier {
         self.word.load(Ordering::Acquire) & 1 != 0
     }
 
-    /// How often that has changed since the watch began, modulo 2^31. Changes shorter than the period go unseen.
+    /// Number of state changes since the watch began, modulo 2^31. Changes shorter than the period are not counted.
     #[inline]
     pub fn changes(&self) -> u32 {
         self.word.load(Ordering::Acquire) >> 1
@@ -41,7 +41,7 @@ impl Carrier {
 
     fn set(&self, up: bool) {
         if self.is_up() != up {
-            // Flips the state and counts: only the watching thread writes.
+            // Inverts the state and increments the counter; only the watching thread writes.
             let word = self.word.load(Ordering::Relaxed);
             self.word.store(((word >> 1).wrapping_add(1) << 1) | u32::from(up), Ordering::Release);
         }
@@ -57,18 +57,18 @@ pub struct CarrierWatch {
 }
 
 impl CarrierWatch {
-    /// A period that sees a cut cable soon and costs next to nothing.
+    /// Detects a cut cable within 5 ms at a negligible load.
     pub const PERIOD: Duration = Duration::from_millis(5);
 
-    /// Starts to watch. The first states are known when this returns. An interface that vanishes has no carrier.
+    /// Starts the thread. The first states are known on return. An interface that disappears has no carrier.
     pub fn start(interfaces: &[&str], period: Duration) -> Result<CarrierWatch, LinkError> {
         let failed = |what| move |errno| LinkError::from_errno(&interfaces.join(" and "), what, errno);
         if let Some(missing) = interfaces.iter().find(|name| kernel::index_of(name).is_none()) {
             return Err(LinkError::NoInterface { name: missing.to_string(), present: interface::names() });
         }
-        let questions = kernel::question_socket().map_err(failed("opening a socket to ask for the carrier"))?;
+        let socket = kernel::request_socket().map_err(failed("opening a socket to read the carrier"))?;
         let watched: Vec<(String, Carrier)> =
-            interfaces.iter().map(|name| (name.to_string(), Carrier::new(has_carrier(&questions, name)))).collect();
+            interfaces.iter().map(|name| (name.to_string(), Carrier::new(has_carrier(&socket, name)))).collect();
         let carriers = watched.iter().map(|(_, carrier)| carrier.clone()).collect();
         let stop = Arc::new(());
         let running = Arc::downgrade(&stop);
@@ -77,7 +77,7 @@ impl CarrierWatch {
             while running.strong_count() > 0 {
                 thread::park_timeout(period);
                 for (name, carrier) in &watched {
-                    carrier.set(has_carrier(&questions, name));
+                    carrier.set(has_carrier(&socket, name));
                 }
             }
         };
@@ -88,10 +88,10 @@ impl CarrierWatch {
         Ok(CarrierWatch { carriers, stop: Some(stop), thread: Some(thread) })
     }
 
-    /// The carrier of the interface at this place of those that [`CarrierWatch::start`] was given.
+    /// The carrier of the interface at this position in the list passed to [`CarrierWatch::start`].
     ///
     /// # Panics
-    /// Where there is no such place.
+    /// If there is no such position.
     pub fn carrier(&self, place: usize) -> &Carrier {
         &self.carriers[place]
     }
@@ -102,20 +102,20 @@ impl Drop for CarrierWatch {
         self.stop = None;
         if let Some(thread) = self.thread.take() {
             thread.thread().unpark();
-            // A panic over there has been printed; there is nothing to add.
+            // The panic message of the thread has already been printed.
             let _ = thread.join();
         }
     }
 }
 
-fn has_carrier(questions: &OwnedFd, name: &str) -> bool {
-    kernel::link_up(questions.as_raw_fd(), name).unwrap_or_else(|_| running(questions, name))
+fn has_carrier(socket: &OwnedFd, name: &str) -> bool {
+    kernel::link_up(socket.as_raw_fd(), name).unwrap_or_else(|_| running(socket, name))
 }
 
-/// What the kernel's own flags say, for drivers that do not answer `ETHTOOL_GLINK`.
-fn running(questions: &OwnedFd, name: &str) -> bool {
-    kernel::ask(questions.as_raw_fd(), name, libc::SIOCGIFFLAGS as _).is_ok_and(|answer| {
-        // SAFETY: the kernel has answered with flags.
+/// `IFF_RUNNING`, for drivers that do not support `ETHTOOL_GLINK`.
+fn running(socket: &OwnedFd, name: &str) -> bool {
+    kernel::interface_request(socket.as_raw_fd(), name, libc::SIOCGIFFLAGS as _).is_ok_and(|answer| {
+        // SAFETY: `SIOCGIFFLAGS` has filled this member.
         let flags = libc::c_int::from(unsafe { answer.ifr_ifru.ifru_flags });
         flags & libc::IFF_UP != 0 && flags & libc::IFF_RUNNING != 0
     })

@@ -1,4 +1,4 @@
-//! Why an interface cannot be used, in words that say what to do.
+//! Errors of opening an interface, with advice.
 
 use std::error::Error;
 use std::fmt;
@@ -12,34 +12,34 @@ use crate::permission;
 pub enum LinkError {
     /// There is no interface of this name.
     NoInterface {
-        /// The name that was asked for.
+        /// The requested name.
         name: String,
-        /// Interfaces that are there.
+        /// The existing interfaces.
         present: Vec<String>,
     },
     /// This process may not open packet sockets.
     Permission {
-        /// The interface that was to be opened.
+        /// The interface to open.
         name: String,
     },
-    /// The interface carries something else than Ethernet, or is the loopback.
+    /// The interface is not an Ethernet interface, or it is the loopback.
     NotEthernet {
         /// The interface.
         name: String,
     },
-    /// A system call failed in a way that is not one of the above.
+    /// Another system call error.
     Os {
         /// The interface.
         name: String,
-        /// What was tried.
+        /// The failed operation.
         what: &'static str,
-        /// The kernel's answer.
+        /// The error number of the kernel.
         errno: i32,
     },
 }
 
 impl LinkError {
-    /// What the kernel's answer to `what` on this interface means.
+    /// The error for `errno` returned by operation `what` on this interface.
     pub(crate) fn from_errno(name: &str, what: &'static str, errno: i32) -> LinkError {
         let name = name.to_owned();
         match errno {
@@ -77,9 +77,9 @@ impl Error for LinkError {}
 
 fn advice(errno: i32) -> &'static str {
     match errno {
-        libc::ENOMEM | libc::ENOBUFS => "the kernel is short of memory: free some, or ask for a smaller receive ring",
+        libc::ENOMEM | libc::ENOBUFS => "the kernel is short of memory: free some, or request a smaller receive ring",
         libc::EMFILE | libc::ENFILE => "too many files are open: raise the limit (ulimit -n) or close some",
-        libc::ENODEV | libc::ENXIO | libc::ENETDOWN => "the interface went away meanwhile: see `ip link` and try again",
+        libc::ENODEV | libc::ENXIO | libc::ENETDOWN => "the interface has disappeared: see `ip link` and try again",
         libc::EAFNOSUPPORT | libc::ENOPROTOOPT | libc::EPROTONOSUPPORT => {
             "this kernel lacks packet sockets with rings (CONFIG_PACKET): use another kernel"
         }
@@ -92,14 +92,14 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_missing_interface_is_told_with_those_that_are_there() {
+    fn a_missing_interface_error_lists_the_existing_interfaces() {
         let present = vec!["lo".to_owned(), "eth0".to_owned()];
         let text = LinkError::NoInterface { name: "eth9".to_owned(), present }.to_string();
         assert_eq!(text, "there is no network interface \"eth9\"; there are: lo, eth0");
     }
 
     #[test]
-    fn a_missing_permission_is_told_with_the_line_that_grants_it() {
+    fn a_missing_permission_error_contains_the_setcap_line() {
         for errno in [libc::EPERM, libc::EACCES] {
             let text = LinkError::from_errno("eth0", "socket", errno).to_string();
             let line = permission::setcap_command();
@@ -108,7 +108,7 @@ mod tests {
     }
 
     #[test]
-    fn other_failures_tell_interface_action_and_advice() {
+    fn other_errors_name_interface_operation_and_advice() {
         let text = LinkError::from_errno("eth0", "mapping the receive ring", libc::ENOMEM).to_string();
         assert!(text.starts_with("eth0: mapping the receive ring: "), "{text}");
         assert!(text.ends_with("smaller receive ring"), "{text}");
@@ -116,7 +116,7 @@ mod tests {
     }
 
     #[test]
-    fn an_interface_without_ethernet_is_told_so() {
+    fn an_interface_without_ethernet_is_an_error() {
         assert!(LinkError::NotEthernet { name: "lo".to_owned() }.to_string().starts_with("lo is not an Ethernet"));
     }
 }

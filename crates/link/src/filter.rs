@@ -1,26 +1,26 @@
 //! Which frames the kernel hands to a socket, as a classic BPF program.
 //!
-//! In goes a [`ClassFilter`], out comes the program. Only EtherType 0x88A4 passes, with or without one VLAN tag; of
-//! those, the class filters look at one bit of the first datagram's Idx, which the MainDevice sets in its acyclic
-//! frames. So each half of the MainDevice has a socket that the other half's frames never wake.
+//! Input: a [`ClassFilter`]. Output: the BPF program. Only EtherType 0x88A4 passes, with or without one VLAN tag. The
+//! class filters also test one bit of the first datagram's Idx, which the MainDevice sets in its acyclic frames. Frames
+//! of one half of the MainDevice therefore never wake the socket of the other half.
 
 /// The EtherType of EtherCAT.
 pub const ETHERCAT: u16 = 0x88A4;
 /// EtherType of a VLAN tag.
 pub const VLAN: u16 = 0x8100;
-/// The bit of Idx that tells the classes apart: set in acyclic frames.
+/// The bit of Idx that separates the classes: set in acyclic frames.
 pub const CLASS_BIT: u8 = 0x80;
 
-/// Where the EtherType is.
+/// Offset of the EtherType.
 pub(crate) const ETHER_TYPE: u32 = 12;
-/// Where the first datagram's Idx is: Ethernet header 14, EtherCAT header 2, Cmd 1.
+/// Offset of the first datagram's Idx: Ethernet header 14, EtherCAT header 2, Cmd 1.
 const IDX: u32 = 17;
-/// What a VLAN tag moves both by.
+/// Bytes by which a VLAN tag moves both offsets.
 const TAG: u32 = 4;
-/// More than any frame: all of it passes.
+/// Longer than any frame: the whole frame passes.
 const WHOLE_FRAME: u32 = 0x4_0000;
 
-/// Frames of which class are received.
+/// Frame classes that a socket receives.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub enum ClassFilter {
     /// Every EtherCAT frame.
@@ -39,7 +39,7 @@ const JUMP_SET: u16 = (libc::BPF_JMP | libc::BPF_JSET | libc::BPF_K) as u16;
 const JUMP: u16 = (libc::BPF_JMP | libc::BPF_JA) as u16;
 pub(crate) const RETURN: u16 = (libc::BPF_RET | libc::BPF_K) as u16;
 
-/// The program, to be attached to a packet socket. A load beyond the end of a frame ends it with "does not pass".
+/// The program to attach to a packet socket. A load beyond the end of a frame rejects the frame.
 pub fn program(filter: ClassFilter) -> [libc::sock_filter; 11] {
     let (set, clear) = match filter {
         ClassFilter::All => (PASS, PASS),
@@ -47,7 +47,7 @@ pub fn program(filter: ClassFilter) -> [libc::sock_filter; 11] {
         ClassFilter::Acyclic => (PASS, REJECT),
     };
     let load = |code, k| libc::sock_filter { code, jt: 0, jf: 0, k };
-    // Jumps are given as places; the kernel counts them from the next instruction.
+    // Jump targets are given as positions; the kernel counts from the next instruction.
     let branch =
         |at: u8, code, k: u32, yes: u8, no: u8| libc::sock_filter { code, jt: yes - at - 1, jf: no - at - 1, k };
     [
@@ -65,7 +65,7 @@ pub fn program(filter: ClassFilter) -> [libc::sock_filter; 11] {
     ]
 }
 
-/// Places of the two ends of the program.
+/// Positions of the two ends of the program.
 const REJECT: u8 = 9;
 const PASS: u8 = 10;
 

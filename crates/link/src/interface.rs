@@ -1,7 +1,7 @@
-//! The network interfaces of the host, whether a cable is plugged in, and which other programs use one.
+//! The network interfaces of the host: list, carrier, and other programs that use an interface.
 //!
-//! In go names, out come snapshots; nothing here is for the cyclic thread, some of it waits for locks of the kernel.
-//! All answers are about the network namespace of the calling thread.
+//! Input: names. Output: snapshots. Some calls wait for locks of the kernel; the cyclic thread must not use this
+//! module. All results are those of the calling thread's network namespace.
 
 mod netlink;
 mod use_warning;
@@ -20,7 +20,7 @@ pub struct Interface {
     pub name: String,
     /// Its number in this namespace.
     pub index: u32,
-    /// Its address; zeros where it has none.
+    /// Its address; zeros if it has none.
     pub mac: [u8; 6],
     /// Whether it is switched on (`ip link set NAME up`).
     pub up: bool,
@@ -32,26 +32,26 @@ pub struct Interface {
     pub loopback: bool,
 }
 
-/// All interfaces, in the kernel's order. Those that vanish meanwhile are left out.
+/// All interfaces, in the kernel's order. Interfaces that disappear during the call are omitted.
 pub fn list() -> Vec<Interface> {
-    let Ok(questions) = kernel::question_socket() else { return Vec::new() };
-    indexed_names().into_iter().filter_map(|(index, name)| describe(questions.as_raw_fd(), index, name)).collect()
+    let Ok(socket) = kernel::request_socket() else { return Vec::new() };
+    indexed_names().into_iter().filter_map(|(index, name)| describe(socket.as_raw_fd(), index, name)).collect()
 }
 
-/// Whether an interface is up and has a link partner; None where there is no such interface or its driver cannot tell.
-/// May wait milliseconds for a lock of the kernel.
+/// Whether an interface is up and has a link partner; None if there is no such interface or the driver does not report
+/// it. May wait milliseconds for a lock of the kernel.
 pub fn carrier(name: &str) -> Option<bool> {
-    let questions = kernel::question_socket().ok()?;
-    kernel::link_up(questions.as_raw_fd(), name).ok()
+    let socket = kernel::request_socket().ok()?;
+    kernel::link_up(socket.as_raw_fd(), name).ok()
 }
 
-/// Switches an interface on or off, as `ip link set NAME up` does. False where that is not permitted (CAP_NET_ADMIN) or
-/// there is no such interface. Waits for a lock of the kernel, and longer for some drivers.
+/// Switches an interface on or off, as `ip link set NAME up` does. False if that is not permitted (CAP_NET_ADMIN) or
+/// there is no such interface. Waits for a lock of the kernel, with some drivers longer.
 pub fn switch(name: &str, up: bool) -> bool {
-    kernel::question_socket().is_ok_and(|questions| kernel::switch(questions.as_raw_fd(), name, up).is_ok())
+    kernel::request_socket().is_ok_and(|socket| kernel::switch(socket.as_raw_fd(), name, up).is_ok())
 }
 
-/// Number of the other end of a veth pair, where that is in this namespace.
+/// Index of the other end of a veth pair, if it is in this namespace.
 pub(crate) fn peer(name: &str) -> Option<u32> {
     netlink::membership(kernel::index_of(name)?)?.peer
 }
@@ -61,12 +61,12 @@ pub(crate) fn names() -> Vec<String> {
     indexed_names().into_iter().map(|(_, name)| name).collect()
 }
 
-/// Numbers of those interfaces whose name is wanted.
+/// Indices of the interfaces with a name that `wanted` accepts.
 pub(crate) fn indices(wanted: impl Fn(&str) -> bool) -> Vec<u32> {
     indexed_names().into_iter().filter(|(_, name)| wanted(name)).map(|(index, _)| index).collect()
 }
 
-/// Name of the interface with this number.
+/// Name of the interface with this index.
 pub(crate) fn name_of(index: u32) -> Option<String> {
     indexed_names().into_iter().find(|(number, _)| *number == index).map(|(_, name)| name)
 }
@@ -91,15 +91,15 @@ fn indexed_names() -> Vec<(u32, String)> {
     found
 }
 
-fn describe(questions: libc::c_int, index: u32, name: String) -> Option<Interface> {
-    let flags = kernel::ask(questions, &name, libc::SIOCGIFFLAGS as _).ok()?;
-    let address = kernel::ask(questions, &name, libc::SIOCGIFHWADDR as _).ok()?;
-    let mtu = kernel::ask(questions, &name, libc::SIOCGIFMTU as _).ok()?;
-    // SAFETY: the kernel has answered each question by filling this member.
+fn describe(socket: libc::c_int, index: u32, name: String) -> Option<Interface> {
+    let flags = kernel::interface_request(socket, &name, libc::SIOCGIFFLAGS as _).ok()?;
+    let address = kernel::interface_request(socket, &name, libc::SIOCGIFHWADDR as _).ok()?;
+    let mtu = kernel::interface_request(socket, &name, libc::SIOCGIFMTU as _).ok()?;
+    // SAFETY: each request has filled this member.
     let (flags, address, mtu) =
         unsafe { (flags.ifr_ifru.ifru_flags, address.ifr_ifru.ifru_hwaddr, mtu.ifr_ifru.ifru_mtu) };
     let has = |flag: libc::c_int| libc::c_int::from(flags) & flag != 0;
-    let carrier = kernel::link_up(questions, &name).unwrap_or(has(libc::IFF_UP) && has(libc::IFF_RUNNING));
+    let carrier = kernel::link_up(socket, &name).unwrap_or(has(libc::IFF_UP) && has(libc::IFF_RUNNING));
     Some(Interface {
         name,
         index,
@@ -124,7 +124,7 @@ mod tests {
     }
 
     #[test]
-    fn an_interface_that_is_not_there_has_no_carrier_to_tell_of() {
+    fn a_missing_interface_has_no_carrier_state() {
         for name in ["", "no-such", "a-name-that-is-longer-than-the-kernel-allows", "with\0end"] {
             assert_eq!(carrier(name), None, "{name:?}");
             assert!(!switch(name, false), "{name:?}");

@@ -1,6 +1,6 @@
-//! What the kernel's headers say and the `libc` crate does not, and the plain system calls under the other modules.
+//! Definitions of kernel headers that the `libc` crate lacks, and the plain system calls of the other modules.
 //!
-//! Constants and layouts are those of `linux/if_packet.h` and `linux/ethtool.h`.
+//! Constants and layouts are from `linux/if_packet.h` and `linux/ethtool.h`.
 
 use std::ffi::CString;
 use std::io;
@@ -22,7 +22,7 @@ pub const TP_STATUS_VLAN_VALID: u32 = 1 << 4;
 pub const TP_STATUS_VLAN_TPID_VALID: u32 = 1 << 6;
 const ETHTOOL_GLINK: u32 = 0x0a;
 
-/// How a receive ring is laid out.
+/// Layout of a receive ring.
 #[repr(C)]
 pub struct RingRequest {
     pub block_size: libc::c_uint,
@@ -31,7 +31,7 @@ pub struct RingRequest {
     pub frame_count: libc::c_uint,
 }
 
-/// What stands in front of each frame in the ring (`tpacket2_hdr`).
+/// Header of each frame in the ring (`tpacket2_hdr`).
 #[repr(C)]
 pub struct FrameHeader {
     pub status: u32,
@@ -46,7 +46,7 @@ pub struct FrameHeader {
     pub padding: [u8; 4],
 }
 
-/// Which frames an interface is to let through (`packet_mreq`).
+/// Frames that an interface accepts (`packet_mreq`).
 #[repr(C)]
 pub struct Membership {
     pub interface: libc::c_int,
@@ -69,12 +69,12 @@ struct EthtoolValue {
     data: u32,
 }
 
-/// The kernel's last answer to this thread.
+/// Error number of the last system call of this thread.
 pub fn errno() -> i32 {
     io::Error::last_os_error().raw_os_error().unwrap_or(0)
 }
 
-/// A socket, closed on exec.
+/// A socket that is closed on exec.
 pub fn socket(domain: libc::c_int, kind: libc::c_int, protocol: libc::c_int) -> Result<OwnedFd, i32> {
     // SAFETY: no pointers are passed.
     let fd = unsafe { libc::socket(domain, kind | libc::SOCK_CLOEXEC, protocol) };
@@ -85,7 +85,7 @@ pub fn socket(domain: libc::c_int, kind: libc::c_int, protocol: libc::c_int) -> 
     Ok(unsafe { OwnedFd::from_raw_fd(fd) })
 }
 
-/// Sets a socket option. `T` has to be what the option wants.
+/// Sets a socket option. `T` has to be the type of the option.
 pub fn set_option<T>(fd: RawFd, level: libc::c_int, option: libc::c_int, value: &T) -> Result<(), i32> {
     let pointer = std::ptr::from_ref(value).cast();
     // SAFETY: pointer and length describe a live value that the kernel only reads.
@@ -93,7 +93,7 @@ pub fn set_option<T>(fd: RawFd, level: libc::c_int, option: libc::c_int, value: 
     if result == 0 { Ok(()) } else { Err(errno()) }
 }
 
-/// Reads a socket option into `value`, which stays as it is where the kernel refuses.
+/// Reads a socket option into `value`, which keeps its value if the kernel refuses.
 pub fn option<T: Copy + Plain>(fd: RawFd, level: libc::c_int, option: libc::c_int, mut value: T) -> T {
     let mut length = size_of::<T>() as libc::socklen_t;
     // SAFETY: pointer and length describe a live value for which any bytes are valid (`Plain`).
@@ -101,7 +101,7 @@ pub fn option<T: Copy + Plain>(fd: RawFd, level: libc::c_int, option: libc::c_in
     value
 }
 
-/// Types for which any bytes are a value.
+/// Types for which all bytes are valid.
 ///
 /// # Safety
 /// Only for integers and structs of them.
@@ -118,21 +118,21 @@ impl Clone for Statistics {
 }
 impl Copy for Statistics {}
 
-/// Asks for something of an interface by name (`SIOCGIF...`); a name that cannot be one is answered with `ENODEV`.
-pub fn ask(fd: RawFd, name: &str, request: libc::c_ulong) -> Result<libc::ifreq, i32> {
+/// Reads a property of an interface by name (`SIOCGIF...`); `ENODEV` for an invalid name.
+pub fn interface_request(fd: RawFd, name: &str, request: libc::c_ulong) -> Result<libc::ifreq, i32> {
     let mut ifreq = named(name)?;
-    // SAFETY: the pointer is to a live ifreq, which all requests passed here read and fill.
+    // SAFETY: the pointer refers to a live ifreq, which all requests passed here read and fill.
     if unsafe { libc::ioctl(fd, request as _, &mut ifreq) } < 0 { Err(errno()) } else { Ok(ifreq) }
 }
 
 /// Switches an interface on or off (`SIOCSIFFLAGS`), as `ip link set NAME up` does; needs CAP_NET_ADMIN.
 pub fn switch(fd: RawFd, name: &str, up: bool) -> Result<(), i32> {
-    let mut ifreq = ask(fd, name, libc::SIOCGIFFLAGS as _)?;
+    let mut ifreq = interface_request(fd, name, libc::SIOCGIFFLAGS as _)?;
     let bit = libc::IFF_UP as libc::c_short;
-    // SAFETY: the kernel has answered the question by filling this member.
+    // SAFETY: `SIOCGIFFLAGS` has filled this member.
     let flags = unsafe { ifreq.ifr_ifru.ifru_flags };
     ifreq.ifr_ifru.ifru_flags = if up { flags | bit } else { flags & !bit };
-    // SAFETY: the pointer is to a live ifreq, which the request reads.
+    // SAFETY: the pointer refers to a live ifreq, which the request reads.
     if unsafe { libc::ioctl(fd, libc::SIOCSIFFLAGS as _, &mut ifreq) } < 0 { Err(errno()) } else { Ok(()) }
 }
 
@@ -145,7 +145,7 @@ pub fn link_up(fd: RawFd, name: &str) -> Result<bool, i32> {
     if unsafe { libc::ioctl(fd, libc::SIOCETHTOOL as _, &mut ifreq) } < 0 { Err(errno()) } else { Ok(value.data != 0) }
 }
 
-/// A question about an interface of this name; `ENODEV` where it cannot be one.
+/// A request for an interface with this name; `ENODEV` if the name is invalid.
 pub fn named(name: &str) -> Result<libc::ifreq, i32> {
     // SAFETY: all bytes zero is a valid ifreq.
     let mut ifreq: libc::ifreq = unsafe { zeroed() };
@@ -158,20 +158,20 @@ pub fn named(name: &str) -> Result<libc::ifreq, i32> {
     Ok(ifreq)
 }
 
-/// The index of an interface, if there is one of this name.
+/// The index of an interface, if an interface has this name.
 pub fn index_of(name: &str) -> Option<u32> {
     let name = CString::new(name).ok()?;
-    // SAFETY: the pointer is to a live string with its end.
+    // SAFETY: the pointer refers to a live null-terminated string.
     let index = unsafe { libc::if_nametoindex(name.as_ptr()) };
     (index != 0).then_some(index)
 }
 
-/// A socket to ask the kernel about interfaces with; it needs no privileges.
-pub fn question_socket() -> Result<OwnedFd, i32> {
+/// A socket for requests about interfaces; it needs no privileges.
+pub fn request_socket() -> Result<OwnedFd, i32> {
     socket(libc::AF_INET, libc::SOCK_DGRAM, 0)
 }
 
-/// Takes a pending error off a socket.
+/// Clears the pending error of a socket.
 pub fn clear_error(fd: &impl AsRawFd) {
     option::<libc::c_int>(fd.as_raw_fd(), libc::SOL_SOCKET, libc::SO_ERROR, 0);
 }

@@ -1,19 +1,19 @@
-//! Everything of RingCAT that talks to the Linux kernel about network interfaces and time.
+//! The part of RingCAT that calls the Linux kernel for network interfaces and time.
 //!
-//! * [`packet_socket`]: frames in and out of an interface: `AF_PACKET` with a memory-mapped receive ring;
-//! * [`filter`]: which frames the kernel puts into that ring;
-//! * [`listener`]: frames of one sender on all interfaces where they are not expected;
-//! * [`waiting`]: sleeping or spinning until a frame or a moment comes;
-//! * [`interface`], [`carrier`]: the interfaces of the host, their other users, whether a cable is plugged in;
-//! * [`tap`]: network interfaces of the host whose other end is this process;
+//! * [`packet_socket`]: sending and receiving frames on an interface: `AF_PACKET` with a memory-mapped receive ring;
+//! * [`filter`]: frames that the kernel puts into that ring;
+//! * [`listener`]: frames of one sender on interfaces where they are not expected;
+//! * [`waiting`]: sleeping or spinning until a frame arrives or a time is reached;
+//! * [`interface`], [`carrier`]: the interfaces of the host, their other users, their carrier;
+//! * [`tap`]: TAP interfaces, network interfaces whose other end is this process;
 //! * [`monotonic`], [`realtime`]: the host's clock, scheduling, memory locking, processor latency;
-//! * [`signals`]: those that ask a program to end;
-//! * [`pcapng`]: captures that Wireshark reads; [`recorder`]: writing them while frames go on; [`sniffer`]: seeing what
-//!   passes on an interface without taking part.
+//! * [`signals`]: signals that request the end of a program;
+//! * [`pcapng`]: captures for Wireshark; [`recorder`]: writing captures during operation; [`sniffer`]: capturing an
+//!   interface passively.
 //!
-//! Frames go in and out as bytes without FCS. Of EtherCAT only the EtherType and the class bit of the first datagram's
-//! Idx are known here. `docs/links.md` tells how another back end is written and what the kernel wants to be granted.
-//! `unsafe` is allowed in this crate, each block says why it is sound.
+//! Frames are bytes without FCS. This crate evaluates only the EtherType and the class bit of the first datagram's Idx.
+//! `docs/links.md` describes how to write another back end and which permissions the kernel requires. `unsafe` is
+//! allowed in this crate; each block states why it is sound.
 #![deny(unsafe_op_in_unsafe_fn)]
 
 pub mod carrier;

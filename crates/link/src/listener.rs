@@ -1,10 +1,10 @@
 //! Frames of one sender on interfaces where they are not expected.
 //!
-//! In go a source address with a mask and the interfaces that are in use; out come the first bytes of EtherCAT frames
-//! with that source that arrive on any other interface, and its name. One socket listens on all of them, whatever comes
-//! or goes; the kernel sorts out all else, so no thread is woken by the traffic of other segments. What is stacked on
-//! another interface (bridge, bond, macvlan) is left out: it shows what arrived below it once more. So is the other end
-//! of a veth pair in the same namespace.
+//! Input: a source address with a mask, and the interfaces in use. Output: the first bytes of EtherCAT frames with that
+//! source that arrive on another interface, and the name of that interface. One socket listens on all interfaces, also
+//! on those created later. The kernel filters all other frames, so traffic of other segments wakes no thread. An
+//! interface on top of another (bridge, bond, macvlan) is left out: it would show frames a second time. The other end
+//! of a veth pair in the same namespace is left out too.
 
 use std::mem::{size_of, zeroed};
 use std::os::fd::{AsFd, AsRawFd, OwnedFd, RawFd};
@@ -20,26 +20,26 @@ use crate::packet_socket;
 pub const KEPT: usize = 64;
 /// Largest number of interfaces to exclude; a filter has to stay small.
 const MAX_LEFT_OUT: usize = 64;
-/// Where a packet socket is bound that is not bound to one interface.
+/// Interface index for a packet socket that is not bound to one interface.
 const ALL_INTERFACES: libc::c_int = 0;
-/// Where the source address is, as two bytes and four.
+/// Offsets of the source address, as two bytes and four.
 const SOURCE: [u32; 2] = [6, 8];
-/// Where a filter finds the number of the interface that a frame came in on.
+/// Offset at which a filter reads the index of the receiving interface.
 const INTERFACE: u32 = (libc::SKF_AD_OFF + libc::SKF_AD_IFINDEX) as u32;
 
 const LOAD_WORD: u16 = (libc::BPF_LD | libc::BPF_W | libc::BPF_ABS) as u16;
 const AND: u16 = (libc::BPF_ALU | libc::BPF_AND | libc::BPF_K) as u16;
 
-/// A sender: bits of the source address that tell its frames.
+/// A sender, identified by bits of the source address.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Sender {
     /// The address.
     pub address: [u8; 6],
-    /// Which bits of it count.
+    /// The bits to compare.
     pub mask: [u8; 6],
 }
 
-/// A frame that was heard.
+/// A received frame.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Heard {
     /// Name of the interface that it arrived on.
@@ -48,15 +48,16 @@ pub struct Heard {
     pub bytes: Vec<u8>,
 }
 
-/// A socket on all interfaces but some.
+/// A socket on all interfaces except some.
 #[derive(Debug)]
 pub struct Listener {
     fd: OwnedFd,
 }
 
 impl Listener {
-    /// Listens for a sender on all interfaces but `except`. Those that are there now let frames to the EtherCAT group
-    /// through meanwhile, as they do broadcast. Waits for locks of the kernel: not for the cyclic thread.
+    /// Listens for a sender on all interfaces except `except`. Interfaces that exist now accept frames to the EtherCAT
+    /// group address while the listener is open; all interfaces accept broadcast. Waits for locks of the kernel: not
+    /// for the cyclic thread.
     ///
     /// # Errors
     /// A missing permission, or a kernel without packet sockets.
@@ -66,27 +67,27 @@ impl Listener {
         let fd = kernel::socket(libc::AF_PACKET, libc::SOCK_RAW | libc::SOCK_NONBLOCK, 0)
             .map_err(failed("opening a packet socket"))?;
         let raw = fd.as_raw_fd();
-        // Before Linux 4.20 the filter alone leaves them out.
+        // Before Linux 4.20 only the filter removes outgoing frames.
         let _ = kernel::set_option(raw, libc::SOL_PACKET, kernel::PACKET_IGNORE_OUTGOING, &1);
         let mut left_out = interface::indices(|name| except.contains(&name) || is_stacked(name));
-        // What is sent on one end of a pair arrives at the other: that is its purpose.
+        // A frame sent on one end of a veth pair arrives at the other end by design.
         left_out.extend(except.iter().filter_map(|name| interface::peer(name)));
         let mut program = program(sender, &left_out);
         packet_socket::attach(raw, &mut program).map_err(failed("attaching the filter"))?;
         packet_socket::bind(raw, ALL_INTERFACES, filter::ETHERCAT).map_err(failed("binding to all interfaces"))?;
         for index in interface::indices(|_| true).into_iter().filter(|index| !left_out.contains(index)) {
-            // One that cannot may still hear broadcast.
+            // An interface that cannot join still receives broadcast.
             let _ = packet_socket::join(raw, index as libc::c_int, false);
         }
         Ok(Listener { fd })
     }
 
-    /// Waits for a frame; `None` as soon as `end` is readable or closed at its other side, or where the kernel fails.
+    /// Waits for a frame; `None` if `end` becomes readable or its other side closes, or if the kernel fails.
     pub fn hear(&self, end: &impl AsFd) -> Option<Heard> {
         loop {
             let place = |fd| libc::pollfd { fd, events: libc::POLLIN, revents: 0 };
             let mut polled = [place(self.fd.as_raw_fd()), place(end.as_fd().as_raw_fd())];
-            // SAFETY: two live places are passed.
+            // SAFETY: the pointer refers to two live entries.
             let result = unsafe { libc::poll(polled.as_mut_ptr(), 2, -1) };
             if result < 0 && kernel::errno() != libc::EINTR || polled[1].revents != 0 {
                 return None;
@@ -95,7 +96,8 @@ impl Listener {
                 match receive(self.fd.as_raw_fd()) {
                     Ok(heard) => return Some(heard),
                     Err(error) if error.kind() == io::ErrorKind::WouldBlock => {}
-                    // One of the interfaces went down: the others go on, and it may come back.
+                    // One of the interfaces went down: the socket keeps working for the others, and the interface may
+                    // come back.
                     Err(error) if error.raw_os_error() == Some(libc::ENETDOWN) => {}
                     Err(_) => return None,
                 }
@@ -109,7 +111,7 @@ fn receive(fd: RawFd) -> io::Result<Heard> {
     // SAFETY: all bytes zero is a valid sockaddr_ll.
     let mut from: libc::sockaddr_ll = unsafe { zeroed() };
     let mut length = size_of::<libc::sockaddr_ll>() as libc::socklen_t;
-    // SAFETY: both pointers are to live memory of the lengths that are passed.
+    // SAFETY: both pointers refer to live memory of the lengths that are passed.
     let received = unsafe {
         let from = std::ptr::from_mut(&mut from).cast();
         libc::recvfrom(fd, bytes.as_mut_ptr().cast(), bytes.len(), 0, from, &mut length)
@@ -122,13 +124,13 @@ fn receive(fd: RawFd) -> io::Result<Heard> {
     Ok(Heard { interface: interface::name_of(index).unwrap_or_else(|| format!("interface {index}")), bytes })
 }
 
-/// Whether an interface lies on top of another one.
+/// Whether an interface lies on top of another interface.
 fn is_stacked(name: &str) -> bool {
     let entries = fs::read_dir(format!("/sys/class/net/{name}")).into_iter().flatten().flatten();
     entries.into_iter().any(|entry| entry.file_name().as_encoded_bytes().starts_with(b"lower_"))
 }
 
-/// Lets the first bytes of EtherCAT frames pass that come from a sender and not on one of these interfaces.
+/// A filter for the first bytes of EtherCAT frames from `sender` on all interfaces except these.
 fn program(sender: Sender, left_out: &[u32]) -> Vec<libc::sock_filter> {
     let plain = |code, k| libc::sock_filter { code, jt: 0, jf: 0, k };
     let left_out = &left_out[..left_out.len().min(MAX_LEFT_OUT)];
@@ -145,7 +147,8 @@ fn program(sender: Sender, left_out: &[u32]) -> Vec<libc::sock_filter> {
     program.push(plain(LOAD_WORD, INTERFACE));
     program.extend(left_out.iter().map(|index| plain(JUMP_EQUAL, *index)));
     program.extend([plain(RETURN, KEPT as u32), plain(RETURN, 0)]);
-    // The last instruction rejects: a comparison of the frame that fails leads there, one of the interface that holds.
+    // The last instruction rejects: it is the target if a comparison of the frame fails or a comparison of the
+    // interface matches.
     let reject = program.len() - 1;
     for (at, instruction) in program.iter_mut().enumerate().filter(|(_, instruction)| instruction.code == JUMP_EQUAL) {
         let way = (reject - at - 1) as u8;
@@ -160,7 +163,7 @@ mod tests {
 
     const SENDER: Sender = Sender { address: [0x02, 0xee, 0x5e, 0x11, 0x22, 0x33], mask: [0, 0, 0, 0xff, 0xff, 0xff] };
 
-    /// Runs a program over a frame as the kernel does.
+    /// Runs a program on a frame as the kernel does.
     fn run(program: &[libc::sock_filter], frame: &[u8], interface: u32) -> u32 {
         let (mut at, mut accumulator) = (0, 0u32);
         loop {
@@ -180,7 +183,7 @@ mod tests {
                     continue;
                 }
                 RETURN => return k,
-                other => panic!("instruction {other:#06x} is not known here"),
+                other => panic!("instruction {other:#06x} is not implemented in this test"),
             };
             let Some(loaded) = loaded else { return 0 };
             accumulator = loaded;
@@ -222,7 +225,7 @@ mod tests {
         for marked in [6, 7, 8] {
             let mut frame = frame();
             frame[marked] = 0xaa;
-            assert_eq!(run(&program, &frame, 7), KEPT as u32, "byte {marked} holds marks");
+            assert_eq!(run(&program, &frame, 7), KEPT as u32, "byte {marked} is not compared");
         }
     }
 }

@@ -1,13 +1,13 @@
 //! The host's monotonic clock: reading it and sleeping until an absolute time.
 //!
-//! Times are nanoseconds of `CLOCK_MONOTONIC`, which starts somewhere, never jumps and stands still in suspend.
+//! Times are nanoseconds of `CLOCK_MONOTONIC`, which has an arbitrary origin, never jumps and stops in suspend.
 
-/// Now.
+/// The current time.
 pub fn now_ns() -> u64 {
     read(libc::CLOCK_MONOTONIC)
 }
 
-/// Time on the monotonic clock at this Unix time, provided it is past and the Unix clock was not set since.
+/// Time on the monotonic clock for this Unix time, provided it is past and the Unix clock was not set since.
 pub fn of_unix_ns(unix_ns: u64) -> u64 {
     let age = read(libc::CLOCK_REALTIME).saturating_sub(unix_ns);
     now_ns().saturating_sub(age)
@@ -15,12 +15,12 @@ pub fn of_unix_ns(unix_ns: u64) -> u64 {
 
 fn read(clock: libc::clockid_t) -> u64 {
     let mut time = libc::timespec { tv_sec: 0, tv_nsec: 0 };
-    // SAFETY: the pointer is to a live timespec; the call writes nothing else.
+    // SAFETY: the pointer refers to a live timespec; the call writes nothing else.
     unsafe { libc::clock_gettime(clock, &mut time) };
     time.tv_sec as u64 * 1_000_000_000 + time.tv_nsec as u64
 }
 
-/// Sleeps until the clock shows `ns`; returns at once where that has passed. Signals do not end the sleep early.
+/// Sleeps until the clock shows `ns`; returns at once if that time has passed. Signals do not end the sleep early.
 pub fn sleep_until_ns(ns: u64) {
     let until = timespec(ns);
     // SAFETY: the request is a live timespec; a null remainder is allowed and unused with an absolute time.
@@ -29,7 +29,7 @@ pub fn sleep_until_ns(ns: u64) {
     {}
 }
 
-/// A time or duration as the kernel takes it.
+/// A time or duration in the kernel's type.
 pub(crate) fn timespec(ns: u64) -> libc::timespec {
     libc::timespec { tv_sec: (ns / 1_000_000_000) as libc::time_t, tv_nsec: (ns % 1_000_000_000) as libc::c_long }
 }
@@ -40,19 +40,19 @@ mod tests {
 
     // covers: links
     #[test]
-    fn a_unix_time_of_a_moment_ago_is_found_on_the_monotonic_clock() {
+    fn a_recent_unix_time_is_converted_to_the_monotonic_clock() {
         let before = now_ns();
         let unix_ns = read(libc::CLOCK_REALTIME);
         let after = now_ns();
         sleep_until_ns(after + 2_000_000);
         let found = of_unix_ns(unix_ns);
-        // The two clocks are not read in one instant.
+        // The two clocks are not read at the same instant.
         assert!((before.saturating_sub(100_000)..=after + 1_000_000).contains(&found), "{before} {found} {after}");
-        assert!(of_unix_ns(u64::MAX) >= found, "a time to come counts as now");
+        assert!(of_unix_ns(u64::MAX) >= found, "a future time counts as now");
     }
 
     #[test]
-    fn a_sleep_ends_at_its_time_or_later_and_one_in_the_past_at_once() {
+    fn a_sleep_ends_at_its_time_or_later_and_at_once_if_the_time_is_past() {
         let until = now_ns() + 2_000_000;
         sleep_until_ns(until);
         assert!(now_ns() >= until);

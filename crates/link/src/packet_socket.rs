@@ -1,8 +1,8 @@
-//! Frames in and out of a network interface: `AF_PACKET` with a memory-mapped receive ring.
+//! Sending and receiving frames on a network interface: `AF_PACKET` with a memory-mapped receive ring.
 //!
-//! In go the name of an interface and [`PacketOptions`]; frames are sent with one system call each and received from
-//! the ring with none. One socket serves one thread; a MainDevice opens two per interface, one for each of its classes
-//! of frames ([`ClassFilter`]). Only EtherType 0x88A4 is received, never what this host sent itself.
+//! Input: the name of an interface and [`PacketOptions`]. Sending takes one system call per frame, receiving from the
+//! ring none. One socket serves one thread; a MainDevice opens two per interface, one for each class of frames
+//! ([`ClassFilter`]). The socket receives only EtherType 0x88A4 and no frames sent by this host.
 
 use std::cell::Cell;
 use std::mem::{size_of, zeroed};
@@ -16,28 +16,29 @@ use crate::monotonic;
 use crate::receive_mode::ReceiveMode;
 use crate::rx_ring::{self, RxRing, Seen, Taken};
 
-/// The group that EtherCAT frames may be sent to instead of broadcast.
+/// The group address to which EtherCAT frames may be sent instead of broadcast.
 pub const GROUP_ADDRESS: [u8; 6] = [0x01, 0x01, 0x05, 0x01, 0x00, 0x00];
 
 /// How a socket is opened.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct PacketOptions {
-    /// Which frames it receives.
+    /// Frames that the socket receives.
     pub filter: ClassFilter,
-    /// How its owner means to wait; see [`PacketSocket::mode`].
+    /// How the owner waits; see [`PacketSocket::mode`].
     pub receive: ReceiveMode,
-    /// Slots of the receive ring: at least two, at most 16,384; 2 KiB each. Frames that find it full are lost.
+    /// Slots of the receive ring: at least 2, at most 16,384, with 2 KiB each. Frames that arrive while the ring is
+    /// full are lost.
     pub ring_frames: u32,
-    /// Whether the interface takes all frames. Without, it takes broadcast, its own address and [`GROUP_ADDRESS`].
+    /// Whether the interface accepts all frames. If not, it accepts broadcast, its own address and [`GROUP_ADDRESS`].
     pub promiscuous: bool,
-    /// Whether frames that came with a VLAN tag are handed out with it. Without, they come as if they had had none: the
-    /// kernel takes the tag off and forgets it before it looks for sockets of one EtherType. With, the socket sees all
-    /// frames before that, and each EtherCAT frame counts as dropped in the statistics of the interface.
+    /// Whether frames keep their VLAN tag. If false, the tag is missing: the kernel removes it before it looks for
+    /// sockets of one EtherType. If true, the socket sees all frames before that step, and each EtherCAT frame counts
+    /// as dropped in the statistics of the interface.
     pub keep_vlan_tags: bool,
 }
 
 impl Default for PacketOptions {
-    /// All EtherCAT frames, asleep while there are none, 256 slots, promiscuous, VLAN tags left out.
+    /// All EtherCAT frames, blocking receive, 256 slots, promiscuous, without VLAN tags.
     fn default() -> Self {
         PacketOptions {
             filter: ClassFilter::All,
@@ -49,12 +50,12 @@ impl Default for PacketOptions {
     }
 }
 
-/// What a socket has seen.
+/// Counters of a socket.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct LinkCounters {
-    /// Frames that the kernel took for sending.
+    /// Frames that the kernel accepted for sending.
     pub sent: u64,
-    /// Frames handed out.
+    /// Frames returned by [`PacketSocket::receive`].
     pub received: u64,
     /// Frames not sent because the interface was down or gone.
     pub down: u64,
@@ -68,7 +69,7 @@ pub struct LinkCounters {
     pub truncated: u64,
 }
 
-/// What a socket sees beyond the EtherCAT frames that arrive.
+/// Frames that a socket receives in addition to incoming EtherCAT frames.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Passing {
     /// Frames that this host sends.
@@ -80,7 +81,7 @@ pub(crate) struct Passing {
 /// A packet socket with its ring.
 #[derive(Debug)]
 pub struct PacketSocket {
-    // Before the descriptor, so that it is unmapped first.
+    // Declared before the descriptor, so that it is unmapped first.
     ring: RxRing,
     fd: OwnedFd,
     interface: String,
@@ -103,12 +104,12 @@ impl PacketSocket {
     ) -> Result<PacketSocket, LinkError> {
         let (index, mac) = ethernet(interface)?;
         let failed = |what| move |errno| LinkError::from_errno(interface, what, errno);
-        // Protocol 0 receives nothing until the filter is in place and the interface chosen.
+        // Protocol 0 receives nothing until the filter and the interface are set.
         let fd = kernel::socket(libc::AF_PACKET, libc::SOCK_RAW, 0).map_err(failed("opening a packet socket"))?;
         let raw = fd.as_raw_fd();
         let set = |option, value: libc::c_int| kernel::set_option(raw, libc::SOL_PACKET, option, &value);
         set(kernel::PACKET_VERSION, kernel::TPACKET_V2).map_err(failed("choosing the ring's version"))?;
-        // Before Linux 4.20 the ring leaves them out, at more cost.
+        // Before Linux 4.20 the ring code discards outgoing frames, at a higher cost.
         let _ = set(kernel::PACKET_IGNORE_OUTGOING, libc::c_int::from(!passing.outgoing));
         if !passing.all {
             attach(raw, &mut filter::program(options.filter)).map_err(failed("attaching the filter"))?;
@@ -124,7 +125,7 @@ impl PacketSocket {
         };
         bind(raw, index, protocol).map_err(failed("binding to the interface"))?;
         join(raw, index, options.promiscuous).map_err(failed("joining the EtherCAT group"))?;
-        // An interface that is down leaves an error behind that the first send would return.
+        // An interface that is down leaves a pending error, which the first send would return.
         kernel::clear_error(&fd);
         let (interface, mode) = (interface.to_owned(), options.receive);
         Ok(PacketSocket { ring, fd, interface, mac, mode, counters: LinkCounters::default(), overrun: Cell::new(0) })
@@ -140,17 +141,17 @@ impl PacketSocket {
         &self.interface
     }
 
-    /// How its owner means to wait, to be passed to [`crate::wait`].
+    /// How the owner waits, to be passed to [`crate::wait`].
     pub fn mode(&self) -> ReceiveMode {
         self.mode
     }
 
-    /// Sends a frame, without FCS: one system call. False where the interface is down or gone or the queue is full;
-    /// the next frame is tried all the same, so an interface that comes back is used at once.
+    /// Sends a frame, without FCS: one system call. False if the interface is down or gone or the queue is full. The
+    /// next call tries again, so an interface that comes back is used at once.
     pub fn send(&mut self, frame: &[u8]) -> bool {
         let mut result = self.send_once(frame);
         if result == Err(libc::ENETDOWN) {
-            // It may be an error kept from when the interface went down, while it is up again by now.
+            // The error may be pending since the interface went down, although the interface is up again.
             kernel::clear_error(&self.fd);
             result = self.send_once(frame);
         }
@@ -169,7 +170,7 @@ impl PacketSocket {
         if sent < 0 { Err(kernel::errno()) } else { Ok(()) }
     }
 
-    /// Hands the oldest frame that has arrived to `take`, false where there is none. No system call.
+    /// Passes the oldest received frame to `take`; false if there is none. No system call.
     #[inline]
     pub fn receive(&mut self, take: &mut dyn FnMut(&[u8])) -> bool {
         loop {
@@ -185,12 +186,12 @@ impl PacketSocket {
         }
     }
 
-    /// When the kernel received the frame that was handed out last, on the monotonic clock. No system call.
+    /// When the kernel received the last frame returned, on the monotonic clock. No system call.
     pub fn received_at_ns(&self) -> u64 {
         monotonic::of_unix_ns(self.ring.stamp_unix_ns())
     }
 
-    /// Hands whatever passed the interface to `take`, oldest first; false where there is nothing. No system call.
+    /// Passes the oldest frame in either direction to `take`; false if there is none. No system call.
     pub(crate) fn look(&mut self, take: &mut dyn FnMut(Seen<'_>)) -> bool {
         let seen = self.ring.take_seen(take);
         self.counters.received += u64::from(seen);
@@ -203,7 +204,7 @@ impl PacketSocket {
         self.ring.has_frame()
     }
 
-    /// What this socket has seen. One system call.
+    /// The counters. One system call.
     pub fn counters(&self) -> LinkCounters {
         let since = kernel::option(self.fd(), libc::SOL_PACKET, kernel::PACKET_STATISTICS, Statistics::default()).drops;
         self.overrun.set(self.overrun.get() + u64::from(since));
@@ -220,9 +221,11 @@ impl PacketSocket {
 fn ethernet(name: &str) -> Result<(libc::c_int, [u8; 6]), LinkError> {
     let missing = || LinkError::NoInterface { name: name.to_owned(), present: interface::names() };
     let index = kernel::index_of(name).ok_or_else(missing)?;
-    let questions = kernel::question_socket().map_err(|errno| LinkError::from_errno(name, "asking for it", errno))?;
-    let answer = kernel::ask(questions.as_raw_fd(), name, libc::SIOCGIFHWADDR as _).map_err(|_| missing())?;
-    // SAFETY: the kernel has answered with a hardware address.
+    let socket =
+        kernel::request_socket().map_err(|errno| LinkError::from_errno(name, "reading its properties", errno))?;
+    let answer =
+        kernel::interface_request(socket.as_raw_fd(), name, libc::SIOCGIFHWADDR as _).map_err(|_| missing())?;
+    // SAFETY: the kernel has filled in a hardware address.
     let address = unsafe { answer.ifr_ifru.ifru_hwaddr };
     if address.sa_family != libc::ARPHRD_ETHER {
         return Err(LinkError::NotEthernet { name: name.to_owned() });

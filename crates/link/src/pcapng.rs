@@ -1,8 +1,8 @@
-//! Captures that Wireshark reads, from several interfaces in one file (pcapng, draft-ietf-opsawg-pcapng).
+//! Writes captures of several interfaces into one file for Wireshark (pcapng, draft-ietf-opsawg-pcapng).
 //!
-//! In go frames with interface, direction and time, out come bytes: one section header, one description per interface
-//! with its name and nanosecond time stamps, one enhanced packet block per frame, and statistics of an interface when
-//! they are known. Little-endian throughout.
+//! Input: frames with interface, direction and time. Output: bytes: one section header, one description per interface
+//! with its name and nanosecond time stamps, one enhanced packet block per frame, and the statistics of an interface
+//! when they are known. Little-endian throughout.
 
 use std::io::{self, Write};
 
@@ -26,7 +26,7 @@ const STATISTICS_DROPPED_BY_KERNEL: u16 = 7;
 /// Time stamps count 10^-9 s.
 const NANOSECONDS: u8 = 9;
 
-/// Which way a frame went, seen from this host.
+/// Direction of a frame, seen from this host.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Direction {
     /// Received.
@@ -44,10 +44,10 @@ impl Direction {
     }
 }
 
-/// What an interface's frames came to in the end.
+/// Totals of an interface at the end.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Statistics {
-    /// Frames seen, whether in the capture or not (`isb_ifrecv`).
+    /// Frames seen, captured or not (`isb_ifrecv`).
     pub seen: u64,
     /// Frames that the capturing program had no room for (`isb_ifdrop`).
     pub dropped: u64,
@@ -92,12 +92,12 @@ impl<W: Write> Writer<W> {
         Ok(writer)
     }
 
-    /// Adds a frame of the interface at this place of those that [`Writer::new`] was given, with the time since 1970.
+    /// Adds a frame of the interface at this position in the list passed to [`Writer::new`], with the time since 1970.
     pub fn frame(&mut self, interface: usize, direction: Direction, unix_time_ns: u64, frame: &[u8]) -> io::Result<()> {
         self.beginning(interface, direction, unix_time_ns, frame, frame.len())
     }
 
-    /// As [`Writer::frame`], of a frame of which only the beginning is at hand; `length` is that of the whole.
+    /// As [`Writer::frame`], for a frame of which only the beginning is available; `length` is that of the whole frame.
     pub fn beginning(
         &mut self,
         interface: usize,
@@ -119,7 +119,7 @@ impl<W: Write> Writer<W> {
         self.end()
     }
 
-    /// Adds what the interface's frames came to.
+    /// Adds the totals of an interface.
     pub fn statistics(&mut self, interface: usize, unix_time_ns: u64, statistics: Statistics) -> io::Result<()> {
         self.begin_for(INTERFACE_STATISTICS, interface, unix_time_ns)?;
         self.option(STATISTICS_RECEIVED, &statistics.seen.to_le_bytes());
@@ -129,12 +129,12 @@ impl<W: Write> Writer<W> {
         self.end()
     }
 
-    /// Hands what is buffered below on to where it belongs.
+    /// Flushes the output.
     pub fn flush(&mut self) -> io::Result<()> {
         self.out.flush()
     }
 
-    /// What was written to.
+    /// Returns the output.
     pub fn into_inner(self) -> W {
         self.out
     }
@@ -146,7 +146,7 @@ impl<W: Write> Writer<W> {
         self.put(&[0; 4]);
     }
 
-    /// Begins a block that is about an interface at a time.
+    /// Begins a block for an interface and a time.
     fn begin_for(&mut self, kind: u32, interface: usize, unix_time_ns: u64) -> io::Result<()> {
         if interface >= self.interfaces {
             return Err(io::Error::new(io::ErrorKind::InvalidInput, "the capture has no such interface"));
@@ -166,7 +166,7 @@ impl<W: Write> Writer<W> {
         self.block.resize(self.block.len().next_multiple_of(4), 0);
     }
 
-    /// Texts beyond what an option can hold are cut.
+    /// Adds an option. Texts longer than an option can hold are truncated.
     fn option(&mut self, code: u16, value: &[u8]) {
         let length = value.len().min(usize::from(u16::MAX));
         self.put(&code.to_le_bytes());

@@ -1,14 +1,14 @@
-//! The command that permits raw frames, interfaces, locked memory and real-time priority to the running program.
+//! The command that grants the running program raw frames, interfaces, locked memory and real-time priority.
 //!
-//! Out comes one line for a shell, with the path of the very file that runs: capabilities belong to a file, and a
-//! program that was built here need not be on the PATH.
+//! Output: one line for a shell with the path of the running file. Capabilities belong to a file, and a program that
+//! was built locally may not be on the PATH.
 
 use std::path::Path;
 
-/// What the program needs, see `docs/links.md`.
+/// The capabilities that the program needs, see `docs/links.md`.
 const CAPABILITIES: &str = "cap_net_raw,cap_net_admin,cap_ipc_lock,cap_sys_nice=ep";
 
-/// The line that permits it, for the program that runs.
+/// The command line for the running program.
 pub fn setcap_command() -> String {
     match std::env::current_exe() {
         Ok(program) => for_program(&program),
@@ -36,7 +36,7 @@ mod tests {
     }
 
     #[test]
-    fn a_path_that_a_shell_would_take_apart_is_quoted() {
+    fn a_path_that_a_shell_would_split_is_quoted() {
         let line = |path: &str| for_program(Path::new(path)).split_once("=ep ").map(|(_, word)| word.to_owned());
         assert_eq!(line("/opt/ringcat-1.0/bin/ringcat").as_deref(), Some("/opt/ringcat-1.0/bin/ringcat"));
         assert_eq!(line("/home/a b/ringcat").as_deref(), Some("'/home/a b/ringcat'"));

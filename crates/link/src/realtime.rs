@@ -1,7 +1,7 @@
-//! What makes a thread keep its times: scheduling, affinity, locked memory, awake processors.
+//! Real-time settings of a thread: scheduling, affinity, locked memory, processor latency.
 //!
-//! Everything is about the calling thread or process, and everything may be refused: a [`RealtimeWarning`] then says
-//! what would permit it. Nothing here ever has to succeed.
+//! All settings are those of the calling thread or process, and all may be refused. A [`RealtimeWarning`] then names
+//! the missing permission. The program runs without them.
 
 use std::error::Error;
 use std::fmt;
@@ -11,7 +11,7 @@ use std::mem::{size_of, zeroed};
 
 use crate::kernel::errno;
 
-/// Something that would have helped and was not permitted or not possible.
+/// A setting that was not permitted or not possible.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct RealtimeWarning {
     what: String,
@@ -24,7 +24,7 @@ impl RealtimeWarning {
         RealtimeWarning { what: what.into(), errno, advice }
     }
 
-    /// The kernel's answer; 0 where it was not asked.
+    /// The error number of the kernel; 0 if there was no system call.
     pub fn errno(&self) -> i32 {
         self.errno
     }
@@ -52,7 +52,7 @@ const PERMIT_LATENCY: &str = "permit writing to it (a udev rule, or root); until
 /// Keeps all memory of this process, present and future, from being swapped out.
 pub fn lock_memory() -> Result<(), RealtimeWarning> {
     let failed = |errno| RealtimeWarning::new("memory is not locked", errno, PERMIT_MEMORY);
-    // With a limit and without the capability the lock might succeed now and make a later allocation fail.
+    // With a limit and without the capability the lock could succeed now and make a later allocation fail.
     if !may_lock_without_limit() {
         return Err(failed(libc::EPERM));
     }
@@ -78,8 +78,8 @@ fn has_capability(number: u32) -> bool {
     effective.and_then(|hex| u64::from_str_radix(hex.trim(), 16).ok()).is_some_and(|set| set >> number & 1 != 0)
 }
 
-/// Lets the calling thread go before all that are not real-time (`SCHED_FIFO`, 1 to 99). Threads that it starts from
-/// now on do not inherit that.
+/// Gives the calling thread real-time priority (`SCHED_FIFO`, 1 to 99). Threads that it starts afterwards do not
+/// inherit it.
 pub fn fifo(priority: i32) -> Result<(), RealtimeWarning> {
     if set_scheduler(libc::SCHED_FIFO | libc::SCHED_RESET_ON_FORK, priority) != 0 {
         let what = format!("the thread does not run with real-time priority {priority}");
@@ -88,18 +88,18 @@ pub fn fifo(priority: i32) -> Result<(), RealtimeWarning> {
     Ok(())
 }
 
-/// The bare system call for the calling thread, as not every C library passes it on.
+/// The bare system call for the calling thread: not every C library implements it.
 fn set_scheduler(policy: libc::c_int, priority: i32) -> libc::c_long {
-    // `sched_param` of the kernel has this one member only.
-    // SAFETY: the pointer is to a live parameter, which the kernel only reads; thread 0 is the calling one.
+    // The kernel's `sched_param` has this one member only.
+    // SAFETY: the pointer refers to a live parameter, which the kernel only reads; thread 0 is the calling thread.
     unsafe { libc::syscall(libc::SYS_sched_setscheduler, 0, policy, std::ptr::from_ref(&priority)) }
 }
 
-/// Makes the calling thread an ordinary one on any processor, whatever it has inherited.
+/// Gives the calling thread ordinary scheduling on any processor, in place of inherited settings.
 pub(crate) fn leave() {
-    // Both only take away privileges or restore what the process has anyway: there is nothing to tell.
+    // Both calls only drop privileges or restore the defaults of the process: there is nothing to report.
     set_scheduler(libc::SCHED_OTHER, 0);
-    // SAFETY: any bytes are a set, the pointer is to a live one and thread 0 is the calling one.
+    // SAFETY: all bytes are a valid set, the pointer refers to a live set and thread 0 is the calling thread.
     unsafe {
         let mut all: libc::cpu_set_t = zeroed();
         std::ptr::write_bytes(&mut all, 0xff, 1);
@@ -107,10 +107,10 @@ pub(crate) fn leave() {
     }
 }
 
-/// Keeps the calling thread on one processor.
+/// Pins the calling thread to one processor.
 pub fn affinity(cpu: usize) -> Result<(), RealtimeWarning> {
     let advice = "take a processor that exists and that this process may use (see `nproc` and `taskset -p $$`)";
-    let failed = |errno| RealtimeWarning::new(format!("the thread is not tied to processor {cpu}"), errno, advice);
+    let failed = |errno| RealtimeWarning::new(format!("the thread is not pinned to processor {cpu}"), errno, advice);
     if cpu >= libc::CPU_SETSIZE as usize {
         return Err(failed(libc::EINVAL));
     }
@@ -124,15 +124,15 @@ pub fn affinity(cpu: usize) -> Result<(), RealtimeWarning> {
     if result == 0 { Ok(()) } else { Err(failed(errno())) }
 }
 
-/// Lets timers of the calling thread end at their time rather than up to 50 us later; real-time threads have that
-/// anyway. Needs no permission.
+/// Sets the timer slack of the calling thread to 1 ns instead of 50 us; real-time threads have no slack. Needs no
+/// permission.
 pub fn precise_timers() {
     // SAFETY: no pointers are passed.
     unsafe { libc::prctl(libc::PR_SET_TIMERSLACK, 1 as libc::c_ulong) };
 }
 
-/// Whether the kernel stops real-time threads that never sleep for a part of each second, as a warning for those that
-/// spin.
+/// A warning if the kernel throttles real-time threads that never sleep (`sched_rt_runtime_us`). It applies to threads
+/// that spin.
 pub fn throttling() -> Option<RealtimeWarning> {
     let read = |name: &str| fs::read_to_string(format!("/proc/sys/kernel/{name}")).ok()?.trim().parse::<i64>().ok();
     let (runtime, period) = (read("sched_rt_runtime_us")?, read("sched_rt_period_us")?);
@@ -142,14 +142,14 @@ pub fn throttling() -> Option<RealtimeWarning> {
     })
 }
 
-/// Keeps all processors from sleeping so deeply that waking up takes longer than asked for, as long as it lives.
+/// Limits the wake-up latency of all processors during the lifetime of this value.
 #[derive(Debug)]
 pub struct CpuLatency {
     _file: File,
 }
 
 impl CpuLatency {
-    /// Asks for at most `us` microseconds; 0 keeps processors awake.
+    /// Requests at most `us` microseconds; 0 keeps processors awake.
     pub fn request(us: u32) -> Result<CpuLatency, RealtimeWarning> {
         const PATH: &str = "/dev/cpu_dma_latency";
         let failed = |error: io::Error| {
@@ -168,7 +168,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_is_refused_is_told_with_what_would_permit_it() {
+    fn a_refused_setting_names_the_missing_permission() {
         let text = RealtimeWarning::new("memory is not locked", libc::EPERM, PERMIT_MEMORY).to_string();
         assert!(text.starts_with("memory is not locked: ") && text.contains("cap_ipc_lock"), "{text}");
         let wrong = fifo(1000).expect_err("priorities end at 99");
@@ -179,19 +179,19 @@ mod tests {
     }
 
     #[test]
-    fn each_help_is_granted_or_told_and_never_stops_the_program() {
-        // In threads of their own, so that the other tests keep their scheduling.
-        let told = std::thread::spawn(|| {
+    fn each_setting_is_granted_or_refused_with_a_warning() {
+        // In separate threads, so that the other tests keep their scheduling.
+        let results = std::thread::spawn(|| {
             precise_timers();
             [fifo(1).err(), affinity(0).err(), CpuLatency::request(0).err(), throttling()]
         });
-        for warning in told.join().expect("no panic").into_iter().flatten() {
+        for warning in results.join().expect("no panic").into_iter().flatten() {
             assert!(warning.to_string().contains("; "), "{warning}");
         }
     }
 
     #[test]
-    fn a_thread_that_leaves_real_time_is_ordinary_again() {
+    fn a_thread_that_leaves_real_time_has_ordinary_scheduling() {
         let policy = std::thread::spawn(|| {
             let _ = fifo(1);
             leave();

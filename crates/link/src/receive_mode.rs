@@ -1,18 +1,18 @@
-//! How a thread waits for frames, as a socket's owner chooses it; [`crate::wait`] does it.
+//! How a thread waits for frames; [`crate::wait`] implements it.
 
 use std::time::Duration;
 
 /// How to wait.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum ReceiveMode {
-    /// Asleep in the kernel.
+    /// Sleeps in the kernel.
     #[default]
     Blocking,
-    /// Spinning on the rings.
+    /// Polls the receive rings.
     BusyPoll,
-    /// Spinning for this long, then asleep.
+    /// Polls for this time, then sleeps.
     Hybrid {
-        /// How long: a little more than frames usually take.
+        /// Time to poll: slightly longer than the usual round trip of a frame.
         spin: Duration,
     },
 }

@@ -1,8 +1,8 @@
-//! Recording frames into a capture file without holding up the threads that send and receive them.
+//! Records frames into a capture file without delaying the threads that send and receive them.
 //!
-//! In go frames, by one [`Tap`] per thread; out comes a pcapng file ([`crate::pcapng`]) that a thread of its own
-//! writes. A tap copies a frame into a queue of fixed size and returns: no allocation, lock, file or system call.
-//! Frames that find the queue full are left out of the file, counted, and told in its statistics (`isb_ifdrop`).
+//! Input: frames, by one [`Tap`] per thread. Output: a pcapng file ([`crate::pcapng`]) written by a separate thread. A
+//! tap copies a frame into a queue of fixed size and returns: no allocation, lock, file or system call. If the queue is
+//! full, the frame is not recorded; the file's statistics count it (`isb_ifdrop`).
 
 mod frame_queue;
 
@@ -22,10 +22,10 @@ use frame_queue::{Consumer, Note, Producer};
 
 /// Memory of a tap: a tenth of a second of one direction at 1 Gbit/s, many seconds of usual traffic.
 const QUEUE_BYTES: usize = 16 << 20;
-/// The file is written so often.
+/// Interval at which the file is written.
 const PERIOD: Duration = Duration::from_millis(5);
 
-/// What went by on an interface.
+/// Totals of an interface.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Recorded {
     /// Frames received that are in the file.
@@ -38,7 +38,7 @@ pub struct Recorded {
     pub lost_by_kernel: u64,
 }
 
-/// Why there is no capture, or only a part of one.
+/// Why there is no capture, or only a partial capture.
 #[derive(Debug)]
 pub struct RecorderError {
     path: PathBuf,
@@ -47,12 +47,12 @@ pub struct RecorderError {
 
 impl fmt::Display for RecorderError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(&words(&self.path, &self.error))
+        f.write_str(&describe(&self.path, &self.error))
     }
 }
 
-/// Why a capture cannot be written, and what to do about it.
-fn words(path: &Path, error: &io::Error) -> String {
+/// Describes why a capture cannot be written, with advice.
+fn describe(path: &Path, error: &io::Error) -> String {
     let advice = match error.kind() {
         io::ErrorKind::StorageFull | io::ErrorKind::QuotaExceeded => "make room or take a file on another disk",
         io::ErrorKind::NotFound => "make its directory first",
@@ -72,9 +72,9 @@ impl Error for RecorderError {
 #[derive(Debug)]
 struct Shared {
     interfaces: usize,
-    /// Queues of taps that the writing thread has not seen yet.
+    /// Queues of taps that the writing thread has not taken over yet.
     new: Mutex<Vec<Consumer>>,
-    /// Unix time minus that of the frames; zero where the clock was never set.
+    /// Unix time minus the time of the frames; zero if the clock was never set.
     clock: OnceLock<u64>,
     lost_by_kernel: Vec<AtomicU64>,
     end: AtomicBool,
@@ -82,7 +82,7 @@ struct Shared {
     failure: OnceLock<String>,
 }
 
-/// A capture in the making. Dropped, it completes the file.
+/// A running capture. Dropping it completes the file.
 #[derive(Debug)]
 pub struct Recorder {
     shared: Arc<Shared>,
@@ -90,17 +90,17 @@ pub struct Recorder {
     thread: Option<JoinHandle<io::Result<Vec<Recorded>>>>,
 }
 
-/// Where one thread puts its frames.
+/// Adds the frames of one thread.
 #[derive(Debug)]
 pub struct Tap {
     shared: Arc<Shared>,
     frames: Producer,
-    /// What makes Unix time of the frames' time.
+    /// Offset from the time of the frames to Unix time.
     to_unix_ns: u64,
 }
 
 impl Recorder {
-    /// Begins a capture of interfaces with these names and descriptions in a file, which is overwritten.
+    /// Begins a capture of interfaces with these names and descriptions; an existing file is overwritten.
     pub fn start(path: &Path, interfaces: &[(&str, &str)]) -> Result<Recorder, RecorderError> {
         let failed = |error| RecorderError { path: path.to_owned(), error };
         let shared = Arc::new(Shared {
@@ -118,14 +118,15 @@ impl Recorder {
         let file_path = path.to_owned();
         let write = move || {
             realtime::leave();
-            let in_words = |error: &io::Error| words(&file_path, error);
-            Scribe { writer, shared: seen, queues: Vec::new(), frame: Vec::new(), recorded: Vec::new() }.write(in_words)
+            let describe_error = |error: &io::Error| describe(&file_path, error);
+            WritingThread { writer, shared: seen, queues: Vec::new(), frame: Vec::new(), recorded: Vec::new() }
+                .write(describe_error)
         };
         let thread = thread::Builder::new().name("capture".to_owned()).spawn(write).map_err(failed)?;
         Ok(Recorder { shared, path: path.to_owned(), thread: Some(thread) })
     }
 
-    /// Where one more thread puts its frames. Takes memory: not for the cyclic path.
+    /// A tap for one more thread. Allocates: not for the cyclic path.
     pub fn tap(&self) -> Tap {
         self.tap_with(QUEUE_BYTES)
     }
@@ -136,19 +137,19 @@ impl Recorder {
         Tap { shared: self.shared.clone(), frames, to_unix_ns: 0 }
     }
 
-    /// Tells how many frames of an interface the kernel has lost so far.
+    /// Sets the number of frames of an interface that the kernel has lost so far.
     pub fn set_lost_by_kernel(&self, interface: usize, frames: u64) {
         if let Some(lost) = self.shared.lost_by_kernel.get(interface) {
             lost.store(frames, Ordering::Relaxed);
         }
     }
 
-    /// Why nothing is written any more, as soon as that is so. Not for the cyclic path.
+    /// Why writing has stopped, if it has. Not for the cyclic path.
     pub fn failure(&self) -> Option<&str> {
         self.shared.failure.get().map(String::as_str)
     }
 
-    /// Completes the file: everything that was put into taps until now is in it. What there was, by interface.
+    /// Completes the file with all frames that taps have added until now. Returns the totals by interface.
     pub fn finish(mut self) -> Result<Vec<Recorded>, RecorderError> {
         self.end().map_err(|error| RecorderError { path: self.path.clone(), error })
     }
@@ -169,19 +170,19 @@ impl Drop for Recorder {
 }
 
 impl Tap {
-    /// Tells what the clock shows now that the frames' times are of. The first tap that does so sets it for all;
-    /// without, times are Unix time.
+    /// Sets the clock of the frame times by its current value. The first tap that does so sets it for all taps. Without
+    /// it, times are Unix time.
     pub fn set_clock(&mut self, now_ns: u64) {
         self.to_unix_ns = *self.shared.clock.get_or_init(|| unix_now_ns().wrapping_sub(now_ns));
     }
 
-    /// Adds a frame of the interface at this place of those that the recorder was given. Does not allocate or wait.
+    /// Adds a frame of the interface at this position in the list of the recorder. Does not allocate or wait.
     #[inline]
     pub fn record(&mut self, interface: usize, direction: Direction, time_ns: u64, frame: &[u8]) {
         self.record_beginning(interface, direction, time_ns, frame, frame.len());
     }
 
-    /// As [`Tap::record`], of a frame of which only the beginning is at hand; `length` is that of the whole.
+    /// As [`Tap::record`], for a frame of which only the beginning is available; `length` is that of the whole frame.
     pub fn record_beginning(
         &mut self,
         interface: usize,
@@ -191,7 +192,7 @@ impl Tap {
         length: usize,
     ) {
         let time_ns = time_ns.wrapping_add(self.to_unix_ns);
-        // What does not fit is counted over there.
+        // The queue counts frames that do not fit.
         self.frames.push(Note { interface, direction, time_ns, length }, beginning);
     }
 }
@@ -201,18 +202,18 @@ fn unix_now_ns() -> u64 {
     SystemTime::now().duration_since(UNIX_EPOCH).map_or(0, |time| time.as_nanos() as u64)
 }
 
-/// The thread that writes.
-struct Scribe<W: Write> {
+/// The writing thread.
+struct WritingThread<W: Write> {
     writer: Writer<W>,
     shared: Arc<Shared>,
-    /// Each with how far it was a period ago.
+    /// Each queue with its end one period ago.
     queues: Vec<(Consumer, u64)>,
     frame: Vec<u8>,
     recorded: Vec<Recorded>,
 }
 
-impl<W: Write> Scribe<W> {
-    fn write(mut self, in_words: impl Fn(&io::Error) -> String) -> io::Result<Vec<Recorded>> {
+impl<W: Write> WritingThread<W> {
+    fn write(mut self, describe: impl Fn(&io::Error) -> String) -> io::Result<Vec<Recorded>> {
         self.recorded = vec![Recorded::default(); self.shared.interfaces];
         let mut result = Ok(());
         loop {
@@ -221,8 +222,8 @@ impl<W: Write> Scribe<W> {
                 .extend(self.shared.new.lock().unwrap_or_else(PoisonError::into_inner).drain(..).map(|q| (q, 0)));
             let written = self.empty(end, result.is_ok());
             if let (Ok(()), Err(error)) = (&result, &written) {
-                // Only this thread sets it, and once.
-                let _ = self.shared.failure.set(in_words(error));
+                // Only this thread sets it, once.
+                let _ = self.shared.failure.set(describe(error));
             }
             result = result.and(written);
             if end {
@@ -246,8 +247,8 @@ impl<W: Write> Scribe<W> {
         Ok(self.recorded)
     }
 
-    /// Writes what was in the queues a period ago, in the order of time: an older frame of another thread has got into
-    /// its queue meanwhile. All there is in the end; nothing where writing has failed before.
+    /// Writes the frames that were in the queues one period ago, ordered by time: by now, older frames of other threads
+    /// are in their queues too. With `all`, writes all frames. Writes nothing if writing has failed before.
     fn empty(&mut self, all: bool, write: bool) -> io::Result<()> {
         let ends: Vec<u64> = self.queues.iter().map(|(queue, _)| queue.end()).collect();
         if all {
@@ -265,7 +266,7 @@ impl<W: Write> Scribe<W> {
                 continue;
             }
             let Note { interface, direction, time_ns, length } = note;
-            // Only a mistaken caller names an interface that is not there.
+            // A wrong interface number is a caller's error; the frame is skipped.
             let Some(recorded) = self.recorded.get_mut(interface) else { continue };
             match direction {
                 Direction::In => recorded.received += 1,

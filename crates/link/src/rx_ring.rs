@@ -1,7 +1,7 @@
 //! The receive ring that the kernel writes frames into (TPACKET_V2).
 //!
-//! In go nothing but the kernel's writes, out come the frames in the order of their arrival, each handed out in place.
-//! A slot belongs to the kernel or to us, as its status word says; nothing else is shared.
+//! The kernel writes frames into the ring; [`RxRing::take`] returns them in order of arrival, each in place. The status
+//! word of a slot states whether the kernel or this process owns it; nothing else is shared.
 
 use std::io;
 use std::mem::size_of;
@@ -16,21 +16,21 @@ use crate::kernel::{
 
 /// Bytes of a slot: header, address of the sender, gap, and a frame of up to 1,982 bytes.
 const SLOT: usize = 2048;
-/// Where `sll_pkttype` of the `sockaddr_ll` behind the header is.
+/// Offset of `sll_pkttype` in the `sockaddr_ll` that follows the header.
 const PACKET_TYPE: usize = size_of::<FrameHeader>() + 10;
 /// Bytes of a VLAN tag.
 const TAG: usize = 4;
-/// What stands before the frame: header and `sockaddr_ll`.
+/// Bytes before the frame: header and `sockaddr_ll`.
 const HEAD: usize = size_of::<FrameHeader>() + size_of::<libc::sockaddr_ll>();
-/// More slots than this are a mistake: 32 MiB.
+/// A larger number of slots (32 MiB) is a configuration error.
 const MAX_SLOTS: u32 = 16_384;
 
-/// What became of the slot at the head of the ring.
+/// Result for the slot at the head of the ring.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Taken {
-    /// Its frame was handed out.
+    /// The frame was returned.
     Frame,
-    /// Its frame was one that this host sent.
+    /// The frame was sent by this host.
     Outgoing,
     /// Its frame is longer than a slot.
     Truncated,
@@ -38,14 +38,14 @@ pub enum Taken {
     Nothing,
 }
 
-/// A frame that passed an interface.
+/// A frame sent or received by an interface.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Seen<'a> {
     /// Whether this host sent it.
     pub outgoing: bool,
-    /// When the kernel saw it, in nanoseconds since 1970.
+    /// Time of the kernel, in nanoseconds since 1970.
     pub unix_time_ns: u64,
-    /// Its length; only a beginning of long frames is at hand.
+    /// Length of the whole frame; long frames are truncated in `bytes`.
     pub length: usize,
     /// The frame.
     pub bytes: &'a [u8],
@@ -61,14 +61,14 @@ pub struct RxRing {
     stamp_unix_ns: u64,
 }
 
-// SAFETY: the mapping belongs to this value alone; nothing about it is bound to a thread.
+// SAFETY: the mapping belongs to this value alone and is not bound to a thread.
 unsafe impl Send for RxRing {}
 
 /// The layout for at least `frames` slots.
 pub fn layout(frames: u32) -> RingRequest {
     // SAFETY: no pointers are passed.
     let page = unsafe { libc::sysconf(libc::_SC_PAGESIZE) };
-    // A block is one page, so that its memory is always found; slots do not cross pages.
+    // A block is one page, so that the kernel can always allocate it; slots do not cross pages.
     let page = usize::try_from(page).unwrap_or(0).max(SLOT);
     let per_block = (page / SLOT) as u32;
     let blocks = frames.clamp(per_block, MAX_SLOTS).div_ceil(per_block);
@@ -85,7 +85,7 @@ impl RxRing {
     pub fn map(fd: libc::c_int, layout: &RingRequest) -> Result<RxRing, i32> {
         let slots = layout.frame_count as usize;
         let (access, flags) = (libc::PROT_READ | libc::PROT_WRITE, libc::MAP_SHARED | libc::MAP_POPULATE);
-        // SAFETY: the kernel chooses the place; nothing that exists is mapped over.
+        // SAFETY: the kernel chooses the address; no existing mapping is replaced.
         let base = unsafe { libc::mmap(std::ptr::null_mut(), slots * SLOT, access, flags, fd, 0) };
         if base == libc::MAP_FAILED {
             return Err(io::Error::last_os_error().raw_os_error().unwrap_or(0));
@@ -99,7 +99,7 @@ impl RxRing {
         self.status().load(Ordering::Acquire) & TP_STATUS_USER != 0
     }
 
-    /// Hands the oldest frame to `take` and gives its slot back to the kernel.
+    /// Passes the oldest frame to `take` and returns its slot to the kernel.
     #[inline]
     pub fn take(&mut self, take: &mut dyn FnMut(&[u8])) -> Taken {
         let mut stamp_unix_ns = self.stamp_unix_ns;
@@ -111,13 +111,13 @@ impl RxRing {
         taken
     }
 
-    /// When the kernel received the frame that was handed out last, in nanoseconds since 1970.
+    /// When the kernel received the last frame returned, in nanoseconds since 1970.
     pub fn stamp_unix_ns(&self) -> u64 {
         self.stamp_unix_ns
     }
 
-    /// As [`RxRing::take`], of all frames, those that this host sent and the beginnings of long ones included; false
-    /// where there is none.
+    /// As [`RxRing::take`], for all frames, including outgoing frames and the beginning of long frames; false if there
+    /// is none.
     pub fn take_seen(&mut self, take: &mut dyn FnMut(Seen<'_>)) -> bool {
         self.take_slot(|status, slot| show(status, slot, take)) != Taken::Nothing
     }
@@ -143,8 +143,8 @@ impl RxRing {
     }
 
     fn status(&self) -> &AtomicU32 {
-        // SAFETY: the status is the first word of the aligned slot and lives as long as the mapping. Our own slice over
-        // the slot in `take` is not used any more when this is called after it.
+        // SAFETY: the status is the first word of the aligned slot and lives as long as the mapping. The slice over the
+        // slot in `take` is no longer used when this is called.
         unsafe { AtomicU32::from_ptr(self.slot().as_ptr().cast()) }
     }
 }
@@ -156,14 +156,14 @@ impl Drop for RxRing {
     }
 }
 
-/// Where things are in a slot.
+/// Offsets in a slot.
 struct Place {
     length: usize,
     start: usize,
     captured: usize,
 }
 
-/// The place of the frame of a slot; `None` where that cannot be one.
+/// The position of the frame in a slot; `None` if the header is invalid.
 fn place(slot: &[u8]) -> Option<Place> {
     let u32_at = |at: usize| u32::from_ne_bytes([slot[at], slot[at + 1], slot[at + 2], slot[at + 3]]);
     let start = usize::from(u16::from_ne_bytes([slot[12], slot[13]]));
@@ -172,7 +172,7 @@ fn place(slot: &[u8]) -> Option<Place> {
     whole.then_some(Place { length, start, captured })
 }
 
-/// Puts a VLAN tag that the kernel took off back; where the frame starts then, and how many bytes longer it is.
+/// Puts back a VLAN tag that the kernel removed. Returns the new start of the frame and the additional bytes.
 fn put_tag_back(status: u32, slot: &mut [u8], start: usize) -> (usize, usize) {
     if status & TP_STATUS_VLAN_VALID == 0 {
         return (start, 0);
@@ -180,20 +180,20 @@ fn put_tag_back(status: u32, slot: &mut [u8], start: usize) -> (usize, usize) {
     let u16_at = |at: usize| u16::from_ne_bytes([slot[at], slot[at + 1]]);
     let (tci, tpid) = (u16_at(24), u16_at(26));
     let tpid = if status & TP_STATUS_VLAN_TPID_VALID == 0 { VLAN } else { tpid };
-    // The addresses move into the gap before them, the tag goes behind them.
+    // The addresses move down into the gap; the tag follows them.
     slot.copy_within(start..start + 12, start - TAG);
     slot[start + 8..start + 10].copy_from_slice(&tpid.to_be_bytes());
     slot[start + 10..start + 12].copy_from_slice(&tci.to_be_bytes());
     (start - TAG, TAG)
 }
 
-/// When the kernel saw the frame of a slot.
+/// When the kernel received or sent the frame of a slot.
 fn stamp(slot: &[u8]) -> u64 {
     let u32_at = |at: usize| u32::from_ne_bytes([slot[at], slot[at + 1], slot[at + 2], slot[at + 3]]);
     u64::from(u32_at(16)) * 1_000_000_000 + u64::from(u32_at(20))
 }
 
-/// Shows whatever the slot that is ours holds.
+/// Passes the content of a slot that this process owns to `take`.
 fn show(status: u32, slot: &mut [u8], take: &mut dyn FnMut(Seen<'_>)) -> Taken {
     let Some(Place { length, start, captured }) = place(slot) else { return Taken::Truncated };
     let unix_time_ns = stamp(slot);
@@ -204,7 +204,7 @@ fn show(status: u32, slot: &mut [u8], take: &mut dyn FnMut(Seen<'_>)) -> Taken {
     Taken::Frame
 }
 
-/// Hands out the frame of a slot that is ours, with its VLAN tag put back if the kernel took it off.
+/// Returns the frame of a slot that this process owns, with its VLAN tag put back if the kernel removed it.
 fn hand_out(status: u32, slot: &mut [u8], take: &mut dyn FnMut(&[u8])) -> Taken {
     if slot[PACKET_TYPE] == PACKET_OUTGOING {
         return Taken::Outgoing;
@@ -241,7 +241,7 @@ mod tests {
     const FRAME: [u8; 18] = [1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 0x88, 0xa4, 0x02, 0x10, 0x07, 0x01];
 
     #[test]
-    fn a_frame_is_handed_out_as_it_came() {
+    fn a_frame_is_returned_unchanged() {
         assert_eq!(handed(TP_STATUS_USER, slot(&FRAME, 0, 0)), (Taken::Frame, FRAME.to_vec()));
     }
 
@@ -259,7 +259,7 @@ mod tests {
     }
 
     #[test]
-    fn a_frame_that_does_not_fit_a_slot_or_is_none_is_not_handed_out() {
+    fn a_truncated_or_invalid_frame_is_not_returned() {
         let mut long = slot(&FRAME, 0, 0);
         long[4..8].copy_from_slice(&9000u32.to_ne_bytes());
         assert_eq!(handed(TP_STATUS_USER, long).0, Taken::Truncated);
@@ -271,7 +271,7 @@ mod tests {
 
     // covers: capture
     #[test]
-    fn whoever_looks_on_sees_sent_frames_times_and_the_beginning_of_long_frames() {
+    fn a_sniffer_sees_sent_frames_times_and_the_beginning_of_long_frames() {
         let mut long = slot(&FRAME, 0xe005, PACKET_OUTGOING);
         long[4..8].copy_from_slice(&9000u32.to_ne_bytes());
         long[16..20].copy_from_slice(&5u32.to_ne_bytes());
@@ -291,7 +291,7 @@ mod tests {
     }
 
     #[test]
-    fn a_ring_has_at_least_the_slots_asked_for_and_a_bound() {
+    fn a_ring_has_at_least_the_requested_slots_and_an_upper_limit() {
         for frames in [0, 1, 3, 64, 65] {
             let layout = layout(frames);
             assert!(layout.frame_count >= frames.max(2));

@@ -1,8 +1,8 @@
-//! Signals that ask a program to end, taken by a thread that waits for them.
+//! Signals that request the end of a program, received by a waiting thread.
 //!
-//! A handler runs in a thread that the kernel chooses, usually the first one of the process. That thread may never run
-//! while another one spins with a real-time priority. So the signals are held back in all threads, and one thread with
-//! a priority above all others waits for them.
+//! A signal handler runs in a thread that the kernel chooses, usually the first thread of the process. That thread may
+//! never run while another thread spins with a real-time priority. Therefore all threads block the signals, and one
+//! thread with a priority above all others waits for them.
 
 use std::fmt;
 use std::mem::zeroed;
@@ -10,22 +10,22 @@ use std::time::Duration;
 
 use crate::monotonic::timespec;
 
-/// A signal that asks for the end.
+/// A signal that requests the end.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Signal {
-    /// The terminal or session is gone.
+    /// The terminal or session has closed.
     Hangup,
     /// Ctrl-C.
     Interrupt,
-    /// The system, or `kill`.
+    /// Sent by the system or by `kill`.
     Terminate,
 }
 
 impl Signal {
-    /// All of them.
+    /// All signals.
     pub const ALL: [Signal; 3] = [Signal::Hangup, Signal::Interrupt, Signal::Terminate];
 
-    /// Its number.
+    /// Signal number.
     pub const fn number(self) -> i32 {
         match self {
             Signal::Hangup => libc::SIGHUP,
@@ -45,13 +45,13 @@ impl fmt::Display for Signal {
     }
 }
 
-/// The signals that are held back.
+/// The blocked signals.
 #[derive(Clone, Copy)]
 pub struct HeldSignals(libc::sigset_t);
 
 impl HeldSignals {
-    /// Holds them back in the calling thread and in those that it starts from now on. SIGHUP is left alone where it is
-    /// ignored, as `nohup` has it.
+    /// Blocks the signals in the calling thread and in the threads that it starts from now on. SIGHUP is left unchanged
+    /// if it is ignored, as under `nohup`.
     pub fn hold() -> HeldSignals {
         // SAFETY: all bytes zero is a valid set and a valid action; the pointers are to live values.
         unsafe {
@@ -69,11 +69,11 @@ impl HeldSignals {
         }
     }
 
-    /// Waits for one of them, up to a time limit.
+    /// Waits for one of the signals, up to a time limit.
     pub fn wait(&self, limit: Duration) -> Option<Signal> {
         let limit = timespec(u64::try_from(limit.as_nanos()).unwrap_or(u64::MAX));
-        // SAFETY: the pointers are to a live set and a live time; what else the kernel knows of the signal is not asked
-        // for.
+        // SAFETY: the pointers refer to a live set and a live time; a null pointer for the signal information is
+        // allowed.
         let number = unsafe { libc::sigtimedwait(&self.0, std::ptr::null_mut(), &limit) };
         Signal::ALL.into_iter().find(|signal| signal.number() == number)
     }
@@ -85,12 +85,12 @@ mod tests {
 
     // covers: signals
     #[test]
-    fn a_signal_that_is_held_back_waits_for_the_thread_that_asks() {
-        // In a thread of its own: the mask of the others stays as it is.
+    fn a_blocked_signal_waits_for_the_thread_that_receives_it() {
+        // In a separate thread: the signal mask of the others stays unchanged.
         let seen = std::thread::spawn(|| {
             let held = HeldSignals::hold();
             assert_eq!(held.wait(Duration::ZERO), None);
-            // SAFETY: the signal is blocked in this thread, which is the one that it is sent to.
+            // SAFETY: this thread blocks the signal and is its target.
             unsafe { libc::pthread_kill(libc::pthread_self(), libc::SIGTERM) };
             (held.wait(Duration::from_secs(5)), held.wait(Duration::ZERO))
         });

@@ -1,37 +1,37 @@
-//! Seeing what passes on a network interface, in both directions, without taking part.
+//! Captures the frames of a network interface in both directions, passively.
 //!
-//! In goes the name of an interface, out come its frames with direction and the kernel's time stamp. A sniffer never
-//! sends; programs that use the interface do not notice it.
+//! Input: the name of an interface. Output: its frames with direction and the kernel's time stamp. A sniffer never
+//! sends and does not disturb programs that use the interface.
 
 use crate::error::LinkError;
 use crate::packet_socket::{PacketOptions, PacketSocket, Passing};
 use crate::pcapng::Direction;
 
-/// Frames that find room while the reader is busy elsewhere: 16 MiB, and a second of frames that come every 100 us.
+/// Slots of the receive ring: 16 MiB, about one second of frames at intervals of 100 us.
 const RING_FRAMES: u32 = 8192;
 
-/// A frame that passed.
+/// A captured frame.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Passed<'a> {
-    /// Received or sent by this host.
+    /// Direction, seen from this host.
     pub direction: Direction,
-    /// When the kernel saw it, in nanoseconds since 1970.
+    /// Time of the kernel, in nanoseconds since 1970.
     pub unix_time_ns: u64,
-    /// Its length without FCS. Of frames beyond 1,982 bytes only the beginning is in `frame`.
+    /// Its length without FCS. Of frames longer than 1,982 bytes, `frame` holds only the beginning.
     pub length: usize,
     /// The frame, with its VLAN tag if it has one.
     pub frame: &'a [u8],
 }
 
-/// Sees one interface.
+/// A capture of one interface.
 #[derive(Debug)]
 pub struct Sniffer {
     socket: PacketSocket,
 }
 
 impl Sniffer {
-    /// Begins to see an interface: EtherCAT frames (EtherType 0x88A4), or all. The interface may be down and come up
-    /// later.
+    /// Begins to capture an interface: EtherCAT frames (EtherType 0x88A4), or all. The interface may be down and come
+    /// up later.
     ///
     /// # Errors
     /// As [`PacketSocket::open`].
@@ -41,7 +41,7 @@ impl Sniffer {
         Ok(Sniffer { socket })
     }
 
-    /// Hands the oldest frame to `take`; false where there is none.
+    /// Passes the oldest frame to `take`; false if there is none.
     pub fn next(&mut self, take: &mut dyn FnMut(Passed<'_>)) -> bool {
         self.socket.look(&mut |seen| {
             let direction = if seen.outgoing { Direction::Out } else { Direction::In };
@@ -54,7 +54,7 @@ impl Sniffer {
         self.socket.counters().overrun
     }
 
-    /// To wait for it with [`crate::wait`].
+    /// The socket, for [`crate::wait`].
     pub fn socket(&self) -> &PacketSocket {
         &self.socket
     }

@@ -1,8 +1,8 @@
 //! TAP interfaces: network interfaces of this host whose other end is this process.
 //!
-//! What the host sends into one is read here as an Ethernet frame, what is written here the host receives. An interface
-//! lasts as long as its value. The host decides when it is switched on, what addresses it has and where it is plugged
-//! in (`ip link set NAME up`, a bridge); without a carrier it sends nothing.
+//! [`TapInterface::receive`] returns the Ethernet frames that the host sends on the interface; the host receives the
+//! frames of [`TapInterface::send`]. An interface exists as long as its value. The administrator of the host switches
+//! it on, assigns addresses and bridges it (`ip link set NAME up`). Without a carrier the host sends nothing.
 //!
 //! Creating one needs CAP_NET_ADMIN; reading and writing do not. Constants are those of `linux/if_tun.h`.
 
@@ -20,37 +20,38 @@ const DEVICE: &CStr = c"/dev/net/tun";
 const TUNSETIFF: libc::c_ulong = 0x4004_54CA;
 const TUNSETCARRIER: libc::c_ulong = 0x4004_54E2;
 const TUNGETIFF: libc::c_ulong = 0x8004_54D2;
-/// Where the bytes of an address begin in `sockaddr`, and what kind it is.
+/// Bytes of a MAC address in `sockaddr`.
 const MAC_LEN: usize = 6;
-/// Frames that the host keeps for us; what is more it drops, so that its connections notice in time.
+/// Length of the host's transmit queue. Further frames are dropped, so that connections of the host notice congestion
+/// in time.
 const QUEUE: libc::c_int = 64;
 
-/// Why there is no interface, in words that say what to do.
+/// Why the interface cannot be created, with advice.
 #[derive(Clone, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum TapError {
-    /// This process may not make network interfaces.
+    /// This process may not create network interfaces.
     Permission {
         /// The interface that was to be made.
         name: String,
     },
-    /// The kernel has no TAP interfaces, or this process does not see them.
+    /// The kernel has no TAP interfaces, or `/dev/net/tun` is not visible to this process.
     NoDevice {
-        /// The kernel's answer.
+        /// The error number of the kernel.
         errno: i32,
     },
-    /// There is an interface of this name, or another program has it open.
+    /// An interface of this name exists, or another program has it open.
     Taken {
         /// The name.
         name: String,
     },
-    /// A system call failed in a way that is not one of the above.
+    /// Another system call error.
     Os {
         /// The interface.
         name: String,
-        /// What was tried.
+        /// The failed operation.
         what: &'static str,
-        /// The kernel's answer.
+        /// The error number of the kernel.
         errno: i32,
     },
 }
@@ -100,13 +101,13 @@ pub struct TapInterface {
 }
 
 impl TapInterface {
-    /// Makes an interface with this name and address, switched off and without a carrier, in the network namespace of
+    /// Creates an interface with this name and address, switched off and without a carrier, in the network namespace of
     /// the calling thread.
     ///
     /// # Errors
     /// A missing permission or device, or a name that is taken.
     pub fn create(name: &str, mac: [u8; MAC_LEN]) -> Result<TapInterface, TapError> {
-        // SAFETY: the path is a string with its end.
+        // SAFETY: the path is a null-terminated string.
         let fd = unsafe { libc::open(DEVICE.as_ptr(), libc::O_RDWR | libc::O_NONBLOCK | libc::O_CLOEXEC) };
         if fd < 0 {
             return Err(match errno() {
@@ -132,13 +133,13 @@ impl TapInterface {
         &self.name
     }
 
-    /// Plugs the cable in or out, so to say. False where the kernel cannot: those before Linux 5.0.
+    /// Sets the carrier of the interface. False if the kernel does not support it (before Linux 5.0).
     pub fn set_carrier(&self, carrier: bool) -> bool {
         let mut value = libc::c_int::from(carrier);
         ioctl(&self.fd, TUNSETCARRIER, &mut value).is_ok()
     }
 
-    /// Whether it still exists: another program may have removed it (`ip link del`).
+    /// Whether it still exists: another program may have deleted it (`ip link del`).
     pub fn exists(&self) -> bool {
         kernel::named(&self.name).is_ok_and(|mut request| ioctl(&self.fd, TUNGETIFF, &mut request).is_ok())
     }
@@ -153,16 +154,16 @@ impl TapInterface {
         ioctl(&self.fd, libc::SIOCSIFHWADDR as _, &mut request)
     }
 
-    /// Shortens the queue, which is a second long else.
+    /// Shortens the transmit queue, which by default holds one second of frames.
     fn set_queue(&self) -> Result<(), i32> {
         let mut request = kernel::named(&self.name)?;
-        // The length is an integer where the MTU is one (`ifr_qlen`, `ifr_mtu`).
+        // The queue length and the MTU are the same integer of the union (`ifr_qlen`, `ifr_mtu`).
         request.ifr_ifru.ifru_mtu = QUEUE;
-        ioctl(&kernel::question_socket()?, libc::SIOCSIFTXQLEN as _, &mut request)
+        ioctl(&kernel::request_socket()?, libc::SIOCSIFTXQLEN as _, &mut request)
     }
 
-    /// Takes the oldest frame that the host sent into the interface; its length, `None` where there is none. What does
-    /// not fit is cut off.
+    /// Takes the oldest frame that the host sent on the interface and returns its length; `None` if there is none. A
+    /// frame longer than `room` is truncated.
     pub fn receive(&self, room: &mut [u8]) -> Option<usize> {
         // SAFETY: pointer and length describe live memory that the kernel writes.
         let count = unsafe { libc::read(self.fd.as_raw_fd(), room.as_mut_ptr().cast(), room.len()) };
@@ -177,14 +178,14 @@ impl TapInterface {
     }
 }
 
-/// Types that requests of TAP descriptors take.
+/// Argument types of requests to TAP descriptors.
 ///
 /// # Safety
-/// Only for what the kernel reads and writes by its full size.
+/// Only for types that the kernel reads and writes in full size.
 unsafe trait Argument {}
-// SAFETY: what TUNSETIFF, TUNGETIFF, SIOCSIFHWADDR and SIOCSIFTXQLEN take.
+// SAFETY: the argument of TUNSETIFF, TUNGETIFF, SIOCSIFHWADDR and SIOCSIFTXQLEN.
 unsafe impl Argument for libc::ifreq {}
-// SAFETY: what TUNSETCARRIER takes.
+// SAFETY: the argument of TUNSETCARRIER.
 unsafe impl Argument for libc::c_int {}
 
 const _: () = assert!(size_of::<libc::c_int>() == 4, "the size is part of the request's number");
@@ -201,7 +202,7 @@ mod tests {
 
     // covers: eoe-interfaces
     #[test]
-    fn what_keeps_an_interface_from_being_made_is_told_with_what_to_do() {
+    fn an_error_of_creating_an_interface_names_the_remedy() {
         let text = TapError::from_errno("eoe0s1", "making it", libc::EPERM).to_string();
         assert!(
             text.starts_with("not permitted to make the network interface eoe0s1") && text.contains("setcap"),

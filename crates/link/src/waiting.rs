@@ -1,8 +1,8 @@
-//! Waiting for a frame or a moment, whichever comes first: asleep, spinning, or first one and then the other.
+//! Waiting for a frame or a time, the earlier of both: sleeping, spinning, or spinning first and then sleeping.
 //!
-//! In go the sockets of a thread and a time, out comes whether a frame is there. Spinning answers within a fraction of
-//! a microsecond and takes a whole processor; sleeping costs tens of microseconds a wake-up; the hybrid spins for as
-//! long as frames usually take to return.
+//! Input: the sockets of a thread and a time. Output: whether a frame has arrived. Spinning responds within a fraction
+//! of a microsecond and occupies a processor; sleeping costs tens of microseconds per wake-up. The hybrid mode spins
+//! for the usual round trip time of frames.
 
 use std::hint::spin_loop;
 
@@ -11,10 +11,10 @@ use crate::monotonic::{now_ns, timespec};
 use crate::packet_socket::PacketSocket;
 use crate::receive_mode::ReceiveMode;
 
-/// At most this many sockets are waited for at once: two classes on two interfaces, and some more for a simulator.
+/// Maximum number of sockets per wait: two classes on two interfaces, and more for a simulator.
 pub const MAX_SOCKETS: usize = 16;
 
-/// Looks at the rings between two looks at the clock; a look at the clock costs about 20 ns.
+/// Checks of the rings between two readings of the clock; reading the clock costs about 20 ns.
 const LOOKS_PER_CLOCK: u32 = 16;
 
 /// Waits until a frame is in one of the rings (true) or the monotonic time has come (false).
@@ -70,11 +70,12 @@ fn sleep(sockets: &[&PacketSocket], until_ns: u64) -> bool {
             return false;
         }
         let timeout = timespec(until_ns - now);
-        // SAFETY: as many places as sockets are passed, all of them live; the signal mask stays as it is.
+        // SAFETY: the pointer refers to as many live entries as sockets are passed; the signal mask stays unchanged.
         unsafe { libc::ppoll(polled.as_mut_ptr(), sockets.len() as libc::nfds_t, &timeout, std::ptr::null()) };
         for (place, socket) in polled.iter().zip(sockets) {
             if place.revents & libc::POLLERR != 0 {
-                // The interface went down. Taking the error off lets the next poll sleep until it is back.
+                // The interface went down. Clearing the error allows the next poll to sleep until the interface is
+                // back.
                 kernel::clear_error(&socket.fd());
             }
         }

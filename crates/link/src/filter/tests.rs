@@ -1,6 +1,6 @@
 use super::*;
 
-/// Runs a program over a frame as the kernel does: how much of it passes.
+/// Runs a program on a frame as the kernel does; returns the number of bytes that pass.
 fn run(program: &[libc::sock_filter], frame: &[u8]) -> u32 {
     let (mut at, mut accumulator) = (0, 0u32);
     loop {
@@ -20,7 +20,7 @@ fn run(program: &[libc::sock_filter], frame: &[u8]) -> u32 {
             JUMP_SET => at += usize::from(if accumulator & k != 0 { jt } else { jf }),
             JUMP => at += k as usize,
             RETURN => return k,
-            other => panic!("instruction {other:#06x} is not known here"),
+            other => panic!("instruction {other:#06x} is not implemented in this test"),
         }
     }
 }
@@ -29,7 +29,7 @@ fn passes(filter: ClassFilter, frame: &[u8]) -> bool {
     let program = program(filter);
     assert!(program.iter().enumerate().all(|(at, i)| at + 1 + usize::from(i.jt.max(i.jf)) <= program.len()));
     let length = run(&program, frame);
-    assert!(length == 0 || length as usize >= frame.len(), "frames pass whole or not at all");
+    assert!(length == 0 || length as usize >= frame.len(), "a frame passes completely or not at all");
     length != 0
 }
 
@@ -62,7 +62,7 @@ fn the_class_bit_of_the_first_idx_decides_which_class_filter_a_frame_passes() {
 }
 
 #[test]
-fn a_frame_with_one_vlan_tag_is_judged_by_the_idx_behind_it() {
+fn a_frame_with_one_vlan_tag_is_filtered_by_the_idx_behind_the_tag() {
     for (idx, acyclic) in [(0x01, false), (0x81, true)] {
         let frame = tagged(ethercat(idx), [0x81, 0x00, 0xe0, 0x05]);
         assert!(passes(ClassFilter::All, &frame));

@@ -1,8 +1,7 @@
-//! Which bridge or bond an interface is a member of, and where the other end of a veth pair is, asked of the kernel
-//! through netlink.
+//! The bridge or bond that an interface is a member of, and the other end of a veth pair, read through netlink.
 //!
-//! In go the index of an interface, out come its controller, its kind and its other end. `/sys` would tell too, but is
-//! tied to the namespace that it was mounted in.
+//! Input: the index of an interface. Output: its controller, its kind and its other end. `/sys` is no alternative: it
+//! is bound to the namespace in which it was mounted.
 
 use std::os::fd::AsRawFd;
 
@@ -10,23 +9,23 @@ use crate::kernel;
 
 const REQUEST_LENGTH: usize = 32;
 const HEADER_LENGTH: usize = 16;
-/// Header and `ifinfomsg`: where the attributes start.
+/// Header and `ifinfomsg`: offset of the attributes.
 const ATTRIBUTES: usize = 32;
-/// Answers are around 2 KiB; an interface with many virtual functions has longer ones, whose end is not needed.
+/// A response has about 2 KiB. It is longer for an interface with many virtual functions; that part is not needed.
 const ANSWER_LENGTH: usize = 32_768;
 
-/// What an interface belongs to.
+/// What the interface belongs to.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Membership {
     /// Index of the bridge or bond.
     pub controller: Option<u32>,
-    /// What the interface itself is: "bridge", "bond", "veth"; empty for a plain one.
+    /// Kind of the interface: "bridge", "bond", "veth"; empty for a plain interface.
     pub kind: String,
-    /// Index of the other end of a pair (veth), where that is in the same namespace.
+    /// Index of the other end of a veth pair, if it is in the same namespace.
     pub peer: Option<u32>,
 }
 
-/// Asks about one interface; None where the kernel does not answer.
+/// Reads the membership of one interface; None if the kernel does not respond.
 pub fn membership(index: u32) -> Option<Membership> {
     let socket = kernel::socket(libc::AF_NETLINK, libc::SOCK_RAW, libc::NETLINK_ROUTE).ok()?;
     let fd = socket.as_raw_fd();
@@ -76,7 +75,7 @@ fn parse(answer: &[u8]) -> Option<Membership> {
     Some(membership)
 }
 
-/// Kind and value of each attribute; ends at the first that is cut short.
+/// Kind and value of each attribute; ends at the first truncated attribute.
 fn attributes(mut bytes: &[u8]) -> impl Iterator<Item = (u16, &[u8])> {
     std::iter::from_fn(move || {
         let length = usize::from(u16::from_ne_bytes(bytes.get(..2)?.try_into().ok()?));
@@ -115,7 +114,7 @@ mod tests {
     }
 
     #[test]
-    fn the_other_end_of_a_pair_is_told_where_it_is_in_the_same_namespace() {
+    fn the_other_end_of_a_pair_is_found_in_the_same_namespace() {
         let empty = || answer()[..ATTRIBUTES].to_vec();
         let mut pair = empty();
         pair.extend(attribute(libc::IFLA_LINK, &9u32.to_ne_bytes()));
@@ -126,11 +125,15 @@ mod tests {
         let mut above = empty();
         above.extend(attribute(libc::IFLA_LINK, &9u32.to_ne_bytes()));
         above.extend(attribute(libc::IFLA_LINKINFO, &attribute(libc::IFLA_INFO_KIND, b"macvlan\0")));
-        assert_eq!(parse(&above).expect("an answer").peer, None, "it lies on top of the other one");
+        assert_eq!(
+            parse(&above).expect("an answer").peer,
+            None,
+            "the interface is stacked on the other one, not its peer"
+        );
     }
 
     #[test]
-    fn answers_cut_short_anywhere_do_no_harm() {
+    fn truncated_responses_do_not_panic() {
         let answer = answer();
         for length in 0..answer.len() {
             let _ = parse(&answer[..length]);

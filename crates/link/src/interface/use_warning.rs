@@ -1,7 +1,7 @@
 //! Other users of an interface that EtherCAT needs exclusively.
 //!
-//! In goes a name, out come [`UseWarning`]s whose text says what to do. Each is a warning: a machine may be set up so
-//! on purpose, and a test bench often is.
+//! Input: a name. Output: [`UseWarning`]s whose texts contain advice. They are warnings only: some machines and many
+//! test benches use an interface so on purpose.
 
 use std::collections::HashSet;
 use std::ffi::CStr;
@@ -12,18 +12,18 @@ use std::net::{IpAddr, Ipv4Addr, Ipv6Addr};
 use super::netlink;
 use crate::filter::ETHERCAT;
 
-/// A use of the interface beside ours.
+/// Another use of the interface.
 #[derive(Clone, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum UseWarning {
-    /// The host speaks IP on it.
+    /// The interface has an IP address of the host.
     Address {
         /// The interface.
         interface: String,
         /// One of its addresses.
         address: IpAddr,
     },
-    /// It is a member of a bridge or bond, which takes or sends frames of its own.
+    /// The interface is a member of a bridge or bond, which takes or sends frames.
     Member {
         /// The interface.
         interface: String,
@@ -32,23 +32,24 @@ pub enum UseWarning {
         /// "bridge", "bond", ...
         kind: String,
     },
-    /// Another socket receives EtherCAT frames on it: another MainDevice, or another of this program.
+    /// Another socket receives EtherCAT frames on the interface: another MainDevice or another instance of this
+    /// program.
     Socket {
         /// The interface.
         interface: String,
-        /// Process and its name, where this user may know.
+        /// Process and its name, if this user may read them.
         owner: Option<(u32, String)>,
     },
-    /// The modules of a MainDevice inside the kernel are loaded.
+    /// Kernel modules of a MainDevice are loaded.
     KernelModule {
         /// The module.
         module: String,
     },
-    /// Its MTU is too small for a whole EtherCAT frame.
+    /// The MTU is too small for an EtherCAT frame of full length.
     SmallMtu {
         /// The interface.
         interface: String,
-        /// What it is.
+        /// The MTU.
         mtu: u32,
     },
 }
@@ -122,7 +123,7 @@ fn read(path: &str) -> String {
 fn addresses(name: &str) -> Vec<IpAddr> {
     let mut found = Vec::new();
     let mut list: *mut libc::ifaddrs = std::ptr::null_mut();
-    // SAFETY: the pointer is to a live place for the list.
+    // SAFETY: the pointer refers to a live variable for the list.
     if unsafe { libc::getifaddrs(&mut list) } != 0 {
         return found;
     }
@@ -130,7 +131,7 @@ fn addresses(name: &str) -> Vec<IpAddr> {
     while !at.is_null() {
         // SAFETY: an entry of the list that getifaddrs returned and that is not freed yet.
         let entry = unsafe { &*at };
-        // SAFETY: names in the list are strings with their end.
+        // SAFETY: names in the list are null-terminated strings.
         if unsafe { CStr::from_ptr(entry.ifa_name) }.to_bytes() == name.as_bytes() {
             found.extend(address(entry.ifa_addr));
         }
@@ -145,7 +146,7 @@ fn address(address: *const libc::sockaddr) -> Option<IpAddr> {
     if address.is_null() {
         return None;
     }
-    // SAFETY: getifaddrs gives addresses of the size that their family says, aligned for any of them.
+    // SAFETY: getifaddrs returns addresses of the size of their family, aligned for every family.
     unsafe {
         match libc::c_int::from((*address).sa_family) {
             libc::AF_INET => {
@@ -172,7 +173,7 @@ fn member(name: &str, index: u32) -> Option<UseWarning> {
     })
 }
 
-/// Packet sockets for EtherCAT on this interface that are not of this process, one warning per process.
+/// Packet sockets for EtherCAT on this interface that belong to other processes, one warning per process.
 fn sockets(name: &str, index: u32) -> Vec<UseWarning> {
     let inodes = bound_inodes(&read("/proc/thread-self/net/packet"), index);
     if inodes.is_empty() {
@@ -201,7 +202,7 @@ fn bound_inodes(table: &str, index: u32) -> Vec<u64> {
     table.lines().skip(1).filter_map(inode).collect()
 }
 
-/// The process that has this socket open, as far as this user may look.
+/// The process that has this socket open, if this user may read it.
 fn owner(inode: u64) -> Option<(u32, String)> {
     for entry in fs::read_dir("/proc").ok()?.flatten() {
         let name = entry.file_name().to_string_lossy().into_owned();
@@ -222,7 +223,7 @@ fn socket_inodes(process: &str) -> impl Iterator<Item = u64> + use<> {
     })
 }
 
-/// Modules of EtherCAT MainDevices among the loaded ones.
+/// Loaded kernel modules of EtherCAT MainDevices.
 fn kernel_modules(table: &str) -> impl Iterator<Item = String> + use<'_> {
     let name = |line: &'_ str| line.split_whitespace().next().map(str::to_owned);
     table.lines().filter_map(name).filter(|name| name == "ec_master")
@@ -259,7 +260,7 @@ mod tests {
     }
 
     #[test]
-    fn each_warning_says_what_to_do() {
+    fn each_warning_contains_advice() {
         let interface = "eth1".to_owned();
         let address = |address: &str| UseWarning::Address {
             interface: interface.clone(),

@@ -1,9 +1,11 @@
 use super::*;
 
 #[test]
-fn a_capture_of_one_frame_is_these_bytes() {
-    let mut writer = Writer::new(Vec::new(), &[("eth0", "main")]).expect("memory takes all");
-    writer.frame(0, Direction::Out, 0x0123_4567_89ab_cdef, &[0xaa, 0xbb, 0xcc, 0xdd, 0xee]).expect("memory takes all");
+fn a_capture_of_one_frame_has_the_expected_bytes() {
+    let mut writer = Writer::new(Vec::new(), &[("eth0", "main")]).expect("writing to memory succeeds");
+    writer
+        .frame(0, Direction::Out, 0x0123_4567_89ab_cdef, &[0xaa, 0xbb, 0xcc, 0xdd, 0xee])
+        .expect("writing to memory succeeds");
     #[rustfmt::skip]
     let expected = [
         // Section header: length 44, byte order, version 1.0, open length, application.
@@ -23,12 +25,12 @@ fn a_capture_of_one_frame_is_these_bytes() {
 }
 
 #[test]
-fn statistics_and_the_beginning_of_a_long_frame_are_these_bytes() {
-    let mut writer = Writer::new(Vec::new(), &[("a", "")]).expect("memory takes all");
+fn statistics_and_the_beginning_of_a_long_frame_have_the_expected_bytes() {
+    let mut writer = Writer::new(Vec::new(), &[("a", "")]).expect("writing to memory succeeds");
     let before = writer.out.len();
-    writer.beginning(0, Direction::In, 1 << 32, &[0xaa; 4], 9000).expect("memory takes all");
+    writer.beginning(0, Direction::In, 1 << 32, &[0xaa; 4], 9000).expect("writing to memory succeeds");
     let statistics = Statistics { seen: 7, dropped: 2, dropped_by_kernel: 0x0102 };
-    writer.statistics(0, 5, statistics).expect("memory takes all");
+    writer.statistics(0, 5, statistics).expect("writing to memory succeeds");
     #[rustfmt::skip]
     let expected = [
         // Packet: length 48, interface 0, time, 4 bytes of 9000, inbound.
@@ -58,7 +60,7 @@ fn blocks(mut bytes: &[u8]) -> Vec<(u32, Vec<u8>)> {
 
 #[test]
 fn frames_of_two_interfaces_are_read_back_with_length_direction_and_time() {
-    let mut writer = Writer::new(Vec::new(), &[("a", ""), ("bc", "red")]).expect("memory takes all");
+    let mut writer = Writer::new(Vec::new(), &[("a", ""), ("bc", "red")]).expect("writing to memory succeeds");
     let frames: Vec<(usize, Direction, u64, Vec<u8>)> = (0..70u8)
         .map(|i| {
             let direction = if i % 3 == 0 { Direction::In } else { Direction::Out };
@@ -66,7 +68,7 @@ fn frames_of_two_interfaces_are_read_back_with_length_direction_and_time() {
         })
         .collect();
     for (interface, direction, time, frame) in &frames {
-        writer.frame(*interface, *direction, *time, frame).expect("memory takes all");
+        writer.frame(*interface, *direction, *time, frame).expect("writing to memory succeeds");
     }
     let blocks = blocks(&writer.into_inner());
     let kinds: Vec<u32> = blocks.iter().map(|(kind, _)| *kind).take(4).collect();
@@ -86,8 +88,8 @@ fn frames_of_two_interfaces_are_read_back_with_length_direction_and_time() {
 }
 
 #[test]
-fn a_frame_of_an_interface_that_was_not_announced_is_refused() {
-    let mut writer = Writer::new(Vec::new(), &[("a", "")]).expect("memory takes all");
+fn a_frame_of_an_interface_that_was_not_declared_is_refused() {
+    let mut writer = Writer::new(Vec::new(), &[("a", "")]).expect("writing to memory succeeds");
     let error = writer.frame(1, Direction::In, 0, &[]).expect_err("there is no interface 1");
     assert_eq!(error.kind(), io::ErrorKind::InvalidInput);
 }

@@ -1,9 +1,9 @@
-//! Frames on their way from the thread that sees them to the one that writes them: a bounded queue of bytes with one
+//! The queue between the thread that receives or sends frames and the writing thread: a bounded queue of bytes with one
 //! producer and one consumer.
 //!
-//! In go frames with interface, direction and time, out come the same in the same order. Without locks and without
-//! `unsafe`: the memory is words that are atomics. The producer neither waits nor allocates nor calls the kernel;
-//! frames that find the queue full are counted per interface.
+//! Input: frames with interface, direction and time. Output: the same frames in the same order. It uses no locks and no
+//! `unsafe`: the memory consists of atomic words. The producer does not wait, allocate or call the kernel. Frames that
+//! do not fit are counted per interface.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -14,33 +14,33 @@ use crate::pcapng::Direction;
 const WORD: usize = size_of::<u64>();
 /// Words in front of a frame: interface, direction and lengths; time.
 const HEAD: usize = 2;
-/// Longer frames are cut: more than a jumbo frame has.
+/// Longer frames are truncated; jumbo frames are shorter.
 pub const LONGEST: usize = 0xFFFF;
-/// What the memory is filled with, so that all of it is there before it is used.
+/// Initial value of the memory: writing it makes the kernel map all pages before use.
 const FILLING: u64 = u64::MAX;
 
-/// What comes with a frame.
+/// Properties of a frame.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Note {
-    /// Place of the interface among those of the capture, at most 255.
+    /// Position of the interface in the list of the capture, at most 255.
     pub interface: usize,
-    /// Which way it went.
+    /// Direction.
     pub direction: Direction,
-    /// When.
+    /// Time.
     pub time_ns: u64,
-    /// Bytes of the whole frame, of which only the beginning may be in the queue.
+    /// Length of the whole frame; the queue may hold only its beginning.
     pub length: usize,
 }
 
 #[derive(Debug)]
 struct Shared {
-    /// A power of two of them; counts of words, modulo that, are places.
+    /// The length is a power of two; a count of words modulo the length is a position.
     words: Box<[AtomicU64]>,
     /// Words written so far; only the producer stores it.
     written: AtomicU64,
     /// Words read so far; only the consumer stores it.
     read: AtomicU64,
-    /// Frames that found the queue full, by interface.
+    /// Frames that did not fit, by interface.
     lost: Box<[AtomicU64]>,
 }
 
@@ -55,7 +55,7 @@ impl Shared {
 pub struct Producer {
     shared: Arc<Shared>,
     written: u64,
-    /// What is known of the consumer's count; it may be further by now.
+    /// Last known count of the consumer; the current count may be higher.
     read: u64,
 }
 
@@ -66,7 +66,7 @@ pub struct Consumer {
     read: u64,
 }
 
-/// A queue of `bytes`, rounded up to a power of two, for frames of this number of interfaces.
+/// A queue of `bytes`, rounded up to a power of two, for this number of interfaces.
 pub fn queue(bytes: usize, interfaces: usize) -> (Producer, Consumer) {
     let words = bytes.div_ceil(WORD).clamp(2 * HEAD, 1 << 28).next_power_of_two();
     let shared = Arc::new(Shared {
@@ -90,7 +90,7 @@ impl Producer {
         }
         if room(self.read) < needed {
             if let Some(lost) = shared.lost.get(note.interface) {
-                // Only this thread writes it.
+                // Only this thread writes the counter.
                 lost.store(lost.load(Ordering::Relaxed) + 1, Ordering::Relaxed);
             }
             return false;
@@ -123,22 +123,22 @@ impl Producer {
 }
 
 impl Consumer {
-    /// How far the producer is now, to be compared with [`Consumer::is_before`].
+    /// The producer's current position, for [`Consumer::is_before`].
     pub fn end(&self) -> u64 {
         self.shared.written.load(Ordering::Acquire)
     }
 
-    /// Whether a frame waits that was there when [`Consumer::end`] said this.
+    /// Whether a frame waits that was added before `end`, a result of [`Consumer::end`].
     pub fn is_before(&self, end: u64) -> bool {
         self.read < end
     }
 
-    /// When the oldest frame passed, if there is one before `end`.
+    /// Time of the oldest frame, if it is before `end`.
     pub fn oldest(&self, end: u64) -> Option<u64> {
         self.is_before(end).then(|| self.shared.word(self.read + 1).load(Ordering::Relaxed))
     }
 
-    /// Takes the oldest frame before `end`; its bytes replace what was in `frame`.
+    /// Removes the oldest frame before `end`; its bytes replace the content of `frame`.
     pub fn pop(&mut self, end: u64, frame: &mut Vec<u8>) -> Option<Note> {
         let time_ns = self.oldest(end)?;
         let head = self.shared.word(self.read).load(Ordering::Relaxed);
@@ -156,7 +156,7 @@ impl Consumer {
         Some(Note { interface: (head >> 24) as usize & 0xFF, direction, time_ns, length: (head >> 32) as usize })
     }
 
-    /// Frames of an interface that found the queue full.
+    /// Frames of an interface that did not fit.
     pub fn lost(&self, interface: usize) -> u64 {
         self.shared.lost.get(interface).map_or(0, |lost| lost.load(Ordering::Relaxed))
     }
@@ -176,7 +176,7 @@ mod tests {
     }
 
     #[test]
-    fn frames_of_every_length_come_out_as_they_went_in_however_often_the_queue_wraps() {
+    fn frames_of_every_length_pass_unchanged_while_the_queue_wraps() {
         let (mut producer, mut consumer) = queue(8192, 2);
         let mut taken = Vec::new();
         for number in 0..5000 {
@@ -190,7 +190,7 @@ mod tests {
     }
 
     #[test]
-    fn a_frame_that_finds_the_queue_full_is_counted_and_the_others_stay() {
+    fn a_frame_for_a_full_queue_is_counted_and_the_others_are_kept() {
         let (mut producer, mut consumer) = queue(256, 2);
         let ones = Note { interface: 1, ..note(1) };
         let pushed = (0..5).filter(|_| producer.push(ones, &[7; 64])).count();
@@ -198,7 +198,7 @@ mod tests {
         let mut taken = Vec::new();
         let end = consumer.end();
         assert!(consumer.pop(end, &mut taken).is_some());
-        assert!(producer.push(ones, &[8; 64]), "there is room again");
+        assert!(producer.push(ones, &[8; 64]), "the queue has room again");
         assert!(!producer.push(ones, &[9; 4096]), "longer than the whole queue");
         let end = consumer.end();
         let rest: Vec<u8> = std::iter::from_fn(|| consumer.pop(end, &mut taken).map(|_| taken[0])).collect();
@@ -207,7 +207,7 @@ mod tests {
 
     // covers: capture
     #[test]
-    fn two_threads_at_once_lose_nothing_but_what_is_counted() {
+    fn two_threads_lose_only_counted_frames() {
         const FRAMES: u64 = 20_000;
         let (mut producer, mut consumer) = queue(16_384, 2);
         let writer = std::thread::spawn(move || (0..FRAMES).filter(|n| producer.push(note(*n), &frame(*n))).count());

@@ -26,7 +26,7 @@ fn word(bytes: &[u8], at: usize) -> u32 {
 
 /// Kind and body of each block of a file.
 fn blocks(path: &Path) -> Vec<(u32, Vec<u8>)> {
-    blocks_of(&fs::read(path).expect("the capture is there"))
+    blocks_of(&fs::read(path).expect("the capture exists"))
 }
 
 fn blocks_of(mut rest: &[u8]) -> Vec<(u32, Vec<u8>)> {
@@ -64,25 +64,25 @@ fn frames_of_two_threads_are_in_one_file_in_the_order_of_time() {
             (producer, (consumer, 0))
         })
         .unzip();
-    let writer = Writer::new(Vec::new(), &[("a", ""), ("b", "")]).expect("memory takes all");
+    let writer = Writer::new(Vec::new(), &[("a", ""), ("b", "")]).expect("writing to memory succeeds");
     let recorded = vec![Recorded::default(); 2];
-    let mut scribe = Scribe { writer, shared, queues, frame: Vec::new(), recorded };
+    let mut scribe = WritingThread { writer, shared, queues, frame: Vec::new(), recorded };
     let mut put = |thread: usize, time_ns: u64| {
         let note = Note { interface: thread, direction: Direction::Out, time_ns, length: 60 };
         assert!(producers[thread].push(note, &[time_ns as u8; 60]));
     };
-    let written = |scribe: &Scribe<Vec<u8>>| scribe.recorded[0].sent + scribe.recorded[1].sent;
+    let written = |scribe: &WritingThread<Vec<u8>>| scribe.recorded[0].sent + scribe.recorded[1].sent;
     put(0, 10);
     put(0, 30);
-    scribe.empty(false, true).expect("memory takes all");
-    assert_eq!(written(&scribe), 0, "another thread may still come with an older frame");
-    // It was stopped between its look at the clock and the queue.
+    scribe.empty(false, true).expect("writing to memory succeeds");
+    assert_eq!(written(&scribe), 0, "another thread may still add an older frame");
+    // The thread was preempted between reading the clock and writing to the queue.
     put(1, 20);
     put(1, 40);
-    scribe.empty(false, true).expect("memory takes all");
+    scribe.empty(false, true).expect("writing to memory succeeds");
     assert_eq!(written(&scribe), 3);
     put(0, 35);
-    scribe.empty(true, true).expect("memory takes all");
+    scribe.empty(true, true).expect("writing to memory succeeds");
     let frames = frames(&blocks_of(&scribe.writer.into_inner()));
     assert_eq!(frames, [(0, 10, 10), (1, 20, 20), (0, 30, 30), (0, 35, 35), (1, 40, 40)]);
 }
@@ -98,7 +98,7 @@ fn frames_of_two_threads_at_once_are_all_in_the_file() {
             scope.spawn(move || (0..3000).for_each(|step| tap.record(number, direction, step, &[step as u8; 60])));
         }
     });
-    let recorded = recorder.finish().expect("it was written");
+    let recorded = recorder.finish().expect("the capture is written");
     assert_eq!(recorded[0], Recorded { sent: 3000, ..Recorded::default() });
     assert_eq!(recorded[1], Recorded { received: 3000, ..Recorded::default() });
     let frames = frames(&blocks(&scratch.0));
@@ -110,7 +110,7 @@ fn frames_of_two_threads_at_once_are_all_in_the_file() {
 
 // covers: capture
 #[test]
-fn frames_that_find_the_queue_full_are_told_in_the_statistics() {
+fn frames_lost_to_a_full_queue_are_in_the_statistics() {
     let scratch = Scratch::new();
     let recorder = Recorder::start(&scratch.0, &[("a", ""), ("b", "")]).expect("a file");
     let mut tap = recorder.tap_with(1024);
@@ -118,7 +118,7 @@ fn frames_that_find_the_queue_full_are_told_in_the_statistics() {
         tap.record(1, Direction::Out, 7, &vec![0xEE; length]);
     }
     recorder.set_lost_by_kernel(0, 5);
-    let recorded = recorder.finish().expect("it was written");
+    let recorded = recorder.finish().expect("the capture is written");
     assert_eq!(recorded[0], Recorded { lost_by_kernel: 5, ..Recorded::default() });
     assert_eq!(recorded[1], Recorded { sent: 3, lost: 2, ..Recorded::default() });
     let blocks = blocks(&scratch.0);
@@ -137,7 +137,7 @@ fn frames_that_find_the_queue_full_are_told_in_the_statistics() {
 }
 
 #[test]
-fn times_of_another_clock_become_unix_time_and_all_taps_have_the_same() {
+fn times_of_another_clock_become_unix_time_for_all_taps() {
     let scratch = Scratch::new();
     let recorder = Recorder::start(&scratch.0, &[("a", "")]).expect("a file");
     let mut taps = [recorder.tap(), recorder.tap()];
@@ -146,7 +146,7 @@ fn times_of_another_clock_become_unix_time_and_all_taps_have_the_same() {
         tap.set_clock(1000);
         tap.record(0, Direction::In, 1500, &[1; 60]);
     }
-    recorder.finish().expect("it was written");
+    recorder.finish().expect("the capture is written");
     let frames = frames(&blocks(&scratch.0));
     assert_eq!(frames[0], frames[1]);
     let since = frames[0].1 - before;
@@ -162,13 +162,13 @@ fn a_capture_is_complete_when_its_recorder_is_dropped() {
     drop(recorder);
     let kinds: Vec<u32> = blocks(&scratch.0).iter().map(|(kind, _)| *kind).collect();
     assert_eq!(kinds, [0x0A0D_0D0A, 1, 6, 5]);
-    // The writer has ended, and no producer is blocked by that.
+    // The writing thread has ended; this must not block a producer.
     tap.record(0, Direction::In, 0, &[1; 60]);
 }
 
 // covers: capture
 #[test]
-fn a_file_that_cannot_be_written_is_named_with_what_to_do() {
+fn an_error_of_writing_names_the_file_and_the_remedy() {
     let start = |path: &str| Recorder::start(Path::new(path), &[("a", "")]).expect_err("no file").to_string();
     let missing = start("/nowhere/at/all.pcapng");
     assert!(missing.contains("/nowhere/at/all.pcapng") && missing.ends_with("make its directory first"), "{missing}");

@@ -1,7 +1,7 @@
-//! Two network namespaces with an Ethernet cable between them, made for one test and removed after it.
+//! Two network namespaces with an Ethernet cable between them, created for one test and removed after it.
 //!
-//! In goes nothing; out comes a [`Bench`], or None with a printed line where this user may not make one. The names
-//! carry the process id, and the two ends have different interface indices.
+//! Output: a [`Bench`], or None with a printed line if this user may not create one. The names contain the process id,
+//! and the two ends have different interface indices.
 
 use std::ffi::OsStr;
 use std::fs::{self, File};
@@ -34,13 +34,13 @@ impl Namespace {
         ip(&["netns", "add", &name])?;
         let namespace = Namespace { name };
         namespace.run(|| {
-            // Frames of the host's own, as for the discovery of neighbours, would only be noise.
+            // Frames of the host itself, such as neighbour discovery, would disturb the tests.
             let _ = fs::write("/proc/sys/net/ipv6/conf/default/disable_ipv6", "1");
         });
         Ok(namespace)
     }
 
-    /// Runs something in a thread that is in this namespace. Sockets opened there stay in it.
+    /// Runs `job` in a thread in this namespace. Sockets opened there stay in it.
     pub fn run<T: Send>(&self, job: impl FnOnce() -> T + Send) -> T {
         let inside = || {
             let path = format!("/var/run/netns/{}", self.name);
@@ -53,20 +53,20 @@ impl Namespace {
         thread::scope(|scope| scope.spawn(inside).join().unwrap_or_else(|panic| std::panic::resume_unwind(panic)))
     }
 
-    /// `ip` in this namespace.
+    /// Runs `ip` in this namespace.
     pub fn ip(&self, arguments: &[&str]) {
         let mut all = vec!["-n", &self.name];
         all.extend(arguments);
-        ip(&all).expect("ip in a namespace of ours");
+        ip(&all).expect("ip in our namespace");
     }
 
-    /// What `ip` says in this namespace.
+    /// Output of `ip` in this namespace.
     pub fn ask_ip(&self, arguments: &[&str]) -> String {
         let output = Command::new("ip").args(["-n", &self.name]).args(arguments).output().expect("ip has run before");
         String::from_utf8_lossy(&output.stdout).into_owned()
     }
 
-    /// A program in this namespace.
+    /// A program to run in this namespace.
     pub fn command(&self, program: impl AsRef<OsStr>) -> Command {
         let mut command = Command::new("ip");
         command.args(["netns", "exec", &self.name]).arg(program);
@@ -76,7 +76,7 @@ impl Namespace {
 
 impl Drop for Namespace {
     fn drop(&mut self) {
-        // Takes its interfaces along. A failure here must not hide the one that may have led here.
+        // Also removes its interfaces. A failure here must not hide the failure that caused the drop.
         if let Err(error) = ip(&["netns", "delete", &self.name]) {
             eprintln!("{error}");
         }
@@ -97,7 +97,7 @@ pub struct Bench {
 }
 
 impl Bench {
-    /// Makes one; None, with a printed line, where that is not possible here.
+    /// Creates a bench; None, with a printed line, if that is not possible here.
     pub fn make() -> Option<Bench> {
         if std::env::var("RINGCAT_ON_THE_WIRE").as_deref() != Ok("1") {
             println!("skipped: RINGCAT_ON_THE_WIRE=1 runs it");
@@ -108,7 +108,7 @@ impl Bench {
             println!("skipped: needs root");
             return None;
         }
-        // A test that failed has removed what it made all the same.
+        // A failed test has removed its namespaces too.
         let turn = TURN.lock().unwrap_or_else(PoisonError::into_inner);
         let name = |end: &str| format!("rc-link-{}-{}-{end}", id(), COUNT.fetch_add(1, Ordering::Relaxed));
         match Namespace::make(name("near")).and_then(|near| Ok((near, Namespace::make(name("far"))?))) {
@@ -124,7 +124,7 @@ impl Bench {
         }
     }
 
-    /// Makes the cable and both interfaces.
+    /// Creates the cable and both interfaces.
     pub fn plug(&self) {
         let (near, far) = (NEAR_INDEX.to_string(), FAR_INDEX.to_string());
         let near_end = ["link", "add", "near", "index", &near, "netns", &self.near.name, "type", "veth"];
@@ -159,10 +159,10 @@ pub fn ethercat(idx: u8, number: u16) -> Vec<u8> {
     frame
 }
 
-/// How long a frame may take that the kernel puts off under load.
+/// Longest delay of a frame that the kernel postpones under load.
 const LATE_NS: u64 = 2_000_000_000;
 
-/// Waits for this many frames, and takes those that are there beyond them too.
+/// Waits for this many frames; also takes further frames that are available.
 pub fn take(socket: &mut PacketSocket, count: usize) -> Vec<Vec<u8>> {
     let (mut frames, until) = (Vec::new(), now_ns() + LATE_NS);
     while frames.len() < count && wait(&[socket], until, ReceiveMode::Blocking) {

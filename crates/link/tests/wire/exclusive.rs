@@ -20,7 +20,7 @@ fn an_interface_for_ethercat_alone_gives_no_warning_even_with_our_own_sockets() 
 }
 
 #[test]
-fn addresses_and_a_small_mtu_are_told() {
+fn addresses_and_a_small_mtu_cause_warnings() {
     let Some(bench) = Bench::make() else { return };
     bench.near.ip(&["address", "add", "192.0.2.7/24", "dev", "near"]);
     let address = UseWarning::Address { interface: "near".to_owned(), address: [192, 0, 2, 7].into() };
@@ -31,7 +31,7 @@ fn addresses_and_a_small_mtu_are_told() {
 }
 
 #[test]
-fn a_bridge_is_told_by_name() {
+fn a_bridge_warning_contains_the_name_of_the_bridge() {
     let Some(bench) = Bench::make() else { return };
     bench.near.ip(&["link", "add", "bridge7", "type", "bridge"]);
     bench.near.ip(&["link", "set", "near", "master", "bridge7"]);
@@ -43,11 +43,11 @@ fn a_bridge_is_told_by_name() {
     assert_eq!(warnings(&bench), [expected]);
 }
 
-/// Says to the test below, which runs in another process, that it is the one that holds the socket.
+/// Set for the test below when it runs in another process to hold the socket.
 const HOLD: &str = "RINGCAT_LINK_TEST_HOLDS_A_SOCKET";
 
 #[test]
-fn a_socket_of_another_process_is_told_with_the_process() {
+fn a_socket_of_another_process_causes_a_warning_with_the_process() {
     if std::env::var_os(HOLD).is_some() {
         let _socket = PacketSocket::open("near", &PacketOptions::default()).expect("a socket");
         println!("\nready");
@@ -55,7 +55,7 @@ fn a_socket_of_another_process_is_told_with_the_process() {
         return;
     }
     let Some(bench) = Bench::make() else { return };
-    let this = "exclusive::a_socket_of_another_process_is_told_with_the_process";
+    let this = "exclusive::a_socket_of_another_process_causes_a_warning_with_the_process";
     let mut other = bench
         .near
         .command(std::env::current_exe().expect("this program"))
@@ -66,13 +66,13 @@ fn a_socket_of_another_process_is_told_with_the_process() {
         .spawn()
         .expect("this program once more");
     let output = other.stdout.take().expect("piped");
-    // Kept until the other has ended: what it prints needs a reader.
+    // Kept until the other process has ended: its output needs a reader.
     let mut lines = BufReader::new(output).lines().map_while(Result::ok);
     let ready = lines.any(|line| line == "ready");
-    let told = warnings(&bench);
+    let warnings_found = warnings(&bench);
     drop(other.stdin.take());
     assert!(ready && other.wait().expect("a process of ours").success());
-    match &told[..] {
+    match &warnings_found[..] {
         [UseWarning::Socket { interface, owner: Some((process, _)) }] => {
             assert_eq!((interface.as_str(), *process), ("near", other.id()));
         }

@@ -1,4 +1,4 @@
-//! Cables that are cut, interfaces that go down, come back or vanish.
+//! Cables that are cut, interfaces that go down, come back or disappear.
 
 use std::thread;
 use std::time::{Duration, Instant};
@@ -9,7 +9,7 @@ use ringcat_link::{CarrierWatch, ClassFilter, PacketOptions, ReceiveMode, interf
 use crate::bench::{Bench, class, ethercat, take};
 
 #[test]
-fn an_interface_that_goes_down_costs_the_frames_sent_meanwhile_and_no_more() {
+fn an_interface_that_goes_down_loses_only_the_frames_sent_meanwhile() {
     let Some(bench) = Bench::make() else { return };
     let mut far = bench.far_socket();
     let mut near = bench.near_socket(class(ClassFilter::All));
@@ -50,7 +50,7 @@ fn a_socket_opened_on_an_interface_that_is_down_works_once_it_is_up() {
 }
 
 #[test]
-fn an_interface_that_vanishes_is_survived() {
+fn an_interface_that_disappears_has_no_carrier_and_sends_nothing() {
     let Some(bench) = Bench::make() else { return };
     let mut near = bench.near_socket(PacketOptions::default());
     let watch = bench.near.run(|| CarrierWatch::start(&["near"], CarrierWatch::PERIOD)).expect("a watch");
@@ -73,7 +73,7 @@ fn thread_time() -> Duration {
 }
 
 #[test]
-fn waiting_on_an_interface_that_is_down_sleeps_until_the_time_has_come() {
+fn a_wait_on_an_interface_that_is_down_sleeps_until_its_end() {
     let Some(bench) = Bench::make() else { return };
     let near = bench.near_socket(PacketOptions::default());
     bench.near.ip(&["link", "set", "near", "down"]);
@@ -84,7 +84,7 @@ fn waiting_on_an_interface_that_is_down_sleeps_until_the_time_has_come() {
 }
 
 #[test]
-fn a_cut_and_healed_cable_is_seen_within_some_periods() {
+fn a_cut_and_a_repaired_cable_are_detected_within_some_periods() {
     let Some(bench) = Bench::make() else { return };
     let watch = bench.near.run(|| CarrierWatch::start(&["lo", "near"], CarrierWatch::PERIOD)).expect("a watch");
     let carrier = watch.carrier(1).clone();
@@ -94,7 +94,7 @@ fn a_cut_and_healed_cable_is_seen_within_some_periods() {
         bench.far.ip(&["link", "set", "far", state]);
         let begin = Instant::now();
         while carrier.is_up() != up {
-            assert!(begin.elapsed() < Duration::from_millis(500), "no sign of far going {state}");
+            assert!(begin.elapsed() < Duration::from_millis(500), "the carrier change to {state} was not detected");
             thread::sleep(Duration::from_micros(200));
         }
         latest = latest.max(begin.elapsed());

@@ -1,4 +1,4 @@
-//! Frames that arrive and frames that must not.
+//! Frames that a socket receives and frames that it rejects.
 
 use std::time::Duration;
 
@@ -47,7 +47,7 @@ fn frames_of_every_length_return_whole_and_in_order_while_the_ring_wraps() {
 }
 
 #[test]
-fn frames_that_find_the_ring_full_are_counted_and_those_before_them_kept() {
+fn frames_for_a_full_ring_are_counted_and_earlier_frames_kept() {
     let Some(bench) = Bench::make() else { return };
     let mut far = bench.far_socket();
     let mut near = bench.near_socket(PacketOptions { ring_frames: 4, ..PacketOptions::default() });
@@ -65,7 +65,7 @@ fn frames_that_find_the_ring_full_are_counted_and_those_before_them_kept() {
 }
 
 #[test]
-fn what_this_host_sends_is_received_by_the_other_end_only() {
+fn frames_sent_by_this_host_arrive_only_at_the_other_end() {
     let Some(bench) = Bench::make() else { return };
     let mut far = bench.far_socket();
     let (mut one, mut other) = (bench.near_socket(class(ClassFilter::All)), bench.near_socket(class(ClassFilter::All)));
@@ -120,7 +120,7 @@ fn a_socket_that_keeps_tags_receives_neither_ip_nor_what_this_host_sends() {
 }
 
 #[test]
-fn a_socket_lets_through_the_group_address_or_everything() {
+fn a_socket_accepts_the_group_address_or_all_frames() {
     let Some(bench) = Bench::make() else { return };
     let group: String = GROUP_ADDRESS.iter().map(|byte| format!("{byte:02x}")).collect();
     let groups = || bench.near.run(|| std::fs::read_to_string("/proc/thread-self/net/dev_mcast")).expect("a table");
@@ -136,7 +136,7 @@ fn a_socket_lets_through_the_group_address_or_everything() {
 }
 
 #[test]
-fn a_socket_knows_its_interface() {
+fn a_socket_returns_name_and_address_of_its_interface() {
     let Some(bench) = Bench::make() else { return };
     let socket = bench.near_socket(PacketOptions { receive: ReceiveMode::BusyPoll, ..PacketOptions::default() });
     let list = bench.near.run(interface::list);
@@ -149,7 +149,7 @@ fn a_socket_knows_its_interface() {
 }
 
 #[test]
-fn what_cannot_be_opened_is_told_by_kind() {
+fn each_cause_of_a_failed_open_is_a_separate_error() {
     let Some(bench) = Bench::make() else { return };
     let open = |name: &'static str| {
         bench.near.run(move || PacketSocket::open(name, &PacketOptions::default()).map(|_| ())).expect_err("no link")
@@ -163,7 +163,7 @@ fn what_cannot_be_opened_is_told_by_kind() {
     }
     assert_eq!(open("lo"), LinkError::NotEthernet { name: "lo".to_owned() });
     let refused = bench.near.run(|| {
-        // SAFETY: no pointers are passed; the bare system call gives up root in this thread alone.
+        // SAFETY: no pointers are passed; the bare system call drops root in this thread alone.
         let result = unsafe { libc::syscall(libc::SYS_setresuid, 65534, 65534, 65534) };
         assert_eq!(result, 0);
         PacketSocket::open("near", &PacketOptions::default()).map(|_| ()).expect_err("not permitted")

@@ -11,10 +11,10 @@ use crate::bench::{Bench, ethercat};
 
 /// The source address of [`ethercat`].
 const SENDER: Sender = Sender { address: [0x02, 0, 0, 0, 0, 1], mask: [0, 0, 0, 0xff, 0xff, 0xff] };
-/// Nothing that is heard takes longer, or else the machine stalls.
+/// Longer than any expected wait; a longer wait means that the machine stalls.
 const PATIENCE: Duration = Duration::from_millis(500);
 
-/// What a listener in the near namespace hears within a while, when `frames` are sent at the far end.
+/// The first frame that a listener in the near namespace receives when `frames` are sent at the far end.
 fn heard(bench: &Bench, except: &[&str], frames: &[Vec<u8>]) -> Option<Heard> {
     let listener = bench.near.run(|| Listener::open(SENDER, except)).expect("a socket");
     let (end, mut stop) = UnixStream::pair().expect("two sockets");
@@ -28,14 +28,14 @@ fn heard(bench: &Bench, except: &[&str], frames: &[Vec<u8>]) -> Option<Heard> {
             }
             thread::sleep(Duration::from_millis(10));
         }
-        stop.write_all(b"end").expect("its other side is there");
-        ears.join().expect("it does not panic")
+        stop.write_all(b"end").expect("the other side is open");
+        ears.join().expect("no panic")
     })
 }
 
 // covers: stray-ring-cable
 #[test]
-fn a_frame_of_the_sender_is_heard_with_the_name_of_its_interface() {
+fn a_frame_of_the_sender_is_received_with_the_name_of_its_interface() {
     let Some(bench) = Bench::make() else { return };
     let mut other = ethercat(0, 1);
     other[11] ^= 1;
@@ -46,7 +46,7 @@ fn a_frame_of_the_sender_is_heard_with_the_name_of_its_interface() {
 }
 
 #[test]
-fn nothing_is_heard_on_interfaces_that_are_left_out() {
+fn interfaces_that_are_left_out_deliver_no_frames() {
     let Some(bench) = Bench::make() else { return };
     assert_eq!(heard(&bench, &["near"], &[ethercat(0, 1)]), None);
 }

@@ -1,6 +1,6 @@
-//! The crate on interfaces of the kernel: pairs of them in namespaces that each test makes and removes.
+//! Tests of the crate on kernel interfaces: veth pairs in namespaces that each test creates and removes.
 //!
-//! Needs root and RINGCAT_ON_THE_WIRE=1; without, each test prints what it needs and passes.
+//! Needs root and RINGCAT_ON_THE_WIRE=1; otherwise each test prints what it needs and passes.
 
 mod bench;
 mod exclusive;

@@ -19,7 +19,7 @@ const MODES: [ReceiveMode; 4] = [
 const LONG_NS: u64 = 5_000_000_000;
 
 #[test]
-fn every_mode_ends_with_the_frame_that_comes() {
+fn every_mode_ends_when_a_frame_arrives() {
     let Some(bench) = Bench::make() else { return };
     let mut far = bench.far_socket();
     let mut near = bench.near_socket(PacketOptions::default());
@@ -50,7 +50,7 @@ fn every_mode_ends_at_its_time_without_a_frame() {
 }
 
 #[test]
-fn a_frame_that_is_there_ends_a_wait_whose_time_is_over() {
+fn a_waiting_frame_ends_a_wait_after_its_time() {
     let Some(bench) = Bench::make() else { return };
     let mut far = bench.far_socket();
     let near = bench.near_socket(PacketOptions::default());
