@@ -7,13 +7,15 @@
 //!
 //! * `writer`, `reader`: the two directions, each a task that lives as long as it has work;
 //! * `delivery`: the lane of a mail; `recent`: duplicate mail;
-//! * `talk`: a conversation that holds a lane; `answer_time`: when to poll for an answer;
+//! * `conversation`: a conversation that holds a lane; `answer_time`: when to poll for an answer;
 //! * [`coe`], [`eoe`], [`foe`], [`soe`], [`aoe`], [`voe`]: the protocols; [`relay`]: messages of gateway clients;
 //!   [`raw`]: messages that the application composes.
 
 mod answer_time;
 pub mod aoe;
+mod bounded_queue;
 pub mod coe;
+mod conversation;
 mod counters;
 mod delivery;
 pub mod eoe;
@@ -26,11 +28,9 @@ pub mod raw;
 mod reader;
 mod recent;
 pub mod relay;
-mod ring;
-mod room;
+mod shared;
 pub mod soe;
 pub mod stream;
-mod talk;
 mod unsolicited;
 pub mod voe;
 mod writer;
@@ -38,9 +38,9 @@ mod writer;
 #[cfg(test)]
 mod tests;
 
+pub use conversation::{Conversation, Limits};
 pub use counters::MailCounters;
 pub use error::MailboxError;
 pub use lane::Lane;
 pub use mailbox::Mailbox;
-pub use talk::{Limits, Talk};
 pub use unsolicited::{Unclaimed, Unsolicited};

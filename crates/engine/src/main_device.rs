@@ -49,7 +49,7 @@ use crate::info::SubDeviceInfo;
 use crate::link::{Link, LinkSet};
 use crate::mail::Mailbox;
 use crate::mail::eoe::EthernetPort;
-use crate::mail::relay::Desk;
+use crate::mail::relay::GatewayQueue;
 use crate::procedures::error_statistics::ErrorStatistics;
 use crate::procedures::own_objects::OwnObjects;
 use crate::procedures::scan::{Scan, ScanError, ScanOptions, scan};
@@ -96,7 +96,7 @@ pub struct MainDevice {
     /// Ethernet of declared SubDevices, where it was asked for.
     ports: Vec<Option<EthernetPort>>,
     /// Messages of a gateway's clients.
-    desk: Option<Desk>,
+    gateway_queue: Option<GatewayQueue>,
     /// What such a client finds at address 0.
     own_objects: OwnObjects,
     /// A link that was taken down on order.
@@ -124,7 +124,7 @@ impl MainDevice {
             statistics_period: None,
             loaded: None,
             ports: Vec::new(),
-            desk: None,
+            gateway_queue: None,
             own_objects: OwnObjects::default(),
             disconnected: None,
             options,
@@ -186,7 +186,7 @@ impl MainDevice {
         self.requests.end();
         self.visited.clear();
         self.ports.clear();
-        self.desk = None;
+        self.gateway_queue = None;
         self.own_objects = OwnObjects::default();
         self.segment = None;
         self.statistics = None;

@@ -94,7 +94,7 @@ impl Lists {
             mail.written += counters.written;
             mail.read += counters.read;
             mail.empty_reads += counters.empty_reads;
-            mail.looks += counters.looks;
+            mail.polls += counters.polls;
         }
         let wire = |frames: u64, bytes: u64| Duration::from_nanos(frames * wire_time_ns(0) + bytes * BYTE_TIME_NS);
         Cost {

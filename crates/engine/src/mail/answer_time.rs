@@ -29,7 +29,7 @@ pub(super) struct AnswerTime {
     /// Answers were available after this time.
     usual: Duration,
     /// After this time an answer was not available yet.
-    vain: Duration,
+    empty_poll: Duration,
     /// The last answer was available at the first poll.
     hit: bool,
     /// Answers available at the first poll since the last earlier poll.
@@ -40,7 +40,7 @@ pub(super) struct AnswerTime {
 
 impl AnswerTime {
     /// Time from the request to the first poll.
-    pub(super) fn first_look(&self) -> Duration {
+    pub(super) fn first_poll(&self) -> Duration {
         if self.is_trying() { self.usual - self.unknown().max(self.step()) / 2 } else { self.usual }
     }
 
@@ -54,7 +54,7 @@ impl AnswerTime {
     }
 
     fn unknown(&self) -> Duration {
-        self.usual.saturating_sub(self.vain)
+        self.usual.saturating_sub(self.empty_poll)
     }
 
     /// Twice the minimum by which an earlier poll is earlier.
@@ -68,21 +68,21 @@ impl AnswerTime {
     }
 
     /// An answer was found `after` its request; the last poll before it, at `vain`, found nothing.
-    pub(super) fn took(&mut self, after: Duration, vain: Option<Duration>) {
+    pub(super) fn took(&mut self, after: Duration, empty_poll: Option<Duration>) {
         let is_known = self.usual != Duration::ZERO;
         let trying = is_known && self.is_trying();
-        let Some(vain) = vain else {
+        let Some(empty_poll) = empty_poll else {
             self.hit = true;
             self.usual = if is_known { self.usual.min(after) } else { after };
-            if self.vain >= self.usual {
-                self.vain = Duration::ZERO;
+            if self.empty_poll >= self.usual {
+                self.empty_poll = Duration::ZERO;
             }
             // A successful attempt is followed by another.
             self.calm += u32::from(!trying);
             return;
         };
-        self.vain = vain;
-        if !trying || vain >= self.usual {
+        self.empty_poll = empty_poll;
+        if !trying || empty_poll >= self.usual {
             self.hit = false;
             self.usual = if is_known { (self.usual + after) / 2 } else { after };
         } else if self.unknown() <= self.step() {
@@ -111,14 +111,14 @@ mod tests {
 
     /// Polls as the reader does; returns the polls that found nothing.
     fn ask(time: &mut AnswerTime, real: Duration) -> u32 {
-        let (mut at, mut vain, mut looks) = (time.first_look(), None, 0);
+        let (mut at, mut empty_poll, mut polls) = (time.first_poll(), None, 0);
         while at < real {
-            vain = Some(at);
+            empty_poll = Some(at);
             at += AnswerTime::pause(at);
-            looks += 1;
+            polls += 1;
         }
-        time.took(at, vain);
-        looks
+        time.took(at, empty_poll);
+        polls
     }
 
     // covers: mailbox, start-lists
@@ -127,11 +127,11 @@ mod tests {
         let real = Duration::from_micros(1000);
         let mut time = AnswerTime::default();
         let learning: u32 = (0..10).map(|_| ask(&mut time, real)).sum();
-        assert!(learning < 16, "{learning} looks in vain for the first ten answers");
+        assert!(learning < 16, "{learning} polls in empty_poll for the first ten answers");
         let later: u32 = (0..200).map(|_| ask(&mut time, real)).sum();
-        let usual = time.first_look();
+        let usual = time.first_poll();
         assert!((Duration::from_micros(940)..Duration::from_micros(1070)).contains(&usual), "{usual:?}");
-        assert!(later < 12, "{later} of 200 looks came too early");
+        assert!(later < 12, "{later} of 200 polls came too early");
     }
 
     // covers: start-lists
@@ -140,7 +140,7 @@ mod tests {
         let mut time = AnswerTime::default();
         for real in [1000, 300, 4000, 200].map(Duration::from_micros) {
             (0..100).for_each(|_| _ = ask(&mut time, real));
-            let usual = time.first_look();
+            let usual = time.first_poll();
             assert!(usual > real * 9 / 10 && usual < real * 5 / 4, "{usual:?} for {real:?}");
         }
     }

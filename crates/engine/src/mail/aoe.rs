@@ -8,8 +8,8 @@ use core::fmt;
 use ringcat_wire::mailbox::PayloadError;
 use ringcat_wire::mailbox::aoe::{AdsCommand, AdsErrorCode, AdsRequest, AdsResponse, AmsAddress, AmsHeader};
 
+use super::conversation::Limits;
 use super::lane::Lane;
-use super::talk::Limits;
 use super::{Mailbox, MailboxError};
 
 /// Source and target of a request.
@@ -160,9 +160,9 @@ async fn request<T>(
     limits: Limits,
     take: impl Fn(AdsResponse<'_>) -> Option<T>,
 ) -> Result<T, AoeError> {
-    let mut talk = mailbox.talk(Lane::Aoe).await?;
-    let (command, invoke_id) = (asked.command(), talk.number());
-    let mut payload = vec![0; talk.room().max(AmsHeader::LEN)];
+    let mut conversation = mailbox.conversation(Lane::Aoe).await?;
+    let (command, invoke_id) = (asked.command(), conversation.number());
+    let mut payload = vec![0; conversation.request_capacity().max(AmsHeader::LEN)];
     let limit = payload.len();
     let too_long = MailboxError::TooLong { bytes: limit + 1, limit };
     let length = asked.encode(&mut payload[AmsHeader::LEN..]).ok_or(too_long)?;
@@ -171,7 +171,7 @@ async fn request<T>(
     let header = AmsHeader { target, source, command, flags, length: length as u32, error, invoke_id };
     payload[..AmsHeader::LEN].copy_from_slice(&header.encode());
     let accept = |payload: &[u8]| answer(payload, command, invoke_id, &take);
-    talk.ask(&payload[..AmsHeader::LEN + length], limits, accept).await?
+    conversation.request(&payload[..AmsHeader::LEN + length], limits, accept).await?
 }
 
 fn answer<T>(

@@ -15,7 +15,7 @@ pub struct MailCounters {
     /// Reads of an empty mailbox.
     pub empty_reads: u64,
     /// Polls of the status of the send mailbox.
-    pub looks: u64,
+    pub polls: u64,
     /// Mails that came twice and were dropped.
     pub duplicates: u64,
     /// Mails received only with the second copy of a read, or after their read was given up.

@@ -8,8 +8,8 @@ use ringcat_wire::mailbox::{ErrorReply, Message, Protocol};
 
 use super::lane::{Arrival, Lane, LaneState};
 use super::protocol_error;
-use super::recent::Way;
-use super::room::{Room, State};
+use super::recent::ReadKind;
+use super::shared::{MailboxState, SharedMailbox};
 use super::unsolicited::{Unclaimed, Unsolicited};
 use crate::event::Event;
 use crate::time::Instant;
@@ -23,64 +23,64 @@ const AOE_RESPONSE: u8 = 0x01;
 const EOE_ANSWERS: [u8; 4] = [3, 5, 7, 9];
 
 /// Takes the content of the send mailbox. Any bytes are allowed. True where a conversation waited for it.
-pub(super) fn deliver(room: &Rc<Room>, mail: &[u8], way: Way, sent: Instant) -> bool {
+pub(super) fn deliver(shared: &Rc<SharedMailbox>, mail: &[u8], kind: ReadKind, sent: Instant) -> bool {
     let wanted = {
-        let state = &mut *room.state();
+        let state = &mut *shared.state_mut();
         let Ok(message) = Message::decode(mail) else {
             state.counters.malformed += 1;
             return false;
         };
-        if is_double(state, &message, way, sent) {
+        if is_duplicate(state, &message, kind, sent) {
             state.counters.duplicates += 1;
             return false;
         }
-        if let Some(error) = protocol_error::told_by(&message) {
+        if let Some(error) = protocol_error::error_in(&message) {
             state.last_error = error;
         }
-        sort(room, state, &message)
+        sort(shared, state, &message)
     };
-    room.news.notify();
+    shared.changed.notify();
     wanted
 }
 
-fn is_double(state: &mut State, message: &Message<'_>, way: Way, sent: Instant) -> bool {
+fn is_duplicate(state: &mut MailboxState, message: &Message<'_>, kind: ReadKind, sent: Instant) -> bool {
     // A repeat may bring the mail before the lost one.
-    let way = if state.repeated && way == Way::Usual { Way::Repeat } else { way };
-    let double = state.recent.is_double(message.header.counter, message.payload, way, sent);
-    state.repeated &= double || way != Way::Repeat;
-    double
+    let kind = if state.repeated && kind == ReadKind::Expected { ReadKind::Repeat } else { kind };
+    let duplicate = state.recent.is_duplicate(message.header.counter, message.payload, kind, sent);
+    state.repeated &= duplicate || kind != ReadKind::Repeat;
+    duplicate
 }
 
-fn sort(room: &Rc<Room>, state: &mut State, message: &Message<'_>) -> bool {
+fn sort(shared: &Rc<SharedMailbox>, state: &mut MailboxState, message: &Message<'_>) -> bool {
     let payload = message.payload;
     let first = payload.first().copied().unwrap_or(0);
     // Frames have no answer, but the sender of frames knows EoE.
-    state.lanes[Lane::Frames.place()].proven |= message.header.protocol == Protocol::Eoe;
+    state.lanes[Lane::Frames.index()].proven |= message.header.protocol == Protocol::Eoe;
     match message.header.protocol {
-        Protocol::Error => refused(state, message, room.bus.now()),
-        Protocol::Coe => coe(room, state, message),
+        Protocol::Error => refused(state, message, shared.bus.now()),
+        Protocol::Coe => coe(shared, state, message),
         Protocol::Foe => answer(state, Lane::Foe, message),
         Protocol::Soe if SOE_ANSWERS.contains(&(first & 0x07)) => answer(state, Lane::Soe, message),
-        Protocol::Soe => shelve(state, message, Unsolicited::Soe),
+        Protocol::Soe => keep(state, message, Unsolicited::Soe),
         Protocol::Aoe if payload.get(AOE_FLAGS_AT).is_some_and(|flags| flags & AOE_RESPONSE != 0) => {
             answer(state, Lane::Aoe, message)
         }
-        Protocol::Aoe => shelve(state, message, Unsolicited::Aoe),
+        Protocol::Aoe => keep(state, message, Unsolicited::Aoe),
         Protocol::Voe => answer(state, Lane::Voe, message),
         Protocol::Eoe if EOE_ANSWERS.contains(&(first & 0x0F)) => answer(state, Lane::Eoe, message),
         Protocol::Eoe if state.ethernet.attached => {
-            state.ethernet.take(payload, room.bus.now());
+            state.ethernet.take(payload, shared.bus.now());
             false
         }
-        Protocol::Eoe => shelve(state, message, Unsolicited::Ethernet),
-        protocol @ Protocol::Other(code) if state.lanes[Lane::Other(code).place()].expected == Some(protocol) => {
+        Protocol::Eoe => keep(state, message, Unsolicited::Ethernet),
+        protocol @ Protocol::Other(code) if state.lanes[Lane::Other(code).index()].expected == Some(protocol) => {
             answer(state, Lane::Other(code), message)
         }
-        Protocol::Other(_) => shelve(state, message, Unsolicited::Other),
+        Protocol::Other(_) => keep(state, message, Unsolicited::Other),
     }
 }
 
-fn coe(room: &Rc<Room>, state: &mut State, message: &Message<'_>) -> bool {
+fn coe(shared: &Rc<SharedMailbox>, state: &mut MailboxState, message: &Message<'_>) -> bool {
     let Some((header, rest)) = message.payload.split_first_chunk() else {
         state.counters.malformed += 1;
         return false;
@@ -92,38 +92,38 @@ fn coe(room: &Rc<Room>, state: &mut State, message: &Message<'_>) -> bool {
                 return false;
             };
             let emergency = Emergency::decode(bytes);
-            state.shelves.emergencies().push((room.bus.now(), emergency));
-            room.bus.report(Event::Emergency { subdevice: room.subdevice, emergency });
+            state.unsolicited.emergencies().push((shared.bus.now(), emergency));
+            shared.bus.report(Event::Emergency { subdevice: shared.subdevice, emergency });
             false
         }
         // An abort has the service of a request in both directions.
         CoeService::SdoRequest | CoeService::SdoResponse | CoeService::SdoInformation => {
             answer(state, Lane::Coe, message)
         }
-        CoeService::TxPdo | CoeService::RxPdo if state.lanes[Lane::Coe.place()].pdo == Some(*header) => {
+        CoeService::TxPdo | CoeService::RxPdo if state.lanes[Lane::Coe.index()].pdo == Some(*header) => {
             answer(state, Lane::Coe, message)
         }
-        CoeService::Other(_) if state.lanes[Lane::Coe.place()].any => answer(state, Lane::Coe, message),
+        CoeService::Other(_) if state.lanes[Lane::Coe.index()].any => answer(state, Lane::Coe, message),
         CoeService::TxPdo
         | CoeService::RxPdo
         | CoeService::TxPdoRemote
         | CoeService::RxPdoRemote
-        | CoeService::Other(_) => shelve(state, message, Unsolicited::Other),
+        | CoeService::Other(_) => keep(state, message, Unsolicited::Other),
     }
 }
 
 /// To the conversation in the lane; without one, into a ring.
-fn answer(state: &mut State, lane: Lane, message: &Message<'_>) -> bool {
+fn answer(state: &mut MailboxState, lane: Lane, message: &Message<'_>) -> bool {
     let arrival = Arrival::Payload(message.payload.to_vec());
-    let own = &mut state.lanes[lane.place()];
+    let own = &mut state.lanes[lane.index()];
     // A conversation takes one answer at a time; the oldest in the queue is not the expected one.
     let oldest = if own.is_full() { own.take() } else { None };
-    let wanted = own.arrive(arrival, state.seen, is_last(lane, message.payload));
+    let wanted = own.arrive(arrival, state.available_at, is_last(lane, message.payload));
     if let Some(oldest) = oldest {
-        put_aside(state, lane, oldest);
+        keep_unclaimed(state, lane, oldest);
     }
     if !wanted {
-        put_aside(state, lane, Arrival::Payload(message.payload.to_vec()));
+        keep_unclaimed(state, lane, Arrival::Payload(message.payload.to_vec()));
     }
     wanted
 }
@@ -138,20 +138,20 @@ pub(super) fn is_last(lane: Lane, payload: &[u8]) -> bool {
 }
 
 /// A mail for a lane without a conversation that waits for it: unsolicited mail, or a late answer.
-pub(super) fn put_aside(state: &mut State, lane: Lane, arrival: Arrival) {
-    let (shelf, protocol, payload) = match arrival {
-        Arrival::Payload(payload) => (lane.shelf(), lane.protocol(), payload),
+pub(super) fn keep_unclaimed(state: &mut MailboxState, lane: Lane, arrival: Arrival) {
+    let (kind, protocol, payload) = match arrival {
+        Arrival::Payload(payload) => (lane.unclaimed_kind(), lane.protocol(), payload),
         Arrival::Refused(reply, _) => (Unsolicited::Other, Protocol::Error, reply.encode().to_vec()),
     };
-    if shelf == Unsolicited::Other {
+    if kind == Unsolicited::Other {
         state.counters.unclaimed += 1;
     }
-    state.shelves.ring(shelf).push(Unclaimed { protocol, payload });
+    state.unsolicited.of_kind(kind).push(Unclaimed { protocol, payload });
 }
 
-fn shelve(state: &mut State, message: &Message<'_>, kind: Unsolicited) -> bool {
+fn keep(state: &mut MailboxState, message: &Message<'_>, kind: Unsolicited) -> bool {
     let unclaimed = Unclaimed { protocol: message.header.protocol, payload: message.payload.to_vec() };
-    state.shelves.ring(kind).push(unclaimed);
+    state.unsolicited.of_kind(kind).push(unclaimed);
     false
 }
 
@@ -159,7 +159,7 @@ fn shelve(state: &mut State, message: &Message<'_>, kind: Unsolicited) -> bool {
 /// that the SubDevice has not shown to support, then to the oldest. A sender of a message in parts is informed, too.
 /// The cause is certain only where the reply can belong to nothing else: neither to a request that was given up nor to
 /// a message without an answer. Otherwise the answer to the ended request may still come.
-fn refused(state: &mut State, message: &Message<'_>, now: Instant) -> bool {
+fn refused(state: &mut MailboxState, message: &Message<'_>, now: Instant) -> bool {
     let Some(bytes) = message.payload.first_chunk() else {
         state.counters.malformed += 1;
         return false;
@@ -181,12 +181,12 @@ fn refused(state: &mut State, message: &Message<'_>, now: Instant) -> bool {
     let others = lanes().any(|lane| is_late(lane) || lane.is_unanswered(now));
     let doubtful = in_parts || others || lanes().filter(|lane| is_waiting(lane)).count() > 1;
     let candidates = state.lanes.iter_mut().filter(|lane| is_waiting(lane) && in_question(lane));
-    match candidates.min_by_key(|lane| (lane.proven, lane.asked.map(|asked| asked.at))) {
-        Some(lane) => lane.arrive(Arrival::Refused(reply, doubtful), state.seen, true),
+    match candidates.min_by_key(|lane| (lane.proven, lane.pending.map(|pending| pending.at))) {
+        Some(lane) => lane.arrive(Arrival::Refused(reply, doubtful), state.available_at, true),
         None if in_parts => false,
         None => {
             state.counters.unclaimed += 1;
-            shelve(state, message, Unsolicited::Other)
+            keep(state, message, Unsolicited::Other)
         }
     }
 }

@@ -13,8 +13,8 @@ pub use error::{FoeError, FoeFailure};
 pub use read::read;
 pub use write::write;
 
+use super::conversation::{Conversation, Limits};
 use super::lane::Lane;
-use super::talk::{Limits, Talk};
 use super::{Mailbox, MailboxError};
 
 /// Parameters of a transfer besides the file name.
@@ -59,7 +59,7 @@ pub enum FoeProgress {
 
 /// A transfer in progress. When it is dropped before its end, the SubDevice receives an FoE error.
 struct Transfer<P> {
-    talk: Talk,
+    conversation: Conversation,
     options: FoeOptions,
     progress: P,
     /// Payload of a message.
@@ -78,10 +78,10 @@ enum Said<T> {
 
 impl<P: FnMut(FoeProgress)> Transfer<P> {
     async fn begin(mailbox: &Mailbox, options: FoeOptions, progress: P) -> Result<Transfer<P>, FoeFailure> {
-        let mut talk = mailbox.talk(Lane::Foe).await?;
-        talk.settle().await?;
-        let payload = alloc::vec![0; talk.room()];
-        Ok(Transfer { talk, options, progress, payload, busy: false, since: None })
+        let mut conversation = mailbox.conversation(Lane::Foe).await?;
+        conversation.settle().await?;
+        let payload = alloc::vec![0; conversation.request_capacity()];
+        Ok(Transfer { conversation, options, progress, payload, busy: false, since: None })
     }
 
     /// Sends a message, repeats it while the SubDevice is busy, and returns what `accept` recognises as the answer.
@@ -96,7 +96,7 @@ impl<P: FnMut(FoeProgress)> Transfer<P> {
                 Said::Answer(answer) => return Ok(answer),
                 Said::Busy => {
                     let pause = self.options.busy_pause;
-                    self.talk.pause(pause).await?;
+                    self.conversation.pause(pause).await?;
                 }
             }
         }
@@ -122,13 +122,15 @@ impl<P: FnMut(FoeProgress)> Transfer<P> {
             other => accept(other).map(Heard::Answer),
         };
         self.busy = true;
-        let answer = self.talk.ask(&self.payload[..length], self.options.limits, heard).await.inspect_err(|error| {
-            // A file that the SubDevice certainly did not open needs no abort.
-            let opens = matches!(message, FoeMessage::Read { .. } | FoeMessage::Write { .. });
-            if opens && matches!(error, MailboxError::Error(_)) && self.talk.late_mark().is_none() {
-                self.busy = false;
-            }
-        })?;
+        let answer = self.conversation.request(&self.payload[..length], self.options.limits, heard).await.inspect_err(
+            |error| {
+                // A file that the SubDevice certainly did not open needs no abort.
+                let opens = matches!(message, FoeMessage::Read { .. } | FoeMessage::Write { .. });
+                if opens && matches!(error, MailboxError::Error(_)) && self.conversation.late_mark().is_none() {
+                    self.busy = false;
+                }
+            },
+        )?;
         match answer {
             Heard::Answer(answer) => Ok(Said::Answer(answer)),
             Heard::Error(code, text) => {
@@ -136,7 +138,7 @@ impl<P: FnMut(FoeProgress)> Transfer<P> {
                 Err(FoeFailure::Refused { code, text })
             }
             Heard::Busy { done, entire, text } => {
-                let now = self.talk.now();
+                let now = self.conversation.now();
                 let (since, before) = self.since.unwrap_or((now, done));
                 let since = if before == done { since } else { now };
                 self.since = Some((since, done));
@@ -156,7 +158,7 @@ impl<P: FnMut(FoeProgress)> Transfer<P> {
         }
         if let Some(length) = (FoeMessage::Error { code, text }).encode(&mut self.payload) {
             // A closed mailbox needs no message.
-            let _ = self.talk.post(&self.payload[..length]);
+            let _ = self.conversation.post(&self.payload[..length]);
         }
     }
 }
@@ -168,7 +170,7 @@ impl<P> Drop for Transfer<P> {
         }
         let message = FoeMessage::Error { code: FoeErrorCode::NOT_DEFINED, text: b"given up" };
         if let Some(length) = message.encode(&mut self.payload) {
-            let _ = self.talk.post(&self.payload[..length]);
+            let _ = self.conversation.post(&self.payload[..length]);
         }
     }
 }

@@ -74,7 +74,7 @@ impl Lane {
     }
 
     /// Its index among all lanes.
-    pub(super) const fn place(self) -> usize {
+    pub(super) const fn index(self) -> usize {
         match self {
             Lane::Coe => 0,
             Lane::Foe => 1,
@@ -88,7 +88,7 @@ impl Lane {
     }
 
     /// Ring for its mail without a waiting conversation.
-    pub(super) const fn shelf(self) -> Unsolicited {
+    pub(super) const fn unclaimed_kind(self) -> Unsolicited {
         match self {
             Lane::Voe => Unsolicited::Voe,
             Lane::Coe | Lane::Foe | Lane::Soe | Lane::Aoe | Lane::Eoe | Lane::Frames | Lane::Other(_) => {
@@ -109,27 +109,27 @@ pub(super) struct Outgoing {
     /// The sender: turn of a conversation.
     pub turn: u32,
     /// Time limit of the answer, if there is one.
-    pub asks: Option<Duration>,
+    pub answer_limit: Option<Duration>,
 }
 
 /// A request that was written.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Asked {
+pub(super) struct PendingRequest {
     /// When it was written, or when the last part of its answer was received.
     pub at: Instant,
     /// Time limit of the answer, or of its next part.
     pub limit: Duration,
     /// Whether the reader has polled for it.
-    pub looked: bool,
+    pub polled: bool,
     /// Time after that at which the last poll found nothing.
-    pub vain: Option<Duration>,
+    pub empty_poll: Option<Duration>,
     /// A part of the answer is received, and the conversation has not asked for more.
     pub answered: bool,
 }
 
-impl Asked {
-    pub(super) const fn at(at: Instant, limit: Duration) -> Asked {
-        Asked { at, limit, looked: false, vain: None, answered: false }
+impl PendingRequest {
+    pub(super) const fn at(at: Instant, limit: Duration) -> PendingRequest {
+        PendingRequest { at, limit, polled: false, empty_poll: None, answered: false }
     }
 }
 
@@ -152,7 +152,7 @@ pub(super) struct LaneState {
     inbox: VecDeque<Arrival>,
     /// The last message to be written, written or not.
     pub written: Option<(u32, Result<(), MailboxError>)>,
-    pub asked: Option<Asked>,
+    pub pending: Option<PendingRequest>,
     /// Until when the answer to a request that was given up, or its next part, may still come.
     pub late_until: Option<Instant>,
     /// Time limit of each part of it.
@@ -193,7 +193,7 @@ impl LaneState {
     /// As [`LaneState::reset`], but the SubDevice keeps its messages: an answer may come when it is reachable again.
     pub(super) fn suspend(&mut self, now: Instant) {
         let late = self.late_until.filter(|until| *until > now).map(|_| self.late_limit);
-        let late_for = self.asked.map(|asked| asked.limit).into_iter().chain(late).chain(self.late_for).max();
+        let late_for = self.pending.map(|pending| pending.limit).into_iter().chain(late).chain(self.late_for).max();
         let (mark, proven, expected) = (self.mark, self.proven, self.expected);
         let unanswered = self.is_unanswered(now).then_some(Instant::NEVER);
         self.reset();
@@ -221,7 +221,7 @@ impl LaneState {
 
     /// The conversation of a turn gives its request up; `open` where the answer is incomplete.
     pub(super) fn give_up(&mut self, turn: u32, open: bool, now: Instant, limit: Duration) {
-        let unanswered = self.asked.take().is_some_and(|asked| !asked.answered);
+        let unanswered = self.pending.take().is_some_and(|pending| !pending.answered);
         // A conversation that only waited for the answer to an earlier one's request leaves that as it is.
         if core::mem::take(&mut self.settling) {
             return;
@@ -240,7 +240,7 @@ impl LaneState {
     }
 
     pub(super) fn is_idle(&self) -> bool {
-        self.turns.is_empty() && self.outbox.is_empty() && self.inbox.is_empty() && self.asked.is_none()
+        self.turns.is_empty() && self.outbox.is_empty() && self.inbox.is_empty() && self.pending.is_none()
     }
 
     pub(super) fn has_room(&self) -> bool {
@@ -249,12 +249,12 @@ impl LaneState {
 
     /// A message of a conversation is about to be written. Its answer may come before the write is confirmed.
     pub(super) fn writing(&mut self, message: &Outgoing, now: Instant) {
-        match message.asks {
+        match message.answer_limit {
             Some(_) => self.writing = Some(message.turn),
             None => self.unanswered_until = Some(Instant::NEVER),
         }
-        if let Some(limit) = message.asks.filter(|_| self.turns.front() == Some(&message.turn)) {
-            self.asked = Some(Asked::at(now, limit));
+        if let Some(limit) = message.answer_limit.filter(|_| self.turns.front() == Some(&message.turn)) {
+            self.pending = Some(PendingRequest::at(now, limit));
             self.expected = Some(message.lane.protocol());
         }
     }
@@ -267,14 +267,14 @@ impl LaneState {
             Err(MailboxError::Bus(_)) => true,
             Err(_) => false,
         };
-        if let Some(limit) = message.asks {
+        if let Some(limit) = message.answer_limit {
             let held = self.turns.front() == Some(&message.turn);
             if held && result.is_ok() {
-                if let Some(asked) = self.asked.as_mut().filter(|asked| !asked.answered) {
-                    *asked = Asked::at(now, limit);
+                if let Some(pending) = self.pending.as_mut().filter(|pending| !pending.answered) {
+                    *pending = PendingRequest::at(now, limit);
                 }
             } else if held {
-                self.asked = None;
+                self.pending = None;
                 if arrived {
                     self.late_from(now, limit);
                 }
@@ -291,26 +291,26 @@ impl LaneState {
 
     /// Time of the first poll for the expected answer.
     pub(super) fn due(&self) -> Option<Instant> {
-        self.waiting().map(|asked| asked.at + self.answer_time.first_look())
+        self.waiting().map(|pending| pending.at + self.answer_time.first_poll())
     }
 
     /// A poll that presumably began then found nothing.
-    pub(super) fn looked_in_vain(&mut self, seen: Instant) {
-        if let Some(asked) = self.asked.as_mut().filter(|asked| asked.looked) {
-            asked.vain = Some(seen.since(asked.at));
+    pub(super) fn polled_empty(&mut self, seen: Instant) {
+        if let Some(pending) = self.pending.as_mut().filter(|pending| pending.polled) {
+            pending.empty_poll = Some(seen.since(pending.at));
         }
     }
 
     /// The request of the answer that the reader polls for.
-    pub(super) fn waiting(&self) -> Option<&Asked> {
-        self.asked.as_ref().filter(|asked| !asked.answered)
+    pub(super) fn waiting(&self) -> Option<&PendingRequest> {
+        self.pending.as_ref().filter(|pending| !pending.answered)
     }
 
     /// Takes an answer, or a possible one, for the conversation. False where none waits.
     ///
     /// `seen` is its presumed time of availability; `last`: no further part of it follows.
     pub(super) fn arrive(&mut self, arrival: Arrival, seen: Instant, last: bool) -> bool {
-        let Some(asked) = &mut self.asked else {
+        let Some(pending) = &mut self.pending else {
             if last {
                 self.late_until = None;
             } else {
@@ -319,9 +319,9 @@ impl LaneState {
             return false;
         };
         self.proven |= matches!(arrival, Arrival::Payload(_));
-        if !asked.answered {
-            asked.answered = true;
-            self.answer_time.took(seen.since(asked.at), asked.vain);
+        if !pending.answered {
+            pending.answered = true;
+            self.answer_time.took(seen.since(pending.at), pending.empty_poll);
         }
         self.inbox.push_back(arrival);
         true

@@ -7,11 +7,11 @@ use ringcat_wire::address::{RegisterAddress, StationAddress};
 use ringcat_wire::mailbox::coe::Emergency;
 use ringcat_wire::sii::MailboxLayout;
 
+use super::conversation::Conversation;
 use super::counters::MailCounters;
 use super::error::MailboxError;
 use super::lane::{Lane, LaneState};
-use super::room::{Room, Session};
-use super::talk::Talk;
+use super::shared::{Session, SharedMailbox};
 use super::unsolicited::{Unclaimed, Unsolicited};
 use crate::supervisor::Bus;
 use crate::time::Instant;
@@ -20,127 +20,127 @@ use crate::time::Instant;
 /// the SubDevice: while the mailbox is not in use, every request ends with [`MailboxError::Closed`].
 #[derive(Clone, Debug)]
 pub struct Mailbox {
-    room: Rc<Room>,
+    shared: Rc<SharedMailbox>,
 }
 
 impl Mailbox {
     /// A mailbox that is not in use yet. `subdevice` names it in events.
     pub fn new(bus: &Bus, subdevice: usize) -> Mailbox {
-        Mailbox { room: Room::new(bus, subdevice) }
+        Mailbox { shared: SharedMailbox::new(bus, subdevice) }
     }
 
     /// The SubDevice has entered PREOP or BOOT with this mailbox: counters restart. `send_manager` is the SyncManager
     /// of the mailbox that the MainDevice reads.
     pub(crate) fn open(&self, station: StationAddress, layout: MailboxLayout, send_manager: u8) {
-        self.room.close();
-        self.room.open(Session::new(station, layout, send_manager, self.room.bus.now()));
+        self.shared.close();
+        self.shared.open(Session::new(station, layout, send_manager, self.shared.bus.now()));
     }
 
     /// The SubDevice goes to INIT.
     pub(crate) fn close(&self) {
-        self.room.close();
+        self.shared.close();
     }
 
     /// The SubDevice does not answer; it may return with its mailbox unchanged.
     pub(crate) fn suspend(&self) {
-        self.room.suspend();
+        self.shared.suspend();
     }
 
     /// The SubDevice answers again and was never in INIT meanwhile.
     pub(crate) fn resume(&self) {
-        self.room.resume();
+        self.shared.resume();
     }
 
     /// The SubDevice has mail, or may have.
-    pub(crate) fn is_full(&self) {
-        self.room.is_full();
+    pub(crate) fn mail_available(&self) {
+        self.shared.mail_available();
     }
 
     /// Makes the reader poll once whether the SubDevice has mail.
-    pub(super) fn look_for_mail(&self) {
-        self.room.look_once();
+    pub(super) fn poll_once(&self) {
+        self.shared.poll_once();
     }
 
-    pub(super) fn room(&self) -> &Rc<Room> {
-        &self.room
+    pub(super) fn shared(&self) -> &Rc<SharedMailbox> {
+        &self.shared
     }
 
     /// Whether it may be used.
     pub fn is_open(&self) -> bool {
-        self.room.look().open
+        self.shared.state().open
     }
 
     /// Whether it is idle: no conversation holds or waits for a lane, no message waits to be written or to be fetched
     /// by a conversation, and neither writer nor reader runs.
     pub fn is_idle(&self) -> bool {
-        let state = self.room.look();
-        let at_work = |time: Option<u32>| time == Some(state.time);
+        let state = self.shared.state();
+        let at_work = |epoch: Option<u32>| epoch == Some(state.epoch);
         state.lanes.iter().all(LaneState::is_idle) && !at_work(state.writer) && !at_work(state.reader)
     }
 
     /// Station address of the SubDevice, while the mailbox may be used.
     pub fn station(&self) -> Option<StationAddress> {
-        let state = self.room.look();
+        let state = self.shared.state();
         state.session.filter(|_| state.open).map(|session| session.station)
     }
 
     /// Station address of the SubDevice and the register that shows whether it has mail, while the mailbox may be used.
     pub(crate) fn send_status(&self) -> Option<(StationAddress, RegisterAddress)> {
-        let state = self.room.look();
+        let state = self.shared.state();
         state.session.filter(|_| state.open).map(|session| (session.station, session.send_status()))
     }
 
     /// Waits for a lane to be free, and takes it.
-    pub async fn talk(&self, lane: Lane) -> Result<Talk, MailboxError> {
+    pub async fn conversation(&self, lane: Lane) -> Result<Conversation, MailboxError> {
         // Types with a lane of their own use only that.
         let lane = if let Lane::Other(code) = lane { Lane::of(code) } else { lane };
-        Talk::take(&self.room, lane).await
+        Conversation::take(&self.shared, lane).await
     }
 
     /// The bus on which it works.
     pub fn bus(&self) -> &Bus {
-        &self.room.bus
+        &self.shared.bus
     }
 
     /// Counters since the beginning.
     pub fn counters(&self) -> MailCounters {
-        self.room.look().counters
+        self.shared.state().counters
     }
 
     /// Code of the last error that the SubDevice has reported in any protocol, in the protocol's own numbers: an SDO
     /// abort, the detail of an error reply, an error of FoE, SoE or AoE; 0 for none.
     pub fn last_protocol_error(&self) -> u32 {
-        self.room.look().last_error
+        self.shared.state().last_error
     }
 
     /// Clears that error; `before` is the previous one.
     pub(crate) fn forget_protocol_error(&self, before: u32) {
-        self.room.state().last_error = before;
+        self.shared.state_mut().last_error = before;
     }
 
     /// Takes the oldest kept emergency, with the time at which it was read. Each was an event, too.
     pub fn pop_emergency(&self) -> Option<(Instant, Emergency)> {
-        self.room.state().shelves.emergencies().pop()
+        self.shared.state_mut().unsolicited.emergencies().pop()
     }
 
     /// Drops all kept emergencies.
     pub fn clear_emergencies(&self) {
-        self.room.state().shelves.emergencies().clear();
+        self.shared.state_mut().unsolicited.emergencies().clear();
     }
 
     /// Number of emergencies that were not kept because there were too many.
     pub fn emergency_overruns(&self) -> u64 {
-        self.room.state().shelves.emergencies().overruns()
+        self.shared.state_mut().unsolicited.emergencies().overruns()
     }
 
     /// Takes the oldest unsolicited mail of a kind.
     pub fn pop_unsolicited(&self, kind: Unsolicited) -> Option<Unclaimed> {
-        self.room.state().shelves.ring(kind).pop()
+        self.shared.state_mut().unsolicited.of_kind(kind).pop()
     }
 
     /// Mails of a kind that were not kept because the ring was full.
     pub fn unsolicited_overruns(&self, kind: Unsolicited) -> u64 {
-        self.room.state().shelves.ring(kind).overruns()
+        self.shared.state_mut().unsolicited.of_kind(kind).overruns()
     }
 
     /// Waits for unsolicited mail of a kind; `None` where none came within the time.
@@ -154,11 +154,11 @@ impl Mailbox {
             None if !self.is_open() => Some(Err(MailboxError::Closed)),
             None => None,
         };
-        self.room.bus.within(limit, self.room.news.until(ready)).await.unwrap_or(Ok(None))
+        self.shared.bus.within(limit, self.shared.changed.until(ready)).await.unwrap_or(Ok(None))
     }
 
     /// Waits for unsolicited mail of a kind.
     pub async fn unsolicited(&self, kind: Unsolicited) -> Unclaimed {
-        self.room.news.until(|| self.pop_unsolicited(kind)).await
+        self.shared.changed.until(|| self.pop_unsolicited(kind)).await
     }
 }

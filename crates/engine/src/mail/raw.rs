@@ -6,20 +6,20 @@
 use alloc::vec::Vec;
 use core::time::Duration;
 
+use super::conversation::Limits;
 use super::lane::Lane;
-use super::talk::Limits;
 use super::{Mailbox, MailboxError};
 
 /// Sends a message and waits until the SubDevice accepted it. An answer to it is kept as unsolicited mail.
 pub async fn send(mailbox: &Mailbox, lane: Lane, payload: &[u8], limit: Duration) -> Result<(), MailboxError> {
-    mailbox.talk(lane).await?.send(payload, limit).await
+    mailbox.conversation(lane).await?.send(payload, limit).await
 }
 
 /// Sends a message and waits for the next mail in the lane, whatever its content, except certainly unsolicited mail:
 /// emergencies and PDOs (CoE), notifications (SoE), requests (AoE), Ethernet frames (EoE).
 pub async fn exchange(mailbox: &Mailbox, lane: Lane, payload: &[u8], limits: Limits) -> Result<Vec<u8>, MailboxError> {
-    let mut talk = mailbox.talk(lane).await?;
-    talk.settle().await?;
-    talk.expect_any(true);
-    talk.ask(payload, limits, |payload| Some(payload.to_vec())).await
+    let mut conversation = mailbox.conversation(lane).await?;
+    conversation.settle().await?;
+    conversation.expect_any(true);
+    conversation.request(payload, limits, |payload| Some(payload.to_vec())).await
 }

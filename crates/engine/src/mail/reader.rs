@@ -11,8 +11,8 @@ use ringcat_wire::register::{SyncManager, SyncManagerActivate, SyncManagerPdiCon
 use super::answer_time::{AnswerTime, ShortestTrip};
 use super::delivery;
 use super::error::MailboxError;
-use super::recent::Way;
-use super::room::{Room, Session};
+use super::recent::ReadKind;
+use super::shared::{Session, SharedMailbox};
 use crate::supervisor::{Bus, BusError};
 use crate::time::Instant;
 
@@ -24,27 +24,27 @@ const REPEAT_PAUSE: Duration = Duration::from_micros(200);
 const FAILURE_PAUSE: Duration = Duration::from_millis(5);
 
 /// Kinds of accesses.
-const LOOK: usize = 0;
+const POLL: usize = 0;
 const READ: usize = 1;
 
 /// Starts a reader unless one runs.
-pub(super) fn start(room: &Rc<Room>) {
-    let time = {
-        let state = &mut *room.state();
-        let lively = state.ethernet.lively(room.bus.now()).is_some();
-        if !state.open || !(state.full || state.curious || state.repeat || state.waiting() || lively) {
+pub(super) fn start(shared: &Rc<SharedMailbox>) {
+    let epoch = {
+        let state = &mut *shared.state_mut();
+        let recently_active = state.ethernet.recently_active(shared.bus.now()).is_some();
+        if !state.open || !(state.full || state.poll_requested || state.repeat || state.waiting() || recently_active) {
             return;
         }
         state.tasks = state.tasks.wrapping_add(1);
-        if state.reader == Some(state.time) {
-            room.work.notify();
+        if state.reader == Some(state.epoch) {
+            shared.work.notify();
             return;
         }
-        state.reader = Some(state.time);
-        state.time
+        state.reader = Some(state.epoch);
+        state.epoch
     };
-    let own = room.clone();
-    room.bus.spawn(async move { run(own, time).await });
+    let own = shared.clone();
+    shared.bus.spawn(async move { run(own, epoch).await });
 }
 
 /// Next step of the reader.
@@ -56,46 +56,46 @@ enum Step {
     /// Read the mailbox.
     Read,
     /// Poll its status.
-    Look,
+    Poll,
     /// Wait.
     Wait(Instant),
 }
 
-async fn run(room: Rc<Room>, time: u32) {
+async fn run(shared: Rc<SharedMailbox>, epoch: u32) {
     // Times of the next poll, after one in vain, and of the next access of any kind, after a failed one.
-    let (mut next_look, mut hold) = (Instant::default(), Instant::default());
-    while let Some(session) = room.session(time) {
-        while let Some(stray) = room.bus.stray_mail(session.station) {
+    let (mut next_poll, mut hold) = (Instant::default(), Instant::default());
+    while let Some(session) = shared.session(epoch) {
+        while let Some(stray) = shared.bus.stray_mail(session.station) {
             {
-                let state = &mut *room.state();
+                let state = &mut *shared.state_mut();
                 state.counters.strays += 1;
-                state.seen = room.bus.now();
+                state.available_at = shared.bus.now();
             }
             // Content read from a mailbox of an earlier session is dropped when it arrives in this one.
             if stray.sent_at >= session.since {
-                delivery::deliver(&room, &stray.mail, Way::Stray, stray.sent_at);
+                delivery::deliver(&shared, &stray.mail, ReadKind::Stray, stray.sent_at);
             }
         }
-        let found = match step(&room, next_look, hold) {
+        let found = match step(&shared, next_poll, hold) {
             Step::End => return,
             Step::Wait(until) => {
-                let limit = until.since(room.bus.now());
-                let tasks = room.look().tasks;
-                let more = || (room.session(time).is_none() || room.look().tasks != tasks).then_some(());
-                if room.bus.within(limit, room.work.until(more)).await.is_ok() {
+                let limit = until.since(shared.bus.now());
+                let tasks = shared.state().tasks;
+                let more = || (shared.session(epoch).is_none() || shared.state().tasks != tasks).then_some(());
+                if shared.bus.within(limit, shared.work.until(more)).await.is_ok() {
                     // The answer of another lane may come sooner.
-                    next_look = room.bus.now();
+                    next_poll = shared.bus.now();
                 }
                 continue;
             }
-            Step::Repeat => repeat(&room, &session).await,
-            Step::Read => read(&room, time, &session).await,
-            Step::Look => look(&room, &session).await,
+            Step::Repeat => repeat(&shared, &session).await,
+            Step::Read => read(&shared, epoch, &session).await,
+            Step::Poll => poll(&shared, &session).await,
         };
-        let now = room.bus.now();
-        next_look = match found {
+        let now = shared.bus.now();
+        next_poll = match found {
             Ok(true) => now,
-            Ok(false) => now + pause(&room, now),
+            Ok(false) => now + pause(&shared, now),
             Err(_) => {
                 hold = now + FAILURE_PAUSE;
                 hold
@@ -105,9 +105,9 @@ async fn run(room: Rc<Room>, time: u32) {
 }
 
 /// The step that is due.
-fn step(room: &Rc<Room>, next_look: Instant, hold: Instant) -> Step {
-    let now = room.bus.now();
-    let state = &mut *room.state();
+fn step(shared: &Rc<SharedMailbox>, next_poll: Instant, hold: Instant) -> Step {
+    let now = shared.bus.now();
+    let state = &mut *shared.state_mut();
     if now < hold {
         return Step::Wait(hold);
     }
@@ -117,128 +117,131 @@ fn step(room: &Rc<Room>, next_look: Instant, hold: Instant) -> Step {
     if state.full {
         return Step::Read;
     }
-    if core::mem::take(&mut state.curious) {
-        return Step::Look;
+    if core::mem::take(&mut state.poll_requested) {
+        return Step::Poll;
     }
-    let Some((due, sure)) = first_look(state, now) else {
+    let Some((due, sure)) = first_poll(state, now) else {
         state.reader = None;
         return Step::End;
     };
-    let due = due.max(next_look);
+    let due = due.max(next_poll);
     if now < due {
         return Step::Wait(due);
     }
     for lane in &mut state.lanes {
         if lane.due().is_some_and(|due| due <= now)
-            && let Some(asked) = &mut lane.asked
+            && let Some(pending) = &mut lane.pending
         {
-            asked.looked = true;
+            pending.polled = true;
         }
     }
-    if sure { Step::Read } else { Step::Look }
+    if sure { Step::Read } else { Step::Poll }
 }
 
 /// When to poll for the first of the expected answers, and whether it will certainly be available then. The reader
 /// polls for fragments of Ethernet frames while some were transferred recently.
-fn first_look(state: &super::room::State, now: Instant) -> Option<(Instant, bool)> {
-    if state.blocked || (state.ethernet.lively(now).is_some() && !state.waiting()) {
+fn first_poll(state: &super::shared::MailboxState, now: Instant) -> Option<(Instant, bool)> {
+    if state.blocked || (state.ethernet.recently_active(now).is_some() && !state.waiting()) {
         return Some((Instant::default(), false));
     }
-    let looks = state.lanes.iter().filter_map(|lane| {
-        let asked = lane.waiting()?;
-        Some((lane.due()?, !asked.looked && lane.answer_time.is_sure()))
+    let polls = state.lanes.iter().filter_map(|lane| {
+        let pending = lane.waiting()?;
+        Some((lane.due()?, !pending.polled && lane.answer_time.is_sure()))
     });
     // An answer due now comes first: the poll may read it at once.
-    let ethernet = state.ethernet.lively(now).map(|_| (now, false));
-    looks.chain(ethernet).min_by_key(|(due, _)| *due)
+    let ethernet = state.ethernet.recently_active(now).map(|_| (now, false));
+    polls.chain(ethernet).min_by_key(|(due, _)| *due)
 }
 
 /// Pause after a poll in vain: a part of the time that the oldest answer was waited for, or of the time since the last
 /// fragment of an Ethernet frame.
-fn pause(room: &Rc<Room>, now: Instant) -> Duration {
-    let state = room.look();
-    let waited = state.lanes.iter().filter_map(|lane| lane.waiting()).map(|asked| now.since(asked.at)).max();
+fn pause(shared: &Rc<SharedMailbox>, now: Instant) -> Duration {
+    let state = shared.state();
+    let waited = state.lanes.iter().filter_map(|lane| lane.waiting()).map(|pending| now.since(pending.at)).max();
     let pause = waited.map(AnswerTime::pause).into_iter().chain(state.ethernet.pause(now)).min();
     pause.unwrap_or(AnswerTime::pause(Duration::ZERO))
 }
 
 /// Presumed start of an access that began then and has just ended, had it not been queued.
-fn asked_at(bus: &Bus, begun: Instant, trip: &mut ShortestTrip) -> Instant {
+fn started_at(bus: &Bus, begun: Instant, trip: &mut ShortestTrip) -> Instant {
     let took = bus.now().since(begun);
     begun + (took - trip.took(took).min(took))
 }
 
 /// Polls the status of the send mailbox; records where it is full.
-async fn look(room: &Rc<Room>, session: &Session) -> Result<bool, MailboxError> {
-    room.state().counters.looks += 1;
-    let begun = room.bus.now();
-    let [status] = room.bus.fprd_array(session.station, session.send_status()).await?;
+async fn poll(shared: &Rc<SharedMailbox>, session: &Session) -> Result<bool, MailboxError> {
+    shared.state_mut().counters.polls += 1;
+    let begun = shared.bus.now();
+    let [status] = shared.bus.fprd_array(session.station, session.send_status()).await?;
     let full = SyncManagerStatus::from_bits(status).mailbox_full;
-    let state = &mut *room.state();
-    let seen = asked_at(&room.bus, begun, &mut state.trips[LOOK]);
+    let state = &mut *shared.state_mut();
+    let seen = started_at(&shared.bus, begun, &mut state.trips[POLL]);
     if full && !state.full {
         state.full = true;
-        state.seen = seen;
+        state.available_at = seen;
     } else if !full {
-        state.lanes.iter_mut().for_each(|lane| lane.looked_in_vain(seen));
+        state.lanes.iter_mut().for_each(|lane| lane.polled_empty(seen));
     }
     Ok(full)
 }
 
 /// Reads the whole send mailbox; false where it is empty.
-async fn read(room: &Rc<Room>, time: u32, session: &Session) -> Result<bool, MailboxError> {
+async fn read(shared: &Rc<SharedMailbox>, epoch: u32, session: &Session) -> Result<bool, MailboxError> {
     let register = RegisterAddress(session.layout.send_offset);
-    let begun = room.bus.now();
-    room.state().reading = true;
-    let reply = room.bus.read_mail(session.station, register, usize::from(session.layout.send_size)).await;
-    if room.session(time).is_none() {
+    let begun = shared.bus.now();
+    shared.state_mut().reading = true;
+    let reply = shared.bus.read_mail(session.station, register, usize::from(session.layout.send_size)).await;
+    if shared.session(epoch).is_none() {
         // The mailbox may be the same after a time in which it was unusable.
-        let lasts = room.look().session.is_some_and(|now| now.since == session.since);
+        let lasts = shared.state().session.is_some_and(|now| now.since == session.since);
         if let Ok(reply) = reply
             && lasts
             && reply.wkc() != Wkc(0)
         {
-            delivery::deliver(room, &reply.data, Way::Stray, begun);
+            delivery::deliver(shared, &reply.data, ReadKind::Stray, begun);
         }
         return Err(MailboxError::Closed);
     }
-    room.state().reading = false;
+    shared.state_mut().reading = false;
     match reply {
         Ok(reply) if reply.wkc() == Wkc(0) => {
-            let state = &mut *room.state();
+            let state = &mut *shared.state_mut();
             state.full = false;
             state.counters.empty_reads += 1;
-            let seen = asked_at(&room.bus, begun, &mut state.trips[READ]);
-            state.lanes.iter_mut().for_each(|lane| lane.looked_in_vain(seen));
+            let seen = started_at(&shared.bus, begun, &mut state.trips[READ]);
+            state.lanes.iter_mut().for_each(|lane| lane.polled_empty(seen));
             Ok(false)
         }
         Ok(reply) => {
             {
-                let state = &mut *room.state();
-                let seen = asked_at(&room.bus, begun, &mut state.trips[READ]);
+                let state = &mut *shared.state_mut();
+                let seen = started_at(&shared.bus, begun, &mut state.trips[READ]);
                 if !core::mem::take(&mut state.full) {
-                    state.seen = seen;
+                    state.available_at = seen;
                 }
                 state.counters.read += 1;
             }
-            let wanted = delivery::deliver(room, &reply.data, Way::Usual, begun);
+            let wanted = delivery::deliver(shared, &reply.data, ReadKind::Expected, begun);
             // Unsolicited mail rarely comes alone.
-            if !wanted && !room.look().waiting() && room.look().ethernet.lively(room.bus.now()).is_none() {
-                look(room, session).await?;
+            if !wanted
+                && !shared.state().waiting()
+                && shared.state().ethernet.recently_active(shared.bus.now()).is_none()
+            {
+                poll(shared, session).await?;
             }
             Ok(true)
         }
         Err(_) => {
-            room.state().repeat = true;
+            shared.state_mut().repeat = true;
             Ok(true)
         }
     }
 }
 
 /// Requests the last mail again; it is in the mailbox then.
-async fn repeat(room: &Rc<Room>, session: &Session) -> Result<bool, MailboxError> {
-    request_repeat(&room.bus, session).await?;
-    let state = &mut *room.state();
+async fn repeat(shared: &Rc<SharedMailbox>, session: &Session) -> Result<bool, MailboxError> {
+    request_repeat(&shared.bus, session).await?;
+    let state = &mut *shared.state_mut();
     state.repeat = false;
     state.full = true;
     state.repeated = true;

@@ -10,7 +10,7 @@ use core::time::Duration;
 use crate::time::Instant;
 
 /// Without a disturbance, only a SubDevice that sends its mail twice causes duplicates: of the last mail.
-const USUAL: usize = 1;
+const AFTER_EXPECTED: usize = 1;
 /// A repeat brings the last mail or the one before; late ones may have come in between. Less than a wrap of the
 /// counter.
 /// counter.
@@ -28,9 +28,9 @@ const FNV_PRIME: u64 = 0x0000_0100_0000_01B3;
 
 /// How a mail was received.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Way {
+pub(super) enum ReadKind {
     /// By a read of its own.
-    Usual,
+    Expected,
     /// After a repeat request.
     Repeat,
     /// Beside the expected read: by one that was given up before it came back, and may have been recovered meanwhile,
@@ -59,16 +59,16 @@ pub(super) struct Recent {
 impl Recent {
     /// Whether a mail is a duplicate; a new one is recorded. `sent` is when its read was sent, or any time between that
     /// and the end of the previous read.
-    pub(super) fn is_double(&mut self, counter: u8, content: &[u8], way: Way, sent: Instant) -> bool {
+    pub(super) fn is_duplicate(&mut self, counter: u8, content: &[u8], kind: ReadKind, sent: Instant) -> bool {
         if counter == 0 {
             return false;
         }
         let content = hash(content);
         let place = self.mails.iter().position(|known| known.sent <= sent).unwrap_or(self.mails.len());
-        let candidates = match way {
-            Way::Usual => place..place + USUAL,
-            Way::Repeat => place..place + AFTER_REPEAT,
-            Way::Stray => place.saturating_sub(AROUND_LATE)..place + AROUND_LATE,
+        let candidates = match kind {
+            ReadKind::Expected => place..place + AFTER_EXPECTED,
+            ReadKind::Repeat => place..place + AFTER_REPEAT,
+            ReadKind::Stray => place.saturating_sub(AROUND_LATE)..place + AROUND_LATE,
         };
         let mut candidates = self.mails.range(candidates.start..candidates.end.min(self.mails.len()));
         if candidates.any(|known| (known.counter, known.content) == (counter, content)) {
@@ -96,24 +96,25 @@ mod tests {
     #[test]
     fn the_same_counter_with_the_same_content_is_a_double() {
         let mut recent = Recent::default();
-        let mut is_double = |counter, content: &[u8]| recent.is_double(counter, content, Way::Usual, Instant(1));
-        assert!(!is_double(1, b"a"));
-        assert!(is_double(1, b"a"));
-        assert!(!is_double(1, b"b"), "a counter that stands still");
-        assert!(!is_double(0, b"b"), "0 is no counter");
-        assert!(!is_double(0, b"b"), "0 is no counter");
+        let mut is_duplicate =
+            |counter, content: &[u8]| recent.is_duplicate(counter, content, ReadKind::Expected, Instant(1));
+        assert!(!is_duplicate(1, b"a"));
+        assert!(is_duplicate(1, b"a"));
+        assert!(!is_duplicate(1, b"b"), "a counter that stands still");
+        assert!(!is_duplicate(0, b"b"), "0 is no counter");
+        assert!(!is_duplicate(0, b"b"), "0 is no counter");
     }
 
     #[test]
     fn after_a_repeat_older_mails_are_doubles_too() {
         let mut recent = Recent::default();
         let at = |ms: u64| Instant(ms * 1_000_000);
-        let mut is_double = |counter, way, ms| recent.is_double(counter, b"x", way, at(ms));
+        let mut is_duplicate = |counter, kind, ms| recent.is_duplicate(counter, b"x", kind, at(ms));
         for counter in 1..=3 {
-            assert!(!is_double(counter, Way::Usual, counter.into()));
+            assert!(!is_duplicate(counter, ReadKind::Expected, counter.into()));
         }
-        assert!(is_double(1, Way::Repeat, 4));
-        assert!(!is_double(4, Way::Repeat, 4));
+        assert!(is_duplicate(1, ReadKind::Repeat, 4));
+        assert!(!is_duplicate(4, ReadKind::Repeat, 4));
     }
 
     // covers: mailbox-faults
@@ -121,17 +122,20 @@ mod tests {
     fn what_comes_late_is_compared_with_what_was_read_about_the_time_when_it_left() {
         let mut recent = Recent::default();
         let at = |ms: u64| Instant(ms * 1_000_000);
-        let mut is_double = |counter, way, ms| recent.is_double(counter, b"x", way, at(ms));
+        let mut is_duplicate = |counter, kind, ms| recent.is_duplicate(counter, b"x", kind, at(ms));
         // Each counter, then a pause of 300 ms with one mail repeated continuously, then each counter again.
         for turn in 0..2 {
             for counter in 1..=7 {
-                assert!(!is_double(counter, Way::Usual, 310 * turn + u64::from(counter)));
+                assert!(!is_duplicate(counter, ReadKind::Expected, 310 * turn + u64::from(counter)));
             }
         }
-        assert!(is_double(7, Way::Stray, 300), "a repeat brought it long after it was accepted");
-        assert!(is_double(1, Way::Stray, 300), "healed by a read that was sent later");
-        assert!(is_double(3, Way::Stray, 312), "healed");
-        assert!(!is_double(2, Way::Stray, 316), "that with this counter before is a turn away: this one is new");
-        assert!(is_double(2, Way::Stray, 316));
+        assert!(is_duplicate(7, ReadKind::Stray, 300), "a repeat brought it long after it was accepted");
+        assert!(is_duplicate(1, ReadKind::Stray, 300), "healed by a read that was sent later");
+        assert!(is_duplicate(3, ReadKind::Stray, 312), "healed");
+        assert!(
+            !is_duplicate(2, ReadKind::Stray, 316),
+            "that with this counter before is a turn away: this one is new"
+        );
+        assert!(is_duplicate(2, ReadKind::Stray, 316));
     }
 }

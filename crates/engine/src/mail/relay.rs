@@ -1,12 +1,12 @@
 //! Mailbox messages of gateway clients, which reach SubDevices through the mailboxes of the MainDevice (protocol 10.1).
 //!
-//! A [`Desk`] takes whole messages and returns answers, with the address and the counter of the client; towards the
+//! A [`GatewayQueue`] takes whole messages and returns answers, with the address and the counter of the client; towards the
 //! SubDevice the router uses its own counter. A message waits for the lane of its protocol like any procedure, so it
 //! disturbs no other transfer. While a transfer of a client is in progress (`dialogue` tracks it) the lane is reserved
 //! for that client, for a limited time: a client that pauses too long, disconnects, or keeps others waiting loses its
 //! transfer, and the SubDevice receives an abort. All queues are bounded, and clients take turns.
 
-mod desk;
 mod dialogue;
+mod gateway_queue;
 
-pub use desk::{Asked, Desk, OwnAnswer, RelayCounters, Relayed};
+pub use gateway_queue::{GatewayQueue, OwnAnswer, Recipient, RelayCounters, Relayed};

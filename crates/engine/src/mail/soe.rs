@@ -8,9 +8,9 @@ use core::fmt;
 
 use ringcat_wire::mailbox::soe::{Idn, SoeElements, SoeErrorCode, SoeMessage, SoeOperation};
 
+use super::conversation::{Conversation, Limits};
 use super::lane::Lane;
 use super::stream::Overflow;
-use super::talk::{Limits, Talk};
 use super::{Mailbox, MailboxError};
 
 /// Drives of a SubDevice.
@@ -111,13 +111,13 @@ pub async fn write(mailbox: &Mailbox, address: SoeAddress, data: &[u8], limits: 
     write_inner(mailbox, address, data, limits).await.map_err(|cause| SoeError { address, cause })
 }
 
-async fn begin(mailbox: &Mailbox, address: SoeAddress) -> Result<Talk, SoeFailure> {
+async fn begin(mailbox: &Mailbox, address: SoeAddress) -> Result<Conversation, SoeFailure> {
     if address.drive >= DRIVES {
         return Err(SoeFailure::Drive);
     }
-    let mut talk = mailbox.talk(Lane::Soe).await?;
-    talk.settle().await?;
-    Ok(talk)
+    let mut conversation = mailbox.conversation(Lane::Soe).await?;
+    conversation.settle().await?;
+    Ok(conversation)
 }
 
 async fn read_inner(
@@ -126,23 +126,23 @@ async fn read_inner(
     limits: Limits,
     limit: usize,
 ) -> Result<Vec<u8>, SoeFailure> {
-    let mut talk = begin(mailbox, address).await?;
+    let mut conversation = begin(mailbox, address).await?;
     let SoeAddress { drive, idn, elements } = address;
     let mut payload = [0; SoeMessage::OVERHEAD];
     let request = SoeMessage::whole(SoeOperation::ReadRequest, drive, elements, idn, &[]);
     let length = request.encode(&mut payload).unwrap_or(0);
     let answer = |payload: &[u8]| answer(payload, SoeOperation::ReadResponse, address);
-    let first = talk.begin(&payload[..length], limits, answer).await?;
-    let (mut all, mut left) = first.inspect_err(|_| talk.complete())?;
+    let first = conversation.begin(&payload[..length], limits, answer).await?;
+    let (mut all, mut left) = first.inspect_err(|_| conversation.complete())?;
     loop {
         if all.len() > limit {
             return Err(SoeFailure::TooLong(Overflow { bytes: all.len() as u64, limit: limit as u64 }));
         }
         if left == 0 {
-            talk.complete();
+            conversation.complete();
             return Ok(all);
         }
-        let (data, follow) = talk.more(limits.1, answer).await??;
+        let (data, follow) = conversation.more(limits.1, answer).await??;
         if follow != left - 1 {
             return Err(SoeFailure::Fragments { expected: left - 1, got: follow });
         }
@@ -152,10 +152,10 @@ async fn read_inner(
 }
 
 async fn write_inner(mailbox: &Mailbox, address: SoeAddress, data: &[u8], limits: Limits) -> Result<(), SoeFailure> {
-    let mut talk = begin(mailbox, address).await?;
+    let mut conversation = begin(mailbox, address).await?;
     let SoeAddress { drive, idn, elements } = address;
-    let mut payload = vec![0; talk.room()];
-    let piece = SoeMessage::max_data(talk.mailbox_sizes().0).max(1);
+    let mut payload = vec![0; conversation.request_capacity()];
+    let piece = SoeMessage::max_data(conversation.mailbox_sizes().0).max(1);
     let count = data.len().div_ceil(piece).max(1);
     let Ok(mut left) = u16::try_from(count - 1) else {
         let limit = piece as u64 * (1 << 16);
@@ -165,22 +165,22 @@ async fn write_inner(mailbox: &Mailbox, address: SoeAddress, data: &[u8], limits
     let mut rest = data;
     let in_parts = left > 0;
     if in_parts {
-        talk.begin_parts();
+        conversation.begin_parts();
     }
     while left > 0 {
         let (data, tail) = rest.split_at(piece);
         rest = tail;
         let message = SoeMessage { incomplete: true, number: left, ..whole(data) };
         let length = encode(&message, &mut payload)?;
-        talk.send(&payload[..length], limits.0).await?;
-        talk.check_parts()?;
+        conversation.send(&payload[..length], limits.0).await?;
+        conversation.check_parts()?;
         left -= 1;
     }
     let length = encode(&whole(rest), &mut payload)?;
     let answer = |payload: &[u8]| answer(payload, SoeOperation::WriteResponse, address);
-    talk.ask(&payload[..length], limits, answer).await??;
+    conversation.request(&payload[..length], limits, answer).await??;
     if in_parts {
-        talk.end_parts()?;
+        conversation.end_parts()?;
     }
     Ok(())
 }

@@ -7,8 +7,8 @@ pub trait Source {
     /// Total length in bytes, where known in advance.
     fn total(&self) -> Option<u64>;
 
-    /// Copies the next bytes into `room` and returns their number; fewer than fit only at the end.
-    fn fill(&mut self, room: &mut [u8]) -> usize;
+    /// Copies the next bytes into `buffer` and returns their number; fewer than fit only at the end.
+    fn fill(&mut self, buffer: &mut [u8]) -> usize;
 }
 
 /// The receiver's limit is exceeded.
@@ -48,10 +48,10 @@ impl Source for Bytes<'_> {
         Some(self.bytes.len() as u64)
     }
 
-    fn fill(&mut self, room: &mut [u8]) -> usize {
+    fn fill(&mut self, buffer: &mut [u8]) -> usize {
         let rest = &self.bytes[self.at..];
-        let count = rest.len().min(room.len());
-        room[..count].copy_from_slice(&rest[..count]);
+        let count = rest.len().min(buffer.len());
+        buffer[..count].copy_from_slice(&rest[..count]);
         self.at += count;
         count
     }
@@ -102,15 +102,15 @@ mod tests {
     use super::*;
 
     #[test]
-    fn bytes_come_in_pieces_and_go_where_there_is_room() {
+    fn a_source_fills_buffers_of_any_size_and_a_sink_keeps_its_limit() {
         let mut source = Bytes::new(b"abcdefg");
         let mut sink = Bounded::new(7);
         assert_eq!(sink.begin(source.total()), Ok(()));
-        let mut room = [0; 3];
+        let mut buffer = [0; 3];
         loop {
-            let count = source.fill(&mut room);
-            sink.take(&room[..count]).unwrap();
-            if count < room.len() {
+            let count = source.fill(&mut buffer);
+            sink.take(&buffer[..count]).unwrap();
+            if count < buffer.len() {
                 break;
             }
         }

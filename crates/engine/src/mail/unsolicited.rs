@@ -5,7 +5,7 @@ use alloc::vec::Vec;
 use ringcat_wire::mailbox::Protocol;
 use ringcat_wire::mailbox::coe::Emergency;
 
-use super::ring::Ring;
+use super::bounded_queue::BoundedQueue;
 use crate::time::Instant;
 
 /// Number of emergencies kept.
@@ -41,23 +41,26 @@ pub struct Unclaimed {
 
 /// The rings.
 #[derive(Debug)]
-pub(super) struct Shelves {
-    emergencies: Ring<(Instant, Emergency)>,
-    rings: [Ring<Unclaimed>; 5],
+pub(super) struct UnsolicitedQueues {
+    emergencies: BoundedQueue<(Instant, Emergency)>,
+    rings: [BoundedQueue<Unclaimed>; 5],
 }
 
-impl Shelves {
-    pub(super) fn new() -> Shelves {
+impl UnsolicitedQueues {
+    pub(super) fn new() -> UnsolicitedQueues {
         let capacity = |kind| if kind == Unsolicited::Ethernet { ETHERNET } else { OTHERS };
         let kinds = [Unsolicited::Ethernet, Unsolicited::Soe, Unsolicited::Aoe, Unsolicited::Voe, Unsolicited::Other];
-        Shelves { emergencies: Ring::new(EMERGENCIES), rings: kinds.map(|kind| Ring::new(capacity(kind))) }
+        UnsolicitedQueues {
+            emergencies: BoundedQueue::new(EMERGENCIES),
+            rings: kinds.map(|kind| BoundedQueue::new(capacity(kind))),
+        }
     }
 
-    pub(super) fn emergencies(&mut self) -> &mut Ring<(Instant, Emergency)> {
+    pub(super) fn emergencies(&mut self) -> &mut BoundedQueue<(Instant, Emergency)> {
         &mut self.emergencies
     }
 
-    pub(super) fn ring(&mut self, kind: Unsolicited) -> &mut Ring<Unclaimed> {
+    pub(super) fn of_kind(&mut self, kind: Unsolicited) -> &mut BoundedQueue<Unclaimed> {
         &mut self.rings[kind as usize]
     }
 }

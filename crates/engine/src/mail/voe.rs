@@ -6,8 +6,8 @@ use core::time::Duration;
 
 use ringcat_wire::mailbox::voe::VoeMessage;
 
+use super::conversation::{Conversation, Limits};
 use super::lane::Lane;
-use super::talk::{Limits, Talk};
 use super::unsolicited::Unsolicited;
 use super::{Mailbox, MailboxError};
 
@@ -29,29 +29,29 @@ pub struct Voe {
 
 /// Sends a message and waits until the SubDevice has accepted it.
 pub async fn send(mailbox: &Mailbox, message: &Voe, limit: Duration) -> Result<(), MailboxError> {
-    let mut talk = mailbox.talk(Lane::Voe).await?;
-    let payload = encode(&talk, message)?;
-    talk.send(&payload, limit).await
+    let mut conversation = mailbox.conversation(Lane::Voe).await?;
+    let payload = encode(&conversation, message)?;
+    conversation.send(&payload, limit).await
 }
 
 /// Sends a message and waits for the next one of the same vendor.
 pub async fn exchange(mailbox: &Mailbox, message: &Voe, limits: Limits) -> Result<Voe, MailboxError> {
-    let mut talk = mailbox.talk(Lane::Voe).await?;
-    talk.settle().await?;
-    let payload = encode(&talk, message)?;
+    let mut conversation = mailbox.conversation(Lane::Voe).await?;
+    conversation.settle().await?;
+    let payload = encode(&conversation, message)?;
     let accept = |payload: &[u8]| decode(payload).filter(|answer| answer.vendor_id == message.vendor_id);
-    talk.ask(&payload, limits, accept).await
+    conversation.request(&payload, limits, accept).await
 }
 
 /// Waits for a message that is not an answer to [`exchange`], and polls the mailbox's status meanwhile. Malformed
 /// messages are skipped.
 pub async fn receive(mailbox: &Mailbox, limit: Duration) -> Result<Voe, MailboxError> {
-    wait(mailbox, limit, Mailbox::look_for_mail).await
+    wait(mailbox, limit, Mailbox::poll_once).await
 }
 
 /// As [`receive`], but reads the mailbox without polling its status.
 pub async fn receive_directly(mailbox: &Mailbox, limit: Duration) -> Result<Voe, MailboxError> {
-    wait(mailbox, limit, Mailbox::is_full).await
+    wait(mailbox, limit, Mailbox::mail_available).await
 }
 
 async fn wait(mailbox: &Mailbox, limit: Duration, look: impl Fn(&Mailbox)) -> Result<Voe, MailboxError> {
@@ -74,9 +74,9 @@ async fn wait(mailbox: &Mailbox, limit: Duration, look: impl Fn(&Mailbox)) -> Re
     }
 }
 
-fn encode(talk: &Talk, message: &Voe) -> Result<Vec<u8>, MailboxError> {
+fn encode(conversation: &Conversation, message: &Voe) -> Result<Vec<u8>, MailboxError> {
     let Voe { vendor_id, vendor_type, ref data } = *message;
-    let (bytes, limit) = (VoeMessage::OVERHEAD + data.len(), talk.room());
+    let (bytes, limit) = (VoeMessage::OVERHEAD + data.len(), conversation.request_capacity());
     let mut payload = vec![0; limit];
     let length = VoeMessage { vendor_id, vendor_type, data }.encode(&mut payload);
     payload.truncate(length.ok_or(MailboxError::TooLong { bytes, limit })?);

@@ -13,7 +13,7 @@ use ringcat_wire::mailbox::{Header, next_counter};
 use super::error::MailboxError;
 use super::lane::{Lane, Outgoing};
 use super::reader;
-use super::room::{Room, Session};
+use super::shared::{Session, SharedMailbox};
 
 /// Pause between two attempts to write into a full mailbox: this one at first, growing to the longest.
 const FIRST_PAUSE: Duration = Duration::from_micros(100);
@@ -23,46 +23,46 @@ const LONGEST_PAUSE: Duration = Duration::from_millis(1);
 const RETRIES: usize = 5;
 
 /// Starts a writer unless one runs.
-pub(super) fn start(room: &Rc<Room>) {
-    let time = {
-        let state = &mut *room.state();
-        if state.writer == Some(state.time) {
+pub(super) fn start(shared: &Rc<SharedMailbox>) {
+    let epoch = {
+        let state = &mut *shared.state_mut();
+        if state.writer == Some(state.epoch) {
             return;
         }
-        state.writer = Some(state.time);
-        state.time
+        state.writer = Some(state.epoch);
+        state.epoch
     };
-    let own = room.clone();
-    room.bus.spawn(async move { run(own, time).await });
+    let own = shared.clone();
+    shared.bus.spawn(async move { run(own, epoch).await });
 }
 
-async fn run(room: Rc<Room>, time: u32) {
-    while let Some((message, session)) = next(&room, time) {
+async fn run(shared: Rc<SharedMailbox>, epoch: u32) {
+    while let Some((message, session)) = next(&shared, epoch) {
         let lane = message.lane;
-        room.state().lanes[lane.place()].writing(&message, room.bus.now());
-        let result = write(&room, time, &session, &message).await;
+        shared.state_mut().lanes[lane.index()].writing(&message, shared.bus.now());
+        let result = write(&shared, epoch, &session, &message).await;
         {
-            let state = &mut *room.state();
-            if state.time != time {
+            let state = &mut *shared.state_mut();
+            if state.epoch != epoch {
                 return;
             }
             state.blocked = false;
-            let now = room.bus.now();
+            let now = shared.bus.now();
             state.counters.written += u64::from(result.is_ok());
             if lane == Lane::Frames {
                 state.ethernet.note_fragment(now);
             }
-            state.lanes[lane.place()].wrote(&message, result, now);
+            state.lanes[lane.index()].wrote(&message, result, now);
         }
-        room.tell();
-        reader::start(&room);
+        shared.notify_all();
+        reader::start(&shared);
     }
 }
 
 /// The next message, with the lanes in turn; `None` ends the writer.
-fn next(room: &Rc<Room>, time: u32) -> Option<(Outgoing, Session)> {
-    let state = &mut *room.state();
-    if state.time != time {
+fn next(shared: &Rc<SharedMailbox>, epoch: u32) -> Option<(Outgoing, Session)> {
+    let state = &mut *shared.state_mut();
+    if state.epoch != epoch {
         return None;
     }
     let count = Lane::COUNT;
@@ -79,8 +79,13 @@ fn next(room: &Rc<Room>, time: u32) -> Option<(Outgoing, Session)> {
     None
 }
 
-async fn write(room: &Rc<Room>, time: u32, session: &Session, message: &Outgoing) -> Result<(), MailboxError> {
-    let bus = &room.bus;
+async fn write(
+    shared: &Rc<SharedMailbox>,
+    epoch: u32,
+    session: &Session,
+    message: &Outgoing,
+) -> Result<(), MailboxError> {
+    let bus = &shared.bus;
     let mail = encode(session, message.lane, &message.payload);
     let register = RegisterAddress(session.layout.receive_offset);
     let until = bus.now() + message.limit;
@@ -91,11 +96,11 @@ async fn write(room: &Rc<Room>, time: u32, session: &Session, message: &Outgoing
             Ok(_) => {}
             Err(error) => {
                 losses += 1;
-                room.state().counters.rewritten += 1;
+                shared.state_mut().counters.rewritten += 1;
                 if losses > RETRIES && bus.now() >= until {
                     return Err(error.into());
                 }
-                if room.session(time).is_none() {
+                if shared.session(epoch).is_none() {
                     return Err(MailboxError::Closed);
                 }
                 continue;
@@ -104,15 +109,15 @@ async fn write(room: &Rc<Room>, time: u32, session: &Session, message: &Outgoing
         if bus.now() >= until {
             return Err(MailboxError::Full { limit: message.limit });
         }
-        if room.session(time).is_none() {
+        if shared.session(epoch).is_none() {
             return Err(MailboxError::Closed);
         }
         // A SubDevice that cannot send its own mail accepts no other.
-        room.state().blocked = true;
-        reader::start(room);
+        shared.state_mut().blocked = true;
+        reader::start(shared);
         bus.sleep(pause).await;
         pause = (pause * 3 / 2).min(LONGEST_PAUSE);
-        if room.session(time).is_none() {
+        if shared.session(epoch).is_none() {
             return Err(MailboxError::Closed);
         }
     }

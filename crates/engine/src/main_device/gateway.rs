@@ -7,7 +7,7 @@ use ringcat_wire::mailbox::{ErrorReply, Message, Protocol};
 use ringcat_wire::sii::MailboxProtocols;
 
 use super::MainDevice;
-use crate::mail::relay::{Asked, Desk, RelayCounters, Relayed};
+use crate::mail::relay::{GatewayQueue, Recipient, RelayCounters, Relayed};
 use crate::procedures::own_objects::Seen;
 use crate::procedures::shared_segment::SharedSegment;
 
@@ -22,8 +22,8 @@ impl MainDevice {
         let bus = self.supervisor.bus();
         let (segment, scan, acyclic) = (self.segment.clone(), self.scan.clone(), self.counters());
         let own_objects = self.own_objects.clone();
-        let desk = self.desk.get_or_insert_with(|| Desk::new(&bus));
-        desk.take(client, message, |message| {
+        let gateway_queue = self.gateway_queue.get_or_insert_with(|| GatewayQueue::new(&bus));
+        gateway_queue.take(client, message, |message| {
             if message.header.address != OWN_ADDRESS {
                 return find(segment.as_ref(), message);
             }
@@ -35,30 +35,30 @@ impl MainDevice {
                 Some(Err(_)) | None => Vec::new(),
             };
             let (seen, payload) = (Seen { bus, segment, scanned, acyclic }, message.payload.to_vec());
-            Ok(Asked::Own(Box::pin(async move { own_objects.answer(&seen, client, &payload).await })))
+            Ok(Recipient::Own(Box::pin(async move { own_objects.answer(&seen, client, &payload).await })))
         });
     }
 
     /// Takes the oldest answer for a client.
     pub fn pop_relayed(&mut self) -> Option<Relayed> {
-        self.desk.as_ref()?.pop()
+        self.gateway_queue.as_ref()?.pop()
     }
 
     /// A client has gone: what it asked for is forgotten, and a transfer of it is ended.
     pub fn forget_client(&mut self, client: u64) {
         self.own_objects.forget(client);
-        if let Some(desk) = &self.desk {
-            desk.forget(client);
+        if let Some(gateway_queue) = &self.gateway_queue {
+            gateway_queue.forget(client);
         }
     }
 
     /// What clients' messages came to.
     pub fn relay_counters(&self) -> RelayCounters {
-        self.desk.as_ref().map(Desk::counters).unwrap_or_default()
+        self.gateway_queue.as_ref().map(GatewayQueue::counters).unwrap_or_default()
     }
 }
 
-fn find(segment: Option<&SharedSegment>, message: &Message<'_>) -> Result<Asked, u16> {
+fn find(segment: Option<&SharedSegment>, message: &Message<'_>) -> Result<Recipient, u16> {
     let Some(segment) = segment else { return Err(ErrorReply::INVALID_HEADER) };
     let access = segment.view();
     let member = access.members.iter().find(|member| member.station.0 == message.header.address);
@@ -79,5 +79,5 @@ fn find(segment: Option<&SharedSegment>, message: &Message<'_>) -> Result<Asked,
     }
     let index = access.member_of(member.station);
     let mailbox = index.and_then(|index| segment.mailbox(index));
-    mailbox.map(Asked::SubDevice).ok_or(ErrorReply::INVALID_HEADER)
+    mailbox.map(Recipient::SubDevice).ok_or(ErrorReply::INVALID_HEADER)
 }

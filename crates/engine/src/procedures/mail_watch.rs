@@ -42,7 +42,7 @@ pub(crate) async fn watch_mail(bus: Bus, segment: SharedSegment) {
             open_mailboxes(&segment).into_iter().partition(|open| open.mapped);
         for open in &mapped {
             if bus.has_stray_mail(open.station) {
-                open.mailbox.is_full();
+                open.mailbox.mail_available();
             }
         }
         // Where some do not answer, nobody knows who: all are asked, until they are found and mended.
@@ -74,7 +74,7 @@ async fn look_together(bus: &Bus, mapped: &[Open]) -> bool {
     let Ok(reply) = bus.transfer(Command::Lrd, target, data, Some(expected)).await else { return true };
     for open in mapped {
         if reply.data[open.index / 8] & 1 << (open.index % 8) != 0 {
-            open.mailbox.is_full();
+            open.mailbox.mail_available();
         }
     }
     reply.wkc() == expected
@@ -83,12 +83,12 @@ async fn look_together(bus: &Bus, mapped: &[Open]) -> bool {
 /// One that does not answer is the matter of the supervision.
 async fn look(bus: Bus, open: Open) {
     if bus.has_stray_mail(open.station) {
-        open.mailbox.is_full();
+        open.mailbox.mail_available();
         return;
     }
     if let Ok([status]) = bus.fprd_array(open.station, open.status).await
         && SyncManagerStatus::from_bits(status).mailbox_full
     {
-        open.mailbox.is_full();
+        open.mailbox.mail_available();
     }
 }

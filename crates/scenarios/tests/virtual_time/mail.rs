@@ -192,7 +192,7 @@ fn an_idle_mailbox_costs_one_byte_per_poll_and_answers_are_read_when_there() {
     assert_eq!(mailbox.counters(), before, "nothing is read or looked at by the router itself");
     assert_eq!(world.run(write_and_read(mailbox.clone(), 50)), Ok(()));
     let counters = mailbox.counters();
-    println!("{} answers, {} empty reads, {} looks", counters.read, counters.empty_reads, counters.looks);
+    println!("{} answers, {} empty reads, {} looks", counters.read, counters.empty_reads, counters.polls);
     assert_eq!(counters.read, 200);
     assert!(counters.empty_reads < 100, "{} empty reads", counters.empty_reads);
 }

@@ -334,8 +334,8 @@ fn one_mebibyte_by_foe_takes_few_round_trips_per_packet_at_any_cycle() {
         });
         let took = (world.now() - start) / packets;
         let after = mailbox.counters();
-        let trips = after.written + after.read + after.looks + after.empty_reads
-            - (before.written + before.read + before.looks + before.empty_reads);
+        let trips = after.written + after.read + after.polls + after.empty_reads
+            - (before.written + before.read + before.polls + before.empty_reads);
         println!(
             "cycle {} ms: {packets} packets, {:.1} round trips and {} us each",
             cycle.as_millis(),

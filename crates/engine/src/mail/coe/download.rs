@@ -28,7 +28,7 @@ pub async fn download(
     let size = source.total().and_then(|total| u32::try_from(total).ok());
     let Some(total) = size else { return Err(SdoError { object, cause: SdoFailure::UnknownSize }) };
     let mut transfer = Transfer::begin(mailbox, object, limits).await?;
-    let room = transfer.talk.room();
+    let room = transfer.conversation.request_capacity();
     let left = |sent: u64| usize::try_from(u64::from(total) - sent).unwrap_or(usize::MAX);
     let expedited = (1..=EXPEDITED_MAX_DATA).contains(&left(0));
     let beside = if expedited { EXPEDITED_MAX_DATA } else { room.saturating_sub(INITIATE_LEN) };

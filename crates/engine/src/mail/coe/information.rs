@@ -14,7 +14,7 @@ use ringcat_wire::mailbox::sdo::AbortCode;
 
 use super::transfer::settle;
 use crate::mail::lane::Lane;
-use crate::mail::{Limits, Mailbox, MailboxError, Talk};
+use crate::mail::{Conversation, Limits, Mailbox, MailboxError};
 
 /// Longest answer: a list of all possible indices.
 const LONGEST: usize = 2 + 2 * 0x1_0000;
@@ -183,15 +183,15 @@ async fn ask(
     key: usize,
     limits: Limits,
 ) -> Result<Vec<u8>, InformationError> {
-    let mut talk = mailbox.talk(Lane::Coe).await?;
-    settle(&mut talk, limits).await?;
+    let mut conversation = mailbox.conversation(Lane::Coe).await?;
+    settle(&mut conversation, limits).await?;
     let mut payload = vec![0; SdoInformation::OVERHEAD + data.len()];
     let length = SdoInformation::whole(request, data).encode(&mut payload).unwrap_or(0);
     let first = |payload: &[u8]| take(payload, response, &data[..key]);
-    let begun = talk.begin(&payload[..length], limits, first).await?;
-    let (mut all, mut left) = begun.inspect_err(|_| talk.complete())?;
+    let begun = conversation.begin(&payload[..length], limits, first).await?;
+    let (mut all, mut left) = begun.inspect_err(|_| conversation.complete())?;
     while left > 0 {
-        let (data, follow) = next(&mut talk, response, limits).await?;
+        let (data, follow) = next(&mut conversation, response, limits).await?;
         if follow != left - 1 {
             return Err(InformationError::Fragments { expected: left - 1, got: follow });
         }
@@ -201,12 +201,16 @@ async fn ask(
             return Err(InformationError::TooLong);
         }
     }
-    talk.complete();
+    conversation.complete();
     Ok(all)
 }
 
-async fn next(talk: &mut Talk, response: InformationOpcode, limits: Limits) -> Result<Fragment, InformationError> {
-    talk.more(limits.1, |payload| take(payload, response, &[])).await?
+async fn next(
+    conversation: &mut Conversation,
+    response: InformationOpcode,
+    limits: Limits,
+) -> Result<Fragment, InformationError> {
+    conversation.more(limits.1, |payload| take(payload, response, &[])).await?
 }
 
 /// Whether a message belongs to the answer.

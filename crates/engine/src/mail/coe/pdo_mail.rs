@@ -56,10 +56,10 @@ impl From<MailboxError> for PdoMailError {
 /// Sends an RxPDO, which has no answer: a refusal by the SubDevice is counted as an unclaimed error reply.
 pub async fn send(mailbox: &Mailbox, pdo: u16, data: &[u8], limit: Duration) -> Result<(), PdoMailError> {
     let number = number(pdo, RX_BASE).ok_or(PdoMailError::Index { pdo })?;
-    let mut talk = mailbox.talk(Lane::Coe).await?;
+    let mut conversation = mailbox.conversation(Lane::Coe).await?;
     let mut payload = CoeHeader { number, ..CoeHeader::new(CoeService::RxPdo) }.encode().to_vec();
     payload.extend_from_slice(data);
-    Ok(talk.send(&payload, limit).await?)
+    Ok(conversation.send(&payload, limit).await?)
 }
 
 /// Requests a TxPDO, or an RxPDO with its current value.
@@ -69,14 +69,14 @@ pub async fn receive(mailbox: &Mailbox, pdo: u16, limits: Limits) -> Result<Vec<
         (None, Some(number)) => (number, CoeService::RxPdoRemote, CoeService::RxPdo),
         (None, None) => return Err(PdoMailError::Index { pdo }),
     };
-    let mut talk = mailbox.talk(Lane::Coe).await?;
-    settle(&mut talk, limits).await?;
-    talk.mark(pdo);
+    let mut conversation = mailbox.conversation(Lane::Coe).await?;
+    settle(&mut conversation, limits).await?;
+    conversation.mark(pdo);
     let [request, answer] = [request, service].map(|service| CoeHeader { number, ..CoeHeader::new(service) }.encode());
-    talk.expect_pdo(Some(answer));
+    conversation.expect_pdo(Some(answer));
     let accept = |payload: &[u8]| payload.strip_prefix(&answer).map(<[u8]>::to_vec);
-    let data = talk.ask(&request, limits, accept).await;
-    talk.expect_pdo(None);
+    let data = conversation.request(&request, limits, accept).await;
+    conversation.expect_pdo(None);
     Ok(data?)
 }
 

@@ -7,7 +7,7 @@ use ringcat_wire::mailbox::sdo::{AbortCode, INITIATE_LEN, SdoRequest, SdoRespons
 use super::address::SdoAddress;
 use super::error::{SdoError, SdoFailure};
 use crate::mail::lane::Lane;
-use crate::mail::{Limits, Mailbox, MailboxError, Talk};
+use crate::mail::{Conversation, Limits, Mailbox, MailboxError};
 
 /// Objects of every CoE device; the abort for a missing one serves as well.
 const DEVICE_TYPE: u16 = 0x1000;
@@ -17,7 +17,7 @@ const FENCES: usize = 3;
 
 /// A transfer in progress. When it ends early, by an error or because it is dropped, it is aborted.
 pub(super) struct Transfer {
-    pub talk: Talk,
+    pub conversation: Conversation,
     pub object: SdoAddress,
     limits: Limits,
     /// The SubDevice may wait for the next message.
@@ -28,11 +28,11 @@ pub(super) struct Transfer {
 impl Transfer {
     pub(super) async fn begin(mailbox: &Mailbox, object: SdoAddress, limits: Limits) -> Result<Transfer, SdoError> {
         let failed = |error| SdoError { object, cause: SdoFailure::Mailbox(error) };
-        let mut talk = mailbox.talk(Lane::Coe).await.map_err(failed)?;
-        settle(&mut talk, limits).await.map_err(failed)?;
-        talk.mark(object.index);
-        let payload = vec![0; talk.room().max(INITIATE_LEN)];
-        Ok(Transfer { talk, object, limits, busy: false, payload })
+        let mut conversation = mailbox.conversation(Lane::Coe).await.map_err(failed)?;
+        settle(&mut conversation, limits).await.map_err(failed)?;
+        conversation.mark(object.index);
+        let payload = vec![0; conversation.request_capacity().max(INITIATE_LEN)];
+        Ok(Transfer { conversation, object, limits, busy: false, payload })
     }
 
     /// Sends a request and waits for the response that `accept` recognises. An abort is one.
@@ -56,7 +56,7 @@ impl Transfer {
             response => accept(response).map(Ok),
         };
         self.busy = true;
-        match self.talk.ask(&self.payload[..length], self.limits, accept).await {
+        match self.conversation.request(&self.payload[..length], self.limits, accept).await {
             Ok(Ok(answer)) => Ok(answer),
             Ok(Err(code)) => {
                 self.busy = false;
@@ -67,7 +67,7 @@ impl Transfer {
             }
             Err(error) => {
                 // A request that the SubDevice refused or never received is not in progress.
-                let doubtful = self.talk.late_mark().is_some();
+                let doubtful = self.conversation.late_mark().is_some();
                 self.busy = in_segments || doubtful || matches!(error, MailboxError::Bus(_));
                 Err(self.failed(SdoFailure::Mailbox(error)))
             }
@@ -96,7 +96,7 @@ impl Transfer {
         let SdoAddress { index, sub_index, .. } = self.object;
         if let Some(length) = (SdoRequest::Abort { index, sub_index, code }).encode(&mut self.payload) {
             // A closed mailbox has no transfer to abort.
-            let _ = self.talk.post(&self.payload[..length]);
+            let _ = self.conversation.post(&self.payload[..length]);
         }
     }
 }
@@ -110,32 +110,32 @@ impl Drop for Transfer {
 /// The answer to a request that was given up may still come, and be taken for the answer to the next request for the
 /// same object. So another object is read first: a SubDevice answers in order, so after that answer no older one can
 /// come.
-pub(in crate::mail) async fn settle(talk: &mut Talk, limits: Limits) -> Result<(), MailboxError> {
+pub(in crate::mail) async fn settle(conversation: &mut Conversation, limits: Limits) -> Result<(), MailboxError> {
     let mut result = Ok(());
     for _ in 0..FENCES {
-        let Some(late) = talk.late_mark() else { return Ok(()) };
+        let Some(late) = conversation.late_mark() else { return Ok(()) };
         let fence = if late == DEVICE_TYPE { IDENTITY } else { DEVICE_TYPE };
-        talk.mark(fence);
-        talk.forget_late();
-        result = ask_fence(talk, fence, limits).await;
+        conversation.mark(fence);
+        conversation.forget_late();
+        result = ask_fence(conversation, fence, limits).await;
         match result {
             Ok(()) => return Ok(()),
             // A certain refusal is an answer, too; otherwise the refusal may belong to another message.
             Err(MailboxError::Error(_)) => {}
             Err(error) => {
                 // Where the request was not sent, nothing has changed.
-                if talk.late_mark().is_none() {
-                    talk.mark(late);
-                    talk.expect_late(limits.1);
+                if conversation.late_mark().is_none() {
+                    conversation.mark(late);
+                    conversation.expect_late(limits.1);
                 }
                 return Err(error);
             }
         }
     }
-    if talk.late_mark().is_some() { result } else { Ok(()) }
+    if conversation.late_mark().is_some() { result } else { Ok(()) }
 }
 
-async fn ask_fence(talk: &mut Talk, fence: u16, limits: Limits) -> Result<(), MailboxError> {
+async fn ask_fence(conversation: &mut Conversation, fence: u16, limits: Limits) -> Result<(), MailboxError> {
     let request = SdoRequest::Upload { index: fence, sub_index: 0, complete_access: false };
     let mut payload = [0; INITIATE_LEN];
     let length = request.encode(&mut payload).unwrap_or(0);
@@ -147,5 +147,5 @@ async fn ask_fence(talk: &mut Talk, fence: u16, limits: Limits) -> Result<(), Ma
         | SdoResponse::DownloadSegmentDone { .. }
         | SdoResponse::UploadSegment { .. } => None,
     };
-    talk.ask(&payload[..length], limits, accept).await
+    conversation.request(&payload[..length], limits, accept).await
 }

@@ -5,9 +5,9 @@ use core::time::Duration;
 
 use super::fragments::Fragments;
 use super::traffic::{EthernetFrame, EthernetStatus, Outgoing, QueueError, TimeStamp};
+use crate::mail::conversation::Conversation;
 use crate::mail::lane::Lane;
-use crate::mail::room::Room;
-use crate::mail::talk::Talk;
+use crate::mail::shared::SharedMailbox;
 use crate::mail::{Mailbox, MailboxError};
 use ringcat_wire::mailbox::eoe::EoeFragment;
 
@@ -20,29 +20,29 @@ const SEND_LIMIT: Duration = Duration::from_millis(500);
 /// queued frames are dropped and counted.
 #[derive(Debug)]
 pub struct EthernetPort {
-    room: Rc<Room>,
+    shared: Rc<SharedMailbox>,
 }
 
 impl EthernetPort {
     /// Opens the port of a mailbox; `None` where it is open already.
     pub fn open(mailbox: &Mailbox) -> Option<EthernetPort> {
-        let room = mailbox.room().clone();
+        let shared = mailbox.shared().clone();
         let attachment = {
-            let traffic = &mut room.state().ethernet;
+            let traffic = &mut shared.state_mut().ethernet;
             if core::mem::replace(&mut traffic.attached, true) {
                 return None;
             }
             traffic.attachment = traffic.attachment.wrapping_add(1);
             traffic.attachment
         };
-        let own = room.clone();
-        room.bus.spawn(async move { send_all(own, attachment).await });
-        Some(EthernetPort { room })
+        let own = shared.clone();
+        shared.bus.spawn(async move { send_all(own, attachment).await });
+        Some(EthernetPort { shared })
     }
 
     /// Whether frames can be sent and received.
     pub fn is_up(&self) -> bool {
-        is_up(&self.room)
+        is_up(&self.shared)
     }
 
     /// Queues a frame, without check sequence, for sending.
@@ -60,56 +60,56 @@ impl EthernetPort {
         if !self.is_up() {
             return Err(QueueError::Down);
         }
-        let number = self.room.state().ethernet.queue(frame, wants_time)?;
-        self.room.news.notify();
+        let number = self.shared.state_mut().ethernet.queue(frame, wants_time)?;
+        self.shared.changed.notify();
         Ok(number)
     }
 
     /// Number of frames that can be queued now; 0 while it is down.
     pub fn room(&self) -> usize {
-        if self.is_up() { self.room.look().ethernet.room() } else { 0 }
+        if self.is_up() { self.shared.state().ethernet.room() } else { 0 }
     }
 
     /// Waits until a frame can be queued.
     pub async fn ready(&self) {
-        self.room.news.until(|| (self.room() > 0).then_some(())).await;
+        self.shared.changed.until(|| (self.room() > 0).then_some(())).await;
     }
 
     /// Takes the oldest received frame.
     pub fn pop_frame(&self) -> Option<EthernetFrame> {
-        self.room.state().ethernet.pop_received()
+        self.shared.state_mut().ethernet.pop_received()
     }
 
     /// Waits for a frame from the SubDevice.
     pub async fn frame(&self) -> EthernetFrame {
-        self.room.news.until(|| self.pop_frame()).await
+        self.shared.changed.until(|| self.pop_frame()).await
     }
 
     /// Takes the oldest received time stamp.
     pub fn pop_time_stamp(&self) -> Option<TimeStamp> {
-        self.room.state().ethernet.pop_time_stamp()
+        self.shared.state_mut().ethernet.pop_time_stamp()
     }
 
     /// Counters, rates, queue length.
     pub fn status(&self) -> EthernetStatus {
         let up = self.is_up();
-        self.room.state().ethernet.status(up, self.room.bus.now())
+        self.shared.state_mut().ethernet.status(up, self.shared.bus.now())
     }
 }
 
 impl Drop for EthernetPort {
     fn drop(&mut self) {
         {
-            let traffic = &mut self.room.state().ethernet;
+            let traffic = &mut self.shared.state_mut().ethernet;
             traffic.attached = false;
             traffic.reset();
         }
-        self.room.news.notify();
+        self.shared.changed.notify();
     }
 }
 
-fn is_up(room: &Room) -> bool {
-    let state = room.look();
+fn is_up(shared: &SharedMailbox) -> bool {
+    let state = shared.state();
     state.session.is_some_and(|session| {
         let size = session.layout.receive_size.min(session.layout.send_size);
         state.open && EoeFragment::max_data(usize::from(size)) > 0
@@ -117,27 +117,27 @@ fn is_up(room: &Room) -> bool {
 }
 
 /// Sends queued frames until the port is dropped.
-async fn send_all(room: Rc<Room>, attachment: u32) {
+async fn send_all(shared: Rc<SharedMailbox>, attachment: u32) {
     loop {
         let work = || {
             let here = {
-                let traffic = &room.look().ethernet;
+                let traffic = &shared.state().ethernet;
                 (traffic.attached && traffic.attachment == attachment).then(|| traffic.has_outgoing())
             };
             match here {
                 None => Some(false),
-                Some(any) => (any && is_up(&room)).then_some(true),
+                Some(any) => (any && is_up(&shared)).then_some(true),
             }
         };
-        if !room.news.until(work).await {
+        if !shared.changed.until(work).await {
             return;
         }
         // It was closed meanwhile: the frames are dropped, too.
-        let Ok(mut talk) = Talk::take(&room, Lane::Frames).await else { continue };
-        while let Some(frame) = next(&room, attachment) {
-            let result = send(&mut talk, &frame).await;
-            let now = room.bus.now();
-            room.state().ethernet.sent(frame.bytes.len(), result.is_ok(), now);
+        let Ok(mut conversation) = Conversation::take(&shared, Lane::Frames).await else { continue };
+        while let Some(frame) = next(&shared, attachment) {
+            let result = send(&mut conversation, &frame).await;
+            let now = shared.bus.now();
+            shared.state_mut().ethernet.sent(frame.bytes.len(), result.is_ok(), now);
             if result == Err(MailboxError::Closed) {
                 // It may be open again, and then needs a new conversation.
                 break;
@@ -146,26 +146,26 @@ async fn send_all(room: Rc<Room>, attachment: u32) {
     }
 }
 
-fn next(room: &Rc<Room>, attachment: u32) -> Option<Outgoing> {
+fn next(shared: &Rc<SharedMailbox>, attachment: u32) -> Option<Outgoing> {
     let frame = {
-        let traffic = &mut room.state().ethernet;
+        let traffic = &mut shared.state_mut().ethernet;
         if traffic.attachment != attachment {
             return None;
         }
         traffic.next_outgoing()
     };
     // A sender may wait for room.
-    room.news.notify();
+    shared.changed.notify();
     frame
 }
 
-async fn send(talk: &mut Talk, frame: &Outgoing) -> Result<(), MailboxError> {
-    let size = talk.mailbox_sizes().0;
+async fn send(conversation: &mut Conversation, frame: &Outgoing) -> Result<(), MailboxError> {
+    let size = conversation.mailbox_sizes().0;
     let Some(fragments) = Fragments::new(&frame.bytes, frame.number, size, frame.wants_time) else {
         return Err(MailboxError::Closed);
     };
     for payload in fragments {
-        talk.send(&payload, SEND_LIMIT).await?;
+        conversation.send(&payload, SEND_LIMIT).await?;
     }
     Ok(())
 }

@@ -6,8 +6,8 @@ use ringcat_wire::mailbox::eoe::{AddressFilter, EoeBody, EoeMessage, EoeResult, 
 
 use super::error::{EoeError, EoeFailure};
 use crate::config::IpSettings;
+use crate::mail::conversation::Limits;
 use crate::mail::lane::Lane;
-use crate::mail::talk::Limits;
 use crate::mail::{Mailbox, MailboxError};
 
 /// Bytes of the longest request: the address filter.
@@ -86,14 +86,14 @@ async fn request<T>(
     let too_long = MailboxError::TooLong { bytes: MAX_REQUEST, limit: payload.len() };
     let length = EoeMessage { port, body }.encode(&mut payload).ok_or(failed(too_long.into()))?;
     let exchange = async {
-        let mut talk = mailbox.talk(Lane::Eoe).await?;
-        talk.settle().await?;
+        let mut conversation = mailbox.conversation(Lane::Eoe).await?;
+        conversation.settle().await?;
         let accept = |payload: &[u8]| {
             let message = EoeMessage::decode(payload).ok()?;
             // Some SubDevices leave the port out.
             if message.port == port || message.port == 0 { answer(message.body) } else { None }
         };
-        talk.ask(&payload[..length], limits, accept).await
+        conversation.request(&payload[..length], limits, accept).await
     };
     match exchange.await {
         Ok((EoeResult::OK, told)) => Ok(told),

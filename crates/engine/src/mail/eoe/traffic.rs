@@ -9,7 +9,7 @@ use ringcat_wire::mailbox::eoe::{EoeBody, EoeMessage};
 
 use super::reassembly::{MAX_FRAME, Outcome, Reassembly};
 use crate::mail::answer_time::AnswerTime;
-use crate::mail::ring::Ring;
+use crate::mail::bounded_queue::BoundedQueue;
 use crate::time::Instant;
 
 /// Shortest frame: its Ethernet header.
@@ -22,7 +22,7 @@ const RECEIVED: usize = 64;
 /// Time stamps that are kept until the application takes them.
 const TIME_STAMPS: usize = 16;
 /// Time after a fragment in which the reader polls for others; later, the mail watch finds them.
-const LIVELY: Duration = Duration::from_millis(20);
+const ACTIVE_FOR: Duration = Duration::from_millis(20);
 /// Rates are those of the last full second.
 const RATE_PERIOD: Duration = Duration::from_secs(1);
 
@@ -157,8 +157,8 @@ pub(in crate::mail) struct Traffic {
     outgoing: VecDeque<Outgoing>,
     number: u8,
     reassembly: Reassembly,
-    received: Ring<EthernetFrame>,
-    time_stamps: Ring<TimeStamp>,
+    received: BoundedQueue<EthernetFrame>,
+    time_stamps: BoundedQueue<TimeStamp>,
     counters: EthernetCounters,
     tx_rate: Rate,
     rx_rate: Rate,
@@ -174,8 +174,8 @@ impl Traffic {
             outgoing: VecDeque::new(),
             number: 0,
             reassembly: Reassembly::default(),
-            received: Ring::new(RECEIVED),
-            time_stamps: Ring::new(TIME_STAMPS),
+            received: BoundedQueue::new(RECEIVED),
+            time_stamps: BoundedQueue::new(TIME_STAMPS),
             counters: EthernetCounters::default(),
             tx_rate: Rate::default(),
             rx_rate: Rate::default(),
@@ -274,14 +274,14 @@ impl Traffic {
     }
 
     /// Time since the last fragment, while more are expected soon.
-    pub(in crate::mail) fn lively(&self, now: Instant) -> Option<Duration> {
+    pub(in crate::mail) fn recently_active(&self, now: Instant) -> Option<Duration> {
         let idle = now.since(self.last_fragment.filter(|_| self.attached)?);
-        (idle < LIVELY).then_some(idle)
+        (idle < ACTIVE_FOR).then_some(idle)
     }
 
     /// Pause to the next poll for a fragment.
     pub(in crate::mail) fn pause(&self, now: Instant) -> Option<Duration> {
-        self.lively(now).map(AnswerTime::pause)
+        self.recently_active(now).map(AnswerTime::pause)
     }
 
     pub(super) fn status(&mut self, up: bool, now: Instant) -> EthernetStatus {

@@ -30,7 +30,7 @@ async fn run(
     progress: impl FnMut(FoeProgress),
 ) -> Result<u64, FoeFailure> {
     let mut transfer = Transfer::begin(mailbox, options, progress).await?;
-    let full = FoeMessage::max_data(transfer.talk.mailbox_sizes().1);
+    let full = FoeMessage::max_data(transfer.conversation.mailbox_sizes().1);
     if full == 0 {
         return Err(FoeFailure::SmallMailbox);
     }
@@ -52,7 +52,7 @@ async fn run(
             // The file is complete, whether or not the last acknowledgement reaches the SubDevice.
             transfer.busy = false;
             let length = acknowledge.encode(&mut transfer.payload).ok_or(FoeFailure::SmallMailbox)?;
-            transfer.talk.send(&transfer.payload[..length], options.limits.0).await?;
+            transfer.conversation.send(&transfer.payload[..length], options.limits.0).await?;
             return Ok(bytes);
         }
         packet = packet.wrapping_add(1);

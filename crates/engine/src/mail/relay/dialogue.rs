@@ -22,16 +22,16 @@ const END_LEN: usize = 64;
 
 /// Expectation of a client's message.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub(super) enum Asks {
-    /// An answer that [`Question`] recognises.
-    Answer(Question),
+pub(super) enum ExpectedAnswer {
+    /// An answer that [`AnswerFilter`] recognises.
+    Matching(AnswerFilter),
     /// No answer.
-    Nothing,
+    None,
 }
 
 /// How to recognise an answer.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub(super) enum Question {
+pub(super) enum AnswerFilter {
     /// Beginning of an SDO transfer, with index and subindex.
     Initiate(u16, u8),
     /// Part of an SDO transfer.
@@ -103,33 +103,37 @@ impl Dialogue {
 
     /// A client's message goes to the SubDevice, whose receive mailbox has this size. The error is for the client: such
     /// a service is not relayed.
-    pub(super) fn ask(&mut self, lane: Lane, payload: &[u8], mailbox_size: usize) -> Result<Asks, u16> {
+    pub(super) fn request(&mut self, lane: Lane, payload: &[u8], mailbox_size: usize) -> Result<ExpectedAnswer, u16> {
         self.pending = self.transfer.clone();
         match lane {
-            Lane::Coe => self.ask_coe(payload),
-            Lane::Foe => self.ask_foe(payload, mailbox_size),
-            Lane::Soe => self.ask_soe(payload),
+            Lane::Coe => self.request_coe(payload),
+            Lane::Foe => self.request_foe(payload, mailbox_size),
+            Lane::Soe => self.request_soe(payload),
             Lane::Aoe => {
                 let (header, _) = AmsHeader::decode(payload).map_err(|_| ErrorReply::SIZE_TOO_SHORT)?;
                 // Bit 0 is that of a response.
                 let request = header.flags & AmsHeader::REQUEST != 0 && header.flags & 0x0001 == 0;
-                Ok(if request { Asks::Answer(Question::Aoe(header.invoke_id)) } else { Asks::Nothing })
+                Ok(if request {
+                    ExpectedAnswer::Matching(AnswerFilter::Aoe(header.invoke_id))
+                } else {
+                    ExpectedAnswer::None
+                })
             }
             Lane::Voe => {
                 let vendor = payload.first_chunk().ok_or(ErrorReply::SIZE_TOO_SHORT)?;
-                Ok(Asks::Answer(Question::Voe(*vendor)))
+                Ok(ExpectedAnswer::Matching(AnswerFilter::Voe(*vendor)))
             }
             Lane::Eoe | Lane::Frames | Lane::Other(_) => {
                 let kind = payload.first().ok_or(ErrorReply::SIZE_TOO_SHORT)? & EOE_TYPE;
-                Ok(Asks::Answer(Question::Eoe(kind + 1)))
+                Ok(ExpectedAnswer::Matching(AnswerFilter::Eoe(kind + 1)))
             }
         }
     }
 
-    fn ask_coe(&mut self, payload: &[u8]) -> Result<Asks, u16> {
+    fn request_coe(&mut self, payload: &[u8]) -> Result<ExpectedAnswer, u16> {
         let bytes = payload.first_chunk().ok_or(ErrorReply::SIZE_TOO_SHORT)?;
         match CoeHeader::decode(bytes).service {
-            CoeService::SdoInformation => return ask_information(payload),
+            CoeService::SdoInformation => return request_information(payload),
             CoeService::SdoRequest => {}
             _ => return Err(ErrorReply::SERVICE_NOT_SUPPORTED),
         }
@@ -144,25 +148,25 @@ impl Dialogue {
                 if last {
                     self.pending = Transfer::None;
                 }
-                Asks::Answer(Question::Segment)
+                ExpectedAnswer::Matching(AnswerFilter::Segment)
             }
-            SdoRequest::UploadSegment { .. } => Asks::Answer(Question::Segment),
+            SdoRequest::UploadSegment { .. } => ExpectedAnswer::Matching(AnswerFilter::Segment),
             SdoRequest::Abort { .. } => {
                 self.transfer = Transfer::None;
-                Asks::Nothing
+                ExpectedAnswer::None
             }
         })
     }
 
-    fn initiate(&mut self, index: u16, sub_index: u8, may_go_on: bool) -> Asks {
+    fn initiate(&mut self, index: u16, sub_index: u8, may_go_on: bool) -> ExpectedAnswer {
         self.transfer = Transfer::None;
         self.pending = if may_go_on { Transfer::Object(index, sub_index) } else { Transfer::None };
-        Asks::Answer(Question::Initiate(index, sub_index))
+        ExpectedAnswer::Matching(AnswerFilter::Initiate(index, sub_index))
     }
 
-    fn ask_foe(&mut self, payload: &[u8], mailbox_size: usize) -> Result<Asks, u16> {
+    fn request_foe(&mut self, payload: &[u8], mailbox_size: usize) -> Result<ExpectedAnswer, u16> {
         let message = FoeMessage::decode(payload).map_err(|_| ErrorReply::SIZE_TOO_SHORT)?;
-        let answer = |data, acknowledge| Asks::Answer(Question::File { data, acknowledge });
+        let answer = |data, acknowledge| ExpectedAnswer::Matching(AnswerFilter::File { data, acknowledge });
         Ok(match message {
             FoeMessage::Read { .. } => {
                 self.pending = Transfer::File;
@@ -179,45 +183,49 @@ impl Dialogue {
             }
             FoeMessage::Acknowledge { .. } if self.transfer == Transfer::FileRead => {
                 self.transfer = Transfer::None;
-                Asks::Nothing
+                ExpectedAnswer::None
             }
             FoeMessage::Acknowledge { packet } => answer(Some(packet.wrapping_add(1)), None),
             // A client that is busy receives the packet again.
             FoeMessage::Busy { .. } => answer(None, None),
             FoeMessage::Error { .. } => {
                 self.transfer = Transfer::None;
-                Asks::Nothing
+                ExpectedAnswer::None
             }
         })
     }
 
-    fn ask_soe(&mut self, payload: &[u8]) -> Result<Asks, u16> {
+    fn request_soe(&mut self, payload: &[u8]) -> Result<ExpectedAnswer, u16> {
         let message = SoeMessage::decode(payload).map_err(|_| ErrorReply::SIZE_TOO_SHORT)?;
         let idn = Idn(message.number);
         self.pending = Transfer::None;
         Ok(match message.operation {
             SoeOperation::WriteRequest if message.incomplete => {
                 self.transfer = Transfer::Fragments;
-                Asks::Nothing
+                ExpectedAnswer::None
             }
-            SoeOperation::ReadRequest => Asks::Answer(Question::Soe(SoeOperation::ReadResponse, message.drive, idn)),
-            SoeOperation::WriteRequest => Asks::Answer(Question::Soe(SoeOperation::WriteResponse, message.drive, idn)),
+            SoeOperation::ReadRequest => {
+                ExpectedAnswer::Matching(AnswerFilter::Soe(SoeOperation::ReadResponse, message.drive, idn))
+            }
+            SoeOperation::WriteRequest => {
+                ExpectedAnswer::Matching(AnswerFilter::Soe(SoeOperation::WriteResponse, message.drive, idn))
+            }
             _ => return Err(ErrorReply::SERVICE_NOT_SUPPORTED),
         })
     }
 
     /// An answer was received from a send mailbox of this size; true where more parts follow.
-    pub(super) fn answered(&mut self, question: &Question, payload: &[u8], mailbox_size: usize) -> bool {
+    pub(super) fn answered(&mut self, filter: &AnswerFilter, payload: &[u8], mailbox_size: usize) -> bool {
         let pending = core::mem::take(&mut self.pending);
         let mut more = false;
-        self.transfer = match question {
-            Question::Initiate(..) | Question::Segment => match SdoResponse::decode(payload) {
+        self.transfer = match filter {
+            AnswerFilter::Initiate(..) | AnswerFilter::Segment => match SdoResponse::decode(payload) {
                 Ok(SdoResponse::UploadNormal { total, data, .. }) if (data.len() as u64) < u64::from(total) => pending,
                 Ok(SdoResponse::UploadSegment { last: false, .. }) => pending,
                 Ok(SdoResponse::DownloadDone { .. } | SdoResponse::DownloadSegmentDone { .. }) => pending,
                 _ => Transfer::None,
             },
-            Question::File { .. } => match FoeMessage::decode(payload) {
+            AnswerFilter::File { .. } => match FoeMessage::decode(payload) {
                 Ok(FoeMessage::Data { data, .. }) if data.len() < FoeMessage::max_data(mailbox_size) => {
                     Transfer::FileRead
                 }
@@ -227,15 +235,15 @@ impl Dialogue {
                 Ok(FoeMessage::Busy { .. }) => Transfer::File,
                 _ => Transfer::None,
             },
-            Question::Information(..) => {
+            AnswerFilter::Information(..) => {
                 more = SdoInformation::decode(payload).is_ok_and(|part| part.incomplete || part.fragments_left > 0);
                 Transfer::None
             }
-            Question::Soe(..) => {
+            AnswerFilter::Soe(..) => {
                 more = SoeMessage::decode(payload).is_ok_and(|part| part.incomplete && !part.error);
                 Transfer::None
             }
-            Question::Aoe(_) | Question::Voe(_) | Question::Eoe(_) => Transfer::None,
+            AnswerFilter::Aoe(_) | AnswerFilter::Voe(_) | AnswerFilter::Eoe(_) => Transfer::None,
         };
         more
     }
@@ -267,28 +275,28 @@ impl Dialogue {
     }
 }
 
-impl Question {
+impl AnswerFilter {
     /// The requested object, where known.
     pub(super) fn index(&self) -> Option<u16> {
         match self {
-            Question::Initiate(index, _) => Some(*index),
+            AnswerFilter::Initiate(index, _) => Some(*index),
             _ => None,
         }
     }
 
     /// Whether a mail is a further part of the answer. For SDO information, only the first part names its subject.
-    pub(super) fn goes_on(&self, payload: &[u8]) -> bool {
+    pub(super) fn continues(&self, payload: &[u8]) -> bool {
         match self {
-            Question::Information(answer, _) => SdoInformation::decode(payload)
+            AnswerFilter::Information(answer, _) => SdoInformation::decode(payload)
                 .is_ok_and(|part| part.opcode == *answer || part.opcode == InformationOpcode::Error),
-            _ => self.knows(payload),
+            _ => self.matches(payload),
         }
     }
 
     /// Whether a mail is an answer, or the first part of it.
-    pub(super) fn knows(&self, payload: &[u8]) -> bool {
+    pub(super) fn matches(&self, payload: &[u8]) -> bool {
         match self {
-            Question::Initiate(asked, asked_sub) => match SdoResponse::decode(payload) {
+            AnswerFilter::Initiate(asked, asked_sub) => match SdoResponse::decode(payload) {
                 Ok(
                     SdoResponse::DownloadDone { index, sub_index, .. }
                     | SdoResponse::UploadExpedited { index, sub_index, .. }
@@ -297,16 +305,16 @@ impl Question {
                 ) => (index, sub_index) == (*asked, *asked_sub),
                 _ => false,
             },
-            Question::Segment => matches!(
+            AnswerFilter::Segment => matches!(
                 SdoResponse::decode(payload),
                 Ok(SdoResponse::DownloadSegmentDone { .. }
                     | SdoResponse::UploadSegment { .. }
                     | SdoResponse::Abort { .. })
             ),
-            Question::Information(answer, key) => SdoInformation::decode(payload).is_ok_and(|part| {
+            AnswerFilter::Information(answer, key) => SdoInformation::decode(payload).is_ok_and(|part| {
                 part.opcode == InformationOpcode::Error || (part.opcode == *answer && part.data.starts_with(key))
             }),
-            Question::File { data, acknowledge } => match FoeMessage::decode(payload) {
+            AnswerFilter::File { data, acknowledge } => match FoeMessage::decode(payload) {
                 Ok(FoeMessage::Data { packet, .. }) => {
                     *data == Some(packet) || (data.is_none() && acknowledge.is_none())
                 }
@@ -314,21 +322,21 @@ impl Question {
                 Ok(FoeMessage::Error { .. } | FoeMessage::Busy { .. }) => true,
                 _ => false,
             },
-            Question::Soe(operation, drive, idn) => SoeMessage::decode(payload).is_ok_and(|message| {
+            AnswerFilter::Soe(operation, drive, idn) => SoeMessage::decode(payload).is_ok_and(|message| {
                 let ours = message.idn().is_none_or(|answered| answered == *idn);
                 message.operation == *operation && message.drive == *drive && ours
             }),
-            Question::Aoe(invoke_id) => {
+            AnswerFilter::Aoe(invoke_id) => {
                 AmsHeader::decode(payload).is_ok_and(|(header, _)| header.invoke_id == *invoke_id)
             }
-            Question::Voe(vendor) => payload.starts_with(vendor),
-            Question::Eoe(kind) => payload.first().is_some_and(|first| first & EOE_TYPE == *kind),
+            AnswerFilter::Voe(vendor) => payload.starts_with(vendor),
+            AnswerFilter::Eoe(kind) => payload.first().is_some_and(|first| first & EOE_TYPE == *kind),
         }
     }
 }
 
 /// A question about the dictionary. Answers start with the request: the kind of a list, an index, a subindex.
-fn ask_information(payload: &[u8]) -> Result<Asks, u16> {
+fn request_information(payload: &[u8]) -> Result<ExpectedAnswer, u16> {
     let request = SdoInformation::decode(payload).map_err(|_| ErrorReply::SIZE_TOO_SHORT)?;
     let (answer, length) = match request.opcode {
         InformationOpcode::ListRequest => (InformationOpcode::ListResponse, 2),
@@ -341,7 +349,7 @@ fn ask_information(payload: &[u8]) -> Result<Asks, u16> {
         | InformationOpcode::Other(_) => return Err(ErrorReply::SERVICE_NOT_SUPPORTED),
     };
     let key = request.data.get(..length).ok_or(ErrorReply::SIZE_TOO_SHORT)?;
-    Ok(Asks::Answer(Question::Information(answer, key.to_vec())))
+    Ok(ExpectedAnswer::Matching(AnswerFilter::Information(answer, key.to_vec())))
 }
 
 #[cfg(test)]

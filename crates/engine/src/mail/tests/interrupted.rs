@@ -50,11 +50,11 @@ fn a_mail_whose_read_was_lost_at_an_outage_is_read_when_the_subdevice_is_back() 
         for code in 1..=3 {
             bench.device.say(Protocol::Coe, &emergency(code), bench.now);
         }
-        bench.mailbox.is_full();
+        bench.mailbox.mail_available();
         // The first read reaches the SubDevice; its answer and all later frames are lost.
         bench.step(|| Fate::LostBack);
         bench.is_away(Duration::from_micros(noticed));
-        bench.mailbox.is_full();
+        bench.mailbox.mail_available();
         bench.pass(Duration::from_millis(50));
         assert_eq!(bench.codes(), [1, 2, 3], "noticed after {noticed} us: {:?}", bench.mailbox.counters());
     }
@@ -106,7 +106,7 @@ fn an_answer_that_waited_during_an_outage_answers_no_other_request() {
 fn what_was_read_before_a_restart_and_comes_back_after_it_is_nobodys() {
     let mut bench = Bench::new(LinkSet::Single, 64);
     bench.device.say(Protocol::Coe, &emergency(1), bench.now);
-    bench.mailbox.is_full();
+    bench.mailbox.mail_available();
     bench.step(|| Fate::Late(Duration::from_millis(60)));
     bench.pass(Duration::from_millis(10));
     // It lost its power and is in PREOP again; the first mail of the new session is another one.
@@ -115,7 +115,7 @@ fn what_was_read_before_a_restart_and_comes_back_after_it_is_nobodys() {
     bench.mailbox.open(StationAddress(STATION), layout, 1);
     bench.device.say(Protocol::Coe, &emergency(2), bench.now);
     for _ in 0..10 {
-        bench.mailbox.is_full();
+        bench.mailbox.mail_available();
         bench.pass(Duration::from_millis(10));
     }
     assert_eq!(bench.codes(), [2], "{:?}", bench.mailbox.counters());

@@ -68,7 +68,7 @@ fn late_fragments_begun_without_a_waiting_request_are_kept_from_the_next() {
     bench.pass(MS);
     bench.device.server.idns.insert((1, 7), new.clone());
     // One of the three is read before the next request.
-    bench.mailbox.is_full();
+    bench.mailbox.mail_available();
     while bench.mailbox.counters().unclaimed == 0 {
         bench.step(|| Fate::Passes);
     }
@@ -91,14 +91,14 @@ fn late_fragments_begun_before_their_write_was_known_are_kept_from_the_next() {
         bench.start(async move { bus.within(2 * MS, soe::read(&mailbox, address, LIMITS, 1000)).await.is_err() });
     // Only reads come back.
     let mailbox = bench.mailbox.clone();
-    let fate = || if mailbox.room().look().reading { Fate::Passes } else { Fate::LostBack };
+    let fate = || if mailbox.shared().state().reading { Fate::Passes } else { Fate::LostBack };
     while bench.device.served.is_empty() {
         bench.step(fate);
     }
     bench.device.server.idns.insert((1, 7), new.clone());
     while given_up.borrow().is_none() {
         if mailbox.counters().read == 0 {
-            mailbox.is_full();
+            mailbox.mail_available();
         }
         bench.step(fate);
     }
@@ -210,7 +210,7 @@ fn a_protocol_that_is_known_is_not_refused_because_ethernet_frames_are() {
     );
     // The server does not support EoE; its error reply arrives before the answer.
     let mailbox = bench.mailbox.clone();
-    bench.start(async move { mailbox.talk(Lane::Frames).await?.send(&[0; 12], LIMITS.0).await });
+    bench.start(async move { mailbox.conversation(Lane::Frames).await?.send(&[0; 12], LIMITS.0).await });
     let second = bench.ask_for(b"second", LIMITS.1, LIMITS);
     bench.pass(20 * MS);
     assert_eq!(second.take(), Some(Some(Ok(message(b"second")))));
@@ -243,7 +243,7 @@ fn an_error_reply_that_comes_while_its_conversation_ends_is_kept_as_unasked_mail
     let ended = bench.start(async move {
         let mut exchange = pin!(raw::exchange(&asking, Lane::of(9), &[0], LIMITS));
         poll_fn(|context| {
-            let gone = mailbox.room().state().lanes[Lane::of(9).place()].has_arrivals();
+            let gone = mailbox.shared().state_mut().lanes[Lane::of(9).index()].has_arrivals();
             if gone { Poll::Ready(true) } else { exchange.as_mut().poll(context).map(|_| false) }
         })
         .await

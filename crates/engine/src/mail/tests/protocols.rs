@@ -159,7 +159,7 @@ fn an_emergency_between_request_and_response_is_kept_and_told() {
     for _ in 0..40 {
         bench.device.say(Protocol::Coe, &mail, bench.now);
     }
-    bench.mailbox.is_full();
+    bench.mailbox.mail_available();
     bench.pass(Duration::from_millis(50));
     assert_eq!(bench.mailbox.emergency_overruns(), 8);
 }
@@ -288,7 +288,7 @@ fn vendor_messages_are_exchanged_and_received_unasked() {
     let result = bench.run(async move {
         voe::send(&mailbox, &sent, LIMITS.0).await?;
         mailbox.bus().sleep(Duration::from_millis(2)).await;
-        mailbox.is_full();
+        mailbox.mail_available();
         voe::receive(&mailbox, LIMITS.1).await
     });
     assert_eq!(result, Ok(message));
@@ -305,8 +305,8 @@ fn an_error_reply_goes_to_the_request_whose_protocol_is_unknown_to_the_subdevice
     let mailbox = bench.mailbox.clone();
     // The simulated server does not support EoE.
     let refused = bench.run(async move {
-        let mut talk = mailbox.talk(Lane::Eoe).await?;
-        talk.ask(&[6, 0, 0, 0], LIMITS, |_| Some(())).await
+        let mut conversation = mailbox.conversation(Lane::Eoe).await?;
+        conversation.request(&[6, 0, 0, 0], LIMITS, |_| Some(())).await
     });
     assert!(matches!(refused, Err(MailboxError::Error(reply)) if reply.detail == 2), "{refused:?}");
     bench.pass(Duration::from_millis(100));

@@ -51,7 +51,7 @@ fn mail_of_any_type_is_exchanged_refused_and_received_unasked() {
     let sent = bench.run(async move { raw::send(&mailbox, Lane::of(OWN), b"echo", LIMITS.0).await });
     assert_eq!(sent, Ok(()));
     bench.pass(Duration::from_millis(5));
-    bench.mailbox.is_full();
+    bench.mailbox.mail_available();
     bench.pass(Duration::from_millis(5));
     let more = (Protocol::Other(12), b"more".to_vec());
     assert_eq!(bench.unasked(Unsolicited::Other), [(own, b"news".to_vec()), more, (own, b"echo".to_vec())]);
@@ -70,7 +70,7 @@ fn an_error_reply_that_nobody_waits_for_is_kept_as_unasked_mail() {
     let mailbox = bench.mailbox.clone();
     bench.run(async move { raw::send(&mailbox, Lane::of(7), b"?", LIMITS.0).await }).unwrap();
     bench.pass(Duration::from_millis(5));
-    bench.mailbox.is_full();
+    bench.mailbox.mail_available();
     bench.pass(Duration::from_millis(5));
     let reply = ErrorReply::new(ErrorReply::UNSUPPORTED_PROTOCOL).encode().to_vec();
     assert_eq!(bench.unasked(Unsolicited::Other), [(Protocol::Error, reply)]);
@@ -109,7 +109,7 @@ fn vendor_messages_that_are_no_answer_are_kept_whenever_they_come() {
             }
             for _ in 0..20 {
                 bench.pass(Duration::from_millis(1));
-                bench.mailbox.is_full();
+                bench.mailbox.mail_available();
             }
             assert_eq!(answer.take(), Some(Ok(asked)));
             assert_eq!(bench.unasked(Unsolicited::Voe), [(Protocol::Voe, payload(&other))], "behind: {behind}");

@@ -68,7 +68,7 @@ fn measure(response: Duration, cycle: Duration) -> Result<Packet, String> {
     let mailbox = world.mailbox(ALL);
     let trips = |world: &World| {
         let counters = world.mailbox(ALL).counters();
-        counters.written + counters.rewritten + counters.read + counters.looks + counters.empty_reads
+        counters.written + counters.rewritten + counters.read + counters.polls + counters.empty_reads
     };
     let frames = |world: &World| world.application().acyclic_counters().sent;
     let before = (world.now(), trips(&world), frames(&world));

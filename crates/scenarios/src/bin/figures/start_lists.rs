@@ -42,5 +42,5 @@ fn show(figures: &mut Figures, name: &str, cost: &Cost) {
     let (acyclic, cyclic) = (ms(*acyclic), ms(*cyclic));
     figures.show(name, ms(*time));
     figures.show("      wire time of acyclic and cyclic frames", format!("{acyclic}, {cyclic}"));
-    figures.show("      empty reads, looks", format!("{}, {}", mail.empty_reads, mail.looks));
+    figures.show("      empty reads, looks", format!("{}, {}", mail.empty_reads, mail.polls));
 }

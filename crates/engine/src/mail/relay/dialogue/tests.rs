@@ -26,9 +26,9 @@ fn foe(message: FoeMessage<'_>) -> Vec<u8> {
     out
 }
 
-fn question(dialogue: &mut Dialogue, lane: Lane, payload: &[u8]) -> Question {
-    match dialogue.ask(lane, payload, SIZE) {
-        Ok(Asks::Answer(question)) => question,
+fn filter(dialogue: &mut Dialogue, lane: Lane, payload: &[u8]) -> AnswerFilter {
+    match dialogue.request(lane, payload, SIZE) {
+        Ok(ExpectedAnswer::Matching(filter)) => filter,
         other => panic!("{other:?}"),
     }
 }
@@ -38,17 +38,17 @@ fn question(dialogue: &mut Dialogue, lane: Lane, payload: &[u8]) -> Question {
 fn an_upload_in_segments_is_open_until_its_last_segment() {
     let mut dialogue = Dialogue::default();
     let upload = sdo(SdoRequest::Upload { index: 0x2000, sub_index: 1, complete_access: false });
-    let asked = question(&mut dialogue, Lane::Coe, &upload);
+    let asked = filter(&mut dialogue, Lane::Coe, &upload);
     let normal = |index| {
         reply(SdoResponse::UploadNormal { index, sub_index: 1, complete_access: false, total: 200, data: &[1; 100] })
     };
-    assert!(asked.knows(&normal(0x2000)) && !asked.knows(&normal(0x2001)));
+    assert!(asked.matches(&normal(0x2000)) && !asked.matches(&normal(0x2001)));
     dialogue.answered(&asked, &normal(0x2000), SIZE);
     assert!(dialogue.is_open());
     for (last, open) in [(false, true), (true, false)] {
-        let asked = question(&mut dialogue, Lane::Coe, &sdo(SdoRequest::UploadSegment { toggle: false }));
+        let asked = filter(&mut dialogue, Lane::Coe, &sdo(SdoRequest::UploadSegment { toggle: false }));
         let part = reply(SdoResponse::UploadSegment { toggle: false, last, data: &[2; 50] });
-        assert!(asked.knows(&part));
+        assert!(asked.matches(&part));
         dialogue.answered(&asked, &part, SIZE);
         assert_eq!(dialogue.is_open(), open);
     }
@@ -61,11 +61,11 @@ fn an_upload_in_segments_is_open_until_its_last_segment() {
 fn answers_are_known_by_what_was_asked_for() {
     let mut dialogue = Dialogue::default();
     let upload = sdo(SdoRequest::Upload { index: 0x2001, sub_index: 110, complete_access: false });
-    let asked = question(&mut dialogue, Lane::Coe, &upload);
+    let asked = filter(&mut dialogue, Lane::Coe, &upload);
     let expedited =
         |index, sub_index| reply(SdoResponse::UploadExpedited { index, sub_index, complete_access: false, data: &[1] });
-    assert!(asked.knows(&expedited(0x2001, 110)));
-    assert!(!asked.knows(&expedited(0x2001, 73)) && !asked.knows(&expedited(0x2000, 110)));
+    assert!(asked.matches(&expedited(0x2001, 110)));
+    assert!(!asked.matches(&expedited(0x2001, 73)) && !asked.matches(&expedited(0x2000, 110)));
 
     let information = |opcode, data: &[u8], fragments_left| {
         let mut out = vec![0; SdoInformation::OVERHEAD + data.len()];
@@ -73,13 +73,13 @@ fn answers_are_known_by_what_was_asked_for() {
         out
     };
     let entry = information(InformationOpcode::EntryRequest, &[0x01, 0x20, 7, 1], 0);
-    let asked = question(&mut dialogue, Lane::Coe, &entry);
+    let asked = filter(&mut dialogue, Lane::Coe, &entry);
     let answer = |key: [u8; 3]| information(InformationOpcode::EntryResponse, &[&key[..], &[1, 7, 0]].concat(), 1);
-    assert!(asked.knows(&answer([0x01, 0x20, 7])) && !asked.knows(&answer([0x01, 0x20, 8])));
-    assert!(!asked.knows(&information(InformationOpcode::ObjectResponse, &[0x01, 0x20, 7], 0)));
-    assert!(asked.knows(&information(InformationOpcode::Error, &[0, 0, 2, 6], 0)));
-    assert!(asked.goes_on(&information(InformationOpcode::EntryResponse, b"name", 0)));
-    assert!(!asked.goes_on(&information(InformationOpcode::ListResponse, b"name", 0)));
+    assert!(asked.matches(&answer([0x01, 0x20, 7])) && !asked.matches(&answer([0x01, 0x20, 8])));
+    assert!(!asked.matches(&information(InformationOpcode::ObjectResponse, &[0x01, 0x20, 7], 0)));
+    assert!(asked.matches(&information(InformationOpcode::Error, &[0, 0, 2, 6], 0)));
+    assert!(asked.continues(&information(InformationOpcode::EntryResponse, b"name", 0)));
+    assert!(!asked.continues(&information(InformationOpcode::ListResponse, b"name", 0)));
 
     let soe = |operation, idn| {
         let message = SoeMessage::whole(operation, 1, SoeElements::VALUE, Idn::standard(0, idn), &[1, 2]);
@@ -88,13 +88,15 @@ fn answers_are_known_by_what_was_asked_for() {
         out.truncate(length);
         out
     };
-    let asked = question(&mut dialogue, Lane::Soe, &soe(SoeOperation::ReadRequest, 47));
-    assert!(asked.knows(&soe(SoeOperation::ReadResponse, 47)) && !asked.knows(&soe(SoeOperation::ReadResponse, 48)));
+    let asked = filter(&mut dialogue, Lane::Soe, &soe(SoeOperation::ReadRequest, 47));
+    assert!(
+        asked.matches(&soe(SoeOperation::ReadResponse, 47)) && !asked.matches(&soe(SoeOperation::ReadResponse, 48))
+    );
     for nothing in [vec![0, 0x80], information(InformationOpcode::EntryRequest, &[1, 2], 0)] {
-        assert_eq!(dialogue.ask(Lane::Coe, &nothing, SIZE), Err(ErrorReply::SIZE_TOO_SHORT));
+        assert_eq!(dialogue.request(Lane::Coe, &nothing, SIZE), Err(ErrorReply::SIZE_TOO_SHORT));
     }
     let answer = information(InformationOpcode::EntryResponse, &[1, 2, 3], 0);
-    assert_eq!(dialogue.ask(Lane::Coe, &answer, SIZE), Err(ErrorReply::SERVICE_NOT_SUPPORTED));
+    assert_eq!(dialogue.request(Lane::Coe, &answer, SIZE), Err(ErrorReply::SERVICE_NOT_SUPPORTED));
 }
 
 // covers: gateway
@@ -103,7 +105,7 @@ fn a_download_that_ends_in_the_middle_is_aborted_for_its_object() {
     let mut dialogue = Dialogue::default();
     let begin =
         SdoRequest::DownloadNormal { index: 0x2002, sub_index: 3, complete_access: false, total: 500, data: &[0; 90] };
-    let asked = question(&mut dialogue, Lane::Coe, &sdo(begin));
+    let asked = filter(&mut dialogue, Lane::Coe, &sdo(begin));
     dialogue.answered(&asked, &reply(SdoResponse::DownloadDone { index: 0x2002, sub_index: 3 }), SIZE);
     assert!(dialogue.is_open());
     let code = AbortCode::PROTOCOL_TIMEOUT;
@@ -111,10 +113,10 @@ fn a_download_that_ends_in_the_middle_is_aborted_for_its_object() {
     assert!(!dialogue.is_open());
     // Expedited and refused transfers leave no state.
     let small = SdoRequest::DownloadExpedited { index: 1, sub_index: 0, complete_access: false, data: &[1] };
-    let asked = question(&mut dialogue, Lane::Coe, &sdo(small));
+    let asked = filter(&mut dialogue, Lane::Coe, &sdo(small));
     dialogue.answered(&asked, &reply(SdoResponse::DownloadDone { index: 1, sub_index: 0 }), SIZE);
     assert!(!dialogue.is_open());
-    let asked = question(&mut dialogue, Lane::Coe, &sdo(begin));
+    let asked = filter(&mut dialogue, Lane::Coe, &sdo(begin));
     dialogue.answered(&asked, &reply(SdoResponse::Abort { index: 0x2002, sub_index: 3, code }), SIZE);
     assert!(!dialogue.is_open());
 }
@@ -123,21 +125,21 @@ fn a_download_that_ends_in_the_middle_is_aborted_for_its_object() {
 #[test]
 fn a_file_is_open_from_its_request_to_its_last_packet() {
     let mut dialogue = Dialogue::default();
-    let asked = question(&mut dialogue, Lane::Foe, &foe(FoeMessage::Read { password: 0, name: b"a" }));
+    let asked = filter(&mut dialogue, Lane::Foe, &foe(FoeMessage::Read { password: 0, name: b"a" }));
     let (full, rest) = ([1; 116], [2; 5]);
     dialogue.answered(&asked, &foe(FoeMessage::Data { packet: 1, data: &full }), SIZE);
     assert!(dialogue.is_open());
-    let asked = question(&mut dialogue, Lane::Foe, &foe(FoeMessage::Acknowledge { packet: 1 }));
+    let asked = filter(&mut dialogue, Lane::Foe, &foe(FoeMessage::Acknowledge { packet: 1 }));
     let last = foe(FoeMessage::Data { packet: 2, data: &rest });
-    assert!(asked.knows(&last) && !asked.knows(&foe(FoeMessage::Data { packet: 1, data: &full })));
+    assert!(asked.matches(&last) && !asked.matches(&foe(FoeMessage::Data { packet: 1, data: &full })));
     dialogue.answered(&asked, &last, SIZE);
     assert!(dialogue.is_open());
-    let end = dialogue.ask(Lane::Foe, &foe(FoeMessage::Acknowledge { packet: 2 }), SIZE);
-    assert_eq!((end, dialogue.is_open()), (Ok(Asks::Nothing), false));
+    let end = dialogue.request(Lane::Foe, &foe(FoeMessage::Acknowledge { packet: 2 }), SIZE);
+    assert_eq!((end, dialogue.is_open()), (Ok(ExpectedAnswer::None), false));
 
-    let asked = question(&mut dialogue, Lane::Foe, &foe(FoeMessage::Write { password: 0, name: b"a" }));
+    let asked = filter(&mut dialogue, Lane::Foe, &foe(FoeMessage::Write { password: 0, name: b"a" }));
     dialogue.answered(&asked, &foe(FoeMessage::Acknowledge { packet: 0 }), SIZE);
-    let asked = question(&mut dialogue, Lane::Foe, &foe(FoeMessage::Data { packet: 1, data: &full }));
+    let asked = filter(&mut dialogue, Lane::Foe, &foe(FoeMessage::Data { packet: 1, data: &full }));
     dialogue.answered(&asked, &foe(FoeMessage::Busy { done: 1, entire: 2, text: b"" }), SIZE);
     assert!(dialogue.is_open());
     let error = dialogue.end().unwrap();
@@ -151,14 +153,14 @@ fn what_must_not_pass_is_refused_with_its_code() {
     assert_eq!(lane(Protocol::Eoe, &[0, 1, 0, 0]), Err(ErrorReply::SERVICE_NOT_SUPPORTED));
     assert_eq!(lane(Protocol::Eoe, &[6, 1, 0, 0]), Ok(Lane::Eoe));
     assert_eq!(lane(Protocol::Other(9), &[]), Err(ErrorReply::UNSUPPORTED_PROTOCOL));
-    assert_eq!(dialogue.ask(Lane::Coe, &[0], SIZE), Err(ErrorReply::SIZE_TOO_SHORT));
-    assert_eq!(dialogue.ask(Lane::Coe, &[0, 0x10, 0, 0], SIZE), Err(ErrorReply::SERVICE_NOT_SUPPORTED));
-    assert_eq!(dialogue.ask(Lane::Voe, &[0, 0x10, 0], SIZE), Err(ErrorReply::SIZE_TOO_SHORT));
+    assert_eq!(dialogue.request(Lane::Coe, &[0], SIZE), Err(ErrorReply::SIZE_TOO_SHORT));
+    assert_eq!(dialogue.request(Lane::Coe, &[0, 0x10, 0, 0], SIZE), Err(ErrorReply::SERVICE_NOT_SUPPORTED));
+    assert_eq!(dialogue.request(Lane::Voe, &[0, 0x10, 0], SIZE), Err(ErrorReply::SIZE_TOO_SHORT));
     for lane in Lane::ALL {
         for length in 0..40 {
             for byte in [0, 1, 2, 3, 4, 5, 6, 0x20, 0xFF] {
                 // Random bytes.
-                let _ = dialogue.ask(lane, &vec![byte; length], SIZE);
+                let _ = dialogue.request(lane, &vec![byte; length], SIZE);
                 let _ = dialogue.end();
             }
         }

@@ -7,9 +7,9 @@ use ringcat_wire::mailbox::Header;
 
 use super::delivery;
 use super::error::MailboxError;
-use super::lane::{Arrival, Asked, Lane, LaneState};
+use super::lane::{Arrival, Lane, LaneState, PendingRequest};
 use super::reader;
-use super::room::Room;
+use super::shared::SharedMailbox;
 use crate::time::Instant;
 
 /// Time limits: until the mailbox accepts the request, until the answer is available.
@@ -27,11 +27,11 @@ const LATE_PARTS: usize = 1 << 16;
 /// A lane of a mailbox, held by one conversation. When it is dropped, the lane is free for the next; a request without
 /// its answer is remembered, so that this answer is not taken for that to another request.
 #[derive(Debug)]
-pub struct Talk {
-    room: Rc<Room>,
+pub struct Conversation {
+    shared: Rc<SharedMailbox>,
     lane: Lane,
     turn: u32,
-    time: u32,
+    epoch: u32,
     /// Time limit of answers; late ones may take as long again.
     limit: Duration,
     /// A request was written, and its answer is incomplete.
@@ -40,7 +40,7 @@ pub struct Talk {
 
 /// A place in the queue for a lane; dropped while waiting, it leaves the queue.
 struct Turn {
-    room: Rc<Room>,
+    shared: Rc<SharedMailbox>,
     lane: Lane,
     turn: u32,
     kept: bool,
@@ -49,62 +49,66 @@ struct Turn {
 impl Drop for Turn {
     fn drop(&mut self) {
         if !self.kept {
-            leave(&self.room, self.lane, self.turn);
+            leave(&self.shared, self.lane, self.turn);
         }
     }
 }
 
-fn leave(room: &Rc<Room>, lane: Lane, turn: u32) {
-    room.state().lanes[lane.place()].turns.retain(|other| *other != turn);
-    room.news.notify();
+fn leave(shared: &Rc<SharedMailbox>, lane: Lane, turn: u32) {
+    shared.state_mut().lanes[lane.index()].turns.retain(|other| *other != turn);
+    shared.changed.notify();
 }
 
-impl Talk {
+impl Conversation {
     /// Waits for the lane to be free.
-    pub(super) async fn take(room: &Rc<Room>, lane: Lane) -> Result<Talk, MailboxError> {
-        let (mut turn, time) = {
-            let state = &mut *room.state();
+    pub(super) async fn take(shared: &Rc<SharedMailbox>, lane: Lane) -> Result<Conversation, MailboxError> {
+        let (mut turn, epoch) = {
+            let state = &mut *shared.state_mut();
             if !state.open {
                 return Err(MailboxError::Closed);
             }
             state.next_id = state.next_id.wrapping_add(1);
-            state.lanes[lane.place()].turns.push_back(state.next_id);
-            (Turn { room: room.clone(), lane, turn: state.next_id, kept: false }, state.time)
+            state.lanes[lane.index()].turns.push_back(state.next_id);
+            (Turn { shared: shared.clone(), lane, turn: state.next_id, kept: false }, state.epoch)
         };
         let ready = || {
-            let state = room.look();
-            if state.time != time {
+            let state = shared.state();
+            if state.epoch != epoch {
                 return Some(Err(MailboxError::Closed));
             }
-            (state.lanes[lane.place()].turns.front() == Some(&turn.turn)).then_some(Ok(()))
+            (state.lanes[lane.index()].turns.front() == Some(&turn.turn)).then_some(Ok(()))
         };
-        room.news.until(ready).await?;
+        shared.changed.until(ready).await?;
         turn.kept = true;
-        Ok(Talk { room: room.clone(), lane, turn: turn.turn, time, limit: Duration::ZERO, open: false })
+        Ok(Conversation { shared: shared.clone(), lane, turn: turn.turn, epoch, limit: Duration::ZERO, open: false })
     }
 
     fn with<T>(&self, work: impl FnOnce(&mut LaneState) -> T) -> Result<T, MailboxError> {
-        let state = &mut *self.room.state();
-        if state.time != self.time { Err(MailboxError::Closed) } else { Ok(work(&mut state.lanes[self.lane.place()])) }
+        let state = &mut *self.shared.state_mut();
+        if state.epoch != self.epoch {
+            Err(MailboxError::Closed)
+        } else {
+            Ok(work(&mut state.lanes[self.lane.index()]))
+        }
     }
 
     /// Largest payload of a message in both directions, in bytes.
     pub fn capacity(&self) -> usize {
-        let state = self.room.look();
+        let state = self.shared.state();
         state.session.map_or(0, |session| {
             usize::from(session.layout.receive_size.min(session.layout.send_size)).saturating_sub(Header::LEN)
         })
     }
 
     /// Largest payload of a message to the SubDevice, in bytes.
-    pub fn room(&self) -> usize {
-        let state = self.room.look();
+    pub fn request_capacity(&self) -> usize {
+        let state = self.shared.state();
         state.session.map_or(0, |session| usize::from(session.layout.receive_size).saturating_sub(Header::LEN))
     }
 
     /// Lengths of the receive and the send mailbox, header included.
     pub fn mailbox_sizes(&self) -> (usize, usize) {
-        let state = self.room.look();
+        let state = self.shared.state();
         state.session.map_or((0, 0), |session| (session.layout.receive_size.into(), session.layout.send_size.into()))
     }
 
@@ -115,26 +119,26 @@ impl Talk {
 
     /// A number that no other recent request of this mailbox has.
     pub fn number(&mut self) -> u32 {
-        let state = &mut *self.room.state();
+        let state = &mut *self.shared.state_mut();
         state.next_id = state.next_id.wrapping_add(1);
         state.next_id
     }
 
     /// The time.
     pub fn now(&self) -> Instant {
-        self.room.bus.now()
+        self.shared.bus.now()
     }
 
     /// Waits, until the mailbox is closed at the latest.
     pub async fn pause(&self, pause: Duration) -> Result<(), MailboxError> {
         let closed = || self.with(|_| ()).err();
-        match self.room.bus.within(pause, self.room.news.until(closed)).await {
+        match self.shared.bus.within(pause, self.shared.changed.until(closed)).await {
             Ok(error) => Err(error),
             Err(_) => Ok(()),
         }
     }
 
-    /// Mark of the next request: a number by which [`Talk::late_mark`] distinguishes requests.
+    /// Mark of the next request: a number by which [`Conversation::late_mark`] distinguishes requests.
     pub fn mark(&mut self, mark: u16) {
         let _ = self.with(|lane| lane.mark = mark);
     }
@@ -161,7 +165,7 @@ impl Talk {
 
     /// The answer to a request that was given up may come within a time.
     pub(super) fn expect_late(&mut self, limit: Duration) {
-        let now = self.room.bus.now();
+        let now = self.shared.bus.now();
         let _ = self.with(|lane| lane.late_from(now, limit));
     }
 
@@ -169,11 +173,11 @@ impl Talk {
     /// more, in protocols whose answers do not name their request.
     pub async fn settle(&mut self) -> Result<(), MailboxError> {
         for _ in 0..LATE_PARTS {
-            let now = self.room.bus.now();
+            let now = self.shared.bus.now();
             let Some(until) = self.with(|lane| lane.late_until)?.filter(|until| *until > now) else { break };
             self.limit = until.since(now);
             self.with(|lane| lane.settling = true)?;
-            self.look_on()?;
+            self.poll_for_more()?;
             // The time limit of a request that is written only now starts then.
             let ready = || {
                 let heard = |lane: &mut LaneState| match lane.take() {
@@ -182,18 +186,19 @@ impl Talk {
                 };
                 self.with(heard).transpose()
             };
-            let heard = self.room.bus.within(self.limit, self.room.news.until(ready)).await.unwrap_or(Ok(None))?;
+            let heard =
+                self.shared.bus.within(self.limit, self.shared.changed.until(ready)).await.unwrap_or(Ok(None))?;
             let Some(arrival) = heard else { continue };
             let (is_part, is_over) = match &arrival {
                 Arrival::Payload(payload) => (true, delivery::is_last(self.lane, payload)),
                 Arrival::Refused(_, doubtful) => (false, !doubtful),
             };
-            delivery::put_aside(&mut self.room.state(), self.lane, arrival);
+            delivery::keep_unclaimed(&mut self.shared.state_mut(), self.lane, arrival);
             if is_over {
                 break;
             }
             if is_part {
-                let now = self.room.bus.now();
+                let now = self.shared.bus.now();
                 self.with(|lane| lane.late_goes_on(now))?;
             }
         }
@@ -225,14 +230,14 @@ impl Talk {
     /// The answer is complete.
     pub fn complete(&mut self) {
         self.open = false;
-        let _ = self.with(|lane| lane.asked = None);
-        self.put_aside();
+        let _ = self.with(|lane| lane.pending = None);
+        self.keep_unclaimed();
     }
 
     /// Sends a message without an answer. It is written even when the conversation ends.
     pub fn post(&mut self, payload: &[u8]) -> Result<(), MailboxError> {
         self.with(|_| ())?;
-        self.room.queue(self.lane, payload.to_vec(), POST_LIMIT, (self.turn, None)).map(drop)
+        self.shared.queue(self.lane, payload.to_vec(), POST_LIMIT, (self.turn, None)).map(drop)
     }
 
     /// Sends a message and waits until the SubDevice has accepted it.
@@ -242,7 +247,7 @@ impl Talk {
 
     /// Sends a request and waits for the mail that `accept` recognises as its answer; other mail of the lane is dropped
     /// and counted.
-    pub async fn ask<T>(
+    pub async fn request<T>(
         &mut self,
         payload: &[u8],
         limits: Limits,
@@ -253,7 +258,7 @@ impl Talk {
         Ok(answer)
     }
 
-    /// As [`Talk::ask`], where further parts of the answer may follow: [`Talk::more`], until [`Talk::complete`].
+    /// As [`Conversation::request`], where further parts of the answer may follow: [`Conversation::more`], until [`Conversation::complete`].
     pub async fn begin<T>(
         &mut self,
         payload: &[u8],
@@ -261,7 +266,7 @@ impl Talk {
         accept: impl FnMut(&[u8]) -> Option<T>,
     ) -> Result<T, MailboxError> {
         self.limit = limits.1;
-        self.put_aside();
+        self.keep_unclaimed();
         // Its answer may begin before the write is confirmed.
         self.open = true;
         self.write(payload, limits.0, Some(limits.1)).await.inspect_err(|_| self.open = false)?;
@@ -275,35 +280,40 @@ impl Talk {
         accept: impl FnMut(&[u8]) -> Option<T>,
     ) -> Result<T, MailboxError> {
         self.limit = limit;
-        self.look_on()?;
+        self.poll_for_more()?;
         self.answer(limit, accept).await
     }
 
     /// Makes the reader poll for more.
-    fn look_on(&mut self) -> Result<(), MailboxError> {
-        let (now, limit) = (self.room.bus.now(), self.limit);
+    fn poll_for_more(&mut self) -> Result<(), MailboxError> {
+        let (now, limit) = (self.shared.bus.now(), self.limit);
         self.with(|lane| {
             if !lane.has_arrivals() {
-                lane.asked = Some(Asked::at(now, limit));
+                lane.pending = Some(PendingRequest::at(now, limit));
             }
         })?;
-        reader::start(&self.room);
+        reader::start(&self.shared);
         Ok(())
     }
 
-    async fn write(&mut self, payload: &[u8], limit: Duration, asks: Option<Duration>) -> Result<(), MailboxError> {
-        let id = self.room.queue(self.lane, payload.to_vec(), limit, (self.turn, asks))?;
+    async fn write(
+        &mut self,
+        payload: &[u8],
+        limit: Duration,
+        answer_limit: Option<Duration>,
+    ) -> Result<(), MailboxError> {
+        let id = self.shared.queue(self.lane, payload.to_vec(), limit, (self.turn, answer_limit))?;
         let ready = || match self.with(|lane| lane.written) {
             Err(error) => Some(Err(error)),
             Ok(Some((written, result))) if written == id => Some(result),
             Ok(_) => None,
         };
-        self.room.news.until(ready).await
+        self.shared.changed.until(ready).await
     }
 
     async fn arrival(&self, limit: Duration) -> Result<Arrival, MailboxError> {
         let ready = || self.with(LaneState::take).transpose();
-        match self.room.bus.within(limit, self.room.news.until(ready)).await {
+        match self.shared.bus.within(limit, self.shared.changed.until(ready)).await {
             Ok(arrival) => arrival,
             Err(_) => Err(MailboxError::NoAnswer { limit }),
         }
@@ -314,9 +324,9 @@ impl Talk {
         limit: Duration,
         mut accept: impl FnMut(&[u8]) -> Option<T>,
     ) -> Result<T, MailboxError> {
-        let until = self.room.bus.now() + limit;
+        let until = self.shared.bus.now() + limit;
         loop {
-            let left = until.since(self.room.bus.now());
+            let left = until.since(self.shared.bus.now());
             match self.arrival(left).await {
                 Ok(Arrival::Refused(reply, doubtful)) => {
                     if doubtful {
@@ -330,8 +340,8 @@ impl Talk {
                     if let Some(answer) = accept(&payload) {
                         return Ok(answer);
                     }
-                    delivery::put_aside(&mut self.room.state(), self.lane, Arrival::Payload(payload));
-                    self.look_on()?;
+                    delivery::keep_unclaimed(&mut self.shared.state_mut(), self.lane, Arrival::Payload(payload));
+                    self.poll_for_more()?;
                 }
                 Err(MailboxError::NoAnswer { .. }) => {
                     self.give_up();
@@ -344,26 +354,26 @@ impl Talk {
 
     /// The request is given up; its answer may come late.
     fn give_up(&mut self) {
-        let (now, limit, turn) = (self.room.bus.now(), self.limit, self.turn);
+        let (now, limit, turn) = (self.shared.bus.now(), self.limit, self.turn);
         let open = core::mem::take(&mut self.open);
         let _ = self.with(|lane| lane.give_up(turn, open, now, limit));
-        self.put_aside();
+        self.keep_unclaimed();
     }
 
     /// Received mail that was not taken becomes unsolicited mail.
-    fn put_aside(&self) {
-        let state = &mut *self.room.state();
-        if state.time != self.time {
+    fn keep_unclaimed(&self) {
+        let state = &mut *self.shared.state_mut();
+        if state.epoch != self.epoch {
             return;
         }
-        while let Some(arrival) = state.lanes[self.lane.place()].take() {
-            delivery::put_aside(state, self.lane, arrival);
+        while let Some(arrival) = state.lanes[self.lane.index()].take() {
+            delivery::keep_unclaimed(state, self.lane, arrival);
         }
     }
 
     /// Written parts may still be refused.
     fn leave_parts(&mut self) {
-        let now = self.room.bus.now();
+        let now = self.shared.bus.now();
         let _ = self.with(|lane| {
             if lane.parts_until.take().is_some() {
                 lane.parts_until = Some(now + PARTS_LIMIT);
@@ -376,7 +386,7 @@ impl Talk {
     fn withdraw(&mut self) {
         let withdraw = |lane: &mut LaneState| {
             let queued = lane.outbox.len();
-            lane.outbox.retain(|message| message.asks.is_none());
+            lane.outbox.retain(|message| message.answer_limit.is_none());
             lane.outbox.len() < queued
         };
         if self.with(withdraw).unwrap_or(false) {
@@ -385,13 +395,13 @@ impl Talk {
     }
 }
 
-impl Drop for Talk {
+impl Drop for Conversation {
     fn drop(&mut self) {
         self.withdraw();
         self.give_up();
         self.leave_parts();
         self.expect_pdo(None);
         self.expect_any(false);
-        leave(&self.room, self.lane, self.turn);
+        leave(&self.shared, self.lane, self.turn);
     }
 }

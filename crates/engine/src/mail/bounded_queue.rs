@@ -4,15 +4,15 @@ use alloc::collections::VecDeque;
 
 /// A bounded queue. Items that arrive while it is full are dropped and counted.
 #[derive(Debug)]
-pub(super) struct Ring<T> {
+pub(super) struct BoundedQueue<T> {
     entries: VecDeque<T>,
     capacity: usize,
     overruns: u64,
 }
 
-impl<T> Ring<T> {
-    pub(super) fn new(capacity: usize) -> Ring<T> {
-        Ring { entries: VecDeque::new(), capacity, overruns: 0 }
+impl<T> BoundedQueue<T> {
+    pub(super) fn new(capacity: usize) -> BoundedQueue<T> {
+        BoundedQueue { entries: VecDeque::new(), capacity, overruns: 0 }
     }
 
     pub(super) fn push(&mut self, entry: T) {
@@ -42,7 +42,7 @@ mod tests {
 
     #[test]
     fn a_full_ring_keeps_what_it_has_and_counts_the_rest() {
-        let mut ring = Ring::new(2);
+        let mut ring = BoundedQueue::new(2);
         (0..5).for_each(|n| ring.push(n));
         assert_eq!(ring.overruns(), 3);
         assert_eq!([ring.pop(), ring.pop(), ring.pop()], [Some(0), Some(1), None]);

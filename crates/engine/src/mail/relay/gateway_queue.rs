@@ -12,10 +12,10 @@ use core::time::Duration;
 
 use ringcat_wire::mailbox::{ErrorReply, Header, Message, Protocol, gateway};
 
-use super::dialogue::{Asks, Dialogue, Question, lane};
+use super::dialogue::{AnswerFilter, Dialogue, ExpectedAnswer, lane};
 use crate::mail::coe;
+use crate::mail::conversation::{Conversation, Limits};
 use crate::mail::lane::Lane;
-use crate::mail::talk::{Limits, Talk};
 use crate::mail::{Mailbox, MailboxError};
 use crate::supervisor::{Bus, Signal};
 use crate::time::Instant;
@@ -66,7 +66,7 @@ pub struct RelayCounters {
 pub type OwnAnswer = Pin<Box<dyn Future<Output = Result<Vec<Vec<u8>>, u16>>>>;
 
 /// Target of a message.
-pub enum Asked {
+pub enum Recipient {
     /// A SubDevice, through its mailbox.
     SubDevice(Mailbox),
     /// The MainDevice itself. The answer is prepared when it is the message's turn.
@@ -99,31 +99,31 @@ struct State {
 }
 
 /// Takes messages of clients and returns answers.
-pub struct Desk {
+pub struct GatewayQueue {
     shared: Rc<Shared>,
 }
 
 struct Shared {
     bus: Bus,
     state: RefCell<State>,
-    news: Signal,
+    changed: Signal,
 }
 
-impl core::fmt::Debug for Desk {
+impl core::fmt::Debug for GatewayQueue {
     fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
-        f.debug_struct("Desk").field("counters", &self.counters()).finish_non_exhaustive()
+        f.debug_struct("GatewayQueue").field("counters", &self.counters()).finish_non_exhaustive()
     }
 }
 
-impl Desk {
+impl GatewayQueue {
     /// A desk without messages.
-    pub fn new(bus: &Bus) -> Desk {
-        Desk { shared: Rc::new(Shared { bus: bus.clone(), state: RefCell::default(), news: bus.signal() }) }
+    pub fn new(bus: &Bus) -> GatewayQueue {
+        GatewayQueue { shared: Rc::new(Shared { bus: bus.clone(), state: RefCell::default(), changed: bus.signal() }) }
     }
 
     /// Takes a client's message, EtherCAT header included. `find` returns the target with its address, and whether the
     /// target supports its protocol. A message that cannot be passed on is answered with an error reply.
-    pub fn take(&self, client: u64, bytes: &[u8], find: impl FnOnce(&Message<'_>) -> Result<Asked, u16>) {
+    pub fn take(&self, client: u64, bytes: &[u8], find: impl FnOnce(&Message<'_>) -> Result<Recipient, u16>) {
         self.shared.state.borrow_mut().counters.messages += 1;
         let Ok(message) = gateway::decode(bytes) else {
             self.shared.state.borrow_mut().counters.malformed += 1;
@@ -133,8 +133,8 @@ impl Desk {
         let mut job = Job { client, header, payload: payload.to_vec(), at: self.shared.bus.now(), own: None };
         let found = lane(header.protocol, payload).and_then(|lane| Ok((find(&message)?, lane)));
         match found {
-            Ok((Asked::SubDevice(mailbox), lane)) => self.queue(job, Some(mailbox), lane),
-            Ok((Asked::Own(answer), lane)) => {
+            Ok((Recipient::SubDevice(mailbox), lane)) => self.queue(job, Some(mailbox), lane),
+            Ok((Recipient::Own(answer), lane)) => {
                 job.own = Some(answer);
                 self.queue(job, None, lane);
             }
@@ -143,7 +143,7 @@ impl Desk {
     }
 
     fn queue(&self, job: Job, mailbox: Option<Mailbox>, lane: Lane) {
-        let key = (job.header.address, lane.place());
+        let key = (job.header.address, lane.index());
         let state = &mut *self.shared.state.borrow_mut();
         let queue = state.queues.entry(key).or_default();
         let of_client = queue.jobs.iter().filter(|other| other.client == job.client).count();
@@ -161,7 +161,7 @@ impl Desk {
                 }
             });
         }
-        self.shared.news.notify();
+        self.shared.changed.notify();
     }
 
     /// A client has disconnected: its messages are dropped, its transfer is ended.
@@ -175,7 +175,7 @@ impl Desk {
             }
             state.answers.retain(|answer| answer.client != client);
         }
-        self.shared.news.notify();
+        self.shared.changed.notify();
     }
 
     /// Takes the oldest answer.
@@ -262,13 +262,13 @@ impl Shared {
 /// Processes the messages for one SubDevice and lane, until there are none.
 async fn serve(shared: Rc<Shared>, key: (u16, usize), mailbox: Mailbox, lane: Lane) {
     while let Some(job) = shared.next(key) {
-        let talk = async {
-            let mut talk = mailbox.talk(lane).await?;
-            settle(&mut talk, lane).await?;
-            Ok::<Talk, MailboxError>(talk)
+        let conversation = async {
+            let mut conversation = mailbox.conversation(lane).await?;
+            settle(&mut conversation, lane).await?;
+            Ok::<Conversation, MailboxError>(conversation)
         };
-        match talk.await {
-            Ok(talk) => converse(&shared, key, talk, lane, job).await,
+        match conversation.await {
+            Ok(conversation) => hold_conversation(&shared, key, conversation, lane, job).await,
             Err(_) => shared.state.borrow_mut().counters.unanswered += 1,
         }
     }
@@ -288,28 +288,34 @@ async fn serve_own(shared: Rc<Shared>, key: (u16, usize)) {
     }
 }
 
-async fn settle(talk: &mut Talk, lane: Lane) -> Result<(), MailboxError> {
+async fn settle(conversation: &mut Conversation, lane: Lane) -> Result<(), MailboxError> {
     match lane {
-        Lane::Coe => coe::settle(talk, LIMITS).await,
-        _ => talk.settle().await,
+        Lane::Coe => coe::settle(conversation, LIMITS).await,
+        _ => conversation.settle().await,
     }
 }
 
 /// One message and its answers, and the rest of the same transfer.
-async fn converse(shared: &Rc<Shared>, key: (u16, usize), mut talk: Talk, lane: Lane, first: Job) {
+async fn hold_conversation(
+    shared: &Rc<Shared>,
+    key: (u16, usize),
+    mut conversation: Conversation,
+    lane: Lane,
+    first: Job,
+) {
     let (client, begin) = (first.client, shared.bus.now());
     let mut dialogue = Dialogue::default();
     let mut job = first;
     loop {
-        let went_well = exchange(shared, &mut talk, &mut dialogue, lane, &job).await;
+        let went_well = exchange(shared, &mut conversation, &mut dialogue, lane, &job).await;
         if !dialogue.is_open() {
             return;
         }
-        let wanted = || talk.is_wanted() || shared.others_wait(key, client);
+        let wanted = || conversation.is_wanted() || shared.others_wait(key, client);
         let next = if !went_well || (wanted() && shared.bus.now().since(begin) > PATIENCE) {
             None
         } else {
-            let next = shared.news.until(|| shared.next_of(key, client));
+            let next = shared.changed.until(|| shared.next_of(key, client));
             shared.bus.within(PAUSE, next).await.ok().flatten()
         };
         match next {
@@ -320,25 +326,33 @@ async fn converse(shared: &Rc<Shared>, key: (u16, usize), mut talk: Talk, lane: 
     shared.state.borrow_mut().counters.ended += 1;
     if let Some(end) = dialogue.end() {
         // A closed mailbox has no transfer to end.
-        let _ = talk.post(&end);
+        let _ = conversation.post(&end);
     }
 }
 
 /// One message and its answers; false where an answer did not come.
-async fn exchange(shared: &Rc<Shared>, talk: &mut Talk, dialogue: &mut Dialogue, lane: Lane, job: &Job) -> bool {
-    let (receive, send) = talk.mailbox_sizes();
-    if job.payload.len() > talk.room() {
+async fn exchange(
+    shared: &Rc<Shared>,
+    conversation: &mut Conversation,
+    dialogue: &mut Dialogue,
+    lane: Lane,
+    job: &Job,
+) -> bool {
+    let (receive, send) = conversation.mailbox_sizes();
+    if job.payload.len() > conversation.request_capacity() {
         shared.refuse(job, ErrorReply::INVALID_SIZE);
         return true;
     }
     let limits = if lane == Lane::Foe { FILE_LIMITS } else { LIMITS };
-    let result = match dialogue.ask(lane, &job.payload, receive) {
+    let result = match dialogue.request(lane, &job.payload, receive) {
         Err(detail) => {
             shared.refuse(job, detail);
             return true;
         }
-        Ok(Asks::Nothing) => talk.send(&job.payload, limits.0).await,
-        Ok(Asks::Answer(question)) => answers(shared, talk, dialogue, &question, job, limits, send).await,
+        Ok(ExpectedAnswer::None) => conversation.send(&job.payload, limits.0).await,
+        Ok(ExpectedAnswer::Matching(filter)) => {
+            answers(shared, conversation, dialogue, &filter, job, limits, send).await
+        }
     };
     match result {
         Ok(()) => true,
@@ -356,26 +370,26 @@ async fn exchange(shared: &Rc<Shared>, talk: &mut Talk, dialogue: &mut Dialogue,
 
 async fn answers(
     shared: &Rc<Shared>,
-    talk: &mut Talk,
+    conversation: &mut Conversation,
     dialogue: &mut Dialogue,
-    question: &Question,
+    filter: &AnswerFilter,
     job: &Job,
     limits: Limits,
     send: usize,
 ) -> Result<(), MailboxError> {
-    if let Some(index) = question.index() {
-        talk.mark(index);
+    if let Some(index) = filter.index() {
+        conversation.mark(index);
     }
-    let accept = |payload: &[u8]| question.knows(payload).then(|| payload.to_vec());
-    let mut answer = talk.begin(&job.payload, limits, accept).await?;
+    let accept = |payload: &[u8]| filter.matches(payload).then(|| payload.to_vec());
+    let mut answer = conversation.begin(&job.payload, limits, accept).await?;
     loop {
-        let more = dialogue.answered(question, &answer, send);
+        let more = dialogue.answered(filter, &answer, send);
         shared.state.borrow_mut().answer(job, job.header.protocol, &answer);
         if !more {
-            talk.complete();
+            conversation.complete();
             return Ok(());
         }
-        let accept = |payload: &[u8]| question.goes_on(payload).then(|| payload.to_vec());
-        answer = talk.more(limits.1, accept).await?;
+        let accept = |payload: &[u8]| filter.continues(payload).then(|| payload.to_vec());
+        answer = conversation.more(limits.1, accept).await?;
     }
 }

@@ -14,7 +14,7 @@ use super::counters::MailCounters;
 use super::eoe::Traffic;
 use super::lane::{Lane, LaneState};
 use super::recent::Recent;
-use super::unsolicited::Shelves;
+use super::unsolicited::UnsolicitedQueues;
 use crate::supervisor::{Bus, Signal};
 use crate::time::Instant;
 
@@ -34,14 +34,14 @@ pub(super) struct Session {
 
 /// The mutable part.
 #[derive(Debug)]
-pub(super) struct State {
+pub(super) struct MailboxState {
     pub session: Option<Session>,
     /// The last accepted mails of the session.
     pub recent: Recent,
     /// The session may be used.
     pub open: bool,
     /// Counts openings and closings, so that tasks of an earlier session end.
-    pub time: u32,
+    pub epoch: u32,
     pub lanes: [LaneState; Lane::COUNT],
     /// Lane with the next turn to write.
     pub next_lane: usize,
@@ -52,9 +52,9 @@ pub(super) struct State {
     /// The send mailbox is known to be full.
     pub full: bool,
     /// A poll is requested whether the send mailbox is full.
-    pub curious: bool,
+    pub poll_requested: bool,
     /// Presumed time at which the mail being read became available.
-    pub seen: Instant,
+    pub available_at: Instant,
     /// Duration of accesses: polls, and reads.
     pub trips: [ShortestTrip; 2],
     /// The receive mailbox is full, and may stay full until the send mailbox is read.
@@ -67,7 +67,7 @@ pub(super) struct State {
     pub tasks: u32,
     /// A repeat may bring mail that was received before.
     pub repeated: bool,
-    pub shelves: Shelves,
+    pub unsolicited: UnsolicitedQueues,
     pub ethernet: Traffic,
     pub counters: MailCounters,
     /// Code of the last error that the SubDevice reported; 0 for none.
@@ -76,75 +76,75 @@ pub(super) struct State {
 
 /// One mailbox.
 #[derive(Debug)]
-pub(super) struct Room {
+pub(super) struct SharedMailbox {
     pub bus: Bus,
     /// Index in the declaration, before activation the position; for events.
     pub subdevice: usize,
-    state: RefCell<State>,
+    state: RefCell<MailboxState>,
     /// Notifies conversations and receivers.
-    pub news: Signal,
+    pub changed: Signal,
     /// Notifies the reader.
     pub work: Signal,
 }
 
-impl Room {
-    pub(super) fn new(bus: &Bus, subdevice: usize) -> Rc<Room> {
-        let state = State {
+impl SharedMailbox {
+    pub(super) fn new(bus: &Bus, subdevice: usize) -> Rc<SharedMailbox> {
+        let state = MailboxState {
             session: None,
             recent: Recent::default(),
             open: false,
-            time: 0,
+            epoch: 0,
             lanes: Default::default(),
             next_lane: 0,
             next_id: 0,
             writer: None,
             reader: None,
             full: false,
-            curious: false,
-            seen: Instant::default(),
+            poll_requested: false,
+            available_at: Instant::default(),
             trips: Default::default(),
             blocked: false,
             repeat: false,
             reading: false,
             tasks: 0,
             repeated: false,
-            shelves: Shelves::new(),
+            unsolicited: UnsolicitedQueues::new(),
             ethernet: Traffic::new(),
             counters: MailCounters::default(),
             last_error: 0,
         };
-        let (news, work) = (bus.signal(), bus.signal());
-        Rc::new(Room { bus: bus.clone(), subdevice, state: RefCell::new(state), news, work })
+        let (changed, work) = (bus.signal(), bus.signal());
+        Rc::new(SharedMailbox { bus: bus.clone(), subdevice, state: RefCell::new(state), changed, work })
     }
 
-    pub(super) fn state(&self) -> RefMut<'_, State> {
+    pub(super) fn state_mut(&self) -> RefMut<'_, MailboxState> {
         self.state.borrow_mut()
     }
 
-    pub(super) fn look(&self) -> Ref<'_, State> {
+    pub(super) fn state(&self) -> Ref<'_, MailboxState> {
         self.state.borrow()
     }
 
     /// The session, while it is open and still the one of `time`.
-    pub(super) fn session(&self, time: u32) -> Option<Session> {
-        let state = self.look();
-        if state.open && state.time == time { state.session } else { None }
+    pub(super) fn session(&self, epoch: u32) -> Option<Session> {
+        let state = self.state();
+        if state.open && state.epoch == epoch { state.session } else { None }
     }
 
     /// The mailbox may be used, with a new session.
     pub(super) fn open(&self, session: Session) {
         {
-            let state = &mut *self.state();
+            let state = &mut *self.state_mut();
             state.session = Some(session);
             state.begin(true);
         }
-        self.tell();
+        self.notify_all();
     }
 
     /// The mailbox cannot be used, and its content is lost; all requests end.
     pub(super) fn close(&self) {
         {
-            let state = &mut *self.state();
+            let state = &mut *self.state_mut();
             state.session = None;
             state.recent = Recent::default();
             if !state.open {
@@ -152,43 +152,43 @@ impl Room {
             }
             state.begin(false);
         }
-        self.tell();
+        self.notify_all();
     }
 
     /// The mailbox cannot be used until it is resumed; all requests end. Mail of reads that may be lost has to be
     /// requested again.
     pub(super) fn suspend(&self) {
         {
-            let state = &mut *self.state();
+            let state = &mut *self.state_mut();
             if !state.open {
                 return;
             }
             let repeat = state.repeat || state.reading;
             let now = self.bus.now();
-            state.end_time(false);
+            state.begin_epoch(false);
             state.repeat = repeat;
             state.lanes.iter_mut().for_each(|lane| lane.suspend(now));
         }
-        self.tell();
+        self.notify_all();
     }
 
-    pub(super) fn tell(&self) {
-        self.news.notify();
+    pub(super) fn notify_all(&self) {
+        self.changed.notify();
         self.work.notify();
     }
 }
 
-impl State {
+impl MailboxState {
     fn begin(&mut self, open: bool) {
-        self.end_time(open);
+        self.begin_epoch(open);
         self.lanes.iter_mut().for_each(LaneState::reset);
     }
 
-    fn end_time(&mut self, open: bool) {
-        self.time = self.time.wrapping_add(1);
+    fn begin_epoch(&mut self, open: bool) {
+        self.epoch = self.epoch.wrapping_add(1);
         self.open = open;
         self.full = false;
-        self.curious = false;
+        self.poll_requested = false;
         self.blocked = false;
         self.repeat = false;
         self.reading = false;

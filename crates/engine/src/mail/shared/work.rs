@@ -6,34 +6,34 @@ use core::time::Duration;
 
 use ringcat_wire::mailbox::Header;
 
-use super::Room;
+use super::SharedMailbox;
 use crate::mail::error::MailboxError;
 use crate::mail::lane::{Lane, Outgoing};
 use crate::mail::{reader, writer};
 
-impl Room {
+impl SharedMailbox {
     /// Queues a message; returns its number.
     pub(in crate::mail) fn queue(
-        self: &Rc<Room>,
+        self: &Rc<SharedMailbox>,
         lane: Lane,
         payload: Vec<u8>,
         limit: Duration,
-        (turn, asks): (u32, Option<Duration>),
+        (turn, answer_limit): (u32, Option<Duration>),
     ) -> Result<u32, MailboxError> {
         let id = {
-            let state = &mut *self.state();
+            let state = &mut *self.state_mut();
             let session = state.session.as_ref().filter(|_| state.open).ok_or(MailboxError::Closed)?;
-            let room = usize::from(session.layout.receive_size).saturating_sub(Header::LEN);
-            if payload.len() > room {
-                return Err(MailboxError::TooLong { bytes: payload.len(), limit: room });
+            let capacity = usize::from(session.layout.receive_size).saturating_sub(Header::LEN);
+            if payload.len() > capacity {
+                return Err(MailboxError::TooLong { bytes: payload.len(), limit: capacity });
             }
-            let queue = &mut state.lanes[lane.place()];
+            let queue = &mut state.lanes[lane.index()];
             if !queue.has_room() {
                 state.counters.refused += 1;
                 return Err(MailboxError::Full { limit });
             }
             state.next_id = state.next_id.wrapping_add(1);
-            queue.outbox.push_back(Outgoing { id: state.next_id, lane, payload, limit, turn, asks });
+            queue.outbox.push_back(Outgoing { id: state.next_id, lane, payload, limit, turn, answer_limit });
             state.next_id
         };
         writer::start(self);
@@ -41,35 +41,35 @@ impl Room {
     }
 
     /// The mailbox can be used again, unchanged.
-    pub(in crate::mail) fn resume(self: &Rc<Room>) {
+    pub(in crate::mail) fn resume(self: &Rc<SharedMailbox>) {
         {
-            let state = &mut *self.state();
+            let state = &mut *self.state_mut();
             if state.open || state.session.is_none() {
                 return;
             }
             let repeat = state.repeat;
             let now = self.bus.now();
-            state.end_time(true);
+            state.begin_epoch(true);
             state.repeat = repeat;
             state.lanes.iter_mut().for_each(|lane| lane.resume(now));
         }
-        self.tell();
+        self.notify_all();
         reader::start(self);
     }
 
     /// There is mail, or there may be.
-    pub(in crate::mail) fn is_full(self: &Rc<Room>) {
+    pub(in crate::mail) fn mail_available(self: &Rc<SharedMailbox>) {
         {
-            let state = &mut *self.state();
+            let state = &mut *self.state_mut();
             state.full = true;
-            state.seen = self.bus.now();
+            state.available_at = self.bus.now();
         }
         reader::start(self);
     }
 
     /// There may be mail: the reader polls once.
-    pub(in crate::mail) fn look_once(self: &Rc<Room>) {
-        self.state().curious = true;
+    pub(in crate::mail) fn poll_once(self: &Rc<SharedMailbox>) {
+        self.state_mut().poll_requested = true;
         reader::start(self);
     }
 }
