@@ -3,6 +3,7 @@
 //! In: a command. Out: the instructions it executed in user mode and how often each function was called. Files go into
 //! a directory of their own, which is removed.
 
+use std::cmp::Ordering;
 use std::collections::BTreeMap;
 use std::env;
 use std::fs;
@@ -15,27 +16,56 @@ use std::process::{Command, Stdio};
 pub struct Profile {
     /// Instructions in user mode.
     pub instructions: u64,
-    /// Calls by name of the called function.
+    /// Calls by name of the called function, also those outside of the function within which was counted.
     pub calls: BTreeMap<String, u64>,
+    /// How often the first instruction of a function was executed, where that was counted.
+    pub entries: BTreeMap<String, u64>,
+    /// Instructions by source file and function: those of the function itself, without what it calls. Code that was
+    /// inlined counts for the file it was written in.
+    pub own: BTreeMap<(String, String), u64>,
 }
 
 impl Profile {
     /// Reads a callgrind output file with names in full.
     pub fn parse(text: &str) -> Option<Profile> {
         let mut profile = Profile::default();
-        let mut called = "";
+        let (mut called, mut file, mut function) = ("", "", "");
         let mut totals = None;
+        let mut is_of_call = false;
+        // Lowest address of each function, and how often it was executed.
+        let mut firsts: BTreeMap<&str, (u64, u64)> = BTreeMap::new();
         for line in text.lines() {
             if let Some(name) = line.strip_prefix("cfn=") {
                 called = name;
+            } else if let Some(name) = ["fl=", "fi=", "fe="].iter().find_map(|prefix| line.strip_prefix(prefix)) {
+                file = name;
+            } else if let Some(name) = line.strip_prefix("fn=") {
+                function = name;
             } else if let Some(rest) = line.strip_prefix("calls=") {
                 let count: u64 = rest.split_whitespace().next()?.parse().ok()?;
                 *profile.calls.entry(called.to_owned()).or_default() += count;
+                // The next line is what the call cost, with all that it called.
+                is_of_call = true;
+            } else if let Some(rest) = line.strip_prefix("0x") {
+                // Address, line of the source, cost.
+                let mut words = rest.split_whitespace();
+                let address = words.next().and_then(|address| u64::from_str_radix(address, 16).ok())?;
+                let count: u64 = words.nth(1)?.parse().ok()?;
+                if !std::mem::take(&mut is_of_call) {
+                    *profile.own.entry((file.to_owned(), function.to_owned())).or_default() += count;
+                    let first = firsts.entry(function).or_insert((address, 0));
+                    match address.cmp(&first.0) {
+                        Ordering::Less => *first = (address, count),
+                        Ordering::Equal => first.1 += count,
+                        Ordering::Greater => {}
+                    }
+                }
             } else if let Some(rest) = line.strip_prefix("totals:").or_else(|| line.strip_prefix("summary:")) {
                 totals = rest.split_whitespace().next()?.parse().ok();
             }
         }
         profile.instructions = totals?;
+        profile.entries = firsts.into_iter().map(|(function, (_, count))| (function.to_owned(), count)).collect();
         Some(profile)
     }
 
@@ -56,7 +86,7 @@ pub fn is_installed() -> bool {
 /// # Errors
 /// Valgrind or the program fails, or the output cannot be read.
 pub fn profile_self(arguments: &[String]) -> io::Result<Profile> {
-    profile(&[], arguments)
+    profile(&[], arguments, Command::new("valgrind"))
 }
 
 /// As [`profile_self`], and counts within functions of this name alone; `*` stands for anything.
@@ -64,14 +94,22 @@ pub fn profile_self(arguments: &[String]) -> io::Result<Profile> {
 /// # Errors
 /// As [`profile_self`].
 pub fn profile_self_within(function: &str, arguments: &[String]) -> io::Result<Profile> {
-    profile(&[format!("--toggle-collect={function}")], arguments)
+    profile(&[format!("--toggle-collect={function}")], arguments, Command::new("valgrind"))
 }
 
-fn profile(options: &[String], arguments: &[String]) -> io::Result<Profile> {
+/// As [`profile_self_within`], with a command that runs valgrind elsewhere.
+///
+/// # Errors
+/// As [`profile_self`].
+pub fn profile_elsewhere_within(valgrind: Command, function: &str, arguments: &[String]) -> io::Result<Profile> {
+    profile(&[format!("--toggle-collect={function}")], arguments, valgrind)
+}
+
+fn profile(options: &[String], arguments: &[String], mut valgrind: Command) -> io::Result<Profile> {
     let directory = Directory::new(&arguments.join("-"))?;
     let out = directory.0.join("callgrind.out");
-    let status = Command::new("valgrind")
-        .args(["--tool=callgrind", "--quiet", "--compress-strings=no"])
+    let status = valgrind
+        .args(["--tool=callgrind", "--quiet", "--compress-strings=no", "--compress-pos=no", "--dump-instr=yes"])
         .args(options)
         .arg(format!("--callgrind-out-file={}", out.display()))
         .arg(env::current_exe()?)
@@ -109,11 +147,14 @@ mod tests {
 
     #[test]
     fn totals_and_calls_are_found_in_an_output_file() {
-        let text = "version: 1\nfn=main\n16 4\ncfn=memcpy\ncalls=12 0\n16 120\ncfn=free\ncalls=1 0\n2 3\ncfn=memcpy\n\
-                    calls=3 0\n1 1\n\ntotals: 4711\n";
+        let text = "version: 1\nfn=main\n0x10 16 4\ncfn=memcpy\ncalls=12 0x80 0\n0x14 16 120\n0x18 17 2\nfi=other.rs\n\
+                    0x10 3 1\ncfn=free\ncalls=1 0x90 0\n0x20 2 3\ncfn=memcpy\ncalls=3 0x80 0\n0x24 1 1\n\ntotals: 4711\n";
         let profile = Profile::parse(text).unwrap();
         assert_eq!(profile.instructions, 4711);
         assert_eq!(profile.calls_of(|name| name == "memcpy"), 15);
+        let own = [("", 6), ("other.rs", 1)].map(|(file, count)| ((file.to_owned(), "main".to_owned()), count));
+        assert_eq!(profile.own, BTreeMap::from(own));
+        assert_eq!(profile.entries, BTreeMap::from([("main".to_owned(), 5)]), "its lowest address is 0x10");
         assert_eq!(Profile::parse("version: 1\n"), None);
     }
 }

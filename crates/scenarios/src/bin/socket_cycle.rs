@@ -1,0 +1,344 @@
+//! What a process-data cycle costs on a packet socket (issue 16): instructions, clock reads and system calls of the
+//! thread with the cycles, CPU time of the whole process, resident memory.
+//!
+//! The MainDevice is a process in a network namespace, `ringcat sim` is at the other end of a veth pair. A cycle is all
+//! that an application's thread does for it: wait for the frames, receive, evaluate, copy, work, pack, send, publish,
+//! sleep. Callgrind counts within the function of a measured cycle alone, after a warm-up, so start-up and the thread
+//! of the supervisor are left out. Valgrind does not see the vDSO: clock reads are counted beside, as calls. Frames
+//! take long in the simulated segment, so that each cycle waits asleep, however slow valgrind is.
+//!
+//! CPU time and memory are those of the process without valgrind, both threads and the watch of the carrier included.
+//!
+//! Run without arguments it prints the tables; `run ...` is the process that is measured.
+
+use std::collections::BTreeMap;
+use std::fs;
+use std::hint::black_box;
+use std::path::PathBuf;
+use std::process::{ExitCode, Stdio};
+use std::time::Duration;
+
+use ringcat::packet::{PacketLinks, ReceiveMode};
+use ringcat::{
+    AcyclicHalf, AlState, Application, DomainId, LastOutputs, MainDevice, Options, ProcessData, SupervisorThread,
+    automatic, realtime,
+};
+use scenarios::callgrind::{Profile, is_installed, profile_elsewhere_within};
+use scenarios::cpu_time::process_cpu_time;
+use scenarios::figures::{Figures, verdict};
+use scenarios::namespaces::{Namespaces, Server};
+
+type Tried<T> = Result<T, String>;
+
+/// Cycles that callgrind counts, and cycles before them.
+const COUNTED: u64 = 500;
+const WARM_UP: u64 = 50;
+/// Their period.
+const PERIOD_US: u64 = 1_000;
+/// How long a frame takes through the simulated segment under valgrind: longer than the rest of the cycle that sent it.
+const RESIDENCE_NS: u64 = 300_000;
+/// Cycles whose CPU time counts.
+const CPU_CYCLES: u64 = 5_000;
+/// From activation to OP at the most, under valgrind.
+const OP_LIMIT: Duration = Duration::from_secs(60);
+const STOP_LIMIT: Duration = Duration::from_secs(10);
+/// The spinning part of a hybrid wait, as in `ringcat run`.
+const SPIN: Duration = Duration::from_micros(200);
+/// Functions and files that a profile shows.
+const SHOWN: usize = 14;
+/// The function within which callgrind counts.
+const WITHIN: &str = "*measured_cycle*";
+
+/// Most instructions of a cycle with two threads, by the number of servos; SOEM in C takes 890 and 1,333 (issue 16).
+const BARS: [(usize, f64); 2] = [(1, 890.0), (50, 1000.0)];
+/// What is aimed at with one servo.
+const AIM: f64 = 800.0;
+/// Most CPU time with 50 servos at 1 kHz, in hundredths of a processor.
+const CPU_BARS: [(&str, f64); 2] = [("block", 8.0), ("hybrid", 15.0)];
+/// Most resident memory with 50 servos.
+const MEMORY_BAR_MB: f64 = 5.0;
+
+fn main() -> ExitCode {
+    let arguments: Vec<String> = std::env::args().skip(1).collect();
+    let words: Vec<&str> = arguments.iter().map(String::as_str).collect();
+    let result = match words[..] {
+        [] => measure(&["instructions", "cpu"]),
+        [part @ ("instructions" | "cpu")] => measure(&[part]),
+        ["run", threads, mode, period, cycles] => run(threads, mode, period, cycles).map(|()| true),
+        _ => Err("usage: socket_cycle [instructions | cpu | run one|two MODE PERIOD_US CYCLES]".to_owned()),
+    };
+    match result {
+        Ok(met) => verdict(met),
+        Err(error) => {
+            eprintln!("socket_cycle: {error}");
+            ExitCode::FAILURE
+        }
+    }
+}
+
+// The process that is measured.
+
+fn receive_mode(name: &str) -> Tried<ReceiveMode> {
+    match name {
+        "block" => Ok(ReceiveMode::Blocking),
+        "hybrid" => Ok(ReceiveMode::Hybrid { spin: SPIN }),
+        "busy" => Ok(ReceiveMode::BusyPoll),
+        _ => Err(format!("no such mode: {name}")),
+    }
+}
+
+/// A MainDevice on `near0` that runs so many cycles; it prints what it has used.
+fn run(threads: &str, mode: &str, period_us: &str, cycles: &str) -> Tried<()> {
+    let (period_us, cycles): (u64, u64) = (number(period_us)?, number(cycles)?);
+    let (mode, period) = (receive_mode(mode)?, Duration::from_micros(period_us));
+    let options = Options::default();
+    realtime::precise_timers();
+    match threads {
+        "two" => {
+            let (cyclic, acyclic) = PacketLinks::open_halves("near0", None, mode).map_err(said)?;
+            let supervisor = SupervisorThread::start(acyclic, &options, realtime::precise_timers).map_err(said)?;
+            let scan = supervisor.scan().map_err(said)?;
+            let declaration = automatic(&scan.subdevices, period);
+            drop(scan);
+            let mut application = supervisor.activate(declaration, cyclic).map_err(|refused| said(refused.error))?;
+            exchange(&mut application, cycles)?;
+            application.stop(LastOutputs::Zero, AlState::Init, STOP_LIMIT).map(drop).map_err(said)
+        }
+        "one" => {
+            let links = PacketLinks::open("near0", None, mode).map_err(said)?;
+            let mut main_device = MainDevice::request(links, &options);
+            let scan = main_device.scan().map_err(said)?;
+            let declaration = automatic(&scan.subdevices, period);
+            drop(scan);
+            let mut application = main_device.activate(declaration).map_err(|refused| said(refused.error))?;
+            exchange(&mut application, cycles)?;
+            application.stop(LastOutputs::Zero, AlState::Init, STOP_LIMIT).map(drop).map_err(said)
+        }
+        _ => Err(format!("one thread or two, not {threads}")),
+    }
+}
+
+fn exchange<H: AcyclicHalf>(application: &mut Application<PacketLinks, H>, cycles: u64) -> Tried<()> {
+    let until = application.now() + OP_LIMIT;
+    while !application.all_settled() {
+        application.cycle(work);
+        if application.now() >= until {
+            return Err("not all SubDevices get to OP".to_owned());
+        }
+    }
+    for _ in 0..WARM_UP {
+        application.cycle(work);
+    }
+    let (before, cpu, begin) = (application.cyclic_counters(), process_cpu_time(), application.now());
+    for _ in 0..cycles {
+        measured_cycle(application);
+    }
+    let (cpu, elapsed) = (process_cpu_time() - cpu, application.now().since(begin));
+    let after = application.cyclic_counters();
+    let disturbed = (after.lost - before.lost).max(after.incomplete - before.incomplete);
+    println!("cycles: {cycles}");
+    println!("disturbed: {disturbed}");
+    println!("skipped: {}", application.pace().skipped);
+    println!("cpu percent: {:.1}", 100.0 * cpu.as_secs_f64() / elapsed.as_secs_f64());
+    for (name, kilobytes) in memory()? {
+        println!("{name}: {kilobytes} kB");
+    }
+    Ok(())
+}
+
+/// A cycle that is counted.
+#[inline(never)]
+fn measured_cycle<H: AcyclicHalf>(application: &mut Application<PacketLinks, H>) {
+    application.cycle(work);
+}
+
+/// What an application does at the least: it looks at an input and changes an output.
+fn work(data: &mut ProcessData<'_>) {
+    if let [first, .., last] = data.image_mut(DomainId(0)) {
+        *first = first.wrapping_add(1);
+        black_box(*last);
+    }
+}
+
+/// Resident memory in kB: all of it, and by what is mapped.
+fn memory() -> Tried<Vec<(String, u64)>> {
+    let maps = fs::read_to_string("/proc/self/smaps").map_err(said)?;
+    let mut parts: BTreeMap<&str, u64> = BTreeMap::new();
+    let mut part = "";
+    for line in maps.lines() {
+        let words: Vec<&str> = line.split_whitespace().collect();
+        match words[..] {
+            [range, _, _, _, _, ref name @ ..] if range.contains('-') => part = kind(name),
+            ["Rss:", size, "kB"] => *parts.entry(part).or_default() += number::<u64>(size)?,
+            _ => {}
+        }
+    }
+    let all = ("resident".to_owned(), parts.values().sum());
+    Ok(std::iter::once(all).chain(parts.into_iter().map(|(name, size)| (format!("of it {name}"), size))).collect())
+}
+
+/// What a mapping is for.
+fn kind(name: &[&str]) -> &'static str {
+    match name.first() {
+        None => "stacks and heaps of threads",
+        Some(name) if name.contains("[heap]") => "heap",
+        Some(name) if name.contains("[stack]") => "stacks and heaps of threads",
+        Some(name) if name.starts_with("socket:") => "receive rings",
+        Some(name) if name.contains(".so") => "libraries",
+        Some(name) if name.starts_with('[') => "kernel",
+        Some(_) => "program",
+    }
+}
+
+// The measurement.
+
+fn measure(parts: &[&str]) -> Tried<bool> {
+    let namespaces = match Namespaces::new() {
+        Ok(namespaces) => namespaces,
+        Err(reason) => {
+            println!("skipped: network namespaces need root and iproute2: {reason}");
+            return Ok(true);
+        }
+    };
+    let mut met = true;
+    if parts.contains(&"instructions") {
+        if is_installed() {
+            met &= instructions(&namespaces)?;
+        } else {
+            println!("skipped: instructions per cycle on a packet socket, for valgrind is not installed");
+        }
+    }
+    if parts.contains(&"cpu") {
+        met &= cpu_and_memory(&namespaces)?;
+    }
+    Ok(met)
+}
+
+/// So many servos at the far end. A frame takes `hop_ns` from one to the next.
+fn simulate(namespaces: &Namespaces, servos: usize, hop_ns: u64) -> Tried<Server> {
+    let file = std::env::temp_dir().join(format!("ringcat-socket-cycle-{}.toml", std::process::id()));
+    let segment = format!(
+        "[segment]\nname = \"servos\"\nring = false\nhop_ns = {hop_ns}\n[[device]]\ntype = \"servo\"\ncount = {servos}\n"
+    );
+    fs::write(&file, segment).map_err(said)?;
+    let here = std::env::current_exe().map_err(said)?;
+    let ringcat = here.parent().map(PathBuf::from).unwrap_or_default().join("ringcat");
+    let arguments = ["sim", "--segment", &file.display().to_string(), "--main", "far0", "--receive", "block"];
+    let server = namespaces.serve(ringcat, &arguments);
+    let removed = fs::remove_file(&file).map_err(said);
+    server.and_then(|server| removed.map(|()| server))
+}
+
+fn instructions(namespaces: &Namespaces) -> Tried<bool> {
+    let mut figures = Figures::new("user-side instructions per cycle on a packet socket, blocking receive");
+    println!("  a cycle: wait, receive, evaluate, copy, work, pack, send, publish, sleep; clocks by vDSO not included");
+    let mut profiles = Vec::new();
+    for (servos, bar) in BARS {
+        let hop_ns = RESIDENCE_NS / servos as u64;
+        for threads in ["two", "one"] {
+            let _simulator = simulate(namespaces, servos, hop_ns)?;
+            let profile = profile(namespaces, threads)?;
+            let per_cycle = profile.instructions as f64 / COUNTED as f64;
+            let name = format!("{servos} servo{}, {threads} thread{}", s(servos), s(usize::from(threads == "two") + 1));
+            if threads == "two" {
+                figures.at_most(&name, per_cycle, bar, "instructions");
+                if servos == 1 {
+                    figures.show("   aimed at", format!("{AIM} instructions"));
+                }
+            } else {
+                figures.show(&name, format!("{per_cycle:.0} instructions"));
+            }
+            for (what, calls) in [
+                ("clock reads", "clock_gettime"),
+                ("waits for a frame (ppoll)", "ppoll"),
+                ("sleeps (clock_nanosleep)", "clock_nanosleep"),
+                ("sends", "send"),
+            ] {
+                let is = |name: &str| name.split('@').next() == Some(calls);
+                let calls = profile.entries.iter().filter(|(name, _)| is(name)).map(|(_, count)| count).sum::<u64>();
+                let calls = calls as f64 / COUNTED as f64;
+                figures.show(&format!("   {what}"), format!("{calls:.2}"));
+            }
+            if threads == "two" {
+                profiles.push((name, profile));
+            }
+        }
+    }
+    let met = figures.print();
+    profiles.iter().for_each(|(name, profile)| print_profile(name, profile));
+    Ok(met)
+}
+
+fn s(count: usize) -> &'static str {
+    if count == 1 { "" } else { "s" }
+}
+
+fn profile(namespaces: &Namespaces, threads: &str) -> Tried<Profile> {
+    let arguments = ["run", threads, "block", &PERIOD_US.to_string(), &COUNTED.to_string()].map(str::to_owned);
+    profile_elsewhere_within(namespaces.near("valgrind"), WITHIN, &arguments).map_err(said)
+}
+
+/// Instructions per cycle by function, and by source file with inlined code where it was written.
+fn print_profile(name: &str, profile: &Profile) {
+    let by = |key: &dyn Fn(&(String, String)) -> String| {
+        let mut sums: BTreeMap<String, u64> = BTreeMap::new();
+        for (place, count) in &profile.own {
+            *sums.entry(key(place)).or_default() += count;
+        }
+        let mut sums: Vec<(String, u64)> = sums.into_iter().collect();
+        sums.sort_by_key(|(_, count)| std::cmp::Reverse(*count));
+        sums
+    };
+    let short =
+        |file: &str| file.rsplit('/').take(3).collect::<Vec<_>>().into_iter().rev().collect::<Vec<_>>().join("/");
+    println!("  {name}, by function:");
+    let function = |(_, function): &(String, String)| function.split('\'').next().unwrap_or_default().to_owned();
+    for (function, count) in by(&function).iter().take(SHOWN) {
+        println!("  {:>7.1}  {function}", *count as f64 / COUNTED as f64);
+    }
+    println!("  {name}, by file in which the code was written:");
+    for (file, count) in by(&|(file, _)| short(file)).iter().take(SHOWN) {
+        println!("  {:>7.1}  {file}", *count as f64 / COUNTED as f64);
+    }
+}
+
+fn cpu_and_memory(namespaces: &Namespaces) -> Tried<bool> {
+    let mut figures = Figures::new("CPU time (user and system) at 1 kHz, 50 servos, two threads; resident memory");
+    let mut memory = Vec::new();
+    for mode in ["block", "hybrid", "busy"] {
+        let _simulator = simulate(namespaces, 50, 1_000)?;
+        let mut command = namespaces.near(std::env::current_exe().map_err(said)?);
+        command.args(["run", "two", mode, &PERIOD_US.to_string(), &CPU_CYCLES.to_string()]);
+        let output = command.stdin(Stdio::null()).output().map_err(said)?;
+        let told = String::from_utf8_lossy(&output.stdout).into_owned();
+        if !output.status.success() {
+            return Err(format!("{mode}: {}", String::from_utf8_lossy(&output.stderr).trim()));
+        }
+        let value = |name: &str| {
+            let line = told.lines().find_map(|line| line.strip_prefix(name)?.strip_prefix(": "));
+            let word = line.and_then(|rest| rest.split_whitespace().next());
+            word.and_then(|word| word.parse::<f64>().ok()).ok_or_else(|| format!("no \"{name}\" in {told:?}"))
+        };
+        let name = format!("receive {mode}, {} of {CPU_CYCLES} cycles disturbed", value("disturbed")?);
+        match CPU_BARS.iter().find(|(bar, _)| *bar == mode) {
+            Some((_, bar)) => figures.at_most(&name, value("cpu percent")?, *bar, "% of a processor"),
+            None => figures.show(&name, format!("{} % of a processor", value("cpu percent")?)),
+        }
+        if mode == "block" {
+            let parts = told.lines().filter(|line| line.starts_with("of it")).map(str::to_owned);
+            memory = parts.collect();
+            figures.at_most("resident memory", value("resident")? / 1024.0, MEMORY_BAR_MB, "MB");
+        }
+    }
+    let met = figures.print();
+    memory.iter().for_each(|line| println!("    {line}"));
+    Ok(met)
+}
+
+fn number<T: std::str::FromStr>(text: &str) -> Tried<T> {
+    text.parse().map_err(|_| format!("not a number: {text}"))
+}
+
+fn said(error: impl std::fmt::Display) -> String {
+    error.to_string()
+}
